@@ -1,0 +1,66 @@
+//! Compiles the WESL kernels in `shaders/` to plain WGSL, one file for each
+//! kernel and variant.
+
+use std::{env, fs, path::Path};
+
+use wesl::{ModulePath, Wesl};
+
+/// Kernels that know nothing of colour channels.
+const PLAIN: &[&str] = &[
+    "adam",
+    "chroma_loss",
+    "compact",
+    "densify",
+    "luma_loss",
+    "project",
+    "scan",
+    "sort",
+    "sum_loss",
+    "tile_lists",
+    "tile_ranges",
+];
+
+/// Kernels compiled once for each kind of colour.
+const COLORED: &[&str] = &["blend", "shade"];
+
+/// Their adjoints: luma trains the geometry too, chroma does not.
+const ADJOINT: &[&str] = &["blend_backward", "shade_backward", "sum_instances"];
+
+fn main() {
+    println!("cargo::rerun-if-changed=shaders");
+    let out = env::var("OUT_DIR").expect("cargo sets OUT_DIR");
+    for kernel in PLAIN {
+        compile(&out, kernel, "", &[]);
+    }
+    for kernel in COLORED {
+        for color in ["luma", "chroma", "rgb"] {
+            compile(&out, kernel, &format!("_{color}"), &[color]);
+        }
+    }
+    for kernel in ADJOINT {
+        compile(&out, kernel, "_luma", &["luma", "geometry"]);
+        compile(&out, kernel, "_chroma", &["chroma"]);
+    }
+    compile(&out, "project_backward", "", &["luma", "geometry"]);
+}
+
+fn compile(out: &str, kernel: &str, suffix: &str, features: &[&str]) {
+    let mut compiler = Wesl::new("shaders");
+    compiler.keep_all_entrypoints();
+    for feature in ["luma", "chroma", "rgb", "geometry"] {
+        compiler.set_feature(feature, features.contains(&feature));
+    }
+    // Plain names: imported functions keep the name they have in their file.
+    compiler.set_mangler(wesl::ManglerKind::None);
+    let module: ModulePath = format!("package::{kernel}")
+        .parse()
+        .expect("a kernel's name is a module path");
+    let wgsl = compiler
+        .compile(&module)
+        .unwrap_or_else(|error| panic!("shaders/{kernel}.wgsl: {error}"));
+    fs::write(
+        Path::new(out).join(format!("{kernel}{suffix}.wgsl")),
+        wgsl.to_string(),
+    )
+    .expect("OUT_DIR is writable");
+}

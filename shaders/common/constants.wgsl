@@ -1,0 +1,49 @@
+// Constants of the rasterizer. `src/raster/constants.rs` holds the same values
+// and a test compares the two.
+
+// Side of a square tile in pixels.
+const TILE_SIDE: u32 = 16u;
+const TILE_PIXELS: u32 = 256u;
+
+// Variance in px² added to every projected covariance: a splat is never thinner
+// than about a pixel, and the covariance can be inverted.
+const BLUR: f32 = 0.3;
+
+// Alpha is capped so that 1/(1 - alpha) in the adjoint stays below 100.
+const ALPHA_MAX: f32 = 0.99;
+
+// Below half an 8-bit step a contribution cannot be seen.
+const ALPHA_MIN: f32 = 0.00392156862745098;
+
+// A pixel is finished when less than this passes through.
+const TRANSMITTANCE_MIN: f32 = 1e-4;
+
+// A quaternion whose squared length is below has no direction in f32.
+const QUAT_NORM_MIN_SQ: f32 = 1e-8;
+
+// The linearised projection is kept inside the image and this share of its half width.
+const FRUSTUM_MARGIN: f32 = 0.3;
+
+// Planes of the geometry array `[11, N]`.
+const PLANE_MEAN: u32 = 0u;
+const PLANE_QUAT: u32 = 3u;
+const PLANE_LOG_SCALE: u32 = 7u;
+const PLANE_OPACITY: u32 = 10u;
+const GEOMETRY_PLANES: u32 = 11u;
+
+// Planes of the statistics for densification `[3, N]`.
+const STAT_GRADIENT: u32 = 0u;
+const STAT_COUNT: u32 = 1u;
+const STAT_RADIUS: u32 = 2u;
+
+// Rank of a Gaussian that the view does not show.
+const INVISIBLE: u32 = 0xffffffffu;
+
+// Words of the status array.
+const STATUS_OVERFLOW: u32 = 0u;
+const STATUS_VISIBLE: u32 = 1u;
+const STATUS_INSTANCES: u32 = 2u;
+const STATUS_NEEDED: u32 = 3u;
+const STATUS_POISONED: u32 = 4u;
+// Training steps taken since the last reset.
+const STATUS_STEPS: u32 = 5u;

@@ -1,0 +1,23 @@
+// Tests on the bits: naga compiles `x != x` to an ordered comparison, which is
+// false for NaN, and `clamp`, `min` and `max` turn NaN into a number.
+
+fn is_finite(x: f32) -> bool {
+    return (bitcast<u32>(x) & 0x7fffffffu) < 0x7f800000u;
+}
+
+fn all_finite3(v: vec3f) -> bool {
+    return is_finite(v.x) && is_finite(v.y) && is_finite(v.z);
+}
+
+fn all_finite4(v: vec4f) -> bool {
+    return is_finite(v.x) && is_finite(v.y) && is_finite(v.z) && is_finite(v.w);
+}
+
+fn sigmoid(x: f32) -> f32 {
+    return 1.0 / (1.0 + exp(-x));
+}
+
+// The workgroup's number when a dispatch had to be folded into two dimensions.
+fn linear_group(group: vec3u, groups: vec3u) -> u32 {
+    return group.x + group.y * groups.x;
+}

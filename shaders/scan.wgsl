@@ -1,0 +1,100 @@
+// Exclusive prefix sum in place: reduce blocks, scan the block sums, apply.
+// The total is checked against a limit: a list that would not fit sets the
+// overflow word, is reported with what it needs, and counts as empty from there.
+import package::common::constants::{STATUS_NEEDED, STATUS_OVERFLOW};
+import package::common::numeric::linear_group;
+
+const SCAN_BLOCK: u32 = 1024u;
+const SCAN_PER_THREAD: u32 = 4u;
+
+struct ScanParameters {
+    length: u32,
+    // Status word that receives the total; 0xffffffff: none.
+    total_word: u32,
+    limit: u32,
+}
+
+@group(0) @binding(0) var<uniform> parameters: ScanParameters;
+@group(0) @binding(1) var<storage, read_write> values: array<u32>;
+@group(0) @binding(2) var<storage, read_write> block_sums: array<u32>;
+@group(0) @binding(3) var<storage, read_write> status: array<u32>;
+
+var<workgroup> sums: array<u32, 256>;
+
+// Inclusive scan over the workgroup; returns the sum before this thread.
+fn exclusive_over_group(local: u32, own: u32) -> u32 {
+    sums[local] = own;
+    for (var step = 1u; step < 256u; step *= 2u) {
+        workgroupBarrier();
+        var before = 0u;
+        if local >= step {
+            before = sums[local - step];
+        }
+        workgroupBarrier();
+        sums[local] += before;
+    }
+    workgroupBarrier();
+    return sums[local] - own;
+}
+
+@compute @workgroup_size(256)
+fn scan_reduce(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
+    let block = linear_group(group, groups);
+    let first = block * SCAN_BLOCK + local * SCAN_PER_THREAD;
+    var own = 0u;
+    for (var k = first; k < min(first + SCAN_PER_THREAD, parameters.length); k++) {
+        own += values[k];
+    }
+    let before = exclusive_over_group(local, own);
+    if local == 255u && block * SCAN_BLOCK < parameters.length {
+        block_sums[block] = before + own;
+    }
+}
+
+@compute @workgroup_size(256)
+fn scan_sums(@builtin(local_invocation_index) local: u32) {
+    let blocks = (parameters.length + SCAN_BLOCK - 1u) / SCAN_BLOCK;
+    var carry = 0u;
+    for (var first = 0u; first < blocks; first += 256u) {
+        let block = first + local;
+        var own = 0u;
+        if block < blocks {
+            own = block_sums[block];
+        }
+        let before = exclusive_over_group(local, own);
+        if block < blocks {
+            block_sums[block] = carry + before;
+        }
+        workgroupBarrier();
+        carry += sums[255];
+        workgroupBarrier();
+    }
+    if local == 0u && parameters.total_word != 0xffffffffu {
+        if carry > parameters.limit {
+            status[STATUS_OVERFLOW] = 1u;
+            status[STATUS_NEEDED] = max(status[STATUS_NEEDED], carry);
+            carry = 0u;
+        }
+        status[parameters.total_word] = carry;
+    }
+}
+
+@compute @workgroup_size(256)
+fn scan_apply(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
+    let block = linear_group(group, groups);
+    let first = block * SCAN_BLOCK + local * SCAN_PER_THREAD;
+    let end = min(first + SCAN_PER_THREAD, parameters.length);
+    var own = 0u;
+    for (var k = first; k < end; k++) {
+        own += values[k];
+    }
+    var before = exclusive_over_group(local, own);
+    if first < end {
+        before += block_sums[block];
+    }
+    for (var k = first; k < end; k++) {
+        let value = values[k];
+        values[k] = before;
+        before += value;
+    }
+}

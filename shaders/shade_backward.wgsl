@@ -1,0 +1,82 @@
+// The adjoint of `shade`: gradients of the spherical harmonics and, through the
+// direction of view, of the means.
+import package::common::color::{CHANNELS, Color, color_dot, color_gradient};
+import package::common::constants::{INVISIBLE, PLANE_MEAN};
+import package::common::numeric::linear_group;
+import package::common::partials::{PARTIAL_COLOR, PARTIAL_STRIDE};
+import package::common::sh::sh_term;
+import package::common::view::View;
+
+@group(0) @binding(0) var<uniform> view: View;
+@group(0) @binding(1) var<storage, read> geometry: array<f32>;
+@group(0) @binding(2) var<storage, read> ranks: array<u32>;
+@group(0) @binding(3) var<storage, read> colors: array<Color>;
+@group(0) @binding(4) var<storage, read> gradients: array<f32>;
+// Planes `[(degree + 1)², CHANNELS, N]`, all of them written.
+@group(0) @binding(5) var<storage, read_write> sh_gradient: array<f32>;
+@if(geometry) @group(0) @binding(6) var<storage, read> sh: array<f32>;
+// Planes `[11, N]`: the three of the means are written.
+@if(geometry) @group(0) @binding(7) var<storage, read_write> geometry_gradient: array<f32>;
+
+fn plane_index(k: u32, i: u32) -> u32 {
+    return k * CHANNELS * view.splat_count + i;
+}
+
+fn store(k: u32, i: u32, value: Color) {
+    let at = plane_index(k, i);
+    @if(luma) { sh_gradient[at] = value; }
+    @if(chroma) { sh_gradient[at] = value.x; sh_gradient[at + view.splat_count] = value.y; }
+    @if(rgb) { sh_gradient[at] = value.x; sh_gradient[at + view.splat_count] = value.y; sh_gradient[at + 2u * view.splat_count] = value.z; }
+}
+
+@if(geometry) fn coefficient(k: u32, i: u32) -> Color {
+    let at = plane_index(k, i);
+    @if(luma) return sh[at];
+    @if(chroma) return vec2f(sh[at], sh[at + view.splat_count]);
+    @if(rgb) return vec3f(sh[at], sh[at + view.splat_count], sh[at + 2u * view.splat_count]);
+}
+
+fn gradient_of(i: u32) -> Color {
+    let at = i * PARTIAL_STRIDE + PARTIAL_COLOR;
+    @if(luma) return gradients[at];
+    @if(chroma) return vec2f(gradients[at], gradients[at + 1u]);
+    @if(rgb) return vec3f(gradients[at], gradients[at + 1u], gradients[at + 2u]);
+}
+
+@compute @workgroup_size(256)
+fn shade_backward(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
+    let i = linear_group(group, groups) * 256u + local;
+    let n = view.splat_count;
+    if i >= n {
+        return;
+    }
+    let count = (view.sh_degree + 1u) * (view.sh_degree + 1u);
+    if ranks[i] == INVISIBLE {
+        for (var k = 0u; k < count; k++) {
+            store(k, i, Color());
+        }
+        @if(geometry) {
+            for (var axis = 0u; axis < 3u; axis++) {
+                geometry_gradient[axis * n + i] = 0.0;
+            }
+        }
+        return;
+    }
+    let v_color = color_gradient(colors[i], gradient_of(i));
+    let offset = vec3f(geometry[i], geometry[n + i], geometry[2u * n + i]) - view.center_near.xyz;
+    // Visible Gaussians lie beyond the near plane: the distance is not zero.
+    let distance = length(offset);
+    let direction = offset / distance;
+    @if(geometry) var v_direction = vec3f();
+    for (var k = 0u; k < count; k++) {
+        let term = sh_term(k, direction);
+        store(k, i, term.value * v_color);
+        @if(geometry) { v_direction += term.slope * color_dot(coefficient(k, i), v_color); }
+    }
+    @if(geometry) {
+        let v_mean = (v_direction - direction * dot(direction, v_direction)) / distance;
+        geometry_gradient[i] = v_mean.x;
+        geometry_gradient[n + i] = v_mean.y;
+        geometry_gradient[2u * n + i] = v_mean.z;
+    }
+}

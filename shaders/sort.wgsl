@@ -1,0 +1,96 @@
+// Stable least-significant-digit radix sort of 32-bit keys with values, eight
+// bits a pass: count digits by block, scan the counts (scan.wgsl), scatter.
+//
+// A key's rank among equal digits of its round is a population count over a
+// bit mask that the workgroup sets with atomicOr: independent of the subgroup
+// size and of the order in which threads run.
+import package::common::numeric::linear_group;
+
+const SORT_ROUNDS: u32 = 8u;
+const SORT_BLOCK: u32 = 2048u;
+
+struct SortParameters {
+    shift: u32,
+    // Status word that holds the number of keys.
+    count_word: u32,
+    // Blocks that the histogram has room for.
+    blocks: u32,
+}
+
+@group(0) @binding(0) var<uniform> parameters: SortParameters;
+@group(0) @binding(1) var<storage, read> status: array<u32>;
+@group(0) @binding(2) var<storage, read> keys: array<u32>;
+@group(0) @binding(3) var<storage, read> values: array<u32>;
+// `[256, blocks]`.
+@group(0) @binding(4) var<storage, read_write> histogram: array<u32>;
+@group(0) @binding(5) var<storage, read_write> sorted_keys: array<u32>;
+@group(0) @binding(6) var<storage, read_write> sorted_values: array<u32>;
+
+var<workgroup> counts: array<atomic<u32>, 256>;
+var<workgroup> bases: array<u32, 256>;
+// 256 digits × 256 threads, a bit each.
+var<workgroup> masks: array<atomic<u32>, 2048>;
+
+@compute @workgroup_size(256)
+fn sort_count(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
+    let block = linear_group(group, groups);
+    if block >= parameters.blocks {
+        return;
+    }
+    let count = status[parameters.count_word];
+    atomicStore(&counts[local], 0u);
+    workgroupBarrier();
+    for (var round = 0u; round < SORT_ROUNDS; round++) {
+        let k = block * SORT_BLOCK + round * 256u + local;
+        if k < count {
+            atomicAdd(&counts[(keys[k] >> parameters.shift) & 255u], 1u);
+        }
+    }
+    workgroupBarrier();
+    histogram[local * parameters.blocks + block] = atomicLoad(&counts[local]);
+}
+
+@compute @workgroup_size(256)
+fn sort_scatter(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
+    let block = linear_group(group, groups);
+    let count = status[parameters.count_word];
+    if block >= parameters.blocks || block * SORT_BLOCK >= count {
+        return;
+    }
+    bases[local] = histogram[local * parameters.blocks + block];
+    for (var word = 0u; word < 8u; word++) {
+        atomicStore(&masks[word * 256u + local], 0u);
+    }
+    let word = local / 32u;
+    let bit = 1u << (local % 32u);
+    for (var round = 0u; round < SORT_ROUNDS; round++) {
+        workgroupBarrier();
+        let k = block * SORT_BLOCK + round * 256u + local;
+        let live = k < count;
+        var digit = 0u;
+        if live {
+            digit = (keys[k] >> parameters.shift) & 255u;
+            atomicOr(&masks[digit * 8u + word], bit);
+        }
+        workgroupBarrier();
+        // Every thread also totals one digit for the next round.
+        var total = 0u;
+        for (var w = 0u; w < 8u; w++) {
+            total += countOneBits(atomicLoad(&masks[local * 8u + w]));
+        }
+        if live {
+            var rank = countOneBits(atomicLoad(&masks[digit * 8u + word]) & (bit - 1u));
+            for (var w = 0u; w < word; w++) {
+                rank += countOneBits(atomicLoad(&masks[digit * 8u + w]));
+            }
+            let target_index = bases[digit] + rank;
+            sorted_keys[target_index] = keys[k];
+            sorted_values[target_index] = values[k];
+        }
+        workgroupBarrier();
+        bases[local] += total;
+        if live {
+            atomicStore(&masks[digit * 8u + word], 0u);
+        }
+    }
+}

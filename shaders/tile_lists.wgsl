@@ -1,0 +1,68 @@
+// Which tiles each visible Gaussian touches. The same pipeline runs twice: it
+// counts, then, after a scan of the counts, it emits. Count and emission cannot
+// disagree, because they are one compiled loop.
+import package::common::constants::{STATUS_INSTANCES, STATUS_VISIBLE, TILE_SIDE};
+import package::common::numeric::linear_group;
+import package::common::projected::{Projected, least_power, power_cutoff};
+import package::common::view::View;
+
+struct TileListsMode {
+    emit: u32,
+}
+
+@group(0) @binding(0) var<uniform> view: View;
+@group(0) @binding(1) var<uniform> mode: TileListsMode;
+@group(0) @binding(2) var<storage, read> projected: array<Projected>;
+// Gaussians by depth.
+@group(0) @binding(3) var<storage, read> order: array<u32>;
+@group(0) @binding(4) var<storage, read> status: array<u32>;
+@group(0) @binding(5) var<storage, read_write> ranks: array<u32>;
+// Counts when counting; their exclusive scan when emitting.
+@group(0) @binding(6) var<storage, read_write> offsets: array<u32>;
+@group(0) @binding(7) var<storage, read_write> keys: array<u32>;
+@group(0) @binding(8) var<storage, read_write> slots: array<u32>;
+@group(0) @binding(9) var<storage, read_write> instance_splats: array<u32>;
+
+@compute @workgroup_size(256)
+fn tile_lists(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
+    let rank = linear_group(group, groups) * 256u + local;
+    if rank >= view.splat_count {
+        return;
+    }
+    let emitting = mode.emit == 1u;
+    if rank >= status[STATUS_VISIBLE] || (emitting && status[STATUS_INSTANCES] == 0u) {
+        if !emitting {
+            offsets[rank] = 0u;
+        }
+        return;
+    }
+    let i = order[rank];
+    let splat = projected[i];
+    let cutoff = power_cutoff(splat.conic_opacity.w);
+    let side = f32(TILE_SIDE);
+    let last = vec2f(view.tiles) - 1.0;
+    let low = vec2u(clamp(floor((splat.mean - splat.extent) / side), vec2f(0.0), last));
+    let high = vec2u(clamp(floor((splat.mean + splat.extent) / side), vec2f(0.0), last));
+    var cursor = 0u;
+    if emitting {
+        cursor = offsets[rank];
+    }
+    let begin = cursor;
+    for (var y = low.y; y <= high.y; y++) {
+        for (var x = low.x; x <= high.x; x++) {
+            let corner = vec2f(vec2u(x, y) * TILE_SIDE) + 0.5;
+            if least_power(splat, corner, corner + (side - 1.0)) <= cutoff {
+                if emitting {
+                    keys[cursor] = y * view.tiles.x + x;
+                    slots[cursor] = cursor;
+                    instance_splats[cursor] = i;
+                }
+                cursor += 1u;
+            }
+        }
+    }
+    if !emitting {
+        offsets[rank] = cursor - begin;
+        ranks[i] = rank;
+    }
+}

@@ -1,0 +1,113 @@
+//! Pinhole cameras.
+
+use glam::{DMat3, DVec3};
+
+/// A pinhole camera with its pose, as COLMAP defines them.
+///
+/// Camera axes: x right, y down, z forward. A world point `X` lies at
+/// `x = rotation · X + translation` in camera space and projects to
+/// `u = fx·x/z + cx`, `v = fy·y/z + cy` in pixels. The centre of the top left
+/// pixel is at `(0.5, 0.5)`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Camera {
+    /// Image width in pixels, at least 1.
+    pub width: u32,
+    /// Image height in pixels, at least 1.
+    pub height: u32,
+    /// Horizontal focal length in pixels.
+    pub fx: f64,
+    /// Vertical focal length in pixels.
+    pub fy: f64,
+    /// Horizontal principal point in pixels.
+    pub cx: f64,
+    /// Vertical principal point in pixels.
+    pub cy: f64,
+    /// World-to-camera rotation.
+    pub rotation: DMat3,
+    /// World-to-camera translation, in world units.
+    pub translation: DVec3,
+}
+
+impl Camera {
+    /// The camera's centre in world space: `-Rᵀ·t`.
+    pub fn center(&self) -> DVec3 {
+        -(self.rotation.transpose() * self.translation)
+    }
+
+    /// The same view at another image size; intrinsics scale with each axis.
+    pub fn resized(&self, width: u32, height: u32) -> Self {
+        let (sx, sy) = (
+            f64::from(width) / f64::from(self.width),
+            f64::from(height) / f64::from(self.height),
+        );
+        Self {
+            width,
+            height,
+            fx: self.fx * sx,
+            fy: self.fy * sy,
+            cx: self.cx * sx,
+            cy: self.cy * sy,
+            ..self.clone()
+        }
+    }
+
+    /// The same view with the world's origin moved to `offset`: a point that
+    /// was at `X` is now at `X - offset`.
+    pub fn recentred(&self, offset: DVec3) -> Self {
+        Self {
+            translation: self.translation + self.rotation * offset,
+            ..self.clone()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn camera() -> Camera {
+        Camera {
+            width: 640,
+            height: 480,
+            fx: 500.0,
+            fy: 510.0,
+            cx: 322.0,
+            cy: 238.0,
+            rotation: DMat3::from_rotation_y(0.3) * DMat3::from_rotation_x(-0.2),
+            translation: DVec3::new(0.5, -1.0, 4.0),
+        }
+    }
+
+    fn project(camera: &Camera, point: DVec3) -> [f64; 2] {
+        let [x, y, z] = (camera.rotation * point + camera.translation).to_array();
+        [camera.fx * x / z + camera.cx, camera.fy * y / z + camera.cy]
+    }
+
+    #[test]
+    fn center_is_where_camera_space_begins() {
+        let camera = camera();
+        let origin = camera.rotation * camera.center() + camera.translation;
+        assert!(origin.length() < 1e-14);
+    }
+
+    #[test]
+    fn resizing_scales_pixels() {
+        let point = DVec3::new(0.2, 0.7, 1.0);
+        let [u, v] = project(&camera(), point);
+        let resized = camera().resized(320, 120);
+        let [us, vs] = project(&resized, point);
+        assert!((us - 0.5 * u).abs() < 1e-12 && (vs - 0.25 * v).abs() < 1e-12);
+        assert_eq!((resized.width, resized.height), (320, 120));
+    }
+
+    #[test]
+    fn recentring_moves_points_and_keeps_pixels() {
+        let (point, offset) = (DVec3::new(0.2, 0.7, 1.0), DVec3::new(10.0, -4.0, 7.0));
+        let moved = camera().recentred(offset);
+        let [u, v] = project(&camera(), point);
+        let [us, vs] = project(&moved, point - offset);
+        assert!((us - u).abs() < 1e-10 && (vs - v).abs() < 1e-10);
+        let center = camera().center() - offset;
+        assert!(moved.center().distance(center) < 1e-12);
+    }
+}

@@ -1,0 +1,273 @@
+//! COLMAP's `.bin` files: little-endian records after a count of them.
+
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+
+use super::{
+    Cameras, Image, Point, camera, insert, intrinsics, model_name, parameter_count, relative_name,
+};
+use crate::capture::error::{CaptureError, Position};
+
+/// Id, model, width, height and the 3 parameters of SIMPLE_PINHOLE.
+const SMALLEST_CAMERA: u64 = 4 + 4 + 8 + 8 + 3 * 8;
+/// Id, quaternion, translation, camera, an ended empty name, a zero count.
+const SMALLEST_IMAGE: u64 = 4 + 4 * 8 + 3 * 8 + 4 + 1 + 8;
+/// Id, position, colour, error, a zero count.
+const SMALLEST_POINT: u64 = 8 + 3 * 8 + 3 + 8 + 8;
+/// x, y and the point's id.
+const OBSERVATION: u64 = 8 + 8 + 8;
+/// An image's id and the index of its observation.
+const TRACK_ELEMENT: u64 = 4 + 4;
+/// Linux's longest path; a name that goes on beyond it never ends.
+const LONGEST_NAME: u64 = 4096;
+
+pub(super) fn cameras(path: &Path) -> Result<Cameras, CaptureError> {
+    let mut records = Records::open(path, "camera", SMALLEST_CAMERA)?;
+    let mut cameras = Cameras::new();
+    while records.next_record() {
+        let id = records.u32("the id")?;
+        let number = records.i32("the model")?;
+        let model = model_name(number);
+        let Some(count) = model.and_then(parameter_count) else {
+            return Err(CaptureError::CameraModel {
+                path: path.into(),
+                camera_id: id,
+                model: model.map_or_else(
+                    || format!("number {number}, which COLMAP does not define"),
+                    Into::into,
+                ),
+            });
+        };
+        let (width, height) = (records.u64("the width")?, records.u64("the height")?);
+        let mut parameters = [0.0; 4];
+        for parameter in &mut parameters[..count] {
+            *parameter = records.f64("the parameters")?;
+        }
+        let checked = intrinsics(width, height, &parameters[..count])
+            .and_then(|intrinsics| insert(&mut cameras, id, intrinsics));
+        checked.map_err(|reason| records.malformed(reason))?;
+    }
+    records.finish()?;
+    Ok(cameras)
+}
+
+pub(super) fn images(path: &Path, cameras: &Cameras) -> Result<Vec<Image>, CaptureError> {
+    let mut records = Records::open(path, "image", SMALLEST_IMAGE)?;
+    let mut images = Vec::with_capacity(records.capacity());
+    while records.next_record() {
+        records.u32("the id")?;
+        let quaternion = records.f64s("the quaternion")?;
+        let translation = DVec3::from(records.f64s::<3>("the translation")?);
+        let camera_id = records.u32("the camera")?;
+        let intrinsics = camera(cameras, camera_id).map_err(|reason| records.malformed(reason))?;
+        let name = records.name()?;
+        let name = relative_name(&name).map_err(|reason| records.malformed(reason))?;
+        let count = records.u64("the number of observations")?;
+        records.skip(count, OBSERVATION, "observations")?;
+        images.push(Image {
+            name,
+            quaternion,
+            translation,
+            intrinsics,
+        });
+    }
+    records.finish()?;
+    Ok(images)
+}
+
+pub(super) fn points(path: &Path) -> Result<Vec<Point>, CaptureError> {
+    let mut records = Records::open(path, "point", SMALLEST_POINT)?;
+    let mut points = Vec::with_capacity(records.capacity());
+    while records.next_record() {
+        records.u64("the id")?;
+        let position = DVec3::from(records.f64s::<3>("the position")?);
+        let color = records.bytes("the colour")?;
+        records.f64("the error")?;
+        let count = records.u64("the track's length")?;
+        records.skip(count, TRACK_ELEMENT, "track elements")?;
+        points.push(Point { position, color });
+    }
+    records.finish()?;
+    Ok(points)
+}
+
+/// A binary file as a sequence of records. Every read is checked against what
+/// the file still holds.
+struct Records {
+    path: PathBuf,
+    reader: BufReader<File>,
+    /// The file's length in bytes.
+    length: u64,
+    /// The next byte to read.
+    offset: u64,
+    /// Where the field read last begins, for errors.
+    field: u64,
+    /// What a record is, for errors.
+    kind: &'static str,
+    /// How many records the file announces.
+    count: u64,
+    /// The current record, from 1; 0 before the first.
+    current: u64,
+}
+
+impl Records {
+    /// Opens a file and checks its count of records, of which none is smaller
+    /// than `smallest` bytes.
+    fn open(path: &Path, kind: &'static str, smallest: u64) -> Result<Self, CaptureError> {
+        let read_error = |source| CaptureError::Read {
+            path: path.into(),
+            source,
+        };
+        let file = File::open(path).map_err(read_error)?;
+        let length = file.metadata().map_err(read_error)?.len();
+        let mut records = Self {
+            path: path.into(),
+            reader: BufReader::new(file),
+            length,
+            offset: 0,
+            field: 0,
+            kind,
+            count: 0,
+            current: 0,
+        };
+        let count = records.u64("the count")?;
+        if count > records.remaining() / smallest {
+            let reason = format!(
+                "the file announces {count} records but its {length} bytes cannot hold them: it is cut off or damaged"
+            );
+            return Err(records.malformed(reason));
+        }
+        records.count = count;
+        Ok(records)
+    }
+
+    /// The count, which `open` has checked against the file's length.
+    fn capacity(&self) -> usize {
+        self.count as usize
+    }
+
+    /// Goes to the next record, if there is one.
+    fn next_record(&mut self) -> bool {
+        self.current += 1;
+        self.current <= self.count
+    }
+
+    /// Checks that nothing follows the last record.
+    fn finish(mut self) -> Result<(), CaptureError> {
+        self.field = self.offset;
+        match self.remaining() {
+            0 => Ok(()),
+            more => Err(self.malformed(format!(
+                "{more} bytes follow the last of {} records",
+                self.count
+            ))),
+        }
+    }
+
+    fn remaining(&self) -> u64 {
+        self.length.saturating_sub(self.offset)
+    }
+
+    fn bytes<const N: usize>(&mut self, field: &str) -> Result<[u8; N], CaptureError> {
+        self.field = self.offset;
+        if self.remaining() < N as u64 {
+            return Err(self.malformed(format!("the file ends within {field}: it is cut off")));
+        }
+        let mut bytes = [0; N];
+        self.reader
+            .read_exact(&mut bytes)
+            .map_err(|source| self.read_error(source))?;
+        self.offset += N as u64;
+        Ok(bytes)
+    }
+
+    fn u32(&mut self, field: &str) -> Result<u32, CaptureError> {
+        self.bytes(field).map(u32::from_le_bytes)
+    }
+
+    fn i32(&mut self, field: &str) -> Result<i32, CaptureError> {
+        self.bytes(field).map(i32::from_le_bytes)
+    }
+
+    fn u64(&mut self, field: &str) -> Result<u64, CaptureError> {
+        self.bytes(field).map(u64::from_le_bytes)
+    }
+
+    fn f64(&mut self, field: &str) -> Result<f64, CaptureError> {
+        self.bytes(field).map(f64::from_le_bytes)
+    }
+
+    fn f64s<const N: usize>(&mut self, field: &str) -> Result<[f64; N], CaptureError> {
+        let mut values = [0.0; N];
+        for value in &mut values {
+            *value = self.f64(field)?;
+        }
+        Ok(values)
+    }
+
+    /// A UTF-8 string that a zero byte ends.
+    fn name(&mut self) -> Result<String, CaptureError> {
+        self.field = self.offset;
+        let mut name = Vec::new();
+        (&mut self.reader)
+            .take(self.length.saturating_sub(self.offset).min(LONGEST_NAME))
+            .read_until(0, &mut name)
+            .map_err(|source| CaptureError::Read {
+                path: self.path.clone(),
+                source,
+            })?;
+        let length = name.len() as u64;
+        if name.pop() != Some(0) {
+            return Err(self.malformed("the name does not end".into()));
+        }
+        let name =
+            String::from_utf8(name).map_err(|_| self.malformed("the name is not UTF-8".into()))?;
+        self.offset += length;
+        Ok(name)
+    }
+
+    /// Passes over `count` elements of `size` bytes.
+    fn skip(&mut self, count: u64, size: u64, what: &str) -> Result<(), CaptureError> {
+        // The error is in the count just read, so `field` stays with it.
+        if count > self.remaining() / size {
+            return Err(self.malformed(format!(
+                "{count} {what} do not fit into the file: it is cut off or damaged"
+            )));
+        }
+        // No overflow: the product is at most the file's length.
+        let bytes = count * size;
+        self.reader
+            .seek_relative(bytes as i64)
+            .map_err(|source| self.read_error(source))?;
+        self.offset += bytes;
+        Ok(())
+    }
+
+    fn malformed(&self, reason: String) -> CaptureError {
+        let record = match self.current {
+            0 => "header".into(),
+            current => format!(
+                "{} {} of {}",
+                self.kind,
+                current.min(self.count),
+                self.count
+            ),
+        };
+        CaptureError::Malformed {
+            path: self.path.clone(),
+            record,
+            position: Position::Byte(self.field),
+            reason,
+        }
+    }
+
+    fn read_error(&self, source: std::io::Error) -> CaptureError {
+        CaptureError::Read {
+            path: self.path.clone(),
+            source,
+        }
+    }
+}

@@ -1,0 +1,200 @@
+//! COLMAP's `.txt` files: a record a line (two for an image), `#` comments.
+
+use std::fs::File;
+use std::io::{BufRead, BufReader, ErrorKind};
+use std::path::{Path, PathBuf};
+use std::str::{FromStr, SplitWhitespace};
+
+use glam::DVec3;
+
+use super::{Cameras, Image, Point, camera, insert, intrinsics, parameter_count, relative_name};
+use crate::capture::error::{CaptureError, Position};
+
+/// `CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]`
+pub(super) fn cameras(path: &Path) -> Result<Cameras, CaptureError> {
+    let mut lines = Lines::open(path, "camera")?;
+    let mut cameras = Cameras::new();
+    while lines.next_record()? {
+        let mut fields = lines.fields();
+        let id = lines.field(&mut fields, "the id")?;
+        let model: String = lines.field(&mut fields, "the model")?;
+        let Some(count) = parameter_count(&model) else {
+            return Err(CaptureError::CameraModel {
+                path: path.into(),
+                camera_id: id,
+                model,
+            });
+        };
+        let width = lines.field(&mut fields, "the width")?;
+        let height = lines.field(&mut fields, "the height")?;
+        let mut parameters = [0.0; 4];
+        for parameter in &mut parameters[..count] {
+            *parameter = lines.field(&mut fields, "the parameters")?;
+        }
+        if fields.next().is_some() {
+            return Err(lines.malformed(format!(
+                "{model} has {count} parameters, and more are there"
+            )));
+        }
+        let checked = intrinsics(width, height, &parameters[..count])
+            .and_then(|intrinsics| insert(&mut cameras, id, intrinsics));
+        checked.map_err(|reason| lines.malformed(reason))?;
+    }
+    Ok(cameras)
+}
+
+/// `IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME`, then a line of `X Y POINT3D_ID`
+/// triples, which may be empty.
+pub(super) fn images(path: &Path, cameras: &Cameras) -> Result<Vec<Image>, CaptureError> {
+    let mut lines = Lines::open(path, "image")?;
+    let mut images = Vec::new();
+    while lines.next_record()? {
+        let mut fields = lines.fields();
+        lines.field::<u32>(&mut fields, "the id")?;
+        let quaternion = lines.numbers(&mut fields, "the quaternion")?;
+        let translation = DVec3::from(lines.numbers::<3>(&mut fields, "the translation")?);
+        let camera_id = lines.field(&mut fields, "the camera")?;
+        let intrinsics = camera(cameras, camera_id).map_err(|reason| lines.malformed(reason))?;
+        // The name is the tenth field and may contain spaces.
+        let name = relative_name(after_fields(&lines.line, 9))
+            .map_err(|reason| lines.malformed(reason))?;
+        images.push(Image {
+            name,
+            quaternion,
+            translation,
+            intrinsics,
+        });
+
+        // A file without the second lines would lose every other image.
+        if lines.next_line()? && lines.fields().count() % 3 != 0 {
+            return Err(lines.malformed(
+                "this line should hold the observations, in threes, or be empty: an image takes two lines".into(),
+            ));
+        }
+    }
+    Ok(images)
+}
+
+/// `POINT3D_ID X Y Z R G B ERROR TRACK[]`
+pub(super) fn points(path: &Path) -> Result<Vec<Point>, CaptureError> {
+    let mut lines = Lines::open(path, "point")?;
+    let mut points = Vec::new();
+    while lines.next_record()? {
+        let mut fields = lines.fields();
+        lines.field::<u64>(&mut fields, "the id")?;
+        let position = DVec3::from(lines.numbers::<3>(&mut fields, "the position")?);
+        let mut color = [0; 3];
+        for channel in &mut color {
+            *channel = lines.field(&mut fields, "the colour")?;
+        }
+        lines.field::<f64>(&mut fields, "the error")?;
+        points.push(Point { position, color });
+    }
+    Ok(points)
+}
+
+/// What follows the first `count` fields of a line, trimmed.
+fn after_fields(line: &str, count: usize) -> &str {
+    (0..count).fold(line.trim(), |rest, _| {
+        rest.find(char::is_whitespace)
+            .map_or("", |end| rest[end..].trim_start())
+    })
+}
+
+/// A text file, line by line.
+struct Lines {
+    path: PathBuf,
+    reader: BufReader<File>,
+    /// The current line.
+    line: String,
+    /// The current line's number, from 1.
+    number: u64,
+    /// What a record is, for errors.
+    kind: &'static str,
+    /// The current record, from 1; 0 before the first.
+    current: u64,
+}
+
+impl Lines {
+    fn open(path: &Path, kind: &'static str) -> Result<Self, CaptureError> {
+        let file = File::open(path).map_err(|source| CaptureError::Read {
+            path: path.into(),
+            source,
+        })?;
+        Ok(Self {
+            path: path.into(),
+            reader: BufReader::new(file),
+            line: String::new(),
+            number: 0,
+            kind,
+            current: 0,
+        })
+    }
+
+    /// Goes to the next line; false at the file's end.
+    fn next_line(&mut self) -> Result<bool, CaptureError> {
+        self.line.clear();
+        self.number += 1;
+        match self.reader.read_line(&mut self.line) {
+            Ok(length) => Ok(length > 0),
+            Err(source) if source.kind() == ErrorKind::InvalidData => {
+                Err(self.malformed("the line is not UTF-8 text".into()))
+            }
+            Err(source) => Err(CaptureError::Read {
+                path: self.path.clone(),
+                source,
+            }),
+        }
+    }
+
+    /// Goes to the next line that is neither empty nor a comment.
+    fn next_record(&mut self) -> Result<bool, CaptureError> {
+        while self.next_line()? {
+            let line = self.line.trim_start();
+            if !line.is_empty() && !line.starts_with('#') {
+                self.current += 1;
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    fn fields(&self) -> SplitWhitespace<'_> {
+        self.line.split_whitespace()
+    }
+
+    /// The next field of the current line.
+    fn field<T: FromStr>(
+        &self,
+        fields: &mut SplitWhitespace<'_>,
+        name: &str,
+    ) -> Result<T, CaptureError> {
+        let field = fields
+            .next()
+            .ok_or_else(|| self.malformed(format!("the line ends before {name}")))?;
+        field
+            .parse()
+            .map_err(|_| self.malformed(format!("{field:?} cannot be {name}")))
+    }
+
+    fn numbers<const N: usize>(
+        &self,
+        fields: &mut SplitWhitespace<'_>,
+        name: &str,
+    ) -> Result<[f64; N], CaptureError> {
+        let mut values = [0.0; N];
+        for value in &mut values {
+            *value = self.field(fields, name)?;
+        }
+        Ok(values)
+    }
+
+    fn malformed(&self, reason: String) -> CaptureError {
+        CaptureError::Malformed {
+            path: self.path.clone(),
+            record: format!("{} {}", self.kind, self.current.max(1)),
+            position: Position::Line(self.number),
+            reason,
+        }
+    }
+}

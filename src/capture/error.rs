@@ -1,0 +1,159 @@
+//! What can be wrong with a capture.
+
+use std::fmt;
+use std::io;
+use std::path::PathBuf;
+
+use thiserror::Error;
+
+/// Where in a file something is wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Position {
+    /// Bytes from the start of a binary file.
+    Byte(u64),
+    /// Line of a text file, counted from 1.
+    Line(u64),
+}
+
+impl fmt::Display for Position {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Byte(offset) => write!(f, "byte {offset}"),
+            Self::Line(number) => write!(f, "line {number}"),
+        }
+    }
+}
+
+/// Why a capture or one of its photos cannot be loaded.
+#[derive(Debug, Error)]
+pub enum CaptureError {
+    /// The given path is no folder.
+    #[error("{dir}: no such folder; give the COLMAP folder that holds images/ and sparse/")]
+    NoFolder {
+        /// The path that was given.
+        dir: PathBuf,
+    },
+    /// The folder holds no `images/`.
+    #[error("{dir}: holds no images/ folder; put the undistorted photos there")]
+    NoImagesFolder {
+        /// The folder that was given.
+        dir: PathBuf,
+    },
+    /// The folder holds no COLMAP model.
+    #[error(
+        "{dir}: holds no COLMAP model; put cameras, images and points3D (.bin or .txt) into its sparse/0/"
+    )]
+    NoModel {
+        /// The folder that was given.
+        dir: PathBuf,
+    },
+    /// Some of a model's three files are there and some are not.
+    #[error(
+        "{dir}: holds {present} but no {missing}; a COLMAP model needs cameras, images and points3D, all .bin or all .txt"
+    )]
+    IncompleteModel {
+        /// The model's folder.
+        dir: PathBuf,
+        /// A file that is there.
+        present: String,
+        /// A file that is not.
+        missing: String,
+    },
+    /// The operating system could not read a file.
+    #[error("{path}: cannot be read: {source}")]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the operating system says.
+        source: io::Error,
+    },
+    /// A model file contradicts COLMAP's format.
+    #[error("{path}: {record}, {position}: {reason}; export the model from COLMAP again")]
+    Malformed {
+        /// The file.
+        path: PathBuf,
+        /// The record, such as `image 3 of 12`.
+        record: String,
+        /// Where in the file.
+        position: Position,
+        /// What is wrong.
+        reason: String,
+    },
+    /// A camera is not a pinhole.
+    #[error(
+        "{path}: camera {camera_id} has the model {model}; only PINHOLE and SIMPLE_PINHOLE can be used: run COLMAP's image_undistorter and give its output folder"
+    )]
+    CameraModel {
+        /// The cameras file.
+        path: PathBuf,
+        /// COLMAP's id of the camera.
+        camera_id: u32,
+        /// COLMAP's name of the model, or its number where it is unknown.
+        model: String,
+    },
+    /// The model holds no images.
+    #[error("{path}: holds no images; COLMAP registered none, so its mapper has to run again")]
+    NoImages {
+        /// The images file.
+        path: PathBuf,
+    },
+    /// The model holds no usable points.
+    #[error("{path}: holds no usable points; run COLMAP's point_triangulator or mapper")]
+    NoPoints {
+        /// The points file.
+        path: PathBuf,
+    },
+    /// Two images have one name.
+    #[error("{path}: two images are named {name}; remove one with COLMAP's image_deleter")]
+    DuplicateName {
+        /// The images file.
+        path: PathBuf,
+        /// The name they share.
+        name: String,
+    },
+    /// No image has a usable pose.
+    #[error("{path}: none of its {count} images has a usable pose; the first, {name}: {reason}")]
+    AllRejected {
+        /// The images file.
+        path: PathBuf,
+        /// How many images were rejected.
+        count: usize,
+        /// The first of them by name.
+        name: String,
+        /// Why that one was rejected.
+        reason: String,
+    },
+    /// Photos that the model names are not there.
+    #[error(
+        "{first}: no such photo, and {missing} of {total} are missing; copy them into images/ under the names COLMAP knew"
+    )]
+    MissingPhotos {
+        /// The first missing photo by name.
+        first: PathBuf,
+        /// How many are missing.
+        missing: usize,
+        /// How many photos the model names.
+        total: usize,
+    },
+    /// A photo cannot be decoded.
+    #[error("{path}: {reason}")]
+    Photo {
+        /// The photo.
+        path: PathBuf,
+        /// What is wrong and what helps.
+        reason: String,
+    },
+    /// A photo has another shape than its camera.
+    #[error(
+        "{path}: is {}×{} pixels but its camera is {}×{}; use the photos that COLMAP's image_undistorter wrote with this model, not turned or cropped",
+        .photo[0], .photo[1], .camera[0], .camera[1]
+    )]
+    PhotoSize {
+        /// The photo.
+        path: PathBuf,
+        /// Its width and height.
+        photo: [u32; 2],
+        /// The camera's width and height.
+        camera: [u32; 2],
+    },
+}

@@ -1,0 +1,275 @@
+//! What was photographed: COLMAP models, pinhole cameras, photos and splits.
+
+pub mod camera;
+mod colmap;
+mod error;
+mod jpeg;
+mod photo;
+mod resample;
+mod split;
+
+#[cfg(test)]
+mod fixtures;
+#[cfg(test)]
+mod tests;
+
+use std::path::{Path, PathBuf};
+
+use glam::{DMat3, DQuat, DVec3};
+
+pub use camera::Camera;
+pub use error::{CaptureError, Position};
+pub use photo::Photo;
+pub use split::{Split, split};
+
+/// A quaternion's length may be off by so much: text files round its digits.
+/// Beyond it the pose is no rotation that anyone meant.
+const QUATERNION_SLACK: f64 = 1e-3;
+
+/// Coordinates beyond this, in world units, are failures of the
+/// reconstruction, not places: georeferenced ones stay below 1e8, even in
+/// millimetres below 1e11.
+const LARGEST_COORDINATE: f64 = 1e12;
+
+/// Recentre when the cameras are farther from the origin than this many
+/// extents: f32 then has less than 2⁻²⁴ · 100 ≈ 6e-6 of the extent as its step.
+const RECENTRE_EXTENTS: f64 = 100.0;
+
+/// What 3DGS multiplies the cameras' radius by for the scene's extent.
+const EXTENT_MARGIN: f64 = 1.1;
+
+/// Cameras closer together than this part of the distance to the points stand,
+/// for the scene's size, in one place.
+const COINCIDENT: f64 = 1e-4;
+
+/// One photo with its camera.
+#[derive(Clone, Debug, PartialEq)]
+pub struct View {
+    /// Path below `images/`, with `/` between folders.
+    pub name: String,
+    /// The photo's file; it exists when the capture is loaded.
+    pub image_path: PathBuf,
+    /// The camera that took it, in the size of COLMAP's model; the file may
+    /// differ, see [`Photo::load`].
+    pub camera: Camera,
+}
+
+/// A point that COLMAP triangulated.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Point {
+    /// World position; finite.
+    pub position: DVec3,
+    /// Encoded sRGB.
+    pub color: [u8; 3],
+}
+
+/// Something in the model that was left out.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Rejected {
+    /// The view's name, or the points file's for points.
+    pub name: String,
+    /// Why, in words.
+    pub reason: String,
+}
+
+/// Photos with poses, and the sparse points seen in them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Capture {
+    /// The COLMAP folder.
+    pub root: PathBuf,
+    /// The usable views, sorted by name; at least one.
+    pub views: Vec<View>,
+    /// The usable points in the order of the file; at least one.
+    pub points: Vec<Point>,
+    /// What was subtracted from every position; add it to come back to COLMAP's
+    /// coordinates. Zero unless these were large; whole numbers.
+    pub offset: DVec3,
+    /// Views without a usable pose, sorted by name, and one entry for all points
+    /// without a usable position.
+    pub rejected: Vec<Rejected>,
+}
+
+impl Capture {
+    /// Loads a COLMAP folder: `images/` and a model in `sparse/0/`, `sparse/` or
+    /// the folder itself, `.bin` before `.txt`.
+    ///
+    /// Views and points whose coordinates are not finite, or no rotation, are
+    /// left out and named in `rejected`. Photos are checked to exist, not read.
+    ///
+    /// # Errors
+    /// If a folder, a file or a photo is missing, a file is damaged, a camera is
+    /// not a pinhole, a name leads out of `images/`, or nothing usable is left.
+    pub fn load(dir: &Path) -> Result<Self, CaptureError> {
+        if !dir.is_dir() {
+            return Err(CaptureError::NoFolder { dir: dir.into() });
+        }
+        let photos = dir.join("images");
+        if !photos.is_dir() {
+            return Err(CaptureError::NoImagesFolder { dir: dir.into() });
+        }
+        let mut model = colmap::read(dir)?;
+        model.images.sort_by(|a, b| a.name.cmp(&b.name));
+        if let Some(pair) = model
+            .images
+            .windows(2)
+            .find(|pair| pair[0].name == pair[1].name)
+        {
+            let name = pair[0].name.clone();
+            return Err(CaptureError::DuplicateName {
+                path: model.images_path,
+                name,
+            });
+        }
+
+        let (mut views, mut rejected) = (Vec::new(), Vec::new());
+        for image in model.images {
+            let colmap::Image {
+                name,
+                quaternion,
+                translation,
+                intrinsics,
+            } = image;
+            match pose(quaternion, translation) {
+                Ok(rotation) => views.push(View {
+                    image_path: photos.join(&name),
+                    name,
+                    camera: intrinsics.camera(rotation, translation),
+                }),
+                Err(reason) => rejected.push(Rejected { name, reason }),
+            }
+        }
+        if views.is_empty() {
+            let path = model.images_path;
+            return Err(match rejected.first() {
+                None => CaptureError::NoImages { path },
+                Some(first) => CaptureError::AllRejected {
+                    path,
+                    count: rejected.len(),
+                    name: first.name.clone(),
+                    reason: first.reason.clone(),
+                },
+            });
+        }
+        check_photos_exist(&views)?;
+
+        let announced = model.points.len();
+        let mut points = model.points;
+        points.retain(|point| is_place(point.position));
+        if points.is_empty() {
+            return Err(CaptureError::NoPoints {
+                path: model.points_path,
+            });
+        }
+        if points.len() < announced {
+            rejected.push(Rejected {
+                name: colmap::file_name(&model.points_path),
+                reason: format!(
+                    "{} of {announced} points have coordinates that are not finite or beyond {LARGEST_COORDINATE:e}",
+                    announced - points.len()
+                ),
+            });
+        }
+
+        let mut capture = Self {
+            root: dir.into(),
+            views,
+            points,
+            offset: DVec3::ZERO,
+            rejected,
+        };
+        capture.recentre();
+        Ok(capture)
+    }
+
+    /// The scene's extent as 3DGS defines it, in world units: 1.1 times the
+    /// largest distance of a camera from the cameras' mean. Always positive.
+    ///
+    /// A single camera, or cameras in one place, have no such extent: 1.1 times
+    /// the median distance from them to the points stands in for it, and 1
+    /// where that too is zero.
+    pub fn extent(&self) -> f64 {
+        let center = self.center();
+        let radius = self
+            .views
+            .iter()
+            .map(|view| view.camera.center().distance(center))
+            .fold(0.0, f64::max);
+        let mut distances: Vec<f64> = self
+            .points
+            .iter()
+            .map(|point| point.position.distance(center))
+            .collect();
+        let middle = distances.len() / 2;
+        let to_points = match distances.get(middle) {
+            Some(_) => *distances.select_nth_unstable_by(middle, f64::total_cmp).1,
+            None => 0.0,
+        };
+        match radius {
+            radius if radius > COINCIDENT * to_points => EXTENT_MARGIN * radius,
+            _ if to_points > 0.0 => EXTENT_MARGIN * to_points,
+            _ => 1.0,
+        }
+    }
+
+    /// The mean of the camera centres.
+    fn center(&self) -> DVec3 {
+        let sum: DVec3 = self.views.iter().map(|view| view.camera.center()).sum();
+        sum / self.views.len().max(1) as f64
+    }
+
+    /// Moves coordinates that are large against the scene, such as UTM ones,
+    /// to the origin while they are still f64.
+    fn recentre(&mut self) {
+        let center = self.center();
+        if center.length() <= RECENTRE_EXTENTS * self.extent() {
+            return;
+        }
+        let offset = center.round();
+        for view in &mut self.views {
+            view.camera = view.camera.recentred(offset);
+        }
+        for point in &mut self.points {
+            point.position -= offset;
+        }
+        self.offset = offset;
+    }
+}
+
+/// The rotation of a pose, or why it is none.
+fn pose([w, x, y, z]: [f64; 4], translation: DVec3) -> Result<DMat3, String> {
+    let quaternion = DQuat::from_xyzw(x, y, z, w);
+    if !(quaternion.is_finite() && translation.is_finite()) {
+        return Err("its pose is not finite".into());
+    }
+    let length = quaternion.length();
+    if (length - 1.0).abs() > QUATERNION_SLACK {
+        return Err(format!(
+            "its rotation is a quaternion of length {length} instead of 1"
+        ));
+    }
+    if !is_place(translation) {
+        return Err(format!("its translation exceeds {LARGEST_COORDINATE:e}"));
+    }
+    Ok(DMat3::from_quat(quaternion.normalize()))
+}
+
+/// Whether coordinates are finite and of a size that a scene can have.
+fn is_place(position: DVec3) -> bool {
+    // NaN fails the comparison.
+    position
+        .to_array()
+        .iter()
+        .all(|c| c.abs() <= LARGEST_COORDINATE)
+}
+
+fn check_photos_exist(views: &[View]) -> Result<(), CaptureError> {
+    let mut missing = views.iter().filter(|view| !view.image_path.is_file());
+    match missing.next() {
+        None => Ok(()),
+        Some(first) => Err(CaptureError::MissingPhotos {
+            first: first.image_path.clone(),
+            missing: 1 + missing.count(),
+            total: views.len(),
+        }),
+    }
+}

@@ -1,0 +1,180 @@
+//! Typed storage buffers and reading them back.
+
+use std::{marker::PhantomData, sync::mpsc};
+
+use bytemuck::Pod;
+
+use super::{Gpu, GpuError};
+
+/// A storage buffer of `len` elements of `T`, zeroed when made.
+pub struct Buffer<T> {
+    raw: wgpu::Buffer,
+    len: usize,
+    element: PhantomData<T>,
+}
+
+impl<T: Pod> Buffer<T> {
+    /// A buffer of zeros. An empty one still has room for one element, because
+    /// a binding may not be empty.
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`] when the adapter cannot bind it.
+    pub fn zeros(gpu: &Gpu, label: &str, len: usize) -> Result<Self, GpuError> {
+        Self::with_usage(gpu, label, len, wgpu::BufferUsages::STORAGE)
+    }
+
+    /// A buffer that holds `data`.
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`] when the adapter cannot bind it.
+    pub fn from_slice(gpu: &Gpu, label: &str, data: &[T]) -> Result<Self, GpuError> {
+        let buffer = Self::zeros(gpu, label, data.len())?;
+        buffer.write(gpu, data);
+        Ok(buffer)
+    }
+
+    /// A uniform buffer that holds `value`.
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`] when the adapter cannot bind it.
+    pub fn uniform(gpu: &Gpu, label: &str, value: &T) -> Result<Self, GpuError> {
+        let buffer = Self::with_usage(gpu, label, 1, wgpu::BufferUsages::UNIFORM)?;
+        buffer.write(gpu, std::slice::from_ref(value));
+        Ok(buffer)
+    }
+
+    fn with_usage(
+        gpu: &Gpu,
+        label: &str,
+        len: usize,
+        usage: wgpu::BufferUsages,
+    ) -> Result<Self, GpuError> {
+        let size = (len.max(1) * size_of::<T>()).next_multiple_of(4) as u64;
+        let limit = gpu.binding_limit();
+        if size > limit {
+            return Err(GpuError::TooLarge {
+                label: label.to_owned(),
+                needed: size,
+                limit,
+            });
+        }
+        let raw = gpu.device().create_buffer(&wgpu::BufferDescriptor {
+            label: Some(label),
+            size,
+            usage: usage | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
+            mapped_at_creation: false,
+        });
+        Ok(Self {
+            raw,
+            len,
+            element: PhantomData,
+        })
+    }
+
+    /// The number of elements.
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    /// Whether there is no element.
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// The buffer that a binding takes.
+    pub fn raw(&self) -> &wgpu::Buffer {
+        &self.raw
+    }
+
+    /// Writes elements from the front, before the next submission runs.
+    ///
+    /// # Panics
+    /// When `data` is longer than the buffer.
+    pub fn write(&self, gpu: &Gpu, data: &[T]) {
+        assert!(
+            data.len() <= self.len,
+            "write of {} into {}",
+            data.len(),
+            self.len
+        );
+        if !data.is_empty() {
+            gpu.queue()
+                .write_buffer(&self.raw, 0, bytemuck::cast_slice(data));
+        }
+    }
+
+    /// Writes elements from index `first` on, before the next submission runs.
+    ///
+    /// # Panics
+    /// When they reach beyond the buffer.
+    pub fn write_at(&self, gpu: &Gpu, first: usize, data: &[T]) {
+        assert!(first + data.len() <= self.len, "write beyond the buffer");
+        if !data.is_empty() {
+            let offset = (first * size_of::<T>()) as u64;
+            gpu.queue()
+                .write_buffer(&self.raw, offset, bytemuck::cast_slice(data));
+        }
+    }
+
+    /// Reads all elements, waiting for the device.
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`].
+    pub fn read(&self, gpu: &Gpu) -> Result<Vec<T>, GpuError> {
+        self.read_later(gpu).wait(gpu)
+    }
+
+    /// Orders a copy of the present content; the device goes on meanwhile.
+    pub fn read_later(&self, gpu: &Gpu) -> Readback<T> {
+        let size = self.raw.size();
+        let staging = gpu.device().create_buffer(&wgpu::BufferDescriptor {
+            label: Some("read-back"),
+            size,
+            usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+            mapped_at_creation: false,
+        });
+        let mut encoder = gpu.device().create_command_encoder(&Default::default());
+        encoder.copy_buffer_to_buffer(&self.raw, 0, &staging, 0, size);
+        gpu.queue().submit([encoder.finish()]);
+        let (sender, done) = mpsc::channel();
+        staging.map_async(wgpu::MapMode::Read, .., move |result| {
+            // The receiver is gone when nobody wants the answer any more.
+            let _ = sender.send(result);
+        });
+        Readback {
+            staging,
+            done,
+            len: self.len,
+            element: PhantomData,
+        }
+    }
+}
+
+/// A copy on its way from the device.
+pub struct Readback<T> {
+    staging: wgpu::Buffer,
+    done: mpsc::Receiver<Result<(), wgpu::BufferAsyncError>>,
+    len: usize,
+    element: PhantomData<T>,
+}
+
+impl<T: Pod> Readback<T> {
+    /// Waits for the copy.
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`].
+    pub fn wait(self, gpu: &Gpu) -> Result<Vec<T>, GpuError> {
+        let lost = |reason: String| GpuError::Lost(gpu.describe(), reason);
+        gpu.wait()?;
+        self.done
+            .recv()
+            .map_err(|error| lost(error.to_string()))?
+            .map_err(|error| lost(error.to_string()))?;
+        let view = self
+            .staging
+            .get_mapped_range(..)
+            .map_err(|error| lost(error.to_string()))?;
+        let bytes = self.len * size_of::<T>();
+        Ok(bytemuck::pod_collect_to_vec(&view[..bytes]))
+    }
+}

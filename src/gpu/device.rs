@@ -1,0 +1,144 @@
+//! Adapter and device.
+
+use std::sync::Arc;
+
+/// What can go wrong with the device.
+#[derive(Debug, thiserror::Error)]
+pub enum GpuError {
+    /// There is no adapter to run on.
+    #[error(
+        "no Vulkan, Metal or DirectX 12 adapter found ({0}): install a graphics driver, or a software one \
+         (Debian: apt-get install mesa-vulkan-drivers)"
+    )]
+    NoAdapter(String),
+    /// The adapter refused a device.
+    #[error(
+        "adapter {adapter}: no device ({reason}): update its driver or choose another with WGPU_ADAPTER_NAME"
+    )]
+    NoDevice {
+        /// The adapter's name.
+        adapter: String,
+        /// What the driver said.
+        reason: String,
+    },
+    /// A buffer is larger than the adapter can bind.
+    #[error(
+        "buffer `{label}` needs {needed} bytes but the adapter binds at most {limit}: lower --max-splats or --max-side"
+    )]
+    TooLarge {
+        /// What the buffer holds.
+        label: String,
+        /// Bytes wanted.
+        needed: u64,
+        /// Bytes that one binding may have.
+        limit: u64,
+    },
+    /// The device was lost or a read-back failed.
+    #[error(
+        "device {0}: read-back failed ({1}): the driver may have reset; run again with fewer splats or smaller images"
+    )]
+    Lost(String, String),
+}
+
+/// A device and its queue, cheap to clone.
+#[derive(Clone)]
+pub struct Gpu(Arc<Inner>);
+
+struct Inner {
+    device: wgpu::Device,
+    queue: wgpu::Queue,
+    info: wgpu::AdapterInfo,
+}
+
+impl Gpu {
+    /// Opens the fastest adapter, or the one that `WGPU_ADAPTER_NAME` names.
+    ///
+    /// # Errors
+    /// [`GpuError::NoAdapter`] or [`GpuError::NoDevice`].
+    pub fn open() -> Result<Self, GpuError> {
+        let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
+        // No kernel here is dispatched indirectly, and the checks cost at every submission.
+        descriptor
+            .flags
+            .remove(wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL);
+        let instance = wgpu::Instance::new(descriptor);
+        let adapter = pollster::block_on(Self::adapter(&instance))?;
+        let info = adapter.get_info();
+        let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
+            label: Some("gs-chroma"),
+            // The adapter's own limits: large scenes need large bindings.
+            required_limits: adapter.limits(),
+            ..Default::default()
+        }))
+        .map_err(|error| GpuError::NoDevice {
+            adapter: info.name.clone(),
+            reason: error.to_string(),
+        })?;
+        Ok(Self(Arc::new(Inner {
+            device,
+            queue,
+            info,
+        })))
+    }
+
+    async fn adapter(instance: &wgpu::Instance) -> Result<wgpu::Adapter, GpuError> {
+        if std::env::var_os("WGPU_ADAPTER_NAME").is_some() {
+            return wgpu::util::initialize_adapter_from_env(instance, None)
+                .await
+                .map_err(|error| GpuError::NoAdapter(error.to_string()));
+        }
+        instance
+            .request_adapter(&wgpu::RequestAdapterOptions {
+                power_preference: wgpu::PowerPreference::HighPerformance,
+                ..Default::default()
+            })
+            .await
+            .map_err(|error| GpuError::NoAdapter(error.to_string()))
+    }
+
+    /// The wgpu device.
+    pub fn device(&self) -> &wgpu::Device {
+        &self.0.device
+    }
+
+    /// The wgpu queue.
+    pub fn queue(&self) -> &wgpu::Queue {
+        &self.0.queue
+    }
+
+    /// The adapter's name, driver and kind.
+    pub fn info(&self) -> &wgpu::AdapterInfo {
+        &self.0.info
+    }
+
+    /// The adapter's name and driver on one line.
+    pub fn describe(&self) -> String {
+        let info = self.info();
+        format!("{} ({} {})", info.name, info.driver, info.driver_info)
+    }
+
+    /// Whether the adapter is a software one.
+    pub fn is_software(&self) -> bool {
+        self.0.info.device_type == wgpu::DeviceType::Cpu
+    }
+
+    /// The largest buffer that one binding may have, in bytes.
+    pub fn binding_limit(&self) -> u64 {
+        let limits = self.0.device.limits();
+        limits
+            .max_storage_buffer_binding_size
+            .min(limits.max_buffer_size)
+    }
+
+    /// Waits until all submitted work is done.
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`].
+    pub fn wait(&self) -> Result<(), GpuError> {
+        self.0
+            .device
+            .poll(wgpu::PollType::wait_indefinitely())
+            .map(|_| ())
+            .map_err(|error| GpuError::Lost(self.describe(), error.to_string()))
+    }
+}

@@ -1,0 +1,138 @@
+//! Compute pipelines and the recording of their dispatches.
+
+use super::Gpu;
+
+/// Threads in a workgroup of the kernels that give a thread to each element.
+const LINEAR_WORKGROUP: u32 = 256;
+
+/// WebGPU's limit on workgroups in one dimension.
+const MAX_GROUPS: u32 = 65_535;
+
+/// Workgroups that cover `elements` at one thread each.
+pub fn groups_for(elements: usize) -> u32 {
+    u32::try_from(elements.div_ceil(LINEAR_WORKGROUP as usize)).unwrap_or(u32::MAX)
+}
+
+/// One compiled entry point.
+pub struct Kernel {
+    pipeline: wgpu::ComputePipeline,
+    layout: wgpu::BindGroupLayout,
+    name: &'static str,
+}
+
+impl Kernel {
+    /// Compiles the entry point `name` of `source`. All bindings
+    /// are in group 0.
+    pub fn new(gpu: &Gpu, name: &'static str, source: &str) -> Self {
+        let module = gpu
+            .device()
+            .create_shader_module(wgpu::ShaderModuleDescriptor {
+                label: Some(name),
+                source: wgpu::ShaderSource::Wgsl(source.into()),
+            });
+        let pipeline = gpu
+            .device()
+            .create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+                label: Some(name),
+                layout: None,
+                module: &module,
+                entry_point: Some(name),
+                compilation_options: wgpu::PipelineCompilationOptions {
+                    // Every kernel writes its workgroup memory before it reads it.
+                    zero_initialize_workgroup_memory: false,
+                    ..Default::default()
+                },
+                cache: None,
+            });
+        Self {
+            layout: pipeline.get_bind_group_layout(0),
+            pipeline,
+            name,
+        }
+    }
+
+    /// Ties buffers to bindings 0, 1, 2 …
+    pub fn bind(&self, gpu: &Gpu, buffers: &[&wgpu::Buffer]) -> Bindings {
+        let numbered: Vec<_> = (0..).zip(buffers.iter().copied()).collect();
+        self.bind_at(gpu, &numbered)
+    }
+
+    /// Ties buffers to the bindings named beside them, for an entry point that
+    /// does not use all that its file declares.
+    pub fn bind_at(&self, gpu: &Gpu, buffers: &[(u32, &wgpu::Buffer)]) -> Bindings {
+        let entries: Vec<_> = buffers
+            .iter()
+            .map(|&(binding, buffer)| wgpu::BindGroupEntry {
+                binding,
+                resource: buffer.as_entire_binding(),
+            })
+            .collect();
+        Bindings(gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some(self.name),
+            layout: &self.layout,
+            entries: &entries,
+        }))
+    }
+}
+
+/// The buffers of one kernel.
+pub struct Bindings(wgpu::BindGroup);
+
+/// Records dispatches into one compute pass; wgpu orders those that share buffers.
+pub struct Recorder {
+    gpu: Gpu,
+    encoder: wgpu::CommandEncoder,
+    pass: Option<wgpu::ComputePass<'static>>,
+}
+
+impl Recorder {
+    /// An empty recording.
+    pub fn new(gpu: &Gpu) -> Self {
+        Self {
+            gpu: gpu.clone(),
+            encoder: gpu.device().create_command_encoder(&Default::default()),
+            pass: None,
+        }
+    }
+
+    /// Runs `groups` workgroups, folded into two dimensions where one is too
+    /// short; kernels see the linear number and check it against their length.
+    pub fn dispatch(&mut self, kernel: &Kernel, bindings: &Bindings, groups: u32) {
+        if groups == 0 {
+            return;
+        }
+        let rows = groups.div_ceil(MAX_GROUPS);
+        self.dispatch_grid(kernel, bindings, groups.div_ceil(rows), rows);
+    }
+
+    /// Runs a grid of workgroups.
+    pub fn dispatch_grid(&mut self, kernel: &Kernel, bindings: &Bindings, x: u32, y: u32) {
+        let pass = self.pass.get_or_insert_with(|| {
+            self.encoder
+                .begin_compute_pass(&Default::default())
+                .forget_lifetime()
+        });
+        pass.set_pipeline(&kernel.pipeline);
+        pass.set_bind_group(0, &bindings.0, &[]);
+        pass.dispatch_workgroups(x, y, 1);
+    }
+
+    /// Copies a whole buffer onto another of the same size.
+    pub fn copy(&mut self, from: &wgpu::Buffer, to: &wgpu::Buffer) {
+        self.pass = None;
+        self.encoder
+            .copy_buffer_to_buffer(from, 0, to, 0, from.size());
+    }
+
+    /// Fills a buffer with zeros.
+    pub fn clear(&mut self, buffer: &wgpu::Buffer) {
+        self.pass = None;
+        self.encoder.clear_buffer(buffer, 0, None);
+    }
+
+    /// Hands the recording to the device.
+    pub fn submit(mut self) {
+        self.pass = None;
+        self.gpu.queue().submit([self.encoder.finish()]);
+    }
+}

@@ -1,0 +1,10 @@
+//! The device: adapter, typed buffers, kernels, command recording, read-back.
+
+mod buffer;
+mod device;
+mod kernel;
+pub mod shaders;
+
+pub use buffer::{Buffer, Readback};
+pub use device::{Gpu, GpuError};
+pub use kernel::{Bindings, Kernel, Recorder, groups_for};

@@ -1,0 +1,61 @@
+//! The WGSL of every kernel, compiled from `shaders/` by `build.rs`.
+
+macro_rules! shaders {
+    ($($(#[$doc:meta])* $name:ident = $file:literal;)*) => {
+        $($(#[$doc])* pub const $name: &str = include_str!(concat!(env!("OUT_DIR"), "/", $file, ".wgsl"));)*
+
+        /// Every compiled kernel by file name, for tests that reflect them.
+        pub const ALL: &[(&str, &str)] = &[$(($file, $name)),*];
+    };
+}
+
+shaders! {
+    /// Adam.
+    ADAM = "adam";
+    /// Chroma loss.
+    CHROMA_LOSS = "chroma_loss";
+    /// Keys of the depth sort.
+    COMPACT = "compact";
+    /// Copies along a densification plan.
+    DENSIFY = "densify";
+    /// Luma loss.
+    LUMA_LOSS = "luma_loss";
+    /// Projection.
+    PROJECT = "project";
+    /// Adjoint of the projection.
+    PROJECT_BACKWARD = "project_backward";
+    /// Prefix sum.
+    SCAN = "scan";
+    /// Radix sort.
+    SORT = "sort";
+    /// Sum of the blocks' losses.
+    SUM_LOSS = "sum_loss";
+    /// Tile lists.
+    TILE_LISTS = "tile_lists";
+    /// Tile ranges.
+    TILE_RANGES = "tile_ranges";
+    /// Blending of luma.
+    BLEND_LUMA = "blend_luma";
+    /// Blending of chroma.
+    BLEND_CHROMA = "blend_chroma";
+    /// Blending of RGB.
+    BLEND_RGB = "blend_rgb";
+    /// Shading of luma.
+    SHADE_LUMA = "shade_luma";
+    /// Shading of chroma.
+    SHADE_CHROMA = "shade_chroma";
+    /// Shading of RGB.
+    SHADE_RGB = "shade_rgb";
+    /// Adjoint of blending, luma and geometry.
+    BLEND_BACKWARD_LUMA = "blend_backward_luma";
+    /// Adjoint of blending, chroma alone.
+    BLEND_BACKWARD_CHROMA = "blend_backward_chroma";
+    /// Adjoint of shading, luma and means.
+    SHADE_BACKWARD_LUMA = "shade_backward_luma";
+    /// Adjoint of shading, chroma alone.
+    SHADE_BACKWARD_CHROMA = "shade_backward_chroma";
+    /// Sum of the instances' gradients, luma and geometry.
+    SUM_INSTANCES_LUMA = "sum_instances_luma";
+    /// Sum of the instances' gradients, chroma alone.
+    SUM_INSTANCES_CHROMA = "sum_instances_chroma";
+}

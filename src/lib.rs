@@ -1,0 +1,13 @@
+//! gs-chroma: coloured 3D Gaussian scenes from grayscale photographs.
+//!
+//! Imports go down only: `cli` → `run`, `report` → `luma`, `chroma`, `measure` →
+//! `raster` → `gpu` → `splats`, `capture`, `color`.
+
+pub mod capture;
+pub mod color;
+pub mod gpu;
+pub mod luma;
+pub mod measure;
+pub mod optimize;
+pub mod raster;
+pub mod splats;

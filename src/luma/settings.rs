@@ -1,0 +1,149 @@
+//! What stage 1 can be told, with the 3DGS values (Kerbl et al. 2023) as default.
+
+/// Learning rates of Adam.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LearningRates {
+    /// Means at the first and the last iteration, as a share of the scene's
+    /// extent: exponential decay between.
+    pub means: [f64; 2],
+    /// Unnormalised quaternions.
+    pub quats: f64,
+    /// Log-scales.
+    pub log_scales: f64,
+    /// Opacity logits.
+    pub opacity_logits: f64,
+    /// Constant spherical-harmonic term.
+    pub sh_constant: f64,
+    /// The other terms: slower, for they explain less.
+    pub sh_rest: f64,
+}
+
+impl Default for LearningRates {
+    fn default() -> Self {
+        Self {
+            means: [1.6e-4, 1.6e-6],
+            quats: 1e-3,
+            log_scales: 5e-3,
+            opacity_logits: 5e-2,
+            sh_constant: 2.5e-3,
+            sh_rest: 2.5e-3 / 20.0,
+        }
+    }
+}
+
+/// When the set of Gaussians changes, in iterations.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Schedule {
+    /// Iterations in all.
+    pub iterations: usize,
+    /// First densification not before this.
+    pub densify_from: usize,
+    /// No densification from this on.
+    pub densify_until: usize,
+    /// Iterations between densifications.
+    pub densify_every: usize,
+    /// Iterations between opacity resets.
+    pub reset_every: usize,
+    /// Iterations between two degrees of spherical harmonics.
+    pub raise_degree_every: usize,
+}
+
+impl Schedule {
+    /// The paper's schedule is written for 15,000 iterations; a shorter run
+    /// passes through the same phases in proportion. Below some 3,000 iterations
+    /// an opacity reset costs more than the run can recover, so there is none.
+    pub fn of(iterations: usize) -> Self {
+        let share = |of_paper: usize| (of_paper * iterations).div_ceil(PAPER_ITERATIONS);
+        let short = iterations < PAPER_ITERATIONS;
+        Self {
+            iterations,
+            densify_from: if short { share(500).max(100) } else { 500 },
+            // A run needs time to settle after the last split; the paper's has stage 2.
+            densify_until: if short {
+                share(12_000)
+            } else {
+                PAPER_ITERATIONS
+            },
+            densify_every: if iterations < 3_000 { 50 } else { 100 },
+            reset_every: if iterations < 6_000 {
+                usize::MAX
+            } else {
+                3_000
+            },
+            raise_degree_every: if short { share(1_000).max(1) } else { 1_000 },
+        }
+    }
+}
+
+/// Luma iterations of ChromaDistill (WACV 2025, supplement).
+pub const PAPER_ITERATIONS: usize = 15_000;
+
+/// Settings of one training.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LumaSettings {
+    /// Learning rates.
+    pub rates: LearningRates,
+    /// Phases.
+    pub schedule: Schedule,
+    /// Degree of the luma harmonics, 0 to 3.
+    pub sh_degree: u32,
+    /// Never more Gaussians than this.
+    pub max_splats: usize,
+    /// Seeds the order of the views and the halves of splits.
+    pub seed: u64,
+    /// Mean gradient of a centre, in normalised device coordinates, from which
+    /// a Gaussian is densified.
+    pub gradient_threshold: f64,
+    /// Gaussians larger than this share of the extent are split, smaller ones cloned.
+    pub split_share: f64,
+    /// Gaussians larger than this share of the extent are removed after the
+    /// first opacity reset.
+    pub prune_share: f64,
+    /// Gaussians below this opacity are removed.
+    pub prune_opacity: f64,
+}
+
+impl LumaSettings {
+    /// The defaults for a run of so many iterations.
+    pub fn new(iterations: usize) -> Self {
+        Self {
+            rates: LearningRates::default(),
+            schedule: Schedule::of(iterations),
+            sh_degree: 3,
+            max_splats: 1_000_000,
+            seed: 0,
+            gradient_threshold: 2e-4,
+            split_share: 0.01,
+            prune_share: 0.1,
+            prune_opacity: 0.005,
+        }
+    }
+
+    /// Learning rate of the means at `iteration`, in world units.
+    pub fn means_rate(&self, iteration: usize, extent: f64) -> f64 {
+        let [first, last] = self.rates.means;
+        let t = iteration as f64 / self.schedule.iterations.max(1) as f64;
+        extent * first * (last / first).powf(t.min(1.0))
+    }
+
+    /// Degree of the harmonics in use at `iteration`.
+    pub fn degree_at(&self, iteration: usize) -> u32 {
+        let raised = iteration / self.schedule.raise_degree_every;
+        self.sh_degree
+            .min(u32::try_from(raised).unwrap_or(u32::MAX))
+    }
+
+    /// Whether the set changes after `iteration` (counted from 1).
+    pub fn densifies_after(&self, iteration: usize) -> bool {
+        let schedule = &self.schedule;
+        iteration > schedule.densify_from
+            && iteration < schedule.densify_until
+            && iteration.is_multiple_of(schedule.densify_every)
+    }
+
+    /// Whether opacities are reset after `iteration` (counted from 1).
+    pub fn resets_after(&self, iteration: usize) -> bool {
+        iteration < self.schedule.densify_until
+            && iteration.is_multiple_of(self.schedule.reset_every)
+    }
+}

@@ -1,0 +1,528 @@
+//! The training loop of stage 1.
+//!
+//! An iteration is one submission without a read-back. Every [`SYNC_EVERY`]
+//! iterations the host orders losses and counts and meanwhile goes on; it waits
+//! for an order only when the next one is due. When tile lists overflow, the
+//! device stops taking steps by itself; the host learns how many it took, grows
+//! the lists and repeats from there, so that the result does not depend on when
+//! it noticed.
+
+use std::{sync::Arc, time::Instant};
+
+use super::{
+    LumaSettings,
+    densify::{self, DensifyKernels, Evidence, Target},
+    loss::{self, Loss, LossKernels},
+};
+use crate::{
+    capture::Camera,
+    gpu::{Buffer, Gpu, GpuError, Readback, Recorder},
+    optimize::{Adam, AdamKernel, LossLog, SumLossKernel},
+    raster::{
+        Field, Geometry, Layer, LayerAdjoint, Lists, Raster, StatusReadback, ViewUniform,
+        constants::*, download,
+    },
+    splats::{Splats, sh},
+};
+
+/// Iterations between two looks at the device.
+const SYNC_EVERY: usize = 25;
+
+/// Tile-list entries to begin with, for each Gaussian.
+const INSTANCES_PER_SPLAT: usize = 8;
+
+/// Room left above what an overflowing view needed.
+const HEADROOM: f64 = 1.25;
+
+/// Opacity to which a reset lowers (3DGS).
+const RESET_OPACITY: f32 = 0.01;
+
+/// One photograph to train on.
+pub struct TrainingView {
+    /// Where it was taken.
+    pub camera: Camera,
+    /// sRGB-encoded gray, `[height, width]`.
+    pub gray: Vec<u8>,
+}
+
+/// How far a training is.
+#[derive(Clone, Copy, Debug)]
+pub struct LumaProgress {
+    /// Iterations done.
+    pub iteration: usize,
+    /// Mean loss since the last report.
+    pub loss: f64,
+    /// Gaussians.
+    pub splats: usize,
+    /// Gaussians culled for values that are not finite, since the set last changed.
+    pub poisoned: usize,
+    /// Seconds since the training began.
+    pub seconds: f64,
+}
+
+struct Kernels {
+    adam: AdamKernel,
+    sum_loss: SumLossKernel,
+    loss: LossKernels,
+    densify: DensifyKernels,
+}
+
+/// What has to be made anew when the number of Gaussians or the room changes.
+struct Workspace {
+    lists: Lists,
+    layer: Layer,
+    adjoint: LayerAdjoint,
+    adam_geometry: Adam,
+    adam_field: Adam,
+    log: LossLog,
+    losses: Vec<Loss>,
+}
+
+/// An order on its way: the status and losses at the end of an iteration.
+struct Report {
+    /// Iterations done when it was ordered, had none been refused.
+    iteration: usize,
+    status: StatusReadback,
+    losses: Readback<f32>,
+}
+
+/// Trains geometry and luma.
+pub struct LumaTrainer {
+    raster: Arc<Raster>,
+    gpu: Gpu,
+    kernels: Kernels,
+    settings: LumaSettings,
+    extent: f64,
+    near: f64,
+    cameras: Vec<Camera>,
+    photos: Vec<Buffer<u32>>,
+    slopes: Buffer<f32>,
+    max_pixels: usize,
+    max_tiles: usize,
+    geometry: Geometry,
+    field: Field,
+    workspace: Workspace,
+    random: fastrand::Rng,
+    /// Iteration at which the present workspace began to count steps.
+    base: usize,
+}
+
+impl LumaTrainer {
+    /// A trainer that starts from `splats` (one channel of the settings' degree).
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`] when the adapter cannot hold it.
+    ///
+    /// # Panics
+    /// Without views, or when a photo's size is not its camera's.
+    pub fn new(
+        raster: Arc<Raster>,
+        settings: LumaSettings,
+        extent: f64,
+        splats: &Splats,
+        views: Vec<TrainingView>,
+    ) -> Result<Self, GpuError> {
+        assert!(!views.is_empty(), "training needs a view");
+        let gpu = raster.gpu.clone();
+        let kernels = Kernels {
+            adam: AdamKernel::new(&gpu),
+            sum_loss: SumLossKernel::new(&gpu),
+            loss: LossKernels::new(&gpu),
+            densify: DensifyKernels::new(&gpu),
+        };
+        let near = NEAR_SHARE * extent;
+        let (mut max_pixels, mut max_tiles) = (0, 0);
+        let (mut cameras, mut photos) = (Vec::new(), Vec::new());
+        for view in views {
+            let uniform = ViewUniform::new(&view.camera, near, 0, 0);
+            assert_eq!(
+                view.gray.len(),
+                uniform.pixel_count(),
+                "photo and camera differ"
+            );
+            max_pixels = max_pixels.max(uniform.pixel_count());
+            max_tiles = max_tiles.max(uniform.tile_count());
+            photos.push(Buffer::from_slice(&gpu, "photo", &loss::pack(&view.gray))?);
+            cameras.push(view.camera);
+        }
+        let slopes = Buffer::zeros(&gpu, "slopes", 3 * max_pixels)?;
+        let geometry = Geometry::upload(&gpu, splats)?;
+        let field = Field::upload(&gpu, &splats.sh)?;
+        let capacity = geometry.count * INSTANCES_PER_SPLAT;
+        let random = fastrand::Rng::with_seed(settings.seed);
+        let workspace = Workspace::new(
+            &raster,
+            &kernels,
+            &geometry,
+            &field,
+            &photos,
+            &slopes,
+            [max_pixels, max_tiles],
+            capacity,
+            None,
+        )?;
+        Ok(Self {
+            raster,
+            gpu,
+            kernels,
+            settings,
+            extent,
+            near,
+            cameras,
+            photos,
+            slopes,
+            max_pixels,
+            max_tiles,
+            geometry,
+            field,
+            workspace,
+            random,
+            base: 0,
+        })
+    }
+
+    /// Trains to the end of the schedule, telling `observe` now and then.
+    ///
+    /// # Errors
+    /// [`GpuError`] when the device runs out of room or is lost.
+    pub fn train(&mut self, observe: &mut dyn FnMut(LumaProgress)) -> Result<(), GpuError> {
+        let begun = Instant::now();
+        let mut iteration = 0;
+        let mut pending: Option<Report> = None;
+        while iteration < self.settings.schedule.iterations {
+            self.step(iteration);
+            iteration += 1;
+            let changes =
+                self.settings.densifies_after(iteration) || self.settings.resets_after(iteration);
+            let ends = iteration == self.settings.schedule.iterations;
+            if !(changes || ends || iteration.is_multiple_of(SYNC_EVERY)) {
+                continue;
+            }
+            let order = Report {
+                iteration,
+                status: self.workspace.lists.status_later(&self.gpu),
+                losses: self.workspace.log.read_later(&self.gpu),
+            };
+            // Before the set changes, and at the end, nothing may be left open.
+            let mut due: Vec<Report> = pending.take().into_iter().collect();
+            if changes || ends {
+                due.push(order);
+            } else {
+                pending = Some(order);
+            }
+            let mut refused = None;
+            for report in due {
+                if let Some(done) = self.review(report, &begun, observe)? {
+                    refused = Some(done);
+                    break;
+                }
+            }
+            if let Some(done) = refused {
+                pending = None;
+                iteration = done;
+                continue;
+            }
+            if self.settings.densifies_after(iteration) {
+                self.densify(iteration)?;
+            }
+            if self.settings.resets_after(iteration) {
+                self.reset_opacities()?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Reads the trained Gaussians.
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`].
+    pub fn splats(&self) -> Result<Splats, GpuError> {
+        download(&self.gpu, &self.geometry, &self.field)
+    }
+
+    /// Records and submits one iteration.
+    fn step(&self, iteration: usize) {
+        let index = self.view_at(iteration);
+        let workspace = &self.workspace;
+        let view = ViewUniform::new(
+            &self.cameras[index],
+            self.near,
+            self.geometry.count,
+            self.settings.degree_at(iteration),
+        );
+        let mut recorder = Recorder::new(&self.gpu);
+        workspace.lists.set_view(&self.gpu, &view);
+        workspace.lists.record(&self.raster, &mut recorder);
+        workspace.layer.record(&self.raster, &mut recorder);
+        workspace.losses[index].record(&self.kernels.loss, &mut recorder, &view);
+        let [x, y] = loss::blocks(&view);
+        workspace.log.record(
+            &self.gpu,
+            &self.kernels.sum_loss,
+            &mut recorder,
+            x * y,
+            view.pixel_count(),
+            iteration,
+        );
+        workspace.adjoint.record(&self.raster, &mut recorder);
+        let step = u32::try_from(iteration + 1).unwrap_or(u32::MAX);
+        let adam = &self.kernels.adam;
+        workspace.adam_geometry.record(
+            &self.gpu,
+            adam,
+            &mut recorder,
+            step,
+            &self.geometry_rates(iteration),
+        );
+        workspace
+            .adam_field
+            .record(&self.gpu, adam, &mut recorder, step, &self.field_rates());
+        recorder.submit();
+    }
+
+    /// The view of an iteration: every view once an epoch, in an order that the
+    /// seed and the epoch alone decide.
+    fn view_at(&self, iteration: usize) -> usize {
+        let views = self.cameras.len();
+        let (epoch, place) = (iteration / views, iteration % views);
+        let mut order: Vec<usize> = (0..views).collect();
+        // An odd multiplier keeps the epochs' seeds apart.
+        let seed = self.settings.seed ^ (epoch as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        fastrand::Rng::with_seed(seed).shuffle(&mut order);
+        order[place]
+    }
+
+    fn geometry_rates(&self, iteration: usize) -> [f32; GEOMETRY_PLANES] {
+        let rates = &self.settings.rates;
+        std::array::from_fn(|plane| {
+            (match plane {
+                PLANE_MEAN..PLANE_QUAT => self.settings.means_rate(iteration, self.extent),
+                PLANE_QUAT..PLANE_LOG_SCALE => rates.quats,
+                PLANE_LOG_SCALE..PLANE_OPACITY => rates.log_scales,
+                _ => rates.opacity_logits,
+            }) as f32
+        })
+    }
+
+    fn field_rates(&self) -> Vec<f32> {
+        let rates = &self.settings.rates;
+        let mut planes = vec![rates.sh_rest as f32; sh::coefficient_count(self.field.degree)];
+        planes[0] = rates.sh_constant as f32;
+        planes
+    }
+
+    /// Looks at a report. Gives the iterations that were really done when the
+    /// lists overflowed, after making room.
+    fn review(
+        &mut self,
+        report: Report,
+        begun: &Instant,
+        observe: &mut dyn FnMut(LumaProgress),
+    ) -> Result<Option<usize>, GpuError> {
+        let status = report.status.wait(&self.gpu)?;
+        if let Some(needed) = status.overflow {
+            let done = self.base + status.steps;
+            let capacity = (needed as f64 * HEADROOM) as usize;
+            self.rebuild(capacity, done)?;
+            return Ok(Some(done));
+        }
+        let losses = report.losses.wait(&self.gpu)?;
+        let since = (report.iteration - 1) / SYNC_EVERY * SYNC_EVERY;
+        let recent = &losses[..report.iteration - since];
+        observe(LumaProgress {
+            iteration: report.iteration,
+            loss: recent.iter().map(|&loss| f64::from(loss)).sum::<f64>() / recent.len() as f64,
+            splats: self.geometry.count,
+            poisoned: status.poisoned,
+            seconds: begun.elapsed().as_secs_f64(),
+        });
+        Ok(None)
+    }
+
+    /// A new workspace with the same Gaussians and moments.
+    fn rebuild(&mut self, capacity: usize, iteration: usize) -> Result<(), GpuError> {
+        let keep = |adam: &Adam| -> Result<[Buffer<f32>; 2], GpuError> {
+            let copies = [
+                Buffer::zeros(&self.gpu, "first moments", adam.first.len())?,
+                Buffer::zeros(&self.gpu, "second moments", adam.second.len())?,
+            ];
+            let mut recorder = Recorder::new(&self.gpu);
+            recorder.copy(adam.first.raw(), copies[0].raw());
+            recorder.copy(adam.second.raw(), copies[1].raw());
+            recorder.submit();
+            Ok(copies)
+        };
+        let moments = [
+            keep(&self.workspace.adam_geometry)?,
+            keep(&self.workspace.adam_field)?,
+        ];
+        // Statistics since the last densification go on.
+        let statistics = self.workspace.statistics().read(&self.gpu)?;
+        self.renew(capacity, iteration, moments)?;
+        self.workspace.statistics().write(&self.gpu, &statistics);
+        Ok(())
+    }
+
+    fn renew(
+        &mut self,
+        capacity: usize,
+        iteration: usize,
+        moments: [[Buffer<f32>; 2]; 2],
+    ) -> Result<(), GpuError> {
+        self.workspace = Workspace::new(
+            &self.raster,
+            &self.kernels,
+            &self.geometry,
+            &self.field,
+            &self.photos,
+            &self.slopes,
+            [self.max_pixels, self.max_tiles],
+            capacity,
+            Some(moments),
+        )?;
+        self.base = iteration;
+        Ok(())
+    }
+
+    fn densify(&mut self, iteration: usize) -> Result<(), GpuError> {
+        let plan = densify::plan(
+            &self.settings,
+            &Evidence {
+                geometry: &self.geometry.planes.read(&self.gpu)?,
+                statistics: &self.workspace.statistics().read(&self.gpu)?,
+                extent: self.extent,
+                prune_large: iteration > self.settings.schedule.reset_every,
+            },
+            &mut self.random,
+        );
+        if plan.is_empty() {
+            // Nothing would be left: keep what there is and go on.
+            return Ok(());
+        }
+        let plan = Buffer::from_slice(&self.gpu, "plan", &plan)?;
+        let apply = |source: &Buffer<f32>, target| {
+            self.kernels
+                .densify
+                .apply(&self.gpu, &plan, self.geometry.count, source, target)
+        };
+        let moments = [&self.workspace.adam_geometry, &self.workspace.adam_field]
+            .map(|adam| [&adam.first, &adam.second].map(|moment| apply(moment, Target::Moments)));
+        let planes = apply(&self.geometry.planes, Target::Geometry)?;
+        let field = apply(&self.field.planes, Target::Field)?;
+        let [[g1, g2], [f1, f2]] = moments;
+        let moments = [[g1?, g2?], [f1?, f2?]];
+        self.geometry = Geometry {
+            count: plan.len(),
+            planes,
+        };
+        self.field.planes = field;
+        let capacity = self
+            .workspace
+            .lists
+            .capacity
+            .max(self.geometry.count * INSTANCES_PER_SPLAT / 2);
+        self.renew(capacity, iteration, moments)
+    }
+
+    /// Lowers every opacity and forgets its momentum.
+    fn reset_opacities(&self) -> Result<(), GpuError> {
+        let n = self.geometry.count;
+        let first = PLANE_OPACITY * n;
+        let ceiling = (RESET_OPACITY / (1.0 - RESET_OPACITY)).ln();
+        let planes = self.geometry.planes.read(&self.gpu)?;
+        let lowered: Vec<f32> = planes[first..first + n]
+            .iter()
+            .map(|&logit| logit.min(ceiling))
+            .collect();
+        self.geometry.planes.write_at(&self.gpu, first, &lowered);
+        for moment in [
+            &self.workspace.adam_geometry.first,
+            &self.workspace.adam_geometry.second,
+        ] {
+            moment.write_at(&self.gpu, first, &vec![0.0; n]);
+        }
+        Ok(())
+    }
+}
+
+impl Workspace {
+    #[allow(
+        clippy::too_many_arguments,
+        reason = "called from two places that own the parts separately"
+    )]
+    fn new(
+        raster: &Raster,
+        kernels: &Kernels,
+        geometry: &Geometry,
+        field: &Field,
+        photos: &[Buffer<u32>],
+        slopes: &Buffer<f32>,
+        [max_pixels, max_tiles]: [usize; 2],
+        capacity: usize,
+        moments: Option<[[Buffer<f32>; 2]; 2]>,
+    ) -> Result<Self, GpuError> {
+        let gpu = &raster.gpu;
+        let lists = Lists::new(raster, geometry, max_tiles, capacity)?;
+        let layer = Layer::new(raster, geometry, &lists, field, max_pixels, max_tiles)?;
+        let adjoint = LayerAdjoint::new(raster, geometry, &lists, field, &layer)?;
+        let log = LossLog::new(gpu, &kernels.sum_loss, &lists.status, max_tiles, SYNC_EVERY)?;
+        let losses = photos
+            .iter()
+            .map(|photo| {
+                Loss::new(
+                    gpu,
+                    &kernels.loss,
+                    &lists,
+                    &layer,
+                    &adjoint,
+                    &log,
+                    slopes,
+                    photo,
+                )
+            })
+            .collect();
+        let (of_geometry, of_field) = match moments {
+            Some([geometry, field]) => (Some(geometry), Some(field)),
+            None => (None, None),
+        };
+        let adam = |gradient, values, moments| {
+            Adam::new(
+                gpu,
+                &kernels.adam,
+                &lists.status,
+                gradient,
+                values,
+                geometry.count,
+                moments,
+            )
+        };
+        let adam_geometry = adam(
+            &adjoint
+                .geometry
+                .as_ref()
+                .expect("luma trains geometry")
+                .gradient,
+            &geometry.planes,
+            of_geometry,
+        )?;
+        let adam_field = adam(&adjoint.field_gradient, &field.planes, of_field)?;
+        Ok(Self {
+            lists,
+            layer,
+            adjoint,
+            adam_geometry,
+            adam_field,
+            log,
+            losses,
+        })
+    }
+
+    fn statistics(&self) -> &Buffer<f32> {
+        &self
+            .adjoint
+            .geometry
+            .as_ref()
+            .expect("luma trains geometry")
+            .statistics
+    }
+}

@@ -1,0 +1,115 @@
+//! Pixelwise differences of two images.
+
+use crate::color::{ciede2000, srgb_to_lab};
+
+/// Peak signal-to-noise ratio in decibels: `-10 log10(mean (a - b)²)`, peak 1.
+///
+/// The mean runs over all values of all channels. Identical images give
+/// `f64::INFINITY`; a NaN anywhere gives NaN.
+///
+/// # Panics
+/// If the lengths differ or are zero.
+pub fn psnr(a: &[f32], b: &[f32]) -> f64 {
+    assert_same_size(a.len(), b.len());
+    let sum: f64 = a
+        .iter()
+        .zip(b)
+        .map(|(&x, &y)| (f64::from(x) - f64::from(y)).powi(2))
+        .sum();
+    -10.0 * (sum / a.len() as f64).log10()
+}
+
+/// CIEDE2000 of two images.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DeltaE {
+    /// The mean over the pixels.
+    pub mean: f64,
+    /// The smallest of the pixels' values that at least 95 % of them do not exceed.
+    pub percentile_95: f64,
+}
+
+/// CIEDE2000 between two RGB images, pixel by pixel.
+///
+/// Values outside `[0, 1]` are taken as they are. A NaN anywhere makes the
+/// mean NaN and counts as the largest difference in the percentile.
+///
+/// # Panics
+/// If the lengths differ or are zero.
+pub fn mean_delta_e(a: &[[f32; 3]], b: &[[f32; 3]]) -> DeltaE {
+    assert_same_size(a.len(), b.len());
+    let mut differences: Vec<f64> = a
+        .iter()
+        .zip(b)
+        .map(|(x, y)| {
+            let [x, y] = [x, y].map(|rgb| srgb_to_lab(rgb.map(f64::from)));
+            // Positive NaN, so that it sorts behind every number.
+            Some(ciede2000(x, y))
+                .filter(|d| !d.is_nan())
+                .unwrap_or(f64::NAN)
+        })
+        .collect();
+    let mean = differences.iter().sum::<f64>() / differences.len() as f64;
+    let rank = (differences.len() * 95).div_ceil(100) - 1;
+    let (_, &mut percentile_95, _) = differences.select_nth_unstable_by(rank, f64::total_cmp);
+    DeltaE {
+        mean,
+        percentile_95,
+    }
+}
+
+fn assert_same_size(a: usize, b: usize) {
+    assert!(
+        a == b && a > 0,
+        "images to compare must be of one size and not empty: {a} and {b} values"
+    );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn psnr_of_a_known_error() {
+        let a = vec![0.5; 100];
+        let b = vec![0.6; 100];
+        assert!((psnr(&a, &b) - 20.0).abs() < 1e-5);
+        let mut one = a.clone();
+        one[7] = 1.0;
+        assert!((psnr(&a, &one) - 10.0 * 400_f64.log10()).abs() < 1e-9);
+    }
+
+    #[test]
+    fn psnr_of_the_same_image_and_of_poison() {
+        assert_eq!(psnr(&[0.25, 1.0], &[0.25, 1.0]), f64::INFINITY);
+        assert!(psnr(&[0.25, f32::NAN], &[0.25, 1.0]).is_nan());
+    }
+
+    #[test]
+    #[should_panic(expected = "one size")]
+    fn psnr_refuses_other_sizes() {
+        psnr(&[0.0], &[0.0, 1.0]);
+    }
+
+    #[test]
+    fn delta_e_of_a_gray_step() {
+        let same = mean_delta_e(&[[0.5, 0.2, 0.1]; 10], &[[0.5, 0.2, 0.1]; 10]);
+        assert_eq!((same.mean, same.percentile_95), (0.0, 0.0));
+        // Black against white differs by 100 in CIEDE2000.
+        let a = [[0.0; 3]; 20];
+        let mut b = a;
+        b[3] = [1.0; 3];
+        let one = mean_delta_e(&a, &b);
+        assert!((one.mean - 5.0).abs() < 1e-9);
+        assert!(one.percentile_95.abs() < 1e-9, "19 of 20 are the same");
+        b[4] = [1.0; 3];
+        assert!((mean_delta_e(&a, &b).percentile_95 - 100.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn delta_e_of_one_pixel_and_of_poison() {
+        let one = mean_delta_e(&[[0.0; 3]], &[[1.0; 3]]);
+        assert!((one.percentile_95 - 100.0).abs() < 1e-9);
+        let poisoned = mean_delta_e(&[[f32::NAN; 3]], &[[1.0; 3]]);
+        assert!(poisoned.mean.is_nan() && poisoned.percentile_95.is_nan());
+    }
+}

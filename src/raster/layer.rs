@@ -1,0 +1,290 @@
+//! One field of colour drawn over a view's tile lists: `shade` and `blend`, and
+//! their adjoints down to the parameters.
+
+use super::{
+    ColorKind, Raster,
+    constants::*,
+    lists::Lists,
+    splats::{Field, Geometry},
+};
+use crate::gpu::{Bindings, Buffer, Gpu, GpuError, Kernel, Recorder, groups_for, shaders};
+
+pub(super) struct LayerKernels {
+    shade: Kernel,
+    blend: Kernel,
+}
+
+impl LayerKernels {
+    pub(super) fn new(gpu: &Gpu, kind: ColorKind) -> Self {
+        let (shade, blend) = match kind {
+            ColorKind::Luma => (shaders::SHADE_LUMA, shaders::BLEND_LUMA),
+            ColorKind::Chroma => (shaders::SHADE_CHROMA, shaders::BLEND_CHROMA),
+            ColorKind::Rgb => (shaders::SHADE_RGB, shaders::BLEND_RGB),
+        };
+        Self {
+            shade: Kernel::new(gpu, "shade", shade),
+            blend: Kernel::new(gpu, "blend", blend),
+        }
+    }
+}
+
+pub(super) struct AdjointKernels {
+    blend: Kernel,
+    sum: Kernel,
+    shade: Kernel,
+}
+
+impl AdjointKernels {
+    /// # Panics
+    /// For RGB, which is shown but never trained.
+    pub(super) fn new(gpu: &Gpu, kind: ColorKind) -> Self {
+        let (blend, sum, shade) = match kind {
+            ColorKind::Luma => (
+                shaders::BLEND_BACKWARD_LUMA,
+                shaders::SUM_INSTANCES_LUMA,
+                shaders::SHADE_BACKWARD_LUMA,
+            ),
+            ColorKind::Chroma => (
+                shaders::BLEND_BACKWARD_CHROMA,
+                shaders::SUM_INSTANCES_CHROMA,
+                shaders::SHADE_BACKWARD_CHROMA,
+            ),
+            ColorKind::Rgb => panic!("RGB has no adjoint"),
+        };
+        Self {
+            blend: Kernel::new(gpu, "blend_backward", blend),
+            sum: Kernel::new(gpu, "sum_instances", sum),
+            shade: Kernel::new(gpu, "shade_backward", shade),
+        }
+    }
+}
+
+/// Buffers and bindings that draw one field.
+pub struct Layer {
+    /// What is drawn.
+    pub kind: ColorKind,
+    /// Colour of each visible Gaussian, `[N]` of the kind's stride.
+    pub colors: Buffer<f32>,
+    /// The picture, `[pixels]` of the kind's stride.
+    pub image: Buffer<f32>,
+    /// Entries of its tile that each pixel used.
+    pub lasts: Buffer<u32>,
+    count: usize,
+    max_tiles: usize,
+    shade: Bindings,
+    blend: Bindings,
+}
+
+impl Layer {
+    /// A layer for views of at most `max_pixels` pixels and `max_tiles` tiles.
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`].
+    pub fn new(
+        raster: &Raster,
+        geometry: &Geometry,
+        lists: &Lists,
+        field: &Field,
+        max_pixels: usize,
+        max_tiles: usize,
+    ) -> Result<Self, GpuError> {
+        let gpu = &raster.gpu;
+        let stride = field.kind.stride();
+        let colors = Buffer::zeros(gpu, "colors", geometry.count * stride)?;
+        let image = Buffer::zeros(gpu, "image", max_pixels * stride)?;
+        let lasts = Buffer::zeros(gpu, "lasts", max_pixels)?;
+        let kernels = raster.layer(field.kind);
+        let shade = kernels.shade.bind(
+            gpu,
+            &[
+                lists.view.raw(),
+                geometry.planes.raw(),
+                field.planes.raw(),
+                lists.ranks.raw(),
+                lists.projected.raw(),
+                colors.raw(),
+                lists.status.raw(),
+            ],
+        );
+        let blend = kernels.blend.bind(
+            gpu,
+            &[
+                lists.view.raw(),
+                lists.starts.raw(),
+                lists.slots().raw(),
+                lists.instance_splats.raw(),
+                lists.projected.raw(),
+                colors.raw(),
+                image.raw(),
+                lasts.raw(),
+            ],
+        );
+        Ok(Self {
+            kind: field.kind,
+            colors,
+            image,
+            lasts,
+            count: geometry.count,
+            max_tiles,
+            shade,
+            blend,
+        })
+    }
+
+    /// Records shading and blending; the lists must have been recorded before.
+    pub fn record(&self, raster: &Raster, recorder: &mut Recorder) {
+        let kernels = raster.layer(self.kind);
+        recorder.dispatch(&kernels.shade, &self.shade, groups_for(self.count));
+        recorder.dispatch(&kernels.blend, &self.blend, self.max_tiles as u32);
+    }
+
+    /// Reads the picture as `[pixels, channels]`.
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`].
+    pub fn read_image(&self, gpu: &Gpu, pixels: usize) -> Result<Vec<f32>, GpuError> {
+        let (stride, channels) = (self.kind.stride(), self.kind.channels());
+        let image = self.image.read(gpu)?;
+        Ok(image
+            .chunks_exact(stride)
+            .take(pixels)
+            .flat_map(|pixel| &pixel[..channels])
+            .copied()
+            .collect())
+    }
+}
+
+/// The adjoint of a [`Layer`]: from the gradient of the picture to gradients of
+/// the field and, for luma, of the geometry.
+pub struct LayerAdjoint {
+    /// Gradient of the loss with respect to the picture; the loss writes it.
+    pub image_gradient: Buffer<f32>,
+    /// Gradient of the field's planes.
+    pub field_gradient: Buffer<f32>,
+    /// Gradient and statistics of the geometry, luma only.
+    pub geometry: Option<GeometryAdjoint>,
+    kind: ColorKind,
+    count: usize,
+    max_tiles: usize,
+    blend: Bindings,
+    sum: Bindings,
+    shade: Bindings,
+}
+
+/// The part of the adjoint that reaches the geometry.
+pub struct GeometryAdjoint {
+    /// Gradient planes `[11, N]`.
+    pub gradient: Buffer<f32>,
+    /// Densification statistics, planes `[3, N]`.
+    pub statistics: Buffer<f32>,
+    project: Bindings,
+}
+
+impl LayerAdjoint {
+    /// The adjoint of `layer`.
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`].
+    pub fn new(
+        raster: &Raster,
+        geometry: &Geometry,
+        lists: &Lists,
+        field: &Field,
+        layer: &Layer,
+    ) -> Result<Self, GpuError> {
+        let gpu = &raster.gpu;
+        let n = geometry.count;
+        let with_geometry = field.kind == ColorKind::Luma;
+        let record = field.kind.channels() + if with_geometry { 6 } else { 0 };
+        let image_gradient = Buffer::zeros(gpu, "image gradient", layer.image.len())?;
+        let partials = Buffer::<f32>::zeros(gpu, "instance gradients", lists.capacity * record)?;
+        let gradients = Buffer::<f32>::zeros(gpu, "projected gradients", n * record)?;
+        let field_gradient = Buffer::zeros(gpu, "field gradient", field.planes.len())?;
+        let geometry_gradient = with_geometry
+            .then(|| Buffer::<f32>::zeros(gpu, "geometry gradient", geometry.planes.len()))
+            .transpose()?;
+        let kernels = raster.adjoint(field.kind);
+        let mut buffers = vec![
+            lists.view.raw(),
+            lists.starts.raw(),
+            lists.slots().raw(),
+            lists.instance_splats.raw(),
+            lists.projected.raw(),
+            layer.lasts.raw(),
+            image_gradient.raw(),
+            partials.raw(),
+        ];
+        if with_geometry {
+            buffers.extend([layer.colors.raw(), layer.image.raw()]);
+        }
+        let blend = kernels.blend.bind(gpu, &buffers);
+        let sum = kernels.sum.bind(
+            gpu,
+            &[
+                lists.order().raw(),
+                lists.offsets.raw(),
+                lists.status.raw(),
+                partials.raw(),
+                gradients.raw(),
+            ],
+        );
+        let mut buffers = vec![
+            lists.view.raw(),
+            geometry.planes.raw(),
+            lists.ranks.raw(),
+            layer.colors.raw(),
+            gradients.raw(),
+            field_gradient.raw(),
+        ];
+        if let Some(gradient) = &geometry_gradient {
+            buffers.extend([field.planes.raw(), gradient.raw()]);
+        }
+        let shade = kernels.shade.bind(gpu, &buffers);
+        let geometry = geometry_gradient
+            .map(|gradient| -> Result<_, GpuError> {
+                let statistics = Buffer::zeros(gpu, "statistics", STATISTICS_PLANES * n)?;
+                let project = raster.project_backward.bind(
+                    gpu,
+                    &[
+                        lists.view.raw(),
+                        geometry.planes.raw(),
+                        lists.ranks.raw(),
+                        lists.projected.raw(),
+                        gradients.raw(),
+                        gradient.raw(),
+                        statistics.raw(),
+                        lists.status.raw(),
+                    ],
+                );
+                Ok(GeometryAdjoint {
+                    gradient,
+                    statistics,
+                    project,
+                })
+            })
+            .transpose()?;
+        Ok(Self {
+            image_gradient,
+            field_gradient,
+            geometry,
+            kind: field.kind,
+            count: n,
+            max_tiles: layer.max_tiles,
+            blend,
+            sum,
+            shade,
+        })
+    }
+
+    /// Records the adjoint; lists, layer and loss must have been recorded before.
+    pub fn record(&self, raster: &Raster, recorder: &mut Recorder) {
+        let kernels = raster.adjoint(self.kind);
+        let groups = groups_for(self.count);
+        recorder.dispatch(&kernels.blend, &self.blend, self.max_tiles as u32);
+        recorder.dispatch(&kernels.sum, &self.sum, groups);
+        recorder.dispatch(&kernels.shade, &self.shade, groups);
+        if let Some(geometry) = &self.geometry {
+            recorder.dispatch(&raster.project_backward, &geometry.project, groups);
+        }
+    }
+}

@@ -1,0 +1,118 @@
+//! The rasterizer and its adjoint, host side.
+//!
+//! project → depth sort → tile lists → tile sort → blend, then back. Every step
+//! is a kernel in `shaders/`; [`Lists`] records those that depend on the
+//! geometry alone, [`Layer`] those that draw one field of colour over it,
+//! [`LayerAdjoint`] their adjoints.
+
+pub mod constants;
+mod layer;
+mod lists;
+mod renderer;
+pub mod scan;
+pub mod sort;
+mod splats;
+mod view;
+
+pub use layer::{GeometryAdjoint, Layer, LayerAdjoint};
+pub use lists::{Lists, Projected, Status, StatusReadback, TileListsMode};
+pub use renderer::{Picture, Renderer};
+pub use splats::{Field, Geometry, download};
+pub use view::ViewUniform;
+
+use crate::gpu::{Gpu, Kernel, shaders};
+use layer::{AdjointKernels, LayerKernels};
+use lists::ListKernels;
+use scan::ScanKernels;
+use sort::SortKernels;
+
+/// What the channels of a field mean.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ColorKind {
+    /// sRGB-encoded gray.
+    Luma,
+    /// CIELAB a and b.
+    Chroma,
+    /// sRGB-encoded red, green and blue.
+    Rgb,
+}
+
+impl ColorKind {
+    /// The kind with so many channels.
+    ///
+    /// # Panics
+    /// For other counts than 1, 2 and 3: [`crate::splats::ShField`] has no others.
+    pub fn of_channels(channels: usize) -> Self {
+        match channels {
+            1 => Self::Luma,
+            2 => Self::Chroma,
+            3 => Self::Rgb,
+            other => panic!("no colour has {other} channels"),
+        }
+    }
+
+    /// Channels of one colour.
+    pub fn channels(self) -> usize {
+        match self {
+            Self::Luma => 1,
+            Self::Chroma => 2,
+            Self::Rgb => 3,
+        }
+    }
+
+    /// Floats between two colours in a device array (`vec3f` is aligned to 16 bytes).
+    pub fn stride(self) -> usize {
+        match self {
+            Self::Luma => 1,
+            Self::Chroma => 2,
+            Self::Rgb => 4,
+        }
+    }
+}
+
+/// The compiled kernels of the rasterizer.
+pub struct Raster {
+    /// The device they run on.
+    pub gpu: Gpu,
+    scan: ScanKernels,
+    sort: SortKernels,
+    lists: ListKernels,
+    layers: [LayerKernels; 3],
+    adjoints: [AdjointKernels; 2],
+    project_backward: Kernel,
+}
+
+impl Raster {
+    /// Compiles all kernels.
+    pub fn new(gpu: &Gpu) -> Self {
+        Self {
+            gpu: gpu.clone(),
+            scan: ScanKernels::new(gpu),
+            sort: SortKernels::new(gpu),
+            lists: ListKernels::new(gpu),
+            layers: [ColorKind::Luma, ColorKind::Chroma, ColorKind::Rgb]
+                .map(|kind| LayerKernels::new(gpu, kind)),
+            adjoints: [ColorKind::Luma, ColorKind::Chroma]
+                .map(|kind| AdjointKernels::new(gpu, kind)),
+            project_backward: Kernel::new(gpu, "project_backward", shaders::PROJECT_BACKWARD),
+        }
+    }
+
+    /// The kernels of the prefix sum.
+    pub fn scan_kernels(&self) -> &ScanKernels {
+        &self.scan
+    }
+
+    /// The kernels of the sort.
+    pub fn sort_kernels(&self) -> &SortKernels {
+        &self.sort
+    }
+
+    fn layer(&self, kind: ColorKind) -> &LayerKernels {
+        &self.layers[kind.channels() - 1]
+    }
+
+    fn adjoint(&self, kind: ColorKind) -> &AdjointKernels {
+        &self.adjoints[kind.channels() - 1]
+    }
+}

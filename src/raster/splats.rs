@@ -1,0 +1,117 @@
+//! Gaussians on the device, one plane an attribute.
+
+use super::{ColorKind, constants::*};
+use crate::{
+    gpu::{Buffer, Gpu, GpuError},
+    splats::{ShField, Splats, sh},
+};
+
+/// Geometry planes `[11, N]`.
+pub struct Geometry {
+    /// Number of Gaussians.
+    pub count: usize,
+    /// Planes: mean, quaternion, log-scale, opacity logit.
+    pub planes: Buffer<f32>,
+}
+
+impl Geometry {
+    /// Uploads the geometry of `splats`.
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`].
+    pub fn upload(gpu: &Gpu, splats: &Splats) -> Result<Self, GpuError> {
+        let n = splats.len();
+        let mut planes = vec![0.0; GEOMETRY_PLANES * n];
+        for i in 0..n {
+            for axis in 0..3 {
+                planes[(PLANE_MEAN + axis) * n + i] = splats.means[i][axis];
+                planes[(PLANE_LOG_SCALE + axis) * n + i] = splats.log_scales[i][axis];
+            }
+            for k in 0..4 {
+                planes[(PLANE_QUAT + k) * n + i] = splats.quats[i][k];
+            }
+            planes[PLANE_OPACITY * n + i] = splats.opacity_logits[i];
+        }
+        Ok(Self {
+            count: n,
+            planes: Buffer::from_slice(gpu, "geometry", &planes)?,
+        })
+    }
+}
+
+/// Spherical-harmonic planes `[(degree + 1)², channels, N]`.
+pub struct Field {
+    /// What the channels are.
+    pub kind: ColorKind,
+    /// Degree that is stored.
+    pub degree: u32,
+    /// The coefficients.
+    pub planes: Buffer<f32>,
+}
+
+impl Field {
+    /// Uploads a field.
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`].
+    pub fn upload(gpu: &Gpu, field: &ShField) -> Result<Self, GpuError> {
+        let stride = sh::coefficient_count(field.degree) * field.channels;
+        let n = field.coefficients.len() / stride;
+        let mut planes = vec![0.0; field.coefficients.len()];
+        for i in 0..n {
+            for k in 0..stride {
+                planes[k * n + i] = field.coefficients[i * stride + k];
+            }
+        }
+        Ok(Self {
+            kind: ColorKind::of_channels(field.channels),
+            degree: field.degree,
+            planes: Buffer::from_slice(gpu, "spherical harmonics", &planes)?,
+        })
+    }
+
+    /// Reads the field back.
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`].
+    pub fn download(&self, gpu: &Gpu) -> Result<ShField, GpuError> {
+        let planes = self.planes.read(gpu)?;
+        let channels = self.kind.channels();
+        let stride = sh::coefficient_count(self.degree) * channels;
+        let n = planes.len() / stride;
+        let mut coefficients = vec![0.0; planes.len()];
+        for i in 0..n {
+            for k in 0..stride {
+                coefficients[i * stride + k] = planes[k * n + i];
+            }
+        }
+        Ok(ShField {
+            degree: self.degree,
+            channels,
+            coefficients,
+        })
+    }
+}
+
+/// Reads geometry and field back into host arrays.
+///
+/// # Errors
+/// [`GpuError::Lost`].
+pub fn download(gpu: &Gpu, geometry: &Geometry, field: &Field) -> Result<Splats, GpuError> {
+    let planes = geometry.planes.read(gpu)?;
+    let n = geometry.count;
+    let at = |plane: usize, i: usize| planes[plane * n + i];
+    Ok(Splats {
+        means: (0..n)
+            .map(|i| std::array::from_fn(|k| at(PLANE_MEAN + k, i)))
+            .collect(),
+        quats: (0..n)
+            .map(|i| std::array::from_fn(|k| at(PLANE_QUAT + k, i)))
+            .collect(),
+        log_scales: (0..n)
+            .map(|i| std::array::from_fn(|k| at(PLANE_LOG_SCALE + k, i)))
+            .collect(),
+        opacity_logits: (0..n).map(|i| at(PLANE_OPACITY, i)).collect(),
+        sh: field.download(gpu)?,
+    })
+}

@@ -1,0 +1,109 @@
+//! The Gaussians: arrays on the host, spherical harmonics, initialisation and
+//! splat files.
+
+pub mod init;
+pub mod ply;
+pub mod sh;
+
+pub use init::{initial_splats, nearest_neighbor_distances};
+pub use ply::{PlyError, ReadSplats, read_ply, write_ply};
+pub use sh::ShField;
+
+/// A set of `N` Gaussians with one field of spherical harmonics.
+///
+/// Arrays are parallel; index `i` is the same Gaussian in all of them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Splats {
+    /// Centres in world units, `[N, 3]`.
+    pub means: Vec<[f32; 3]>,
+    /// Rotations as quaternions `w x y z`, `[N, 4]`; not necessarily of unit length.
+    pub quats: Vec<[f32; 4]>,
+    /// Natural logarithms of the standard deviations along the rotated axes, `[N, 3]`.
+    pub log_scales: Vec<[f32; 3]>,
+    /// Logits of the opacities, `[N]`.
+    pub opacity_logits: Vec<f32>,
+    /// What the Gaussians show: luma (1 channel), chroma (2) or RGB (3).
+    pub sh: ShField,
+}
+
+impl Splats {
+    /// The number of Gaussians.
+    pub fn len(&self) -> usize {
+        self.means.len()
+    }
+
+    /// Whether there is no Gaussian at all.
+    pub fn is_empty(&self) -> bool {
+        self.means.is_empty()
+    }
+
+    /// The same Gaussians showing the mean of their channels: a gray scene with
+    /// one channel. A field without channels becomes zeros.
+    pub fn to_luma(&self) -> Self {
+        let channels = self.sh.channels;
+        let coefficients = if channels == 0 {
+            ShField::zeros(self.len(), self.sh.degree, 1).coefficients
+        } else {
+            let mean = |values: &[f32]| values.iter().sum::<f32>() / channels as f32;
+            let coefficients = self.sh.coefficients.chunks_exact(channels);
+            coefficients.map(mean).collect()
+        };
+        Self {
+            sh: ShField {
+                degree: self.sh.degree,
+                channels: 1,
+                coefficients,
+            },
+            ..self.clone()
+        }
+    }
+
+    /// Whether the channels of every coefficient differ by at most `tolerance`,
+    /// in units of the coefficients. NaN is not gray.
+    pub fn is_gray(&self, tolerance: f32) -> bool {
+        let channels = self.sh.channels.max(1);
+        let mut coefficients = self.sh.coefficients.chunks_exact(channels);
+        coefficients.all(|values| {
+            let near = |value: &f32| (value - values[0]).abs() <= tolerance;
+            values.iter().all(near)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn two_splats(coefficients: Vec<f32>) -> Splats {
+        Splats {
+            means: vec![[0.0; 3], [1.0; 3]],
+            quats: vec![[1.0, 0.0, 0.0, 0.0]; 2],
+            log_scales: vec![[-1.0; 3]; 2],
+            opacity_logits: vec![0.5; 2],
+            sh: ShField {
+                degree: 0,
+                channels: 3,
+                coefficients,
+            },
+        }
+    }
+
+    #[test]
+    fn luma_is_the_mean_of_the_channels() {
+        let splats = two_splats(vec![1.0, 2.0, 6.0, -1.0, 0.0, 1.0]);
+        let luma = splats.to_luma();
+        assert_eq!(luma.sh.channels, 1);
+        assert_eq!(luma.sh.coefficients, [3.0, 0.0]);
+        assert_eq!(luma.means, splats.means);
+    }
+
+    #[test]
+    fn gray_within_the_tolerance() {
+        assert!(two_splats(vec![0.5, 0.5, 0.5, 1.0, 1.0, 1.0]).is_gray(0.0));
+        let nearly = two_splats(vec![0.5, 0.5, 0.5, 1.0, 1.01, 1.0]);
+        assert!(nearly.is_gray(0.02));
+        assert!(!nearly.is_gray(0.005));
+        assert!(!two_splats(vec![0.5, f32::NAN, 0.5, 1.0, 1.0, 1.0]).is_gray(1.0));
+        assert!(nearly.to_luma().is_gray(0.0));
+    }
+}

@@ -1,0 +1,159 @@
+//! The header of a PLY file and where its numbers lie.
+
+use super::{CENTER, PlyError, SHAPE, degree_of_rest_count, sh_names};
+use ply_rs_bw::parser::{Parser, Reader};
+use ply_rs_bw::ply::{DefaultElement, ElementDef, Header, PropertyType, ScalarType};
+use std::io::{BufRead, Read};
+use std::path::Path;
+
+/// Longest header that is read. A splat header takes 2 KiB; a file without
+/// `end_header` must not be read to its end.
+const MAX_HEADER_BYTES: u64 = 64 * 1024;
+
+/// Which numbers of a vertex make a Gaussian.
+pub(super) struct VertexLayout {
+    /// SH degree.
+    pub degree: u32,
+    /// For each needed number, in the order centre, SH, shape: the place among
+    /// the vertex's properties.
+    pub columns: Vec<usize>,
+    /// Types of all properties of a vertex, in file order.
+    pub types: Vec<ScalarType>,
+}
+
+/// Reads up to and including the line `end_header`.
+///
+/// The header is cut out before it is parsed so that its length is bounded and
+/// comments in any text encoding do no harm.
+pub(super) fn read_header(path: &Path, file: &mut impl BufRead) -> Result<Header, PlyError> {
+    let wrong = |reason: String| PlyError::Header {
+        path: path.to_path_buf(),
+        reason,
+    };
+    let mut bytes = Vec::new();
+    let mut limited = file.take(MAX_HEADER_BYTES);
+    loop {
+        let start = bytes.len();
+        let read = limited.read_until(b'\n', &mut bytes);
+        read.map_err(PlyError::io(path))?;
+        let line = bytes[start..].trim_ascii();
+        if start == 0 && line != b"ply" {
+            return Err(wrong("the first line is not \"ply\"".into()));
+        }
+        if line == b"end_header" {
+            break;
+        }
+        if bytes.len() == start {
+            return Err(wrong(format!(
+                "no line \"end_header\" within {} KiB",
+                MAX_HEADER_BYTES / 1024
+            )));
+        }
+    }
+
+    let text = String::from_utf8_lossy(&bytes);
+    let header = Parser::<DefaultElement>::new()
+        .read_header(&mut Reader::new(text.as_bytes()))
+        .map_err(|error| {
+            wrong(match error.line() {
+                Some(number) => {
+                    let line = text.lines().nth(number - 1).unwrap_or_default();
+                    format!("line {number}: \"{}\"", line.trim())
+                }
+                None => error.to_string(),
+            })
+        })?;
+
+    // The parser keeps one of two elements or properties with the same name,
+    // which would shift every number after it.
+    let lines_of = |word: &str| {
+        let first_words = text.lines().map(|line| line.split_whitespace().next());
+        first_words.filter(|first| *first == Some(word)).count()
+    };
+    let properties: usize = header.elements.values().map(|e| e.properties.len()).sum();
+    if lines_of("element") != header.elements.len() || lines_of("property") != properties {
+        return Err(wrong("two elements or properties have one name".into()));
+    }
+    Ok(header)
+}
+
+impl VertexLayout {
+    /// Finds the properties of a Gaussian among those of the vertex element.
+    pub fn new(path: &Path, vertex: &ElementDef) -> Result<Self, PlyError> {
+        let properties = &vertex.properties;
+        if properties.contains_key("packed_position") {
+            return Err(PlyError::Compressed {
+                path: path.to_path_buf(),
+            });
+        }
+        let types = properties
+            .values()
+            .map(|property| match &property.data_type {
+                PropertyType::Scalar(scalar) => Ok(scalar.clone()),
+                PropertyType::List(..) => Err(PlyError::Header {
+                    path: path.to_path_buf(),
+                    reason: format!("vertex property \"{}\" is a list", property.name),
+                }),
+            });
+        let types = types.collect::<Result<_, _>>()?;
+
+        let is_rest = |name: &&String| name.starts_with("f_rest_");
+        let count = properties.keys().filter(is_rest).count();
+        let degree = degree_of_rest_count(count).ok_or_else(|| PlyError::RestCount {
+            path: path.to_path_buf(),
+            count,
+        })?;
+
+        let names = CENTER.into_iter().map(String::from);
+        let names = names.chain(sh_names(degree));
+        let names = names.chain(SHAPE.into_iter().map(String::from));
+        let columns = names.map(|property| {
+            let column = properties.get_index_of(&property);
+            column.ok_or_else(|| PlyError::MissingProperty {
+                path: path.to_path_buf(),
+                property,
+            })
+        });
+        Ok(Self {
+            degree,
+            columns: columns.collect::<Result<_, _>>()?,
+            types,
+        })
+    }
+}
+
+/// Bytes of a number in a binary file.
+pub(super) fn byte_size(scalar: &ScalarType) -> usize {
+    match scalar {
+        ScalarType::Char | ScalarType::UChar => 1,
+        ScalarType::Short | ScalarType::UShort => 2,
+        ScalarType::Int | ScalarType::UInt | ScalarType::Float => 4,
+        ScalarType::Double => 8,
+    }
+}
+
+/// Reads the number at the start of `bytes`, which hold at least its size.
+#[inline]
+pub(super) fn decode(scalar: &ScalarType, big_endian: bool, bytes: &[u8]) -> f64 {
+    macro_rules! number {
+        ($type:ty) => {{
+            let mut buffer = [0; size_of::<$type>()];
+            buffer.copy_from_slice(&bytes[..size_of::<$type>()]);
+            if big_endian {
+                <$type>::from_be_bytes(buffer) as f64
+            } else {
+                <$type>::from_le_bytes(buffer) as f64
+            }
+        }};
+    }
+    match scalar {
+        ScalarType::Char => number!(i8),
+        ScalarType::UChar => number!(u8),
+        ScalarType::Short => number!(i16),
+        ScalarType::UShort => number!(u16),
+        ScalarType::Int => number!(i32),
+        ScalarType::UInt => number!(u32),
+        ScalarType::Float => number!(f32),
+        ScalarType::Double => number!(f64),
+    }
+}

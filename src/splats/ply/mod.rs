@@ -1,0 +1,58 @@
+//! Splat files: the `.ply` layout of the 3D Gaussian Splatting reference
+//! implementation, which every viewer reads.
+//!
+//! A vertex is a Gaussian: `x y z` (centre), `f_dc_0..2` and `f_rest_*` (SH of
+//! red, green, blue), `opacity` (logit), `scale_0..2` (natural logarithms of
+//! the standard deviations), `rot_0..3` (quaternion w x y z). Normals are
+//! written as zeros because some readers expect them.
+
+mod error;
+mod header;
+mod read;
+mod write;
+
+pub use error::PlyError;
+pub use read::{ReadSplats, read_ply};
+pub use write::write_ply;
+
+use super::sh::{MAX_DEGREE, coefficient_count};
+
+/// Colour channels of a splat file.
+const CHANNELS: usize = 3;
+
+/// Properties before the SH: centre and normal.
+const NORMALS: [&str; 3] = ["nx", "ny", "nz"];
+const CENTER: [&str; 3] = ["x", "y", "z"];
+
+/// Properties after the SH.
+const SHAPE: [&str; 8] = [
+    "opacity", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3",
+];
+
+/// Names of the SH properties at a degree: `f_dc_0..2`, then `f_rest_*`.
+fn sh_names(degree: u32) -> impl Iterator<Item = String> {
+    let dc = (0..CHANNELS).map(|c| format!("f_dc_{c}"));
+    dc.chain((0..rest_count(degree)).map(|i| format!("f_rest_{i}")))
+}
+
+/// How many `f_rest_*` properties a degree has: 0, 9, 24 or 45.
+fn rest_count(degree: u32) -> usize {
+    CHANNELS * (coefficient_count(degree) - 1)
+}
+
+/// The degree that has `count` properties `f_rest_*`.
+fn degree_of_rest_count(count: usize) -> Option<u32> {
+    (0..=MAX_DEGREE).find(|&degree| rest_count(degree) == count)
+}
+
+/// Where coefficient `(k, channel)` of one Gaussian stands among the SH
+/// properties: `f_rest_*` holds all coefficients of red, then green, then blue.
+fn sh_position(degree: u32, k: usize, channel: usize) -> usize {
+    match k {
+        0 => channel,
+        k => CHANNELS + channel * (coefficient_count(degree) - 1) + k - 1,
+    }
+}
+
+#[cfg(test)]
+mod tests;

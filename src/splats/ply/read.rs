@@ -1,0 +1,271 @@
+//! Reading splat files of any make.
+
+use super::header::{VertexLayout, byte_size, decode, read_header};
+use super::{CHANNELS, PlyError, sh_position};
+use crate::splats::{ShField, Splats, sh::coefficient_count};
+use ply_rs_bw::ply::{ElementDef, Encoding, PropertyType, ScalarType};
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, ErrorKind, Read};
+use std::path::Path;
+
+/// Bytes of the body that are read at once.
+const CHUNK_BYTES: usize = 1 << 20;
+
+/// Norm below which a quaternion has no direction.
+const MIN_QUATERNION_NORM: f64 = 1e-12;
+
+/// What a splat file holds.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ReadSplats {
+    /// The Gaussians, with an RGB field. Quaternions are as in the file, not
+    /// necessarily of unit length.
+    pub splats: Splats,
+    /// Gaussians that were left out because a number was not finite or the
+    /// quaternion zero. Viewers draw nothing sensible for those.
+    pub skipped: usize,
+}
+
+/// Reads an uncompressed 3D Gaussian Splatting `.ply` file.
+///
+/// Text or binary of either byte order; properties in any order and of any
+/// type; further properties and elements are ignored. Numbers are rounded to
+/// f32.
+///
+/// # Errors
+/// A [`PlyError`] where the header is damaged or longer than 64 KiB, a property
+/// is missing, the number of `f_rest_*` fits no degree, or the file is shorter
+/// than its header says (found out before memory is taken for it).
+pub fn read_ply(path: &Path) -> Result<ReadSplats, PlyError> {
+    let file = File::open(path).map_err(PlyError::io(path))?;
+    let file_bytes = file.metadata().map_err(PlyError::io(path))?.len();
+    let mut file = BufReader::with_capacity(CHUNK_BYTES, file);
+    let header = read_header(path, &mut file)?;
+    let mut body = Body {
+        path,
+        encoding: header.encoding,
+        file,
+        line: String::new(),
+    };
+
+    for element in header.elements.values() {
+        if element.name != "vertex" {
+            body.skip(element)?;
+            continue;
+        }
+        let layout = VertexLayout::new(path, element)?;
+        let sizes = layout.types.iter().map(byte_size);
+        let min_row_bytes = match header.encoding {
+            // A digit and a separator each.
+            Encoding::Ascii => 2 * layout.types.len(),
+            _ => sizes.sum(),
+        };
+        // One byte of grace: the last line of a text file may lack its end.
+        if element.count as u128 * min_row_bytes as u128 > u128::from(file_bytes) + 1 {
+            return Err(body.truncated(element));
+        }
+        return body.read_vertices(element, &layout);
+    }
+    Err(PlyError::MissingProperty {
+        path: path.to_path_buf(),
+        property: "x".into(),
+    })
+}
+
+/// The numbers after the header.
+struct Body<'a> {
+    path: &'a Path,
+    encoding: Encoding,
+    file: BufReader<File>,
+    line: String,
+}
+
+impl Body<'_> {
+    fn truncated(&self, element: &ElementDef) -> PlyError {
+        PlyError::Truncated {
+            path: self.path.to_path_buf(),
+            element: element.name.clone(),
+            announced: element.count,
+        }
+    }
+
+    /// Names the file, and the element where the file ended too early.
+    fn failed(&self, element: &ElementDef, source: io::Error) -> PlyError {
+        match source.kind() {
+            ErrorKind::UnexpectedEof => self.truncated(element),
+            _ => PlyError::io(self.path)(source),
+        }
+    }
+
+    /// The next line of a text file.
+    fn next_line(&mut self, element: &ElementDef, index: usize) -> Result<&str, PlyError> {
+        self.line.clear();
+        match self.file.read_line(&mut self.line) {
+            Ok(0) => Err(self.truncated(element)),
+            Ok(_) => Ok(&self.line),
+            Err(error) if error.kind() == ErrorKind::InvalidData => {
+                Err(self.bad_row(element, index))
+            }
+            Err(error) => Err(self.failed(element, error)),
+        }
+    }
+
+    fn bad_row(&self, element: &ElementDef, index: usize) -> PlyError {
+        PlyError::Row {
+            path: self.path.to_path_buf(),
+            element: element.name.clone(),
+            index,
+        }
+    }
+
+    /// Passes over an element that stands before the vertices.
+    fn skip(&mut self, element: &ElementDef) -> Result<(), PlyError> {
+        if element.properties.is_empty() {
+            return Ok(());
+        }
+        for index in 0..element.count {
+            if self.encoding == Encoding::Ascii {
+                self.next_line(element, index)?;
+                continue;
+            }
+            for property in element.properties.values() {
+                let bytes = match &property.data_type {
+                    PropertyType::Scalar(scalar) => byte_size(scalar) as u64,
+                    PropertyType::List(length, scalar) => {
+                        let length = self.read_number(element, length)?;
+                        if !(length >= 0.0 && length.fract() == 0.0) {
+                            return Err(self.bad_row(element, index));
+                        }
+                        length as u64 * byte_size(scalar) as u64
+                    }
+                };
+                let skipped = io::copy(&mut (&mut self.file).take(bytes), &mut io::sink());
+                if skipped.map_err(|error| self.failed(element, error))? < bytes {
+                    return Err(self.truncated(element));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn read_number(&mut self, element: &ElementDef, kind: &ScalarType) -> Result<f64, PlyError> {
+        let mut buffer = [0; 8];
+        let read = self.file.read_exact(&mut buffer[..byte_size(kind)]);
+        read.map_err(|error| self.failed(element, error))?;
+        Ok(decode(kind, self.big_endian(), &buffer))
+    }
+
+    fn big_endian(&self) -> bool {
+        self.encoding == Encoding::BinaryBigEndian
+    }
+
+    fn read_vertices(
+        mut self,
+        element: &ElementDef,
+        layout: &VertexLayout,
+    ) -> Result<ReadSplats, PlyError> {
+        let mut collected = Collector::with_capacity(element.count, layout.degree);
+        let mut needed = vec![0.0; layout.columns.len()];
+        if self.encoding == Encoding::Ascii {
+            let mut row = Vec::new();
+            for index in 0..element.count {
+                row.clear();
+                let words = self.next_line(element, index)?.split_ascii_whitespace();
+                row.extend(words.map_while(|word| word.parse::<f64>().ok()));
+                if row.len() != layout.types.len() {
+                    return Err(self.bad_row(element, index));
+                }
+                for (value, &column) in needed.iter_mut().zip(&layout.columns) {
+                    *value = row[column] as f32;
+                }
+                collected.push(&needed);
+            }
+            return Ok(collected.finish());
+        }
+
+        // For each number of a Gaussian: where it lies in a row, and its type.
+        let mut stride = 0;
+        let mut offsets = Vec::with_capacity(layout.types.len());
+        for kind in &layout.types {
+            offsets.push(stride);
+            stride += byte_size(kind);
+        }
+        let place = |&column: &usize| (offsets[column], layout.types[column].clone());
+        let places: Vec<_> = layout.columns.iter().map(place).collect();
+
+        let big_endian = self.big_endian();
+        let chunk_rows = (CHUNK_BYTES / stride).clamp(1, element.count.max(1));
+        let mut buffer = vec![0; chunk_rows * stride];
+        let mut remaining = element.count;
+        while remaining > 0 {
+            let rows = remaining.min(chunk_rows);
+            let chunk = &mut buffer[..rows * stride];
+            let read = self.file.read_exact(chunk);
+            read.map_err(|error| self.failed(element, error))?;
+            for row in chunk.chunks_exact(stride) {
+                for (value, (offset, kind)) in needed.iter_mut().zip(&places) {
+                    *value = decode(kind, big_endian, &row[*offset..]) as f32;
+                }
+                collected.push(&needed);
+            }
+            remaining -= rows;
+        }
+        Ok(collected.finish())
+    }
+}
+
+/// Sorts the numbers of each Gaussian into the arrays.
+struct Collector {
+    read: ReadSplats,
+    /// For each coefficient of the field its place among the SH properties.
+    sh_positions: Vec<usize>,
+}
+
+impl Collector {
+    fn with_capacity(count: usize, degree: u32) -> Self {
+        let sh_positions: Vec<usize> = (0..coefficient_count(degree))
+            .flat_map(|k| (0..CHANNELS).map(move |channel| sh_position(degree, k, channel)))
+            .collect();
+        let splats = Splats {
+            means: Vec::with_capacity(count),
+            quats: Vec::with_capacity(count),
+            log_scales: Vec::with_capacity(count),
+            opacity_logits: Vec::with_capacity(count),
+            sh: ShField {
+                degree,
+                channels: CHANNELS,
+                coefficients: Vec::with_capacity(count * sh_positions.len()),
+            },
+        };
+        Self {
+            read: ReadSplats { splats, skipped: 0 },
+            sh_positions,
+        }
+    }
+
+    /// `values` hold centre, SH and shape in this order.
+    fn push(&mut self, values: &[f32]) {
+        let (center, rest) = values.split_at(3);
+        let (sh, shape) = rest.split_at(self.sh_positions.len());
+        let quaternion = [shape[4], shape[5], shape[6], shape[7]];
+        let norm = quaternion
+            .iter()
+            .map(|&q| f64::from(q).powi(2))
+            .sum::<f64>()
+            .sqrt();
+        if !values.iter().all(|value| value.is_finite()) || norm < MIN_QUATERNION_NORM {
+            self.read.skipped += 1;
+            return;
+        }
+        let splats = &mut self.read.splats;
+        splats.means.push([center[0], center[1], center[2]]);
+        splats.opacity_logits.push(shape[0]);
+        splats.log_scales.push([shape[1], shape[2], shape[3]]);
+        splats.quats.push(quaternion);
+        let coefficients = self.sh_positions.iter().map(|&position| sh[position]);
+        splats.sh.coefficients.extend(coefficients);
+    }
+
+    fn finish(self) -> ReadSplats {
+        self.read
+    }
+}

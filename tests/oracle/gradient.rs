@@ -1,0 +1,161 @@
+//! Gradients of a picture by dual numbers: forward code only.
+//!
+//! The scalar is `Σ_p Σ_c v[p][c] · out[p][c]`. One parameter at a time is
+//! seeded, and only pixels to which its Gaussian contributes are blended
+//! again, with only the splats that contribute there. That leaves nothing
+//! out: decisions depend on real parts, so what was skipped stays skipped.
+//!
+//! To leave out pixels near a discontinuity, set their `v` to zero.
+
+use super::blend::{ScreenSplat, blend_pixel, pixel_centre};
+use super::render::{to_screen, visible};
+use super::scene::{Scene, View};
+use super::shade::Shading;
+use super::{lift, seed};
+use num_dual::Dual64;
+
+/// Derivatives with respect to what blending takes of one Gaussian.
+/// `conic[1]` is that of the one off-diagonal number.
+pub type ScreenGradient<const C: usize> = ScreenSplat<f64, C>;
+
+/// A rendered view, ready to be differentiated.
+struct Tape<'a, const C: usize> {
+    view: &'a View,
+    upstream: &'a [[f64; C]],
+    /// Scene indices by depth.
+    order: Vec<usize>,
+    /// The same splats as dual constants.
+    splats: Vec<ScreenSplat<Dual64, C>>,
+    /// Per pixel, positions in `order` that contribute.
+    contributors: Vec<Vec<usize>>,
+    /// Per position in `order`, the pixels it contributes to.
+    pixels: Vec<Vec<usize>>,
+}
+
+impl<'a, const C: usize> Tape<'a, C> {
+    fn record(
+        scene: &Scene<f64, C>,
+        view: &'a View,
+        shading: Shading,
+        upstream: &'a [[f64; C]],
+    ) -> Self {
+        assert_eq!(upstream.len(), view.width * view.height);
+        let list = visible(scene, view, shading);
+        let mut contributors = Vec::new();
+        let mut pixels = vec![Vec::new(); list.len()];
+        for index in 0..upstream.len() {
+            let [x, y] = pixel_centre(index, view.width);
+            let pixel = blend_pixel(list.iter().map(|v| &v.splat), x, y);
+            for &position in &pixel.contributors {
+                pixels[position].push(index);
+            }
+            contributors.push(pixel.contributors);
+        }
+        Self {
+            view,
+            upstream,
+            order: list.iter().map(|v| v.index).collect(),
+            splats: list.iter().map(|v| lift_splat(&v.splat)).collect(),
+            contributors,
+            pixels,
+        }
+    }
+
+    /// The scalar's derivative along that of `varied`, which stands at `position`.
+    fn derivative(&self, position: usize, varied: &ScreenSplat<Dual64, C>) -> f64 {
+        let mut sum = 0.0;
+        for &index in &self.pixels[position] {
+            let [x, y] = pixel_centre(index, self.view.width);
+            let splats = self.contributors[index].iter().map(|&other| {
+                if other == position {
+                    varied
+                } else {
+                    &self.splats[other]
+                }
+            });
+            let pixel = blend_pixel(splats, x, y);
+            for (v, out) in self.upstream[index].iter().zip(pixel.colour) {
+                sum += v * out.eps;
+            }
+        }
+        sum
+    }
+}
+
+fn lift_splat<const C: usize>(splat: &ScreenSplat<f64, C>) -> ScreenSplat<Dual64, C> {
+    ScreenSplat {
+        mean2d: splat.mean2d.map(lift),
+        conic: splat.conic.map(lift),
+        opacity: lift(splat.opacity),
+        colour: splat.colour.map(lift),
+    }
+}
+
+fn zero_splat<const C: usize>() -> ScreenGradient<C> {
+    ScreenSplat {
+        mean2d: [0.0; 2],
+        conic: [0.0; 3],
+        opacity: 0.0,
+        colour: [0.0; C],
+    }
+}
+
+fn splat_fields<T, const C: usize>(splat: &mut ScreenSplat<T, C>) -> impl Iterator<Item = &mut T> {
+    (splat.mean2d.iter_mut())
+        .chain(&mut splat.conic)
+        .chain(std::iter::once(&mut splat.opacity))
+        .chain(&mut splat.colour)
+}
+
+/// The gradient with respect to every parameter, in the shape of the scene;
+/// zero for Gaussians that are culled. `upstream` is v, `[height · width][C]`.
+pub fn gradient<const C: usize>(
+    scene: &Scene<f64, C>,
+    view: &View,
+    shading: Shading,
+    upstream: &[[f64; C]],
+) -> Scene<f64, C> {
+    let tape = Tape::record(scene, view, shading, upstream);
+    let mut rows: Vec<_> = (0..scene.len())
+        .map(|i| {
+            let mut row = scene.gaussian(i);
+            row.parameters_mut().for_each(|p| *p = 0.0);
+            row
+        })
+        .collect();
+    for (position, &index) in tape.order.iter().enumerate() {
+        let constant = scene.gaussian(index).to_dual();
+        for (parameter, slot) in rows[index].parameters_mut().enumerate() {
+            let mut varied = constant.clone();
+            if let Some(value) = varied.parameters_mut().nth(parameter) {
+                *value = seed(value.re);
+            }
+            if let Ok((_, splat)) = to_screen(&varied, view, shading) {
+                *slot = tape.derivative(position, &splat);
+            }
+        }
+    }
+    Scene::of(scene.degree, rows)
+}
+
+/// The gradient with respect to what blending takes of each Gaussian,
+/// `[N]`; zero for Gaussians that are culled.
+pub fn screen_gradient<const C: usize>(
+    scene: &Scene<f64, C>,
+    view: &View,
+    shading: Shading,
+    upstream: &[[f64; C]],
+) -> Vec<ScreenGradient<C>> {
+    let tape = Tape::record(scene, view, shading, upstream);
+    let mut result = vec![zero_splat(); scene.len()];
+    for (position, &index) in tape.order.iter().enumerate() {
+        for (field, slot) in splat_fields(&mut result[index]).enumerate() {
+            let mut varied = tape.splats[position];
+            if let Some(value) = splat_fields(&mut varied).nth(field) {
+                *value = seed(value.re);
+            }
+            *slot = tape.derivative(position, &varied);
+        }
+    }
+    result
+}

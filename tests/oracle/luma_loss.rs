@@ -1,0 +1,176 @@
+//! The luma loss: 0.8 · L1 + 0.2 · (1 - SSIM), averaged over the pixels.
+//!
+//! SSIM after Wang et al. 2004 with an 11×11 Gaussian window; outside the
+//! image the window meets zeros, as in the reference splat trainer.
+
+use super::constants::{SSIM_C1, SSIM_C2, SSIM_SIGMA, SSIM_WEIGHT, SSIM_WINDOW};
+use super::{Number, lift, seed};
+
+const RADIUS: usize = SSIM_WINDOW / 2;
+
+/// The window along one axis; sums to one.
+pub fn window() -> [f64; SSIM_WINDOW] {
+    let raw: [f64; SSIM_WINDOW] = std::array::from_fn(|i| {
+        let distance = i as f64 - RADIUS as f64;
+        (-distance * distance / (2.0 * SSIM_SIGMA * SSIM_SIGMA)).exp()
+    });
+    let sum: f64 = raw.iter().sum();
+    raw.map(|w| w / sum)
+}
+
+/// The pixels of a window around `centre` that lie in `0..size`.
+fn reach(centre: usize, size: usize) -> std::ops::Range<usize> {
+    centre.saturating_sub(RADIUS)..(centre + RADIUS + 1).min(size)
+}
+
+/// SSIM at one pixel. `x` and `y` are `[height · width]`.
+fn ssim_at<T: Number>(
+    x: impl Fn(usize) -> T,
+    y: &[f64],
+    [width, height]: [usize; 2],
+    pixel: usize,
+    window: &[f64; SSIM_WINDOW],
+) -> T {
+    let (column, row) = (pixel % width, pixel / width);
+    let [mut mean_x, mut xx, mut xy] = [T::zero(); 3];
+    let [mut mean_y, mut yy] = [0.0; 2];
+    for j in reach(row, height) {
+        for i in reach(column, width) {
+            let weight = window[i + RADIUS - column] * window[j + RADIUS - row];
+            let (a, b) = (x(j * width + i), y[j * width + i]);
+            mean_x += a * weight;
+            mean_y += b * weight;
+            xx += a * a * weight;
+            yy += b * b * weight;
+            xy += a * b * weight;
+        }
+    }
+    let variance_x = xx - mean_x * mean_x;
+    let variance_y = yy - mean_y * mean_y;
+    let covariance = xy - mean_x * mean_y;
+    let luminance =
+        (mean_x * mean_y * 2.0 + SSIM_C1) / (mean_x * mean_x + mean_y * mean_y + SSIM_C1);
+    let structure = (covariance * 2.0 + SSIM_C2) / (variance_x + variance_y + SSIM_C2);
+    luminance * structure
+}
+
+/// `|r|`, with slope zero at zero.
+fn absolute<T: Number>(r: T) -> T {
+    if r.re() > 0.0 {
+        r
+    } else if r.re() < 0.0 {
+        -r
+    } else {
+        r * 0.0
+    }
+}
+
+/// The map of SSIM of `x` against `y`, `[height · width]`.
+pub fn ssim_map<T: Number>(x: &[T], y: &[f64], width: usize, height: usize) -> Vec<T> {
+    let window = window();
+    (0..width * height)
+        .map(|pixel| ssim_at(|i| x[i], y, [width, height], pixel, &window))
+        .collect()
+}
+
+/// The loss of a rendered image `x` against a photo `y`, both `[height · width]`.
+pub fn luma_loss<T: Number>(x: &[T], y: &[f64], width: usize, height: usize) -> T {
+    let mut sum = T::zero();
+    for (pixel, ssim) in ssim_map(x, y, width, height).into_iter().enumerate() {
+        sum += absolute(x[pixel] - y[pixel]) * (1.0 - SSIM_WEIGHT);
+        sum += (T::one() - ssim) * SSIM_WEIGHT;
+    }
+    sum / (width * height) as f64
+}
+
+/// The loss's gradient with respect to `x`: each pixel in turn as a dual
+/// number, summed over the windows it lies in.
+pub fn luma_loss_gradient(x: &[f64], y: &[f64], width: usize, height: usize) -> Vec<f64> {
+    let window = window();
+    (0..width * height)
+        .map(|varied| {
+            let dual = |i: usize| if i == varied { seed(x[i]) } else { lift(x[i]) };
+            let mut sum = absolute(dual(varied) - y[varied]) * (1.0 - SSIM_WEIGHT);
+            for j in reach(varied / width, height) {
+                for i in reach(varied % width, width) {
+                    let ssim = ssim_at(dual, y, [width, height], j * width + i, &window);
+                    sum -= ssim * SSIM_WEIGHT;
+                }
+            }
+            sum.eps / (width * height) as f64
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::random::Random;
+    use super::*;
+
+    fn images(seed: u64, count: usize) -> [Vec<f64>; 2] {
+        let mut random = Random::new(seed);
+        [(); 2].map(|()| (0..count).map(|_| random.range(0.0, 1.0)).collect())
+    }
+
+    #[test]
+    fn window_is_normalised_and_symmetric() {
+        let w = window();
+        assert!((w.iter().sum::<f64>() - 1.0).abs() < 1e-15);
+        assert_eq!(w[0], w[10]);
+        assert!((w[5] / w[4] - (1.0 / 4.5_f64).exp()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn identical_images_have_no_loss_and_no_slope() {
+        let [x, _] = images(31, 20 * 17);
+        assert!(
+            ssim_map(&x, &x, 20, 17)
+                .iter()
+                .all(|s| (s - 1.0).abs() < 1e-12)
+        );
+        assert!(luma_loss(&x, &x, 20, 17).abs() < 1e-12);
+        let gradient = luma_loss_gradient(&x, &x, 20, 17);
+        assert!(gradient.iter().all(|g| g.abs() < 1e-12));
+    }
+
+    #[test]
+    fn constant_images_have_the_analytic_ssim() {
+        let (x, y) = (vec![0.3; 24 * 24], vec![0.6; 24 * 24]);
+        let inside = ssim_map(&x, &y, 24, 24)[12 * 24 + 12];
+        let expected = (2.0 * 0.18 + SSIM_C1) / (0.09 + 0.36 + SSIM_C1);
+        assert!((inside - expected).abs() < 1e-10);
+        // In the corner, six of eleven taps of each axis see the image.
+        let share: f64 = window()[5..].iter().sum::<f64>().powi(2);
+        let (a, b) = (0.3 * share, 0.6 * share);
+        let luminance = (2.0 * a * b + SSIM_C1) / (a * a + b * b + SSIM_C1);
+        let spread = share - share * share;
+        let structure = (2.0 * 0.18 * spread + SSIM_C2) / (0.45 * spread + SSIM_C2);
+        let corner = ssim_map(&x, &y, 24, 24)[0];
+        assert!((corner - luminance * structure).abs() < 1e-10);
+    }
+
+    #[test]
+    fn black_and_white_are_finite() {
+        for (x, y) in [(0.0, 0.0), (1.0, 1.0), (0.0, 1.0)] {
+            let (x, y): (Vec<f64>, Vec<f64>) = (vec![x; 144], vec![y; 144]);
+            assert!(luma_loss(&x, &y, 12, 12).is_finite());
+            let gradient = luma_loss_gradient(&x, &y, 12, 12);
+            assert!(gradient.iter().all(|g| g.is_finite()));
+        }
+    }
+
+    #[test]
+    fn gradient_agrees_with_finite_differences() {
+        let [x, y] = images(32, 16 * 13);
+        let gradient = luma_loss_gradient(&x, &y, 16, 13);
+        for pixel in [0, 5, 15, 90, 100, 207] {
+            let shifted = |by: f64| {
+                let mut x = x.clone();
+                x[pixel] += by;
+                luma_loss(&x, &y, 16, 13)
+            };
+            let difference = (shifted(1e-6) - shifted(-1e-6)) / 2e-6;
+            assert!((difference - gradient[pixel]).abs() < 1e-9);
+        }
+    }
+}
