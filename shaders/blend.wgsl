@@ -1,9 +1,10 @@
-// Front-to-back blending, one thread a pixel, one workgroup a tile. All threads
-// of a tile read the same Gaussian at the same time, so no staging is needed.
+// Front-to-back blending. A workgroup draws a tile, a thread four pixels of a
+// column; all threads read the same Gaussian at the same time, so nothing is staged.
 import package::common::color::Color;
-import package::common::constants::{ALPHA_MAX, ALPHA_MIN, TILE_SIDE, TRANSMITTANCE_MIN};
+import package::common::constants::{TILE_SIDE, TRANSMITTANCE_MIN};
 import package::common::numeric::linear_group;
-import package::common::projected::{Projected, power_at, raw_alpha};
+import package::common::projected::{Projected, raw_alpha};
+import package::common::quad::{Quad, contributes, pixel_of, powers, quad_alpha, weighted};
 import package::common::view::View;
 
 @group(0) @binding(0) var<uniform> view: View;
@@ -16,39 +17,42 @@ import package::common::view::View;
 // Instances of the tile up to and including the last that this pixel used.
 @group(0) @binding(7) var<storage, read_write> lasts: array<u32>;
 
-@compute @workgroup_size(TILE_SIDE, TILE_SIDE)
+@compute @workgroup_size(16, 4)
 fn blend(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_id) local: vec3u) {
     let tile = linear_group(group, groups);
     if tile >= view.tiles.x * view.tiles.y {
         return;
     }
-    let pixel = vec2u(tile % view.tiles.x, tile / view.tiles.x) * TILE_SIDE + local.xy;
-    let center = vec2f(pixel) + 0.5;
+    let first = vec2u(tile % view.tiles.x, tile / view.tiles.x) * TILE_SIDE + vec2u(local.x, local.y * 4u);
+    let rows = first.y + vec4u(0u, 1u, 2u, 3u);
+    let center = vec2f(first) + 0.5;
     let start = starts[tile];
     let end = starts[tile + 1u];
-    var color = Color();
-    var transmittance = 1.0;
-    var last = 0u;
-    var live = all(pixel < view.size);
-    for (var k = start; k < end && live; k++) {
+    var color = Quad();
+    var transmittance = vec4f(1.0);
+    var last = vec4u(0u);
+    let inside = vec4<bool>(first.x < view.size.x) & (rows < vec4u(view.size.y));
+    var live = inside;
+    for (var k = start; k < end && any(live); k++) {
         let i = instance_splats[slots[k]];
-        let splat = projected[i];
-        let power = power_at(splat.conic_opacity.xyz, center - splat.mean);
-        let alpha = min(ALPHA_MAX, raw_alpha(splat.conic_opacity.w, power));
-        if power >= 0.0 && alpha >= ALPHA_MIN {
-            let next = transmittance * (1.0 - alpha);
-            if next >= TRANSMITTANCE_MIN {
-                color += alpha * transmittance * colors[i];
-                transmittance = next;
-                last = k - start + 1u;
-            } else {
-                live = false;
-            }
-        }
+        let mean = projected[i].mean;
+        let conic_opacity = projected[i].conic_opacity;
+        let power = powers(conic_opacity.xyz, center - mean);
+        let alpha = quad_alpha(conic_opacity.w * exp(-power));
+        let next = transmittance * (1.0 - alpha);
+        let hit = contributes(power, alpha) & live;
+        let open = next >= vec4f(TRANSMITTANCE_MIN);
+        let used = hit & open;
+        color += weighted(select(vec4f(0.0), alpha * transmittance, used), colors[i]);
+        transmittance = select(transmittance, next, used);
+        last = select(last, vec4u(k - start + 1u), used);
+        live = live & (open | !hit);
     }
-    if all(pixel < view.size) {
-        let p = pixel.y * view.size.x + pixel.x;
-        image[p] = color;
-        lasts[p] = last;
+    for (var row = 0u; row < 4u; row++) {
+        if inside[row] {
+            let p = rows[row] * view.size.x + first.x;
+            image[p] = pixel_of(color, row);
+            lasts[p] = last[row];
+        }
     }
 }

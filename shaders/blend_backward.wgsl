@@ -1,22 +1,24 @@
-// The adjoint of `blend`, one lane a Gaussian instead of one thread a pixel.
+// The adjoint of `blend`: for each instance, the gradient with respect to its
+// colour and, where the geometry is trained, its centre, conic and opacity.
 //
-// A workgroup takes a tile's list in buckets. In a bucket each lane owns one
-// instance and walks over all pixels of the tile, one step behind the lane
-// before it, so that a pixel meets the instances in depth order. The pixel's
-// running state lies in workgroup memory; in any step no two lanes touch the
-// same pixel. Each lane sums its own Gaussian's gradient in registers in a
-// fixed order: no atomics, no reduction, the same bits every run.
+// A workgroup takes a tile, a thread eight pixels of a column, as two quads. The
+// instances come in batches: each thread adds up its own pixels' share of an
+// instance and leaves it in workgroup memory; when the batch is full, the
+// threads add up the shares, one figure each, in a fixed order. No atomics, no
+// subgroups, the same bits every run.
 //
-// Transmittance is recomputed front to back, as `blend` computed it; nothing is
+// Transmittance is recomputed front to back as `blend` computed it; nothing is
 // recovered by dividing by 1 - alpha.
-import package::common::color::{Color, color_dot};
-import package::common::constants::{ALPHA_MAX, ALPHA_MIN, TILE_PIXELS, TILE_SIDE};
+import package::common::color::{CHANNELS, Color, color_dot};
+import package::common::constants::{ALPHA_MAX, ALPHA_MIN, TILE_SIDE};
 import package::common::numeric::linear_group;
 import package::common::partials::{PARTIAL_COLOR, PARTIAL_STRIDE};
-import package::common::projected::{Projected, power_at, raw_alpha};
+import package::common::projected::Projected;
+import package::common::quad::{Quad, contributes, powers, quad_alpha};
 import package::common::view::View;
 
-const BUCKET: u32 = 32u;
+const THREADS: u32 = 32u;
+const BATCH: u32 = 16u;
 
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var<storage, read> starts: array<u32>;
@@ -31,115 +33,142 @@ const BUCKET: u32 = 32u;
 @if(geometry) @group(0) @binding(8) var<storage, read> colors: array<Color>;
 @if(geometry) @group(0) @binding(9) var<storage, read> image: array<Color>;
 
-var<workgroup> transmittance: array<f32, TILE_PIXELS>;
-// Gradient times the colour that is still to come behind the lane at work.
-@if(geometry) var<workgroup> remaining: array<f32, TILE_PIXELS>;
-var<workgroup> gradient: array<Color, TILE_PIXELS>;
-var<workgroup> pixel_last: array<u32, TILE_PIXELS>;
+// Shares of one batch, `[figure, instance, thread]`. A figure is a sum over
+// pixels: of dL/dpower times 1, dx, dy, dx², dx·dy, dy², then of the weighted
+// gradient, a channel each.
+var<workgroup> shares: array<f32, PARTIAL_STRIDE * BATCH * THREADS>;
 var<workgroup> tile_last: atomic<u32>;
 var<workgroup> uniform_last: u32;
 
-@compute @workgroup_size(BUCKET)
-fn blend_backward(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) lane: u32) {
+struct Pixels {
+    transmittance: vec4f,
+    // Gradient times the colour still to come, summed over the channels.
+    @if(geometry) remaining: vec4f,
+    gradient: Quad,
+    last: vec4u,
+}
+
+@if(luma) fn channel(quad: Quad, c: u32) -> vec4f { return quad; }
+@if(!luma) fn channel(quad: Quad, c: u32) -> vec4f { return quad[c]; }
+@if(luma) fn insert(quad: Quad, k: u32, color: Color) -> Quad { var q = quad; q[k] = color; return q; }
+@if(chroma) fn insert(quad: Quad, k: u32, color: Color) -> Quad { var q = quad; q[0][k] = color.x; q[1][k] = color.y; return q; }
+// The gradient of each pixel times one colour.
+@if(luma) fn shown(quad: Quad, color: Color) -> vec4f { return quad * color; }
+@if(chroma) fn shown(quad: Quad, color: Color) -> vec4f { return quad[0] * color.x + quad[1] * color.y; }
+
+fn load(first: vec2u) -> Pixels {
+    var pixels = Pixels();
+    pixels.transmittance = vec4f(1.0);
+    for (var k = 0u; k < 4u; k++) {
+        let at = first + vec2u(0u, k);
+        if all(at < view.size) {
+            let p = at.y * view.size.x + at.x;
+            pixels.gradient = insert(pixels.gradient, k, image_gradient[p]);
+            pixels.last[k] = lasts[p];
+            @if(geometry) { pixels.remaining[k] = color_dot(image_gradient[p], image[p]); }
+        }
+    }
+    return pixels;
+}
+
+// Adds one quad's share of an instance and moves the quad behind it. `d` is the
+// first pixel relative to the Gaussian's centre.
+fn accumulate(
+    figures: ptr<function, array<f32, PARTIAL_STRIDE>>,
+    pixels: ptr<function, Pixels>,
+    own: u32,
+    conic_opacity: vec4f,
+    d: vec2f,
+    @if(geometry) color: Color,
+) {
+    let power = powers(conic_opacity.xyz, d);
+    let raw = conic_opacity.w * exp(-power);
+    let alpha = quad_alpha(raw);
+    let before = (*pixels).transmittance;
+    let hit = contributes(power, alpha) & (vec4u(own) < (*pixels).last);
+    let weight = select(vec4f(0.0), alpha * before, hit);
+    for (var c = 0u; c < CHANNELS; c++) {
+        (*figures)[PARTIAL_COLOR + c] += dot(weight, channel((*pixels).gradient, c));
+    }
+    (*pixels).transmittance = select(before, before * (1.0 - alpha), hit);
+    @if(geometry) {
+        let contribution = shown((*pixels).gradient, color);
+        let behind = (*pixels).remaining - weight * contribution;
+        (*pixels).remaining = behind;
+        let v_alpha = before * contribution - behind / (1.0 - alpha);
+        // The cap on alpha passes no gradient.
+        let v_power = select(vec4f(0.0), -alpha * v_alpha, hit & (raw < vec4f(ALPHA_MAX)));
+        let rows = d.y + vec4f(0.0, 1.0, 2.0, 3.0);
+        let sum = v_power.x + v_power.y + v_power.z + v_power.w;
+        let sum_y = dot(v_power, rows);
+        (*figures)[0] += sum;
+        (*figures)[1] += sum * d.x;
+        (*figures)[2] += sum_y;
+        (*figures)[3] += sum * d.x * d.x;
+        (*figures)[4] += sum_y * d.x;
+        (*figures)[5] += dot(v_power, rows * rows);
+    }
+}
+
+@compute @workgroup_size(THREADS)
+fn blend_backward(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) thread: u32) {
     let tile = linear_group(group, groups);
     if tile >= view.tiles.x * view.tiles.y {
         return;
     }
-    let origin = vec2u(tile % view.tiles.x, tile / view.tiles.x) * TILE_SIDE;
-    if lane == 0u {
+    let first = vec2u(tile % view.tiles.x, tile / view.tiles.x) * TILE_SIDE + vec2u(thread % 16u, (thread / 16u) * 8u);
+    var upper = load(first);
+    var lower = load(first + vec2u(0u, 4u));
+    let most = max(upper.last, lower.last);
+    if thread == 0u {
         atomicStore(&tile_last, 0u);
     }
     workgroupBarrier();
-    for (var k = lane; k < TILE_PIXELS; k += BUCKET) {
-        let pixel = origin + vec2u(k % TILE_SIDE, k / TILE_SIDE);
-        pixel_last[k] = 0u;
-        if all(pixel < view.size) {
-            let p = pixel.y * view.size.x + pixel.x;
-            transmittance[k] = 1.0;
-            gradient[k] = image_gradient[p];
-            pixel_last[k] = lasts[p];
-            atomicMax(&tile_last, lasts[p]);
-            @if(geometry) { remaining[k] = color_dot(image_gradient[p], image[p]); }
-        }
-    }
+    atomicMax(&tile_last, max(max(most.x, most.y), max(most.z, most.w)));
     workgroupBarrier();
-    if lane == 0u {
+    if thread == 0u {
         uniform_last = atomicLoad(&tile_last);
     }
     let used = workgroupUniformLoad(&uniform_last);
     let start = starts[tile];
-    for (var first = 0u; first < used; first += BUCKET) {
-        let own = first + lane;
-        let live = own < used;
-        var slot = 0u;
-        var mean = vec2f();
-        var conic_opacity = vec4f();
-        @if(geometry) var color = Color();
-        if live {
-            slot = slots[start + own];
-            let i = instance_splats[slot];
-            mean = projected[i].mean - vec2f(origin) - 0.5;
-            conic_opacity = projected[i].conic_opacity;
-            @if(geometry) { color = colors[i]; }
-        }
-        var v_color = Color();
-        // Sums of dL/dpower times 1, dx, dy, dx², dx·dy, dy².
-        @if(geometry) var moment0 = 0.0;
-        @if(geometry) var moment1 = vec2f();
-        @if(geometry) var moment2 = vec3f();
-        for (var step = 0u; step < TILE_PIXELS + BUCKET - 1u; step++) {
-            // Wraps around before the lane's first pixel: then it is out of range too.
-            let k = step - lane;
-            if live && k < TILE_PIXELS {
-                if own < pixel_last[k] {
-                    let d = vec2f(vec2u(k % TILE_SIDE, k / TILE_SIDE)) - mean;
-                    let power = power_at(conic_opacity.xyz, d);
-                    let raw = raw_alpha(conic_opacity.w, power);
-                    let alpha = min(ALPHA_MAX, raw);
-                    if power >= 0.0 && alpha >= ALPHA_MIN {
-                        let before = transmittance[k];
-                        let weight = alpha * before;
-                        let g = gradient[k];
-                        v_color += weight * g;
-                        transmittance[k] = before * (1.0 - alpha);
-                        @if(geometry) {
-                            let shown = color_dot(g, color);
-                            let behind = remaining[k] - weight * shown;
-                            remaining[k] = behind;
-                            if raw < ALPHA_MAX {
-                                let v_alpha = before * shown - behind / (1.0 - alpha);
-                                let v_power = -alpha * v_alpha;
-                                moment0 += v_power;
-                                moment1 += v_power * d;
-                                moment2 += v_power * d.xxy * d.xyy;
-                            }
-                        }
-                    }
-                }
-            }
-            workgroupBarrier();
-        }
-        if live {
-            let at = slot * PARTIAL_STRIDE;
+    for (var batch = 0u; batch < used; batch += BATCH) {
+        let members = min(BATCH, used - batch);
+        for (var member = 0u; member < members; member++) {
+            let own = batch + member;
+            let i = instance_splats[slots[start + own]];
+            let conic_opacity = projected[i].conic_opacity;
+            let d = vec2f(first) + 0.5 - projected[i].mean;
+            @if(geometry) let color = colors[i];
+            var figures = array<f32, PARTIAL_STRIDE>();
             @if(geometry) {
-                let conic = conic_opacity.xyz;
-                partials[at] = -(conic.x * moment1.x + conic.y * moment1.y);
-                partials[at + 1u] = -(conic.y * moment1.x + conic.z * moment1.y);
-                partials[at + 2u] = 0.5 * moment2.x;
-                partials[at + 3u] = moment2.y;
-                partials[at + 4u] = 0.5 * moment2.z;
-                // A Gaussian whose colour is not finite has opacity 0 and no moments.
-                partials[at + 5u] = -moment0 / max(conic_opacity.w, ALPHA_MIN);
+                accumulate(&figures, &upper, own, conic_opacity, d, color);
+                accumulate(&figures, &lower, own, conic_opacity, d + vec2f(0.0, 4.0), color);
             }
-            let c = at + PARTIAL_COLOR;
-            @if(luma) { partials[c] = v_color; }
-            @if(chroma) { partials[c] = v_color.x; partials[c + 1u] = v_color.y; }
-            @if(rgb) { partials[c] = v_color.x; partials[c + 1u] = v_color.y; partials[c + 2u] = v_color.z; }
+            @if(!geometry) {
+                accumulate(&figures, &upper, own, conic_opacity, d);
+                accumulate(&figures, &lower, own, conic_opacity, d + vec2f(0.0, 4.0));
+            }
+            for (var c = 0u; c < PARTIAL_STRIDE; c++) {
+                shares[(c * BATCH + member) * THREADS + thread] = figures[c];
+            }
         }
+        workgroupBarrier();
+        for (var k = thread; k < PARTIAL_STRIDE * BATCH; k += THREADS) {
+            let member = k % BATCH;
+            var sum = 0.0;
+            // Start at different threads' shares, in an order fixed for each k.
+            for (var t = 0u; t < THREADS; t++) {
+                sum += shares[k * THREADS + (t + k) % THREADS];
+            }
+            if member < members {
+                partials[slots[start + batch + member] * PARTIAL_STRIDE + k / BATCH] = sum;
+            }
+        }
+        workgroupBarrier();
     }
     // Instances behind the last one used have no gradient, and must say so.
     let count = starts[tile + 1u] - start;
-    for (var own = used + lane; own < count; own += BUCKET) {
+    for (var own = used + thread; own < count; own += THREADS) {
         let at = slots[start + own] * PARTIAL_STRIDE;
         for (var c = 0u; c < PARTIAL_STRIDE; c++) {
             partials[at + c] = 0.0;

@@ -1,7 +1,10 @@
-// Sums the gradient records of a Gaussian's instances in emission order.
-import package::common::constants::{STATUS_INSTANCES, STATUS_VISIBLE};
+// Sums the gradient records of a Gaussian's instances in emission order, then
+// turns the moments of dL/dpower into the gradients of centre, conic and opacity:
+// power = ½(A dx² + C dy²) + B dx dy with d = pixel - centre, and alpha = opacity·exp(-power).
+import package::common::constants::{ALPHA_MIN, STATUS_INSTANCES, STATUS_VISIBLE};
 import package::common::numeric::linear_group;
 import package::common::partials::PARTIAL_STRIDE;
+@if(geometry) import package::common::projected::Projected;
 
 @group(0) @binding(0) var<storage, read> order: array<u32>;
 @group(0) @binding(1) var<storage, read> offsets: array<u32>;
@@ -9,6 +12,7 @@ import package::common::partials::PARTIAL_STRIDE;
 @group(0) @binding(3) var<storage, read> partials: array<f32>;
 // `[N, PARTIAL_STRIDE]`, written for visible Gaussians only.
 @group(0) @binding(4) var<storage, read_write> gradients: array<f32>;
+@if(geometry) @group(0) @binding(5) var<storage, read> projected: array<Projected>;
 
 @compute @workgroup_size(256)
 fn sum_instances(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
@@ -29,6 +33,17 @@ fn sum_instances(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) g
         }
     }
     let i = order[rank];
+    @if(geometry) {
+        let q = projected[i].conic_opacity;
+        let m = sum;
+        sum[0] = -(q.x * m[1] + q.y * m[2]);
+        sum[1] = -(q.y * m[1] + q.z * m[2]);
+        sum[2] = 0.5 * m[3];
+        sum[3] = m[4];
+        sum[4] = 0.5 * m[5];
+        // A Gaussian whose colour is not finite has opacity 0 and no moments.
+        sum[5] = -m[0] / max(q.w, ALPHA_MIN);
+    }
     for (var c = 0u; c < PARTIAL_STRIDE; c++) {
         gradients[i * PARTIAL_STRIDE + c] = sum[c];
     }

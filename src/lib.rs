@@ -4,6 +4,7 @@
 //! `raster` → `gpu` → `splats`, `capture`, `color`.
 
 pub mod capture;
+pub mod chroma;
 pub mod color;
 pub mod gpu;
 pub mod luma;

@@ -1,5 +1,5 @@
-// The gradient record of one Gaussian on the image plane: mean (2), conic (3),
-// opacity (1) where the geometry is trained, then the colour.
+// The gradient record of one Gaussian on the image plane: six figures for mean,
+// conic and opacity where the geometry is trained, then the colour.
 import package::common::color::CHANNELS;
 
 @if(geometry) const PARTIAL_COLOR: u32 = 6u;

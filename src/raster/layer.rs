@@ -138,6 +138,11 @@ impl Layer {
         recorder.dispatch(&kernels.blend, &self.blend, self.max_tiles as u32);
     }
 
+    /// tmp
+    pub fn record_shade(&self, raster: &Raster, recorder: &mut Recorder) {
+        let kernels = raster.layer(self.kind);
+        recorder.dispatch(&kernels.shade, &self.shade, groups_for(self.count));
+    }
     /// Reads the picture as `[pixels, channels]`.
     ///
     /// # Errors
@@ -218,16 +223,17 @@ impl LayerAdjoint {
             buffers.extend([layer.colors.raw(), layer.image.raw()]);
         }
         let blend = kernels.blend.bind(gpu, &buffers);
-        let sum = kernels.sum.bind(
-            gpu,
-            &[
-                lists.order().raw(),
-                lists.offsets.raw(),
-                lists.status.raw(),
-                partials.raw(),
-                gradients.raw(),
-            ],
-        );
+        let mut buffers = vec![
+            lists.order().raw(),
+            lists.offsets.raw(),
+            lists.status.raw(),
+            partials.raw(),
+            gradients.raw(),
+        ];
+        if with_geometry {
+            buffers.push(lists.projected.raw());
+        }
+        let sum = kernels.sum.bind(gpu, &buffers);
         let mut buffers = vec![
             lists.view.raw(),
             geometry.planes.raw(),

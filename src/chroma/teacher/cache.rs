@@ -1,0 +1,204 @@
+//! Answers of a network on disk, so that each photo is coloured once.
+
+use super::{AbImage, GrayImage, TeacherError};
+use npyz::{WriteOptions, WriterBuilder};
+use sha2::{Digest, Sha256};
+use std::fs::{self, File};
+use std::io::{self, Read, Write};
+use std::path::{Path, PathBuf};
+
+/// Part of every key; counts up when the meaning of an answer changes.
+const FORMAT_VERSION: u32 = 1;
+
+/// A folder of answers: `<key>.npy`, f32 `[2, h, w]`, a then b in CIELAB units
+/// at the network's own resolution.
+pub(super) struct Cache {
+    folder: PathBuf,
+}
+
+impl Cache {
+    /// Creates the folder where it is missing.
+    pub fn open(folder: &Path) -> Result<Self, TeacherError> {
+        fs::create_dir_all(folder).map_err(TeacherError::io(folder))?;
+        Ok(Self {
+            folder: folder.to_path_buf(),
+        })
+    }
+
+    fn path(&self, key: &str) -> PathBuf {
+        self.folder.join(format!("{key}.npy"))
+    }
+
+    /// The answer to a key; none where there is none or it is damaged.
+    pub fn load(&self, key: &str) -> Option<AbImage> {
+        decode(&fs::read(self.path(key)).ok()?)
+    }
+
+    /// Keeps an answer. The file appears when it is complete.
+    pub fn store(&self, key: &str, image: &AbImage) -> Result<(), TeacherError> {
+        let path = self.path(key);
+        let stored = || -> io::Result<()> {
+            let mut file = tempfile::NamedTempFile::new_in(&self.folder)?;
+            file.write_all(&encode(image)?)?;
+            file.persist(&path)?;
+            Ok(())
+        };
+        stored().map_err(TeacherError::io(&path))
+    }
+}
+
+/// What an answer depends on: the photo, the model and how it is asked.
+pub(super) fn key(photo: &GrayImage<'_>, model: &str, profile: &str, input: [u32; 2]) -> String {
+    let mut hash = Sha256::new();
+    hash.update(format!(
+        "gs-chroma teacher answer {FORMAT_VERSION}\n{model}\n{profile}\n{}x{}\n{}x{}\n",
+        input[0], input[1], photo.width, photo.height
+    ));
+    hash.update(photo.pixels);
+    hexadecimal(&hash.finalize())
+}
+
+/// SHA-256 of a file in hexadecimal.
+pub(super) fn hash_file(path: &Path) -> io::Result<String> {
+    let mut file = File::open(path)?;
+    let mut hash = Sha256::new();
+    let mut buffer = vec![0; 1 << 20];
+    loop {
+        let count = file.read(&mut buffer)?;
+        if count == 0 {
+            return Ok(hexadecimal(&hash.finalize()));
+        }
+        hash.update(&buffer[..count]);
+    }
+}
+
+fn hexadecimal(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+fn encode(image: &AbImage) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    let mut writer = WriteOptions::<f32>::new()
+        .default_dtype()
+        .shape(&[2, u64::from(image.height), u64::from(image.width)])
+        .writer(&mut bytes)
+        .begin_nd()?;
+    for channel in 0..2 {
+        writer.extend(image.ab.iter().map(|ab| ab[channel]))?;
+    }
+    writer.finish()?;
+    Ok(bytes)
+}
+
+/// Reads what [`encode`] writes and nothing else. The file is our own, so its
+/// header must be ours to the byte; any other is damage.
+fn decode(bytes: &[u8]) -> Option<AbImage> {
+    let header = String::from_utf8_lossy(&bytes[..bytes.len().min(128)]).into_owned();
+    let shape = header.split_once("(2,")?.1.split_once(')')?.0;
+    let mut sides = shape.split(',').map(|side| side.trim().parse::<u32>());
+    let (height, width) = (sides.next()?.ok()?, sides.next()?.ok()?);
+
+    let count = usize::try_from(u64::from(height) * u64::from(width)).ok()?;
+    let start = bytes.len().checked_sub(count.checked_mul(8)?)?;
+    let values: Vec<f32> = bytes[start..]
+        .as_chunks()
+        .0
+        .iter()
+        .map(|&four| f32::from_le_bytes(four))
+        .collect();
+    let (a, b) = values.split_at(count);
+    let image = AbImage {
+        width,
+        height,
+        ab: a.iter().zip(b).map(|(&a, &b)| [a, b]).collect(),
+    };
+    let finite = values.iter().all(|value| value.is_finite());
+    (count > 0 && finite && encode(&image).ok()? == bytes).then_some(image)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn image() -> AbImage {
+        AbImage {
+            width: 3,
+            height: 2,
+            ab: (0..6).map(|i| [i as f32, -0.5 * i as f32]).collect(),
+        }
+    }
+
+    #[test]
+    fn answers_are_npy_files_that_come_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let cache = Cache::open(&folder.path().join("a/b")).unwrap();
+        assert_eq!(cache.load("key"), None);
+        cache.store("key", &image()).unwrap();
+        assert_eq!(cache.load("key"), Some(image()));
+        assert_eq!(cache.load("other"), None);
+
+        let bytes = fs::read(folder.path().join("a/b/key.npy")).unwrap();
+        let file = npyz::NpyFile::new(&bytes[..]).unwrap();
+        assert_eq!(file.shape(), [2, 2, 3]);
+        let values: Vec<f32> = file.into_vec().unwrap();
+        assert_eq!(values[..6], [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
+        assert_eq!(values[6..], [0.0, -0.5, -1.0, -1.5, -2.0, -2.5]);
+    }
+
+    #[test]
+    fn damaged_answers_are_no_answers() {
+        let good = encode(&image()).unwrap();
+        let header = good.len() - 48;
+        assert_eq!(decode(&good), Some(image()));
+        for length in 0..good.len() {
+            assert_eq!(decode(&good[..length]), None, "{length}");
+        }
+        for position in 0..header {
+            let mut bad = good.clone();
+            bad[position] ^= 1;
+            assert_eq!(decode(&bad), None, "{position}");
+        }
+        let mut longer = good.clone();
+        longer.push(0);
+        assert_eq!(decode(&longer), None);
+        let mut infinite = good.clone();
+        infinite[header..header + 4].copy_from_slice(&f32::INFINITY.to_le_bytes());
+        assert_eq!(decode(&infinite), None);
+        let lie =
+            String::from_utf8_lossy(&good[..header]).replace("2, 3", "4294967295, 4294967295");
+        assert_eq!(decode(lie.as_bytes()), None);
+    }
+
+    #[test]
+    fn keys_change_with_everything_that_matters() {
+        let photo = |width, height, pixels| GrayImage {
+            width,
+            height,
+            pixels,
+        };
+        let base = photo(2, 1, &[1, 2]);
+        let keys = [
+            key(&base, "m", "p", [8, 8]),
+            key(&photo(2, 1, &[1, 3]), "m", "p", [8, 8]),
+            key(&photo(1, 2, &[1, 2]), "m", "p", [8, 8]),
+            key(&base, "n", "p", [8, 8]),
+            key(&base, "m", "q", [8, 8]),
+            key(&base, "m", "p", [8, 16]),
+        ];
+        for (i, key) in keys.iter().enumerate() {
+            assert_eq!(key.len(), 64);
+            assert!(!keys[..i].contains(key), "{i}");
+        }
+        assert_eq!(keys[0], key(&base, "m", "p", [8, 8]));
+    }
+
+    #[test]
+    fn the_hash_of_a_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("abc");
+        fs::write(&path, "abc").unwrap();
+        // FIPS 180-2, appendix B.1.
+        let expected = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
+        assert_eq!(hash_file(&path).unwrap(), expected);
+    }
+}

@@ -1,0 +1,137 @@
+//! What can go wrong with a teacher.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Why a teacher could not be opened or could not colour a photo.
+#[derive(Debug, thiserror::Error)]
+pub enum TeacherError {
+    /// The file system refused.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// The system's reason.
+        source: io::Error,
+    },
+    /// The path leads to something else.
+    #[error("{}: a teacher is an .onnx file or a folder of coloured images", path.display())]
+    NoTeacher {
+        /// The path.
+        path: PathBuf,
+    },
+    /// The shared library of ONNX Runtime is nowhere.
+    #[error(
+        "ONNX Runtime was not found: put its shared library, 1.17 or newer (lib/ in a release from \
+         https://github.com/microsoft/onnxruntime/releases, or onnxruntime/capi/ in the Python \
+         package) into {}, or let ORT_DYLIB_PATH name it", cache.display()
+    )]
+    NoRuntime {
+        /// The project's folder for it.
+        cache: PathBuf,
+    },
+    /// The shared library of ONNX Runtime does not load.
+    #[error("{}: not a usable ONNX Runtime library: {reason}", path.display())]
+    BadRuntime {
+        /// The library.
+        path: PathBuf,
+        /// The loader's reason.
+        reason: String,
+    },
+    /// ONNX Runtime does not take the model.
+    #[error("{}: not a usable ONNX model: {reason}", path.display())]
+    BadModel {
+        /// The `.onnx` file.
+        path: PathBuf,
+        /// The runtime's reason.
+        reason: String,
+    },
+    /// The model is no colorization network that is known here.
+    #[error("{}: no known colorization network: it has {found}; accepted: {accepted}", path.display())]
+    NoProfile {
+        /// The `.onnx` file.
+        path: PathBuf,
+        /// Its inputs and outputs.
+        found: String,
+        /// Those of the known networks.
+        accepted: String,
+    },
+    /// The network failed on a photo.
+    #[error("{}: failed on photo {photo}: {reason}", path.display())]
+    Network {
+        /// The `.onnx` file.
+        path: PathBuf,
+        /// The photo's name.
+        photo: String,
+        /// What happened.
+        reason: String,
+    },
+    /// The photo's pixels do not fill its size.
+    #[error("photo {photo}: {pixels} pixels do not make an image of {width} x {height}")]
+    BadPhoto {
+        /// The photo's name.
+        photo: String,
+        /// The photo's width.
+        width: u32,
+        /// The photo's height.
+        height: u32,
+        /// How many pixels there are.
+        pixels: usize,
+    },
+    /// The folder holds no image.
+    #[error("{}: holds no .png, .jpg or .jpeg image", path.display())]
+    EmptyFolder {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// Two images of the folder stand for one photo.
+    #[error("{} and {}: both would colour one photo; keep one of them", first.display(), second.display())]
+    TwoImages {
+        /// One image.
+        first: PathBuf,
+        /// The other.
+        second: PathBuf,
+    },
+    /// An image of the folder does not decode.
+    #[error("{}: not a readable image: {reason}", path.display())]
+    BadImage {
+        /// The image.
+        path: PathBuf,
+        /// The decoder's reason.
+        reason: String,
+    },
+    /// An image of the folder shows another cut of the photo.
+    #[error(
+        "{}: {} x {} has another aspect than photo {photo} of {} x {}; crop or pad it to the photo's",
+        path.display(), size[0], size[1], photo_size[0], photo_size[1]
+    )]
+    Aspect {
+        /// The image.
+        path: PathBuf,
+        /// Its width and height.
+        size: [u32; 2],
+        /// The photo's name.
+        photo: String,
+        /// The photo's width and height.
+        photo_size: [u32; 2],
+    },
+}
+
+impl TeacherError {
+    /// Names the file of an I/O error.
+    pub(super) fn io(path: &Path) -> impl FnOnce(io::Error) -> Self {
+        let path = path.to_path_buf();
+        move |source| Self::Io { path, source }
+    }
+}
+
+/// The first line of a message, for errors that have one line.
+pub(super) fn first_line(message: impl ToString) -> String {
+    let message = message.to_string();
+    message
+        .lines()
+        .next()
+        .unwrap_or_default()
+        .trim()
+        .to_string()
+}
