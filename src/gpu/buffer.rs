@@ -6,7 +6,8 @@ use bytemuck::Pod;
 
 use super::{Gpu, GpuError};
 
-/// A storage buffer of `len` elements of `T`, zeroed when made.
+/// A storage buffer of `len` elements of `T`, zeroed when made. Clones share it.
+#[derive(Clone)]
 pub struct Buffer<T> {
     raw: wgpu::Buffer,
     len: usize,

@@ -17,7 +17,7 @@ use super::{
 use crate::{
     capture::Camera,
     gpu::{Buffer, Gpu, GpuError, Readback, Recorder},
-    optimize::{Adam, AdamKernel, LossLog, SumLossKernel},
+    optimize::{Adam, AdamKernel, LossLog, SumLossKernel, view_at},
     raster::{
         Field, Geometry, Layer, LayerAdjoint, Lists, Raster, StatusReadback, ViewUniform,
         constants::*, download,
@@ -242,7 +242,7 @@ impl LumaTrainer {
 
     /// Records and submits one iteration.
     fn step(&self, iteration: usize) {
-        let index = self.view_at(iteration);
+        let index = view_at(self.settings.seed, self.cameras.len(), iteration);
         let workspace = &self.workspace;
         let view = ViewUniform::new(
             &self.cameras[index],
@@ -278,18 +278,6 @@ impl LumaTrainer {
             .adam_field
             .record(&self.gpu, adam, &mut recorder, step, &self.field_rates());
         recorder.submit();
-    }
-
-    /// The view of an iteration: every view once an epoch, in an order that the
-    /// seed and the epoch alone decide.
-    fn view_at(&self, iteration: usize) -> usize {
-        let views = self.cameras.len();
-        let (epoch, place) = (iteration / views, iteration % views);
-        let mut order: Vec<usize> = (0..views).collect();
-        // An odd multiplier keeps the epochs' seeds apart.
-        let seed = self.settings.seed ^ (epoch as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-        fastrand::Rng::with_seed(seed).shuffle(&mut order);
-        order[place]
     }
 
     fn geometry_rates(&self, iteration: usize) -> [f32; GEOMETRY_PLANES] {
@@ -464,7 +452,8 @@ impl Workspace {
         let gpu = &raster.gpu;
         let lists = Lists::new(raster, geometry, max_tiles, capacity)?;
         let layer = Layer::new(raster, geometry, &lists, field, max_pixels, max_tiles)?;
-        let adjoint = LayerAdjoint::new(raster, geometry, &lists, field, &layer)?;
+        let gradient = Buffer::zeros(gpu, "luma gradient", field.planes.len())?;
+        let adjoint = LayerAdjoint::new(raster, geometry, &lists, field, &layer, gradient)?;
         let log = LossLog::new(gpu, &kernels.sum_loss, &lists.status, max_tiles, SYNC_EVERY)?;
         let losses = photos
             .iter()

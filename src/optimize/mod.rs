@@ -1,7 +1,9 @@
-//! What both stages of training share: Adam and the log of losses.
+//! What both stages of training share: Adam, the log of losses, the order of views.
 
 mod adam;
 mod loss_log;
+mod order;
 
 pub use adam::{Adam, AdamKernel, AdamParameters};
 pub use loss_log::{LossLog, SumLossKernel, SumLossParameters};
+pub use order::view_at;

@@ -138,11 +138,6 @@ impl Layer {
         recorder.dispatch(&kernels.blend, &self.blend, self.max_tiles as u32);
     }
 
-    /// tmp
-    pub fn record_shade(&self, raster: &Raster, recorder: &mut Recorder) {
-        let kernels = raster.layer(self.kind);
-        recorder.dispatch(&kernels.shade, &self.shade, groups_for(self.count));
-    }
     /// Reads the picture as `[pixels, channels]`.
     ///
     /// # Errors
@@ -186,7 +181,8 @@ pub struct GeometryAdjoint {
 }
 
 impl LayerAdjoint {
-    /// The adjoint of `layer`.
+    /// The adjoint of `layer`; it writes the field's gradient to `field_gradient`,
+    /// which several adjoints may share.
     ///
     /// # Errors
     /// [`GpuError::TooLarge`].
@@ -196,6 +192,7 @@ impl LayerAdjoint {
         lists: &Lists,
         field: &Field,
         layer: &Layer,
+        field_gradient: Buffer<f32>,
     ) -> Result<Self, GpuError> {
         let gpu = &raster.gpu;
         let n = geometry.count;
@@ -204,7 +201,6 @@ impl LayerAdjoint {
         let image_gradient = Buffer::zeros(gpu, "image gradient", layer.image.len())?;
         let partials = Buffer::<f32>::zeros(gpu, "instance gradients", lists.capacity * record)?;
         let gradients = Buffer::<f32>::zeros(gpu, "projected gradients", n * record)?;
-        let field_gradient = Buffer::zeros(gpu, "field gradient", field.planes.len())?;
         let geometry_gradient = with_geometry
             .then(|| Buffer::<f32>::zeros(gpu, "geometry gradient", geometry.planes.len()))
             .transpose()?;

@@ -1,0 +1,135 @@
+//! From luma and chroma to the RGB harmonics that viewers blend.
+//!
+//! Viewers blend sRGB values; the native picture blends gray and a/b and
+//! converts afterwards. Gaussian by Gaussian, the colour at the mean gray is
+//! exact, and the harmonics of the gray become those of R, G and B through the
+//! slope of each channel over the range in which the gray varies.
+
+use crate::{
+    color::{gamut_map_lab, gray_to_lightness},
+    splats::{ShField, Splats, sh},
+};
+
+/// Bounds on half the range over which the slope is taken: below, rounding
+/// shows; above, the colour would no longer be that of this gray.
+const HALF_RANGE: [f64; 2] = [0.01, 0.25];
+
+/// RGB Gaussians that look like `luma` (one channel) with `chroma` (a, b).
+///
+/// # Panics
+/// When the two have not the same number of Gaussians.
+pub fn bake_rgb(luma: &Splats, chroma: &ShField) -> Splats {
+    let degree = luma.sh.degree.max(chroma.degree);
+    let mut rgb = ShField::zeros(luma.len(), degree, 3);
+    let stride = 3 * sh::coefficient_count(degree);
+    for (i, out) in rgb.coefficients.chunks_exact_mut(stride).enumerate() {
+        bake_one(luma.sh.of(i), chroma.of(i), out);
+    }
+    Splats {
+        sh: rgb,
+        ..luma.clone()
+    }
+}
+
+fn bake_one(luma: &[f32], chroma: &[f32], out: &mut [f32]) {
+    let at = |ab: [f64; 2], gray: f64| color(gray, ab);
+    let gray = 0.5 + sh::C0 * f64::from(luma[0]);
+    let ab = [chroma[0], chroma[1]].map(|c| sh::C0 * f64::from(c));
+    let mean = at(ab, gray);
+    // Parseval: the mean square over the sphere is the sum of squares over 4π.
+    let spread = |terms: &mut dyn Iterator<Item = f32>| {
+        let squares: f64 = terms.map(|c| f64::from(c).powi(2)).sum();
+        (squares / (4.0 * std::f64::consts::PI)).sqrt()
+    };
+    let half = spread(&mut luma[1..].iter().copied()).clamp(HALF_RANGE[0], HALF_RANGE[1]);
+    let (above, below) = (at(ab, gray + half), at(ab, gray - half));
+    for channel in 0..3 {
+        out[channel] = ((mean[channel] - 0.5) / sh::C0) as f32;
+        let slope = (above[channel] - below[channel]) / (2.0 * half);
+        for (k, &c) in luma.iter().enumerate().skip(1) {
+            out[3 * k + channel] += (slope * f64::from(c)) as f32;
+        }
+    }
+    for which in 0..2 {
+        let terms = || chroma.iter().copied().skip(2 + which).step_by(2);
+        // CIELAB steps of one unit are as small as a step needs to be.
+        let half = spread(&mut terms()).clamp(1.0, 10.0);
+        let moved = |by: f64| {
+            let mut ab = ab;
+            ab[which] += by;
+            at(ab, gray)
+        };
+        let (above, below) = (moved(half), moved(-half));
+        for (k, c) in terms().enumerate() {
+            for channel in 0..3 {
+                let slope = (above[channel] - below[channel]) / (2.0 * half);
+                out[3 * (k + 1) + channel] += (slope * f64::from(c)) as f32;
+            }
+        }
+    }
+}
+
+/// sRGB of a gray with a/b. Beyond black and white the excess stays gray, so
+/// that a Gaussian that overshoots in gray overshoots alike in colour.
+fn color(gray: f64, ab: [f64; 2]) -> [f64; 3] {
+    let shown = gray.clamp(0.0, 1.0);
+    gamut_map_lab([gray_to_lightness(shown), ab[0], ab[1]]).map(|v| v + gray - shown)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::color::lab_to_srgb;
+
+    fn one(luma: &[f32], chroma: &[f32], degrees: [u32; 2]) -> Vec<f32> {
+        let splats = Splats {
+            means: vec![[0.0; 3]],
+            quats: vec![[1.0, 0.0, 0.0, 0.0]],
+            log_scales: vec![[0.0; 3]],
+            opacity_logits: vec![0.0],
+            sh: ShField {
+                degree: degrees[0],
+                channels: 1,
+                coefficients: luma.to_vec(),
+            },
+        };
+        let chroma = ShField {
+            degree: degrees[1],
+            channels: 2,
+            coefficients: chroma.to_vec(),
+        };
+        bake_rgb(&splats, &chroma).sh.coefficients
+    }
+
+    #[test]
+    fn gray_stays_gray_with_all_its_harmonics() {
+        let luma = [0.3, 0.1, -0.2, 0.05];
+        let baked = one(&luma, &[0.0, 0.0], [1, 0]);
+        for (k, &c) in luma.iter().enumerate() {
+            for channel in 0..3 {
+                assert!((baked[3 * k + channel] - c).abs() < 1e-4, "{k} {channel}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_constant_colour_is_exact() {
+        let (gray, ab) = (0.55, [20.0, -30.0]);
+        let luma = [((gray - 0.5) / sh::C0) as f32];
+        let baked = one(&luma, &ab.map(|v| (v / sh::C0) as f32), [0, 0]);
+        let wanted = lab_to_srgb([gray_to_lightness(gray), ab[0], ab[1]]);
+        for channel in 0..3 {
+            let shown = 0.5 + sh::C0 * f64::from(baked[channel]);
+            assert!((shown - wanted[channel]).abs() < 1e-5);
+        }
+    }
+
+    #[test]
+    fn chroma_that_depends_on_the_direction_reaches_rgb() {
+        // a rises along basis function 2 (z): red rises with it, green falls.
+        let mut chroma = vec![0.0; 8];
+        chroma[2 * 2] = 10.0;
+        let baked = one(&[0.0], &chroma, [0, 1]);
+        assert!(baked[3 * 2] > 0.0 && baked[3 * 2 + 1] < 0.0);
+    }
+}

@@ -1,0 +1,141 @@
+//! One view at one scale: tile lists made once, drawn and pulled back many times.
+
+use super::loss::ChromaLossWeights;
+use crate::{
+    capture::Camera,
+    gpu::{Bindings, Buffer, GpuError, Kernel, Recorder},
+    optimize::LossLog,
+    raster::{Field, Geometry, Layer, LayerAdjoint, Lists, Raster, ViewUniform},
+};
+
+/// Threads of a workgroup of the loss.
+const LOSS_BLOCK: usize = 256;
+
+/// What all passes share.
+pub struct Shared {
+    /// The frozen geometry.
+    pub geometry: Geometry,
+    /// The chroma that is learnt.
+    pub field: Field,
+    /// Its gradient, written by whichever pass ran last.
+    pub gradient: Buffer<f32>,
+    /// The losses.
+    pub log: LossLog,
+    /// The loss kernel.
+    pub loss: Kernel,
+    /// Nearest depth shown, in world units.
+    pub near: f64,
+}
+
+/// One view at one scale.
+pub struct Pass {
+    /// The camera at this scale.
+    pub view: ViewUniform,
+    lists: Lists,
+    layer: Layer,
+    adjoint: LayerAdjoint,
+    loss: Bindings,
+    /// Whether the lists hold this view already.
+    listed: bool,
+}
+
+impl Pass {
+    /// A pass for `camera` towards the a/b in `wanted`. `coarser` is the pass of
+    /// the next coarser scale of the same view, if any.
+    ///
+    /// # Errors
+    /// [`GpuError`] when it does not fit.
+    pub fn new(
+        raster: &Raster,
+        shared: &Shared,
+        camera: &Camera,
+        wanted: &[[f32; 2]],
+        coarser: Option<&Self>,
+        agreement: f32,
+    ) -> Result<Self, GpuError> {
+        let gpu = &raster.gpu;
+        let geometry = &shared.geometry;
+        let view = ViewUniform::new(camera, shared.near, geometry.count, shared.field.degree);
+        let (pixels, tiles) = (view.pixel_count(), view.tile_count());
+        let lists = exact_lists(raster, geometry, &view)?;
+        let layer = Layer::new(raster, geometry, &lists, &shared.field, pixels, tiles)?;
+        let adjoint = LayerAdjoint::new(
+            raster,
+            geometry,
+            &lists,
+            &shared.field,
+            &layer,
+            shared.gradient.clone(),
+        )?;
+        let wanted = Buffer::from_slice(gpu, "wanted a/b", wanted)?;
+        let weights = Buffer::uniform(
+            gpu,
+            "chroma loss weights",
+            &ChromaLossWeights {
+                coarser_size: coarser.map_or([1, 1], |pass| pass.view.size),
+                teacher: 1.0,
+                agreement: coarser.map_or(0.0, |_| agreement),
+            },
+        )?;
+        let loss = shared.loss.bind(
+            gpu,
+            &[
+                lists.view.raw(),
+                layer.image.raw(),
+                wanted.raw(),
+                coarser.map_or(&layer, |pass| &pass.layer).image.raw(),
+                weights.raw(),
+                shared.log.block_losses.raw(),
+                adjoint.image_gradient.raw(),
+            ],
+        );
+        Ok(Self {
+            view,
+            lists,
+            layer,
+            adjoint,
+            loss,
+            listed: false,
+        })
+    }
+
+    /// Bytes on the device: the sum over the buffers of [`Lists`], [`Layer`] and
+    /// [`LayerAdjoint`] for each Gaussian, list entry and pixel.
+    pub fn bytes(&self) -> usize {
+        let splats = self.view.splat_count as usize;
+        80 * splats + 28 * self.lists.capacity + 28 * self.view.pixel_count()
+    }
+
+    /// Blocks of its loss.
+    pub fn blocks(&self) -> u32 {
+        self.view.pixel_count().div_ceil(LOSS_BLOCK) as u32
+    }
+
+    /// Records drawing, loss and adjoint.
+    pub fn record(&mut self, raster: &Raster, shared: &Shared, recorder: &mut Recorder) {
+        if !self.listed {
+            self.lists.set_view(&raster.gpu, &self.view);
+            self.lists.record(raster, recorder);
+            self.listed = true;
+        }
+        self.layer.record(raster, recorder);
+        recorder.dispatch(&shared.loss, &self.loss, self.blocks());
+        self.adjoint.record(raster, recorder);
+    }
+}
+
+/// Lists with just the room that this view needs; the geometry will not change.
+fn exact_lists(
+    raster: &Raster,
+    geometry: &Geometry,
+    view: &ViewUniform,
+) -> Result<Lists, GpuError> {
+    // Nothing fits into no room: the device counts what it would have needed.
+    let probe = Lists::new(raster, geometry, view.tile_count(), 0)?;
+    let mut recorder = Recorder::new(&raster.gpu);
+    probe.set_view(&raster.gpu, view);
+    probe.record(raster, &mut recorder);
+    recorder.submit();
+    let needed = probe.status(&raster.gpu)?.overflow.unwrap_or(0);
+    Lists::new(raster, geometry, view.tile_count(), needed)
+}
