@@ -5,10 +5,13 @@
 
 pub mod capture;
 pub mod chroma;
+pub mod cli;
 pub mod color;
 pub mod gpu;
 pub mod luma;
 pub mod measure;
 pub mod optimize;
 pub mod raster;
+pub mod report;
+pub mod run;
 pub mod splats;

@@ -4,8 +4,7 @@
 use std::{sync::Arc, time::Instant};
 
 use super::{
-    ChromaSettings,
-    loss,
+    ChromaSettings, loss,
     pass::{Pass, Shared},
     teacher::AbImage,
 };
@@ -90,7 +89,13 @@ impl Distiller {
             })
             .max()
             .unwrap_or(0);
-        let log = LossLog::new(&gpu, &sum_loss, &status, max_pixels.div_ceil(256), REPORT_EVERY)?;
+        let log = LossLog::new(
+            &gpu,
+            &sum_loss,
+            &status,
+            max_pixels.div_ceil(256),
+            REPORT_EVERY,
+        )?;
         let adam_kernel = AdamKernel::new(&gpu);
         let adam = Adam::new(
             &gpu,

@@ -73,20 +73,52 @@ pub fn random_scene<const C: usize>(
     count: usize,
     degree: usize,
 ) -> (Scene<f64, C>, View) {
-    let mut random = Random::new(seed);
     let view = oblique_view();
+    (random_scene_before(&view, seed, count, degree), view)
+}
+
+/// A view of some odd size, 17 to 80 pixels a side, from anywhere.
+pub fn random_view(seed: u64) -> View {
+    let mut random = Random::new(seed ^ 0x5eed);
+    let quat = random.array::<4>(-1.0, 1.0);
+    let norm = quat.iter().map(|q| q * q).sum::<f64>().sqrt();
+    let (width, height) = (
+        17 + random.bits() as usize % 64,
+        17 + random.bits() as usize % 64,
+    );
+    View {
+        rotation: rotation(quat.map(|q| q / norm)).map(|row| row.map(round)),
+        translation: random.array(-3.0, 3.0),
+        fx: random.range(40.0, 70.0),
+        fy: random.range(40.0, 70.0),
+        cx: width as f64 * random.range(0.4, 0.6),
+        cy: height as f64 * random.range(0.4, 0.6),
+        width,
+        height,
+        near: round(0.1),
+    }
+}
+
+/// As [`random_scene`], before another view.
+pub fn random_scene_before<const C: usize>(
+    view: &View,
+    seed: u64,
+    count: usize,
+    degree: usize,
+) -> Scene<f64, C> {
+    let mut random = Random::new(seed);
     let mut scene = Scene::empty(degree);
     let mut depths: Vec<f64> = Vec::new();
     while scene.len() < count {
         let depth = random.range(1.5, 6.0);
-        let gaussian = random_gaussian(&mut random, &view, depth, degree);
+        let gaussian = random_gaussian(&mut random, view, depth, degree);
         let apart = depths.iter().all(|d| (d / depth - 1.0).abs() > 1e-4);
-        if apart && gaussian.margin(&view, Shading::of_channels(C)) > 1e-3 {
+        if apart && gaussian.margin(view, Shading::of_channels(C)) > 1e-3 {
             depths.push(depth);
             scene.push(gaussian);
         }
     }
-    (scene, view)
+    scene
 }
 
 fn random_gaussian<const C: usize>(

@@ -1,0 +1,28 @@
+//! `gs-chroma export`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use crate::run::{RunError, export};
+
+/// Write a run's scene as a splat file in the photos' own coordinates.
+#[derive(Args)]
+pub struct Export {
+    /// Run folder [default: newest under runs/].
+    run: Option<PathBuf>,
+    /// Splat file to write.
+    #[arg(short, long, value_name = "FILE.ply")]
+    output: PathBuf,
+    /// Write the luminance although the scene is coloured.
+    #[arg(long)]
+    luma: bool,
+}
+
+impl Export {
+    pub(super) fn run(self) -> Result<(), RunError> {
+        let count = export(self.run.as_deref(), &self.output, self.luma)?;
+        println!("wrote {count} Gaussians to {}", self.output.display());
+        Ok(())
+    }
+}

@@ -1,0 +1,72 @@
+//! `gs-chroma fit`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::progress::Progress;
+use crate::run::{FitOptions, Preset, RunError, fit};
+
+/// Train geometry and luminance on a folder of photos with COLMAP poses.
+#[derive(Args)]
+pub struct Fit {
+    /// Folder with images/ and a COLMAP model (sparse/0, sparse or the folder itself).
+    colmap_dir: PathBuf,
+    /// Run folder to write [default: runs/<folder name>].
+    #[arg(short, long, value_name = "RUN")]
+    output: Option<PathBuf>,
+    /// How much work to put in [default: paper on a GPU, draft without one].
+    #[arg(long, value_enum)]
+    preset: Option<Preset>,
+    /// Luma iterations, instead of the preset's.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    iterations: Option<u32>,
+    /// Scale photos down until their longer side has this many pixels.
+    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(16..))]
+    max_side: Option<u32>,
+    /// Never keep more Gaussians than this.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    max_splats: Option<u32>,
+    /// Degree of the luminance's dependence on the direction of view.
+    #[arg(long, value_name = "0..3", value_parser = clap::value_parser!(u32).range(0..=3))]
+    sh_degree: Option<u32>,
+    /// Seed of every random choice: same seed, same bytes.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+    /// Start from these Gaussians instead of COLMAP's points.
+    #[arg(long, value_name = "FILE.ply")]
+    init: Option<PathBuf>,
+    /// Train on all views; by default every 8th is held out to measure with.
+    #[arg(long)]
+    no_holdout: bool,
+    /// Print the report as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Fit {
+    pub(super) fn run(self) -> Result<(), RunError> {
+        let mut progress = Progress::default();
+        let options = FitOptions {
+            colmap_dir: self.colmap_dir,
+            output: self.output,
+            preset: self.preset,
+            iterations: self.iterations.map(|n| n as usize),
+            max_side: self.max_side,
+            max_splats: self.max_splats.map(|n| n as usize),
+            sh_degree: self.sh_degree,
+            seed: self.seed,
+            init: self.init,
+            holdout: !self.no_holdout,
+        };
+        let (folder, report) = fit(&options, &mut |event| progress.show(&event))?;
+        progress.finish();
+        if self.json {
+            println!("{}", report.to_json());
+        } else {
+            println!("{}", report.luma_summary());
+            println!("wrote {}", folder.luma().display());
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,47 @@
+//! `gs-chroma info`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use crate::run::{RunError, info};
+
+/// Say what a run, a splat file or a COLMAP folder holds.
+#[derive(Args)]
+pub struct Info {
+    /// Run folder, splat file or COLMAP folder.
+    path: PathBuf,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Info {
+    pub(super) fn run(self) -> Result<(), RunError> {
+        let value = info(&self.path)?;
+        if self.json {
+            println!("{value:#}");
+        } else {
+            print_lines("", &value);
+        }
+        Ok(())
+    }
+}
+
+/// Prints a JSON value as `key: value` lines, nested keys joined by dots.
+fn print_lines(key: &str, value: &serde_json::Value) {
+    match value {
+        serde_json::Value::Object(map) => {
+            for (name, value) in map {
+                let key = if key.is_empty() {
+                    name.clone()
+                } else {
+                    format!("{key}.{name}")
+                };
+                print_lines(&key, value);
+            }
+        }
+        serde_json::Value::String(text) => println!("{key}: {text}"),
+        other => println!("{key}: {other}"),
+    }
+}

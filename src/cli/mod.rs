@@ -1,0 +1,45 @@
+//! The commands: arguments in, text out. What they do is in [`crate::run`].
+
+mod colorize;
+mod export;
+mod fit;
+mod info;
+mod progress;
+mod render;
+
+use clap::{Parser, Subcommand};
+
+use crate::run::RunError;
+
+/// Turns grayscale photos with COLMAP poses into a coloured 3D Gaussian scene.
+#[derive(Parser)]
+#[command(version, about)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Fit(fit::Fit),
+    Colorize(colorize::Colorize),
+    Render(render::Render),
+    Export(export::Export),
+    Info(info::Info),
+}
+
+impl Cli {
+    /// Runs the command.
+    ///
+    /// # Errors
+    /// Whatever stopped it, as one line that names the file and the remedy.
+    pub fn run(self) -> Result<(), RunError> {
+        match self.command {
+            Command::Fit(command) => command.run(),
+            Command::Colorize(command) => command.run(),
+            Command::Render(command) => command.run(),
+            Command::Export(command) => command.run(),
+            Command::Info(command) => command.run(),
+        }
+    }
+}

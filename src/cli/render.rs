@@ -1,0 +1,44 @@
+//! `gs-chroma render`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::progress::Progress;
+use crate::run::{RenderOptions, RunError, Views, render};
+
+/// Draw a scene from the photographed viewpoints, one PNG a view.
+#[derive(Args)]
+pub struct Render {
+    /// Run folder, or a splat file with --colmap [default: newest under runs/].
+    run: Option<PathBuf>,
+    /// COLMAP folder with the cameras, when it is not where `fit` found it.
+    #[arg(long, value_name = "COLMAP_DIR")]
+    colmap: Option<PathBuf>,
+    /// Which views.
+    #[arg(long, value_enum, default_value_t = Views::Test)]
+    views: Views,
+    /// Draw luma.ply although color.ply is there.
+    #[arg(long)]
+    luma: bool,
+    /// Folder to write the pictures to.
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+}
+
+impl Render {
+    pub(super) fn run(self) -> Result<(), RunError> {
+        let mut progress = Progress::default();
+        let options = RenderOptions {
+            run: self.run,
+            colmap: self.colmap,
+            views: self.views,
+            luma: self.luma,
+            output: self.output,
+        };
+        let count = render(&options, &mut |event| progress.show(&event))?;
+        progress.finish();
+        println!("wrote {count} pictures to {}", options.output.display());
+        Ok(())
+    }
+}

@@ -1,0 +1,233 @@
+//! What a run tells about itself: `report.json` and the contact sheet.
+//! docs/run-folder.md describes every key.
+
+mod contact_sheet;
+
+pub use contact_sheet::{Row, contact_sheet, to_image};
+
+use serde::{Deserialize, Serialize};
+
+/// Version of the report's layout; raised when a key changes its meaning.
+pub const REPORT_VERSION: u32 = 1;
+
+/// `report.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Report {
+    /// [`REPORT_VERSION`].
+    pub version: u32,
+    /// Version of the program.
+    pub program: String,
+    /// What was photographed.
+    pub capture: CaptureReport,
+    /// What it ran on.
+    pub device: DeviceReport,
+    /// `draft`, `balanced` or `paper`.
+    pub preset: String,
+    /// Seed of every random choice.
+    pub seed: u64,
+    /// Stage 1.
+    pub luma: LumaReport,
+    /// Stage 2, once `colorize` has run.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub chroma: Option<ChromaReport>,
+}
+
+/// What was photographed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CaptureReport {
+    /// The COLMAP folder, absolute.
+    pub path: String,
+    /// Views with a usable pose.
+    pub views: usize,
+    /// Views trained on.
+    pub train: usize,
+    /// Views held out.
+    pub test: usize,
+    /// Triangulated points.
+    pub points: usize,
+    /// Views or points left out, with the reason.
+    pub rejected: Vec<String>,
+    /// Longer side to which photos were scaled down, in pixels.
+    pub max_side: Option<u32>,
+    /// Radius of the cameras as 3DGS takes it, in world units.
+    pub extent: f64,
+    /// What was subtracted from the world's coordinates, in world units.
+    pub offset: [f64; 3],
+    /// Whether every 8th view was held out.
+    pub holdout: bool,
+}
+
+/// What it ran on.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DeviceReport {
+    /// Adapter and driver.
+    pub name: String,
+    /// Vulkan, Metal or DX12.
+    pub backend: String,
+    /// Whether it is a software adapter.
+    pub software: bool,
+}
+
+/// Stage 1.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LumaReport {
+    /// Iterations.
+    pub iterations: usize,
+    /// Degree of the luma harmonics.
+    pub sh_degree: u32,
+    /// Cap on Gaussians.
+    pub max_splats: usize,
+    /// Gaussians at the end.
+    pub splats: usize,
+    /// Gaussians that the last views culled for values that are not finite.
+    pub poisoned: usize,
+    /// Loss at the end.
+    pub loss: f64,
+    /// Wall seconds.
+    pub seconds: LumaSeconds,
+    /// Largest resident memory of the process in bytes, where the system tells.
+    pub peak_host_memory: Option<u64>,
+    /// Mean over the held-out views, if any.
+    pub held_out: Option<LumaQuality>,
+    /// Each held-out view.
+    pub held_out_views: Vec<LumaView>,
+}
+
+/// Wall seconds of stage 1.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LumaSeconds {
+    /// Reading poses and photos, placing the first Gaussians.
+    pub load: f64,
+    /// Training.
+    pub train: f64,
+    /// Measuring on held-out views.
+    pub measure: f64,
+}
+
+/// Quality of gray pictures.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LumaQuality {
+    /// Peak signal-to-noise ratio in dB.
+    pub psnr: f64,
+    /// Structural similarity.
+    pub ssim: f64,
+}
+
+/// One held-out view of stage 1.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LumaView {
+    /// The photo's name.
+    pub name: String,
+    /// Its quality.
+    #[serde(flatten)]
+    pub quality: LumaQuality,
+}
+
+/// Stage 2.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ChromaReport {
+    /// Who coloured the photos.
+    pub teacher: serde_json::Value,
+    /// Training views that the teacher coloured.
+    pub colored_views: usize,
+    /// Iterations of this stage.
+    pub iterations: usize,
+    /// Last iteration, counted from the start of stage 1.
+    pub until: usize,
+    /// Degree of the chroma harmonics.
+    pub sh_degree: u32,
+    /// Loss at the end, in CIELAB units.
+    pub loss: f64,
+    /// Wall seconds.
+    pub seconds: ChromaSeconds,
+    /// Largest resident memory of the process in bytes, where the system tells.
+    pub peak_host_memory: Option<u64>,
+    /// ΔE00 between the native picture and the exported file's.
+    pub bake: ColorError,
+    /// Views that the bake was measured on: `test`, or `train` without held-out ones.
+    pub measured_on: String,
+    /// Mean over those views of the exported file's pictures.
+    pub pictures: ColorQuality,
+    /// Each of them.
+    pub views: Vec<ColorView>,
+}
+
+/// Wall seconds of stage 2.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ChromaSeconds {
+    /// Asking the teacher.
+    pub teacher: f64,
+    /// Distilling.
+    pub distill: f64,
+    /// Baking, writing and measuring.
+    pub measure: f64,
+}
+
+/// A colour difference.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ColorError {
+    /// Mean ΔE00.
+    pub mean: f64,
+    /// Mean over the views of each view's 95th percentile.
+    pub percentile_95: f64,
+}
+
+/// Quality of coloured pictures.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ColorQuality {
+    /// ΔE00 to the photo, where the photo has colours.
+    pub delta_e: Option<ColorError>,
+    /// Colourfulness (Hasler and Süsstrunk 2003).
+    pub colorfulness: f64,
+    /// Colourfulness of the teacher's picture.
+    pub teacher_colorfulness: Option<f64>,
+}
+
+/// One coloured picture.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ColorView {
+    /// The photo's name.
+    pub name: String,
+    /// Its quality.
+    #[serde(flatten)]
+    pub quality: ColorQuality,
+}
+
+impl Report {
+    /// The report as indented JSON.
+    pub fn to_json(&self) -> String {
+        // Plain structs with string keys: serialising them cannot fail.
+        serde_json::to_string_pretty(self).unwrap_or_default()
+    }
+
+    /// Stage 1 on one line.
+    pub fn luma_summary(&self) -> String {
+        let luma = &self.luma;
+        let quality = luma.held_out.map_or(String::new(), |quality| {
+            format!(
+                ", held-out PSNR {:.2} dB, SSIM {:.3}",
+                quality.psnr, quality.ssim
+            )
+        });
+        format!(
+            "{} Gaussians after {} iterations in {:.0} s{quality}",
+            luma.splats, luma.iterations, luma.seconds.train
+        )
+    }
+
+    /// Stage 2 on one line.
+    pub fn chroma_summary(&self) -> String {
+        let Some(chroma) = &self.chroma else {
+            return "not coloured yet".to_owned();
+        };
+        let truth = chroma.pictures.delta_e.map_or(String::new(), |error| {
+            format!(", ΔE00 to the photos {:.2}", error.mean)
+        });
+        format!(
+            "coloured from {} views in {:.0} s{truth}, export off by ΔE00 {:.2}",
+            chroma.colored_views,
+            chroma.seconds.teacher + chroma.seconds.distill,
+            chroma.bake.mean
+        )
+    }
+}

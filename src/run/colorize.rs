@@ -1,0 +1,480 @@
+//! `colorize`: a teacher's colours into a trained scene.
+
+use std::{
+    fmt::Write,
+    path::{Path, PathBuf},
+    sync::Arc,
+    time::Instant,
+};
+
+use super::{
+    Event, Observer, RunError, RunFolder, Stage, files,
+    fit::comments,
+    preset::Preset,
+    scene::{Scene, gray_to_rgb, rgb_pixels, shown_rgb},
+};
+use crate::{
+    chroma::{
+        ChromaSettings, ChromaView, Distiller, bake_rgb, native_rgb,
+        teacher::{AbImage, GrayImage, Teacher},
+    },
+    gpu::Gpu,
+    measure,
+    raster::{Picture, Raster},
+    report::{
+        CaptureReport, ChromaReport, ChromaSeconds, ColorError, ColorQuality, ColorView,
+        DeviceReport, LumaReport, LumaSeconds, REPORT_VERSION, Report, Row, contact_sheet,
+    },
+    splats::{ShField, Splats, ply},
+};
+
+/// Views on the contact sheet.
+const SHEET_ROWS: usize = 4;
+
+/// What `colorize` is asked to do.
+#[derive(Clone, Debug)]
+pub struct ColorizeOptions {
+    /// Run folder or gray splat file; the newest run by default.
+    pub run: Option<PathBuf>,
+    /// The teacher.
+    pub teacher: PathBuf,
+    /// The coloured splat file; `color.ply` in the run folder by default.
+    pub output: Option<PathBuf>,
+    /// Last iteration, counted from the start of stage 1; the preset's by default.
+    pub until: Option<usize>,
+    /// Degree of the chroma harmonics.
+    pub sh_degree: u32,
+    /// COLMAP folder, where it is not the one that `fit` noted.
+    pub colmap: Option<PathBuf>,
+}
+
+/// What `colorize` wrote.
+#[derive(Clone, Debug)]
+pub struct Output {
+    /// The coloured splat file.
+    pub ply: PathBuf,
+    /// The contact sheet, when a run was coloured.
+    pub contact_sheet: Option<PathBuf>,
+}
+
+/// Colours a run or a gray splat file.
+///
+/// # Errors
+/// [`RunError`]; nothing is written before the colours are found.
+pub fn colorize(
+    options: &ColorizeOptions,
+    observe: &mut Observer<'_>,
+) -> Result<(Output, Report), RunError> {
+    let source = Source::find(options)?;
+    let cache = source.folder.as_ref().map(RunFolder::teacher);
+    let mut teacher = Teacher::open(&options.teacher, cache.as_deref())?;
+    let gpu = Gpu::open()?;
+    let mut report = source.report(&gpu);
+    let capture = &report.capture;
+    let scene = Scene::load(
+        &source.colmap_dir(options, capture)?,
+        capture.max_side,
+        capture.holdout,
+        observe,
+    )?;
+    let read = ply::read_ply(&source.splats)?;
+    if read.skipped > 0 {
+        observe(Event::Note(format!(
+            "{}: skipped {} Gaussians with values that are not finite or no rotation",
+            source.splats.display(),
+            read.skipped
+        )));
+    }
+    let luma = read.splats.to_luma();
+    let preset = source.preset(&report, &gpu);
+    let iterations = chroma_iterations(options, preset, report.luma.iterations)?;
+
+    let begun = Instant::now();
+    let answers = ask(&mut teacher, options, &scene, observe)?;
+    let seconds_teacher = begun.elapsed().as_secs_f64();
+
+    let begun = Instant::now();
+    let raster = Arc::new(Raster::new(&gpu));
+    let settings = ChromaSettings {
+        sh_degree: options.sh_degree,
+        seed: report.seed,
+        ..ChromaSettings::new(iterations)
+    };
+    let views: Vec<ChromaView> = scene
+        .split
+        .train
+        .iter()
+        .filter_map(|&i| {
+            Some(ChromaView {
+                camera: scene.photos[i].1.clone(),
+                wanted: answers[i].clone()?,
+            })
+        })
+        .collect();
+    let colored_views = views.len();
+    let mut distiller = Distiller::new(raster.clone(), settings, scene.extent, &luma, views)?;
+    let (mut log, mut loss) = (String::new(), 0.0);
+    distiller.run(&mut |progress| {
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            log,
+            "{},{:.6},{},{:.3}",
+            report.luma.iterations + progress.iteration,
+            progress.loss,
+            luma.len(),
+            progress.seconds
+        );
+        observe(Event::Progress {
+            stage: Stage::Chroma,
+            done: progress.iteration,
+            total: iterations,
+            message: format!("loss {:.3}", progress.loss),
+        });
+        loss = progress.loss;
+    })?;
+    let chroma = distiller.chroma()?;
+    drop(distiller);
+    let seconds_distill = begun.elapsed().as_secs_f64();
+
+    let begun = Instant::now();
+    let baked = bake_rgb(&luma, &chroma);
+    let measured = Measured::of(&raster, &scene, &luma, &chroma, &baked, &answers)?;
+    report.chroma = Some(ChromaReport {
+        teacher: serde_json::to_value(teacher.describe()).unwrap_or_default(),
+        colored_views,
+        iterations,
+        until: report.luma.iterations + iterations,
+        sh_degree: options.sh_degree,
+        loss,
+        seconds: ChromaSeconds {
+            teacher: seconds_teacher,
+            distill: seconds_distill,
+            measure: begun.elapsed().as_secs_f64(),
+        },
+        peak_host_memory: files::peak_host_memory(),
+        bake: measured.bake,
+        measured_on: scene.measured().0.to_owned(),
+        pictures: measured.mean(),
+        views: measured.views,
+    });
+    let output = Output {
+        ply: options
+            .output
+            .clone()
+            .unwrap_or_else(|| source.default_output()),
+        contact_sheet: source.folder.as_ref().map(RunFolder::contact_sheet),
+    };
+    ply::write_ply(&output.ply, &baked, glam::DVec3::ZERO, &comments())?;
+    if let Some(folder) = &source.folder {
+        append_log(folder, report.luma.iterations, &log)?;
+        files::write_png(&folder.contact_sheet(), &contact_sheet(&measured.rows))?;
+        folder.write_report(&report)?;
+    }
+    Ok((output, report))
+}
+
+/// Where the gray Gaussians come from.
+struct Source {
+    folder: Option<RunFolder>,
+    report: Option<Report>,
+    splats: PathBuf,
+}
+
+impl Source {
+    fn find(options: &ColorizeOptions) -> Result<Self, RunError> {
+        match &options.run {
+            Some(path)
+                if path
+                    .extension()
+                    .is_some_and(|e| e.eq_ignore_ascii_case("ply")) =>
+            {
+                Ok(Self {
+                    folder: None,
+                    report: None,
+                    splats: path.clone(),
+                })
+            }
+            run => {
+                let folder = match run {
+                    Some(path) => RunFolder::at(path),
+                    None => RunFolder::newest()?,
+                };
+                Ok(Self {
+                    report: Some(folder.read_report()?),
+                    splats: folder.luma(),
+                    folder: Some(folder),
+                })
+            }
+        }
+    }
+
+    fn colmap_dir(
+        &self,
+        options: &ColorizeOptions,
+        capture: &CaptureReport,
+    ) -> Result<PathBuf, RunError> {
+        match (&options.colmap, &self.report) {
+            (Some(path), _) => Ok(path.clone()),
+            (None, Some(_)) => Ok(PathBuf::from(&capture.path)),
+            (None, None) => Err(RunError::NoCameras(self.splats.clone())),
+        }
+    }
+
+    /// The run's report, or an empty one for a splat file.
+    fn report(&self, gpu: &Gpu) -> Report {
+        self.report.clone().unwrap_or_else(|| Report {
+            version: REPORT_VERSION,
+            program: env!("CARGO_PKG_VERSION").to_owned(),
+            capture: CaptureReport {
+                path: String::new(),
+                views: 0,
+                train: 0,
+                test: 0,
+                points: 0,
+                rejected: Vec::new(),
+                max_side: if gpu.is_software() {
+                    Preset::Draft.amounts().max_side
+                } else {
+                    None
+                },
+                extent: 0.0,
+                offset: [0.0; 3],
+                holdout: true,
+            },
+            device: DeviceReport {
+                name: gpu.describe(),
+                backend: format!("{:?}", gpu.info().backend),
+                software: gpu.is_software(),
+            },
+            preset: String::new(),
+            seed: 0,
+            luma: LumaReport {
+                iterations: 0,
+                sh_degree: 0,
+                max_splats: 0,
+                splats: 0,
+                poisoned: 0,
+                loss: 0.0,
+                seconds: LumaSeconds {
+                    load: 0.0,
+                    train: 0.0,
+                    measure: 0.0,
+                },
+                peak_host_memory: None,
+                held_out: None,
+                held_out_views: Vec::new(),
+            },
+            chroma: None,
+        })
+    }
+
+    fn preset(&self, report: &Report, gpu: &Gpu) -> Preset {
+        match report.preset.as_str() {
+            "draft" => Preset::Draft,
+            "balanced" => Preset::Balanced,
+            "" if gpu.is_software() => Preset::Draft,
+            _ => Preset::Paper,
+        }
+    }
+
+    fn default_output(&self) -> PathBuf {
+        match &self.folder {
+            Some(folder) => folder.color(),
+            None => {
+                let stem = self.splats.file_stem().unwrap_or_default();
+                let mut name = stem.to_owned();
+                name.push("-color.ply");
+                self.splats.with_file_name(name)
+            }
+        }
+    }
+}
+
+fn chroma_iterations(
+    options: &ColorizeOptions,
+    preset: Preset,
+    luma: usize,
+) -> Result<usize, RunError> {
+    match options.until {
+        Some(until) if until <= luma => Err(RunError::NothingUntil { until, luma }),
+        Some(until) => Ok(until - luma),
+        // As many as the preset's, however many stage 1 really took.
+        None => {
+            let amounts = preset.amounts();
+            Ok(amounts.until - amounts.iterations)
+        }
+    }
+}
+
+/// The teacher's answer for each view, `None` where it has none. Held-out views
+/// are asked too: for the contact sheet, never for training.
+fn ask(
+    teacher: &mut Teacher,
+    options: &ColorizeOptions,
+    scene: &Scene,
+    observe: &mut Observer<'_>,
+) -> Result<Vec<Option<AbImage>>, RunError> {
+    let total = scene.photos.len();
+    let mut answers = Vec::with_capacity(total);
+    for (i, (photo, _)) in scene.photos.iter().enumerate() {
+        let name = &scene.capture.views[i].name;
+        observe(Event::Progress {
+            stage: Stage::Teacher,
+            done: i,
+            total,
+            message: name.clone(),
+        });
+        answers.push(teacher.colorize(
+            name,
+            GrayImage {
+                width: photo.width,
+                height: photo.height,
+                pixels: &photo.gray,
+            },
+        )?);
+    }
+    if scene.split.train.iter().all(|&i| answers[i].is_none()) {
+        return Err(RunError::TeacherCoversNothing {
+            teacher: options.teacher.clone(),
+            example: scene.capture.views[scene.split.train[0]].name.clone(),
+        });
+    }
+    Ok(answers)
+}
+
+/// Pictures of the measured views and what they amount to.
+struct Measured {
+    bake: ColorError,
+    views: Vec<ColorView>,
+    rows: Vec<Row>,
+}
+
+impl Measured {
+    fn of(
+        raster: &Arc<Raster>,
+        scene: &Scene,
+        luma: &Splats,
+        chroma: &ShField,
+        baked: &Splats,
+        answers: &[Option<AbImage>],
+    ) -> Result<Self, RunError> {
+        let mut renderer = scene.renderer(raster, luma, &[&luma.sh, chroma, &baked.sh])?;
+        let (mut errors, mut views, mut rows) = (Vec::new(), Vec::new(), Vec::new());
+        for &i in scene.measured().1 {
+            let (photo, camera) = &scene.photos[i];
+            let pictures = renderer.render(camera)?;
+            let native = native_rgb(&pictures[0], &pictures[1]);
+            let exported = shown_rgb(&pictures[2].pixels);
+            let error = measure::mean_delta_e(&native, &exported);
+            errors.push(ColorError {
+                mean: error.mean,
+                percentile_95: error.percentile_95,
+            });
+            let taught = answers[i]
+                .as_ref()
+                .map(|answer| teacher_picture(&photo.gray, answer));
+            let truth = photo.rgb.as_ref().map(|_| rgb_pixels(photo));
+            views.push(ColorView {
+                name: scene.capture.views[i].name.clone(),
+                quality: ColorQuality {
+                    delta_e: truth.as_ref().map(|truth| {
+                        let error = measure::mean_delta_e(&exported, truth);
+                        ColorError {
+                            mean: error.mean,
+                            percentile_95: error.percentile_95,
+                        }
+                    }),
+                    colorfulness: measure::colorfulness(&exported),
+                    teacher_colorfulness: taught.as_deref().map(measure::colorfulness),
+                },
+            });
+            if rows.len() < SHEET_ROWS {
+                rows.push(Row {
+                    width: camera.width,
+                    height: camera.height,
+                    pictures: vec![
+                        Some(rgb_pixels(photo)),
+                        Some(gray_to_rgb(&pictures[0].pixels)),
+                        taught,
+                        Some(exported),
+                    ],
+                });
+            }
+        }
+        Ok(Self {
+            bake: mean_error(&errors),
+            views,
+            rows,
+        })
+    }
+
+    fn mean(&self) -> ColorQuality {
+        let count = self.views.len() as f64;
+        let errors: Vec<ColorError> = self
+            .views
+            .iter()
+            .filter_map(|v| v.quality.delta_e)
+            .collect();
+        let taught: Vec<f64> = self
+            .views
+            .iter()
+            .filter_map(|view| view.quality.teacher_colorfulness)
+            .collect();
+        ColorQuality {
+            delta_e: (!errors.is_empty()).then(|| mean_error(&errors)),
+            colorfulness: self
+                .views
+                .iter()
+                .map(|v| v.quality.colorfulness)
+                .sum::<f64>()
+                / count,
+            teacher_colorfulness: (!taught.is_empty())
+                .then(|| taught.iter().sum::<f64>() / taught.len() as f64),
+        }
+    }
+}
+
+fn mean_error(errors: &[ColorError]) -> ColorError {
+    let count = errors.len() as f64;
+    ColorError {
+        mean: errors.iter().map(|error| error.mean).sum::<f64>() / count,
+        percentile_95: errors.iter().map(|error| error.percentile_95).sum::<f64>() / count,
+    }
+}
+
+/// The photo's lightness with the teacher's a/b.
+fn teacher_picture(gray: &[u8], answer: &AbImage) -> Vec<[f32; 3]> {
+    let as_picture = |channels, pixels| Picture {
+        width: answer.width,
+        height: answer.height,
+        channels,
+        pixels,
+    };
+    native_rgb(
+        &as_picture(1, gray.iter().map(|&v| f32::from(v) / 255.0).collect()),
+        &as_picture(2, answer.ab.as_flattened().to_vec()),
+    )
+}
+
+/// Puts the chroma rows behind the luma rows, in place of those of an earlier
+/// colouring.
+fn append_log(folder: &RunFolder, luma: usize, rows: &str) -> Result<(), RunError> {
+    let path = folder.log();
+    let log = read_or_empty(&path);
+    let mut kept: String = log
+        .lines()
+        .filter(|line| {
+            let first = line.split(',').next().unwrap_or_default();
+            first
+                .parse::<usize>()
+                .map_or(true, |iteration| iteration <= luma)
+        })
+        .flat_map(|line| [line, "\n"])
+        .collect();
+    kept.push_str(rows);
+    files::write(&path, kept.as_bytes())
+}
+
+fn read_or_empty(path: &Path) -> String {
+    std::fs::read_to_string(path).unwrap_or_default()
+}

@@ -1,0 +1,294 @@
+//! `fit`: photos to geometry and luma.
+
+use std::{fmt::Write, path::PathBuf, sync::Arc, time::Instant};
+
+use super::{
+    Event, Observer, Preset, RunError, RunFolder, Stage, files,
+    scene::{Scene, gray_pixels},
+};
+use crate::{
+    color::gray_from_rgb,
+    gpu::Gpu,
+    luma::{LumaSettings, LumaTrainer, TrainingView},
+    measure,
+    raster::Raster,
+    report::{
+        CaptureReport, DeviceReport, LumaQuality, LumaReport, LumaSeconds, LumaView,
+        REPORT_VERSION, Report,
+    },
+    splats::{ShField, Splats, init::initial_splats, ply, sh},
+};
+
+/// What `fit` is asked to do; `None` leaves it to the preset.
+#[derive(Clone, Debug)]
+pub struct FitOptions {
+    /// The COLMAP folder.
+    pub colmap_dir: PathBuf,
+    /// The run folder; `runs/<folder name>` by default.
+    pub output: Option<PathBuf>,
+    /// Amount of work; `paper` on a GPU and `draft` on a software adapter by default.
+    pub preset: Option<Preset>,
+    /// Iterations.
+    pub iterations: Option<usize>,
+    /// Longer side of the photos in pixels.
+    pub max_side: Option<u32>,
+    /// Cap on Gaussians.
+    pub max_splats: Option<usize>,
+    /// Degree of the luma harmonics.
+    pub sh_degree: Option<u32>,
+    /// Seed.
+    pub seed: u64,
+    /// Gaussians to start from.
+    pub init: Option<PathBuf>,
+    /// Whether every 8th view is held out.
+    pub holdout: bool,
+}
+
+/// Trains and writes the run folder.
+///
+/// # Errors
+/// [`RunError`]; files of an earlier run stay as they were until training is done.
+pub fn fit(
+    options: &FitOptions,
+    observe: &mut Observer<'_>,
+) -> Result<(RunFolder, Report), RunError> {
+    let begun = Instant::now();
+    let gpu = Gpu::open()?;
+    let preset = choose_preset(options, &gpu, observe);
+    let amounts = preset.amounts();
+    let max_side = options.max_side.or(amounts.max_side);
+    let scene = Scene::load(&options.colmap_dir, max_side, options.holdout, observe)?;
+    let settings = LumaSettings {
+        sh_degree: options.sh_degree.unwrap_or(amounts.sh_degree),
+        max_splats: options.max_splats.unwrap_or(amounts.max_splats),
+        seed: options.seed,
+        ..LumaSettings::new(options.iterations.unwrap_or(amounts.iterations))
+    };
+    let start = first_splats(options, &scene, &settings)?;
+    let folder = match &options.output {
+        Some(path) => RunFolder::at(path),
+        None => RunFolder::for_capture(&options.colmap_dir),
+    };
+    files::make_folder(folder.path())?;
+    let raster = Arc::new(Raster::new(&gpu));
+    let load = begun.elapsed().as_secs_f64();
+
+    let begun = Instant::now();
+    let views = scene
+        .split
+        .train
+        .iter()
+        .map(|&i| TrainingView {
+            camera: scene.photos[i].1.clone(),
+            gray: scene.photos[i].0.gray.clone(),
+        })
+        .collect();
+    let mut trainer = LumaTrainer::new(
+        raster.clone(),
+        settings.clone(),
+        scene.extent,
+        &start,
+        views,
+    )?;
+    let mut log = String::from("iteration,loss,splats,seconds\n");
+    let mut last = None;
+    trainer.train(&mut |progress| {
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            log,
+            "{},{:.6},{},{:.3}",
+            progress.iteration, progress.loss, progress.splats, progress.seconds
+        );
+        observe(Event::Progress {
+            stage: Stage::Luma,
+            done: progress.iteration,
+            total: settings.schedule.iterations,
+            message: format!("loss {:.4}, {} splats", progress.loss, progress.splats),
+        });
+        last = Some(progress);
+    })?;
+    let splats = trainer.splats()?;
+    let train = begun.elapsed().as_secs_f64();
+
+    let begun = Instant::now();
+    let held_out_views = measure_luma(&raster, &scene, &splats)?;
+    let report = Report {
+        version: REPORT_VERSION,
+        program: env!("CARGO_PKG_VERSION").to_owned(),
+        capture: capture_report(options, &scene, max_side),
+        device: DeviceReport {
+            name: gpu.describe(),
+            backend: format!("{:?}", gpu.info().backend),
+            software: gpu.is_software(),
+        },
+        preset: preset.name().to_owned(),
+        seed: options.seed,
+        luma: LumaReport {
+            iterations: settings.schedule.iterations,
+            sh_degree: settings.sh_degree,
+            max_splats: settings.max_splats,
+            splats: splats.len(),
+            poisoned: last.map_or(0, |progress| progress.poisoned),
+            loss: last.map_or(0.0, |progress| progress.loss),
+            seconds: LumaSeconds {
+                load,
+                train,
+                measure: begun.elapsed().as_secs_f64(),
+            },
+            peak_host_memory: files::peak_host_memory(),
+            held_out: mean_quality(&held_out_views),
+            held_out_views,
+        },
+        chroma: None,
+    };
+    // The old colours do not belong to the new geometry.
+    for stale in [folder.color(), folder.contact_sheet()] {
+        if stale.exists() {
+            std::fs::remove_file(&stale).map_err(files::at(&stale))?;
+        }
+    }
+    ply::write_ply(&folder.luma(), &splats, glam::DVec3::ZERO, &comments())?;
+    files::write(&folder.log(), log.as_bytes())?;
+    folder.write_report(&report)?;
+    Ok((folder, report))
+}
+
+/// Comments in the header of every splat file.
+pub(super) fn comments() -> Vec<String> {
+    vec![format!("gs-chroma {}", env!("CARGO_PKG_VERSION"))]
+}
+
+fn choose_preset(options: &FitOptions, gpu: &Gpu, observe: &mut Observer<'_>) -> Preset {
+    match options.preset {
+        Some(preset) => preset,
+        None if gpu.is_software() => {
+            observe(Event::Note(format!(
+                "{} has no GPU behind it: preset draft (--preset paper overrules)",
+                gpu.info().name
+            )));
+            Preset::Draft
+        }
+        None => Preset::Paper,
+    }
+}
+
+fn first_splats(
+    options: &FitOptions,
+    scene: &Scene,
+    settings: &LumaSettings,
+) -> Result<Splats, RunError> {
+    let Some(path) = &options.init else {
+        let points: Vec<_> = scene
+            .capture
+            .points
+            .iter()
+            .map(|point| {
+                let rgb = point.color.map(|v| f64::from(v) / 255.0);
+                (
+                    point.position.as_vec3().to_array(),
+                    gray_from_rgb(rgb) as f32,
+                )
+            })
+            .collect();
+        let mut splats = initial_splats(&points, scene.extent as f32, settings.sh_degree);
+        truncate(&mut splats, settings.max_splats);
+        return Ok(splats);
+    };
+    let mut splats = ply::read_ply(path)?.splats.to_luma();
+    let offset = scene.capture.offset.as_vec3().to_array();
+    for mean in &mut splats.means {
+        *mean = std::array::from_fn(|axis| mean[axis] - offset[axis]);
+    }
+    splats.sh = at_degree(&splats.sh, splats.means.len(), settings.sh_degree);
+    truncate(&mut splats, settings.max_splats);
+    Ok(splats)
+}
+
+/// The field cut or filled up with zeros to another degree.
+fn at_degree(field: &ShField, count: usize, degree: u32) -> ShField {
+    let mut out = ShField::zeros(count, degree, field.channels);
+    let stride = sh::coefficient_count(degree) * field.channels;
+    for i in 0..count {
+        let from = field.of(i);
+        let shared = from.len().min(stride);
+        out.coefficients[i * stride..i * stride + shared].copy_from_slice(&from[..shared]);
+    }
+    out
+}
+
+/// Keeps an evenly spread choice of at most `max` Gaussians: a cap is a cap.
+fn truncate(splats: &mut Splats, max: usize) {
+    let count = splats.len();
+    if count <= max {
+        return;
+    }
+    let chosen: Vec<usize> = (0..max).map(|k| k * count / max).collect();
+    let stride = splats.sh.coefficients.len() / count;
+    splats.sh.coefficients = chosen
+        .iter()
+        .flat_map(|&i| splats.sh.coefficients[i * stride..(i + 1) * stride].to_vec())
+        .collect();
+    splats.means = chosen.iter().map(|&i| splats.means[i]).collect();
+    splats.quats = chosen.iter().map(|&i| splats.quats[i]).collect();
+    splats.log_scales = chosen.iter().map(|&i| splats.log_scales[i]).collect();
+    splats.opacity_logits = chosen.iter().map(|&i| splats.opacity_logits[i]).collect();
+}
+
+fn measure_luma(
+    raster: &Arc<Raster>,
+    scene: &Scene,
+    splats: &Splats,
+) -> Result<Vec<LumaView>, RunError> {
+    let mut renderer = scene.renderer(raster, splats, &[&splats.sh])?;
+    scene
+        .split
+        .test
+        .iter()
+        .map(|&i| {
+            let (photo, camera) = &scene.photos[i];
+            let picture = renderer.render(camera)?.remove(0);
+            let shown: Vec<f32> = picture.pixels.iter().map(|v| v.clamp(0.0, 1.0)).collect();
+            let truth = gray_pixels(photo);
+            let (width, height) = (camera.width as usize, camera.height as usize);
+            Ok(LumaView {
+                name: scene.capture.views[i].name.clone(),
+                quality: LumaQuality {
+                    psnr: measure::psnr(&shown, &truth),
+                    ssim: measure::ssim(width, height, &shown, &truth),
+                },
+            })
+        })
+        .collect()
+}
+
+fn mean_quality(views: &[LumaView]) -> Option<LumaQuality> {
+    let mean = |value: fn(&LumaQuality) -> f64| {
+        views.iter().map(|view| value(&view.quality)).sum::<f64>() / views.len() as f64
+    };
+    (!views.is_empty()).then(|| LumaQuality {
+        psnr: mean(|quality| quality.psnr),
+        ssim: mean(|quality| quality.ssim),
+    })
+}
+
+fn capture_report(options: &FitOptions, scene: &Scene, max_side: Option<u32>) -> CaptureReport {
+    let capture = &scene.capture;
+    let path =
+        std::fs::canonicalize(&options.colmap_dir).unwrap_or_else(|_| options.colmap_dir.clone());
+    CaptureReport {
+        path: path.to_string_lossy().into_owned(),
+        views: capture.views.len(),
+        train: scene.split.train.len(),
+        test: scene.split.test.len(),
+        points: capture.points.len(),
+        rejected: capture
+            .rejected
+            .iter()
+            .map(|rejected| format!("{}: {}", rejected.name, rejected.reason))
+            .collect(),
+        max_side,
+        extent: scene.extent,
+        offset: capture.offset.to_array(),
+        holdout: options.holdout,
+    }
+}

@@ -1,0 +1,103 @@
+//! A run's folder.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    time::SystemTime,
+};
+
+use super::{RunError, files};
+use crate::report::Report;
+
+/// Where runs go unless told otherwise.
+const RUNS: &str = "runs";
+
+/// The folder of one run; docs/run-folder.md lists what lies in it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RunFolder(PathBuf);
+
+impl RunFolder {
+    /// The folder at `path`.
+    pub fn at(path: &Path) -> Self {
+        Self(path.to_owned())
+    }
+
+    /// `runs/<name of the COLMAP folder>`.
+    pub fn for_capture(colmap_dir: &Path) -> Self {
+        let resolved = fs::canonicalize(colmap_dir).unwrap_or_else(|_| colmap_dir.to_owned());
+        let name = resolved.file_name().unwrap_or("scene".as_ref());
+        Self(Path::new(RUNS).join(name))
+    }
+
+    /// The run under `runs/` whose report is newest.
+    ///
+    /// # Errors
+    /// [`RunError::NoRun`].
+    pub fn newest() -> Result<Self, RunError> {
+        let written = |path: &Path| -> Option<SystemTime> {
+            fs::metadata(Self::at(path).report()).ok()?.modified().ok()
+        };
+        fs::read_dir(RUNS)
+            .map_err(|_| RunError::NoRun)?
+            .filter_map(|entry| Some(entry.ok()?.path()))
+            .filter_map(|path| Some((written(&path)?, path)))
+            .max()
+            .map(|(_, path)| Self(path))
+            .ok_or(RunError::NoRun)
+    }
+
+    /// The folder itself.
+    pub fn path(&self) -> &Path {
+        &self.0
+    }
+
+    /// Geometry and luma.
+    pub fn luma(&self) -> PathBuf {
+        self.0.join("luma.ply")
+    }
+
+    /// The coloured scene.
+    pub fn color(&self) -> PathBuf {
+        self.0.join("color.ply")
+    }
+
+    /// The report.
+    pub fn report(&self) -> PathBuf {
+        self.0.join("report.json")
+    }
+
+    /// The losses.
+    pub fn log(&self) -> PathBuf {
+        self.0.join("log.csv")
+    }
+
+    /// The teacher's cached answers.
+    pub fn teacher(&self) -> PathBuf {
+        self.0.join("teacher")
+    }
+
+    /// Photo, luma, teacher and colour side by side.
+    pub fn contact_sheet(&self) -> PathBuf {
+        self.0.join("contact-sheet.png")
+    }
+
+    /// Reads the report.
+    ///
+    /// # Errors
+    /// [`RunError::File`] when there is none or it is damaged.
+    pub fn read_report(&self) -> Result<Report, RunError> {
+        let path = self.report();
+        let text = fs::read_to_string(&path).map_err(|error| RunError::File {
+            path: path.clone(),
+            reason: format!("{error}: a run folder has a report; make one with `gs-chroma fit`"),
+        })?;
+        serde_json::from_str(&text).map_err(|error| RunError::File {
+            path,
+            reason: format!("damaged ({error}): run `gs-chroma fit` again"),
+        })
+    }
+
+    pub(super) fn write_report(&self, report: &Report) -> Result<(), RunError> {
+        files::write(&self.report(), (report.to_json() + "\n").as_bytes())
+    }
+}

@@ -1,0 +1,89 @@
+//! `info` and `export`.
+
+use std::path::Path;
+
+use glam::DVec3;
+use serde_json::{Value, json};
+
+use super::{RunError, RunFolder, fit::comments};
+use crate::{capture::Capture, splats::ply};
+
+/// What a run folder, a splat file or a COLMAP folder holds.
+///
+/// # Errors
+/// [`RunError`] when it is none of them or damaged.
+pub fn info(path: &Path) -> Result<Value, RunError> {
+    if path.is_file() {
+        return splat_info(path);
+    }
+    let folder = RunFolder::at(path);
+    if folder.report().is_file() {
+        let report = folder.read_report()?;
+        return Ok(serde_json::to_value(report).unwrap_or_default());
+    }
+    let capture = Capture::load(path)?;
+    let sizes: Vec<_> = capture
+        .views
+        .iter()
+        .map(|view| [view.camera.width, view.camera.height])
+        .collect();
+    Ok(json!({
+        "kind": "COLMAP folder",
+        "views": capture.views.len(),
+        "points": capture.points.len(),
+        "rejected": capture.rejected.iter().map(|r| format!("{}: {}", r.name, r.reason)).collect::<Vec<_>>(),
+        "largest_photo": sizes.iter().max_by_key(|[w, h]| w * h),
+        "extent": capture.extent(),
+        "offset": capture.offset.to_array(),
+    }))
+}
+
+fn splat_info(path: &Path) -> Result<Value, RunError> {
+    let read = ply::read_ply(path)?;
+    let splats = &read.splats;
+    let bound = |pick: fn(f32, f32) -> f32, start: f32| -> [f32; 3] {
+        std::array::from_fn(|axis| {
+            splats
+                .means
+                .iter()
+                .fold(start, |bound, mean| pick(bound, mean[axis]))
+        })
+    };
+    Ok(json!({
+        "kind": "splat file",
+        "splats": splats.len(),
+        "skipped": read.skipped,
+        "sh_degree": splats.sh.degree,
+        // Half an 8-bit step: what no viewer shows as a colour.
+        "gray": splats.is_gray(0.5 / 255.0),
+        "lowest": bound(f32::min, f32::INFINITY),
+        "highest": bound(f32::max, f32::NEG_INFINITY),
+    }))
+}
+
+/// Writes a run's scene with the photos' own coordinates; gives the number of
+/// Gaussians.
+///
+/// # Errors
+/// [`RunError`].
+pub fn export(run: Option<&Path>, output: &Path, luma: bool) -> Result<usize, RunError> {
+    let folder = match run {
+        Some(path) => RunFolder::at(path),
+        None => RunFolder::newest()?,
+    };
+    let report = folder.read_report()?;
+    let colored = !luma && folder.color().exists();
+    let file = if colored {
+        folder.color()
+    } else {
+        folder.luma()
+    };
+    let splats = ply::read_ply(&file)?.splats;
+    ply::write_ply(
+        output,
+        &splats,
+        DVec3::from(report.capture.offset),
+        &comments(),
+    )?;
+    Ok(splats.len())
+}

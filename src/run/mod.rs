@@ -1,0 +1,118 @@
+//! Whole runs: what a command does from its options to its files.
+
+mod colorize;
+mod files;
+mod fit;
+mod folder;
+mod info;
+mod preset;
+mod render;
+mod scene;
+
+use std::{fmt, path::PathBuf};
+
+pub use colorize::{ColorizeOptions, Output, colorize};
+pub use fit::{FitOptions, fit};
+pub use folder::RunFolder;
+pub use info::{export, info};
+pub use preset::Preset;
+pub use render::{RenderOptions, Views, render};
+
+use crate::{
+    capture::CaptureError, chroma::teacher::TeacherError, gpu::GpuError, splats::ply::PlyError,
+};
+
+/// What can stop a run.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// The photos or their poses.
+    #[error(transparent)]
+    Capture(#[from] CaptureError),
+    /// The device.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+    /// A splat file.
+    #[error(transparent)]
+    Ply(#[from] PlyError),
+    /// The teacher.
+    #[error(transparent)]
+    Teacher(#[from] TeacherError),
+    /// The file system.
+    #[error("{}: {reason}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it and what to do.
+        reason: String,
+    },
+    /// There is no run to go on with.
+    #[error("no run under runs/: train one with `gs-chroma fit COLMAP_DIR`, or name a run folder")]
+    NoRun,
+    /// A splat file without cameras.
+    #[error("{}: a splat file has no cameras: name the COLMAP folder with --colmap", .0.display())]
+    NoCameras(PathBuf),
+    /// The teacher has no picture for any training view.
+    #[error("{}: no image of it has the name of a training photo (such as {example}): name its images like the photos", teacher.display())]
+    TeacherCoversNothing {
+        /// The teacher's folder.
+        teacher: PathBuf,
+        /// A photo's name.
+        example: String,
+    },
+    /// Nothing is left for stage 2.
+    #[error("--until {until}: stage 1 already took {luma} iterations: choose a larger number")]
+    NothingUntil {
+        /// What was asked.
+        until: usize,
+        /// Iterations of stage 1.
+        luma: usize,
+    },
+}
+
+/// A part of a run that takes time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// Reading photos.
+    Photos,
+    /// Stage 1.
+    Luma,
+    /// Asking the teacher.
+    Teacher,
+    /// Stage 2.
+    Chroma,
+    /// Drawing pictures.
+    Render,
+}
+
+impl fmt::Display for Stage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Photos => "photos",
+            Self::Luma => "luma",
+            Self::Teacher => "teacher",
+            Self::Chroma => "chroma",
+            Self::Render => "render",
+        })
+    }
+}
+
+/// What a run tells while it goes on.
+#[derive(Clone, Debug)]
+pub enum Event {
+    /// A line worth reading once.
+    Note(String),
+    /// How far a stage is.
+    Progress {
+        /// Which stage.
+        stage: Stage,
+        /// Steps done.
+        done: usize,
+        /// Steps in all.
+        total: usize,
+        /// Figures of the moment.
+        message: String,
+    },
+}
+
+/// Who is told.
+pub type Observer<'a> = dyn FnMut(Event) + 'a;

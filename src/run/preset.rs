@@ -1,0 +1,68 @@
+//! Named amounts of work.
+
+use clap::ValueEnum;
+use serde::{Deserialize, Serialize};
+
+/// How much work to put into a scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Preset {
+    /// Minutes on a processor: small photos, few Gaussians.
+    Draft,
+    /// About half the paper's work.
+    Balanced,
+    /// The schedule of the ChromaDistill paper: 15,000 luma iterations, chroma until 30,000.
+    Paper,
+}
+
+/// What a preset stands for.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Amounts {
+    /// Luma iterations.
+    pub iterations: usize,
+    /// Last chroma iteration.
+    pub until: usize,
+    /// Cap on Gaussians.
+    pub max_splats: usize,
+    /// Longer side of the photos.
+    pub max_side: Option<u32>,
+    /// Degree of the luma harmonics.
+    pub sh_degree: u32,
+}
+
+impl Preset {
+    pub(super) fn amounts(self) -> Amounts {
+        match self {
+            Self::Draft => Amounts {
+                iterations: 1_000,
+                until: 1_300,
+                max_splats: 20_000,
+                max_side: Some(400),
+                sh_degree: 1,
+            },
+            Self::Balanced => Amounts {
+                iterations: 7_000,
+                until: 10_000,
+                max_splats: 500_000,
+                max_side: Some(1_600),
+                sh_degree: 2,
+            },
+            Self::Paper => Amounts {
+                iterations: 15_000,
+                until: 30_000,
+                max_splats: 3_000_000,
+                max_side: None,
+                sh_degree: 3,
+            },
+        }
+    }
+
+    /// The name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Draft => "draft",
+            Self::Balanced => "balanced",
+            Self::Paper => "paper",
+        }
+    }
+}

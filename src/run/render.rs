@@ -1,0 +1,125 @@
+//! `render`: pictures from the photographed viewpoints.
+
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+use clap::ValueEnum;
+
+use super::{
+    Event, Observer, RunError, RunFolder, Stage, files,
+    scene::{gray_to_rgb, shown_rgb},
+};
+use crate::{
+    capture::{Capture, Photo, split},
+    gpu::Gpu,
+    raster::{Field, Geometry, Raster, Renderer, constants::NEAR_SHARE},
+    report::to_image,
+    splats::ply,
+};
+
+/// Which of a capture's views.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Views {
+    /// Those trained on.
+    Train,
+    /// Those held out.
+    Test,
+    /// All.
+    All,
+}
+
+/// What `render` is asked to do.
+#[derive(Clone, Debug)]
+pub struct RenderOptions {
+    /// Run folder or splat file; the newest run by default.
+    pub run: Option<PathBuf>,
+    /// COLMAP folder, where it is not the one that `fit` noted.
+    pub colmap: Option<PathBuf>,
+    /// Which views.
+    pub views: Views,
+    /// Draw the luma although the scene is coloured.
+    pub luma: bool,
+    /// Folder for the pictures.
+    pub output: PathBuf,
+}
+
+/// Draws the scene and gives the number of pictures.
+///
+/// # Errors
+/// [`RunError`].
+pub fn render(options: &RenderOptions, observe: &mut Observer<'_>) -> Result<usize, RunError> {
+    let is_file = |path: &Path| {
+        path.extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case("ply"))
+    };
+    let (file, colmap, max_side, holdout) = match &options.run {
+        Some(path) if is_file(path) => {
+            let colmap = options
+                .colmap
+                .clone()
+                .ok_or_else(|| RunError::NoCameras(path.clone()))?;
+            (path.clone(), colmap, None, true)
+        }
+        run => {
+            let folder = match run {
+                Some(path) => RunFolder::at(path),
+                None => RunFolder::newest()?,
+            };
+            let capture = folder.read_report()?.capture;
+            let colored = !options.luma && folder.color().exists();
+            let file = if colored {
+                folder.color()
+            } else {
+                folder.luma()
+            };
+            let noted = PathBuf::from(&capture.path);
+            let colmap = options.colmap.clone().unwrap_or(noted);
+            (file, colmap, capture.max_side, capture.holdout)
+        }
+    };
+    let capture = Capture::load(&colmap)?;
+    let splats = ply::read_ply(&file)?.splats;
+    let splats = if options.luma {
+        splats.to_luma()
+    } else {
+        splats
+    };
+    let gpu = Gpu::open()?;
+    let raster = Arc::new(Raster::new(&gpu));
+    let mut renderer = Renderer::new(
+        raster,
+        Geometry::upload(&gpu, &splats)?,
+        vec![Field::upload(&gpu, &splats.sh)?],
+        NEAR_SHARE * capture.extent(),
+    )?;
+    let split = split(capture.views.len(), holdout);
+    let chosen: Vec<usize> = match options.views {
+        Views::Train => split.train,
+        Views::Test => split.test,
+        Views::All => (0..capture.views.len()).collect(),
+    };
+    for (done, &i) in chosen.iter().enumerate() {
+        let view = &capture.views[i];
+        observe(Event::Progress {
+            stage: Stage::Render,
+            done,
+            total: chosen.len(),
+            message: view.name.clone(),
+        });
+        // The photo decides the size, which the model's camera may miss by a pixel.
+        let (_, camera) = Photo::load(view, max_side)?;
+        let picture = renderer.render(&camera)?.remove(0);
+        let pixels = match picture.channels {
+            1 => gray_to_rgb(&picture.pixels),
+            _ => shown_rgb(&picture.pixels),
+        };
+        let path = options.output.join(&view.name).with_extension("png");
+        if let Some(folder) = path.parent() {
+            files::make_folder(folder)?;
+        }
+        files::write_png(&path, &to_image(picture.width, picture.height, &pixels))?;
+    }
+    Ok(chosen.len())
+}

@@ -1,0 +1,110 @@
+//! What several commands need of a capture: its photos at working size, a
+//! renderer for its splats.
+
+use std::{path::Path, sync::Arc};
+
+use super::{Event, Observer, RunError, Stage};
+use crate::{
+    capture::{Camera, Capture, Photo, Split, split},
+    gpu::GpuError,
+    raster::{Field, Geometry, Raster, Renderer, constants::NEAR_SHARE},
+    splats::{ShField, Splats},
+};
+
+/// A capture with its photos decoded.
+pub(super) struct Scene {
+    pub capture: Capture,
+    pub split: Split,
+    /// Photo and camera of each view, at working size.
+    pub photos: Vec<(Photo, Camera)>,
+    pub extent: f64,
+}
+
+impl Scene {
+    /// Reads a COLMAP folder and decodes its photos.
+    pub fn load(
+        colmap_dir: &Path,
+        max_side: Option<u32>,
+        holdout: bool,
+        observe: &mut Observer<'_>,
+    ) -> Result<Self, RunError> {
+        let capture = Capture::load(colmap_dir)?;
+        for rejected in &capture.rejected {
+            observe(Event::Note(format!(
+                "left out {}: {}",
+                rejected.name, rejected.reason
+            )));
+        }
+        let total = capture.views.len();
+        let mut photos = Vec::with_capacity(total);
+        for (done, view) in capture.views.iter().enumerate() {
+            observe(Event::Progress {
+                stage: Stage::Photos,
+                done,
+                total,
+                message: view.name.clone(),
+            });
+            photos.push(Photo::load(view, max_side)?);
+        }
+        Ok(Self {
+            split: split(total, holdout),
+            extent: capture.extent(),
+            capture,
+            photos,
+        })
+    }
+
+    /// The views to measure on: the held-out ones, or all where none is.
+    pub fn measured(&self) -> (&'static str, &[usize]) {
+        if self.split.test.is_empty() {
+            ("train", &self.split.train)
+        } else {
+            ("test", &self.split.test)
+        }
+    }
+
+    /// A renderer of several fields over the geometry of `splats`.
+    pub fn renderer(
+        &self,
+        raster: &Arc<Raster>,
+        splats: &Splats,
+        fields: &[&ShField],
+    ) -> Result<Renderer, GpuError> {
+        let gpu = &raster.gpu;
+        let fields = fields
+            .iter()
+            .map(|field| Field::upload(gpu, field))
+            .collect::<Result<_, _>>()?;
+        let geometry = Geometry::upload(gpu, splats)?;
+        Renderer::new(raster.clone(), geometry, fields, NEAR_SHARE * self.extent)
+    }
+}
+
+/// Gray pixels as floats in [0, 1].
+pub(super) fn gray_pixels(photo: &Photo) -> Vec<f32> {
+    photo.gray.iter().map(|&v| f32::from(v) / 255.0).collect()
+}
+
+/// The photo as RGB in [0, 1], gray where it has no colours.
+pub(super) fn rgb_pixels(photo: &Photo) -> Vec<[f32; 3]> {
+    match &photo.rgb {
+        Some(rgb) => rgb
+            .iter()
+            .map(|c| c.map(|v| f32::from(v) / 255.0))
+            .collect(),
+        None => gray_pixels(photo).into_iter().map(|v| [v; 3]).collect(),
+    }
+}
+
+/// A one-channel picture as RGB.
+pub(super) fn gray_to_rgb(pixels: &[f32]) -> Vec<[f32; 3]> {
+    pixels.iter().map(|&v| [v.clamp(0.0, 1.0); 3]).collect()
+}
+
+/// A three-channel picture as RGB in [0, 1].
+pub(super) fn shown_rgb(pixels: &[f32]) -> Vec<[f32; 3]> {
+    pixels
+        .chunks_exact(3)
+        .map(|c| [c[0], c[1], c[2]].map(|v| v.clamp(0.0, 1.0)))
+        .collect()
+}

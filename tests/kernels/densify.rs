@@ -1,0 +1,135 @@
+//! `densify`: copies, kept and dropped moments, halves of splits.
+
+use std::sync::LazyLock;
+
+use gs_chroma::{
+    gpu::Buffer,
+    luma::densify::{DensifyKernels, Descent, Target},
+    raster::constants::*,
+};
+
+use crate::{
+    compare::widen,
+    errors::{Row, Sample, assert_all, relative},
+    harness::{bits, gpu},
+    oracle::{
+        linear::{apply, rotation},
+        random::Random,
+    },
+};
+
+const OLD: usize = 300;
+
+fn geometry(random: &mut Random) -> Vec<f32> {
+    let plane = |random: &mut Random, low, high| -> Vec<f32> {
+        (0..OLD).map(|_| random.range(low, high) as f32).collect()
+    };
+    (0..GEOMETRY_PLANES)
+        .flat_map(|index| match index {
+            PLANE_LOG_SCALE..PLANE_OPACITY => plane(random, -6.0, 0.0),
+            _ => plane(random, -2.0, 2.0),
+        })
+        .collect()
+}
+
+/// Survivors with gaps, clones, halves; 600 rows are three workgroups.
+fn plan(random: &mut Random) -> Vec<Descent> {
+    (0..600)
+        .map(|j| Descent {
+            source: (j * 7 % OLD) as u32,
+            keep_moments: u32::from(j % 3 == 0),
+            split: u32::from(j % 3 == 2),
+            offset: random.array::<3>(-2.0, 2.0).map(|v| v as f32),
+            ..Descent::default()
+        })
+        .collect()
+}
+
+fn applied(plan: &[Descent], source: &[f32], target: Target) -> Vec<f32> {
+    let plan = Buffer::from_slice(gpu(), "plan", plan).unwrap();
+    let source = Buffer::from_slice(gpu(), "source", source).unwrap();
+    let kernels = DensifyKernels::new(gpu());
+    let new = kernels.apply(gpu(), &plan, OLD, &source, target).unwrap();
+    new.read(gpu()).unwrap()
+}
+
+/// What one row of the plan makes of the geometry, in `f64`.
+fn descendant(old: &[f32], descent: &Descent) -> Vec<f64> {
+    let i = descent.source as usize;
+    let mut new: Vec<f64> = (0..GEOMETRY_PLANES)
+        .map(|plane| f64::from(old[plane * OLD + i]))
+        .collect();
+    if descent.split == 1 {
+        let quat: [f64; 4] = std::array::from_fn(|k| new[PLANE_QUAT + k]);
+        let norm = quat.iter().map(|q| q * q).sum::<f64>().sqrt();
+        let offset: [f64; 3] = std::array::from_fn(|axis| {
+            new[PLANE_LOG_SCALE + axis].exp() * f64::from(descent.offset[axis])
+        });
+        let moved = apply(&rotation(quat.map(|q| q / norm)), &offset);
+        for axis in 0..3 {
+            new[PLANE_MEAN + axis] += moved[axis];
+            new[PLANE_LOG_SCALE + axis] -= 1.6_f64.ln();
+        }
+    }
+    new
+}
+
+pub static ROWS: LazyLock<Vec<Row>> = LazyLock::new(|| {
+    let mut random = Random::new(1);
+    let (old, plan) = (geometry(&mut random), plan(&mut random));
+    let new = applied(&plan, &old, Target::Geometry);
+    let column = |j: usize| (0..GEOMETRY_PLANES).map(move |plane| plane * plan_len() + j);
+    fn plan_len() -> usize {
+        600
+    }
+    let (mut copied, mut split) = ((Vec::new(), Vec::new()), (Vec::new(), Vec::new()));
+    for (j, descent) in plan.iter().enumerate() {
+        let side = if descent.split == 1 {
+            &mut split
+        } else {
+            &mut copied
+        };
+        side.0.extend(column(j).map(|at| new[at]));
+        side.1.extend(descendant(&old, descent));
+    }
+    let sample = |(actual, expected): (Vec<f32>, Vec<f64>)| [Sample::new(widen(&actual), expected)];
+    vec![
+        Row::elementwise("densify", "copies", relative(0.0, 0.0), &sample(copied)),
+        Row::elementwise(
+            "densify",
+            "halves of splits",
+            relative(1e-9, 1.0),
+            &sample(split),
+        ),
+    ]
+});
+
+#[test]
+fn geometry_is_copied_and_split() {
+    assert_all(&ROWS);
+}
+
+#[test]
+fn fields_are_copied_and_newcomers_have_no_moments() {
+    let mut random = Random::new(2);
+    let plan = plan(&mut random);
+    for planes in [1, 4, 16] {
+        let old: Vec<f32> = (0..planes * OLD)
+            .map(|_| random.range(-1.0, 1.0) as f32)
+            .collect();
+        let expected = |keeps: fn(&Descent) -> bool| -> Vec<f32> {
+            (0..planes)
+                .flat_map(|plane| plan.iter().map(move |descent| (plane, descent)))
+                .map(|(plane, descent)| match keeps(descent) {
+                    true => old[plane * OLD + descent.source as usize],
+                    false => 0.0,
+                })
+                .collect()
+        };
+        let field = applied(&plan, &old, Target::Field);
+        assert_eq!(bits(&field), bits(&expected(|_| true)), "{planes} planes");
+        let moments = applied(&plan, &old, Target::Moments);
+        let kept = expected(|descent| descent.keep_moments == 1);
+        assert_eq!(bits(&moments), bits(&kept), "{planes} planes");
+    }
+}

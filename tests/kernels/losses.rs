@@ -1,0 +1,265 @@
+//! `luma_loss`, `luma_loss_backward`, `chroma_loss` and `sum_loss`.
+
+use std::sync::LazyLock;
+
+use bytemuck::{Pod, Zeroable};
+use gs_chroma::{
+    gpu::{Buffer, Kernel, Recorder, groups_for, shaders},
+    optimize::{LossLog, SumLossKernel},
+    raster::{ViewUniform, constants::STATUS_WORDS},
+};
+
+use crate::{
+    compare::widen,
+    errors::{Row, Sample, assert_all, gradient_bounds, relative},
+    harness::gpu,
+    oracle::{
+        chroma_loss::{chroma_loss, chroma_loss_gradient},
+        luma_loss::{luma_loss, luma_loss_gradient},
+        random::Random,
+    },
+};
+
+/// Blocks cut short on either side, images smaller than the window, whole blocks.
+const SIZES: [[usize; 2]; 6] = [[5, 3], [1, 1], [16, 16], [17, 33], [40, 27], [61, 48]];
+
+/// Adds up what a loss kernel left; `record` runs it.
+fn logged(
+    sizes: [usize; 2],
+    blocks: usize,
+    record: impl FnOnce(&mut Recorder, &Buffer<f32>),
+) -> f64 {
+    let kernel = SumLossKernel::new(gpu());
+    let status = Buffer::zeros(gpu(), "status", STATUS_WORDS).unwrap();
+    let log = LossLog::new(gpu(), &kernel, &status, blocks, 3).unwrap();
+    let mut recorder = Recorder::new(gpu());
+    record(&mut recorder, &log.block_losses);
+    // Iteration 7 of a ring of three stands at 1.
+    let pixels = sizes[0] * sizes[1];
+    log.record(gpu(), &kernel, &mut recorder, blocks as u32, pixels, 7);
+    recorder.submit();
+    f64::from(log.read_later(gpu()).wait(gpu()).unwrap()[1])
+}
+
+fn view(size: [usize; 2]) -> Buffer<ViewUniform> {
+    let size = size.map(|side| side as u32);
+    let uniform = ViewUniform {
+        size,
+        ..ViewUniform::default()
+    };
+    Buffer::uniform(gpu(), "view", &uniform).unwrap()
+}
+
+/// A picture and a photo of it: alike, unlike, or nearly flat and bright,
+/// where the variances cancel most.
+fn luma_images(seed: u64, pixels: usize) -> (Vec<f32>, Vec<u8>) {
+    let mut random = Random::new(seed);
+    let (level, spread) = [(0.5, 0.5), (0.4, 0.1), (0.97, 0.005)][seed as usize % 3];
+    let mut photo = Vec::new();
+    let mut image = Vec::new();
+    for _ in 0..pixels {
+        let value = level + random.range(-spread, spread);
+        photo.push((value * 255.0) as u8);
+        image.push((value + random.range(-spread, spread)) as f32);
+    }
+    (image, photo)
+}
+
+fn luma_on_device(size: [usize; 2], image: &[f32], photo: &[u8]) -> (f64, Vec<f32>) {
+    let pixels = image.len();
+    let mut words = vec![0_u32; pixels.div_ceil(4)];
+    for (p, &gray) in photo.iter().enumerate() {
+        words[p / 4] |= u32::from(gray) << (8 * (p % 4));
+    }
+    let kernel = |name| Kernel::new(gpu(), name, shaders::LUMA_LOSS);
+    let (forward, backward) = (kernel("luma_loss"), kernel("luma_loss_backward"));
+    let view = view(size);
+    let image = Buffer::from_slice(gpu(), "image", image).unwrap();
+    let photo = Buffer::from_slice(gpu(), "photo", &words).unwrap();
+    let slopes = Buffer::<f32>::zeros(gpu(), "slopes", 3 * pixels).unwrap();
+    let gradient = Buffer::<f32>::zeros(gpu(), "gradient", pixels).unwrap();
+    let inputs = [view.raw(), image.raw(), photo.raw(), slopes.raw()];
+    let [x, y] = size.map(|side| side.div_ceil(16) as u32);
+    let loss = logged(size, (x * y) as usize, |recorder, block_losses| {
+        let mut numbered: Vec<_> = (0..).zip(inputs).collect();
+        numbered.push((4, block_losses.raw()));
+        recorder.dispatch_grid(&forward, &forward.bind_at(gpu(), &numbered), x, y);
+        numbered[4] = (5, gradient.raw());
+        recorder.dispatch_grid(&backward, &backward.bind_at(gpu(), &numbered), x, y);
+    });
+    (loss, gradient.read(gpu()).unwrap())
+}
+
+fn luma() -> [Vec<Sample>; 2] {
+    let (mut values, mut gradients) = (Vec::new(), Vec::new());
+    for (k, size) in SIZES.into_iter().enumerate() {
+        for seed in 0..3 {
+            let [width, height] = size;
+            let (image, photo) = luma_images(3 * k as u64 + seed, width * height);
+            let (loss, gradient) = luma_on_device(size, &image, &photo);
+            let x = widen(&image);
+            let y: Vec<f64> = photo.iter().map(|&gray| f64::from(gray) / 255.0).collect();
+            values.push(Sample::new(
+                vec![loss],
+                vec![luma_loss(&x, &y, width, height)],
+            ));
+            // By pixel, not by image: sizes are comparable.
+            let scale = (width * height) as f64;
+            let scaled = |values: Vec<f64>| values.into_iter().map(|v| v * scale).collect();
+            let expected = luma_loss_gradient(&x, &y, width, height);
+            gradients.push(Sample::new(scaled(widen(&gradient)), scaled(expected)));
+        }
+    }
+    [values, gradients]
+}
+
+/// Twin of `struct ChromaLossWeights`.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Weights {
+    coarser_size: [u32; 2],
+    teacher: f32,
+    agreement: f32,
+}
+
+/// Bilinear sample with half-pixel centres, as images are resized everywhere.
+fn upsample(coarser: &[[f64; 2]], from: [usize; 2], to: [usize; 2]) -> Vec<[f64; 2]> {
+    let taps = |index: usize, axis: usize| {
+        let at = (index as f64 + 0.5) * from[axis] as f64 / to[axis] as f64 - 0.5;
+        let at = at.clamp(0.0, from[axis] as f64 - 1.0);
+        let low = at.floor();
+        [
+            (low as usize, 1.0 - (at - low)),
+            ((low as usize + 1).min(from[axis] - 1), at - low),
+        ]
+    };
+    (0..to[0] * to[1])
+        .map(|p| {
+            let mut sum = [0.0; 2];
+            for (row, down) in taps(p / to[0], 1) {
+                for (column, across) in taps(p % to[0], 0) {
+                    let value = coarser[row * from[0] + column];
+                    sum = [0, 1].map(|c| sum[c] + across * down * value[c]);
+                }
+            }
+            sum
+        })
+        .collect()
+}
+
+fn chroma_on_device(
+    size: [usize; 2],
+    [image, wanted, coarser]: [&[[f64; 2]]; 3],
+    weights: &Weights,
+) -> (f64, Vec<f32>) {
+    let buffer = |values: &[[f64; 2]]| {
+        let values: Vec<f32> = values.as_flattened().iter().map(|&v| v as f32).collect();
+        Buffer::from_slice(gpu(), "pixels", &values).unwrap()
+    };
+    let kernel = Kernel::new(gpu(), "chroma_loss", shaders::CHROMA_LOSS);
+    let [view, weights] = [
+        view(size).raw().clone(),
+        Buffer::uniform(gpu(), "weights", weights)
+            .unwrap()
+            .raw()
+            .clone(),
+    ];
+    let [image, wanted, coarser] = [image, wanted, coarser].map(buffer);
+    let gradient = Buffer::<f32>::zeros(gpu(), "gradient", image.len()).unwrap();
+    let groups = groups_for(size[0] * size[1]);
+    let loss = logged(size, groups as usize, |recorder, block_losses| {
+        let [image, wanted, coarser] = [&image, &wanted, &coarser].map(Buffer::raw);
+        let (losses, gradient) = (block_losses.raw(), gradient.raw());
+        let buffers = [&view, image, wanted, coarser, &weights, losses, gradient];
+        recorder.dispatch(&kernel, &kernel.bind(gpu(), &buffers), groups);
+    });
+    (loss, gradient.read(gpu()).unwrap())
+}
+
+fn chroma(agreement: f32) -> [Vec<Sample>; 2] {
+    let (mut values, mut gradients) = (Vec::new(), Vec::new());
+    for (seed, size) in SIZES.into_iter().enumerate() {
+        let mut random = Random::new(seed as u64);
+        let half = size.map(|side| side.div_ceil(2));
+        let mut pixels = |[width, height]: [usize; 2], spread: f64| -> Vec<[f64; 2]> {
+            (0..width * height)
+                .map(|_| random.array(-spread, spread))
+                .collect()
+        };
+        let (wanted, coarser) = (pixels(size, 60.0), pixels(half, 60.0));
+        let image: Vec<[f64; 2]> = (pixels(size, 3.0).iter().zip(&wanted))
+            .map(|(noise, w)| [0, 1].map(|c| f64::from((w[c] + noise[c]) as f32)))
+            .collect();
+        let weights = Weights {
+            coarser_size: half.map(|side| side as u32),
+            teacher: 0.75,
+            agreement,
+        };
+        let (loss, gradient) = chroma_on_device(size, [&image, &wanted, &coarser], &weights);
+        let smooth = upsample(&coarser, half, size);
+        let (teacher, agreement) = (0.75, f64::from(agreement));
+        let expected =
+            teacher * chroma_loss(&image, &wanted) + agreement * chroma_loss(&image, &smooth);
+        values.push(Sample::new(vec![loss], vec![expected]));
+        let [by_teacher, by_coarser] =
+            [&wanted, &smooth].map(|target| chroma_loss_gradient(&image, target));
+        let scale = (size[0] * size[1]) as f64;
+        let expected = (by_teacher
+            .as_flattened()
+            .iter()
+            .zip(by_coarser.as_flattened()))
+        .map(|(t, c)| scale * (teacher * t + agreement * c))
+        .collect();
+        let actual = widen(&gradient).into_iter().map(|v| v * scale).collect();
+        gradients.push(Sample::new(actual, expected));
+    }
+    [values, gradients]
+}
+
+pub static ROWS: LazyLock<Vec<Row>> = LazyLock::new(|| {
+    let value = |kernel, what, unit, samples: &[Sample]| {
+        Row::elementwise(kernel, what, relative(unit, 0.0), samples)
+    };
+    let gradient = |kernel, what, l2, unit, samples: &[Sample]| {
+        Row::gradient(
+            kernel,
+            what,
+            gradient_bounds(l2, relative(unit, 1.0)),
+            samples,
+        )
+    };
+    let [luma_values, luma_gradients] = luma();
+    let [plain_values, plain_gradients] = chroma(0.0);
+    let [values, gradients] = chroma(0.5);
+    vec![
+        value("luma_loss", "value", 1e-9, &luma_values),
+        gradient(
+            "luma_loss",
+            "gradient × pixels",
+            1e-9,
+            1e-9,
+            &luma_gradients,
+        ),
+        value("chroma_loss", "value", 1e-9, &plain_values),
+        gradient(
+            "chroma_loss",
+            "gradient × pixels",
+            1e-9,
+            1e-9,
+            &plain_gradients,
+        ),
+        value("chroma_loss", "value with agreement", 1e-9, &values),
+        gradient(
+            "chroma_loss",
+            "gradient × pixels with agreement",
+            1e-9,
+            1e-9,
+            &gradients,
+        ),
+    ]
+});
+
+#[test]
+fn losses_and_their_gradients_are_those_of_the_oracle() {
+    assert_all(&ROWS);
+}

@@ -1,0 +1,188 @@
+//! The same bits every run, and whatever room the tile lists begin with.
+
+use gs_chroma::{
+    luma::{LumaProgress, LumaSettings, LumaTrainer, TrainingView},
+    raster::{Field, Geometry, Renderer},
+    splats::Splats,
+};
+
+use crate::{
+    harness::{Stage, bits, camera, gpu, raster, splats},
+    oracle::{
+        random::{Random, oblique_view, random_scene},
+        scene::View,
+    },
+};
+
+const COUNT: usize = 40;
+
+/// Tile-list entries that a training begins with, for each Gaussian.
+const ROOM: usize = 8;
+
+#[test]
+fn forward_and_backward_give_the_same_bits() {
+    let (scene, view) = random_scene::<1>(11, 400, 3);
+    let splats = splats(&scene);
+    let mut random = Random::new(1);
+    let upstream: Vec<f64> = (0..view.width * view.height)
+        .map(|_| random.range(-1.0, 1.0))
+        .collect();
+    let run = || {
+        let stage = Stage::new(&splats, &view);
+        let gradient = stage.backward(&upstream).bits_without(None);
+        (bits(&stage.image()), gradient, stage.tiles())
+    };
+    let first = run();
+    for _ in 1..5 {
+        assert!(run() == first);
+    }
+}
+
+/// A far view, in which Gaussians touch few tiles, and two near ones.
+fn views() -> Vec<View> {
+    let view = |scale: f64, shift: f64| View {
+        fx: 60.0 * scale,
+        fy: 60.0 * scale,
+        cx: 64.0,
+        cy: 48.0,
+        width: 128,
+        height: 96,
+        translation: [0.3 + shift, -0.2, 0.5],
+        ..oblique_view()
+    };
+    vec![view(0.25, 0.0), view(1.3, 0.1), view(1.2, -0.1)]
+}
+
+/// Trains on pictures of a scene, starting beside it; gives the splats and
+/// what was reported.
+fn train(start: &Splats, target: &Splats) -> (Splats, Vec<LumaProgress>) {
+    let mut settings = LumaSettings::new(60);
+    settings.sh_degree = 1;
+    settings.gradient_threshold = 1e-6;
+    settings.max_splats = start.len() + 10;
+    settings.prune_share = 1.0;
+    settings.schedule.densify_from = 20;
+    settings.schedule.densify_every = 25;
+    settings.schedule.densify_until = 60;
+    settings.schedule.raise_degree_every = 20;
+    settings.schedule.reset_every = 40;
+    let geometry = Geometry::upload(gpu(), target).unwrap();
+    let field = Field::upload(gpu(), &target.sh).unwrap();
+    let mut renderer = Renderer::new(raster(), geometry, vec![field], 0.01).unwrap();
+    let photos = views().into_iter().map(|view| {
+        let camera = camera(&view);
+        let picture = renderer.render(&camera).unwrap().remove(0);
+        let gray = picture.pixels.iter().map(|v| (v * 255.0) as u8).collect();
+        TrainingView { camera, gray }
+    });
+    let views = photos.collect();
+    let mut trainer = LumaTrainer::new(raster(), settings, 4.0, start, views).unwrap();
+    let mut reports = Vec::new();
+    trainer
+        .train(&mut |progress| reports.push(progress))
+        .unwrap();
+    (trainer.splats().unwrap(), reports)
+}
+
+fn start_and_target() -> [Splats; 2] {
+    let mut target = splats(&random_scene::<1>(12, COUNT, 1).0);
+    let scales = target.log_scales.as_flattened_mut();
+    scales.iter_mut().for_each(|scale| *scale += 0.7);
+    let mut start = target.clone();
+    let mut random = Random::new(3);
+    for value in start.means.as_flattened_mut() {
+        *value += random.range(-0.05, 0.05) as f32;
+    }
+    start.sh.coefficients.iter_mut().for_each(|c| *c *= 0.5);
+    [start, target]
+}
+
+fn same(a: &Splats, b: &Splats) -> bool {
+    let all = |s: &Splats| {
+        let [means, scales] = [&s.means, &s.log_scales].map(|v| bits(v.as_flattened()));
+        let quats = bits(s.quats.as_flattened());
+        let rest = [&s.opacity_logits, &s.sh.coefficients].map(|v| bits(v));
+        (means, scales, quats, rest)
+    };
+    all(a) == all(b)
+}
+
+#[test]
+fn training_twice_gives_the_same_splats() {
+    let [start, target] = start_and_target();
+    let (first, reports) = train(&start, &target);
+    assert!(first.len() > COUNT, "densification took place");
+    assert!(first != start);
+    assert!(reports.last().unwrap().loss < reports[0].loss);
+    assert!(same(&train(&start, &target).0, &first));
+}
+
+/// Gaussians behind every camera change nothing but the room that the lists
+/// begin with: with them nothing overflows, without them every near view does.
+#[test]
+fn overflow_changes_nothing() {
+    let [start, target] = start_and_target();
+    let instances = views().map_counts(&start);
+    assert!(
+        instances[0] <= COUNT * ROOM && instances[1] > COUNT * ROOM,
+        "{instances:?}"
+    );
+    let bystanders = instances.iter().max().unwrap();
+    let mut roomy = start.clone();
+    for _ in 0..*bystanders {
+        let centre = oblique_view().centre();
+        let behind =
+            std::array::from_fn(|k| (centre[k] - 50.0 * oblique_view().rotation[2][k]) as f32);
+        roomy.means.push(behind);
+        roomy.quats.push([1.0, 0.0, 0.0, 0.0]);
+        roomy.log_scales.push([-3.0; 3]);
+        roomy.opacity_logits.push(1.0);
+        roomy.sh.coefficients.extend([0.0; 4]);
+    }
+    let (short, short_reports) = train(&start, &target);
+    let (long, long_reports) = train(&roomy, &target);
+    assert!(same(&short, &without(&long, *bystanders)));
+    let losses = |reports: &[LumaProgress]| {
+        reports
+            .iter()
+            .map(|r| (r.iteration, r.loss))
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(losses(&short_reports), losses(&long_reports));
+}
+
+trait Counts {
+    fn map_counts(self, splats: &Splats) -> Vec<usize>;
+}
+
+impl Counts for Vec<View> {
+    /// Tile-list entries that each view needs.
+    fn map_counts(self, splats: &Splats) -> Vec<usize> {
+        let count = |view: View| {
+            let stage = Stage::new(splats, &view);
+            stage.forward();
+            stage.status().instances
+        };
+        self.into_iter().map(count).collect()
+    }
+}
+
+/// The splats without those behind every camera.
+fn without(splats: &Splats, bystanders: usize) -> Splats {
+    let keep: Vec<usize> = (0..splats.len())
+        .filter(|&i| splats.sh.coefficients[4 * i..4 * i + 4] != [0.0; 4])
+        .collect();
+    assert_eq!(keep.len() + bystanders, splats.len());
+    let mut kept = Splats {
+        means: keep.iter().map(|&i| splats.means[i]).collect(),
+        quats: keep.iter().map(|&i| splats.quats[i]).collect(),
+        log_scales: keep.iter().map(|&i| splats.log_scales[i]).collect(),
+        opacity_logits: keep.iter().map(|&i| splats.opacity_logits[i]).collect(),
+        sh: splats.sh.clone(),
+    };
+    kept.sh.coefficients = keep
+        .iter()
+        .flat_map(|&i| splats.sh.coefficients[4 * i..4 * i + 4].to_vec())
+        .collect();
+    kept
+}
