@@ -9,7 +9,7 @@
 //
 // Transmittance is recomputed front to back as `blend` computed it; nothing is
 // recovered by dividing by 1 - alpha.
-import package::common::color::{CHANNELS, Color, color_dot};
+import package::common::color::{Color, color_dot};
 import package::common::constants::{ALPHA_MAX, ALPHA_MIN, TILE_SIDE};
 import package::common::numeric::linear_group;
 import package::common::partials::{PARTIAL_COLOR, PARTIAL_STRIDE};
@@ -19,6 +19,8 @@ import package::common::view::View;
 
 const THREADS: u32 = 32u;
 const BATCH: u32 = 16u;
+// Shares of one figure.
+const FIGURE: u32 = BATCH * THREADS;
 
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var<storage, read> starts: array<u32>;
@@ -40,6 +42,15 @@ var<workgroup> shares: array<f32, PARTIAL_STRIDE * BATCH * THREADS>;
 var<workgroup> tile_last: atomic<u32>;
 var<workgroup> uniform_last: u32;
 
+// One thread's share of one instance.
+struct Share {
+    // Sums of dL/dpower times 1, dx, dy, dx² and dx·dy, dy².
+    @if(geometry) moments: vec4f,
+    @if(geometry) moments_y: vec2f,
+    // Sum of the weighted gradient.
+    color: Color,
+}
+
 struct Pixels {
     transmittance: vec4f,
     // Gradient times the colour still to come, summed over the channels.
@@ -48,8 +59,9 @@ struct Pixels {
     last: vec4u,
 }
 
-@if(luma) fn channel(quad: Quad, c: u32) -> vec4f { return quad; }
-@if(!luma) fn channel(quad: Quad, c: u32) -> vec4f { return quad[c]; }
+// The gradient of four pixels, weighted and added up.
+@if(luma) fn gathered(weight: vec4f, quad: Quad) -> Color { return dot(weight, quad); }
+@if(chroma) fn gathered(weight: vec4f, quad: Quad) -> Color { return vec2f(dot(weight, quad[0]), dot(weight, quad[1])); }
 @if(luma) fn insert(quad: Quad, k: u32, color: Color) -> Quad { var q = quad; q[k] = color; return q; }
 @if(chroma) fn insert(quad: Quad, k: u32, color: Color) -> Quad { var q = quad; q[0][k] = color.x; q[1][k] = color.y; return q; }
 // The gradient of each pixel times one colour.
@@ -74,7 +86,7 @@ fn load(first: vec2u) -> Pixels {
 // Adds one quad's share of an instance and moves the quad behind it. `d` is the
 // first pixel relative to the Gaussian's centre.
 fn accumulate(
-    figures: ptr<function, array<f32, PARTIAL_STRIDE>>,
+    share: ptr<function, Share>,
     pixels: ptr<function, Pixels>,
     own: u32,
     conic_opacity: vec4f,
@@ -87,9 +99,7 @@ fn accumulate(
     let before = (*pixels).transmittance;
     let hit = contributes(power, alpha) & (vec4u(own) < (*pixels).last);
     let weight = select(vec4f(0.0), alpha * before, hit);
-    for (var c = 0u; c < CHANNELS; c++) {
-        (*figures)[PARTIAL_COLOR + c] += dot(weight, channel((*pixels).gradient, c));
-    }
+    (*share).color += gathered(weight, (*pixels).gradient);
     (*pixels).transmittance = select(before, before * (1.0 - alpha), hit);
     @if(geometry) {
         let contribution = shown((*pixels).gradient, color);
@@ -101,12 +111,8 @@ fn accumulate(
         let rows = d.y + vec4f(0.0, 1.0, 2.0, 3.0);
         let sum = v_power.x + v_power.y + v_power.z + v_power.w;
         let sum_y = dot(v_power, rows);
-        (*figures)[0] += sum;
-        (*figures)[1] += sum * d.x;
-        (*figures)[2] += sum_y;
-        (*figures)[3] += sum * d.x * d.x;
-        (*figures)[4] += sum_y * d.x;
-        (*figures)[5] += dot(v_power, rows * rows);
+        (*share).moments += vec4f(sum, sum * d.x, sum_y, sum * d.x * d.x);
+        (*share).moments_y += vec2f(sum_y * d.x, dot(v_power, rows * rows));
     }
 }
 
@@ -139,17 +145,28 @@ fn blend_backward(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) 
             let conic_opacity = projected[i].conic_opacity;
             let d = vec2f(first) + 0.5 - projected[i].mean;
             @if(geometry) let color = colors[i];
-            var figures = array<f32, PARTIAL_STRIDE>();
+            var share = Share();
             @if(geometry) {
-                accumulate(&figures, &upper, own, conic_opacity, d, color);
-                accumulate(&figures, &lower, own, conic_opacity, d + vec2f(0.0, 4.0), color);
+                accumulate(&share, &upper, own, conic_opacity, d, color);
+                accumulate(&share, &lower, own, conic_opacity, d + vec2f(0.0, 4.0), color);
             }
             @if(!geometry) {
-                accumulate(&figures, &upper, own, conic_opacity, d);
-                accumulate(&figures, &lower, own, conic_opacity, d + vec2f(0.0, 4.0));
+                accumulate(&share, &upper, own, conic_opacity, d);
+                accumulate(&share, &lower, own, conic_opacity, d + vec2f(0.0, 4.0));
             }
-            for (var c = 0u; c < PARTIAL_STRIDE; c++) {
-                shares[(c * BATCH + member) * THREADS + thread] = figures[c];
+            let at = member * THREADS + thread;
+            @if(geometry) {
+                shares[at] = share.moments.x;
+                shares[FIGURE + at] = share.moments.y;
+                shares[2u * FIGURE + at] = share.moments.z;
+                shares[3u * FIGURE + at] = share.moments.w;
+                shares[4u * FIGURE + at] = share.moments_y.x;
+                shares[5u * FIGURE + at] = share.moments_y.y;
+            }
+            @if(luma) { shares[PARTIAL_COLOR * FIGURE + at] = share.color; }
+            @if(chroma) {
+                shares[PARTIAL_COLOR * FIGURE + at] = share.color.x;
+                shares[(PARTIAL_COLOR + 1u) * FIGURE + at] = share.color.y;
             }
         }
         workgroupBarrier();

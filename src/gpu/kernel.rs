@@ -23,13 +23,26 @@ pub struct Kernel {
 impl Kernel {
     /// Compiles the entry point `name` of `source`. All bindings
     /// are in group 0.
-    pub fn new(gpu: &Gpu, name: &'static str, source: &str) -> Self {
-        let module = gpu
-            .device()
-            .create_shader_module(wgpu::ShaderModuleDescriptor {
-                label: Some(name),
-                source: wgpu::ShaderSource::Wgsl(source.into()),
-            });
+    pub fn new(gpu: &Gpu, name: &'static str, source: &'static str) -> Self {
+        let description = wgpu::ShaderModuleDescriptor {
+            label: Some(name),
+            source: wgpu::ShaderSource::Wgsl(source.into()),
+        };
+        // SAFETY: without loop bounding a shader must not loop for ever, without
+        // division checks it must not divide an integer by zero. The sources are
+        // this crate's own: every loop counts towards a bound that its body does
+        // not move, and every integer divisor is a constant or a size that the
+        // host makes at least 1. Bounds checks stay on.
+        let module = unsafe {
+            gpu.device().create_shader_module_trusted(
+                description,
+                wgpu::ShaderRuntimeChecks {
+                    force_loop_bounding: false,
+                    int_div_checks: false,
+                    ..wgpu::ShaderRuntimeChecks::checked()
+                },
+            )
+        };
         let pipeline = gpu
             .device()
             .create_compute_pipeline(&wgpu::ComputePipelineDescriptor {

@@ -261,6 +261,11 @@ impl Lists {
         self.by_tile.sorted_values()
     }
 
+    /// Tiles that a view may have.
+    pub fn max_tiles(&self) -> usize {
+        self.max_tiles
+    }
+
     /// Chooses the camera for what is recorded and submitted next.
     ///
     /// # Panics

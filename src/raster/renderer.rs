@@ -33,6 +33,7 @@ pub struct Renderer {
     lists: Lists,
     layers: Vec<Layer>,
     max_pixels: usize,
+    max_tiles: usize,
 }
 
 impl Renderer {
@@ -56,6 +57,7 @@ impl Renderer {
             lists,
             layers: Vec::new(),
             max_pixels: 0,
+            max_tiles: 0,
         })
     }
 
@@ -65,7 +67,8 @@ impl Renderer {
     /// [`GpuError`] when buffers do not fit or the device is lost.
     pub fn render(&mut self, camera: &Camera) -> Result<Vec<Picture>, GpuError> {
         let view = ViewUniform::new(camera, self.near, self.geometry.count, 0);
-        if view.pixel_count() > self.max_pixels {
+        // Of two views, the one with fewer pixels may have more tiles.
+        if view.pixel_count() > self.max_pixels || view.tile_count() > self.max_tiles {
             let capacity = self
                 .lists
                 .capacity
@@ -106,9 +109,10 @@ impl Renderer {
     }
 
     fn resize(&mut self, view: &ViewUniform, capacity: usize) -> Result<(), GpuError> {
-        let (raster, tiles) = (&self.raster, view.tile_count());
-        self.max_pixels = view.pixel_count();
-        self.lists = Lists::new(raster, &self.geometry, tiles, capacity)?;
+        let raster = &self.raster;
+        self.max_pixels = self.max_pixels.max(view.pixel_count());
+        self.max_tiles = self.max_tiles.max(view.tile_count());
+        self.lists = Lists::new(raster, &self.geometry, self.max_tiles, capacity)?;
         self.layers = self
             .fields
             .iter()
@@ -119,7 +123,7 @@ impl Renderer {
                     &self.lists,
                     field,
                     self.max_pixels,
-                    tiles,
+                    self.max_tiles,
                 )
             })
             .collect::<Result<_, _>>()?;
