@@ -14,6 +14,7 @@ from .network import Network
 BIN = 10.0  # Lab units; the side of one cell of the colour histogram.
 HALF_BINS = 11
 UNIFORM_SHARE = 0.5  # Zhang et al. 2016: mix the histogram with a uniform one before inverting.
+MOST_WEIGHT = 8.0  # A few stray pixels must not steer the network.
 RATE = 4e-3
 
 
@@ -51,7 +52,7 @@ def fit(
         error = torch.nn.functional.smooth_l1_loss(
             network(gray), chroma, reduction="none", beta=2.0
         ).sum(dim=1)
-        loss = (error * weights[cell(chroma)].clamp(max=8.0)).mean()
+        loss = (error * weights[cell(chroma)].clamp(max=MOST_WEIGHT)).mean()
         optimiser.zero_grad()
         loss.backward()
         optimiser.step()
