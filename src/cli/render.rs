@@ -15,9 +15,9 @@ pub struct Render {
     /// COLMAP folder with the cameras, when it is not where `fit` found it.
     #[arg(long, value_name = "COLMAP_DIR")]
     colmap: Option<PathBuf>,
-    /// Which views.
-    #[arg(long, value_enum, default_value_t = Views::Test)]
-    views: Views,
+    /// Which views [default: those held out, or all where none is].
+    #[arg(long, value_enum)]
+    views: Option<Views>,
     /// Draw luma.ply although color.ply is there.
     #[arg(long)]
     luma: bool,

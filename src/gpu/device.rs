@@ -130,6 +130,12 @@ impl Gpu {
             .min(limits.max_buffer_size)
     }
 
+    /// Bytes that live buffers take on the device at present, where the backend tells.
+    pub fn allocated_bytes(&self) -> Option<u64> {
+        let report = self.0.device.generate_allocator_report()?;
+        Some(report.total_allocated_bytes)
+    }
+
     /// Waits until all submitted work is done.
     ///
     /// # Errors

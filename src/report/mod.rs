@@ -87,6 +87,8 @@ pub struct LumaReport {
     pub seconds: LumaSeconds,
     /// Largest resident memory of the process in bytes, where the system tells.
     pub peak_host_memory: Option<u64>,
+    /// Largest memory of the device's buffers in bytes, where the backend tells.
+    pub peak_device_memory: Option<u64>,
     /// Mean over the held-out views, if any.
     pub held_out: Option<LumaQuality>,
     /// Each held-out view.
@@ -142,6 +144,8 @@ pub struct ChromaReport {
     pub seconds: ChromaSeconds,
     /// Largest resident memory of the process in bytes, where the system tells.
     pub peak_host_memory: Option<u64>,
+    /// Largest memory of the device's buffers in bytes, where the backend tells.
+    pub peak_device_memory: Option<u64>,
     /// ΔE00 between the native picture and the exported file's.
     pub bake: ColorError,
     /// Views that the bake was measured on: `test`, or `train` without held-out ones.

@@ -113,7 +113,7 @@ pub fn colorize(
         .collect();
     let colored_views = views.len();
     let mut distiller = Distiller::new(raster.clone(), settings, scene.extent, &luma, views)?;
-    let (mut log, mut loss) = (String::new(), 0.0);
+    let (mut log, mut loss, mut peak_device_memory) = (String::new(), 0.0, None);
     distiller.run(&mut |progress| {
         // Writing to a string cannot fail.
         let _ = writeln!(
@@ -131,6 +131,7 @@ pub fn colorize(
             message: format!("loss {:.3}", progress.loss),
         });
         loss = progress.loss;
+        peak_device_memory = peak_device_memory.max(gpu.allocated_bytes());
     })?;
     let chroma = distiller.chroma()?;
     drop(distiller);
@@ -152,6 +153,7 @@ pub fn colorize(
             measure: begun.elapsed().as_secs_f64(),
         },
         peak_host_memory: files::peak_host_memory(),
+        peak_device_memory,
         bake: measured.bake,
         measured_on: scene.measured().0.to_owned(),
         pictures: measured.mean(),
@@ -261,6 +263,7 @@ impl Source {
                     measure: 0.0,
                 },
                 peak_host_memory: None,
+                peak_device_memory: None,
                 held_out: None,
                 held_out_views: Vec::new(),
             },

@@ -91,7 +91,7 @@ pub fn fit(
         views,
     )?;
     let mut log = String::from("iteration,loss,splats,seconds\n");
-    let mut last = None;
+    let (mut last, mut peak_device_memory) = (None, None);
     trainer.train(&mut |progress| {
         // Writing to a string cannot fail.
         let _ = writeln!(
@@ -106,6 +106,7 @@ pub fn fit(
             message: format!("loss {:.4}, {} splats", progress.loss, progress.splats),
         });
         last = Some(progress);
+        peak_device_memory = peak_device_memory.max(gpu.allocated_bytes());
     })?;
     let splats = trainer.splats()?;
     let train = begun.elapsed().as_secs_f64();
@@ -136,6 +137,7 @@ pub fn fit(
                 measure: begun.elapsed().as_secs_f64(),
             },
             peak_host_memory: files::peak_host_memory(),
+            peak_device_memory,
             held_out: mean_quality(&held_out_views),
             held_out_views,
         },

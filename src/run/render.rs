@@ -37,8 +37,8 @@ pub struct RenderOptions {
     pub run: Option<PathBuf>,
     /// COLMAP folder, where it is not the one that `fit` noted.
     pub colmap: Option<PathBuf>,
-    /// Which views.
-    pub views: Views,
+    /// Which views; those held out by default, or all where none is.
+    pub views: Option<Views>,
     /// Draw the luma although the scene is coloured.
     pub luma: bool,
     /// Folder for the pictures.
@@ -96,9 +96,10 @@ pub fn render(options: &RenderOptions, observe: &mut Observer<'_>) -> Result<usi
     )?;
     let split = split(capture.views.len(), holdout);
     let chosen: Vec<usize> = match options.views {
-        Views::Train => split.train,
-        Views::Test => split.test,
-        Views::All => (0..capture.views.len()).collect(),
+        Some(Views::Train) => split.train,
+        Some(Views::Test) => split.test,
+        None if !split.test.is_empty() => split.test,
+        None | Some(Views::All) => (0..capture.views.len()).collect(),
     };
     for (done, &i) in chosen.iter().enumerate() {
         let view = &capture.views[i];
