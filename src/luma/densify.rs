@@ -204,3 +204,125 @@ impl DensifyKernels {
         Ok(destination)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Planes for Gaussians of (standard deviation, opacity, mean pull).
+    fn evidence(gaussians: &[(f32, f32, f32)]) -> (Vec<f32>, Vec<f32>) {
+        let n = gaussians.len();
+        let mut geometry = vec![0.0; GEOMETRY_PLANES * n];
+        let mut statistics = vec![0.0; STATISTICS_PLANES * n];
+        for (i, &(deviation, opacity, pull)) in gaussians.iter().enumerate() {
+            geometry[PLANE_QUAT * n + i] = 1.0;
+            for axis in 0..3 {
+                geometry[(PLANE_LOG_SCALE + axis) * n + i] = deviation.ln();
+            }
+            geometry[PLANE_OPACITY * n + i] = (opacity / (1.0 - opacity)).ln();
+            // Seen in four views.
+            statistics[i] = 4.0 * pull;
+            statistics[n + i] = 4.0;
+        }
+        (geometry, statistics)
+    }
+
+    fn planned(
+        settings: &LumaSettings,
+        gaussians: &[(f32, f32, f32)],
+        prune_large: bool,
+    ) -> Vec<Descent> {
+        let (geometry, statistics) = evidence(gaussians);
+        let evidence = Evidence {
+            geometry: &geometry,
+            statistics: &statistics,
+            extent: 1.0,
+            prune_large,
+        };
+        plan(settings, &evidence, &mut fastrand::Rng::with_seed(1))
+    }
+
+    fn sources(plan: &[Descent]) -> Vec<(u32, u32, u32)> {
+        plan.iter()
+            .map(|d| (d.source, d.keep_moments, d.split))
+            .collect()
+    }
+
+    const CALM: (f32, f32, f32) = (0.005, 0.5, 1e-5);
+    const SMALL: (f32, f32, f32) = (0.005, 0.5, 1e-3);
+    const LARGE: (f32, f32, f32) = (0.05, 0.5, 1e-3);
+    const FAINT: (f32, f32, f32) = (0.005, 0.004, 1e-3);
+    const HUGE: (f32, f32, f32) = (0.2, 0.5, 1e-5);
+
+    #[test]
+    fn small_ones_are_cloned_large_ones_split_faint_ones_removed() {
+        let plan = planned(
+            &LumaSettings::new(1000),
+            &[CALM, SMALL, LARGE, FAINT],
+            false,
+        );
+        assert_eq!(
+            sources(&plan),
+            [(0, 1, 0), (1, 1, 0), (1, 0, 0), (2, 0, 1), (2, 0, 1)]
+        );
+        assert_eq!(plan[2].offset, [0.0; 3]);
+        assert_ne!(plan[3].offset, plan[4].offset);
+    }
+
+    #[test]
+    fn oversized_ones_go_only_when_asked() {
+        let settings = LumaSettings::new(1000);
+        assert_eq!(sources(&planned(&settings, &[HUGE, CALM], false)).len(), 2);
+        assert_eq!(
+            sources(&planned(&settings, &[HUGE, CALM], true)),
+            [(1, 1, 0)]
+        );
+    }
+
+    #[test]
+    fn the_cap_holds_and_the_strongest_come_first() {
+        let settings = LumaSettings {
+            max_splats: 4,
+            ..LumaSettings::new(1000)
+        };
+        let stronger = (0.005, 0.5, 2e-3);
+        let plan = planned(&settings, &[SMALL, stronger, CALM], false);
+        assert_eq!(sources(&plan), [(0, 1, 0), (1, 1, 0), (2, 1, 0), (1, 0, 0)]);
+        let full = LumaSettings {
+            max_splats: 2,
+            ..settings
+        };
+        assert_eq!(planned(&full, &[SMALL, stronger, CALM], false).len(), 3);
+    }
+
+    #[test]
+    fn what_is_not_a_number_does_not_survive() {
+        let (mut geometry, statistics) = evidence(&[CALM, CALM]);
+        geometry[2 * PLANE_QUAT] = f32::NAN;
+        let evidence = Evidence {
+            geometry: &geometry,
+            statistics: &statistics,
+            extent: 1.0,
+            prune_large: false,
+        };
+        let mut random = fastrand::Rng::with_seed(1);
+        assert_eq!(
+            sources(&plan(&LumaSettings::new(1000), &evidence, &mut random)),
+            [(1, 1, 0)]
+        );
+    }
+
+    #[test]
+    fn normal_deviates_have_mean_zero_and_variance_one() {
+        let mut random = fastrand::Rng::with_seed(7);
+        let sample: Vec<f64> = (0..20_000)
+            .map(|_| f64::from(standard_normal(&mut random)))
+            .collect();
+        let mean = sample.iter().sum::<f64>() / sample.len() as f64;
+        let square = sample.iter().map(|v| v * v).sum::<f64>() / sample.len() as f64;
+        assert!(
+            mean.abs() < 0.03 && (square - 1.0).abs() < 0.04,
+            "{mean} {square}"
+        );
+    }
+}

@@ -147,3 +147,39 @@ impl LumaSettings {
             && iteration.is_multiple_of(self.schedule.reset_every)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_papers_schedule_is_3dgs() {
+        let schedule = Schedule::of(PAPER_ITERATIONS);
+        assert_eq!(
+            schedule,
+            Schedule {
+                iterations: 15_000,
+                densify_from: 500,
+                densify_until: 15_000,
+                densify_every: 100,
+                reset_every: 3_000,
+                raise_degree_every: 1_000,
+            }
+        );
+        let settings = LumaSettings::new(PAPER_ITERATIONS);
+        assert!(!settings.densifies_after(500) && settings.densifies_after(600));
+        assert!(settings.resets_after(3_000) && !settings.resets_after(15_000));
+        assert_eq!(
+            [0, 999, 1_000, 2_500, 9_000].map(|i| settings.degree_at(i)),
+            [0, 0, 1, 2, 3]
+        );
+    }
+
+    #[test]
+    fn rates_of_means_decay_from_end_to_end() {
+        let settings = LumaSettings::new(1_000);
+        assert!((settings.means_rate(0, 2.0) - 3.2e-4).abs() < 1e-12);
+        assert!((settings.means_rate(1_000, 2.0) - 3.2e-6).abs() < 1e-14);
+        assert!((settings.means_rate(500, 2.0) - 3.2e-5).abs() < 1e-12);
+    }
+}

@@ -294,3 +294,43 @@ fn capture_report(options: &FitOptions, scene: &Scene, max_side: Option<u32>) ->
         holdout: options.holdout,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn numbered(count: usize, degree: u32) -> Splats {
+        let mut splats = Splats {
+            means: (0..count).map(|i| [i as f32; 3]).collect(),
+            quats: vec![[1.0, 0.0, 0.0, 0.0]; count],
+            log_scales: (0..count).map(|i| [-(i as f32); 3]).collect(),
+            opacity_logits: (0..count).map(|i| i as f32).collect(),
+            sh: ShField::zeros(count, degree, 1),
+        };
+        for (k, c) in splats.sh.coefficients.iter_mut().enumerate() {
+            *c = k as f32;
+        }
+        splats
+    }
+
+    #[test]
+    fn a_cap_is_a_cap_for_the_first_gaussians_too() {
+        let mut splats = numbered(10, 1);
+        truncate(&mut splats, 4);
+        assert_eq!(splats.opacity_logits, [0.0, 2.0, 5.0, 7.0]);
+        assert_eq!(splats.means[3], [7.0; 3]);
+        assert_eq!(splats.sh.of(2), [20.0, 21.0, 22.0, 23.0]);
+        let before = splats.clone();
+        truncate(&mut splats, 4);
+        assert_eq!(splats, before);
+    }
+
+    #[test]
+    fn harmonics_change_degree_without_moving() {
+        let splats = numbered(2, 1);
+        assert_eq!(at_degree(&splats.sh, 2, 0).coefficients, [0.0, 4.0]);
+        let raised = at_degree(&splats.sh, 2, 2);
+        assert_eq!(raised.of(1)[..5], [4.0, 5.0, 6.0, 7.0, 0.0]);
+        assert_eq!(raised.of(1).len(), 9);
+    }
+}
