@@ -14,6 +14,8 @@ struct AdamParameters {
 
 const BETA1: f32 = 0.9;
 const BETA2: f32 = 0.999;
+// Written out: 1 - 0.999 in f32 is off by 1e-5.
+const ONE_LESS_BETA2: f32 = 0.001;
 // Small enough never to matter beside a gradient that a pixel could notice (3DGS).
 const EPSILON: f32 = 1e-15;
 
@@ -34,8 +36,13 @@ fn adam(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
     }
     let plane = k / parameters.splat_count;
     let g = gradient[k];
+    // Harmonics near the end of f32 overflow on the way; a parameter that has
+    // no gradient stays what it is.
+    if !is_finite(g) {
+        return;
+    }
     let m = BETA1 * first_moment[k] + (1.0 - BETA1) * g;
-    let v = BETA2 * second_moment[k] + (1.0 - BETA2) * g * g;
+    let v = BETA2 * second_moment[k] + ONE_LESS_BETA2 * g * g;
     first_moment[k] = m;
     second_moment[k] = v;
     let rate = parameters.learning_rates[plane / 4u][plane % 4u];

@@ -19,8 +19,10 @@ import package::common::view::View;
 
 const THREADS: u32 = 32u;
 const BATCH: u32 = 16u;
-// Shares of one figure.
-const FIGURE: u32 = BATCH * THREADS;
+// A word more than there are threads: neighbouring sums lie in different banks.
+const SHARE_STRIDE: u32 = THREADS + 1u;
+// Words of one figure.
+const FIGURE: u32 = BATCH * SHARE_STRIDE;
 
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var<storage, read> starts: array<u32>;
@@ -38,7 +40,7 @@ const FIGURE: u32 = BATCH * THREADS;
 // Shares of one batch, `[figure, instance, thread]`. A figure is a sum over
 // pixels: of dL/dpower times 1, dx, dy, dx², dx·dy, dy², then of the weighted
 // gradient, a channel each.
-var<workgroup> shares: array<f32, PARTIAL_STRIDE * BATCH * THREADS>;
+var<workgroup> shares: array<f32, PARTIAL_STRIDE * FIGURE>;
 var<workgroup> tile_last: atomic<u32>;
 var<workgroup> uniform_last: u32;
 
@@ -154,7 +156,7 @@ fn blend_backward(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) 
                 accumulate(&share, &upper, own, conic_opacity, d);
                 accumulate(&share, &lower, own, conic_opacity, d + vec2f(0.0, 4.0));
             }
-            let at = member * THREADS + thread;
+            let at = member * SHARE_STRIDE + thread;
             @if(geometry) {
                 shares[at] = share.moments.x;
                 shares[FIGURE + at] = share.moments.y;
@@ -173,9 +175,8 @@ fn blend_backward(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) 
         for (var k = thread; k < PARTIAL_STRIDE * BATCH; k += THREADS) {
             let member = k % BATCH;
             var sum = 0.0;
-            // Start at different threads' shares, in an order fixed for each k.
             for (var t = 0u; t < THREADS; t++) {
-                sum += shares[k * THREADS + (t + k) % THREADS];
+                sum += shares[k * SHARE_STRIDE + t];
             }
             if member < members {
                 partials[slots[start + batch + member] * PARTIAL_STRIDE + k / BATCH] = sum;

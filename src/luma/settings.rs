@@ -101,6 +101,9 @@ pub struct LumaSettings {
     pub prune_share: f64,
     /// Gaussians below this opacity are removed.
     pub prune_opacity: f64,
+    /// Whether each iteration has a background of its own: then a scene that
+    /// covers its photos cannot use half-transparent Gaussians as dark ones.
+    pub random_background: bool,
 }
 
 impl LumaSettings {
@@ -116,6 +119,7 @@ impl LumaSettings {
             split_share: 0.01,
             prune_share: 0.1,
             prune_opacity: 0.005,
+            random_background: false,
         }
     }
 

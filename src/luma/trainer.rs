@@ -250,6 +250,10 @@ impl LumaTrainer {
             self.geometry.count,
             self.settings.degree_at(iteration),
         );
+        let view = ViewUniform {
+            background: self.background_at(iteration),
+            ..view
+        };
         let mut recorder = Recorder::new(&self.gpu);
         workspace.lists.set_view(&self.gpu, &view);
         workspace.lists.record(&self.raster, &mut recorder);
@@ -278,6 +282,15 @@ impl LumaTrainer {
             .adam_field
             .record(&self.gpu, adam, &mut recorder, step, &self.field_rates());
         recorder.submit();
+    }
+
+    /// The background of an iteration, a function of seed and iteration alone.
+    fn background_at(&self, iteration: usize) -> f32 {
+        if !self.settings.random_background {
+            return 0.0;
+        }
+        let seed = self.settings.seed ^ (iteration as u64 + 1).wrapping_mul(0xd1b5_4a32_d192_ed03);
+        fastrand::Rng::with_seed(seed).f32()
     }
 
     fn geometry_rates(&self, iteration: usize) -> [f32; GEOMETRY_PLANES] {
@@ -344,10 +357,14 @@ impl LumaTrainer {
             keep(&self.workspace.adam_geometry)?,
             keep(&self.workspace.adam_field)?,
         ];
-        // Statistics since the last densification go on.
-        let statistics = self.workspace.statistics().read(&self.gpu)?;
+        // Statistics since the last densification and losses since the last report go on.
+        let statistics = self.workspace.statistics().clone();
+        let losses = self.workspace.log.losses.clone();
         self.renew(capacity, iteration, moments)?;
-        self.workspace.statistics().write(&self.gpu, &statistics);
+        let mut recorder = Recorder::new(&self.gpu);
+        recorder.copy(statistics.raw(), self.workspace.statistics().raw());
+        recorder.copy(losses.raw(), self.workspace.log.losses.raw());
+        recorder.submit();
         Ok(())
     }
 

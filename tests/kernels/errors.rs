@@ -1,6 +1,11 @@
 //! Measured errors: each row is one quantity over several scenes.
 
-use crate::compare::{Elementwise, FlipBounds, GradientBounds};
+use std::sync::LazyLock;
+
+use crate::{
+    compare::{Elementwise, FlipBounds, GradientBounds},
+    harness::gpu,
+};
 
 /// What a kernel gave and what the oracle says, of one scene.
 pub struct Sample {
@@ -36,23 +41,35 @@ pub struct Row {
     failures: Vec<String>,
 }
 
-/// `unit · (scale + |x|)`: relative errors, floored at a typical size.
-pub fn relative(unit: f64, scale: f64) -> Elementwise {
+/// What a bound leaves above the worst that was seen. The figures in the tests
+/// were seen on Mesa 22.3's llvmpipe; WGSL allows `exp`, `sqrt` and quotients
+/// several units in the last place, of which other drivers make other use.
+static HEADROOM: LazyLock<f64> = LazyLock::new(|| {
+    let measured = gpu().is_software() && gpu().info().driver_info.contains("Mesa 22.3");
+    if measured { 1.05 } else { 16.0 }
+});
+
+/// Errors up to `worst · (scale + |x|)` were seen: relative ones, floored at a
+/// typical size of the quantity.
+pub fn relative(worst: f64, scale: f64) -> Elementwise {
+    let unit = worst * *HEADROOM;
     Elementwise {
         absolute: unit * scale,
         relative: unit,
     }
 }
 
-/// Bounds on a gradient: on the relative L2 error, on elements as a share of
-/// `scale` plus their own size. The angle and the bias follow from the L2 error.
-pub fn gradient_bounds(relative_l2: f64, elements: Elementwise) -> GradientBounds {
+/// Bounds on a gradient of which this relative L2 error was seen; angle and bias have to
+/// be as small as it makes them.
+pub fn gradient_bounds(worst_l2: f64, elements: Elementwise) -> GradientBounds {
+    let relative_l2 = worst_l2 * *HEADROOM;
     GradientBounds {
         elementwise: elements,
         relative_l2,
         // 1 - cos φ is about φ²/2, and φ is at most the relative error.
         cosine: 0.51 * relative_l2 * relative_l2,
-        signed_bias: relative_l2,
+        // In L1 norms, in which small elements weigh more.
+        signed_bias: 2.0 * relative_l2,
     }
 }
 
@@ -162,7 +179,7 @@ pub fn table<'a>(device: &str, rows: impl Iterator<Item = &'a Row>) -> String {
     );
     for row in rows {
         text += &format!(
-            "| {} | {} | {} | {:.1e} | {:.1e} | {} | {:.2} |\n",
+            "| {} | {} | {} | {:.2e} | {:.2e} | {} | {:.3} |\n",
             row.kernel,
             row.what,
             row.scenes,

@@ -72,14 +72,13 @@ fn scenes<const C: usize>() -> Vec<(Scene<f64, C>, View)> {
 
 pub static ROWS: LazyLock<Vec<Row>> = LazyLock::new(|| {
     let bounds = [
-        // (relative L2, elements)
-        gradient_bounds(1e-9, relative(1e-9, 1.0)),
-        gradient_bounds(1e-9, relative(1e-9, 1.0)),
-        gradient_bounds(1e-9, relative(1e-9, 1.0)),
-        gradient_bounds(1e-9, relative(1e-9, 1.0)),
-        gradient_bounds(1e-9, relative(1e-9, 1.0)),
+        gradient_bounds(3.16e-6, relative(1.52e-5, 1.0)),
+        gradient_bounds(4.34e-6, relative(5.29e-6, 1.0)),
+        gradient_bounds(1.44e-6, relative(2.69e-6, 1.0)),
+        gradient_bounds(2.02e-6, relative(8.40e-7, 1.0)),
+        gradient_bounds(1.97e-6, relative(1.98e-6, 1.0)),
     ];
-    let chroma = gradient_bounds(1e-9, relative(1e-9, 1.0));
+    let chroma = gradient_bounds(1.94e-6, relative(2.22e-6, 1.0));
     let mut rows = Vec::new();
     for ((name, samples), bounds) in measure::<1>(&scenes()).into_iter().zip(bounds) {
         rows.push(Row::gradient("luma adjoint", name, bounds, &samples));

@@ -3,6 +3,7 @@
 use std::{collections::BTreeMap, mem::offset_of};
 
 use gs_chroma::{
+    chroma::ChromaLossWeights,
     gpu::shaders,
     luma::densify::{DensifyParameters, Descent},
     optimize::{AdamParameters, SumLossParameters},
@@ -64,7 +65,7 @@ fn twins() -> Vec<Twin> {
             splat_count,
             sh_degree,
             instance_capacity,
-            padding
+            background
         }
     );
     // Three rows there, one array of rows here.
@@ -110,6 +111,13 @@ fn twins() -> Vec<Twin> {
                 blocks,
                 pixels,
                 entry
+            }
+        ),
+        twin!(
+            "ChromaLossWeights" = ChromaLossWeights {
+                coarser_size,
+                teacher,
+                agreement
             }
         ),
         twin!(

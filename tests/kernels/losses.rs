@@ -2,8 +2,8 @@
 
 use std::sync::LazyLock;
 
-use bytemuck::{Pod, Zeroable};
 use gs_chroma::{
+    chroma::ChromaLossWeights,
     gpu::{Buffer, Kernel, Recorder, groups_for, shaders},
     optimize::{LossLog, SumLossKernel},
     raster::{ViewUniform, constants::STATUS_WORDS},
@@ -50,11 +50,17 @@ fn view(size: [usize; 2]) -> Buffer<ViewUniform> {
     Buffer::uniform(gpu(), "view", &uniform).unwrap()
 }
 
-/// A picture and a photo of it: alike, unlike, or nearly flat and bright,
-/// where the variances cancel most.
-fn luma_images(seed: u64, pixels: usize) -> (Vec<f32>, Vec<u8>) {
+/// Gray level and how far pixels stray from it.
+type Tone = (f64, f64);
+
+const TONES: [Tone; 2] = [(0.5, 0.5), (0.4, 0.1)];
+
+/// Where the variances in SSIM cancel most.
+const BRIGHT_AND_FLAT: [Tone; 1] = [(0.97, 0.005)];
+
+/// A picture and a photo.
+fn luma_images(seed: u64, pixels: usize, (level, spread): Tone) -> (Vec<f32>, Vec<u8>) {
     let mut random = Random::new(seed);
-    let (level, spread) = [(0.5, 0.5), (0.4, 0.1), (0.97, 0.005)][seed as usize % 3];
     let mut photo = Vec::new();
     let mut image = Vec::new();
     for _ in 0..pixels {
@@ -90,12 +96,12 @@ fn luma_on_device(size: [usize; 2], image: &[f32], photo: &[u8]) -> (f64, Vec<f3
     (loss, gradient.read(gpu()).unwrap())
 }
 
-fn luma() -> [Vec<Sample>; 2] {
+fn luma(tones: &[Tone]) -> [Vec<Sample>; 2] {
     let (mut values, mut gradients) = (Vec::new(), Vec::new());
     for (k, size) in SIZES.into_iter().enumerate() {
-        for seed in 0..3 {
+        for &tone in tones {
             let [width, height] = size;
-            let (image, photo) = luma_images(3 * k as u64 + seed, width * height);
+            let (image, photo) = luma_images(k as u64, width * height, tone);
             let (loss, gradient) = luma_on_device(size, &image, &photo);
             let x = widen(&image);
             let y: Vec<f64> = photo.iter().map(|&gray| f64::from(gray) / 255.0).collect();
@@ -111,15 +117,6 @@ fn luma() -> [Vec<Sample>; 2] {
         }
     }
     [values, gradients]
-}
-
-/// Twin of `struct ChromaLossWeights`.
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct Weights {
-    coarser_size: [u32; 2],
-    teacher: f32,
-    agreement: f32,
 }
 
 /// Bilinear sample with half-pixel centres, as images are resized everywhere.
@@ -150,7 +147,7 @@ fn upsample(coarser: &[[f64; 2]], from: [usize; 2], to: [usize; 2]) -> Vec<[f64;
 fn chroma_on_device(
     size: [usize; 2],
     [image, wanted, coarser]: [&[[f64; 2]]; 3],
-    weights: &Weights,
+    weights: &ChromaLossWeights,
 ) -> (f64, Vec<f32>) {
     let buffer = |values: &[[f64; 2]]| {
         let values: Vec<f32> = values.as_flattened().iter().map(|&v| v as f32).collect();
@@ -190,7 +187,7 @@ fn chroma(agreement: f32) -> [Vec<Sample>; 2] {
         let image: Vec<[f64; 2]> = (pixels(size, 3.0).iter().zip(&wanted))
             .map(|(noise, w)| [0, 1].map(|c| f64::from((w[c] + noise[c]) as f32)))
             .collect();
-        let weights = Weights {
+        let weights = ChromaLossWeights {
             coarser_size: half.map(|side| side as u32),
             teacher: 0.75,
             agreement,
@@ -217,43 +214,52 @@ fn chroma(agreement: f32) -> [Vec<Sample>; 2] {
 }
 
 pub static ROWS: LazyLock<Vec<Row>> = LazyLock::new(|| {
-    let value = |kernel, what, unit, samples: &[Sample]| {
-        Row::elementwise(kernel, what, relative(unit, 0.0), samples)
+    let value = |kernel, what, worst, samples: &[Sample]| {
+        Row::elementwise(kernel, what, relative(worst, 0.0), samples)
     };
-    let gradient = |kernel, what, l2, unit, samples: &[Sample]| {
+    let gradient = |kernel, what, l2, worst, samples: &[Sample]| {
         Row::gradient(
             kernel,
             what,
-            gradient_bounds(l2, relative(unit, 1.0)),
+            gradient_bounds(l2, relative(worst, 1.0)),
             samples,
         )
     };
-    let [luma_values, luma_gradients] = luma();
+    let [luma_values, luma_gradients] = luma(&TONES);
+    let [flat_values, flat_gradients] = luma(&BRIGHT_AND_FLAT);
     let [plain_values, plain_gradients] = chroma(0.0);
     let [values, gradients] = chroma(0.5);
     vec![
-        value("luma_loss", "value", 1e-9, &luma_values),
+        value("luma_loss", "value", 2.86e-7, &luma_values),
         gradient(
             "luma_loss",
             "gradient × pixels",
-            1e-9,
-            1e-9,
+            1.04e-6,
+            6.18e-6,
             &luma_gradients,
         ),
-        value("chroma_loss", "value", 1e-9, &plain_values),
+        value("luma_loss", "value, bright and flat", 4.95e-4, &flat_values),
+        gradient(
+            "luma_loss",
+            "gradient × pixels, bright and flat",
+            5.94e-5,
+            1.93e-4,
+            &flat_gradients,
+        ),
+        value("chroma_loss", "value", 6.35e-8, &plain_values),
         gradient(
             "chroma_loss",
             "gradient × pixels",
-            1e-9,
-            1e-9,
+            7.40e-8,
+            4.72e-8,
             &plain_gradients,
         ),
-        value("chroma_loss", "value with agreement", 1e-9, &values),
+        value("chroma_loss", "value with agreement", 7.73e-8, &values),
         gradient(
             "chroma_loss",
             "gradient × pixels with agreement",
-            1e-9,
-            1e-9,
+            2.06e-6,
+            1.58e-5,
             &gradients,
         ),
     ]

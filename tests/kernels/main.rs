@@ -20,6 +20,7 @@ mod layout;
 mod losses;
 mod poison;
 mod project;
+mod renderer;
 mod repeat;
 mod scan;
 mod sort;

@@ -51,10 +51,10 @@ pub static ROWS: LazyLock<Vec<Row>> = LazyLock::new(|| {
     }
     let row = |k: usize, what, bound| Row::elementwise("project", what, bound, &samples[k]);
     vec![
-        row(0, "mean2d, px", relative(1e-9, 10.0)),
-        row(1, "conic, px⁻²", relative(1e-9, 0.01)),
-        row(2, "opacity", relative(1e-9, 0.0)),
-        row(3, "half extent, px", relative(1e-9, 0.0)),
+        row(0, "mean2d, px", relative(9.06e-7, 10.0)),
+        row(1, "conic, px⁻²", relative(6.69e-6, 0.01)),
+        row(2, "opacity", relative(2.99e-7, 0.0)),
+        row(3, "half extent, px", relative(6.17e-7, 0.0)),
     ]
 });
 
