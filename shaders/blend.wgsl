@@ -4,7 +4,7 @@ import package::common::color::Color;
 import package::common::constants::{TILE_SIDE, TRANSMITTANCE_MIN};
 import package::common::numeric::linear_group;
 import package::common::projected::{Projected, raw_alpha};
-import package::common::quad::{Quad, contributes, pixel_of, powers, quad_alpha, uniform_quad, weighted};
+import package::common::quad::{Quad, contributes, pixel_of, powers, quad_alpha, weighted};
 import package::common::view::View;
 
 @group(0) @binding(0) var<uniform> view: View;
@@ -48,8 +48,6 @@ fn blend(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: v
         last = select(last, vec4u(k - start + 1u), used);
         live = live & (open | !hit);
     }
-    // The adjoint needs no word of this: it goes back from the finished picture.
-    color += uniform_quad(transmittance * view.background);
     for (var row = 0u; row < 4u; row++) {
         if inside[row] {
             let p = rows[row] * view.size.x + first.x;

@@ -14,11 +14,6 @@ import package::common::view::View;
 @if(chroma) fn weighted(weights: vec4f, color: Color) -> Quad { return Quad(weights * color.x, weights * color.y); }
 @if(rgb) fn weighted(weights: vec4f, color: Color) -> Quad { return Quad(weights * color.x, weights * color.y, weights * color.z); }
 
-// The same weights in every channel.
-@if(luma) fn uniform_quad(weights: vec4f) -> Quad { return weights; }
-@if(chroma) fn uniform_quad(weights: vec4f) -> Quad { return Quad(weights, weights); }
-@if(rgb) fn uniform_quad(weights: vec4f) -> Quad { return Quad(weights, weights, weights); }
-
 // Colour of one of the four pixels.
 @if(luma) fn pixel_of(quad: Quad, k: u32) -> Color { return quad[k]; }
 @if(chroma) fn pixel_of(quad: Quad, k: u32) -> Color { return vec2f(quad[0][k], quad[1][k]); }

@@ -16,6 +16,5 @@ struct View {
     // Degree of the spherical harmonics in use and the degree they are stored with.
     sh_degree: u32,
     instance_capacity: u32,
-    // What shows where Gaussians let light through, the same in every channel.
-    background: f32,
+    padding: u32,
 }

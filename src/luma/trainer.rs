@@ -250,10 +250,6 @@ impl LumaTrainer {
             self.geometry.count,
             self.settings.degree_at(iteration),
         );
-        let view = ViewUniform {
-            background: self.background_at(iteration),
-            ..view
-        };
         let mut recorder = Recorder::new(&self.gpu);
         workspace.lists.set_view(&self.gpu, &view);
         workspace.lists.record(&self.raster, &mut recorder);
@@ -280,35 +276,29 @@ impl LumaTrainer {
         );
         workspace
             .adam_field
-            .record(&self.gpu, adam, &mut recorder, step, &self.field_rates());
+            .record(&self.gpu, adam, &mut recorder, step, &self.field_rates(iteration));
         recorder.submit();
-    }
-
-    /// The background of an iteration, a function of seed and iteration alone.
-    fn background_at(&self, iteration: usize) -> f32 {
-        if !self.settings.random_background {
-            return 0.0;
-        }
-        let seed = self.settings.seed ^ (iteration as u64 + 1).wrapping_mul(0xd1b5_4a32_d192_ed03);
-        fastrand::Rng::with_seed(seed).f32()
     }
 
     fn geometry_rates(&self, iteration: usize) -> [f32; GEOMETRY_PLANES] {
         let rates = &self.settings.rates;
+        let cooled = self.settings.cooled(iteration);
         std::array::from_fn(|plane| {
             (match plane {
                 PLANE_MEAN..PLANE_QUAT => self.settings.means_rate(iteration, self.extent),
-                PLANE_QUAT..PLANE_LOG_SCALE => rates.quats,
-                PLANE_LOG_SCALE..PLANE_OPACITY => rates.log_scales,
-                _ => rates.opacity_logits,
+                PLANE_QUAT..PLANE_LOG_SCALE => cooled * rates.quats,
+                PLANE_LOG_SCALE..PLANE_OPACITY => cooled * rates.log_scales,
+                _ => cooled * rates.opacity_logits,
             }) as f32
         })
     }
 
-    fn field_rates(&self) -> Vec<f32> {
+    fn field_rates(&self, iteration: usize) -> Vec<f32> {
         let rates = &self.settings.rates;
-        let mut planes = vec![rates.sh_rest as f32; sh::coefficient_count(self.field.degree)];
-        planes[0] = rates.sh_constant as f32;
+        let cooled = self.settings.cooled(iteration);
+        let rest = (cooled * rates.sh_rest) as f32;
+        let mut planes = vec![rest; sh::coefficient_count(self.field.degree)];
+        planes[0] = (cooled * rates.sh_constant) as f32;
         planes
     }
 

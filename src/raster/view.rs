@@ -27,8 +27,8 @@ pub struct ViewUniform {
     pub sh_degree: u32,
     /// Entries that the tile lists have room for.
     pub instance_capacity: u32,
-    /// What shows where Gaussians let light through, the same in every channel.
-    pub background: f32,
+    /// Unused; keeps the size a multiple of 16.
+    pub padding: u32,
 }
 
 impl ViewUniform {
@@ -71,7 +71,7 @@ impl ViewUniform {
             splat_count: splat_count as u32,
             sh_degree,
             instance_capacity: 0,
-            background: 0.0,
+            padding: 0,
         }
     }
 

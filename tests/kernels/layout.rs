@@ -65,7 +65,7 @@ fn twins() -> Vec<Twin> {
             splat_count,
             sh_degree,
             instance_capacity,
-            background
+            padding
         }
     );
     // Three rows there, one array of rows here.
