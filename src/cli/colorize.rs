@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::progress::Progress;
+use super::{print, progress::Progress};
 use crate::run::{ColorizeOptions, RunError, colorize};
 
 /// How chroma is solved for.
@@ -57,12 +57,12 @@ impl Colorize {
         let (output, report) = colorize(&options, &mut |event| progress.show(&event))?;
         progress.finish();
         if self.json {
-            println!("{}", report.to_json());
+            print(report.to_json())?;
         } else {
-            println!("{}", report.chroma_summary());
-            println!("wrote {}", output.ply.display());
+            print(report.chroma_summary())?;
+            print(format_args!("wrote {}", output.ply.display()))?;
             if let Some(sheet) = output.contact_sheet {
-                println!("wrote {}", sheet.display());
+                print(format_args!("wrote {}", sheet.display()))?;
             }
         }
         Ok(())

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::print;
 use crate::run::{RunError, export};
 
 /// Write a run's scene as a splat file in the photos' own coordinates.
@@ -22,7 +23,10 @@ pub struct Export {
 impl Export {
     pub(super) fn run(self) -> Result<(), RunError> {
         let count = export(self.run.as_deref(), &self.output, self.luma)?;
-        println!("wrote {count} Gaussians to {}", self.output.display());
+        print(format_args!(
+            "wrote {count} Gaussians to {}",
+            self.output.display()
+        ))?;
         Ok(())
     }
 }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::progress::Progress;
+use super::{print, progress::Progress};
 use crate::run::{FitOptions, Preset, RunError, fit};
 
 /// Train geometry and luminance on a folder of photos with COLMAP poses.
@@ -62,10 +62,10 @@ impl Fit {
         let (folder, report) = fit(&options, &mut |event| progress.show(&event))?;
         progress.finish();
         if self.json {
-            println!("{}", report.to_json());
+            print(report.to_json())?;
         } else {
-            println!("{}", report.luma_summary());
-            println!("wrote {}", folder.luma().display());
+            print(report.luma_summary())?;
+            print(format_args!("wrote {}", folder.luma().display()))?;
         }
         Ok(())
     }

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::print;
 use crate::run::{RunError, info};
 
 /// Say what a run, a splat file or a COLMAP folder holds.
@@ -20,16 +21,16 @@ impl Info {
     pub(super) fn run(self) -> Result<(), RunError> {
         let value = info(&self.path)?;
         if self.json {
-            println!("{value:#}");
+            print(format_args!("{value:#}"))?;
         } else {
-            print_lines("", &value);
+            print_lines("", &value)?;
         }
         Ok(())
     }
 }
 
 /// Prints a JSON value as `key: value` lines, nested keys joined by dots.
-fn print_lines(key: &str, value: &serde_json::Value) {
+fn print_lines(key: &str, value: &serde_json::Value) -> Result<(), RunError> {
     match value {
         serde_json::Value::Object(map) => {
             for (name, value) in map {
@@ -38,10 +39,11 @@ fn print_lines(key: &str, value: &serde_json::Value) {
                 } else {
                     format!("{key}.{name}")
                 };
-                print_lines(&key, value);
+                print_lines(&key, value)?;
             }
+            Ok(())
         }
-        serde_json::Value::String(text) => println!("{key}: {text}"),
-        other => println!("{key}: {other}"),
+        serde_json::Value::String(text) => print(format_args!("{key}: {text}")),
+        other => print(format_args!("{key}: {other}")),
     }
 }

@@ -7,6 +7,12 @@ mod info;
 mod progress;
 mod render;
 
+use std::{
+    fmt::Display,
+    io::{self, Write},
+    path::PathBuf,
+};
+
 use clap::{Parser, Subcommand};
 
 use crate::run::RunError;
@@ -41,5 +47,17 @@ impl Cli {
             Command::Export(command) => command.run(),
             Command::Info(command) => command.run(),
         }
+    }
+}
+
+/// Prints a line to standard output. A reader that has seen enough (`| head`) is
+/// no error.
+fn print(line: impl Display) -> Result<(), RunError> {
+    match writeln!(io::stdout(), "{line}") {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(RunError::File {
+            path: PathBuf::from("standard output"),
+            reason: error.to_string(),
+        }),
+        _ => Ok(()),
     }
 }

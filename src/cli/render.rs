@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::progress::Progress;
+use super::{print, progress::Progress};
 use crate::run::{RenderOptions, RunError, Views, render};
 
 /// Draw a scene from the photographed viewpoints, one PNG a view.
@@ -38,7 +38,10 @@ impl Render {
         };
         let count = render(&options, &mut |event| progress.show(&event))?;
         progress.finish();
-        println!("wrote {count} pictures to {}", options.output.display());
+        print(format_args!(
+            "wrote {count} pictures to {}",
+            options.output.display()
+        ))?;
         Ok(())
     }
 }

@@ -16,9 +16,6 @@ pub struct LearningRates {
     pub sh_constant: f64,
     /// The other terms: slower, for they explain less.
     pub sh_rest: f64,
-    /// What all rates but the means' have fallen to by the last iteration, as a
-    /// share; 1 keeps them constant, as 3DGS does.
-    pub cooled: f64,
 }
 
 impl Default for LearningRates {
@@ -30,7 +27,6 @@ impl Default for LearningRates {
             opacity_logits: 5e-2,
             sh_constant: 2.5e-3,
             sh_rest: 2.5e-3 / 20.0,
-            cooled: 1.0,
         }
     }
 }
@@ -128,12 +124,6 @@ impl LumaSettings {
         let [first, last] = self.rates.means;
         let t = iteration as f64 / self.schedule.iterations.max(1) as f64;
         extent * first * (last / first).powf(t.min(1.0))
-    }
-
-    /// What the rates but the means' are multiplied by at `iteration`.
-    pub fn cooled(&self, iteration: usize) -> f64 {
-        let t = iteration as f64 / self.schedule.iterations.max(1) as f64;
-        self.rates.cooled.powf(t.min(1.0))
     }
 
     /// Degree of the harmonics in use at `iteration`.

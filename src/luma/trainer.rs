@@ -276,29 +276,27 @@ impl LumaTrainer {
         );
         workspace
             .adam_field
-            .record(&self.gpu, adam, &mut recorder, step, &self.field_rates(iteration));
+            .record(&self.gpu, adam, &mut recorder, step, &self.field_rates());
         recorder.submit();
     }
 
     fn geometry_rates(&self, iteration: usize) -> [f32; GEOMETRY_PLANES] {
         let rates = &self.settings.rates;
-        let cooled = self.settings.cooled(iteration);
         std::array::from_fn(|plane| {
             (match plane {
                 PLANE_MEAN..PLANE_QUAT => self.settings.means_rate(iteration, self.extent),
-                PLANE_QUAT..PLANE_LOG_SCALE => cooled * rates.quats,
-                PLANE_LOG_SCALE..PLANE_OPACITY => cooled * rates.log_scales,
-                _ => cooled * rates.opacity_logits,
+                PLANE_QUAT..PLANE_LOG_SCALE => rates.quats,
+                PLANE_LOG_SCALE..PLANE_OPACITY => rates.log_scales,
+                _ => rates.opacity_logits,
             }) as f32
         })
     }
 
-    fn field_rates(&self, iteration: usize) -> Vec<f32> {
+    fn field_rates(&self) -> Vec<f32> {
         let rates = &self.settings.rates;
-        let cooled = self.settings.cooled(iteration);
-        let rest = (cooled * rates.sh_rest) as f32;
+        let rest = rates.sh_rest as f32;
         let mut planes = vec![rest; sh::coefficient_count(self.field.degree)];
-        planes[0] = (cooled * rates.sh_constant) as f32;
+        planes[0] = rates.sh_constant as f32;
         planes
     }
 

@@ -9,9 +9,9 @@ use std::{
 
 use super::{
     Event, Observer, RunError, RunFolder, Stage, files,
-    fit::comments,
+    fit::{capture_report, comments},
     preset::Preset,
-    scene::{Scene, gray_to_rgb, rgb_pixels, shown_rgb},
+    scene::{Scene, gray_to_rgb, read_splats, rgb_pixels, shown_rgb},
 };
 use crate::{
     chroma::{
@@ -70,24 +70,29 @@ pub fn colorize(
     let mut teacher = Teacher::open(&options.teacher, cache.as_deref())?;
     let gpu = Gpu::open()?;
     let mut report = source.report(&gpu);
-    let capture = &report.capture;
-    let scene = Scene::load(
-        &source.colmap_dir(options, capture)?,
-        capture.max_side,
-        capture.holdout,
-        observe,
-    )?;
-    let read = ply::read_ply(&source.splats)?;
-    if read.skipped > 0 {
-        observe(Event::Note(format!(
-            "{}: skipped {} Gaussians with values that are not finite or no rotation",
-            source.splats.display(),
-            read.skipped
-        )));
+    let (max_side, holdout) = (report.capture.max_side, report.capture.holdout);
+    let colmap_dir = source.colmap_dir(options, &report.capture)?;
+    let scene = Scene::load(&colmap_dir, max_side, holdout, observe)?;
+    // A run's own files are moved already; others lie where COLMAP has the cameras.
+    let offset = match source.folder {
+        Some(_) => glam::DVec3::ZERO,
+        None => scene.capture.offset,
+    };
+    let luma = read_splats(&source.splats, offset, observe)?.to_luma();
+    if source.report.is_none() {
+        report.capture = capture_report(&colmap_dir, &scene, max_side, holdout);
+        (report.luma.splats, report.luma.sh_degree) = (luma.len(), luma.sh.degree);
     }
-    let luma = read.splats.to_luma();
     let preset = source.preset(&report, &gpu);
     let iterations = chroma_iterations(options, preset, report.luma.iterations)?;
+    let output = Output {
+        ply: options
+            .output
+            .clone()
+            .unwrap_or_else(|| source.default_output()),
+        contact_sheet: source.folder.as_ref().map(RunFolder::contact_sheet),
+    };
+    files::make_folder_of(&output.ply)?;
 
     let begun = Instant::now();
     let answers = ask(&mut teacher, options, &scene, observe)?;
@@ -159,14 +164,7 @@ pub fn colorize(
         pictures: measured.mean(),
         views: measured.views,
     });
-    let output = Output {
-        ply: options
-            .output
-            .clone()
-            .unwrap_or_else(|| source.default_output()),
-        contact_sheet: source.folder.as_ref().map(RunFolder::contact_sheet),
-    };
-    ply::write_ply(&output.ply, &baked, glam::DVec3::ZERO, &comments())?;
+    ply::write_ply(&output.ply, &baked, offset, &comments())?;
     if let Some(folder) = &source.folder {
         append_log(folder, report.luma.iterations, &log)?;
         files::write_png(&folder.contact_sheet(), &contact_sheet(&measured.rows))?;

@@ -15,13 +15,17 @@ pub(super) fn at(path: &Path) -> impl FnOnce(std::io::Error) -> RunError {
     }
 }
 
-/// Writes beside and renames.
-pub(super) fn write(path: &Path, bytes: &[u8]) -> Result<(), RunError> {
-    let folder = match path.parent() {
+/// The folder of a file.
+fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
-    };
-    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(at(path))?;
+    }
+}
+
+/// Writes beside and renames.
+pub(super) fn write(path: &Path, bytes: &[u8]) -> Result<(), RunError> {
+    let mut file = tempfile::NamedTempFile::new_in(folder_of(path)).map_err(at(path))?;
     file.write_all(bytes).map_err(at(path))?;
     #[cfg(unix)]
     {
@@ -46,9 +50,36 @@ pub(super) fn write_png(path: &Path, image: &RgbImage) -> Result<(), RunError> {
     write(path, bytes.get_ref())
 }
 
-/// Makes a folder and those above it.
+/// Makes a folder and those above it, and tries whether it can be written to:
+/// better now than after hours of work.
 pub(super) fn make_folder(path: &Path) -> Result<(), RunError> {
-    fs::create_dir_all(path).map_err(at(path))
+    let refused = |reason: String| RunError::File {
+        path: path.to_owned(),
+        reason,
+    };
+    if path.is_file() {
+        return Err(refused("is a file; name a folder".to_owned()));
+    }
+    fs::create_dir_all(path).map_err(at(path))?;
+    match tempfile::tempfile_in(path) {
+        Ok(_) => Ok(()),
+        // Only the kind: the rest names a temporary file.
+        Err(error) => Err(refused(format!(
+            "cannot be written to ({}); choose another folder with -o",
+            error.kind()
+        ))),
+    }
+}
+
+/// Makes the folder that a file will be written to, see [`make_folder`].
+pub(super) fn make_folder_of(path: &Path) -> Result<(), RunError> {
+    if path.is_dir() {
+        return Err(RunError::File {
+            path: path.to_owned(),
+            reason: "is a folder; name a .ply file".to_owned(),
+        });
+    }
+    make_folder(folder_of(path))
 }
 
 /// The largest resident memory of this process so far, in bytes.

@@ -1,10 +1,15 @@
 //! `fit`: photos to geometry and luma.
 
-use std::{fmt::Write, path::PathBuf, sync::Arc, time::Instant};
+use std::{
+    fmt::Write,
+    path::{Path, PathBuf},
+    sync::Arc,
+    time::Instant,
+};
 
 use super::{
     Event, Observer, Preset, RunError, RunFolder, Stage, files,
-    scene::{Scene, gray_pixels},
+    scene::{Scene, gray_pixels, read_splats},
 };
 use crate::{
     color::gray_from_rgb,
@@ -18,6 +23,9 @@ use crate::{
     },
     splats::{ShField, Splats, init::initial_splats, ply, sh},
 };
+
+/// PSNR of pictures without a difference, in dB: JSON knows no infinity.
+const IDENTICAL_PSNR: f64 = 100.0;
 
 /// What `fit` is asked to do; `None` leaves it to the preset.
 #[derive(Clone, Debug)]
@@ -64,7 +72,7 @@ pub fn fit(
         seed: options.seed,
         ..LumaSettings::new(options.iterations.unwrap_or(amounts.iterations))
     };
-    let start = first_splats(options, &scene, &settings)?;
+    let start = first_splats(options, &scene, &settings, observe)?;
     let folder = match &options.output {
         Some(path) => RunFolder::at(path),
         None => RunFolder::for_capture(&options.colmap_dir),
@@ -116,7 +124,7 @@ pub fn fit(
     let report = Report {
         version: REPORT_VERSION,
         program: env!("CARGO_PKG_VERSION").to_owned(),
-        capture: capture_report(options, &scene, max_side),
+        capture: capture_report(&options.colmap_dir, &scene, max_side, options.holdout),
         device: DeviceReport {
             name: gpu.describe(),
             backend: format!("{:?}", gpu.info().backend),
@@ -178,6 +186,7 @@ fn first_splats(
     options: &FitOptions,
     scene: &Scene,
     settings: &LumaSettings,
+    observe: &mut Observer<'_>,
 ) -> Result<Splats, RunError> {
     let Some(path) = &options.init else {
         let points: Vec<_> = scene
@@ -196,11 +205,7 @@ fn first_splats(
         truncate(&mut splats, settings.max_splats);
         return Ok(splats);
     };
-    let mut splats = ply::read_ply(path)?.splats.to_luma();
-    let offset = scene.capture.offset.as_vec3().to_array();
-    for mean in &mut splats.means {
-        *mean = std::array::from_fn(|axis| mean[axis] - offset[axis]);
-    }
+    let mut splats = read_splats(path, scene.capture.offset, observe)?.to_luma();
     splats.sh = at_degree(&splats.sh, splats.means.len(), settings.sh_degree);
     truncate(&mut splats, settings.max_splats);
     Ok(splats)
@@ -255,7 +260,7 @@ fn measure_luma(
             Ok(LumaView {
                 name: scene.capture.views[i].name.clone(),
                 quality: LumaQuality {
-                    psnr: measure::psnr(&shown, &truth),
+                    psnr: measure::psnr(&shown, &truth).min(IDENTICAL_PSNR),
                     ssim: measure::ssim(width, height, &shown, &truth),
                 },
             })
@@ -273,10 +278,15 @@ fn mean_quality(views: &[LumaView]) -> Option<LumaQuality> {
     })
 }
 
-fn capture_report(options: &FitOptions, scene: &Scene, max_side: Option<u32>) -> CaptureReport {
+/// What a report says about the photos.
+pub(super) fn capture_report(
+    colmap_dir: &Path,
+    scene: &Scene,
+    max_side: Option<u32>,
+    holdout: bool,
+) -> CaptureReport {
     let capture = &scene.capture;
-    let path =
-        std::fs::canonicalize(&options.colmap_dir).unwrap_or_else(|_| options.colmap_dir.clone());
+    let path = std::fs::canonicalize(colmap_dir).unwrap_or_else(|_| colmap_dir.to_owned());
     CaptureReport {
         path: path.to_string_lossy().into_owned(),
         views: capture.views.len(),
@@ -291,7 +301,7 @@ fn capture_report(options: &FitOptions, scene: &Scene, max_side: Option<u32>) ->
         max_side,
         extent: scene.extent,
         offset: capture.offset.to_array(),
-        holdout: options.holdout,
+        holdout,
     }
 }
 

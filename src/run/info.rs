@@ -5,7 +5,7 @@ use std::path::Path;
 use glam::DVec3;
 use serde_json::{Value, json};
 
-use super::{RunError, RunFolder, fit::comments};
+use super::{RunError, RunFolder, files, fit::comments};
 use crate::{capture::Capture, splats::ply};
 
 /// What a run folder, a splat file or a COLMAP folder holds.
@@ -32,7 +32,7 @@ pub fn info(path: &Path) -> Result<Value, RunError> {
         "views": capture.views.len(),
         "points": capture.points.len(),
         "rejected": capture.rejected.iter().map(|r| format!("{}: {}", r.name, r.reason)).collect::<Vec<_>>(),
-        "largest_photo": sizes.iter().max_by_key(|[w, h]| w * h),
+        "largest_photo": sizes.iter().max_by_key(|&&[w, h]| u64::from(w) * u64::from(h)),
         "extent": capture.extent(),
         "offset": capture.offset.to_array(),
     }))
@@ -79,6 +79,7 @@ pub fn export(run: Option<&Path>, output: &Path, luma: bool) -> Result<usize, Ru
         folder.luma()
     };
     let splats = ply::read_ply(&file)?.splats;
+    files::make_folder_of(output)?;
     ply::write_ply(
         output,
         &splats,

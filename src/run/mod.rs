@@ -51,6 +51,12 @@ pub enum RunError {
     /// A splat file without cameras.
     #[error("{}: a splat file has no cameras: name the COLMAP folder with --colmap", .0.display())]
     NoCameras(PathBuf),
+    /// A splat file without Gaussians.
+    #[error("{}: holds no Gaussians: name another file, or train again with `gs-chroma fit`", .0.display())]
+    NoSplats(PathBuf),
+    /// All views were trained on.
+    #[error("no view is held out: choose --views train or --views all")]
+    NoHeldOut,
     /// The teacher has no picture for any training view.
     #[error("{}: no image of it has the name of a training photo (such as {example}): name its images like the photos", teacher.display())]
     TeacherCoversNothing {

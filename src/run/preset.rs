@@ -38,7 +38,8 @@ impl Preset {
                 until: 1_300,
                 max_splats: 20_000,
                 max_side: Some(400),
-                sh_degree: 1,
+                // A short run only learns noise from the direction of view.
+                sh_degree: 0,
             },
             Self::Balanced => Amounts {
                 iterations: 7_000,

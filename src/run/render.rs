@@ -6,17 +6,17 @@ use std::{
 };
 
 use clap::ValueEnum;
+use glam::DVec3;
 
 use super::{
     Event, Observer, RunError, RunFolder, Stage, files,
-    scene::{gray_to_rgb, shown_rgb},
+    scene::{gray_to_rgb, read_splats, shown_rgb},
 };
 use crate::{
     capture::{Capture, Photo, split},
     gpu::Gpu,
     raster::{Field, Geometry, Raster, Renderer, constants::NEAR_SHARE},
     report::to_image,
-    splats::ply,
 };
 
 /// Which of a capture's views.
@@ -54,13 +54,13 @@ pub fn render(options: &RenderOptions, observe: &mut Observer<'_>) -> Result<usi
         path.extension()
             .is_some_and(|e| e.eq_ignore_ascii_case("ply"))
     };
-    let (file, colmap, max_side, holdout) = match &options.run {
+    let (file, colmap, max_side, holdout, moved) = match &options.run {
         Some(path) if is_file(path) => {
             let colmap = options
                 .colmap
                 .clone()
                 .ok_or_else(|| RunError::NoCameras(path.clone()))?;
-            (path.clone(), colmap, None, true)
+            (path.clone(), colmap, None, true, false)
         }
         run => {
             let folder = match run {
@@ -76,16 +76,29 @@ pub fn render(options: &RenderOptions, observe: &mut Observer<'_>) -> Result<usi
             };
             let noted = PathBuf::from(&capture.path);
             let colmap = options.colmap.clone().unwrap_or(noted);
-            (file, colmap, capture.max_side, capture.holdout)
+            (file, colmap, capture.max_side, capture.holdout, true)
         }
     };
     let capture = Capture::load(&colmap)?;
-    let splats = ply::read_ply(&file)?.splats;
+    // A run's own files are moved already; others lie where COLMAP has the cameras.
+    let offset = if moved { DVec3::ZERO } else { capture.offset };
+    let splats = read_splats(&file, offset, observe)?;
     let splats = if options.luma {
         splats.to_luma()
     } else {
         splats
     };
+    let split = split(capture.views.len(), holdout);
+    let chosen: Vec<usize> = match options.views {
+        Some(Views::Train) => split.train,
+        Some(Views::Test) => split.test,
+        None if !split.test.is_empty() => split.test,
+        None | Some(Views::All) => (0..capture.views.len()).collect(),
+    };
+    if chosen.is_empty() {
+        return Err(RunError::NoHeldOut);
+    }
+    files::make_folder(&options.output)?;
     let gpu = Gpu::open()?;
     let raster = Arc::new(Raster::new(&gpu));
     let mut renderer = Renderer::new(
@@ -94,13 +107,6 @@ pub fn render(options: &RenderOptions, observe: &mut Observer<'_>) -> Result<usi
         vec![Field::upload(&gpu, &splats.sh)?],
         NEAR_SHARE * capture.extent(),
     )?;
-    let split = split(capture.views.len(), holdout);
-    let chosen: Vec<usize> = match options.views {
-        Some(Views::Train) => split.train,
-        Some(Views::Test) => split.test,
-        None if !split.test.is_empty() => split.test,
-        None | Some(Views::All) => (0..capture.views.len()).collect(),
-    };
     for (done, &i) in chosen.iter().enumerate() {
         let view = &capture.views[i];
         observe(Event::Progress {

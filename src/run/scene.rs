@@ -3,12 +3,14 @@
 
 use std::{path::Path, sync::Arc};
 
+use glam::DVec3;
+
 use super::{Event, Observer, RunError, Stage};
 use crate::{
     capture::{Camera, Capture, Photo, Split, split},
     gpu::GpuError,
     raster::{Field, Geometry, Raster, Renderer, constants::NEAR_SHARE},
-    splats::{ShField, Splats},
+    splats::{ShField, Splats, ply},
 };
 
 /// A capture with its photos decoded.
@@ -78,6 +80,33 @@ impl Scene {
         let geometry = Geometry::upload(gpu, splats)?;
         Renderer::new(raster.clone(), geometry, fields, NEAR_SHARE * self.extent)
     }
+}
+
+/// Reads a splat file that has at least one Gaussian and subtracts `offset`, in
+/// world units, from its centres.
+pub(super) fn read_splats(
+    path: &Path,
+    offset: DVec3,
+    observe: &mut Observer<'_>,
+) -> Result<Splats, RunError> {
+    let read = ply::read_ply(path)?;
+    if read.skipped > 0 {
+        observe(Event::Note(format!(
+            "{}: skipped {} Gaussians with values that are not finite or no rotation",
+            path.display(),
+            read.skipped
+        )));
+    }
+    let mut splats = read.splats;
+    if splats.is_empty() {
+        return Err(RunError::NoSplats(path.to_owned()));
+    }
+    for mean in &mut splats.means {
+        *mean = (DVec3::from(mean.map(f64::from)) - offset)
+            .as_vec3()
+            .to_array();
+    }
+    Ok(splats)
 }
 
 /// Gray pixels as floats in [0, 1].

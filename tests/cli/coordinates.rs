@@ -1,0 +1,83 @@
+//! Scenes far from the origin: files beside a run lie where COLMAP has the cameras.
+
+use super::picture::{png, psnr};
+use super::program::Place;
+use super::scene;
+use super::shared::{QUICK_FIT, onnx};
+use super::splat_file::SplatFile;
+
+const OFFSET: [f64; 3] = [3000.25, -2000.5, 500.0];
+
+fn run_far_away() -> Place {
+    let place = Place::new();
+    scene::write_moved(&place.path("scene"), OFFSET);
+    let mut fit = QUICK_FIT;
+    fit[5] = "40";
+    place.succeed(&fit);
+    place
+}
+
+/// The mean of the Gaussians' centres.
+fn middle(place: &Place, name: &str) -> [f64; 3] {
+    let file = SplatFile::read(place, name);
+    ["x", "y", "z"].map(|axis| {
+        let column = file.column(axis);
+        column.iter().map(|&v| f64::from(v)).sum::<f64>() / column.len() as f64
+    })
+}
+
+fn assert_near(found: [f64; 3], wanted: [f64; 3]) {
+    for axis in 0..3 {
+        assert!(
+            (found[axis] - wanted[axis]).abs() < 1.0,
+            "{found:?} {wanted:?}"
+        );
+    }
+}
+
+#[test]
+fn export_gives_colmaps_coordinates_back() {
+    let place = run_far_away();
+    let report = place.report("runs/scene");
+    let offset: Vec<f64> = (0..3)
+        .map(|k| report["capture"]["offset"][k].as_f64().expect("a number"))
+        .collect();
+    place.succeed(&["export", "-o", "far.ply"]);
+    assert_near(middle(&place, "far.ply"), OFFSET);
+    // In the run they lie near the origin, where f32 is fine enough.
+    let inside = std::array::from_fn(|k| OFFSET[k] - offset[k]);
+    assert_near(middle(&place, "runs/scene/luma.ply"), inside);
+    assert!(offset.iter().any(|v| v.abs() > 100.0));
+}
+
+#[test]
+fn exported_files_come_back_to_their_photos() {
+    let place = run_far_away();
+    place.succeed(&["export", "-o", "far.ply"]);
+    place.succeed(&["render", "--views", "all", "-o", "run"]);
+    place.succeed(&[
+        "render", "far.ply", "--colmap", "scene", "--views", "all", "-o", "file",
+    ]);
+    for index in [0, 5] {
+        let name = scene::name(index);
+        let [run, file] = ["run", "file"].map(|from| png(&place, &format!("{from}/{name}")));
+        assert!(run.iter().any(|v| *v > 0.2), "something is to be seen");
+        assert!(psnr(&run, &file) > 40.0, "{name}: {} dB", psnr(&run, &file));
+    }
+
+    let teacher = onnx("ddcolor_tiny.onnx");
+    let colorize = ["colorize", "far.ply", "--colmap", "scene", "--until", "5"];
+    place.succeed(&[&colorize[..], &["--teacher", &teacher]].concat());
+    assert_near(middle(&place, "far-color.ply"), OFFSET);
+
+    let held_out = |run: &str| {
+        let psnr = &place.report(run)["luma"]["held_out"]["psnr"];
+        psnr.as_f64().expect("a number")
+    };
+    let fit = ["fit", "scene", "--preset", "draft", "--iterations", "1"];
+    place.succeed(&[&fit[..], &["-o", "runs/points"]].concat());
+    place.succeed(&[&fit[..], &["-o", "runs/init", "--init", "far.ply"]].concat());
+    let [trained, init, points] = ["runs/scene", "runs/init", "runs/points"].map(held_out);
+    assert!((trained - init).abs() < 0.5, "{trained} {init}");
+    assert!(init > points + 0.5, "{init} {points}");
+}

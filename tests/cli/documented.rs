@@ -1,0 +1,81 @@
+//! docs/run-folder.md names everything that a run folder holds.
+
+use std::collections::BTreeSet;
+
+use serde_json::Value;
+
+use super::shared::place_with_run;
+
+fn page() -> String {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/run-folder.md");
+    std::fs::read_to_string(path).expect("the page")
+}
+
+/// Paths of all keys, such as `luma.seconds.train`; of a list, those of its items.
+fn collect_keys(value: &Value, path: &str, keys: &mut BTreeSet<String>) {
+    match value {
+        Value::Object(map) => {
+            for (name, value) in map {
+                let path = if path.is_empty() {
+                    name.clone()
+                } else {
+                    format!("{path}.{name}")
+                };
+                collect_keys(value, &path, keys);
+                keys.insert(path);
+            }
+        }
+        Value::Array(items) => items.iter().for_each(|item| collect_keys(item, path, keys)),
+        _ => {}
+    }
+}
+
+#[test]
+fn every_key_of_a_report_and_no_other() {
+    let report = place_with_run().report("runs/scene");
+    let mut keys = BTreeSet::new();
+    collect_keys(&report, "", &mut keys);
+    assert!(keys.len() > 50, "{keys:?}");
+    // Rows of tables whose first cell is one or more paths.
+    let page = page();
+    let (_, section) = page.split_once("## report.json").expect("the section");
+    let (section, _) = section.split_once("\n## ").unwrap_or((section, ""));
+    let documented: BTreeSet<String> = section
+        .lines()
+        .filter_map(|line| line.strip_prefix("| `")?.split('|').next())
+        .flat_map(|cell| cell.split('`').step_by(2))
+        .filter(|path| !path.trim().is_empty())
+        .map(str::to_owned)
+        .collect();
+    assert_eq!(documented, keys);
+}
+
+#[test]
+fn the_example_is_a_report() {
+    let report = place_with_run().report("runs/scene");
+    let page = page();
+    let (_, example) = page.split_once("```json").expect("an example");
+    let (example, _) = example.split_once("```").expect("its end");
+    let example: Value = serde_json::from_str(example).expect("JSON");
+    let (mut real, mut shown) = (BTreeSet::new(), BTreeSet::new());
+    collect_keys(&report, "", &mut real);
+    collect_keys(&example, "", &mut shown);
+    assert!(shown.len() > 20 && shown.is_subset(&real), "{shown:?}");
+    assert_eq!(example["version"], report["version"]);
+}
+
+#[test]
+fn every_file_and_every_column() {
+    let place = place_with_run();
+    let page = page();
+    for name in place.files("runs/scene") {
+        let name = name
+            .split_once('/')
+            .map_or(name.clone(), |(folder, _)| format!("{folder}/"));
+        assert!(page.contains(&format!("`{name}`")), "{name}");
+    }
+    let log = String::from_utf8(place.read("runs/scene/log.csv")).expect("text");
+    for column in log.lines().next().expect("a header").split(',') {
+        assert!(page.contains(&format!("`{column}`")), "{column}");
+    }
+}

@@ -1,0 +1,153 @@
+//! What can be wrong with a teacher, ONNX Runtime and the device.
+
+use super::{COLORIZE, Case, Place, case, nothing};
+use crate::scene;
+
+/// Saves an image as the teacher's for a view.
+fn paint(place: &Place, name: &str, [width, height]: [u32; 2]) {
+    std::fs::create_dir_all(place.path("painted")).expect("writable");
+    let image = image::RgbImage::new(width, height);
+    image
+        .save(place.path("painted").join(name))
+        .expect("writable");
+}
+
+const PAINTED: &str = "colorize --teacher painted --until 62";
+
+/// Variables that name Vulkan's drivers, pointing nowhere.
+#[cfg(target_os = "linux")]
+const NO_DRIVER: &[(&str, &str)] = &[
+    ("VK_DRIVER_FILES", "/nonexistent.json"),
+    ("VK_ICD_FILENAMES", "/nonexistent.json"),
+];
+
+#[cfg(target_os = "linux")]
+const fn without_device(name: &'static str, command: &'static str) -> Case {
+    Case {
+        environment: NO_DRIVER,
+        ..case(
+            name,
+            nothing,
+            command,
+            &["no Vulkan", "adapter", "mesa-vulkan-drivers"],
+        )
+    }
+}
+
+pub(super) const CASES: &[Case] = &[
+    case(
+        "no such teacher",
+        nothing,
+        "colorize --teacher nowhere.onnx",
+        &["nowhere.onnx"],
+    ),
+    case(
+        "no teacher's file",
+        nothing,
+        "colorize --teacher runs/scene/luma.ply",
+        &["luma.ply", ".onnx file or a folder"],
+    ),
+    case(
+        "a truncated network",
+        nothing,
+        "colorize --teacher onnx/truncated.onnx",
+        &["truncated.onnx", "not a usable ONNX model"],
+    ),
+    case(
+        "an empty network",
+        |p| p.write("onnx/empty.onnx", ""),
+        "colorize --teacher onnx/empty.onnx",
+        &["empty.onnx", "not a usable ONNX model"],
+    ),
+    case(
+        "a wrong rank",
+        nothing,
+        "colorize --teacher onnx/wrong_rank.onnx",
+        &["wrong_rank.onnx", "[1,8]", "accepted: DDColor"],
+    ),
+    case(
+        "wrong channels",
+        nothing,
+        "colorize --teacher onnx/wrong_channels.onnx",
+        &["wrong_channels.onnx", "[1,5,32,32]", "[1,2,h,w]"],
+    ),
+    case(
+        "two inputs",
+        nothing,
+        "colorize --teacher onnx/two_inputs.onnx",
+        &["two_inputs.onnx", "style", "accepted"],
+    ),
+    case(
+        "an empty folder",
+        |p| std::fs::create_dir(p.path("painted")).expect("writable"),
+        PAINTED,
+        &["painted", "no .png, .jpg or .jpeg"],
+    ),
+    case(
+        "a folder of other names",
+        |p| paint(p, "portrait.png", scene::SIZE),
+        PAINTED,
+        &["painted", "name of a training photo", "01.png"],
+    ),
+    case(
+        "a folder of held-out views",
+        |p| paint(p, "00.png", scene::SIZE),
+        PAINTED,
+        &["painted", "name of a training photo", "01.png"],
+    ),
+    case(
+        "another aspect",
+        |p| paint(p, "01.png", [50, 50]),
+        PAINTED,
+        &["01.png", "50 x 50", "64 x 48"],
+    ),
+    case(
+        "two images for a photo",
+        |p| {
+            paint(p, "01.png", scene::SIZE);
+            paint(p, "01.jpg", scene::SIZE);
+        },
+        PAINTED,
+        &["01.png", "01.jpg", "keep one"],
+    ),
+    case(
+        "a damaged image",
+        |p| p.write("painted/01.png", "\u{89}PNG"),
+        PAINTED,
+        &["01.png", "not a readable image"],
+    ),
+    Case {
+        environment: &[("ORT_DYLIB_PATH", "/nonexistent/libonnxruntime.so")],
+        ..case(
+            "no ONNX Runtime",
+            nothing,
+            COLORIZE,
+            &[
+                "/nonexistent/libonnxruntime.so",
+                "not a usable ONNX Runtime library",
+            ],
+        )
+    },
+    Case {
+        environment: &[
+            ("ORT_DYLIB_PATH", ""),
+            ("XDG_CACHE_HOME", "/nonexistent"),
+            ("LOCALAPPDATA", "/nonexistent"),
+            ("HOME", "/nonexistent"),
+        ],
+        ..case(
+            "ONNX Runtime nowhere",
+            nothing,
+            COLORIZE,
+            &["ONNX Runtime was not found", "ORT_DYLIB_PATH"],
+        )
+    },
+];
+
+/// Only Vulkan's loader takes its drivers from the environment.
+#[cfg(target_os = "linux")]
+pub(super) const DEVICES: &[Case] = &[
+    without_device("fit without a device", super::FIT),
+    without_device("colorize without a device", COLORIZE),
+    without_device("render without a device", "render -o out"),
+];

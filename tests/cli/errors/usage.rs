@@ -1,0 +1,72 @@
+//! What clap refuses: exit code 2.
+
+use super::{Case, case, nothing};
+
+const fn usage(name: &'static str, command: &'static str, words: &'static [&'static str]) -> Case {
+    Case {
+        code: 2,
+        ..case(name, nothing, command, words)
+    }
+}
+
+pub(super) const CASES: &[Case] = &[
+    usage("no such command", "paint scene", &["paint"]),
+    usage("no such option", "fit scene --fast", &["--fast"]),
+    usage("no folder", "fit", &["<COLMAP_DIR>"]),
+    usage("no teacher", "colorize runs/scene", &["--teacher"]),
+    usage("no output to render to", "render runs/scene", &["--output"]),
+    usage("no output to export to", "export runs/scene", &["--output"]),
+    usage("no path", "info", &["<PATH>"]),
+    usage(
+        "no number",
+        "fit scene --iterations many",
+        &["many", "--iterations"],
+    ),
+    usage(
+        "no iterations",
+        "fit scene --iterations 0",
+        &["0", "--iterations"],
+    ),
+    usage(
+        "no splats",
+        "fit scene --max-splats 0",
+        &["0", "--max-splats"],
+    ),
+    usage(
+        "photos too small",
+        "fit scene --max-side 15",
+        &["15", "--max-side"],
+    ),
+    usage(
+        "a degree too high",
+        "fit scene --sh-degree 4",
+        &["4", "--sh-degree"],
+    ),
+    usage(
+        "a chroma degree too high",
+        "colorize --teacher t --sh-degree 4",
+        &["4", "--sh-degree"],
+    ),
+    usage("a negative seed", "fit scene --seed=-1", &["-1", "--seed"]),
+    usage(
+        "no such preset",
+        "fit scene --preset best",
+        &["best", "--preset"],
+    ),
+    usage(
+        "no such solver",
+        "colorize --teacher t --solver newton",
+        &["newton", "--solver"],
+    ),
+    usage(
+        "no such views",
+        "render --views some -o out",
+        &["some", "--views"],
+    ),
+    usage(
+        "until nothing",
+        "colorize --teacher t --until 0",
+        &["0", "--until"],
+    ),
+    usage("two folders", "fit scene scene", &["scene"]),
+];

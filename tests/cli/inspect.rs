@@ -1,0 +1,152 @@
+//! `info`, `export`, help, and who reads the output.
+
+use std::fs;
+use std::process::Stdio;
+
+use super::program::{Done, Place};
+use super::scene;
+use super::shared::{place_with_run, place_with_scene};
+use super::splat_file::SplatFile;
+
+const COMMANDS: [&str; 5] = ["fit", "colorize", "render", "export", "info"];
+
+#[test]
+fn info_on_a_run() {
+    let place = place_with_run();
+    assert_eq!(
+        place.json(&["info", "runs/scene", "--json"]),
+        place.report("runs/scene")
+    );
+    let words = place.succeed(&["info", "runs/scene"]);
+    for line in [
+        "preset: draft",
+        "luma.iterations: 60",
+        "chroma.teacher.kind: DDColor",
+    ] {
+        assert!(words.lines().any(|found| found == line), "{words}");
+    }
+}
+
+#[test]
+fn info_on_splat_files() {
+    let place = place_with_run();
+    for (file, gray) in [("luma.ply", true), ("color.ply", false)] {
+        let path = format!("runs/scene/{file}");
+        let info = place.json(&["info", &path, "--json"]);
+        assert_eq!(info["kind"], "splat file");
+        assert_eq!(info["gray"], gray);
+        assert_eq!(info["sh_degree"], 2);
+        assert_eq!(info["skipped"], 0);
+        let file = SplatFile::read(&place, &path);
+        assert_eq!(info["splats"], file.count());
+        let lowest = file.column("y").into_iter().fold(f32::INFINITY, f32::min);
+        assert_eq!(info["lowest"][1].as_f64(), Some(f64::from(lowest)));
+    }
+}
+
+#[test]
+fn info_on_a_colmap_folder() {
+    let place = place_with_scene();
+    let info = place.json(&["info", "scene", "--json"]);
+    assert_eq!(info["kind"], "COLMAP folder");
+    assert_eq!(info["views"], scene::VIEWS);
+    assert_eq!(info["points"], scene::POINTS);
+    assert_eq!(info["largest_photo"], serde_json::json!(scene::SIZE));
+    assert!(place.succeed(&["info", "scene"]).contains("points: 64"));
+    // Larger than u32 can count pixels.
+    scene::write_moved(&place.path("large"), [0.0; 3]);
+    place.write(
+        "large/sparse/cameras.txt",
+        "1 PINHOLE 1048576 1048576 60 60 32 24\n",
+    );
+    let info = place.json(&["info", "large", "--json"]);
+    assert_eq!(info["largest_photo"], serde_json::json!([1 << 20, 1 << 20]));
+}
+
+#[test]
+fn export_writes_colours_or_luma() {
+    let place = place_with_run();
+    let count = SplatFile::read(&place, "runs/scene/color.ply").count();
+    for (name, options) in [("new/color.ply", &[][..]), ("luma.ply", &["--luma"])] {
+        let export = ["export", "runs/scene", "-o", name];
+        let printed = place.succeed(&[&export[..], options].concat());
+        assert!(printed.contains(&format!("{count} Gaussians")), "{printed}");
+        let file = SplatFile::read(&place, name);
+        assert_eq!(file.count(), count);
+        let gray = file.column("f_dc_0") == file.column("f_dc_1");
+        assert_eq!(gray, !options.is_empty());
+    }
+    // The run's colour is what is exported, and luma where there is none.
+    let [out, run] = ["new/color.ply", "runs/scene/color.ply"]
+        .map(|name| SplatFile::read(&place, name).column("f_rest_3"));
+    assert_eq!(out, run);
+    fs::remove_file(place.path("runs/scene/color.ply")).expect("a file");
+    place.succeed(&["export", "-o", "gray.ply"]);
+    assert!(place.read("gray.ply") == place.read("luma.ply"));
+}
+
+#[test]
+fn help_and_version() {
+    let place = Place::new();
+    let help = place.succeed(&["--help"]);
+    assert!(
+        COMMANDS.iter().all(|command| help.contains(command)),
+        "{help}"
+    );
+    assert!(
+        place
+            .succeed(&["--version"])
+            .contains(env!("CARGO_PKG_VERSION"))
+    );
+    for command in COMMANDS {
+        assert!(
+            place
+                .succeed(&[command, "--help"])
+                .contains("Usage: gs-chroma")
+        );
+    }
+}
+
+#[test]
+fn options_of_the_documentation_exist() {
+    let place = Place::new();
+    let help = COMMANDS
+        .map(|command| place.succeed(&[command, "--help"]))
+        .concat();
+    let known: Vec<&str> = help.split([' ', ',', '\n']).collect();
+    for page in ["README.md", "docs/guide.md"] {
+        let path = format!("{}/{page}", env!("CARGO_MANIFEST_DIR"));
+        let text = fs::read_to_string(path).expect("a page");
+        // Command lines of the program, and first cells of tables of options.
+        let pieces = text
+            .lines()
+            .filter_map(|line| match line.strip_prefix("| `-") {
+                Some(_) => line.split('|').nth(1),
+                None => line.contains("gs-chroma ").then_some(line),
+            });
+        let options: Vec<&str> = pieces
+            .flat_map(|piece| piece.split([' ', '`', ';', '.', ')']))
+            .filter(|word| word.starts_with("--") && !["--help", "--path"].contains(word))
+            .collect();
+        assert!(options.len() > 5, "{page}: {options:?}");
+        for option in options {
+            assert!(known.contains(&option), "{page}: {option}");
+        }
+    }
+}
+
+#[test]
+fn a_reader_may_leave_early() {
+    let place = place_with_run();
+    for arguments in [
+        &["info", "runs/scene"][..],
+        &["info", "runs/scene", "--json"],
+    ] {
+        let mut command = place.command(arguments);
+        command.stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut child = command.spawn().expect("the program starts");
+        drop(child.stdout.take());
+        let done = Done::of(child.wait_with_output());
+        assert_eq!((done.code, done.stderr.as_str()), (Some(0), ""));
+    }
+}

@@ -1,0 +1,21 @@
+//! The program as its users meet it: arguments in, files, text and exit code out.
+//!
+//! A Vulkan, Metal or DirectX 12 adapter and ONNX Runtime are needed
+//! (`tools/setup.py` installs both); a software adapter will do.
+
+#[path = "../oracle/mod.rs"]
+mod oracle;
+
+mod coordinates;
+mod documented;
+mod errors;
+mod inspect;
+mod picture;
+mod program;
+mod repeat;
+mod scene;
+mod shared;
+mod splat_file;
+mod teach;
+mod train;
+mod view;

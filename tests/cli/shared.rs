@@ -1,0 +1,63 @@
+//! One run that many tests read: trained and coloured once.
+
+use std::fs;
+use std::path::PathBuf;
+use std::sync::LazyLock;
+
+use super::program::{Place, files_below};
+use super::scene;
+
+/// Luma iterations of the shared run.
+pub const LUMA: usize = 60;
+/// Last chroma iteration of the shared run.
+pub const UNTIL: usize = 80;
+
+/// Arguments of a short `fit` of `scene/`.
+pub const QUICK_FIT: [&str; 6] = ["fit", "scene", "--preset", "draft", "--iterations", "3"];
+
+/// The tests' networks.
+pub fn onnx(name: &str) -> String {
+    format!("{}/tests/fixtures/onnx/{name}", env!("CARGO_MANIFEST_DIR"))
+}
+
+/// A folder with `scene/` and nothing else.
+pub fn place_with_scene() -> Place {
+    let place = Place::new();
+    scene::write(&place.path("scene"));
+    place
+}
+
+/// Files with their bytes, and the path of `scene/` in their report.
+type Made = (Vec<(String, Vec<u8>)>, String);
+
+/// A folder with `scene/` and its coloured run in `runs/scene`, luma of degree 2
+/// and chroma of degree 1.
+pub fn place_with_run() -> Place {
+    static MADE: LazyLock<Made> = LazyLock::new(|| {
+        let place = place_with_scene();
+        let (luma, until) = (LUMA.to_string(), UNTIL.to_string());
+        let fit = ["fit", "scene", "--preset", "draft", "--sh-degree", "2"];
+        place.succeed(&[&fit[..], &["--iterations", &luma]].concat());
+        let teacher = onnx("ddcolor_tiny.onnx");
+        let colorize = ["colorize", "--sh-degree", "1", "--teacher", &teacher];
+        place.succeed(&[&colorize[..], &["--until", &until]].concat());
+        (files_below(&place.path("")), absolute(place.path("scene")))
+    });
+    let place = Place::new();
+    for (name, bytes) in &MADE.0 {
+        place.write(name, bytes);
+    }
+    // The report names the photos' folder.
+    let report = String::from_utf8(place.read("runs/scene/report.json")).expect("text");
+    assert!(report.contains(&MADE.1), "{report}");
+    let here = absolute(place.path("scene"));
+    place.write("runs/scene/report.json", report.replace(&MADE.1, &here));
+    place
+}
+
+/// A path as a report has it.
+fn absolute(path: PathBuf) -> String {
+    let path = fs::canonicalize(path).expect("a folder");
+    let quoted = serde_json::to_string(&path.to_string_lossy()).expect("text");
+    quoted.trim_matches('"').to_owned()
+}

@@ -1,0 +1,235 @@
+//! `fit`.
+
+use std::fs;
+
+use serde_json::json;
+
+use super::program::Place;
+use super::scene;
+use super::shared::{QUICK_FIT, place_with_run, place_with_scene};
+use super::splat_file::SplatFile;
+
+#[test]
+fn the_run_is_named_after_the_folder() {
+    let place = place_with_scene();
+    place.succeed(&QUICK_FIT);
+    assert_eq!(
+        place.files("runs"),
+        ["scene/log.csv", "scene/luma.ply", "scene/report.json"]
+    );
+    let mut again = QUICK_FIT;
+    again[1] = "scene/";
+    place.succeed(&again);
+    again[1] = "scene/../scene/.";
+    place.succeed(&again);
+    assert_eq!(fs::read_dir(place.path("runs")).expect("runs").count(), 1);
+
+    place.succeed(&[&QUICK_FIT[..], &["-o", "deep/er/run"]].concat());
+    assert_eq!(
+        place.files("deep"),
+        ["er/run/log.csv", "er/run/luma.ply", "er/run/report.json"]
+    );
+}
+
+#[test]
+fn json_is_the_report() {
+    let place = place_with_scene();
+    let printed = place.json(&[&QUICK_FIT[..], &["--json", "--seed", "5"]].concat());
+    assert_eq!(printed, place.report("runs/scene"));
+    assert_eq!(printed["seed"], 5);
+    assert_eq!(printed["preset"], "draft");
+    assert_eq!(printed["luma"]["iterations"], 3);
+    let capture = &printed["capture"];
+    assert_eq!(capture["views"], scene::VIEWS);
+    assert_eq!(capture["train"], scene::VIEWS - scene::HELD_OUT);
+    assert_eq!(capture["test"], scene::HELD_OUT);
+    assert_eq!(capture["points"], scene::POINTS);
+    assert_eq!(capture["holdout"], true);
+    let names: Vec<_> = (0..scene::HELD_OUT)
+        .map(|k| &printed["luma"]["held_out_views"][k]["name"])
+        .collect();
+    assert_eq!(names, [&json!(scene::name(0)), &json!(scene::name(8))]);
+    assert!(printed.get("chroma").is_none());
+}
+
+#[test]
+fn words_without_json() {
+    let place = place_with_scene();
+    let printed = place.succeed(&QUICK_FIT);
+    assert_eq!(printed.lines().count(), 2, "{printed}");
+    assert!(
+        printed.contains("64 Gaussians after 3 iterations"),
+        "{printed}"
+    );
+    assert!(
+        printed.contains("PSNR") && printed.contains("luma.ply"),
+        "{printed}"
+    );
+}
+
+#[test]
+fn training_makes_better_pictures() {
+    let place = place_with_run();
+    place.succeed(&[&QUICK_FIT[..], &["-o", "runs/short"]].concat());
+    let psnr = |run: &str| {
+        let value = &place.report(run)["luma"]["held_out"]["psnr"];
+        value.as_f64().expect("a number")
+    };
+    let (long, short) = (psnr("runs/scene"), psnr("runs/short"));
+    assert!(long > short + 1.0, "{long} {short}");
+}
+
+#[test]
+fn no_holdout_trains_on_all_views() {
+    let place = place_with_scene();
+    let report = place.json(&[&QUICK_FIT[..], &["--no-holdout", "--json"]].concat());
+    assert_eq!(report["capture"]["train"], scene::VIEWS);
+    assert_eq!(report["capture"]["test"], 0);
+    assert_eq!(report["capture"]["holdout"], false);
+    assert!(report["luma"]["held_out"].is_null());
+    assert_eq!(report["luma"]["held_out_views"], json!([]));
+}
+
+#[test]
+fn max_splats_is_a_cap() {
+    let place = place_with_scene();
+    // Below the number of COLMAP's points, and where densification would exceed it.
+    for (cap, iterations) in [(1, "3"), (40, "240"), (80, "240")] {
+        let max = cap.to_string();
+        let options = ["--iterations", iterations, "--max-splats", &max];
+        place.succeed(&[&["fit", "scene", "--preset", "draft"][..], &options].concat());
+        let count = SplatFile::read(&place, "runs/scene/luma.ply").count();
+        assert!(count <= cap, "{count} of {cap}");
+        assert!(count > cap / 2, "{count} of {cap}");
+        let report = place.report("runs/scene");
+        assert_eq!(report["luma"]["max_splats"], cap);
+        assert_eq!(report["luma"]["splats"], count);
+    }
+    assert!(place.report("runs/scene")["luma"]["splats"].as_u64() > Some(64));
+}
+
+#[test]
+fn init_starts_from_a_file() {
+    let place = place_with_run();
+    // Fewer Gaussians than COLMAP has points: what comes out tells where it began.
+    place.succeed(&[&QUICK_FIT[..], &["--max-splats", "40", "-o", "runs/few"]].concat());
+    let init = ["--init", "runs/few/luma.ply", "-o", "runs/init"];
+    place.succeed(&[&QUICK_FIT[..], &init].concat());
+    assert_eq!(place.report("runs/init")["luma"]["splats"], 40);
+
+    let psnr = |run: &str| {
+        let value = &place.report(run)["luma"]["held_out"]["psnr"];
+        value.as_f64().expect("a number")
+    };
+    for (file, degree) in [("luma.ply", "2"), ("luma.ply", "0"), ("color.ply", "3")] {
+        let init = format!("runs/scene/{file}");
+        let options = ["--init", &init, "--sh-degree", degree, "-o", "runs/init"];
+        place.succeed(&[&QUICK_FIT[..], &options].concat());
+        let (before, after) = (psnr("runs/scene"), psnr("runs/init"));
+        assert!(
+            (before - after).abs() < 1.0,
+            "{file} {degree}: {before} {after}"
+        );
+    }
+}
+
+#[test]
+fn presets_and_what_overrules_them() {
+    let place = place_with_scene();
+    let presets = [
+        ("draft", 20_000, 1, json!(400)),
+        ("balanced", 500_000, 2, json!(1600)),
+        ("paper", 3_000_000, 3, json!(null)),
+    ];
+    for (preset, max_splats, degree, max_side) in presets {
+        let fit = [
+            "fit",
+            "scene",
+            "--iterations",
+            "2",
+            "--json",
+            "--preset",
+            preset,
+        ];
+        let report = place.json(&fit);
+        assert_eq!(report["preset"], preset);
+        assert_eq!(report["luma"]["max_splats"], max_splats);
+        assert_eq!(report["luma"]["sh_degree"], degree);
+        assert_eq!(report["capture"]["max_side"], max_side);
+    }
+    let own = ["--max-side", "32", "--max-splats", "99", "--sh-degree", "0"];
+    let report = place.json(&[&QUICK_FIT[..], &own, &["--json"]].concat());
+    assert_eq!(report["luma"]["max_splats"], 99);
+    assert_eq!(report["luma"]["sh_degree"], 0);
+    assert_eq!(report["capture"]["max_side"], 32);
+}
+
+#[test]
+fn the_default_preset_depends_on_the_device() {
+    let place = place_with_scene();
+    let done = place.run(&["fit", "scene", "--iterations", "2"]);
+    assert_eq!(done.code, Some(0), "{}", done.stderr);
+    let report = place.report("runs/scene");
+    let software = report["device"]["software"] == true;
+    assert_eq!(report["preset"], if software { "draft" } else { "paper" });
+    assert_eq!(
+        done.stderr.contains("preset draft"),
+        software,
+        "{}",
+        done.stderr
+    );
+}
+
+#[test]
+fn fitting_again_forgets_the_old_colours() {
+    let place = place_with_run();
+    let mut fit = QUICK_FIT;
+    fit[5] = "2";
+    place.succeed(&fit);
+    let files = place.files("runs/scene");
+    assert!(!files.contains(&"color.ply".to_owned()), "{files:?}");
+    assert!(
+        !files.contains(&"contact-sheet.png".to_owned()),
+        "{files:?}"
+    );
+    assert!(place.report("runs/scene").get("chroma").is_none());
+    let log = String::from_utf8(place.read("runs/scene/log.csv")).expect("text");
+    let rows: Vec<_> = log.lines().map(|row| row.split(',').next()).collect();
+    assert_eq!(rows, [Some("iteration"), Some("2")], "{log}");
+}
+
+#[test]
+fn one_photo_one_point_or_nothing_but_black_will_do() {
+    let place = Place::new();
+    scene::write_moved(&place.path("scene"), [0.0; 3]);
+    let first = |name: &str, lines: usize| {
+        let text = String::from_utf8(place.read(name)).expect("text");
+        let kept: String = text.split_inclusive('\n').take(lines).collect();
+        place.write(name, kept);
+    };
+    let teacher = super::shared::onnx("ddcolor_tiny.onnx");
+    let check = || {
+        place.succeed(&QUICK_FIT);
+        place.succeed(&["colorize", "--until", "5", "--teacher", &teacher]);
+    };
+    first("scene/sparse/points3D.txt", 1);
+    check();
+    first("scene/sparse/images.txt", 2);
+    check();
+    // A picture without any difference has an infinite PSNR, which JSON lacks.
+    let [width, height] = scene::SIZE;
+    let black = image::GrayImage::new(width, height);
+    for index in 0..scene::VIEWS {
+        let path = place.path("scene/images").join(scene::name(index));
+        black.save(path).expect("writable");
+    }
+    scene::write_moved_model(&place.path("scene"), [0.0; 3]);
+    let points = String::from_utf8(place.read("scene/sparse/points3D.txt")).expect("text");
+    let dark: String = points
+        .lines()
+        .map(|line| line.split(' ').take(4).collect::<Vec<_>>().join(" ") + " 0 0 0 0.5\n")
+        .collect();
+    place.write("scene/sparse/points3D.txt", dark);
+    check();
+    assert!(place.report("runs/scene")["luma"]["held_out"]["psnr"].is_f64());
+}
