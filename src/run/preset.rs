@@ -34,9 +34,9 @@ impl Preset {
     pub(super) fn amounts(self) -> Amounts {
         match self {
             Self::Draft => Amounts {
-                iterations: 1_000,
-                until: 1_300,
-                max_splats: 20_000,
+                iterations: 800,
+                until: 950,
+                max_splats: 12_000,
                 max_side: Some(400),
                 // A short run only learns noise from the direction of view.
                 sh_degree: 0,

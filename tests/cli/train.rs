@@ -137,7 +137,7 @@ fn init_starts_from_a_file() {
 fn presets_and_what_overrules_them() {
     let place = place_with_scene();
     let presets = [
-        ("draft", 20_000, 1, json!(400)),
+        ("draft", 12_000, 0, json!(400)),
         ("balanced", 500_000, 2, json!(1600)),
         ("paper", 3_000_000, 3, json!(null)),
     ];
