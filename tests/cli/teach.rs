@@ -85,7 +85,7 @@ fn json_is_the_report_and_words_name_the_files() {
 
     // Without --until as many iterations as the preset's.
     let printed = place.json(&[&colorize[..], &["--json"]].concat());
-    assert_eq!(printed["chroma"]["iterations"], 300);
+    assert_eq!(printed["chroma"]["iterations"], 150);
 
     // Rows of the colouring before are replaced.
     let log = String::from_utf8(place.read("runs/scene/log.csv")).expect("text");
