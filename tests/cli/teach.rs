@@ -101,7 +101,7 @@ fn json_is_the_report_and_words_name_the_files() {
         })
         .collect();
     assert!(iterations.is_sorted_by(|a, b| a < b), "{iterations:?}");
-    assert_eq!(iterations.last(), Some(&(LUMA + 300)));
+    assert_eq!(iterations.last(), Some(&(LUMA + 150)));
 }
 
 #[test]
