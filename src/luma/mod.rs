@@ -4,6 +4,7 @@ pub mod densify;
 mod loss;
 mod settings;
 mod trainer;
+mod workspace;
 
 pub use densify::DensifyParameters;
 pub use settings::{LumaSettings, Schedule};

@@ -11,22 +11,20 @@ use std::{sync::Arc, time::Instant};
 
 use super::{
     LumaSettings,
-    densify::{self, DensifyKernels, Evidence, Target},
-    loss::{self, Loss, LossKernels},
+    densify::{self, Evidence, Target},
+    loss,
+    workspace::{Kernels, Workspace},
 };
 use crate::{
     capture::Camera,
     gpu::{Buffer, Gpu, GpuError, Readback, Recorder},
-    optimize::{Adam, AdamKernel, LossLog, SumLossKernel, view_at},
-    raster::{
-        Field, Geometry, Layer, LayerAdjoint, Lists, Raster, StatusReadback, ViewUniform,
-        constants::*, download,
-    },
+    optimize::{Adam, view_at},
+    raster::{Field, Geometry, Raster, StatusReadback, ViewUniform, constants::*, download},
     splats::{Splats, sh},
 };
 
 /// Iterations between two looks at the device.
-const SYNC_EVERY: usize = 25;
+pub(super) const SYNC_EVERY: usize = 25;
 
 /// Tile-list entries to begin with, for each Gaussian.
 const INSTANCES_PER_SPLAT: usize = 8;
@@ -58,24 +56,6 @@ pub struct LumaProgress {
     pub poisoned: usize,
     /// Seconds since the training began.
     pub seconds: f64,
-}
-
-struct Kernels {
-    adam: AdamKernel,
-    sum_loss: SumLossKernel,
-    loss: LossKernels,
-    densify: DensifyKernels,
-}
-
-/// What has to be made anew when the number of Gaussians or the room changes.
-struct Workspace {
-    lists: Lists,
-    layer: Layer,
-    adjoint: LayerAdjoint,
-    adam_geometry: Adam,
-    adam_field: Adam,
-    log: LossLog,
-    losses: Vec<Loss>,
 }
 
 /// An order on its way: the status and losses at the end of an iteration.
@@ -124,12 +104,7 @@ impl LumaTrainer {
     ) -> Result<Self, GpuError> {
         assert!(!views.is_empty(), "training needs a view");
         let gpu = raster.gpu.clone();
-        let kernels = Kernels {
-            adam: AdamKernel::new(&gpu),
-            sum_loss: SumLossKernel::new(&gpu),
-            loss: LossKernels::new(&gpu),
-            densify: DensifyKernels::new(&gpu),
-        };
+        let kernels = Kernels::new(&gpu);
         let near = NEAR_SHARE * extent;
         let (mut max_pixels, mut max_tiles) = (0, 0);
         let (mut cameras, mut photos) = (Vec::new(), Vec::new());
@@ -435,88 +410,5 @@ impl LumaTrainer {
             moment.write_at(&self.gpu, first, &vec![0.0; n]);
         }
         Ok(())
-    }
-}
-
-impl Workspace {
-    #[allow(
-        clippy::too_many_arguments,
-        reason = "called from two places that own the parts separately"
-    )]
-    fn new(
-        raster: &Raster,
-        kernels: &Kernels,
-        geometry: &Geometry,
-        field: &Field,
-        photos: &[Buffer<u32>],
-        slopes: &Buffer<f32>,
-        [max_pixels, max_tiles]: [usize; 2],
-        capacity: usize,
-        moments: Option<[[Buffer<f32>; 2]; 2]>,
-    ) -> Result<Self, GpuError> {
-        let gpu = &raster.gpu;
-        let lists = Lists::new(raster, geometry, max_tiles, capacity)?;
-        let layer = Layer::new(raster, geometry, &lists, field, max_pixels, max_tiles)?;
-        let gradient = Buffer::zeros(gpu, "luma gradient", field.planes.len())?;
-        let adjoint = LayerAdjoint::new(raster, geometry, &lists, field, &layer, gradient)?;
-        let log = LossLog::new(gpu, &kernels.sum_loss, &lists.status, max_tiles, SYNC_EVERY)?;
-        let losses = photos
-            .iter()
-            .map(|photo| {
-                Loss::new(
-                    gpu,
-                    &kernels.loss,
-                    &lists,
-                    &layer,
-                    &adjoint,
-                    &log,
-                    slopes,
-                    photo,
-                )
-            })
-            .collect();
-        let (of_geometry, of_field) = match moments {
-            Some([geometry, field]) => (Some(geometry), Some(field)),
-            None => (None, None),
-        };
-        let adam = |gradient, values, moments| {
-            Adam::new(
-                gpu,
-                &kernels.adam,
-                &lists.status,
-                gradient,
-                values,
-                geometry.count,
-                moments,
-            )
-        };
-        let adam_geometry = adam(
-            &adjoint
-                .geometry
-                .as_ref()
-                .expect("luma trains geometry")
-                .gradient,
-            &geometry.planes,
-            of_geometry,
-        )?;
-        let adam_field = adam(&adjoint.field_gradient, &field.planes, of_field)?;
-        Ok(Self {
-            lists,
-            layer,
-            adjoint,
-            adam_geometry,
-            adam_field,
-            log,
-            losses,
-        })
-    }
-
-    fn statistics(&self) -> &Buffer<f32> {
-        &self
-            .adjoint
-            .geometry
-            .as_ref()
-            .expect("luma trains geometry")
-            .statistics
     }
 }

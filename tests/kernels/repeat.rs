@@ -130,7 +130,7 @@ fn training_twice_gives_the_same_splats() {
     let iterations: Vec<_> = reports.iter().map(|r| r.iteration).collect();
     assert_eq!(iterations, [25, 40, 50, 60]);
     let least = reports.iter().map(|r| r.loss).fold(f64::INFINITY, f64::min);
-    assert!(least < reports[0].loss, "training learns");
+    assert!(least < reports[0].loss, "training learns: {reports:?}");
     assert!(same(&train(&start, &target).0, first));
 }
 

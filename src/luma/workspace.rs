@@ -1,0 +1,133 @@
+//! Everything of a training step that is tied to the number of Gaussians or to
+//! the room of the tile lists.
+
+use super::{
+    densify::DensifyKernels,
+    loss::{Loss, LossKernels},
+    trainer::SYNC_EVERY,
+};
+use crate::{
+    gpu::{Buffer, Gpu, GpuError},
+    optimize::{Adam, AdamKernel, LossLog, SumLossKernel},
+    raster::{Field, Geometry, Layer, LayerAdjoint, Lists, Raster},
+};
+
+/// The kernels of a step besides the rasterizer's.
+pub struct Kernels {
+    pub adam: AdamKernel,
+    pub sum_loss: SumLossKernel,
+    pub loss: LossKernels,
+    pub densify: DensifyKernels,
+}
+
+impl Kernels {
+    /// Compiles them.
+    pub fn new(gpu: &Gpu) -> Self {
+        Self {
+            adam: AdamKernel::new(gpu),
+            sum_loss: SumLossKernel::new(gpu),
+            loss: LossKernels::new(gpu),
+            densify: DensifyKernels::new(gpu),
+        }
+    }
+}
+
+/// What has to be made anew when the number of Gaussians or the room changes.
+pub struct Workspace {
+    pub lists: Lists,
+    pub layer: Layer,
+    pub adjoint: LayerAdjoint,
+    pub adam_geometry: Adam,
+    pub adam_field: Adam,
+    pub log: LossLog,
+    pub losses: Vec<Loss>,
+}
+
+impl Workspace {
+    /// A workspace for tile lists of `capacity` entries; Adam goes on from
+    /// `moments` (of geometry and field) or starts from rest.
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`].
+    #[allow(
+        clippy::too_many_arguments,
+        reason = "called from two places that own the parts separately"
+    )]
+    pub fn new(
+        raster: &Raster,
+        kernels: &Kernels,
+        geometry: &Geometry,
+        field: &Field,
+        photos: &[Buffer<u32>],
+        slopes: &Buffer<f32>,
+        [max_pixels, max_tiles]: [usize; 2],
+        capacity: usize,
+        moments: Option<[[Buffer<f32>; 2]; 2]>,
+    ) -> Result<Self, GpuError> {
+        let gpu = &raster.gpu;
+        let lists = Lists::new(raster, geometry, max_tiles, capacity)?;
+        let layer = Layer::new(raster, geometry, &lists, field, max_pixels, max_tiles)?;
+        let gradient = Buffer::zeros(gpu, "luma gradient", field.planes.len())?;
+        let adjoint = LayerAdjoint::new(raster, geometry, &lists, field, &layer, gradient)?;
+        let log = LossLog::new(gpu, &kernels.sum_loss, &lists.status, max_tiles, SYNC_EVERY)?;
+        let losses = photos
+            .iter()
+            .map(|photo| {
+                Loss::new(
+                    gpu,
+                    &kernels.loss,
+                    &lists,
+                    &layer,
+                    &adjoint,
+                    &log,
+                    slopes,
+                    photo,
+                )
+            })
+            .collect();
+        let (of_geometry, of_field) = match moments {
+            Some([geometry, field]) => (Some(geometry), Some(field)),
+            None => (None, None),
+        };
+        let adam = |gradient, values, moments| {
+            Adam::new(
+                gpu,
+                &kernels.adam,
+                &lists.status,
+                gradient,
+                values,
+                geometry.count,
+                moments,
+            )
+        };
+        let adam_geometry = adam(
+            &adjoint
+                .geometry
+                .as_ref()
+                .expect("luma trains geometry")
+                .gradient,
+            &geometry.planes,
+            of_geometry,
+        )?;
+        let adam_field = adam(&adjoint.field_gradient, &field.planes, of_field)?;
+        Ok(Self {
+            lists,
+            layer,
+            adjoint,
+            adam_geometry,
+            adam_field,
+            log,
+            losses,
+        })
+    }
+
+    /// Densification statistics since the set last changed.
+    pub fn statistics(&self) -> &Buffer<f32> {
+        &self
+            .adjoint
+            .geometry
+            .as_ref()
+            .expect("luma trains geometry")
+            .statistics
+    }
+}
