@@ -32,7 +32,7 @@ class Wheel(NamedTuple):
 
     platform: str
     sha256: str
-    library_name: str
+    shared_object: str
 
 
 WHEELS = {
@@ -114,7 +114,7 @@ def install_packages(packages: list[str]) -> None:
 def runtime_is_missing() -> bool:
     """Whether ONNX Runtime is neither named by the user nor in the cache folder."""
     wheel = wheel_here()
-    there = bool(wheel) and (cache_folder() / wheel.library_name).is_file()
+    there = bool(wheel) and (cache_folder() / wheel.shared_object).is_file()
     return not there and not os.environ.get("ORT_DYLIB_PATH")
 
 
@@ -146,7 +146,7 @@ def install_runtime() -> None:
         (downloaded,) = work.glob("*.whl")
         with zipfile.ZipFile(downloaded) as archive:
             # The library last: it is what tells that all is there.
-            for name in ("LICENSE", "ThirdPartyNotices.txt", f"capi/{wheel.library_name}"):
+            for name in ("LICENSE", "ThirdPartyNotices.txt", f"capi/{wheel.shared_object}"):
                 part = Path(archive.extract(f"onnxruntime/{name}", work))
                 part.replace(folder / part.name)
 
