@@ -130,7 +130,8 @@ fn training_twice_gives_the_same_splats() {
     let iterations: Vec<_> = reports.iter().map(|r| r.iteration).collect();
     assert_eq!(iterations, [25, 40, 50, 60]);
     let losses: Vec<_> = reports.iter().map(|r| r.loss).collect();
-    assert!(losses.iter().all(|loss| loss.is_finite()), "{losses:?}");
+    let least = losses.iter().copied().fold(f64::INFINITY, f64::min);
+    assert!(least < losses[0], "training learns: {losses:?}");
     assert!(same(&train(&start, &target).0, first));
 }
 
