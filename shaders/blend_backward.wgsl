@@ -13,6 +13,7 @@ import package::common::color::{Color, color_dot};
 import package::common::constants::{ALPHA_MAX, ALPHA_MIN, TILE_SIDE};
 import package::common::numeric::linear_group;
 import package::common::partials::{PARTIAL_COLOR, PARTIAL_STRIDE};
+@if(geometry) import package::common::partials::PARTIAL_PULL;
 import package::common::projected::Projected;
 import package::common::quad::{Quad, contributes, powers, quad_alpha};
 import package::common::view::View;
@@ -38,8 +39,8 @@ const FIGURE: u32 = BATCH * SHARE_STRIDE;
 @if(geometry) @group(0) @binding(9) var<storage, read> image: array<Color>;
 
 // Shares of one batch, `[figure, instance, thread]`. A figure is a sum over
-// pixels: of dL/dpower times 1, dx, dy, dx², dx·dy, dy², then of the weighted
-// gradient, a channel each.
+// pixels: of dL/dpower times 1, dx, dy, dx², dx·dy, dy², of the pull, then of the
+// weighted gradient, a channel each.
 var<workgroup> shares: array<f32, PARTIAL_STRIDE * FIGURE>;
 var<workgroup> tile_last: atomic<u32>;
 var<workgroup> uniform_last: u32;
@@ -49,6 +50,8 @@ struct Share {
     // Sums of dL/dpower times 1, dx, dy, dx² and dx·dy, dy².
     @if(geometry) moments: vec4f,
     @if(geometry) moments_y: vec2f,
+    // Sum of the lengths of the gradients with respect to the centre.
+    @if(geometry) pull: f32,
     // Sum of the weighted gradient.
     color: Color,
 }
@@ -115,6 +118,10 @@ fn accumulate(
         let sum_y = dot(v_power, rows);
         (*share).moments += vec4f(sum, sum * d.x, sum_y, sum * d.x * d.x);
         (*share).moments_y += vec2f(sum_y * d.x, dot(v_power, rows * rows));
+        let to_ndc = 0.5 * vec2f(view.size);
+        let slope_x = to_ndc.x * (conic_opacity.x * d.x + conic_opacity.y * rows);
+        let slope_y = to_ndc.y * (conic_opacity.y * d.x + conic_opacity.z * rows);
+        (*share).pull += dot(abs(v_power), sqrt(slope_x * slope_x + slope_y * slope_y));
     }
 }
 
@@ -164,6 +171,7 @@ fn blend_backward(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) 
                 shares[3u * FIGURE + at] = share.moments.w;
                 shares[4u * FIGURE + at] = share.moments_y.x;
                 shares[5u * FIGURE + at] = share.moments_y.y;
+                shares[PARTIAL_PULL * FIGURE + at] = share.pull;
             }
             @if(luma) { shares[PARTIAL_COLOR * FIGURE + at] = share.color; }
             @if(chroma) {

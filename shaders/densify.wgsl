@@ -1,26 +1,26 @@
 // Carries out a densification plan: each new Gaussian is a copy of an old one,
-// moved and shrunk when it is the half of a split. Moments follow survivors;
+// moved, resized and dimmed where it is the half of a split. Moments follow survivors;
 // newcomers start without.
-import package::common::constants::{GEOMETRY_PLANES, PLANE_LOG_SCALE, PLANE_MEAN, PLANE_QUAT};
+import package::common::constants::{GEOMETRY_PLANES, PLANE_LOG_SCALE, PLANE_MEAN, PLANE_OPACITY, PLANE_QUAT};
 import package::common::numeric::linear_group;
 import package::common::rotation::rotation_from_quat;
 
 struct Descent {
-    // Offset in units of the source's standard deviations (splits only).
+    // Offset in units of the source's standard deviations.
     offset: vec3f,
     source: u32,
-    // 1 when the moments are kept.
-    keep_moments: u32,
-    // 1 for the half of a split.
-    split: u32,
+    // Added to the log-scales.
+    log_growth: vec3f,
+    // 1 for a survivor, which is copied with its moments; 0 for the half of a split.
+    survives: u32,
+    // Added to the opacity logit.
+    logit_step: f32,
 }
 
 struct DensifyParameters {
     old_count: u32,
     new_count: u32,
     planes: u32,
-    // log 1.6: each half is smaller by this factor (3DGS).
-    shrink: f32,
 }
 
 @group(0) @binding(0) var<uniform> parameters: DensifyParameters;
@@ -41,7 +41,7 @@ fn densify_geometry(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups
     for (var index = 0u; index < GEOMETRY_PLANES; index++) {
         destination[index * parameters.new_count + j] = source[index * old + i];
     }
-    if descent.split == 0u {
+    if descent.survives == 1u {
         return;
     }
     let quat = vec4f(source[PLANE_QUAT * old + i], source[(PLANE_QUAT + 1u) * old + i],
@@ -50,9 +50,10 @@ fn densify_geometry(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups
         source[(PLANE_LOG_SCALE + 2u) * old + i]);
     // A Gaussian is split for its gradient, so it was visible, so its quaternion has a length.
     let moved = rotation_from_quat(quat * inverseSqrt(dot(quat, quat))) * (exp(log_scale) * descent.offset);
+    destination[PLANE_OPACITY * parameters.new_count + j] += descent.logit_step;
     for (var axis = 0u; axis < 3u; axis++) {
         destination[(PLANE_MEAN + axis) * parameters.new_count + j] += moved[axis];
-        destination[(PLANE_LOG_SCALE + axis) * parameters.new_count + j] = log_scale[axis] - parameters.shrink;
+        destination[(PLANE_LOG_SCALE + axis) * parameters.new_count + j] = log_scale[axis] + descent.log_growth[axis];
     }
 }
 
@@ -76,6 +77,6 @@ fn densify_moments(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups)
         return;
     }
     for (var index = 0u; index < parameters.planes; index++) {
-        destination[index * parameters.new_count + j] = select(0.0, source[index * parameters.old_count + plan[j].source], plan[j].keep_moments == 1u);
+        destination[index * parameters.new_count + j] = select(0.0, source[index * parameters.old_count + plan[j].source], plan[j].survives == 1u);
     }
 }

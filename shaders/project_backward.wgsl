@@ -3,10 +3,10 @@
 // docs/architecture.md. Adds to the gradient of the means, to which
 // `shade_backward` has contributed, and sets the others.
 import package::common::color::CHANNELS;
-import package::common::constants::{INVISIBLE, PLANE_LOG_SCALE, PLANE_MEAN, PLANE_OPACITY, PLANE_QUAT, STAT_COUNT, STAT_GRADIENT, STAT_RADIUS, STATUS_OVERFLOW};
+import package::common::constants::{INVISIBLE, PLANE_LOG_SCALE, PLANE_MEAN, PLANE_OPACITY, PLANE_QUAT, STAT_PULL, STAT_VIEWS, STATUS_OVERFLOW};
 import package::common::geometry::footprint;
 import package::common::numeric::linear_group;
-import package::common::partials::PARTIAL_STRIDE;
+import package::common::partials::{PARTIAL_PULL, PARTIAL_STRIDE};
 import package::common::projected::Projected;
 import package::common::rotation::{quat_gradient, rotation_from_quat};
 import package::common::view::View;
@@ -18,7 +18,7 @@ import package::common::view::View;
 @group(0) @binding(4) var<storage, read> gradients: array<f32>;
 // Planes `[11, N]`.
 @group(0) @binding(5) var<storage, read_write> geometry_gradient: array<f32>;
-// Planes `[3, N]`, accumulated over iterations.
+// Planes `[2, N]`, accumulated over iterations.
 @group(0) @binding(6) var<storage, read_write> statistics: array<f32>;
 @group(0) @binding(7) var<storage, read> status: array<u32>;
 
@@ -107,9 +107,6 @@ fn project_backward(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups
     if status[STATUS_OVERFLOW] != 0u {
         return;
     }
-    // 3DGS measures the pull on a centre in normalised device coordinates.
-    statistics[STAT_GRADIENT * n + i] += length(v_center * 0.5 * vec2f(view.size));
-    statistics[STAT_COUNT * n + i] += 1.0;
-    let extent = projected[i].extent;
-    statistics[STAT_RADIUS * n + i] = max(statistics[STAT_RADIUS * n + i], max(extent.x, extent.y));
+    statistics[STAT_PULL * n + i] += gradients[at + PARTIAL_PULL];
+    statistics[STAT_VIEWS * n + i] += 1.0;
 }

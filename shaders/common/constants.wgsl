@@ -31,10 +31,10 @@ const PLANE_LOG_SCALE: u32 = 7u;
 const PLANE_OPACITY: u32 = 10u;
 const GEOMETRY_PLANES: u32 = 11u;
 
-// Planes of the statistics for densification `[3, N]`.
-const STAT_GRADIENT: u32 = 0u;
-const STAT_COUNT: u32 = 1u;
-const STAT_RADIUS: u32 = 2u;
+// Planes of the statistics for densification `[2, N]`: pulls added up over the
+// views that showed a Gaussian, and how many these were.
+const STAT_PULL: u32 = 0u;
+const STAT_VIEWS: u32 = 1u;
 
 // Rank of a Gaussian that the view does not show.
 const INVISIBLE: u32 = 0xffffffffu;

@@ -1,5 +1,12 @@
-//! Adaptive density control of 3DGS: the host plans from a few numbers a
-//! Gaussian, the device carries the plan out (`shaders/densify.wgsl`).
+//! Adaptive density control: the host plans from a few numbers a Gaussian, the
+//! device carries the plan out (`shaders/densify.wgsl`).
+//!
+//! As in 3DGS, Gaussians that the loss pulls at are divided and faint ones
+//! removed. What differs, and why, is in docs/decisions.md: the pull does not
+//! cancel between pixels (AbsGS, Ye et al. 2024), every division is a split that
+//! keeps the first two moments, and a set grows by a bounded share at a time.
+
+use std::f64::consts::FRAC_1_SQRT_2;
 
 use bytemuck::{Pod, Zeroable};
 
@@ -9,23 +16,30 @@ use crate::{
     raster::constants::*,
 };
 
-/// Splits divide the standard deviations by this.
-const SHRINK: f32 = 1.6;
+/// Both halves of a split together let as much light through as this power of
+/// the whole's transmittance, each: a half alone would be ½ where they coincide,
+/// but they stand apart. The value is Brush's.
+const SPLIT_TRANSMITTANCE_POWER: f64 = FRAC_1_SQRT_2;
+
+/// Opacities of halves stay this far from 0 and 1, where a logit has no bounds.
+const OPACITY_MARGIN: f64 = 1.0 / 255.0;
 
 /// Twin of `struct Descent`: where a new Gaussian comes from.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Descent {
-    /// Offset in the source's standard deviations, splits only.
+    /// Offset in the source's standard deviations.
     pub offset: [f32; 3],
     /// Index of the source.
     pub source: u32,
-    /// 1 when Adam's moments are kept.
-    pub keep_moments: u32,
-    /// 1 for the half of a split.
-    pub split: u32,
+    /// Added to the log-scales.
+    pub log_growth: [f32; 3],
+    /// 1 for a survivor, which is copied with its moments; 0 for the half of a split.
+    pub survives: u32,
+    /// Added to the opacity logit.
+    pub logit_step: f32,
     /// Keeps the size a multiple of 16.
-    pub padding: [u32; 2],
+    pub padding: [u32; 3],
 }
 
 /// Twin of `struct DensifyParameters`.
@@ -38,15 +52,13 @@ pub struct DensifyParameters {
     pub new_count: u32,
     /// Planes of the array at hand.
     pub planes: u32,
-    /// Taken off the log-scales of a split.
-    pub shrink: f32,
 }
 
 /// What the plan is made from.
 pub struct Evidence<'a> {
     /// Geometry planes `[11, N]`.
     pub geometry: &'a [f32],
-    /// Statistics planes `[3, N]`.
+    /// Statistics planes `[2, N]`.
     pub statistics: &'a [f32],
     /// The scene's extent in world units.
     pub extent: f64,
@@ -54,14 +66,10 @@ pub struct Evidence<'a> {
     pub prune_large: bool,
 }
 
-/// Plans one densification: survivors in their old order, then clones, then
-/// halves of splits. Where the cap does not admit all, the Gaussians with the
-/// strongest gradients come first (ties by index).
-pub fn plan(
-    settings: &LumaSettings,
-    evidence: &Evidence<'_>,
-    random: &mut fastrand::Rng,
-) -> Vec<Descent> {
+/// Plans one densification: survivors in their old order, then the halves of
+/// splits. Where growth or the cap does not admit all, the Gaussians with the
+/// strongest pull come first (ties by index).
+pub fn plan(settings: &LumaSettings, evidence: &Evidence<'_>) -> Vec<Descent> {
     let n = evidence.geometry.len() / GEOMETRY_PLANES;
     let at = |plane: usize, i: usize| evidence.geometry[plane * n + i];
     let largest = |i: usize| {
@@ -78,9 +86,9 @@ pub fn plan(
             && (0..GEOMETRY_PLANES).all(|p| at(p, i).is_finite())
     };
     let pull = |i: usize| {
-        let count = evidence.statistics[n + i];
-        if count > 0.0 {
-            f64::from(evidence.statistics[i] / count)
+        let views = evidence.statistics[STAT_VIEWS * n + i];
+        if views > 0.0 {
+            f64::from(evidence.statistics[STAT_PULL * n + i] / views)
         } else {
             0.0
         }
@@ -90,45 +98,58 @@ pub fn plan(
     let mut candidates: Vec<(f64, usize)> = survivors
         .iter()
         .map(|&i| (pull(i), i))
-        .filter(|&(pull, _)| pull >= settings.gradient_threshold)
+        .filter(|&(pull, _)| pull >= settings.pull_threshold)
         .collect();
     candidates.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-    // A clone and a split each add one.
-    candidates.truncate(settings.max_splats.saturating_sub(survivors.len()));
-    let mut chosen: Vec<usize> = candidates.into_iter().map(|(_, i)| i).collect();
-    chosen.sort_unstable();
+    // A split adds one.
+    let room = settings.max_splats.saturating_sub(survivors.len());
+    let growth = (survivors.len() as f64 * settings.growth).ceil() as usize;
+    candidates.truncate(room.min(growth));
+    let mut splits: Vec<usize> = candidates.into_iter().map(|(_, i)| i).collect();
+    splits.sort_unstable();
 
-    let (splits, clones): (Vec<usize>, Vec<usize>) = chosen
-        .into_iter()
-        .partition(|&i| largest(i) > settings.split_share * evidence.extent);
-    let of = |source: usize, keep_moments: u32| Descent {
-        source: source as u32,
-        keep_moments,
-        ..Descent::default()
-    };
     let mut plan: Vec<Descent> = survivors
         .iter()
         .filter(|i| splits.binary_search(i).is_err())
-        .map(|&i| of(i, 1))
+        .map(|&i| Descent {
+            source: i as u32,
+            survives: 1,
+            ..Descent::default()
+        })
         .collect();
-    plan.extend(clones.iter().map(|&i| of(i, 0)));
-    for &i in &splits {
-        for _ in 0..2 {
-            plan.push(Descent {
-                offset: std::array::from_fn(|_| standard_normal(random)),
-                split: 1,
-                ..of(i, 0)
-            });
-        }
-    }
+    plan.extend(splits.into_iter().flat_map(|i| {
+        let log_scales = std::array::from_fn(|axis| f64::from(at(PLANE_LOG_SCALE + axis, i)));
+        halves(i as u32, log_scales, f64::from(at(PLANE_OPACITY, i)))
+    }));
     plan
 }
 
-/// Box and Muller's normal deviate.
-fn standard_normal(random: &mut fastrand::Rng) -> f32 {
-    // 1 - u lies in (0, 1]: its logarithm is finite.
-    let radius = (-2.0 * (1.0 - random.f64()).ln()).sqrt();
-    (radius * (std::f64::consts::TAU * random.f64()).cos()) as f32
+/// Two halves that keep the whole's mean and variances. Along the largest axis
+/// they stand 1/√2 standard deviations to either side and are narrower by 1/√2: (1/√2)² + (1/√2)² = 1. Shorter axes shrink less, by their square
+/// share of the largest, so that a needle is cut across and a ball along its
+/// diagonal.
+fn halves(source: u32, log_scales: [f64; 3], logit: f64) -> [Descent; 2] {
+    let largest = log_scales.into_iter().fold(f64::NEG_INFINITY, f64::max);
+    let shrink = log_scales.map(|log_scale| {
+        let relative = (log_scale - largest).exp();
+        1.0 - (1.0 - FRAC_1_SQRT_2) * relative * relative
+    });
+    let offset = shrink.map(|k| (1.0 - k * k).max(0.0).sqrt() as f32);
+    // 1 - opacity = 1 / (1 + exp(logit)).
+    let opacity = 1.0 - (1.0 + logit.exp()).powf(-SPLIT_TRANSMITTANCE_POWER);
+    let opacity = opacity.clamp(OPACITY_MARGIN, 1.0 - OPACITY_MARGIN);
+    let half = Descent {
+        offset,
+        source,
+        log_growth: shrink.map(|k| k.ln() as f32),
+        logit_step: ((opacity / (1.0 - opacity)).ln() - logit) as f32,
+        ..Descent::default()
+    };
+    let other = Descent {
+        offset: offset.map(|x| -x),
+        ..half
+    };
+    [half, other]
 }
 
 /// The three entry points.
@@ -181,7 +202,6 @@ impl DensifyKernels {
                 old_count: old_count as u32,
                 new_count: plan.len() as u32,
                 planes: planes as u32,
-                shrink: SHRINK.ln(),
             },
         )?;
         let kernel = match target {
@@ -221,8 +241,8 @@ mod tests {
             }
             geometry[PLANE_OPACITY * n + i] = (opacity / (1.0 - opacity)).ln();
             // Seen in four views.
-            statistics[i] = 4.0 * pull;
-            statistics[n + i] = 4.0;
+            statistics[STAT_PULL * n + i] = 4.0 * pull;
+            statistics[STAT_VIEWS * n + i] = 4.0;
         }
         (geometry, statistics)
     }
@@ -239,60 +259,59 @@ mod tests {
             extent: 1.0,
             prune_large,
         };
-        plan(settings, &evidence, &mut fastrand::Rng::with_seed(1))
+        plan(settings, &evidence)
     }
 
-    fn sources(plan: &[Descent]) -> Vec<(u32, u32, u32)> {
-        plan.iter()
-            .map(|d| (d.source, d.keep_moments, d.split))
-            .collect()
+    fn sources(plan: &[Descent]) -> Vec<(u32, u32)> {
+        plan.iter().map(|d| (d.source, d.survives)).collect()
+    }
+
+    fn eager() -> LumaSettings {
+        LumaSettings {
+            growth: 1.0,
+            ..LumaSettings::new(1000)
+        }
     }
 
     const CALM: (f32, f32, f32) = (0.005, 0.5, 1e-5);
-    const SMALL: (f32, f32, f32) = (0.005, 0.5, 1e-3);
-    const LARGE: (f32, f32, f32) = (0.05, 0.5, 1e-3);
-    const FAINT: (f32, f32, f32) = (0.005, 0.004, 1e-3);
+    const PULLED: (f32, f32, f32) = (0.005, 0.5, 2e-3);
+    const FAINT: (f32, f32, f32) = (0.005, 0.004, 1e-2);
     const HUGE: (f32, f32, f32) = (0.2, 0.5, 1e-5);
 
     #[test]
-    fn small_ones_are_cloned_large_ones_split_faint_ones_removed() {
-        let plan = planned(
-            &LumaSettings::new(1000),
-            &[CALM, SMALL, LARGE, FAINT],
-            false,
-        );
-        assert_eq!(
-            sources(&plan),
-            [(0, 1, 0), (1, 1, 0), (1, 0, 0), (2, 0, 1), (2, 0, 1)]
-        );
-        assert_eq!(plan[2].offset, [0.0; 3]);
-        assert_ne!(plan[3].offset, plan[4].offset);
+    fn pulled_ones_are_split_faint_ones_removed() {
+        let plan = planned(&eager(), &[CALM, PULLED, FAINT], false);
+        assert_eq!(sources(&plan), [(0, 1), (1, 0), (1, 0)]);
+        assert_eq!(plan[0].offset, [0.0; 3]);
+        assert_eq!(plan[1].offset, plan[2].offset.map(|x| -x));
     }
 
     #[test]
     fn oversized_ones_go_only_when_asked() {
-        let settings = LumaSettings::new(1000);
-        assert_eq!(sources(&planned(&settings, &[HUGE, CALM], false)).len(), 2);
-        assert_eq!(
-            sources(&planned(&settings, &[HUGE, CALM], true)),
-            [(1, 1, 0)]
-        );
+        assert_eq!(planned(&eager(), &[HUGE, CALM], false).len(), 2);
+        assert_eq!(sources(&planned(&eager(), &[HUGE, CALM], true)), [(1, 1)]);
     }
 
     #[test]
-    fn the_cap_holds_and_the_strongest_come_first() {
-        let settings = LumaSettings {
+    fn cap_and_growth_hold_and_the_strongest_come_first() {
+        let stronger = (0.005, 0.5, 4e-3);
+        let gaussians = [PULLED, stronger, CALM];
+        let first = [(0, 1), (2, 1), (1, 0), (1, 0)];
+        let capped = LumaSettings {
             max_splats: 4,
-            ..LumaSettings::new(1000)
+            ..eager()
         };
-        let stronger = (0.005, 0.5, 2e-3);
-        let plan = planned(&settings, &[SMALL, stronger, CALM], false);
-        assert_eq!(sources(&plan), [(0, 1, 0), (1, 1, 0), (2, 1, 0), (1, 0, 0)]);
+        assert_eq!(sources(&planned(&capped, &gaussians, false)), first);
         let full = LumaSettings {
             max_splats: 2,
-            ..settings
+            ..eager()
         };
-        assert_eq!(planned(&full, &[SMALL, stronger, CALM], false).len(), 3);
+        assert_eq!(planned(&full, &gaussians, false).len(), 3);
+        let slow = LumaSettings {
+            growth: 0.3,
+            ..eager()
+        };
+        assert_eq!(sources(&planned(&slow, &gaussians, false)), first);
     }
 
     #[test]
@@ -305,24 +324,37 @@ mod tests {
             extent: 1.0,
             prune_large: false,
         };
-        let mut random = fastrand::Rng::with_seed(1);
-        assert_eq!(
-            sources(&plan(&LumaSettings::new(1000), &evidence, &mut random)),
-            [(1, 1, 0)]
-        );
+        assert_eq!(sources(&plan(&eager(), &evidence)), [(1, 1)]);
     }
 
     #[test]
-    fn normal_deviates_have_mean_zero_and_variance_one() {
-        let mut random = fastrand::Rng::with_seed(7);
-        let sample: Vec<f64> = (0..20_000)
-            .map(|_| f64::from(standard_normal(&mut random)))
-            .collect();
-        let mean = sample.iter().sum::<f64>() / sample.len() as f64;
-        let square = sample.iter().map(|v| v * v).sum::<f64>() / sample.len() as f64;
-        assert!(
-            mean.abs() < 0.03 && (square - 1.0).abs() < 0.04,
-            "{mean} {square}"
-        );
+    fn halves_keep_mean_and_variance() {
+        let scales = [0.3_f64, 0.1, 1e-4];
+        let [one, other] = halves(0, scales.map(f64::ln), 0.7);
+        for axis in 0..3 {
+            let [a, b] = [one, other].map(|half| f64::from(half.offset[axis]));
+            assert_eq!(a + b, 0.0);
+            let shrink = f64::from(one.log_growth[axis]).exp();
+            assert!((a * a + shrink * shrink - 1.0).abs() < 1e-6, "axis {axis}");
+        }
+        // The longest axis is halved in area, the shortest left alone.
+        assert!((f64::from(one.log_growth[0]) - FRAC_1_SQRT_2.ln()).abs() < 1e-6);
+        assert!(one.log_growth[2].abs() < 1e-6);
+    }
+
+    #[test]
+    fn halves_are_fainter_and_stay_finite() {
+        for logit in [-200.0, -5.0, 0.0, 3.0, 200.0] {
+            let [half, _] = halves(0, [0.0; 3], logit);
+            let after = logit + f64::from(half.logit_step);
+            assert!(
+                after.is_finite() && after.abs() < 5.6,
+                "{logit} gives {after}"
+            );
+        }
+        let [half, _] = halves(0, [0.0; 3], 0.0);
+        // 1 - ½^0.7071 = 0.3874.
+        let after = 1.0 / (1.0 + (-f64::from(half.logit_step)).exp());
+        assert!((after - 0.387_453).abs() < 1e-5, "{after}");
     }
 }

@@ -82,7 +82,6 @@ pub struct LumaTrainer {
     geometry: Geometry,
     field: Field,
     workspace: Workspace,
-    random: fastrand::Rng,
     /// Iteration at which the present workspace began to count steps.
     base: usize,
 }
@@ -124,7 +123,6 @@ impl LumaTrainer {
         let geometry = Geometry::upload(&gpu, splats)?;
         let field = Field::upload(&gpu, &splats.sh)?;
         let capacity = geometry.count * INSTANCES_PER_SPLAT;
-        let random = fastrand::Rng::with_seed(settings.seed);
         let workspace = Workspace::new(
             &raster,
             &kernels,
@@ -151,7 +149,6 @@ impl LumaTrainer {
             geometry,
             field,
             workspace,
-            random,
             base: 0,
         })
     }
@@ -361,7 +358,6 @@ impl LumaTrainer {
                 extent: self.extent,
                 prune_large: iteration > self.settings.schedule.reset_every,
             },
-            &mut self.random,
         );
         if plan.is_empty() {
             // Nothing would be left: keep what there is and go on.

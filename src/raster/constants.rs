@@ -26,8 +26,14 @@ pub const PLANE_QUAT: usize = 3;
 pub const PLANE_LOG_SCALE: usize = 7;
 /// The plane of the opacity logits.
 pub const PLANE_OPACITY: usize = 10;
-/// Planes of the densification statistics: gradient sum, count, largest radius.
-pub const STATISTICS_PLANES: usize = 3;
+/// Planes of the densification statistics: sum of pulls, views.
+pub const STATISTICS_PLANES: usize = 2;
+/// The plane of the pulls: over the views that showed a Gaussian, the sum over
+/// pixels of the length of the loss's gradient with respect to the Gaussian's
+/// centre in normalised device coordinates.
+pub const STAT_PULL: usize = 0;
+/// The plane of the counts of these views.
+pub const STAT_VIEWS: usize = 1;
 
 /// Words of the status array.
 pub const STATUS_WORDS: usize = 6;

@@ -175,7 +175,7 @@ pub struct LayerAdjoint {
 pub struct GeometryAdjoint {
     /// Gradient planes `[11, N]`.
     pub gradient: Buffer<f32>,
-    /// Densification statistics, planes `[3, N]`.
+    /// Densification statistics, planes `[2, N]`.
     pub statistics: Buffer<f32>,
     project: Bindings,
 }
@@ -197,7 +197,7 @@ impl LayerAdjoint {
         let gpu = &raster.gpu;
         let n = geometry.count;
         let with_geometry = field.kind == ColorKind::Luma;
-        let record = field.kind.channels() + if with_geometry { 6 } else { 0 };
+        let record = field.kind.channels() + if with_geometry { 7 } else { 0 };
         let image_gradient = Buffer::zeros(gpu, "image gradient", layer.image.len())?;
         let partials = Buffer::<f32>::zeros(gpu, "instance gradients", lists.capacity * record)?;
         let gradients = Buffer::<f32>::zeros(gpu, "projected gradients", n * record)?;

@@ -12,16 +12,20 @@ use std::collections::HashMap;
 /// Neighbours that set the width of an initial Gaussian (Kerbl et al. 2023).
 const NEIGHBORS: usize = 3;
 
-/// Opacity of an initial Gaussian (Kerbl et al. 2023).
-const INITIAL_OPACITY: f64 = 0.1;
+/// Standard deviation of an initial Gaussian as a share of the distance to its
+/// neighbours, and its opacity. 3DGS begins with 1 and 0.1: a fog that must first
+/// find its surface. Smaller and denser ones stand on it from the start (figures
+/// in docs/decisions.md).
+const INITIAL_WIDTH: f32 = 0.5;
+const INITIAL_OPACITY: f64 = 0.5;
 
 /// Smallest initial standard deviation, relative to the scene's extent: without
 /// it duplicated points would be infinitely thin. The reference clamps the
 /// squared distance at 1e-7 in scenes a few units wide, about the same.
 const MIN_RELATIVE_SCALE: f32 = 1e-4;
 
-/// One isotropic Gaussian a point: its standard deviation is the root mean
-/// square distance to the three nearest other points, its opacity 0.1, its
+/// One isotropic Gaussian a point: its standard deviation is half the root
+/// mean square distance to the three nearest other points, its opacity 0.5, its
 /// constant colour the point's gray value.
 ///
 /// `points` are `(position, gray)` in world units and sRGB-encoded `0..=1`;
@@ -39,7 +43,7 @@ pub fn initial_splats(points: &[([f32; 3], f32)], extent: f32, sh_degree: u32) -
     let min_scale = (extent * MIN_RELATIVE_SCALE).max(f32::MIN_POSITIVE);
     let log_scales = nearest_neighbor_distances(&means, NEIGHBORS)
         .into_iter()
-        .map(|distance| [distance.max(min_scale).min(f32::MAX).ln(); 3])
+        .map(|distance| [(INITIAL_WIDTH * distance).max(min_scale).min(f32::MAX).ln(); 3])
         .collect();
 
     let mut field = ShField::zeros(count, degree, 1);
@@ -378,9 +382,9 @@ mod tests {
         assert_eq!(splats.len(), 2);
         assert_eq!(splats.means, [[0.0; 3], [2.0, 0.0, 0.0]]);
         assert_eq!(splats.quats, [[1.0, 0.0, 0.0, 0.0]; 2]);
-        assert_eq!(splats.log_scales, [[2f32.ln(); 3]; 2]);
+        assert_eq!(splats.log_scales, [[1f32.ln(); 3]; 2]);
         let opacity = 1.0 / (1.0 + (-splats.opacity_logits[1]).exp());
-        assert!((opacity - 0.1).abs() < 1e-6);
+        assert!((opacity - 0.5).abs() < 1e-6);
         assert_eq!((splats.sh.degree, splats.sh.channels), (3, 1));
         for (i, gray) in [1.0, 0.25].into_iter().enumerate() {
             let coefficients = splats.sh.of(i);

@@ -32,14 +32,15 @@ fn geometry(random: &mut Random) -> Vec<f32> {
         .collect()
 }
 
-/// Survivors with gaps, clones, halves; 600 rows are three workgroups.
+/// Survivors with gaps, halves; 600 rows are three workgroups.
 fn plan(random: &mut Random) -> Vec<Descent> {
     (0..600)
         .map(|j| Descent {
             source: (j * 7 % OLD) as u32,
-            keep_moments: u32::from(j % 3 == 0),
-            split: u32::from(j % 3 == 2),
+            survives: u32::from(j % 3 == 0),
             offset: random.array::<3>(-2.0, 2.0).map(|v| v as f32),
+            log_growth: random.array::<3>(-1.0, 0.5).map(|v| v as f32),
+            logit_step: random.range(-2.0, 2.0) as f32,
             ..Descent::default()
         })
         .collect()
@@ -59,16 +60,17 @@ fn descendant(old: &[f32], descent: &Descent) -> Vec<f64> {
     let mut new: Vec<f64> = (0..GEOMETRY_PLANES)
         .map(|plane| f64::from(old[plane * OLD + i]))
         .collect();
-    if descent.split == 1 {
+    if descent.survives == 0 {
         let quat: [f64; 4] = std::array::from_fn(|k| new[PLANE_QUAT + k]);
         let norm = quat.iter().map(|q| q * q).sum::<f64>().sqrt();
         let offset: [f64; 3] = std::array::from_fn(|axis| {
             new[PLANE_LOG_SCALE + axis].exp() * f64::from(descent.offset[axis])
         });
+        new[PLANE_OPACITY] += f64::from(descent.logit_step);
         let moved = apply(&rotation(quat.map(|q| q / norm)), &offset);
         for axis in 0..3 {
             new[PLANE_MEAN + axis] += moved[axis];
-            new[PLANE_LOG_SCALE + axis] -= 1.6_f64.ln();
+            new[PLANE_LOG_SCALE + axis] += f64::from(descent.log_growth[axis]);
         }
     }
     new
@@ -81,7 +83,7 @@ pub static ROWS: LazyLock<Vec<Row>> = LazyLock::new(|| {
     let count = plan.len();
     let (mut copied, mut split) = ((Vec::new(), Vec::new()), (Vec::new(), Vec::new()));
     for (j, descent) in plan.iter().enumerate() {
-        let side = if descent.split == 1 {
+        let side = if descent.survives == 0 {
             &mut split
         } else {
             &mut copied
@@ -127,7 +129,7 @@ fn fields_are_copied_and_newcomers_have_no_moments() {
         let field = applied(&plan, &old, Target::Field);
         assert_eq!(bits(&field), bits(&expected(|_| true)), "{planes} planes");
         let moments = applied(&plan, &old, Target::Moments);
-        let kept = expected(|descent| descent.keep_moments == 1);
+        let kept = expected(|descent| descent.survives == 1);
         assert_eq!(bits(&moments), bits(&kept), "{planes} planes");
     }
 }

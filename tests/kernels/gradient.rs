@@ -3,12 +3,15 @@
 
 use std::sync::LazyLock;
 
+use gs_chroma::raster::constants::{STAT_PULL, STAT_VIEWS};
+
 use crate::{
     blend::MARGIN,
+    compare::widen,
     errors::{Row, Sample, assert_all, gradient_bounds, relative},
     harness::{Stage, splats},
     oracle::{
-        gradient::gradient,
+        gradient::{gradient, pulls},
         random::{Random, opaque_stack, random_scene_before, random_view},
         render::decision_margin,
         scene::{Scene, View},
@@ -47,7 +50,13 @@ fn measure<const C: usize>(scenes: &[(Scene<f64, C>, View)]) -> Vec<(&'static st
         let upstream = upstream(seed as u64, scene, view);
         let expected = gradient(scene, view, Shading::of_channels(C), &upstream);
         let actual = Stage::new(&splats(scene), view).backward(upstream.as_flattened());
-        let pairs = actual.groups().into_iter().zip(oracle_groups(&expected));
+        let mut rows = actual.groups();
+        let mut expected = oracle_groups(&expected);
+        if C == 1 {
+            rows.push(("pull", widen(&actual.statistics[..scene.len()])));
+            expected.push(pulls(scene, view, Shading::of_channels(C), &upstream));
+        }
+        let pairs = rows.into_iter().zip(expected);
         for (k, ((name, actual), expected)) in pairs.enumerate() {
             if groups.len() <= k {
                 groups.push((name, Vec::new()));
@@ -77,6 +86,7 @@ pub static ROWS: LazyLock<Vec<Row>> = LazyLock::new(|| {
         gradient_bounds(1.44e-6, relative(2.69e-6, 1.0)),
         gradient_bounds(2.02e-6, relative(8.40e-7, 1.0)),
         gradient_bounds(1.97e-6, relative(1.98e-6, 1.0)),
+        gradient_bounds(4.03e-7, relative(5.6e-6, 1.0)),
     ];
     let chroma = gradient_bounds(1.94e-6, relative(2.22e-6, 1.0));
     let mut rows = Vec::new();
@@ -91,7 +101,7 @@ pub static ROWS: LazyLock<Vec<Row>> = LazyLock::new(|| {
 
 #[test]
 fn gradients_are_those_of_dual_numbers() {
-    assert_eq!(ROWS.len(), 6);
+    assert_eq!(ROWS.len(), 7);
     assert_all(&ROWS);
 }
 
@@ -123,9 +133,9 @@ fn statistics_follow_the_views_that_show_a_gaussian() {
     let twice = stage.backward(&upstream).statistics;
     for (i, projected) in stage.projected().into_iter().enumerate() {
         let at = |values: &[f32], plane: usize| values[plane * scene.len() + i];
-        let (count, radius) = projected.map_or((0.0, 0.0), |p| (1.0, p.extent[0].max(p.extent[1])));
-        assert_eq!((at(&once, 1), at(&once, 2)), (count, radius));
-        assert_eq!((at(&twice, 1), at(&twice, 2)), (2.0 * count, radius));
-        assert_eq!(at(&twice, 0), 2.0 * at(&once, 0));
+        let views = if projected.is_some() { 1.0 } else { 0.0 };
+        assert_eq!(at(&once, STAT_VIEWS), views);
+        assert_eq!(at(&twice, STAT_VIEWS), 2.0 * views);
+        assert_eq!(at(&twice, STAT_PULL), 2.0 * at(&once, STAT_PULL));
     }
 }

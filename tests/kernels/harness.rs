@@ -175,7 +175,7 @@ pub struct Gradient {
     count: usize,
     /// `[11, N]`; empty for chroma.
     pub geometry: Vec<f32>,
-    /// `[3, N]`; empty for chroma.
+    /// `[2, N]`; empty for chroma.
     pub statistics: Vec<f32>,
     /// `[(degree + 1)², channels, N]`.
     pub field: Vec<f32>,

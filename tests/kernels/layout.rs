@@ -124,16 +124,16 @@ fn twins() -> Vec<Twin> {
             "Descent" = Descent {
                 offset,
                 source,
-                keep_moments,
-                split
+                log_growth,
+                survives,
+                logit_step
             }
         ),
         twin!(
             "DensifyParameters" = DensifyParameters {
                 old_count,
                 new_count,
-                planes,
-                shrink
+                planes
             }
         ),
     ]
@@ -221,9 +221,8 @@ fn constants_are_those_of_the_crate() {
             ("PLANE_LOG_SCALE", index(PLANE_LOG_SCALE)),
             ("PLANE_OPACITY", index(PLANE_OPACITY)),
             ("GEOMETRY_PLANES", index(GEOMETRY_PLANES)),
-            ("STAT_GRADIENT", 0.0),
-            ("STAT_COUNT", 1.0),
-            ("STAT_RADIUS", index(STATISTICS_PLANES - 1)),
+            ("STAT_PULL", index(STAT_PULL)),
+            ("STAT_VIEWS", index(STAT_VIEWS)),
             ("INVISIBLE", f64::from(u32::MAX)),
             ("STATUS_OVERFLOW", index(STATUS_OVERFLOW)),
             ("STATUS_VISIBLE", index(STATUS_VISIBLE)),

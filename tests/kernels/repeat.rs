@@ -65,7 +65,7 @@ fn train(start: &Splats, target: &Splats) -> (Splats, Vec<LumaProgress>) {
     let mut settings = LumaSettings::new(60);
     settings.seed = FAR_FIRST;
     settings.sh_degree = 1;
-    settings.gradient_threshold = 1e-6;
+    settings.pull_threshold = 1e-6;
     // Ten more, however many bystanders there are.
     settings.max_splats = start.len() + 10;
     settings.prune_share = 1.0;

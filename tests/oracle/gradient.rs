@@ -63,8 +63,16 @@ impl<'a, const C: usize> Tape<'a, C> {
 
     /// The scalar's derivative along that of `varied`, which stands at `position`.
     fn derivative(&self, position: usize, varied: &ScreenSplat<Dual64, C>) -> f64 {
-        let mut sum = 0.0;
-        for &index in &self.pixels[position] {
+        self.derivatives(position, varied).sum()
+    }
+
+    /// The same, one share a pixel that the Gaussian contributes to.
+    fn derivatives(
+        &self,
+        position: usize,
+        varied: &ScreenSplat<Dual64, C>,
+    ) -> impl Iterator<Item = f64> {
+        self.pixels[position].iter().map(move |&index| {
             let [x, y] = pixel_centre(index, self.view.width);
             let splats = self.contributors[index].iter().map(|&other| {
                 if other == position {
@@ -74,11 +82,9 @@ impl<'a, const C: usize> Tape<'a, C> {
                 }
             });
             let pixel = blend_pixel(splats, x, y);
-            for (v, out) in self.upstream[index].iter().zip(pixel.colour) {
-                sum += v * out.eps;
-            }
-        }
-        sum
+            let shares = self.upstream[index].iter().zip(pixel.colour);
+            shares.map(|(v, out)| v * out.eps).sum()
+        })
     }
 }
 
@@ -156,6 +162,29 @@ pub fn screen_gradient<const C: usize>(
             }
             *slot = tape.derivative(position, &varied);
         }
+    }
+    result
+}
+
+/// The pull on each Gaussian, `[N]`: the sum over pixels of the length of the
+/// gradient with respect to its centre in normalised device coordinates.
+pub fn pulls<const C: usize>(
+    scene: &Scene<f64, C>,
+    view: &View,
+    shading: Shading,
+    upstream: &[[f64; C]],
+) -> Vec<f64> {
+    let tape = Tape::record(scene, view, shading, upstream);
+    let half = [view.width, view.height].map(|side| side as f64 / 2.0);
+    let mut result = vec![0.0; scene.len()];
+    for (position, &index) in tape.order.iter().enumerate() {
+        let [x, y] = [0, 1].map(|axis| {
+            let mut varied = tape.splats[position];
+            varied.mean2d[axis] = seed(varied.mean2d[axis].re);
+            let slopes = tape.derivatives(position, &varied);
+            slopes.map(|v| v * half[axis]).collect::<Vec<_>>()
+        });
+        result[index] = x.into_iter().zip(y).map(|(x, y)| x.hypot(y)).sum();
     }
     result
 }
