@@ -1,7 +1,7 @@
 // Spherical harmonics to the colour that each visible Gaussian shows this view.
 import package::common::color::{CHANNELS, Color, color_from_sh};
-import package::common::constants::{INVISIBLE, PLANE_MEAN, STATUS_POISONED};
-import package::common::numeric::{is_finite, linear_group};
+import package::common::constants::{COLOR_MAX, INVISIBLE, PLANE_MEAN, STATUS_POISONED};
+import package::common::numeric::{is_within, linear_group};
 import package::common::projected::Projected;
 import package::common::sh::sh_term;
 import package::common::view::View;
@@ -22,9 +22,9 @@ fn coefficient(k: u32, i: u32) -> Color {
     @if(rgb) return vec3f(sh[first], sh[first + view.splat_count], sh[first + 2u * view.splat_count]);
 }
 
-@if(luma) fn finite(c: Color) -> bool { return is_finite(c); }
-@if(chroma) fn finite(c: Color) -> bool { return is_finite(c.x) && is_finite(c.y); }
-@if(rgb) fn finite(c: Color) -> bool { return is_finite(c.x) && is_finite(c.y) && is_finite(c.z); }
+@if(luma) fn drawable(c: Color) -> bool { return is_within(c, COLOR_MAX); }
+@if(chroma) fn drawable(c: Color) -> bool { return is_within(c.x, COLOR_MAX) && is_within(c.y, COLOR_MAX); }
+@if(rgb) fn drawable(c: Color) -> bool { return is_within(c.x, COLOR_MAX) && is_within(c.y, COLOR_MAX) && is_within(c.z, COLOR_MAX); }
 
 @compute @workgroup_size(256)
 fn shade(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
@@ -40,7 +40,7 @@ fn shade(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: v
     for (var k = 1u; k < count; k++) {
         sum += coefficient(k, i) * sh_term(k, direction).value;
     }
-    if !finite(sum) {
+    if !drawable(sum) {
         // Opacity 0 takes it out of every tile's blend.
         projected[i].conic_opacity.w = 0.0;
         ranks[i] = INVISIBLE;

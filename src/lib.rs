@@ -1,16 +1,20 @@
 //! gs-chroma: coloured 3D Gaussian scenes from grayscale photographs.
 //!
 //! Imports go down only: `cli` → `run`, `report` → `luma`, `chroma`, `measure` →
-//! `raster` → `gpu` → `splats`, `capture`, `color`.
+//! `raster` → `gpu` → `splats`, `capture`, `color`. [`doctor`] compares the kernels
+//! of `raster` with the [`oracle`], which uses nothing else of the crate.
 
 pub mod capture;
 pub mod chroma;
 pub mod cli;
 pub mod color;
+pub mod compare;
+pub mod doctor;
 pub mod gpu;
 pub mod luma;
 pub mod measure;
 pub mod optimize;
+pub mod oracle;
 pub mod raster;
 pub mod report;
 pub mod run;

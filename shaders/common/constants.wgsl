@@ -18,6 +18,10 @@ const ALPHA_MIN: f32 = 0.00392156862745098;
 // A pixel is finished when less than this passes through.
 const TRANSMITTANCE_MIN: f32 = 1e-4;
 
+// A larger colour is poison: its gradient times squared pixel distances, squared
+// again by Adam, would overflow.
+const COLOR_MAX: f32 = 1e4;
+
 // A quaternion whose squared length is below has no direction in f32.
 const QUAT_NORM_MIN_SQ: f32 = 1e-8;
 

@@ -5,6 +5,11 @@ fn is_finite(x: f32) -> bool {
     return (bitcast<u32>(x) & 0x7fffffffu) < 0x7f800000u;
 }
 
+// Whether x is a number of at most this magnitude; by bits, for NaN passes comparisons.
+fn is_within(x: f32, bound: f32) -> bool {
+    return (bitcast<u32>(x) & 0x7fffffffu) <= bitcast<u32>(bound);
+}
+
 fn all_finite3(v: vec3f) -> bool {
     return is_finite(v.x) && is_finite(v.y) && is_finite(v.z);
 }

@@ -1,6 +1,7 @@
 //! The commands: arguments in, text out. What they do is in [`crate::run`].
 
 mod colorize;
+mod doctor;
 mod export;
 mod fit;
 mod info;
@@ -32,6 +33,7 @@ enum Command {
     Render(render::Render),
     Export(export::Export),
     Info(info::Info),
+    Doctor(doctor::Doctor),
 }
 
 impl Cli {
@@ -46,6 +48,7 @@ impl Cli {
             Command::Render(command) => command.run(),
             Command::Export(command) => command.run(),
             Command::Info(command) => command.run(),
+            Command::Doctor(command) => command.run(),
         }
     }
 }

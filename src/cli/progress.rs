@@ -28,7 +28,7 @@ impl Progress {
             } => {
                 if self.bar.as_ref().is_none_or(|(shown, _)| shown != stage) {
                     self.finish();
-                    self.bar = Some((*stage, new_bar(*stage, *total)));
+                    self.bar = Some((*stage, bar(&stage.to_string(), *total)));
                 }
                 if let Some((_, bar)) = &self.bar {
                     bar.set_position(*done as u64);
@@ -52,13 +52,14 @@ impl Drop for Progress {
     }
 }
 
-fn new_bar(stage: Stage, total: usize) -> ProgressBar {
+/// A bar that counts to `total`.
+pub(super) fn bar(name: &str, total: usize) -> ProgressBar {
     let style =
         ProgressStyle::with_template("{prefix:>9} {bar:30} {pos}/{len} {per_sec} ETA {eta} {msg}")
             .unwrap_or_else(|_| ProgressStyle::default_bar());
     let bar = ProgressBar::new(total as u64)
         .with_style(style)
-        .with_prefix(stage.to_string());
+        .with_prefix(name.to_owned());
     bar.enable_steady_tick(Duration::from_millis(500));
     bar
 }

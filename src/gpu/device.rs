@@ -11,6 +11,16 @@ pub enum GpuError {
          (Debian: apt-get install mesa-vulkan-drivers)"
     )]
     NoAdapter(String),
+    /// None is called as the environment asks.
+    #[error(
+        "WGPU_ADAPTER_NAME: no adapter's name contains {wanted:?} (there is: {found}): choose one of these, or unset it"
+    )]
+    NoSuchAdapter {
+        /// What was asked for.
+        wanted: String,
+        /// The adapters there are.
+        found: String,
+    },
     /// The adapter refused a device.
     #[error(
         "adapter {adapter}: no device ({reason}): update its driver or choose another with WGPU_ADAPTER_NAME"
@@ -42,7 +52,18 @@ pub enum GpuError {
 
 /// A device and its queue, cheap to clone.
 #[derive(Clone)]
-pub struct Gpu(Arc<Inner>);
+pub struct Gpu {
+    inner: Arc<Inner>,
+    patch: Option<Patch>,
+}
+
+/// A kernel changed on purpose.
+#[derive(Clone, Copy)]
+struct Patch {
+    kernel: &'static str,
+    from: &'static str,
+    to: &'static str,
+}
 
 struct Inner {
     device: wgpu::Device,
@@ -54,7 +75,7 @@ impl Gpu {
     /// Opens the fastest adapter, or the one that `WGPU_ADAPTER_NAME` names.
     ///
     /// # Errors
-    /// [`GpuError::NoAdapter`] or [`GpuError::NoDevice`].
+    /// [`GpuError::NoAdapter`], [`GpuError::NoSuchAdapter`] or [`GpuError::NoDevice`].
     pub fn open() -> Result<Self, GpuError> {
         let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
         // No kernel here is dispatched indirectly, and the checks cost at every submission.
@@ -74,18 +95,51 @@ impl Gpu {
             adapter: info.name.clone(),
             reason: error.to_string(),
         })?;
-        Ok(Self(Arc::new(Inner {
-            device,
-            queue,
-            info,
-        })))
+        Ok(Self {
+            inner: Arc::new(Inner {
+                device,
+                queue,
+                info,
+            }),
+            patch: None,
+        })
+    }
+
+    /// The same device, on which kernel `kernel` will be compiled with `from`
+    /// replaced by `to`: for tests that show that a broken kernel is noticed.
+    #[doc(hidden)]
+    pub fn with_broken(&self, kernel: &'static str, from: &'static str, to: &'static str) -> Self {
+        Self {
+            inner: self.inner.clone(),
+            patch: Some(Patch { kernel, from, to }),
+        }
+    }
+
+    /// The source of `kernel` as [`Self::with_broken`] wants it, if it wants it changed.
+    pub(super) fn broken(&self, kernel: &str, source: &str) -> Option<String> {
+        let patch = self.patch.as_ref()?;
+        let concerned = patch.kernel == kernel && source.contains(patch.from);
+        concerned.then(|| source.replace(patch.from, patch.to))
     }
 
     async fn adapter(instance: &wgpu::Instance) -> Result<wgpu::Adapter, GpuError> {
-        if std::env::var_os("WGPU_ADAPTER_NAME").is_some() {
-            return wgpu::util::initialize_adapter_from_env(instance, None)
-                .await
-                .map_err(|error| GpuError::NoAdapter(error.to_string()));
+        if let Some(wanted) = std::env::var_os("WGPU_ADAPTER_NAME") {
+            // wgpu's own helper panics where none matches.
+            let wanted = wanted.to_string_lossy().into_owned();
+            let adapters = instance.enumerate_adapters(wgpu::Backends::all()).await;
+            let name = |adapter: &wgpu::Adapter| adapter.get_info().name;
+            let matches = |adapter: &&wgpu::Adapter| {
+                name(adapter)
+                    .to_lowercase()
+                    .contains(&wanted.to_lowercase())
+            };
+            return match adapters.iter().find(matches) {
+                Some(adapter) => Ok(adapter.clone()),
+                None => Err(GpuError::NoSuchAdapter {
+                    found: adapters.iter().map(name).collect::<Vec<_>>().join(", "),
+                    wanted,
+                }),
+            };
         }
         instance
             .request_adapter(&wgpu::RequestAdapterOptions {
@@ -98,17 +152,17 @@ impl Gpu {
 
     /// The wgpu device.
     pub fn device(&self) -> &wgpu::Device {
-        &self.0.device
+        &self.inner.device
     }
 
     /// The wgpu queue.
     pub fn queue(&self) -> &wgpu::Queue {
-        &self.0.queue
+        &self.inner.queue
     }
 
     /// The adapter's name, driver and kind.
     pub fn info(&self) -> &wgpu::AdapterInfo {
-        &self.0.info
+        &self.inner.info
     }
 
     /// The adapter's name and driver on one line.
@@ -119,12 +173,12 @@ impl Gpu {
 
     /// Whether the adapter is a software one.
     pub fn is_software(&self) -> bool {
-        self.0.info.device_type == wgpu::DeviceType::Cpu
+        self.inner.info.device_type == wgpu::DeviceType::Cpu
     }
 
     /// The largest buffer that one binding may have, in bytes.
     pub fn binding_limit(&self) -> u64 {
-        let limits = self.0.device.limits();
+        let limits = self.inner.device.limits();
         limits
             .max_storage_buffer_binding_size
             .min(limits.max_buffer_size)
@@ -132,7 +186,7 @@ impl Gpu {
 
     /// Bytes that live buffers take on the device at present, where the backend tells.
     pub fn allocated_bytes(&self) -> Option<u64> {
-        let report = self.0.device.generate_allocator_report()?;
+        let report = self.inner.device.generate_allocator_report()?;
         Some(report.total_allocated_bytes)
     }
 
@@ -141,7 +195,7 @@ impl Gpu {
     /// # Errors
     /// [`GpuError::Lost`].
     pub fn wait(&self) -> Result<(), GpuError> {
-        self.0
+        self.inner
             .device
             .poll(wgpu::PollType::wait_indefinitely())
             .map(|_| ())

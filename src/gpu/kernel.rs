@@ -24,24 +24,27 @@ impl Kernel {
     /// Compiles the entry point `name` of `source`. All bindings
     /// are in group 0.
     pub fn new(gpu: &Gpu, name: &'static str, source: &'static str) -> Self {
-        let description = wgpu::ShaderModuleDescriptor {
+        let describe = |source| wgpu::ShaderModuleDescriptor {
             label: Some(name),
-            source: wgpu::ShaderSource::Wgsl(source.into()),
+            source: wgpu::ShaderSource::Wgsl(source),
         };
-        // SAFETY: without loop bounding a shader must not loop for ever, without
-        // division checks it must not divide an integer by zero. The sources are
-        // this crate's own: every loop counts towards a bound that its body does
-        // not move, and every integer divisor is a constant or a size that the
-        // host makes at least 1. Bounds checks stay on.
-        let module = unsafe {
-            gpu.device().create_shader_module_trusted(
-                description,
-                wgpu::ShaderRuntimeChecks {
-                    force_loop_bounding: false,
-                    int_div_checks: false,
-                    ..wgpu::ShaderRuntimeChecks::checked()
-                },
-            )
+        let module = match gpu.broken(name, source) {
+            Some(broken) => gpu.device().create_shader_module(describe(broken.into())),
+            // SAFETY: without loop bounding a shader must not loop for ever, without
+            // division checks it must not divide an integer by zero. The sources are
+            // this crate's own: every loop counts towards a bound that its body does
+            // not move, and every integer divisor is a constant or a size that the
+            // host makes at least 1. Bounds checks stay on.
+            None => unsafe {
+                gpu.device().create_shader_module_trusted(
+                    describe(source.into()),
+                    wgpu::ShaderRuntimeChecks {
+                        force_loop_bounding: false,
+                        int_div_checks: false,
+                        ..wgpu::ShaderRuntimeChecks::checked()
+                    },
+                )
+            },
         };
         let pipeline = gpu
             .device()

@@ -78,7 +78,12 @@ impl Schedule {
             } else {
                 PAPER_ITERATIONS
             },
-            densify_every: if iterations < SHORT_RUN { 200 } else { 100 },
+            // Some five looks at the pulls, each over enough iterations to be worth one.
+            densify_every: if iterations < SHORT_RUN {
+                (iterations / 5).clamp(50, 200)
+            } else {
+                100
+            },
             reset_every: if iterations < 6_000 {
                 usize::MAX
             } else {

@@ -11,6 +11,8 @@ pub const ALPHA_MAX: f32 = 0.99;
 pub const ALPHA_MIN: f32 = 1.0 / 255.0;
 /// Transmittance below which a pixel is finished.
 pub const TRANSMITTANCE_MIN: f32 = 1e-4;
+/// Largest magnitude of a colour in any kind's units.
+pub const COLOR_MAX: f32 = 1e4;
 /// Squared length below which a quaternion has no direction.
 pub const QUAT_NORM_MIN_SQ: f32 = 1e-8;
 /// Share of the half image beyond its border where the linearised projection is clamped.

@@ -73,6 +73,18 @@ pub enum RunError {
         /// Iterations of stage 1.
         luma: usize,
     },
+    /// The device computes something else than the reference.
+    #[error(
+        "{failed} of {cases} cases fail on {adapter}: update its driver, or choose another adapter with WGPU_ADAPTER_NAME, and please report the output of `gs-chroma doctor --json`"
+    )]
+    Unsound {
+        /// Cases that failed.
+        failed: usize,
+        /// Cases in all.
+        cases: usize,
+        /// The adapter's name.
+        adapter: String,
+    },
 }
 
 /// A part of a run that takes time.

@@ -34,8 +34,8 @@ impl Preset {
     pub(super) fn amounts(self) -> Amounts {
         match self {
             Self::Draft => Amounts {
-                iterations: 800,
-                until: 950,
+                iterations: 700,
+                until: 850,
                 max_splats: 12_000,
                 max_side: Some(400),
                 // A short run only learns noise from the direction of view.

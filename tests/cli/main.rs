@@ -3,10 +3,10 @@
 //! A Vulkan, Metal or DirectX 12 adapter and ONNX Runtime are needed
 //! (`tools/setup.py` installs both); a software adapter will do.
 
-#[path = "../oracle/mod.rs"]
-mod oracle;
+use gs_chroma::oracle;
 
 mod coordinates;
+mod doctor;
 mod documented;
 mod errors;
 mod inspect;

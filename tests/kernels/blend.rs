@@ -2,6 +2,8 @@
 
 use std::sync::LazyLock;
 
+use gs_chroma::doctor::MARGIN;
+
 use crate::{
     compare::{FlipBounds, widen},
     errors::{Row, Sample, assert_all, relative},
@@ -14,9 +16,6 @@ use crate::{
         shade::Shading,
     },
 };
-
-/// Pixels with a smaller margin may fall the other way in `f32`.
-pub const MARGIN: f64 = 1e-4;
 
 /// Scenes of every degree before views of odd sizes, and opaque stacks.
 fn scenes<const C: usize>() -> Vec<(Scene<f64, C>, View)> {

@@ -2,6 +2,8 @@
 
 use std::sync::LazyLock;
 
+use gs_chroma::doctor::headroom;
+
 use crate::{
     compare::{Elementwise, FlipBounds, GradientBounds},
     harness::gpu,
@@ -41,13 +43,7 @@ pub struct Row {
     failures: Vec<String>,
 }
 
-/// What a bound leaves above the worst that was seen. The figures in the tests
-/// were seen on Mesa 22.3's llvmpipe; WGSL allows `exp`, `sqrt` and quotients
-/// several units in the last place, of which other drivers make other use.
-static HEADROOM: LazyLock<f64> = LazyLock::new(|| {
-    let measured = gpu().is_software() && gpu().info().driver_info.contains("Mesa 22.3");
-    if measured { 1.05 } else { 16.0 }
-});
+static HEADROOM: LazyLock<f64> = LazyLock::new(|| headroom(gpu()));
 
 /// Errors up to `worst · (scale + |x|)` were seen: relative ones, floored at a
 /// typical size of the quantity.

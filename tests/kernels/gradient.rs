@@ -3,10 +3,12 @@
 
 use std::sync::LazyLock;
 
-use gs_chroma::raster::constants::{STAT_PULL, STAT_VIEWS};
+use gs_chroma::{
+    doctor::MARGIN,
+    raster::constants::{STAT_PULL, STAT_VIEWS},
+};
 
 use crate::{
-    blend::MARGIN,
     compare::widen,
     errors::{Row, Sample, assert_all, gradient_bounds, relative},
     harness::{Stage, splats},

@@ -214,6 +214,7 @@ fn constants_are_those_of_the_crate() {
             ("ALPHA_MAX", f64::from(ALPHA_MAX)),
             ("ALPHA_MIN", f64::from(ALPHA_MIN)),
             ("TRANSMITTANCE_MIN", f64::from(TRANSMITTANCE_MIN)),
+            ("COLOR_MAX", f64::from(COLOR_MAX)),
             ("QUAT_NORM_MIN_SQ", f64::from(QUAT_NORM_MIN_SQ)),
             ("FRUSTUM_MARGIN", narrow(FRUSTUM_MARGIN)),
             ("PLANE_MEAN", index(PLANE_MEAN)),
@@ -253,6 +254,7 @@ fn constants_are_those_of_the_oracle() {
         ("constants", "BLUR", vec![oracle::BLUR]),
         ("constants", "ALPHA_MAX", vec![oracle::ALPHA_MAX]),
         ("constants", "ALPHA_MIN", vec![oracle::ALPHA_MIN]),
+        ("constants", "COLOR_MAX", vec![oracle::COLOR_MAX]),
         (
             "constants",
             "TRANSMITTANCE_MIN",

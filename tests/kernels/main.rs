@@ -5,10 +5,7 @@
 //! `cargo test --release --test kernels error_table -- --nocapture`.
 //! A Vulkan, Metal or DirectX 12 adapter is needed; a software one will do.
 
-#[path = "../compare/mod.rs"]
-mod compare;
-#[path = "../oracle/mod.rs"]
-mod oracle;
+use gs_chroma::{compare, oracle};
 
 mod adam;
 mod blend;

@@ -9,11 +9,6 @@
 //! at the real part only: a dual number takes the path that `f64` takes.
 //! Nothing here uses the crate under test.
 
-#![allow(
-    dead_code,
-    reason = "each test program uses its own part of the oracle"
-)]
-
 pub mod adam;
 pub mod blend;
 pub mod chroma_loss;

@@ -173,6 +173,11 @@ impl<T: Number, const C: usize> Scene<T, C> {
         self.means.len()
     }
 
+    /// Whether it has none.
+    pub fn is_empty(&self) -> bool {
+        self.means.is_empty()
+    }
+
     /// Harmonics per Gaussian and channel.
     pub fn coefficient_count(&self) -> usize {
         (self.degree + 1).pow(2)

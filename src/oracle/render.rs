@@ -2,6 +2,7 @@
 
 use super::Number;
 use super::blend::{Pixel, ScreenSplat, blend};
+use super::constants::COLOR_MAX;
 use super::project::{Cull, Projected};
 use super::scene::{Gaussian, Scene, View};
 use super::shade::{Shading, shade};
@@ -27,11 +28,15 @@ pub fn to_screen<T: Number, const C: usize>(
     shading: Shading,
 ) -> Result<(Projected<T>, ScreenSplat<T, C>), Cull> {
     let projected = gaussian.project(view)?;
+    let colour = shade(&gaussian.mean, &gaussian.sh, view, shading);
+    if colour.iter().any(|c| c.re().abs() > COLOR_MAX) {
+        return Err(Cull::Colour);
+    }
     let splat = ScreenSplat {
         mean2d: projected.mean2d,
         conic: projected.conic,
         opacity: projected.opacity,
-        colour: shade(&gaussian.mean, &gaussian.sh, view, shading),
+        colour,
     };
     Ok((projected, splat))
 }

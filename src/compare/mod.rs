@@ -12,12 +12,6 @@
 //! - [`FlipBounds`]: a tight bound, and a capped, even-handed share of
 //!   elements that may fall the other way at a discontinuity.
 
-#![allow(
-    dead_code,
-    unused_imports,
-    reason = "each test program uses its own part of the comparators"
-)]
-
 mod elementwise;
 mod flips;
 mod gradient;

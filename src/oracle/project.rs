@@ -42,6 +42,8 @@ pub enum Cull {
     Opacity,
     /// The box around the visible ellipse misses the image.
     Outside,
+    /// The colour exceeds [`COLOR_MAX`](super::constants::COLOR_MAX).
+    Colour,
 }
 
 /// Where the Jacobian stops following x/z, y/z: `[[low, high]; 2]`.

@@ -1,0 +1,62 @@
+//! `gs-chroma doctor`.
+
+use clap::Args;
+
+use super::{print, progress};
+use crate::{
+    doctor::{Diagnosis, cases::CASES},
+    gpu::Gpu,
+    run::RunError,
+};
+
+/// Compare this device's kernels with an exact reference on hard cases.
+#[derive(Args)]
+pub struct Doctor {
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Doctor {
+    pub(super) fn run(self) -> Result<(), RunError> {
+        let gpu = Gpu::open()?;
+        let bar = progress::bar("cases", CASES.len());
+        let diagnosis = Diagnosis::of(&gpu, &mut |index, name| {
+            bar.set_position(index as u64);
+            bar.set_message(name);
+        })?;
+        bar.finish_and_clear();
+        if self.json {
+            // Numbers and strings only: this cannot fail.
+            let json = serde_json::to_string_pretty(&diagnosis).unwrap_or_default();
+            print(json)?;
+        } else {
+            print(format_args!(
+                "adapter: {} ({}, {})\ndriver: {}\nlargest binding: {} MiB\nfeatures: {}\n\n{}",
+                diagnosis.adapter,
+                diagnosis.backend,
+                if diagnosis.software {
+                    "software"
+                } else {
+                    "hardware"
+                },
+                diagnosis.driver,
+                diagnosis.max_binding_bytes >> 20,
+                if diagnosis.features.is_empty() {
+                    "none needed".to_owned()
+                } else {
+                    diagnosis.features.join(", ")
+                },
+                diagnosis.table(),
+            ))?;
+        }
+        match diagnosis.failures() {
+            0 => Ok(()),
+            failed => Err(RunError::Unsound {
+                failed,
+                cases: diagnosis.cases.len(),
+                adapter: diagnosis.adapter,
+            }),
+        }
+    }
+}

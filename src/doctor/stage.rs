@@ -1,0 +1,249 @@
+//! One view of one scene with all its buffers: what a kernel case runs on.
+
+use std::sync::Arc;
+
+use glam::{DMat3, DVec3};
+
+use crate::{
+    capture::Camera,
+    gpu::{Buffer, GpuError, Recorder},
+    oracle::scene::{Scene, View},
+    raster::{
+        Field, Geometry, Layer, LayerAdjoint, Lists, Projected, Raster, Status, ViewUniform,
+        constants::*,
+    },
+    splats::{ShField, Splats},
+};
+
+/// The oracle's view as a camera.
+pub fn camera(view: &View) -> Camera {
+    Camera {
+        width: view.width as u32,
+        height: view.height as u32,
+        fx: view.fx,
+        fy: view.fy,
+        cx: view.cx,
+        cy: view.cy,
+        rotation: DMat3::from_cols_array_2d(&view.rotation).transpose(),
+        translation: DVec3::from_array(view.translation),
+    }
+}
+
+/// The oracle's scene as splats; its values are exact in `f32`.
+pub fn splats<const C: usize>(scene: &Scene<f64, C>) -> Splats {
+    fn narrow<const K: usize>(rows: &[[f64; K]]) -> Vec<[f32; K]> {
+        rows.iter().map(|row| row.map(|v| v as f32)).collect()
+    }
+    Splats {
+        means: narrow(&scene.means),
+        quats: narrow(&scene.quats),
+        log_scales: narrow(&scene.log_scales),
+        opacity_logits: scene.opacity_logits.iter().map(|&v| v as f32).collect(),
+        sh: ShField {
+            degree: scene.degree as u32,
+            channels: C,
+            coefficients: scene.sh.iter().flatten().map(|&v| v as f32).collect(),
+        },
+    }
+}
+
+/// One scene before one camera, with all its buffers.
+pub struct Stage {
+    /// The view, which may be changed between two pictures.
+    pub view: ViewUniform,
+    /// Projection and tile lists.
+    pub lists: Lists,
+    /// Shading and blending.
+    pub layer: Layer,
+    raster: Arc<Raster>,
+    count: usize,
+    adjoint: Option<LayerAdjoint>,
+}
+
+impl Stage {
+    /// A stage with room for every Gaussian in every tile.
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`].
+    pub fn new(raster: &Arc<Raster>, splats: &Splats, view: &View) -> Result<Self, GpuError> {
+        let [columns, rows] =
+            [view.width, view.height].map(|side| side.div_ceil(TILE_SIDE as usize));
+        Self::with_capacity(raster, splats, view, splats.len() * columns * rows)
+    }
+
+    /// A stage with room for so many tile-list entries.
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`].
+    pub fn with_capacity(
+        raster: &Arc<Raster>,
+        splats: &Splats,
+        view: &View,
+        capacity: usize,
+    ) -> Result<Self, GpuError> {
+        let (gpu, near) = (&raster.gpu, view.near);
+        let degree = splats.sh.degree;
+        let view = ViewUniform::new(&camera(view), near, splats.len(), degree);
+        let (pixels, tiles) = (view.pixel_count(), view.tile_count());
+        let geometry = Geometry::upload(gpu, splats)?;
+        let field = Field::upload(gpu, &splats.sh)?;
+        let lists = Lists::new(raster, &geometry, tiles, capacity)?;
+        let layer = Layer::new(raster, &geometry, &lists, &field, pixels, tiles)?;
+        let trained = field.kind.channels() < 3;
+        let adjoint = trained
+            .then(|| {
+                let gradient = Buffer::zeros(gpu, "field gradient", field.planes.len())?;
+                LayerAdjoint::new(raster, &geometry, &lists, &field, &layer, gradient)
+            })
+            .transpose()?;
+        Ok(Self {
+            view,
+            lists,
+            layer,
+            raster: raster.clone(),
+            count: splats.len(),
+            adjoint,
+        })
+    }
+
+    fn record(&self) -> Recorder {
+        let gpu = &self.raster.gpu;
+        let mut recorder = Recorder::new(gpu);
+        self.lists.set_view(gpu, &self.view);
+        self.lists.record(&self.raster, &mut recorder);
+        self.layer.record(&self.raster, &mut recorder);
+        recorder
+    }
+
+    /// Draws, and gives the picture `[pixels, channels]`.
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`].
+    pub fn forward(&self) -> Result<Vec<f32>, GpuError> {
+        self.record().submit();
+        self.image()
+    }
+
+    /// Draws, and differentiates `Σ upstream · picture`; `upstream` is
+    /// `[pixels, channels]`.
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`].
+    ///
+    /// # Panics
+    /// For RGB, which is shown but never trained.
+    pub fn backward(&self, upstream: &[f64]) -> Result<Gradient, GpuError> {
+        let gpu = &self.raster.gpu;
+        let adjoint = self.adjoint.as_ref().expect("RGB is not trained");
+        let narrow: Vec<f32> = upstream.iter().map(|&v| v as f32).collect();
+        adjoint.image_gradient.write(gpu, &narrow);
+        let mut recorder = self.record();
+        adjoint.record(&self.raster, &mut recorder);
+        recorder.submit();
+        let (geometry, statistics) = match &adjoint.geometry {
+            Some(geometry) => (geometry.gradient.read(gpu)?, geometry.statistics.read(gpu)?),
+            None => (Vec::new(), Vec::new()),
+        };
+        Ok(Gradient {
+            count: self.count,
+            geometry,
+            statistics,
+            field: adjoint.field_gradient.read(gpu)?,
+        })
+    }
+
+    /// The picture last drawn.
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`].
+    pub fn image(&self) -> Result<Vec<f32>, GpuError> {
+        let pixels = self.view.pixel_count();
+        self.layer.read_image(&self.raster.gpu, pixels)
+    }
+
+    /// What the device counted since the last reset.
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`].
+    pub fn status(&self) -> Result<Status, GpuError> {
+        self.lists.status(&self.raster.gpu)
+    }
+
+    /// The projection of each Gaussian, none where it is not visible.
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`].
+    pub fn projected(&self) -> Result<Vec<Option<Projected>>, GpuError> {
+        let gpu = &self.raster.gpu;
+        let ranks = self.lists.ranks.read(gpu)?;
+        let projected = self.lists.projected.read(gpu)?;
+        Ok((ranks.into_iter().zip(projected))
+            .map(|(rank, projected)| (rank != u32::MAX).then_some(projected))
+            .collect())
+    }
+
+    /// The Gaussians of each tile in the order in which they are blended.
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`].
+    pub fn tiles(&self) -> Result<Vec<Vec<usize>>, GpuError> {
+        let gpu = &self.raster.gpu;
+        let (slots, starts) = (self.lists.slots().read(gpu)?, self.lists.starts.read(gpu)?);
+        let splats = self.lists.instance_splats.read(gpu)?;
+        Ok((starts.windows(2))
+            .map(|span| &slots[span[0] as usize..span[1] as usize])
+            .map(|slots| slots.iter().map(|&s| splats[s as usize] as usize).collect())
+            .collect())
+    }
+}
+
+/// What the adjoint leaves, as planes.
+#[derive(PartialEq)]
+pub struct Gradient {
+    count: usize,
+    /// `[11, N]`; empty for chroma.
+    pub geometry: Vec<f32>,
+    /// `[2, N]`; empty for chroma.
+    pub statistics: Vec<f32>,
+    /// `[(degree + 1)², channels, N]`.
+    pub field: Vec<f32>,
+}
+
+impl Gradient {
+    /// The groups of parameters with their names, each `[N, …]` as the oracle
+    /// has it; chroma has the last one only.
+    pub fn groups(&self) -> Vec<(&'static str, Vec<f64>)> {
+        let field_planes = self.field.len() / self.count;
+        let mut groups = Vec::new();
+        if !self.geometry.is_empty() {
+            for (name, first, end) in [
+                ("means", PLANE_MEAN, PLANE_QUAT),
+                ("quats", PLANE_QUAT, PLANE_LOG_SCALE),
+                ("log_scales", PLANE_LOG_SCALE, PLANE_OPACITY),
+                ("opacity_logits", PLANE_OPACITY, GEOMETRY_PLANES),
+            ] {
+                groups.push((name, self.rows(&self.geometry, first..end)));
+            }
+        }
+        groups.push(("sh", self.rows(&self.field, 0..field_planes)));
+        groups
+    }
+
+    fn rows(&self, planes: &[f32], span: std::ops::Range<usize>) -> Vec<f64> {
+        (0..self.count)
+            .flat_map(|i| span.clone().map(move |plane| (plane, i)))
+            .map(|(plane, i)| f64::from(planes[plane * self.count + i]))
+            .collect()
+    }
+
+    /// All planes without those of Gaussian `index`, as bits.
+    pub fn bits_without(&self, index: Option<usize>) -> Vec<u32> {
+        let planes = [&self.geometry, &self.statistics, &self.field];
+        (planes
+            .into_iter()
+            .flat_map(|planes| planes.iter().enumerate()))
+        .filter(|(at, _)| Some(at % self.count) != index)
+        .map(|(_, value)| value.to_bits())
+        .collect()
+    }
+}

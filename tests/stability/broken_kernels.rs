@@ -1,0 +1,69 @@
+//! Kernels broken on purpose: the cases notice each.
+
+use std::sync::Arc;
+
+use gs_chroma::{
+    doctor::{cases::CASES, examine},
+    raster::Raster,
+};
+
+use crate::gpu;
+
+/// Cases that fail when `kernel` is compiled with `from` replaced by `to`.
+fn failing(kernel: &'static str, from: &'static str, to: &'static str) -> Vec<&'static str> {
+    let raster = Arc::new(Raster::new(&gpu().with_broken(kernel, from, to)));
+    (CASES.iter())
+        .filter(|case| case.name != "65,600 tiles")
+        .filter(|case| examine(&raster, case).unwrap().failure.is_some())
+        .map(|case| case.name)
+        .collect()
+}
+
+#[test]
+fn a_wrong_sign_is_noticed() {
+    let failing = failing("project_backward", "let v_r2 = -(", "let v_r2 = (");
+    assert!(failing.contains(&"ordinary scene"), "{failing:?}");
+}
+
+#[test]
+fn a_missing_factor_is_noticed() {
+    let failing = failing("sum_instances", "0.5 * m[3]", "m[3]");
+    assert!(failing.contains(&"ordinary scene"), "{failing:?}");
+}
+
+/// Nothing but the poisoned case can tell: a clamp makes a number of NaN.
+#[test]
+fn a_clamp_that_swallows_nan_is_noticed() {
+    let failing = failing(
+        "project",
+        "let logit = plane(PLANE_OPACITY, i);",
+        "let logit = clamp(plane(PLANE_OPACITY, i), -30.0, 30.0);",
+    );
+    assert!(failing.contains(&"opacity is not a number"), "{failing:?}");
+    assert!(!failing.contains(&"ordinary scene"), "{failing:?}");
+}
+
+#[test]
+fn a_higher_cap_on_alpha_is_noticed() {
+    let failing = failing(
+        "blend",
+        "const ALPHA_MAX: f32 = 0.99;",
+        "const ALPHA_MAX: f32 = 0.999;",
+    );
+    assert!(failing.contains(&"opacity saturates"), "{failing:?}");
+}
+
+#[test]
+fn a_jacobian_without_its_clamp_is_noticed() {
+    let failing = failing(
+        "project",
+        "clamp(f.camera.xy / f.camera.z, view.slope_limits.xy, view.slope_limits.zw)",
+        "f.camera.xy / f.camera.z",
+    );
+    assert!(failing.contains(&"far beside the image"), "{failing:?}");
+}
+
+#[test]
+fn an_untouched_kernel_is_not() {
+    assert_eq!(failing("project", "no such line", ""), [""; 0]);
+}

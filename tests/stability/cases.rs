@@ -1,0 +1,47 @@
+//! Every case of the table holds, and docs/hard-cases.md is that table.
+
+use std::collections::BTreeSet;
+
+use gs_chroma::doctor::{Diagnosis, cases::CASES};
+
+use crate::gpu;
+
+const DOCS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/hard-cases.md");
+
+const HEADER: &str = "# Hard cases
+
+Scenes at which splat rasterizers break, and how far this one is from the f64 oracle
+on them: the largest error of a pixel (in units of the brightest one, at least 1), and
+the largest relative L2 error of the gradient of a group of parameters against dual
+numbers. *Poisoned* Gaussians are culled and counted; nothing else may change by them.
+The cases are defined in `src/doctor/cases.rs`. `gs-chroma doctor` runs them on your
+own device; bounds are the worst seen on the device below × 1.05, and × 16 on others.
+
+This file is written by `WRITE_DOCS=1 cargo test --release --test stability`.
+";
+
+#[test]
+fn every_case_holds() {
+    let diagnosis = Diagnosis::of(gpu(), &mut |_, _| {}).unwrap();
+    let table = diagnosis.table();
+    println!("{table}");
+    if std::env::var_os("WRITE_DOCS").is_some() {
+        let device = format!("{} ({})", diagnosis.adapter, diagnosis.driver);
+        std::fs::write(DOCS, format!("{HEADER}\nMeasured on {device}.\n\n{table}")).unwrap();
+    }
+    assert!(diagnosis.cases.len() >= 50);
+    assert_eq!(diagnosis.failures(), 0, "{table}");
+}
+
+#[test]
+fn cases_have_names_of_their_own_and_stand_in_the_documentation() {
+    let names: BTreeSet<_> = CASES.iter().map(|case| case.name).collect();
+    assert_eq!(names.len(), CASES.len());
+    let docs = std::fs::read_to_string(DOCS).unwrap();
+    for name in names {
+        assert!(
+            docs.contains(&format!("| {name} |")),
+            "{name} is missing: see {DOCS}"
+        );
+    }
+}

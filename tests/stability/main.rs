@@ -1,0 +1,22 @@
+//! Hard cases: the kernels on scenes at which rasterizers break, and whether
+//! anyone would notice if they did.
+//!
+//! `WRITE_DOCS=1 cargo test --release --test stability` makes docs/hard-cases.md
+//! from what it measures.
+
+mod broken_kernels;
+mod cases;
+mod poison;
+mod shader_lint;
+mod training;
+
+use std::sync::LazyLock;
+
+use gs_chroma::gpu::Gpu;
+
+static GPU: LazyLock<Gpu> = LazyLock::new(|| Gpu::open().unwrap_or_else(|error| panic!("{error}")));
+
+/// The device that all tests share.
+fn gpu() -> &'static Gpu {
+    &GPU
+}

@@ -1,0 +1,309 @@
+//! A lint of the compiled shaders over naga's IR.
+//!
+//! No kernel may test for NaN by comparing floats with `!=`: compilers may
+//! assume that there is no NaN. Every division, root, logarithm, power and
+//! normalisation of floats stands in [`REASONS`] with what keeps it finite.
+
+use std::collections::BTreeSet;
+
+use gs_chroma::gpu::shaders;
+use naga::{
+    BinaryOperator, Expression, Function, MathFunction, Module, ScalarKind,
+    valid::{Capabilities, FunctionInfo, ValidationFlags, Validator},
+};
+
+/// `(function, expression, what keeps it finite)`.
+const REASONS: &[(&str, &str, &str)] = &[
+    (
+        "accumulate",
+        "behind / (1.0 - alpha)",
+        "ALPHA_MAX keeps 1 - alpha at 0.01 or more",
+    ),
+    (
+        "accumulate",
+        "sqrt",
+        "of a sum of squares; sizes and conics are finite",
+    ),
+    (
+        "adam",
+        "rate * (m * parameters.correction1) / (sqrt(v * parameters.correction2) + EPSILON)",
+        "EPSILON is added to the root",
+    ),
+    (
+        "adam",
+        "sqrt",
+        "of a mean of squares times a positive correction",
+    ),
+    (
+        "chroma_loss",
+        "0.5 / f32(pixels)",
+        "the kernel runs for images of at least one pixel",
+    ),
+    ("chroma_loss", "sqrt", "SMOOTHING² is added to a square"),
+    (
+        "chroma_loss",
+        "weights.agreement * drift / length_drift",
+        "a length is at least SMOOTHING",
+    ),
+    (
+        "chroma_loss",
+        "weights.teacher * residual / length_teacher",
+        "a length is at least SMOOTHING",
+    ),
+    (
+        "densify_geometry",
+        "inverseSqrt",
+        "only visible Gaussians are split; they passed QUAT_NORM_MIN_SQ",
+    ),
+    (
+        "footprint",
+        "f.camera.xy / f.camera.z",
+        "project culls what is not beyond the near plane before it uses the result",
+    ),
+    (
+        "footprint",
+        "view.intrinsics.xy / f.camera.z",
+        "project culls what is not beyond the near plane before it uses the result",
+    ),
+    (
+        "least_power",
+        "-conic.y * nearest.x / conic.z",
+        "project culls conics whose diagonal is not positive",
+    ),
+    (
+        "least_power",
+        "-conic.y * nearest.y / conic.x",
+        "project culls conics whose diagonal is not positive",
+    ),
+    (
+        "luma_loss",
+        "-ssim / d",
+        "SSIM_C2 is added to a variance, rounding stays far below it",
+    ),
+    (
+        "luma_loss",
+        "2.0 * a / (c * d)",
+        "SSIM_C1 and SSIM_C2 are added to squares and variances",
+    ),
+    (
+        "luma_loss",
+        "2.0 * mu_x * ssim / c",
+        "SSIM_C1 is added to a sum of squares",
+    ),
+    (
+        "luma_loss",
+        "2.0 * mu_y * b / (c * d)",
+        "SSIM_C1 and SSIM_C2 are added to squares and variances",
+    ),
+    (
+        "luma_loss",
+        "a * b / (c * d)",
+        "SSIM_C1 and SSIM_C2 are added to squares and variances",
+    ),
+    (
+        "luma_loss_backward",
+        "(L1_WEIGHT * sign(x - y) - SSIM_WEIGHT * ssim_gradient) / f32(pixels)",
+        "the kernel runs for images of at least one pixel",
+    ),
+    (
+        "photo_at",
+        "f32((photo[p / 4u] >> (8u * (p % 4u))) & 255u) / 255.0",
+        "a constant divisor",
+    ),
+    (
+        "power_cutoff",
+        "log",
+        "project culls opacities below ALPHA_MIN before it asks",
+    ),
+    ("power_cutoff", "opacity / ALPHA_MIN", "a constant divisor"),
+    (
+        "project",
+        "inverseSqrt",
+        "guarded by QUAT_NORM_MIN_SQ in the branch above",
+    ),
+    (
+        "project",
+        "sqrt",
+        "of a maximum with 0 times a variance of at least BLUR",
+    ),
+    (
+        "project",
+        "vec3f(f.covariance.z, -f.covariance.y, f.covariance.x) / determinant",
+        "the next branch culls determinants that are not positive and finite",
+    ),
+    (
+        "project",
+        "view.intrinsics.xy * f.camera.xy / f.camera.z",
+        "culled above unless beyond the near plane",
+    ),
+    (
+        "project_backward",
+        "1.0 / f.camera.z",
+        "visible Gaussians lie beyond the near plane",
+    ),
+    (
+        "project_backward",
+        "inverseSqrt",
+        "visible Gaussians passed QUAT_NORM_MIN_SQ",
+    ),
+    (
+        "shade",
+        "normalize",
+        "visible Gaussians lie beyond the near plane, off the camera",
+    ),
+    (
+        "shade_backward",
+        "(v_direction - direction * dot(direction, v_direction)) / distance",
+        "visible Gaussians lie beyond the near plane, off the camera",
+    ),
+    (
+        "shade_backward",
+        "offset / distance",
+        "visible Gaussians lie beyond the near plane, off the camera",
+    ),
+    (
+        "sigmoid",
+        "1.0 / (1.0 + exp(-x))",
+        "1 is added to a positive number; infinity gives 0",
+    ),
+    (
+        "sum_instances",
+        "-m[0] / max(q.w, ALPHA_MIN)",
+        "the divisor is at least ALPHA_MIN",
+    ),
+    (
+        "sum_loss",
+        "sums[0] / f32(parameters.pixels)",
+        "the host sets a count of at least one pixel",
+    ),
+    (
+        "tile_lists",
+        "(splat.mean + splat.extent) / side",
+        "a constant divisor",
+    ),
+    (
+        "tile_lists",
+        "(splat.mean - splat.extent) / side",
+        "a constant divisor",
+    ),
+    (
+        "upsampled",
+        "vec2f(weights.coarser_size) / vec2f(view.size)",
+        "the kernel runs for images of at least one pixel",
+    ),
+];
+
+/// What the lint found in one function.
+#[derive(Default)]
+struct Findings {
+    /// `!=` between floats.
+    comparisons: Vec<String>,
+    /// Operations that need a reason.
+    risky: Vec<String>,
+}
+
+fn is_float(module: &Module, info: &FunctionInfo, expression: naga::Handle<Expression>) -> bool {
+    let inner = info[expression].ty.inner_with(&module.types);
+    inner.scalar_kind() == Some(ScalarKind::Float)
+}
+
+fn lint(module: &Module, function: &Function, info: &FunctionInfo, source: &str) -> Findings {
+    let mut findings = Findings::default();
+    for (handle, expression) in function.expressions.iter() {
+        let text = || {
+            let text = &source[function
+                .expressions
+                .get_span(handle)
+                .to_range()
+                .unwrap_or(0..0)];
+            text.split_whitespace().collect::<Vec<_>>().join(" ")
+        };
+        match *expression {
+            Expression::Binary { op, left, .. } if is_float(module, info, left) => match op {
+                BinaryOperator::NotEqual => findings.comparisons.push(text()),
+                BinaryOperator::Divide | BinaryOperator::Modulo => findings.risky.push(text()),
+                _ => {}
+            },
+            Expression::Math {
+                fun:
+                    MathFunction::Normalize
+                    | MathFunction::Sqrt
+                    | MathFunction::InverseSqrt
+                    | MathFunction::Log
+                    | MathFunction::Log2
+                    | MathFunction::Pow
+                    | MathFunction::Inverse
+                    | MathFunction::Acos
+                    | MathFunction::Asin,
+                ..
+            } => findings.risky.push(text()),
+            _ => {}
+        }
+    }
+    findings
+}
+
+/// All findings of a source as `(function, expression)`, comparisons first.
+fn findings(name: &str, source: &str) -> [BTreeSet<(String, String)>; 2] {
+    let module = naga::front::wgsl::parse_str(source).unwrap_or_else(|e| panic!("{name}: {e}"));
+    let mut validator = Validator::new(ValidationFlags::all(), Capabilities::all());
+    let info = validator
+        .validate(&module)
+        .unwrap_or_else(|e| panic!("{name}: {e:?}"));
+    let mut found = [BTreeSet::new(), BTreeSet::new()];
+    let mut add = |function: &Function, info: &FunctionInfo, name: &str| {
+        let Findings { comparisons, risky } = lint(&module, function, info, source);
+        for (set, list) in found.iter_mut().zip([comparisons, risky]) {
+            set.extend(list.into_iter().map(|text| (name.to_owned(), text)));
+        }
+    };
+    for (handle, function) in module.functions.iter() {
+        add(
+            function,
+            &info[handle],
+            function.name.as_deref().unwrap_or_default(),
+        );
+    }
+    for (index, entry) in module.entry_points.iter().enumerate() {
+        add(&entry.function, info.get_entry_point(index), &entry.name);
+    }
+    found
+}
+
+#[test]
+fn no_kernel_compares_floats_with_not_equal() {
+    for (name, source) in shaders::ALL {
+        assert_eq!(findings(name, source)[0], BTreeSet::new(), "{name}");
+    }
+}
+
+#[test]
+fn every_operation_that_can_leave_the_numbers_has_a_reason() {
+    let found: BTreeSet<_> = (shaders::ALL.iter())
+        .flat_map(|(name, source)| findings(name, source)[1].clone())
+        .collect();
+    let reasons: BTreeSet<_> = (REASONS.iter())
+        .map(|(function, text, _)| ((*function).to_owned(), (*text).to_owned()))
+        .collect();
+    let without: Vec<_> = found.difference(&reasons).collect();
+    assert!(without.is_empty(), "no reason for {without:#?}");
+    let stale: Vec<_> = reasons.difference(&found).collect();
+    assert!(stale.is_empty(), "a reason for nothing: {stale:#?}");
+    assert!(REASONS.iter().all(|(_, _, reason)| reason.len() > 10));
+}
+
+#[test]
+fn the_lint_sees_what_it_is_for() {
+    let source = "fn bad(x: f32, v: vec3f) -> f32 {
+        if x != x { return 0.0; }
+        return sqrt(x) / normalize(v).x + log(x) + f32(3u / 2u);
+    }
+    @compute @workgroup_size(1) fn main() { _ = bad(1.0, vec3f(1.0)); }";
+    let [comparisons, risky] = findings("bad", source);
+    assert_eq!(comparisons.len(), 1);
+    let texts: Vec<_> = risky.iter().map(|(_, text)| text.as_str()).collect();
+    assert_eq!(
+        texts,
+        ["log", "normalize", "sqrt", "sqrt(x) / normalize(v).x"]
+    );
+}
