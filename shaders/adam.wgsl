@@ -1,6 +1,6 @@
 // Adam (Kingma & Ba 2015) over planes `[planes, N]` with one learning rate a plane.
-import package::common::constants::STATUS_OVERFLOW;
-import package::common::numeric::{is_finite, linear_group};
+import package::common::constants::{STATUS_OVERFLOW, STATUS_REFUSED};
+import package::common::numeric::{is_within, linear_group};
 
 struct AdamParameters {
     splat_count: u32,
@@ -18,9 +18,12 @@ const BETA2: f32 = 0.999;
 const ONE_LESS_BETA2: f32 = 0.001;
 // Small enough never to matter beside a gradient that a pixel could notice (3DGS).
 const EPSILON: f32 = 1e-15;
+// The second moment holds squares: a larger gradient would make it infinite, and
+// an infinite moment stops its parameter for ever.
+const GRADIENT_MAX: f32 = 1e18;
 
 @group(0) @binding(0) var<uniform> parameters: AdamParameters;
-@group(0) @binding(1) var<storage, read> status: array<u32>;
+@group(0) @binding(1) var<storage, read_write> status: array<atomic<u32>>;
 @group(0) @binding(2) var<storage, read> gradient: array<f32>;
 @group(0) @binding(3) var<storage, read_write> values: array<f32>;
 @group(0) @binding(4) var<storage, read_write> first_moment: array<f32>;
@@ -31,14 +34,15 @@ fn adam(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
     let k = linear_group(group, groups) * 256u + local;
     // After an overflow nothing moves until the host has grown the buffers and
     // repeats the iteration.
-    if k >= parameters.splat_count * parameters.planes || status[STATUS_OVERFLOW] != 0u {
+    if k >= parameters.splat_count * parameters.planes || atomicLoad(&status[STATUS_OVERFLOW]) != 0u {
         return;
     }
     let plane = k / parameters.splat_count;
     let g = gradient[k];
-    // Harmonics near the end of f32 overflow on the way; a parameter that has
-    // no gradient stays what it is.
-    if !is_finite(g) {
+    // Nothing known leads here; if something does, it is counted, and a parameter
+    // that has no gradient stays what it is.
+    if !is_within(g, GRADIENT_MAX) {
+        atomicAdd(&status[STATUS_REFUSED], 1u);
         return;
     }
     let m = BETA1 * first_moment[k] + (1.0 - BETA1) * g;

@@ -23,10 +23,13 @@ const SSIM_WEIGHT: f32 = 0.2;
 @group(0) @binding(1) var<storage, read> image: array<f32>;
 // Four 8-bit pixels to a word.
 @group(0) @binding(2) var<storage, read> photo: array<u32>;
-// Planes `[3, pixels]`.
-@group(0) @binding(3) var<storage, read_write> slopes: array<f32>;
-@group(0) @binding(4) var<storage, read_write> block_losses: array<f32>;
-@group(0) @binding(5) var<storage, read_write> image_gradient: array<f32>;
+// Derivatives of a window's SSIM, by pixel; an array each, for three of an 8K
+// image in one would not fit into the smallest binding limit (128 MiB).
+@group(0) @binding(3) var<storage, read_write> by_mean: array<f32>;
+@group(0) @binding(4) var<storage, read_write> by_square: array<f32>;
+@group(0) @binding(5) var<storage, read_write> by_product: array<f32>;
+@group(0) @binding(6) var<storage, read_write> block_losses: array<f32>;
+@group(0) @binding(7) var<storage, read_write> image_gradient: array<f32>;
 
 fn photo_at(p: u32) -> f32 {
     return f32((photo[p / 4u] >> (8u * (p % 4u))) & 255u) / 255.0;
@@ -97,15 +100,13 @@ fn luma_loss(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) group
         let c = mu_x * mu_x + mu_y * mu_y + C1;
         let d = variance_x + variance_y + C2;
         let ssim = a * b / (c * d);
-        let by_covariance = 2.0 * a / (c * d);
-        let by_variance = -ssim / d;
-        let by_mean = 2.0 * mu_y * b / (c * d) - 2.0 * mu_x * ssim / c
-            - mu_y * by_covariance - 2.0 * mu_x * by_variance;
+        let product = 2.0 * a / (c * d);
+        let square = -ssim / d;
         let p = pixel.y * view.size.x + pixel.x;
-        let pixels = view.size.x * view.size.y;
-        slopes[p] = by_mean;
-        slopes[pixels + p] = by_variance;
-        slopes[2u * pixels + p] = by_covariance;
+        by_mean[p] = 2.0 * mu_y * b / (c * d) - 2.0 * mu_x * ssim / c
+            - mu_y * product - 2.0 * mu_x * square;
+        by_square[p] = square;
+        by_product[p] = product;
         let center = (id.y + RADIUS) * APRON + id.x + RADIUS;
         let difference = apron_image[center] - apron_photo[center];
         losses[local] = L1_WEIGHT * abs(difference) + SSIM_WEIGHT * (1.0 - ssim);
@@ -122,28 +123,40 @@ fn luma_loss(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) group
     }
 }
 
+fn slope(plane: u32, p: u32) -> f32 {
+    switch plane {
+        case 0u: { return by_mean[p]; }
+        case 1u: { return by_square[p]; }
+        default: { return by_product[p]; }
+    }
+}
+
+// One kind of slope, weighted and added up along rows.
+fn row_sums(plane: u32, group: vec3u, local: u32) {
+    for (var cell = local; cell < APRON * APRON; cell += 256u) {
+        let p = apron_pixel(group, cell);
+        apron_image[cell] = 0.0;
+        if p != 0xffffffffu {
+            apron_image[cell] = slope(plane, p);
+        }
+    }
+    workgroupBarrier();
+    for (var cell = local; cell < SIDE * APRON; cell += 256u) {
+        let first = (cell / SIDE) * APRON + cell % SIDE;
+        var sum = 0.0;
+        for (var k = 0u; k < 11u; k++) {
+            sum += WINDOW[k] * apron_image[first + k];
+        }
+        rows[plane][cell] = sum;
+    }
+    workgroupBarrier();
+}
+
 @compute @workgroup_size(16, 16)
 fn luma_loss_backward(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32, @builtin(local_invocation_id) id: vec3u) {
-    let pixels = view.size.x * view.size.y;
-    for (var plane = 0u; plane < 3u; plane++) {
-        for (var cell = local; cell < APRON * APRON; cell += 256u) {
-            let p = apron_pixel(group, cell);
-            apron_image[cell] = 0.0;
-            if p != 0xffffffffu {
-                apron_image[cell] = slopes[plane * pixels + p];
-            }
-        }
-        workgroupBarrier();
-        for (var cell = local; cell < SIDE * APRON; cell += 256u) {
-            let first = (cell / SIDE) * APRON + cell % SIDE;
-            var sum = 0.0;
-            for (var k = 0u; k < 11u; k++) {
-                sum += WINDOW[k] * apron_image[first + k];
-            }
-            rows[plane][cell] = sum;
-        }
-        workgroupBarrier();
-    }
+    row_sums(0u, group, local);
+    row_sums(1u, group, local);
+    row_sums(2u, group, local);
     let pixel = group.xy * SIDE + id.xy;
     if any(pixel >= view.size) {
         return;
@@ -157,5 +170,5 @@ fn luma_loss_backward(@builtin(workgroup_id) group: vec3u, @builtin(local_invoca
     let x = image[p];
     let y = photo_at(p);
     let ssim_gradient = sums.x + 2.0 * x * sums.y + y * sums.z;
-    image_gradient[p] = (L1_WEIGHT * sign(x - y) - SSIM_WEIGHT * ssim_gradient) / f32(pixels);
+    image_gradient[p] = (L1_WEIGHT * sign(x - y) - SSIM_WEIGHT * ssim_gradient) / f32(view.size.x * view.size.y);
 }

@@ -51,3 +51,5 @@ const STATUS_NEEDED: u32 = 3u;
 const STATUS_POISONED: u32 = 4u;
 // Training steps taken since the last reset.
 const STATUS_STEPS: u32 = 5u;
+// Gradients that Adam refused.
+const STATUS_REFUSED: u32 = 6u;

@@ -38,7 +38,7 @@ pub struct Loss {
 
 impl Loss {
     /// Ties the layer's image to `photo` (8-bit gray, four pixels a word).
-    /// `slopes` has room for three floats a pixel.
+    /// `slopes` are three buffers with room for a float a pixel.
     #[allow(
         clippy::too_many_arguments,
         reason = "each is a buffer of its own that the kernel binds"
@@ -50,30 +50,19 @@ impl Loss {
         layer: &Layer,
         adjoint: &LayerAdjoint,
         log: &LossLog,
-        slopes: &Buffer<f32>,
+        slopes: &[Buffer<f32>; 3],
         photo: &Buffer<u32>,
     ) -> Self {
-        let [view, image, photo, slopes] = [
-            lists.view.raw(),
-            layer.image.raw(),
-            photo.raw(),
-            slopes.raw(),
-        ];
-        Self {
-            forward: kernels
-                .forward
-                .bind(gpu, &[view, image, photo, slopes, log.block_losses.raw()]),
-            backward: kernels.backward.bind_at(
-                gpu,
-                &[
-                    (0, view),
-                    (1, image),
-                    (2, photo),
-                    (3, slopes),
-                    (5, adjoint.image_gradient.raw()),
-                ],
-            ),
-        }
+        let [by_mean, by_square, by_product] = slopes.each_ref().map(Buffer::raw);
+        let inputs = [lists.view.raw(), layer.image.raw(), photo.raw()];
+        let mut bindings: Vec<_> = (0..)
+            .zip(inputs.into_iter().chain([by_mean, by_square, by_product]))
+            .collect();
+        bindings.push((6, log.block_losses.raw()));
+        let forward = kernels.forward.bind_at(gpu, &bindings);
+        bindings[6] = (7, adjoint.image_gradient.raw());
+        let backward = kernels.backward.bind_at(gpu, &bindings);
+        Self { forward, backward }
     }
 
     /// Records both passes.

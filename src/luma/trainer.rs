@@ -54,6 +54,8 @@ pub struct LumaProgress {
     pub splats: usize,
     /// Gaussians culled for values that are not finite, since the set last changed.
     pub poisoned: usize,
+    /// Gradients refused for not being finite, since the set last changed.
+    pub refused: usize,
     /// Seconds since the training began.
     pub seconds: f64,
 }
@@ -76,7 +78,7 @@ pub struct LumaTrainer {
     near: f64,
     cameras: Vec<Camera>,
     photos: Vec<Buffer<u32>>,
-    slopes: Buffer<f32>,
+    slopes: [Buffer<f32>; 3],
     max_pixels: usize,
     max_tiles: usize,
     geometry: Geometry,
@@ -119,7 +121,8 @@ impl LumaTrainer {
             photos.push(Buffer::from_slice(&gpu, "photo", &loss::pack(&view.gray))?);
             cameras.push(view.camera);
         }
-        let slopes = Buffer::zeros(&gpu, "slopes", 3 * max_pixels)?;
+        let slopes = || Buffer::zeros(&gpu, "slopes", max_pixels);
+        let slopes = [slopes()?, slopes()?, slopes()?];
         let geometry = Geometry::upload(&gpu, splats)?;
         let field = Field::upload(&gpu, &splats.sh)?;
         let capacity = geometry.count * INSTANCES_PER_SPLAT;
@@ -295,6 +298,7 @@ impl LumaTrainer {
             loss: recent.iter().map(|&loss| f64::from(loss)).sum::<f64>() / recent.len() as f64,
             splats: self.geometry.count,
             poisoned: status.poisoned,
+            refused: status.refused,
             seconds: begun.elapsed().as_secs_f64(),
         });
         Ok(None)

@@ -59,7 +59,7 @@ impl Workspace {
         geometry: &Geometry,
         field: &Field,
         photos: &[Buffer<u32>],
-        slopes: &Buffer<f32>,
+        slopes: &[Buffer<f32>; 3],
         [max_pixels, max_tiles]: [usize; 2],
         capacity: usize,
         moments: Option<[[Buffer<f32>; 2]; 2]>,

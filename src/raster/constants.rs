@@ -38,7 +38,7 @@ pub const STAT_PULL: usize = 0;
 pub const STAT_VIEWS: usize = 1;
 
 /// Words of the status array.
-pub const STATUS_WORDS: usize = 6;
+pub const STATUS_WORDS: usize = 7;
 /// Set when the tile lists overflowed.
 pub const STATUS_OVERFLOW: usize = 0;
 /// Gaussians in view.
@@ -51,6 +51,8 @@ pub const STATUS_NEEDED: usize = 3;
 pub const STATUS_POISONED: usize = 4;
 /// Training steps taken since the last reset; an overflowing view stops the count.
 pub const STATUS_STEPS: usize = 5;
+/// Gradients that Adam refused since the last reset.
+pub const STATUS_REFUSED: usize = 6;
 
 /// The nearest camera depth at which a Gaussian is shown, as a share of the
 /// scene's extent: a fixed distance would empty small scenes.

@@ -40,6 +40,9 @@ pub struct Status {
     /// Gaussians culled for values that are not finite or a quaternion without
     /// direction, summed over the views since the last reset.
     pub poisoned: usize,
+    /// Gradients of single parameters that Adam refused since the last reset,
+    /// because they are no numbers or their squares would not be.
+    pub refused: usize,
     /// Training steps since the last reset; none is taken after an overflow.
     pub steps: usize,
 }
@@ -51,6 +54,7 @@ impl Status {
             visible: words[STATUS_VISIBLE] as usize,
             instances: words[STATUS_INSTANCES] as usize,
             poisoned: words[STATUS_POISONED] as usize,
+            refused: words[STATUS_REFUSED] as usize,
             steps: words[STATUS_STEPS] as usize,
         }
     }

@@ -81,6 +81,9 @@ pub struct LumaReport {
     pub splats: usize,
     /// Gaussians that the last views culled for values that are not finite.
     pub poisoned: usize,
+    /// Gradients refused for not being finite, since the set last changed.
+    #[serde(default)]
+    pub refused: usize,
     /// Loss at the end.
     pub loss: f64,
     /// Wall seconds.

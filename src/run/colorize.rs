@@ -123,7 +123,7 @@ pub fn colorize(
         // Writing to a string cannot fail.
         let _ = writeln!(
             log,
-            "{},{:.6},{},{:.3}",
+            "{},{:.6},{},{:.3},",
             report.luma.iterations + progress.iteration,
             progress.loss,
             luma.len(),
@@ -254,6 +254,7 @@ impl Source {
                 max_splats: 0,
                 splats: 0,
                 poisoned: 0,
+                refused: 0,
                 loss: 0.0,
                 seconds: LumaSeconds {
                     load: 0.0,

@@ -98,14 +98,14 @@ pub fn fit(
         &start,
         views,
     )?;
-    let mut log = String::from("iteration,loss,splats,seconds\n");
+    let mut log = String::from("iteration,loss,splats,seconds,poisoned\n");
     let (mut last, mut peak_device_memory) = (None, None);
     trainer.train(&mut |progress| {
         // Writing to a string cannot fail.
         let _ = writeln!(
             log,
-            "{},{:.6},{},{:.3}",
-            progress.iteration, progress.loss, progress.splats, progress.seconds
+            "{},{:.6},{},{:.3},{}",
+            progress.iteration, progress.loss, progress.splats, progress.seconds, progress.poisoned
         );
         observe(Event::Progress {
             stage: Stage::Luma,
@@ -138,6 +138,7 @@ pub fn fit(
             max_splats: settings.max_splats,
             splats: splats.len(),
             poisoned: last.map_or(0, |progress| progress.poisoned),
+            refused: last.map_or(0, |progress| progress.refused),
             loss: last.map_or(0.0, |progress| progress.loss),
             seconds: LumaSeconds {
                 load,

@@ -90,7 +90,7 @@ fn json_is_the_report_and_words_name_the_files() {
     // Rows of the colouring before are replaced.
     let log = String::from_utf8(place.read("runs/scene/log.csv")).expect("text");
     let rows: Vec<&str> = log.lines().collect();
-    assert_eq!(rows[0], "iteration,loss,splats,seconds");
+    assert_eq!(rows[0], "iteration,loss,splats,seconds,poisoned");
     let iterations: Vec<usize> = rows[1..]
         .iter()
         .map(|row| {

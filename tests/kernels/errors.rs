@@ -88,7 +88,8 @@ impl Row {
             let error: f64 = pairs().map(|(a, e)| (a - e).powi(2)).sum();
             let norm: f64 = sample.expected.iter().map(|e| e * e).sum();
             row.largest_error = row.largest_error.max(largest);
-            if error > 0.0 {
+            // Where nothing but zero is expected, an error has no relative size.
+            if error > 0.0 && norm > 0.0 {
                 row.relative_l2 = row.relative_l2.max((error / norm).sqrt());
             }
         }

@@ -230,7 +230,8 @@ fn constants_are_those_of_the_crate() {
             ("STATUS_INSTANCES", index(STATUS_INSTANCES)),
             ("STATUS_NEEDED", index(STATUS_NEEDED)),
             ("STATUS_POISONED", index(STATUS_POISONED)),
-            ("STATUS_STEPS", index(STATUS_WORDS - 1)),
+            ("STATUS_STEPS", index(STATUS_STEPS)),
+            ("STATUS_REFUSED", index(STATUS_WORDS - 1)),
         ]
         .map(|(name, value)| (name.to_owned(), vec![value])),
     );

@@ -82,15 +82,23 @@ fn luma_on_device(size: [usize; 2], image: &[f32], photo: &[u8]) -> (f64, Vec<f3
     let view = view(size);
     let image = Buffer::from_slice(gpu(), "image", image).unwrap();
     let photo = Buffer::from_slice(gpu(), "photo", &words).unwrap();
-    let slopes = Buffer::<f32>::zeros(gpu(), "slopes", 3 * pixels).unwrap();
+    let slopes = [(); 3].map(|()| Buffer::<f32>::zeros(gpu(), "slopes", pixels).unwrap());
     let gradient = Buffer::<f32>::zeros(gpu(), "gradient", pixels).unwrap();
-    let inputs = [view.raw(), image.raw(), photo.raw(), slopes.raw()];
+    let [by_mean, by_square, by_product] = slopes.each_ref().map(Buffer::raw);
+    let inputs = [
+        view.raw(),
+        image.raw(),
+        photo.raw(),
+        by_mean,
+        by_square,
+        by_product,
+    ];
     let [x, y] = size.map(|side| side.div_ceil(16) as u32);
     let loss = logged(size, (x * y) as usize, |recorder, block_losses| {
         let mut numbered: Vec<_> = (0..).zip(inputs).collect();
-        numbered.push((4, block_losses.raw()));
+        numbered.push((6, block_losses.raw()));
         recorder.dispatch_grid(&forward, &forward.bind_at(gpu(), &numbered), x, y);
-        numbered[4] = (5, gradient.raw());
+        numbered[6] = (7, gradient.raw());
         recorder.dispatch_grid(&backward, &backward.bind_at(gpu(), &numbered), x, y);
     });
     (loss, gradient.read(gpu()).unwrap())
@@ -116,6 +124,37 @@ fn luma(tones: &[Tone]) -> [Vec<Sample>; 2] {
             gradients.push(Sample::new(scaled(widen(&gradient)), scaled(expected)));
         }
     }
+    [values, gradients]
+}
+
+/// Constant picture and photo: no variance at all, equal or as far apart as can
+/// be, and pictures that no screen can show.
+const CONSTANT: [(f32, u8); 7] = [
+    (0.0, 0),
+    (1.0, 255),
+    (0.25, 128),
+    (0.0, 255),
+    (1.0, 0),
+    (3.0, 0),
+    (-2.0, 255),
+];
+
+/// Values and gradients (by pixel) of constant pictures.
+fn constant() -> [Vec<Sample>; 2] {
+    let size @ [width, height] = [17, 33];
+    let pixels = width * height;
+    let samples = CONSTANT.map(|(picture, photo)| {
+        let (loss, gradient) = luma_on_device(size, &vec![picture; pixels], &vec![photo; pixels]);
+        let x = vec![f64::from(picture); pixels];
+        let y = vec![f64::from(photo) / 255.0; pixels];
+        let by_pixel = |values: Vec<f64>| values.iter().map(|v| v * pixels as f64).collect();
+        let expected = luma_loss_gradient(&x, &y, width, height);
+        (
+            Sample::new(vec![loss], vec![luma_loss(&x, &y, width, height)]),
+            Sample::new(by_pixel(widen(&gradient)), by_pixel(expected)),
+        )
+    });
+    let (values, gradients) = samples.into_iter().unzip();
     [values, gradients]
 }
 
@@ -227,6 +266,7 @@ pub static ROWS: LazyLock<Vec<Row>> = LazyLock::new(|| {
     };
     let [luma_values, luma_gradients] = luma(&TONES);
     let [flat_values, flat_gradients] = luma(&BRIGHT_AND_FLAT);
+    let [constant_values, constant_gradients] = constant();
     let [plain_values, plain_gradients] = chroma(0.0);
     let [values, gradients] = chroma(0.5);
     vec![
@@ -245,6 +285,18 @@ pub static ROWS: LazyLock<Vec<Row>> = LazyLock::new(|| {
             5.94e-5,
             1.93e-4,
             &flat_gradients,
+        ),
+        Row::elementwise(
+            "luma_loss",
+            "value, constant pictures",
+            relative(4.2e-7, 1.0),
+            &constant_values,
+        ),
+        Row::elementwise(
+            "luma_loss",
+            "gradient × pixels, constant pictures",
+            relative(1.38e-4, 1.0),
+            &constant_gradients,
         ),
         value("chroma_loss", "value", 6.35e-8, &plain_values),
         gradient(
@@ -268,4 +320,30 @@ pub static ROWS: LazyLock<Vec<Row>> = LazyLock::new(|| {
 #[test]
 fn losses_and_their_gradients_are_those_of_the_oracle() {
     assert_all(&ROWS);
+}
+
+/// Where the teacher is met there is no slope, far from it the slope of L1.
+#[test]
+fn chroma_slopes_at_rest_and_far_away() {
+    let size = [9, 5];
+    let weights = ChromaLossWeights {
+        coarser_size: [5, 3],
+        teacher: 1.0,
+        agreement: 0.0,
+    };
+    let coarser = vec![[0.0; 2]; 15];
+    for (away, slope) in [(0.0, 0.0), (300.0, 1.0), (-1e6, -1.0)] {
+        let wanted = vec![[12.5, -30.0]; 45];
+        let image = vec![[12.5 + away, -30.0]; 45];
+        let (loss, gradient) = chroma_on_device(size, [&image, &wanted, &coarser], &weights);
+        assert!(
+            (loss - chroma_loss(&image, &wanted)).abs() <= 1e-6 * loss,
+            "{loss}"
+        );
+        for pair in gradient.chunks_exact(2) {
+            // The mean over pixels and both channels.
+            assert!((f64::from(pair[0]) * 90.0 - slope).abs() < 1e-5, "{pair:?}");
+            assert_eq!(pair[1], 0.0);
+        }
+    }
 }

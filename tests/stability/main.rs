@@ -7,6 +7,7 @@
 mod broken_kernels;
 mod cases;
 mod poison;
+mod poison_capture;
 mod shader_lint;
 mod training;
 

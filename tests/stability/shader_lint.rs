@@ -102,7 +102,7 @@ const REASONS: &[(&str, &str, &str)] = &[
     ),
     (
         "luma_loss_backward",
-        "(L1_WEIGHT * sign(x - y) - SSIM_WEIGHT * ssim_gradient) / f32(pixels)",
+        "(L1_WEIGHT * sign(x - y) - SSIM_WEIGHT * ssim_gradient) / f32(view.size.x * view.size.y)",
         "the kernel runs for images of at least one pixel",
     ),
     (

@@ -314,3 +314,17 @@ fn a_hundred_thousand_gaussians_in_one_tile_train() {
     assert_sound(&splats, &reports);
     assert!(splats.len() > 50_000);
 }
+
+/// 129,600 tiles, buffers next to the smallest binding limit there is.
+#[test]
+fn photos_of_8k_train() {
+    let mut world = world(Frame::ORDINARY, 1);
+    world.cameras[0] = world.cameras[0].resized(7680, 4320);
+    let small = &world.photos[0];
+    let large = (0..4320 * 7680).map(|p| small[p / 7680 / 90 * 64 + p % 7680 / 120]);
+    world.photos[0] = large.collect();
+    world.points.truncate(12);
+    let start = initial_splats(&world.points, world.extent as f32, 0);
+    let (splats, reports) = trained_from(&world, &start, 1).unwrap();
+    assert_sound(&splats, &reports);
+}
