@@ -17,6 +17,17 @@ numbers. *Poisoned* Gaussians are culled and counted; nothing else may change by
 The cases are defined in `src/doctor/cases.rs`. `gs-chroma doctor` runs them on your
 own device; bounds are the worst seen on the device below × 1.05, and × 16 on others.
 
+Where nobody can do better than f32: 65,600 tiles take coordinates beyond a million
+pixels, whose step is 1/16; a needle across the pixels makes the exponent a small
+difference of large terms (docs/decisions.md).
+
+`tests/stability` holds more: poison in every parameter of Gaussians and every number of
+COLMAP models, kernels broken on purpose, a lint of the shaders, and whole trainings
+(worlds a thousandth and ten thousand times as large, turned, shifted; one photo; three
+points; flat, doubled and collapsed clouds; a camera inside a Gaussian; black, white
+and gray photos; 100,000 Gaussians in one tile; 8K). Georeferenced coordinates, colour
+conversions and files have their own tests in `tests/cli` and `src/color`.
+
 This file is written by `WRITE_DOCS=1 cargo test --release --test stability`.
 ";
 

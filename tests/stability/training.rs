@@ -147,11 +147,22 @@ fn trained_from(
     start: &Splats,
     iterations: usize,
 ) -> Result<(Splats, Vec<LumaProgress>), GpuError> {
-    let settings = LumaSettings {
+    trained_with(world, start, settings(start, iterations))
+}
+
+fn settings(start: &Splats, iterations: usize) -> LumaSettings {
+    LumaSettings {
         sh_degree: start.sh.degree,
         max_splats: 2 * start.len(),
         ..LumaSettings::new(iterations)
-    };
+    }
+}
+
+fn trained_with(
+    world: &World,
+    start: &Splats,
+    settings: LumaSettings,
+) -> Result<(Splats, Vec<LumaProgress>), GpuError> {
     let views = (world.cameras.iter().zip(&world.photos))
         .map(|(camera, gray)| TrainingView {
             camera: camera.clone(),
@@ -169,7 +180,11 @@ fn train(world: &World) -> f64 {
     let start = initial_splats(&world.points, world.extent as f32, 1);
     let (splats, reports) = trained_from(world, &start, ITERATIONS).unwrap();
     assert_sound(&splats, &reports);
-    let pictures = pictures(&splats, &world.cameras, world.extent);
+    mean_psnr(world, &splats)
+}
+
+fn mean_psnr(world: &World, splats: &Splats) -> f64 {
+    let pictures = pictures(splats, &world.cameras, world.extent);
     let wanted = |photo: &[u8]| {
         photo
             .iter()
@@ -294,6 +309,40 @@ fn black_white_and_constant_photos_train() {
         world.photos.iter_mut().for_each(|photo| photo.fill(gray));
         assert!(train(&world) > 20.0, "{gray}");
     }
+}
+
+/// A reset leaves Gaussians so faint that some reach 1/255 nowhere and have no
+/// gradient; the others must bring the picture back.
+#[test]
+fn an_opacity_reset_is_recovered_from() {
+    let world = world(Frame::ORDINARY, 5);
+    let start = initial_splats(&world.points, world.extent as f32, 1);
+    let mut settings = settings(&start, 300);
+    settings.schedule.reset_every = 100;
+    settings.schedule.densify_until = 150;
+    let (splats, reports) = trained_with(&world, &start, settings).unwrap();
+    assert_sound(&splats, &reports);
+    let loss_at = |iteration| {
+        let report = reports.iter().find(|report| report.iteration == iteration);
+        report.unwrap().loss
+    };
+    assert!(loss_at(125) > 2.0 * loss_at(100), "there was a reset");
+    let psnr = mean_psnr(&world, &splats);
+    assert!(psnr > 24.0, "{psnr} dB");
+}
+
+/// Where a rule would remove every Gaussian, it removes none.
+#[test]
+fn a_rule_that_would_remove_all_removes_none() {
+    let world = world(Frame::ORDINARY, 2);
+    let start = initial_splats(&world.points, world.extent as f32, 0);
+    let mut settings = settings(&start, ITERATIONS);
+    settings.prune_opacity = 1.1;
+    settings.schedule.densify_from = 0;
+    settings.schedule.densify_every = 30;
+    let (splats, reports) = trained_with(&world, &start, settings).unwrap();
+    assert_sound(&splats, &reports);
+    assert_eq!(splats.len(), start.len());
 }
 
 /// Every Gaussian in one tile: one workgroup has all the work.
