@@ -81,3 +81,25 @@ fn exported_files_come_back_to_their_photos() {
     assert!((trained - init).abs() < 0.5, "{trained} {init}");
     assert!(init > points + 0.5, "{init} {points}");
 }
+
+/// Georeferenced: where the steps of `f32` are half a unit.
+#[test]
+fn utm_coordinates_train_like_those_at_the_origin() {
+    let utm = [512_345.25, 5_403_210.5, 321.0];
+    let [near, far] = [[0.0; 3], utm].map(|offset| {
+        let place = Place::new();
+        scene::write_moved(&place.path("scene"), offset);
+        let mut fit = QUICK_FIT;
+        fit[5] = "150";
+        place.succeed(&fit);
+        place
+    });
+    let [near, away] = [&near, &far].map(|place| {
+        let held_out = &place.report("runs/scene")["luma"]["held_out"];
+        held_out["psnr"].as_f64().expect("a number")
+    });
+    assert!((near - away).abs() < 0.5, "{near} dB and {away} dB");
+    assert!(near > 15.0, "{near} dB");
+    far.succeed(&["export", "-o", "utm.ply"]);
+    assert_near(middle(&far, "utm.ply"), utm);
+}

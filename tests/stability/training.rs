@@ -359,7 +359,7 @@ fn a_hundred_thousand_gaussians_in_one_tile_train() {
         .collect();
     let mut start = initial_splats(&points, 1.4, 0);
     start.opacity_logits.fill(-5.0);
-    let (splats, reports) = trained_from(&world, &start, 10).unwrap();
+    let (splats, reports) = trained_from(&world, &start, 100).unwrap();
     assert_sound(&splats, &reports);
     assert!(splats.len() > 50_000);
 }
