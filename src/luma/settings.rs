@@ -21,9 +21,8 @@ pub struct LearningRates {
 impl LearningRates {
     /// The 3DGS rates for the 30,000 iterations they were tuned for; in a run
     /// below [`SHORT_RUN`] sizes learn twice as fast, opacities half as fast, and
-    /// the means' rate falls by a third of the decades: there is no time for the
-    /// last, and what 3DGS repairs later must not break now (measured in
-    /// docs/decisions.md).
+    /// the means' rate falls by half a decade instead of two: there is no time to
+    /// move and to settle as well (measured in docs/decisions.md).
     pub fn of(iterations: usize) -> Self {
         let long = Self {
             means: [1.6e-4, 1.6e-6],

@@ -2,7 +2,13 @@
 
 use std::collections::BTreeSet;
 
-use gs_chroma::doctor::{Diagnosis, cases::CASES};
+use gs_chroma::{
+    doctor::{
+        Diagnosis,
+        cases::{CASES, ODD},
+    },
+    oracle::{render::visible, shade::Shading},
+};
 
 use crate::gpu;
 
@@ -17,7 +23,7 @@ numbers. *Poisoned* Gaussians are culled and counted; nothing else may change by
 The cases are defined in `src/doctor/cases.rs`. `gs-chroma doctor` runs them on your
 own device; bounds are the worst seen on the device below × 1.05, and × 16 on others.
 
-Where nobody can do better than f32: 65,600 tiles take coordinates beyond a million
+Where f32 shows: 65,600 tiles take coordinates beyond a million
 pixels, whose step is 1/16; a needle across the pixels makes the exponent a small
 difference of large terms (docs/decisions.md).
 
@@ -55,4 +61,17 @@ fn cases_have_names_of_their_own_and_stand_in_the_documentation() {
             "{name} is missing: see {DOCS}"
         );
     }
+}
+
+/// A troublesome Gaussian that nobody sees would prove nothing.
+#[test]
+fn the_odd_one_is_in_view_unless_it_must_vanish() {
+    let unseen = CASES.iter().filter(|case| {
+        let hard = (case.make)();
+        let list = visible(&hard.scene, &hard.view, Shading::Offset);
+        let matters = hard.scene.len() > ODD && hard.broken.is_empty();
+        matters && list.iter().all(|seen| seen.index != ODD)
+    });
+    let names: Vec<_> = unseen.map(|case| case.name).collect();
+    assert!(names.is_empty(), "{names:?}");
 }
