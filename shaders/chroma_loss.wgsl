@@ -25,12 +25,13 @@ struct ChromaLossWeights {
 var<workgroup> losses: array<f32, 256>;
 
 // Bilinear sample of the coarser image at this pixel, half-pixel centres.
+// The position is counted in halves of a fine pixel: integers are exact where a
+// quotient in f32 would lose the fraction.
 fn upsampled(pixel: vec2u) -> vec2f {
-    let scale = vec2f(weights.coarser_size) / vec2f(view.size);
-    let at = clamp((vec2f(pixel) + 0.5) * scale - 0.5, vec2f(0.0), vec2f(weights.coarser_size) - 1.0);
-    let low = vec2u(at);
+    let at = max((2u * pixel + 1u) * weights.coarser_size, view.size) - view.size;
+    let low = at / (2u * view.size);
     let high = min(low + 1u, weights.coarser_size - 1u);
-    let t = at - vec2f(low);
+    let t = vec2f(at % (2u * view.size)) / vec2f(2u * view.size);
     let width = weights.coarser_size.x;
     let top = mix(coarser[low.y * width + low.x], coarser[low.y * width + high.x], t.x);
     let bottom = mix(coarser[high.y * width + low.x], coarser[high.y * width + high.x], t.x);

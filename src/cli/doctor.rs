@@ -4,12 +4,12 @@ use clap::Args;
 
 use super::{print, progress};
 use crate::{
-    doctor::{Diagnosis, cases::CASES},
+    doctor::{Diagnosis, STEPS, measured},
     gpu::Gpu,
     run::RunError,
 };
 
-/// Compare this device's kernels with an exact reference on hard cases.
+/// Compare this device's kernels with an exact reference, on random scenes and on hard cases.
 #[derive(Args)]
 pub struct Doctor {
     /// Print JSON.
@@ -20,7 +20,7 @@ pub struct Doctor {
 impl Doctor {
     pub(super) fn run(self) -> Result<(), RunError> {
         let gpu = Gpu::open()?;
-        let bar = progress::bar("cases", CASES.len());
+        let bar = progress::bar("checks", STEPS);
         let diagnosis = Diagnosis::of(&gpu, &mut |index, name| {
             bar.set_position(index as u64);
             bar.set_message(name);
@@ -32,7 +32,7 @@ impl Doctor {
             print(json)?;
         } else {
             print(format_args!(
-                "adapter: {} ({}, {})\ndriver: {}\nlargest binding: {} MiB\nfeatures: {}\n\n{}",
+                "adapter: {} ({}, {})\ndriver: {}\nlargest binding: {} MiB\nfeatures: {}\n\n{}\n{}",
                 diagnosis.adapter,
                 diagnosis.backend,
                 if diagnosis.software {
@@ -47,14 +47,15 @@ impl Doctor {
                 } else {
                     diagnosis.features.join(", ")
                 },
-                diagnosis.table(),
+                measured::table(&diagnosis.kernels),
+                diagnosis.case_table(),
             ))?;
         }
         match diagnosis.failures() {
             0 => Ok(()),
             failed => Err(RunError::Unsound {
                 failed,
-                cases: diagnosis.cases.len(),
+                checks: diagnosis.checks(),
                 adapter: diagnosis.adapter,
             }),
         }

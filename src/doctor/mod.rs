@@ -2,6 +2,8 @@
 //! oracle says. The first thing to ask of someone who reports a bad picture.
 
 pub mod cases;
+pub mod kernels;
+pub mod measured;
 pub mod stage;
 
 use std::{fmt::Write, sync::Arc};
@@ -22,6 +24,8 @@ use crate::{
     raster::Raster,
 };
 use cases::{CASES, Case, Hard};
+use kernels::TOPICS;
+use measured::Row;
 use stage::{Stage, splats};
 
 /// Pixels whose decisions are closer than this to falling the other way may do so in `f32`.
@@ -85,21 +89,33 @@ pub struct Diagnosis {
     pub max_workgroup_bytes: u32,
     /// Optional features in use; the kernels need none.
     pub features: Vec<String>,
-    /// Every case.
+    /// Every kernel on random inputs.
+    pub kernels: Vec<Row>,
+    /// Every hard case.
     pub cases: Vec<Verdict>,
 }
 
+/// Steps of a diagnosis: topics of kernels, then cases.
+pub const STEPS: usize = TOPICS.len() + CASES.len();
+
 impl Diagnosis {
-    /// Runs every case, telling `observe` which one is next.
+    /// Measures every kernel and runs every case, telling `observe` which one is
+    /// next of [`STEPS`].
     ///
     /// # Errors
     /// [`GpuError`] when the device has no room for a case or is lost.
     pub fn of(gpu: &Gpu, observe: &mut dyn FnMut(usize, &'static str)) -> Result<Self, GpuError> {
         let raster = Arc::new(Raster::new(gpu));
-        let cases = CASES.iter().enumerate().map(|(index, case)| {
-            observe(index, case.name);
-            examine(&raster, case)
-        });
+        let mut kernels = Vec::new();
+        for (index, (topic, measure)) in TOPICS.into_iter().enumerate() {
+            observe(index, topic);
+            kernels.extend(measure(&raster)?);
+        }
+        let mut cases = Vec::new();
+        for (index, case) in CASES.iter().enumerate() {
+            observe(TOPICS.len() + index, case.name);
+            cases.push(examine(&raster, case)?);
+        }
         let info = gpu.info();
         let limits = gpu.device().limits();
         let features = gpu.device().features();
@@ -115,19 +131,25 @@ impl Diagnosis {
                 .iter_names()
                 .map(|(name, _)| name.to_owned())
                 .collect(),
-            cases: cases.collect::<Result<_, _>>()?,
+            kernels,
+            cases,
         })
     }
 
-    /// How many cases failed.
+    /// How many kernels' quantities and cases failed.
     pub fn failures(&self) -> usize {
-        (self.cases.iter())
-            .filter(|case| case.failure.is_some())
-            .count()
+        let kernels = self.kernels.iter().filter(|row| !row.failures.is_empty());
+        let cases = self.cases.iter().filter(|case| case.failure.is_some());
+        kernels.count() + cases.count()
+    }
+
+    /// How many there are in all.
+    pub fn checks(&self) -> usize {
+        self.kernels.len() + self.cases.len()
     }
 
     /// The cases as a Markdown table.
-    pub fn table(&self) -> String {
+    pub fn case_table(&self) -> String {
         let mut text = String::from(
             "| case | what goes wrong elsewhere | picture error | bound | gradient error | bound | poisoned | verdict |\n\
              |---|---|--:|--:|--:|--:|--:|---|\n",

@@ -75,13 +75,13 @@ pub enum RunError {
     },
     /// The device computes something else than the reference.
     #[error(
-        "{failed} of {cases} cases fail on {adapter}: update its driver, or choose another adapter with WGPU_ADAPTER_NAME, and please report the output of `gs-chroma doctor --json`"
+        "{failed} of {checks} checks fail on {adapter}: update its driver, or choose another adapter with WGPU_ADAPTER_NAME, and please report the output of `gs-chroma doctor --json`"
     )]
     Unsound {
-        /// Cases that failed.
+        /// Checks that failed.
         failed: usize,
-        /// Cases in all.
-        cases: usize,
+        /// Checks in all.
+        checks: usize,
         /// The adapter's name.
         adapter: String,
     },

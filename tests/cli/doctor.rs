@@ -7,6 +7,23 @@ fn doctor_says_what_the_device_is_and_that_every_case_holds() {
     let diagnosis = Place::new().json(&["doctor", "--json"]);
     assert!(!diagnosis["adapter"].as_str().unwrap().is_empty());
     assert!(diagnosis["max_binding_bytes"].as_u64().unwrap() >= 1 << 27);
+    let kernels = diagnosis["kernels"].as_array().unwrap();
+    for kernel in [
+        "project",
+        "sort",
+        "blend",
+        "luma_loss",
+        "chroma_loss",
+        "adam",
+    ] {
+        assert!(
+            kernels.iter().any(|row| row["kernel"] == kernel),
+            "{kernel}"
+        );
+    }
+    for row in kernels {
+        assert!(row["failures"].as_array().unwrap().is_empty(), "{row}");
+    }
     let cases = diagnosis["cases"].as_array().unwrap();
     assert!(cases.len() >= 50);
     for case in cases {
@@ -21,7 +38,9 @@ fn doctor_in_words() {
     let words = Place::new().succeed(&["doctor"]);
     let first = words.lines().next().unwrap();
     assert!(first.starts_with("adapter: "), "{first}");
-    assert!(words.contains("| needle | ") && words.contains(" holds |"));
+    assert!(
+        words.contains("| needle | ") && words.contains("| sort | ") && words.contains(" holds |")
+    );
 }
 
 #[test]

@@ -1,36 +1,16 @@
-//! `densify`: copies, kept and dropped moments, halves of splits.
-
-use std::sync::LazyLock;
+//! `densify`: kept and dropped moments.
 
 use gs_chroma::{
     gpu::Buffer,
     luma::densify::{DensifyKernels, Descent, Target},
-    raster::constants::*,
 };
 
 use crate::{
-    compare::widen,
-    errors::{Row, Sample, assert_all, relative},
     harness::{bits, gpu},
-    oracle::{
-        linear::{apply, rotation},
-        random::Random,
-    },
+    oracle::random::Random,
 };
 
 const OLD: usize = 300;
-
-fn geometry(random: &mut Random) -> Vec<f32> {
-    let plane = |random: &mut Random, low, high| -> Vec<f32> {
-        (0..OLD).map(|_| random.range(low, high) as f32).collect()
-    };
-    (0..GEOMETRY_PLANES)
-        .flat_map(|index| match index {
-            PLANE_LOG_SCALE..PLANE_OPACITY => plane(random, -6.0, 0.0),
-            _ => plane(random, -2.0, 2.0),
-        })
-        .collect()
-}
 
 /// Survivors with gaps, halves; 600 rows are three workgroups.
 fn plan(random: &mut Random) -> Vec<Descent> {
@@ -52,61 +32,6 @@ fn applied(plan: &[Descent], source: &[f32], target: Target) -> Vec<f32> {
     let kernels = DensifyKernels::new(gpu());
     let new = kernels.apply(gpu(), &plan, OLD, &source, target).unwrap();
     new.read(gpu()).unwrap()
-}
-
-/// What one row of the plan makes of the geometry, in `f64`.
-fn descendant(old: &[f32], descent: &Descent) -> Vec<f64> {
-    let i = descent.source as usize;
-    let mut new: Vec<f64> = (0..GEOMETRY_PLANES)
-        .map(|plane| f64::from(old[plane * OLD + i]))
-        .collect();
-    if descent.survives == 0 {
-        let quat: [f64; 4] = std::array::from_fn(|k| new[PLANE_QUAT + k]);
-        let norm = quat.iter().map(|q| q * q).sum::<f64>().sqrt();
-        let offset: [f64; 3] = std::array::from_fn(|axis| {
-            new[PLANE_LOG_SCALE + axis].exp() * f64::from(descent.offset[axis])
-        });
-        new[PLANE_OPACITY] += f64::from(descent.logit_step);
-        let moved = apply(&rotation(quat.map(|q| q / norm)), &offset);
-        for axis in 0..3 {
-            new[PLANE_MEAN + axis] += moved[axis];
-            new[PLANE_LOG_SCALE + axis] += f64::from(descent.log_growth[axis]);
-        }
-    }
-    new
-}
-
-pub static ROWS: LazyLock<Vec<Row>> = LazyLock::new(|| {
-    let mut random = Random::new(1);
-    let (old, plan) = (geometry(&mut random), plan(&mut random));
-    let new = applied(&plan, &old, Target::Geometry);
-    let count = plan.len();
-    let (mut copied, mut split) = ((Vec::new(), Vec::new()), (Vec::new(), Vec::new()));
-    for (j, descent) in plan.iter().enumerate() {
-        let side = if descent.survives == 0 {
-            &mut split
-        } else {
-            &mut copied
-        };
-        side.0
-            .extend((0..GEOMETRY_PLANES).map(|plane| new[plane * count + j]));
-        side.1.extend(descendant(&old, descent));
-    }
-    let sample = |(actual, expected): (Vec<f32>, Vec<f64>)| [Sample::new(widen(&actual), expected)];
-    vec![
-        Row::elementwise("densify", "copies", relative(0.0, 0.0), &sample(copied)),
-        Row::elementwise(
-            "densify",
-            "halves of splits",
-            relative(3.82e-7, 1.0),
-            &sample(split),
-        ),
-    ]
-});
-
-#[test]
-fn geometry_is_copied_and_split() {
-    assert_all(&ROWS);
 }
 
 #[test]

@@ -1,45 +1,45 @@
 //! Every GPU kernel against the `f64` oracle.
 //!
-//! A topic measures once ([`errors::Row`]) and its test asserts; `error_table`
-//! writes all measurements to `target/kernel-errors.md`:
+//! `gs_chroma::doctor` measures the kernels on random inputs; `error_table` asserts
+//! that all of it is within bounds and writes it to `target/kernel-errors.md`:
 //! `cargo test --release --test kernels error_table -- --nocapture`.
 //! A Vulkan, Metal or DirectX 12 adapter is needed; a software one will do.
 
-use gs_chroma::{compare, oracle};
+use gs_chroma::{
+    compare,
+    doctor::{kernels::TOPICS, measured},
+    oracle,
+};
 
 mod adam;
 mod blend;
 mod densify;
-mod errors;
 mod gradient;
 mod harness;
 mod layout;
 mod losses;
 mod poison;
-mod project;
 mod renderer;
 mod repeat;
 mod scan;
 mod sort;
 mod tiles;
 
-/// Prints and files what was measured.
+/// Prints, files and judges what is measured.
 #[test]
 fn error_table() {
+    let rows: Vec<measured::Row> = (TOPICS.iter())
+        .flat_map(|(_, measure)| measure(&harness::raster()).unwrap())
+        .collect();
     let device = harness::gpu().describe();
-    let topics = [
-        &project::ROWS,
-        &blend::ROWS,
-        &gradient::ROWS,
-        &losses::ROWS,
-        &adam::ROWS,
-        &densify::ROWS,
-    ];
-    let rows = topics.into_iter().flat_map(|rows| rows.iter());
-    let table = errors::table(&device, rows);
+    let table = format!(
+        "Kernels on {device} against the f64 oracle; the worst input of each row.\n\n{}",
+        measured::table(&rows)
+    );
     println!("{table}");
-    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/target/kernel-errors.md");
-    std::fs::create_dir_all(concat!(env!("CARGO_MANIFEST_DIR"), "/target"))
-        .expect("a target folder");
-    std::fs::write(file, table).expect("target is writable");
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/target");
+    std::fs::create_dir_all(folder).expect("a target folder");
+    std::fs::write(format!("{folder}/kernel-errors.md"), &table).expect("target is writable");
+    assert!(rows.len() >= 28);
+    assert!(rows.iter().all(|row| row.failures.is_empty()), "{table}");
 }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use gs_chroma::{
-    doctor::{cases::CASES, examine},
+    doctor::{cases::CASES, examine, kernels::TOPICS},
     raster::Raster,
 };
 
@@ -66,4 +66,36 @@ fn a_jacobian_without_its_clamp_is_noticed() {
 #[test]
 fn an_untouched_kernel_is_not() {
     assert_eq!(failing("project", "no such line", ""), [""; 0]);
+}
+
+/// Kernels that no case runs are measured on random inputs.
+#[test]
+fn broken_losses_and_steps_are_noticed() {
+    for (kernel, from, to) in [
+        (
+            "luma_loss",
+            "by_square[p] = square",
+            "by_square[p] = 0.5 * square",
+        ),
+        ("luma_loss_backward", "2.0 * x * sums.y", "x * sums.y"),
+        ("chroma_loss", "weights.teacher * residual", "residual"),
+        ("sum_loss", "k += 256u", "k += 512u"),
+        ("adam", "sqrt(v * parameters.correction2)", "sqrt(v)"),
+        ("densify_geometry", "exp(log_scale)", "log_scale"),
+        (
+            "scan_apply",
+            "before += block_sums[block]",
+            "before += 2u * block_sums[block]",
+        ),
+        (
+            "sort_scatter",
+            "bases[local] += total",
+            "bases[local] += 0u",
+        ),
+    ] {
+        let raster = Arc::new(Raster::new(&gpu().with_broken(kernel, from, to)));
+        let rows = (TOPICS.iter()).flat_map(|(_, measure)| measure(&raster).unwrap());
+        let failed: Vec<_> = rows.filter(|row| !row.failures.is_empty()).collect();
+        assert!(!failed.is_empty(), "{kernel}");
+    }
 }

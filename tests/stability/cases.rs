@@ -6,6 +6,7 @@ use gs_chroma::{
     doctor::{
         Diagnosis,
         cases::{CASES, ODD},
+        measured,
     },
     oracle::{render::visible, shade::Shading},
 };
@@ -37,17 +38,27 @@ conversions and files have their own tests in `tests/cli` and `src/color`.
 This file is written by `WRITE_DOCS=1 cargo test --release --test stability`.
 ";
 
+const KERNELS: &str = "## Kernels on random inputs
+
+The worst input of each row; `gs-chroma doctor` measures these as well.
+";
+
 #[test]
 fn every_case_holds() {
     let diagnosis = Diagnosis::of(gpu(), &mut |_, _| {}).unwrap();
-    let table = diagnosis.table();
-    println!("{table}");
+    let table = diagnosis.case_table();
+    let kernels = measured::table(&diagnosis.kernels);
+    println!("{table}\n{kernels}");
     if std::env::var_os("WRITE_DOCS").is_some() {
         let device = format!("{} ({})", diagnosis.adapter, diagnosis.driver);
-        std::fs::write(DOCS, format!("{HEADER}\nMeasured on {device}.\n\n{table}")).unwrap();
+        std::fs::write(
+            DOCS,
+            format!("{HEADER}\nMeasured on {device}.\n\n{table}\n{KERNELS}\n{kernels}"),
+        )
+        .unwrap();
     }
     assert!(diagnosis.cases.len() >= 50);
-    assert_eq!(diagnosis.failures(), 0, "{table}");
+    assert_eq!(diagnosis.failures(), 0, "{table}\n{kernels}");
 }
 
 #[test]

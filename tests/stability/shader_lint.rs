@@ -188,7 +188,7 @@ const REASONS: &[(&str, &str, &str)] = &[
     ),
     (
         "upsampled",
-        "vec2f(weights.coarser_size) / vec2f(view.size)",
+        "vec2f(at % (2u * view.size)) / vec2f(2u * view.size)",
         "the kernel runs for images of at least one pixel",
     ),
 ];

@@ -364,16 +364,33 @@ fn a_hundred_thousand_gaussians_in_one_tile_train() {
     assert!(splats.len() > 50_000);
 }
 
-/// 129,600 tiles, buffers next to the smallest binding limit there is.
+/// One photo at 8K, of which the rows from `first` on are kept.
+fn eight_k(first: usize, rows: usize) -> World {
+    let mut world = world(Frame::ORDINARY, 1);
+    let camera = &mut world.cameras[0];
+    *camera = camera.resized(7680, 4320);
+    camera.height = rows as u32;
+    camera.cy -= first as f64;
+    let small = &world.photos[0];
+    let pixels = (first * 7680..(first + rows) * 7680).map(|p| (p / 7680, p % 7680));
+    world.photos[0] = pixels.map(|(y, x)| small[y / 90 * 64 + x / 120]).collect();
+    world
+}
+
+/// 129,600 tiles, buffers next to the smallest binding limit there is. One
+/// iteration: it takes half a minute on two cores without a GPU.
 #[test]
 fn photos_of_8k_train() {
-    let mut world = world(Frame::ORDINARY, 1);
-    world.cameras[0] = world.cameras[0].resized(7680, 4320);
-    let small = &world.photos[0];
-    let large = (0..4320 * 7680).map(|p| small[p / 7680 / 90 * 64 + p % 7680 / 120]);
-    world.photos[0] = large.collect();
+    let mut world = eight_k(0, 4320);
     world.points.truncate(12);
     let start = initial_splats(&world.points, world.extent as f32, 0);
     let (splats, reports) = trained_from(&world, &start, 1).unwrap();
     assert_sound(&splats, &reports);
+}
+
+/// The middle of such a photo for as long as the other scenes.
+#[test]
+fn strips_as_wide_as_8k_train_for_a_hundred_iterations() {
+    let psnr = train(&eight_k(2144, 32));
+    assert!(psnr > 20.0, "{psnr}");
 }

@@ -1,15 +1,16 @@
-//! Measured errors: each row is one quantity over several scenes.
+//! Measured errors: each row is one quantity of one kernel over several inputs.
 
-use std::sync::LazyLock;
+use std::fmt::Write;
 
-use gs_chroma::doctor::headroom;
+use serde::Serialize;
 
+use super::headroom;
 use crate::{
     compare::{Elementwise, FlipBounds, GradientBounds},
-    harness::gpu,
+    gpu::Gpu,
 };
 
-/// What a kernel gave and what the oracle says, of one scene.
+/// What a kernel gave and what the oracle says, of one input.
 pub struct Sample {
     /// The kernel's values.
     pub actual: Vec<f64>,
@@ -30,58 +31,78 @@ impl Sample {
     }
 }
 
-/// One line of the table: the worst of its scenes, and whether all passed.
+/// Bounds as the worst errors seen on the reference device, with the headroom
+/// that the present one is given.
+#[derive(Clone, Copy, Debug)]
+pub struct Allowance(f64);
+
+impl Allowance {
+    /// What this device is allowed.
+    pub fn of(gpu: &Gpu) -> Self {
+        Self(headroom(gpu))
+    }
+
+    /// Errors up to `worst · (scale + |x|)` were seen: relative ones, floored at a
+    /// typical size of the quantity.
+    pub fn relative(self, worst: f64, scale: f64) -> Elementwise {
+        let unit = worst * self.0;
+        Elementwise {
+            absolute: unit * scale,
+            relative: unit,
+        }
+    }
+
+    /// Bounds on a gradient of which this relative L2 error was seen; angle and
+    /// bias have to be as small as it makes them.
+    pub fn gradient(self, worst_l2: f64, elements: Elementwise) -> GradientBounds {
+        let relative_l2 = worst_l2 * self.0;
+        GradientBounds {
+            elementwise: elements,
+            relative_l2,
+            // 1 - cos φ is about φ²/2, and φ is at most the relative error.
+            cosine: 0.51 * relative_l2 * relative_l2,
+            // In L1 norms, in which small elements weigh more.
+            signed_bias: 2.0 * relative_l2,
+        }
+    }
+}
+
+/// One line of the table: the worst of its inputs, and whether all passed.
+#[derive(Clone, Debug, Serialize)]
 pub struct Row {
-    kernel: &'static str,
-    what: &'static str,
-    scenes: usize,
-    largest_error: f64,
-    relative_l2: f64,
+    /// The kernel.
+    pub kernel: &'static str,
+    /// The quantity, with its unit.
+    pub what: &'static str,
+    /// Inputs it was measured on.
+    pub inputs: usize,
+    /// Largest absolute error.
+    pub largest_error: f64,
+    /// Largest relative L2 error.
+    pub relative_l2: f64,
     /// How much of the bound was used, at most 1.
-    used: f64,
-    bound: String,
-    failures: Vec<String>,
-}
-
-static HEADROOM: LazyLock<f64> = LazyLock::new(|| headroom(gpu()));
-
-/// Errors up to `worst · (scale + |x|)` were seen: relative ones, floored at a
-/// typical size of the quantity.
-pub fn relative(worst: f64, scale: f64) -> Elementwise {
-    let unit = worst * *HEADROOM;
-    Elementwise {
-        absolute: unit * scale,
-        relative: unit,
-    }
-}
-
-/// Bounds on a gradient of which this relative L2 error was seen; angle and bias have to
-/// be as small as it makes them.
-pub fn gradient_bounds(worst_l2: f64, elements: Elementwise) -> GradientBounds {
-    let relative_l2 = worst_l2 * *HEADROOM;
-    GradientBounds {
-        elementwise: elements,
-        relative_l2,
-        // 1 - cos φ is about φ²/2, and φ is at most the relative error.
-        cosine: 0.51 * relative_l2 * relative_l2,
-        // In L1 norms, in which small elements weigh more.
-        signed_bias: 2.0 * relative_l2,
-    }
+    pub used: f64,
+    /// The bound in words.
+    pub bound: String,
+    /// What is wrong, if anything is.
+    pub failures: Vec<String>,
 }
 
 impl Row {
     fn new(kernel: &'static str, what: &'static str, samples: &[Sample]) -> Self {
-        assert!(!samples.is_empty(), "{kernel}, {what}: nothing to compare");
         let mut row = Self {
             kernel,
             what,
-            scenes: samples.len(),
+            inputs: samples.len(),
             largest_error: 0.0,
             relative_l2: 0.0,
             used: 0.0,
             bound: String::new(),
             failures: Vec::new(),
         };
+        if samples.is_empty() {
+            row.failures.push("nothing to compare".to_owned());
+        }
         for sample in samples {
             let pairs = || sample.actual.iter().zip(&sample.expected);
             let largest = pairs().map(|(a, e)| (a - e).abs()).fold(0.0, f64::max);
@@ -152,38 +173,41 @@ impl Row {
         }
         row
     }
+
+    /// Integers, which are right or wrong.
+    pub fn exact(kernel: &'static str, what: &'static str, samples: &[Sample]) -> Self {
+        let bound = Elementwise {
+            absolute: 0.0,
+            relative: 0.0,
+        };
+        let mut row = Self::elementwise(kernel, what, bound, samples);
+        "exact".clone_into(&mut row.bound);
+        row
+    }
 }
 
-/// # Panics
-/// When any row failed, with all that did.
-pub fn assert_all(rows: &[Row]) {
-    let failed: Vec<_> = (rows.iter())
-        .filter(|row| !row.failures.is_empty())
-        .map(|row| {
-            let Row { kernel, what, .. } = row;
-            format!("{kernel}, {what}: {}", row.failures.join("; "))
-        })
-        .collect();
-    assert!(failed.is_empty(), "{}", failed.join("\n"));
-}
-
-/// The table in Markdown.
-pub fn table<'a>(device: &str, rows: impl Iterator<Item = &'a Row>) -> String {
-    let mut text = format!(
-        "Kernels in f32 on {device} against the f64 oracle; the worst scene of each row.\n\n\
-         | kernel | what | scenes | max abs error | relative L2 | bound | used |\n\
-         |---|---|--:|--:|--:|---|--:|\n"
+/// The rows as a Markdown table.
+pub fn table(rows: &[Row]) -> String {
+    let mut text = String::from(
+        "| kernel | what | inputs | largest error | relative L2 | bound | used | verdict |\n\
+         |---|---|--:|--:|--:|---|--:|---|\n",
     );
     for row in rows {
-        text += &format!(
-            "| {} | {} | {} | {:.2e} | {:.2e} | {} | {:.3} |\n",
+        let verdict = match row.failures.as_slice() {
+            [] => "holds".to_owned(),
+            failures => failures.join("; "),
+        };
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            text,
+            "| {} | {} | {} | {:.2e} | {:.2e} | {} | {:.3} | {verdict} |",
             row.kernel,
             row.what,
-            row.scenes,
+            row.inputs,
             row.largest_error,
             row.relative_l2,
             row.bound,
-            row.used
+            row.used,
         );
     }
     text

@@ -1,0 +1,82 @@
+//! `shade` and `blend`: pictures of luma, chroma and RGB.
+
+use std::sync::Arc;
+
+use crate::{
+    compare::{FlipBounds, widen},
+    doctor::{
+        MARGIN,
+        measured::{Allowance, Row, Sample},
+        stage::{Stage, splats},
+    },
+    gpu::GpuError,
+    oracle::{
+        constants::ALPHA_MIN,
+        random::{opaque_stack, random_scene_before, random_view},
+        render::render_pixels,
+        scene::{Scene, View},
+        shade::Shading,
+    },
+    raster::Raster,
+};
+
+/// Scenes of every degree before views of odd sizes, and opaque stacks.
+fn scenes<const C: usize>() -> Vec<(Scene<f64, C>, View)> {
+    let loose = (0..4).map(|seed| {
+        let view = random_view(seed);
+        let scene = random_scene_before(&view, seed, 150, seed as usize);
+        (scene, view)
+    });
+    loose
+        .chain((8..10).map(|seed| opaque_stack(seed, 60, 1)))
+        .collect()
+}
+
+fn pictures<const C: usize>(raster: &Arc<Raster>) -> Result<Vec<Sample>, GpuError> {
+    let pictures = scenes::<C>().into_iter().map(|(scene, view)| {
+        let actual = Stage::new(raster, &splats(&scene), &view)?.forward()?;
+        let pixels = render_pixels(&scene, &view, Shading::of_channels(C));
+        Ok(Sample {
+            actual: widen(&actual),
+            expected: pixels.iter().flat_map(|p| p.colour).collect(),
+            may_flip: (pixels.iter())
+                .flat_map(|p| [p.margin < MARGIN; C])
+                .collect(),
+        })
+    });
+    pictures.collect()
+}
+
+/// `worst` is the largest error seen per unit of colour, `brightest` the largest colour.
+fn bounds(allowed: Allowance, worst: f64, brightest: f64) -> FlipBounds {
+    FlipBounds {
+        rest: allowed.relative(worst, brightest),
+        // What a contribution at the floor of alpha shows, or of transmittance.
+        jump: allowed.relative(ALPHA_MIN, brightest),
+        cap: 0.01,
+    }
+}
+
+pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
+    let allowed = Allowance::of(&raster.gpu);
+    Ok(vec![
+        Row::picture(
+            "blend",
+            "luma, 0 to 1",
+            bounds(allowed, 1.27e-6, 1.0),
+            &pictures::<1>(raster)?,
+        ),
+        Row::picture(
+            "blend",
+            "chroma, Lab units",
+            bounds(allowed, 1.09e-6, 80.0),
+            &pictures::<2>(raster)?,
+        ),
+        Row::picture(
+            "blend",
+            "RGB, 0 to 1",
+            bounds(allowed, 1.34e-6, 1.0),
+            &pictures::<3>(raster)?,
+        ),
+    ])
+}

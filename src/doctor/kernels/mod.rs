@@ -1,0 +1,35 @@
+//! Every kernel on random inputs against the oracle: one topic a file, one
+//! [`Row`] a quantity. Bounds are the worst errors seen on Mesa 22.3's llvmpipe.
+
+mod adam;
+mod blend;
+mod densify;
+mod gradient;
+mod losses;
+mod project;
+mod scan;
+mod sort;
+
+pub use losses::chroma_loss_on;
+pub use scan::scan_on;
+pub use sort::sort_on;
+
+use std::sync::Arc;
+
+use super::measured::Row;
+use crate::{gpu::GpuError, raster::Raster};
+
+/// Measures a topic.
+type Measure = fn(&Arc<Raster>) -> Result<Vec<Row>, GpuError>;
+
+/// The topics in the order in which an iteration meets them.
+pub const TOPICS: [(&str, Measure); 8] = [
+    ("project", project::rows),
+    ("scan", scan::rows),
+    ("sort", sort::rows),
+    ("blend", blend::rows),
+    ("losses", losses::rows),
+    ("adjoint", gradient::rows),
+    ("adam", adam::rows),
+    ("densify", densify::rows),
+];
