@@ -11,7 +11,7 @@ use super::{
 use crate::{
     capture::Camera,
     gpu::{Buffer, Gpu, GpuError, Recorder},
-    optimize::{Adam, AdamKernel, LossLog, SumLossKernel, view_at},
+    optimize::{Adam, AdamKernel, Load, LossLog, SumLossKernel, view_at},
     raster::{Field, Geometry, Raster, constants::*},
     splats::{ShField, Splats, sh},
 };
@@ -163,6 +163,29 @@ impl Distiller {
     /// [`GpuError::Lost`].
     pub fn chroma(&self) -> Result<ShField, GpuError> {
         self.shared.field.download(&self.gpu)
+    }
+
+    /// What a dispatch worked on, the mean over the passes that are kept.
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`].
+    pub fn load(&self) -> Result<Load, GpuError> {
+        let passes: Vec<&Pass> = self.chains.iter().flatten().flatten().collect();
+        let mut load = Load::default();
+        for pass in &passes {
+            let of_pass = pass.load(&self.gpu)?;
+            load.visible += of_pass.visible / passes.len() as f64;
+            load.instances += of_pass.instances / passes.len() as f64;
+            load.pixels += of_pass.pixels / passes.len() as f64;
+            load.tiles += of_pass.tiles / passes.len() as f64;
+        }
+        Ok(Load {
+            splats: self.shared.geometry.count as f64,
+            capacity: load.instances,
+            channels: 2.0,
+            sh_planes: 2.0 * sh::coefficient_count(self.settings.sh_degree) as f64,
+            ..load
+        })
     }
 
     /// One view through all scales, one step of Adam a scale.

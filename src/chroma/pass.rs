@@ -3,8 +3,8 @@
 use super::loss::ChromaLossWeights;
 use crate::{
     capture::Camera,
-    gpu::{Bindings, Buffer, GpuError, Kernel, Recorder},
-    optimize::LossLog,
+    gpu::{Bindings, Buffer, Gpu, GpuError, Kernel, Recorder},
+    optimize::{Load, LossLog},
     raster::{Field, Geometry, Layer, LayerAdjoint, Lists, Raster, ViewUniform},
 };
 
@@ -104,6 +104,21 @@ impl Pass {
     pub fn bytes(&self) -> usize {
         let splats = self.view.splat_count as usize;
         80 * splats + 28 * self.lists.capacity + 28 * self.view.pixel_count()
+    }
+
+    /// Its share of [`Distiller::load`](super::Distiller::load).
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`].
+    pub fn load(&self, gpu: &Gpu) -> Result<Load, GpuError> {
+        let status = self.lists.status(gpu)?;
+        Ok(Load {
+            visible: status.visible as f64,
+            instances: status.instances as f64,
+            pixels: self.view.pixel_count() as f64,
+            tiles: self.view.tile_count() as f64,
+            ..Load::default()
+        })
     }
 
     /// Blocks of its loss.

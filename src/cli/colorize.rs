@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use super::{print, progress::Progress};
+use crate::report::timings_table;
 use crate::run::{ColorizeOptions, RunError, colorize};
 
 /// How chroma is solved for.
@@ -37,6 +38,9 @@ pub struct Colorize {
     /// COLMAP folder with the photos, when it is not where `fit` found it.
     #[arg(long, value_name = "COLMAP_DIR")]
     colmap: Option<PathBuf>,
+    /// Time every kernel, and print a table of it.
+    #[arg(long)]
+    timings: bool,
     /// Print the report as JSON.
     #[arg(long)]
     json: bool,
@@ -53,6 +57,7 @@ impl Colorize {
             until: self.until.map(|n| n as usize),
             sh_degree: self.sh_degree,
             colmap: self.colmap,
+            timings: self.timings,
         };
         let (output, report) = colorize(&options, &mut |event| progress.show(&event))?;
         progress.finish();
@@ -63,6 +68,10 @@ impl Colorize {
             print(format_args!("wrote {}", output.ply.display()))?;
             if let Some(sheet) = output.contact_sheet {
                 print(format_args!("wrote {}", sheet.display()))?;
+            }
+            let chroma = report.chroma.as_ref();
+            if let Some(rows) = chroma.and_then(|chroma| chroma.timings.as_ref()) {
+                print(timings_table(rows))?;
             }
         }
         Ok(())

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::{print, progress::Progress};
+use crate::report::timings_table;
 use crate::run::{FitOptions, Preset, RunError, fit};
 
 /// Train geometry and luminance on a folder of photos with COLMAP poses.
@@ -39,6 +40,9 @@ pub struct Fit {
     /// Train on all views; by default every 8th is held out to measure with.
     #[arg(long)]
     no_holdout: bool,
+    /// Time every kernel, and print a table of it.
+    #[arg(long)]
+    timings: bool,
     /// Print the report as JSON.
     #[arg(long)]
     json: bool,
@@ -58,6 +62,7 @@ impl Fit {
             seed: self.seed,
             init: self.init,
             holdout: !self.no_holdout,
+            timings: self.timings,
         };
         let (folder, report) = fit(&options, &mut |event| progress.show(&event))?;
         progress.finish();
@@ -66,6 +71,9 @@ impl Fit {
         } else {
             print(report.luma_summary())?;
             print(format_args!("wrote {}", folder.luma().display()))?;
+            if let Some(rows) = &report.luma.timings {
+                print(timings_table(rows))?;
+            }
         }
         Ok(())
     }

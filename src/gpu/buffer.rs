@@ -44,6 +44,11 @@ impl<T: Pod> Buffer<T> {
         Ok(buffer)
     }
 
+    /// A buffer that timestamps are resolved into.
+    pub(super) fn for_queries(gpu: &Gpu, label: &str, len: usize) -> Result<Self, GpuError> {
+        Self::with_usage(gpu, label, len, wgpu::BufferUsages::QUERY_RESOLVE)
+    }
+
     fn with_usage(
         gpu: &Gpu,
         label: &str,

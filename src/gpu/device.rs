@@ -1,6 +1,8 @@
 //! Adapter and device.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use super::stopwatch::{KernelTime, Stopwatch};
 
 /// What can go wrong with the device.
 #[derive(Debug, thiserror::Error)]
@@ -55,6 +57,7 @@ pub enum GpuError {
 pub struct Gpu {
     inner: Arc<Inner>,
     patch: Option<Patch>,
+    stopwatch: Option<Arc<Mutex<Stopwatch>>>,
 }
 
 /// A kernel changed on purpose.
@@ -89,6 +92,8 @@ impl Gpu {
             label: Some("gs-chroma"),
             // The adapter's own limits: large scenes need large bindings.
             required_limits: adapter.limits(),
+            // For `--timings`; nothing else needs it.
+            required_features: adapter.features() & wgpu::Features::TIMESTAMP_QUERY,
             ..Default::default()
         }))
         .map_err(|error| GpuError::NoDevice {
@@ -102,7 +107,37 @@ impl Gpu {
                 info,
             }),
             patch: None,
+            stopwatch: None,
         })
+    }
+
+    /// The same device, on which every dispatch recorded from now on is timed.
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`].
+    pub fn timed(&self) -> Result<Self, GpuError> {
+        let stopwatch = Stopwatch::new(self)?;
+        Ok(Self {
+            stopwatch: Some(Arc::new(Mutex::new(stopwatch))),
+            ..self.clone()
+        })
+    }
+
+    /// What each kernel took since the last call, in order of first use; nothing
+    /// unless the device is [`Self::timed`]. Waits for the device.
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`].
+    pub fn timings(&self) -> Result<Vec<KernelTime>, GpuError> {
+        match self.stopwatch() {
+            Some(mut stopwatch) => stopwatch.take(self),
+            None => Ok(Vec::new()),
+        }
+    }
+
+    pub(super) fn stopwatch(&self) -> Option<MutexGuard<'_, Stopwatch>> {
+        let stopwatch = self.stopwatch.as_ref()?;
+        Some(stopwatch.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
     /// The same device, on which kernel `kernel` will be compiled with `from`
@@ -110,8 +145,8 @@ impl Gpu {
     #[doc(hidden)]
     pub fn with_broken(&self, kernel: &'static str, from: &'static str, to: &'static str) -> Self {
         Self {
-            inner: self.inner.clone(),
             patch: Some(Patch { kernel, from, to }),
+            ..self.clone()
         }
     }
 

@@ -1,6 +1,8 @@
 //! Compute pipelines and the recording of their dispatches.
 
-use super::Gpu;
+use std::time::Instant;
+
+use super::{Gpu, stopwatch::Timing};
 
 /// Threads in a workgroup of the kernels that give a thread to each element.
 const LINEAR_WORKGROUP: u32 = 256;
@@ -123,14 +125,58 @@ impl Recorder {
 
     /// Runs a grid of workgroups.
     pub fn dispatch_grid(&mut self, kernel: &Kernel, bindings: &Bindings, x: u32, y: u32) {
-        let pass = self.pass.get_or_insert_with(|| {
-            self.encoder
-                .begin_compute_pass(&Default::default())
-                .forget_lifetime()
-        });
+        let timing = match self.gpu.stopwatch() {
+            Some(mut stopwatch) => stopwatch.claim(kernel.name),
+            None => Timing::None,
+        };
+        match timing {
+            Timing::None => self.record(kernel, bindings, [x, y]),
+            Timing::Device(queries, first) => {
+                self.pass = Some(self.begin(Some(wgpu::ComputePassTimestampWrites {
+                    query_set: &queries,
+                    beginning_of_pass_write_index: Some(first),
+                    end_of_pass_write_index: Some(first + 1),
+                })));
+                self.record(kernel, bindings, [x, y]);
+                self.pass = None;
+            }
+            Timing::Host => {
+                self.flush();
+                // A lost device shows at the next read-back.
+                let _ = self.gpu.wait();
+                let begun = Instant::now();
+                self.record(kernel, bindings, [x, y]);
+                self.flush();
+                let _ = self.gpu.wait();
+                if let Some(mut stopwatch) = self.gpu.stopwatch() {
+                    stopwatch.add(kernel.name, begun.elapsed());
+                }
+            }
+        }
+    }
+
+    fn begin(
+        &mut self,
+        timestamp_writes: Option<wgpu::ComputePassTimestampWrites<'_>>,
+    ) -> wgpu::ComputePass<'static> {
+        self.pass = None;
+        self.encoder
+            .begin_compute_pass(&wgpu::ComputePassDescriptor {
+                label: None,
+                timestamp_writes,
+            })
+            .forget_lifetime()
+    }
+
+    fn record(&mut self, kernel: &Kernel, bindings: &Bindings, [x, y]: [u32; 2]) {
+        let mut pass = match self.pass.take() {
+            Some(pass) => pass,
+            None => self.begin(None),
+        };
         pass.set_pipeline(&kernel.pipeline);
         pass.set_bind_group(0, &bindings.0, &[]);
         pass.dispatch_workgroups(x, y, 1);
+        self.pass = Some(pass);
     }
 
     /// Copies a whole buffer onto another of the same size.
@@ -150,5 +196,21 @@ impl Recorder {
     pub fn submit(mut self) {
         self.pass = None;
         self.gpu.queue().submit([self.encoder.finish()]);
+        if let Some(mut stopwatch) = self.gpu.stopwatch()
+            && stopwatch.is_filling()
+        {
+            stopwatch.read_later(&self.gpu);
+        }
+    }
+
+    /// Hands over what is recorded so far and goes on.
+    fn flush(&mut self) {
+        self.pass = None;
+        let next = self
+            .gpu
+            .device()
+            .create_command_encoder(&Default::default());
+        let recorded = std::mem::replace(&mut self.encoder, next);
+        self.gpu.queue().submit([recorded.finish()]);
     }
 }

@@ -4,7 +4,9 @@ mod buffer;
 mod device;
 mod kernel;
 pub mod shaders;
+mod stopwatch;
 
 pub use buffer::{Buffer, Readback};
 pub use device::{Gpu, GpuError};
 pub use kernel::{Bindings, Kernel, Recorder, groups_for};
+pub use stopwatch::KernelTime;

@@ -18,7 +18,7 @@ use super::{
 use crate::{
     capture::Camera,
     gpu::{Buffer, Gpu, GpuError, Readback, Recorder},
-    optimize::{Adam, view_at},
+    optimize::{Adam, Load, view_at},
     raster::{Field, Geometry, Raster, StatusReadback, ViewUniform, constants::*, download},
     splats::{Splats, sh},
 };
@@ -86,6 +86,10 @@ pub struct LumaTrainer {
     workspace: Workspace,
     /// Iteration at which the present workspace began to count steps.
     base: usize,
+    /// Sums over the reports of what [`Self::load`] averages.
+    seen: Load,
+    /// Reports.
+    reports: usize,
 }
 
 impl LumaTrainer {
@@ -153,6 +157,8 @@ impl LumaTrainer {
             field,
             workspace,
             base: 0,
+            seen: Load::default(),
+            reports: 0,
         })
     }
 
@@ -213,6 +219,25 @@ impl LumaTrainer {
     /// [`GpuError::Lost`].
     pub fn splats(&self) -> Result<Splats, GpuError> {
         download(&self.gpu, &self.geometry, &self.field)
+    }
+
+    /// What an iteration worked on, the mean over the reports.
+    pub fn load(&self) -> Load {
+        let mean = |sum: f64| sum / self.reports.max(1) as f64;
+        let pixels = self
+            .cameras
+            .iter()
+            .map(|c| f64::from(c.width) * f64::from(c.height));
+        Load {
+            splats: mean(self.seen.splats),
+            visible: mean(self.seen.visible),
+            instances: mean(self.seen.instances),
+            capacity: mean(self.seen.capacity),
+            pixels: pixels.sum::<f64>() / self.cameras.len() as f64,
+            tiles: self.max_tiles as f64,
+            channels: 1.0,
+            sh_planes: sh::coefficient_count(self.field.degree) as f64,
+        }
     }
 
     /// Records and submits one iteration.
@@ -291,6 +316,11 @@ impl LumaTrainer {
             return Ok(Some(done));
         }
         let losses = report.losses.wait(&self.gpu)?;
+        self.seen.splats += self.geometry.count as f64;
+        self.seen.visible += status.visible as f64;
+        self.seen.instances += status.instances as f64;
+        self.seen.capacity += self.workspace.lists.capacity as f64;
+        self.reports += 1;
         let since = (report.iteration - 1) / SYNC_EVERY * SYNC_EVERY;
         let recent = &losses[..report.iteration - since];
         observe(LumaProgress {

@@ -3,7 +3,9 @@
 mod adam;
 mod loss_log;
 mod order;
+mod traffic;
 
 pub use adam::{Adam, AdamKernel, AdamParameters};
 pub use loss_log::{LossLog, SumLossKernel, SumLossParameters};
 pub use order::view_at;
+pub use traffic::{Load, minimum_bytes};

@@ -2,8 +2,10 @@
 //! docs/run-folder.md describes every key.
 
 mod contact_sheet;
+mod timings;
 
 pub use contact_sheet::{Row, contact_sheet, to_image};
+pub use timings::{KernelReport, kernel_reports, timings_table};
 
 use serde::{Deserialize, Serialize};
 
@@ -96,6 +98,9 @@ pub struct LumaReport {
     pub held_out: Option<LumaQuality>,
     /// Each held-out view.
     pub held_out_views: Vec<LumaView>,
+    /// Where the device's time went, with `--timings`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub timings: Option<Vec<KernelReport>>,
 }
 
 /// Wall seconds of stage 1.
@@ -157,6 +162,9 @@ pub struct ChromaReport {
     pub pictures: ColorQuality,
     /// Each of them.
     pub views: Vec<ColorView>,
+    /// Where the device's time went, with `--timings`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub timings: Option<Vec<KernelReport>>,
 }
 
 /// Wall seconds of stage 2.

@@ -9,7 +9,7 @@ use std::{
 
 use super::{
     Event, Observer, RunError, RunFolder, Stage, files,
-    fit::{capture_report, comments},
+    fit::{capture_report, comments, open_gpu},
     preset::Preset,
     scene::{Scene, gray_to_rgb, read_splats, rgb_pixels, shown_rgb},
 };
@@ -24,6 +24,7 @@ use crate::{
     report::{
         CaptureReport, ChromaReport, ChromaSeconds, ColorError, ColorQuality, ColorView,
         DeviceReport, LumaReport, LumaSeconds, REPORT_VERSION, Report, Row, contact_sheet,
+        kernel_reports,
     },
     splats::{ShField, Splats, ply},
 };
@@ -46,6 +47,8 @@ pub struct ColorizeOptions {
     pub sh_degree: u32,
     /// COLMAP folder, where it is not the one that `fit` noted.
     pub colmap: Option<PathBuf>,
+    /// Whether the report says where the device's time went.
+    pub timings: bool,
 }
 
 /// What `colorize` wrote.
@@ -68,7 +71,7 @@ pub fn colorize(
     let source = Source::find(options)?;
     let cache = source.folder.as_ref().map(RunFolder::teacher);
     let mut teacher = Teacher::open(&options.teacher, cache.as_deref())?;
-    let gpu = Gpu::open()?;
+    let gpu = open_gpu(options.timings)?;
     let mut report = source.report(&gpu);
     let (max_side, holdout) = (report.capture.max_side, report.capture.holdout);
     let colmap_dir = source.colmap_dir(options, &report.capture)?;
@@ -139,6 +142,9 @@ pub fn colorize(
         peak_device_memory = peak_device_memory.max(gpu.allocated_bytes());
     })?;
     let chroma = distiller.chroma()?;
+    let timings = (options.timings)
+        .then(|| Ok::<_, RunError>(kernel_reports(&gpu.timings()?, &distiller.load()?)))
+        .transpose()?;
     drop(distiller);
     let seconds_distill = begun.elapsed().as_secs_f64();
 
@@ -163,6 +169,7 @@ pub fn colorize(
         measured_on: scene.measured().0.to_owned(),
         pictures: measured.mean(),
         views: measured.views,
+        timings,
     });
     ply::write_ply(&output.ply, &baked, offset, &comments())?;
     if let Some(folder) = &source.folder {
@@ -265,6 +272,7 @@ impl Source {
                 peak_device_memory: None,
                 held_out: None,
                 held_out_views: Vec::new(),
+                timings: None,
             },
             chroma: None,
         })

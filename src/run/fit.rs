@@ -19,7 +19,7 @@ use crate::{
     raster::Raster,
     report::{
         CaptureReport, DeviceReport, LumaQuality, LumaReport, LumaSeconds, LumaView,
-        REPORT_VERSION, Report,
+        REPORT_VERSION, Report, kernel_reports,
     },
     splats::{ShField, Splats, init::initial_splats, ply, sh},
 };
@@ -50,6 +50,8 @@ pub struct FitOptions {
     pub init: Option<PathBuf>,
     /// Whether every 8th view is held out.
     pub holdout: bool,
+    /// Whether the report says where the device's time went.
+    pub timings: bool,
 }
 
 /// Trains and writes the run folder.
@@ -61,7 +63,7 @@ pub fn fit(
     observe: &mut Observer<'_>,
 ) -> Result<(RunFolder, Report), RunError> {
     let begun = Instant::now();
-    let gpu = Gpu::open()?;
+    let gpu = open_gpu(options.timings)?;
     let preset = choose_preset(options, &gpu, observe);
     let amounts = preset.amounts();
     let max_side = options.max_side.or(amounts.max_side);
@@ -117,6 +119,9 @@ pub fn fit(
         peak_device_memory = peak_device_memory.max(gpu.allocated_bytes());
     })?;
     let splats = trainer.splats()?;
+    let timings = (options.timings)
+        .then(|| Ok::<_, RunError>(kernel_reports(&gpu.timings()?, &trainer.load())))
+        .transpose()?;
     let train = begun.elapsed().as_secs_f64();
 
     let begun = Instant::now();
@@ -149,6 +154,7 @@ pub fn fit(
             peak_device_memory,
             held_out: mean_quality(&held_out_views),
             held_out_views,
+            timings,
         },
         chroma: None,
     };
@@ -162,6 +168,12 @@ pub fn fit(
     files::write(&folder.log(), log.as_bytes())?;
     folder.write_report(&report)?;
     Ok((folder, report))
+}
+
+/// The device; with `timed`, its dispatches are.
+pub(super) fn open_gpu(timed: bool) -> Result<Gpu, RunError> {
+    let gpu = Gpu::open()?;
+    Ok(if timed { gpu.timed()? } else { gpu })
 }
 
 /// Comments in the header of every splat file.

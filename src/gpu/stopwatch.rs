@@ -1,0 +1,164 @@
+//! Where the device's time goes: every dispatch timed.
+//!
+//! With timestamp queries each dispatch becomes a compute pass of its own, whose
+//! beginning and end the device notes; nothing waits. Devices without them are
+//! timed from the host, which submits each dispatch alone and waits for it.
+
+use std::time::Duration;
+
+use super::{Buffer, Gpu, GpuError, Readback};
+
+/// Timestamps of one query set: WebGPU's limit.
+const QUERIES: u32 = wgpu::QUERY_SET_MAX_QUERIES;
+
+/// Queries that one recording may need; the set is read when fewer are left.
+const SPARE: u32 = QUERIES / 2;
+
+/// What one kernel took.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct KernelTime {
+    /// Its name.
+    pub kernel: &'static str,
+    /// How often it was dispatched.
+    pub dispatches: u64,
+    /// Seconds in all.
+    pub seconds: f64,
+}
+
+/// Times the dispatches of one [`Gpu`] and its clones.
+pub(super) struct Stopwatch {
+    clock: Clock,
+    times: Vec<KernelTime>,
+}
+
+enum Clock {
+    Device {
+        queries: wgpu::QuerySet,
+        resolved: Buffer<u64>,
+        /// Kernels whose two timestamps stand in the set, in order.
+        claimed: Vec<&'static str>,
+        /// Sets that were full, on their way.
+        pending: Vec<(Vec<&'static str>, Readback<u64>)>,
+    },
+    Host,
+}
+
+/// How a dispatch is to be timed.
+pub(super) enum Timing {
+    /// By these two queries.
+    Device(wgpu::QuerySet, u32),
+    /// Alone, by the host.
+    Host,
+    /// Not at all: the set is full.
+    None,
+}
+
+impl Stopwatch {
+    /// # Errors
+    /// [`GpuError::TooLarge`].
+    pub(super) fn new(gpu: &Gpu) -> Result<Self, GpuError> {
+        let features = gpu.device().features();
+        let clock = if features.contains(wgpu::Features::TIMESTAMP_QUERY) {
+            Clock::Device {
+                queries: gpu.device().create_query_set(&wgpu::QuerySetDescriptor {
+                    label: Some("stopwatch"),
+                    ty: wgpu::QueryType::Timestamp,
+                    count: QUERIES,
+                }),
+                resolved: Buffer::for_queries(gpu, "timestamps", QUERIES as usize)?,
+                claimed: Vec::new(),
+                pending: Vec::new(),
+            }
+        } else {
+            Clock::Host
+        };
+        Ok(Self {
+            clock,
+            times: Vec::new(),
+        })
+    }
+
+    /// Claims two queries for a dispatch of `kernel`.
+    pub(super) fn claim(&mut self, kernel: &'static str) -> Timing {
+        match &mut self.clock {
+            Clock::Host => Timing::Host,
+            Clock::Device {
+                queries, claimed, ..
+            } => {
+                let first = 2 * claimed.len() as u32;
+                if first >= QUERIES {
+                    return Timing::None;
+                }
+                claimed.push(kernel);
+                Timing::Device(queries.clone(), first)
+            }
+        }
+    }
+
+    /// Whether the queries should be read after the recording at hand.
+    pub(super) fn is_filling(&self) -> bool {
+        matches!(&self.clock, Clock::Device { claimed, .. } if 2 * claimed.len() as u32 > SPARE)
+    }
+
+    /// Orders the timestamps taken so far and makes room for others.
+    pub(super) fn read_later(&mut self, gpu: &Gpu) {
+        let Clock::Device {
+            queries,
+            resolved,
+            claimed,
+            pending,
+        } = &mut self.clock
+        else {
+            return;
+        };
+        if claimed.is_empty() {
+            return;
+        }
+        let mut encoder = gpu.device().create_command_encoder(&Default::default());
+        let taken = 2 * claimed.len() as u32;
+        encoder.resolve_query_set(queries, 0..taken, resolved.raw(), 0);
+        gpu.queue().submit([encoder.finish()]);
+        pending.push((std::mem::take(claimed), resolved.read_later(gpu)));
+    }
+
+    /// Notes what the host measured.
+    pub(super) fn add(&mut self, kernel: &'static str, taken: Duration) {
+        self.note(kernel, taken.as_secs_f64());
+    }
+
+    fn note(&mut self, kernel: &'static str, seconds: f64) {
+        match self.times.iter_mut().find(|time| time.kernel == kernel) {
+            Some(time) => {
+                time.dispatches += 1;
+                time.seconds += seconds;
+            }
+            None => self.times.push(KernelTime {
+                kernel,
+                dispatches: 1,
+                seconds,
+            }),
+        }
+    }
+
+    /// Waits for all timestamps; gives the times by kernel in order of first use,
+    /// and forgets them.
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`].
+    pub(super) fn take(&mut self, gpu: &Gpu) -> Result<Vec<KernelTime>, GpuError> {
+        self.read_later(gpu);
+        let sets = match &mut self.clock {
+            Clock::Device { pending, .. } => std::mem::take(pending),
+            Clock::Host => Vec::new(),
+        };
+        let period = 1e-9 * f64::from(gpu.queue().get_timestamp_period());
+        for (kernels, readback) in sets {
+            let ticks = readback.wait(gpu)?;
+            for (kernel, ticks) in kernels.into_iter().zip(ticks.chunks_exact(2)) {
+                // A driver may reset its clock in between.
+                self.note(kernel, ticks[1].saturating_sub(ticks[0]) as f64 * period);
+            }
+        }
+        Ok(std::mem::take(&mut self.times))
+    }
+}

@@ -1,0 +1,91 @@
+//! What the kernels must read and write at least: the measure of how fast they
+//! could be.
+
+/// Average size of what the kernels of a stage worked on, a dispatch.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Load {
+    /// Gaussians.
+    pub splats: f64,
+    /// Gaussians in view.
+    pub visible: f64,
+    /// Entries of the tile lists.
+    pub instances: f64,
+    /// Entries that the tile lists have room for.
+    pub capacity: f64,
+    /// Pixels.
+    pub pixels: f64,
+    /// Tiles.
+    pub tiles: f64,
+    /// Channels of the picture: 1 in stage 1, 2 in stage 2.
+    pub channels: f64,
+    /// Spherical-harmonic planes of all channels.
+    pub sh_planes: f64,
+}
+
+/// Bytes of a word.
+const WORD: f64 = 4.0;
+
+/// Words of a projected Gaussian.
+const PROJECTED: f64 = 8.0;
+
+/// Words that a tile list leads blending to: slot, index, centre, conic and
+/// opacity; the colour comes on top.
+const LISTED: f64 = 8.0;
+
+/// Bytes that a dispatch of `kernel` must read and write at least, if every input is
+/// read once and the caches hold the rest.
+pub fn minimum_bytes(kernel: &str, load: &Load) -> f64 {
+    let Load {
+        splats,
+        visible,
+        instances,
+        capacity,
+        pixels,
+        tiles,
+        channels,
+        sh_planes,
+    } = *load;
+    let trains_geometry = channels == 1.0;
+    let geometry = if trains_geometry { 11.0 } else { 0.0 };
+    // What an instance's gradient takes: seven figures for the geometry, the colour.
+    let partial = channels + if trains_geometry { 7.0 } else { 0.0 };
+    let digit_passes = [4.0, ((tiles + 1.0).log2() / 8.0).ceil().max(1.0)];
+    let passes = digit_passes[0] + digit_passes[1];
+    let keys = (digit_passes[0] * visible + digit_passes[1] * instances) / passes;
+    let histograms = (digit_passes[0] * splats + digit_passes[1] * capacity) / 2048.0 * 256.0;
+    // A scan runs over flags, over counts and over each pass's histogram.
+    let scanned = (2.0 * splats + histograms) / (2.0 + passes);
+    let words = match kernel {
+        "project" => 13.0 * splats + (PROJECTED + 1.0) * visible,
+        "compact" => splats + 3.0 * visible,
+        "scan_reduce" => scanned,
+        "scan_sums" => 2.0 * scanned / 1024.0,
+        "scan_apply" => 2.0 * scanned,
+        "sort_count" => keys,
+        "sort_scatter" => 4.0 * keys,
+        // The average of counting and emitting.
+        "tile_lists" => (PROJECTED + 2.5) * visible + 1.5 * instances,
+        "tile_ranges" => 2.0 * tiles,
+        "shade" => splats + (3.0 + sh_planes + channels) * visible,
+        "blend" => (LISTED + channels) * instances + (channels + 1.0) * pixels,
+        "luma_loss" => 4.25 * pixels,
+        "luma_loss_backward" => 5.25 * pixels,
+        "chroma_loss" => 3.25 * channels * pixels,
+        "sum_loss" => tiles,
+        "blend_backward" => {
+            (LISTED + channels + partial) * instances + (2.0 * channels + 1.0) * pixels
+        }
+        "sum_instances" => partial * instances + (partial + 2.0) * visible,
+        "shade_backward" => splats + (3.0 + 2.0 * channels) * visible + sh_planes * splats,
+        "project_backward" => splats + (11.0 + PROJECTED + partial + 4.0) * visible + 11.0 * splats,
+        // Gradient, value and both moments in, the latter three out.
+        "adam" if trains_geometry => 7.0 * (geometry + sh_planes) / 2.0 * splats,
+        "adam" => 7.0 * sh_planes * splats,
+        // The average of geometry, harmonics and the moments of both.
+        "densify_geometry" => 2.0 * 11.0 * splats,
+        "densify_sh" => 2.0 * sh_planes * splats,
+        "densify_moments" => (11.0 + sh_planes) * splats,
+        _ => 0.0,
+    };
+    WORD * words
+}
