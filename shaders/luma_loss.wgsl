@@ -8,12 +8,12 @@ import package::common::view::View;
 
 const RADIUS: u32 = 5u;
 const SIDE: u32 = 16u;
-// A block with its halo.
-const APRON: u32 = 26u;
-const WINDOW: array<f32, 11> = array<f32, 11>(
-    0.00102838008447911, 0.007598758135239185, 0.03600077212843083, 0.10936068950970002,
-    0.2130055377112537, 0.26601172486179436, 0.2130055377112537, 0.10936068950970002,
-    0.03600077212843083, 0.007598758135239185, 0.00102838008447911);
+// Rows of a block with its halo.
+const HALO: u32 = 26u;
+// The window along one axis up to its middle; the rest mirrors it.
+const WINDOW: array<f32, 6> = array<f32, 6>(
+    0.00102838008447911, 0.007598758135239185, 0.03600077212843083,
+    0.10936068950970002, 0.2130055377112537, 0.26601172486179436);
 const C1: f32 = 0.0001;
 const C2: f32 = 0.0009;
 const L1_WEIGHT: f32 = 0.8;
@@ -35,84 +35,137 @@ fn photo_at(p: u32) -> f32 {
     return f32((photo[p / 4u] >> (8u * (p % 4u))) & 255u) / 255.0;
 }
 
-var<workgroup> apron_image: array<f32, 676>;
-var<workgroup> apron_photo: array<f32, 676>;
-// Sums along rows: five moments in the first pass, three slopes in the second.
+// Sums along rows, `[moment, row, column]`: five moments in the first pass, three
+// slopes in the second.
 var<workgroup> rows: array<array<f32, 416>, 5>;
-var<workgroup> losses: array<f32, 256>;
+var<workgroup> losses: array<f32, 64>;
 
-// Index into the image of a cell of the apron, or 0xffffffff outside.
-fn apron_pixel(group: vec3u, cell: u32) -> u32 {
-    let at = vec2i(group.xy * SIDE) + vec2i(vec2u(cell % APRON, cell / APRON)) - i32(RADIUS);
-    if any(at < vec2i(0)) || any(at >= vec2i(view.size)) {
-        return 0xffffffffu;
-    }
-    return u32(at.y) * view.size.x + u32(at.x);
+// Sixteen neighbours, of which the last two are not used.
+struct Run {
+    a: vec4f,
+    b: vec4f,
+    c: vec4f,
+    d: vec4f,
 }
 
-@compute @workgroup_size(16, 16)
+// The window over the fourteen values from four places on. Four sums share most
+// of their values; each value is loaded once.
+fn windowed(v: Run) -> vec4f {
+    return WINDOW[0] * (v.a + vec4f(v.c.zw, v.d.xy))
+        + WINDOW[1] * (vec4f(v.a.yzw, v.b.x) + vec4f(v.c.yzw, v.d.x))
+        + WINDOW[2] * (vec4f(v.a.zw, v.b.xy) + v.c)
+        + WINDOW[3] * (vec4f(v.a.w, v.b.xyz) + vec4f(v.b.w, v.c.xyz))
+        + WINDOW[4] * (v.b + vec4f(v.b.zw, v.c.xy))
+        + WINDOW[5] * vec4f(v.b.yzw, v.c.x);
+}
+
+fn times(v: Run, w: Run) -> Run {
+    return Run(v.a * w.a, v.b * w.b, v.c * w.c, v.d * w.d);
+}
+
+// Where the run for four columns lies along a row of the block's halo.
+struct Span {
+    // Index into the image of the row's first pixel.
+    row: u32,
+    // Column of the run's first pixel.
+    column: i32,
+    // Whether the image has the row.
+    inside: bool,
+}
+
+// The run for the four columns from `quad` on in row `row` of the halo.
+fn span(group: vec3u, row: u32, quad: u32) -> Span {
+    let at = vec2i(group.xy * SIDE + vec2u(quad, row)) - i32(RADIUS);
+    let height = i32(view.size.y);
+    return Span(u32(clamp(at.y, 0, height - 1)) * view.size.x, at.x, at.y >= 0 && at.y < height);
+}
+
+// Which of the run's pixels from `k` on the image has.
+fn has(s: Span, k: i32) -> vec4<bool> {
+    let columns = s.column + k + vec4i(0, 1, 2, 3);
+    return (columns >= vec4i(0)) & (columns < vec4i(i32(view.size.x))) & vec4<bool>(s.inside);
+}
+
+// Indices of these pixels; somewhere in the row where the image has none.
+fn indices(s: Span, k: i32) -> vec4u {
+    let columns = s.column + k + vec4i(0, 1, 2, 3);
+    return s.row + vec4u(clamp(columns, vec4i(0), vec4i(i32(view.size.x) - 1)));
+}
+
+fn image_quad(s: Span, k: i32) -> vec4f {
+    let p = indices(s, k);
+    return select(vec4f(0.0), vec4f(image[p.x], image[p.y], image[p.z], image[p.w]), has(s, k));
+}
+
+fn photo_quad(s: Span, k: i32) -> vec4f {
+    let p = indices(s, k);
+    return select(vec4f(0.0), vec4f(photo_at(p.x), photo_at(p.y), photo_at(p.z), photo_at(p.w)), has(s, k));
+}
+
+// Puts four sums along a row where `column_run` finds them.
+fn store(moment: u32, row: u32, quad: u32, sums: vec4f) {
+    let at = row * SIDE + quad;
+    rows[moment][at] = sums.x;
+    rows[moment][at + 1u] = sums.y;
+    rows[moment][at + 2u] = sums.z;
+    rows[moment][at + 3u] = sums.w;
+}
+
+fn column_quad(moment: u32, at: u32) -> vec4f {
+    return vec4f(rows[moment][at], rows[moment][at + SIDE], rows[moment][at + 2u * SIDE], rows[moment][at + 3u * SIDE]);
+}
+
+// The window over both axes for the four pixels of a column from row `4 y` on.
+fn column_sums(moment: u32, id: vec3u) -> vec4f {
+    let at = id.y * 4u * SIDE + id.x;
+    let d = vec4f(rows[moment][at + 12u * SIDE], rows[moment][at + 13u * SIDE], 0.0, 0.0);
+    return windowed(Run(column_quad(moment, at), column_quad(moment, at + 4u * SIDE), column_quad(moment, at + 8u * SIDE), d));
+}
+
+@compute @workgroup_size(16, 4)
 fn luma_loss(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32, @builtin(local_invocation_id) id: vec3u) {
-    for (var cell = local; cell < APRON * APRON; cell += 256u) {
-        let p = apron_pixel(group, cell);
-        apron_image[cell] = 0.0;
-        apron_photo[cell] = 0.0;
-        if p != 0xffffffffu {
-            apron_image[cell] = image[p];
-            apron_photo[cell] = photo_at(p);
-        }
+    for (var task = local; task < HALO * 4u; task += 64u) {
+        let row = task / 4u;
+        let quad = (task % 4u) * 4u;
+        let s = span(group, row, quad);
+        let x = Run(image_quad(s, 0), image_quad(s, 4), image_quad(s, 8), image_quad(s, 12));
+        let y = Run(photo_quad(s, 0), photo_quad(s, 4), photo_quad(s, 8), photo_quad(s, 12));
+        store(0u, row, quad, windowed(x));
+        store(1u, row, quad, windowed(y));
+        store(2u, row, quad, windowed(times(x, x)));
+        store(3u, row, quad, windowed(times(y, y)));
+        store(4u, row, quad, windowed(times(x, y)));
     }
     workgroupBarrier();
-    for (var cell = local; cell < SIDE * APRON; cell += 256u) {
-        let first = (cell / SIDE) * APRON + cell % SIDE;
-        var sums = array<f32, 5>();
-        for (var k = 0u; k < 11u; k++) {
-            let x = apron_image[first + k];
-            let y = apron_photo[first + k];
-            sums[0] += WINDOW[k] * x;
-            sums[1] += WINDOW[k] * y;
-            sums[2] += WINDOW[k] * x * x;
-            sums[3] += WINDOW[k] * y * y;
-            sums[4] += WINDOW[k] * x * y;
-        }
-        for (var m = 0u; m < 5u; m++) {
-            rows[m][cell] = sums[m];
+    let mu_x = column_sums(0u, id);
+    let mu_y = column_sums(1u, id);
+    let variance_x = column_sums(2u, id) - mu_x * mu_x;
+    let variance_y = column_sums(3u, id) - mu_y * mu_y;
+    let covariance = column_sums(4u, id) - mu_x * mu_y;
+    let a = 2.0 * mu_x * mu_y + C1;
+    let b = 2.0 * covariance + C2;
+    // Both at least C1 and C2 but for rounding, so never zero.
+    let c = mu_x * mu_x + mu_y * mu_y + C1;
+    let d = variance_x + variance_y + C2;
+    let ssim = a * b / (c * d);
+    let product = 2.0 * a / (c * d);
+    let square = -ssim / d;
+    let mean = 2.0 * mu_y * b / (c * d) - 2.0 * mu_x * ssim / c - mu_y * product - 2.0 * mu_x * square;
+    let first = group.xy * SIDE + vec2u(id.x, id.y * 4u);
+    var loss = 0.0;
+    for (var k = 0u; k < 4u; k++) {
+        let pixel = first + vec2u(0u, k);
+        if all(pixel < view.size) {
+            let p = pixel.y * view.size.x + pixel.x;
+            by_mean[p] = mean[k];
+            by_square[p] = square[k];
+            by_product[p] = product[k];
+            loss += L1_WEIGHT * abs(image[p] - photo_at(p)) + SSIM_WEIGHT * (1.0 - ssim[k]);
         }
     }
+    losses[local] = loss;
     workgroupBarrier();
-    let pixel = group.xy * SIDE + id.xy;
-    losses[local] = 0.0;
-    if all(pixel < view.size) {
-        var moments = array<f32, 5>();
-        for (var k = 0u; k < 11u; k++) {
-            let cell = (id.y + k) * SIDE + id.x;
-            for (var m = 0u; m < 5u; m++) {
-                moments[m] += WINDOW[k] * rows[m][cell];
-            }
-        }
-        let mu_x = moments[0];
-        let mu_y = moments[1];
-        let variance_x = moments[2] - mu_x * mu_x;
-        let variance_y = moments[3] - mu_y * mu_y;
-        let covariance = moments[4] - mu_x * mu_y;
-        let a = 2.0 * mu_x * mu_y + C1;
-        let b = 2.0 * covariance + C2;
-        // Both at least C1 and C2 but for rounding, so never zero.
-        let c = mu_x * mu_x + mu_y * mu_y + C1;
-        let d = variance_x + variance_y + C2;
-        let ssim = a * b / (c * d);
-        let product = 2.0 * a / (c * d);
-        let square = -ssim / d;
-        let p = pixel.y * view.size.x + pixel.x;
-        by_mean[p] = 2.0 * mu_y * b / (c * d) - 2.0 * mu_x * ssim / c
-            - mu_y * product - 2.0 * mu_x * square;
-        by_square[p] = square;
-        by_product[p] = product;
-        let center = (id.y + RADIUS) * APRON + id.x + RADIUS;
-        let difference = apron_image[center] - apron_photo[center];
-        losses[local] = L1_WEIGHT * abs(difference) + SSIM_WEIGHT * (1.0 - ssim);
-    }
-    workgroupBarrier();
-    for (var half = 128u; half > 0u; half /= 2u) {
+    for (var half = 32u; half > 0u; half /= 2u) {
         if local < half {
             losses[local] += losses[local + half];
         }
@@ -123,52 +176,43 @@ fn luma_loss(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) group
     }
 }
 
-fn slope(plane: u32, p: u32) -> f32 {
-    switch plane {
-        case 0u: { return by_mean[p]; }
-        case 1u: { return by_square[p]; }
-        default: { return by_product[p]; }
-    }
+// Four pixels' slopes, a kind to a column.
+fn slopes_quad(s: Span, k: i32) -> mat3x4f {
+    let p = indices(s, k);
+    let known = has(s, k);
+    return mat3x4f(
+        select(vec4f(0.0), vec4f(by_mean[p.x], by_mean[p.y], by_mean[p.z], by_mean[p.w]), known),
+        select(vec4f(0.0), vec4f(by_square[p.x], by_square[p.y], by_square[p.z], by_square[p.w]), known),
+        select(vec4f(0.0), vec4f(by_product[p.x], by_product[p.y], by_product[p.z], by_product[p.w]), known));
 }
 
-// One kind of slope, weighted and added up along rows.
-fn row_sums(plane: u32, group: vec3u, local: u32) {
-    for (var cell = local; cell < APRON * APRON; cell += 256u) {
-        let p = apron_pixel(group, cell);
-        apron_image[cell] = 0.0;
-        if p != 0xffffffffu {
-            apron_image[cell] = slope(plane, p);
-        }
-    }
-    workgroupBarrier();
-    for (var cell = local; cell < SIDE * APRON; cell += 256u) {
-        let first = (cell / SIDE) * APRON + cell % SIDE;
-        var sum = 0.0;
-        for (var k = 0u; k < 11u; k++) {
-            sum += WINDOW[k] * apron_image[first + k];
-        }
-        rows[plane][cell] = sum;
-    }
-    workgroupBarrier();
-}
-
-@compute @workgroup_size(16, 16)
+@compute @workgroup_size(16, 4)
 fn luma_loss_backward(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32, @builtin(local_invocation_id) id: vec3u) {
-    row_sums(0u, group, local);
-    row_sums(1u, group, local);
-    row_sums(2u, group, local);
-    let pixel = group.xy * SIDE + id.xy;
-    if any(pixel >= view.size) {
-        return;
+    for (var task = local; task < HALO * 4u; task += 64u) {
+        let row = task / 4u;
+        let quad = (task % 4u) * 4u;
+        let s = span(group, row, quad);
+        let a = slopes_quad(s, 0);
+        let b = slopes_quad(s, 4);
+        let c = slopes_quad(s, 8);
+        let d = slopes_quad(s, 12);
+        store(0u, row, quad, windowed(Run(a[0], b[0], c[0], d[0])));
+        store(1u, row, quad, windowed(Run(a[1], b[1], c[1], d[1])));
+        store(2u, row, quad, windowed(Run(a[2], b[2], c[2], d[2])));
     }
-    var sums = vec3f();
-    for (var k = 0u; k < 11u; k++) {
-        let cell = (id.y + k) * SIDE + id.x;
-        sums += WINDOW[k] * vec3f(rows[0][cell], rows[1][cell], rows[2][cell]);
+    workgroupBarrier();
+    let mean = column_sums(0u, id);
+    let square = column_sums(1u, id);
+    let product = column_sums(2u, id);
+    let first = group.xy * SIDE + vec2u(id.x, id.y * 4u);
+    for (var k = 0u; k < 4u; k++) {
+        let pixel = first + vec2u(0u, k);
+        if all(pixel < view.size) {
+            let p = pixel.y * view.size.x + pixel.x;
+            let x = image[p];
+            let y = photo_at(p);
+            let ssim_gradient = mean[k] + 2.0 * x * square[k] + y * product[k];
+            image_gradient[p] = (L1_WEIGHT * sign(x - y) - SSIM_WEIGHT * ssim_gradient) / f32(view.size.x * view.size.y);
+        }
     }
-    let p = pixel.y * view.size.x + pixel.x;
-    let x = image[p];
-    let y = photo_at(p);
-    let ssim_gradient = sums.x + 2.0 * x * sums.y + y * sums.z;
-    image_gradient[p] = (L1_WEIGHT * sign(x - y) - SSIM_WEIGHT * ssim_gradient) / f32(view.size.x * view.size.y);
 }
