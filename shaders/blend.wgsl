@@ -1,11 +1,17 @@
 // Front-to-back blending. A workgroup draws a tile, a thread four pixels of a
-// column; all threads read the same Gaussian at the same time, so nothing is staged.
+// column. The Gaussians of the tile's list come in batches: each thread fetches
+// one and notes which of the tile's eight parts (8 by 4 pixels, eight
+// neighbouring threads) it touches; then each part draws what touches it.
 import package::common::color::Color;
 import package::common::constants::{TILE_SIDE, TRANSMITTANCE_MIN};
 import package::common::numeric::linear_group;
-import package::common::projected::{Projected, raw_alpha};
+import package::common::projected::{Projected, power_cutoff, touches};
 import package::common::quad::{Quad, contributes, pixel_of, powers, quad_alpha, weighted};
 import package::common::view::View;
+
+const BATCH: u32 = 64u;
+const PARTS: u32 = 8u;
+const PART_SIZE: vec2f = vec2f(8.0, 4.0);
 
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var<storage, read> starts: array<u32>;
@@ -17,36 +23,83 @@ import package::common::view::View;
 // Instances of the tile up to and including the last that this pixel used.
 @group(0) @binding(7) var<storage, read_write> lasts: array<u32>;
 
+var<workgroup> means: array<vec2f, BATCH>;
+var<workgroup> conic_opacities: array<vec4f, BATCH>;
+var<workgroup> batch_colors: array<Color, BATCH>;
+// Which of the batch touch a part: 32 a word, two words a part.
+var<workgroup> touching: array<atomic<u32>, 16>;
+// Threads that have a pixel left to draw.
+var<workgroup> drawing: atomic<u32>;
+var<workgroup> uniform_drawing: u32;
+
 @compute @workgroup_size(16, 4)
-fn blend(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_id) local: vec3u) {
+fn blend(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_id) local: vec3u, @builtin(local_invocation_index) thread: u32) {
     let tile = linear_group(group, groups);
     if tile >= view.tiles.x * view.tiles.y {
         return;
     }
-    let first = vec2u(tile % view.tiles.x, tile / view.tiles.x) * TILE_SIDE + vec2u(local.x, local.y * 4u);
+    let corner = vec2u(tile % view.tiles.x, tile / view.tiles.x) * TILE_SIDE;
+    let first = corner + vec2u(local.x, local.y * 4u);
     let rows = first.y + vec4u(0u, 1u, 2u, 3u);
     let center = vec2f(first) + 0.5;
+    let part = thread / 8u;
     let start = starts[tile];
-    let end = starts[tile + 1u];
+    let count = starts[tile + 1u] - start;
     var color = Quad();
     var transmittance = vec4f(1.0);
     var last = vec4u(0u);
     let inside = vec4<bool>(first.x < view.size.x) & (rows < vec4u(view.size.y));
     var live = inside;
-    for (var k = start; k < end && any(live); k++) {
-        let i = instance_splats[slots[k]];
-        let mean = projected[i].mean;
-        let conic_opacity = projected[i].conic_opacity;
-        let power = powers(conic_opacity.xyz, center - mean);
-        let alpha = quad_alpha(conic_opacity.w * exp(-power));
-        let next = transmittance * (1.0 - alpha);
-        let hit = contributes(power, alpha) & live;
-        let open = next >= vec4f(TRANSMITTANCE_MIN);
-        let used = hit & open;
-        color += weighted(select(vec4f(0.0), alpha * transmittance, used), colors[i]);
-        transmittance = select(transmittance, next, used);
-        last = select(last, vec4u(k - start + 1u), used);
-        live = live & (open | !hit);
+    for (var batch = 0u; batch < count; batch += BATCH) {
+        if thread < 2u * PARTS {
+            atomicStore(&touching[thread], 0u);
+        }
+        if thread == 0u {
+            atomicStore(&drawing, 0u);
+        }
+        workgroupBarrier();
+        if batch + thread < count {
+            let i = instance_splats[slots[start + batch + thread]];
+            let splat = projected[i];
+            means[thread] = splat.mean;
+            conic_opacities[thread] = splat.conic_opacity;
+            batch_colors[thread] = colors[i];
+            let cutoff = power_cutoff(splat.conic_opacity.w);
+            for (var p = 0u; p < PARTS; p++) {
+                let low = vec2f(corner) + 0.5 + vec2f(vec2u(p % 2u, p / 2u)) * PART_SIZE;
+                if touches(splat, cutoff, low, low + PART_SIZE - 1.0) {
+                    atomicOr(&touching[2u * p + thread / 32u], 1u << (thread % 32u));
+                }
+            }
+        }
+        if any(live) {
+            atomicStore(&drawing, 1u);
+        }
+        workgroupBarrier();
+        if thread == 0u {
+            uniform_drawing = atomicLoad(&drawing);
+        }
+        if workgroupUniformLoad(&uniform_drawing) == 0u {
+            break;
+        }
+        for (var word = 0u; word < 2u; word++) {
+            var left = atomicLoad(&touching[2u * part + word]);
+            while left != 0u && any(live) {
+                let k = 32u * word + firstTrailingBit(left);
+                left &= left - 1u;
+                let power = powers(conic_opacities[k].xyz, center - means[k]);
+                let alpha = quad_alpha(conic_opacities[k].w * exp(-power));
+                let next = transmittance * (1.0 - alpha);
+                let hit = contributes(power, alpha) & live;
+                let open = next >= vec4f(TRANSMITTANCE_MIN);
+                let used = hit & open;
+                color += weighted(select(vec4f(0.0), alpha * transmittance, used), batch_colors[k]);
+                transmittance = select(transmittance, next, used);
+                last = select(last, vec4u(batch + k + 1u), used);
+                live = live & (open | !hit);
+            }
+        }
+        workgroupBarrier();
     }
     for (var row = 0u; row < 4u; row++) {
         if inside[row] {

@@ -2,10 +2,11 @@
 // colour and, where the geometry is trained, its centre, conic and opacity.
 //
 // A workgroup takes a tile, a thread eight pixels of a column, as two quads. The
-// instances come in batches: each thread adds up its own pixels' share of an
-// instance and leaves it in workgroup memory; when the batch is full, the
-// threads add up the shares, one figure each, in a fixed order. No atomics, no
-// subgroups, the same bits every run.
+// Gaussians of the tile's list come in batches: threads fetch them and note which
+// of the tile's four parts (8 by 8 pixels, eight neighbouring threads) they touch.
+// Each thread adds up its own pixels' share of a Gaussian that touches its part and
+// leaves it in workgroup memory; then the threads add up the shares, one figure
+// each, in a fixed order. No float atomics, no subgroups, the same bits every run.
 //
 // Transmittance is recomputed front to back as `blend` computed it; nothing is
 // recovered by dividing by 1 - alpha.
@@ -14,16 +15,18 @@ import package::common::constants::{ALPHA_MAX, ALPHA_MIN, TILE_SIDE};
 import package::common::numeric::linear_group;
 import package::common::partials::{PARTIAL_COLOR, PARTIAL_STRIDE};
 @if(geometry) import package::common::partials::PARTIAL_PULL;
-import package::common::projected::Projected;
+import package::common::projected::{Projected, power_cutoff, touches};
 import package::common::quad::{Quad, contributes, powers, quad_alpha};
 import package::common::view::View;
 
 const THREADS: u32 = 32u;
 const BATCH: u32 = 16u;
-// A word more than there are threads: neighbouring sums lie in different banks.
-const SHARE_STRIDE: u32 = THREADS + 1u;
-// Words of one figure.
-const FIGURE: u32 = BATCH * SHARE_STRIDE;
+const PARTS: u32 = 4u;
+// Threads of a part, and pixels on its side.
+const PART: u32 = 8u;
+// A word more than there are figures, if these are even: neighbouring threads
+// write to different banks.
+const SHARE: u32 = PARTIAL_STRIDE | 1u;
 
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var<storage, read> starts: array<u32>;
@@ -38,11 +41,20 @@ const FIGURE: u32 = BATCH * SHARE_STRIDE;
 @if(geometry) @group(0) @binding(8) var<storage, read> colors: array<Color>;
 @if(geometry) @group(0) @binding(9) var<storage, read> image: array<Color>;
 
-// Shares of one batch, `[figure, instance, thread]`. A figure is a sum over
+// Shares of one batch, `[instance, thread, figure]`. A figure is a sum over
 // pixels: of dL/dpower times 1, dx, dy, dx², dx·dy, dy², of the pull, then of the
 // weighted gradient, a channel each.
-var<workgroup> shares: array<f32, PARTIAL_STRIDE * FIGURE>;
-var<workgroup> tile_last: atomic<u32>;
+var<workgroup> shares: array<f32, BATCH * THREADS * SHARE>;
+var<workgroup> means: array<vec2f, BATCH>;
+var<workgroup> conic_opacities: array<vec4f, BATCH>;
+@if(geometry) var<workgroup> batch_colors: array<Color, BATCH>;
+// Where the gradient of an instance goes.
+var<workgroup> batch_slots: array<u32, BATCH>;
+// Parts that an instance touches, a bit each; instances that touch a part.
+var<workgroup> touched: array<u32, BATCH>;
+var<workgroup> touching: array<atomic<u32>, PARTS>;
+// Instances of each part up to the last that one of its pixels used; of the tile.
+var<workgroup> part_lasts: array<atomic<u32>, PARTS>;
 var<workgroup> uniform_last: u32;
 
 // One thread's share of one instance.
@@ -131,31 +143,60 @@ fn blend_backward(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) 
     if tile >= view.tiles.x * view.tiles.y {
         return;
     }
-    let first = vec2u(tile % view.tiles.x, tile / view.tiles.x) * TILE_SIDE + vec2u(thread % 16u, (thread / 16u) * 8u);
+    let corner = vec2u(tile % view.tiles.x, tile / view.tiles.x) * TILE_SIDE;
+    let first = corner + vec2u(thread % TILE_SIDE, (thread / TILE_SIDE) * PART);
+    let part = thread / PART;
     var upper = load(first);
     var lower = load(first + vec2u(0u, 4u));
     let most = max(upper.last, lower.last);
-    if thread == 0u {
-        atomicStore(&tile_last, 0u);
+    if thread < PARTS {
+        atomicStore(&part_lasts[thread], 0u);
     }
     workgroupBarrier();
-    atomicMax(&tile_last, max(max(most.x, most.y), max(most.z, most.w)));
+    atomicMax(&part_lasts[part], max(max(most.x, most.y), max(most.z, most.w)));
     workgroupBarrier();
     if thread == 0u {
-        uniform_last = atomicLoad(&tile_last);
+        uniform_last = max(max(atomicLoad(&part_lasts[0]), atomicLoad(&part_lasts[1])),
+            max(atomicLoad(&part_lasts[2]), atomicLoad(&part_lasts[3])));
     }
     let used = workgroupUniformLoad(&uniform_last);
     let start = starts[tile];
     for (var batch = 0u; batch < used; batch += BATCH) {
         let members = min(BATCH, used - batch);
-        for (var member = 0u; member < members; member++) {
+        if thread < PARTS {
+            atomicStore(&touching[thread], 0u);
+        }
+        workgroupBarrier();
+        if thread < members {
+            let slot = slots[start + batch + thread];
+            let i = instance_splats[slot];
+            let splat = projected[i];
+            batch_slots[thread] = slot;
+            means[thread] = splat.mean;
+            conic_opacities[thread] = splat.conic_opacity;
+            @if(geometry) { batch_colors[thread] = colors[i]; }
+            let cutoff = power_cutoff(splat.conic_opacity.w);
+            var parts = 0u;
+            for (var p = 0u; p < PARTS; p++) {
+                let low = vec2f(corner + vec2u(p % 2u, p / 2u) * PART) + 0.5;
+                if batch + thread < atomicLoad(&part_lasts[p]) && touches(splat, cutoff, low, low + f32(PART - 1u)) {
+                    parts |= 1u << p;
+                    atomicOr(&touching[p], 1u << thread);
+                }
+            }
+            touched[thread] = parts;
+        }
+        workgroupBarrier();
+        var left = atomicLoad(&touching[part]);
+        while left != 0u {
+            let member = firstTrailingBit(left);
+            left &= left - 1u;
             let own = batch + member;
-            let i = instance_splats[slots[start + own]];
-            let conic_opacity = projected[i].conic_opacity;
-            let d = vec2f(first) + 0.5 - projected[i].mean;
-            @if(geometry) let color = colors[i];
+            let conic_opacity = conic_opacities[member];
+            let d = vec2f(first) + 0.5 - means[member];
             var share = Share();
             @if(geometry) {
+                let color = batch_colors[member];
                 accumulate(&share, &upper, own, conic_opacity, d, color);
                 accumulate(&share, &lower, own, conic_opacity, d + vec2f(0.0, 4.0), color);
             }
@@ -163,32 +204,36 @@ fn blend_backward(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) 
                 accumulate(&share, &upper, own, conic_opacity, d);
                 accumulate(&share, &lower, own, conic_opacity, d + vec2f(0.0, 4.0));
             }
-            let at = member * SHARE_STRIDE + thread;
+            let at = (member * THREADS + thread) * SHARE;
             @if(geometry) {
                 shares[at] = share.moments.x;
-                shares[FIGURE + at] = share.moments.y;
-                shares[2u * FIGURE + at] = share.moments.z;
-                shares[3u * FIGURE + at] = share.moments.w;
-                shares[4u * FIGURE + at] = share.moments_y.x;
-                shares[5u * FIGURE + at] = share.moments_y.y;
-                shares[PARTIAL_PULL * FIGURE + at] = share.pull;
+                shares[at + 1u] = share.moments.y;
+                shares[at + 2u] = share.moments.z;
+                shares[at + 3u] = share.moments.w;
+                shares[at + 4u] = share.moments_y.x;
+                shares[at + 5u] = share.moments_y.y;
+                shares[at + PARTIAL_PULL] = share.pull;
             }
-            @if(luma) { shares[PARTIAL_COLOR * FIGURE + at] = share.color; }
+            @if(luma) { shares[at + PARTIAL_COLOR] = share.color; }
             @if(chroma) {
-                shares[PARTIAL_COLOR * FIGURE + at] = share.color.x;
-                shares[(PARTIAL_COLOR + 1u) * FIGURE + at] = share.color.y;
+                shares[at + PARTIAL_COLOR] = share.color.x;
+                shares[at + PARTIAL_COLOR + 1u] = share.color.y;
             }
         }
         workgroupBarrier();
-        for (var k = thread; k < PARTIAL_STRIDE * BATCH; k += THREADS) {
-            let member = k % BATCH;
+        for (var task = thread; task < PARTIAL_STRIDE * members; task += THREADS) {
+            let member = task / PARTIAL_STRIDE;
+            let figure = task % PARTIAL_STRIDE;
+            var parts = touched[member];
             var sum = 0.0;
-            for (var t = 0u; t < THREADS; t++) {
-                sum += shares[k * SHARE_STRIDE + t];
+            while parts != 0u {
+                let at = (member * THREADS + firstTrailingBit(parts) * PART) * SHARE + figure;
+                parts &= parts - 1u;
+                for (var t = 0u; t < PART; t++) {
+                    sum += shares[at + t * SHARE];
+                }
             }
-            if member < members {
-                partials[slots[start + batch + member] * PARTIAL_STRIDE + k / BATCH] = sum;
-            }
+            partials[batch_slots[member] * PARTIAL_STRIDE + figure] = sum;
         }
         workgroupBarrier();
     }

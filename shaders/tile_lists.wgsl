@@ -3,7 +3,7 @@
 // disagree, because they are one compiled loop.
 import package::common::constants::{STATUS_INSTANCES, STATUS_VISIBLE, TILE_SIDE};
 import package::common::numeric::linear_group;
-import package::common::projected::{Projected, least_power, power_cutoff};
+import package::common::projected::{Projected, power_cutoff, touches};
 import package::common::view::View;
 
 struct TileListsMode {
@@ -51,7 +51,7 @@ fn tile_lists(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) grou
     for (var y = low.y; y <= high.y; y++) {
         for (var x = low.x; x <= high.x; x++) {
             let corner = vec2f(vec2u(x, y) * TILE_SIDE) + 0.5;
-            if least_power(splat, corner, corner + (side - 1.0)) <= cutoff {
+            if touches(splat, cutoff, corner, corner + (side - 1.0)) {
                 if emitting {
                     keys[cursor] = y * view.tiles.x + x;
                     slots[cursor] = cursor;

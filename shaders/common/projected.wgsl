@@ -41,3 +41,9 @@ fn least_power(splat: Projected, low: vec2f, high: vec2f) -> f32 {
     let on_horizontal = vec2f(clamp(-conic.y * nearest.y / conic.x, lower.x, upper.x), nearest.y);
     return min(power_at(conic, on_vertical), power_at(conic, on_horizontal));
 }
+
+// Whether the Gaussian can be seen in the rectangle of pixel centres
+// [low, high]. Lists, blending and adjoint all ask here.
+fn touches(splat: Projected, cutoff: f32, low: vec2f, high: vec2f) -> bool {
+    return least_power(splat, low, high) <= cutoff;
+}

@@ -20,9 +20,10 @@ pub struct LearningRates {
 
 impl LearningRates {
     /// The 3DGS rates for the 30,000 iterations they were tuned for; in a run
-    /// below [`SHORT_RUN`] sizes learn twice as fast, opacities half as fast, and
-    /// the means' rate falls by half a decade instead of two: there is no time to
-    /// move and to settle as well (measured in docs/decisions.md).
+    /// below [`SHORT_RUN`] sizes and attitudes learn twice as fast, colours four
+    /// times, opacities half as fast, and the means' rate falls by half a decade
+    /// instead of two: there is little time to move in (measured in
+    /// docs/decisions.md).
     pub fn of(iterations: usize) -> Self {
         let long = Self {
             means: [1.6e-4, 1.6e-6],
@@ -37,8 +38,10 @@ impl LearningRates {
         }
         Self {
             means: [1.6e-4, 4.8e-5],
+            quats: 2e-3,
             log_scales: 1e-2,
             opacity_logits: 2.5e-2,
+            sh_constant: 1e-2,
             ..long
         }
     }
@@ -59,6 +62,8 @@ pub struct Schedule {
     pub reset_every: usize,
     /// Iterations between two degrees of spherical harmonics.
     pub raise_degree_every: usize,
+    /// From here on all learning rates fall, to [`SETTLED`] at the end.
+    pub settle_from: usize,
 }
 
 impl Schedule {
@@ -89,12 +94,22 @@ impl Schedule {
                 3_000
             },
             raise_degree_every: if short { share(1_000).max(1) } else { 1_000 },
+            // A long run's only rate that is still large, the means', falls by itself.
+            settle_from: if iterations < SHORT_RUN {
+                iterations * 7 / 10
+            } else {
+                iterations
+            },
         }
     }
 }
 
 /// A run with fewer iterations learns at the rates for short runs.
 pub const SHORT_RUN: usize = 3_000;
+
+/// Share of its learning rates at which a short run ends: steps that answer to one
+/// view at a time leave noise as large as they are.
+pub const SETTLED: f64 = 0.1;
 
 /// Luma iterations of ChromaDistill (WACV 2025, supplement).
 pub const PAPER_ITERATIONS: usize = 15_000;
@@ -148,6 +163,17 @@ impl LumaSettings {
         extent * first * (last / first).powf(t.min(1.0))
     }
 
+    /// What all learning rates are multiplied by at `iteration`, the means' included.
+    pub fn settling(&self, iteration: usize) -> f64 {
+        let Schedule {
+            iterations,
+            settle_from,
+            ..
+        } = self.schedule;
+        let settled = iteration.saturating_sub(settle_from) as f64;
+        SETTLED.powf(settled / (iterations - settle_from).max(1) as f64)
+    }
+
     /// Degree of the harmonics in use at `iteration`.
     pub fn degree_at(&self, iteration: usize) -> u32 {
         let raised = iteration / self.schedule.raise_degree_every;
@@ -186,6 +212,7 @@ mod tests {
                 densify_every: 100,
                 reset_every: 3_000,
                 raise_degree_every: 1_000,
+                settle_from: 15_000,
             }
         );
         let settings = LumaSettings::new(PAPER_ITERATIONS);
@@ -206,5 +233,20 @@ mod tests {
         // A short run ends where it still learns.
         let short = LumaSettings::new(1_000);
         assert!(short.means_rate(1_000, 2.0) > 20.0 * settings.means_rate(15_000, 2.0));
+    }
+
+    #[test]
+    fn short_runs_settle() {
+        let long = LumaSettings::new(PAPER_ITERATIONS);
+        assert!([0, 14_999, 15_000].iter().all(|&i| long.settling(i) == 1.0));
+        let short = LumaSettings::new(1_000);
+        let at = [0, 700, 850, 1_000].map(|i| short.settling(i));
+        let wanted = [1.0, 1.0, 0.1_f64.sqrt(), 0.1];
+        assert!(
+            at.iter().zip(wanted).all(|(a, w)| (a - w).abs() < 1e-12),
+            "{at:?}"
+        );
+        // One iteration is all there is.
+        assert_eq!(LumaSettings::new(1).settling(0), 1.0);
     }
 }

@@ -274,29 +274,36 @@ impl LumaTrainer {
             step,
             &self.geometry_rates(iteration),
         );
-        workspace
-            .adam_field
-            .record(&self.gpu, adam, &mut recorder, step, &self.field_rates());
+        workspace.adam_field.record(
+            &self.gpu,
+            adam,
+            &mut recorder,
+            step,
+            &self.field_rates(iteration),
+        );
         recorder.submit();
     }
 
     fn geometry_rates(&self, iteration: usize) -> [f32; GEOMETRY_PLANES] {
         let rates = &self.settings.rates;
+        let settling = self.settings.settling(iteration);
         std::array::from_fn(|plane| {
-            (match plane {
-                PLANE_MEAN..PLANE_QUAT => self.settings.means_rate(iteration, self.extent),
-                PLANE_QUAT..PLANE_LOG_SCALE => rates.quats,
-                PLANE_LOG_SCALE..PLANE_OPACITY => rates.log_scales,
-                _ => rates.opacity_logits,
-            }) as f32
+            (settling
+                * match plane {
+                    PLANE_MEAN..PLANE_QUAT => self.settings.means_rate(iteration, self.extent),
+                    PLANE_QUAT..PLANE_LOG_SCALE => rates.quats,
+                    PLANE_LOG_SCALE..PLANE_OPACITY => rates.log_scales,
+                    _ => rates.opacity_logits,
+                }) as f32
         })
     }
 
-    fn field_rates(&self) -> Vec<f32> {
+    fn field_rates(&self, iteration: usize) -> Vec<f32> {
         let rates = &self.settings.rates;
-        let rest = rates.sh_rest as f32;
+        let settling = self.settings.settling(iteration);
+        let rest = (settling * rates.sh_rest) as f32;
         let mut planes = vec![rest; sh::coefficient_count(self.field.degree)];
-        planes[0] = rates.sh_constant as f32;
+        planes[0] = (settling * rates.sh_constant) as f32;
         planes
     }
 
