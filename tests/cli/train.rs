@@ -53,6 +53,37 @@ fn json_is_the_report() {
 }
 
 #[test]
+fn timings_name_every_kernel() {
+    let place = place_with_scene();
+    let words = place.succeed(&[&QUICK_FIT[..], &["--timings"]].concat());
+    assert!(words.contains("| blend_backward "), "{words}");
+    let report = place.report("runs/scene");
+    let rows = report["luma"]["timings"].as_array().expect("rows");
+    let total = |key: &str| -> f64 { rows.iter().filter_map(|row| row[key].as_f64()).sum() };
+    assert!((total("share") - 1.0).abs() < 1e-9 && total("seconds") > 0.0);
+    for (kernel, dispatches) in [("project", 3), ("luma_loss", 3), ("adam", 6)] {
+        let row = rows.iter().find(|row| row["kernel"] == kernel);
+        let row = row.unwrap_or_else(|| panic!("{kernel} is missing"));
+        assert_eq!(row["dispatches"], dispatches, "{kernel}");
+        assert!(row["minimum_bytes"].as_f64() > Some(0.0), "{kernel}");
+    }
+
+    let teacher = super::shared::onnx("ddcolor_tiny.onnx");
+    let colorize = [
+        "colorize",
+        "--teacher",
+        &teacher,
+        "--until",
+        "5",
+        "--timings",
+    ];
+    let words = place.succeed(&colorize);
+    assert!(words.contains("| chroma_loss "), "{words}");
+    let report = place.report("runs/scene");
+    assert!(report["chroma"]["timings"][0]["seconds"].as_f64() > Some(0.0));
+}
+
+#[test]
 fn words_without_json() {
     let place = place_with_scene();
     let printed = place.succeed(&QUICK_FIT);

@@ -1,11 +1,12 @@
 //! The same bits every run, and whatever room the tile lists begin with.
 
-use std::sync::LazyLock;
+use std::sync::{Arc, LazyLock};
 
 use gs_chroma::{
+    doctor::stage,
     luma::{LumaProgress, LumaSettings, LumaTrainer, TrainingView},
     optimize::view_at,
-    raster::{Field, Geometry, Renderer},
+    raster::{Field, Geometry, Raster, Renderer},
     splats::Splats,
 };
 
@@ -42,6 +43,28 @@ fn forward_and_backward_give_the_same_bits() {
     for _ in 1..5 {
         assert!(run() == first);
     }
+}
+
+/// Timing a dispatch must not change what it computes; without timestamp queries
+/// the host does it.
+#[test]
+fn timed_dispatches_give_the_same_bits() {
+    let (scene, view) = random_scene::<1>(12, 200, 1);
+    let splats = splats(&scene);
+    let picture = Stage::new(&splats, &view).forward();
+    let timed = gpu().timed().unwrap();
+    let raster = Arc::new(Raster::new(&timed));
+    let stage = stage::Stage::new(&raster, &splats, &view).unwrap();
+    // More dispatches than one set of timestamps holds.
+    for _ in 0..150 {
+        assert_eq!(bits(&stage.forward().unwrap()), bits(&picture));
+    }
+    let times = timed.timings().unwrap();
+    let blend = times.iter().find(|time| time.kernel == "blend").unwrap();
+    assert_eq!(blend.dispatches, 150);
+    assert!(times.iter().all(|time| time.seconds >= 0.0) && blend.seconds > 0.0);
+    assert!(timed.timings().unwrap().is_empty());
+    assert!(gpu().timings().unwrap().is_empty());
 }
 
 /// A far view, in which Gaussians touch few tiles, and two near ones.
