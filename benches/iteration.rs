@@ -1,0 +1,240 @@
+//! What an iteration costs, kernel by kernel, against the number of Gaussians and
+//! of pixels:
+//!
+//! ```sh
+//! cargo bench                                # 10⁴ and 10⁵ Gaussians, 320 to 1,280 pixels
+//! cargo bench -- --full                      # 10⁴ to 10⁶, 320 to 3,840
+//! cargo bench -- --full --csv cost.csv       # for tools/plot_cost.py
+//! ```
+//!
+//! Gaussians fill the view at random, as wide as lets eight cover each pixel: finer
+//! where there are more, as in scenes. Times are medians over rounds of a few
+//! iterations each; the kernels' come from the device where it has timestamp queries.
+//! A harness of its own, because one round times all kernels at once.
+
+use std::{
+    collections::BTreeMap, fmt::Write, path::PathBuf, process::ExitCode, sync::Arc, time::Instant,
+};
+
+use glam::{DMat3, DVec3};
+use gs_chroma::{
+    capture::Camera,
+    gpu::{Gpu, GpuError},
+    luma::{LumaSettings, LumaTrainer, TrainingView},
+    oracle::random::Random,
+    raster::Raster,
+    splats::{ShField, Splats},
+};
+
+/// Iterations of a round, and rounds.
+const ITERATIONS: usize = 4;
+const ROUNDS: usize = 5;
+
+/// Gaussians that cover each pixel.
+const OVERDRAW: f64 = 8.0;
+
+/// Standard deviations to where a Gaussian of opacity 0.5 is seen: √(2 ln 127).
+const REACH: f64 = 3.1;
+
+/// What was measured of one size.
+struct Cost {
+    splats: usize,
+    width: u32,
+    /// Seconds of an iteration as the host sees it.
+    wall: f64,
+    /// Seconds of each kernel in an iteration.
+    kernels: BTreeMap<&'static str, f64>,
+}
+
+fn camera(width: u32) -> Camera {
+    let height = width * 9 / 16;
+    Camera {
+        width,
+        height,
+        fx: f64::from(width),
+        fy: f64::from(width),
+        cx: f64::from(width) / 2.0,
+        cy: f64::from(height) / 2.0,
+        rotation: DMat3::IDENTITY,
+        translation: DVec3::ZERO,
+    }
+}
+
+fn cloud(count: usize, camera: &Camera) -> Splats {
+    let mut random = Random::new(1);
+    let pixels = f64::from(camera.width) * f64::from(camera.height);
+    let deviation =
+        (OVERDRAW * pixels / (std::f64::consts::PI * REACH * REACH * count as f64)).sqrt();
+    let (mut means, mut log_scales) = (Vec::new(), Vec::new());
+    for _ in 0..count {
+        let depth = random.range(2.0, 6.0);
+        let x = random.range(0.0, f64::from(camera.width)) - camera.cx;
+        let y = random.range(0.0, f64::from(camera.height)) - camera.cy;
+        means.push([x * depth / camera.fx, y * depth / camera.fy, depth].map(|v| v as f32));
+        let width = (deviation * depth / camera.fx).ln();
+        log_scales.push([0.0; 3].map(|_: f64| (width + random.range(-0.7, 0.7)) as f32));
+    }
+    let random_floats = |random: &mut Random, n: usize| -> Vec<f32> {
+        (0..n).map(|_| random.range(-1.0, 1.0) as f32).collect()
+    };
+    Splats {
+        means,
+        quats: (0..count)
+            .map(|_| random.array(-1.0, 1.0).map(|v| v as f32))
+            .collect(),
+        log_scales,
+        opacity_logits: random_floats(&mut random, count),
+        sh: ShField {
+            degree: 0,
+            channels: 1,
+            coefficients: random_floats(&mut random, count),
+        },
+    }
+}
+
+/// A trainer that has found its room already.
+fn trainer(gpu: &Gpu, count: usize, width: u32) -> Result<LumaTrainer, GpuError> {
+    let camera = camera(width);
+    let mut random = Random::new(2);
+    let pixels = camera.width * camera.height;
+    let gray = (0..pixels).map(|_| random.bits() as u8).collect();
+    let settings = LumaSettings {
+        sh_degree: 0,
+        max_splats: count,
+        ..LumaSettings::new(ITERATIONS)
+    };
+    let splats = cloud(count, &camera);
+    let raster = Arc::new(Raster::new(gpu));
+    let views = vec![TrainingView { camera, gray }];
+    let mut trainer = LumaTrainer::new(raster, settings, 5.0, &splats, views)?;
+    trainer.train(&mut |_| {})?;
+    Ok(trainer)
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+fn measure(gpu: &Gpu, splats: usize, width: u32) -> Result<Cost, GpuError> {
+    let mut plain = trainer(gpu, splats, width)?;
+    let mut walls = Vec::new();
+    for _ in 0..ROUNDS {
+        let begun = Instant::now();
+        plain.train(&mut |_| {})?;
+        walls.push(begun.elapsed().as_secs_f64() / ITERATIONS as f64);
+    }
+    drop(plain);
+    let timed = gpu.timed()?;
+    let mut trainer = trainer(&timed, splats, width)?;
+    timed.timings()?;
+    let mut rounds: BTreeMap<&'static str, Vec<f64>> = BTreeMap::new();
+    for _ in 0..ROUNDS {
+        trainer.train(&mut |_| {})?;
+        for time in timed.timings()? {
+            let seconds = time.seconds / ITERATIONS as f64;
+            rounds.entry(time.kernel).or_default().push(seconds);
+        }
+    }
+    Ok(Cost {
+        splats,
+        width,
+        wall: median(walls),
+        kernels: rounds
+            .into_iter()
+            .map(|(kernel, times)| (kernel, median(times)))
+            .collect(),
+    })
+}
+
+/// Kernels down, sizes across, milliseconds of an iteration.
+fn table(costs: &[Cost]) -> String {
+    let mut text = String::from("| ms |");
+    // Writing to a string cannot fail.
+    for cost in costs {
+        let _ = write!(text, " {} at {} px |", cost.splats, cost.width);
+    }
+    text += "\n|---|";
+    text += &"--:|".repeat(costs.len());
+    let mut kernels: Vec<&str> = costs
+        .iter()
+        .flat_map(|cost| cost.kernels.keys().copied())
+        .collect();
+    kernels.sort_unstable();
+    kernels.dedup();
+    for kernel in kernels {
+        let _ = write!(text, "\n| `{kernel}` |");
+        for cost in costs {
+            let _ = write!(
+                text,
+                " {:.3} |",
+                1e3 * cost.kernels.get(kernel).unwrap_or(&0.0)
+            );
+        }
+    }
+    text += "\n| an iteration, as the host sees it |";
+    for cost in costs {
+        let _ = write!(text, " {:.2} |", 1e3 * cost.wall);
+    }
+    text
+}
+
+fn csv(costs: &[Cost]) -> String {
+    let mut text = String::from("splats,width,kernel,seconds\n");
+    for cost in costs {
+        let wall = std::iter::once((&"iteration", &cost.wall));
+        for (kernel, seconds) in cost.kernels.iter().chain(wall) {
+            let _ = writeln!(text, "{},{},{kernel},{seconds:.9}", cost.splats, cost.width);
+        }
+    }
+    text
+}
+
+fn main() -> ExitCode {
+    let (mut full, mut file) = (false, None);
+    let mut arguments = std::env::args().skip(1);
+    while let Some(argument) = arguments.next() {
+        match argument.as_str() {
+            // Cargo passes it.
+            "--bench" => {}
+            "--full" => full = true,
+            "--csv" => file = arguments.next().map(PathBuf::from),
+            other => {
+                eprintln!("error: unknown argument {other}: give --full or --csv FILE");
+                return ExitCode::from(2);
+            }
+        }
+    }
+    let (counts, widths): (&[usize], &[u32]) = if full {
+        (&[10_000, 100_000, 1_000_000], &[320, 1280, 3840])
+    } else {
+        (&[10_000, 100_000], &[320, 1280])
+    };
+    let gpu = match Gpu::open() {
+        Ok(gpu) => gpu,
+        Err(error) => {
+            eprintln!("error: {error}");
+            return ExitCode::FAILURE;
+        }
+    };
+    let mut costs = Vec::new();
+    for &count in counts {
+        for &width in widths {
+            match measure(&gpu, count, width) {
+                Ok(cost) => {
+                    eprintln!("{count} Gaussians at {width} px: {:.1} ms", 1e3 * cost.wall);
+                    costs.push(cost);
+                }
+                Err(error) => eprintln!("{count} Gaussians at {width} px: {error}"),
+            }
+        }
+    }
+    println!("{}\n\n{}", gpu.describe(), table(&costs));
+    if let Some(file) = file
+        && let Err(error) = std::fs::write(&file, csv(&costs))
+    {
+        eprintln!("error: {}: {error}", file.display());
+        return ExitCode::FAILURE;
+    }
+    ExitCode::SUCCESS
+}
