@@ -28,6 +28,9 @@ pub struct Fit {
     /// Never keep more Gaussians than this.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     max_splats: Option<u32>,
+    /// Take no more of the device's memory than this; fewer Gaussians if need be.
+    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u32).range(1..))]
+    memory_limit: Option<u32>,
     /// Degree of the luminance's dependence on the direction of view.
     #[arg(long, value_name = "0..3", value_parser = clap::value_parser!(u32).range(0..=3))]
     sh_degree: Option<u32>,
@@ -61,6 +64,7 @@ impl Fit {
             sh_degree: self.sh_degree,
             seed: self.seed,
             init: self.init,
+            memory_limit: self.memory_limit.map(|mib| u64::from(mib) << 20),
             holdout: !self.no_holdout,
             timings: self.timings,
         };

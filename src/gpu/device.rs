@@ -45,6 +45,34 @@ pub enum GpuError {
         /// Bytes that one binding may have.
         limit: u64,
     },
+    /// A set of Gaussians needs a buffer that the adapter cannot bind.
+    #[error(
+        "{splats} Gaussians: buffer `{label}` exceeds the {limit} bytes that the adapter binds; about {fits} would fit: \
+         set --max-splats {fits}, or lower --max-side"
+    )]
+    TooManySplats {
+        /// Gaussians.
+        splats: usize,
+        /// How many there is room for, roughly.
+        fits: usize,
+        /// What the buffer holds.
+        label: String,
+        /// Bytes that one binding may have.
+        limit: u64,
+    },
+    /// A training needs more than it was allowed.
+    #[error(
+        "{splats} Gaussians and their tile lists need {} MiB of the device but --memory-limit allows {}: \
+         raise it, or lower --max-splats or --max-side", needed.div_ceil(1 << 20), limit >> 20
+    )]
+    OverLimit {
+        /// Gaussians.
+        splats: usize,
+        /// Bytes wanted.
+        needed: u64,
+        /// Bytes allowed.
+        limit: u64,
+    },
     /// The device was lost or a read-back failed.
     #[error(
         "device {0}: read-back failed ({1}): the driver may have reset; run again with fewer splats or smaller images"

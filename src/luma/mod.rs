@@ -2,10 +2,12 @@
 
 pub mod densify;
 mod loss;
+mod memory;
 mod settings;
 mod trainer;
 mod workspace;
 
 pub use densify::DensifyParameters;
+pub use memory::Demand;
 pub use settings::{LumaSettings, Schedule};
 pub use trainer::{LumaProgress, LumaTrainer, TrainingView};

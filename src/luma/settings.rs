@@ -137,6 +137,8 @@ pub struct LumaSettings {
     pub prune_share: f64,
     /// Gaussians below this opacity are removed.
     pub prune_opacity: f64,
+    /// Bytes that the training may take on the device; no limit when `None`.
+    pub memory_limit: Option<u64>,
 }
 
 impl LumaSettings {
@@ -153,6 +155,7 @@ impl LumaSettings {
             growth: 0.3,
             prune_share: 0.1,
             prune_opacity: 0.005,
+            memory_limit: None,
         }
     }
 

@@ -13,6 +13,7 @@ use super::{
     LumaSettings,
     densify::{self, Evidence, Target},
     loss,
+    memory::{Demand, ENTRIES_PER_SPLAT},
     workspace::{Kernels, Workspace},
 };
 use crate::{
@@ -25,9 +26,6 @@ use crate::{
 
 /// Iterations between two looks at the device.
 pub(super) const SYNC_EVERY: usize = 25;
-
-/// Tile-list entries to begin with, for each Gaussian.
-const INSTANCES_PER_SPLAT: usize = 8;
 
 /// Room left above what an overflowing view needed.
 const HEADROOM: f64 = 1.25;
@@ -83,7 +81,9 @@ pub struct LumaTrainer {
     max_tiles: usize,
     geometry: Geometry,
     field: Field,
-    workspace: Workspace,
+    /// None only while a new one is made, which the old one would crowd out.
+    workspace: Option<Workspace>,
+    demand: Demand,
     /// Iteration at which the present workspace began to count steps.
     base: usize,
     /// Sums over the reports of what [`Self::load`] averages.
@@ -125,11 +125,13 @@ impl LumaTrainer {
             photos.push(Buffer::from_slice(&gpu, "photo", &loss::pack(&view.gray))?);
             cameras.push(view.camera);
         }
+        let demand = Demand::of(cameras.iter(), splats.sh.degree);
         let slopes = || Buffer::zeros(&gpu, "slopes", max_pixels);
         let slopes = [slopes()?, slopes()?, slopes()?];
         let geometry = Geometry::upload(&gpu, splats)?;
         let field = Field::upload(&gpu, &splats.sh)?;
-        let capacity = geometry.count * INSTANCES_PER_SPLAT;
+        let capacity = geometry.count * ENTRIES_PER_SPLAT;
+        check(&settings, &demand, geometry.count, capacity)?;
         let workspace = Workspace::new(
             &raster,
             &kernels,
@@ -155,7 +157,8 @@ impl LumaTrainer {
             max_tiles,
             geometry,
             field,
-            workspace,
+            workspace: Some(workspace),
+            demand,
             base: 0,
             seen: Load::default(),
             reports: 0,
@@ -181,8 +184,8 @@ impl LumaTrainer {
             }
             let order = Report {
                 iteration,
-                status: self.workspace.lists.status_later(&self.gpu),
-                losses: self.workspace.log.read_later(&self.gpu),
+                status: self.workspace().lists.status_later(&self.gpu),
+                losses: self.workspace().log.read_later(&self.gpu),
             };
             // Before the set changes, and at the end, nothing may be left open.
             let mut due: Vec<Report> = pending.take().into_iter().collect();
@@ -240,10 +243,14 @@ impl LumaTrainer {
         }
     }
 
+    fn workspace(&self) -> &Workspace {
+        self.workspace.as_ref().expect("one is always put back")
+    }
+
     /// Records and submits one iteration.
     fn step(&self, iteration: usize) {
         let index = view_at(self.settings.seed, self.cameras.len(), iteration);
-        let workspace = &self.workspace;
+        let workspace = self.workspace();
         let view = ViewUniform::new(
             &self.cameras[index],
             self.near,
@@ -326,7 +333,7 @@ impl LumaTrainer {
         self.seen.splats += self.geometry.count as f64;
         self.seen.visible += status.visible as f64;
         self.seen.instances += status.instances as f64;
-        self.seen.capacity += self.workspace.lists.capacity as f64;
+        self.seen.capacity += self.workspace().lists.capacity as f64;
         self.reports += 1;
         let since = (report.iteration - 1) / SYNC_EVERY * SYNC_EVERY;
         let recent = &losses[..report.iteration - since];
@@ -355,16 +362,16 @@ impl LumaTrainer {
             Ok(copies)
         };
         let moments = [
-            keep(&self.workspace.adam_geometry)?,
-            keep(&self.workspace.adam_field)?,
+            keep(&self.workspace().adam_geometry)?,
+            keep(&self.workspace().adam_field)?,
         ];
         // Statistics since the last densification and losses since the last report go on.
-        let statistics = self.workspace.statistics().clone();
-        let losses = self.workspace.log.losses.clone();
+        let statistics = self.workspace().statistics().clone();
+        let losses = self.workspace().log.losses.clone();
         self.renew(capacity, iteration, moments)?;
         let mut recorder = Recorder::new(&self.gpu);
-        recorder.copy(statistics.raw(), self.workspace.statistics().raw());
-        recorder.copy(losses.raw(), self.workspace.log.losses.raw());
+        recorder.copy(statistics.raw(), self.workspace().statistics().raw());
+        recorder.copy(losses.raw(), self.workspace().log.losses.raw());
         recorder.submit();
         Ok(())
     }
@@ -375,7 +382,11 @@ impl LumaTrainer {
         iteration: usize,
         moments: [[Buffer<f32>; 2]; 2],
     ) -> Result<(), GpuError> {
-        self.workspace = Workspace::new(
+        check(&self.settings, &self.demand, self.geometry.count, capacity)?;
+        self.workspace = None;
+        // Only now the device frees what it held.
+        self.gpu.wait()?;
+        let workspace = Workspace::new(
             &self.raster,
             &self.kernels,
             &self.geometry,
@@ -385,7 +396,8 @@ impl LumaTrainer {
             [self.max_pixels, self.max_tiles],
             capacity,
             Some(moments),
-        )?;
+        );
+        self.workspace = Some(workspace.map_err(|error| too_many(error, self.geometry.count))?);
         self.base = iteration;
         Ok(())
     }
@@ -395,7 +407,7 @@ impl LumaTrainer {
             &self.settings,
             &Evidence {
                 geometry: &self.geometry.planes.read(&self.gpu)?,
-                statistics: &self.workspace.statistics().read(&self.gpu)?,
+                statistics: &self.workspace().statistics().read(&self.gpu)?,
                 extent: self.extent,
                 prune_large: iteration > self.settings.schedule.reset_every,
             },
@@ -410,8 +422,11 @@ impl LumaTrainer {
                 .densify
                 .apply(&self.gpu, &plan, self.geometry.count, source, target)
         };
-        let moments = [&self.workspace.adam_geometry, &self.workspace.adam_field]
-            .map(|adam| [&adam.first, &adam.second].map(|moment| apply(moment, Target::Moments)));
+        let moments = [
+            &self.workspace().adam_geometry,
+            &self.workspace().adam_field,
+        ]
+        .map(|adam| [&adam.first, &adam.second].map(|moment| apply(moment, Target::Moments)));
         let planes = apply(&self.geometry.planes, Target::Geometry)?;
         let field = apply(&self.field.planes, Target::Field)?;
         let [[g1, g2], [f1, f2]] = moments;
@@ -422,10 +437,10 @@ impl LumaTrainer {
         };
         self.field.planes = field;
         let capacity = self
-            .workspace
+            .workspace()
             .lists
             .capacity
-            .max(self.geometry.count * INSTANCES_PER_SPLAT / 2);
+            .max(self.geometry.count * ENTRIES_PER_SPLAT / 2);
         self.renew(capacity, iteration, moments)
     }
 
@@ -441,11 +456,46 @@ impl LumaTrainer {
             .collect();
         self.geometry.planes.write_at(&self.gpu, first, &lowered);
         for moment in [
-            &self.workspace.adam_geometry.first,
-            &self.workspace.adam_geometry.second,
+            &self.workspace().adam_geometry.first,
+            &self.workspace().adam_geometry.second,
         ] {
             moment.write_at(&self.gpu, first, &vec![0.0; n]);
         }
         Ok(())
+    }
+}
+
+/// Whether a training may take what it is about to.
+fn check(
+    settings: &LumaSettings,
+    demand: &Demand,
+    splats: usize,
+    entries: usize,
+) -> Result<(), GpuError> {
+    let needed = demand.bytes(splats, entries);
+    match settings.memory_limit {
+        Some(limit) if needed > limit => Err(GpuError::OverLimit {
+            splats,
+            needed,
+            limit,
+        }),
+        _ => Ok(()),
+    }
+}
+
+/// Says how many Gaussians a binding would have had room for.
+fn too_many(error: GpuError, splats: usize) -> GpuError {
+    match error {
+        GpuError::TooLarge {
+            label,
+            needed,
+            limit,
+        } => GpuError::TooManySplats {
+            splats,
+            fits: (splats as f64 * limit as f64 / needed as f64) as usize,
+            label,
+            limit,
+        },
+        other => other,
     }
 }

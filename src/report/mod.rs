@@ -94,6 +94,10 @@ pub struct LumaReport {
     pub peak_host_memory: Option<u64>,
     /// Largest memory of the device's buffers in bytes, where the backend tells.
     pub peak_device_memory: Option<u64>,
+    /// Bytes that a training of as many Gaussians as there are at the end was expected
+    /// to take on the device at most.
+    #[serde(default)]
+    pub estimated_device_memory: u64,
     /// Mean over the held-out views, if any.
     pub held_out: Option<LumaQuality>,
     /// Each held-out view.

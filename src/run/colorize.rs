@@ -270,6 +270,7 @@ impl Source {
                 },
                 peak_host_memory: None,
                 peak_device_memory: None,
+                estimated_device_memory: 0,
                 held_out: None,
                 held_out_views: Vec::new(),
                 timings: None,

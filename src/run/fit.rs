@@ -13,8 +13,8 @@ use super::{
 };
 use crate::{
     color::gray_from_rgb,
-    gpu::Gpu,
-    luma::{LumaSettings, LumaTrainer, TrainingView},
+    gpu::{Gpu, GpuError},
+    luma::{Demand, LumaSettings, LumaTrainer, TrainingView},
     measure,
     raster::Raster,
     report::{
@@ -48,6 +48,8 @@ pub struct FitOptions {
     pub seed: u64,
     /// Gaussians to start from.
     pub init: Option<PathBuf>,
+    /// Bytes that training may take on the device.
+    pub memory_limit: Option<u64>,
     /// Whether every 8th view is held out.
     pub holdout: bool,
     /// Whether the report says where the device's time went.
@@ -68,12 +70,30 @@ pub fn fit(
     let amounts = preset.amounts();
     let max_side = options.max_side.or(amounts.max_side);
     let scene = Scene::load(&options.colmap_dir, max_side, options.holdout, observe)?;
-    let settings = LumaSettings {
+    let mut settings = LumaSettings {
+        memory_limit: options.memory_limit,
         sh_degree: options.sh_degree.unwrap_or(amounts.sh_degree),
         max_splats: options.max_splats.unwrap_or(amounts.max_splats),
         seed: options.seed,
         ..LumaSettings::new(options.iterations.unwrap_or(amounts.iterations))
     };
+    let cameras = scene.split.train.iter().map(|&i| &scene.photos[i].1);
+    let demand = Demand::of(cameras, settings.sh_degree);
+    let fits = demand.largest_set(options.memory_limit, gpu.binding_limit());
+    if fits == 0 {
+        return Err(RunError::Gpu(GpuError::OverLimit {
+            splats: 1,
+            needed: demand.peak_bytes(1),
+            limit: options.memory_limit.unwrap_or(gpu.binding_limit()),
+        }));
+    }
+    if fits < settings.max_splats {
+        observe(Event::Note(match options.memory_limit {
+            Some(limit) => format!("at most {fits} Gaussians fit into {} MiB", limit >> 20),
+            None => format!("at most {fits} Gaussians fit into the adapter's bindings"),
+        }));
+        settings.max_splats = fits;
+    }
     let start = first_splats(options, &scene, &settings, observe)?;
     let folder = match &options.output {
         Some(path) => RunFolder::at(path),
@@ -152,6 +172,7 @@ pub fn fit(
             },
             peak_host_memory: files::peak_host_memory(),
             peak_device_memory,
+            estimated_device_memory: demand.peak_bytes(splats.len()),
             held_out: mean_quality(&held_out_views),
             held_out_views,
             timings,

@@ -53,6 +53,24 @@ fn json_is_the_report() {
 }
 
 #[test]
+fn a_memory_limit_lowers_the_cap() {
+    let place = place_with_scene();
+    let done = place.run(&[&QUICK_FIT[..], &["--memory-limit", "1"]].concat());
+    assert_eq!(done.code, Some(0), "{}", done.stderr);
+    assert!(
+        done.stderr.contains("Gaussians fit into 1 MiB"),
+        "{}",
+        done.stderr
+    );
+    let luma = &place.report("runs/scene")["luma"];
+    assert!(
+        luma["estimated_device_memory"].as_u64() <= Some(1 << 20),
+        "{luma}"
+    );
+    assert!(luma["max_splats"].as_u64() < Some(12_000), "{luma}");
+}
+
+#[test]
 fn timings_name_every_kernel() {
     let place = place_with_scene();
     let words = place.succeed(&[&QUICK_FIT[..], &["--timings"]].concat());

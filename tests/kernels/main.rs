@@ -18,6 +18,7 @@ mod gradient;
 mod harness;
 mod layout;
 mod losses;
+mod memory;
 mod poison;
 mod renderer;
 mod repeat;

@@ -1,0 +1,123 @@
+//! How much room a training takes on the device, known before any is taken.
+
+use crate::{
+    capture::Camera,
+    raster::{ViewUniform, constants::*},
+    splats::sh,
+};
+
+/// Bytes of a word.
+const WORD: u64 = 4;
+
+/// Tile-list entries that a set is expected to need for each Gaussian, at least.
+pub(super) const ENTRIES_PER_SPLAT: usize = 8;
+
+/// Words that a Gaussian takes besides its parameters: projection 8, four flags and
+/// ranks, keys and places of the depth sort 4, its histogram, colour, gradient on the
+/// image plane 8, statistics.
+const SCRATCH_WORDS: f64 = 8.0 + 4.0 + 4.0 + 0.125 + 1.0 + 8.0 + STATISTICS_PLANES as f64;
+
+/// Words of a tile-list entry: keys and places of the tile sort 4, its histogram, the
+/// Gaussian's index, the gradient's eight figures.
+const ENTRY_WORDS: f64 = 4.0 + 0.125 + 1.0 + 8.0;
+
+/// Words of a pixel: picture, last entry, gradient, three slopes of SSIM.
+const PIXEL_WORDS: u64 = 6;
+
+/// What does not depend on the number of Gaussians.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Demand {
+    /// Pixels of the largest photo.
+    pub max_pixels: u64,
+    /// Bytes of all photos as they lie on the device.
+    pub photos: u64,
+    /// Degree of the luma harmonics.
+    pub sh_degree: u32,
+}
+
+impl Demand {
+    /// What photos by these cameras ask for.
+    pub fn of<'a>(cameras: impl Iterator<Item = &'a Camera>, sh_degree: u32) -> Self {
+        let mut demand = Self {
+            max_pixels: 0,
+            photos: 0,
+            sh_degree,
+        };
+        for camera in cameras {
+            let pixels = ViewUniform::new(camera, 1.0, 0, 0).pixel_count() as u64;
+            demand.max_pixels = demand.max_pixels.max(pixels);
+            demand.photos += pixels.next_multiple_of(WORD);
+        }
+        demand
+    }
+
+    fn parameters(&self) -> f64 {
+        (GEOMETRY_PLANES + sh::coefficient_count(self.sh_degree)) as f64
+    }
+
+    /// Bytes for each Gaussian, tile lists not counted: its parameters four times
+    /// (values, gradient, both moments of Adam) and what a view leaves.
+    pub fn bytes_per_splat(&self) -> f64 {
+        WORD as f64 * (4.0 * self.parameters() + SCRATCH_WORDS)
+    }
+
+    /// Bytes while `splats` Gaussians with `entries` tile-list entries are trained.
+    pub fn bytes(&self, splats: usize, entries: usize) -> u64 {
+        let words = ENTRY_WORDS * entries as f64;
+        let moving = self.bytes_per_splat() * splats as f64 + WORD as f64 * words;
+        moving as u64 + WORD * PIXEL_WORDS * self.max_pixels + self.photos
+    }
+
+    /// Bytes at most: while the set changes, parameters and moments exist twice.
+    pub fn peak_bytes(&self, splats: usize) -> u64 {
+        let twice = WORD as f64 * 3.0 * self.parameters() * splats as f64;
+        self.bytes(splats, ENTRIES_PER_SPLAT * splats) + twice as u64
+    }
+
+    /// The largest number of Gaussians whose [`Self::peak_bytes`] are within `limit`
+    /// bytes and whose buffers are within `binding_limit` bytes each; 0 when not even
+    /// the pictures are.
+    pub fn largest_set(&self, limit: Option<u64>, binding_limit: u64) -> usize {
+        let harmonics = sh::coefficient_count(self.sh_degree);
+        let widest = GEOMETRY_PLANES.max(harmonics) as u64 * WORD;
+        let by_binding = (binding_limit / widest) as usize;
+        let Some(limit) = limit else {
+            return by_binding;
+        };
+        let fixed = self.bytes(0, 0);
+        let each = self.peak_bytes(1_000_000).saturating_sub(fixed) as f64 / 1e6;
+        by_binding.min((limit.saturating_sub(fixed) as f64 / each) as usize)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DEMAND: Demand = Demand {
+        max_pixels: 57_600,
+        photos: 576_000,
+        sh_degree: 0,
+    };
+
+    #[test]
+    fn the_largest_set_is_within_the_limit_and_the_next_is_not() {
+        for limit in [8 << 20, 100 << 20, 4_u64 << 30] {
+            let fits = DEMAND.largest_set(Some(limit), u64::MAX);
+            assert!(DEMAND.peak_bytes(fits) <= limit);
+            assert!(DEMAND.peak_bytes(fits + 2) > limit, "{fits}");
+        }
+        assert_eq!(DEMAND.largest_set(Some(1000), u64::MAX), 0);
+    }
+
+    #[test]
+    fn bindings_bound_a_set_without_a_limit() {
+        // Eleven planes of words; sixteen at degree 3.
+        assert_eq!(DEMAND.largest_set(None, 128 << 20), (128 << 20) / 44);
+        let demand = Demand {
+            sh_degree: 3,
+            ..DEMAND
+        };
+        assert_eq!(demand.largest_set(None, 128 << 20), (128 << 20) / 64);
+    }
+}

@@ -1,0 +1,77 @@
+//! What a training takes on the device is what was said before.
+
+use std::sync::Arc;
+
+use gs_chroma::{
+    gpu::{Gpu, GpuError},
+    luma::{Demand, LumaSettings, LumaTrainer, TrainingView},
+    raster::Raster,
+    splats::{Splats, init::initial_splats},
+};
+
+use crate::{
+    harness::camera,
+    oracle::random::{Random, oblique_view},
+};
+
+const COUNT: usize = 100_000;
+
+fn start(sh_degree: u32) -> Splats {
+    let mut random = Random::new(4);
+    let points: Vec<_> = (0..COUNT)
+        .map(|_| (random.array(-1.0, 1.0).map(|v| v as f32), 0.5))
+        .collect();
+    initial_splats(&points, 1.0, sh_degree)
+}
+
+fn trainer(gpu: &Gpu, start: &Splats, limit: Option<u64>) -> Result<LumaTrainer, GpuError> {
+    let camera = camera(&oblique_view());
+    let gray = vec![128; (camera.width * camera.height) as usize];
+    let settings = LumaSettings {
+        memory_limit: limit,
+        ..LumaSettings::new(10)
+    };
+    let raster = Arc::new(Raster::new(gpu));
+    LumaTrainer::new(
+        raster,
+        settings,
+        1.0,
+        start,
+        vec![TrainingView { camera, gray }],
+    )
+}
+
+#[test]
+fn a_training_takes_what_was_estimated() {
+    for sh_degree in [0, 3] {
+        // A device of its own: other tests allocate on the shared one.
+        let gpu = Gpu::open().unwrap();
+        let start = start(sh_degree);
+        let before = gpu.allocated_bytes().unwrap();
+        let _trainer = trainer(&gpu, &start, None).unwrap();
+        // What uploads pass through is free again once they are done.
+        gpu.queue().submit([]);
+        gpu.wait().unwrap();
+        let taken = (gpu.allocated_bytes().unwrap() - before) as f64;
+        let demand = Demand::of([camera(&oblique_view())].iter(), sh_degree);
+        let expected = demand.bytes(COUNT, 8 * COUNT) as f64;
+        let ratio = taken / expected;
+        assert!((0.98..1.02).contains(&ratio), "degree {sh_degree}: {ratio}");
+    }
+}
+
+#[test]
+fn what_is_beyond_the_limit_is_refused_before_it_is_taken() {
+    let gpu = Gpu::open().unwrap();
+    let start = start(0);
+    let before = gpu.allocated_bytes().unwrap();
+    let refused = trainer(&gpu, &start, Some(30 << 20)).err().unwrap();
+    let GpuError::OverLimit { splats, needed, .. } = refused else {
+        panic!("{refused}");
+    };
+    assert_eq!(splats, COUNT);
+    assert!(needed > 30 << 20);
+    // Parameters and pictures come first; the rest is never asked for.
+    gpu.wait().unwrap();
+    assert!(gpu.allocated_bytes().unwrap() - before < 10 << 20);
+}
