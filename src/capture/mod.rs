@@ -20,6 +20,7 @@ use glam::{DMat3, DQuat, DVec3};
 pub use camera::Camera;
 pub use error::{CaptureError, Position};
 pub use photo::Photo;
+pub use resample::downscale;
 pub use split::{Split, split};
 
 /// A quaternion's length may be off by so much: text files round its digits.

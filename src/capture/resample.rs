@@ -7,7 +7,7 @@
 /// The mean is taken over encoded values, not in linear light, as OpenCV and
 /// PIL do it and hence as the pictures of published results were made.
 /// `from` and `to` are width and height; `to` must not exceed `from`.
-pub(super) fn downscale<const N: usize>(
+pub fn downscale<const N: usize>(
     picture: &[[u8; N]],
     from: [usize; 2],
     to: [usize; 2],

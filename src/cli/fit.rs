@@ -28,6 +28,9 @@ pub struct Fit {
     /// Never keep more Gaussians than this.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     max_splats: Option<u32>,
+    /// Share of the iterations, from the first on, that see photos at half their size.
+    #[arg(long, value_name = "0..1", default_value_t = 0.0, value_parser = share)]
+    coarse: f64,
     /// Take no more of the device's memory than this; fewer Gaussians if need be.
     #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u32).range(1..))]
     memory_limit: Option<u32>,
@@ -64,6 +67,7 @@ impl Fit {
             sh_degree: self.sh_degree,
             seed: self.seed,
             init: self.init,
+            coarse: self.coarse,
             memory_limit: self.memory_limit.map(|mib| u64::from(mib) << 20),
             holdout: !self.no_holdout,
             timings: self.timings,
@@ -80,5 +84,12 @@ impl Fit {
             }
         }
         Ok(())
+    }
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(share) if (0.0..=1.0).contains(&share) => Ok(share),
+        _ => Err("not a number from 0 to 1".to_owned()),
     }
 }

@@ -64,6 +64,8 @@ pub struct Schedule {
     pub raise_degree_every: usize,
     /// From here on all learning rates fall, to [`SETTLED`] at the end.
     pub settle_from: usize,
+    /// Until here photos are seen at half their size: a quarter of the pixels.
+    pub coarse_until: usize,
 }
 
 impl Schedule {
@@ -100,6 +102,7 @@ impl Schedule {
             } else {
                 iterations
             },
+            coarse_until: 0,
         }
     }
 }
@@ -216,6 +219,7 @@ mod tests {
                 reset_every: 3_000,
                 raise_degree_every: 1_000,
                 settle_from: 15_000,
+                coarse_until: 0,
             }
         );
         let settings = LumaSettings::new(PAPER_ITERATIONS);

@@ -17,7 +17,7 @@ use super::{
     workspace::{Kernels, Workspace},
 };
 use crate::{
-    capture::Camera,
+    capture::{Camera, downscale},
     gpu::{Buffer, Gpu, GpuError, Readback, Recorder},
     optimize::{Adam, Load, view_at},
     raster::{Field, Geometry, Raster, StatusReadback, ViewUniform, constants::*, download},
@@ -34,11 +34,26 @@ const HEADROOM: f64 = 1.25;
 const RESET_OPACITY: f32 = 0.01;
 
 /// One photograph to train on.
+#[derive(Clone, Debug)]
 pub struct TrainingView {
     /// Where it was taken.
     pub camera: Camera,
     /// sRGB-encoded gray, `[height, width]`.
     pub gray: Vec<u8>,
+}
+
+impl TrainingView {
+    /// The same at half the size, each side rounded up.
+    pub fn halved(&self) -> Self {
+        let sides = [self.camera.width, self.camera.height];
+        let half = sides.map(|side| side.div_ceil(2));
+        let as_size = |sides: [u32; 2]| sides.map(|side| side as usize);
+        let pixels: Vec<[u8; 1]> = self.gray.iter().map(|&v| [v]).collect();
+        Self {
+            camera: self.camera.resized(half[0], half[1]),
+            gray: downscale(&pixels, as_size(sides), as_size(half)).into_flattened(),
+        }
+    }
 }
 
 /// How far a training is.
@@ -74,8 +89,12 @@ pub struct LumaTrainer {
     settings: LumaSettings,
     extent: f64,
     near: f64,
+    /// Of each view; behind them, where training begins coarse, at half the size.
     cameras: Vec<Camera>,
+    /// In the same order.
     photos: Vec<Buffer<u32>>,
+    /// Views.
+    views: usize,
     slopes: [Buffer<f32>; 3],
     max_pixels: usize,
     max_tiles: usize,
@@ -113,7 +132,12 @@ impl LumaTrainer {
         let near = NEAR_SHARE * extent;
         let (mut max_pixels, mut max_tiles) = (0, 0);
         let (mut cameras, mut photos) = (Vec::new(), Vec::new());
-        for view in views {
+        let count = views.len();
+        let coarse: Vec<TrainingView> = match settings.schedule.coarse_until {
+            0 => Vec::new(),
+            _ => views.iter().map(TrainingView::halved).collect(),
+        };
+        for view in views.into_iter().chain(coarse) {
             let uniform = ViewUniform::new(&view.camera, near, 0, 0);
             assert_eq!(
                 view.gray.len(),
@@ -152,6 +176,7 @@ impl LumaTrainer {
             near,
             cameras,
             photos,
+            views: count,
             slopes,
             max_pixels,
             max_tiles,
@@ -249,7 +274,10 @@ impl LumaTrainer {
 
     /// Records and submits one iteration.
     fn step(&self, iteration: usize) {
-        let index = view_at(self.settings.seed, self.cameras.len(), iteration);
+        let mut index = view_at(self.settings.seed, self.views, iteration);
+        if iteration < self.settings.schedule.coarse_until {
+            index += self.views;
+        }
         let workspace = self.workspace();
         let view = ViewUniform::new(
             &self.cameras[index],

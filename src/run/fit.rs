@@ -48,6 +48,8 @@ pub struct FitOptions {
     pub seed: u64,
     /// Gaussians to start from.
     pub init: Option<PathBuf>,
+    /// Share of the iterations, from the first on, that see photos at half their size.
+    pub coarse: f64,
     /// Bytes that training may take on the device.
     pub memory_limit: Option<u64>,
     /// Whether every 8th view is held out.
@@ -77,6 +79,8 @@ pub fn fit(
         seed: options.seed,
         ..LumaSettings::new(options.iterations.unwrap_or(amounts.iterations))
     };
+    settings.schedule.coarse_until =
+        (options.coarse * settings.schedule.iterations as f64) as usize;
     let cameras = scene.split.train.iter().map(|&i| &scene.photos[i].1);
     let demand = Demand::of(cameras, settings.sh_degree);
     let fits = demand.largest_set(options.memory_limit, gpu.binding_limit());

@@ -1,13 +1,22 @@
 //! What several commands need of a capture: its photos at working size, a
 //! renderer for its splats.
 
-use std::{path::Path, sync::Arc};
+use std::{
+    num::NonZero,
+    path::Path,
+    sync::{
+        Arc,
+        atomic::{AtomicUsize, Ordering},
+        mpsc,
+    },
+    thread,
+};
 
 use glam::DVec3;
 
 use super::{Event, Observer, RunError, Stage};
 use crate::{
-    capture::{Camera, Capture, Photo, Split, split},
+    capture::{Camera, Capture, CaptureError, Photo, Split, View, split},
     gpu::GpuError,
     raster::{Field, Geometry, Raster, Renderer, constants::NEAR_SHARE},
     splats::{ShField, Splats, ply},
@@ -38,16 +47,7 @@ impl Scene {
             )));
         }
         let total = capture.views.len();
-        let mut photos = Vec::with_capacity(total);
-        for (done, view) in capture.views.iter().enumerate() {
-            observe(Event::Progress {
-                stage: Stage::Photos,
-                done,
-                total,
-                message: view.name.clone(),
-            });
-            photos.push(Photo::load(view, max_side)?);
-        }
+        let photos = decode(&capture.views, max_side, observe)?;
         Ok(Self {
             split: split(total, holdout),
             extent: capture.extent(),
@@ -80,6 +80,58 @@ impl Scene {
         let geometry = Geometry::upload(gpu, splats)?;
         Renderer::new(raster.clone(), geometry, fields, NEAR_SHARE * self.extent)
     }
+}
+
+/// Decodes the photos of all views, as many at a time as there are processors. Of
+/// several that cannot be, the first is named, as if they were read in order.
+fn decode(
+    views: &[View],
+    max_side: Option<u32>,
+    observe: &mut Observer<'_>,
+) -> Result<Vec<(Photo, Camera)>, CaptureError> {
+    let workers = thread::available_parallelism().map_or(1, NonZero::get);
+    let next = AtomicUsize::new(0);
+    let (sender, decoded) = mpsc::channel();
+    thread::scope(|scope| {
+        for _ in 0..workers.min(views.len()) {
+            let (sender, next) = (sender.clone(), &next);
+            scope.spawn(move || {
+                loop {
+                    let index = next.fetch_add(1, Ordering::Relaxed);
+                    let Some(view) = views.get(index) else {
+                        break;
+                    };
+                    // The receiver stays until every sender is gone.
+                    let _ = sender.send((index, Photo::load(view, max_side)));
+                }
+            });
+        }
+        drop(sender);
+        let mut photos: Vec<_> = views.iter().map(|_| None).collect();
+        let mut failure: Option<(usize, CaptureError)> = None;
+        for (done, (index, result)) in decoded.iter().enumerate() {
+            observe(Event::Progress {
+                stage: Stage::Photos,
+                done,
+                total: views.len(),
+                message: views[index].name.clone(),
+            });
+            match result {
+                Ok(photo) => photos[index] = Some(photo),
+                Err(error) => {
+                    // Whatever comes before this one is being decoded already.
+                    next.store(views.len(), Ordering::Relaxed);
+                    if failure.as_ref().is_none_or(|(first, _)| index < *first) {
+                        failure = Some((index, error));
+                    }
+                }
+            }
+        }
+        match failure {
+            Some((_, error)) => Err(error),
+            None => Ok(photos.into_iter().flatten().collect()),
+        }
+    })
 }
 
 /// Reads a splat file that has at least one Gaussian and subtracts `offset`, in
