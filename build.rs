@@ -13,6 +13,7 @@ const PLAIN: &[&str] = &[
     "densify",
     "luma_loss",
     "project",
+    "relocation",
     "scan",
     "sort",
     "sum_loss",

@@ -2,9 +2,10 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 
 use super::{print, progress::Progress};
+use crate::luma::Densification;
 use crate::report::timings_table;
 use crate::run::{FitOptions, Preset, RunError, fit};
 
@@ -28,6 +29,9 @@ pub struct Fit {
     /// Never keep more Gaussians than this.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     max_splats: Option<u32>,
+    /// How Gaussians come and go: split where the loss pulls, or put faint ones where others are.
+    #[arg(long, value_enum, default_value_t = Densify::Split)]
+    densify: Densify,
     /// Share of the iterations, from the first on, that see photos at half their size.
     #[arg(long, value_name = "0..1", default_value_t = 0.0, value_parser = share)]
     coarse: f64,
@@ -67,6 +71,10 @@ impl Fit {
             sh_degree: self.sh_degree,
             seed: self.seed,
             init: self.init,
+            densification: match self.densify {
+                Densify::Split => Densification::Split,
+                Densify::Relocate => Densification::Relocate,
+            },
             coarse: self.coarse,
             memory_limit: self.memory_limit.map(|mib| u64::from(mib) << 20),
             holdout: !self.no_holdout,
@@ -85,6 +93,15 @@ impl Fit {
         }
         Ok(())
     }
+}
+
+/// Ways in which Gaussians come and go.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Densify {
+    /// 3D Gaussian Splatting's way.
+    Split,
+    /// The way of 3DGS as Markov chain Monte Carlo.
+    Relocate,
 }
 
 fn share(text: &str) -> Result<f64, String> {

@@ -24,6 +24,8 @@ shaders! {
     PROJECT = "project";
     /// Adjoint of the projection.
     PROJECT_BACKWARD = "project_backward";
+    /// What densification by relocation adds to a step.
+    RELOCATION = "relocation";
     /// Prefix sum.
     SCAN = "scan";
     /// Radix sort.

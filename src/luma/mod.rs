@@ -3,11 +3,12 @@
 pub mod densify;
 mod loss;
 mod memory;
+pub mod relocation;
 mod settings;
 mod trainer;
 mod workspace;
 
 pub use densify::DensifyParameters;
 pub use memory::Demand;
-pub use settings::{LumaSettings, Schedule};
+pub use settings::{Densification, LumaSettings, Schedule};
 pub use trainer::{LumaProgress, LumaTrainer, TrainingView};

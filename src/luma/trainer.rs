@@ -10,10 +10,11 @@
 use std::{sync::Arc, time::Instant};
 
 use super::{
-    LumaSettings,
+    Densification, LumaSettings,
     densify::{self, Evidence, Target},
     loss,
     memory::{Demand, ENTRIES_PER_SPLAT},
+    relocation::{self, RelocationParameters},
     workspace::{Kernels, Workspace},
 };
 use crate::{
@@ -159,6 +160,7 @@ impl LumaTrainer {
         let workspace = Workspace::new(
             &raster,
             &kernels,
+            &settings,
             &geometry,
             &field,
             &photos,
@@ -300,6 +302,21 @@ impl LumaTrainer {
             iteration,
         );
         workspace.adjoint.record(&self.raster, &mut recorder);
+        if let Some(relocation) = &workspace.relocation {
+            let rate = self.settings.settling(iteration)
+                * self.settings.means_rate(iteration, self.extent);
+            relocation.set(
+                &self.gpu,
+                &RelocationParameters::new(
+                    self.geometry.count,
+                    self.settings.seed,
+                    iteration,
+                    rate,
+                    self.extent,
+                ),
+            );
+            relocation.record_pull(&self.kernels.relocation, &mut recorder);
+        }
         let step = u32::try_from(iteration + 1).unwrap_or(u32::MAX);
         let adam = &self.kernels.adam;
         workspace.adam_geometry.record(
@@ -316,6 +333,9 @@ impl LumaTrainer {
             step,
             &self.field_rates(iteration),
         );
+        if let Some(relocation) = &workspace.relocation {
+            relocation.record_noise(&self.kernels.relocation, &mut recorder);
+        }
         recorder.submit();
     }
 
@@ -417,6 +437,7 @@ impl LumaTrainer {
         let workspace = Workspace::new(
             &self.raster,
             &self.kernels,
+            &self.settings,
             &self.geometry,
             &self.field,
             &self.photos,
@@ -431,15 +452,16 @@ impl LumaTrainer {
     }
 
     fn densify(&mut self, iteration: usize) -> Result<(), GpuError> {
-        let plan = densify::plan(
-            &self.settings,
-            &Evidence {
-                geometry: &self.geometry.planes.read(&self.gpu)?,
-                statistics: &self.workspace().statistics().read(&self.gpu)?,
-                extent: self.extent,
-                prune_large: iteration > self.settings.schedule.reset_every,
-            },
-        );
+        let evidence = Evidence {
+            geometry: &self.geometry.planes.read(&self.gpu)?,
+            statistics: &self.workspace().statistics().read(&self.gpu)?,
+            extent: self.extent,
+            prune_large: iteration > self.settings.schedule.reset_every,
+        };
+        let plan = match self.settings.densification {
+            Densification::Split => densify::plan(&self.settings, &evidence),
+            Densification::Relocate => relocation::plan(&self.settings, &evidence, iteration),
+        };
         if plan.is_empty() {
             // Nothing would be left: keep what there is and go on.
             return Ok(());

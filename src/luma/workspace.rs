@@ -2,8 +2,11 @@
 //! the room of the tile lists.
 
 use super::{
+    LumaSettings,
     densify::DensifyKernels,
     loss::{Loss, LossKernels},
+    relocation::{Relocation, RelocationKernels},
+    settings::Densification,
     trainer::SYNC_EVERY,
 };
 use crate::{
@@ -18,6 +21,7 @@ pub struct Kernels {
     pub sum_loss: SumLossKernel,
     pub loss: LossKernels,
     pub densify: DensifyKernels,
+    pub relocation: RelocationKernels,
 }
 
 impl Kernels {
@@ -28,6 +32,7 @@ impl Kernels {
             sum_loss: SumLossKernel::new(gpu),
             loss: LossKernels::new(gpu),
             densify: DensifyKernels::new(gpu),
+            relocation: RelocationKernels::new(gpu),
         }
     }
 }
@@ -41,6 +46,8 @@ pub struct Workspace {
     pub adam_field: Adam,
     pub log: LossLog,
     pub losses: Vec<Loss>,
+    /// When the set changes by relocation.
+    pub relocation: Option<Relocation>,
 }
 
 impl Workspace {
@@ -56,6 +63,7 @@ impl Workspace {
     pub fn new(
         raster: &Raster,
         kernels: &Kernels,
+        settings: &LumaSettings,
         geometry: &Geometry,
         field: &Field,
         photos: &[Buffer<u32>],
@@ -100,16 +108,15 @@ impl Workspace {
                 moments,
             )
         };
-        let adam_geometry = adam(
-            &adjoint
-                .geometry
-                .as_ref()
-                .expect("luma trains geometry")
-                .gradient,
-            &geometry.planes,
-            of_geometry,
-        )?;
+        let adam_geometry = adam(geometry_gradient(&adjoint), &geometry.planes, of_geometry)?;
         let adam_field = adam(&adjoint.field_gradient, &field.planes, of_field)?;
+        let relocation = (settings.densification == Densification::Relocate)
+            .then(|| {
+                let kernels = &kernels.relocation;
+                let gradient = geometry_gradient(&adjoint);
+                Relocation::new(gpu, kernels, &lists.status, &geometry.planes, gradient)
+            })
+            .transpose()?;
         Ok(Self {
             lists,
             layer,
@@ -118,6 +125,7 @@ impl Workspace {
             adam_field,
             log,
             losses,
+            relocation,
         })
     }
 
@@ -130,4 +138,9 @@ impl Workspace {
             .expect("luma trains geometry")
             .statistics
     }
+}
+
+fn geometry_gradient(adjoint: &LayerAdjoint) -> &Buffer<f32> {
+    let geometry = adjoint.geometry.as_ref();
+    &geometry.expect("luma trains geometry").gradient
 }

@@ -1,7 +1,7 @@
 //! The oracle: every kernel once more, in `f64` and plain loops.
 //!
 //! One file a kernel, under the kernel's own name: [`project`], [`shade`],
-//! [`tiles`], [`blend`], [`luma_loss`], [`chroma_loss`], [`adam`]. [`render`]
+//! [`tiles`], [`blend`], [`luma_loss`], [`chroma_loss`], [`adam`], [`relocation`]. [`render`]
 //! chains the first four without tiles; [`gradient`] differentiates the chain
 //! with dual numbers, so no derivative in here was worked out by hand.
 //!
@@ -22,6 +22,7 @@ pub mod project;
 #[cfg(test)]
 mod project_tests;
 pub mod random;
+pub mod relocation;
 pub mod render;
 pub mod scene;
 pub mod shade;

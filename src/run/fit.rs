@@ -14,7 +14,7 @@ use super::{
 use crate::{
     color::gray_from_rgb,
     gpu::{Gpu, GpuError},
-    luma::{Demand, LumaSettings, LumaTrainer, TrainingView},
+    luma::{Demand, Densification, LumaSettings, LumaTrainer, TrainingView},
     measure,
     raster::Raster,
     report::{
@@ -48,6 +48,8 @@ pub struct FitOptions {
     pub seed: u64,
     /// Gaussians to start from.
     pub init: Option<PathBuf>,
+    /// How the set of Gaussians changes.
+    pub densification: Densification,
     /// Share of the iterations, from the first on, that see photos at half their size.
     pub coarse: f64,
     /// Bytes that training may take on the device.
@@ -79,6 +81,9 @@ pub fn fit(
         seed: options.seed,
         ..LumaSettings::new(options.iterations.unwrap_or(amounts.iterations))
     };
+    if options.densification == Densification::Relocate {
+        settings = settings.relocating();
+    }
     settings.schedule.coarse_until =
         (options.coarse * settings.schedule.iterations as f64) as usize;
     let cameras = scene.split.train.iter().map(|&i| &scene.photos[i].1);

@@ -43,6 +43,25 @@ fn densified_runs_repeat_too() {
     assert_ne!(points, splats, "the set of Gaussians changes");
 }
 
+/// Relocation draws lots and adds noise; the first sixty iterations are coarse.
+#[test]
+fn relocated_and_coarse_runs_repeat_too() {
+    let place = place_with_scene();
+    let cap = [
+        "--densify",
+        "relocate",
+        "--coarse",
+        "0.25",
+        "--max-splats",
+        "320",
+    ];
+    let fit = ["scene", "--iterations", "240"];
+    assert_repeats(&place, &[&fit[..], &cap].concat(), "245");
+    let luma = &place.report("first")["luma"];
+    assert!(luma["splats"].as_u64() <= Some(320), "{luma}");
+    assert_ne!(luma["splats"], place.report("first")["capture"]["points"]);
+}
+
 #[test]
 fn colouring_again_gives_the_same_bytes() {
     let place = place_with_run();

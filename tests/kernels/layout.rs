@@ -5,7 +5,10 @@ use std::{collections::BTreeMap, mem::offset_of};
 use gs_chroma::{
     chroma::ChromaLossWeights,
     gpu::shaders,
-    luma::densify::{DensifyParameters, Descent},
+    luma::{
+        densify::{DensifyParameters, Descent},
+        relocation::RelocationParameters,
+    },
     optimize::{AdamParameters, SumLossParameters},
     raster::{
         Projected, TileListsMode, ViewUniform, constants, scan::ScanParameters,
@@ -104,6 +107,15 @@ fn twins() -> Vec<Twin> {
                 correction1,
                 correction2,
                 learning_rates
+            }
+        ),
+        twin!(
+            "RelocationParameters" = RelocationParameters {
+                splat_count,
+                seed,
+                opacity_weight,
+                scale_weight,
+                noise
             }
         ),
         twin!(

@@ -186,6 +186,22 @@ const REASONS: &[(&str, &str, &str)] = &[
         "(splat.mean - splat.extent) / side",
         "a constant divisor",
     ),
+    ("normal3", "log", "of a number above 0"),
+    (
+        "normal3",
+        "sqrt",
+        "the logarithm of at most 1 is not positive",
+    ),
+    (
+        "relocation_noise",
+        "inverseSqrt",
+        "of at least QUAT_NORM_MIN_SQ",
+    ),
+    (
+        "uniform_above_zero",
+        "(f32(bits >> 8u) + 1.0) / 16777216.0",
+        "a constant divisor",
+    ),
     (
         "upsampled",
         "vec2f(at % (2u * view.size)) / vec2f(2u * view.size)",

@@ -7,6 +7,7 @@ mod densify;
 mod gradient;
 mod losses;
 mod project;
+mod relocation;
 mod scan;
 mod sort;
 
@@ -23,7 +24,7 @@ use crate::{gpu::GpuError, raster::Raster};
 type Measure = fn(&Arc<Raster>) -> Result<Vec<Row>, GpuError>;
 
 /// The topics in the order in which an iteration meets them.
-pub const TOPICS: [(&str, Measure); 8] = [
+pub const TOPICS: [(&str, Measure); 9] = [
     ("project", project::rows),
     ("scan", scan::rows),
     ("sort", sort::rows),
@@ -32,4 +33,5 @@ pub const TOPICS: [(&str, Measure); 8] = [
     ("adjoint", gradient::rows),
     ("adam", adam::rows),
     ("densify", densify::rows),
+    ("relocation", relocation::rows),
 ];

@@ -1,0 +1,65 @@
+"""The gray photos that all programs get."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+from PIL import Image
+
+from bench_peers.colmap import Camera, Model, Shot, read_model
+from bench_peers.command import Problem
+from lab import RGB_TO_XYZ, decode, encode
+
+# Every how many photos by name one is held out: gs-chroma's habit, which `render --views test` follows.
+HOLDOUT_STEP = 8
+
+# A photo's aspect may differ from its camera's by so much, as in gs-chroma.
+ASPECT_SLACK = 0.01
+
+
+def to_gray(rgb: ArrayLike) -> np.ndarray:
+    """8-bit gray with the L* of 8-bit colours, as the program makes it: equal L* is equal luminance."""
+    return np.rint(255 * encode(decode(np.asarray(rgb) / 255) @ RGB_TO_XYZ[1])).astype(np.uint8)
+
+
+def copy_gray(colmap: Path, gray: Path, side: int) -> list[str]:
+    """Writes the COLMAP folders `all` and `train` below `gray`; gives the held-out photos' names.
+
+    Photos are scaled to the size of their camera, and the camera before that to the longer side:
+    a program that takes the camera's size for the photo's, or the other way round, is right too.
+    """
+    model = read_model(colmap)
+    cameras: dict[int, Camera] = {}
+    shots: list[Shot] = []
+
+    def new_name(shot: Shot) -> str:
+        return str(Path(shot.name).with_suffix(".png"))
+
+    for shot in sorted(model.shots, key=new_name):
+        with Image.open(colmap / "images" / shot.name) as file:
+            photo = file.convert("RGB")
+        camera = model.cameras[shot.camera]
+        if abs(photo.width / photo.height * camera.height / camera.width - 1) > ASPECT_SLACK:
+            raise Problem(f"{shot.name} has another aspect than its camera")
+        camera = cameras.setdefault(shot.camera, camera.fitted(min(side, max(photo.size))))
+        small = photo.resize((camera.width, camera.height), Image.Resampling.LANCZOS)
+        shot = shot._replace(name=new_name(shot))
+        path = gray / "all" / "images" / shot.name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        # Three equal channels: not every program reads a file of one.
+        Image.fromarray(to_gray(small)).convert("RGB").save(path)
+        shots.append(shot)
+
+    held_out = [shot.name for shot in shots[::HOLDOUT_STEP]]
+    train = [shot for i, shot in enumerate(shots) if i % HOLDOUT_STEP != 0]
+    for shot in train:
+        path = gray / "train" / "images" / shot.name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(gray / "all" / "images" / shot.name, path)
+    colors = [(int(v),) * 3 for v in to_gray(model.colors)]
+    for name, some in (("all", shots), ("train", train)):
+        Model(cameras, some, model.positions, colors).write(gray / name / "sparse" / "0")
+    return held_out
