@@ -8,7 +8,7 @@
 //! ```
 //!
 //! Gaussians fill the view at random, as wide as lets eight cover each pixel: finer
-//! where there are more, as in scenes. Times are medians over rounds of a few
+//! where there are more, as in scenes. Times are medians over up to five rounds of four
 //! iterations each; the kernels' come from the device where it has timestamp queries.
 //! A harness of its own, because one round times all kernels at once.
 
@@ -29,6 +29,9 @@ use gs_chroma::{
 /// Iterations of a round, and rounds.
 const ITERATIONS: usize = 4;
 const ROUNDS: usize = 5;
+
+/// No further round of a size after so many seconds.
+const PATIENCE: f64 = 20.0;
 
 /// Gaussians that cover each pixel.
 const OVERDRAW: f64 = 8.0;
@@ -119,7 +122,8 @@ fn median(mut values: Vec<f64>) -> f64 {
 fn measure(gpu: &Gpu, splats: usize, width: u32) -> Result<Cost, GpuError> {
     let mut plain = trainer(gpu, splats, width)?;
     let mut walls = Vec::new();
-    for _ in 0..ROUNDS {
+    let first = Instant::now();
+    while walls.len() < ROUNDS && (walls.is_empty() || first.elapsed().as_secs_f64() < PATIENCE) {
         let begun = Instant::now();
         plain.train(&mut |_| {})?;
         walls.push(begun.elapsed().as_secs_f64() / ITERATIONS as f64);
@@ -129,7 +133,7 @@ fn measure(gpu: &Gpu, splats: usize, width: u32) -> Result<Cost, GpuError> {
     let mut trainer = trainer(&timed, splats, width)?;
     timed.timings()?;
     let mut rounds: BTreeMap<&'static str, Vec<f64>> = BTreeMap::new();
-    for _ in 0..ROUNDS {
+    for _ in 0..walls.len() {
         trainer.train(&mut |_| {})?;
         for time in timed.timings()? {
             let seconds = time.seconds / ITERATIONS as f64;
@@ -139,7 +143,7 @@ fn measure(gpu: &Gpu, splats: usize, width: u32) -> Result<Cost, GpuError> {
     Ok(Cost {
         splats,
         width,
-        wall: median(walls),
+        wall: median(walls.clone()),
         kernels: rounds
             .into_iter()
             .map(|(kernel, times)| (kernel, median(times)))
