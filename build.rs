@@ -43,12 +43,16 @@ fn main() {
         compile(&out, kernel, "_chroma", &["chroma"]);
     }
     compile(&out, "project_backward", "", &["luma", "geometry"]);
+    // In training the two that reach the parameters take Adam's step at once.
+    for kernel in ["project_backward", "shade_backward"] {
+        compile(&out, kernel, "_step", &["luma", "geometry", "step"]);
+    }
 }
 
 fn compile(out: &str, kernel: &str, suffix: &str, features: &[&str]) {
     let mut compiler = Wesl::new("shaders");
     compiler.keep_all_entrypoints();
-    for feature in ["luma", "chroma", "rgb", "geometry"] {
+    for feature in ["luma", "chroma", "rgb", "geometry", "step"] {
         compiler.set_feature(feature, features.contains(&feature));
     }
     // Plain names: imported functions keep the name they have in their file.

@@ -1,33 +1,75 @@
 // The adjoint of `project`: from centres, conics and opacities on the image
 // plane to means, quaternions, log-scales and opacity logits. Derivation in
-// docs/architecture.md. Adds to the gradient of the means, to which
-// `shade_backward` has contributed, and sets the others.
+// docs/architecture.md. In training (`step`) Adam moves the parameters at once, and
+// their gradient is never stored.
+@if(step) import package::common::adam::{AdamParameters, GRADIENT_MAX, adam_step};
 import package::common::color::CHANNELS;
 import package::common::constants::{INVISIBLE, PLANE_LOG_SCALE, PLANE_MEAN, PLANE_OPACITY, PLANE_QUAT, STAT_PULL, STAT_VIEWS, STATUS_OVERFLOW};
+@if(step) import package::common::constants::STATUS_REFUSED;
 import package::common::geometry::footprint;
 import package::common::numeric::linear_group;
+@if(step) import package::common::numeric::{is_within, sigmoid};
 import package::common::partials::{PARTIAL_PULL, PARTIAL_STRIDE};
 import package::common::projected::Projected;
 import package::common::rotation::{quat_gradient, rotation_from_quat};
 import package::common::view::View;
 
 @group(0) @binding(0) var<uniform> view: View;
-@group(0) @binding(1) var<storage, read> geometry: array<f32>;
+@if(!step) @group(0) @binding(1) var<storage, read> geometry: array<f32>;
+@if(step) @group(0) @binding(1) var<storage, read_write> geometry: array<f32>;
 @group(0) @binding(2) var<storage, read> ranks: array<u32>;
 @group(0) @binding(3) var<storage, read> projected: array<Projected>;
 @group(0) @binding(4) var<storage, read> gradients: array<f32>;
 // Planes `[11, N]`.
-@group(0) @binding(5) var<storage, read_write> geometry_gradient: array<f32>;
+@if(!step) @group(0) @binding(5) var<storage, read_write> geometry_gradient: array<f32>;
 // Planes `[2, N]`, accumulated over iterations.
 @group(0) @binding(6) var<storage, read_write> statistics: array<f32>;
-@group(0) @binding(7) var<storage, read> status: array<u32>;
+@group(0) @binding(7) var<storage, read_write> status: array<atomic<u32>>;
+// Planes `[3, N]`, what `shade_backward` adds to the means' gradient.
+@group(0) @binding(8) var<storage, read> mean_gradient: array<f32>;
+@if(step) @group(0) @binding(9) var<uniform> parameters: AdamParameters;
+@if(step) @group(0) @binding(10) var<storage, read_write> first_moment: array<f32>;
+@if(step) @group(0) @binding(11) var<storage, read_write> second_moment: array<f32>;
 
 fn plane(index: u32, i: u32) -> f32 {
     return geometry[index * view.splat_count + i];
 }
 
-fn store(index: u32, i: u32, value: f32) {
+// Adam's step for element i of plane `plane`, instead of leaving the gradient. Nothing
+// known leads to a gradient that is refused; if something does, it is counted, and
+// the parameter stays what it is.
+@if(step) fn descend(plane: u32, i: u32, gradient: f32) {
+    if !is_within(gradient, GRADIENT_MAX) {
+        atomicAdd(&status[STATUS_REFUSED], 1u);
+        return;
+    }
+    let k = plane * view.splat_count + i;
+    let rate = parameters.learning_rates[plane / 4u][plane % 4u];
+    let correction = vec2f(parameters.correction1, parameters.correction2);
+    let next = adam_step(vec3f(geometry[k], first_moment[k], second_moment[k]), gradient, rate, correction);
+    geometry[k] = next.x;
+    first_moment[k] = next.y;
+    second_moment[k] = next.z;
+}
+
+@if(step) fn store(index: u32, i: u32, value: f32) { descend(index, i, value); }
+
+@if(!step) fn store(index: u32, i: u32, value: f32) {
     geometry_gradient[index * view.splat_count + i] = value;
+}
+
+// What relocation adds to the gradients of opacity logit and log-scales: its loss
+// counts opacities and standard deviations (Kheradmand et al. 2024, equation 10).
+@if(step) fn opacity_pull(logit: f32) -> f32 {
+    let opacity = sigmoid(logit);
+    return parameters.opacity_weight * opacity * (1.0 - opacity);
+}
+@if(step) fn scale_pull(scale: vec3f) -> vec3f { return parameters.scale_weight * scale; }
+@if(!step) fn opacity_pull(logit: f32) -> f32 { return 0.0; }
+@if(!step) fn scale_pull(scale: vec3f) -> vec3f { return vec3f(); }
+
+fn log_scales(i: u32) -> vec3f {
+    return vec3f(plane(PLANE_LOG_SCALE, i), plane(PLANE_LOG_SCALE + 1u, i), plane(PLANE_LOG_SCALE + 2u, i));
 }
 
 @compute @workgroup_size(256)
@@ -37,10 +79,21 @@ fn project_backward(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups
     if i >= n {
         return;
     }
+    // After an overflow nothing moves until the host has grown the buffers and
+    // repeats the iteration.
+    let overflow = atomicLoad(&status[STATUS_OVERFLOW]) != 0u;
+    @if(step) { if overflow { return; } }
+    let scale = exp(log_scales(i));
+    let pull_on_scale = scale_pull(scale);
+    let pull_on_opacity = opacity_pull(plane(PLANE_OPACITY, i));
     if ranks[i] == INVISIBLE {
-        for (var index = PLANE_QUAT; index <= PLANE_OPACITY; index++) {
+        for (var index = PLANE_MEAN; index < PLANE_LOG_SCALE; index++) {
             store(index, i, 0.0);
         }
+        for (var axis = 0u; axis < 3u; axis++) {
+            store(PLANE_LOG_SCALE + axis, i, pull_on_scale[axis]);
+        }
+        store(PLANE_OPACITY, i, pull_on_opacity);
         return;
     }
     let at = i * PARTIAL_STRIDE;
@@ -50,7 +103,6 @@ fn project_backward(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups
 
     let mean = vec3f(plane(PLANE_MEAN, i), plane(PLANE_MEAN + 1u, i), plane(PLANE_MEAN + 2u, i));
     let quat = vec4f(plane(PLANE_QUAT, i), plane(PLANE_QUAT + 1u, i), plane(PLANE_QUAT + 2u, i), plane(PLANE_QUAT + 3u, i));
-    let scale = exp(vec3f(plane(PLANE_LOG_SCALE, i), plane(PLANE_LOG_SCALE + 1u, i), plane(PLANE_LOG_SCALE + 2u, i)));
     let inverse_norm = inverseSqrt(dot(quat, quat));
     let unit = quat * inverse_norm;
     let f = footprint(view, mean, unit, scale);
@@ -96,15 +148,15 @@ fn project_backward(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups
     let v_quat = (v_unit - unit * dot(unit, v_unit)) * inverse_norm;
 
     for (var axis = 0u; axis < 3u; axis++) {
-        store(PLANE_MEAN + axis, i, geometry_gradient[axis * n + i] + v_mean[axis]);
-        store(PLANE_LOG_SCALE + axis, i, v_log_scale[axis]);
+        store(PLANE_MEAN + axis, i, mean_gradient[axis * n + i] + v_mean[axis]);
+        store(PLANE_LOG_SCALE + axis, i, v_log_scale[axis] + pull_on_scale[axis]);
     }
     for (var k = 0u; k < 4u; k++) {
         store(PLANE_QUAT + k, i, v_quat[k]);
     }
-    store(PLANE_OPACITY, i, v_opacity * q.w * (1.0 - q.w));
+    store(PLANE_OPACITY, i, v_opacity * q.w * (1.0 - q.w) + pull_on_opacity);
 
-    if status[STATUS_OVERFLOW] != 0u {
+    if overflow {
         return;
     }
     statistics[STAT_PULL * n + i] += gradients[at + PARTIAL_PULL];

@@ -1,7 +1,6 @@
 // What densification by relocation adds to a step (Kheradmand et al. 2024, "3D
-// Gaussian Splatting as Markov Chain Monte Carlo"): before Adam a pull towards small
-// and faint Gaussians, after it noise on the means, shaped like each Gaussian and
-// stilled by its opacity.
+// Gaussian Splatting as Markov Chain Monte Carlo"): noise on the means, shaped like
+// each Gaussian and stilled by its opacity.
 import package::common::constants::{PLANE_LOG_SCALE, PLANE_MEAN, PLANE_OPACITY, PLANE_QUAT, QUAT_NORM_MIN_SQ, STATUS_OVERFLOW};
 import package::common::numeric::{linear_group, sigmoid};
 import package::common::rotation::rotation_from_quat;
@@ -10,10 +9,6 @@ struct RelocationParameters {
     splat_count: u32,
     // Of the noise; another one each step.
     seed: u32,
-    // Weights of the mean opacity and of the mean standard deviation in the loss,
-    // over the number of values.
-    opacity_weight: f32,
-    scale_weight: f32,
     // World units of noise for one world unit of variance.
     noise: f32,
 }
@@ -26,7 +21,6 @@ const TAU: f32 = 6.283185307179586;
 @group(0) @binding(0) var<uniform> parameters: RelocationParameters;
 @group(0) @binding(1) var<storage, read> status: array<u32>;
 @group(0) @binding(2) var<storage, read_write> geometry: array<f32>;
-@group(0) @binding(3) var<storage, read_write> gradient: array<f32>;
 
 // PCG hash (Jarzynski and Olano 2020).
 fn pcg(value: u32) -> u32 {
@@ -53,20 +47,6 @@ fn normal3(i: u32) -> vec3f {
 
 fn plane(index: u32, i: u32) -> f32 {
     return geometry[index * parameters.splat_count + i];
-}
-
-@compute @workgroup_size(256)
-fn relocation_pull(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
-    let i = linear_group(group, groups) * 256u + local;
-    if i >= parameters.splat_count {
-        return;
-    }
-    let opacity = sigmoid(plane(PLANE_OPACITY, i));
-    gradient[PLANE_OPACITY * parameters.splat_count + i] += parameters.opacity_weight * opacity * (1.0 - opacity);
-    for (var axis = 0u; axis < 3u; axis++) {
-        let index = PLANE_LOG_SCALE + axis;
-        gradient[index * parameters.splat_count + i] += parameters.scale_weight * exp(plane(index, i));
-    }
 }
 
 @compute @workgroup_size(256)

@@ -1,8 +1,12 @@
 // The adjoint of `shade`: gradients of the spherical harmonics and, through the
-// direction of view, of the means.
+// direction of view, of the means. In training (`step`) Adam moves the harmonics at
+// once, and their gradient is never stored.
+@if(step) import package::common::adam::{AdamParameters, GRADIENT_MAX, adam_step};
 import package::common::color::{CHANNELS, Color, color_dot, color_gradient};
 import package::common::constants::{INVISIBLE, PLANE_MEAN};
+@if(step) import package::common::constants::{STATUS_OVERFLOW, STATUS_REFUSED};
 import package::common::numeric::linear_group;
+@if(step) import package::common::numeric::is_within;
 import package::common::partials::{PARTIAL_COLOR, PARTIAL_STRIDE};
 import package::common::sh::sh_term;
 import package::common::view::View;
@@ -13,16 +17,40 @@ import package::common::view::View;
 @group(0) @binding(3) var<storage, read> colors: array<Color>;
 @group(0) @binding(4) var<storage, read> gradients: array<f32>;
 // Planes `[(degree + 1)², CHANNELS, N]`, all of them written.
-@group(0) @binding(5) var<storage, read_write> sh_gradient: array<f32>;
-@if(geometry) @group(0) @binding(6) var<storage, read> sh: array<f32>;
-// Planes `[11, N]`: the three of the means are written.
-@if(geometry) @group(0) @binding(7) var<storage, read_write> geometry_gradient: array<f32>;
+@if(!step) @group(0) @binding(5) var<storage, read_write> sh_gradient: array<f32>;
+@if(geometry && !step) @group(0) @binding(6) var<storage, read> sh: array<f32>;
+@if(step) @group(0) @binding(6) var<storage, read_write> sh: array<f32>;
+// Planes `[3, N]`, what the means' gradient owes to the direction of view.
+@if(geometry) @group(0) @binding(7) var<storage, read_write> mean_gradient: array<f32>;
+@if(step) @group(0) @binding(8) var<uniform> parameters: AdamParameters;
+@if(step) @group(0) @binding(9) var<storage, read_write> status: array<atomic<u32>>;
+@if(step) @group(0) @binding(10) var<storage, read_write> first_moment: array<f32>;
+@if(step) @group(0) @binding(11) var<storage, read_write> second_moment: array<f32>;
 
 fn plane_index(k: u32, i: u32) -> u32 {
     return k * CHANNELS * view.splat_count + i;
 }
 
-fn store(k: u32, i: u32, value: Color) {
+// Adam's step for element i of plane `plane`, instead of leaving the gradient. Nothing
+// known leads to a gradient that is refused; if something does, it is counted, and
+// the parameter stays what it is.
+@if(step) fn descend(plane: u32, i: u32, gradient: f32) {
+    if !is_within(gradient, GRADIENT_MAX) {
+        atomicAdd(&status[STATUS_REFUSED], 1u);
+        return;
+    }
+    let k = plane * view.splat_count + i;
+    let rate = parameters.learning_rates[plane / 4u][plane % 4u];
+    let correction = vec2f(parameters.correction1, parameters.correction2);
+    let next = adam_step(vec3f(sh[k], first_moment[k], second_moment[k]), gradient, rate, correction);
+    sh[k] = next.x;
+    first_moment[k] = next.y;
+    second_moment[k] = next.z;
+}
+
+@if(step) fn store(k: u32, i: u32, value: Color) { descend(k, i, value); }
+
+@if(!step) fn store(k: u32, i: u32, value: Color) {
     let at = plane_index(k, i);
     @if(luma) { sh_gradient[at] = value; }
     @if(chroma) { sh_gradient[at] = value.x; sh_gradient[at + view.splat_count] = value.y; }
@@ -50,6 +78,9 @@ fn shade_backward(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) 
     if i >= n {
         return;
     }
+    // After an overflow nothing moves until the host has grown the buffers and
+    // repeats the iteration.
+    @if(step) { if atomicLoad(&status[STATUS_OVERFLOW]) != 0u { return; } }
     let count = (view.sh_degree + 1u) * (view.sh_degree + 1u);
     if ranks[i] == INVISIBLE {
         for (var k = 0u; k < count; k++) {
@@ -57,7 +88,7 @@ fn shade_backward(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) 
         }
         @if(geometry) {
             for (var axis = 0u; axis < 3u; axis++) {
-                geometry_gradient[axis * n + i] = 0.0;
+                mean_gradient[axis * n + i] = 0.0;
             }
         }
         return;
@@ -70,13 +101,13 @@ fn shade_backward(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) 
     @if(geometry) var v_direction = vec3f();
     for (var k = 0u; k < count; k++) {
         let term = sh_term(k, direction);
-        store(k, i, term.value * v_color);
         @if(geometry) { v_direction += term.slope * color_dot(coefficient(k, i), v_color); }
+        store(k, i, term.value * v_color);
     }
     @if(geometry) {
         let v_mean = (v_direction - direction * dot(direction, v_direction)) / distance;
-        geometry_gradient[i] = v_mean.x;
-        geometry_gradient[n + i] = v_mean.y;
-        geometry_gradient[2u * n + i] = v_mean.z;
+        mean_gradient[i] = v_mean.x;
+        mean_gradient[n + i] = v_mean.y;
+        mean_gradient[2u * n + i] = v_mean.z;
     }
 }

@@ -21,8 +21,8 @@ GROUPS = {
               "sort_scatter", "tile_lists", "tile_ranges"],
     "blending": ["shade", "blend"],
     "loss": ["luma_loss", "luma_loss_backward", "sum_loss"],
-    "adjoint": ["blend_backward", "sum_instances", "shade_backward", "project_backward"],
-    "Adam": ["adam"],
+    "adjoint": ["blend_backward", "sum_instances"],
+    "steps": ["shade_backward", "project_backward"],
 }
 
 

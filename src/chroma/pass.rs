@@ -5,7 +5,7 @@ use crate::{
     capture::Camera,
     gpu::{Bindings, Buffer, Gpu, GpuError, Kernel, Recorder},
     optimize::{Load, LossLog},
-    raster::{Field, Geometry, Layer, LayerAdjoint, Lists, Raster, ViewUniform},
+    raster::{Field, Geometry, Layer, LayerAdjoint, Lists, Outcome, Raster, ViewUniform},
 };
 
 /// Threads of a workgroup of the loss.
@@ -65,7 +65,7 @@ impl Pass {
             &lists,
             &shared.field,
             &layer,
-            shared.gradient.clone(),
+            &Outcome::Gradient(&shared.gradient),
         )?;
         let wanted = Buffer::from_slice(gpu, "wanted a/b", wanted)?;
         let weights = Buffer::uniform(

@@ -9,8 +9,8 @@ use crate::{
     gpu::{Buffer, GpuError, Recorder},
     oracle::scene::{Scene, View},
     raster::{
-        Field, Geometry, Layer, LayerAdjoint, Lists, Projected, Raster, Status, ViewUniform,
-        constants::*,
+        Field, Geometry, Layer, LayerAdjoint, Lists, Outcome, Projected, Raster, Status,
+        ViewUniform, constants::*,
     },
     splats::{ShField, Splats},
 };
@@ -57,7 +57,7 @@ pub struct Stage {
     pub layer: Layer,
     raster: Arc<Raster>,
     count: usize,
-    adjoint: Option<LayerAdjoint>,
+    adjoint: Option<(LayerAdjoint, Buffer<f32>)>,
 }
 
 impl Stage {
@@ -93,7 +93,9 @@ impl Stage {
         let adjoint = trained
             .then(|| {
                 let gradient = Buffer::zeros(gpu, "field gradient", field.planes.len())?;
-                LayerAdjoint::new(raster, &geometry, &lists, &field, &layer, gradient)
+                let outcome = Outcome::Gradient(&gradient);
+                LayerAdjoint::new(raster, &geometry, &lists, &field, &layer, &outcome)
+                    .map(|adjoint| (adjoint, gradient))
             })
             .transpose()?;
         Ok(Self {
@@ -134,7 +136,7 @@ impl Stage {
     /// For RGB, which is shown but never trained.
     pub fn backward(&self, upstream: &[f64]) -> Result<Gradient, GpuError> {
         let gpu = &self.raster.gpu;
-        let adjoint = self.adjoint.as_ref().expect("RGB is not trained");
+        let (adjoint, field_gradient) = self.adjoint.as_ref().expect("RGB is not trained");
         let narrow: Vec<f32> = upstream.iter().map(|&v| v as f32).collect();
         adjoint.image_gradient.write(gpu, &narrow);
         let mut recorder = self.record();
@@ -148,7 +150,7 @@ impl Stage {
             count: self.count,
             geometry,
             statistics,
-            field: adjoint.field_gradient.read(gpu)?,
+            field: field_gradient.read(gpu)?,
         })
     }
 

@@ -24,6 +24,8 @@ shaders! {
     PROJECT = "project";
     /// Adjoint of the projection.
     PROJECT_BACKWARD = "project_backward";
+    /// Adjoint of the projection, with Adam's step.
+    PROJECT_BACKWARD_STEP = "project_backward_step";
     /// What densification by relocation adds to a step.
     RELOCATION = "relocation";
     /// Prefix sum.
@@ -54,6 +56,8 @@ shaders! {
     BLEND_BACKWARD_CHROMA = "blend_backward_chroma";
     /// Adjoint of shading, luma and means.
     SHADE_BACKWARD_LUMA = "shade_backward_luma";
+    /// Adjoint of shading, luma and means, with Adam's step.
+    SHADE_BACKWARD_STEP = "shade_backward_step";
     /// Adjoint of shading, chroma alone.
     SHADE_BACKWARD_CHROMA = "shade_backward_chroma";
     /// Sum of the instances' gradients, luma and geometry.

@@ -10,12 +10,12 @@ use crate::{
 const WORD: u64 = 4;
 
 /// Tile-list entries that a set is expected to need for each Gaussian, at least.
-pub(super) const ENTRIES_PER_SPLAT: usize = 8;
+pub(super) const ENTRIES_PER_SPLAT: usize = 4;
 
 /// Words that a Gaussian takes besides its parameters: projection 8, four flags and
 /// ranks, keys and places of the depth sort 4, its histogram, colour, gradient on the
-/// image plane 8, statistics.
-const SCRATCH_WORDS: f64 = 8.0 + 4.0 + 4.0 + 0.125 + 1.0 + 8.0 + STATISTICS_PLANES as f64;
+/// image plane 8, of its mean 3, statistics.
+const SCRATCH_WORDS: f64 = 8.0 + 4.0 + 4.0 + 0.125 + 1.0 + 8.0 + 3.0 + STATISTICS_PLANES as f64;
 
 /// Words of a tile-list entry: keys and places of the tile sort 4, its histogram, the
 /// Gaussian's index, the gradient's eight figures.
@@ -55,10 +55,11 @@ impl Demand {
         (GEOMETRY_PLANES + sh::coefficient_count(self.sh_degree)) as f64
     }
 
-    /// Bytes for each Gaussian, tile lists not counted: its parameters four times
-    /// (values, gradient, both moments of Adam) and what a view leaves.
+    /// Bytes for each Gaussian, tile lists not counted: its parameters three times
+    /// (values and both moments of Adam; gradients are never stored) and what a view
+    /// leaves. At most 450 at degree 3.
     pub fn bytes_per_splat(&self) -> f64 {
-        WORD as f64 * (4.0 * self.parameters() + SCRATCH_WORDS)
+        WORD as f64 * (3.0 * self.parameters() + SCRATCH_WORDS)
     }
 
     /// Bytes while `splats` Gaussians with `entries` tile-list entries are trained.
@@ -78,8 +79,9 @@ impl Demand {
     /// bytes and whose buffers are within `binding_limit` bytes each; 0 when not even
     /// the pictures are.
     pub fn largest_set(&self, limit: Option<u64>, binding_limit: u64) -> usize {
-        let harmonics = sh::coefficient_count(self.sh_degree);
-        let widest = GEOMETRY_PLANES.max(harmonics) as u64 * WORD;
+        let planes = GEOMETRY_PLANES.max(sh::coefficient_count(self.sh_degree));
+        // A buffer of parameters, or the gradients of the tile lists' entries.
+        let widest = WORD * planes.max(8 * ENTRIES_PER_SPLAT) as u64;
         let by_binding = (binding_limit / widest) as usize;
         let Some(limit) = limit else {
             return by_binding;
@@ -111,13 +113,20 @@ mod tests {
     }
 
     #[test]
-    fn bindings_bound_a_set_without_a_limit() {
-        // Eleven planes of words; sixteen at degree 3.
-        assert_eq!(DEMAND.largest_set(None, 128 << 20), (128 << 20) / 44);
-        let demand = Demand {
-            sh_degree: 3,
-            ..DEMAND
+    fn a_gaussian_takes_at_most_450_bytes() {
+        let of = |sh_degree| {
+            Demand {
+                sh_degree,
+                ..DEMAND
+            }
+            .bytes_per_splat()
         };
-        assert_eq!(demand.largest_set(None, 128 << 20), (128 << 20) / 64);
+        assert!(of(3) <= 450.0 && of(0) < 270.0, "{} {}", of(3), of(0));
+    }
+
+    #[test]
+    fn bindings_bound_a_set_without_a_limit() {
+        // Four entries with eight figures each.
+        assert_eq!(DEMAND.largest_set(None, 128 << 20), 1 << 20);
     }
 }

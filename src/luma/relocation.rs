@@ -43,95 +43,77 @@ pub struct RelocationParameters {
     pub splat_count: u32,
     /// Of the noise.
     pub seed: u32,
-    /// Weight of each opacity.
-    pub opacity_weight: f32,
-    /// Weight of each standard deviation.
-    pub scale_weight: f32,
     /// World units of noise for one world unit of variance.
     pub noise: f32,
 }
 
 impl RelocationParameters {
     /// For a step of `count` Gaussians with the means' `rate` in world units.
-    pub fn new(count: usize, seed: u64, iteration: usize, rate: f64, extent: f64) -> Self {
-        let each = 1.0 / count.max(1) as f64;
+    pub fn new(count: usize, seed: u64, iteration: usize, rate: f64) -> Self {
         let mut random = fastrand::Rng::with_seed(seed ^ (iteration as u64).rotate_left(32));
         Self {
             splat_count: count as u32,
             seed: random.u32(..),
-            opacity_weight: (OPACITY_WEIGHT * each) as f32,
-            scale_weight: (SCALE_WEIGHT * each / (3.0 * extent)) as f32,
             noise: (NOISE * rate) as f32,
         }
     }
 }
 
-/// The two entry points.
-pub struct RelocationKernels {
-    pull: Kernel,
-    noise: Kernel,
+/// Weights of each opacity and each standard deviation in the loss of `count`
+/// Gaussians in a scene of this extent.
+pub fn weights(count: usize, extent: f64) -> [f32; 2] {
+    let each = 1.0 / count.max(1) as f64;
+    [OPACITY_WEIGHT * each, SCALE_WEIGHT * each / (3.0 * extent)].map(|weight| weight as f32)
 }
 
-impl RelocationKernels {
-    /// Compiles them.
+/// The kernel.
+pub struct RelocationKernel(Kernel);
+
+impl RelocationKernel {
+    /// Compiles it.
     pub fn new(gpu: &Gpu) -> Self {
-        let kernel = |name| Kernel::new(gpu, name, shaders::RELOCATION);
-        Self {
-            pull: kernel("relocation_pull"),
-            noise: kernel("relocation_noise"),
-        }
+        Self(Kernel::new(gpu, "relocation_noise", shaders::RELOCATION))
     }
 }
 
-/// What relocation adds to a step, tied to its buffers.
+/// The noise, tied to its buffers.
 pub struct Relocation {
     parameters: Buffer<RelocationParameters>,
-    pull: Bindings,
     noise: Bindings,
     count: usize,
 }
 
 impl Relocation {
-    /// Ties the kernels to `geometry` and its `gradient`, planes `[11, N]`.
+    /// Ties the kernel to `geometry`, planes `[11, N]`.
     ///
     /// # Errors
     /// [`GpuError::TooLarge`].
     pub fn new(
         gpu: &Gpu,
-        kernels: &RelocationKernels,
+        kernel: &RelocationKernel,
         status: &Buffer<u32>,
         geometry: &Buffer<f32>,
-        gradient: &Buffer<f32>,
     ) -> Result<Self, GpuError> {
-        let parameters = Buffer::uniform(
-            gpu,
-            "relocation parameters",
-            &RelocationParameters::default(),
-        )?;
-        let (uniform, geometry_) = (parameters.raw(), geometry.raw());
-        let pull = [(0, uniform), (2, geometry_), (3, gradient.raw())];
-        let noise = [(0, uniform), (1, status.raw()), (2, geometry_)];
+        let nothing = RelocationParameters::default();
+        let parameters = Buffer::uniform(gpu, "relocation parameters", &nothing)?;
+        let buffers = [parameters.raw(), status.raw(), geometry.raw()];
         Ok(Self {
-            pull: kernels.pull.bind_at(gpu, &pull),
-            noise: kernels.noise.bind_at(gpu, &noise),
+            noise: kernel.0.bind(gpu, &buffers),
             count: geometry.len() / GEOMETRY_PLANES,
             parameters,
         })
     }
 
-    /// Chooses the weights for what is recorded and submitted next.
-    pub fn set(&self, gpu: &Gpu, parameters: &RelocationParameters) {
+    /// Records the noise: after the step.
+    pub fn record(
+        &self,
+        gpu: &Gpu,
+        kernel: &RelocationKernel,
+        recorder: &mut Recorder,
+        parameters: &RelocationParameters,
+    ) {
         self.parameters.write(gpu, &[*parameters]);
-    }
-
-    /// Records the pull: after the adjoint, before Adam.
-    pub fn record_pull(&self, kernels: &RelocationKernels, recorder: &mut Recorder) {
-        recorder.dispatch(&kernels.pull, &self.pull, groups_for(self.count));
-    }
-
-    /// Records the noise: after Adam.
-    pub fn record_noise(&self, kernels: &RelocationKernels, recorder: &mut Recorder) {
-        recorder.dispatch(&kernels.noise, &self.noise, groups_for(self.count));
+        recorder.dispatch(&kernel.0, &self.noise, groups_for(self.count));
     }
 }
 

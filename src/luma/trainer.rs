@@ -1,7 +1,7 @@
 //! The training loop of stage 1.
 //!
 //! An iteration is one submission without a read-back. Every [`SYNC_EVERY`]
-//! iterations the host orders losses and counts and meanwhile goes on; it waits
+//! iterations, and oftener at first, the host orders losses and counts and meanwhile goes on; it waits
 //! for an order only when the next one is due. When tile lists overflow, the
 //! device stops taking steps by itself; the host learns how many it took, grows
 //! the lists and repeats from there, so that the result does not depend on when
@@ -20,7 +20,7 @@ use super::{
 use crate::{
     capture::{Camera, downscale},
     gpu::{Buffer, Gpu, GpuError, Readback, Recorder},
-    optimize::{Adam, Load, view_at},
+    optimize::{AdamState, Load, view_at},
     raster::{Field, Geometry, Raster, StatusReadback, ViewUniform, constants::*, download},
     splats::{Splats, sh},
 };
@@ -206,7 +206,10 @@ impl LumaTrainer {
             let changes =
                 self.settings.densifies_after(iteration) || self.settings.resets_after(iteration);
             let ends = iteration == self.settings.schedule.iterations;
-            if !(changes || ends || iteration.is_multiple_of(SYNC_EVERY)) {
+            // The first views say how much room is needed: those lost to an overflow
+            // are few if it is noticed early.
+            let early = iteration < SYNC_EVERY && iteration.is_power_of_two();
+            if !(changes || ends || early || iteration.is_multiple_of(SYNC_EVERY)) {
                 continue;
             }
             let order = Report {
@@ -301,40 +304,26 @@ impl LumaTrainer {
             view.pixel_count(),
             iteration,
         );
+        let step = u32::try_from(iteration + 1).unwrap_or(u32::MAX);
+        let weights = match self.settings.densification {
+            Densification::Split => [0.0; 2],
+            Densification::Relocate => relocation::weights(self.geometry.count, self.extent),
+        };
+        let rates = self.geometry_rates(iteration);
+        let (geometry, field) = (&workspace.adam_geometry, &workspace.adam_field);
+        geometry.set(&self.gpu, step, &rates, weights);
+        field.set(&self.gpu, step, &self.field_rates(iteration), [0.0; 2]);
         workspace.adjoint.record(&self.raster, &mut recorder);
         if let Some(relocation) = &workspace.relocation {
             let rate = self.settings.settling(iteration)
                 * self.settings.means_rate(iteration, self.extent);
-            relocation.set(
+            let seed = self.settings.seed;
+            relocation.record(
                 &self.gpu,
-                &RelocationParameters::new(
-                    self.geometry.count,
-                    self.settings.seed,
-                    iteration,
-                    rate,
-                    self.extent,
-                ),
+                &self.kernels.relocation,
+                &mut recorder,
+                &RelocationParameters::new(self.geometry.count, seed, iteration, rate),
             );
-            relocation.record_pull(&self.kernels.relocation, &mut recorder);
-        }
-        let step = u32::try_from(iteration + 1).unwrap_or(u32::MAX);
-        let adam = &self.kernels.adam;
-        workspace.adam_geometry.record(
-            &self.gpu,
-            adam,
-            &mut recorder,
-            step,
-            &self.geometry_rates(iteration),
-        );
-        workspace.adam_field.record(
-            &self.gpu,
-            adam,
-            &mut recorder,
-            step,
-            &self.field_rates(iteration),
-        );
-        if let Some(relocation) = &workspace.relocation {
-            relocation.record_noise(&self.kernels.relocation, &mut recorder);
         }
         recorder.submit();
     }
@@ -398,7 +387,7 @@ impl LumaTrainer {
 
     /// A new workspace with the same Gaussians and moments.
     fn rebuild(&mut self, capacity: usize, iteration: usize) -> Result<(), GpuError> {
-        let keep = |adam: &Adam| -> Result<[Buffer<f32>; 2], GpuError> {
+        let keep = |adam: &AdamState| -> Result<[Buffer<f32>; 2], GpuError> {
             let copies = [
                 Buffer::zeros(&self.gpu, "first moments", adam.first.len())?,
                 Buffer::zeros(&self.gpu, "second moments", adam.second.len())?,
@@ -490,7 +479,7 @@ impl LumaTrainer {
             .workspace()
             .lists
             .capacity
-            .max(self.geometry.count * ENTRIES_PER_SPLAT / 2);
+            .max(self.geometry.count * ENTRIES_PER_SPLAT);
         self.renew(capacity, iteration, moments)
     }
 

@@ -5,34 +5,32 @@ use super::{
     LumaSettings,
     densify::DensifyKernels,
     loss::{Loss, LossKernels},
-    relocation::{Relocation, RelocationKernels},
+    relocation::{Relocation, RelocationKernel},
     settings::Densification,
     trainer::SYNC_EVERY,
 };
 use crate::{
     gpu::{Buffer, Gpu, GpuError},
-    optimize::{Adam, AdamKernel, LossLog, SumLossKernel},
-    raster::{Field, Geometry, Layer, LayerAdjoint, Lists, Raster},
+    optimize::{AdamState, LossLog, SumLossKernel},
+    raster::{Field, Geometry, Layer, LayerAdjoint, Lists, Outcome, Raster},
 };
 
 /// The kernels of a step besides the rasterizer's.
 pub struct Kernels {
-    pub adam: AdamKernel,
     pub sum_loss: SumLossKernel,
     pub loss: LossKernels,
     pub densify: DensifyKernels,
-    pub relocation: RelocationKernels,
+    pub relocation: RelocationKernel,
 }
 
 impl Kernels {
     /// Compiles them.
     pub fn new(gpu: &Gpu) -> Self {
         Self {
-            adam: AdamKernel::new(gpu),
             sum_loss: SumLossKernel::new(gpu),
             loss: LossKernels::new(gpu),
             densify: DensifyKernels::new(gpu),
-            relocation: RelocationKernels::new(gpu),
+            relocation: RelocationKernel::new(gpu),
         }
     }
 }
@@ -42,8 +40,8 @@ pub struct Workspace {
     pub lists: Lists,
     pub layer: Layer,
     pub adjoint: LayerAdjoint,
-    pub adam_geometry: Adam,
-    pub adam_field: Adam,
+    pub adam_geometry: AdamState,
+    pub adam_field: AdamState,
     pub log: LossLog,
     pub losses: Vec<Loss>,
     /// When the set changes by relocation.
@@ -75,8 +73,18 @@ impl Workspace {
         let gpu = &raster.gpu;
         let lists = Lists::new(raster, geometry, max_tiles, capacity)?;
         let layer = Layer::new(raster, geometry, &lists, field, max_pixels, max_tiles)?;
-        let gradient = Buffer::zeros(gpu, "luma gradient", field.planes.len())?;
-        let adjoint = LayerAdjoint::new(raster, geometry, &lists, field, &layer, gradient)?;
+        let (of_geometry, of_field) = match moments {
+            Some([geometry, field]) => (Some(geometry), Some(field)),
+            None => (None, None),
+        };
+        let count = geometry.count;
+        let adam_geometry = AdamState::new(gpu, geometry.planes.len(), count, of_geometry)?;
+        let adam_field = AdamState::new(gpu, field.planes.len(), count, of_field)?;
+        let outcome = Outcome::Step {
+            geometry: adam_geometry.step_buffers(),
+            field: adam_field.step_buffers(),
+        };
+        let adjoint = LayerAdjoint::new(raster, geometry, &lists, field, &layer, &outcome)?;
         let log = LossLog::new(gpu, &kernels.sum_loss, &lists.status, max_tiles, SYNC_EVERY)?;
         let losses = photos
             .iter()
@@ -93,28 +101,10 @@ impl Workspace {
                 )
             })
             .collect();
-        let (of_geometry, of_field) = match moments {
-            Some([geometry, field]) => (Some(geometry), Some(field)),
-            None => (None, None),
-        };
-        let adam = |gradient, values, moments| {
-            Adam::new(
-                gpu,
-                &kernels.adam,
-                &lists.status,
-                gradient,
-                values,
-                geometry.count,
-                moments,
-            )
-        };
-        let adam_geometry = adam(geometry_gradient(&adjoint), &geometry.planes, of_geometry)?;
-        let adam_field = adam(&adjoint.field_gradient, &field.planes, of_field)?;
         let relocation = (settings.densification == Densification::Relocate)
             .then(|| {
                 let kernels = &kernels.relocation;
-                let gradient = geometry_gradient(&adjoint);
-                Relocation::new(gpu, kernels, &lists.status, &geometry.planes, gradient)
+                Relocation::new(gpu, kernels, &lists.status, &geometry.planes)
             })
             .transpose()?;
         Ok(Self {
@@ -138,9 +128,4 @@ impl Workspace {
             .expect("luma trains geometry")
             .statistics
     }
-}
-
-fn geometry_gradient(adjoint: &LayerAdjoint) -> &Buffer<f32> {
-    let geometry = adjoint.geometry.as_ref();
-    &geometry.expect("luma trains geometry").gradient
 }

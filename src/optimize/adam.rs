@@ -2,7 +2,10 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::gpu::{Bindings, Buffer, Gpu, GpuError, Kernel, Recorder, groups_for, shaders};
+use crate::{
+    gpu::{Bindings, Buffer, Gpu, GpuError, Kernel, Recorder, groups_for, shaders},
+    raster::StepBuffers,
+};
 
 const BETA1: f64 = 0.9;
 const BETA2: f64 = 0.999;
@@ -22,6 +25,12 @@ pub struct AdamParameters {
     pub correction1: f32,
     /// 1 / (1 - β₂ᵗ).
     pub correction2: f32,
+    /// Weight of each opacity in the loss.
+    pub opacity_weight: f32,
+    /// Weight of each standard deviation in the loss.
+    pub scale_weight: f32,
+    /// Keeps the rates aligned.
+    pub padding: [u32; 2],
     /// One rate a plane.
     pub learning_rates: [f32; MAX_PLANES],
 }
@@ -37,15 +46,82 @@ impl AdamKernel {
 }
 
 /// Adam's state for one buffer of parameters.
-pub struct Adam {
+pub struct AdamState {
     /// First moments.
     pub first: Buffer<f32>,
     /// Second moments.
     pub second: Buffer<f32>,
     parameters: Buffer<AdamParameters>,
-    bindings: Bindings,
     planes: usize,
     count: usize,
+}
+
+impl AdamState {
+    /// For planes of `count` elements, `len` in all, starting from the given moments,
+    /// or from rest.
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`].
+    pub fn new(
+        gpu: &Gpu,
+        len: usize,
+        count: usize,
+        moments: Option<[Buffer<f32>; 2]>,
+    ) -> Result<Self, GpuError> {
+        let zeros = |label| Buffer::zeros(gpu, label, len);
+        let [first, second] = match moments {
+            Some(moments) => moments,
+            None => [zeros("first moments")?, zeros("second moments")?],
+        };
+        Ok(Self {
+            first,
+            second,
+            parameters: Buffer::uniform(gpu, "adam parameters", &AdamParameters::zeroed())?,
+            planes: len / count.max(1),
+            count,
+        })
+    }
+
+    /// What an adjoint that steps at once binds.
+    pub fn step_buffers(&self) -> StepBuffers<'_> {
+        StepBuffers {
+            parameters: self.parameters.raw(),
+            first: &self.first,
+            second: &self.second,
+        }
+    }
+
+    /// Chooses a learning rate for each plane for what is submitted next. `step`
+    /// counts from 1 and sets the bias correction. `weights` are those of each opacity
+    /// and each standard deviation in the loss.
+    ///
+    /// # Panics
+    /// When there are fewer rates than planes, or more than 48 planes.
+    pub fn set(&self, gpu: &Gpu, step: u32, rates: &[f32], weights: [f32; 2]) {
+        let mut learning_rates = [0.0; MAX_PLANES];
+        learning_rates[..self.planes].copy_from_slice(&rates[..self.planes]);
+        let correction = |beta: f64| (1.0 / (1.0 - beta.powf(f64::from(step)))) as f32;
+        self.parameters.write(
+            gpu,
+            &[AdamParameters {
+                splat_count: self.count as u32,
+                planes: self.planes as u32,
+                correction1: correction(BETA1),
+                correction2: correction(BETA2),
+                opacity_weight: weights[0],
+                scale_weight: weights[1],
+                padding: [0; 2],
+                learning_rates,
+            }],
+        );
+    }
+}
+
+/// Adam on a stored gradient.
+pub struct Adam {
+    /// Moments and rates.
+    pub state: AdamState,
+    bindings: Bindings,
 }
 
 impl Adam {
@@ -63,35 +139,22 @@ impl Adam {
         count: usize,
         moments: Option<[Buffer<f32>; 2]>,
     ) -> Result<Self, GpuError> {
-        let zeros = |label| Buffer::zeros(gpu, label, values.len());
-        let [first, second] = match moments {
-            Some(moments) => moments,
-            None => [zeros("first moments")?, zeros("second moments")?],
-        };
-        let parameters = Buffer::uniform(gpu, "adam parameters", &AdamParameters::zeroed())?;
+        let state = AdamState::new(gpu, values.len(), count, moments)?;
         let bindings = kernel.0.bind(
             gpu,
             &[
-                parameters.raw(),
+                state.parameters.raw(),
                 status.raw(),
                 gradient.raw(),
                 values.raw(),
-                first.raw(),
-                second.raw(),
+                state.first.raw(),
+                state.second.raw(),
             ],
         );
-        Ok(Self {
-            first,
-            second,
-            parameters,
-            bindings,
-            planes: values.len() / count.max(1),
-            count,
-        })
+        Ok(Self { state, bindings })
     }
 
-    /// Records one step with a learning rate for each plane. `step` counts from
-    /// 1 and sets the bias correction.
+    /// Records one step as [`AdamState::set`] describes it.
     ///
     /// # Panics
     /// When there are fewer rates than planes, or more than 48 planes.
@@ -103,23 +166,8 @@ impl Adam {
         step: u32,
         rates: &[f32],
     ) {
-        let mut learning_rates = [0.0; MAX_PLANES];
-        learning_rates[..self.planes].copy_from_slice(&rates[..self.planes]);
-        let correction = |beta: f64| (1.0 / (1.0 - beta.powf(f64::from(step)))) as f32;
-        self.parameters.write(
-            gpu,
-            &[AdamParameters {
-                splat_count: self.count as u32,
-                planes: self.planes as u32,
-                correction1: correction(BETA1),
-                correction2: correction(BETA2),
-                learning_rates,
-            }],
-        );
-        recorder.dispatch(
-            &kernel.0,
-            &self.bindings,
-            groups_for(self.count * self.planes),
-        );
+        self.state.set(gpu, step, rates, [0.0; 2]);
+        let elements = self.state.count * self.state.planes;
+        recorder.dispatch(&kernel.0, &self.bindings, groups_for(elements));
     }
 }

@@ -5,7 +5,7 @@ mod loss_log;
 mod order;
 mod traffic;
 
-pub use adam::{Adam, AdamKernel, AdamParameters};
+pub use adam::{Adam, AdamKernel, AdamParameters, AdamState};
 pub use loss_log::{LossLog, SumLossKernel, SumLossParameters};
 pub use order::view_at;
 pub use traffic::{Load, minimum_bytes};

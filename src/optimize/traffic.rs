@@ -32,6 +32,9 @@ const PROJECTED: f64 = 8.0;
 /// opacity; the colour comes on top.
 const LISTED: f64 = 8.0;
 
+/// Words of a step of one Gaussian's geometry: value and both moments, in and out.
+const GEOMETRY_STEP: f64 = 6.0 * 11.0;
+
 /// Bytes that a dispatch of `kernel` must read and write at least, if every input is
 /// read once and the caches hold the rest.
 pub fn minimum_bytes(kernel: &str, load: &Load) -> f64 {
@@ -46,9 +49,11 @@ pub fn minimum_bytes(kernel: &str, load: &Load) -> f64 {
         sh_planes,
     } = *load;
     let trains_geometry = channels == 1.0;
-    let geometry = if trains_geometry { 11.0 } else { 0.0 };
+    let trained = f64::from(u8::from(trains_geometry));
+    // With the geometry, Adam's step is taken at once: value and moments in and out.
+    let sh_step = if trains_geometry { 6.0 } else { 1.0 } * sh_planes;
     // What an instance's gradient takes: seven figures for the geometry, the colour.
-    let partial = channels + if trains_geometry { 7.0 } else { 0.0 };
+    let partial = channels + 7.0 * trained;
     let digit_passes = [4.0, ((tiles + 1.0).log2() / 8.0).ceil().max(1.0)];
     let passes = digit_passes[0] + digit_passes[1];
     let keys = (digit_passes[0] * visible + digit_passes[1] * instances) / passes;
@@ -76,10 +81,13 @@ pub fn minimum_bytes(kernel: &str, load: &Load) -> f64 {
             (LISTED + channels + partial) * instances + (2.0 * channels + 1.0) * pixels
         }
         "sum_instances" => partial * instances + (partial + 2.0) * visible,
-        "shade_backward" => splats + (3.0 + 2.0 * channels) * visible + sh_planes * splats,
-        "project_backward" => splats + (11.0 + PROJECTED + partial + 4.0) * visible + 11.0 * splats,
+        "shade_backward" => {
+            splats + (3.0 + 2.0 * channels) * visible + (3.0 * trained + sh_step) * splats
+        }
+        "project_backward" => {
+            splats + (PROJECTED + partial + 7.0) * visible + GEOMETRY_STEP * splats
+        }
         // Gradient, value and both moments in, the latter three out.
-        "adam" if trains_geometry => 7.0 * (geometry + sh_planes) / 2.0 * splats,
         "adam" => 7.0 * sh_planes * splats,
         // The average of geometry, harmonics and the moments of both.
         "densify_geometry" => 2.0 * 11.0 * splats,

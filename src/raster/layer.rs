@@ -159,11 +159,10 @@ impl Layer {
 pub struct LayerAdjoint {
     /// Gradient of the loss with respect to the picture; the loss writes it.
     pub image_gradient: Buffer<f32>,
-    /// Gradient of the field's planes.
-    pub field_gradient: Buffer<f32>,
     /// Gradient and statistics of the geometry, luma only.
     pub geometry: Option<GeometryAdjoint>,
     kind: ColorKind,
+    steps: bool,
     count: usize,
     max_tiles: usize,
     blend: Bindings,
@@ -171,9 +170,34 @@ pub struct LayerAdjoint {
     shade: Bindings,
 }
 
+/// What becomes of the gradient of the parameters.
+pub enum Outcome<'a> {
+    /// It is written: that of the field to this buffer, which several adjoints may
+    /// share, that of the geometry (luma only) to planes of its own.
+    Gradient(&'a Buffer<f32>),
+    /// Adam takes a step with it, and it is never stored (luma only).
+    Step {
+        /// Of the geometry.
+        geometry: StepBuffers<'a>,
+        /// Of the field.
+        field: StepBuffers<'a>,
+    },
+}
+
+/// What Adam needs for a step.
+#[derive(Clone, Copy)]
+pub struct StepBuffers<'a> {
+    /// Uniform with rates and corrections.
+    pub parameters: &'a wgpu::Buffer,
+    /// First moments.
+    pub first: &'a Buffer<f32>,
+    /// Second moments.
+    pub second: &'a Buffer<f32>,
+}
+
 /// The part of the adjoint that reaches the geometry.
 pub struct GeometryAdjoint {
-    /// Gradient planes `[11, N]`.
+    /// Gradient planes `[11, N]`; empty where Adam steps at once.
     pub gradient: Buffer<f32>,
     /// Densification statistics, planes `[2, N]`.
     pub statistics: Buffer<f32>,
@@ -181,18 +205,20 @@ pub struct GeometryAdjoint {
 }
 
 impl LayerAdjoint {
-    /// The adjoint of `layer`; it writes the field's gradient to `field_gradient`,
-    /// which several adjoints may share.
+    /// The adjoint of `layer`.
     ///
     /// # Errors
     /// [`GpuError::TooLarge`].
+    ///
+    /// # Panics
+    /// When chroma is to step at once.
     pub fn new(
         raster: &Raster,
         geometry: &Geometry,
         lists: &Lists,
         field: &Field,
         layer: &Layer,
-        field_gradient: Buffer<f32>,
+        outcome: &Outcome<'_>,
     ) -> Result<Self, GpuError> {
         let gpu = &raster.gpu;
         let n = geometry.count;
@@ -201,9 +227,8 @@ impl LayerAdjoint {
         let image_gradient = Buffer::zeros(gpu, "image gradient", layer.image.len())?;
         let partials = Buffer::<f32>::zeros(gpu, "instance gradients", lists.capacity * record)?;
         let gradients = Buffer::<f32>::zeros(gpu, "projected gradients", n * record)?;
-        let geometry_gradient = with_geometry
-            .then(|| Buffer::<f32>::zeros(gpu, "geometry gradient", geometry.planes.len()))
-            .transpose()?;
+        let steps = matches!(outcome, Outcome::Step { .. });
+        assert!(with_geometry || !steps, "only luma steps at once");
         let kernels = raster.adjoint(field.kind);
         let mut buffers = vec![
             lists.view.raw(),
@@ -230,24 +255,39 @@ impl LayerAdjoint {
             buffers.push(lists.projected.raw());
         }
         let sum = kernels.sum.bind(gpu, &buffers);
-        let mut buffers = vec![
-            lists.view.raw(),
-            geometry.planes.raw(),
-            lists.ranks.raw(),
-            layer.colors.raw(),
-            gradients.raw(),
-            field_gradient.raw(),
-        ];
-        if let Some(gradient) = &geometry_gradient {
-            buffers.extend([field.planes.raw(), gradient.raw()]);
+        let mean_gradient = with_geometry
+            .then(|| Buffer::<f32>::zeros(gpu, "gradient of means", 3 * n))
+            .transpose()?;
+        let mut bindings: Vec<_> = (0..)
+            .zip([
+                lists.view.raw(),
+                geometry.planes.raw(),
+                lists.ranks.raw(),
+                layer.colors.raw(),
+                gradients.raw(),
+            ])
+            .collect();
+        if let Outcome::Gradient(field_gradient) = outcome {
+            bindings.push((5, field_gradient.raw()));
         }
-        let shade = kernels.shade.bind(gpu, &buffers);
-        let geometry = geometry_gradient
-            .map(|gradient| -> Result<_, GpuError> {
+        if let Some(mean_gradient) = &mean_gradient {
+            bindings.extend([(6, field.planes.raw()), (7, mean_gradient.raw())]);
+        }
+        let shade = match outcome {
+            Outcome::Gradient(_) => kernels.shade.bind_at(gpu, &bindings),
+            Outcome::Step { field, .. } => {
+                bindings.extend([(8, field.parameters), (9, lists.status.raw())]);
+                bindings.extend([(10, field.first.raw()), (11, field.second.raw())]);
+                raster.shade_step.bind_at(gpu, &bindings)
+            }
+        };
+        let geometry = mean_gradient
+            .map(|mean_gradient| -> Result<_, GpuError> {
                 let statistics = Buffer::zeros(gpu, "statistics", STATISTICS_PLANES * n)?;
-                let project = raster.project_backward.bind(
-                    gpu,
-                    &[
+                let planes = if steps { 0 } else { geometry.planes.len() };
+                let gradient = Buffer::zeros(gpu, "geometry gradient", planes)?;
+                let mut bindings: Vec<_> = (0..)
+                    .zip([
                         lists.view.raw(),
                         geometry.planes.raw(),
                         lists.ranks.raw(),
@@ -256,8 +296,18 @@ impl LayerAdjoint {
                         gradient.raw(),
                         statistics.raw(),
                         lists.status.raw(),
-                    ],
-                );
+                        mean_gradient.raw(),
+                    ])
+                    .collect();
+                let project = match outcome {
+                    Outcome::Gradient(_) => raster.project_backward.bind_at(gpu, &bindings),
+                    Outcome::Step { geometry, .. } => {
+                        bindings.retain(|&(binding, _)| binding != 5);
+                        bindings.extend([(9, geometry.parameters)]);
+                        bindings.extend([(10, geometry.first.raw()), (11, geometry.second.raw())]);
+                        raster.project_step.bind_at(gpu, &bindings)
+                    }
+                };
                 Ok(GeometryAdjoint {
                     gradient,
                     statistics,
@@ -267,9 +317,9 @@ impl LayerAdjoint {
             .transpose()?;
         Ok(Self {
             image_gradient,
-            field_gradient,
             geometry,
             kind: field.kind,
+            steps,
             count: n,
             max_tiles: layer.max_tiles,
             blend,
@@ -284,9 +334,14 @@ impl LayerAdjoint {
         let groups = groups_for(self.count);
         recorder.dispatch(&kernels.blend, &self.blend, self.max_tiles as u32);
         recorder.dispatch(&kernels.sum, &self.sum, groups);
-        recorder.dispatch(&kernels.shade, &self.shade, groups);
+        let (shade, project) = if self.steps {
+            (&raster.shade_step, &raster.project_step)
+        } else {
+            (&kernels.shade, &raster.project_backward)
+        };
+        recorder.dispatch(shade, &self.shade, groups);
         if let Some(geometry) = &self.geometry {
-            recorder.dispatch(&raster.project_backward, &geometry.project, groups);
+            recorder.dispatch(project, &geometry.project, groups);
         }
     }
 }

@@ -14,7 +14,7 @@ pub mod sort;
 mod splats;
 mod view;
 
-pub use layer::{GeometryAdjoint, Layer, LayerAdjoint};
+pub use layer::{GeometryAdjoint, Layer, LayerAdjoint, Outcome, StepBuffers};
 pub use lists::{Lists, Projected, Status, StatusReadback, TileListsMode};
 pub use renderer::{Picture, Renderer};
 pub use splats::{Field, Geometry, download};
@@ -80,6 +80,8 @@ pub struct Raster {
     layers: [LayerKernels; 3],
     adjoints: [AdjointKernels; 2],
     project_backward: Kernel,
+    shade_step: Kernel,
+    project_step: Kernel,
 }
 
 impl Raster {
@@ -95,6 +97,8 @@ impl Raster {
             adjoints: [ColorKind::Luma, ColorKind::Chroma]
                 .map(|kind| AdjointKernels::new(gpu, kind)),
             project_backward: Kernel::new(gpu, "project_backward", shaders::PROJECT_BACKWARD),
+            shade_step: Kernel::new(gpu, "shade_backward", shaders::SHADE_BACKWARD_STEP),
+            project_step: Kernel::new(gpu, "project_backward", shaders::PROJECT_BACKWARD_STEP),
         }
     }
 

@@ -79,10 +79,11 @@ fn timings_name_every_kernel() {
     let rows = report["luma"]["timings"].as_array().expect("rows");
     let total = |key: &str| -> f64 { rows.iter().filter_map(|row| row[key].as_f64()).sum() };
     assert!((total("share") - 1.0).abs() < 1e-9 && total("seconds") > 0.0);
-    for (kernel, dispatches) in [("project", 3), ("luma_loss", 3), ("adam", 6)] {
+    for kernel in ["project", "luma_loss", "scan_sums"] {
         let row = rows.iter().find(|row| row["kernel"] == kernel);
         let row = row.unwrap_or_else(|| panic!("{kernel} is missing"));
-        assert_eq!(row["dispatches"], dispatches, "{kernel}");
+        // Once an iteration, and again where the lists overflowed.
+        assert!(row["dispatches"].as_u64() >= Some(3), "{kernel}");
         assert!(row["minimum_bytes"].as_f64() > Some(0.0), "{kernel}");
     }
 

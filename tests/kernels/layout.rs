@@ -106,6 +106,8 @@ fn twins() -> Vec<Twin> {
                 planes,
                 correction1,
                 correction2,
+                opacity_weight,
+                scale_weight,
                 learning_rates
             }
         ),
@@ -113,8 +115,6 @@ fn twins() -> Vec<Twin> {
             "RelocationParameters" = RelocationParameters {
                 splat_count,
                 seed,
-                opacity_weight,
-                scale_weight,
                 noise
             }
         ),

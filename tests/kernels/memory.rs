@@ -54,7 +54,7 @@ fn a_training_takes_what_was_estimated() {
         gpu.wait().unwrap();
         let taken = (gpu.allocated_bytes().unwrap() - before) as f64;
         let demand = Demand::of([camera(&oblique_view())].iter(), sh_degree);
-        let expected = demand.bytes(COUNT, 8 * COUNT) as f64;
+        let expected = demand.bytes(COUNT, 4 * COUNT) as f64;
         let ratio = taken / expected;
         assert!((0.98..1.02).contains(&ratio), "degree {sh_degree}: {ratio}");
     }

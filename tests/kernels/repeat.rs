@@ -24,7 +24,7 @@ const COUNT: usize = 40;
 const FAR_FIRST: u64 = 3;
 
 /// Tile-list entries that a training begins with, for each Gaussian.
-const ROOM: usize = 8;
+const ROOM: usize = 4;
 
 #[test]
 fn forward_and_backward_give_the_same_bits() {

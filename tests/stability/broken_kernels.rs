@@ -80,7 +80,8 @@ fn broken_losses_and_steps_are_noticed() {
         ("luma_loss_backward", "2.0 * x * square[k]", "x * square[k]"),
         ("chroma_loss", "weights.teacher * residual", "residual"),
         ("sum_loss", "k += 256u", "k += 512u"),
-        ("adam", "sqrt(v * parameters.correction2)", "sqrt(v)"),
+        ("adam", "sqrt(v * correction.y)", "sqrt(v)"),
+        ("shade_backward", "sqrt(v * correction.y)", "sqrt(v)"),
         ("densify_geometry", "exp(log_scale)", "log_scale"),
         (
             "scan_apply",

@@ -25,12 +25,12 @@ const REASONS: &[(&str, &str, &str)] = &[
         "of a sum of squares; sizes and conics are finite",
     ),
     (
-        "adam",
-        "rate * (m * parameters.correction1) / (sqrt(v * parameters.correction2) + EPSILON)",
+        "adam_step",
+        "rate * (m * correction.x) / (sqrt(v * correction.y) + EPSILON)",
         "EPSILON is added to the root",
     ),
     (
-        "adam",
+        "adam_step",
         "sqrt",
         "of a mean of squares times a positive correction",
     ),

@@ -58,12 +58,12 @@ fn run(gpu: &Gpu, [planes, count]: [usize; 2]) -> Result<[Sample; 3], GpuError> 
     let values = Buffer::from_slice(gpu, "values", &start)?;
     let slope = Buffer::zeros(gpu, "gradient", len)?;
     let status = Buffer::zeros(gpu, "status", STATUS_WORDS)?;
-    let state = Adam::new(gpu, &kernel, &status, &slope, &values, count, None)?;
+    let optimizer = Adam::new(gpu, &kernel, &status, &slope, &values, count, None)?;
     for step in 1..=STEPS {
         let gradient = gradient(&mut random, len);
         slope.write(gpu, &gradient);
         let mut recorder = Recorder::new(gpu);
-        state.record(gpu, &kernel, &mut recorder, step, &rates);
+        optimizer.record(gpu, &kernel, &mut recorder, step, &rates);
         recorder.submit();
         for (k, (value, moments)) in expected.iter_mut().zip(&mut moments).enumerate() {
             let rate = f64::from(rates[k / count]);
@@ -82,8 +82,8 @@ fn run(gpu: &Gpu, [planes, count]: [usize; 2]) -> Result<[Sample; 3], GpuError> 
     };
     Ok([
         Sample::new(read(&values)?, expected),
-        by_size(1, read(&state.first)?, first),
-        by_size(2, read(&state.second)?, second),
+        by_size(1, read(&optimizer.state.first)?, first),
+        by_size(2, read(&optimizer.state.second)?, second),
     ])
 }
 

@@ -10,6 +10,7 @@ mod project;
 mod relocation;
 mod scan;
 mod sort;
+mod step;
 
 pub use losses::chroma_loss_on;
 pub use scan::scan_on;
@@ -24,13 +25,14 @@ use crate::{gpu::GpuError, raster::Raster};
 type Measure = fn(&Arc<Raster>) -> Result<Vec<Row>, GpuError>;
 
 /// The topics in the order in which an iteration meets them.
-pub const TOPICS: [(&str, Measure); 9] = [
+pub const TOPICS: [(&str, Measure); 10] = [
     ("project", project::rows),
     ("scan", scan::rows),
     ("sort", sort::rows),
     ("blend", blend::rows),
     ("losses", losses::rows),
     ("adjoint", gradient::rows),
+    ("step", step::rows),
     ("adam", adam::rows),
     ("densify", densify::rows),
     ("relocation", relocation::rows),

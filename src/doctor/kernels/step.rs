@@ -1,0 +1,164 @@
+//! `shade_backward` and `project_backward` with Adam's step: the same as Adam on the
+//! gradient that they leave without it.
+
+use std::sync::Arc;
+
+use crate::{
+    compare::widen,
+    doctor::{
+        measured::{Allowance, Row, Sample},
+        stage::{Stage, splats},
+    },
+    gpu::{Buffer, GpuError, Recorder},
+    optimize::AdamState,
+    oracle::{
+        adam::{Moments, adam},
+        random::{Random, random_scene_before, random_view},
+        relocation::relocation_pull,
+    },
+    raster::{Field, Geometry, Layer, LayerAdjoint, Lists, Outcome, Raster, constants::*},
+    splats::Splats,
+};
+
+/// The step, which the corrections of the moments depend on.
+const STEP: u32 = 3;
+
+/// Weights of opacity and standard deviation in the loss.
+const WEIGHTS: [f32; 2] = [0.25, 0.5];
+
+/// Rate of plane `plane`.
+fn rate(plane: usize) -> f32 {
+    1e-2 * 1.1_f32.powi(plane as i32)
+}
+
+/// Planes after a step: values, first and second moments.
+type Planes = [Vec<f32>; 3];
+
+/// Geometry and field after a fused step from these moments.
+fn stepped(
+    raster: &Arc<Raster>,
+    splats: &Splats,
+    stage: &Stage,
+    upstream: &[f32],
+    moments: &[[Vec<f32>; 2]; 2],
+) -> Result<[Planes; 2], GpuError> {
+    let gpu = &raster.gpu;
+    let (pixels, tiles) = (stage.view.pixel_count(), stage.view.tile_count());
+    let geometry = Geometry::upload(gpu, splats)?;
+    let field = Field::upload(gpu, &splats.sh)?;
+    let lists = Lists::new(raster, &geometry, tiles, splats.len() * tiles)?;
+    let layer = Layer::new(raster, &geometry, &lists, &field, pixels, tiles)?;
+    let state = |values: &Buffer<f32>, [first, second]: &[Vec<f32>; 2]| {
+        let moments = [
+            Buffer::from_slice(gpu, "first moments", first)?,
+            Buffer::from_slice(gpu, "second moments", second)?,
+        ];
+        let state = AdamState::new(gpu, values.len(), splats.len(), Some(moments))?;
+        let rates: Vec<f32> = (0..values.len() / splats.len()).map(rate).collect();
+        state.set(gpu, STEP, &rates, WEIGHTS);
+        Ok::<_, GpuError>(state)
+    };
+    let of_geometry = state(&geometry.planes, &moments[0])?;
+    let of_field = state(&field.planes, &moments[1])?;
+    let outcome = Outcome::Step {
+        geometry: of_geometry.step_buffers(),
+        field: of_field.step_buffers(),
+    };
+    let adjoint = LayerAdjoint::new(raster, &geometry, &lists, &field, &layer, &outcome)?;
+    adjoint.image_gradient.write(gpu, upstream);
+    let mut recorder = Recorder::new(gpu);
+    lists.set_view(gpu, &stage.view);
+    lists.record(raster, &mut recorder);
+    layer.record(raster, &mut recorder);
+    adjoint.record(raster, &mut recorder);
+    recorder.submit();
+    let planes = |values: &Buffer<f32>, state: &AdamState| {
+        Ok::<_, GpuError>([
+            values.read(gpu)?,
+            state.first.read(gpu)?,
+            state.second.read(gpu)?,
+        ])
+    };
+    Ok([
+        planes(&geometry.planes, &of_geometry)?,
+        planes(&field.planes, &of_field)?,
+    ])
+}
+
+/// What relocation adds to the gradient of element `at` of the geometry.
+fn pull(geometry: &[f32], at: usize, count: usize) -> f64 {
+    let (plane, value) = (at / count, f64::from(geometry[at]));
+    let weights = WEIGHTS.map(f64::from);
+    match plane {
+        PLANE_LOG_SCALE..PLANE_OPACITY => relocation_pull(0.0, [value; 3], weights).1[0],
+        PLANE_OPACITY => relocation_pull(value, [0.0; 3], weights).0,
+        _ => 0.0,
+    }
+}
+
+pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
+    let (gpu, allowed) = (&raster.gpu, Allowance::of(&raster.gpu));
+    let mut samples: [[Vec<Sample>; 3]; 2] = Default::default();
+    for seed in 40..43 {
+        let view = random_view(seed);
+        let scene = random_scene_before::<1>(&view, seed, 300, seed as usize % 4);
+        let splats = splats(&scene);
+        let stage = Stage::new(raster, &splats, &view)?;
+        let mut random = Random::new(seed);
+        let upstream: Vec<f64> = (0..view.width * view.height)
+            .map(|_| random.range(-1.0, 1.0))
+            .collect();
+        let gradient = stage.backward(&upstream)?;
+        let starts = [
+            Geometry::upload(gpu, &splats)?.planes.read(gpu)?,
+            Field::upload(gpu, &splats.sh)?.planes.read(gpu)?,
+        ];
+        let gradients = [&gradient.geometry, &gradient.field];
+        // Moments of the gradient's own size.
+        let moments = gradients.map(|gradient| {
+            let mut some = |g: &f32| random.range(0.5, 2.0) as f32 * (g.abs() + 1e-3);
+            [
+                gradient.iter().map(&mut some).collect::<Vec<f32>>(),
+                gradient.iter().map(|g| some(g).powi(2)).collect(),
+            ]
+        });
+        let narrow: Vec<f32> = upstream.iter().map(|&v| v as f32).collect();
+        let actual = stepped(raster, &splats, &stage, &narrow, &moments)?;
+        for (which, actual) in actual.iter().enumerate() {
+            let mut expected: [Vec<f64>; 3] = Default::default();
+            for at in 0..starts[which].len() {
+                let mut value = f64::from(starts[which][at]);
+                let mut moment = Moments {
+                    first: f64::from(moments[which][0][at]),
+                    second: f64::from(moments[which][1][at]),
+                };
+                let mut slope = f64::from(gradients[which][at]);
+                if which == 0 {
+                    slope += pull(&starts[0], at, splats.len());
+                }
+                let rate = f64::from(rate(at / splats.len()));
+                adam(&mut value, &mut moment, slope, rate, STEP as i32);
+                expected[0].push(value);
+                expected[1].push(moment.first);
+                expected[2].push(moment.second);
+            }
+            for (k, expected) in expected.into_iter().enumerate() {
+                samples[which][k].push(Sample::new(widen(&actual[k]), expected));
+            }
+        }
+    }
+    let bounds = [
+        allowed.relative(4.7e-8, 1.0),
+        allowed.relative(6.0e-7, 1e-3),
+        allowed.relative(5.4e-7, 1e-6),
+    ];
+    let quantities = ["value after a step", "first moment", "second moment"];
+    let kernels = ["project_backward", "shade_backward"];
+    let mut rows = Vec::new();
+    for (kernel, samples) in kernels.into_iter().zip(&samples) {
+        for ((what, bound), samples) in quantities.into_iter().zip(bounds).zip(samples) {
+            rows.push(Row::elementwise(kernel, what, bound, samples));
+        }
+    }
+    Ok(rows)
+}
