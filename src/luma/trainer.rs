@@ -1,11 +1,11 @@
 //! The training loop of stage 1.
 //!
 //! An iteration is one submission without a read-back. Every [`SYNC_EVERY`]
-//! iterations, and oftener at first, the host orders losses and counts and meanwhile goes on; it waits
-//! for an order only when the next one is due. When tile lists overflow, the
-//! device stops taking steps by itself; the host learns how many it took, grows
-//! the lists and repeats from there, so that the result does not depend on when
-//! it noticed.
+//! iterations, and oftener at first, the host orders losses and counts and
+//! meanwhile goes on; it waits for an order only when the next one is due. When
+//! tile lists overflow, the device stops taking steps by itself; the host learns
+//! how many it took, grows the lists and repeats from there, so that the result
+//! does not depend on when it noticed.
 
 use std::{sync::Arc, time::Instant};
 
@@ -78,6 +78,8 @@ pub struct LumaProgress {
 struct Report {
     /// Iterations done when it was ordered, had none been refused.
     iteration: usize,
+    /// Whether the caller hears of it, and not only of an overflow.
+    told: bool,
     status: StatusReadback,
     losses: Readback<f32>,
 }
@@ -209,11 +211,13 @@ impl LumaTrainer {
             // The first views say how much room is needed: those lost to an overflow
             // are few if it is noticed early.
             let early = iteration < SYNC_EVERY && iteration.is_power_of_two();
-            if !(changes || ends || early || iteration.is_multiple_of(SYNC_EVERY)) {
+            let told = changes || ends || iteration.is_multiple_of(SYNC_EVERY);
+            if !(told || early) {
                 continue;
             }
             let order = Report {
                 iteration,
+                told,
                 status: self.workspace().lists.status_later(&self.gpu),
                 losses: self.workspace().log.read_later(&self.gpu),
             };
@@ -372,6 +376,9 @@ impl LumaTrainer {
         self.seen.instances += status.instances as f64;
         self.seen.capacity += self.workspace().lists.capacity as f64;
         self.reports += 1;
+        if !report.told {
+            return Ok(None);
+        }
         let since = (report.iteration - 1) / SYNC_EVERY * SYNC_EVERY;
         let recent = &losses[..report.iteration - since];
         observe(LumaProgress {

@@ -189,6 +189,7 @@ fn presets_and_what_overrules_them() {
     let presets = [
         ("draft", 12_000, 0, json!(400)),
         ("balanced", 500_000, 2, json!(1600)),
+        // Or as many as the device has room for.
         ("paper", 3_000_000, 3, json!(null)),
     ];
     for (preset, max_splats, degree, max_side) in presets {
@@ -203,7 +204,8 @@ fn presets_and_what_overrules_them() {
         ];
         let report = place.json(&fit);
         assert_eq!(report["preset"], preset);
-        assert_eq!(report["luma"]["max_splats"], max_splats);
+        let cap = report["luma"]["max_splats"].as_u64();
+        assert!(cap == Some(max_splats) || preset == "paper" && cap < Some(max_splats));
         assert_eq!(report["luma"]["sh_degree"], degree);
         assert_eq!(report["capture"]["max_side"], max_side);
     }
