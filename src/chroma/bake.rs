@@ -6,13 +6,17 @@
 //! slope of each channel over the range in which the gray varies.
 
 use crate::{
-    color::{gamut_map_lab, gray_to_lightness},
+    color::{gray_to_lightness, lab_to_srgb},
     splats::{ShField, Splats, sh},
 };
 
 /// Bounds on half the range over which the slope is taken: below, rounding
 /// shows; above, the colour would no longer be that of this gray.
 const HALF_RANGE: [f64; 2] = [0.01, 0.25];
+
+/// Grays at which a Gaussian's own lightness decides what its a/b amount to; beyond,
+/// that of the nearer bound does (measured in docs/decisions.md).
+const LIKELY_GRAY: [f64; 2] = [0.2, 0.8];
 
 /// RGB Gaussians that look like `luma` (one channel) with `chroma` (a, b).
 ///
@@ -69,17 +73,20 @@ fn bake_one(luma: &[f32], chroma: &[f32], out: &mut [f32]) {
     }
 }
 
-/// sRGB of a gray with a/b. Beyond black and white the excess stays gray, so
-/// that a Gaussian that overshoots in gray overshoots alike in colour.
+/// sRGB of a gray with a/b: the gray itself plus what the a/b change at a lightness at
+/// which the pixel may well be.
+///
+/// A single Gaussian is often darker than black or brighter than white, where no
+/// colour is left: what it adds to a pixel of middling gray would be lost. Nor is it
+/// brought into the gamut: the sum is what is shown, and viewers clip that.
 fn color(gray: f64, ab: [f64; 2]) -> [f64; 3] {
-    let shown = gray.clamp(0.0, 1.0);
-    gamut_map_lab([gray_to_lightness(shown), ab[0], ab[1]]).map(|v| v + gray - shown)
+    let likely = gray.clamp(LIKELY_GRAY[0], LIKELY_GRAY[1]);
+    lab_to_srgb([gray_to_lightness(likely), ab[0], ab[1]]).map(|v| v + gray - likely)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::color::lab_to_srgb;
 
     fn one(luma: &[f32], chroma: &[f32], degrees: [u32; 2]) -> Vec<f32> {
         let splats = Splats {
@@ -121,6 +128,26 @@ mod tests {
         for channel in 0..3 {
             let shown = 0.5 + sh::C0 * f64::from(baked[channel]);
             assert!((shown - wanted[channel]).abs() < 1e-5);
+        }
+    }
+
+    /// A pair that blends to a middling gray keeps its colour, wherever each stands.
+    #[test]
+    fn colours_survive_beyond_black_and_white() {
+        let ab = [20.0, -30.0];
+        let shown = |gray: f64| {
+            let luma = [((gray - 0.5) / sh::C0) as f32];
+            let baked = one(&luma, &ab.map(|v| (v / sh::C0) as f32), [0, 0]);
+            [0, 1, 2].map(|channel| 0.5 + sh::C0 * f64::from(baked[channel]))
+        };
+        let (dark, bright) = (shown(-0.3), shown(1.3));
+        let blended = [0, 1, 2].map(|channel| (dark[channel] + bright[channel]) / 2.0);
+        let wanted = lab_to_srgb([gray_to_lightness(0.5), ab[0], ab[1]]);
+        for channel in 0..3 {
+            assert!(
+                (blended[channel] - wanted[channel]).abs() < 0.03,
+                "{blended:?} {wanted:?}"
+            );
         }
     }
 

@@ -80,6 +80,27 @@ pub enum GpuError {
     Lost(String, String),
 }
 
+impl GpuError {
+    /// Of a buffer that grows with the set of Gaussians: says how many of these
+    /// `splats` there would have been room for.
+    #[must_use]
+    pub fn of_splats(self, splats: usize) -> Self {
+        match self {
+            Self::TooLarge {
+                label,
+                needed,
+                limit,
+            } => Self::TooManySplats {
+                splats,
+                fits: (splats as f64 * limit as f64 / needed as f64) as usize,
+                label,
+                limit,
+            },
+            other => other,
+        }
+    }
+}
+
 /// A device and its queue, cheap to clone.
 #[derive(Clone)]
 pub struct Gpu {

@@ -2,6 +2,7 @@
 
 use crate::{
     capture::Camera,
+    gpu::GpuError,
     raster::{ViewUniform, constants::*},
     splats::sh,
 };
@@ -16,6 +17,9 @@ pub(super) const ENTRIES_PER_SPLAT: usize = 4;
 /// ranks, keys and places of the depth sort 4, its histogram, colour, gradient on the
 /// image plane 8, of its mean 3, statistics.
 const SCRATCH_WORDS: f64 = 8.0 + 4.0 + 4.0 + 0.125 + 1.0 + 8.0 + 3.0 + STATISTICS_PLANES as f64;
+
+/// Words of a line of the plan that a change of the set follows.
+const PLAN_WORDS: f64 = 12.0;
 
 /// Words of a tile-list entry: keys and places of the tile sort 4, its histogram, the
 /// Gaussian's index, the gradient's eight figures.
@@ -69,9 +73,26 @@ impl Demand {
         moving as u64 + WORD * PIXEL_WORDS * self.max_pixels + self.photos
     }
 
+    /// Whether `splats` Gaussians with `entries` tile-list entries are within `limit`
+    /// bytes.
+    ///
+    /// # Errors
+    /// [`GpuError::OverLimit`] if not.
+    pub fn check(&self, limit: Option<u64>, splats: usize, entries: usize) -> Result<(), GpuError> {
+        let needed = self.bytes(splats, entries);
+        match limit {
+            Some(limit) if needed > limit => Err(GpuError::OverLimit {
+                splats,
+                needed,
+                limit,
+            }),
+            _ => Ok(()),
+        }
+    }
+
     /// Bytes at most: while the set changes, parameters and moments exist twice.
     pub fn peak_bytes(&self, splats: usize) -> u64 {
-        let twice = WORD as f64 * 3.0 * self.parameters() * splats as f64;
+        let twice = WORD as f64 * (3.0 * self.parameters() + PLAN_WORDS) * splats as f64;
         self.bytes(splats, ENTRIES_PER_SPLAT * splats) + twice as u64
     }
 

@@ -6,9 +6,11 @@ mod memory;
 pub mod relocation;
 mod settings;
 mod trainer;
+mod view;
 mod workspace;
 
 pub use densify::DensifyParameters;
 pub use memory::Demand;
 pub use settings::{Densification, LumaSettings, Schedule};
-pub use trainer::{LumaProgress, LumaTrainer, TrainingView};
+pub use trainer::{LumaProgress, LumaTrainer};
+pub use view::TrainingView;

@@ -15,10 +15,11 @@ use super::{
     loss,
     memory::{Demand, ENTRIES_PER_SPLAT},
     relocation::{self, RelocationParameters},
+    view::TrainingView,
     workspace::{Kernels, Workspace},
 };
 use crate::{
-    capture::{Camera, downscale},
+    capture::Camera,
     gpu::{Buffer, Gpu, GpuError, Readback, Recorder},
     optimize::{AdamState, Load, view_at},
     raster::{Field, Geometry, Raster, StatusReadback, ViewUniform, constants::*, download},
@@ -33,29 +34,6 @@ const HEADROOM: f64 = 1.25;
 
 /// Opacity to which a reset lowers (3DGS).
 const RESET_OPACITY: f32 = 0.01;
-
-/// One photograph to train on.
-#[derive(Clone, Debug)]
-pub struct TrainingView {
-    /// Where it was taken.
-    pub camera: Camera,
-    /// sRGB-encoded gray, `[height, width]`.
-    pub gray: Vec<u8>,
-}
-
-impl TrainingView {
-    /// The same at half the size, each side rounded up.
-    pub fn halved(&self) -> Self {
-        let sides = [self.camera.width, self.camera.height];
-        let half = sides.map(|side| side.div_ceil(2));
-        let as_size = |sides: [u32; 2]| sides.map(|side| side as usize);
-        let pixels: Vec<[u8; 1]> = self.gray.iter().map(|&v| [v]).collect();
-        Self {
-            camera: self.camera.resized(half[0], half[1]),
-            gray: downscale(&pixels, as_size(sides), as_size(half)).into_flattened(),
-        }
-    }
-}
 
 /// How far a training is.
 #[derive(Clone, Copy, Debug)]
@@ -158,7 +136,7 @@ impl LumaTrainer {
         let geometry = Geometry::upload(&gpu, splats)?;
         let field = Field::upload(&gpu, &splats.sh)?;
         let capacity = geometry.count * ENTRIES_PER_SPLAT;
-        check(&settings, &demand, geometry.count, capacity)?;
+        demand.check(settings.memory_limit, geometry.count, capacity)?;
         let workspace = Workspace::new(
             &raster,
             &kernels,
@@ -426,7 +404,8 @@ impl LumaTrainer {
         iteration: usize,
         moments: [[Buffer<f32>; 2]; 2],
     ) -> Result<(), GpuError> {
-        check(&self.settings, &self.demand, self.geometry.count, capacity)?;
+        let limit = self.settings.memory_limit;
+        self.demand.check(limit, self.geometry.count, capacity)?;
         self.workspace = None;
         // Only now the device frees what it held.
         self.gpu.wait()?;
@@ -442,7 +421,7 @@ impl LumaTrainer {
             capacity,
             Some(moments),
         );
-        self.workspace = Some(workspace.map_err(|error| too_many(error, self.geometry.count))?);
+        self.workspace = Some(workspace.map_err(|error| error.of_splats(self.geometry.count))?);
         self.base = iteration;
         Ok(())
     }
@@ -508,40 +487,5 @@ impl LumaTrainer {
             moment.write_at(&self.gpu, first, &vec![0.0; n]);
         }
         Ok(())
-    }
-}
-
-/// Whether a training may take what it is about to.
-fn check(
-    settings: &LumaSettings,
-    demand: &Demand,
-    splats: usize,
-    entries: usize,
-) -> Result<(), GpuError> {
-    let needed = demand.bytes(splats, entries);
-    match settings.memory_limit {
-        Some(limit) if needed > limit => Err(GpuError::OverLimit {
-            splats,
-            needed,
-            limit,
-        }),
-        _ => Ok(()),
-    }
-}
-
-/// Says how many Gaussians a binding would have had room for.
-fn too_many(error: GpuError, splats: usize) -> GpuError {
-    match error {
-        GpuError::TooLarge {
-            label,
-            needed,
-            limit,
-        } => GpuError::TooManySplats {
-            splats,
-            fits: (splats as f64 * limit as f64 / needed as f64) as usize,
-            label,
-            limit,
-        },
-        other => other,
     }
 }
