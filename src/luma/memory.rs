@@ -28,31 +28,47 @@ const ENTRY_WORDS: f64 = 4.0 + 0.125 + 1.0 + 8.0;
 /// Words of a pixel: picture, last entry, gradient, three slopes of SSIM.
 const PIXEL_WORDS: u64 = 6;
 
+/// Photos stay on the device while they take at most one part in so many of a memory
+/// limit: the rest is worth more to Gaussians, and a photo an iteration is little to
+/// bring.
+const PHOTO_SHARE: u64 = 4;
+
 /// What does not depend on the number of Gaussians.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Demand {
     /// Pixels of the largest photo.
     pub max_pixels: u64,
-    /// Bytes of all photos as they lie on the device.
+    /// Bytes of the photos on the device: all, or the largest if they are streamed.
     pub photos: u64,
+    /// Whether photos are brought to the device one at a time.
+    pub streams: bool,
     /// Degree of the luma harmonics.
     pub sh_degree: u32,
 }
 
 impl Demand {
-    /// What photos by these cameras ask for.
-    pub fn of<'a>(cameras: impl Iterator<Item = &'a Camera>, sh_degree: u32) -> Self {
-        let mut demand = Self {
-            max_pixels: 0,
-            photos: 0,
-            sh_degree,
-        };
+    /// What photos by these cameras ask for within `limit` bytes, if there is one.
+    pub fn of<'a>(
+        cameras: impl Iterator<Item = &'a Camera>,
+        sh_degree: u32,
+        limit: Option<u64>,
+    ) -> Self {
+        let (mut max_pixels, mut photos) = (0, 0);
         for camera in cameras {
             let pixels = ViewUniform::new(camera, 1.0, 0, 0).pixel_count() as u64;
-            demand.max_pixels = demand.max_pixels.max(pixels);
-            demand.photos += pixels.next_multiple_of(WORD);
+            max_pixels = max_pixels.max(pixels);
+            photos += pixels.next_multiple_of(WORD);
         }
-        demand
+        let streams = limit.is_some_and(|limit| photos > limit / PHOTO_SHARE);
+        if streams {
+            photos = max_pixels.next_multiple_of(WORD);
+        }
+        Self {
+            max_pixels,
+            photos,
+            streams,
+            sh_degree,
+        }
     }
 
     fn parameters(&self) -> f64 {
@@ -120,6 +136,7 @@ mod tests {
     const DEMAND: Demand = Demand {
         max_pixels: 57_600,
         photos: 576_000,
+        streams: false,
         sh_degree: 0,
     };
 

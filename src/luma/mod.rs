@@ -3,6 +3,7 @@
 pub mod densify;
 mod loss;
 mod memory;
+mod photos;
 pub mod relocation;
 mod settings;
 mod trainer;

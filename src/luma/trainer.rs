@@ -14,6 +14,7 @@ use super::{
     densify::{self, Evidence, Target},
     loss,
     memory::{Demand, ENTRIES_PER_SPLAT},
+    photos::Photos,
     relocation::{self, RelocationParameters},
     view::TrainingView,
     workspace::{Kernels, Workspace},
@@ -73,7 +74,7 @@ pub struct LumaTrainer {
     /// Of each view; behind them, where training begins coarse, at half the size.
     cameras: Vec<Camera>,
     /// In the same order.
-    photos: Vec<Buffer<u32>>,
+    photos: Photos,
     /// Views.
     views: usize,
     slopes: [Buffer<f32>; 3],
@@ -112,7 +113,7 @@ impl LumaTrainer {
         let kernels = Kernels::new(&gpu);
         let near = NEAR_SHARE * extent;
         let (mut max_pixels, mut max_tiles) = (0, 0);
-        let (mut cameras, mut photos) = (Vec::new(), Vec::new());
+        let (mut cameras, mut grays) = (Vec::new(), Vec::new());
         let count = views.len();
         let coarse: Vec<TrainingView> = match settings.schedule.coarse_until {
             0 => Vec::new(),
@@ -127,10 +128,11 @@ impl LumaTrainer {
             );
             max_pixels = max_pixels.max(uniform.pixel_count());
             max_tiles = max_tiles.max(uniform.tile_count());
-            photos.push(Buffer::from_slice(&gpu, "photo", &loss::pack(&view.gray))?);
+            grays.push(view.gray);
             cameras.push(view.camera);
         }
-        let demand = Demand::of(cameras.iter(), splats.sh.degree);
+        let demand = Demand::of(cameras.iter(), splats.sh.degree, settings.memory_limit);
+        let photos = Photos::new(&gpu, grays.iter().map(Vec::as_slice), demand.streams)?;
         let slopes = || Buffer::zeros(&gpu, "slopes", max_pixels);
         let slopes = [slopes()?, slopes()?, slopes()?];
         let geometry = Geometry::upload(&gpu, splats)?;
@@ -143,7 +145,7 @@ impl LumaTrainer {
             &settings,
             &geometry,
             &field,
-            &photos,
+            photos.buffers(),
             &slopes,
             [max_pixels, max_tiles],
             capacity,
@@ -276,7 +278,8 @@ impl LumaTrainer {
         workspace.lists.set_view(&self.gpu, &view);
         workspace.lists.record(&self.raster, &mut recorder);
         workspace.layer.record(&self.raster, &mut recorder);
-        workspace.losses[index].record(&self.kernels.loss, &mut recorder, &view);
+        let photo = self.photos.show(&self.gpu, index);
+        workspace.losses[photo].record(&self.kernels.loss, &mut recorder, &view);
         let [x, y] = loss::blocks(&view);
         workspace.log.record(
             &self.gpu,
@@ -415,7 +418,7 @@ impl LumaTrainer {
             &self.settings,
             &self.geometry,
             &self.field,
-            &self.photos,
+            self.photos.buffers(),
             &self.slopes,
             [self.max_pixels, self.max_tiles],
             capacity,

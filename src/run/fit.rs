@@ -87,7 +87,7 @@ pub fn fit(
     settings.schedule.coarse_until =
         (options.coarse * settings.schedule.iterations as f64) as usize;
     let cameras = scene.split.train.iter().map(|&i| &scene.photos[i].1);
-    let demand = Demand::of(cameras, settings.sh_degree);
+    let demand = Demand::of(cameras, settings.sh_degree, options.memory_limit);
     let fits = demand.largest_set(options.memory_limit, gpu.binding_limit());
     if fits == 0 {
         return Err(RunError::Gpu(GpuError::OverLimit {

@@ -53,7 +53,7 @@ fn a_training_takes_what_was_estimated() {
         gpu.queue().submit([]);
         gpu.wait().unwrap();
         let taken = (gpu.allocated_bytes().unwrap() - before) as f64;
-        let demand = Demand::of([camera(&oblique_view())].iter(), sh_degree);
+        let demand = Demand::of([camera(&oblique_view())].iter(), sh_degree, None);
         let expected = demand.bytes(COUNT, 4 * COUNT) as f64;
         let ratio = taken / expected;
         assert!((0.98..1.02).contains(&ratio), "degree {sh_degree}: {ratio}");
@@ -74,4 +74,35 @@ fn what_is_beyond_the_limit_is_refused_before_it_is_taken() {
     // Parameters and pictures come first; the rest is never asked for.
     gpu.wait().unwrap();
     assert!(gpu.allocated_bytes().unwrap() - before < 10 << 20);
+}
+
+/// Photos that would take more than a quarter of the limit come one at a time.
+#[test]
+fn streamed_photos_train_alike() {
+    let gpu = Gpu::open().unwrap();
+    let camera = camera(&oblique_view());
+    let pixels = (camera.width * camera.height) as usize;
+    let views: Vec<TrainingView> = (0..20)
+        .map(|k| TrainingView {
+            camera: camera.clone(),
+            gray: (0..pixels).map(|p| (p * (k + 1)) as u8).collect(),
+        })
+        .collect();
+    let cameras = || views.iter().map(|view| &view.camera);
+    let start = initial_splats(&[([0.0; 3], 0.5), ([0.1, 0.2, 0.0], 0.3)], 1.0, 0);
+    let all = Demand::of(cameras(), 0, None);
+    let limit = 4 * all.photos - 4;
+    assert!(!all.streams && Demand::of(cameras(), 0, Some(limit)).streams);
+    let raster = Arc::new(Raster::new(&gpu));
+    let trained = |memory_limit| {
+        let settings = LumaSettings {
+            memory_limit,
+            ..LumaSettings::new(45)
+        };
+        let raster = raster.clone();
+        let mut trainer = LumaTrainer::new(raster, settings, 1.0, &start, views.clone()).unwrap();
+        trainer.train(&mut |_| {}).unwrap();
+        trainer.splats().unwrap()
+    };
+    assert!(trained(Some(limit)) == trained(None));
 }
