@@ -13,7 +13,6 @@ use gs_chroma::{
 
 mod adam;
 mod blend;
-mod densify;
 mod gradient;
 mod harness;
 mod layout;

@@ -1,4 +1,4 @@
-//! `densify`: copies and halves of splits.
+//! `densify`: copies, halves of splits, kept and dropped moments.
 
 use std::sync::Arc;
 
@@ -94,19 +94,36 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
             .extend((0..GEOMETRY_PLANES).map(|plane| new[plane * count + j]));
         side.1.extend(descendant(&old, descent));
     }
+    let (mut fields, mut moments) = (Vec::new(), Vec::new());
+    for planes in [1, 4, 16] {
+        let old: Vec<f32> = (0..planes * OLD)
+            .map(|_| random.range(-1.0, 1.0) as f32)
+            .collect();
+        let expected = |keeps: fn(&Descent) -> bool| -> Vec<f64> {
+            (0..planes)
+                .flat_map(|plane| plan.iter().map(move |descent| (plane, descent)))
+                .map(|(plane, descent)| match keeps(descent) {
+                    true => f64::from(old[plane * OLD + descent.source as usize]),
+                    false => 0.0,
+                })
+                .collect()
+        };
+        let moved = |target| Ok(widen(&applied(&raster.gpu, &plan, &old, target)?));
+        fields.push(Sample::new(moved(Target::Field)?, expected(|_| true)));
+        // Newcomers have none.
+        let kept = expected(|descent| descent.survives == 1);
+        moments.push(Sample::new(moved(Target::Moments)?, kept));
+    }
     let sample = |(actual, expected): (Vec<f32>, Vec<f64>)| [Sample::new(widen(&actual), expected)];
     Ok(vec![
+        Row::exact("densify_geometry", "copies", &sample(copied)),
         Row::elementwise(
-            "densify",
-            "copies",
-            allowed.relative(0.0, 0.0),
-            &sample(copied),
-        ),
-        Row::elementwise(
-            "densify",
+            "densify_geometry",
             "halves of splits",
             allowed.relative(3.82e-7, 1.0),
             &sample(split),
         ),
+        Row::exact("densify_sh", "copies", &fields),
+        Row::exact("densify_moments", "kept and dropped", &moments),
     ])
 }
