@@ -102,7 +102,7 @@ fn photo_quad(s: Span, k: i32) -> vec4f {
     return select(vec4f(0.0), vec4f(photo_at(p.x), photo_at(p.y), photo_at(p.z), photo_at(p.w)), has(s, k));
 }
 
-// Puts four sums along a row where `column_run` finds them.
+// Puts four sums along a row where `column_sums` finds them.
 fn store(moment: u32, row: u32, quad: u32, sums: vec4f) {
     let at = row * SIDE + quad;
     rows[moment][at] = sums.x;

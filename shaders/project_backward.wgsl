@@ -3,7 +3,6 @@
 // docs/architecture.md. In training (`step`) Adam moves the parameters at once, and
 // their gradient is never stored.
 @if(step) import package::common::adam::{AdamParameters, GRADIENT_MAX, adam_step};
-import package::common::color::CHANNELS;
 import package::common::constants::{INVISIBLE, PLANE_LOG_SCALE, PLANE_MEAN, PLANE_OPACITY, PLANE_QUAT, STAT_PULL, STAT_VIEWS, STATUS_OVERFLOW};
 @if(step) import package::common::constants::STATUS_REFUSED;
 import package::common::geometry::footprint;
@@ -60,11 +59,16 @@ fn plane(index: u32, i: u32) -> f32 {
 
 // What relocation adds to the gradients of opacity logit and log-scales: its loss
 // counts opacities and standard deviations (Kheradmand et al. 2024, equation 10).
+// Without weights not even a poisoned value may leave a gradient.
 @if(step) fn opacity_pull(logit: f32) -> f32 {
+    if parameters.opacity_weight == 0.0 { return 0.0; }
     let opacity = sigmoid(logit);
     return parameters.opacity_weight * opacity * (1.0 - opacity);
 }
-@if(step) fn scale_pull(scale: vec3f) -> vec3f { return parameters.scale_weight * scale; }
+@if(step) fn scale_pull(scale: vec3f) -> vec3f {
+    if parameters.scale_weight == 0.0 { return vec3f(); }
+    return parameters.scale_weight * scale;
+}
 @if(!step) fn opacity_pull(logit: f32) -> f32 { return 0.0; }
 @if(!step) fn scale_pull(scale: vec3f) -> vec3f { return vec3f(); }
 

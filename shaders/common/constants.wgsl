@@ -3,7 +3,6 @@
 
 // Side of a square tile in pixels.
 const TILE_SIDE: u32 = 16u;
-const TILE_PIXELS: u32 = 256u;
 
 // Variance in px² added to every projected covariance: a splat is never thinner
 // than about a pixel, and the covariance can be inverted.

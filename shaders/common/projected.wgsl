@@ -1,4 +1,3 @@
-import package::common::constants::ALPHA_MAX;
 import package::common::constants::ALPHA_MIN;
 
 // A Gaussian on the image plane.
@@ -19,11 +18,6 @@ fn power_at(conic: vec3f, d: vec2f) -> f32 {
 // The power at which alpha falls to ALPHA_MIN.
 fn power_cutoff(opacity: f32) -> f32 {
     return log(opacity / ALPHA_MIN);
-}
-
-// Alpha before the cap; the cap decides whether the adjoint passes.
-fn raw_alpha(opacity: f32, power: f32) -> f32 {
-    return opacity * exp(-power);
 }
 
 // The least power over the rectangle of pixel centres [low, high]: 0 when the

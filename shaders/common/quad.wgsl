@@ -2,7 +2,6 @@
 // and their arithmetic has no branches.
 import package::common::color::Color;
 import package::common::constants::{ALPHA_MAX, ALPHA_MIN, TILE_SIDE};
-import package::common::projected::power_at;
 import package::common::view::View;
 
 @if(luma) alias Quad = vec4f;

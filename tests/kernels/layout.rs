@@ -221,7 +221,6 @@ fn constants_are_those_of_the_crate() {
     let expected = BTreeMap::from(
         [
             ("TILE_SIDE", f64::from(TILE_SIDE)),
-            ("TILE_PIXELS", f64::from(TILE_SIDE * TILE_SIDE)),
             ("BLUR", f64::from(BLUR)),
             ("ALPHA_MAX", f64::from(ALPHA_MAX)),
             ("ALPHA_MIN", f64::from(ALPHA_MIN)),

@@ -266,6 +266,21 @@ fn one_photo_trains() {
     assert!(train(&world(Frame::ORDINARY, 1)) > 24.0);
 }
 
+/// It is culled and counted, and leaves no gradient that would have to be refused.
+#[test]
+fn a_poisoned_gaussian_among_others_trains() {
+    let world = world(Frame::ORDINARY, 3);
+    let mut start = initial_splats(&world.points, world.extent as f32, 1);
+    start.log_scales[7][1] = f32::NAN;
+    start.opacity_logits[9] = f32::NAN;
+    start.log_scales[11] = [200.0; 3];
+    let (splats, reports) = trained_from(&world, &start, 20).unwrap();
+    let last = reports.last().unwrap();
+    // In every view.
+    assert_eq!((last.poisoned, last.refused), (3 * 20, 0));
+    assert!(last.loss.is_finite() && splats.means.as_flattened().iter().all(|v| v.is_finite()));
+}
+
 #[test]
 fn three_points_train() {
     let mut world = world(Frame::ORDINARY, 5);
