@@ -10,6 +10,7 @@ const PLAIN: &[&str] = &[
     "adam",
     "chroma_loss",
     "compact",
+    "conjugate",
     "densify",
     "luma_loss",
     "project",
@@ -19,6 +20,8 @@ const PLAIN: &[&str] = &[
     "sum_loss",
     "tile_lists",
     "tile_ranges",
+    "view_correction",
+    "weigh",
 ];
 
 /// Kernels compiled once for each kind of colour.
@@ -47,12 +50,17 @@ fn main() {
     for kernel in ["project_backward", "shade_backward"] {
         compile(&out, kernel, "_step", &["luma", "geometry", "step"]);
     }
+    // The solver sums over the views, and needs the loss's curvature.
+    compile(&out, "shade_backward", "_chroma_add", &["chroma", "add"]);
+    compile(&out, "chroma_loss", "_curvature", &["curvature"]);
 }
 
 fn compile(out: &str, kernel: &str, suffix: &str, features: &[&str]) {
     let mut compiler = Wesl::new("shaders");
     compiler.keep_all_entrypoints();
-    for feature in ["luma", "chroma", "rgb", "geometry", "step"] {
+    for feature in [
+        "luma", "chroma", "rgb", "geometry", "step", "add", "curvature",
+    ] {
         compiler.set_feature(feature, features.contains(&feature));
     }
     // Plain names: imported functions keep the name they have in their file.

@@ -1,4 +1,8 @@
-// Smoothed L1 between rendered and wanted a/b, value and gradient.
+// Smoothed L1 between rendered and wanted a/b, value and gradient. It may decline to
+// a constant for large residuals, so that a teacher who is plainly wrong does not
+// count. For the solver (`curvature`), the slope over the residual as well: the
+// weight of the pixel in the quadratic that touches the loss from above.
+import package::common::correction::{Correction, corrected};
 import package::common::numeric::linear_group;
 import package::common::view::View;
 
@@ -14,15 +18,43 @@ const SMOOTHING: f32 = 0.5;
 @group(0) @binding(4) var<uniform> weights: ChromaLossWeights;
 @group(0) @binding(5) var<storage, read_write> block_losses: array<f32>;
 @group(0) @binding(6) var<storage, read_write> image_gradient: array<vec2f>;
+// How much each wanted pixel counts: 0 not at all, 1 as an ordinary one, more where
+// somebody painted it by hand.
+@group(0) @binding(7) var<storage, read> pixel_weights: array<f32>;
+// `[views]`
+@group(0) @binding(8) var<storage, read> corrections: array<Correction>;
+@if(curvature) @group(0) @binding(9) var<storage, read_write> curvatures: array<vec2f>;
 
 struct ChromaLossWeights {
     coarser_size: vec2u,
     teacher: f32,
     // Weight of the agreement with the coarser scale.
     agreement: f32,
+    // One over the residual at which the loss has all but levelled off; 0: never.
+    decline: f32,
+    // Which correction is this view's.
+    view_index: u32,
+    // 1 where pixel_weights has a weight for each pixel.
+    weighted: u32,
+    padding: u32,
+}
+
+struct Penalty {
+    value: vec2f,
+    // Slope over residual.
+    curvature: vec2f,
 }
 
 var<workgroup> losses: array<f32, 256>;
+
+fn penalty(residual: vec2f, decline: f32) -> Penalty {
+    let length = sqrt(residual * residual + SMOOTHING * SMOOTHING);
+    if decline > 0.0 {
+        let kept = exp(-decline * (length - SMOOTHING));
+        return Penalty((1.0 - kept) / decline, kept / length);
+    }
+    return Penalty(length - SMOOTHING, 1.0 / length);
+}
 
 // Bilinear sample of the coarser image at this pixel, half-pixel centres.
 // The position is counted in halves of a fine pixel: integers are exact where a
@@ -46,18 +78,32 @@ fn chroma_loss(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) gro
     losses[local] = 0.0;
     if p < pixels {
         let scale = 0.5 / f32(pixels);
-        let residual = image[p] - wanted[p];
-        let length_teacher = sqrt(residual * residual + SMOOTHING * SMOOTHING);
-        var loss = weights.teacher * (length_teacher - SMOOTHING);
-        var gradient = weights.teacher * residual / length_teacher;
+        var weight = 1.0;
+        if weights.weighted != 0u {
+            weight = pixel_weights[p];
+        }
+        // What somebody painted is neither corrected nor doubted.
+        let painted = weight > 1.0;
+        var target_ab = wanted[p];
+        if !painted {
+            target_ab = corrected(corrections[weights.view_index], target_ab);
+        }
+        let residual = image[p] - target_ab;
+        let taught = penalty(residual, select(weights.decline, 0.0, painted));
+        weight *= weights.teacher;
+        var loss = weight * taught.value;
+        var curvature = weight * taught.curvature;
+        var gradient = curvature * residual;
         if weights.agreement > 0.0 {
             let drift = image[p] - upsampled(vec2u(p % view.size.x, p / view.size.x));
-            let length_drift = sqrt(drift * drift + SMOOTHING * SMOOTHING);
-            loss += weights.agreement * (length_drift - SMOOTHING);
-            gradient += weights.agreement * drift / length_drift;
+            let agreed = penalty(drift, 0.0);
+            loss += weights.agreement * agreed.value;
+            curvature += weights.agreement * agreed.curvature;
+            gradient += weights.agreement * agreed.curvature * drift;
         }
         losses[local] = 0.5 * (loss.x + loss.y);
         image_gradient[p] = scale * gradient;
+        @if(curvature) { curvatures[p] = scale * curvature; }
     }
     workgroupBarrier();
     for (var half = 128u; half > 0u; half /= 2u) {

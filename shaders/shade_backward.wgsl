@@ -16,7 +16,7 @@ import package::common::view::View;
 @group(0) @binding(2) var<storage, read> ranks: array<u32>;
 @group(0) @binding(3) var<storage, read> colors: array<Color>;
 @group(0) @binding(4) var<storage, read> gradients: array<f32>;
-// Planes `[(degree + 1)², CHANNELS, N]`, all of them written.
+// Planes `[(degree + 1)², CHANNELS, N]`: all of them written, or (`add`) added to.
 @if(!step) @group(0) @binding(5) var<storage, read_write> sh_gradient: array<f32>;
 @if(geometry && !step) @group(0) @binding(6) var<storage, read> sh: array<f32>;
 @if(step) @group(0) @binding(6) var<storage, read_write> sh: array<f32>;
@@ -50,7 +50,13 @@ fn plane_index(k: u32, i: u32) -> u32 {
 
 @if(step) fn store(k: u32, i: u32, value: Color) { descend(k, i, value); }
 
-@if(!step) fn store(k: u32, i: u32, value: Color) {
+@if(add) fn store(k: u32, i: u32, value: Color) {
+    let at = plane_index(k, i);
+    sh_gradient[at] += value.x;
+    sh_gradient[at + view.splat_count] += value.y;
+}
+
+@if(!step && !add) fn store(k: u32, i: u32, value: Color) {
     let at = plane_index(k, i);
     @if(luma) { sh_gradient[at] = value; }
     @if(chroma) { sh_gradient[at] = value.x; sh_gradient[at + view.splat_count] = value.y; }
@@ -83,7 +89,7 @@ fn shade_backward(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) 
     @if(step) { if atomicLoad(&status[STATUS_OVERFLOW]) != 0u { return; } }
     let count = (view.sh_degree + 1u) * (view.sh_degree + 1u);
     if ranks[i] == INVISIBLE {
-        for (var k = 0u; k < count; k++) {
+        @if(!add) for (var k = 0u; k < count; k++) {
             store(k, i, Color());
         }
         @if(geometry) {

@@ -4,12 +4,11 @@
 use std::{sync::Arc, time::Instant};
 
 use super::{
-    ChromaSettings, loss,
+    ChromaSettings, ChromaView, irls,
+    loss::{self, ChromaLossWeights, Correction},
     pass::{Pass, Shared},
-    teacher::AbImage,
 };
 use crate::{
-    capture::Camera,
     gpu::{Buffer, Gpu, GpuError, Recorder},
     optimize::{Adam, AdamKernel, Load, LossLog, SumLossKernel, view_at},
     raster::{Field, Geometry, Raster, constants::*},
@@ -23,21 +22,17 @@ const REPORT_EVERY: usize = 50;
 /// beyond it the tile lists of a view are made anew whenever it comes up.
 const CACHE_BYTES: usize = 2 << 30;
 
-/// A view and what its teacher says.
-pub struct ChromaView {
-    /// Where the photo was taken.
-    pub camera: Camera,
-    /// Wanted a/b at the camera's size.
-    pub wanted: AbImage,
-}
-
 /// How far a distillation is.
 #[derive(Clone, Copy, Debug)]
 pub struct ChromaProgress {
-    /// Iterations done.
+    /// Iterations of Adam, or rounds of reweighting, done.
     pub iteration: usize,
-    /// Mean loss of the full scale since the last report, in CIELAB units.
+    /// Mean loss of the finest scale in use, in CIELAB units: since the last report, or
+    /// at the start of the round.
     pub loss: f64,
+    /// Drawings of a view with their adjoints, those of coarser scales by their share of
+    /// the pixels.
+    pub passes: f64,
     /// Seconds since the distillation began.
     pub seconds: f64,
 }
@@ -54,6 +49,8 @@ pub struct Distiller {
     sum_loss: SumLossKernel,
     /// Each view's passes, coarse to fine, while memory allows.
     chains: Vec<Option<Vec<Pass>>>,
+    /// Iterations done.
+    done: usize,
 }
 
 impl Distiller {
@@ -114,6 +111,7 @@ impl Distiller {
                 gradient,
                 log,
                 loss: loss::kernel(&gpu),
+                corrections: Buffer::from_slice(&gpu, "corrections", &[Correction::NONE])?,
                 near: NEAR_SHARE * extent,
             },
             raster,
@@ -124,6 +122,7 @@ impl Distiller {
             adam_kernel,
             sum_loss,
             chains,
+            done: 0,
         })
     }
 
@@ -132,12 +131,25 @@ impl Distiller {
     /// # Errors
     /// [`GpuError`] when the device runs out of room or is lost.
     pub fn run(&mut self, observe: &mut dyn FnMut(ChromaProgress)) -> Result<(), GpuError> {
+        self.run_to(self.settings.iterations, observe)
+    }
+
+    /// Goes on until so many iterations are done, and leaves the rest for later.
+    ///
+    /// # Errors
+    /// [`GpuError`] when the device runs out of room or is lost.
+    pub fn run_to(
+        &mut self,
+        until: usize,
+        observe: &mut dyn FnMut(ChromaProgress),
+    ) -> Result<(), GpuError> {
         let begun = Instant::now();
         let mut pending = None;
-        for iteration in 0..self.settings.iterations {
+        for iteration in self.done..until.min(self.settings.iterations) {
             self.step(iteration)?;
             let done = iteration + 1;
-            let ends = done == self.settings.iterations;
+            self.done = done;
+            let ends = done == until;
             if !(ends || done.is_multiple_of(REPORT_EVERY)) {
                 continue;
             }
@@ -150,6 +162,10 @@ impl Distiller {
                     iteration: done,
                     loss: recent.iter().map(|&loss| f64::from(loss)).sum::<f64>()
                         / recent.len() as f64,
+                    passes: done as f64
+                        * (0..=self.settings.coarser_scales as usize)
+                            .map(irls::share)
+                            .sum::<f64>(),
                     seconds: begun.elapsed().as_secs_f64(),
                 });
             }
@@ -236,15 +252,17 @@ impl Distiller {
     fn chain(&self, view: &ChromaView) -> Result<Vec<Pass>, GpuError> {
         let mut chain: Vec<Pass> = Vec::new();
         for scale in (0..=self.settings.coarser_scales).rev() {
-            let [width, height] =
-                [view.camera.width, view.camera.height].map(|side| (side >> scale).max(1));
             let pass = Pass::new(
                 &self.raster,
                 &self.shared,
-                &view.camera.resized(width, height),
-                &view.wanted.resized(width, height).ab,
+                &view.at_scale(scale),
                 chain.last(),
-                self.settings.agreement,
+                ChromaLossWeights {
+                    teacher: 1.0,
+                    agreement: self.settings.agreement,
+                    decline: self.settings.robust.map_or(0.0, |residual| 1.0 / residual),
+                    ..ChromaLossWeights::default()
+                },
             )?;
             chain.push(pass);
         }

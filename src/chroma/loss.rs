@@ -4,9 +4,12 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::gpu::{Gpu, Kernel, shaders};
 
+/// Pixels that a workgroup of the loss takes.
+pub(super) const LOSS_BLOCK: usize = 256;
+
 /// Twin of `struct ChromaLossWeights`.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct ChromaLossWeights {
     /// Width and height of the coarser image.
     pub coarser_size: [u32; 2],
@@ -14,9 +17,44 @@ pub struct ChromaLossWeights {
     pub teacher: f32,
     /// Weight of the agreement with the coarser image; 0 where there is none.
     pub agreement: f32,
+    /// One over the residual, in CIELAB units, at which the loss has all but
+    /// levelled off; 0: it never does.
+    pub decline: f32,
+    /// Which correction is this view's.
+    pub view_index: u32,
+    /// 1 where each pixel has a weight.
+    pub weighted: u32,
+    /// Unused; keeps the size a multiple of 16.
+    pub padding: u32,
+}
+
+/// Twin of `struct Correction`: wanted a/b become gain · ab + offset.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct Correction {
+    /// Rows of the gain.
+    pub gain: [[f32; 2]; 2],
+    /// In CIELAB units.
+    pub offset: [f32; 2],
+    /// Unused; keeps the size a multiple of 16.
+    pub padding: [f32; 2],
+}
+
+impl Correction {
+    /// Changes nothing.
+    pub const NONE: Self = Self {
+        gain: [[1.0, 0.0], [0.0, 1.0]],
+        offset: [0.0; 2],
+        padding: [0.0; 2],
+    };
 }
 
 /// Compiles the kernel.
 pub(super) fn kernel(gpu: &Gpu) -> Kernel {
     Kernel::new(gpu, "chroma_loss", shaders::CHROMA_LOSS)
+}
+
+/// Compiles the kernel that gives the curvature too.
+pub(super) fn curvature_kernel(gpu: &Gpu) -> Kernel {
+    Kernel::new(gpu, "chroma_loss", shaders::CHROMA_LOSS_CURVATURE)
 }

@@ -1,15 +1,14 @@
 //! One view at one scale: tile lists made once, drawn and pulled back many times.
 
-use super::loss::ChromaLossWeights;
+use super::{
+    ChromaView,
+    loss::{ChromaLossWeights, Correction, LOSS_BLOCK},
+};
 use crate::{
-    capture::Camera,
     gpu::{Bindings, Buffer, Gpu, GpuError, Kernel, Recorder},
     optimize::{Load, LossLog},
     raster::{Field, Geometry, Layer, LayerAdjoint, Lists, Outcome, Raster, ViewUniform},
 };
-
-/// Threads of a workgroup of the loss.
-const LOSS_BLOCK: usize = 256;
 
 /// What all passes share.
 pub struct Shared {
@@ -23,6 +22,8 @@ pub struct Shared {
     pub log: LossLog,
     /// The loss kernel.
     pub loss: Kernel,
+    /// A correction that changes nothing: this solver takes teachers as they are.
+    pub corrections: Buffer<Correction>,
     /// Nearest depth shown, in world units.
     pub near: f64,
 }
@@ -40,22 +41,21 @@ pub struct Pass {
 }
 
 impl Pass {
-    /// A pass for `camera` towards the a/b in `wanted`. `coarser` is the pass of
-    /// the next coarser scale of the same view, if any.
+    /// A pass towards `wanted`. `coarser` is the pass of the next coarser scale of the
+    /// same view; without one `loss_weights` have no agreement.
     ///
     /// # Errors
     /// [`GpuError`] when it does not fit.
     pub fn new(
         raster: &Raster,
         shared: &Shared,
-        camera: &Camera,
-        wanted: &[[f32; 2]],
+        wanted: &ChromaView,
         coarser: Option<&Self>,
-        agreement: f32,
+        loss_weights: ChromaLossWeights,
     ) -> Result<Self, GpuError> {
         let gpu = &raster.gpu;
         let geometry = &shared.geometry;
-        let view = ViewUniform::new(camera, shared.near, geometry.count, shared.field.degree);
+        let view = ViewUniform::new(&wanted.camera, shared.near, geometry.count, shared.field.degree);
         let (pixels, tiles) = (view.pixel_count(), view.tile_count());
         let lists = exact_lists(raster, geometry, &view)?;
         let layer = Layer::new(raster, geometry, &lists, &shared.field, pixels, tiles)?;
@@ -67,16 +67,19 @@ impl Pass {
             &layer,
             &Outcome::Gradient(&shared.gradient),
         )?;
-        let wanted = Buffer::from_slice(gpu, "wanted a/b", wanted)?;
+        let pixel_weights = wanted.weights.as_deref().unwrap_or(&[0.0]);
+        let pixel_weights = Buffer::from_slice(gpu, "pixel weights", pixel_weights)?;
         let weights = Buffer::uniform(
             gpu,
             "chroma loss weights",
             &ChromaLossWeights {
                 coarser_size: coarser.map_or([1, 1], |pass| pass.view.size),
-                teacher: 1.0,
-                agreement: coarser.map_or(0.0, |_| agreement),
+                agreement: coarser.map_or(0.0, |_| loss_weights.agreement),
+                weighted: u32::from(wanted.weights.is_some()),
+                ..loss_weights
             },
         )?;
+        let wanted = Buffer::from_slice(gpu, "wanted a/b", &wanted.wanted.ab)?;
         let loss = shared.loss.bind(
             gpu,
             &[
@@ -87,6 +90,8 @@ impl Pass {
                 weights.raw(),
                 shared.log.block_losses.raw(),
                 adjoint.image_gradient.raw(),
+                pixel_weights.raw(),
+                shared.corrections.raw(),
             ],
         );
         Ok(Self {
@@ -145,12 +150,24 @@ fn exact_lists(
     geometry: &Geometry,
     view: &ViewUniform,
 ) -> Result<Lists, GpuError> {
+    let needed = exact_capacity(raster, geometry, view)?;
+    Lists::new(raster, geometry, view.tile_count(), needed)
+}
+
+/// Entries of the tile lists that this view needs.
+///
+/// # Errors
+/// [`GpuError`] when the device is lost.
+pub fn exact_capacity(
+    raster: &Raster,
+    geometry: &Geometry,
+    view: &ViewUniform,
+) -> Result<usize, GpuError> {
     // Nothing fits into no room: the device counts what it would have needed.
     let probe = Lists::new(raster, geometry, view.tile_count(), 0)?;
     let mut recorder = Recorder::new(&raster.gpu);
     probe.set_view(&raster.gpu, view);
     probe.record(raster, &mut recorder);
     recorder.submit();
-    let needed = probe.status(&raster.gpu)?.overflow.unwrap_or(0);
-    Lists::new(raster, geometry, view.tile_count(), needed)
+    Ok(probe.status(&raster.gpu)?.overflow.unwrap_or(0))
 }

@@ -19,6 +19,17 @@ pub struct ChromaSettings {
     pub rates: [f64; 2],
     /// The rate of the terms beyond the constant one, as a share of it (3DGS).
     pub rest_share: f64,
+    /// Residual in CIELAB units at which the loss has all but levelled off, so that
+    /// what is plainly wrong in one view does not count; `None`: plain L1.
+    pub robust: Option<f32>,
+    /// Whether each view's teacher is brought into line with the others (solver only).
+    pub corrects_views: bool,
+    /// Coarser scales that the solver passes through on its way, one round each.
+    pub warm_scales: u32,
+    /// Rounds of reweighting at full size.
+    pub rounds: usize,
+    /// Steps of conjugate gradients in each round.
+    pub steps: usize,
     /// Seeds the order of the views.
     pub seed: u64,
 }
@@ -33,6 +44,11 @@ impl ChromaSettings {
             agreement: 1.0,
             rates: [2.0, 0.1],
             rest_share: 1.0 / 20.0,
+            robust: None,
+            corrects_views: false,
+            warm_scales: 2,
+            rounds: 8,
+            steps: 5,
             seed: 0,
         }
     }

@@ -14,8 +14,12 @@ shaders! {
     ADAM = "adam";
     /// Chroma loss.
     CHROMA_LOSS = "chroma_loss";
+    /// Chroma loss with its curvature.
+    CHROMA_LOSS_CURVATURE = "chroma_loss_curvature";
     /// Keys of the depth sort.
     COMPACT = "compact";
+    /// Conjugate gradients.
+    CONJUGATE = "conjugate";
     /// Copies along a densification plan.
     DENSIFY = "densify";
     /// Luma loss.
@@ -38,6 +42,10 @@ shaders! {
     TILE_LISTS = "tile_lists";
     /// Tile ranges.
     TILE_RANGES = "tile_ranges";
+    /// Corrections of the views' teachers.
+    VIEW_CORRECTION = "view_correction";
+    /// A picture times its weights.
+    WEIGH = "weigh";
     /// Blending of luma.
     BLEND_LUMA = "blend_luma";
     /// Blending of chroma.
@@ -60,6 +68,8 @@ shaders! {
     SHADE_BACKWARD_STEP = "shade_backward_step";
     /// Adjoint of shading, chroma alone.
     SHADE_BACKWARD_CHROMA = "shade_backward_chroma";
+    /// Adjoint of shading, chroma alone, added to what is there.
+    SHADE_BACKWARD_CHROMA_ADD = "shade_backward_chroma_add";
     /// Sum of the instances' gradients, luma and geometry.
     SUM_INSTANCES_LUMA = "sum_instances_luma";
     /// Sum of the instances' gradients, chroma alone.

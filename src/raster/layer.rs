@@ -32,6 +32,8 @@ pub(super) struct AdjointKernels {
     blend: Kernel,
     sum: Kernel,
     shade: Kernel,
+    /// Adds to the gradient instead of replacing it; chroma only.
+    shade_add: Option<Kernel>,
 }
 
 impl AdjointKernels {
@@ -55,7 +57,37 @@ impl AdjointKernels {
             blend: Kernel::new(gpu, "blend_backward", blend),
             sum: Kernel::new(gpu, "sum_instances", sum),
             shade: Kernel::new(gpu, "shade_backward", shade),
+            shade_add: (kind == ColorKind::Chroma)
+                .then(|| Kernel::new(gpu, "shade_backward", shaders::SHADE_BACKWARD_CHROMA_ADD)),
         }
+    }
+}
+
+/// What a layer draws on. Layers that are drawn one after the other may share it.
+#[derive(Clone)]
+pub struct Canvas {
+    colors: Buffer<f32>,
+    image: Buffer<f32>,
+    lasts: Buffer<u32>,
+}
+
+impl Canvas {
+    /// A canvas for so many Gaussians and pixels.
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`].
+    pub fn new(
+        gpu: &Gpu,
+        kind: ColorKind,
+        splats: usize,
+        max_pixels: usize,
+    ) -> Result<Self, GpuError> {
+        let stride = kind.stride();
+        Ok(Self {
+            colors: Buffer::zeros(gpu, "colors", splats * stride)?,
+            image: Buffer::zeros(gpu, "image", max_pixels * stride)?,
+            lasts: Buffer::zeros(gpu, "lasts", max_pixels)?,
+        })
     }
 }
 
@@ -88,11 +120,25 @@ impl Layer {
         max_pixels: usize,
         max_tiles: usize,
     ) -> Result<Self, GpuError> {
+        let canvas = Canvas::new(&raster.gpu, field.kind, geometry.count, max_pixels)?;
+        Ok(Self::on(raster, geometry, lists, field, canvas, max_tiles))
+    }
+
+    /// A layer on a canvas that is there, for views of at most `max_tiles` tiles.
+    pub fn on(
+        raster: &Raster,
+        geometry: &Geometry,
+        lists: &Lists,
+        field: &Field,
+        canvas: Canvas,
+        max_tiles: usize,
+    ) -> Self {
         let gpu = &raster.gpu;
-        let stride = field.kind.stride();
-        let colors = Buffer::zeros(gpu, "colors", geometry.count * stride)?;
-        let image = Buffer::zeros(gpu, "image", max_pixels * stride)?;
-        let lasts = Buffer::zeros(gpu, "lasts", max_pixels)?;
+        let Canvas {
+            colors,
+            image,
+            lasts,
+        } = canvas;
         let kernels = raster.layer(field.kind);
         let shade = kernels.shade.bind(
             gpu,
@@ -119,7 +165,7 @@ impl Layer {
                 lasts.raw(),
             ],
         );
-        Ok(Self {
+        Self {
             kind: field.kind,
             colors,
             image,
@@ -128,7 +174,7 @@ impl Layer {
             max_tiles,
             shade,
             blend,
-        })
+        }
     }
 
     /// Records shading and blending; the lists must have been recorded before.
@@ -154,6 +200,41 @@ impl Layer {
     }
 }
 
+/// What an adjoint writes on the way. Adjoints that run one after the other may
+/// share it.
+#[derive(Clone)]
+pub struct AdjointScratch {
+    partials: Buffer<f32>,
+    gradients: Buffer<f32>,
+}
+
+impl AdjointScratch {
+    /// Scratch for so many Gaussians and entries of the tile lists.
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`].
+    pub fn new(
+        gpu: &Gpu,
+        kind: ColorKind,
+        splats: usize,
+        capacity: usize,
+    ) -> Result<Self, GpuError> {
+        let record = kind.channels() + if kind == ColorKind::Luma { 7 } else { 0 };
+        Ok(Self {
+            partials: Buffer::zeros(gpu, "instance gradients", capacity * record)?,
+            gradients: Buffer::zeros(gpu, "projected gradients", splats * record)?,
+        })
+    }
+}
+
+/// What the last kernels of an adjoint do with the gradient.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Ending {
+    Replaces,
+    Adds,
+    Steps,
+}
+
 /// The adjoint of a [`Layer`]: from the gradient of the picture to gradients of
 /// the field and, for luma, of the geometry.
 pub struct LayerAdjoint {
@@ -162,7 +243,7 @@ pub struct LayerAdjoint {
     /// Gradient and statistics of the geometry, luma only.
     pub geometry: Option<GeometryAdjoint>,
     kind: ColorKind,
-    steps: bool,
+    ending: Ending,
     count: usize,
     max_tiles: usize,
     blend: Bindings,
@@ -175,6 +256,8 @@ pub enum Outcome<'a> {
     /// It is written: that of the field to this buffer, which several adjoints may
     /// share, that of the geometry (luma only) to planes of its own.
     Gradient(&'a Buffer<f32>),
+    /// It is added to what this buffer holds (chroma only).
+    Sum(&'a Buffer<f32>),
     /// Adam takes a step with it, and it is never stored (luma only).
     Step {
         /// Of the geometry.
@@ -211,7 +294,7 @@ impl LayerAdjoint {
     /// [`GpuError::TooLarge`].
     ///
     /// # Panics
-    /// When chroma is to step at once.
+    /// When chroma is to step at once, or luma to be added up.
     pub fn new(
         raster: &Raster,
         geometry: &Geometry,
@@ -221,14 +304,58 @@ impl LayerAdjoint {
         outcome: &Outcome<'_>,
     ) -> Result<Self, GpuError> {
         let gpu = &raster.gpu;
+        let image_gradient = Buffer::zeros(gpu, "image gradient", layer.image.len())?;
+        let scratch = AdjointScratch::new(gpu, field.kind, geometry.count, lists.capacity)?;
+        Self::on(
+            raster,
+            geometry,
+            lists,
+            field,
+            layer,
+            image_gradient,
+            scratch,
+            outcome,
+        )
+    }
+
+    /// The adjoint of `layer` from the picture's gradient in `image_gradient`, with
+    /// scratch that is there.
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`].
+    ///
+    /// # Panics
+    /// When chroma is to step at once, or luma to be added up.
+    #[allow(
+        clippy::too_many_arguments,
+        reason = "what is drawn, what on, and what becomes of it"
+    )]
+    pub fn on(
+        raster: &Raster,
+        geometry: &Geometry,
+        lists: &Lists,
+        field: &Field,
+        layer: &Layer,
+        image_gradient: Buffer<f32>,
+        scratch: AdjointScratch,
+        outcome: &Outcome<'_>,
+    ) -> Result<Self, GpuError> {
+        let gpu = &raster.gpu;
         let n = geometry.count;
         let with_geometry = field.kind == ColorKind::Luma;
-        let record = field.kind.channels() + if with_geometry { 7 } else { 0 };
-        let image_gradient = Buffer::zeros(gpu, "image gradient", layer.image.len())?;
-        let partials = Buffer::<f32>::zeros(gpu, "instance gradients", lists.capacity * record)?;
-        let gradients = Buffer::<f32>::zeros(gpu, "projected gradients", n * record)?;
-        let steps = matches!(outcome, Outcome::Step { .. });
-        assert!(with_geometry || !steps, "only luma steps at once");
+        let AdjointScratch {
+            partials,
+            gradients,
+        } = scratch;
+        let ending = match outcome {
+            Outcome::Gradient(_) => Ending::Replaces,
+            Outcome::Sum(_) => Ending::Adds,
+            Outcome::Step { .. } => Ending::Steps,
+        };
+        assert!(
+            with_geometry || ending != Ending::Steps,
+            "only luma steps at once"
+        );
         let kernels = raster.adjoint(field.kind);
         let mut buffers = vec![
             lists.view.raw(),
@@ -267,24 +394,26 @@ impl LayerAdjoint {
                 gradients.raw(),
             ])
             .collect();
-        if let Outcome::Gradient(field_gradient) = outcome {
+        if let Outcome::Gradient(field_gradient) | Outcome::Sum(field_gradient) = outcome {
             bindings.push((5, field_gradient.raw()));
         }
         if let Some(mean_gradient) = &mean_gradient {
             bindings.extend([(6, field.planes.raw()), (7, mean_gradient.raw())]);
         }
-        let shade = match outcome {
-            Outcome::Gradient(_) => kernels.shade.bind_at(gpu, &bindings),
-            Outcome::Step { field, .. } => {
-                bindings.extend([(8, field.parameters), (9, lists.status.raw())]);
-                bindings.extend([(10, field.first.raw()), (11, field.second.raw())]);
-                raster.shade_step.bind_at(gpu, &bindings)
-            }
-        };
+        if let Outcome::Step { field, .. } = outcome {
+            bindings.extend([(8, field.parameters), (9, lists.status.raw())]);
+            bindings.extend([(10, field.first.raw()), (11, field.second.raw())]);
+        }
+        let shade = raster
+            .shade_backward(field.kind, ending)
+            .bind_at(gpu, &bindings);
         let geometry = mean_gradient
             .map(|mean_gradient| -> Result<_, GpuError> {
                 let statistics = Buffer::zeros(gpu, "statistics", STATISTICS_PLANES * n)?;
-                let planes = if steps { 0 } else { geometry.planes.len() };
+                let planes = match ending {
+                    Ending::Steps => 0,
+                    Ending::Replaces | Ending::Adds => geometry.planes.len(),
+                };
                 let gradient = Buffer::zeros(gpu, "geometry gradient", planes)?;
                 let mut bindings: Vec<_> = (0..)
                     .zip([
@@ -300,7 +429,9 @@ impl LayerAdjoint {
                     ])
                     .collect();
                 let project = match outcome {
-                    Outcome::Gradient(_) => raster.project_backward.bind_at(gpu, &bindings),
+                    Outcome::Gradient(_) | Outcome::Sum(_) => {
+                        raster.project_backward.bind_at(gpu, &bindings)
+                    }
                     Outcome::Step { geometry, .. } => {
                         bindings.retain(|&(binding, _)| binding != 5);
                         bindings.extend([(9, geometry.parameters)]);
@@ -319,7 +450,7 @@ impl LayerAdjoint {
             image_gradient,
             geometry,
             kind: field.kind,
-            steps,
+            ending,
             count: n,
             max_tiles: layer.max_tiles,
             blend,
@@ -334,14 +465,25 @@ impl LayerAdjoint {
         let groups = groups_for(self.count);
         recorder.dispatch(&kernels.blend, &self.blend, self.max_tiles as u32);
         recorder.dispatch(&kernels.sum, &self.sum, groups);
-        let (shade, project) = if self.steps {
-            (&raster.shade_step, &raster.project_step)
-        } else {
-            (&kernels.shade, &raster.project_backward)
-        };
+        let shade = raster.shade_backward(self.kind, self.ending);
         recorder.dispatch(shade, &self.shade, groups);
         if let Some(geometry) = &self.geometry {
+            let project = match self.ending {
+                Ending::Steps => &raster.project_step,
+                Ending::Replaces | Ending::Adds => &raster.project_backward,
+            };
             recorder.dispatch(project, &geometry.project, groups);
+        }
+    }
+}
+
+impl Raster {
+    fn shade_backward(&self, kind: ColorKind, ending: Ending) -> &Kernel {
+        let kernels = self.adjoint(kind);
+        match ending {
+            Ending::Replaces => &kernels.shade,
+            Ending::Adds => (kernels.shade_add.as_ref()).expect("only chroma is added up"),
+            Ending::Steps => &self.shade_step,
         }
     }
 }

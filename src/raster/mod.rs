@@ -14,7 +14,9 @@ pub mod sort;
 mod splats;
 mod view;
 
-pub use layer::{GeometryAdjoint, Layer, LayerAdjoint, Outcome, StepBuffers};
+pub use layer::{
+    AdjointScratch, Canvas, GeometryAdjoint, Layer, LayerAdjoint, Outcome, StepBuffers,
+};
 pub use lists::{Lists, Projected, Status, StatusReadback, TileListsMode};
 pub use renderer::{Picture, Renderer};
 pub use splats::{Field, Geometry, download};

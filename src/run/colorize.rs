@@ -116,6 +116,7 @@ pub fn colorize(
             Some(ChromaView {
                 camera: scene.photos[i].1.clone(),
                 wanted: answers[i].clone()?,
+                weights: None,
             })
         })
         .collect();

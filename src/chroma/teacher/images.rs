@@ -58,7 +58,7 @@ impl AbImage {
 
 /// What happens along an axis that becomes shorter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Shrinking {
+pub(in crate::chroma) enum Shrinking {
     /// Every source pixel counts.
     Averages,
     /// The two nearest source pixels count, as in plain bilinear interpolation.
@@ -68,7 +68,7 @@ pub(super) enum Shrinking {
 
 /// Resamples `pixels`, `[height, width]` values of `C` channels, with half-pixel
 /// centres. Sizes are width and height; a target size of 0 counts as 1.
-pub(super) fn resample<const C: usize>(
+pub(in crate::chroma) fn resample<const C: usize>(
     pixels: &[[f32; C]],
     size: [u32; 2],
     target: [u32; 2],

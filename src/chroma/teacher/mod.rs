@@ -15,6 +15,7 @@ mod runtime;
 pub use error::TeacherError;
 pub use folder::FolderTeacher;
 pub use images::{AbImage, GrayImage};
+pub(super) use images::{Shrinking, resample};
 pub use network::NetworkTeacher;
 
 use serde::Serialize;

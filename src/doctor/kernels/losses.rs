@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::{
-    chroma::ChromaLossWeights,
+    chroma::{ChromaLossWeights, Correction},
     compare::widen,
     doctor::measured::{Allowance, Row, Sample},
     gpu::{Buffer, Gpu, GpuError, Kernel, Recorder, groups_for, shaders},
@@ -209,11 +209,16 @@ pub fn chroma_loss_on(
     let (image, wanted, coarser) = (buffer(image)?, buffer(wanted)?, buffer(coarser)?);
     let gradient = Buffer::<f32>::zeros(gpu, "gradient", image.len())?;
     let groups = groups_for(size[0] * size[1]);
+    let pixel_weights = Buffer::from_slice(gpu, "pixel weights", &[0.0_f32])?;
+    let corrections = Buffer::from_slice(gpu, "corrections", &[Correction::NONE])?;
     let loss = logged(gpu, size, groups as usize, |recorder, block_losses| {
         let [image, wanted, coarser] = [&image, &wanted, &coarser].map(Buffer::raw);
         let (losses, gradient) = (block_losses.raw(), gradient.raw());
         let (view, weights) = (view.raw(), weights.raw());
-        let buffers = [view, image, wanted, coarser, weights, losses, gradient];
+        let (pixels, corrections) = (pixel_weights.raw(), corrections.raw());
+        let buffers = [
+            view, image, wanted, coarser, weights, losses, gradient, pixels, corrections,
+        ];
         recorder.dispatch(&kernel, &kernel.bind(gpu, &buffers), groups);
     })?;
     Ok((loss, gradient.read(gpu)?))
@@ -238,6 +243,7 @@ fn chroma(gpu: &Gpu, agreement: f32) -> Result<[Vec<Sample>; 2], GpuError> {
             coarser_size: half.map(|side| side as u32),
             teacher: 0.75,
             agreement,
+            ..ChromaLossWeights::default()
         };
         let (loss, gradient) = chroma_loss_on(gpu, size, [&image, &wanted, &coarser], &weights)?;
         let smooth = upsample(&coarser, half, size);

@@ -1,0 +1,205 @@
+//! How fast the two solvers of stage 2 get where: the plain loss against seconds and
+//! view passes, on a run that `fit` made.
+//!
+//! ```sh
+//! cargo bench --bench solvers -- RUN TEACHER [--csv F] [--iterations N]
+//! ```
+//!
+//! TEACHER is an `.onnx` file or a folder, as for `colorize --teacher`. Both solvers get
+//! the same views, wanted a/b and scales; the loss of each stage on the way is measured
+//! by the same code, its time left out. `tools/plot_solvers.py` draws the CSV.
+
+use std::{
+    fmt::Write, fs, path::Path, path::PathBuf, process::ExitCode, sync::Arc, time::Instant,
+};
+
+use gs_chroma::{
+    capture::{Capture, Photo, split},
+    chroma::{
+        ChromaSettings, ChromaView, Distiller, Solver,
+        teacher::{GrayImage, Teacher},
+    },
+    gpu::Gpu,
+    raster::Raster,
+    splats::{Splats, ply},
+};
+
+type Fallible<T> = Result<T, Box<dyn std::error::Error>>;
+
+/// One point of a curve.
+struct Point {
+    solver: &'static str,
+    step: usize,
+    passes: f64,
+    seconds: f64,
+    objective: f64,
+}
+
+struct Problem {
+    raster: Arc<Raster>,
+    luma: Splats,
+    extent: f64,
+    views: Vec<ChromaView>,
+}
+
+fn load(run: &Path, teacher: &Path) -> Fallible<Problem> {
+    let report: serde_json::Value =
+        serde_json::from_slice(&fs::read(run.join("report.json"))?)?;
+    let noted = &report["capture"];
+    let colmap = PathBuf::from(noted["path"].as_str().ok_or("report.json has no path")?);
+    let max_side = noted["max_side"].as_u64().map(|side| side as u32);
+    let capture = Capture::load(&colmap)?;
+    let mut teacher = Teacher::open(teacher, Some(&run.join("teacher")))?;
+    let split = split(capture.views.len(), noted["holdout"].as_bool().unwrap_or(true));
+    let mut views = Vec::new();
+    for &i in &split.train {
+        let (photo, camera) = Photo::load(&capture.views[i], max_side)?;
+        let gray = GrayImage {
+            width: photo.width,
+            height: photo.height,
+            pixels: &photo.gray,
+        };
+        if let Some(wanted) = teacher.colorize(&capture.views[i].name, gray)? {
+            views.push(ChromaView {
+                camera,
+                wanted,
+                weights: None,
+            });
+        }
+    }
+    Ok(Problem {
+        raster: Arc::new(Raster::new(&Gpu::open()?)),
+        luma: ply::read_ply(&run.join("luma.ply"))?.splats.to_luma(),
+        extent: capture.extent(),
+        views,
+    })
+}
+
+/// Iterations of Adam at which the loss is looked at: a few in each doubling.
+fn stops(last: usize) -> Vec<usize> {
+    let mut stops: Vec<usize> = (0..)
+        .map(|k| (25.0 * 2_f64.powf(0.5 * f64::from(k))).round() as usize)
+        .take_while(|&n| n < last)
+        .collect();
+    stops.push(last);
+    stops
+}
+
+fn compare(problem: &Problem, iterations: usize) -> Fallible<Vec<Point>> {
+    let mut points = Vec::new();
+    let settings = ChromaSettings::new(iterations);
+    let Problem {
+        raster,
+        luma,
+        extent,
+        views,
+    } = problem;
+    // Measures only; it never solves.
+    let mut judge = Solver::new(raster.clone(), &settings, *extent, luma, views)?;
+
+    let begun = Instant::now();
+    let mut solver = Solver::new(raster.clone(), &settings, *extent, luma, views)?;
+    let mut spent = begun.elapsed().as_secs_f64();
+    for round in 0..solver.round_count() {
+        let begun = Instant::now();
+        let mut passes = 0.0;
+        solver.run_to(round + 1, &mut |progress| passes = progress.passes)?;
+        let chroma = solver.chroma()?;
+        spent += begun.elapsed().as_secs_f64();
+        points.push(Point {
+            solver: "irls",
+            step: round + 1,
+            passes,
+            seconds: spent,
+            objective: judge.objective(&chroma)?,
+        });
+        println!("{}", line(points.last().expect("just pushed")));
+    }
+    drop(solver);
+
+    let begun = Instant::now();
+    let mut adam = Distiller::new(raster.clone(), settings, *extent, luma, views.clone())?;
+    let mut spent = begun.elapsed().as_secs_f64();
+    for stop in stops(iterations) {
+        let begun = Instant::now();
+        let mut passes = 0.0;
+        adam.run_to(stop, &mut |progress| passes = progress.passes)?;
+        let chroma = adam.chroma()?;
+        spent += begun.elapsed().as_secs_f64();
+        points.push(Point {
+            solver: "adam",
+            step: stop,
+            passes,
+            seconds: spent,
+            objective: judge.objective(&chroma)?,
+        });
+        println!("{}", line(points.last().expect("just pushed")));
+    }
+    Ok(points)
+}
+
+fn line(point: &Point) -> String {
+    format!(
+        "{:5} {:6} {:9.1} passes {:8.2} s   loss {:.4}",
+        point.solver, point.step, point.passes, point.seconds, point.objective
+    )
+}
+
+fn summary(points: &[Point]) {
+    let of = |name: &'static str| points.iter().filter(move |point| point.solver == name);
+    let Some(goal) = of("adam").last() else {
+        return;
+    };
+    match of("irls").find(|point| point.objective <= goal.objective) {
+        Some(reached) => println!(
+            "irls reaches adam's last loss with 1/{:.1} of its passes in 1/{:.1} of its time",
+            goal.passes / reached.passes,
+            goal.seconds / reached.seconds
+        ),
+        None => println!("irls does not reach adam's last loss"),
+    }
+}
+
+fn main() -> ExitCode {
+    let mut arguments = std::env::args().skip(1).filter(|a| a != "--bench");
+    let (mut places, mut csv, mut iterations) = (Vec::new(), None, 15_000);
+    while let Some(argument) = arguments.next() {
+        match argument.as_str() {
+            "--csv" => csv = arguments.next(),
+            "--iterations" => {
+                iterations = arguments.next().and_then(|n| n.parse().ok()).unwrap_or(15_000);
+            }
+            _ => places.push(PathBuf::from(argument)),
+        }
+    }
+    let [run, teacher] = &places[..] else {
+        eprintln!("usage: cargo bench --bench solvers -- RUN TEACHER [--csv F] [--iterations N]");
+        return ExitCode::from(2);
+    };
+    let result = load(run, teacher).and_then(|problem| compare(&problem, iterations));
+    match result {
+        Ok(points) => {
+            summary(&points);
+            let mut text = String::from("solver,step,passes,seconds,objective\n");
+            for p in &points {
+                // Writing to a string cannot fail.
+                let _ = writeln!(
+                    text,
+                    "{},{},{:.2},{:.4},{:.6}",
+                    p.solver, p.step, p.passes, p.seconds, p.objective
+                );
+            }
+            match csv.map(|path| fs::write(path, text)) {
+                Some(Err(error)) => {
+                    eprintln!("{error}");
+                    ExitCode::FAILURE
+                }
+                _ => ExitCode::SUCCESS,
+            }
+        }
+        Err(error) => {
+            eprintln!("{error}");
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -1,0 +1,149 @@
+// What brings each view's teacher into line with the colours found so far. The
+// teacher's a/b are taken to be M · x + m of the rendered x, by weighted least squares;
+// over the views M is made to average to the identity and m to zero, so that the
+// scene's own colour cannot drift; what is wanted becomes M⁻¹(t - m).
+import package::common::correction::Correction;
+import package::common::numeric::linear_group;
+import package::common::view::View;
+
+// Workgroups that sum one view.
+const SUM_GROUPS: u32 = 64u;
+// Weight; weighted x, t; xx (3); t xᵀ (4 rows by t).
+const SUMS: u32 = 12u;
+// Variance in squared CIELAB units that is added to both sides: a view with hardly any
+// colour says nothing about the gain, which then stays at the identity.
+const PRIOR_VARIANCE: f32 = 4.0;
+// A gain that all but loses a direction cannot be undone.
+const DETERMINANT_MIN: f32 = 0.1;
+
+struct CorrectionParameters {
+    views: u32,
+    view_index: u32,
+    // 1 where pixel_weights has a weight for each pixel.
+    weighted: u32,
+    padding: u32,
+}
+
+@group(0) @binding(0) var<uniform> view: View;
+@group(0) @binding(1) var<storage, read> image: array<vec2f>;
+@group(0) @binding(2) var<storage, read> wanted: array<vec2f>;
+@group(0) @binding(3) var<storage, read> curvatures: array<vec2f>;
+@group(0) @binding(4) var<uniform> parameters: CorrectionParameters;
+// `[views, SUM_GROUPS, SUMS]`
+@group(0) @binding(5) var<storage, read_write> view_sums: array<f32>;
+@group(0) @binding(6) var<storage, read_write> corrections: array<Correction>;
+@group(0) @binding(7) var<storage, read> pixel_weights: array<f32>;
+
+var<workgroup> sums: array<f32, 256 * SUMS>;
+
+@compute @workgroup_size(256)
+fn view_correction_sums(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
+    var own: array<f32, SUMS>;
+    for (var p = group.x * 256u + local; p < view.size.x * view.size.y; p += 256u * SUM_GROUPS) {
+        // One weight for both channels; painted pixels are not the teacher's.
+        var weight = 0.5 * (curvatures[p].x + curvatures[p].y);
+        if parameters.weighted != 0u && pixel_weights[p] > 1.0 {
+            weight = 0.0;
+        }
+        let x = image[p];
+        let t = wanted[p];
+        own[0] += weight;
+        own[1] += weight * x.x;
+        own[2] += weight * x.y;
+        own[3] += weight * t.x;
+        own[4] += weight * t.y;
+        own[5] += weight * x.x * x.x;
+        own[6] += weight * x.x * x.y;
+        own[7] += weight * x.y * x.y;
+        own[8] += weight * t.x * x.x;
+        own[9] += weight * t.x * x.y;
+        own[10] += weight * t.y * x.x;
+        own[11] += weight * t.y * x.y;
+    }
+    for (var s = 0u; s < SUMS; s++) {
+        sums[s * 256u + local] = own[s];
+    }
+    workgroupBarrier();
+    for (var half = 128u; half > 0u; half /= 2u) {
+        if local < half {
+            for (var s = 0u; s < SUMS; s++) {
+                sums[s * 256u + local] += sums[s * 256u + local + half];
+            }
+        }
+        workgroupBarrier();
+    }
+    if local < SUMS {
+        view_sums[(parameters.view_index * SUM_GROUPS + group.x) * SUMS + local] = sums[local * 256u];
+    }
+}
+
+// The teacher of one view as M and m; M in `gain`.
+fn teacher_of(index: u32) -> Correction {
+    var s: array<f32, SUMS>;
+    for (var g = 0u; g < SUM_GROUPS; g++) {
+        for (var k = 0u; k < SUMS; k++) {
+            s[k] += view_sums[(index * SUM_GROUPS + g) * SUMS + k];
+        }
+    }
+    if !(s[0] > 0.0) {
+        return Correction(vec4f(1.0, 0.0, 0.0, 1.0), vec2f(), vec2f());
+    }
+    for (var k = 1u; k < SUMS; k++) {
+        s[k] /= s[0];
+    }
+    let x = vec2f(s[1], s[2]);
+    let t = vec2f(s[3], s[4]);
+    let xx = max(s[5] - x.x * x.x, 0.0) + PRIOR_VARIANCE;
+    let yy = max(s[7] - x.y * x.y, 0.0) + PRIOR_VARIANCE;
+    let bound = 0.999 * sqrt(xx * yy);
+    let xy = clamp(s[6] - x.x * x.y, -bound, bound);
+    let across = vec4f(s[8] - t.x * x.x, s[9] - t.x * x.y, s[10] - t.y * x.x, s[11] - t.y * x.y)
+        + vec4f(PRIOR_VARIANCE, 0.0, 0.0, PRIOR_VARIANCE);
+    let inverse = vec3f(yy, -xy, xx) / (xx * yy - xy * xy);
+    let gain = vec4f(
+        across.x * inverse.x + across.y * inverse.y, across.x * inverse.y + across.y * inverse.z,
+        across.z * inverse.x + across.w * inverse.y, across.z * inverse.y + across.w * inverse.z,
+    );
+    return Correction(gain, t - vec2f(dot(gain.xy, x), dot(gain.zw, x)), vec2f());
+}
+
+// One workgroup, a thread for every 256th view.
+@compute @workgroup_size(256)
+fn view_correction(@builtin(local_invocation_index) local: u32) {
+    var mean = Correction();
+    for (var v = local; v < parameters.views; v += 256u) {
+        let teacher = teacher_of(v);
+        corrections[v] = teacher;
+        mean.gain += teacher.gain;
+        mean.offset += teacher.offset;
+    }
+    sums[local] = mean.gain.x;
+    sums[256u + local] = mean.gain.y;
+    sums[512u + local] = mean.gain.z;
+    sums[768u + local] = mean.gain.w;
+    sums[1024u + local] = mean.offset.x;
+    sums[1280u + local] = mean.offset.y;
+    workgroupBarrier();
+    for (var half = 128u; half > 0u; half /= 2u) {
+        if local < half {
+            for (var s = 0u; s < 6u; s++) {
+                sums[s * 256u + local] += sums[s * 256u + local + half];
+            }
+        }
+        workgroupBarrier();
+    }
+    let views = f32(parameters.views);
+    let mean_gain = vec4f(sums[0], sums[256], sums[512], sums[768]) / views;
+    let mean_offset = vec2f(sums[1024], sums[1280]) / views;
+    for (var v = local; v < parameters.views; v += 256u) {
+        let gain = corrections[v].gain + vec4f(1.0, 0.0, 0.0, 1.0) - mean_gain;
+        let offset = corrections[v].offset - mean_offset;
+        let determinant = gain.x * gain.w - gain.y * gain.z;
+        if determinant > DETERMINANT_MIN {
+            let inverse = vec4f(gain.w, -gain.y, -gain.z, gain.x) / determinant;
+            corrections[v] = Correction(inverse, -vec2f(dot(inverse.xy, offset), dot(inverse.zw, offset)), vec2f());
+        } else {
+            corrections[v] = Correction(vec4f(1.0, 0.0, 0.0, 1.0), vec2f(), vec2f());
+        }
+    }
+}

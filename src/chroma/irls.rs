@@ -1,0 +1,381 @@
+//! The fast solver: with the geometry frozen, a/b at each pixel are linear in the
+//! unknowns, so the distillation is a robust linear regression. Iteratively reweighted
+//! least squares, each round a few steps of preconditioned conjugate gradients over all
+//! views, all of it on the device.
+
+use std::{rc::Rc, sync::Arc, time::Instant};
+
+use super::{
+    ChromaProgress, ChromaSettings, ChromaView,
+    conjugate::Conjugate,
+    loss::LOSS_BLOCK,
+    pass::exact_capacity,
+    rows::{Room, Rows, Shared},
+};
+use crate::{
+    gpu::{Buffer, Gpu, GpuError, Readback, Recorder},
+    optimize::{Load, LossLog, SumLossKernel},
+    raster::{Field, Geometry, Lists, Raster, ViewUniform, constants::*},
+    splats::{ShField, Splats, sh},
+};
+
+/// Tile lists are kept while they take no more than this many bytes on the device;
+/// the views beyond share one set, made anew whenever they come up.
+const CACHE_BYTES: usize = 2 << 30;
+
+/// Bytes of the tile lists for each Gaussian and each entry ([`Lists`] and the scratch
+/// of its sorts).
+const LIST_BYTES: [usize; 2] = [64, 20];
+
+/// The ridge in pixels: a Gaussian that a hundredth of a pixel depends on is left
+/// where the others' share ends, instead of running after rounding errors.
+const RIDGE_PIXELS: f64 = 0.01;
+
+/// One reweighting.
+#[derive(Clone, Debug, PartialEq)]
+struct Round {
+    /// Scales whose pictures count, coarse to fine.
+    scales: Vec<usize>,
+    /// Weight of the agreement between scales.
+    agreement: f32,
+    /// Residual at which the loss levels off, if it does.
+    robust: Option<f32>,
+    /// Whether the views' corrections are found anew after it.
+    corrects: bool,
+}
+
+/// The rounds that the settings ask for: one on each coarser scale alone, to be near
+/// the answer at little cost, then the rest on all that count.
+fn rounds(settings: &ChromaSettings) -> Vec<Round> {
+    let settings = &mut settings.clone();
+    let knob = |n: &str| std::env::var(n).ok().and_then(|v| v.parse::<f64>().ok());
+    if let Some(v) = knob("K_SCALES") { settings.coarser_scales = v as u32; }
+    if let Some(v) = knob("K_WARM") { settings.warm_scales = v as u32; }
+    if let Some(v) = knob("K_ROUNDS") { settings.rounds = v as usize; }
+    if let Some(v) = knob("K_ROBUST") { settings.robust = (v > 0.0).then_some(v as f32); }
+    if let Some(v) = knob("K_CORRECT") { settings.corrects_views = v > 0.0; }
+    let coarsest = settings.coarser_scales as usize;
+    let warm = (1..=settings.warm_scales as usize).rev().map(|scale| Round {
+        scales: vec![scale],
+        agreement: 0.0,
+        robust: None,
+        corrects: settings.corrects_views,
+    });
+    let full = (0..settings.rounds).map(|round| Round {
+        scales: (0..=coarsest).rev().collect(),
+        agreement: settings.agreement,
+        // Plain at first: what is far off now may be right once the rest is in place.
+        robust: settings.robust.filter(|_| round >= PLAIN_ROUNDS.min(settings.rounds / 2)),
+        corrects: settings.corrects_views,
+    });
+    warm.chain(full).collect()
+}
+
+/// Rounds at full size before the loss levels off.
+const PLAIN_ROUNDS: usize = 2;
+
+/// Solves for chroma harmonics.
+pub struct Solver {
+    raster: Arc<Raster>,
+    gpu: Gpu,
+    shared: Shared,
+    conjugate: Conjugate,
+    sum_loss: SumLossKernel,
+    rounds: Vec<Round>,
+    steps: usize,
+    /// `[views][scales]`, full size first.
+    rows: Vec<Vec<Rows>>,
+    passes: f64,
+    /// Rounds done.
+    done: usize,
+}
+
+impl Solver {
+    /// A solver for frozen `splats`, starting from gray.
+    ///
+    /// # Errors
+    /// [`GpuError`] when it does not fit or the device is lost.
+    ///
+    /// # Panics
+    /// Without views, or when a wanted image has not its camera's size.
+    pub fn new(
+        raster: Arc<Raster>,
+        settings: &ChromaSettings,
+        extent: f64,
+        splats: &Splats,
+        views: &[ChromaView],
+    ) -> Result<Self, GpuError> {
+        assert!(!views.is_empty(), "a solver needs a view");
+        let gpu = raster.gpu.clone();
+        let near = NEAR_SHARE * extent;
+        let geometry = Geometry::upload(&gpu, splats)?;
+        let zeros = ShField::zeros(splats.len(), settings.sh_degree, 2);
+        let fields = [Field::upload(&gpu, &zeros)?, Field::upload(&gpu, &zeros)?];
+        let rounds = rounds(settings);
+        let scales = (rounds.iter().flat_map(|round| &round.scales))
+            .max()
+            .map_or(1, |scale| scale + 1);
+        let chains: Vec<Vec<ChromaView>> = (views.iter())
+            .map(|view| {
+                let (camera, wanted) = (&view.camera, &view.wanted);
+                assert_eq!([wanted.width, wanted.height], [camera.width, camera.height]);
+                (0..scales).map(|scale| view.at_scale(scale as u32)).collect()
+            })
+            .collect();
+        let uniform = |view: &ChromaView| ViewUniform::new(&view.camera, near, geometry.count, 0);
+        let largest = |of: &dyn Fn(&ViewUniform) -> usize, scale: usize| {
+            let sizes = chains.iter().map(|chain| of(&uniform(&chain[scale])));
+            sizes.max().unwrap_or(0)
+        };
+        let pixels: Vec<usize> = (0..scales)
+            .map(|scale| largest(&ViewUniform::pixel_count, scale))
+            .collect();
+        let tiles = largest(&ViewUniform::tile_count, 0);
+        let capacities = chains
+            .iter()
+            .map(|chain| {
+                (chain.iter())
+                    .map(|view| exact_capacity(&raster, &geometry, &uniform(view)))
+                    .collect::<Result<Vec<usize>, GpuError>>()
+            })
+            .collect::<Result<Vec<_>, _>>()?;
+        let capacity = capacities.iter().flatten().copied().max().unwrap_or(0);
+
+        let status = Buffer::zeros(&gpu, "status", STATUS_WORDS)?;
+        let sum_loss = SumLossKernel::new(&gpu);
+        let blocks = pixels[0].div_ceil(LOSS_BLOCK);
+        // One more for the loss of a field that is asked for.
+        let entries = (rounds.len() + 1) * views.len();
+        let log = LossLog::new(&gpu, &sum_loss, &status, blocks, entries)?;
+        let room = Room { pixels, capacity };
+        let ridge = RIDGE_PIXELS * 0.5 / room.pixels[0] as f64 * sh::C0 * sh::C0;
+        let shared = Shared::new(&gpu, geometry, fields, log, views.len(), &room)?;
+        let conjugate = Conjugate::new(&gpu, &shared.system, splats.len(), ridge as f32)?;
+
+        let mut spare: Option<Rc<Lists>> = None;
+        let mut kept = 0;
+        let mut rows = Vec::with_capacity(chains.len());
+        for (index, (chain, capacities)) in chains.iter().zip(&capacities).enumerate() {
+            let mut of_view: Vec<Rows> = Vec::with_capacity(scales);
+            for scale in (0..scales).rev() {
+                let needed = capacities[scale];
+                let bytes = LIST_BYTES[0] * splats.len() + LIST_BYTES[1] * needed;
+                let geometry = &shared.geometry;
+                let lists = if kept + bytes <= CACHE_BYTES {
+                    kept += bytes;
+                    let tiles = uniform_tiles(&chain[scale], near, geometry.count);
+                    (Rc::new(Lists::new(&raster, geometry, tiles, needed)?), true)
+                } else {
+                    if spare.is_none() {
+                        spare = Some(Rc::new(Lists::new(&raster, geometry, tiles, capacity)?));
+                    }
+                    (spare.clone().expect("made above"), false)
+                };
+                let (view, coarser) = (&chain[scale], of_view.last());
+                let at = [index, scale];
+                of_view.push(Rows::new(&raster, &shared, near, view, at, lists, coarser)?);
+            }
+            of_view.reverse();
+            rows.push(of_view);
+        }
+        Ok(Self {
+            gpu,
+            raster,
+            shared,
+            conjugate,
+            sum_loss,
+            rounds,
+            steps: std::env::var("K_STEPS").ok().and_then(|v| v.parse().ok()).unwrap_or(settings.steps),
+            rows,
+            passes: 0.0,
+            done: 0,
+        })
+    }
+
+    /// Rounds that [`Solver::run`] takes.
+    pub fn round_count(&self) -> usize {
+        self.rounds.len()
+    }
+
+    /// Solves, telling `observe` after each round.
+    ///
+    /// # Errors
+    /// [`GpuError`] when the device is lost.
+    pub fn run(&mut self, observe: &mut dyn FnMut(ChromaProgress)) -> Result<(), GpuError> {
+        self.run_to(self.rounds.len(), observe)
+    }
+
+    /// Goes on until so many rounds are done, and leaves the rest for later.
+    ///
+    /// # Errors
+    /// [`GpuError`] when the device is lost.
+    pub fn run_to(
+        &mut self,
+        until: usize,
+        observe: &mut dyn FnMut(ChromaProgress),
+    ) -> Result<(), GpuError> {
+        let begun = Instant::now();
+        let mut pending: Option<(usize, f64, Readback<f32>)> = None;
+        let until = until.min(self.rounds.len());
+        for index in self.done..until {
+            let round = self.rounds[index].clone();
+            self.linearize(index, &round);
+            for _ in 0..self.steps {
+                self.step(&round);
+            }
+            self.done = index + 1;
+            let log = self.shared.log.read_later(&self.gpu);
+            let due = pending.replace((index, self.passes, log));
+            let last = if self.done == until {
+                pending.take()
+            } else {
+                None
+            };
+            for (index, passes, losses) in due.into_iter().chain(last) {
+                let losses = losses.wait(&self.gpu)?;
+                let views = self.rows.len();
+                let of_round = &losses[index * views..][..views];
+                observe(ChromaProgress {
+                    iteration: index + 1,
+                    loss: of_round.iter().map(|&loss| f64::from(loss)).sum::<f64>() / views as f64,
+                    passes,
+                    seconds: begun.elapsed().as_secs_f64(),
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// The plain loss of `chroma` over all views at full size, in CIELAB units: what the
+    /// solvers are compared by. Leaves the solver with this field.
+    ///
+    /// # Errors
+    /// [`GpuError`].
+    pub fn objective(&mut self, chroma: &ShField) -> Result<f64, GpuError> {
+        let planes = Field::upload(&self.gpu, chroma)?.planes;
+        let mut recorder = Recorder::new(&self.gpu);
+        recorder.copy(planes.raw(), self.shared.field.planes.raw());
+        recorder.submit();
+        let (index, passes) = (self.rounds.len(), self.passes);
+        let plain = Round {
+            scales: vec![0],
+            agreement: 0.0,
+            robust: None,
+            corrects: false,
+        };
+        self.linearize(index, &plain);
+        self.passes = passes;
+        let losses = self.shared.log.read_later(&self.gpu).wait(&self.gpu)?;
+        let views = self.rows.len();
+        let of_field = &losses[index * views..][..views];
+        Ok(of_field.iter().map(|&loss| f64::from(loss)).sum::<f64>() / views as f64)
+    }
+
+    /// Reads the chroma found so far.
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`].
+    pub fn chroma(&self) -> Result<ShField, GpuError> {
+        self.shared.field.download(&self.gpu)
+    }
+
+    /// What a dispatch worked on, the mean over the rows.
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`].
+    pub fn load(&self) -> Result<Load, GpuError> {
+        let rows: Vec<&Rows> = self.rows.iter().flatten().collect();
+        let mut load = Load::default();
+        for row in &rows {
+            let status = row.status(&self.gpu)?;
+            load.visible += status.visible as f64 / rows.len() as f64;
+            load.instances += status.instances as f64 / rows.len() as f64;
+            load.pixels += row.view.pixel_count() as f64 / rows.len() as f64;
+            load.tiles += row.view.tile_count() as f64 / rows.len() as f64;
+        }
+        Ok(Load {
+            splats: self.shared.geometry.count as f64,
+            capacity: load.instances,
+            channels: 2.0,
+            sh_planes: self.shared.field.planes.len() as f64 / self.shared.geometry.count as f64,
+            ..load
+        })
+    }
+
+    /// Draws every view as it is, and sets up the least squares that touch the loss
+    /// there.
+    fn linearize(&mut self, index: usize, round: &Round) {
+        let (raster, shared) = (&self.raster, &self.shared);
+        let mut recorder = Recorder::new(&self.gpu);
+        recorder.clear(shared.system.residual.raw());
+        recorder.clear(shared.system.diagonal.raw());
+        recorder.submit();
+        let views = self.rows.len();
+        for (view, rows) in self.rows.iter_mut().enumerate() {
+            let finest = round.scales.last().copied();
+            for &scale in &round.scales {
+                let row = &mut rows[scale];
+                let decline = round.robust.map_or(0.0, |residual| 1.0 / residual);
+                // There is nothing to agree with where the coarser scale is not drawn.
+                let agreement = if round.scales.contains(&(scale + 1)) {
+                    round.agreement
+                } else {
+                    0.0
+                };
+                row.weigh_by(&self.gpu, agreement, decline);
+                let mut recorder = Recorder::new(&self.gpu);
+                row.linearize(raster, shared, &mut recorder);
+                if Some(scale) == finest {
+                    if round.corrects {
+                        row.sum_correction(shared, &mut recorder);
+                    }
+                    shared.log.record(
+                        &self.gpu,
+                        &self.sum_loss,
+                        &mut recorder,
+                        row.blocks(),
+                        row.view.pixel_count(),
+                        index * views + view,
+                    );
+                }
+                recorder.submit();
+                self.passes += share(scale);
+            }
+        }
+        let mut recorder = Recorder::new(&self.gpu);
+        // The first picture is gray and says nothing about the teachers.
+        if round.corrects && index > 0 {
+            shared.corrections.solve(&mut recorder);
+        }
+        self.conjugate.begin(&mut recorder);
+        recorder.submit();
+    }
+
+    /// One step of conjugate gradients over all views.
+    fn step(&mut self, round: &Round) {
+        let (raster, shared) = (&self.raster, &self.shared);
+        let mut recorder = Recorder::new(&self.gpu);
+        recorder.clear(shared.system.product.raw());
+        recorder.submit();
+        for rows in &mut self.rows {
+            for &scale in &round.scales {
+                let mut recorder = Recorder::new(&self.gpu);
+                rows[scale].multiply(raster, shared, &mut recorder);
+                recorder.submit();
+                self.passes += share(scale);
+            }
+        }
+        let mut recorder = Recorder::new(&self.gpu);
+        self.conjugate.step(&mut recorder);
+        recorder.submit();
+    }
+}
+
+/// What a pass over one scale is of a pass at full size.
+pub(super) fn share(scale: usize) -> f64 {
+    0.25_f64.powi(scale as i32)
+}
+
+fn uniform_tiles(view: &ChromaView, near: f64, splats: usize) -> usize {
+    ViewUniform::new(&view.camera, near, splats, 0).tile_count()
+}
