@@ -87,7 +87,11 @@ fn stops(last: usize) -> Vec<usize> {
 
 fn compare(problem: &Problem, iterations: usize) -> Fallible<Vec<Point>> {
     let mut points = Vec::new();
-    let settings = ChromaSettings::new(iterations);
+    let settings = ChromaSettings {
+        rounds: 8,
+        steps: 5,
+        ..ChromaSettings::exact()
+    };
     let Problem {
         raster,
         luma,
@@ -116,9 +120,10 @@ fn compare(problem: &Problem, iterations: usize) -> Fallible<Vec<Point>> {
         println!("{}", line(points.last().expect("just pushed")));
     }
     drop(solver);
+    let paper = ChromaSettings::adam(iterations);
 
     let begun = Instant::now();
-    let mut adam = Distiller::new(raster.clone(), settings, *extent, luma, views.clone())?;
+    let mut adam = Distiller::new(raster.clone(), paper, *extent, luma, views.clone())?;
     let mut spent = begun.elapsed().as_secs_f64();
     for stop in stops(iterations) {
         let begun = Instant::now();

@@ -31,6 +31,9 @@ const LIST_BYTES: [usize; 2] = [64, 20];
 /// where the others' share ends, instead of running after rounding errors.
 const RIDGE_PIXELS: f64 = 0.01;
 
+/// Residual, in CIELAB units, of a pixel that counts as one.
+const TYPICAL_RESIDUAL: f64 = 3.0;
+
 /// One reweighting.
 #[derive(Clone, Debug, PartialEq)]
 struct Round {
@@ -44,34 +47,31 @@ struct Round {
     corrects: bool,
 }
 
-/// The rounds that the settings ask for: one on each coarser scale alone, to be near
-/// the answer at little cost, then the rest on all that count.
+/// The rounds that the settings ask for: on each coarser scale alone, to bring the
+/// views' corrections and the colours close at little cost, then on all scales that
+/// count.
 fn rounds(settings: &ChromaSettings) -> Vec<Round> {
-    let settings = &mut settings.clone();
-    let knob = |n: &str| std::env::var(n).ok().and_then(|v| v.parse::<f64>().ok());
-    if let Some(v) = knob("K_SCALES") { settings.coarser_scales = v as u32; }
-    if let Some(v) = knob("K_WARM") { settings.warm_scales = v as u32; }
-    if let Some(v) = knob("K_ROUNDS") { settings.rounds = v as usize; }
-    if let Some(v) = knob("K_ROBUST") { settings.robust = (v > 0.0).then_some(v as f32); }
-    if let Some(v) = knob("K_CORRECT") { settings.corrects_views = v > 0.0; }
-    let coarsest = settings.coarser_scales as usize;
-    let warm = (1..=settings.warm_scales as usize).rev().map(|scale| Round {
-        scales: vec![scale],
-        agreement: 0.0,
-        robust: None,
-        corrects: settings.corrects_views,
-    });
-    let full = (0..settings.rounds).map(|round| Round {
-        scales: (0..=coarsest).rev().collect(),
-        agreement: settings.agreement,
+    let round = |scales: Vec<usize>, agreement, settled: bool| Round {
+        scales,
+        agreement,
         // Plain at first: what is far off now may be right once the rest is in place.
-        robust: settings.robust.filter(|_| round >= PLAIN_ROUNDS.min(settings.rounds / 2)),
+        robust: settings.robust.filter(|_| settled),
         corrects: settings.corrects_views,
+    };
+    let coarsest = settings.warm_scales as usize;
+    let warm = (1..=coarsest).rev().flat_map(|scale| {
+        let settled = move |index| scale < coarsest || index >= PLAIN_ROUNDS;
+        (0..settings.warm_rounds).map(move |index| round(vec![scale], 0.0, settled(index)))
+    });
+    let scales: Vec<usize> = (0..=settings.coarser_scales as usize).rev().collect();
+    let full = (0..settings.rounds).map(|index| {
+        let settled = coarsest > 0 || index >= PLAIN_ROUNDS;
+        round(scales.clone(), settings.agreement, settled)
     });
     warm.chain(full).collect()
 }
 
-/// Rounds at full size before the loss levels off.
+/// Rounds before the loss levels off.
 const PLAIN_ROUNDS: usize = 2;
 
 /// Solves for chroma harmonics.
@@ -85,6 +85,8 @@ pub struct Solver {
     steps: usize,
     /// `[views][scales]`, full size first.
     rows: Vec<Vec<Rows>>,
+    /// Of the largest view.
+    pixels: usize,
     passes: f64,
     /// Rounds done.
     done: usize,
@@ -185,8 +187,9 @@ impl Solver {
             conjugate,
             sum_loss,
             rounds,
-            steps: std::env::var("K_STEPS").ok().and_then(|v| v.parse().ok()).unwrap_or(settings.steps),
+            steps: settings.steps,
             rows,
+            pixels: room.pixels[0],
             passes: 0.0,
             done: 0,
         })
@@ -269,6 +272,21 @@ impl Solver {
         let views = self.rows.len();
         let of_field = &losses[index * views..][..views];
         Ok(of_field.iter().map(|&loss| f64::from(loss)).sum::<f64>() / views as f64)
+    }
+
+    /// How far the views decide each Gaussian's colour, in pixels that show it fully and
+    /// whose wanted colour is about met.
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`].
+    pub fn seen(&self) -> Result<Vec<f32>, GpuError> {
+        let count = self.shared.geometry.count;
+        let diagonal = self.shared.system.diagonal.read(&self.gpu)?;
+        // One pixel of weight one whose residual is the typical one.
+        let pixel = 0.5 / self.pixels as f64 / TYPICAL_RESIDUAL * sh::C0;
+        Ok((0..count)
+            .map(|i| (0.5 * f64::from(diagonal[i] + diagonal[count + i]) / pixel) as f32)
+            .collect())
     }
 
     /// Reads the chroma found so far.

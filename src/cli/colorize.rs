@@ -2,18 +2,12 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 
 use super::{print, progress::Progress};
+use crate::chroma::SolverKind;
 use crate::report::timings_table;
 use crate::run::{ColorizeOptions, RunError, colorize};
-
-/// How chroma is solved for.
-#[derive(Clone, Copy, ValueEnum)]
-enum Solver {
-    /// The paper's: stochastic steps of Adam, coarse to fine.
-    Adam,
-}
 
 /// Colour a trained run with a colorization network or a folder of coloured photos.
 #[derive(Args)]
@@ -30,8 +24,8 @@ pub struct Colorize {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     until: Option<u32>,
     /// How chroma is solved for.
-    #[arg(long, value_enum, default_value_t = Solver::Adam)]
-    solver: Solver,
+    #[arg(long, value_enum, default_value_t = SolverKind::Irls)]
+    solver: SolverKind,
     /// Degree of the chroma's dependence on the direction of view.
     #[arg(long, value_name = "0..3", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=3))]
     sh_degree: u32,
@@ -48,13 +42,13 @@ pub struct Colorize {
 
 impl Colorize {
     pub(super) fn run(self) -> Result<(), RunError> {
-        let Solver::Adam = self.solver;
         let mut progress = Progress::default();
         let options = ColorizeOptions {
             run: self.run,
             teacher: self.teacher,
             output: self.output,
             until: self.until.map(|n| n as usize),
+            solver: self.solver,
             sh_degree: self.sh_degree,
             colmap: self.colmap,
             timings: self.timings,

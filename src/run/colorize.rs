@@ -15,7 +15,7 @@ use super::{
 };
 use crate::{
     chroma::{
-        ChromaSettings, ChromaView, Distiller, bake_rgb, native_rgb,
+        ChromaSettings, ChromaView, SolverKind, bake_rgb, distil, native_rgb,
         teacher::{AbImage, GrayImage, Teacher},
     },
     gpu::Gpu,
@@ -43,6 +43,8 @@ pub struct ColorizeOptions {
     pub output: Option<PathBuf>,
     /// Last iteration, counted from the start of stage 1; the preset's by default.
     pub until: Option<usize>,
+    /// Who solves.
+    pub solver: SolverKind,
     /// Degree of the chroma harmonics.
     pub sh_degree: u32,
     /// COLMAP folder, where it is not the one that `fit` noted.
@@ -106,7 +108,10 @@ pub fn colorize(
     let settings = ChromaSettings {
         sh_degree: options.sh_degree,
         seed: report.seed,
-        ..ChromaSettings::new(iterations)
+        ..match options.solver {
+            SolverKind::Irls => ChromaSettings::irls(),
+            SolverKind::Adam => ChromaSettings::adam(iterations),
+        }
     };
     let views: Vec<ChromaView> = scene
         .split
@@ -121,9 +126,8 @@ pub fn colorize(
         })
         .collect();
     let colored_views = views.len();
-    let mut distiller = Distiller::new(raster.clone(), settings, scene.extent, &luma, views)?;
     let (mut log, mut loss, mut peak_device_memory) = (String::new(), 0.0, None);
-    distiller.run(&mut |progress| {
+    let found = distil(&raster, &settings, scene.extent, &luma, views, &mut |progress| {
         // Writing to a string cannot fail.
         let _ = writeln!(
             log,
@@ -142,11 +146,10 @@ pub fn colorize(
         loss = progress.loss;
         peak_device_memory = peak_device_memory.max(gpu.allocated_bytes());
     })?;
-    let chroma = distiller.chroma()?;
+    let chroma = found.chroma;
     let timings = (options.timings)
-        .then(|| Ok::<_, RunError>(kernel_reports(&gpu.timings()?, &distiller.load()?)))
+        .then(|| Ok::<_, RunError>(kernel_reports(&gpu.timings()?, &found.load)))
         .transpose()?;
-    drop(distiller);
     let seconds_distill = begun.elapsed().as_secs_f64();
 
     let begun = Instant::now();

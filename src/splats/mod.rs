@@ -2,10 +2,12 @@
 //! splat files.
 
 pub mod init;
+mod neighbors;
 pub mod ply;
 pub mod sh;
 
-pub use init::{initial_splats, nearest_neighbor_distances};
+pub use init::initial_splats;
+pub use neighbors::{nearest_neighbor_distances, nearest_neighbors};
 pub use ply::{PlyError, ReadSplats, read_ply, write_ply};
 pub use sh::ShField;
 

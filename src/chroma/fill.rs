@@ -1,0 +1,149 @@
+//! Colour for Gaussians that the views hardly show: that of their neighbours.
+
+use crate::splats::{ShField, Splats, nearest_neighbors, sh};
+
+/// Neighbours that a Gaussian looks to.
+const NEIGHBORS: usize = 8;
+
+/// Difference in gray at which a neighbour's word has lost most of its weight: edges of
+/// luma are where colours end.
+const GRAY_RANGE: f64 = 0.1;
+
+/// What all neighbours together weigh against the views, in pixels that show the
+/// Gaussian fully.
+const NEIGHBOR_PIXELS: f64 = 1.0;
+
+/// Sweeps over all Gaussians: colour travels at least so many neighbours far into what
+/// nobody sees.
+const SWEEPS: usize = 100;
+
+/// Draws the constant harmonic of `chroma` towards that of the neighbours in position
+/// and gray: the less a Gaussian is seen, the more.
+///
+/// `seen` is how far the views decide each Gaussian's colour, in pixels that show it
+/// fully. Minimises `Σ seen_i |c_i - chroma_i|² + Σ w_ij |c_i - c_j|²` by Gauss–Seidel
+/// sweeps. The higher harmonics of Gaussians seen less than a pixel fade with `seen`.
+///
+/// # Panics
+/// When the three have not the same number of Gaussians.
+pub fn fill_unseen(luma: &Splats, chroma: &mut ShField, seen: &[f32]) {
+    let count = luma.len();
+    assert_eq!(count, seen.len());
+    let stride = 2 * sh::coefficient_count(chroma.degree);
+    assert_eq!(chroma.coefficients.len(), count * stride);
+    let grays: Vec<f64> = (0..count)
+        .map(|i| 0.5 + sh::C0 * f64::from(luma.sh.of(i)[0]))
+        .collect();
+    let neighbors = nearest_neighbors(&luma.means, NEIGHBORS);
+    // Both ends weigh an edge alike, so that the sweeps descend one energy.
+    let mut edges: Vec<Vec<(u32, f64)>> = vec![Vec::new(); count];
+    for (i, others) in neighbors.iter().enumerate() {
+        for &j in others {
+            let apart = (grays[i] - grays[j as usize]) / GRAY_RANGE;
+            let weight = NEIGHBOR_PIXELS / NEIGHBORS as f64 * (-apart * apart).exp();
+            edges[i].push((j, 0.5 * weight));
+            edges[j as usize].push((i as u32, 0.5 * weight));
+        }
+    }
+    let found: Vec<[f64; 2]> = (chroma.coefficients.chunks_exact(stride))
+        .map(|c| [f64::from(c[0]), f64::from(c[1])])
+        .collect();
+    let mut filled = found.clone();
+    for sweep in 0..SWEEPS {
+        for k in 0..count {
+            // There and back, or colour would travel one way only.
+            let i = if sweep % 2 == 0 { k } else { count - 1 - k };
+            let own = f64::from(seen[i]);
+            let (mut sum, mut weight) = ([own * found[i][0], own * found[i][1]], own);
+            for &(j, w) in &edges[i] {
+                let other = filled[j as usize];
+                sum = [sum[0] + w * other[0], sum[1] + w * other[1]];
+                weight += w;
+            }
+            if weight > 0.0 {
+                filled[i] = sum.map(|s| s / weight);
+            }
+        }
+    }
+    for (i, out) in chroma.coefficients.chunks_exact_mut(stride).enumerate() {
+        let sure = seen[i].min(1.0);
+        out[0] = filled[i][0] as f32;
+        out[1] = filled[i][1] as f32;
+        for c in &mut out[2..] {
+            *c *= sure;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A row of Gaussians one unit apart.
+    fn row(grays: &[f32]) -> Splats {
+        let count = grays.len();
+        Splats {
+            means: (0..count).map(|i| [i as f32, 0.0, 0.0]).collect(),
+            quats: vec![[1.0, 0.0, 0.0, 0.0]; count],
+            log_scales: vec![[0.0; 3]; count],
+            opacity_logits: vec![0.0; count],
+            sh: ShField {
+                degree: 0,
+                channels: 1,
+                coefficients: grays.iter().map(|g| (g - 0.5) / sh::C0 as f32).collect(),
+            },
+        }
+    }
+
+    fn chroma(values: &[[f32; 2]]) -> ShField {
+        ShField {
+            degree: 0,
+            channels: 2,
+            coefficients: values.as_flattened().to_vec(),
+        }
+    }
+
+    #[test]
+    fn the_unseen_take_their_neighbours_colour() {
+        let luma = row(&[0.5; 12]);
+        let mut values = [[30.0, -20.0]; 12];
+        let mut seen = [100.0; 12];
+        for i in 4..7 {
+            (values[i], seen[i]) = ([-90.0, 90.0], 0.0);
+        }
+        let mut field = chroma(&values);
+        fill_unseen(&luma, &mut field, &seen);
+        for c in field.coefficients.chunks_exact(2) {
+            assert!((c[0] - 30.0).abs() < 1e-3 && (c[1] + 20.0).abs() < 1e-3, "{c:?}");
+        }
+    }
+
+    #[test]
+    fn colour_does_not_cross_an_edge_of_luma() {
+        let mut grays = [0.2; 20];
+        grays[10..].fill(0.9);
+        let mut values = [[10.0, 0.0]; 20];
+        values[10..].fill([-40.0, 0.0]);
+        let mut seen = [50.0; 20];
+        (seen[9], seen[10]) = (0.0, 0.0);
+        (values[9], values[10]) = ([0.0; 2], [0.0; 2]);
+        let mut field = chroma(&values);
+        fill_unseen(&row(&grays), &mut field, &seen);
+        assert!((field.of(9)[0] - 10.0).abs() < 0.5, "{:?}", field.of(9));
+        assert!((field.of(10)[0] + 40.0).abs() < 0.5, "{:?}", field.of(10));
+    }
+
+    #[test]
+    fn what_is_well_seen_stays() {
+        let values: Vec<[f32; 2]> = (0..30).map(|i| [i as f32, -(i as f32)]).collect();
+        let mut field = chroma(&values);
+        fill_unseen(&row(&[0.5; 30]), &mut field, &[1e4; 30]);
+        for (c, v) in field.coefficients.iter().zip(values.as_flattened()) {
+            assert!((c - v).abs() < 0.01);
+        }
+        // Nobody sees anything: gray stays gray, and nothing is divided by zero.
+        let mut nothing = chroma(&[[0.0; 2]; 3]);
+        fill_unseen(&row(&[0.5; 3]), &mut nothing, &[0.0; 3]);
+        assert_eq!(nothing.coefficients, [0.0; 6]);
+    }
+}

@@ -1,0 +1,114 @@
+//! RGB harmonics by the chroma solver. Two channels are two channels: red with green,
+//! then blue with nothing.
+
+use std::sync::Arc;
+
+use super::{ChromaSettings, ChromaView, Solver, teacher::AbImage};
+use crate::{
+    capture::Camera,
+    gpu::GpuError,
+    raster::Raster,
+    splats::{ShField, Splats, sh},
+};
+
+/// The solver's loss is made for CIELAB units, 100 of which span black to white.
+const UNITS: f32 = 100.0;
+
+/// A view and the colours wanted in its picture.
+#[derive(Clone, Debug)]
+pub struct RgbView {
+    /// Where the picture is taken from.
+    pub camera: Camera,
+    /// sRGB-encoded, `[height, width]`; differences may be negative.
+    pub wanted: Vec<[f32; 3]>,
+}
+
+/// Fits RGB harmonics of `degree` on the frozen geometry of `luma` to coloured
+/// pictures: what training RGB splats on a teacher's pictures would give on this
+/// geometry. Plain L1, with the rounds and steps of `settings`.
+///
+/// # Errors
+/// [`GpuError`] when it does not fit or the device is lost.
+pub fn fit_rgb(
+    raster: &Arc<Raster>,
+    settings: &ChromaSettings,
+    extent: f64,
+    luma: &Splats,
+    views: &[RgbView],
+) -> Result<ShField, GpuError> {
+    let mut field = solve(raster, settings, extent, luma, views)?;
+    let stride = 3 * sh::coefficient_count(field.degree);
+    for of_splat in field.coefficients.chunks_exact_mut(stride) {
+        for constant in &mut of_splat[..3] {
+            *constant -= (0.5 / sh::C0) as f32;
+        }
+    }
+    Ok(field)
+}
+
+/// Moves the constant harmonics of `baked` so that its pictures lose `views`' wanted
+/// differences: native picture minus what `baked` shows.
+///
+/// # Errors
+/// [`GpuError`] when it does not fit or the device is lost.
+pub fn refine_bake(
+    raster: &Arc<Raster>,
+    settings: &ChromaSettings,
+    extent: f64,
+    baked: &mut Splats,
+    views: &[RgbView],
+) -> Result<(), GpuError> {
+    let moved = solve(raster, settings, extent, baked, views)?;
+    let stride = 3 * sh::coefficient_count(baked.sh.degree);
+    let of_splat = baked.sh.coefficients.chunks_exact_mut(stride);
+    for (out, by) in of_splat.zip(moved.coefficients.chunks_exact(3)) {
+        for channel in 0..3 {
+            out[channel] += by[channel];
+        }
+    }
+    Ok(())
+}
+
+/// The field whose blend is wanted, without the offset of mid-gray.
+fn solve(
+    raster: &Arc<Raster>,
+    settings: &ChromaSettings,
+    extent: f64,
+    splats: &Splats,
+    views: &[RgbView],
+) -> Result<ShField, GpuError> {
+    let mut rgb = ShField::zeros(splats.len(), settings.sh_degree, 3);
+    for channels in [&[0, 1][..], &[2]] {
+        let pair = |view: &RgbView| ChromaView {
+            camera: view.camera.clone(),
+            wanted: AbImage {
+                width: view.camera.width,
+                height: view.camera.height,
+                ab: (view.wanted.iter())
+                    .map(|rgb| {
+                        let mut pair = [0.0; 2];
+                        for (out, &channel) in pair.iter_mut().zip(channels) {
+                            *out = UNITS * rgb[channel];
+                        }
+                        pair
+                    })
+                    .collect(),
+            },
+            weights: None,
+        };
+        let views: Vec<ChromaView> = views.iter().map(pair).collect();
+        let mut solver = Solver::new(raster.clone(), settings, extent, splats, &views)?;
+        solver.run(&mut |_| ())?;
+        let found = solver.chroma()?;
+        let (from, to) = (
+            found.coefficients.chunks_exact(2),
+            rgb.coefficients.chunks_exact_mut(3),
+        );
+        for (from, to) in from.zip(to) {
+            for (value, &channel) in from.iter().zip(channels) {
+                to[channel] = value / UNITS;
+            }
+        }
+    }
+    Ok(rgb)
+}
