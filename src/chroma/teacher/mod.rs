@@ -11,11 +11,13 @@ mod images;
 mod network;
 mod profile;
 mod runtime;
+mod upsample;
 
 pub use error::TeacherError;
 pub use folder::FolderTeacher;
 pub use images::{AbImage, GrayImage};
 pub use network::NetworkTeacher;
+pub use upsample::Upsample;
 
 use serde::Serialize;
 use std::path::Path;

@@ -1,7 +1,7 @@
 //! What is known about colorization networks: their inputs, their outputs and
 //! what the numbers mean.
 
-use super::images::Shrinking;
+use super::images::Filter;
 use ort::session::Session;
 use ort::value::{Outlet, TensorElementType, ValueType};
 
@@ -19,7 +19,7 @@ pub(super) struct Profile {
     /// What a white pixel is in the input; black is 0.
     pub white: f32,
     /// How a photo larger than the input is made smaller.
-    pub shrinking: Shrinking,
+    pub shrinking: Filter,
     /// Channels of the output, `[1, channels, h, w]` of f32: a and b.
     pub output_channels: i64,
     /// Factor from the output to CIELAB units.
@@ -37,7 +37,7 @@ pub(super) static PROFILES: &[Profile] = &[
         names: ["input", "output"],
         input_channels: 3,
         white: 1.0,
-        shrinking: Shrinking::Interpolates,
+        shrinking: Filter::Bilinear,
         output_channels: 2,
         output_scale: 1.0,
         default_side: 512,
