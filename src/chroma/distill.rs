@@ -29,6 +29,9 @@ pub struct ChromaView {
     pub camera: Camera,
     /// Wanted a/b at the camera's size.
     pub wanted: AbImage,
+    /// How much each pixel of it counts, `[height, width]`, at least 0; `None`
+    /// stands for 1 everywhere. Adam does not look at it.
+    pub weights: Option<Vec<f32>>,
 }
 
 /// How far a distillation is.
