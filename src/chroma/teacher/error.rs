@@ -48,8 +48,8 @@ pub enum TeacherError {
     },
     /// The model is no colorization network that is known here.
     #[error(
-        "{}: no known colorization network: it has {found}; accepted: {accepted}; a manifest \
-         beside it ({}) can describe another", path.display(), manifest_beside(path).display()
+        "{}: no known colorization network: it has {found}; accepted: {accepted}; a .toml beside \
+         it can describe another (docs/guide.md)", path.display()
     )]
     NoProfile {
         /// The `.onnx` file.

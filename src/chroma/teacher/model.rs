@@ -2,7 +2,7 @@
 //! profiles' contracts.
 
 use super::TeacherError;
-use super::profile::{BUILT_IN, BuiltIn, MAX_SIDE, OutputKind, Profile, Role};
+use super::profile::{BUILT_IN, BuiltIn, MAX_SIDE, Profile, Role};
 use ort::session::Session;
 use ort::value::{Outlet, TensorElementType, ValueType};
 use std::path::Path;
@@ -250,27 +250,16 @@ fn shape_in_words(shape: &[i64]) -> String {
 /// What a profile accepts, in words.
 fn accepted(profile: &Profile) -> String {
     let inputs = profile.inputs.iter().map(|role| match role {
-        Role::Image => format!("image Float32 [1,{},H,W]", profile.image.channels()),
-        Role::Hints => "hints Float32 [1,2,H,W]".to_owned(),
-        Role::Mask => "mask Float32 [1,1,H,W]".to_owned(),
-        Role::Class => "class of integers".to_owned(),
-        Role::Noise => "noise Float32".to_owned(),
-        Role::Zeros => "zeros Float32".to_owned(),
+        Role::Image => format!("[1,{},H,W]", profile.image.channels()),
+        Role::Hints => "[1,2,H,W]".to_owned(),
+        Role::Mask => "[1,1,H,W]".to_owned(),
+        Role::Class => "a class of integers".to_owned(),
+        Role::Noise => "a code".to_owned(),
+        Role::Zeros => "zeros".to_owned(),
     });
     let inputs = inputs.collect::<Vec<_>>().join(", ");
-    let multiple = match profile.size_multiple {
-        1 => String::new(),
-        multiple => format!(", H and W multiples of {multiple}"),
-    };
-    let answer = match profile.output {
-        OutputKind::Ab => "a, b",
-        OutputKind::Rgb => "RGB",
-    };
     let channels = profile.output.channels();
-    format!(
-        "{} ({inputs} to {answer} Float32 [1,{channels},h,w]{multiple})",
-        profile.name
-    )
+    format!("{} ({inputs} to [1,{channels},h,w])", profile.name)
 }
 
 #[cfg(test)]
@@ -398,7 +387,7 @@ mod tests {
                 "{message}"
             );
             assert!(
-                message.contains("DDColor (image Float32 [1,3,H,W]"),
+                message.contains("DDColor ([1,3,H,W] to [1,2,h,w])"),
                 "{message}"
             );
         }

@@ -286,3 +286,26 @@ fn load(path: &Path, environment: &ort::environment::Environment) -> ort::Result
         .with_log_level(ort::logging::LogLevel::Fatal)?
         .commit_from_file(path)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn noise_is_normal_and_always_the_same() {
+        let values = noise(20_000);
+        assert_eq!(values[..119], noise(119));
+        let mean = |power: i32| {
+            let powers = values.iter().map(|v| f64::from(*v).powi(power));
+            powers.sum::<f64>() / values.len() as f64
+        };
+        // Moments of the standard normal distribution: 0, 1, 0, 3.
+        for (power, expected) in [(1, 0.0), (2, 1.0), (3, 0.0), (4, 3.0)] {
+            assert!(
+                (mean(power) - expected).abs() < 0.15,
+                "{power}: {}",
+                mean(power)
+            );
+        }
+    }
+}

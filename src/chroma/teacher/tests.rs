@@ -214,7 +214,7 @@ fn models_that_are_no_teachers() {
         for part in [
             "input Float32 [1,",
             "output Float32 [1,",
-            "DDColor (image Float32 [1,3,H,W]",
+            "DDColor ([1,3,H,W] to [1,2,h,w])",
         ] {
             assert!(message.contains(part), "{message}");
         }
