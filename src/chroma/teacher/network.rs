@@ -140,7 +140,7 @@ impl NetworkTeacher {
                 Role::Hints | Role::Mask => {
                     image_tensor(size, told(&self.profile, hints, size, role))
                 }
-                Role::Class | Role::Noise | Role::Zeros => other(role, port),
+                Role::Class | Role::Noise | Role::Zeros => other(&self.profile, role, port),
             })
             .collect();
         let outputs = self.session.run(&inputs?[..]).map_err(first_line)?;
@@ -219,7 +219,7 @@ fn told(profile: &Profile, hints: Option<&HintImage>, size: [u32; 2], role: Role
 }
 
 /// An input that has nothing to do with the photo.
-fn other(role: Role, port: &Port) -> Result<SessionInputValue<'static>, String> {
+fn other(profile: &Profile, role: Role, port: &Port) -> Result<SessionInputValue<'static>, String> {
     let (shape, count) = (port.closed(), port.len().unwrap_or(0));
     match (role, port.element) {
         (_, Element::I64) => {
@@ -230,18 +230,18 @@ fn other(role: Role, port: &Port) -> Result<SessionInputValue<'static>, String> 
             let tensor = Tensor::from_array((shape, vec![0_i32; count])).map_err(first_line)?;
             Ok(tensor.into())
         }
-        (Role::Noise, _) => tensor(shape, noise(count)),
+        (Role::Noise, _) => tensor(shape, noise(count, profile.noise_std.unwrap_or(1.0))),
         _ => tensor(shape, vec![0.0; count]),
     }
 }
 
-/// Standard normal numbers (Box and Muller 1958), always the same.
-fn noise(count: usize) -> Vec<f32> {
+/// Normal numbers of mean 0 (Box and Muller 1958), always the same.
+fn noise(count: usize, deviation: f32) -> Vec<f32> {
     let mut random = fastrand::Rng::with_seed(NOISE_SEED);
     let mut normal = || {
         // In (0, 1], so that the logarithm is finite.
         let radius = (-2.0 * (1.0 - random.f32()).ln()).sqrt();
-        radius * (TAU * random.f32()).cos()
+        deviation * radius * (TAU * random.f32()).cos()
     };
     (0..count).map(|_| normal()).collect()
 }
@@ -293,19 +293,16 @@ mod tests {
 
     #[test]
     fn noise_is_normal_and_always_the_same() {
-        let values = noise(20_000);
-        assert_eq!(values[..119], noise(119));
+        let values = noise(20_000, 0.5);
+        assert_eq!(values[..119], noise(119, 0.5));
         let mean = |power: i32| {
             let powers = values.iter().map(|v| f64::from(*v).powi(power));
             powers.sum::<f64>() / values.len() as f64
         };
-        // Moments of the standard normal distribution: 0, 1, 0, 3.
-        for (power, expected) in [(1, 0.0), (2, 1.0), (3, 0.0), (4, 3.0)] {
-            assert!(
-                (mean(power) - expected).abs() < 0.15,
-                "{power}: {}",
-                mean(power)
-            );
+        // Moments of a normal distribution: 0, σ², 0, 3 σ⁴.
+        for (power, expected) in [(1, 0.0), (2, 0.25), (3, 0.0), (4, 0.1875)] {
+            let found = mean(power);
+            assert!((found - expected).abs() < 0.01, "{power}: {found}");
         }
     }
 }

@@ -47,6 +47,9 @@ pub(super) struct Profile {
     /// What a, b of -110 and 110 are in the hints.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub hint_range: Option<[f32; 2]>,
+    /// Standard deviation of the random code.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub noise_std: Option<f32>,
 }
 
 /// What an input of a model is for.
@@ -61,7 +64,8 @@ pub(super) enum Role {
     Mask,
     /// The number of a class: integers, all 0.
     Class,
-    /// A random code: f32, the same normally distributed numbers for each photo.
+    /// A random code: f32, the same normally distributed numbers for each photo,
+    /// of mean 0 and deviation `noise_std`.
     Noise,
     /// Something not to be used: f32, all 0.
     Zeros,
@@ -172,6 +176,12 @@ impl Profile {
             "size: must be a multiple of size_multiple, which must be at least 1"
         } else if self.hint_range.is_some() != (count(Role::Hints) == 1) {
             "hint_range: belongs with \"hints\" among the inputs, and only there"
+        } else if self.noise_std.is_some() != (count(Role::Noise) > 0)
+            || self
+                .noise_std
+                .is_some_and(|std| !(std.is_finite() && std >= 0.0))
+        {
+            "noise_std: must be a number from 0 on, belongs with \"noise\" among the inputs, and only there"
         } else {
             return Ok(());
         };
@@ -209,14 +219,15 @@ impl Profile {
     /// Width and height at which the network sees a photo; `fixed` are the
     /// model's own and `size` stands for [`Self::size`].
     pub fn input_size(&self, photo: [u32; 2], fixed: [Option<u32>; 2], size: u32) -> [u32; 2] {
-        let short = f64::from(photo[0].min(photo[1]).max(1));
-        let multiple = f64::from(self.size_multiple);
+        let [short, multiple] = [photo[0].min(photo[1]).max(1), self.size_multiple];
         let side = |axis: usize| match self.resize {
             Resize::Stretch => size,
             Resize::ShortSide => {
-                let side = f64::from(photo[axis]) / short * f64::from(size);
-                let most = (f64::from(MAX_SIDE) / multiple).floor();
-                ((side / multiple).round().clamp(1.0, most) * multiple) as u32
+                // Rounded up, as BigColor's own program does.
+                let whole = u64::from(photo[axis].max(1)) * u64::from(size);
+                let steps = whole.div_ceil(u64::from(short) * u64::from(multiple));
+                u32::try_from(steps)
+                    .map_or(MAX_SIDE, |steps| steps.min(MAX_SIDE / multiple) * multiple)
             }
         };
         std::array::from_fn(|axis| fixed[axis].unwrap_or_else(|| side(axis)))
@@ -364,6 +375,8 @@ mod tests {
                 "unknown variant `style`",
             ),
             ("[\"image\"]", "[\"image\", \"hints\"]", "hint_range: "),
+            ("[\"image\"]", "[\"image\", \"noise\"]", "noise_std: "),
+            ("size = 512", "noise_std = 1\nsize = 512", "noise_std: "),
             ("mean = [0, 0, 0]", "mean = [0]", "mean and std: "),
             ("std = [1, 1, 1]", "std = [1, 0, 1]", "mean and std: "),
             ("std = [1, 1, 1]", "std = [1, nan, 1]", "mean and std: "),
@@ -400,9 +413,10 @@ mod tests {
             [64, 256]
         );
         let short = named("bigcolor").unwrap();
-        // 256 · 4/3 = 341.3, whose nearest multiple of 16 is 336.
-        assert_eq!(short.input_size([800, 600], [None; 2], 256), [336, 256]);
-        assert_eq!(short.input_size([600, 800], [None; 2], 256), [256, 336]);
+        // 256 · 4/3 = 341.3, and the next multiple of 16 is 352.
+        assert_eq!(short.input_size([800, 600], [None; 2], 256), [352, 256]);
+        assert_eq!(short.input_size([600, 800], [None; 2], 256), [256, 352]);
+        assert_eq!(short.input_size([800, 600], [None; 2], 240), [320, 240]);
         assert_eq!(short.input_size([7, 7], [None; 2], 256), [256, 256]);
         assert_eq!(short.input_size([1, 60_000], [None; 2], 256), [256, 8192]);
         assert_eq!(short.input_size([800, 600], [Some(32); 2], 256), [32, 32]);
