@@ -40,10 +40,10 @@ pub struct Colorize {
     /// What the network takes and gives: a profile (ddcolor, siggraph17, siggraph17-full, eccv16,
     /// caffe-v2, bigcolor, deoldify, deoldify-browser) or a manifest [default: FILE.toml beside
     /// FILE.onnx, or what its inputs and outputs tell].
-    #[arg(long, value_name = "NAME|FILE.toml")]
+    #[arg(long, value_name = "NAME|FILE.toml", requires = "teacher")]
     teacher_profile: Option<String>,
     /// Side in pixels at which a network sees photos, where it leaves that open [default: the profile's].
-    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(1..=8192))]
+    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(1..=8192), requires = "teacher")]
     teacher_size: Option<u32>,
     /// How a teacher's small picture becomes as large as the photo.
     #[arg(long, value_enum, default_value_t = Upsample::Guided)]

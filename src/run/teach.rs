@@ -54,6 +54,8 @@ pub struct Taught {
 /// The teachers and hints of a command, opened.
 pub(super) struct Teachers {
     teachers: Vec<Member>,
+    /// Whether the options say how a network is to be asked.
+    asked_of_networks: bool,
     strength: f32,
     hints: Option<(PathBuf, HintFolder)>,
 }
@@ -93,9 +95,20 @@ impl Teachers {
                 .iter()
                 .map(member)
                 .collect::<Result<_, RunError>>()?,
+            asked_of_networks: options.settings.profile.is_some()
+                || options.settings.size.is_some(),
             strength: options.strength,
             hints: hints.transpose()?,
         })
+    }
+
+    /// Whether something was said of how to ask a network, and there is none.
+    fn asks_no_network(&self) -> bool {
+        let networks = self
+            .teachers
+            .iter()
+            .any(|member| member.teacher.is_network());
+        self.asked_of_networks && !networks
     }
 
     /// Name, kind and weight of each teacher.
@@ -126,6 +139,12 @@ impl Teachers {
     /// or the hints have no image for any training view, and
     /// [`RunError::NothingPainted`] where there are but hints, all of them empty.
     pub fn ask(&mut self, scene: &Scene, observe: &mut Observer<'_>) -> Result<Lesson, RunError> {
+        if self.asks_no_network() {
+            observe(Event::Note(
+                "--teacher-profile and --teacher-size change nothing: no teacher is a network"
+                    .into(),
+            ));
+        }
         let total = scene.photos.len();
         let mut lesson = Lesson {
             views: Vec::with_capacity(total),
@@ -205,21 +224,17 @@ impl Teachers {
 
 /// The mean of several answers of one size by their weights.
 fn mean(answers: Vec<(AbImage, f32)>) -> Option<AbImage> {
-    let total: f32 = answers.iter().map(|(_, weight)| weight).sum();
-    let mut answers = answers.into_iter();
-    let (mut mean, weight) = answers.next()?;
-    if answers.len() == 0 {
-        return Some(mean);
-    }
-    mean.ab
-        .iter_mut()
-        .for_each(|ab| *ab = ab.map(|value| value * weight / total));
-    for (answer, weight) in answers {
-        for (sum, ab) in mean.ab.iter_mut().zip(&answer.ab) {
-            *sum = [0, 1].map(|c: usize| sum[c] + ab[c] * weight / total);
-        }
-    }
-    Some(mean)
+    let total: f64 = answers.iter().map(|(_, weight)| f64::from(*weight)).sum();
+    let shares = answers.into_iter();
+    let shares = shares.map(|(answer, weight)| (answer, (f64::from(weight) / total) as f32));
+    shares
+        .map(|(answer, share)| scaled(answer, share))
+        .reduce(|mut sum, answer| {
+            for (sum, ab) in sum.ab.iter_mut().zip(&answer.ab) {
+                *sum = [sum[0] + ab[0], sum[1] + ab[1]];
+            }
+            sum
+        })
 }
 
 fn scaled(mut answer: AbImage, strength: f32) -> AbImage {
@@ -287,6 +302,12 @@ mod tests {
         assert_eq!(mean(vec![(one.clone(), 3.0)]), Some(one.clone()));
         let both = mean(vec![(one, 3.0), (image(&[[-10.0, 20.0]]), 1.0)]);
         assert_eq!(both, Some(image(&[[5.0, -10.0]])));
+        // The sum of these weights is no f32.
+        let large = vec![
+            (image(&[[4.0, 2.0]]), f32::MAX),
+            (image(&[[8.0, 4.0]]), f32::MAX),
+        ];
+        assert_eq!(mean(large), Some(image(&[[6.0, 3.0]])));
     }
 
     #[test]

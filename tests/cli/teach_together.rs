@@ -165,6 +165,22 @@ fn a_network_with_hint_inputs_is_told_of_them() {
 }
 
 #[test]
+fn options_of_networks_without_one_are_remarked_on() {
+    let place = place_with_run();
+    paint(&place, "red", RED, &all());
+    let until = ["colorize", "--until", "62", "--teacher", "red"];
+    let done = place.run(&[&until[..], &["--teacher-size", "64"]].concat());
+    assert_eq!(done.code, Some(0), "{}", done.stderr);
+    assert!(
+        done.stderr.contains("no teacher is a network"),
+        "{}",
+        done.stderr
+    );
+    let done = place.run(&until);
+    assert!(!done.stderr.contains("network"), "{}", done.stderr);
+}
+
+#[test]
 fn profile_size_and_upsampling_are_asked_for() {
     let place = place_with_run();
     let network = onnx("deoldify_tiny.onnx");

@@ -176,11 +176,6 @@ impl TeacherError {
     }
 }
 
-/// Where the manifest of a model lies.
-pub(super) fn manifest_beside(model: &Path) -> PathBuf {
-    model.with_extension("toml")
-}
-
 /// The first line of a message, for errors that have one line.
 pub(super) fn first_line(message: impl ToString) -> String {
     let message = message.to_string();

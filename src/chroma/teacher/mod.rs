@@ -102,6 +102,11 @@ impl Teacher {
         })
     }
 
+    /// Whether it is a network and not a folder.
+    pub fn is_network(&self) -> bool {
+        matches!(self.source, Source::Network(_))
+    }
+
     /// Name, kind and identity, for reports.
     pub fn describe(&self) -> TeacherInfo {
         match &self.source {

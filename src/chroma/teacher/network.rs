@@ -1,7 +1,7 @@
 //! A colorization network as a teacher.
 
 use super::cache::{Cache, Question, hash_file, key};
-use super::error::{first_line, manifest_beside};
+use super::error::first_line;
 use super::images::resample;
 use super::model::{Element, Fit, Port, Ports};
 use super::profile::{self, OutputKind, Profile, Role};
@@ -43,7 +43,7 @@ impl NetworkTeacher {
         cache_dir: Option<&Path>,
         settings: &TeacherSettings,
     ) -> Result<Self, TeacherError> {
-        let manifest = manifest_beside(path);
+        let manifest = path.with_extension("toml");
         let told = match &settings.profile {
             Some(name) => Some(profile::named(name)?),
             None if manifest.exists() => Some(Profile::read(&manifest)?),
