@@ -109,28 +109,24 @@ impl Ports {
         })
     }
 
-    /// The built-in profile that describes the model, by shapes and then by
-    /// names.
+    /// The built-in profile that describes the model: by shapes, where several
+    /// fit by the ratio of sides, and then by names.
     ///
     /// # Errors
     /// [`TeacherError::NoProfile`] where none does,
     /// [`TeacherError::SeveralProfiles`] where more than one might.
     pub fn choose(&self, path: &Path) -> Result<(Profile, Fit), TeacherError> {
-        let mut fitting: Vec<(&BuiltIn, Profile, Fit)> = Vec::new();
-        for built_in in BUILT_IN {
+        let fit = |built_in: &'static BuiltIn| {
             let profile = built_in.profile();
-            if let Some(fit) = self.fit(&profile)
-                && self.has_stride(&fit, &profile, built_in.stride)
-            {
-                fitting.push((built_in, profile, fit));
-            }
-        }
-        if fitting
-            .iter()
-            .any(|(kind, ..)| self.has_names(kind.tensors))
-        {
-            fitting.retain(|(kind, ..)| self.has_names(kind.tensors));
-        }
+            let fit = self.fit(&profile)?;
+            Some((built_in, profile, fit))
+        };
+        let mut fitting: Vec<_> = BUILT_IN.iter().filter_map(fit).collect();
+        // Sides tell more than names, which an exporter may have made up.
+        keep_if_any(&mut fitting, |(kind, profile, fit)| {
+            self.has_stride(fit, profile, kind.stride)
+        });
+        keep_if_any(&mut fitting, |(kind, ..)| self.has_names(kind.tensors));
         if fitting.len() > 1 {
             let names: Vec<_> = fitting.iter().map(|(kind, ..)| kind.names[0]).collect();
             return Err(TeacherError::SeveralProfiles {
@@ -238,6 +234,13 @@ impl Port {
     }
 }
 
+/// Keeps what a clue speaks for, or everything where it speaks for nothing.
+fn keep_if_any<T>(found: &mut Vec<T>, clue: impl Fn(&T) -> bool) {
+    if found.iter().any(&clue) {
+        found.retain(clue);
+    }
+}
+
 fn shape_in_words(shape: &[i64]) -> String {
     let side = |&side: &i64| match side {
         -1 => "?".to_string(),
@@ -306,6 +309,12 @@ mod tests {
                 "ECCV16/SIGGRAPH17",
             ),
             (vec![image("x", 1, 224)], image("y", 2, 56), "Caffe v2"),
+            (
+                vec![image("input", 1, 224)],
+                image("output", 2, 56),
+                "Caffe v2",
+            ),
+            (vec![image("x", 3, 512)], image("y", 2, 256), "DDColor"),
             (
                 vec![image("input", 1, -1)],
                 image("output", 2, -1),
