@@ -199,3 +199,44 @@ fn profile_size_and_upsampling_are_asked_for() {
         answers + scene::VIEWS
     );
 }
+
+#[test]
+fn help_and_guide_name_every_profile() {
+    let place = place_with_run();
+    let network = onnx("deoldify_tiny.onnx");
+    let asked = [
+        "colorize",
+        "--teacher",
+        &network,
+        "--teacher-profile",
+        "none",
+    ];
+    let refused = place.run(&asked).stderr;
+    let names = refused
+        .split_once("there are ")
+        .and_then(|(_, rest)| rest.split_once(", or"));
+    let names: Vec<_> = names.expect("a list").0.split(", ").collect();
+    assert!(names.len() > 6, "{names:?}");
+    let help = place.succeed(&["colorize", "--help"]);
+    let guide = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/guide.md");
+    let guide = fs::read_to_string(guide).expect("the guide");
+    for name in names {
+        assert!(help.contains(name), "{name}");
+        assert!(guide.contains(&format!("`{name}`")), "{name}");
+    }
+}
+
+/// The manifest that the guide shows is a whole one.
+#[test]
+fn the_guides_manifest_is_taken() {
+    let place = place_with_run();
+    let guide = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/guide.md");
+    let guide = fs::read_to_string(guide).expect("the guide");
+    let (_, manifest) = guide.split_once("```toml\n").expect("a manifest");
+    let (manifest, _) = manifest.split_once("```").expect("its end");
+    let network = fs::read(onnx("siggraph17_tiny.onnx")).expect("a fixture");
+    place.write("mine.onnx", network);
+    place.write("mine.toml", manifest);
+    let chroma = colorize(&place, &["--teacher", "mine.onnx"]);
+    assert_eq!(chroma["teacher"]["kind"], "Mine");
+}
