@@ -1,6 +1,6 @@
 //! What a solver is given: a camera and the a/b wanted in its picture.
 
-use super::teacher::{AbImage, Shrinking, resample};
+use super::teacher::{AbImage, Filter, resample};
 use crate::capture::Camera;
 
 /// A view and what its teacher says.
@@ -32,7 +32,7 @@ impl ChromaView {
         let known: Vec<[f32; 3]> = (self.wanted.ab.iter().zip(weights))
             .map(|(ab, &w)| [w * ab[0], w * ab[1], w])
             .collect();
-        let known = resample(&known, size, [width, height], Shrinking::Averages);
+        let known = resample(&known, size, [width, height], Filter::Average);
         Self {
             camera,
             wanted: AbImage {

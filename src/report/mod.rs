@@ -140,9 +140,21 @@ pub struct LumaView {
 /// Stage 2.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ChromaReport {
-    /// Who coloured the photos.
-    pub teacher: serde_json::Value,
-    /// Training views that the teacher coloured.
+    /// Who coloured the photos, where there is exactly one teacher.
+    pub teacher: Option<TeacherReport>,
+    /// All teachers, in the order of the command line.
+    #[serde(default)]
+    pub teachers: Vec<TeacherReport>,
+    /// What the teachers' a and b were multiplied by.
+    #[serde(default = "whole")]
+    pub strength: f32,
+    /// How answers smaller than the photo were enlarged: `guided` or `bilinear`.
+    #[serde(default)]
+    pub upsample: String,
+    /// Training views with painted hints.
+    #[serde(default)]
+    pub hints: usize,
+    /// Training views that a teacher coloured or that have hints.
     pub colored_views: usize,
     /// Iterations of this stage.
     pub iterations: usize,
@@ -169,6 +181,27 @@ pub struct ChromaReport {
     /// Where the device's time went, with `--timings`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub timings: Option<Vec<KernelReport>>,
+}
+
+/// A teacher.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TeacherReport {
+    /// Name of its file or folder.
+    pub name: String,
+    /// A network's profile, such as `DDColor`, or `folder`.
+    pub kind: String,
+    /// SHA-256 of the `.onnx` file in hexadecimal.
+    pub sha256: Option<String>,
+    /// Width and height at which the network sees photos.
+    pub input_size: Option<[u32; 2]>,
+    /// What its answers count beside the other teachers'.
+    #[serde(default = "whole")]
+    pub weight: f32,
+}
+
+/// What a weight or strength is where nothing else is said.
+fn whole() -> f32 {
+    1.0
 }
 
 /// Wall seconds of stage 2.

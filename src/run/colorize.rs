@@ -12,11 +12,12 @@ use super::{
     fit::{capture_report, comments, open_gpu},
     preset::Preset,
     scene::{Scene, gray_to_rgb, read_splats, rgb_pixels, shown_rgb},
+    teach::{Taught, TeachOptions, Teachers},
 };
 use crate::{
     chroma::{
         ChromaSettings, ChromaView, SolverKind, bake_rgb, distil, native_rgb,
-        teacher::{AbImage, GrayImage, Teacher},
+        teacher::{AbImage, Upsample},
     },
     gpu::Gpu,
     measure,
@@ -37,8 +38,8 @@ const SHEET_ROWS: usize = 4;
 pub struct ColorizeOptions {
     /// Run folder or gray splat file; the newest run by default.
     pub run: Option<PathBuf>,
-    /// The teacher.
-    pub teacher: PathBuf,
+    /// Who colours the photos.
+    pub teach: TeachOptions,
     /// The coloured splat file; `color.ply` in the run folder by default.
     pub output: Option<PathBuf>,
     /// Last iteration, counted from the start of stage 1; the preset's by default.
@@ -72,7 +73,7 @@ pub fn colorize(
 ) -> Result<(Output, Report), RunError> {
     let source = Source::find(options)?;
     let cache = source.folder.as_ref().map(RunFolder::teacher);
-    let mut teacher = Teacher::open(&options.teacher, cache.as_deref())?;
+    let mut teachers = Teachers::open(&options.teach, cache.as_deref())?;
     let gpu = open_gpu(options.timings)?;
     let mut report = source.report(&gpu);
     let (max_side, holdout) = (report.capture.max_side, report.capture.holdout);
@@ -100,7 +101,7 @@ pub fn colorize(
     files::make_folder_of(&output.ply)?;
 
     let begun = Instant::now();
-    let answers = ask(&mut teacher, options, &scene, observe)?;
+    let lesson = teachers.ask(&scene, observe)?;
     let seconds_teacher = begun.elapsed().as_secs_f64();
 
     let begun = Instant::now();
@@ -118,10 +119,11 @@ pub fn colorize(
         .train
         .iter()
         .filter_map(|&i| {
+            let taught = lesson.views[i].clone()?;
             Some(ChromaView {
                 camera: scene.photos[i].1.clone(),
-                wanted: answers[i].clone()?,
-                weights: None,
+                wanted: taught.answer,
+                weights: taught.weights,
             })
         })
         .collect();
@@ -154,9 +156,25 @@ pub fn colorize(
 
     let begun = Instant::now();
     let baked = bake_rgb(&luma, &chroma);
-    let measured = Measured::of(&raster, &scene, &luma, &chroma, &baked, &answers)?;
+    let measured = Measured::of(&raster, &scene, &luma, &chroma, &baked, &lesson.views)?;
     report.chroma = Some(ChromaReport {
-        teacher: serde_json::to_value(teacher.describe()).unwrap_or_default(),
+        teacher: match &teachers.describe()[..] {
+            [only] => Some(only.clone()),
+            _ => None,
+        },
+        teachers: teachers.describe(),
+        strength: options.teach.strength,
+        upsample: match options.teach.settings.upsample {
+            Upsample::Guided => "guided",
+            Upsample::Bilinear => "bilinear",
+        }
+        .to_owned(),
+        hints: scene
+            .split
+            .train
+            .iter()
+            .filter(|&&i| lesson.hinted[i])
+            .count(),
         colored_views,
         iterations,
         until: report.luma.iterations + iterations,
@@ -321,42 +339,6 @@ fn chroma_iterations(
     }
 }
 
-/// The teacher's answer for each view, `None` where it has none. Held-out views
-/// are asked too: for the contact sheet, never for training.
-fn ask(
-    teacher: &mut Teacher,
-    options: &ColorizeOptions,
-    scene: &Scene,
-    observe: &mut Observer<'_>,
-) -> Result<Vec<Option<AbImage>>, RunError> {
-    let total = scene.photos.len();
-    let mut answers = Vec::with_capacity(total);
-    for (i, (photo, _)) in scene.photos.iter().enumerate() {
-        let name = &scene.capture.views[i].name;
-        observe(Event::Progress {
-            stage: Stage::Teacher,
-            done: i,
-            total,
-            message: name.clone(),
-        });
-        answers.push(teacher.colorize(
-            name,
-            GrayImage {
-                width: photo.width,
-                height: photo.height,
-                pixels: &photo.gray,
-            },
-        )?);
-    }
-    if scene.split.train.iter().all(|&i| answers[i].is_none()) {
-        return Err(RunError::TeacherCoversNothing {
-            teacher: options.teacher.clone(),
-            example: scene.capture.views[scene.split.train[0]].name.clone(),
-        });
-    }
-    Ok(answers)
-}
-
 /// Pictures of the measured views and what they amount to.
 struct Measured {
     bake: ColorError,
@@ -371,7 +353,7 @@ impl Measured {
         luma: &Splats,
         chroma: &ShField,
         baked: &Splats,
-        answers: &[Option<AbImage>],
+        taught: &[Option<Taught>],
     ) -> Result<Self, RunError> {
         let mut renderer = scene.renderer(raster, luma, &[&luma.sh, chroma, &baked.sh])?;
         let (mut errors, mut views, mut rows) = (Vec::new(), Vec::new(), Vec::new());
@@ -385,9 +367,9 @@ impl Measured {
                 mean: error.mean,
                 percentile_95: error.percentile_95,
             });
-            let taught = answers[i]
+            let taught = taught[i]
                 .as_ref()
-                .map(|answer| teacher_picture(&photo.gray, answer));
+                .map(|taught| teacher_picture(&photo.gray, &taught.answer));
             let truth = photo.rgb.as_ref().map(|_| rgb_pixels(photo));
             views.push(ColorView {
                 name: scene.capture.views[i].name.clone(),

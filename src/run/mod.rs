@@ -8,6 +8,7 @@ mod info;
 mod preset;
 mod render;
 mod scene;
+mod teach;
 
 use std::{fmt, path::PathBuf};
 
@@ -17,6 +18,7 @@ pub use folder::RunFolder;
 pub use info::{export, info};
 pub use preset::Preset;
 pub use render::{RenderOptions, Views, render};
+pub use teach::{HINT_WEIGHT, Taught, TeachOptions};
 
 use crate::{
     capture::CaptureError, chroma::teacher::TeacherError, gpu::GpuError, splats::ply::PlyError,
@@ -65,6 +67,9 @@ pub enum RunError {
         /// A photo's name.
         example: String,
     },
+    /// There are hints for training views, but no paint.
+    #[error("{}: nothing is painted on any training photo: paint on one, or give a --teacher as well", .0.display())]
+    NothingPainted(PathBuf),
     /// Nothing is left for stage 2.
     #[error("--until {until}: stage 1 already took {luma} iterations: choose a larger number")]
     NothingUntil {

@@ -17,5 +17,6 @@ mod scene;
 mod shared;
 mod splat_file;
 mod teach;
+mod teach_together;
 mod train;
 mod view;

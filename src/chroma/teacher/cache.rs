@@ -8,7 +8,7 @@ use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
 /// Part of every key; counts up when the meaning of an answer changes.
-const FORMAT_VERSION: u32 = 1;
+const FORMAT_VERSION: u32 = 2;
 
 /// A folder of answers: `<key>.npy`, f32 `[2, h, w]`, a then b in CIELAB units
 /// at the network's own resolution.
@@ -48,13 +48,35 @@ impl Cache {
 }
 
 /// What an answer depends on: the photo, the model and how it is asked.
-pub(super) fn key(photo: &GrayImage<'_>, model: &str, profile: &str, input: [u32; 2]) -> String {
+#[derive(Clone, Copy)]
+pub(super) struct Question<'a> {
+    pub photo: GrayImage<'a>,
+    /// SHA-256 of the model's file.
+    pub model: &'a str,
+    /// The profile in full.
+    pub profile: &'a str,
+    /// Width and height of the network's input.
+    pub input: [u32; 2],
+    /// What the network is told of hints, as it is told it.
+    pub hints: Option<&'a [[f32; 3]]>,
+}
+
+/// The key of a question's answer.
+pub(super) fn key(question: &Question<'_>) -> String {
+    let (photo, [width, height]) = (&question.photo, question.input);
     let mut hash = Sha256::new();
     hash.update(format!(
-        "gs-chroma teacher answer {FORMAT_VERSION}\n{model}\n{profile}\n{}x{}\n{}x{}\n",
-        input[0], input[1], photo.width, photo.height
+        "gs-chroma teacher answer {FORMAT_VERSION}\n{}\n{}\n{width}x{height}\n{}x{}\n{}\n",
+        question.model,
+        question.profile,
+        photo.width,
+        photo.height,
+        question.hints.is_some(),
     ));
     hash.update(photo.pixels);
+    for value in question.hints.unwrap_or_default().as_flattened() {
+        hash.update(value.to_le_bytes());
+    }
     hexadecimal(&hash.finalize())
 }
 
@@ -176,20 +198,33 @@ mod tests {
             height,
             pixels,
         };
-        let base = photo(2, 1, &[1, 2]);
+        let base = Question {
+            photo: photo(2, 1, &[1, 2]),
+            model: "m",
+            profile: "p",
+            input: [8, 8],
+            hints: None,
+        };
+        let asked = |change: &dyn Fn(&mut Question<'static>)| {
+            let mut question = base;
+            change(&mut question);
+            key(&question)
+        };
         let keys = [
-            key(&base, "m", "p", [8, 8]),
-            key(&photo(2, 1, &[1, 3]), "m", "p", [8, 8]),
-            key(&photo(1, 2, &[1, 2]), "m", "p", [8, 8]),
-            key(&base, "n", "p", [8, 8]),
-            key(&base, "m", "q", [8, 8]),
-            key(&base, "m", "p", [8, 16]),
+            key(&base),
+            asked(&|q| q.photo = photo(2, 1, &[1, 3])),
+            asked(&|q| q.photo = photo(1, 2, &[1, 2])),
+            asked(&|q| q.model = "n"),
+            asked(&|q| q.profile = "q"),
+            asked(&|q| q.input = [8, 16]),
+            asked(&|q| q.hints = Some(&[[0.0; 3]])),
+            asked(&|q| q.hints = Some(&[[1.0; 3]])),
         ];
         for (i, key) in keys.iter().enumerate() {
             assert_eq!(key.len(), 64);
             assert!(!keys[..i].contains(key), "{i}");
         }
-        assert_eq!(keys[0], key(&base, "m", "p", [8, 8]));
+        assert_eq!(keys[0], key(&base));
     }
 
     #[test]

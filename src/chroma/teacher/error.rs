@@ -47,7 +47,10 @@ pub enum TeacherError {
         reason: String,
     },
     /// The model is no colorization network that is known here.
-    #[error("{}: no known colorization network: it has {found}; accepted: {accepted}", path.display())]
+    #[error(
+        "{}: no known colorization network: it has {found}; accepted: {accepted}; a .toml beside \
+         it can describe another (docs/guide.md)", path.display()
+    )]
     NoProfile {
         /// The `.onnx` file.
         path: PathBuf,
@@ -55,6 +58,54 @@ pub enum TeacherError {
         found: String,
         /// Those of the known networks.
         accepted: String,
+    },
+    /// More than one kind of network has such inputs and outputs.
+    #[error(
+        "{}: several kinds of networks have its inputs and outputs, and only you can know which \
+         it is: give --teacher-profile {profiles}", path.display()
+    )]
+    SeveralProfiles {
+        /// The `.onnx` file.
+        path: PathBuf,
+        /// Names of the profiles.
+        profiles: String,
+    },
+    /// No built-in profile has this name.
+    #[error(
+        "--teacher-profile {name}: no such profile; there are {known}, or name a .toml manifest"
+    )]
+    UnknownProfile {
+        /// What was asked for.
+        name: String,
+        /// Names of the built-in profiles.
+        known: String,
+    },
+    /// A manifest does not describe a network.
+    #[error("{}: {reason}; docs/guide.md lists the fields of a manifest", path.display())]
+    BadManifest {
+        /// The `.toml` file.
+        path: PathBuf,
+        /// The field and what is wrong with it.
+        reason: String,
+    },
+    /// The model does not take the size that was asked for.
+    #[error("{}: --teacher-size {size}: {reason}", path.display())]
+    BadSize {
+        /// The `.onnx` file.
+        path: PathBuf,
+        /// What was asked for.
+        size: u32,
+        /// Why it cannot be, and what can.
+        reason: String,
+    },
+    /// A hint says something about every pixel.
+    #[error(
+        "{}: has no transparency, so it would paint the whole photo; save the hints alone on a \
+         transparent layer, as PNG", path.display()
+    )]
+    NoTransparency {
+        /// The image.
+        path: PathBuf,
     },
     /// The network failed on a photo.
     #[error("{}: failed on photo {photo}: {reason}", path.display())]

@@ -1,16 +1,9 @@
 //! A folder of coloured images as a teacher.
 
-use super::error::first_line;
+use super::named_images::NamedImages;
 use super::{AbImage, GrayImage, TeacherError, TeacherInfo, file_name};
 use crate::color::srgb_to_lab;
-use std::collections::BTreeMap;
-use std::collections::btree_map::Entry;
-use std::fs;
 use std::path::{Path, PathBuf};
-
-/// How far the aspects of photo and image may differ: rounding to whole pixels
-/// in a tool that works at a small size, not another cut of the photo.
-const ASPECT_TOLERANCE: f64 = 0.02;
 
 /// Images that were coloured elsewhere, for any subset of the photos.
 ///
@@ -18,8 +11,7 @@ const ASPECT_TOLERANCE: f64 = 0.02;
 /// the two extensions are. Symbolic links to folders are not followed.
 pub struct FolderTeacher {
     folder: PathBuf,
-    /// Images by path below the folder, without extension.
-    images: BTreeMap<String, PathBuf>,
+    images: NamedImages,
 }
 
 impl FolderTeacher {
@@ -30,122 +22,57 @@ impl FolderTeacher {
     /// [`TeacherError::TwoImages`] where two differ only in their extension,
     /// [`TeacherError::Io`] where a folder cannot be read.
     pub fn open(folder: &Path) -> Result<Self, TeacherError> {
-        let mut images = BTreeMap::new();
-        let mut folders = vec![folder.to_path_buf()];
-        while let Some(current) = folders.pop() {
-            for entry in fs::read_dir(&current).map_err(TeacherError::io(&current))? {
-                let entry = entry.map_err(TeacherError::io(&current))?;
-                let path = entry.path();
-                let kind = entry.file_type().map_err(TeacherError::io(&path))?;
-                if kind.is_dir() {
-                    folders.push(path);
-                } else if is_image(&path) && path.is_file() {
-                    let below = path.strip_prefix(folder).unwrap_or(&path);
-                    match images.entry(key(below)) {
-                        Entry::Vacant(entry) => {
-                            entry.insert(path);
-                        }
-                        Entry::Occupied(entry) => {
-                            return Err(TeacherError::TwoImages {
-                                first: entry.get().min(&path).clone(),
-                                second: entry.get().max(&path).clone(),
-                            });
-                        }
-                    }
-                }
-            }
-        }
-        if images.is_empty() {
-            return Err(TeacherError::EmptyFolder {
-                path: folder.to_path_buf(),
-            });
-        }
         Ok(Self {
             folder: folder.to_path_buf(),
-            images,
+            images: NamedImages::open(folder)?,
         })
     }
 
     /// Whether there is an image for the photo with this path below the photo
     /// folder.
     pub fn covers(&self, name: &str) -> bool {
-        self.images.contains_key(&key(Path::new(name)))
+        self.images.covers(name)
     }
 
     pub(super) fn describe(&self) -> TeacherInfo {
         TeacherInfo {
             name: file_name(&self.folder),
-            kind: "folder",
+            kind: "folder".to_owned(),
             sha256: None,
             input_size: None,
         }
     }
 
+    /// Colours of the photo's image at the image's size; none where there is no
+    /// image.
     pub(super) fn colorize(
         &self,
         name: &str,
         photo: GrayImage<'_>,
     ) -> Result<Option<AbImage>, TeacherError> {
-        let Some(path) = self.images.get(&key(Path::new(name))) else {
+        let Some((_, image)) = self.images.load(name, photo)? else {
             return Ok(None);
         };
-        let bad_image = |reason: String| TeacherError::BadImage {
-            path: path.clone(),
-            reason,
-        };
-        let reader = image::ImageReader::open(path).map_err(TeacherError::io(path))?;
-        // A .png that is really a JPEG is a common slip and does no harm.
-        let reader = reader.with_guessed_format();
-        let decoded = reader.map_err(TeacherError::io(path))?.decode();
-        let image = decoded.map_err(|error| bad_image(first_line(error)))?;
         let (width, height) = (image.width(), image.height());
-
-        let aspect = f64::from(width) * f64::from(photo.height)
-            / (f64::from(height) * f64::from(photo.width));
-        if (aspect - 1.0).abs() > ASPECT_TOLERANCE {
-            return Err(TeacherError::Aspect {
-                path: path.clone(),
-                size: [width, height],
-                photo: name.to_string(),
-                photo_size: [photo.width, photo.height],
-            });
-        }
         let rgb = image.into_rgb32f();
         let ab = rgb.pixels().map(|rgb| {
             let [_, a, b] = srgb_to_lab(rgb.0.map(f64::from));
             [a as f32, b as f32]
         });
-        let colors = AbImage {
+        Ok(Some(AbImage {
             width,
             height,
             ab: ab.collect(),
-        };
-        Ok(Some(colors.resized(photo.width, photo.height)))
+        }))
     }
-}
-
-fn is_image(path: &Path) -> bool {
-    let extension = path.extension().unwrap_or_default();
-    ["png", "jpg", "jpeg"]
-        .iter()
-        .any(|known| extension.eq_ignore_ascii_case(known))
-}
-
-/// A path without its extension, with `/` between its parts on every system.
-fn key(path: &Path) -> String {
-    let path = path.with_extension("");
-    let parts: Vec<_> = path
-        .components()
-        .filter(|part| !matches!(part, std::path::Component::CurDir))
-        .map(|part| part.as_os_str().to_string_lossy())
-        .collect();
-    parts.join("/")
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::Upsample;
     use super::*;
     use image::{Rgb, RgbImage};
+    use std::fs;
     use tempfile::TempDir;
 
     const GRAY: [u8; 64] = [128; 64];
@@ -174,7 +101,9 @@ mod tests {
         save(&folder, "a.b.png", 8, 8, [0, 255, 0]);
         fs::write(folder.path().join("notes.txt"), "text").unwrap();
         let teacher = FolderTeacher::open(folder.path()).unwrap();
-        assert_eq!(teacher.images.len(), 3);
+        for known in ["left/0001.png", "right/0001.png", "a.b.png"] {
+            assert!(teacher.covers(known));
+        }
         assert!(teacher.covers("left/0001.jpeg"));
         assert!(teacher.covers("./left/0001.tiff"));
         assert!(teacher.covers("a.b.png"));
@@ -209,6 +138,7 @@ mod tests {
         stripes.save(folder.path().join("v.png")).unwrap();
         let teacher = FolderTeacher::open(folder.path()).unwrap();
         let small = teacher.colorize("v.jpg", photo(8, 4)).unwrap().unwrap();
+        let small = small.upsampled(photo(8, 4), Upsample::Guided);
         assert_eq!((small.width, small.height, small.ab.len()), (8, 4, 32));
         let a = |rgb| srgb_to_lab(rgb)[1] as f32;
         let mean = (a([1.0, 0.0, 0.0]) + a([0.0, 1.0, 1.0])) / 2.0;
@@ -275,6 +205,8 @@ mod tests {
         std::os::unix::fs::symlink(folder.path().join("v.png"), folder.path().join("w.png"))
             .unwrap();
         let teacher = FolderTeacher::open(folder.path()).unwrap();
-        assert_eq!(teacher.images.keys().collect::<Vec<_>>(), ["v", "w"]);
+        for (name, known) in [("v", true), ("w.jpg", true), ("loop/v.png", false)] {
+            assert_eq!(teacher.covers(name), known, "{name}");
+        }
     }
 }

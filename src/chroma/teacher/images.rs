@@ -1,6 +1,7 @@
 //! Images in and out of a teacher, and their change of size.
 
 use super::TeacherError;
+use serde::{Deserialize, Serialize};
 
 /// A gray photo that is to be coloured.
 #[derive(Clone, Copy, Debug)]
@@ -51,19 +52,23 @@ impl AbImage {
         Self {
             width: width.max(1),
             height: height.max(1),
-            ab: resample(&self.ab, size, [width, height], Shrinking::Averages),
+            ab: resample(&self.ab, size, [width, height], Filter::Average),
         }
     }
 }
 
-/// What happens along an axis that becomes shorter.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::chroma) enum Shrinking {
-    /// Every source pixel counts.
-    Averages,
-    /// The two nearest source pixels count, as in plain bilinear interpolation.
-    /// Aliases, but some networks define their input so.
-    Interpolates,
+/// How an image becomes another size. Along an axis that becomes longer,
+/// `Bilinear` and `Average` are the same.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Filter {
+    /// The nearest source pixel.
+    Nearest,
+    /// The two nearest source pixels of an axis by distance. Aliases where the
+    /// axis shrinks, but some networks define their input so.
+    Bilinear,
+    /// As `Bilinear`, but where an axis shrinks every source pixel counts.
+    Average,
 }
 
 /// Resamples `pixels`, `[height, width]` values of `C` channels, with half-pixel
@@ -72,15 +77,15 @@ pub(in crate::chroma) fn resample<const C: usize>(
     pixels: &[[f32; C]],
     size: [u32; 2],
     target: [u32; 2],
-    shrinking: Shrinking,
+    filter: Filter,
 ) -> Vec<[f32; C]> {
     let [width, height] = size.map(|side| side as usize);
     let [new_width, new_height] = target.map(|side| side.max(1) as usize);
     if [width, height] == [new_width, new_height] {
         return pixels.to_vec();
     }
-    let columns = taps(width, new_width, shrinking);
-    let rows = taps(height, new_height, shrinking);
+    let columns = taps(width, new_width, filter);
+    let rows = taps(height, new_height, filter);
     let weighted = |taps: &Taps, at: &dyn Fn(usize) -> [f32; C]| {
         let mut sum = [0.0; C];
         for (i, weight) in taps.weights.iter().enumerate() {
@@ -111,18 +116,27 @@ struct Taps {
     weights: Vec<f32>,
 }
 
-/// A tent around each target pixel's centre, cut off at the image's border.
-fn taps(length: usize, new_length: usize, shrinking: Shrinking) -> Vec<Taps> {
+/// A tent around each target pixel's centre, cut off at the image's border; for
+/// [`Filter::Nearest`] the one pixel at the centre.
+fn taps(length: usize, new_length: usize, filter: Filter) -> Vec<Taps> {
     let step = length as f64 / new_length as f64;
-    let radius = match shrinking {
-        Shrinking::Averages => step.max(1.0),
-        Shrinking::Interpolates => 1.0,
+    let radius = match filter {
+        Filter::Average => step.max(1.0),
+        Filter::Nearest | Filter::Bilinear => 1.0,
     };
     let taps_at = |i: usize| {
+        if filter == Filter::Nearest {
+            let first = (((i as f64 + 0.5) * step) as usize).min(length - 1);
+            return Taps {
+                first,
+                weights: vec![1.0],
+            };
+        }
         // Position of the target's centre, in source pixels from the first centre.
         let center = ((i as f64 + 0.5) * step - 0.5).clamp(0.0, (length - 1) as f64);
-        let first = (center - radius).floor().max(0.0) as usize;
-        let last = ((center + radius).ceil() as usize).min(length - 1);
+        // The tent's feet themselves weigh nothing.
+        let first = ((center - radius).floor() + 1.0).max(0.0) as usize;
+        let last = ((center + radius).ceil() as usize - 1).min(length - 1);
         let tent = |x: usize| (1.0 - (x as f64 - center).abs() / radius).max(0.0);
         let sum: f64 = (first..=last).map(tent).sum();
         let weights = (first..=last).map(|x| (tent(x) / sum) as f32).collect();
@@ -184,8 +198,17 @@ mod tests {
     #[test]
     fn plain_interpolation_takes_two_pixels() {
         let pixels = [[0.0], [1.0], [2.0], [9.0], [9.0], [9.0], [9.0], [9.0]];
-        let small = resample(&pixels, [8, 1], [2, 1], Shrinking::Interpolates);
+        let small = resample(&pixels, [8, 1], [2, 1], Filter::Bilinear);
         assert_eq!(small, [[1.5], [9.0]]);
+    }
+
+    #[test]
+    fn the_nearest_pixel_is_the_one_at_the_centre() {
+        let pixels = [[0.0], [1.0], [2.0], [3.0], [4.0], [5.0]];
+        let small = resample(&pixels, [6, 1], [2, 1], Filter::Nearest);
+        assert_eq!(small, [[1.0], [4.0]]);
+        let large = resample(&small, [2, 1], [4, 1], Filter::Nearest);
+        assert_eq!(large, [[1.0], [1.0], [4.0], [4.0]]);
     }
 
     #[test]

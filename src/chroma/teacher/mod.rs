@@ -7,26 +7,49 @@
 mod cache;
 mod error;
 mod folder;
+mod hints;
 mod images;
+mod model;
+mod named_images;
 mod network;
 mod profile;
 mod runtime;
+mod upsample;
 
 pub use error::TeacherError;
 pub use folder::FolderTeacher;
+pub use hints::{HintFolder, HintImage};
 pub use images::{AbImage, GrayImage};
-pub(super) use images::{Shrinking, resample};
+pub(super) use images::{Filter, resample};
 pub use network::NetworkTeacher;
+pub use upsample::Upsample;
 
 use serde::Serialize;
 use std::path::Path;
 
 /// Someone who colours photos.
-pub enum Teacher {
-    /// A colorization network.
-    Network(NetworkTeacher),
-    /// A folder of coloured images.
+pub struct Teacher {
+    source: Source,
+    upsample: Upsample,
+}
+
+enum Source {
+    Network(Box<NetworkTeacher>),
     Folder(FolderTeacher),
+}
+
+/// How a teacher is to be asked.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct TeacherSettings {
+    /// A network's contract: the name of a built-in profile or the path of a
+    /// `.toml` manifest. None for the manifest beside the model, or what its
+    /// inputs and outputs say.
+    pub profile: Option<String>,
+    /// Side in pixels of a network's input where the model leaves it open; none
+    /// for the profile's.
+    pub size: Option<u32>,
+    /// How answers smaller than the photo are enlarged.
+    pub upsample: Upsample,
 }
 
 /// What a report says about a teacher.
@@ -35,11 +58,12 @@ pub struct TeacherInfo {
     /// Name of the file or folder.
     pub name: String,
     /// The network's profile, such as `DDColor`, or `folder`.
-    pub kind: &'static str,
+    pub kind: String,
     /// SHA-256 of the `.onnx` file in hexadecimal; weights that lie in separate
     /// files beside it are not in it.
     pub sha256: Option<String>,
-    /// Width and height at which the network sees photos.
+    /// Width and height at which the network sees photos; twice the shorter side
+    /// where the longer follows the photo's aspect.
     pub input_size: Option<[u32; 2]>,
 }
 
@@ -47,38 +71,53 @@ impl Teacher {
     /// Opens an `.onnx` file or a folder of coloured images.
     ///
     /// A network's answers are kept in `cache_dir` (created where missing) and
-    /// used again for the same photo, model and input size; a folder needs no
-    /// cache.
+    /// used again for the same photo, model, profile, input size and hints; a
+    /// folder needs no cache.
     ///
     /// # Errors
     /// A [`TeacherError`] where the path is neither, the folder holds no image
-    /// or two images of one name, ONNX Runtime is not installed, or the model
-    /// is damaged or has inputs and outputs that no profile describes.
-    pub fn open(path: &Path, cache_dir: Option<&Path>) -> Result<Self, TeacherError> {
+    /// or two images of one name, ONNX Runtime is not installed, the model is
+    /// damaged, or its inputs and outputs fit no profile, not the one that is
+    /// asked for, or more than one.
+    pub fn open(
+        path: &Path,
+        cache_dir: Option<&Path>,
+        settings: &TeacherSettings,
+    ) -> Result<Self, TeacherError> {
         let metadata = std::fs::metadata(path).map_err(TeacherError::io(path))?;
         let is_onnx = path
             .extension()
             .is_some_and(|e| e.eq_ignore_ascii_case("onnx"));
-        if metadata.is_dir() {
-            FolderTeacher::open(path).map(Self::Folder)
+        let source = if metadata.is_dir() {
+            Source::Folder(FolderTeacher::open(path)?)
         } else if is_onnx {
-            NetworkTeacher::open(path, cache_dir).map(Self::Network)
+            Source::Network(Box::new(NetworkTeacher::open(path, cache_dir, settings)?))
         } else {
-            Err(TeacherError::NoTeacher {
+            return Err(TeacherError::NoTeacher {
                 path: path.to_path_buf(),
-            })
-        }
+            });
+        };
+        Ok(Self {
+            source,
+            upsample: settings.upsample,
+        })
+    }
+
+    /// Whether it is a network and not a folder.
+    pub fn is_network(&self) -> bool {
+        matches!(self.source, Source::Network(_))
     }
 
     /// Name, kind and identity, for reports.
     pub fn describe(&self) -> TeacherInfo {
-        match self {
-            Self::Network(network) => network.describe(),
-            Self::Folder(folder) => folder.describe(),
+        match &self.source {
+            Source::Network(network) => network.describe(),
+            Source::Folder(folder) => folder.describe(),
         }
     }
 
-    /// Colours one photo. `name` is its path relative to the photo folder.
+    /// Colours one photo. `name` is its path relative to the photo folder;
+    /// `hints` are told to a network that takes hints.
     ///
     /// Answers at the photo's size; `None` where a folder has no image for this
     /// photo. The same photo gets the same answer on the same machine.
@@ -91,12 +130,14 @@ impl Teacher {
         &mut self,
         name: &str,
         photo: GrayImage<'_>,
+        hints: Option<&HintImage>,
     ) -> Result<Option<AbImage>, TeacherError> {
         photo.check(name)?;
-        match self {
-            Self::Network(network) => network.colorize(name, photo).map(Some),
-            Self::Folder(folder) => folder.colorize(name, photo),
-        }
+        let answer = match &mut self.source {
+            Source::Network(network) => Some(network.colorize(name, photo, hints)?),
+            Source::Folder(folder) => folder.colorize(name, photo)?,
+        };
+        Ok(answer.map(|answer| answer.upsampled(photo, self.upsample)))
     }
 }
 
@@ -106,5 +147,7 @@ fn file_name(path: &Path) -> String {
     name.to_string_lossy().into_owned()
 }
 
+#[cfg(test)]
+mod contract_tests;
 #[cfg(test)]
 mod tests;

@@ -1,123 +1,439 @@
-//! What is known about colorization networks: their inputs, their outputs and
-//! what the numbers mean.
+//! What a colorization network takes and gives, as data.
 
-use super::images::Shrinking;
-use ort::session::Session;
-use ort::value::{Outlet, TensorElementType, ValueType};
+use super::TeacherError;
+use super::images::Filter;
+use crate::color::gray_to_lightness;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
 
-/// One kind of network. New kinds are new rows of [`PROFILES`].
-#[derive(Debug, PartialEq)]
+/// Largest input side that may be asked for; beyond it the shape is nonsense
+/// and must not be allocated.
+pub(super) const MAX_SIDE: u32 = 8192;
+
+/// CIELAB a and b that an `output_range` or `hint_range` speaks of: that of
+/// SIGGRAPH17's tanh, which no sRGB colour exceeds.
+const AB_LIMIT: f32 = 110.0;
+
+/// The contract of one kind of network, and the fields of a manifest.
+///
+/// docs/guide.md explains every field to those who write one.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub(super) struct Profile {
     /// Name for reports.
-    pub name: &'static str,
-    /// Usual names of input and output; they decide between profiles whose
-    /// shapes both fit, a model with other names is accepted too.
-    pub names: [&'static str; 2],
-    /// Channels of the input, `[1, channels, H, W]` of f32: each is the gray
-    /// value (3 stand for R, G and B).
-    pub input_channels: i64,
-    /// What a white pixel is in the input; black is 0.
-    pub white: f32,
-    /// How a photo larger than the input is made smaller.
-    pub shrinking: Shrinking,
-    /// Channels of the output, `[1, channels, h, w]` of f32: a and b.
-    pub output_channels: i64,
-    /// Factor from the output to CIELAB units.
-    pub output_scale: f32,
-    /// Side of the input where the model leaves it open.
-    pub default_side: u32,
+    pub name: String,
+    /// What the model's inputs are for, in their order.
+    pub inputs: Vec<Role>,
+    /// What the channels of the image are.
+    pub image: ImageKind,
+    /// What black and white are, before `mean` and `std`.
+    pub input_range: [f32; 2],
+    /// Subtracted from each channel.
+    pub mean: Vec<f32>,
+    /// What each channel is then divided by.
+    pub std: Vec<f32>,
+    /// Side of the input in pixels where the model leaves it open.
+    pub size: u32,
+    /// What open sides are multiples of.
+    pub size_multiple: u32,
+    /// How the photo's shape becomes the input's.
+    pub resize: Resize,
+    /// How the photo's pixels become the input's.
+    pub filter: Filter,
+    /// What the answer is.
+    pub output: OutputKind,
+    /// What black and white are, or a, b of -110 and 110.
+    pub output_range: [f32; 2],
+    /// What a, b of -110 and 110 are in the hints.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hint_range: Option<[f32; 2]>,
+    /// Standard deviation of the random code.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub noise_std: Option<f32>,
 }
 
-/// All networks that can be teachers.
-pub(super) static PROFILES: &[Profile] = &[
-    // Kang et al., ICCV 2023. The photo is stretched to a square; the
-    // normalisation by ImageNet's mean and deviation is part of the model.
-    Profile {
-        name: "DDColor",
-        names: ["input", "output"],
-        input_channels: 3,
-        white: 1.0,
-        shrinking: Shrinking::Interpolates,
-        output_channels: 2,
-        output_scale: 1.0,
-        default_side: 512,
+/// What an input of a model is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum Role {
+    /// The photo: f32 `[1, channels, H, W]`.
+    Image,
+    /// Painted a, b: f32 `[1, 2, H, W]`, 0 where nothing is painted.
+    Hints,
+    /// 1 where something is painted, else 0: f32 `[1, 1, H, W]`.
+    Mask,
+    /// The number of a class: integers, all 0.
+    Class,
+    /// A random code: f32, the same normally distributed numbers for each photo,
+    /// of mean 0 and deviation `noise_std`.
+    Noise,
+    /// Something not to be used: f32, all 0.
+    Zeros,
+}
+
+/// What the channels of a network's image are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum ImageKind {
+    /// Three channels, each the encoded gray.
+    GrayRgb,
+    /// One channel, the encoded gray.
+    Gray,
+    /// One channel, CIELAB L*, which is not 100 times the encoded gray.
+    Lightness,
+}
+
+/// How a photo's shape becomes that of the input.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum Resize {
+    /// To a square, whatever the aspect.
+    Stretch,
+    /// The shorter side is the size, the longer follows the aspect.
+    ShortSide,
+}
+
+/// What a network answers with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum OutputKind {
+    /// CIELAB a and b.
+    Ab,
+    /// Encoded sRGB, of which a and b are taken.
+    Rgb,
+}
+
+impl ImageKind {
+    pub fn channels(self) -> usize {
+        match self {
+            Self::GrayRgb => 3,
+            Self::Gray | Self::Lightness => 1,
+        }
+    }
+}
+
+impl OutputKind {
+    pub fn channels(self) -> usize {
+        match self {
+            Self::Ab => 2,
+            Self::Rgb => 3,
+        }
+    }
+}
+
+impl Profile {
+    /// Reads a manifest.
+    ///
+    /// # Errors
+    /// [`TeacherError::BadManifest`] for a field that is missing, unknown or
+    /// makes no sense, [`TeacherError::Io`].
+    pub fn read(path: &Path) -> Result<Self, TeacherError> {
+        let text = std::fs::read_to_string(path).map_err(TeacherError::io(path))?;
+        Self::parse(&text).map_err(|reason| TeacherError::BadManifest {
+            path: path.to_path_buf(),
+            reason,
+        })
+    }
+
+    /// Reads the text of a manifest, or says what is wrong with it.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let profile: Self = toml::from_str(text).map_err(|error| {
+            let before = error
+                .span()
+                .map_or("", |span| &text[..span.start.min(text.len())]);
+            // An error about the file as a whole has no line of its own.
+            let line = match before.lines().count() {
+                0 => String::new(),
+                _ => format!("line {}: ", before.matches('\n').count() + 1),
+            };
+            format!("{line}{}", error.message().replace('\n', " "))
+        })?;
+        profile.check()?;
+        Ok(profile)
+    }
+
+    fn check(&self) -> Result<(), String> {
+        let count = |role| self.inputs.iter().filter(|&&input| input == role).count();
+        let ranges = [
+            Some(self.input_range),
+            Some(self.output_range),
+            self.hint_range,
+        ];
+        let is_range = |[low, high]: [f32; 2]| low.is_finite() && high.is_finite() && low != high;
+        let channels = self.image.channels();
+        let deviations = self.std.iter().all(|std| std.is_finite() && *std != 0.0);
+        let means = self.mean.iter().all(|mean| mean.is_finite());
+        let wrong = if count(Role::Image) != 1 || count(Role::Hints) > 1 || count(Role::Mask) > 1 {
+            "inputs: must name \"image\" once, \"hints\" and \"mask\" at most once"
+        } else if !ranges.into_iter().flatten().all(is_range) {
+            "input_range, output_range and hint_range: must be two different numbers"
+        } else if self.mean.len() != channels || self.std.len() != channels || !means || !deviations
+        {
+            "mean and std: must be one number for each channel of image, std not 0"
+        } else if !(1..=MAX_SIDE).contains(&self.size) {
+            "size: must be 1 to 8192"
+        } else if self.size_multiple == 0 || !self.size.is_multiple_of(self.size_multiple) {
+            "size: must be a multiple of size_multiple, which must be at least 1"
+        } else if self.hint_range.is_some() != (count(Role::Hints) == 1) {
+            "hint_range: belongs with \"hints\" among the inputs, and only there"
+        } else if self.noise_std.is_some() != (count(Role::Noise) > 0)
+            || self
+                .noise_std
+                .is_some_and(|std| !(std.is_finite() && std >= 0.0))
+        {
+            "noise_std: must be a number from 0 on, belongs with \"noise\" among the inputs, and only there"
+        } else {
+            return Ok(());
+        };
+        Err(wrong.to_owned())
+    }
+
+    /// Values of the input's channels for a gray from 0 to 1.
+    pub fn image_value(&self, gray: f32, channel: usize) -> f32 {
+        let value = match self.image {
+            ImageKind::GrayRgb | ImageKind::Gray => gray,
+            ImageKind::Lightness => gray_to_lightness(f64::from(gray)) as f32 / 100.0,
+        };
+        let [black, white] = self.input_range;
+        (black + value * (white - black) - self.mean[channel]) / self.std[channel]
+    }
+
+    /// CIELAB a or b of a value of the output.
+    pub fn ab(&self, value: f32) -> f32 {
+        let [low, high] = self.output_range;
+        (value - (low + high) / 2.0) * (2.0 * AB_LIMIT / (high - low))
+    }
+
+    /// Encoded sRGB from 0 to 1 of a value of the output.
+    pub fn rgb(&self, value: f32) -> f32 {
+        let [black, white] = self.output_range;
+        ((value - black) / (white - black)).clamp(0.0, 1.0)
+    }
+
+    /// What a painted a or b is among the hints.
+    pub fn hint(&self, value: f32) -> f32 {
+        let [low, high] = self.hint_range.unwrap_or([-AB_LIMIT, AB_LIMIT]);
+        (low + high) / 2.0 + value * (high - low) / (2.0 * AB_LIMIT)
+    }
+
+    /// Width and height at which the network sees a photo; `fixed` are the
+    /// model's own and `size` stands for [`Self::size`].
+    pub fn input_size(&self, photo: [u32; 2], fixed: [Option<u32>; 2], size: u32) -> [u32; 2] {
+        let [short, multiple] = [photo[0].min(photo[1]).max(1), self.size_multiple];
+        let side = |axis: usize| match self.resize {
+            Resize::Stretch => size,
+            Resize::ShortSide => {
+                // Rounded up, as BigColor's own program does.
+                let whole = u64::from(photo[axis].max(1)) * u64::from(size);
+                let steps = whole.div_ceil(u64::from(short) * u64::from(multiple));
+                u32::try_from(steps)
+                    .map_or(MAX_SIDE, |steps| steps.min(MAX_SIDE / multiple) * multiple)
+            }
+        };
+        std::array::from_fn(|axis| fixed[axis].unwrap_or_else(|| side(axis)))
+    }
+
+    /// The profile in full, for a cache's keys.
+    pub fn identity(&self) -> String {
+        // Plain fields: serialising them cannot fail.
+        serde_json::to_string(self).unwrap_or_default()
+    }
+}
+
+/// A profile that the program brings along.
+pub(super) struct BuiltIn {
+    /// Names for `--teacher-profile`; several where networks share a contract.
+    pub names: &'static [&'static str],
+    /// Its manifest.
+    text: &'static str,
+    /// Usual names of the model's inputs and outputs; none where they are names
+    /// that every exporter gives, and tell nothing.
+    pub tensors: &'static [&'static str],
+    /// Side of the input over that of the output.
+    pub stride: u32,
+}
+
+/// All of them.
+pub(super) static BUILT_IN: &[BuiltIn] = &[
+    BuiltIn {
+        names: &["ddcolor"],
+        text: include_str!("profiles/ddcolor.toml"),
+        tensors: &["input", "output"],
+        stride: 1,
+    },
+    BuiltIn {
+        names: &["siggraph17", "eccv16"],
+        text: include_str!("profiles/siggraph17.toml"),
+        tensors: &["input", "output"],
+        stride: 1,
+    },
+    BuiltIn {
+        names: &["siggraph17-full"],
+        text: include_str!("profiles/siggraph17-full.toml"),
+        tensors: &["input_A", "input_B", "mask_B", "output"],
+        stride: 1,
+    },
+    BuiltIn {
+        names: &["caffe-v2"],
+        text: include_str!("profiles/caffe-v2.toml"),
+        tensors: &["data_l", "class8_ab"],
+        stride: 4,
+    },
+    BuiltIn {
+        names: &["bigcolor"],
+        text: include_str!("profiles/bigcolor.toml"),
+        tensors: &[],
+        stride: 1,
+    },
+    BuiltIn {
+        names: &["deoldify"],
+        text: include_str!("profiles/deoldify.toml"),
+        tensors: &[],
+        stride: 1,
+    },
+    BuiltIn {
+        names: &["deoldify-browser"],
+        text: include_str!("profiles/deoldify-browser.toml"),
+        tensors: &[],
+        stride: 1,
     },
 ];
 
-/// Largest input side that a model may ask for; beyond it the shape is nonsense
-/// and must not be allocated.
-const MAX_SIDE: i64 = 8192;
-
-/// Sides of an image tensor `[1, channels, H, W]` of f32, -1 where left open;
-/// none where `outlet` is no such tensor.
-fn image_sides(outlet: &Outlet, channels: i64) -> Option<[i64; 2]> {
-    let ValueType::Tensor {
-        ty: TensorElementType::Float32,
-        shape,
-        ..
-    } = outlet.dtype()
-    else {
-        return None;
-    };
-    let [batch, c, height, width] = shape[..] else {
-        return None;
-    };
-    let fits = |side: i64, expected: i64| side == expected || side == -1;
-    (fits(batch, 1) && fits(c, channels)).then_some([width, height])
+impl BuiltIn {
+    pub fn profile(&self) -> Profile {
+        // A test reads them all.
+        Profile::parse(self.text).expect("built-in profiles are sound")
+    }
 }
 
-/// The profile that describes a model, with the width and height of its input.
-///
-/// Both the number of tensors and their shapes must fit. None where no profile
-/// does.
-pub(super) fn choose(session: &Session) -> Option<(&'static Profile, [u32; 2])> {
-    let ([input], [output]) = (session.inputs(), session.outputs()) else {
-        return None;
-    };
-    let fitting = PROFILES.iter().filter_map(|profile| {
-        let sides = image_sides(input, profile.input_channels)?;
-        image_sides(output, profile.output_channels)?;
-        let side = |side: i64| match side {
-            -1 => Some(profile.default_side),
-            1..=MAX_SIDE => u32::try_from(side).ok(),
-            _ => None,
-        };
-        Some((profile, [side(sides[0])?, side(sides[1])?]))
-    });
-    fitting.min_by_key(|(profile, _)| profile.names != [input.name(), output.name()])
+/// The profile of this name, or that of the manifest at this path.
+pub(super) fn named(name: &str) -> Result<Profile, TeacherError> {
+    let path = Path::new(name);
+    if path
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("toml"))
+    {
+        return Profile::read(path);
+    }
+    let is_it = |built_in: &&BuiltIn| built_in.names.iter().any(|n| n.eq_ignore_ascii_case(name));
+    let found = BUILT_IN.iter().find(is_it);
+    found
+        .map(BuiltIn::profile)
+        .ok_or_else(|| TeacherError::UnknownProfile {
+            name: name.to_owned(),
+            known: BUILT_IN
+                .iter()
+                .flat_map(|b| b.names)
+                .copied()
+                .collect::<Vec<_>>()
+                .join(", "),
+        })
 }
 
-/// Inputs and outputs of a model, in words.
-pub(super) fn describe_model(session: &Session) -> String {
-    let all = |outlets: &[Outlet]| {
-        let words = outlets.iter().map(|outlet| match outlet.dtype() {
-            ValueType::Tensor { ty, shape, .. } => {
-                format!("{} {ty:?} {}", outlet.name(), shape_in_words(shape))
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ddcolor() -> &'static str {
+        BUILT_IN[0].text
+    }
+
+    #[test]
+    fn built_in_profiles_are_sound_and_have_their_names() {
+        for built_in in BUILT_IN {
+            let profile = built_in.profile();
+            for name in built_in.names {
+                assert_eq!(named(&name.to_uppercase()).unwrap(), profile);
             }
-            other => format!("{} ({other:?})", outlet.name()),
-        });
-        words.collect::<Vec<_>>().join(", ")
-    };
-    let (inputs, outputs) = (all(session.inputs()), all(session.outputs()));
-    format!("inputs {inputs} and outputs {outputs}")
-}
+        }
+        let message = named("colorful").unwrap_err().to_string();
+        for part in ["colorful", "ddcolor", "eccv16", "deoldify-browser"] {
+            assert!(message.contains(part), "{message}");
+        }
+    }
 
-fn shape_in_words(shape: &[i64]) -> String {
-    let side = |&side: &i64| match side {
-        -1 => "?".to_string(),
-        side => side.to_string(),
-    };
-    let sides: Vec<_> = shape.iter().map(side).collect();
-    format!("[{}]", sides.join(","))
-}
+    #[test]
+    fn what_is_wrong_with_a_manifest_is_named() {
+        for (from, to, expected) in [
+            ("size = 512\n", "", "missing field `size`"),
+            ("size = 512", "sise = 512", "unknown field `sise`"),
+            (
+                "size = 512",
+                "size = 512\ncolour = 1",
+                "line 10: unknown field `colour`",
+            ),
+            ("size = 512", "size = \"large\"", "line 9: "),
+            ("size = 512", "size = 0", "size: "),
+            ("size = 512", "size = 99999", "size: "),
+            ("size_multiple = 1", "size_multiple = 7", "size: "),
+            ("size_multiple = 1", "size_multiple = 0", "size: "),
+            ("[\"image\"]", "[]", "inputs: "),
+            ("[\"image\"]", "[\"image\", \"image\"]", "inputs: "),
+            (
+                "[\"image\"]",
+                "[\"image\", \"style\"]",
+                "unknown variant `style`",
+            ),
+            ("[\"image\"]", "[\"image\", \"hints\"]", "hint_range: "),
+            ("[\"image\"]", "[\"image\", \"noise\"]", "noise_std: "),
+            ("size = 512", "noise_std = 1\nsize = 512", "noise_std: "),
+            ("mean = [0, 0, 0]", "mean = [0]", "mean and std: "),
+            ("std = [1, 1, 1]", "std = [1, 0, 1]", "mean and std: "),
+            ("std = [1, 1, 1]", "std = [1, nan, 1]", "mean and std: "),
+            (
+                "input_range = [0, 1]",
+                "input_range = [1, 1]",
+                "input_range",
+            ),
+            (
+                "input_range = [0, 1]",
+                "input_range = [0, inf]",
+                "input_range",
+            ),
+            ("\"stretch\"", "\"crop\"", "`stretch`"),
+            ("\"bilinear\"", "\"bicubic\"", "`average`"),
+            ("\"ab\"", "\"lab\"", "`rgb`"),
+            ("\"gray-rgb\"", "\"rgb\"", "`gray-rgb`"),
+            ("size = 512", "size = ", "line 9: "),
+        ] {
+            let text = ddcolor().replacen(from, to, 1);
+            assert_ne!(text, ddcolor());
+            let reason = Profile::parse(&text).unwrap_err();
+            assert!(reason.contains(expected), "{to}: {reason}");
+            assert!(!reason.contains('\n'), "{reason}");
+        }
+    }
 
-/// What the profiles accept, in words.
-pub(super) fn describe_accepted() -> String {
-    let words = PROFILES.iter().map(|p| {
-        format!(
-            "{} ({} Float32 [1,{},H,W] to {} Float32 [1,{},h,w])",
-            p.name, p.names[0], p.input_channels, p.names[1], p.output_channels
-        )
-    });
-    words.collect::<Vec<_>>().join("; ")
+    #[test]
+    fn sides_follow_the_model_then_the_way_of_resizing() {
+        let stretched = named("deoldify").unwrap();
+        assert_eq!(stretched.input_size([800, 600], [None; 2], 256), [256, 256]);
+        assert_eq!(
+            stretched.input_size([800, 600], [Some(64), None], 256),
+            [64, 256]
+        );
+        let short = named("bigcolor").unwrap();
+        // 256 · 4/3 = 341.3, and the next multiple of 16 is 352.
+        assert_eq!(short.input_size([800, 600], [None; 2], 256), [352, 256]);
+        assert_eq!(short.input_size([600, 800], [None; 2], 256), [256, 352]);
+        assert_eq!(short.input_size([800, 600], [None; 2], 240), [320, 240]);
+        assert_eq!(short.input_size([7, 7], [None; 2], 256), [256, 256]);
+        assert_eq!(short.input_size([1, 60_000], [None; 2], 256), [256, 8192]);
+        assert_eq!(short.input_size([800, 600], [Some(32); 2], 256), [32, 32]);
+    }
+
+    #[test]
+    fn ranges_mean_deviation_and_lightness() {
+        let mut profile = named("ddcolor").unwrap();
+        profile.input_range = [-1.0, 1.0];
+        (profile.mean, profile.std) = (vec![0.5, 0.0, 0.0], vec![0.25, 1.0, 1.0]);
+        assert_eq!(profile.image_value(0.75, 0), 0.0);
+        assert_eq!(profile.image_value(0.75, 1), 0.5);
+        profile.output_range = [-1.0, 1.0];
+        assert_eq!((profile.ab(1.0), profile.ab(-0.5)), (110.0, -55.0));
+        assert_eq!((profile.rgb(0.0), profile.rgb(3.0)), (0.5, 1.0));
+        // CIE: L* of an encoded gray of 0.5 is 53.389, not 50.
+        let caffe = named("caffe-v2").unwrap();
+        assert!((caffe.image_value(0.5, 0) - 3.389).abs() < 1e-3);
+    }
 }

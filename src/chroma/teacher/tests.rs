@@ -5,13 +5,22 @@ use super::*;
 use std::fs;
 use std::path::PathBuf;
 
-fn fixture(name: &str) -> PathBuf {
+pub fn fixture(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/onnx");
     folder.join(name)
 }
 
+/// Opens a teacher asked as usual.
 fn open(path: &Path, cache: Option<&Path>) -> Result<Teacher, TeacherError> {
-    match Teacher::open(path, cache) {
+    open_with(path, cache, &TeacherSettings::default())
+}
+
+pub fn open_with(
+    path: &Path,
+    cache: Option<&Path>,
+    settings: &TeacherSettings,
+) -> Result<Teacher, TeacherError> {
+    match Teacher::open(path, cache, settings) {
         Err(error @ (TeacherError::NoRuntime { .. } | TeacherError::BadRuntime { .. })) => {
             panic!("these tests need ONNX Runtime: {error}")
         }
@@ -27,7 +36,7 @@ fn refusal(path: &Path) -> String {
     message
 }
 
-fn gray(width: u32, height: u32, pixels: &[u8]) -> GrayImage<'_> {
+pub fn gray(width: u32, height: u32, pixels: &[u8]) -> GrayImage<'_> {
     GrayImage {
         width,
         height,
@@ -91,7 +100,7 @@ fn a_network_colours_in_closed_form() {
     for (level, a, b) in [(0u8, -40.0, 40.0), (255, 40.0, -20.0), (51, -24.0, 28.0)] {
         let pixels = [level; 15];
         let answer = teacher
-            .colorize("v.png", gray(5, 3, &pixels))
+            .colorize("v.png", gray(5, 3, &pixels), None)
             .unwrap()
             .unwrap();
         assert_eq!((answer.width, answer.height, answer.ab.len()), (5, 3, 15));
@@ -111,7 +120,7 @@ fn the_picture_is_neither_turned_nor_mirrored() {
         .map(|i| (i % 64 * 2 + i / 64 * 4) as u8)
         .collect();
     let answer = teacher
-        .colorize("v.png", gray(64, 32, &pixels))
+        .colorize("v.png", gray(64, 32, &pixels), None)
         .unwrap()
         .unwrap();
     for (i, (ab, level)) in answer.ab.iter().zip(&pixels).enumerate() {
@@ -132,7 +141,7 @@ fn the_same_photo_gets_the_same_answer() {
     let photo = gray(40, 30, &pixels);
     let mut answers = (0..3).map(|_| {
         let mut teacher = open(&fixture("ddcolor_tiny.onnx"), None).unwrap();
-        teacher.colorize("v.png", photo).unwrap().unwrap()
+        teacher.colorize("v.png", photo, None).unwrap().unwrap()
     });
     let first = answers.next().unwrap();
     assert!(answers.all(|answer| answer == first));
@@ -152,9 +161,9 @@ fn descriptions() {
 
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("v.png"), "").unwrap();
-    let info = Teacher::open(folder.path(), None).unwrap().describe();
+    let info = open(folder.path(), None).unwrap().describe();
     assert_eq!(
-        (info.kind, info.sha256, info.input_size),
+        (&info.kind[..], info.sha256, info.input_size),
         ("folder", None, None)
     );
 }
@@ -166,7 +175,7 @@ fn answers_come_from_the_cache() {
     let ask = || {
         let mut teacher = open(&fixture("ddcolor_tiny.onnx"), Some(folder.path())).unwrap();
         teacher
-            .colorize("v.png", gray(4, 3, &pixels))
+            .colorize("v.png", gray(4, 3, &pixels), None)
             .unwrap()
             .unwrap()
     };
@@ -186,7 +195,8 @@ fn answers_come_from_the_cache() {
         .unwrap()
         .store(key, &planted)
         .unwrap();
-    assert_eq!(ask().ab, [[7.0, 8.0]; 12]);
+    let near = |ab: &[f32; 2]| (ab[0] - 7.0).abs() < 1e-5 && (ab[1] - 8.0).abs() < 1e-5;
+    assert!(ask().ab.iter().all(near));
 
     // A damaged one is made again.
     fs::write(&path, "damaged").unwrap();
@@ -204,7 +214,7 @@ fn models_that_are_no_teachers() {
         for part in [
             "input Float32 [1,",
             "output Float32 [1,",
-            "DDColor (input Float32 [1,3,H,W]",
+            "DDColor ([1,3,H,W] to [1,2,h,w])",
         ] {
             assert!(message.contains(part), "{message}");
         }
@@ -237,12 +247,12 @@ fn answers_that_are_not_finite_name_the_photo() {
     assert_eq!(teacher.describe().input_size, Some([512, 512]));
 
     let white = teacher
-        .colorize("white.png", gray(2, 2, &[255; 4]))
+        .colorize("white.png", gray(2, 2, &[255; 4]), None)
         .unwrap()
         .unwrap();
     assert_eq!(white.ab, [[0.0, 0.0]; 4]);
     let error = teacher
-        .colorize("left/black.png", gray(2, 2, &[0; 4]))
+        .colorize("left/black.png", gray(2, 2, &[0; 4]), None)
         .unwrap_err();
     let message = error.to_string();
     for part in ["logarithm.onnx", "left/black.png", "-inf"] {
@@ -255,6 +265,8 @@ fn answers_that_are_not_finite_name_the_photo() {
 #[test]
 fn photos_that_do_not_fill_their_size_are_refused() {
     let mut teacher = open(&fixture("ddcolor_tiny.onnx"), None).unwrap();
-    let error = teacher.colorize("v.png", gray(3, 2, &[0; 5])).unwrap_err();
+    let error = teacher
+        .colorize("v.png", gray(3, 2, &[0; 5]), None)
+        .unwrap_err();
     assert!(error.to_string().contains("v.png"));
 }

@@ -51,6 +51,7 @@ fn check(case: &Case) {
     let place = place_with_run();
     for name in [
         "ddcolor_tiny",
+        "deoldify_tiny",
         "truncated",
         "two_inputs",
         "wrong_channels",

@@ -12,6 +12,18 @@ fn paint(place: &Place, name: &str, [width, height]: [u32; 2]) {
         .expect("writable");
 }
 
+/// Saves an image of one colour as the hints for view 1.
+fn hint<P: image::PixelWithColorType<Subpixel = u8>>(place: &Place, pixel: P)
+where
+    [u8]: image::EncodableLayout,
+{
+    std::fs::create_dir_all(place.path("hints")).expect("writable");
+    let image = image::ImageBuffer::from_pixel(scene::SIZE[0], scene::SIZE[1], pixel);
+    image.save(place.path("hints/01.png")).expect("writable");
+}
+
+const HINTED: &str = "colorize --hints hints --until 62";
+
 const PAINTED: &str = "colorize --teacher painted --until 62";
 
 /// Variables that name Vulkan's drivers, pointing nowhere.
@@ -76,6 +88,72 @@ pub(super) const CASES: &[Case] = &[
         nothing,
         "colorize --teacher onnx/two_inputs.onnx",
         &["two_inputs.onnx", "style", "accepted"],
+    ),
+    case(
+        "two kinds of networks fit",
+        nothing,
+        "colorize --teacher onnx/deoldify_tiny.onnx",
+        &[
+            "deoldify_tiny.onnx",
+            "--teacher-profile deoldify or deoldify-browser",
+        ],
+    ),
+    case(
+        "no such profile",
+        nothing,
+        "colorize --teacher onnx/deoldify_tiny.onnx --teacher-profile colorful",
+        &["--teacher-profile colorful", "deoldify-browser"],
+    ),
+    case(
+        "another network's profile",
+        nothing,
+        "colorize --teacher onnx/ddcolor_tiny.onnx --teacher-profile deoldify",
+        &["ddcolor_tiny.onnx", "accepted: DeOldify"],
+    ),
+    case(
+        "a size that the network does not take",
+        nothing,
+        "colorize --teacher onnx/ddcolor_tiny.onnx --teacher-size 64",
+        &["ddcolor_tiny.onnx", "--teacher-size 64", "takes 32"],
+    ),
+    case(
+        "a manifest with a field too many",
+        |p| p.write("onnx/ddcolor_tiny.toml", "name = \"x\"\nsise = 3\n"),
+        "colorize --teacher onnx/ddcolor_tiny.onnx",
+        &["ddcolor_tiny.toml", "line 2", "`sise`", "guide.md"],
+    ),
+    case(
+        "a manifest with a field too few",
+        |p| p.write("own.toml", "name = \"x\"\n"),
+        "colorize --teacher onnx/ddcolor_tiny.onnx --teacher-profile own.toml",
+        &["own.toml", "missing field `inputs`", "guide.md"],
+    ),
+    case(
+        "hints without transparency",
+        |p| hint(p, image::Rgb([200, 0, 0])),
+        HINTED,
+        &["01.png", "no transparency", "PNG"],
+    ),
+    case(
+        "hints without paint",
+        |p| hint(p, image::Rgba([200, 0, 0, 0])),
+        HINTED,
+        &["hints", "nothing is painted", "--teacher"],
+    ),
+    case(
+        "hints of other names",
+        |p| {
+            hint(p, image::Rgba([200, 0, 0, 9]));
+            std::fs::rename(p.path("hints/01.png"), p.path("hints/x.png")).expect("a file");
+        },
+        HINTED,
+        &["hints", "name of a training photo", "01.png"],
+    ),
+    case(
+        "one teacher of two covers nothing",
+        |p| paint(p, "00.png", scene::SIZE),
+        "colorize --teacher onnx/ddcolor_tiny.onnx --teacher painted",
+        &["painted", "name of a training photo"],
     ),
     case(
         "an empty folder",

@@ -68,5 +68,35 @@ pub(super) const CASES: &[Case] = &[
         "colorize --teacher t --until 0",
         &["0", "--until"],
     ),
+    usage(
+        "more weights than teachers",
+        "colorize --teacher t --weights 1,2",
+        &["--weights", "2 numbers for 1 teachers"],
+    ),
+    usage(
+        "a weight of nothing",
+        "colorize --teacher t --weights 0",
+        &["0", "--weights", "above 0"],
+    ),
+    usage(
+        "weights without teachers",
+        "colorize --hints h --weights 1",
+        &["--teacher"],
+    ),
+    usage(
+        "too strong",
+        "colorize --teacher t --strength 1.5",
+        &["1.5", "--strength", "0 to 1"],
+    ),
+    usage(
+        "a teacher of no size",
+        "colorize --teacher t --teacher-size 0",
+        &["0", "--teacher-size"],
+    ),
+    usage(
+        "no such way of enlarging",
+        "colorize --teacher t --upsample sharp",
+        &["sharp", "--upsample"],
+    ),
     usage("two folders", "fit scene scene", &["scene"]),
 ];

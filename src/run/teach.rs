@@ -1,0 +1,337 @@
+//! Asking the teachers: what each view's colours are to be, and how much each
+//! pixel of that counts.
+
+use std::path::{Path, PathBuf};
+
+use super::{Event, Observer, RunError, Stage, scene::Scene};
+use crate::{
+    chroma::teacher::{
+        AbImage, GrayImage, HintFolder, HintImage, Teacher, TeacherInfo, TeacherSettings,
+    },
+    report::TeacherReport,
+};
+
+/// How much a painted pixel counts where one that a teacher coloured counts 1:
+/// more than the views that see the same place from elsewhere and say something
+/// else, of which there are seldom more than a few dozen.
+pub const HINT_WEIGHT: f32 = 50.0;
+
+/// Who colours the photos.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TeachOptions {
+    /// Teachers and their weights, above 0; may be empty where there are hints.
+    pub teachers: Vec<(PathBuf, f32)>,
+    /// How they are asked.
+    pub settings: TeacherSettings,
+    /// What their a and b are multiplied by, 0 to 1.
+    pub strength: f32,
+    /// A folder of painted hints.
+    pub hints: Option<PathBuf>,
+}
+
+impl Default for TeachOptions {
+    fn default() -> Self {
+        Self {
+            teachers: Vec::new(),
+            settings: TeacherSettings::default(),
+            strength: 1.0,
+            hints: None,
+        }
+    }
+}
+
+/// What is known of a view's colours.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Taught {
+    /// CIELAB a, b at the photo's size; 0 where nothing is known.
+    pub answer: AbImage,
+    /// How much each pixel counts, `[height, width]`: 1 where a teacher coloured
+    /// it, 0 where nothing is known, up to [`HINT_WEIGHT`] where it is painted.
+    /// `None` stands for 1 everywhere.
+    pub weights: Option<Vec<f32>>,
+}
+
+/// The teachers and hints of a command, opened.
+pub(super) struct Teachers {
+    teachers: Vec<Member>,
+    /// Whether the options say how a network is to be asked.
+    asked_of_networks: bool,
+    strength: f32,
+    hints: Option<(PathBuf, HintFolder)>,
+}
+
+struct Member {
+    path: PathBuf,
+    teacher: Teacher,
+    weight: f32,
+}
+
+/// What all views were taught.
+pub(super) struct Lesson {
+    /// What is known of each view; `None` where nothing is.
+    pub views: Vec<Option<Taught>>,
+    /// Which views have hints.
+    pub hinted: Vec<bool>,
+}
+
+impl Teachers {
+    /// Opens them; networks keep their answers in `cache`.
+    ///
+    /// # Errors
+    /// [`RunError::Teacher`].
+    pub fn open(options: &TeachOptions, cache: Option<&Path>) -> Result<Self, RunError> {
+        let member = |(path, weight): &(PathBuf, f32)| {
+            Ok(Member {
+                path: path.clone(),
+                teacher: Teacher::open(path, cache, &options.settings)?,
+                weight: *weight,
+            })
+        };
+        let hints = options.hints.as_ref();
+        let hints = hints.map(|path| Ok::<_, RunError>((path.clone(), HintFolder::open(path)?)));
+        Ok(Self {
+            teachers: options
+                .teachers
+                .iter()
+                .map(member)
+                .collect::<Result<_, RunError>>()?,
+            asked_of_networks: options.settings.profile.is_some()
+                || options.settings.size.is_some(),
+            strength: options.strength,
+            hints: hints.transpose()?,
+        })
+    }
+
+    /// Whether something was said of how to ask a network, and there is none.
+    fn asks_no_network(&self) -> bool {
+        let networks = self
+            .teachers
+            .iter()
+            .any(|member| member.teacher.is_network());
+        self.asked_of_networks && !networks
+    }
+
+    /// Name, kind and weight of each teacher.
+    pub fn describe(&self) -> Vec<TeacherReport> {
+        let describe = |member: &Member| {
+            let TeacherInfo {
+                name,
+                kind,
+                sha256,
+                input_size,
+            } = member.teacher.describe();
+            TeacherReport {
+                name,
+                kind,
+                sha256,
+                input_size,
+                weight: member.weight,
+            }
+        };
+        self.teachers.iter().map(describe).collect()
+    }
+
+    /// Asks about every view. Held-out views are asked about too: for the
+    /// contact sheet, never for training.
+    ///
+    /// # Errors
+    /// [`RunError::Teacher`], [`RunError::TeacherCoversNothing`] where a teacher
+    /// or the hints have no image for any training view, and
+    /// [`RunError::NothingPainted`] where there are but hints, all of them empty.
+    pub fn ask(&mut self, scene: &Scene, observe: &mut Observer<'_>) -> Result<Lesson, RunError> {
+        if self.asks_no_network() {
+            observe(Event::Note(
+                "--teacher-profile and --teacher-size change nothing: no teacher is a network"
+                    .into(),
+            ));
+        }
+        let total = scene.photos.len();
+        let mut lesson = Lesson {
+            views: Vec::with_capacity(total),
+            hinted: Vec::with_capacity(total),
+        };
+        // Which teachers have an answer for a training view, and whether there
+        // is a hint for one.
+        let (mut covers, mut hints_cover) = (vec![false; self.teachers.len()], false);
+        for (i, (photo, _)) in scene.photos.iter().enumerate() {
+            let name = &scene.capture.views[i].name;
+            observe(Event::Progress {
+                stage: Stage::Teacher,
+                done: i,
+                total,
+                message: name.clone(),
+            });
+            let gray = GrayImage {
+                width: photo.width,
+                height: photo.height,
+                pixels: &photo.gray,
+            };
+            let trained = scene.split.train.contains(&i);
+            let folder = self
+                .hints
+                .as_ref()
+                .map(|(_, folder)| folder.load(name, gray));
+            let mut hints = folder.transpose()?.flatten();
+            hints_cover |= trained && hints.is_some();
+            if hints.as_ref().is_some_and(HintImage::is_empty) {
+                observe(Event::Note(format!(
+                    "left out the hints for {name}: nothing is painted there"
+                )));
+                hints = None;
+            }
+            let mut answers = Vec::new();
+            for (member, covers) in self.teachers.iter_mut().zip(&mut covers) {
+                if let Some(answer) = member.teacher.colorize(name, gray, hints.as_ref())? {
+                    answers.push((answer, member.weight));
+                    *covers |= trained;
+                }
+            }
+            let answer = mean(answers).map(|answer| scaled(answer, self.strength));
+            lesson.hinted.push(hints.is_some());
+            lesson.views.push(match hints {
+                Some(hints) => Some(with_hints(answer, &hints.resized(gray.width, gray.height))),
+                None => answer.map(|answer| Taught {
+                    answer,
+                    weights: None,
+                }),
+            });
+        }
+        covers.push(hints_cover);
+        self.check(&covers, scene, &lesson)?;
+        Ok(lesson)
+    }
+
+    /// Whether every source has something for a training view; `covers` says so
+    /// of each teacher and then of the hints.
+    fn check(&self, covers: &[bool], scene: &Scene, lesson: &Lesson) -> Result<(), RunError> {
+        let teachers = self.teachers.iter().map(|member| &member.path);
+        let hints = self.hints.as_ref().map(|(path, _)| path);
+        let mut sources = teachers.chain(hints).zip(covers);
+        if let Some((path, _)) = sources.find(|(_, covers)| !**covers) {
+            return Err(RunError::TeacherCoversNothing {
+                teacher: path.clone(),
+                example: scene.capture.views[scene.split.train[0]].name.clone(),
+            });
+        }
+        match hints {
+            Some(path) if scene.split.train.iter().all(|&i| lesson.views[i].is_none()) => {
+                Err(RunError::NothingPainted(path.clone()))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// The mean of several answers of one size by their weights.
+fn mean(answers: Vec<(AbImage, f32)>) -> Option<AbImage> {
+    let total: f64 = answers.iter().map(|(_, weight)| f64::from(*weight)).sum();
+    let shares = answers.into_iter();
+    let shares = shares.map(|(answer, weight)| (answer, (f64::from(weight) / total) as f32));
+    shares
+        .map(|(answer, share)| scaled(answer, share))
+        .reduce(|mut sum, answer| {
+            for (sum, ab) in sum.ab.iter_mut().zip(&answer.ab) {
+                *sum = [sum[0] + ab[0], sum[1] + ab[1]];
+            }
+            sum
+        })
+}
+
+fn scaled(mut answer: AbImage, strength: f32) -> AbImage {
+    answer
+        .ab
+        .iter_mut()
+        .for_each(|ab| *ab = ab.map(|value| value * strength));
+    answer
+}
+
+/// Lays paint of the photo's size over an answer. Each pixel is the mean of the
+/// teachers' answer, of weight 1 − α (0 without one), and the paint, of weight
+/// α · [`HINT_WEIGHT`]; it counts as much as both.
+fn with_hints(answer: Option<AbImage>, hints: &HintImage) -> Taught {
+    let known = f32::from(answer.is_some());
+    let mut answer = answer.unwrap_or_else(|| AbImage {
+        width: hints.width,
+        height: hints.height,
+        ab: vec![[0.0; 2]; hints.paint.len()],
+    });
+    let mut weights = Vec::with_capacity(hints.paint.len());
+    for (ab, &[a, b, alpha]) in answer.ab.iter_mut().zip(&hints.paint) {
+        let teachers = known * (1.0 - alpha);
+        let weight = teachers + HINT_WEIGHT * alpha;
+        if weight > 0.0 {
+            let paint = [a, b];
+            *ab = [0, 1].map(|c: usize| (teachers * ab[c] + HINT_WEIGHT * paint[c]) / weight);
+        }
+        weights.push(weight);
+    }
+    Taught {
+        answer,
+        weights: Some(weights),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn image(ab: &[[f32; 2]]) -> AbImage {
+        AbImage {
+            width: ab.len() as u32,
+            height: 1,
+            ab: ab.to_vec(),
+        }
+    }
+
+    /// Paint of a 40, b −10 at each α.
+    fn paint(alphas: &[f32]) -> HintImage {
+        HintImage {
+            width: alphas.len() as u32,
+            height: 1,
+            paint: alphas
+                .iter()
+                .map(|&alpha| [40.0 * alpha, -10.0 * alpha, alpha])
+                .collect(),
+        }
+    }
+
+    #[test]
+    fn answers_are_averaged_by_weight() {
+        assert_eq!(mean(Vec::new()), None);
+        let one = image(&[[10.0, -20.0]]);
+        assert_eq!(mean(vec![(one.clone(), 3.0)]), Some(one.clone()));
+        let both = mean(vec![(one, 3.0), (image(&[[-10.0, 20.0]]), 1.0)]);
+        assert_eq!(both, Some(image(&[[5.0, -10.0]])));
+        // The sum of these weights is no f32.
+        let large = vec![
+            (image(&[[4.0, 2.0]]), f32::MAX),
+            (image(&[[8.0, 4.0]]), f32::MAX),
+        ];
+        assert_eq!(mean(large), Some(image(&[[6.0, 3.0]])));
+    }
+
+    #[test]
+    fn strength_scales_answers() {
+        assert_eq!(scaled(image(&[[10.0, -20.0]]), 0.25), image(&[[2.5, -5.0]]));
+        assert_eq!(scaled(image(&[[10.0, -20.0]]), 0.0).ab, [[0.0; 2]]);
+    }
+
+    #[test]
+    fn paint_outweighs_the_teacher_where_it_is_opaque() {
+        let answer = image(&[[8.0, 8.0]; 3]);
+        let taught = with_hints(Some(answer), &paint(&[0.0, 1.0, 0.5]));
+        assert_eq!(taught.answer.ab[..2], [[8.0, 8.0], [40.0, -10.0]]);
+        // (0.5 · 8 + 25 · 40) / 25.5
+        assert!((taught.answer.ab[2][0] - 39.372_55).abs() < 1e-4);
+        assert_eq!(taught.weights, Some(vec![1.0, 50.0, 25.5]));
+    }
+
+    #[test]
+    fn without_a_teacher_only_paint_counts() {
+        let taught = with_hints(None, &paint(&[0.0, 1.0, 0.5]));
+        assert_eq!(taught.weights, Some(vec![0.0, 50.0, 25.0]));
+        assert_eq!(taught.answer.ab[0], [0.0; 2]);
+        assert_eq!(taught.answer.ab[1], [40.0, -10.0]);
+        assert!((taught.answer.ab[2][0] - 40.0).abs() < 1e-4);
+    }
+}
