@@ -2,6 +2,7 @@
 //! splat files.
 
 pub mod init;
+pub mod npy;
 pub mod ply;
 pub mod sh;
 

@@ -34,6 +34,7 @@ fn the_files_of_a_coloured_run() {
     let files = place.files("runs/scene");
     let own: Vec<_> = files.iter().filter(|name| !name.contains('/')).collect();
     let wanted = [
+        "chroma.npy",
         "color.ply",
         "contact-sheet.png",
         "log.csv",

@@ -10,7 +10,7 @@ mod folder;
 mod images;
 mod network;
 mod profile;
-mod runtime;
+pub(crate) mod runtime;
 
 pub use error::TeacherError;
 pub use folder::FolderTeacher;
