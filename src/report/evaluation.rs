@@ -53,6 +53,8 @@ pub struct Evaluation {
     pub scene: String,
     /// Who coloured the photos, where `--teacher` names someone.
     pub teacher: Option<serde_json::Value>,
+    /// Colourfulness of the teacher's pictures, mean over all photos that it coloured.
+    pub teacher_colorfulness: Option<f64>,
     /// Views that were measured: `test`, or `train` without held-out ones.
     pub measured_on: String,
     /// Gray pictures, mean over these views.

@@ -37,6 +37,8 @@ pub fn encode(field: &ShField) -> io::Result<Vec<u8>> {
 pub fn decode(bytes: &[u8], count: usize, channels: usize) -> Result<ShField, String> {
     let (header, values) = split_header(bytes).ok_or("no .npy file of version 1.0")?;
     let header: String = header.chars().filter(|c| !c.is_whitespace()).collect();
+    // Writers differ in whether a tuple ends with a comma.
+    let header = header.replace(",)", ")");
     let of_degree = |degree: &u32| {
         let terms = coefficient_count(*degree);
         header

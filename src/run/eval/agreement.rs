@@ -7,14 +7,15 @@ use image::RgbImage;
 
 use super::{
     EvalOptions,
-    drawing::{Drawing, Layer, Painter},
+    drawing::{Drawing, Layer, Painter, ab_of, to_picture},
     subject::Subject,
 };
 use crate::{
     capture::Camera,
+    chroma::teacher::AbImage,
     measure::{Consistency, Flow, camera_path, decode_flo, visible},
     report::{BetweenScore, ConsistencyScore, Method, PathConsistency, PathScore, to_image},
-    run::{Event, Observer, RunError, Stage},
+    run::{Event, Observer, RunError, Stage, scene::rgb_pixels},
 };
 
 /// Distances in frames: short range as in the literature, with 1 beside 10, and long
@@ -167,7 +168,8 @@ pub(super) fn along_path(
 }
 
 /// Compares the photographed views in pairs; where there is a teacher, those that it
-/// coloured.
+/// coloured. What photos in colour differ by among themselves tells how much is due to
+/// light, noise and the flow.
 pub(super) fn between_views(
     painter: &mut Painter<'_>,
     subject: &Subject,
@@ -178,6 +180,7 @@ pub(super) fn between_views(
     let candidates: Vec<usize> = (0..views.len())
         .filter(|&i| !taught || painter.answer(i).is_some())
         .collect();
+    let in_color = views.iter().all(|(photo, _)| photo.rgb.is_some());
     let count = candidates.len().min(MAX_VIEWS);
     let mut frames = Vec::with_capacity(count);
     for k in 0..count {
@@ -193,8 +196,18 @@ pub(super) fn between_views(
         let mut drawing = painter.draw(&camera, name)?;
         if let Some(answer) = painter.answer(i) {
             let answer = answer.resized(camera.width, camera.height);
-            let layer = Layer::Ab(super::drawing::to_picture(&answer));
+            let layer = Layer::Ab(to_picture(&answer));
             drawing.layers.push((Method::Teacher, layer));
+        }
+        if in_color {
+            let photo = &views[i].0;
+            let truth = AbImage {
+                width: photo.width,
+                height: photo.height,
+                ab: ab_of(&rgb_pixels(photo)),
+            };
+            let truth = to_picture(&truth.resized(camera.width, camera.height));
+            drawing.layers.push((Method::Photo, Layer::Ab(truth)));
         }
         frames.push(Frame::of(drawing));
     }

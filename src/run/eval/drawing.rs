@@ -4,13 +4,16 @@ use std::sync::Arc;
 
 use super::{subject::Subject, teacher::EvalTeacher};
 use crate::{
-    capture::Camera,
+    capture::{Camera, Photo},
     chroma::{native_rgb, teacher::AbImage},
     color::srgb_to_lab,
     measure::{MIN_OPACITY, PositionFields},
     raster::{Picture, Raster, Renderer},
     report::Method,
-    run::{RunError, scene::shown_rgb},
+    run::{
+        RunError,
+        scene::{gray_pixels, shown_rgb},
+    },
 };
 
 /// Draws every method's picture.
@@ -129,6 +132,16 @@ pub(super) fn ab_of(rgb: &[[f32; 3]]) -> Vec<[f32; 2]> {
         [a as f32, b as f32]
     };
     rgb.iter().map(ab).collect()
+}
+
+/// A photo's gray as a picture of one channel.
+pub(super) fn gray_picture(photo: &Photo) -> Picture {
+    Picture {
+        width: photo.width,
+        height: photo.height,
+        channels: 1,
+        pixels: gray_pixels(photo),
+    }
 }
 
 /// A teacher's answer as a picture of two channels.

@@ -16,9 +16,7 @@ use std::{
 use super::{Event, Observer, RunError, RunFolder, Stage, files, fit::open_gpu};
 use crate::{
     raster::Raster,
-    report::{
-        EVALUATION_VERSION, Evaluation, Figure, Method, PageRow, Rules, evaluation_page, to_image,
-    },
+    report::{EVALUATION_VERSION, Evaluation, Figure, PageRow, Rules, evaluation_page, to_image},
 };
 use drawing::Painter;
 use lpips::Lpips;
@@ -121,6 +119,7 @@ pub fn eval(
         program: env!("CARGO_PKG_VERSION").to_owned(),
         scene: subject.name(),
         teacher: painter.teacher(),
+        teacher_colorfulness: score::teacher_colorfulness(&painter, &subject),
         measured_on: measured_on.to_owned(),
         luma: score::mean_luma(&views),
         bake: score::mean_bake(&views),
@@ -143,15 +142,12 @@ pub fn eval(
 fn page_row(folder: &Path, index: usize, scored: &Scored) -> Result<PageRow, RunError> {
     let [width, height] = scored.size;
     let mut figures = Vec::new();
-    for (caption, pixels) in &scored.pictures {
-        let slug: String = caption
-            .chars()
-            .map(|c| if c.is_ascii_alphanumeric() { c } else { '-' })
-            .collect();
-        let file = format!("view-{index:02}-{slug}.png");
-        files::write_png(&folder.join(&file), &to_image(width, height, pixels))?;
+    for shot in &scored.shots {
+        let file = format!("view-{index:02}-{}.png", shot.file);
+        let image = to_image(width, height, &shot.pixels);
+        files::write_png(&folder.join(&file), &image)?;
         figures.push(Figure {
-            caption: caption.clone(),
+            caption: shot.caption.to_owned(),
             file,
         });
     }
@@ -159,15 +155,4 @@ fn page_row(folder: &Path, index: usize, scored: &Scored) -> Result<PageRow, Run
         name: scored.score.name.clone(),
         figures,
     })
-}
-
-/// What a method is called below its picture.
-fn caption(method: Method) -> String {
-    match method {
-        Method::Native => "ours, blended in CIELAB".to_owned(),
-        Method::Exported => "ours, as viewers show it".to_owned(),
-        Method::RgbSplats => "teacher, then RGB splats".to_owned(),
-        Method::PerFrame => "luma, then teacher".to_owned(),
-        Method::Teacher | Method::Photo => method.to_string(),
-    }
 }

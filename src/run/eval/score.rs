@@ -1,15 +1,14 @@
 //! Pictures of a view against its photo.
 
 use super::{
-    caption,
-    drawing::{Drawing, Layer, ab_of, to_picture},
+    drawing::{Drawing, Layer, Painter, ab_of, gray_picture, to_picture},
     lpips::Lpips,
+    subject::Subject,
 };
 use crate::{
     capture::Photo,
     chroma::teacher::AbImage,
     measure,
-    raster::Picture,
     report::{ColorError, LumaScore, Method, PictureScore, ViewScore, error_map},
     run::{
         RunError,
@@ -25,9 +24,28 @@ pub(super) struct Scored {
     bake: Option<ColorError>,
     /// Width and height.
     pub size: [u32; 2],
-    /// Captions and pictures for the page.
-    pub pictures: Vec<(String, Vec<[f32; 3]>)>,
+    /// Pictures for the page.
+    pub shots: Vec<Shot>,
 }
+
+/// A picture for the page.
+pub(super) struct Shot {
+    /// Part of its file's name.
+    pub file: &'static str,
+    /// What it shows.
+    pub caption: &'static str,
+    /// RGB in [0, 1], `[height, width]`.
+    pub pixels: Vec<[f32; 3]>,
+}
+
+/// Methods on the page; the exported picture stands for the native one, and what that
+/// costs is the bake's figure.
+const SHOWN: [(Method, &str, &str); 4] = [
+    (Method::Teacher, "teacher", "teacher"),
+    (Method::Exported, "ours", "ours"),
+    (Method::RgbSplats, "rgb-splats", "teacher, then RGB splats"),
+    (Method::PerFrame, "per-frame", "luma, then teacher"),
+];
 
 impl Scored {
     /// Measures what was drawn, and the teacher's answer, against a photo.
@@ -43,10 +61,16 @@ impl Scored {
         let gray = gray_pixels(photo);
         let shown = rgb_pixels(photo);
         let drawn_gray = gray_to_rgb(&drawing.gray.pixels);
-        let mut pictures = vec![
-            (caption(Method::Photo), shown.clone()),
-            ("luma".to_owned(), drawn_gray.clone()),
-        ];
+        let mut shots = Vec::new();
+        let mut show = |file, caption, pixels| {
+            shots.push(Shot {
+                file,
+                caption,
+                pixels,
+            })
+        };
+        show("photo", "photo", shown.clone());
+        show("luma", "luma", drawn_gray.clone());
         let clamped: Vec<f32> = drawn_gray.iter().map(|rgb| rgb[0]).collect();
         let luma = LumaScore {
             psnr: measure::psnr(&clamped, &gray).min(IDENTICAL_PSNR),
@@ -58,12 +82,6 @@ impl Scored {
         };
         // Fidelity to a gray photo's colours is no figure.
         let truth = photo.rgb.as_ref().map(|_| &shown);
-        let photo_gray = Picture {
-            width: photo.width,
-            height: photo.height,
-            channels: 1,
-            pixels: gray,
-        };
         let mut scores = Vec::new();
         let mut rendered = Vec::new();
         let mut score = |method: Method, rgb: Vec<[f32; 3]>, ab: &[[f32; 2]]| {
@@ -90,7 +108,7 @@ impl Scored {
         }
         if let Some(answer) = answer {
             let layer = Layer::Ab(to_picture(answer));
-            score(Method::Teacher, layer.rgb(&photo_gray), &answer.ab)?;
+            score(Method::Teacher, layer.rgb(&gray_picture(photo)), &answer.ab)?;
         }
         let of = |method: Method| {
             rendered
@@ -101,33 +119,24 @@ impl Scored {
         let bake = of(Method::Native)
             .zip(of(Method::Exported))
             .map(|(native, exported)| color_error(native, exported));
-        let mut maps = Vec::new();
-        if let (Some(truth), Some(exported)) = (truth, of(Method::Exported)) {
-            let distances = |ab: &[[f32; 2]]| -> Vec<f64> {
-                let apart = |(p, q): (&[f32; 2], [f32; 2])| {
-                    f64::from(p[0] - q[0]).hypot(f64::from(p[1] - q[1]))
-                };
-                ab.iter().zip(ab_of(truth)).map(apart).collect()
-            };
-            maps.push(("ΔE00, ours", measure::delta_e(exported, truth)));
-            maps.push(("a/b error, ours", distances(&ab_of(exported))));
-            if let Some(answer) = answer {
-                maps.push(("a/b error, teacher", distances(&answer.ab)));
-            }
-        }
-        // The exported picture stands for the native one; what that costs is `bake`.
-        for method in [
-            Method::Teacher,
-            Method::Exported,
-            Method::RgbSplats,
-            Method::PerFrame,
-        ] {
+        for (method, file, caption) in SHOWN {
             if let Some(rgb) = of(method) {
-                pictures.push((caption(method), rgb.clone()));
+                show(file, caption, rgb.clone());
             }
         }
-        for (caption, errors) in maps {
-            pictures.push((caption.to_owned(), error_map(&errors)));
+        if let (Some(truth), Some(exported)) = (truth, of(Method::Exported)) {
+            let wanted = ab_of(truth);
+            let mut map = |file, caption, errors: &[f64]| show(file, caption, error_map(errors));
+            map("delta-e", "ΔE00, ours", &measure::delta_e(exported, truth));
+            map(
+                "ab",
+                "a/b error, ours",
+                &distances(&ab_of(exported), &wanted),
+            );
+            if let Some(answer) = answer {
+                let errors = distances(&answer.ab, &wanted);
+                map("ab-teacher", "a/b error, teacher", &errors);
+            }
         }
         scores.push(PictureScore {
             method: Method::Photo,
@@ -147,9 +156,15 @@ impl Scored {
             },
             bake,
             size,
-            pictures,
+            shots,
         })
     }
+}
+
+/// Distance of each pixel's colours in the a, b plane.
+fn distances(ab: &[[f32; 2]], wanted: &[[f32; 2]]) -> Vec<f64> {
+    let apart = |(p, q): (&[f32; 2], &[f32; 2])| f64::from((p[0] - q[0]).hypot(p[1] - q[1]));
+    ab.iter().zip(wanted).map(apart).collect()
 }
 
 fn rgb_ssim([width, height]: [usize; 2], a: &[[f32; 3]], b: &[[f32; 3]]) -> f64 {
@@ -187,6 +202,15 @@ pub(super) fn mean_luma(views: &[Scored]) -> LumaScore {
         ssim: mean(lumas().map(|l| Some(l.ssim))).unwrap_or(f64::NAN),
         lpips: mean(lumas().map(|l| l.lpips)),
     }
+}
+
+/// Mean colourfulness of the teacher's pictures of all photos.
+pub(super) fn teacher_colorfulness(painter: &Painter<'_>, subject: &Subject) -> Option<f64> {
+    let photos = subject.scene.photos.iter().enumerate();
+    mean(photos.map(|(i, (photo, _))| {
+        let layer = Layer::Ab(to_picture(painter.answer(i)?));
+        Some(measure::colorfulness(&layer.rgb(&gray_picture(photo))))
+    }))
 }
 
 /// Mean over the views of what the export costs.
