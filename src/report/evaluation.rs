@@ -1,7 +1,7 @@
 //! What `eval` measures: `eval.json` and its tables. docs/run-folder.md describes
 //! every key.
 
-use std::fmt::{self, Write};
+use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
@@ -216,8 +216,8 @@ pub struct Table {
     pub head: Vec<String>,
     /// The rows.
     pub rows: Vec<Vec<String>>,
-    /// What has to be known to read it.
-    pub note: String,
+    /// What has to be known to read it, a line each.
+    pub notes: Vec<String>,
 }
 
 impl Evaluation {
@@ -273,19 +273,21 @@ impl Evaluation {
         } else {
             "training"
         };
-        let bake = self.bake.map_or(String::new(), |bake| {
+        let mut notes = vec![
+            "PSNR in dB; a/b error: root mean square in CIELAB units, lightness taken from the photo."
+                .to_owned(),
+        ];
+        notes.extend(self.bake.map(|bake| {
             format!(
-                "; exported against native: ΔE00 {:.2}, 95 % {:.2}",
+                "Exported against native: ΔE00 {:.2}, 95 % {:.2}.",
                 bake.mean, bake.percentile_95
             )
-        });
+        }));
         Table {
             title: format!("{} {which} views against their photos", self.views.len()),
             head: head.map(str::to_owned).to_vec(),
             rows: std::iter::once(luma).chain(colored).collect(),
-            note: format!(
-                "PSNR in dB; a/b error: root mean square in CIELAB units, lightness taken from the photo{bake}"
-            ),
+            notes,
         }
     }
 
@@ -335,28 +337,30 @@ impl Evaluation {
             .map(str::to_owned)
             .to_vec();
         head.extend(methods.iter().map(Method::to_string));
-        let mut note = format!(
-            "root mean square in CIELAB units (mean square of {}); denominator: {}; path of {} frames, {} flow; pairs of photographed views share {:.0} % or more; pixels are {}",
-            self.rules.scale,
-            self.rules.denominator,
-            self.path.frames,
-            self.path.flow,
-            100.0 * self.between.least_overlap,
-            self.rules.mask
-        );
+        let mut notes = vec![
+            format!(
+                "Root mean square in CIELAB units, and in brackets the mean square of {}; denominator: {}.",
+                self.rules.scale, self.rules.denominator
+            ),
+            format!(
+                "Path of {} frames, {} flow; photographed views are a pair where {:.0} % or more is visible.",
+                self.path.frames,
+                self.path.flow,
+                100.0 * self.between.least_overlap
+            ),
+            format!("Pixels are {}.", self.rules.mask),
+        ];
         if !self.path.skipped.is_empty() {
-            // Writing to a string cannot fail.
-            let _ = write!(
-                note,
-                "; the path is too short for Δ = {:?}",
+            notes.push(format!(
+                "The path is too short for Δ = {:?}.",
                 self.path.skipped
-            );
+            ));
         }
         Table {
             title: "Differences of a, b between views of one place".to_owned(),
             head,
             rows,
-            note,
+            notes,
         }
     }
 }
@@ -399,7 +403,7 @@ impl fmt::Display for Table {
         for row in &self.rows {
             line(f, row)?;
         }
-        write!(f, "\n{}", self.note)
+        write!(f, "\n{}", self.notes.join("\n"))
     }
 }
 
@@ -413,9 +417,9 @@ mod tests {
             title: "Two".to_owned(),
             head: vec!["a".to_owned(), "ΔE00".to_owned()],
             rows: vec![vec!["long".to_owned(), "1.5".to_owned()]],
-            note: "note".to_owned(),
+            notes: vec!["one".to_owned(), "two".to_owned()],
         };
-        let want = "Two:\n\n| a    | ΔE00 |\n|------|-----:|\n| long |  1.5 |\n\nnote";
+        let want = "Two:\n\n| a    | ΔE00 |\n|------|-----:|\n| long |  1.5 |\n\none\ntwo";
         assert_eq!(table.to_string(), want);
     }
 }

@@ -146,10 +146,11 @@ fn push_table(html: &mut String, table: &Table) {
         }
         html.push_str("</tr>\n");
     }
+    let notes: Vec<String> = table.notes.iter().map(|note| escaped(note)).collect();
     let _ = write!(
         html,
         "</tbody></table></div>\n<p class=\"note\">{}</p>\n",
-        escaped(&table.note)
+        notes.join("<br>\n")
     );
 }
 

@@ -14,6 +14,7 @@ use crate::{
         RunError,
         scene::{gray_pixels, shown_rgb},
     },
+    splats::ShField,
 };
 
 /// Draws every method's picture.
@@ -46,21 +47,25 @@ pub(super) struct Drawing {
 }
 
 impl<'a> Painter<'a> {
+    /// A painter of the subject's own pictures, of RGB splats on its geometry, and of
+    /// what a teacher makes of the gray pictures.
     pub fn new(
         raster: &Arc<Raster>,
         subject: &Subject,
+        rgb: &[(Method, &ShField)],
         teacher: Option<&'a mut EvalTeacher>,
     ) -> Result<Self, RunError> {
         let scene = &subject.scene;
         let origin = scene.photos[0].1.center();
         let positions = PositionFields::new(&subject.luma, origin, scene.extent);
         let [xy, z1] = &positions.fields;
-        let mut fields = vec![&subject.luma.sh, xy, z1, &subject.exported];
+        let mut fields = vec![&subject.luma.sh, xy, z1];
+        fields.extend(rgb.iter().map(|(_, field)| field));
         fields.extend(&subject.chroma);
         Ok(Self {
             renderer: scene.renderer(raster, &subject.luma, &fields)?,
             has_native: subject.chroma.is_some(),
-            rgb: vec![Method::Exported],
+            rgb: rgb.iter().map(|(method, _)| *method).collect(),
             positions,
             teacher,
         })

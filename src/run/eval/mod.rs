@@ -16,7 +16,9 @@ use std::{
 use super::{Event, Observer, RunError, RunFolder, Stage, files, fit::open_gpu};
 use crate::{
     raster::Raster,
-    report::{EVALUATION_VERSION, Evaluation, Figure, PageRow, Rules, evaluation_page, to_image},
+    report::{
+        EVALUATION_VERSION, Evaluation, Figure, Method, PageRow, Rules, evaluation_page, to_image,
+    },
 };
 use drawing::Painter;
 use lpips::Lpips;
@@ -76,7 +78,8 @@ pub fn eval(
         None => None,
     };
     let raster = Arc::new(Raster::new(&open_gpu(false)?));
-    let mut painter = Painter::new(&raster, &subject, teacher.as_mut())?;
+    let rgb = [(Method::Exported, &subject.exported)];
+    let mut painter = Painter::new(&raster, &subject, &rgb, teacher.as_mut())?;
 
     let mut views = Vec::new();
     let mut rows = Vec::new();

@@ -56,6 +56,12 @@ impl EvalTeacher {
             };
             answers.push(teacher.colorize(&view.name, gray)?);
         }
+        if answers.iter().all(Option::is_none) {
+            return Err(RunError::TeacherCoversNothing {
+                teacher: path.to_owned(),
+                example: scene.capture.views[0].name.clone(),
+            });
+        }
         let frames = match teacher {
             Teacher::Network(_) if baselines => Some(Teacher::open(path, None)?),
             Teacher::Folder(_) if baselines => {
