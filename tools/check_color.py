@@ -43,6 +43,7 @@ HEAD = [
     "/ teacher's (≤ 0.4)",
     "/ RGB splats' (≤ 0.6)",
     "colourfulness / teacher's (± 5 %)",
+    "/ photos'",
     "path Δ = 30 / per frame (≤ 0.5)",
     "held-out ΔE00: ours, RGB splats",
     "bake mean, 95 % (≤ 1, ≤ 3)",
@@ -102,6 +103,8 @@ def row(scene: str, teacher: str, method: str, found: dict, seconds: float) -> l
     cells.append(bounded(to_rgb, TO_RGB_SPLATS) if known else judged(to_rgb, True))
     colourful = ours["colorfulness"] / found["teacher_colorfulness"]
     cells.append(judged(colourful, abs(colourful - 1) <= COLOURFULNESS))
+    # An unsteady teacher's whims are colourful too: what the scene has is in the photos.
+    cells.append(judged(ratio(ours, pictures.get("photo"), "colorfulness"), True))
     cells.append(bounded(ratio(far.get(method), far.get("per_frame"), "error"), TO_PER_FRAME))
     mine = ours["delta_e"]["mean"]
     theirs = rgb["delta_e"]["mean"] if rgb else None

@@ -17,13 +17,19 @@ const BOUNDARY: [f64; 2] = [0.01, 0.002];
 
 /// Which pixels of the first picture are seen in the second as well, `[height, width]`.
 ///
-/// `forward` leads from the first picture to the second, `backward` from the second
-/// to the first. The rule is that of W.-S. Lai et al., *Learning Blind Video Temporal
-/// Consistency*, ECCV 2018 (after Ruder et al. 2016): a pixel is hidden where the way
-/// there and back does not end near where it began, `|w(B) + F|² > 0.01 (|w(B)|² + |F|²)
-/// + 0.5`, `w(B)` the backward flow at its target, or where the flow breaks, `|∇u|² +
-/// |∇v|² > 0.01 |F|² + 0.002` with forward differences (backward ones in the last row
-/// and column); and where the target lies outside the picture or a flow is unknown.
+/// `forward` (F, with components u and v) leads from the first picture to the second,
+/// `backward` (B) from the second to the first. The rule is that of W.-S. Lai et al.,
+/// *Learning Blind Video Temporal Consistency*, ECCV 2018 (after Ruder et al. 2016). With
+/// w(B) the backward flow at a pixel's target, the pixel is hidden where the way there and
+/// back does not end near where it began,
+///
+/// `|w(B) + F|² > 0.01 (|w(B)|² + |F|²) + 0.5`,
+///
+/// where the flow breaks (forward differences, backward ones in the last row and column),
+///
+/// `|∇u|² + |∇v|² > 0.01 |F|² + 0.002`,
+///
+/// and where the target lies outside the picture or a flow is unknown.
 pub fn visible(forward: &Flow, backward: &Flow) -> Vec<bool> {
     let size = [backward.width, backward.height];
     (0..forward.vectors.len())
