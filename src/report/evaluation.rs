@@ -284,7 +284,10 @@ impl Evaluation {
             )
         }));
         Table {
-            title: format!("{} {which} views against their photos", self.views.len()),
+            title: match self.views.len() {
+                1 => format!("One {which} view against its photo"),
+                count => format!("{count} {which} views against their photos"),
+            },
             head: head.map(str::to_owned).to_vec(),
             rows: std::iter::once(luma).chain(colored).collect(),
             notes,

@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use super::program::Place;
 use super::scene;
-use super::shared::{onnx, place_with_run};
+use super::shared::{QUICK_FIT, onnx, place_with_run};
 
 /// Frames enough for Δ = 1, 7 and 10, too few for 30.
 const FRAMES: usize = 12;
@@ -342,4 +342,27 @@ fn gray_photos_have_no_colours_to_compare() {
     assert!(number(&found["bake"]["mean"]) > 0.0);
     let between = found["between"]["consistency"].as_array().expect("a list");
     assert!(between.iter().all(|score| score["method"] != "photo"));
+}
+
+#[test]
+fn a_single_photo_is_measured_on_itself() {
+    let place = Place::new();
+    scene::write_moved(&place.path("scene"), [0.0; 3]);
+    let images = String::from_utf8(place.read("scene/sparse/images.txt")).expect("text");
+    let first: String = images.split_inclusive('\n').take(2).collect();
+    place.write("scene/sparse/images.txt", first);
+    place.succeed(&QUICK_FIT);
+    place.succeed(&["colorize", "--teacher", "scene/images", "--until", "5"]);
+    let found = evaluated(&place, &["--teacher", "scene/images"]);
+    assert_eq!(found["measured_on"], "train");
+    assert_eq!(found["views"].as_array().expect("views").len(), 1);
+    assert_eq!(found["between"]["consistency"], serde_json::json!([]));
+    // The path stands still, and so do its colours.
+    let score = of(&found["path"]["consistency"], "native");
+    assert!(number(&score["rms"]) < 1e-3, "{score}");
+    let words = place.succeed(&["eval", "--frames", "2"]);
+    assert!(
+        words.contains("One training view against its photo"),
+        "{words}"
+    );
 }
