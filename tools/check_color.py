@@ -8,7 +8,7 @@ not there are skipped with a word. A scene is fitted once (and not again while i
 then coloured and evaluated with each teacher: the photos themselves (oracle), the photos made
 unsteady by unsteady_teacher.py, and the bundled network. Needs numpy and Pillow.
 
-`--colorize "--robust off"` hands flags to `gs-chroma colorize`: with them an ablation's table.
+`--colorize="--sh-degree 1"` hands flags to `gs-chroma colorize`: with them an ablation's table.
 """
 
 from __future__ import annotations
