@@ -55,6 +55,27 @@ impl Flow {
         }
     }
 
+    /// The pixel of the first picture in which a world point lies, and by how many
+    /// pixels the flow misses the point's place in the second; none where the point is
+    /// not in front of both cameras, outside the first picture, or the flow is unknown.
+    pub fn miss(&self, from: &Camera, to: &Camera, point: DVec3) -> Option<(usize, f64)> {
+        let place = |camera: &Camera| {
+            let seen = camera.rotation * point + camera.translation;
+            (seen.z > 0.0).then(|| {
+                [
+                    camera.fx * seen.x / seen.z + camera.cx,
+                    camera.fy * seen.y / seen.z + camera.cy,
+                ]
+            })
+        };
+        let ([x, y], [x2, y2]) = (place(from)?, place(to)?);
+        let inside = x >= 0.0 && y >= 0.0 && x < self.width as f64 && y < self.height as f64;
+        let index = inside.then(|| y as usize * self.width + x as usize)?;
+        let [u, v] = self.vectors[index].map(f64::from);
+        let miss = (x + u - x2).hypot(y + v - y2);
+        miss.is_finite().then_some((index, miss))
+    }
+
     /// Where the centre of a pixel goes, in pixels from the top left corner.
     pub fn target(&self, index: usize) -> [f64; 2] {
         let [u, v] = self.vectors[index].map(f64::from);
@@ -187,6 +208,29 @@ pub(super) mod tests {
         assert!(flow.vectors.iter().flatten().all(|v| v.is_nan()));
         let still = Flow::geometric(&from, &from, &[4.0; 1200]);
         assert!(still.vectors.iter().flatten().all(|v| v.abs() < 1e-6));
+    }
+
+    #[test]
+    fn a_points_way_tells_how_good_the_flow_is() {
+        let from = camera(DVec3::ZERO, 0.0);
+        let to = camera(DVec3::new(0.4, 0.0, 0.0), 0.0);
+        let flow = Flow::geometric(&from, &to, &[4.0; 1200]);
+        // In the middle of the pixel (25, 20), on the plane, and twice as far.
+        let at = |z: f64| DVec3::new(z * (25.5 - 21.0) / 50.0, z * (20.5 - 14.0) / 55.0, z);
+        let (index, miss) = flow.miss(&from, &to, at(4.0)).unwrap();
+        assert_eq!(index, 20 * 40 + 25);
+        assert!(miss < 1e-5, "{miss}");
+        let (_, miss) = flow.miss(&from, &to, at(8.0)).unwrap();
+        assert!((miss - 2.5).abs() < 1e-5, "{miss}");
+        for unseen in [
+            at(-4.0),
+            DVec3::new(9.0, 0.0, 4.0),
+            DVec3::new(0.0, -9.0, 4.0),
+        ] {
+            assert_eq!(flow.miss(&from, &to, unseen), None);
+        }
+        let unknown = Flow::geometric(&from, &to, &[f32::NAN; 1200]);
+        assert_eq!(unknown.miss(&from, &to, at(4.0)), None);
     }
 
     #[test]

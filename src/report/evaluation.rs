@@ -173,6 +173,8 @@ pub struct BetweenScore {
     pub size: [u32; 2],
     /// Share of visible pixels that makes a pair.
     pub least_overlap: f64,
+    /// By how many pixels the flow misses COLMAP's points, median over visible ones.
+    pub flow_error: Option<f64>,
     /// One entry a method.
     pub consistency: Vec<ConsistencyScore>,
 }
@@ -353,6 +355,11 @@ impl Evaluation {
             ),
             format!("Pixels are {}.", self.rules.mask),
         ];
+        notes.extend(self.between.flow_error.map(|pixels| {
+            format!(
+                "Between photographed views the flow misses COLMAP's points by {pixels:.1} pixels (median)."
+            )
+        }));
         if !self.path.skipped.is_empty() {
             notes.push(format!(
                 "The path is too short for Δ = {:?}.",

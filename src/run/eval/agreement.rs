@@ -33,6 +33,9 @@ const MAX_VIEWS: usize = 60;
 /// Share of the first picture that two photographed views must share.
 const LEAST_OVERLAP: f64 = 0.2;
 
+/// Triangulated points that each pair's flow is checked on; of more, an even choice.
+const MAX_POINTS: usize = 2000;
+
 /// What of a drawing is compared.
 struct Frame {
     camera: Camera,
@@ -211,6 +214,9 @@ pub(super) fn between_views(
         }
         frames.push(Frame::of(drawing));
     }
+    let points = &subject.scene.capture.points;
+    let every = points.len().div_ceil(MAX_POINTS);
+    let mut misses = Vec::new();
     let mut sums = Sums::default();
     for (i, first) in frames.iter().enumerate() {
         for second in &frames[i + 1..] {
@@ -219,6 +225,12 @@ pub(super) fn between_views(
             let shared = seen.iter().filter(|seen| **seen).count();
             if shared as f64 >= LEAST_OVERLAP * seen.len() as f64 {
                 sums.add(first, second, &forward, &seen);
+                let miss = points.iter().step_by(every).filter_map(|point| {
+                    let (pixel, miss) =
+                        forward.miss(&first.camera, &second.camera, point.position)?;
+                    seen[pixel].then_some(miss)
+                });
+                misses.extend(miss);
             }
         }
     }
@@ -228,8 +240,15 @@ pub(super) fn between_views(
             .first()
             .map_or([0; 2], |frame| [frame.camera.width, frame.camera.height]),
         least_overlap: LEAST_OVERLAP,
+        flow_error: median(misses),
         consistency: sums.scores(),
     })
+}
+
+/// The upper median.
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    let middle = values.len() / 2;
+    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
 /// The camera at no more than [`MAX_SIDE`] pixels.
