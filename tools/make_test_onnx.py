@@ -175,6 +175,17 @@ def truncated(path: Path, whole: Path) -> None:
     path.write_bytes(content[: 2 * len(content) // 3])
 
 
+def perceptual(path: Path, height: int | str, width: int | str) -> None:
+    """A perceptual distance in closed form: the mean squared difference of two pictures."""
+    picture: Shape = [1, 3, height, width]
+    save(
+        path, [helper.make_node("Sub", ["first", "second"], ["difference"]),
+               helper.make_node("Mul", ["difference", "difference"], ["square"]),
+               helper.make_node("ReduceMean", ["square"], ["distance"], keepdims=1)],
+        {"first": picture, "second": picture}, {"distance": [1, 1, 1, 1]}, [],
+    )  # fmt: skip
+
+
 def main() -> None:
     """Writes all files."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -187,6 +198,8 @@ def main() -> None:
     ):  # fmt: skip
         make(folder / f"{make.__name__}.onnx")
     truncated(folder / "truncated.onnx", folder / "ddcolor_tiny.onnx")
+    perceptual(folder / "perceptual.onnx", "H", "W")
+    perceptual(folder / "perceptual_small.onnx", SIDE // 2, SIDE)
     for path in sorted(folder.glob("*.onnx")):
         print(f"{path.name}: {path.stat().st_size} bytes")
 

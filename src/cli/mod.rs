@@ -2,6 +2,7 @@
 
 mod colorize;
 mod doctor;
+mod eval;
 mod export;
 mod fit;
 mod info;
@@ -31,6 +32,7 @@ enum Command {
     Fit(fit::Fit),
     Colorize(colorize::Colorize),
     Render(render::Render),
+    Eval(eval::Eval),
     Export(export::Export),
     Info(info::Info),
     Doctor(doctor::Doctor),
@@ -46,6 +48,7 @@ impl Cli {
             Command::Fit(command) => command.run(),
             Command::Colorize(command) => command.run(),
             Command::Render(command) => command.run(),
+            Command::Eval(command) => command.run(),
             Command::Export(command) => command.run(),
             Command::Info(command) => command.run(),
             Command::Doctor(command) => command.run(),

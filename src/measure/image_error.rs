@@ -36,9 +36,23 @@ pub struct DeltaE {
 /// # Panics
 /// If the lengths differ or are zero.
 pub fn mean_delta_e(a: &[[f32; 3]], b: &[[f32; 3]]) -> DeltaE {
+    let mut differences = delta_e(a, b);
+    let mean = differences.iter().sum::<f64>() / differences.len() as f64;
+    let rank = (differences.len() * 95).div_ceil(100) - 1;
+    let (_, &mut percentile_95, _) = differences.select_nth_unstable_by(rank, f64::total_cmp);
+    DeltaE {
+        mean,
+        percentile_95,
+    }
+}
+
+/// CIEDE2000 of each pixel of two RGB images.
+///
+/// # Panics
+/// If the lengths differ or are zero.
+pub fn delta_e(a: &[[f32; 3]], b: &[[f32; 3]]) -> Vec<f64> {
     assert_same_size(a.len(), b.len());
-    let mut differences: Vec<f64> = a
-        .iter()
+    a.iter()
         .zip(b)
         .map(|(x, y)| {
             let [x, y] = [x, y].map(|rgb| srgb_to_lab(rgb.map(f64::from)));
@@ -47,14 +61,22 @@ pub fn mean_delta_e(a: &[[f32; 3]], b: &[[f32; 3]]) -> DeltaE {
                 .filter(|d| !d.is_nan())
                 .unwrap_or(f64::NAN)
         })
-        .collect();
-    let mean = differences.iter().sum::<f64>() / differences.len() as f64;
-    let rank = (differences.len() * 95).div_ceil(100) - 1;
-    let (_, &mut percentile_95, _) = differences.select_nth_unstable_by(rank, f64::total_cmp);
-    DeltaE {
-        mean,
-        percentile_95,
-    }
+        .collect()
+}
+
+/// Root mean square of the differences of a and of b, in CIELAB units: the error of a
+/// picture's colours where its lightness is taken from the reference.
+///
+/// # Panics
+/// If the lengths differ or are zero.
+pub fn ab_error(a: &[[f32; 2]], b: &[[f32; 2]]) -> f64 {
+    assert_same_size(a.len(), b.len());
+    let squares: f64 = a
+        .iter()
+        .zip(b)
+        .flat_map(|(x, y)| [0, 1].map(|c| (f64::from(x[c]) - f64::from(y[c])).powi(2)))
+        .sum();
+    (squares / (2 * a.len()) as f64).sqrt()
 }
 
 fn assert_same_size(a: usize, b: usize) {
@@ -103,6 +125,15 @@ mod tests {
         assert!(one.percentile_95.abs() < 1e-9, "19 of 20 are the same");
         b[4] = [1.0; 3];
         assert!((mean_delta_e(&a, &b).percentile_95 - 100.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn ab_error_is_the_root_mean_square_of_both_channels() {
+        let truth = [[0.0, 0.0], [10.0, -5.0], [1.0, 1.0]];
+        let ours = [[3.0, 4.0], [10.0, -5.0], [1.0, 2.0]];
+        assert!((ab_error(&ours, &truth) - f64::sqrt(26.0 / 6.0)).abs() < 1e-12);
+        assert_eq!(ab_error(&truth, &truth), 0.0);
+        assert!(ab_error(&[[f32::NAN, 0.0]], &[[0.0; 2]]).is_nan());
     }
 
     #[test]

@@ -1,11 +1,24 @@
-//! How good a picture is: fidelity to a reference and colourfulness.
+//! How good a picture is: fidelity to a reference, colourfulness, and whether views of
+//! one scene agree.
 //!
 //! Images are row by row from the top left, encoded sRGB in `[0, 1]`.
 
 mod colorfulness;
+mod consistency;
+mod depth;
+mod flo;
+mod flow;
 mod image_error;
+mod path;
 mod ssim;
+mod visibility;
 
 pub use colorfulness::{colorfulness, colorfulness_absolute};
-pub use image_error::{DeltaE, mean_delta_e, psnr};
+pub use consistency::{Consistency, DENOMINATOR_RULE, SCALE_RULE};
+pub use depth::PositionFields;
+pub use flo::decode_flo;
+pub use flow::Flow;
+pub use image_error::{DeltaE, ab_error, delta_e, mean_delta_e, psnr};
+pub use path::{camera_path, distance};
 pub use ssim::ssim;
+pub use visibility::{MASK_RULE, MIN_OPACITY, visible};

@@ -1,10 +1,18 @@
-//! What a run tells about itself: `report.json` and the contact sheet.
+//! What a run tells about itself: `report.json`, the contact sheet, and what `eval`
+//! finds.
 //! docs/run-folder.md describes every key.
 
 mod contact_sheet;
+mod evaluation;
+mod page;
 mod timings;
 
 pub use contact_sheet::{Row, contact_sheet, to_image};
+pub use evaluation::{
+    BetweenScore, ConsistencyScore, EVALUATION_VERSION, Evaluation, LumaScore, Method,
+    PathConsistency, PathScore, PictureScore, Rules, Table, ViewScore,
+};
+pub use page::{Figure, MAP_END, PageRow, error_map, evaluation_page};
 pub use timings::{KernelReport, kernel_reports, timings_table};
 
 use serde::{Deserialize, Serialize};

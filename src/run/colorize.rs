@@ -195,6 +195,9 @@ pub fn colorize(
     });
     ply::write_ply(&output.ply, &baked, offset, &comments())?;
     if let Some(folder) = &source.folder {
+        if output.ply == folder.color() {
+            folder.write_chroma(&chroma)?;
+        }
         append_log(folder, report.luma.iterations, &log)?;
         files::write_png(&folder.contact_sheet(), &contact_sheet(&measured.rows))?;
         folder.write_report(&report)?;

@@ -25,7 +25,7 @@ use crate::{
 };
 
 /// PSNR of pictures without a difference, in dB: JSON knows no infinity.
-const IDENTICAL_PSNR: f64 = 100.0;
+pub(super) const IDENTICAL_PSNR: f64 = 100.0;
 
 /// What `fit` is asked to do; `None` leaves it to the preset.
 #[derive(Clone, Debug)]
@@ -189,11 +189,10 @@ pub fn fit(
         chroma: None,
     };
     // The old colours do not belong to the new geometry.
-    for stale in [folder.color(), folder.contact_sheet()] {
-        if stale.exists() {
-            std::fs::remove_file(&stale).map_err(files::at(&stale))?;
-        }
+    for stale in [folder.color(), folder.chroma(), folder.contact_sheet()] {
+        files::remove(&stale)?;
     }
+    folder.forget_evaluation()?;
     ply::write_ply(&folder.luma(), &splats, glam::DVec3::ZERO, &comments())?;
     files::write(&folder.log(), log.as_bytes())?;
     folder.write_report(&report)?;

@@ -7,7 +7,10 @@ use std::{
 };
 
 use super::{RunError, files};
-use crate::report::Report;
+use crate::{
+    report::Report,
+    splats::{ShField, npy},
+};
 
 /// Where runs go unless told otherwise.
 const RUNS: &str = "runs";
@@ -61,6 +64,21 @@ impl RunFolder {
         self.0.join("color.ply")
     }
 
+    /// The native a/b harmonics of the coloured scene.
+    pub fn chroma(&self) -> PathBuf {
+        self.0.join("chroma.npy")
+    }
+
+    /// What `eval` found.
+    pub fn evaluation(&self) -> PathBuf {
+        self.0.join("eval.json")
+    }
+
+    /// The page of `eval` with its pictures.
+    pub fn evaluation_page(&self) -> PathBuf {
+        self.0.join("eval")
+    }
+
     /// The report.
     pub fn report(&self) -> PathBuf {
         self.0.join("report.json")
@@ -95,6 +113,38 @@ impl RunFolder {
             path,
             reason: format!("damaged ({error}): run `gs-chroma fit` again"),
         })
+    }
+
+    /// Reads the native chroma of `count` Gaussians, CIELAB a and b; none where
+    /// the run has no such file.
+    ///
+    /// # Errors
+    /// [`RunError::File`] when it is damaged or belongs to other Gaussians.
+    pub fn read_chroma(&self, count: usize) -> Result<Option<ShField>, RunError> {
+        let path = self.chroma();
+        if !path.exists() {
+            return Ok(None);
+        }
+        let bytes = fs::read(&path).map_err(files::at(&path))?;
+        let field = npy::decode(&bytes, count, 2).map_err(|reason| RunError::File {
+            path,
+            reason: format!("{reason}: run `gs-chroma colorize` again"),
+        })?;
+        Ok(Some(field))
+    }
+
+    /// Writes the native chroma; what was measured of an earlier one goes.
+    pub(super) fn write_chroma(&self, chroma: &ShField) -> Result<(), RunError> {
+        let path = self.chroma();
+        let bytes = npy::encode(chroma).map_err(files::at(&path))?;
+        self.forget_evaluation()?;
+        files::write(&path, &bytes)
+    }
+
+    /// Removes what `eval` wrote.
+    pub(super) fn forget_evaluation(&self) -> Result<(), RunError> {
+        files::remove(&self.evaluation())?;
+        files::remove_page(&self.evaluation_page())
     }
 
     pub(super) fn write_report(&self, report: &Report) -> Result<(), RunError> {

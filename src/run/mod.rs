@@ -1,6 +1,7 @@
 //! Whole runs: what a command does from its options to its files.
 
 mod colorize;
+mod eval;
 mod files;
 mod fit;
 mod folder;
@@ -13,6 +14,7 @@ mod teach;
 use std::{fmt, path::PathBuf};
 
 pub use colorize::{ColorizeOptions, Output, colorize};
+pub use eval::{EvalOptions, eval};
 pub use fit::{FitOptions, fit};
 pub use folder::RunFolder;
 pub use info::{export, info};
@@ -105,6 +107,12 @@ pub enum Stage {
     Chroma,
     /// Drawing pictures.
     Render,
+    /// Measuring pictures against photos.
+    Measure,
+    /// Drawing and comparing the frames of a path.
+    Path,
+    /// Drawing and comparing photographed views.
+    Pairs,
 }
 
 impl fmt::Display for Stage {
@@ -115,6 +123,9 @@ impl fmt::Display for Stage {
             Self::Teacher => "teacher",
             Self::Chroma => "chroma",
             Self::Render => "render",
+            Self::Measure => "measure",
+            Self::Path => "path",
+            Self::Pairs => "pairs",
         })
     }
 }

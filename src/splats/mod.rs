@@ -3,6 +3,7 @@
 
 pub mod init;
 mod neighbors;
+pub mod npy;
 pub mod ply;
 pub mod sh;
 

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use serde_json::Value;
 
-use super::shared::place_with_run;
+use super::shared::{onnx, place_with_run};
 
 fn page() -> String {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/run-folder.md");
@@ -33,12 +33,25 @@ fn collect_keys(value: &Value, path: &str, keys: &mut BTreeSet<String>) {
 #[test]
 fn every_key_of_a_report_and_no_other() {
     let report = place_with_run().report("runs/scene");
+    are_documented(&report, "## report.json");
+}
+
+#[test]
+fn every_key_of_an_evaluation_and_no_other() {
+    let teacher = onnx("ddcolor_tiny.onnx");
+    let eval = ["eval", "--frames", "2", "--json", "--teacher", &teacher];
+    let evaluation = place_with_run().json(&eval);
+    are_documented(&evaluation, "## eval.json");
+}
+
+/// Whether the tables of a section of the page name the keys of a value and no other.
+fn are_documented(value: &Value, section: &str) {
     let mut keys = BTreeSet::new();
-    collect_keys(&report, "", &mut keys);
+    collect_keys(value, "", &mut keys);
     assert!(keys.len() > 50, "{keys:?}");
     // Rows of tables whose first cell is one or more paths.
     let page = page();
-    let (_, section) = page.split_once("## report.json").expect("the section");
+    let (_, section) = page.split_once(section).expect("the section");
     let (section, _) = section.split_once("\n## ").unwrap_or((section, ""));
     let documented: BTreeSet<String> = section
         .lines()
@@ -67,6 +80,7 @@ fn the_example_is_a_report() {
 #[test]
 fn every_file_and_every_column() {
     let place = place_with_run();
+    place.succeed(&["eval", "--frames", "2"]);
     let page = page();
     for name in place.files("runs/scene") {
         let name = name

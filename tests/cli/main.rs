@@ -9,6 +9,7 @@ mod coordinates;
 mod doctor;
 mod documented;
 mod errors;
+mod eval;
 mod inspect;
 mod picture;
 mod program;

@@ -13,6 +13,7 @@ use gs_chroma::{
 
 mod adam;
 mod blend;
+mod depth;
 mod gradient;
 mod harness;
 mod layout;

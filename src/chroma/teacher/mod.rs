@@ -13,7 +13,7 @@ mod model;
 mod named_images;
 mod network;
 mod profile;
-mod runtime;
+pub(crate) mod runtime;
 mod upsample;
 
 pub use error::TeacherError;

@@ -28,7 +28,7 @@ static ENVIRONMENT: Mutex<Option<Environment>> = Mutex::new(None);
 /// The library is looked for where `ORT_DYLIB_PATH` says (and then nowhere
 /// else), beside the program, in the project's cache folder, and on the
 /// system's library path.
-pub(super) fn environment() -> Result<Environment, TeacherError> {
+pub(crate) fn environment() -> Result<Environment, TeacherError> {
     // A panic elsewhere leaves a whole environment or none.
     let mut environment = ENVIRONMENT.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(environment) = environment.as_ref() {

@@ -1,0 +1,75 @@
+//! `gs-chroma eval`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::{print, progress::Progress};
+use crate::chroma::teacher::TeacherSettings;
+use crate::run::{EvalOptions, RunError, eval};
+
+/// Measure a coloured run: fidelity, colourfulness, and whether views agree.
+#[derive(Args)]
+pub struct Eval {
+    /// Run folder [default: newest under runs/].
+    run: Option<PathBuf>,
+    /// The teacher, to be measured beside the scene: an .onnx file or a folder.
+    #[arg(long, value_name = "FILE.onnx|DIR")]
+    teacher: Option<PathBuf>,
+    /// What the network takes and gives, as for `colorize`.
+    #[arg(long, value_name = "NAME|FILE.toml", requires = "teacher")]
+    teacher_profile: Option<String>,
+    /// Side in pixels at which a network sees photos, as for `colorize`.
+    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(1..=8192), requires = "teacher")]
+    teacher_size: Option<u32>,
+    /// Measure other ways to colour a scene as well: the teacher on each drawn gray frame.
+    #[arg(long, requires = "teacher")]
+    baselines: bool,
+    /// Frames of the rendered path.
+    #[arg(long, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u32).range(2..=9999))]
+    frames: u32,
+    /// Folder of optical flow between the path's frames, 0000-0007.flo and 0007-0000.flo for
+    /// each pair [default: flow from depth and poses].
+    #[arg(long, value_name = "DIR")]
+    flow: Option<PathBuf>,
+    /// A perceptual distance: two inputs [1,3,H,W] in [-1,1], one number out.
+    #[arg(long, value_name = "FILE.onnx")]
+    lpips: Option<PathBuf>,
+    /// COLMAP folder with the photos, when it is not where `fit` found it.
+    #[arg(long, value_name = "COLMAP_DIR")]
+    colmap: Option<PathBuf>,
+    /// Print eval.json.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Eval {
+    pub(super) fn run(self) -> Result<(), RunError> {
+        let mut progress = Progress::default();
+        let options = EvalOptions {
+            run: self.run,
+            teacher: self.teacher,
+            teacher_settings: TeacherSettings {
+                profile: self.teacher_profile,
+                size: self.teacher_size,
+                ..TeacherSettings::default()
+            },
+            colmap: self.colmap,
+            frames: self.frames as usize,
+            baselines: self.baselines,
+            flow: self.flow,
+            lpips: self.lpips,
+        };
+        let (folder, evaluation) = eval(&options, &mut |event| progress.show(&event))?;
+        progress.finish();
+        if self.json {
+            return print(evaluation.to_json());
+        }
+        for table in evaluation.tables() {
+            print(format_args!("{table}\n"))?;
+        }
+        print(format_args!("wrote {}", folder.evaluation().display()))?;
+        let page = folder.evaluation_page().join("index.html");
+        print(format_args!("wrote {}", page.display()))
+    }
+}

@@ -1,0 +1,284 @@
+//! Whether pictures of one place agree: along a rendered path, and between the
+//! photographed views.
+
+use std::{collections::VecDeque, path::Path};
+
+use image::RgbImage;
+
+use super::{
+    EvalOptions,
+    drawing::{Drawing, Layer, Painter, ab_of, to_picture},
+    subject::Subject,
+};
+use crate::{
+    capture::Camera,
+    chroma::teacher::AbImage,
+    measure::{Consistency, Flow, camera_path, decode_flo, visible},
+    report::{BetweenScore, ConsistencyScore, Method, PathConsistency, PathScore, to_image},
+    run::{Event, Observer, RunError, Stage, scene::rgb_pixels},
+};
+
+/// Distances in frames: short range as in the literature, with 1 beside 10, and long
+/// range, with 30 beside 7.
+const DELTAS: [usize; 4] = [1, 7, 10, 30];
+
+/// Longer side of the pictures that are compared, in pixels: a path's frames wait in
+/// memory for their partners.
+const MAX_SIDE: u32 = 640;
+
+/// Photographed views that are compared with each other; of more, an even choice. Pairs
+/// grow with the square.
+const MAX_VIEWS: usize = 60;
+
+/// Share of the first picture that two photographed views must share.
+const LEAST_OVERLAP: f64 = 0.2;
+
+/// Triangulated points that each pair's flow is checked on; of more, an even choice.
+const MAX_POINTS: usize = 2000;
+
+/// What of a drawing is compared.
+struct Frame {
+    camera: Camera,
+    depth: Vec<f32>,
+    colors: Vec<(Method, Vec<[f32; 2]>)>,
+}
+
+/// Sums of each method.
+#[derive(Default)]
+struct Sums(Vec<(Method, Consistency)>);
+
+impl Frame {
+    fn of(drawing: Drawing) -> Self {
+        let colors = drawing.layers.iter().map(|(m, layer)| (*m, layer.ab()));
+        Self {
+            colors: colors.collect(),
+            camera: drawing.camera,
+            depth: drawing.depth,
+        }
+    }
+
+    fn size(&self) -> [usize; 2] {
+        [self.camera.width as usize, self.camera.height as usize]
+    }
+
+    fn flow_to(&self, other: &Self) -> Flow {
+        Flow::geometric(&self.camera, &other.camera, &self.depth)
+    }
+
+    /// Takes what is not known where the scene has no depth out of another's flow.
+    fn masked(&self, mut flow: Flow) -> Flow {
+        for (vector, depth) in flow.vectors.iter_mut().zip(&self.depth) {
+            if depth.is_nan() {
+                *vector = [f32::NAN; 2];
+            }
+        }
+        flow
+    }
+}
+
+impl Sums {
+    fn add(&mut self, first: &Frame, second: &Frame, flow: &Flow, seen: &[bool]) {
+        for ((method, ours), (other, theirs)) in first.colors.iter().zip(&second.colors) {
+            debug_assert_eq!(method, other, "every frame has the same methods");
+            if !self.0.iter().any(|(m, _)| m == method) {
+                self.0.push((*method, Consistency::default()));
+            }
+            for (_, sum) in self.0.iter_mut().filter(|(m, _)| m == method) {
+                sum.add(ours, theirs, second.size(), flow, seen);
+            }
+        }
+    }
+
+    fn scores(&self) -> Vec<ConsistencyScore> {
+        let score = |(method, sum): &(Method, Consistency)| ConsistencyScore::new(*method, sum);
+        self.0.iter().map(score).collect()
+    }
+}
+
+/// Draws the path, gives each frame's exported picture to `keep`, and compares frames.
+pub(super) fn along_path(
+    painter: &mut Painter<'_>,
+    subject: &Subject,
+    options: &EvalOptions,
+    observe: &mut Observer<'_>,
+    keep: &mut dyn FnMut(usize, RgbImage) -> Result<(), RunError>,
+) -> Result<PathScore, RunError> {
+    let scene = &subject.scene;
+    let train = &scene.split.train;
+    let cameras: Vec<Camera> = train.iter().map(|&i| small(&scene.photos[i].1)).collect();
+    let cameras: Vec<&Camera> = cameras.iter().collect();
+    let path = camera_path(&cameras, scene.extent, options.frames);
+    let mut sums: Vec<(usize, Sums)> = DELTAS.map(|delta| (delta, Sums::default())).into();
+    let mut recent: VecDeque<Frame> = VecDeque::new();
+    for (index, camera) in path.iter().enumerate() {
+        observe(Event::Progress {
+            stage: Stage::Path,
+            done: index,
+            total: path.len(),
+            message: String::new(),
+        });
+        let drawing = painter.draw(camera, &format!("frame {index}"))?;
+        let exported = drawing.layers.iter().find(|(m, _)| *m == Method::Exported);
+        if let Some((_, layer)) = exported {
+            let pixels = layer.rgb(&drawing.gray);
+            keep(index, to_image(camera.width, camera.height, &pixels))?;
+        }
+        let frame = Frame::of(drawing);
+        for (delta, sums) in &mut sums {
+            // The most recent frame is one back.
+            let Some(first) = recent.len().checked_sub(*delta).map(|at| &recent[at]) else {
+                continue;
+            };
+            let flow = |from: &Frame, to: &Frame, names: [usize; 2]| match &options.flow {
+                Some(folder) => Ok(from.masked(read_flow(folder, names, from.size())?)),
+                None => Ok::<_, RunError>(from.flow_to(to)),
+            };
+            let forward = flow(first, &frame, [index - *delta, index])?;
+            let backward = flow(&frame, first, [index, index - *delta])?;
+            sums.add(first, &frame, &forward, &visible(&forward, &backward));
+        }
+        recent.push_back(frame);
+        if recent.len() > DELTAS[DELTAS.len() - 1] {
+            recent.pop_front();
+        }
+    }
+    let skipped: Vec<usize> = DELTAS.into_iter().filter(|&d| d >= path.len()).collect();
+    if !skipped.is_empty() {
+        observe(Event::Note(format!(
+            "a path of {} frames is too short for Δ = {skipped:?}: choose more --frames",
+            path.len()
+        )));
+    }
+    let flow = if options.flow.is_some() {
+        "files"
+    } else {
+        "geometric"
+    };
+    Ok(PathScore {
+        frames: path.len(),
+        size: [path[0].width, path[0].height],
+        flow: flow.to_owned(),
+        skipped,
+        consistency: sums
+            .iter()
+            .flat_map(|(delta, sums)| {
+                let delta = *delta;
+                let scores = sums.scores().into_iter();
+                scores.map(move |score| PathConsistency { delta, score })
+            })
+            .collect(),
+    })
+}
+
+/// Compares the photographed views in pairs; where there is a teacher, those that it
+/// coloured. What photos in colour differ by among themselves tells how much is due to
+/// light, noise and the flow.
+pub(super) fn between_views(
+    painter: &mut Painter<'_>,
+    subject: &Subject,
+    observe: &mut Observer<'_>,
+) -> Result<BetweenScore, RunError> {
+    let views = &subject.scene.photos;
+    let taught = painter.teacher().is_some();
+    let candidates: Vec<usize> = (0..views.len())
+        .filter(|&i| !taught || painter.answer(i).is_some())
+        .collect();
+    let in_color = views.iter().all(|(photo, _)| photo.rgb.is_some());
+    let count = candidates.len().min(MAX_VIEWS);
+    let mut frames = Vec::with_capacity(count);
+    for k in 0..count {
+        let i = candidates[k * candidates.len() / count];
+        let name = &subject.scene.capture.views[i].name;
+        observe(Event::Progress {
+            stage: Stage::Pairs,
+            done: k,
+            total: count,
+            message: name.clone(),
+        });
+        let camera = small(&views[i].1);
+        let mut drawing = painter.draw(&camera, name)?;
+        if let Some(answer) = painter.answer(i) {
+            let answer = answer.resized(camera.width, camera.height);
+            let layer = Layer::Ab(to_picture(&answer));
+            drawing.layers.push((Method::Teacher, layer));
+        }
+        if in_color {
+            let photo = &views[i].0;
+            let truth = AbImage {
+                width: photo.width,
+                height: photo.height,
+                ab: ab_of(&rgb_pixels(photo)),
+            };
+            let truth = to_picture(&truth.resized(camera.width, camera.height));
+            drawing.layers.push((Method::Photo, Layer::Ab(truth)));
+        }
+        frames.push(Frame::of(drawing));
+    }
+    let points = &subject.scene.capture.points;
+    let every = points.len().div_ceil(MAX_POINTS);
+    let mut misses = Vec::new();
+    let mut sums = Sums::default();
+    for (i, first) in frames.iter().enumerate() {
+        for second in &frames[i + 1..] {
+            let forward = first.flow_to(second);
+            let seen = visible(&forward, &second.flow_to(first));
+            let shared = seen.iter().filter(|seen| **seen).count();
+            if shared as f64 >= LEAST_OVERLAP * seen.len() as f64 {
+                sums.add(first, second, &forward, &seen);
+                let miss = points.iter().step_by(every).filter_map(|point| {
+                    let (pixel, miss) =
+                        forward.miss(&first.camera, &second.camera, point.position)?;
+                    seen[pixel].then_some(miss)
+                });
+                misses.extend(miss);
+            }
+        }
+    }
+    Ok(BetweenScore {
+        views: count,
+        size: frames
+            .first()
+            .map_or([0; 2], |frame| [frame.camera.width, frame.camera.height]),
+        least_overlap: LEAST_OVERLAP,
+        flow_error: median(misses),
+        consistency: sums.scores(),
+    })
+}
+
+/// The upper median.
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    let middle = values.len() / 2;
+    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
+/// The camera at no more than [`MAX_SIDE`] pixels.
+fn small(camera: &Camera) -> Camera {
+    let longer = camera.width.max(camera.height);
+    if longer <= MAX_SIDE {
+        return camera.clone();
+    }
+    let scaled = |side: u32| {
+        let exact = f64::from(side) * f64::from(MAX_SIDE) / f64::from(longer);
+        (exact.round() as u32).max(1)
+    };
+    camera.resized(scaled(camera.width), scaled(camera.height))
+}
+
+/// The flow from one frame to another: `0000-0007.flo`.
+fn read_flow(folder: &Path, [from, to]: [usize; 2], size: [usize; 2]) -> Result<Flow, RunError> {
+    let path = folder.join(format!("{from:04}-{to:04}.flo"));
+    let failure = |reason: String| RunError::File {
+        path: path.clone(),
+        reason,
+    };
+    let bytes = std::fs::read(&path).map_err(|error| {
+        failure(format!(
+            "{error}: --flow needs one file for each pair of frames and direction"
+        ))
+    })?;
+    decode_flo(&bytes, size[0], size[1]).map_err(|reason| {
+        failure(format!(
+            "{reason}: make it from the frames that `eval` writes, with as many --frames"
+        ))
+    })
+}

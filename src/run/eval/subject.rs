@@ -1,0 +1,81 @@
+//! What is measured: a run with its scene, its luma and its colours.
+
+use std::path::PathBuf;
+
+use super::EvalOptions;
+use crate::{
+    report::Report,
+    run::{
+        Event, Observer, RunError, RunFolder,
+        scene::{Scene, read_splats},
+    },
+    splats::{ShField, Splats},
+};
+
+/// A coloured run.
+pub(super) struct Subject {
+    pub folder: RunFolder,
+    pub report: Report,
+    pub scene: Scene,
+    /// Geometry and luma.
+    pub luma: Splats,
+    /// Native a/b, where the run has them.
+    pub chroma: Option<ShField>,
+    /// RGB of the exported file.
+    pub exported: ShField,
+}
+
+impl Subject {
+    pub fn load(options: &EvalOptions, observe: &mut Observer<'_>) -> Result<Self, RunError> {
+        let folder = match &options.run {
+            Some(path) => RunFolder::at(path),
+            None => RunFolder::newest()?,
+        };
+        let report = folder.read_report()?;
+        let refused = |path: PathBuf, reason: &str| RunError::File {
+            path,
+            reason: format!("{reason}: run `gs-chroma colorize` first"),
+        };
+        let color = folder.color();
+        if !color.exists() {
+            return Err(refused(color, "the run is not coloured yet"));
+        }
+        // A run's own files are moved already.
+        let offset = glam::DVec3::ZERO;
+        let luma = read_splats(&folder.luma(), offset, observe)?.to_luma();
+        let exported = read_splats(&color, offset, observe)?;
+        if exported.means != luma.means || exported.sh.channels != 3 {
+            return Err(refused(color, "its Gaussians are not those of luma.ply"));
+        }
+        let chroma = folder.read_chroma(luma.len())?;
+        if chroma.is_none() {
+            observe(Event::Note(format!(
+                "{} is missing: the native picture is not measured; `gs-chroma colorize` writes it",
+                folder.chroma().display()
+            )));
+        }
+        let colmap = match &options.colmap {
+            Some(path) => path.clone(),
+            None => PathBuf::from(&report.capture.path),
+        };
+        let capture = &report.capture;
+        let scene = Scene::load(&colmap, capture.max_side, capture.holdout, observe)?;
+        Ok(Self {
+            folder,
+            report,
+            scene,
+            luma,
+            chroma,
+            exported: exported.sh,
+        })
+    }
+
+    /// The name of the photos' folder.
+    pub fn name(&self) -> String {
+        let root = &self.scene.capture.root;
+        let name = root.canonicalize().ok();
+        let name = name.as_ref().unwrap_or(root).file_name();
+        name.map_or("scene".into(), |n| n.to_string_lossy())
+            .into_owned()
+    }
+}

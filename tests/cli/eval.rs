@@ -1,0 +1,368 @@
+//! `eval`.
+
+use std::fs;
+
+use serde_json::Value;
+
+use super::program::Place;
+use super::scene;
+use super::shared::{QUICK_FIT, onnx, place_with_run};
+
+/// Frames enough for Δ = 1, 7 and 10, too few for 30.
+const FRAMES: usize = 12;
+
+/// Evaluates the run briefly; gives what `--json` prints.
+fn evaluated(place: &Place, more: &[&str]) -> Value {
+    let frames = FRAMES.to_string();
+    place.json(&[&["eval", "--frames", &frames, "--json"], more].concat())
+}
+
+fn of<'a>(scores: &'a Value, method: &str) -> &'a Value {
+    let scores = scores.as_array().expect("a list");
+    let found = scores.iter().find(|score| score["method"] == method);
+    found.unwrap_or_else(|| panic!("no {method} in {scores:?}"))
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("{value}"))
+}
+
+#[test]
+fn a_run_beside_its_network_and_the_baseline() {
+    let place = place_with_run();
+    let teacher = onnx("ddcolor_tiny.onnx");
+    let found = evaluated(&place, &["--teacher", &teacher, "--baselines"]);
+    let written: Value = serde_json::from_slice(&place.read("runs/scene/eval.json")).expect("JSON");
+    assert_eq!(found, written);
+    assert_eq!(found["measured_on"], "test");
+    assert_eq!(found["teacher"]["name"], "ddcolor_tiny.onnx");
+    assert_eq!(
+        found["views"].as_array().expect("views").len(),
+        scene::HELD_OUT
+    );
+
+    // What colorize measured of the same pictures.
+    let report = place.report("runs/scene");
+    let chroma = &report["chroma"];
+    let exported = of(&found["pictures"], "exported");
+    for (ours, theirs) in [
+        (&found["luma"]["psnr"], &report["luma"]["held_out"]["psnr"]),
+        (&found["bake"]["mean"], &chroma["bake"]["mean"]),
+        (
+            &exported["delta_e"]["mean"],
+            &chroma["pictures"]["delta_e"]["mean"],
+        ),
+        (
+            &exported["colorfulness"],
+            &chroma["pictures"]["colorfulness"],
+        ),
+    ] {
+        assert!(
+            (number(ours) - number(theirs)).abs() < 1e-3,
+            "{ours} {theirs}"
+        );
+    }
+
+    // The path: 12 frames, so that 30 is too far.
+    let path = &found["path"];
+    assert_eq!(
+        (&path["frames"], &path["flow"]),
+        (&FRAMES.into(), &"geometric".into())
+    );
+    assert_eq!(path["skipped"], serde_json::json!([30]));
+    for (delta, pairs) in [(1, 11), (7, 5), (10, 2)] {
+        let scores = path["consistency"].as_array().expect("a list");
+        let at: Vec<Value> = scores
+            .iter()
+            .filter(|s| s["delta"] == delta)
+            .cloned()
+            .collect();
+        let native = of(&Value::Array(at), "native").clone();
+        assert_eq!(native["pairs"], pairs);
+        let [error, rms] = ["error", "rms"].map(|key| number(&native[key]));
+        assert!(
+            (255.0 * error.sqrt() - rms).abs() < 1e-9 && rms < 5.0,
+            "{native}"
+        );
+        let values = number(&native["values"]);
+        let pixels = f64::from(pairs * (scene::SIZE[0] * scene::SIZE[1]) as i32);
+        assert!((values - 2.0 * pixels * number(&native["visible"])).abs() < 0.5);
+        assert!(number(&native["visible"]) > 0.1, "{native}");
+    }
+    let between = &found["between"];
+    assert_eq!(between["views"], scene::VIEWS);
+    for method in ["native", "exported", "teacher", "per_frame", "photo"] {
+        assert!(
+            number(&of(&between["consistency"], method)["pairs"]) >= 9.0,
+            "{method}"
+        );
+    }
+    // Two views of one splat differ less than two answers of a network.
+    let rms = |method| number(&of(&between["consistency"], method)["rms"]);
+    assert!(rms("native") < rms("teacher"), "{between}");
+}
+
+#[test]
+fn the_photos_as_a_teacher_make_no_error() {
+    let place = place_with_run();
+    let found = evaluated(&place, &["--teacher", "scene/images", "--baselines"]);
+    let teacher = of(&found["pictures"], "teacher");
+    // The gray has 8 bits, the colours have all theirs.
+    assert!(number(&teacher["ab_error"]) < 1e-3, "{teacher}");
+    assert!(number(&teacher["delta_e"]["mean"]) < 0.5, "{teacher}");
+    let photo = of(&found["pictures"], "photo");
+    assert!((number(&teacher["colorfulness"]) - number(&photo["colorfulness"])).abs() < 0.5);
+    assert_eq!(photo["ab_error"], Value::Null);
+    let rms = |method| number(&of(&found["between"]["consistency"], method)["rms"]);
+    assert!((rms("teacher") - rms("photo")).abs() < 1e-3);
+    // A folder colours no frames.
+    let methods: Vec<&Value> = found["pictures"]
+        .as_array()
+        .expect("a list")
+        .iter()
+        .map(|s| &s["method"])
+        .collect();
+    assert_eq!(methods, ["native", "exported", "teacher", "photo"]);
+}
+
+#[test]
+fn the_page_shows_every_view_with_files_that_are_there() {
+    let place = place_with_run();
+    let words = place.succeed(&["eval", "--frames", "3"]);
+    for part in [
+        "ΔE00",
+        "a/b error",
+        "Δ = 1",
+        "too short",
+        "0.01",
+        "(x+128)/255",
+        "visible pixels × 2",
+    ] {
+        assert!(words.contains(part), "{part}: {words}");
+    }
+    let page = String::from_utf8(place.read("runs/scene/eval/index.html")).expect("text");
+    assert!(
+        !page.contains("<script") && !page.contains("http"),
+        "{page}"
+    );
+    let mut sources = 0;
+    for part in page.split("src=\"").skip(1) {
+        let file = part.split('"').next().expect("a name");
+        let image = image::open(place.path("runs/scene/eval").join(file)).expect("a picture");
+        assert_eq!([image.width(), image.height()], scene::SIZE, "{file}");
+        sources += 1;
+    }
+    // Photo, luma, ours and two maps a view, and the frames.
+    assert_eq!(sources, 5 * scene::HELD_OUT + 3);
+    assert!(page.contains(&scene::name(8)), "{page}");
+
+    // A second evaluation leaves nothing of the first, a new colouring neither.
+    place.write("runs/scene/eval/frame-0099.png", "old");
+    place.succeed(&["eval", "--frames", "2"]);
+    let files = place.files("runs/scene");
+    assert!(
+        !files
+            .iter()
+            .any(|name| name.contains("0099") || name.contains(".eval-")),
+        "{files:?}"
+    );
+    place.succeed(&["colorize", "--teacher", "scene/images", "--until", "62"]);
+    let files = place.files("runs/scene");
+    assert!(
+        !files.iter().any(|name| name.starts_with("eval")),
+        "{files:?}"
+    );
+}
+
+#[test]
+fn flow_from_files_takes_the_place_of_depth() {
+    let place = place_with_run();
+    // Two frames; what stood at x is said to stand at x + 1.
+    let [width, height] = scene::SIZE;
+    let write = |name: &str, u: f32| {
+        let mut bytes = b"PIEH".to_vec();
+        bytes.extend([width, height].iter().flat_map(|side| side.to_le_bytes()));
+        for _ in 0..width * height {
+            bytes.extend([u, 0.0].iter().flat_map(|v| v.to_le_bytes()));
+        }
+        place.write(&format!("flow/{name}.flo"), bytes);
+    };
+    write("0000-0001", 1.0);
+    write("0001-0000", -1.0);
+    let eval = ["eval", "--frames", "2", "--flow", "flow", "--json"];
+    let found = place.json(&eval);
+    assert_eq!(found["path"]["flow"], "files");
+    let score = of(&found["path"]["consistency"], "native");
+    let geometric = place.json(&["eval", "--frames", "2", "--json"]);
+    let own = number(&of(&geometric["path"]["consistency"], "native")["rms"]);
+    assert!((number(&score["rms"]) - own).abs() > 1e-6, "{score}");
+    // Nothing is visible where there and back do not meet.
+    write("0001-0000", 1.0);
+    let found = place.json(&eval);
+    let score = of(&found["path"]["consistency"], "native");
+    assert_eq!(
+        (&score["values"], &score["error"]),
+        (&0.into(), &Value::Null)
+    );
+
+    fs::remove_file(place.path("flow/0001-0000.flo")).expect("a file");
+    let error = fails(&place, &eval, 1);
+    assert!(
+        error.contains("0001-0000.flo") && error.contains("--flow"),
+        "{error}"
+    );
+    place.write("flow/0001-0000.flo", "no flow");
+    assert!(fails(&place, &eval, 1).contains("no .flo file"));
+}
+
+#[test]
+fn a_perceptual_distance_by_a_network_of_ones_own() {
+    let place = place_with_run();
+    let with = |name: &str| {
+        let network = onnx(name);
+        place.json(&["eval", "--frames", "2", "--lpips", &network, "--json"])
+    };
+    let found = with("perceptual.onnx");
+    // That network's distance is the mean squared error of values in [-1, 1].
+    for view in found["views"].as_array().expect("views") {
+        for score in [&view["luma"], of(&view["pictures"], "exported")] {
+            let want = 4.0 * 10_f64.powf(-number(&score["psnr"]) / 10.0);
+            assert!(
+                (number(&score["lpips"]) / want - 1.0).abs() < 1e-3,
+                "{score}"
+            );
+        }
+    }
+    // A smaller picture loses detail, and errors with it.
+    let small = number(&with("perceptual_small.onnx")["luma"]["lpips"]);
+    assert!(
+        small > 0.0 && small < number(&found["luma"]["lpips"]),
+        "{small}"
+    );
+    for (name, part) in [
+        ("ddcolor_tiny.onnx", "two inputs"),
+        ("truncated.onnx", "not a usable ONNX model"),
+        ("missing.onnx", "no such file"),
+    ] {
+        let error = fails(
+            &place,
+            &["eval", "--frames", "2", "--lpips", &onnx(name)],
+            1,
+        );
+        assert!(error.contains(name) && error.contains(part), "{error}");
+    }
+}
+
+/// The one line of error of a run that fails with this code.
+fn fails(place: &Place, arguments: &[&str], code: i32) -> String {
+    let done = place.run(arguments);
+    assert_eq!(done.code, Some(code), "{arguments:?}: {}", done.stderr);
+    done.stderr
+}
+
+#[test]
+fn what_cannot_be_measured_is_said_with_the_remedy() {
+    let place = place_with_run();
+    let eval = ["eval", "--frames", "2"];
+    for wrong in [
+        &["eval", "--frames", "1"][..],
+        &["eval", "--frames", "many"],
+        &["eval", "--baselines"],
+    ] {
+        fails(&place, wrong, 2);
+    }
+    // A folder that is no page is not replaced.
+    place.write("runs/scene/eval/notes.txt", "mine");
+    let error = fails(&place, &eval, 1);
+    assert!(error.contains("in the way"), "{error}");
+    fs::remove_dir_all(place.path("runs/scene/eval")).expect("a folder");
+
+    let chroma = place.read("runs/scene/chroma.npy");
+    place.write("runs/scene/chroma.npy", &chroma[..chroma.len() - 4]);
+    let error = fails(&place, &eval, 1);
+    assert!(
+        error.contains("chroma.npy") && error.contains("colorize"),
+        "{error}"
+    );
+    // Without it the exported file is measured alone.
+    fs::remove_file(place.path("runs/scene/chroma.npy")).expect("a file");
+    let done = place.run(&[&eval[..], &["--json"]].concat());
+    assert!(done.stderr.contains("chroma.npy"), "{}", done.stderr);
+    let found: Value = serde_json::from_str(&done.stdout).expect("JSON");
+    assert_eq!(found["bake"], Value::Null);
+    of(&found["pictures"], "exported");
+
+    // Colours of other Gaussians, then none.
+    place.write("runs/scene/color.ply", place.read("runs/scene/luma.ply"));
+    assert!(
+        place.run(&eval).code == Some(0),
+        "the same Gaussians in gray"
+    );
+    place.succeed(&[
+        "fit",
+        "scene",
+        "-o",
+        "other/run",
+        "--preset",
+        "draft",
+        "--iterations",
+        "3",
+    ]);
+    place.write("runs/scene/color.ply", place.read("other/run/luma.ply"));
+    let error = fails(&place, &eval, 1);
+    assert!(error.contains("luma.ply"), "{error}");
+    fs::remove_file(place.path("runs/scene/color.ply")).expect("a file");
+    let error = fails(&place, &eval, 1);
+    assert!(error.contains("not coloured yet"), "{error}");
+    // Nothing of a failure stays behind.
+    let files = place.files("runs/scene");
+    assert!(
+        !files.iter().any(|name| name.contains(".eval-")),
+        "{files:?}"
+    );
+}
+
+#[test]
+fn gray_photos_have_no_colours_to_compare() {
+    let place = place_with_run();
+    for index in 0..scene::VIEWS {
+        let path = place.path("scene/images").join(scene::name(index));
+        image::open(&path)
+            .expect("a photo")
+            .into_luma8()
+            .save(path)
+            .expect("writable");
+    }
+    let found = evaluated(&place, &[]);
+    let exported = of(&found["pictures"], "exported");
+    for key in ["psnr", "ssim", "delta_e", "ab_error", "lpips"] {
+        assert_eq!(exported[key], Value::Null, "{key}");
+    }
+    assert!(number(&exported["colorfulness"]) > 0.0);
+    assert!(number(&found["bake"]["mean"]) > 0.0);
+    let between = found["between"]["consistency"].as_array().expect("a list");
+    assert!(between.iter().all(|score| score["method"] != "photo"));
+}
+
+#[test]
+fn a_single_photo_is_measured_on_itself() {
+    let place = Place::new();
+    scene::write_moved(&place.path("scene"), [0.0; 3]);
+    let images = String::from_utf8(place.read("scene/sparse/images.txt")).expect("text");
+    let first: String = images.split_inclusive('\n').take(2).collect();
+    place.write("scene/sparse/images.txt", first);
+    place.succeed(&QUICK_FIT);
+    place.succeed(&["colorize", "--teacher", "scene/images", "--until", "5"]);
+    let found = evaluated(&place, &["--teacher", "scene/images"]);
+    assert_eq!(found["measured_on"], "train");
+    assert_eq!(found["views"].as_array().expect("views").len(), 1);
+    assert_eq!(found["between"]["consistency"], serde_json::json!([]));
+    // The path stands still, and so do its colours.
+    let score = of(&found["path"]["consistency"], "native");
+    assert!(number(&score["rms"]) < 1e-3, "{score}");
+    let words = place.succeed(&["eval", "--frames", "2"]);
+    assert!(
+        words.contains("One training view against its photo"),
+        "{words}"
+    );
+}
