@@ -59,7 +59,13 @@ fn compile(out: &str, kernel: &str, suffix: &str, features: &[&str]) {
     let mut compiler = Wesl::new("shaders");
     compiler.keep_all_entrypoints();
     for feature in [
-        "luma", "chroma", "rgb", "geometry", "step", "add", "curvature",
+        "luma",
+        "chroma",
+        "rgb",
+        "geometry",
+        "step",
+        "add",
+        "curvature",
     ] {
         compiler.set_feature(feature, features.contains(&feature));
     }

@@ -9,9 +9,7 @@
 //! the same views, wanted a/b and scales; the loss of each stage on the way is measured
 //! by the same code, its time left out. `tools/plot_solvers.py` draws the CSV.
 
-use std::{
-    fmt::Write, fs, path::Path, path::PathBuf, process::ExitCode, sync::Arc, time::Instant,
-};
+use std::{fmt::Write, fs, path::Path, path::PathBuf, process::ExitCode, sync::Arc, time::Instant};
 
 use gs_chroma::{
     capture::{Capture, Photo, split},
@@ -43,14 +41,16 @@ struct Problem {
 }
 
 fn load(run: &Path, teacher: &Path) -> Fallible<Problem> {
-    let report: serde_json::Value =
-        serde_json::from_slice(&fs::read(run.join("report.json"))?)?;
+    let report: serde_json::Value = serde_json::from_slice(&fs::read(run.join("report.json"))?)?;
     let noted = &report["capture"];
     let colmap = PathBuf::from(noted["path"].as_str().ok_or("report.json has no path")?);
     let max_side = noted["max_side"].as_u64().map(|side| side as u32);
     let capture = Capture::load(&colmap)?;
     let mut teacher = Teacher::open(teacher, Some(&run.join("teacher")))?;
-    let split = split(capture.views.len(), noted["holdout"].as_bool().unwrap_or(true));
+    let split = split(
+        capture.views.len(),
+        noted["holdout"].as_bool().unwrap_or(true),
+    );
     let mut views = Vec::new();
     for &i in &split.train {
         let (photo, camera) = Photo::load(&capture.views[i], max_side)?;
@@ -172,7 +172,10 @@ fn main() -> ExitCode {
         match argument.as_str() {
             "--csv" => csv = arguments.next(),
             "--iterations" => {
-                iterations = arguments.next().and_then(|n| n.parse().ok()).unwrap_or(15_000);
+                iterations = arguments
+                    .next()
+                    .and_then(|n| n.parse().ok())
+                    .unwrap_or(15_000);
             }
             _ => places.push(PathBuf::from(argument)),
         }

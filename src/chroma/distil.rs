@@ -55,8 +55,7 @@ pub fn distil(
 ) -> Result<Distilled, GpuError> {
     match settings.solver {
         SolverKind::Adam => {
-            let mut adam =
-                Distiller::new(raster.clone(), settings.clone(), extent, splats, views)?;
+            let mut adam = Distiller::new(raster.clone(), settings.clone(), extent, splats, views)?;
             adam.run(observe)?;
             Ok(Distilled {
                 chroma: adam.chroma()?,

@@ -114,7 +114,10 @@ mod tests {
         let mut field = chroma(&values);
         fill_unseen(&luma, &mut field, &seen);
         for c in field.coefficients.chunks_exact(2) {
-            assert!((c[0] - 30.0).abs() < 1e-3 && (c[1] + 20.0).abs() < 1e-3, "{c:?}");
+            assert!(
+                (c[0] - 30.0).abs() < 1e-3 && (c[1] + 20.0).abs() < 1e-3,
+                "{c:?}"
+            );
         }
     }
 

@@ -121,7 +121,9 @@ impl Solver {
             .map(|view| {
                 let (camera, wanted) = (&view.camera, &view.wanted);
                 assert_eq!([wanted.width, wanted.height], [camera.width, camera.height]);
-                (0..scales).map(|scale| view.at_scale(scale as u32)).collect()
+                (0..scales)
+                    .map(|scale| view.at_scale(scale as u32))
+                    .collect()
             })
             .collect();
         let uniform = |view: &ChromaView| ViewUniform::new(&view.camera, near, geometry.count, 0);

@@ -55,7 +55,12 @@ impl Pass {
     ) -> Result<Self, GpuError> {
         let gpu = &raster.gpu;
         let geometry = &shared.geometry;
-        let view = ViewUniform::new(&wanted.camera, shared.near, geometry.count, shared.field.degree);
+        let view = ViewUniform::new(
+            &wanted.camera,
+            shared.near,
+            geometry.count,
+            shared.field.degree,
+        );
         let (pixels, tiles) = (view.pixel_count(), view.tile_count());
         let lists = exact_lists(raster, geometry, &view)?;
         let layer = Layer::new(raster, geometry, &lists, &shared.field, pixels, tiles)?;

@@ -118,7 +118,10 @@ impl Rows {
     ///
     /// # Errors
     /// [`GpuError::TooLarge`].
-    #[allow(clippy::too_many_arguments, reason = "one for each thing it is made of")]
+    #[allow(
+        clippy::too_many_arguments,
+        reason = "one for each thing it is made of"
+    )]
     pub fn new(
         raster: &Raster,
         shared: &Shared,
@@ -138,8 +141,11 @@ impl Rows {
             |field: &Field| Layer::on(raster, geometry, &lists, field, canvas.clone(), tiles);
         let (chroma, direction) = (layer(&shared.field), layer(&shared.direction));
         let wanted = Buffer::from_slice(gpu, "wanted a/b", &view.wanted.ab)?;
-        let pixel_weights =
-            Buffer::from_slice(gpu, "pixel weights", view.weights.as_deref().unwrap_or(&[0.0]))?;
+        let pixel_weights = Buffer::from_slice(
+            gpu,
+            "pixel weights",
+            view.weights.as_deref().unwrap_or(&[0.0]),
+        )?;
         let curvatures = Buffer::<f32>::zeros(gpu, "curvatures", 2 * uniform.pixel_count())?;
         let loss_weights = ChromaLossWeights {
             coarser_size: coarser.map_or([1, 1], |rows| rows.view.size),

@@ -39,13 +39,7 @@ impl ChromaView {
                 width,
                 height,
                 ab: (known.iter())
-                    .map(|&[a, b, w]| {
-                        if w > 0.0 {
-                            [a / w, b / w]
-                        } else {
-                            [0.0; 2]
-                        }
-                    })
+                    .map(|&[a, b, w]| if w > 0.0 { [a / w, b / w] } else { [0.0; 2] })
                     .collect(),
             },
             weights: Some(known.iter().map(|&[_, _, w]| w).collect()),

@@ -129,25 +129,32 @@ pub fn colorize(
         .collect();
     let colored_views = views.len();
     let (mut log, mut loss, mut peak_device_memory) = (String::new(), 0.0, None);
-    let found = distil(&raster, &settings, scene.extent, &luma, views, &mut |progress| {
-        // Writing to a string cannot fail.
-        let _ = writeln!(
-            log,
-            "{},{:.6},{},{:.3},",
-            report.luma.iterations + progress.iteration,
-            progress.loss,
-            luma.len(),
-            progress.seconds
-        );
-        observe(Event::Progress {
-            stage: Stage::Chroma,
-            done: progress.iteration,
-            total: iterations,
-            message: format!("loss {:.3}", progress.loss),
-        });
-        loss = progress.loss;
-        peak_device_memory = peak_device_memory.max(gpu.allocated_bytes());
-    })?;
+    let found = distil(
+        &raster,
+        &settings,
+        scene.extent,
+        &luma,
+        views,
+        &mut |progress| {
+            // Writing to a string cannot fail.
+            let _ = writeln!(
+                log,
+                "{},{:.6},{},{:.3},",
+                report.luma.iterations + progress.iteration,
+                progress.loss,
+                luma.len(),
+                progress.seconds
+            );
+            observe(Event::Progress {
+                stage: Stage::Chroma,
+                done: progress.iteration,
+                total: iterations,
+                message: format!("loss {:.3}", progress.loss),
+            });
+            loss = progress.loss;
+            peak_device_memory = peak_device_memory.max(gpu.allocated_bytes());
+        },
+    )?;
     let chroma = found.chroma;
     let timings = (options.timings)
         .then(|| Ok::<_, RunError>(kernel_reports(&gpu.timings()?, &found.load)))

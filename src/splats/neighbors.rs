@@ -147,7 +147,11 @@ impl Search {
         stack.push((0, 0.0));
         while let Some((index, lower_bound)) = stack.pop() {
             // The radius shrinks once k neighbours are known.
-            if nearest.len() == k && nearest.last().is_none_or(|&(worst, _)| lower_bound >= worst) {
+            if nearest.len() == k
+                && nearest
+                    .last()
+                    .is_none_or(|&(worst, _)| lower_bound >= worst)
+            {
                 continue;
             }
             let node = &tree.bvh.nodes[index as usize];
@@ -377,7 +381,10 @@ mod tests {
         let expected: [&[u32]; 7] = [&[1, 3], &[0, 3], &[1, 3], &[0, 1], &[], &[0, 1], &[0, 3]];
         assert_eq!(found, expected);
         assert!(nearest_neighbors(&[], 2).is_empty());
-        assert_eq!(nearest_neighbors(&[[1.0; 3]; 3], 2), vec![Vec::<u32>::new(); 3]);
+        assert_eq!(
+            nearest_neighbors(&[[1.0; 3]; 3], 2),
+            vec![Vec::<u32>::new(); 3]
+        );
     }
 
     #[test]

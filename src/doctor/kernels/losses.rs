@@ -217,7 +217,15 @@ pub fn chroma_loss_on(
         let (view, weights) = (view.raw(), weights.raw());
         let (pixels, corrections) = (pixel_weights.raw(), corrections.raw());
         let buffers = [
-            view, image, wanted, coarser, weights, losses, gradient, pixels, corrections,
+            view,
+            image,
+            wanted,
+            coarser,
+            weights,
+            losses,
+            gradient,
+            pixels,
+            corrections,
         ];
         recorder.dispatch(&kernel, &kernel.bind(gpu, &buffers), groups);
     })?;
