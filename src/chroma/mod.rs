@@ -1,8 +1,9 @@
 //! Stage 2: colour, distilled from a teacher into frozen geometry.
 
-mod bake;
+mod bake_rgb;
 mod conjugate;
 mod correction;
+mod degree;
 mod distil;
 mod distill;
 mod fill;
@@ -16,15 +17,16 @@ mod settings;
 pub mod teacher;
 mod view;
 
-pub use bake::bake_rgb;
+pub use bake_rgb::bake_rgb;
 pub use conjugate::{Conjugate, ConjugateParameters, System};
 pub use correction::{CorrectionParameters, Corrections};
+pub use degree::{ChosenDegree, choose_degree};
 pub use distil::{Distilled, SolverKind, distil};
 pub use distill::{ChromaProgress, Distiller};
 pub use fill::fill_unseen;
 pub use irls::Solver;
 pub use loss::{ChromaLossWeights, Correction};
 pub use picture::native_rgb;
-pub use rgb::{RgbView, fit_rgb, refine_bake};
+pub use rgb::{RgbView, bake, fit_rgb};
 pub use settings::ChromaSettings;
 pub use view::ChromaView;

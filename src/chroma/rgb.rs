@@ -3,16 +3,19 @@
 
 use std::sync::Arc;
 
-use super::{ChromaSettings, ChromaView, Solver, teacher::AbImage};
+use super::{ChromaSettings, ChromaView, Solver, bake_rgb, native_rgb, teacher::AbImage};
 use crate::{
     capture::Camera,
     gpu::GpuError,
-    raster::Raster,
+    raster::{Field, Geometry, Raster, Renderer, constants::NEAR_SHARE},
     splats::{ShField, Splats, sh},
 };
 
 /// The solver's loss is made for CIELAB units, 100 of which span black to white.
 const UNITS: f32 = 100.0;
+
+/// Views that the bake is measured against at most; more of one scene say little new.
+const BAKE_VIEWS: usize = 32;
 
 /// A view and the colours wanted in its picture.
 #[derive(Clone, Debug)]
@@ -46,19 +49,52 @@ pub fn fit_rgb(
     Ok(field)
 }
 
-/// Moves the constant harmonics of `baked` so that its pictures lose `views`' wanted
-/// differences: native picture minus what `baked` shows.
+/// RGB Gaussians that look like `luma` with `chroma`: each Gaussian by itself first
+/// ([`bake_rgb`]), then their constant harmonics moved together so that the exported
+/// pictures of `cameras` come close to the native ones.
 ///
 /// # Errors
 /// [`GpuError`] when it does not fit or the device is lost.
-pub fn refine_bake(
+pub fn bake(
     raster: &Arc<Raster>,
-    settings: &ChromaSettings,
     extent: f64,
-    baked: &mut Splats,
-    views: &[RgbView],
-) -> Result<(), GpuError> {
-    let moved = solve(raster, settings, extent, baked, views)?;
+    luma: &Splats,
+    chroma: &ShField,
+    cameras: &[Camera],
+) -> Result<Splats, GpuError> {
+    let mut baked = bake_rgb(luma, chroma);
+    let gpu = &raster.gpu;
+    let fields = [&luma.sh, chroma, &baked.sh];
+    let fields = fields.map(|field| Field::upload(gpu, field));
+    let mut renderer = Renderer::new(
+        raster.clone(),
+        Geometry::upload(gpu, luma)?,
+        fields.into_iter().collect::<Result<_, _>>()?,
+        NEAR_SHARE * extent,
+    )?;
+    let step = cameras.len().div_ceil(BAKE_VIEWS).max(1);
+    let mut views = Vec::new();
+    for camera in cameras.iter().step_by(step) {
+        let pictures = renderer.render(camera)?;
+        let native = native_rgb(&pictures[0], &pictures[1]);
+        let shown = pictures[2].pixels.chunks_exact(3);
+        let missing = |(native, shown): (&[f32; 3], &[f32])| {
+            // Viewers clip what they show: nothing is missing beyond white.
+            [0, 1, 2].map(|c| native[c] - shown[c].clamp(0.0, 1.0))
+        };
+        views.push(RgbView {
+            camera: camera.clone(),
+            wanted: native.iter().zip(shown).map(missing).collect(),
+        });
+    }
+    drop(renderer);
+    let settings = ChromaSettings {
+        warm_scales: 1,
+        rounds: 2,
+        steps: 4,
+        ..ChromaSettings::exact()
+    };
+    let moved = solve(raster, &settings, extent, luma, &views)?;
     let stride = 3 * sh::coefficient_count(baked.sh.degree);
     let of_splat = baked.sh.coefficients.chunks_exact_mut(stride);
     for (out, by) in of_splat.zip(moved.coefficients.chunks_exact(3)) {
@@ -66,7 +102,7 @@ pub fn refine_bake(
             out[channel] += by[channel];
         }
     }
-    Ok(())
+    Ok(baked)
 }
 
 /// The field whose blend is wanted, without the offset of mid-gray.

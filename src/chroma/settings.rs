@@ -51,6 +51,8 @@ impl ChromaSettings {
             coarser_scales: 2,
             iterations,
             robust: None,
+            corrects_views: false,
+            fills: false,
             ..Self::irls()
         }
     }
@@ -85,6 +87,14 @@ impl ChromaSettings {
             warm_rounds: 1,
             fills: false,
             ..Self::irls()
+        }
+    }
+
+    /// Iterations of Adam, or rounds of least squares on all scales.
+    pub fn steps_to_report(&self) -> usize {
+        match self.solver {
+            SolverKind::Adam => self.iterations,
+            SolverKind::Irls => self.warm_scales as usize * self.warm_rounds + self.rounds,
         }
     }
 

@@ -7,7 +7,7 @@ use clap::{Args, CommandFactory, ValueEnum, error::ErrorKind};
 use super::{Cli, print, progress::Progress};
 use crate::chroma::{SolverKind, teacher};
 use crate::report::timings_table;
-use crate::run::{ColorizeOptions, RunError, TeachOptions, colorize};
+use crate::run::{ChromaOptions, ColorizeOptions, Degree, RunError, TeachOptions, colorize};
 
 /// How a teacher's small picture becomes as large as the photo.
 #[derive(Clone, Copy, ValueEnum)]
@@ -50,15 +50,32 @@ pub struct Colorize {
     /// Coloured splat file to write [default: color.ply in the run folder].
     #[arg(short, long, value_name = "FILE.ply")]
     output: Option<PathBuf>,
-    /// Last iteration, counted from the start of `fit` [default: the preset's].
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
-    until: Option<u32>,
     /// How chroma is solved for.
     #[arg(long, value_enum, default_value_t = SolverKind::Irls)]
     solver: SolverKind,
-    /// Degree of the chroma's dependence on the direction of view.
-    #[arg(long, value_name = "0..3", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=3))]
-    sh_degree: u32,
+    /// Adam's last iteration, counted from the start of `fit` [default: the preset's].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    until: Option<u32>,
+    /// Rounds of least squares at full size [default: 4].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    rounds: Option<u32>,
+    /// Difference in CIELAB units from which on a view is not believed, or `off` [default: 10
+    /// with irls, off with adam].
+    #[arg(long, value_name = "UNITS|off", value_parser = robust)]
+    robust: Option<f32>,
+    /// Bring the views' teachers, who disagree in saturation and tint, into line [default: on with irls].
+    #[arg(long, value_enum, value_name = "on|off")]
+    correct_views: Option<Switch>,
+    /// Give Gaussians that no view sees well their neighbours' colour [default: on with irls].
+    #[arg(long, value_enum, value_name = "on|off")]
+    fill: Option<Switch>,
+    /// Coarser scales that count beside the full one [default: 0 with irls, 2 with adam].
+    #[arg(long, value_name = "0..4", value_parser = clap::value_parser!(u32).range(0..=4))]
+    scales: Option<u32>,
+    /// Degree of the chroma's dependence on the direction of view, or `auto`: what training views
+    /// that are held back prove useful.
+    #[arg(long, value_name = "0..3|auto", default_value = "0", value_parser = degree)]
+    sh_degree: Degree,
     /// COLMAP folder with the photos, when it is not where `fit` found it.
     #[arg(long, value_name = "COLMAP_DIR")]
     colmap: Option<PathBuf>,
@@ -68,6 +85,36 @@ pub struct Colorize {
     /// Print the report as JSON.
     #[arg(long)]
     json: bool,
+}
+
+/// A choice to be made either way, whatever the default is.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Switch {
+    On,
+    Off,
+}
+
+/// A residual; `off` is one that is never reached.
+fn robust(text: &str) -> Result<f32, String> {
+    let residual = match text {
+        "off" => Some(f32::INFINITY),
+        _ => text
+            .parse()
+            .ok()
+            .filter(|r: &f32| *r > 0.0 && r.is_finite()),
+    };
+    residual.ok_or_else(|| "must be a number above 0, or off".to_owned())
+}
+
+/// A degree of harmonics.
+fn degree(text: &str) -> Result<Degree, String> {
+    match text {
+        "auto" => Ok(Degree::Auto),
+        _ => match text.parse() {
+            Ok(degree @ 0..=3) => Ok(Degree::Fixed(degree)),
+            _ => Err("must be 0, 1, 2, 3 or auto".to_owned()),
+        },
+    }
 }
 
 /// A teacher's weight.
@@ -107,7 +154,27 @@ impl Colorize {
         teachers.iter().cloned().zip(weights).collect()
     }
 
+    /// Ends the program where an option belongs to the other solver.
+    fn check_solver(&self) {
+        let of_irls = [
+            ("--rounds", self.rounds.is_some()),
+            ("--correct-views", self.correct_views == Some(Switch::On)),
+            ("--fill", self.fill == Some(Switch::On)),
+        ];
+        let (options, other) = match self.solver {
+            SolverKind::Adam => (&of_irls[..], SolverKind::Irls),
+            SolverKind::Irls => (&[("--until", self.until.is_some())][..], SolverKind::Adam),
+        };
+        if let Some((option, _)) = options.iter().find(|(_, given)| *given) {
+            let message = format!("{option} needs --solver {}", other.name());
+            Cli::command()
+                .error(ErrorKind::ArgumentConflict, message)
+                .exit();
+        }
+    }
+
     pub(super) fn run(self) -> Result<(), RunError> {
+        self.check_solver();
         let mut progress = Progress::default();
         let options = ColorizeOptions {
             teach: TeachOptions {
@@ -126,8 +193,15 @@ impl Colorize {
             run: self.run,
             output: self.output,
             until: self.until.map(|n| n as usize),
-            solver: self.solver,
-            sh_degree: self.sh_degree,
+            chroma: ChromaOptions {
+                solver: self.solver,
+                sh_degree: self.sh_degree,
+                scales: self.scales,
+                rounds: self.rounds.map(|n| n as usize),
+                robust: self.robust,
+                correct_views: self.correct_views.map(|switch| switch == Switch::On),
+                fill: self.fill.map(|switch| switch == Switch::On),
+            },
             colmap: self.colmap,
             timings: self.timings,
         };

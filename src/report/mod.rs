@@ -164,12 +164,31 @@ pub struct ChromaReport {
     pub hints: usize,
     /// Training views that a teacher coloured or that have hints.
     pub colored_views: usize,
-    /// Iterations of this stage.
+    /// Who solved: `irls` or `adam`.
+    #[serde(default = "adam")]
+    pub solver: String,
+    /// Iterations of Adam, or rounds of least squares on all scales.
     pub iterations: usize,
-    /// Last iteration, counted from the start of stage 1.
+    /// The last of them, counted from the start of stage 1.
     pub until: usize,
+    /// Drawings of a view with their adjoints, those of coarser scales by their share of
+    /// the pixels.
+    #[serde(default)]
+    pub passes: f64,
     /// Degree of the chroma harmonics.
     pub sh_degree: u32,
+    /// Coarser scales that counted.
+    #[serde(default)]
+    pub coarser_scales: u32,
+    /// Residual, in CIELAB units, at which the loss levels off; `None`: plain L1.
+    #[serde(default)]
+    pub robust: Option<f32>,
+    /// Whether each view's teacher was brought into line with the others.
+    #[serde(default)]
+    pub corrects_views: bool,
+    /// Whether Gaussians that no view sees well took their neighbours' colour.
+    #[serde(default)]
+    pub fills: bool,
     /// Loss at the end, in CIELAB units.
     pub loss: f64,
     /// Wall seconds.
@@ -205,6 +224,11 @@ pub struct TeacherReport {
     /// What its answers count beside the other teachers'.
     #[serde(default = "whole")]
     pub weight: f32,
+}
+
+/// The solver of reports that do not name one.
+fn adam() -> String {
+    "adam".to_owned()
 }
 
 /// What a weight or strength is where nothing else is said.

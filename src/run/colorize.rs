@@ -8,15 +8,18 @@ use std::{
 };
 
 use super::{
-    Event, Observer, RunError, RunFolder, Stage, files,
+    Event, Observer, RunError, RunFolder, Stage,
+    chroma_options::{ChromaOptions, Degree},
+    files,
     fit::{capture_report, comments, open_gpu},
     preset::Preset,
     scene::{Scene, gray_to_rgb, read_splats, rgb_pixels, shown_rgb},
     teach::{Taught, TeachOptions, Teachers},
 };
 use crate::{
+    capture::Camera,
     chroma::{
-        ChromaSettings, ChromaView, SolverKind, bake_rgb, distil, native_rgb,
+        ChosenDegree, ChromaProgress, ChromaView, bake, choose_degree, distil, native_rgb,
         teacher::{AbImage, Upsample},
     },
     gpu::Gpu,
@@ -44,10 +47,8 @@ pub struct ColorizeOptions {
     pub output: Option<PathBuf>,
     /// Last iteration, counted from the start of stage 1; the preset's by default.
     pub until: Option<usize>,
-    /// Who solves.
-    pub solver: SolverKind,
-    /// Degree of the chroma harmonics.
-    pub sh_degree: u32,
+    /// How chroma is solved for.
+    pub chroma: ChromaOptions,
     /// COLMAP folder, where it is not the one that `fit` noted.
     pub colmap: Option<PathBuf>,
     /// Whether the report says where the device's time went.
@@ -90,7 +91,7 @@ pub fn colorize(
         (report.luma.splats, report.luma.sh_degree) = (luma.len(), luma.sh.degree);
     }
     let preset = source.preset(&report, &gpu);
-    let iterations = chroma_iterations(options, preset, report.luma.iterations)?;
+    let iterations = adam_iterations(options, preset, report.luma.iterations)?;
     let output = Output {
         ply: options
             .output
@@ -106,14 +107,6 @@ pub fn colorize(
 
     let begun = Instant::now();
     let raster = Arc::new(Raster::new(&gpu));
-    let settings = ChromaSettings {
-        sh_degree: options.sh_degree,
-        seed: report.seed,
-        ..match options.solver {
-            SolverKind::Irls => ChromaSettings::irls(),
-            SolverKind::Adam => ChromaSettings::adam(iterations),
-        }
-    };
     let views: Vec<ChromaView> = scene
         .split
         .train
@@ -128,33 +121,38 @@ pub fn colorize(
         })
         .collect();
     let colored_views = views.len();
-    let (mut log, mut loss, mut peak_device_memory) = (String::new(), 0.0, None);
-    let found = distil(
-        &raster,
-        &settings,
-        scene.extent,
-        &luma,
-        views,
-        &mut |progress| {
-            // Writing to a string cannot fail.
-            let _ = writeln!(
-                log,
-                "{},{:.6},{},{:.3},",
-                report.luma.iterations + progress.iteration,
-                progress.loss,
-                luma.len(),
-                progress.seconds
-            );
-            observe(Event::Progress {
-                stage: Stage::Chroma,
-                done: progress.iteration,
-                total: iterations,
-                message: format!("loss {:.3}", progress.loss),
-            });
-            loss = progress.loss;
-            peak_device_memory = peak_device_memory.max(gpu.allocated_bytes());
-        },
-    )?;
+    let degree = match options.chroma.sh_degree {
+        Degree::Fixed(degree) => degree,
+        Degree::Auto => {
+            let settings = options.chroma.settings(iterations, 0, report.seed);
+            let chosen = choose_degree(&raster, &settings, scene.extent, &luma, &views)?;
+            observe(Event::Note(describe(&chosen)));
+            chosen.degree
+        }
+    };
+    let settings = options.chroma.settings(iterations, degree, report.seed);
+    let (mut log, mut last, mut peak_device_memory) = (String::new(), None, None);
+    let total = settings.steps_to_report();
+    let told = &mut |progress: ChromaProgress| {
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            log,
+            "{},{:.6},{},{:.3},",
+            report.luma.iterations + progress.iteration,
+            progress.loss,
+            luma.len(),
+            progress.seconds
+        );
+        observe(Event::Progress {
+            stage: Stage::Chroma,
+            done: progress.iteration,
+            total,
+            message: format!("loss {:.3}", progress.loss),
+        });
+        last = Some(progress);
+        peak_device_memory = peak_device_memory.max(gpu.allocated_bytes());
+    };
+    let found = distil(&raster, &settings, scene.extent, &luma, views, told)?;
     let chroma = found.chroma;
     let timings = (options.timings)
         .then(|| Ok::<_, RunError>(kernel_reports(&gpu.timings()?, &found.load)))
@@ -162,7 +160,10 @@ pub fn colorize(
     let seconds_distill = begun.elapsed().as_secs_f64();
 
     let begun = Instant::now();
-    let baked = bake_rgb(&luma, &chroma);
+    let cameras: Vec<Camera> = (scene.split.train.iter())
+        .map(|&i| scene.photos[i].1.clone())
+        .collect();
+    let baked = bake(&raster, scene.extent, &luma, &chroma, &cameras)?;
     let measured = Measured::of(&raster, &scene, &luma, &chroma, &baked, &lesson.views)?;
     report.chroma = Some(ChromaReport {
         teacher: match &teachers.describe()[..] {
@@ -183,10 +184,16 @@ pub fn colorize(
             .filter(|&&i| lesson.hinted[i])
             .count(),
         colored_views,
-        iterations,
-        until: report.luma.iterations + iterations,
-        sh_degree: options.sh_degree,
-        loss,
+        solver: settings.solver.name().to_owned(),
+        iterations: total,
+        until: report.luma.iterations + total,
+        passes: last.map_or(0.0, |progress| progress.passes),
+        sh_degree: degree,
+        coarser_scales: settings.coarser_scales,
+        robust: settings.robust,
+        corrects_views: settings.corrects_views,
+        fills: settings.fills,
+        loss: last.map_or(0.0, |progress| progress.loss),
         seconds: ChromaSeconds {
             teacher: seconds_teacher,
             distill: seconds_distill,
@@ -210,6 +217,19 @@ pub fn colorize(
         folder.write_report(&report)?;
     }
     Ok((output, report))
+}
+
+/// What the views held back say about the degree.
+fn describe(chosen: &ChosenDegree) -> String {
+    let losses: Vec<String> = (0..)
+        .zip(&chosen.losses)
+        .map(|(degree, loss)| format!("{degree}: {loss:.3}"))
+        .collect();
+    format!(
+        "chroma harmonics of degree {}, for views held back lose {}",
+        chosen.degree,
+        losses.join(", ")
+    )
 }
 
 /// Where the gray Gaussians come from.
@@ -333,7 +353,7 @@ impl Source {
     }
 }
 
-fn chroma_iterations(
+fn adam_iterations(
     options: &ColorizeOptions,
     preset: Preset,
     luma: usize,

@@ -1,5 +1,6 @@
 //! Whole runs: what a command does from its options to its files.
 
+mod chroma_options;
 mod colorize;
 mod eval;
 mod files;
@@ -13,6 +14,7 @@ mod teach;
 
 use std::{fmt, path::PathBuf};
 
+pub use chroma_options::{ChromaOptions, Degree};
 pub use colorize::{ColorizeOptions, Output, colorize};
 pub use eval::{EvalOptions, eval};
 pub use fit::{FitOptions, fit};

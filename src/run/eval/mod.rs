@@ -82,7 +82,12 @@ pub fn eval(
         None => None,
     };
     let raster = Arc::new(Raster::new(&open_gpu(false)?));
-    let rgb = [(Method::Exported, &subject.exported)];
+    let splats = match &teacher {
+        Some(teacher) if options.baselines => Some(teacher.rgb_splats(&raster, &subject, observe)?),
+        _ => None,
+    };
+    let mut rgb = vec![(Method::Exported, &subject.exported)];
+    rgb.extend(splats.as_ref().map(|field| (Method::RgbSplats, field)));
     let mut painter = Painter::new(&raster, &subject, &rgb, teacher.as_mut())?;
 
     let mut views = Vec::new();

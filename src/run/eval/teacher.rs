@@ -1,17 +1,28 @@
 //! The teacher as one to be measured: its own pictures, and what it makes of the gray
 //! scene frame by frame.
 
-use std::path::Path;
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
-use super::subject::Subject;
+use super::{
+    drawing::{gray_picture, to_picture},
+    subject::Subject,
+};
 use crate::{
-    chroma::teacher::{AbImage, GrayImage, Teacher, TeacherSettings},
-    raster::Picture,
+    chroma::{
+        ChromaSettings, RgbView, fit_rgb, native_rgb,
+        teacher::{AbImage, GrayImage, Teacher, TeacherSettings},
+    },
+    raster::{Picture, Raster},
     run::{Event, Observer, RunError, Stage},
+    splats::{ShField, sh},
 };
 
 /// A teacher and its answers for the photos.
 pub(super) struct EvalTeacher {
+    path: PathBuf,
     /// Name, kind and identity.
     pub info: serde_json::Value,
     /// The answer for each view, `None` where there is none.
@@ -75,10 +86,59 @@ impl EvalTeacher {
             None
         };
         Ok(Self {
+            path: path.to_owned(),
             info: serde_json::to_value(info).unwrap_or_default(),
             answers,
             frames,
         })
+    }
+
+    /// RGB splats on the run's geometry, fitted to the teacher's pictures of the training
+    /// views: harmonics of degree 3 as splat trainers have, with the rounds and steps
+    /// that `colorize` takes by default.
+    pub fn rgb_splats(
+        &self,
+        raster: &Arc<Raster>,
+        subject: &Subject,
+        observe: &mut Observer<'_>,
+    ) -> Result<ShField, RunError> {
+        let scene = &subject.scene;
+        let (done, total) = (0, 1);
+        let message = "RGB splats to compare with".to_owned();
+        observe(Event::Progress {
+            stage: Stage::Chroma,
+            done,
+            total,
+            message,
+        });
+        let views: Vec<RgbView> = (scene.split.train.iter())
+            .filter_map(|&i| {
+                let (photo, camera) = &scene.photos[i];
+                let wanted =
+                    native_rgb(&gray_picture(photo), &to_picture(self.answers[i].as_ref()?));
+                Some(RgbView {
+                    camera: camera.clone(),
+                    wanted,
+                })
+            })
+            .collect();
+        if views.is_empty() {
+            return Err(RunError::TeacherCoversNothing {
+                teacher: self.path.clone(),
+                example: scene.capture.views[scene.split.train[0]].name.clone(),
+            });
+        }
+        let settings = ChromaSettings {
+            sh_degree: sh::MAX_DEGREE,
+            ..ChromaSettings::exact()
+        };
+        Ok(fit_rgb(
+            raster,
+            &settings,
+            scene.extent,
+            &subject.luma,
+            &views,
+        )?)
     }
 
     /// What the teacher makes of a drawn gray picture; `None` without that baseline.
