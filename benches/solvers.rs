@@ -181,8 +181,9 @@ fn main() -> ExitCode {
         }
     }
     let [run, teacher] = &places[..] else {
-        eprintln!("usage: cargo bench --bench solvers -- RUN TEACHER [--csv F] [--iterations N]");
-        return ExitCode::from(2);
+        // A plain `cargo bench` comes here too.
+        println!("solvers: no RUN and TEACHER named: skipped");
+        return ExitCode::SUCCESS;
     };
     let result = load(run, teacher).and_then(|problem| compare(&problem, iterations));
     match result {

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import shlex
 import subprocess
 import sys
 import time
@@ -38,7 +39,7 @@ def main() -> int:
     parser.add_argument("--data", type=Path, default=Path("../shared/data"))
     parser.add_argument("--program", default="target/release/gs-chroma")
     parser.add_argument("--iterations", type=int, default=1000)
-    parser.add_argument("--until", type=int, default=1300)
+    parser.add_argument("--colorize", default="", help="more flags for colorize, as one word")
     parser.add_argument("--scenes", nargs="*", default=[name for name, _, _ in SCENES])
     arguments = parser.parse_args()
     print("| scene | side | Gaussians | fit | PSNR | SSIM | colour | ΔE00 | colourfulness / teacher | bake ΔE00 mean, 95 % | memory |")
@@ -58,7 +59,7 @@ def main() -> int:
         )
         report, color_seconds = run(
             [arguments.program, "colorize", str(out), "--teacher", str(folder / "images")]
-            + ["--until", str(arguments.until), "--json"]
+            + [*shlex.split(arguments.colorize), "--json"]
         )
         luma, chroma = report["luma"], report["chroma"]
         held_out, pictures, bake = luma["held_out"], chroma["pictures"], chroma["bake"]

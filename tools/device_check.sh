@@ -72,11 +72,13 @@ else
         --max-side "$side" --timings --json
 fi
 
-# As many iterations again, like the paper.
+# Both solvers; Adam with as many iterations again, like the paper.
 if [ ! -f "$out/run/luma.ply" ]; then skip colorize "nothing was fitted"
 else
-    step colorize.json "$program" colorize "$out/run" --teacher "$scene/images" \
-        --until $((2 * iterations)) --timings --json
+    step colorize-adam.json "$program" colorize "$out/run" --teacher "$scene/images" \
+        --solver adam --until $((2 * iterations)) --timings --json
+    step colorize.json "$program" colorize "$out/run" --teacher "$scene/images" --timings --json
+    step eval.json "$program" eval "$out/run" --teacher "$scene/images" --baselines --json
 fi
 
 peers=()

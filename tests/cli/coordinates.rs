@@ -66,7 +66,9 @@ fn exported_files_come_back_to_their_photos() {
     }
 
     let teacher = onnx("ddcolor_tiny.onnx");
-    let colorize = ["colorize", "far.ply", "--colmap", "scene", "--until", "5"];
+    let colorize = [
+        "colorize", "far.ply", "--colmap", "scene", "--solver", "adam", "--until", "5",
+    ];
     place.succeed(&[&colorize[..], &["--teacher", &teacher]].concat());
     assert_near(middle(&place, "far-color.ply"), OFFSET);
 

@@ -166,7 +166,15 @@ fn the_page_shows_every_view_with_files_that_are_there() {
             .any(|name| name.contains("0099") || name.contains(".eval-")),
         "{files:?}"
     );
-    place.succeed(&["colorize", "--teacher", "scene/images", "--until", "62"]);
+    place.succeed(&[
+        "colorize",
+        "--teacher",
+        "scene/images",
+        "--solver",
+        "adam",
+        "--until",
+        "62",
+    ]);
     let files = place.files("runs/scene");
     assert!(
         !files.iter().any(|name| name.starts_with("eval")),
@@ -352,7 +360,15 @@ fn a_single_photo_is_measured_on_itself() {
     let first: String = images.split_inclusive('\n').take(2).collect();
     place.write("scene/sparse/images.txt", first);
     place.succeed(&QUICK_FIT);
-    place.succeed(&["colorize", "--teacher", "scene/images", "--until", "5"]);
+    place.succeed(&[
+        "colorize",
+        "--teacher",
+        "scene/images",
+        "--solver",
+        "adam",
+        "--until",
+        "5",
+    ]);
     let found = evaluated(&place, &["--teacher", "scene/images"]);
     assert_eq!(found["measured_on"], "train");
     assert_eq!(found["views"].as_array().expect("views").len(), 1);

@@ -16,6 +16,7 @@ mod program;
 mod repeat;
 mod scene;
 mod shared;
+mod solver;
 mod splat_file;
 mod teach;
 mod teach_together;

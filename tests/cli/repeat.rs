@@ -8,7 +8,16 @@ fn outcome(place: &Place, run: &str, fit: &[&str], until: &str, seed: &str) -> [
     let common = ["fit", "-o", run, "--preset", "draft", "--seed", seed];
     place.succeed(&[&common[..], fit].concat());
     let teacher = onnx("ddcolor_tiny.onnx");
-    place.succeed(&["colorize", run, "--teacher", &teacher, "--until", until]);
+    place.succeed(&[
+        "colorize",
+        run,
+        "--teacher",
+        &teacher,
+        "--solver",
+        "adam",
+        "--until",
+        until,
+    ]);
     ["luma.ply", "color.ply"].map(|file| place.read(&format!("{run}/{file}")))
 }
 
@@ -67,7 +76,15 @@ fn colouring_again_gives_the_same_bytes() {
     let place = place_with_run();
     let teacher = onnx("ddcolor_tiny.onnx");
     let until = UNTIL.to_string();
-    let colorize = ["colorize", "--sh-degree", "1", "--until", &until];
+    let colorize = [
+        "colorize",
+        "--sh-degree",
+        "1",
+        "--solver",
+        "adam",
+        "--until",
+        &until,
+    ];
     place.succeed(&[&colorize[..], &["--teacher", &teacher, "-o", "again.ply"]].concat());
     assert!(place.read("again.ply") == place.read("runs/scene/color.ply"));
 }

@@ -40,7 +40,7 @@ pub fn place_with_run() -> Place {
         place.succeed(&[&fit[..], &["--iterations", &luma]].concat());
         let teacher = onnx("ddcolor_tiny.onnx");
         let colorize = ["colorize", "--sh-degree", "1", "--teacher", &teacher];
-        place.succeed(&[&colorize[..], &["--until", &until]].concat());
+        place.succeed(&[&colorize[..], &["--solver", "adam", "--until", &until]].concat());
         (files_below(&place.path("")), absolute(place.path("scene")))
     });
     let place = Place::new();

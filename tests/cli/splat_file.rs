@@ -140,7 +140,16 @@ fn each_degree_has_its_properties() {
     // The colours' degree may exceed the luminance's.
     place.succeed(&[&QUICK_FIT[..], &["--sh-degree", "0"]].concat());
     let teacher = onnx("ddcolor_tiny.onnx");
-    let colorize = ["colorize", "--until", "5", "--sh-degree", "3", "--teacher"];
+    let colorize = [
+        "colorize",
+        "--solver",
+        "adam",
+        "--until",
+        "5",
+        "--sh-degree",
+        "3",
+        "--teacher",
+    ];
     place.succeed(&[&colorize[..], &[&teacher]].concat());
     let file = SplatFile::read(&place, "runs/scene/color.ply");
     assert_eq!(file.header, expected_header(file.count(), 45));

@@ -22,6 +22,8 @@ fn with_painted(place: &Place) -> serde_json::Value {
         "colorize",
         "--teacher",
         "painted",
+        "--solver",
+        "adam",
         "--until",
         &until,
         "--json",
@@ -129,7 +131,15 @@ fn the_newest_run_is_taken() {
         file.set_modified(now - Duration::from_secs(age))
             .expect("a time");
     }
-    place.succeed(&["colorize", "--teacher", &network(), "--until", "62"]);
+    place.succeed(&[
+        "colorize",
+        "--teacher",
+        &network(),
+        "--solver",
+        "adam",
+        "--until",
+        "62",
+    ]);
     assert!(place.path("runs/newest/color.ply").exists());
     assert!(!place.path("runs/newer/color.ply").exists());
 }
@@ -144,6 +154,8 @@ fn an_own_output_leaves_the_runs_colours() {
         "colorize",
         "--teacher",
         &teacher,
+        "--solver",
+        "adam",
         "--until",
         "62",
         "-o",
@@ -169,7 +181,15 @@ fn a_network_is_asked_once_for_each_photo() {
         bytes[values..].fill(0);
         place.write(&path, bytes);
     }
-    let colorize = ["colorize", "--until", "62", "--json", "--teacher"];
+    let colorize = [
+        "colorize",
+        "--solver",
+        "adam",
+        "--until",
+        "62",
+        "--json",
+        "--teacher",
+    ];
     let report = place.json(&[&colorize[..], &[&network()]].concat());
     let gray = &report["chroma"]["pictures"]["teacher_colorfulness"];
     assert!(gray.as_f64().expect("a number") < 0.5, "{gray}");
@@ -251,7 +271,13 @@ fn a_splat_file_is_coloured_with_colmaps_cameras() {
         "--teacher",
         &teacher,
     ];
-    let report = place.json(&[&colorize[..], &["--until", "9", "--json"]].concat());
+    let report = place.json(
+        &[
+            &colorize[..],
+            &["--solver", "adam", "--until", "9", "--json"],
+        ]
+        .concat(),
+    );
     assert_eq!(report["chroma"]["iterations"], 9);
     assert_eq!(report["capture"]["views"], scene::VIEWS);
     let (gray, color) = (
@@ -271,7 +297,13 @@ fn a_splat_file_is_coloured_with_colmaps_cameras() {
             );
         }
     }
-    place.succeed(&[&colorize[..], &["--until", "9", "-o", "out.ply"]].concat());
+    place.succeed(
+        &[
+            &colorize[..],
+            &["--solver", "adam", "--until", "9", "-o", "out.ply"],
+        ]
+        .concat(),
+    );
     assert!(place.read("out.ply") == place.read("gray-color.ply"));
     assert!(!place.path("teacher").exists());
 }
@@ -281,7 +313,15 @@ fn photos_that_have_moved_are_named_with_colmap() {
     let place = place_with_run();
     fs::rename(place.path("scene"), place.path("moved")).expect("a folder");
     let teacher = network();
-    let colorize = ["colorize", "--until", "62", "--teacher", &teacher];
+    let colorize = [
+        "colorize",
+        "--solver",
+        "adam",
+        "--until",
+        "62",
+        "--teacher",
+        &teacher,
+    ];
     let done = place.run(&colorize);
     assert_eq!(done.code, Some(1));
     assert!(done.stderr.contains("scene"), "{}", done.stderr);

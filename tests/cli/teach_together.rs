@@ -39,7 +39,7 @@ fn hint(place: &Place, color: [u8; 3], views: &[usize], columns: u32) {
 
 /// The chroma report of a short colouring with these arguments.
 fn colorize(place: &Place, arguments: &[&str]) -> Value {
-    let start = ["colorize", "--until", "120", "--json"];
+    let start = ["colorize", "--solver", "adam", "--until", "120", "--json"];
     place.json(&[&start[..], arguments].concat())["chroma"].clone()
 }
 
@@ -133,7 +133,9 @@ fn hints_do_without_a_teacher() {
     // Held out, so not trained on; and one without paint, which is noted.
     hint(&place, BLUE, &[0], scene::SIZE[0]);
     hint(&place, BLUE, &[6], 0);
-    let arguments = ["colorize", "--until", "120", "--json", "--hints", "hints"];
+    let arguments = [
+        "colorize", "--solver", "adam", "--until", "120", "--json", "--hints", "hints",
+    ];
     let done = place.run(&arguments);
     assert_eq!(done.code, Some(0), "{}", done.stderr);
     assert!(
@@ -168,7 +170,15 @@ fn a_network_with_hint_inputs_is_told_of_them() {
 fn options_of_networks_without_one_are_remarked_on() {
     let place = place_with_run();
     paint(&place, "red", RED, &all());
-    let until = ["colorize", "--until", "62", "--teacher", "red"];
+    let until = [
+        "colorize",
+        "--solver",
+        "adam",
+        "--until",
+        "62",
+        "--teacher",
+        "red",
+    ];
     let done = place.run(&[&until[..], &["--teacher-size", "64"]].concat());
     assert_eq!(done.code, Some(0), "{}", done.stderr);
     assert!(

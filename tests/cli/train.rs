@@ -92,6 +92,8 @@ fn timings_name_every_kernel() {
         "colorize",
         "--teacher",
         &teacher,
+        "--solver",
+        "adam",
         "--until",
         "5",
         "--timings",
@@ -260,7 +262,15 @@ fn one_photo_one_point_or_nothing_but_black_will_do() {
     let teacher = super::shared::onnx("ddcolor_tiny.onnx");
     let check = || {
         place.succeed(&QUICK_FIT);
-        place.succeed(&["colorize", "--until", "5", "--teacher", &teacher]);
+        place.succeed(&[
+            "colorize",
+            "--solver",
+            "adam",
+            "--until",
+            "5",
+            "--teacher",
+            &teacher,
+        ]);
     };
     first("scene/sparse/points3D.txt", 1);
     check();

@@ -1,0 +1,122 @@
+//! `colorize --solver irls`, the default.
+
+use image::imageops::{FilterType, resize};
+use image::{Rgb, RgbImage};
+
+use super::program::Place;
+use super::scene;
+use super::shared::{LUMA, onnx, place_with_run};
+
+/// Rounds on the two coarser scales, which come before those at full size.
+const WARM: usize = 16;
+
+/// Two rounds at full size; one would do to be quick, but then nothing is repeated.
+const QUICK: [&str; 5] = ["colorize", "--rounds", "2", "--json", "--teacher"];
+
+#[test]
+fn the_default_solver_says_what_it_did() {
+    let place = place_with_run();
+    let teacher = onnx("ddcolor_tiny.onnx");
+    let chroma = &place.json(&[&QUICK[..], &[&teacher]].concat())["chroma"];
+    assert_eq!(chroma["solver"], "irls");
+    assert_eq!(chroma["iterations"], WARM + 2);
+    assert_eq!(chroma["until"], LUMA + WARM + 2);
+    assert_eq!(chroma["robust"], 10.0);
+    assert_eq!(chroma["corrects_views"], true);
+    assert_eq!(chroma["fills"], true);
+    assert_eq!(chroma["coarser_scales"], 0);
+    // Eight views, four drawings a round: all at full size, 1/4 and 1/16 before.
+    let passes = 8.0 * 4.0 * (2.0 + 8.0 / 4.0 + 8.0 / 16.0);
+    assert_eq!(chroma["passes"], passes);
+
+    let plain = ["--robust", "off", "--correct-views", "off", "--fill", "off"];
+    let choices = ["--scales", "1", "--sh-degree", "1"];
+    let arguments = [&QUICK[..], &[&teacher], &plain, &choices].concat();
+    let chroma = &place.json(&arguments)["chroma"];
+    assert_eq!(chroma["robust"], serde_json::Value::Null);
+    assert_eq!(chroma["corrects_views"], false);
+    assert_eq!(chroma["fills"], false);
+    assert_eq!(chroma["coarser_scales"], 1);
+    assert_eq!(chroma["sh_degree"], 1);
+}
+
+#[test]
+fn solving_again_gives_the_same_bytes() {
+    let place = place_with_run();
+    let teacher = onnx("ddcolor_tiny.onnx");
+    for output in ["first.ply", "second.ply"] {
+        place.succeed(&[&QUICK[..], &[&teacher, "-o", output]].concat());
+    }
+    assert!(place.read("first.ply") == place.read("second.ply"));
+}
+
+#[test]
+fn options_of_the_other_solver_are_refused() {
+    let place = place_with_run();
+    let teacher = onnx("ddcolor_tiny.onnx");
+    let adam = ["--solver", "adam"];
+    let cases: [(&[&str], &str); 4] = [
+        (&["--until", "62"], "--until needs --solver adam"),
+        (
+            &[&adam[..], &["--rounds", "2"]].concat(),
+            "--rounds needs --solver irls",
+        ),
+        (
+            &[&adam[..], &["--fill", "on"]].concat(),
+            "--fill needs --solver irls",
+        ),
+        (
+            &[&adam[..], &["--correct-views", "on"]].concat(),
+            "--correct-views needs --solver irls",
+        ),
+    ];
+    for (options, message) in cases {
+        let done = place.run(&[&["colorize", "--teacher", &teacher], options].concat());
+        assert_eq!(done.code, Some(2), "{options:?}: {}", done.stderr);
+        assert!(done.stderr.contains(message), "{}", done.stderr);
+    }
+    for wrong in [
+        ["--robust", "0"],
+        ["--robust", "nan"],
+        ["--sh-degree", "4"],
+        ["--scales", "5"],
+        ["--rounds", "0"],
+    ] {
+        let done = place.run(&[&["colorize", "--teacher", &teacher], &wrong[..]].concat());
+        assert_eq!(done.code, Some(2), "{wrong:?}");
+    }
+}
+
+/// Paints some photos' copies in one colour, keeping their lightness out of it.
+fn paint(place: &Place, photos: &[usize], color: [u8; 3]) {
+    let [width, height] = scene::SIZE;
+    let flat = RgbImage::from_pixel(4, 4, Rgb(color));
+    for &photo in photos {
+        let file = place.path(&format!("three/{}", scene::name(photo)));
+        std::fs::create_dir_all(file.parent().expect("a folder")).expect("a folder");
+        resize(&flat, width, height, FilterType::Nearest)
+            .save(file)
+            .expect("a picture");
+    }
+}
+
+/// Three frames coloured by hand colour the whole scene, from every side.
+#[test]
+fn three_painted_frames_colour_the_whole_scene() {
+    let place = place_with_run();
+    paint(&place, &[1, 2, 3], [200, 120, 80]);
+    let report = place.json(&[&QUICK[..], &["three"]].concat());
+    assert_eq!(report["chroma"]["colored_views"], 3);
+    place.succeed(&["render", "--views", "all", "-o", "pictures"]);
+    let mut grays = Vec::new();
+    for photo in 0..scene::VIEWS {
+        let file = format!("pictures/{}", scene::name(photo));
+        let file = place.path(&file).with_extension("png");
+        let picture = image::open(file).expect("a picture").to_rgb8();
+        // Where the scene is bright enough to have a colour, it is warm.
+        let lit: Vec<_> = (picture.pixels()).filter(|p| p.0[0] > 60).collect();
+        let warm = lit.iter().filter(|p| p.0[0] > p.0[2] + 8).count();
+        grays.push(1.0 - warm as f64 / lit.len().max(1) as f64);
+    }
+    assert!(grays.iter().all(|&gray| gray < 0.05), "{grays:?}");
+}
