@@ -85,8 +85,7 @@ impl DepthSteps {
         (0..pixels)
             .map(|pixel| {
                 let opacity = at(last, pixel);
-                // Written so that NaN fails.
-                if !(opacity >= MIN_OPACITY) {
+                if opacity.is_nan() || opacity < MIN_OPACITY {
                     return f32::NAN;
                 }
                 let half = 0.5 * opacity;
