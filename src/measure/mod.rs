@@ -15,7 +15,7 @@ mod visibility;
 
 pub use colorfulness::{colorfulness, colorfulness_absolute};
 pub use consistency::{Consistency, DENOMINATOR_RULE, SCALE_RULE};
-pub use depth::PositionFields;
+pub use depth::DepthSteps;
 pub use flo::decode_flo;
 pub use flow::Flow;
 pub use image_error::{DeltaE, ab_error, delta_e, mean_delta_e, psnr};

@@ -30,6 +30,7 @@ pub struct Renderer {
     geometry: Geometry,
     fields: Vec<Field>,
     near: f64,
+    one_list: bool,
     lists: Lists,
     layers: Vec<Layer>,
     max_pixels: usize,
@@ -54,11 +55,20 @@ impl Renderer {
             geometry,
             fields,
             near,
+            one_list: false,
             lists,
             layers: Vec::new(),
             max_pixels: 0,
             max_tiles: 0,
         })
+    }
+
+    /// Makes tile lists once a view, not once a field: for fields in which every
+    /// Gaussian has a colour that can be drawn. One that shading refuses would be missing
+    /// in the fields behind.
+    pub fn with_one_list(mut self) -> Self {
+        self.one_list = true;
+        self
     }
 
     /// Draws all fields as `camera` sees them.
@@ -76,7 +86,7 @@ impl Renderer {
             self.resize(&view, capacity)?;
         }
         loop {
-            for (layer, field) in self.layers.iter().zip(&self.fields) {
+            for (index, (layer, field)) in self.layers.iter().zip(&self.fields).enumerate() {
                 // The degree is a property of the field, the rest of the view.
                 let mut recorder = Recorder::new(&self.raster.gpu);
                 self.lists.set_view(
@@ -86,7 +96,9 @@ impl Renderer {
                         ..view
                     },
                 );
-                self.lists.record(&self.raster, &mut recorder);
+                if index == 0 || !self.one_list {
+                    self.lists.record(&self.raster, &mut recorder);
+                }
                 layer.record(&self.raster, &mut recorder);
                 recorder.submit();
             }

@@ -48,12 +48,12 @@ struct Frame {
 struct Sums(Vec<(Method, Consistency)>);
 
 impl Frame {
-    fn of(drawing: Drawing) -> Self {
+    fn of(drawing: Drawing, depth: Vec<f32>) -> Self {
         let colors = drawing.layers.iter().map(|(m, layer)| (*m, layer.ab()));
         Self {
             colors: colors.collect(),
             camera: drawing.camera,
-            depth: drawing.depth,
+            depth,
         }
     }
 
@@ -123,7 +123,7 @@ pub(super) fn along_path(
             let pixels = layer.rgb(&drawing.gray);
             keep(index, to_image(camera.width, camera.height, &pixels))?;
         }
-        let frame = Frame::of(drawing);
+        let frame = Frame::of(drawing, painter.depth(camera)?);
         for (delta, sums) in &mut sums {
             // The most recent frame is one back.
             let Some(first) = recent.len().checked_sub(*delta).map(|at| &recent[at]) else {
@@ -212,7 +212,7 @@ pub(super) fn between_views(
             let truth = to_picture(&truth.resized(camera.width, camera.height));
             drawing.layers.push((Method::Photo, Layer::Ab(truth)));
         }
-        frames.push(Frame::of(drawing));
+        frames.push(Frame::of(drawing, painter.depth(&camera)?));
     }
     let points = &subject.scene.capture.points;
     let every = points.len().div_ceil(MAX_POINTS);

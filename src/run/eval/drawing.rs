@@ -7,7 +7,7 @@ use crate::{
     capture::{Camera, Photo},
     chroma::{native_rgb, teacher::AbImage},
     color::srgb_to_lab,
-    measure::{MIN_OPACITY, PositionFields},
+    measure::DepthSteps,
     raster::{Picture, Raster, Renderer},
     report::Method,
     run::{
@@ -19,8 +19,9 @@ use crate::{
 
 /// Draws every method's picture.
 pub(super) struct Painter<'a> {
+    raster: Arc<Raster>,
+    subject: &'a Subject,
     renderer: Renderer,
-    positions: PositionFields,
     has_native: bool,
     /// Methods that are RGB splats, in the order of their fields.
     rgb: Vec<Method>,
@@ -40,9 +41,6 @@ pub(super) struct Drawing {
     pub camera: Camera,
     /// One channel, encoded sRGB.
     pub gray: Picture,
-    /// Along the camera's z axis in world units, `[height, width]`; NaN where the
-    /// scene is not opaque enough to have a depth.
-    pub depth: Vec<f32>,
     pub layers: Vec<(Method, Layer)>,
 }
 
@@ -51,22 +49,20 @@ impl<'a> Painter<'a> {
     /// what a teacher makes of the gray pictures.
     pub fn new(
         raster: &Arc<Raster>,
-        subject: &Subject,
+        subject: &'a Subject,
         rgb: &[(Method, &ShField)],
         teacher: Option<&'a mut EvalTeacher>,
     ) -> Result<Self, RunError> {
         let scene = &subject.scene;
-        let origin = scene.photos[0].1.center();
-        let positions = PositionFields::new(&subject.luma, origin, scene.extent);
-        let [xy, z1] = &positions.fields;
-        let mut fields = vec![&subject.luma.sh, xy, z1];
+        let mut fields = vec![&subject.luma.sh];
         fields.extend(rgb.iter().map(|(_, field)| field));
         fields.extend(&subject.chroma);
         Ok(Self {
+            raster: raster.clone(),
+            subject,
             renderer: scene.renderer(raster, &subject.luma, &fields)?,
             has_native: subject.chroma.is_some(),
             rgb: rgb.iter().map(|(method, _)| *method).collect(),
-            positions,
             teacher,
         })
     }
@@ -75,8 +71,7 @@ impl<'a> Painter<'a> {
     pub fn draw(&mut self, camera: &Camera, name: &str) -> Result<Drawing, RunError> {
         let mut pictures = self.renderer.render(camera)?.into_iter();
         let mut next = || pictures.next().expect("a picture for every field");
-        let (gray, xy, z1) = (next(), next(), next());
-        let (depth, opacity) = self.positions.depth(camera, &xy, &z1);
+        let gray = next();
         let mut layers = Vec::new();
         for &method in &self.rgb {
             layers.push((method, Layer::Rgb(shown_rgb(&next().pixels))));
@@ -91,14 +86,22 @@ impl<'a> Painter<'a> {
         }
         Ok(Drawing {
             camera: camera.clone(),
-            depth: depth
-                .into_iter()
-                .zip(opacity)
-                .map(|(z, opacity)| if opacity >= MIN_OPACITY { z } else { f32::NAN })
-                .collect(),
             gray,
             layers,
         })
+    }
+
+    /// The scene's median depth along the camera's z axis in world units, `[height,
+    /// width]`; NaN where it is not opaque enough to have one.
+    pub fn depth(&self, camera: &Camera) -> Result<Vec<f32>, RunError> {
+        let steps = DepthSteps::new(&self.subject.luma, camera);
+        let fields: Vec<&ShField> = steps.fields.iter().collect();
+        let luma = &self.subject.luma;
+        let renderer = self.subject.scene.renderer(&self.raster, luma, &fields)?;
+        // Zeros and ones can be drawn.
+        let mut renderer = renderer.with_one_list();
+        let pixels = camera.width as usize * camera.height as usize;
+        Ok(steps.median(&renderer.render(camera)?, pixels))
     }
 
     /// The teacher's answer for a photo.
