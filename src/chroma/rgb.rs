@@ -15,7 +15,7 @@ use crate::{
 const UNITS: f32 = 100.0;
 
 /// Views that the bake is measured against at most; more of one scene say little new.
-const BAKE_VIEWS: usize = 32;
+const BAKE_VIEWS: usize = 16;
 
 /// A view and the colours wanted in its picture.
 #[derive(Clone, Debug)]

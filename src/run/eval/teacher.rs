@@ -130,7 +130,9 @@ impl EvalTeacher {
         }
         let settings = ChromaSettings {
             sh_degree: sh::MAX_DEGREE,
-            ..ChromaSettings::exact()
+            robust: None,
+            corrects_views: false,
+            ..ChromaSettings::irls()
         };
         Ok(fit_rgb(
             raster,
