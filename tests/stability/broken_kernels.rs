@@ -108,7 +108,12 @@ fn broken_losses_and_steps_are_noticed() {
             "let painted = weight > 1.0",
             "let painted = weight > 100.0",
         ),
-        ("chroma loss", "weigh", "weights[p] * image[p]", "image[p]"),
+        (
+            "chroma loss",
+            "weigh",
+            "weights[p] * image[p]",
+            "weights[p].yx * image[p]",
+        ),
         (
             "conjugate",
             "conjugate_beta",
@@ -119,7 +124,7 @@ fn broken_losses_and_steps_are_noticed() {
             "conjugate",
             "conjugate_begin",
             "-residual[k] - parameters.ridge * unknowns[k]",
-            "-residual[k]",
+            "-residual[k] + parameters.ridge * unknowns[k]",
         ),
         (
             "conjugate",
@@ -145,7 +150,7 @@ fn broken_losses_and_steps_are_noticed() {
             "pixel_weights[p] > 1.0 ||",
             "pixel_weights[p] > 100.0 ||",
         ),
-        ("losses", "sum_loss", "k += 256u", "k += 512u"),
+        ("chroma loss", "sum_loss", "k += 256u", "k += 512u"),
         ("adam", "adam", "sqrt(v * correction.y)", "sqrt(v)"),
         (
             "adjoint",

@@ -1,4 +1,4 @@
-//! `chroma_loss`, with and without the curvature, and `weigh`.
+//! `chroma_loss`, with and without the curvature, `sum_loss` of many blocks, and `weigh`.
 
 use std::sync::Arc;
 
