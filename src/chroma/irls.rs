@@ -249,7 +249,8 @@ impl Solver {
     }
 
     /// The plain loss of `chroma` over all views at full size, in CIELAB units: what the
-    /// solvers are compared by. Leaves the solver with this field.
+    /// solvers are compared by. Teachers count as corrected so far, which is not at all
+    /// before the second round. Leaves the solver with this field.
     ///
     /// # Errors
     /// [`GpuError`].

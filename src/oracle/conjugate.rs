@@ -50,9 +50,9 @@ impl Conjugate {
         } else {
             0.0
         };
-        for k in 0..product.len() {
+        for (k, p) in product.iter().enumerate() {
             self.unknowns[k] += alpha * self.direction[k];
-            self.residual[k] -= alpha * product[k];
+            self.residual[k] -= alpha * p;
         }
         let preconditioned: Vec<f64> = (self.residual.iter().zip(&self.preconditioner))
             .map(|(r, m)| r / m)

@@ -39,14 +39,17 @@ fn inverse(m: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
 }
 
 /// The teacher as an affine map of what is rendered; the prior pulls the gain to the
-/// identity. Without any weight, the identity.
+/// identity. Pixels of exactly zero show nothing and do not count. Without any weight,
+/// the identity.
 pub fn teacher_of(pixels: &[Pixel]) -> Affine {
+    let shown = |pixel: &&Pixel| pixel.1.iter().any(|x| x.abs() > 0.0);
+    let pixels: Vec<&Pixel> = pixels.iter().filter(shown).collect();
     let weight: f64 = pixels.iter().map(|pixel| pixel.0).sum();
     if weight <= 0.0 {
         return Affine::IDENTITY;
     }
     let mean = |of: &dyn Fn(&Pixel) -> f64| {
-        pixels.iter().map(|pixel| pixel.0 * of(pixel)).sum::<f64>() / weight
+        (pixels.iter().map(|pixel| pixel.0 * of(pixel))).sum::<f64>() / weight
     };
     let x = [0, 1].map(|c| mean(&|pixel| pixel.1[c]));
     let t = [0, 1].map(|c| mean(&|pixel| pixel.2[c]));
@@ -153,6 +156,8 @@ mod tests {
         assert_eq!(found.offset, [4.0, -3.0]);
         assert_eq!(teacher_of(&[(0.0, [1.0; 2], [50.0; 2])]), Affine::IDENTITY);
         assert_eq!(teacher_of(&[]), Affine::IDENTITY);
+        // The sky, where no Gaussian is.
+        assert_eq!(teacher_of(&[(1.0, [0.0; 2], [50.0; 2])]), Affine::IDENTITY);
         // A teacher that knows no colour at all cannot be undone.
         let mut random = Random::new(4);
         let gray = Affine {

@@ -503,3 +503,18 @@ fn views_with_gains_and_tints_agree_on_their_mean() {
     assert!(away < 2.0, "{away}");
     assert!((kept - 1.0).abs() < 0.05, "{kept}");
 }
+
+/// A photo of the sky, where no Gaussian is, says nothing about the others' tints.
+#[test]
+fn a_view_that_shows_nothing_tints_nothing() {
+    let ab = [30.0, -10.0];
+    let mut views = constant_views(&[ab; 5]);
+    let away = Camera {
+        rotation: DMat3::from_rotation_y(std::f64::consts::PI),
+        ..views[0].camera.clone()
+    };
+    views.push(chroma_view(away, vec![[-60.0, 70.0]; PIXELS]));
+    let inner = inner(&solved(&ChromaSettings::irls(), &wall(), &views));
+    let away = farthest(&inner, &vec![ab; inner.len()]);
+    assert!(away < 1.0, "{away}");
+}

@@ -150,6 +150,12 @@ fn broken_losses_and_steps_are_noticed() {
             "pixel_weights[p] > 1.0 ||",
             "pixel_weights[p] > 100.0 ||",
         ),
+        (
+            "view correction",
+            "view_correction_sums",
+            "all(x == vec2f())",
+            "all(x == vec2f(1.0))",
+        ),
         ("chroma loss", "sum_loss", "k += 256u", "k += 512u"),
         ("adam", "adam", "sqrt(v * correction.y)", "sqrt(v)"),
         (
