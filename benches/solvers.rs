@@ -15,7 +15,7 @@ use gs_chroma::{
     capture::{Capture, Photo, split},
     chroma::{
         ChromaSettings, ChromaView, Distiller, Solver,
-        teacher::{GrayImage, Teacher},
+        teacher::{GrayImage, Teacher, TeacherSettings},
     },
     gpu::Gpu,
     raster::Raster,
@@ -46,7 +46,11 @@ fn load(run: &Path, teacher: &Path) -> Fallible<Problem> {
     let colmap = PathBuf::from(noted["path"].as_str().ok_or("report.json has no path")?);
     let max_side = noted["max_side"].as_u64().map(|side| side as u32);
     let capture = Capture::load(&colmap)?;
-    let mut teacher = Teacher::open(teacher, Some(&run.join("teacher")))?;
+    let mut teacher = Teacher::open(
+        teacher,
+        Some(&run.join("teacher")),
+        &TeacherSettings::default(),
+    )?;
     let split = split(
         capture.views.len(),
         noted["holdout"].as_bool().unwrap_or(true),
@@ -59,7 +63,7 @@ fn load(run: &Path, teacher: &Path) -> Fallible<Problem> {
             height: photo.height,
             pixels: &photo.gray,
         };
-        if let Some(wanted) = teacher.colorize(&capture.views[i].name, gray)? {
+        if let Some(wanted) = teacher.colorize(&capture.views[i].name, gray, None)? {
             views.push(ChromaView {
                 camera,
                 wanted,
