@@ -40,12 +40,17 @@ var<workgroup> sums: array<f32, 256 * SUMS>;
 fn view_correction_sums(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
     var own: array<f32, SUMS>;
     for (var p = group.x * 256u + local; p < view.size.x * view.size.y; p += 256u * SUM_GROUPS) {
-        // One weight for both channels; painted pixels are not the teacher's.
+        // One weight for both channels. Painted pixels are not the teacher's; of unknown
+        // ones the curvature may be that of the agreement between scales; where nothing
+        // is drawn, there is nothing to compare with.
         var weight = 0.5 * (curvatures[p].x + curvatures[p].y);
-        if parameters.weighted != 0u && pixel_weights[p] > 1.0 {
+        if parameters.weighted != 0u && (pixel_weights[p] > 1.0 || pixel_weights[p] <= 0.0) {
             weight = 0.0;
         }
         let x = image[p];
+        if all(x == vec2f()) {
+            weight = 0.0;
+        }
         let t = wanted[p];
         own[0] += weight;
         own[1] += weight * x.x;

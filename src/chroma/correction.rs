@@ -7,10 +7,10 @@ use super::loss::Correction;
 use crate::gpu::{Bindings, Buffer, Gpu, GpuError, Kernel, Recorder, shaders};
 
 /// Workgroups that sum one view.
-const SUM_GROUPS: usize = 64;
+pub const SUM_GROUPS: usize = 64;
 
 /// Sums of one workgroup.
-const SUMS: usize = 12;
+pub const SUMS: usize = 12;
 
 /// Twin of `struct CorrectionParameters`.
 #[repr(C)]

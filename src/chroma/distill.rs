@@ -18,10 +18,6 @@ use crate::{
 /// Iterations between two reports.
 const REPORT_EVERY: usize = 50;
 
-/// Passes are kept while they take no more than this many bytes on the device;
-/// beyond it the tile lists of a view are made anew whenever it comes up.
-const CACHE_BYTES: usize = 2 << 30;
-
 /// How far a distillation is.
 #[derive(Clone, Copy, Debug)]
 pub struct ChromaProgress {
@@ -244,7 +240,7 @@ impl Distiller {
     fn keep(&mut self, index: usize, chain: Vec<Pass>) {
         let bytes = |chain: &[Pass]| chain.iter().map(Pass::bytes).sum::<usize>();
         let others: usize = self.chains.iter().flatten().map(|chain| bytes(chain)).sum();
-        if others + bytes(&chain) <= CACHE_BYTES {
+        if others + bytes(&chain) <= self.settings.cache_bytes {
             self.chains[index] = Some(chain);
         }
     }

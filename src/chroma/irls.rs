@@ -19,10 +19,6 @@ use crate::{
     splats::{ShField, Splats, sh},
 };
 
-/// Tile lists are kept while they take no more than this many bytes on the device;
-/// the views beyond share one set, made anew whenever they come up.
-const CACHE_BYTES: usize = 2 << 30;
-
 /// Bytes of the tile lists for each Gaussian and each entry ([`Lists`] and the scratch
 /// of its sorts).
 const LIST_BYTES: [usize; 2] = [64, 20];
@@ -156,6 +152,7 @@ impl Solver {
         let shared = Shared::new(&gpu, geometry, fields, log, views.len(), &room)?;
         let conjugate = Conjugate::new(&gpu, &shared.system, splats.len(), ridge as f32)?;
 
+        // The views beyond `cache_bytes` share one set of lists.
         let mut spare: Option<Rc<Lists>> = None;
         let mut kept = 0;
         let mut rows = Vec::with_capacity(chains.len());
@@ -165,7 +162,7 @@ impl Solver {
                 let needed = capacities[scale];
                 let bytes = LIST_BYTES[0] * splats.len() + LIST_BYTES[1] * needed;
                 let geometry = &shared.geometry;
-                let lists = if kept + bytes <= CACHE_BYTES {
+                let lists = if kept + bytes <= settings.cache_bytes {
                     kept += bytes;
                     let tiles = uniform_tiles(&chain[scale], near, geometry.count);
                     (Rc::new(Lists::new(&raster, geometry, tiles, needed)?), true)
@@ -252,7 +249,8 @@ impl Solver {
     }
 
     /// The plain loss of `chroma` over all views at full size, in CIELAB units: what the
-    /// solvers are compared by. Leaves the solver with this field.
+    /// solvers are compared by. Teachers count as corrected so far, which is not at all
+    /// before the second round. Leaves the solver with this field.
     ///
     /// # Errors
     /// [`GpuError`].

@@ -19,7 +19,7 @@ mod view;
 
 pub use bake_rgb::bake_rgb;
 pub use conjugate::{Conjugate, ConjugateParameters, System};
-pub use correction::{CorrectionParameters, Corrections};
+pub use correction::{CorrectionParameters, Corrections, SUM_GROUPS, SUMS};
 pub use degree::{ChosenDegree, choose_degree};
 pub use distil::{Distilled, SolverKind, distil};
 pub use distill::{ChromaProgress, Distiller};

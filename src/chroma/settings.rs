@@ -41,7 +41,13 @@ pub struct ChromaSettings {
     /// Whether Gaussians that no view sees well take their neighbours' colour after
     /// least squares.
     pub fills: bool,
+    /// Tile lists are kept while they take no more than this many bytes on the device;
+    /// those of the other views are made anew whenever they come up.
+    pub cache_bytes: usize,
 }
+
+/// Leaves room for the rest on devices of 4 GiB.
+const CACHE_BYTES: usize = 2 << 30;
 
 impl ChromaSettings {
     /// The paper's distillation: Adam for so many iterations, three scales.
@@ -75,6 +81,7 @@ impl ChromaSettings {
             rounds: 4,
             steps: 3,
             fills: true,
+            cache_bytes: CACHE_BYTES,
         }
     }
 

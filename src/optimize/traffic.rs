@@ -50,6 +50,8 @@ pub fn minimum_bytes(kernel: &str, load: &Load) -> f64 {
     } = *load;
     let trains_geometry = channels == 1.0;
     let trained = f64::from(u8::from(trains_geometry));
+    // Unknowns of the solver.
+    let planes = sh_planes * splats;
     // With the geometry, Adam's step is taken at once: value and moments in and out.
     let sh_step = if trains_geometry { 6.0 } else { 1.0 } * sh_planes;
     // What an instance's gradient takes: seven figures for the geometry, the colour.
@@ -76,6 +78,15 @@ pub fn minimum_bytes(kernel: &str, load: &Load) -> f64 {
         "luma_loss" => 4.25 * pixels,
         "luma_loss_backward" => 5.25 * pixels,
         "chroma_loss" => 3.25 * channels * pixels,
+        "weigh" => 3.0 * channels * pixels,
+        // Picture, wanted a/b and curvature.
+        "view_correction_sums" => 3.0 * channels * pixels,
+        "conjugate_begin" => 4.0 * planes + 2.0 * splats,
+        "conjugate_product" => 2.0 * planes,
+        "conjugate_step" => 6.0 * planes + 2.0 * splats,
+        "conjugate_direction" => 3.0 * planes + 2.0 * splats,
+        // One partial sum for every 256 unknowns.
+        "conjugate_rho" | "conjugate_alpha" | "conjugate_beta" => planes / 256.0,
         "sum_loss" => tiles,
         "blend_backward" => {
             (LISTED + channels + partial) * instances + (2.0 * channels + 1.0) * pixels

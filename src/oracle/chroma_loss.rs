@@ -1,4 +1,5 @@
-//! The chroma loss: a smooth L1, averaged over pixels and both channels.
+//! The chroma loss: a smooth L1, averaged over pixels and both channels; for the
+//! solver, with what weighs and corrects the teacher.
 
 use super::constants::CHROMA_EPSILON;
 use super::{Number, seed};
@@ -6,6 +7,26 @@ use super::{Number, seed};
 /// `√(r² + ε²) - ε` of a residual in Lab units (Charbonnier et al. 1994).
 pub fn smooth_l1<T: Number>(residual: T) -> T {
     (residual * residual + CHROMA_EPSILON * CHROMA_EPSILON).sqrt() - CHROMA_EPSILON
+}
+
+/// `(1 - exp(-decline · ρ)) / decline` of the smooth L1 ρ (Welsch's function, of ρ instead
+/// of its square): levels off at `1 / decline`. With a decline of 0, ρ itself.
+pub fn declining<T: Number>(residual: T, decline: f64) -> T {
+    let length = smooth_l1(residual);
+    if decline > 0.0 {
+        (T::one() - (-length * decline).exp()) / decline
+    } else {
+        length
+    }
+}
+
+/// Slope of [`declining`] over the residual; at 0 its limit `1 / ε`.
+pub fn curvature(residual: f64, decline: f64) -> f64 {
+    if residual == 0.0 {
+        1.0 / CHROMA_EPSILON
+    } else {
+        declining(seed(residual), decline).eps / residual
+    }
 }
 
 /// The loss of rendered a/b against the target's, both `[pixels][2]`.
@@ -23,6 +44,62 @@ pub fn chroma_loss_gradient(rendered: &[[f64; 2]], target: &[[f64; 2]]) -> Vec<[
     (rendered.iter().zip(target))
         .map(|(r, t)| [0, 1].map(|c| smooth_l1(seed(r[c]) - t[c]).eps / count))
         .collect()
+}
+
+/// How a teacher's a/b enter the loss.
+#[derive(Clone, Debug)]
+pub struct Teaching {
+    /// Wanted a/b, `[pixels][2]`.
+    pub wanted: Vec<[f64; 2]>,
+    /// How much each pixel counts; those above 1 were painted by hand.
+    pub weights: Vec<f64>,
+    /// Rows of what wanted a/b are multiplied by, painted ones excepted.
+    pub gain: [[f64; 2]; 2],
+    /// What is added then, in Lab units.
+    pub offset: [f64; 2],
+    /// See [`declining`]; painted pixels never decline.
+    pub decline: f64,
+}
+
+impl Teaching {
+    /// Target and decline of pixel `p`.
+    fn of(&self, p: usize) -> ([f64; 2], f64) {
+        let [a, b] = self.wanted[p];
+        if self.weights[p] > 1.0 {
+            return ([a, b], 0.0);
+        }
+        let target = [0, 1].map(|c| self.gain[c][0] * a + self.gain[c][1] * b + self.offset[c]);
+        (target, self.decline)
+    }
+
+    /// The loss of rendered a/b, `[pixels][2]`.
+    pub fn loss<T: Number>(&self, rendered: &[[T; 2]]) -> T {
+        let mut sum = T::zero();
+        for (p, r) in rendered.iter().enumerate() {
+            let (target, decline) = self.of(p);
+            for c in 0..2 {
+                sum += declining(r[c] - target[c], decline) * self.weights[p];
+            }
+        }
+        sum / (2 * rendered.len()) as f64
+    }
+
+    /// For each pixel and channel, slope of the loss and slope over residual.
+    pub fn slopes(&self, rendered: &[[f64; 2]]) -> [Vec<[f64; 2]>; 2] {
+        let count = (2 * rendered.len()) as f64;
+        let each = |of: &dyn Fn(f64, f64) -> f64| {
+            (rendered.iter().enumerate())
+                .map(|(p, r)| {
+                    let (target, decline) = self.of(p);
+                    [0, 1].map(|c| self.weights[p] * of(r[c] - target[c], decline) / count)
+                })
+                .collect()
+        };
+        [
+            each(&|residual, decline| declining(seed(residual), decline).eps),
+            each(&curvature),
+        ]
+    }
 }
 
 #[cfg(test)]
@@ -61,5 +138,71 @@ mod tests {
                 assert!((whole - gradient[pixel][channel]).abs() < 1e-16);
             }
         }
+    }
+
+    #[test]
+    fn a_declining_loss_levels_off() {
+        assert_eq!(declining(0.0, 0.1), 0.0);
+        assert_eq!(declining(1.2_f64, 0.0), smooth_l1(1.2));
+        // ρ(1.2) = 0.8.
+        assert!((declining(1.2_f64, 0.5) - 2.0 * (1.0 - (-0.4_f64).exp())).abs() < 1e-15);
+        assert!((declining(1e4_f64, 0.1) - 10.0).abs() < 1e-12);
+        // A decline that is all but none changes all but nothing.
+        assert!((declining(30.0_f64, 1e-9) - smooth_l1(30.0)).abs() < 1e-5);
+    }
+
+    /// What makes reweighting descend: the parabola with this curvature that touches
+    /// the loss lies above it everywhere (Lange 2016, chapter 4).
+    #[test]
+    fn the_curvature_is_that_of_a_parabola_above() {
+        for decline in [0.0, 0.05, 0.3] {
+            for at in [-40.0, -0.7, 0.0, 0.2, 9.0] {
+                let curve = curvature(at, decline);
+                for x in (-200..=200).map(|k| 0.5 * f64::from(k)) {
+                    let parabola = declining(at, decline) + 0.5 * curve * (x * x - at * at);
+                    assert!(
+                        parabola >= declining(x, decline) - 1e-12,
+                        "{decline} {at} {x}"
+                    );
+                }
+            }
+            // No jump at zero.
+            assert!((curvature(1e-7, decline) - 2.0).abs() < 1e-6);
+        }
+    }
+
+    fn teaching() -> Teaching {
+        Teaching {
+            wanted: vec![[9.0, -3.0], [0.0, 60.0], [-7.0, 7.25], [30.0, 1.0]],
+            weights: vec![1.0, 0.25, 0.0, 50.0],
+            gain: [[1.2, -0.1], [0.2, 0.8]],
+            offset: [2.0, -1.0],
+            decline: 0.2,
+        }
+    }
+
+    #[test]
+    fn slopes_are_those_of_the_whole_taught_loss() {
+        let rendered = [[10.0, -3.0], [0.2, 55.0], [7.0, 7.0], [29.0, -4.0]];
+        let teaching = teaching();
+        let [slopes, curvatures] = teaching.slopes(&rendered);
+        for p in 0..4 {
+            for c in 0..2 {
+                let mut dual = rendered.map(|p| p.map(lift));
+                dual[p][c].eps = 1.0;
+                let whole = teaching.loss(&dual).eps;
+                assert!((whole - slopes[p][c]).abs() < 1e-15, "{p} {c}");
+                let (target, _) = teaching.of(p);
+                let through = curvatures[p][c] * (rendered[p][c] - target[c]);
+                assert!((through - slopes[p][c]).abs() < 1e-15, "{p} {c}");
+            }
+        }
+        assert_eq!(slopes[2], [0.0; 2]);
+        // A painted pixel is taken as it is, and not doubted.
+        assert_eq!(teaching.of(3), ([30.0, 1.0], 0.0));
+        let painted = 50.0 / 8.0 * (smooth_l1(-1.0) + smooth_l1(-5.0_f64));
+        let mut alone = teaching.clone();
+        alone.weights[..3].fill(0.0);
+        assert!((alone.loss(&rendered) - painted).abs() < 1e-14);
     }
 }

@@ -44,6 +44,12 @@ pub const SSIM_C2: f64 = 0.03 * 0.03;
 /// Half-width of the chroma loss's rounded corner, in Lab units.
 pub const CHROMA_EPSILON: f64 = 0.5;
 
+/// Variance in squared Lab units that is added to both sides of a view's regression.
+pub const CORRECTION_PRIOR: f64 = 4.0;
+
+/// A gain whose determinant is no larger cannot be undone.
+pub const CORRECTION_DETERMINANT_MIN: f64 = 0.1;
+
 /// Adam's decay of the first moment.
 pub const ADAM_BETA1: f64 = 0.9;
 

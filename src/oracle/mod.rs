@@ -1,8 +1,9 @@
 //! The oracle: every kernel once more, in `f64` and plain loops.
 //!
 //! One file a kernel, under the kernel's own name: [`project`], [`shade`],
-//! [`tiles`], [`blend`], [`luma_loss`], [`chroma_loss`], [`adam`], [`relocation`]. [`render`]
-//! chains the first four without tiles; [`gradient`] differentiates the chain
+//! [`tiles`], [`blend`], [`luma_loss`], [`chroma_loss`], [`conjugate`],
+//! [`view_correction`], [`adam`], [`relocation`]. [`render`] chains the first four
+//! without tiles; [`gradient`] differentiates the chain
 //! with dual numbers, so no derivative in here was worked out by hand.
 //!
 //! The code is generic over [`Number`]. Control flow (cull, skip, stop) looks
@@ -12,6 +13,7 @@
 pub mod adam;
 pub mod blend;
 pub mod chroma_loss;
+pub mod conjugate;
 pub mod constants;
 pub mod gradient;
 #[cfg(test)]
@@ -27,6 +29,7 @@ pub mod render;
 pub mod scene;
 pub mod shade;
 pub mod tiles;
+pub mod view_correction;
 
 use num_dual::{Dual64, DualNum};
 

@@ -3,7 +3,9 @@
 use std::{collections::BTreeMap, mem::offset_of};
 
 use gs_chroma::{
-    chroma::ChromaLossWeights,
+    chroma::{
+        ChromaLossWeights, ConjugateParameters, Correction, CorrectionParameters, SUM_GROUPS, SUMS,
+    },
     gpu::shaders,
     luma::{
         densify::{DensifyParameters, Descent},
@@ -129,7 +131,35 @@ fn twins() -> Vec<Twin> {
             "ChromaLossWeights" = ChromaLossWeights {
                 coarser_size,
                 teacher,
-                agreement
+                agreement,
+                decline,
+                view_index,
+                weighted,
+                padding
+            }
+        ),
+        twin!(
+            "Correction" = Correction {
+                gain,
+                offset,
+                padding
+            }
+        ),
+        twin!(
+            "CorrectionParameters" = CorrectionParameters {
+                views,
+                view_index,
+                weighted,
+                padding
+            }
+        ),
+        twin!(
+            "ConjugateParameters" = ConjugateParameters {
+                length,
+                splats,
+                blocks,
+                ridge,
+                diagonal_scale
             }
         ),
         twin!(
@@ -258,6 +288,7 @@ fn constants_are_those_of_the_oracle() {
         ("sh", harmonics),
         ("luma_loss", shaders::LUMA_LOSS),
         ("chroma_loss", shaders::CHROMA_LOSS),
+        ("view_correction", shaders::VIEW_CORRECTION),
         ("adam", shaders::ADAM),
     ];
     let files = BTreeMap::from(files.map(|(name, source)| (name, constants_of(name, source))));
@@ -293,6 +324,16 @@ fn constants_are_those_of_the_oracle() {
         ("luma_loss", "SSIM_WEIGHT", vec![oracle::SSIM_WEIGHT]),
         ("luma_loss", "L1_WEIGHT", vec![1.0 - oracle::SSIM_WEIGHT]),
         ("chroma_loss", "SMOOTHING", vec![oracle::CHROMA_EPSILON]),
+        (
+            "view_correction",
+            "PRIOR_VARIANCE",
+            vec![oracle::CORRECTION_PRIOR],
+        ),
+        (
+            "view_correction",
+            "DETERMINANT_MIN",
+            vec![oracle::CORRECTION_DETERMINANT_MIN],
+        ),
         ("adam", "BETA1", vec![oracle::ADAM_BETA1]),
         ("adam", "BETA2", vec![oracle::ADAM_BETA2]),
         ("adam", "EPSILON", vec![oracle::ADAM_EPSILON]),
@@ -305,4 +346,11 @@ fn constants_are_those_of_the_oracle() {
             "{name} of {file}.wgsl"
         );
     }
+}
+
+#[test]
+fn sums_of_a_view_have_the_shape_that_the_host_makes_room_for() {
+    let wgsl = constants_of("view_correction", shaders::VIEW_CORRECTION);
+    assert_eq!(wgsl["SUM_GROUPS"], [SUM_GROUPS as f64]);
+    assert_eq!(wgsl["SUMS"], [SUMS as f64]);
 }

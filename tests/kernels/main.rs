@@ -23,6 +23,7 @@ mod poison;
 mod renderer;
 mod repeat;
 mod scan;
+mod solver;
 mod sort;
 mod tiles;
 

@@ -39,17 +39,6 @@ const REASONS: &[(&str, &str, &str)] = &[
         "0.5 / f32(pixels)",
         "the kernel runs for images of at least one pixel",
     ),
-    ("chroma_loss", "sqrt", "SMOOTHING² is added to a square"),
-    (
-        "chroma_loss",
-        "weights.agreement * drift / length_drift",
-        "a length is at least SMOOTHING",
-    ),
-    (
-        "chroma_loss",
-        "weights.teacher * residual / length_teacher",
-        "a length is at least SMOOTHING",
-    ),
     (
         "densify_geometry",
         "inverseSqrt",
@@ -106,6 +95,14 @@ const REASONS: &[(&str, &str, &str)] = &[
         "the kernel runs for images of at least one pixel",
     ),
     (
+        "penalty",
+        "(1.0 - kept) / decline",
+        "in the branch where decline is positive; kept is at most 1",
+    ),
+    ("penalty", "1.0 / length", "a length is at least SMOOTHING"),
+    ("penalty", "kept / length", "a length is at least SMOOTHING"),
+    ("penalty", "sqrt", "SMOOTHING² is added to a square"),
+    (
         "photo_at",
         "f32((photo[p / 4u] >> (8u * (p % 4u))) & 255u) / 255.0",
         "a constant divisor",
@@ -116,6 +113,11 @@ const REASONS: &[(&str, &str, &str)] = &[
         "project culls opacities below ALPHA_MIN before it asks",
     ),
     ("power_cutoff", "opacity / ALPHA_MIN", "a constant divisor"),
+    (
+        "preconditioned",
+        "residual[k] / (parameters.diagonal_scale * diagonal[of_channel] + parameters.ridge)",
+        "the ridge is positive, sums of weights are not negative",
+    ),
     (
         "project",
         "inverseSqrt",
@@ -177,6 +179,21 @@ const REASONS: &[(&str, &str, &str)] = &[
         "the host sets a count of at least one pixel",
     ),
     (
+        "teacher_of",
+        "s[k] /= s[0]",
+        "what is not positive left in the branch above",
+    ),
+    (
+        "teacher_of",
+        "sqrt",
+        "of a product of variances of at least PRIOR_VARIANCE",
+    ),
+    (
+        "teacher_of",
+        "vec3f(yy, -xy, xx) / (xx * yy - xy * xy)",
+        "xy is clamped to 0.999 of the root of xx yy, which is positive",
+    ),
+    (
         "tile_lists",
         "(splat.mean + splat.extent) / side",
         "a constant divisor",
@@ -193,6 +210,11 @@ const REASONS: &[(&str, &str, &str)] = &[
         "the logarithm of at most 1 is not positive",
     ),
     (
+        "ratio",
+        "above / below",
+        "in the branch where the divisor is positive",
+    ),
+    (
         "relocation_noise",
         "inverseSqrt",
         "of at least QUAT_NORM_MIN_SQ",
@@ -206,6 +228,21 @@ const REASONS: &[(&str, &str, &str)] = &[
         "upsampled",
         "vec2f(at % (2u * view.size)) / vec2f(2u * view.size)",
         "the kernel runs for images of at least one pixel",
+    ),
+    (
+        "view_correction",
+        "vec2f(sums[1024], sums[1280]) / views",
+        "the host sets a count of at least one view",
+    ),
+    (
+        "view_correction",
+        "vec4f(gain.w, -gain.y, -gain.z, gain.x) / determinant",
+        "in the branch where it is at least DETERMINANT_MIN",
+    ),
+    (
+        "view_correction",
+        "vec4f(sums[0], sums[256], sums[512], sums[768]) / views",
+        "the host sets a count of at least one view",
     ),
 ];
 

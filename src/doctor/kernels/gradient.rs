@@ -10,7 +10,7 @@ use crate::{
         measured::{Allowance, Row, Sample},
         stage::{Stage, splats},
     },
-    gpu::GpuError,
+    gpu::{Buffer, GpuError, Recorder},
     oracle::{
         gradient::{gradient, pulls},
         random::{Random, opaque_stack, random_scene_before, random_view},
@@ -18,7 +18,7 @@ use crate::{
         scene::{Scene, View},
         shade::Shading,
     },
-    raster::Raster,
+    raster::{Field, Geometry, LayerAdjoint, Outcome, Raster},
 };
 
 /// The gradient of a picture: one random number a value, none where a pixel
@@ -73,6 +73,36 @@ fn measure<const C: usize>(
     Ok(groups)
 }
 
+/// The adjoint that adds, against the plain one and what was there.
+fn added(raster: &Arc<Raster>, scenes: &[(Scene<f64, 2>, View)]) -> Result<Vec<Sample>, GpuError> {
+    let gpu = &raster.gpu;
+    (scenes.iter().enumerate())
+        .map(|(seed, (scene, view))| {
+            let (splats, upstream) = (splats(scene), upstream(seed as u64, scene, view));
+            let stage = Stage::new(raster, &splats, view)?;
+            let once = stage.backward(upstream.as_flattened())?.field;
+            // Not the gradient itself: what nobody sees keeps what was there.
+            let before: Vec<f32> = once.iter().map(|slope| 3.0 - 0.5 * slope).collect();
+            let geometry = Geometry::upload(gpu, &splats)?;
+            let field = Field::upload(gpu, &splats.sh)?;
+            let sum = Buffer::from_slice(gpu, "sum", &before)?;
+            let outcome = Outcome::Sum(&sum);
+            let Stage { lists, layer, .. } = &stage;
+            let adjoint = LayerAdjoint::new(raster, &geometry, lists, &field, layer, &outcome)?;
+            let upstream: Vec<f32> = (upstream.as_flattened().iter())
+                .map(|&v| v as f32)
+                .collect();
+            adjoint.image_gradient.write(gpu, &upstream);
+            let mut recorder = Recorder::new(gpu);
+            adjoint.record(raster, &mut recorder);
+            recorder.submit();
+            let pairs = before.iter().zip(&once);
+            let expected = pairs.map(|(&b, &o)| f64::from(b) + f64::from(o)).collect();
+            Ok(Sample::new(widen(&sum.read(gpu)?), expected))
+        })
+        .collect()
+}
+
 /// Scenes of every degree before views of odd sizes, and opaque stacks.
 fn scenes<const C: usize>() -> Vec<(Scene<f64, C>, View)> {
     let loose = (20..26).map(|seed| {
@@ -104,5 +134,11 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
     for (name, samples) in measure::<2>(raster, &scenes())? {
         rows.push(Row::gradient("chroma adjoint", name, chroma, &samples));
     }
+    rows.push(Row::elementwise(
+        "chroma adjoint",
+        "sh, added to what is there",
+        allowed.relative(4.36e-8, 1.0),
+        &added(raster, &scenes())?,
+    ));
     Ok(rows)
 }

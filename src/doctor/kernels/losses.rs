@@ -1,15 +1,13 @@
-//! `luma_loss`, `luma_loss_backward`, `chroma_loss` and `sum_loss`.
+//! `luma_loss`, `luma_loss_backward` and `sum_loss`.
 
 use std::sync::Arc;
 
 use crate::{
-    chroma::{ChromaLossWeights, Correction},
     compare::widen,
     doctor::measured::{Allowance, Row, Sample},
-    gpu::{Buffer, Gpu, GpuError, Kernel, Recorder, groups_for, shaders},
+    gpu::{Buffer, Gpu, GpuError, Kernel, Recorder, shaders},
     optimize::{LossLog, SumLossKernel},
     oracle::{
-        chroma_loss::{chroma_loss, chroma_loss_gradient},
         luma_loss::{luma_loss, luma_loss_gradient},
         random::Random,
     },
@@ -17,13 +15,10 @@ use crate::{
 };
 
 /// Blocks cut short on either side, images smaller than the window, whole blocks.
-const SIZES: [[usize; 2]; 6] = [[5, 3], [1, 1], [16, 16], [17, 33], [40, 27], [61, 48]];
-
-/// More blocks of 256 pixels than `sum_loss` has threads.
-const MANY_BLOCKS: [usize; 2] = [301, 243];
+pub(super) const SIZES: [[usize; 2]; 6] = [[5, 3], [1, 1], [16, 16], [17, 33], [40, 27], [61, 48]];
 
 /// Adds up what a loss kernel left; `record` runs it.
-fn logged(
+pub(super) fn logged(
     gpu: &Gpu,
     sizes: [usize; 2],
     blocks: usize,
@@ -41,7 +36,8 @@ fn logged(
     Ok(f64::from(log.read_later(gpu).wait(gpu)?[1]))
 }
 
-fn view(gpu: &Gpu, size: [usize; 2]) -> Result<Buffer<ViewUniform>, GpuError> {
+/// A view of which nothing but the size matters.
+pub(super) fn view(gpu: &Gpu, size: [usize; 2]) -> Result<Buffer<ViewUniform>, GpuError> {
     let size = size.map(|side| side as u32);
     let uniform = ViewUniform {
         size,
@@ -164,116 +160,6 @@ fn constant(gpu: &Gpu) -> Result<[Vec<Sample>; 2], GpuError> {
     Ok([values, gradients])
 }
 
-/// Bilinear sample with half-pixel centres, as images are resized everywhere.
-fn upsample(coarser: &[[f64; 2]], from: [usize; 2], to: [usize; 2]) -> Vec<[f64; 2]> {
-    let taps = |index: usize, axis: usize| {
-        let at = (index as f64 + 0.5) * from[axis] as f64 / to[axis] as f64 - 0.5;
-        let at = at.clamp(0.0, from[axis] as f64 - 1.0);
-        let low = at.floor();
-        [
-            (low as usize, 1.0 - (at - low)),
-            ((low as usize + 1).min(from[axis] - 1), at - low),
-        ]
-    };
-    (0..to[0] * to[1])
-        .map(|p| {
-            let mut sum = [0.0; 2];
-            for (row, down) in taps(p / to[0], 1) {
-                for (column, across) in taps(p % to[0], 0) {
-                    let value = coarser[row * from[0] + column];
-                    sum = [0, 1].map(|c| sum[c] + across * down * value[c]);
-                }
-            }
-            sum
-        })
-        .collect()
-}
-
-/// Loss and gradient `[pixels, 2]` of a picture against the teacher's (both
-/// `[pixels]`) and the coarser level's picture, of the size in `weights`.
-///
-/// # Errors
-/// [`GpuError`].
-pub fn chroma_loss_on(
-    gpu: &Gpu,
-    size: [usize; 2],
-    [image, wanted, coarser]: [&[[f64; 2]]; 3],
-    weights: &ChromaLossWeights,
-) -> Result<(f64, Vec<f32>), GpuError> {
-    let buffer = |values: &[[f64; 2]]| {
-        let values: Vec<f32> = values.as_flattened().iter().map(|&v| v as f32).collect();
-        Buffer::from_slice(gpu, "pixels", &values)
-    };
-    let kernel = Kernel::new(gpu, "chroma_loss", shaders::CHROMA_LOSS);
-    let (view, weights) = (view(gpu, size)?, Buffer::uniform(gpu, "weights", weights)?);
-    let (image, wanted, coarser) = (buffer(image)?, buffer(wanted)?, buffer(coarser)?);
-    let gradient = Buffer::<f32>::zeros(gpu, "gradient", image.len())?;
-    let groups = groups_for(size[0] * size[1]);
-    let pixel_weights = Buffer::from_slice(gpu, "pixel weights", &[0.0_f32])?;
-    let corrections = Buffer::from_slice(gpu, "corrections", &[Correction::NONE])?;
-    let loss = logged(gpu, size, groups as usize, |recorder, block_losses| {
-        let [image, wanted, coarser] = [&image, &wanted, &coarser].map(Buffer::raw);
-        let (losses, gradient) = (block_losses.raw(), gradient.raw());
-        let (view, weights) = (view.raw(), weights.raw());
-        let (pixels, corrections) = (pixel_weights.raw(), corrections.raw());
-        let buffers = [
-            view,
-            image,
-            wanted,
-            coarser,
-            weights,
-            losses,
-            gradient,
-            pixels,
-            corrections,
-        ];
-        recorder.dispatch(&kernel, &kernel.bind(gpu, &buffers), groups);
-    })?;
-    Ok((loss, gradient.read(gpu)?))
-}
-
-fn chroma(gpu: &Gpu, agreement: f32) -> Result<[Vec<Sample>; 2], GpuError> {
-    let (mut values, mut gradients) = (Vec::new(), Vec::new());
-    let sizes = SIZES.into_iter().chain([MANY_BLOCKS]);
-    for (seed, size) in sizes.enumerate() {
-        let mut random = Random::new(seed as u64);
-        let half = size.map(|side| side.div_ceil(2));
-        let mut pixels = |[width, height]: [usize; 2], spread: f64| -> Vec<[f64; 2]> {
-            (0..width * height)
-                .map(|_| random.array(-spread, spread))
-                .collect()
-        };
-        let (wanted, coarser) = (pixels(size, 60.0), pixels(half, 60.0));
-        let image: Vec<[f64; 2]> = (pixels(size, 3.0).iter().zip(&wanted))
-            .map(|(noise, w)| [0, 1].map(|c| f64::from((w[c] + noise[c]) as f32)))
-            .collect();
-        let weights = ChromaLossWeights {
-            coarser_size: half.map(|side| side as u32),
-            teacher: 0.75,
-            agreement,
-            ..ChromaLossWeights::default()
-        };
-        let (loss, gradient) = chroma_loss_on(gpu, size, [&image, &wanted, &coarser], &weights)?;
-        let smooth = upsample(&coarser, half, size);
-        let (teacher, agreement) = (0.75, f64::from(agreement));
-        let expected =
-            teacher * chroma_loss(&image, &wanted) + agreement * chroma_loss(&image, &smooth);
-        values.push(Sample::new(vec![loss], vec![expected]));
-        let [by_teacher, by_coarser] =
-            [&wanted, &smooth].map(|target| chroma_loss_gradient(&image, target));
-        let scale = (size[0] * size[1]) as f64;
-        let expected = (by_teacher
-            .as_flattened()
-            .iter()
-            .zip(by_coarser.as_flattened()))
-        .map(|(t, c)| scale * (teacher * t + agreement * c))
-        .collect();
-        let actual = widen(&gradient).into_iter().map(|v| v * scale).collect();
-        gradients.push(Sample::new(actual, expected));
-    }
-    Ok([values, gradients])
-}
-
 pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
     let gpu = &raster.gpu;
     let allowed = Allowance::of(gpu);
@@ -291,8 +177,6 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
     let [luma_values, luma_gradients] = luma(gpu, &TONES)?;
     let [flat_values, flat_gradients] = luma(gpu, &BRIGHT_AND_FLAT)?;
     let [constant_values, constant_gradients] = constant(gpu)?;
-    let [plain_values, plain_gradients] = chroma(gpu, 0.0)?;
-    let [values, gradients] = chroma(gpu, 0.5)?;
     Ok(vec![
         value("luma_loss", "value", 2.86e-7, &luma_values),
         gradient(
@@ -321,22 +205,6 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
             "gradient × pixels, constant pictures",
             allowed.relative(1.38e-4, 1.0),
             &constant_gradients,
-        ),
-        value("chroma_loss", "value", 6.35e-8, &plain_values),
-        gradient(
-            "chroma_loss",
-            "gradient × pixels",
-            7.40e-8,
-            5.1e-8,
-            &plain_gradients,
-        ),
-        value("chroma_loss", "value with agreement", 1.24e-7, &values),
-        gradient(
-            "chroma_loss",
-            "gradient × pixels with agreement",
-            1.5e-7,
-            1.77e-6,
-            &gradients,
         ),
     ])
 }

@@ -3,6 +3,8 @@
 
 mod adam;
 mod blend;
+mod chroma_loss;
+mod conjugate;
 mod densify;
 mod gradient;
 mod losses;
@@ -11,8 +13,9 @@ mod relocation;
 mod scan;
 mod sort;
 mod step;
+mod view_correction;
 
-pub use losses::chroma_loss_on;
+pub use chroma_loss::{ChromaInput, ChromaOutput};
 pub use scan::scan_on;
 pub use sort::sort_on;
 
@@ -25,15 +28,18 @@ use crate::{gpu::GpuError, raster::Raster};
 type Measure = fn(&Arc<Raster>) -> Result<Vec<Row>, GpuError>;
 
 /// The topics in the order in which an iteration meets them.
-pub const TOPICS: [(&str, Measure); 10] = [
+pub const TOPICS: [(&str, Measure); 13] = [
     ("project", project::rows),
     ("scan", scan::rows),
     ("sort", sort::rows),
     ("blend", blend::rows),
     ("losses", losses::rows),
+    ("chroma loss", chroma_loss::rows),
     ("adjoint", gradient::rows),
     ("step", step::rows),
     ("adam", adam::rows),
     ("densify", densify::rows),
     ("relocation", relocation::rows),
+    ("view correction", view_correction::rows),
+    ("conjugate", conjugate::rows),
 ];

@@ -1,0 +1,358 @@
+//! `chroma_loss`, with and without the curvature, `sum_loss` of many blocks, and `weigh`.
+
+use std::sync::Arc;
+
+use super::losses::{SIZES, logged, view};
+use crate::{
+    chroma::{ChromaLossWeights, Correction},
+    compare::widen,
+    doctor::measured::{Allowance, Row, Sample},
+    gpu::{Buffer, Gpu, GpuError, Kernel, Recorder, groups_for, shaders},
+    oracle::{
+        chroma_loss::{Teaching, chroma_loss, chroma_loss_gradient, curvature},
+        random::{Random, round},
+    },
+    raster::Raster,
+};
+
+/// More blocks of 256 pixels than `sum_loss` has threads.
+const MANY_BLOCKS: [usize; 2] = [301, 243];
+
+/// Weight of the teacher: exact in f32, and not 1.
+const TEACHER: f64 = 0.75;
+
+/// What the kernel takes.
+pub struct ChromaInput<'a> {
+    /// Width and height.
+    pub size: [usize; 2],
+    /// Rendered a/b, `[pixels][2]`.
+    pub image: &'a [[f64; 2]],
+    /// Wanted a/b, `[pixels][2]`.
+    pub wanted: &'a [[f64; 2]],
+    /// The coarser scale's picture, of the size in `weights`.
+    pub coarser: &'a [[f64; 2]],
+    /// How much each pixel counts; read where `weights` say so.
+    pub pixel_weights: &'a [f64],
+    /// One for each view.
+    pub corrections: &'a [Correction],
+    /// What weighs them.
+    pub weights: ChromaLossWeights,
+}
+
+/// What it gives.
+pub struct ChromaOutput {
+    /// The mean over the pixels.
+    pub loss: f64,
+    /// With respect to the image, `[pixels, 2]`.
+    pub gradient: Vec<f32>,
+    /// Slope over residual, `[pixels, 2]`; empty unless asked for.
+    pub curvatures: Vec<f32>,
+}
+
+fn pixels(gpu: &Gpu, values: &[[f64; 2]]) -> Result<Buffer<f32>, GpuError> {
+    let values: Vec<f32> = values.as_flattened().iter().map(|&v| v as f32).collect();
+    Buffer::from_slice(gpu, "pixels", &values)
+}
+
+impl ChromaInput<'_> {
+    /// Runs the kernel, or (`curved`) the one that gives the curvature too.
+    ///
+    /// # Errors
+    /// [`GpuError`].
+    pub fn run(&self, gpu: &Gpu, curved: bool) -> Result<ChromaOutput, GpuError> {
+        let source = if curved {
+            shaders::CHROMA_LOSS_CURVATURE
+        } else {
+            shaders::CHROMA_LOSS
+        };
+        let kernel = Kernel::new(gpu, "chroma_loss", source);
+        let view = view(gpu, self.size)?;
+        let weights = Buffer::uniform(gpu, "weights", &self.weights)?;
+        let [image, wanted, coarser] = [self.image, self.wanted, self.coarser];
+        let (image, wanted, coarser) = (
+            pixels(gpu, image)?,
+            pixels(gpu, wanted)?,
+            pixels(gpu, coarser)?,
+        );
+        let narrow: Vec<f32> = self.pixel_weights.iter().map(|&w| w as f32).collect();
+        let pixel_weights = Buffer::from_slice(gpu, "pixel weights", &narrow)?;
+        let corrections = Buffer::from_slice(gpu, "corrections", self.corrections)?;
+        let gradient = Buffer::<f32>::zeros(gpu, "gradient", image.len())?;
+        let curvatures = Buffer::<f32>::zeros(gpu, "curvatures", image.len())?;
+        let groups = groups_for(self.size[0] * self.size[1]);
+        let loss = logged(gpu, self.size, groups as usize, |recorder, block_losses| {
+            let mut buffers = vec![
+                view.raw(),
+                image.raw(),
+                wanted.raw(),
+                coarser.raw(),
+                weights.raw(),
+                block_losses.raw(),
+                gradient.raw(),
+                pixel_weights.raw(),
+                corrections.raw(),
+            ];
+            if curved {
+                buffers.push(curvatures.raw());
+            }
+            recorder.dispatch(&kernel, &kernel.bind(gpu, &buffers), groups);
+        })?;
+        Ok(ChromaOutput {
+            loss,
+            gradient: gradient.read(gpu)?,
+            curvatures: if curved {
+                curvatures.read(gpu)?
+            } else {
+                Vec::new()
+            },
+        })
+    }
+}
+
+/// Bilinear sample with half-pixel centres, as images are resized everywhere.
+fn upsample(coarser: &[[f64; 2]], from: [usize; 2], to: [usize; 2]) -> Vec<[f64; 2]> {
+    let taps = |index: usize, axis: usize| {
+        let at = (index as f64 + 0.5) * from[axis] as f64 / to[axis] as f64 - 0.5;
+        let at = at.clamp(0.0, from[axis] as f64 - 1.0);
+        let low = at.floor();
+        [
+            (low as usize, 1.0 - (at - low)),
+            ((low as usize + 1).min(from[axis] - 1), at - low),
+        ]
+    };
+    (0..to[0] * to[1])
+        .map(|p| {
+            let mut sum = [0.0; 2];
+            for (row, down) in taps(p / to[0], 1) {
+                for (column, across) in taps(p % to[0], 0) {
+                    let value = coarser[row * from[0] + column];
+                    sum = [0, 1].map(|c| sum[c] + across * down * value[c]);
+                }
+            }
+            sum
+        })
+        .collect()
+}
+
+/// How a row asks for the loss.
+#[derive(Clone, Copy)]
+struct Terms {
+    agreement: f64,
+    decline: f64,
+    /// Whether pixels have weights and the teacher is corrected.
+    weighed: bool,
+    curved: bool,
+}
+
+const PLAIN: Terms = Terms {
+    agreement: 0.0,
+    decline: 0.0,
+    weighed: false,
+    curved: false,
+};
+
+/// Weights that decide differently: unknown, half known, ordinary, painted.
+const PIXEL_WEIGHTS: [f64; 5] = [0.0, 0.375, 1.0, 1.0, 50.0];
+
+/// The third of them is the view's.
+const CORRECTIONS: [Correction; 3] = [
+    Correction::NONE,
+    Correction {
+        gain: [[0.5, 3.0], [2.0, -1.0]],
+        offset: [90.0, -90.0],
+        padding: [0.0; 2],
+    },
+    Correction {
+        gain: [[1.25, -0.125], [0.0625, 0.75]],
+        offset: [-3.0, 5.5],
+        padding: [0.0; 2],
+    },
+];
+
+/// Values, gradients and curvatures, the latter two by pixel.
+fn measure(gpu: &Gpu, terms: Terms) -> Result<[Vec<Sample>; 3], GpuError> {
+    let mut samples: [Vec<Sample>; 3] = Default::default();
+    let sizes = SIZES.into_iter().chain([MANY_BLOCKS]);
+    for (seed, size) in sizes.enumerate() {
+        let mut random = Random::new(seed as u64);
+        let half = size.map(|side| side.div_ceil(2));
+        let mut pixels = |[width, height]: [usize; 2], spread: f64| -> Vec<[f64; 2]> {
+            (0..width * height)
+                .map(|_| random.array(-spread, spread))
+                .collect()
+        };
+        let (wanted, coarser) = (pixels(size, 60.0), pixels(half, 60.0));
+        let noise = pixels(size, 3.0);
+        let count = size[0] * size[1];
+        let mut teaching = Teaching {
+            weights: vec![1.0; count],
+            gain: [[1.0, 0.0], [0.0, 1.0]],
+            offset: [0.0; 2],
+            decline: round(terms.decline),
+            wanted,
+        };
+        if terms.weighed {
+            let weights = (0..count).map(|p| PIXEL_WEIGHTS[(p * 7 + seed) % PIXEL_WEIGHTS.len()]);
+            teaching.weights = weights.collect();
+            teaching.gain = CORRECTIONS[2].gain.map(|row| row.map(f64::from));
+            teaching.offset = CORRECTIONS[2].offset.map(f64::from);
+        }
+        // About what is wanted after the correction, a painted pixel far from it.
+        let image: Vec<[f64; 2]> = (teaching.wanted.iter().zip(&noise))
+            .map(|(&[a, b], noise)| {
+                let (gain, offset) = (teaching.gain, teaching.offset);
+                [0, 1].map(|c| round(gain[c][0] * a + gain[c][1] * b + offset[c] + noise[c]))
+            })
+            .collect();
+        let input = ChromaInput {
+            size,
+            image: &image,
+            wanted: &teaching.wanted,
+            coarser: &coarser,
+            pixel_weights: if terms.weighed {
+                &teaching.weights
+            } else {
+                &[0.0]
+            },
+            corrections: &CORRECTIONS,
+            weights: ChromaLossWeights {
+                coarser_size: half.map(|side| side as u32),
+                teacher: TEACHER as f32,
+                agreement: terms.agreement as f32,
+                decline: terms.decline as f32,
+                view_index: if terms.weighed { 2 } else { 0 },
+                weighted: u32::from(terms.weighed),
+                padding: 0,
+            },
+        };
+        let output = input.run(gpu, terms.curved)?;
+
+        let smooth = upsample(&coarser, half, size);
+        let [slopes, curves] = teaching.slopes(&image);
+        let drift = chroma_loss_gradient(&image, &smooth);
+        let by_drift: Vec<[f64; 2]> = (image.iter().zip(&smooth))
+            .map(|(x, s)| [0, 1].map(|c| curvature(x[c] - s[c], 0.0) / (2 * count) as f64))
+            .collect();
+        let scale = count as f64;
+        let sum = |by_teacher: &[[f64; 2]], by_coarser: &[[f64; 2]]| -> Vec<f64> {
+            let pairs = by_teacher.as_flattened().iter();
+            (pairs.zip(by_coarser.as_flattened()))
+                .map(|(t, c)| scale * (TEACHER * t + terms.agreement * c))
+                .collect()
+        };
+        let loss = TEACHER * teaching.loss(&image) + terms.agreement * chroma_loss(&image, &smooth);
+        let scaled = |values: &[f32]| widen(values).into_iter().map(|v| v * scale).collect();
+        samples[0].push(Sample::new(vec![output.loss], vec![loss]));
+        samples[1].push(Sample::new(scaled(&output.gradient), sum(&slopes, &drift)));
+        if terms.curved {
+            let expected = sum(&curves, &by_drift);
+            samples[2].push(Sample::new(scaled(&output.curvatures), expected));
+        }
+    }
+    Ok(samples)
+}
+
+/// A picture times its weights; a product rounds once.
+fn weigh(gpu: &Gpu) -> Result<Vec<Sample>, GpuError> {
+    let kernel = Kernel::new(gpu, "weigh", shaders::WEIGH);
+    (SIZES.into_iter().enumerate())
+        .map(|(seed, size)| {
+            let mut random = Random::new(seed as u64);
+            let mut draw = |low, high| -> Vec<[f64; 2]> {
+                (0..size[0] * size[1])
+                    .map(|_| random.array(low, high))
+                    .collect()
+            };
+            let (image, weights) = (draw(-90.0, 90.0), draw(0.0, 1e-4));
+            let buffers = [pixels(gpu, &image)?, pixels(gpu, &weights)?];
+            let weighted = Buffer::<f32>::zeros(gpu, "weighted", buffers[0].len())?;
+            let view = view(gpu, size)?;
+            let bound = [
+                view.raw(),
+                buffers[0].raw(),
+                buffers[1].raw(),
+                weighted.raw(),
+            ];
+            let mut recorder = Recorder::new(gpu);
+            let groups = groups_for(size[0] * size[1]);
+            recorder.dispatch(&kernel, &kernel.bind(gpu, &bound), groups);
+            recorder.submit();
+            let expected = (image.as_flattened().iter().zip(weights.as_flattened()))
+                .map(|(x, w)| round(x * w))
+                .collect();
+            Ok(Sample::new(widen(&weighted.read(gpu)?), expected))
+        })
+        .collect()
+}
+
+pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
+    let gpu = &raster.gpu;
+    let allowed = Allowance::of(gpu);
+    let value = |what, worst, samples: &[Sample]| {
+        Row::elementwise("chroma_loss", what, allowed.relative(worst, 0.0), samples)
+    };
+    let gradient = |what, l2, worst, samples: &[Sample]| {
+        let bounds = allowed.gradient(l2, allowed.relative(worst, 1.0));
+        Row::gradient("chroma_loss", what, bounds, samples)
+    };
+    let [plain_values, plain_gradients, _] = measure(gpu, PLAIN)?;
+    let agreement = Terms {
+        agreement: 0.5,
+        ..PLAIN
+    };
+    let [values, gradients, _] = measure(gpu, agreement)?;
+    let solver = Terms {
+        decline: 0.1,
+        weighed: true,
+        curved: true,
+        ..PLAIN
+    };
+    let [weighed_values, weighed_gradients, weighed_curvatures] = measure(gpu, solver)?;
+    let all = Terms {
+        agreement: 0.5,
+        ..solver
+    };
+    let [all_values, all_gradients, all_curvatures] = measure(gpu, all)?;
+    Ok(vec![
+        value("value", 6.35e-8, &plain_values),
+        gradient("gradient × pixels", 7.40e-8, 6.31e-8, &plain_gradients),
+        value("value with agreement", 1.24e-7, &values),
+        gradient(
+            "gradient × pixels with agreement",
+            1.53e-7,
+            1.88e-6,
+            &gradients,
+        ),
+        value(
+            "value, weighed, corrected, declining",
+            1.40e-7,
+            &weighed_values,
+        ),
+        gradient(
+            "gradient × pixels, weighed, corrected, declining",
+            3.43e-7,
+            5.28e-6,
+            &weighed_gradients,
+        ),
+        gradient(
+            "curvature × pixels, weighed, corrected, declining",
+            3.90e-7,
+            2.62e-6,
+            &weighed_curvatures,
+        ),
+        value("value, all terms", 1.33e-7, &all_values),
+        gradient(
+            "gradient × pixels, all terms",
+            1.01e-7,
+            4.60e-6,
+            &all_gradients,
+        ),
+        gradient(
+            "curvature × pixels, all terms",
+            3.83e-7,
+            2.62e-6,
+            &all_curvatures,
+        ),
+        Row::exact("weigh", "weighted picture", &weigh(gpu)?),
+    ])
+}

@@ -1,0 +1,170 @@
+//! What brings the views' teachers into line: of each view, the affine map from
+//! rendered to taught a/b by weighted least squares; of all, what is left when their
+//! mean is taken out, undone.
+
+use super::constants::{CORRECTION_DETERMINANT_MIN, CORRECTION_PRIOR};
+
+/// `gain · ab + offset`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Affine {
+    /// Rows.
+    pub gain: [[f64; 2]; 2],
+    /// In Lab units.
+    pub offset: [f64; 2],
+}
+
+impl Affine {
+    /// Changes nothing.
+    pub const IDENTITY: Self = Self {
+        gain: [[1.0, 0.0], [0.0, 1.0]],
+        offset: [0.0; 2],
+    };
+
+    /// The map of one a/b.
+    pub fn of(&self, ab: [f64; 2]) -> [f64; 2] {
+        [0, 1].map(|c| self.gain[c][0] * ab[0] + self.gain[c][1] * ab[1] + self.offset[c])
+    }
+}
+
+/// A pixel of a view: weight, rendered and taught a/b.
+pub type Pixel = (f64, [f64; 2], [f64; 2]);
+
+fn determinant(m: [[f64; 2]; 2]) -> f64 {
+    m[0][0] * m[1][1] - m[0][1] * m[1][0]
+}
+
+fn inverse(m: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
+    let d = determinant(m);
+    [[m[1][1] / d, -m[0][1] / d], [-m[1][0] / d, m[0][0] / d]]
+}
+
+/// The teacher as an affine map of what is rendered; the prior pulls the gain to the
+/// identity. Pixels of exactly zero show nothing and do not count. Without any weight,
+/// the identity.
+pub fn teacher_of(pixels: &[Pixel]) -> Affine {
+    let shown = |pixel: &&Pixel| pixel.1.iter().any(|x| x.abs() > 0.0);
+    let pixels: Vec<&Pixel> = pixels.iter().filter(shown).collect();
+    let weight: f64 = pixels.iter().map(|pixel| pixel.0).sum();
+    if weight <= 0.0 {
+        return Affine::IDENTITY;
+    }
+    let mean = |of: &dyn Fn(&Pixel) -> f64| {
+        (pixels.iter().map(|pixel| pixel.0 * of(pixel))).sum::<f64>() / weight
+    };
+    let x = [0, 1].map(|c| mean(&|pixel| pixel.1[c]));
+    let t = [0, 1].map(|c| mean(&|pixel| pixel.2[c]));
+    let prior = |i: usize, j: usize| if i == j { CORRECTION_PRIOR } else { 0.0 };
+    // Centred before it is squared: nothing cancels.
+    let within =
+        [0, 1].map(|i| [0, 1].map(|j| mean(&|p| (p.1[i] - x[i]) * (p.1[j] - x[j])) + prior(i, j)));
+    let across =
+        [0, 1].map(|i| [0, 1].map(|j| mean(&|p| (p.2[i] - t[i]) * (p.1[j] - x[j])) + prior(i, j)));
+    let inverse = inverse(within);
+    let gain =
+        [0, 1].map(|i| [0, 1].map(|j| across[i][0] * inverse[0][j] + across[i][1] * inverse[1][j]));
+    let offset = [0, 1].map(|c| t[c] - gain[c][0] * x[0] - gain[c][1] * x[1]);
+    Affine { gain, offset }
+}
+
+/// What wanted a/b of each view have to go through.
+pub fn view_corrections(views: &[Vec<Pixel>]) -> Vec<Affine> {
+    let teachers: Vec<Affine> = views.iter().map(|pixels| teacher_of(pixels)).collect();
+    let mean =
+        |of: &dyn Fn(&Affine) -> f64| teachers.iter().map(of).sum::<f64>() / teachers.len() as f64;
+    let mean_gain = [0, 1].map(|i| [0, 1].map(|j| mean(&|t| t.gain[i][j])));
+    let mean_offset = [0, 1].map(|i| mean(&|t| t.offset[i]));
+    (teachers.iter())
+        .map(|teacher| {
+            let identity = Affine::IDENTITY.gain;
+            let gain = [0, 1]
+                .map(|i| [0, 1].map(|j| teacher.gain[i][j] - mean_gain[i][j] + identity[i][j]));
+            if determinant(gain) <= CORRECTION_DETERMINANT_MIN {
+                return Affine::IDENTITY;
+            }
+            let gain = inverse(gain);
+            let m = [0, 1].map(|c| teacher.offset[c] - mean_offset[c]);
+            let offset = [0, 1].map(|c| -gain[c][0] * m[0] - gain[c][1] * m[1]);
+            Affine { gain, offset }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::random::Random;
+    use super::*;
+
+    /// Rendered a/b far more spread than the prior, and what `teacher` makes of them.
+    fn view(random: &mut Random, teacher: Affine) -> Vec<Pixel> {
+        (0..200)
+            .map(|_| {
+                let x = random.array(-3e4, 3e4);
+                (random.range(0.1, 2.0), x, teacher.of(x))
+            })
+            .collect()
+    }
+
+    fn close(a: Affine, b: Affine, far: f64) -> bool {
+        let gains = a.gain.as_flattened().iter().zip(b.gain.as_flattened());
+        let offsets = a.offset.iter().zip(&b.offset);
+        gains.chain(offsets).all(|(a, b)| (a - b).abs() < far)
+    }
+
+    const WARM: Affine = Affine {
+        gain: [[1.1, 0.1], [-0.2, 0.9]],
+        offset: [4.0, 7.0],
+    };
+
+    #[test]
+    fn an_affine_teacher_is_found() {
+        let found = teacher_of(&view(&mut Random::new(1), WARM));
+        assert!(close(found, WARM, 1e-4), "{found:?}");
+    }
+
+    /// Teachers whose mean is the identity give the same once they are corrected.
+    #[test]
+    fn corrected_teachers_agree() {
+        let cold = Affine {
+            gain: [[0.9, -0.1], [0.2, 1.1]],
+            offset: [-4.0, -7.0],
+        };
+        let mut random = Random::new(2);
+        let views = [WARM, cold].map(|teacher| view(&mut random, teacher));
+        for (correction, pixels) in view_corrections(&views).iter().zip(&views) {
+            for &(_, x, t) in pixels {
+                let back = correction.of(t);
+                assert!((back[0] - x[0]).abs() < 1e-2 && (back[1] - x[1]).abs() < 1e-2);
+            }
+        }
+    }
+
+    /// What all teachers share is the scene's colour, which must not drift.
+    #[test]
+    fn what_all_share_stays() {
+        let mut random = Random::new(3);
+        let views = [(); 3].map(|()| view(&mut random, WARM));
+        for correction in view_corrections(&views) {
+            assert!(close(correction, Affine::IDENTITY, 1e-3), "{correction:?}");
+        }
+    }
+
+    #[test]
+    fn little_colour_says_little() {
+        let flat = vec![(1.0, [5.0, 5.0], [9.0, 2.0]); 10];
+        let found = teacher_of(&flat);
+        assert_eq!(found.gain, Affine::IDENTITY.gain);
+        assert_eq!(found.offset, [4.0, -3.0]);
+        assert_eq!(teacher_of(&[(0.0, [1.0; 2], [50.0; 2])]), Affine::IDENTITY);
+        assert_eq!(teacher_of(&[]), Affine::IDENTITY);
+        // The sky, where no Gaussian is.
+        assert_eq!(teacher_of(&[(1.0, [0.0; 2], [50.0; 2])]), Affine::IDENTITY);
+        // A teacher that knows no colour at all cannot be undone.
+        let mut random = Random::new(4);
+        let gray = Affine {
+            gain: [[0.0; 2]; 2],
+            offset: [0.0; 2],
+        };
+        let views = [gray, WARM, WARM, WARM].map(|teacher| view(&mut random, teacher));
+        assert_eq!(view_corrections(&views)[0], Affine::IDENTITY);
+    }
+}
