@@ -8,7 +8,8 @@ not there are skipped with a word. A scene is fitted once (and not again while i
 then coloured and evaluated with each teacher: the photos themselves (oracle), the photos made
 unsteady by unsteady_teacher.py, and the bundled network. Needs numpy and Pillow.
 
-`--colorize="--sh-degree 1"` hands flags to `gs-chroma colorize`: with them an ablation's table.
+`--colorize="--sh-degree 1"` hands flags to `gs-chroma colorize`. `--ablation` prints another table:
+each part of the solver off, or its degree raised, with the unsteady teacher.
 """
 
 from __future__ import annotations
@@ -34,6 +35,20 @@ TO_TEACHER = 0.4
 COLOURFULNESS = 0.05
 TO_PER_FRAME = 1 / 2
 BAKE = (1.0, 3.0)
+
+# What `--ablation` tries: a name and colorize's flags.
+VARIANTS = {
+    "as it is": "",
+    "robust off": "--robust off",
+    "correction off": "--correct-views off",
+    "robust and correction off": "--robust off --correct-views off",
+    "fill off": "--fill off",
+    "two coarser scales": "--scales 2",
+    "degree 1": "--sh-degree 1",
+    "degree 2": "--sh-degree 2",
+    "degree 3": "--sh-degree 3",
+    "Adam, 150 iterations": "--solver adam --until {until}",
+}
 
 HEAD = [
     "scene",
@@ -124,6 +139,23 @@ def line(cells: list[str]) -> None:
     print("| " + " | ".join(cells) + " |", flush=True)
 
 
+def ablation(program: str, scene: str, out: Path) -> None:
+    """A row for each variant, of the exported file."""
+    teacher = str(out / "unsteady")
+    for name, flags in VARIANTS.items():
+        luma = json.loads((out / "run" / "report.json").read_text())["luma"]
+        flags = flags.format(until=luma["iterations"] + 150)
+        asked = [str(out / "run"), "--teacher", teacher]
+        report, _ = run([program, "colorize", *asked, *shlex.split(flags), "--json"])
+        found = json.loads(run([program, "eval", *asked, "--frames", "2", "--json"])[0])
+        ours = by_method(found["pictures"])["exported"]
+        between = by_method(found["between"]["consistency"])["exported"]
+        chroma = json.loads(report)["chroma"]
+        figures = [f"{between['rms']:.2f}", f"{ours['ab_error']:.2f}"]
+        figures += [f"{ours['delta_e']['mean']:.2f}", f"{ours['colorfulness']:.1f}"]
+        line([scene, name, *figures, f"{chroma['passes']:.0f}", f"{chroma['seconds']['distill']:.0f}"])
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("-o", "--output", type=Path, default=Path("target/color"))
@@ -136,10 +168,16 @@ def main() -> int:
     parser.add_argument("--frames", type=int, default=60)
     parser.add_argument("--scenes", nargs="*", default=list(SCENES), choices=list(SCENES))
     parser.add_argument("--teachers", nargs="*", default=TEACHERS, choices=TEACHERS)
+    parser.add_argument("--ablation", action="store_true")
     arguments = parser.parse_args()
     program = arguments.program
-    line(HEAD)
-    line(["---"] * len(HEAD))
+    head = HEAD
+    if arguments.ablation:
+        head = ["scene", "variant", "views differ by", "held-out a/b error", "ΔE00"]
+        head += ["colourfulness", "view passes", "seconds"]
+        arguments.teachers = ["unsteady"]
+    line(head)
+    line(["---"] * len(head))
     for scene in arguments.scenes:
         folder = arguments.data / scene
         if not folder.is_dir():
@@ -156,6 +194,9 @@ def main() -> int:
         if "unsteady" in arguments.teachers and not unsteady.is_dir():
             script = [sys.executable, str(TOOLS / "unsteady_teacher.py")]
             run([*script, str(folder / "images"), "-o", str(unsteady), "--max-side", str(SIDE)])
+        if arguments.ablation:
+            ablation(program, scene, out)
+            continue
         paths = {"oracle": folder / "images", "unsteady": unsteady, "network": arguments.network}
         for teacher in arguments.teachers:
             asked = [str(out / "run"), "--teacher", str(paths[teacher])]
