@@ -156,7 +156,7 @@ fn line(point: &Point) -> String {
 
 fn summary(points: &[Point]) {
     let of = |name: &'static str| points.iter().filter(move |point| point.solver == name);
-    let Some(goal) = of("adam").last() else {
+    let Some(goal) = of("adam").next_back() else {
         return;
     };
     match of("irls").find(|point| point.objective <= goal.objective) {
