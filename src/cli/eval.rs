@@ -22,7 +22,8 @@ pub struct Eval {
     /// Side in pixels at which a network sees photos, as for `colorize`.
     #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(1..=8192), requires = "teacher")]
     teacher_size: Option<u32>,
-    /// Measure other ways to colour a scene as well: the teacher on each drawn gray frame.
+    /// Measure other ways to colour a scene as well: RGB splats fitted to the teacher's pictures,
+    /// and the teacher on each drawn gray frame.
     #[arg(long, requires = "teacher")]
     baselines: bool,
     /// Frames of the rendered path.

@@ -122,7 +122,10 @@ fn the_photos_as_a_teacher_make_no_error() {
         .iter()
         .map(|s| &s["method"])
         .collect();
-    assert_eq!(methods, ["native", "exported", "teacher", "photo"]);
+    assert_eq!(
+        methods,
+        ["native", "exported", "teacher", "rgb_splats", "photo"]
+    );
 }
 
 #[test]

@@ -8,7 +8,9 @@ use super::scene;
 use super::shared::{place_with_run, place_with_scene};
 use super::splat_file::SplatFile;
 
-const COMMANDS: [&str; 6] = ["fit", "colorize", "render", "export", "info", "doctor"];
+const COMMANDS: [&str; 7] = [
+    "fit", "colorize", "eval", "render", "export", "info", "doctor",
+];
 
 #[test]
 fn info_on_a_run() {

@@ -171,7 +171,7 @@ pub(super) const CASES: &[Case] = &[
     case(
         "until before the end of luma",
         nothing,
-        "colorize --teacher onnx/ddcolor_tiny.onnx --until 60",
+        "colorize --teacher onnx/ddcolor_tiny.onnx --solver adam --until 60",
         &["--until 60", "60 iterations", "larger"],
     ),
     case(
@@ -201,13 +201,13 @@ pub(super) const CASES: &[Case] = &[
     case(
         "colorize into a folder",
         nothing,
-        "colorize --teacher onnx/ddcolor_tiny.onnx --until 62 -o runs",
+        "colorize --teacher onnx/ddcolor_tiny.onnx --solver adam --until 62 -o runs",
         &["runs", "is a folder", ".ply"],
     ),
     case(
         "colorize below a file",
         nothing,
-        "colorize --teacher onnx/ddcolor_tiny.onnx --until 62 -o onnx/truncated.onnx/color.ply",
+        "colorize --teacher onnx/ddcolor_tiny.onnx --solver adam --until 62 -o onnx/truncated.onnx/color.ply",
         &["truncated.onnx"],
     ),
     case(
@@ -236,7 +236,7 @@ pub(super) const UNWRITABLE: &[Case] = &[
     case(
         "colorize",
         nothing,
-        "colorize --teacher onnx/ddcolor_tiny.onnx --until 62 -o /proc/out.ply",
+        "colorize --teacher onnx/ddcolor_tiny.onnx --solver adam --until 62 -o /proc/out.ply",
         &["/proc", "cannot be written to", "-o"],
     ),
     case(

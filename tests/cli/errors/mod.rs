@@ -45,7 +45,7 @@ const fn case(
 fn nothing(_: &Place) {}
 
 const FIT: &str = "fit scene --preset draft --iterations 3 -o out";
-const COLORIZE: &str = "colorize --teacher onnx/ddcolor_tiny.onnx --until 62";
+const COLORIZE: &str = "colorize --teacher onnx/ddcolor_tiny.onnx --solver adam --until 62";
 
 fn check(case: &Case) {
     let place = place_with_run();

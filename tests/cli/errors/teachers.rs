@@ -22,9 +22,9 @@ where
     image.save(place.path("hints/01.png")).expect("writable");
 }
 
-const HINTED: &str = "colorize --hints hints --until 62";
+const HINTED: &str = "colorize --hints hints --solver adam --until 62";
 
-const PAINTED: &str = "colorize --teacher painted --until 62";
+const PAINTED: &str = "colorize --teacher painted --solver adam --until 62";
 
 /// Variables that name Vulkan's drivers, pointing nowhere.
 #[cfg(target_os = "linux")]
