@@ -27,13 +27,13 @@ PATCH_SIDE = (0.15, 0.25)
 PATCH_CHROMA = (20.0, 60.0)
 
 
-def unsteady(rgb: Array, chance: np.random.Generator) -> Array:
+def unsteady(rgb: Array, chance: np.random.Generator, shift: float, patches: int) -> Array:
     """An sRGB picture (height, width, 3) in [0, 1] with colours as of a whim."""
     lab = rgb_to_lab(rgb)
     height, width = lab.shape[:2]
     lab[..., 1:] *= chance.uniform(*SATURATION)
-    lab[..., 1:] += chance.normal(0.0, SHIFT, 2)
-    for _ in range(PATCHES):
+    lab[..., 1:] += chance.normal(0.0, shift, 2)
+    for _ in range(patches):
         w, h = (chance.uniform(*PATCH_SIDE, 2) * (width, height)).astype(int).clip(1)
         x, y = chance.integers(width - w + 1), chance.integers(height - h + 1)
         chroma, hue = chance.uniform(*PATCH_CHROMA), chance.uniform(0.0, 2.0 * np.pi)
@@ -66,6 +66,8 @@ def main() -> int:
     parser.add_argument("-o", "--output", type=Path, required=True)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--max-side", type=int, default=0, help="shrink photos first (pixels)")
+    parser.add_argument("--shift", type=float, default=SHIFT, help="deviation of a cast's a and b")
+    parser.add_argument("--patches", type=int, default=PATCHES, help="wrong patches in a view")
     arguments = parser.parse_args()
     known = {".png", ".jpg", ".jpeg"}
     found = arguments.photos.rglob("*")
@@ -79,7 +81,8 @@ def main() -> int:
             photo = opened.convert("RGB")
         if arguments.max_side:
             photo.thumbnail((arguments.max_side, arguments.max_side), Image.Resampling.BOX)
-        picture = unsteady(np.asarray(photo, dtype=np.float64) / 255.0, chance)
+        rgb = np.asarray(photo, dtype=np.float64) / 255.0
+        picture = unsteady(rgb, chance, arguments.shift, arguments.patches)
         out = arguments.output / path.relative_to(arguments.photos).with_suffix(".png")
         out.parent.mkdir(parents=True, exist_ok=True)
         Image.fromarray((picture * 255.0).round().astype(np.uint8)).save(out)
