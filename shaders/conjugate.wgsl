@@ -55,15 +55,19 @@ fn preconditioned(k: u32) -> f32 {
     return residual[k] / (parameters.diagonal_scale * diagonal[of_channel] + parameters.ridge);
 }
 
-fn block_of(group: vec3u, groups: vec3u) -> u32 {
-    return linear_group(group, groups);
+// Leaves the workgroup's sum for the kernel that adds up the blocks.
+fn leave_sum(block: u32, local: u32, own: f32) {
+    let sum = sum_of_group(local, own);
+    if local == 0u && block < parameters.blocks {
+        block_sums[block] = sum;
+    }
 }
 
 // Turns a gradient into the residual of a fresh system, the ridge's part included, and
 // begins with the preconditioned residual as the direction.
 @compute @workgroup_size(256)
 fn conjugate_begin(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
-    let block = block_of(group, groups);
+    let block = linear_group(group, groups);
     let k = block * 256u + local;
     var own = 0.0;
     if k < parameters.length {
@@ -72,31 +76,25 @@ fn conjugate_begin(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups)
         direction[k] = z;
         own = residual[k] * z;
     }
-    let sum = sum_of_group(local, own);
-    if local == 0u && block < parameters.blocks {
-        block_sums[block] = sum;
-    }
+    leave_sum(block, local, own);
 }
 
 // Partial sums of direction · matrix · direction.
 @compute @workgroup_size(256)
 fn conjugate_product(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
-    let block = block_of(group, groups);
+    let block = linear_group(group, groups);
     let k = block * 256u + local;
     var own = 0.0;
     if k < parameters.length {
         own = direction[k] * (product[k] + parameters.ridge * direction[k]);
     }
-    let sum = sum_of_group(local, own);
-    if local == 0u && block < parameters.blocks {
-        block_sums[block] = sum;
-    }
+    leave_sum(block, local, own);
 }
 
 // One step along the direction, and partial sums of the new residual's square.
 @compute @workgroup_size(256)
 fn conjugate_step(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
-    let block = block_of(group, groups);
+    let block = linear_group(group, groups);
     let k = block * 256u + local;
     var own = 0.0;
     if k < parameters.length {
@@ -105,16 +103,13 @@ fn conjugate_step(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) 
         residual[k] -= alpha * (product[k] + parameters.ridge * direction[k]);
         own = residual[k] * preconditioned(k);
     }
-    let sum = sum_of_group(local, own);
-    if local == 0u && block < parameters.blocks {
-        block_sums[block] = sum;
-    }
+    leave_sum(block, local, own);
 }
 
 // The next direction.
 @compute @workgroup_size(256)
 fn conjugate_direction(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
-    let k = block_of(group, groups) * 256u + local;
+    let k = linear_group(group, groups) * 256u + local;
     if k < parameters.length {
         direction[k] = preconditioned(k) + scalars[BETA] * direction[k];
     }

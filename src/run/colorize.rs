@@ -10,31 +10,26 @@ use std::{
 use super::{
     Event, Observer, RunError, RunFolder, Stage,
     chroma_options::{ChromaOptions, Degree},
+    color_quality::Measured,
     files,
     fit::{capture_report, comments, open_gpu},
     preset::Preset,
-    scene::{Scene, gray_to_rgb, read_splats, rgb_pixels, shown_rgb},
-    teach::{Taught, TeachOptions, Teachers},
+    scene::{Scene, read_splats},
+    teach::{TeachOptions, Teachers},
 };
 use crate::{
     capture::Camera,
     chroma::{
-        ChosenDegree, ChromaProgress, ChromaView, bake, choose_degree, distil, native_rgb,
-        teacher::{AbImage, Upsample},
+        ChosenDegree, ChromaProgress, ChromaView, bake, choose_degree, distil, teacher::Upsample,
     },
     gpu::Gpu,
-    measure,
-    raster::{Picture, Raster},
+    raster::Raster,
     report::{
-        CaptureReport, ChromaReport, ChromaSeconds, ColorError, ColorQuality, ColorView,
-        DeviceReport, LumaReport, LumaSeconds, REPORT_VERSION, Report, Row, contact_sheet,
-        kernel_reports,
+        CaptureReport, ChromaReport, ChromaSeconds, DeviceReport, LumaReport, LumaSeconds,
+        REPORT_VERSION, Report, contact_sheet, kernel_reports,
     },
-    splats::{ShField, Splats, ply},
+    splats::ply,
 };
-
-/// Views on the contact sheet.
-const SHEET_ROWS: usize = 4;
 
 /// What `colorize` is asked to do.
 #[derive(Clone, Debug)]
@@ -367,120 +362,6 @@ fn adam_iterations(
             Ok(amounts.until - amounts.iterations)
         }
     }
-}
-
-/// Pictures of the measured views and what they amount to.
-struct Measured {
-    bake: ColorError,
-    views: Vec<ColorView>,
-    rows: Vec<Row>,
-}
-
-impl Measured {
-    fn of(
-        raster: &Arc<Raster>,
-        scene: &Scene,
-        luma: &Splats,
-        chroma: &ShField,
-        baked: &Splats,
-        taught: &[Option<Taught>],
-    ) -> Result<Self, RunError> {
-        let mut renderer = scene.renderer(raster, luma, &[&luma.sh, chroma, &baked.sh])?;
-        let (mut errors, mut views, mut rows) = (Vec::new(), Vec::new(), Vec::new());
-        for &i in scene.measured().1 {
-            let (photo, camera) = &scene.photos[i];
-            let pictures = renderer.render(camera)?;
-            let native = native_rgb(&pictures[0], &pictures[1]);
-            let exported = shown_rgb(&pictures[2].pixels);
-            let error = measure::mean_delta_e(&native, &exported);
-            errors.push(ColorError {
-                mean: error.mean,
-                percentile_95: error.percentile_95,
-            });
-            let taught = taught[i]
-                .as_ref()
-                .map(|taught| teacher_picture(&photo.gray, &taught.answer));
-            let truth = photo.rgb.as_ref().map(|_| rgb_pixels(photo));
-            views.push(ColorView {
-                name: scene.capture.views[i].name.clone(),
-                quality: ColorQuality {
-                    delta_e: truth.as_ref().map(|truth| {
-                        let error = measure::mean_delta_e(&exported, truth);
-                        ColorError {
-                            mean: error.mean,
-                            percentile_95: error.percentile_95,
-                        }
-                    }),
-                    colorfulness: measure::colorfulness(&exported),
-                    teacher_colorfulness: taught.as_deref().map(measure::colorfulness),
-                },
-            });
-            if rows.len() < SHEET_ROWS {
-                rows.push(Row {
-                    width: camera.width,
-                    height: camera.height,
-                    pictures: vec![
-                        Some(rgb_pixels(photo)),
-                        Some(gray_to_rgb(&pictures[0].pixels)),
-                        taught,
-                        Some(exported),
-                    ],
-                });
-            }
-        }
-        Ok(Self {
-            bake: mean_error(&errors),
-            views,
-            rows,
-        })
-    }
-
-    fn mean(&self) -> ColorQuality {
-        let count = self.views.len() as f64;
-        let errors: Vec<ColorError> = self
-            .views
-            .iter()
-            .filter_map(|v| v.quality.delta_e)
-            .collect();
-        let taught: Vec<f64> = self
-            .views
-            .iter()
-            .filter_map(|view| view.quality.teacher_colorfulness)
-            .collect();
-        ColorQuality {
-            delta_e: (!errors.is_empty()).then(|| mean_error(&errors)),
-            colorfulness: self
-                .views
-                .iter()
-                .map(|v| v.quality.colorfulness)
-                .sum::<f64>()
-                / count,
-            teacher_colorfulness: (!taught.is_empty())
-                .then(|| taught.iter().sum::<f64>() / taught.len() as f64),
-        }
-    }
-}
-
-fn mean_error(errors: &[ColorError]) -> ColorError {
-    let count = errors.len() as f64;
-    ColorError {
-        mean: errors.iter().map(|error| error.mean).sum::<f64>() / count,
-        percentile_95: errors.iter().map(|error| error.percentile_95).sum::<f64>() / count,
-    }
-}
-
-/// The photo's lightness with the teacher's a/b.
-fn teacher_picture(gray: &[u8], answer: &AbImage) -> Vec<[f32; 3]> {
-    let as_picture = |channels, pixels| Picture {
-        width: answer.width,
-        height: answer.height,
-        channels,
-        pixels,
-    };
-    native_rgb(
-        &as_picture(1, gray.iter().map(|&v| f32::from(v) / 255.0).collect()),
-        &as_picture(2, answer.ab.as_flattened().to_vec()),
-    )
 }
 
 /// Puts the chroma rows behind the luma rows, in place of those of an earlier

@@ -1,6 +1,7 @@
 //! Whole runs: what a command does from its options to its files.
 
 mod chroma_options;
+mod color_quality;
 mod colorize;
 mod eval;
 mod files;

@@ -1,0 +1,138 @@
+//! How good a coloured scene is, as far as `colorize` itself says.
+
+use std::sync::Arc;
+
+use super::{
+    RunError,
+    scene::{Scene, gray_to_rgb, rgb_pixels, shown_rgb},
+    teach::Taught,
+};
+use crate::{
+    chroma::{native_rgb, teacher::AbImage},
+    measure,
+    raster::{Picture, Raster},
+    report::{ColorError, ColorQuality, ColorView, Row},
+    splats::{ShField, Splats},
+};
+
+/// Views on the contact sheet.
+const SHEET_ROWS: usize = 4;
+
+/// Pictures of the measured views and what they amount to.
+pub(super) struct Measured {
+    /// The exported file against the native pictures, mean over the views.
+    pub bake: ColorError,
+    /// Each view.
+    pub views: Vec<ColorView>,
+    /// Some of them, for the contact sheet.
+    pub rows: Vec<Row>,
+}
+
+impl Measured {
+    /// Draws and measures the held-out views, or all where none is.
+    pub fn of(
+        raster: &Arc<Raster>,
+        scene: &Scene,
+        luma: &Splats,
+        chroma: &ShField,
+        baked: &Splats,
+        taught: &[Option<Taught>],
+    ) -> Result<Self, RunError> {
+        let mut renderer = scene.renderer(raster, luma, &[&luma.sh, chroma, &baked.sh])?;
+        let (mut errors, mut views, mut rows) = (Vec::new(), Vec::new(), Vec::new());
+        for &i in scene.measured().1 {
+            let (photo, camera) = &scene.photos[i];
+            let pictures = renderer.render(camera)?;
+            let native = native_rgb(&pictures[0], &pictures[1]);
+            let exported = shown_rgb(&pictures[2].pixels);
+            let error = measure::mean_delta_e(&native, &exported);
+            errors.push(ColorError {
+                mean: error.mean,
+                percentile_95: error.percentile_95,
+            });
+            let taught = taught[i]
+                .as_ref()
+                .map(|taught| teacher_picture(&photo.gray, &taught.answer));
+            let truth = photo.rgb.as_ref().map(|_| rgb_pixels(photo));
+            views.push(ColorView {
+                name: scene.capture.views[i].name.clone(),
+                quality: ColorQuality {
+                    delta_e: truth.as_ref().map(|truth| {
+                        let error = measure::mean_delta_e(&exported, truth);
+                        ColorError {
+                            mean: error.mean,
+                            percentile_95: error.percentile_95,
+                        }
+                    }),
+                    colorfulness: measure::colorfulness(&exported),
+                    teacher_colorfulness: taught.as_deref().map(measure::colorfulness),
+                },
+            });
+            if rows.len() < SHEET_ROWS {
+                rows.push(Row {
+                    width: camera.width,
+                    height: camera.height,
+                    pictures: vec![
+                        Some(rgb_pixels(photo)),
+                        Some(gray_to_rgb(&pictures[0].pixels)),
+                        taught,
+                        Some(exported),
+                    ],
+                });
+            }
+        }
+        Ok(Self {
+            bake: mean_error(&errors),
+            views,
+            rows,
+        })
+    }
+
+    /// The mean over the views.
+    pub fn mean(&self) -> ColorQuality {
+        let count = self.views.len() as f64;
+        let errors: Vec<ColorError> = self
+            .views
+            .iter()
+            .filter_map(|v| v.quality.delta_e)
+            .collect();
+        let taught: Vec<f64> = self
+            .views
+            .iter()
+            .filter_map(|view| view.quality.teacher_colorfulness)
+            .collect();
+        ColorQuality {
+            delta_e: (!errors.is_empty()).then(|| mean_error(&errors)),
+            colorfulness: self
+                .views
+                .iter()
+                .map(|v| v.quality.colorfulness)
+                .sum::<f64>()
+                / count,
+            teacher_colorfulness: (!taught.is_empty())
+                .then(|| taught.iter().sum::<f64>() / taught.len() as f64),
+        }
+    }
+}
+
+fn mean_error(errors: &[ColorError]) -> ColorError {
+    let count = errors.len() as f64;
+    ColorError {
+        mean: errors.iter().map(|error| error.mean).sum::<f64>() / count,
+        percentile_95: errors.iter().map(|error| error.percentile_95).sum::<f64>() / count,
+    }
+}
+
+/// The photo's lightness with the teacher's a/b.
+fn teacher_picture(gray: &[u8], answer: &AbImage) -> Vec<[f32; 3]> {
+    let as_picture = |channels, pixels| Picture {
+        width: answer.width,
+        height: answer.height,
+        channels,
+        pixels,
+    };
+    native_rgb(
+        &as_picture(1, gray.iter().map(|&v| f32::from(v) / 255.0).collect()),
+        &as_picture(2, answer.ab.as_flattened().to_vec()),
+    )
+}
