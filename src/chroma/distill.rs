@@ -141,7 +141,8 @@ impl Distiller {
     ) -> Result<(), GpuError> {
         let begun = Instant::now();
         let mut pending = None;
-        for iteration in self.done..until.min(self.settings.iterations) {
+        let until = until.min(self.settings.iterations);
+        for iteration in self.done..until {
             self.step(iteration)?;
             let done = iteration + 1;
             self.done = done;
