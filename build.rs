@@ -12,7 +12,6 @@ const PLAIN: &[&str] = &[
     "compact",
     "conjugate",
     "densify",
-    "luma_loss",
     "project",
     "relocation",
     "scan",
@@ -29,6 +28,9 @@ const COLORED: &[&str] = &["blend", "shade"];
 
 /// Their adjoints: luma trains the geometry too, chroma does not.
 const ADJOINT: &[&str] = &["blend_backward", "shade_backward", "sum_instances"];
+
+/// Effects of the photos that the luma loss may reckon with.
+const LOSS_EFFECTS: &[&str] = &["exposed", "masked", "robust"];
 
 fn main() {
     println!("cargo::rerun-if-changed=shaders");
@@ -50,6 +52,15 @@ fn main() {
     for kernel in ["project_backward", "shade_backward"] {
         compile(&out, kernel, "_step", &["luma", "geometry", "step"]);
     }
+    // Each effect of the photos is in the loss only where a scene calls for it.
+    for subset in 0..1 << LOSS_EFFECTS.len() {
+        let features: Vec<&str> = (LOSS_EFFECTS.iter().enumerate())
+            .filter(|(bit, _)| subset >> bit & 1 == 1)
+            .map(|(_, &effect)| effect)
+            .collect();
+        let suffix: String = features.iter().map(|effect| format!("_{effect}")).collect();
+        compile(&out, "luma_loss", &suffix, &features);
+    }
     // The solver sums over the views, and needs the loss's curvature.
     compile(&out, "shade_backward", "_chroma_add", &["chroma", "add"]);
     compile(&out, "chroma_loss", "_curvature", &["curvature"]);
@@ -66,6 +77,9 @@ fn compile(out: &str, kernel: &str, suffix: &str, features: &[&str]) {
         "step",
         "add",
         "curvature",
+        "exposed",
+        "masked",
+        "robust",
     ] {
         compiler.set_feature(feature, features.contains(&feature));
     }

@@ -108,7 +108,7 @@ fn trainer(gpu: &Gpu, count: usize, width: u32) -> Result<LumaTrainer, GpuError>
     };
     let splats = cloud(count, &camera);
     let raster = Arc::new(Raster::new(gpu));
-    let views = vec![TrainingView { camera, gray }];
+    let views = vec![TrainingView::new(camera, gray)];
     let mut trainer = LumaTrainer::new(raster, settings, 5.0, &splats, views)?;
     trainer.train(&mut |_| {})?;
     Ok(trainer)

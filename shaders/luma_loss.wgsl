@@ -4,6 +4,15 @@
 // zeros outside the image, as 3DGS trains. The first pass writes what the
 // second one needs: the derivatives of each window's SSIM with respect to the
 // window's mean, mean square and mean product.
+//
+// Variants, each absent unless it is compiled in:
+// `exposed`: the photo shows gain · picture + offset; where the photo is black or
+//   white, what lies beyond is met.
+// `masked`: a pixel counts as much as its mask says.
+// `robust`: a pixel that the picture misses by far counts little (Geman and
+//   McClure 1987); the weight is held fixed when differentiating.
+// A weight multiplies both images, as if the pixel lay outside for zero, and the
+// terms of the window around it.
 import package::common::view::View;
 
 const RADIUS: u32 = 5u;
@@ -30,9 +39,56 @@ const SSIM_WEIGHT: f32 = 0.2;
 @group(0) @binding(5) var<storage, read_write> by_product: array<f32>;
 @group(0) @binding(6) var<storage, read_write> block_losses: array<f32>;
 @group(0) @binding(7) var<storage, read_write> image_gradient: array<f32>;
+// Packed as the photo.
+@if(masked) @group(0) @binding(8) var<storage, read> mask: array<u32>;
+@if(exposed || robust) @group(0) @binding(9) var<uniform> parameters: LumaLossParameters;
+
+@if(exposed || robust) struct LumaLossParameters {
+    gain: f32,
+    offset: f32,
+    // One over the residual at which a pixel's weight is a quarter.
+    inverse_residual: f32,
+    padding: u32,
+}
 
 fn photo_at(p: u32) -> f32 {
     return f32((photo[p / 4u] >> (8u * (p % 4u))) & 255u) / 255.0;
+}
+
+// The picture as the photo would show it.
+@if(!exposed) fn shown(p: u32) -> f32 { return image[p]; }
+@if(exposed) fn shown(p: u32) -> f32 {
+    let value = parameters.gain * image[p] + parameters.offset;
+    return select(value, photo_at(p), is_beyond(p, value));
+}
+
+// Whether the photo could not show the value.
+@if(exposed) fn is_beyond(p: u32, value: f32) -> bool {
+    let y = photo_at(p);
+    return (y >= 1.0 && value > 1.0) || (y <= 0.0 && value < 0.0);
+}
+
+// Derivative of `shown` with respect to the picture.
+@if(!exposed) fn slope(p: u32) -> f32 { return 1.0; }
+@if(exposed) fn slope(p: u32) -> f32 {
+    let value = parameters.gain * image[p] + parameters.offset;
+    return select(parameters.gain, 0.0, is_beyond(p, value));
+}
+
+@if(masked) fn mask_at(p: u32) -> f32 {
+    return f32((mask[p / 4u] >> (8u * (p % 4u))) & 255u) / 255.0;
+}
+
+// What a pixel counts.
+@if(masked || robust) fn weight(p: u32, x: f32, y: f32) -> f32 {
+    var weight = 1.0;
+    @if(robust) {
+        let r = (x - y) * parameters.inverse_residual;
+        let falloff = 1.0 / (1.0 + r * r);
+        weight = falloff * falloff;
+    }
+    @if(masked) { weight *= mask_at(p); }
+    return weight;
 }
 
 // Sums along rows, `[moment, row, column]`: five moments in the first pass, three
@@ -94,12 +150,21 @@ fn indices(s: Span, k: i32) -> vec4u {
 
 fn image_quad(s: Span, k: i32) -> vec4f {
     let p = indices(s, k);
-    return select(vec4f(0.0), vec4f(image[p.x], image[p.y], image[p.z], image[p.w]), has(s, k));
+    return select(vec4f(0.0), vec4f(shown(p.x), shown(p.y), shown(p.z), shown(p.w)), has(s, k));
 }
 
 fn photo_quad(s: Span, k: i32) -> vec4f {
     let p = indices(s, k);
     return select(vec4f(0.0), vec4f(photo_at(p.x), photo_at(p.y), photo_at(p.z), photo_at(p.w)), has(s, k));
+}
+
+@if(masked || robust) fn weight_quad(s: Span, k: i32, x: vec4f, y: vec4f) -> vec4f {
+    let p = indices(s, k);
+    return vec4f(weight(p.x, x.x, y.x), weight(p.y, x.y, y.y), weight(p.z, x.z, y.z), weight(p.w, x.w, y.w));
+}
+
+@if(masked || robust) fn weights(s: Span, x: Run, y: Run) -> Run {
+    return Run(weight_quad(s, 0, x.a, y.a), weight_quad(s, 4, x.b, y.b), weight_quad(s, 8, x.c, y.c), weight_quad(s, 12, x.d, y.d));
 }
 
 // Puts four sums along a row where `column_sums` finds them.
@@ -128,8 +193,13 @@ fn luma_loss(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) group
         let row = task / 4u;
         let quad = (task % 4u) * 4u;
         let s = span(group, row, quad);
-        let x = Run(image_quad(s, 0), image_quad(s, 4), image_quad(s, 8), image_quad(s, 12));
-        let y = Run(photo_quad(s, 0), photo_quad(s, 4), photo_quad(s, 8), photo_quad(s, 12));
+        var x = Run(image_quad(s, 0), image_quad(s, 4), image_quad(s, 8), image_quad(s, 12));
+        var y = Run(photo_quad(s, 0), photo_quad(s, 4), photo_quad(s, 8), photo_quad(s, 12));
+        @if(masked || robust) {
+            let w = weights(s, x, y);
+            x = times(w, x);
+            y = times(w, y);
+        }
         store(0u, row, quad, windowed(x));
         store(1u, row, quad, windowed(y));
         store(2u, row, quad, windowed(times(x, x)));
@@ -157,10 +227,21 @@ fn luma_loss(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) group
         let pixel = first + vec2u(0u, k);
         if all(pixel < view.size) {
             let p = pixel.y * view.size.x + pixel.x;
-            by_mean[p] = mean[k];
-            by_square[p] = square[k];
-            by_product[p] = product[k];
-            loss += L1_WEIGHT * abs(image[p] - photo_at(p)) + SSIM_WEIGHT * (1.0 - ssim[k]);
+            let x = shown(p);
+            let y = photo_at(p);
+            @if(!(masked || robust)) {
+                by_mean[p] = mean[k];
+                by_square[p] = square[k];
+                by_product[p] = product[k];
+                loss += L1_WEIGHT * abs(x - y) + SSIM_WEIGHT * (1.0 - ssim[k]);
+            }
+            @if(masked || robust) {
+                let w = weight(p, x, y);
+                by_mean[p] = w * mean[k];
+                by_square[p] = w * square[k];
+                by_product[p] = w * product[k];
+                loss += w * (L1_WEIGHT * abs(x - y) + SSIM_WEIGHT * (1.0 - ssim[k]));
+            }
         }
     }
     losses[local] = loss;
@@ -204,15 +285,23 @@ fn luma_loss_backward(@builtin(workgroup_id) group: vec3u, @builtin(local_invoca
     let mean = column_sums(0u, id);
     let square = column_sums(1u, id);
     let product = column_sums(2u, id);
+    let pixels = f32(view.size.x * view.size.y);
     let first = group.xy * SIDE + vec2u(id.x, id.y * 4u);
     for (var k = 0u; k < 4u; k++) {
         let pixel = first + vec2u(0u, k);
         if all(pixel < view.size) {
             let p = pixel.y * view.size.x + pixel.x;
-            let x = image[p];
+            let x = shown(p);
             let y = photo_at(p);
-            let ssim_gradient = mean[k] + 2.0 * x * square[k] + y * product[k];
-            image_gradient[p] = (L1_WEIGHT * sign(x - y) - SSIM_WEIGHT * ssim_gradient) / f32(view.size.x * view.size.y);
+            @if(!(masked || robust)) {
+                let ssim_gradient = mean[k] + 2.0 * x * square[k] + y * product[k];
+                image_gradient[p] = slope(p) * (L1_WEIGHT * sign(x - y) - SSIM_WEIGHT * ssim_gradient) / pixels;
+            }
+            @if(masked || robust) {
+                let w = weight(p, x, y);
+                let ssim_gradient = mean[k] + w * (2.0 * x * square[k] + y * product[k]);
+                image_gradient[p] = slope(p) * w * (L1_WEIGHT * sign(x - y) - SSIM_WEIGHT * ssim_gradient) / pixels;
+            }
         }
     }
 }

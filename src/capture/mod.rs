@@ -3,6 +3,7 @@
 pub mod camera;
 mod colmap;
 mod error;
+mod exposure;
 mod jpeg;
 mod photo;
 mod resample;
@@ -19,6 +20,7 @@ use glam::{DMat3, DQuat, DVec3};
 
 pub use camera::Camera;
 pub use error::{CaptureError, Position};
+pub use exposure::Exposure;
 pub use photo::Photo;
 pub use resample::downscale;
 pub use split::{Split, split};

@@ -1,7 +1,11 @@
 //! The luma loss (`shaders/luma_loss.wgsl`).
 
+use bytemuck::{Pod, Zeroable};
+
+use super::photos::Photos;
 use crate::{
-    gpu::{Bindings, Buffer, Gpu, Kernel, Recorder, shaders},
+    capture::Exposure,
+    gpu::{Bindings, Buffer, Gpu, GpuError, Kernel, Recorder, shaders},
     optimize::LossLog,
     raster::{Layer, LayerAdjoint, Lists, ViewUniform},
 };
@@ -14,6 +18,66 @@ pub fn blocks(view: &ViewUniform) -> [u32; 2] {
     view.size.map(|side| side.div_ceil(BLOCK_SIDE))
 }
 
+/// What the loss reckons with. What it does not is neither in the compiled kernels nor
+/// in any buffer.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LossEffects {
+    /// Photos differ in exposure.
+    pub exposed: bool,
+    /// Some pixels do not count.
+    pub masked: bool,
+    /// Pixels that the picture misses by far count little.
+    pub robust: bool,
+}
+
+impl LossEffects {
+    /// The kernels that have these effects and no others.
+    pub fn shader(self) -> &'static str {
+        match (self.exposed, self.masked, self.robust) {
+            (false, false, false) => shaders::LUMA_LOSS,
+            (true, false, false) => shaders::LUMA_LOSS_EXPOSED,
+            (false, true, false) => shaders::LUMA_LOSS_MASKED,
+            (false, false, true) => shaders::LUMA_LOSS_ROBUST,
+            (true, true, false) => shaders::LUMA_LOSS_EXPOSED_MASKED,
+            (true, false, true) => shaders::LUMA_LOSS_EXPOSED_ROBUST,
+            (false, true, true) => shaders::LUMA_LOSS_MASKED_ROBUST,
+            (true, true, true) => shaders::LUMA_LOSS_EXPOSED_MASKED_ROBUST,
+        }
+    }
+
+    /// Whether the kernels bind [`LumaLossParameters`].
+    pub fn has_parameters(self) -> bool {
+        self.exposed || self.robust
+    }
+}
+
+/// `LumaLossParameters` of the kernels.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct LumaLossParameters {
+    /// What the picture is multiplied by to be the photo's.
+    pub gain: f32,
+    /// What is added then.
+    pub offset: f32,
+    /// One over the residual at which a pixel's weight is a quarter; 0: all count alike.
+    pub inverse_residual: f32,
+    /// Nothing.
+    pub padding: u32,
+}
+
+impl LumaLossParameters {
+    /// For a photo of this exposure; `residual` is the one, in gray, at which a pixel's
+    /// weight is a quarter.
+    pub fn new(exposure: Exposure, residual: Option<f64>) -> Self {
+        Self {
+            gain: exposure.gain as f32,
+            offset: exposure.offset as f32,
+            inverse_residual: residual.map_or(0.0, |residual| (1.0 / residual) as f32),
+            padding: 0,
+        }
+    }
+}
+
 /// The two passes.
 pub struct LossKernels {
     forward: Kernel,
@@ -22,11 +86,62 @@ pub struct LossKernels {
 
 impl LossKernels {
     /// Compiles them.
-    pub fn new(gpu: &Gpu) -> Self {
+    pub fn new(gpu: &Gpu, effects: LossEffects) -> Self {
         Self {
-            forward: Kernel::new(gpu, "luma_loss", shaders::LUMA_LOSS),
-            backward: Kernel::new(gpu, "luma_loss_backward", shaders::LUMA_LOSS),
+            forward: Kernel::new(gpu, "luma_loss", effects.shader()),
+            backward: Kernel::new(gpu, "luma_loss_backward", effects.shader()),
         }
+    }
+}
+
+/// What the pictures are compared with, and room to do so.
+pub struct Targets {
+    /// The photos.
+    pub photos: Photos,
+    /// Their masks in the same order, if pixels count differently.
+    pub masks: Option<Photos>,
+    /// For photos with exposures or a loss that levels off.
+    pub parameters: Option<Buffer<LumaLossParameters>>,
+    /// Three buffers with room for a float a pixel.
+    pub slopes: [Buffer<f32>; 3],
+}
+
+impl Targets {
+    /// Photos as 8-bit gray and their masks; empty masks if `effects` has none.
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`].
+    pub fn new(
+        gpu: &Gpu,
+        effects: LossEffects,
+        photos: &[Vec<u8>],
+        masks: &[Vec<u8>],
+        streamed: bool,
+    ) -> Result<Self, GpuError> {
+        let packed =
+            |pictures: &[Vec<u8>]| Photos::new(gpu, pictures.iter().map(Vec::as_slice), streamed);
+        let largest = photos.iter().map(Vec::len).max().unwrap_or(0);
+        let slopes = || Buffer::zeros(gpu, "slopes", largest);
+        let unset = LumaLossParameters::zeroed();
+        Ok(Self {
+            photos: packed(photos)?,
+            masks: effects.masked.then(|| packed(masks)).transpose()?,
+            parameters: (effects.has_parameters())
+                .then(|| Buffer::uniform(gpu, "loss parameters", &unset))
+                .transpose()?,
+            slopes: [slopes()?, slopes()?, slopes()?],
+        })
+    }
+
+    /// Readies a photo for what is submitted next, and gives its buffers' place.
+    pub fn show(&self, gpu: &Gpu, index: usize, parameters: LumaLossParameters) -> usize {
+        if let Some(masks) = &self.masks {
+            masks.show(gpu, index);
+        }
+        if let Some(buffer) = &self.parameters {
+            buffer.write(gpu, &[parameters]);
+        }
+        self.photos.show(gpu, index)
     }
 }
 
@@ -37,32 +152,36 @@ pub struct Loss {
 }
 
 impl Loss {
-    /// Ties the layer's image to `photo` (8-bit gray, four pixels a word).
-    /// `slopes` are three buffers with room for a float a pixel.
-    #[allow(
-        clippy::too_many_arguments,
-        reason = "each is a buffer of its own that the kernel binds"
-    )]
-    pub fn new(
+    /// Ties the layer's image to each buffer that a photo may stand in.
+    pub fn all(
         gpu: &Gpu,
         kernels: &LossKernels,
         lists: &Lists,
         layer: &Layer,
         adjoint: &LayerAdjoint,
         log: &LossLog,
-        slopes: &[Buffer<f32>; 3],
-        photo: &Buffer<u32>,
-    ) -> Self {
-        let [by_mean, by_square, by_product] = slopes.each_ref().map(Buffer::raw);
-        let inputs = [lists.view.raw(), layer.image.raw(), photo.raw()];
-        let mut bindings: Vec<_> = (0..)
-            .zip(inputs.into_iter().chain([by_mean, by_square, by_product]))
-            .collect();
-        bindings.push((6, log.block_losses.raw()));
-        let forward = kernels.forward.bind_at(gpu, &bindings);
-        bindings[6] = (7, adjoint.image_gradient.raw());
-        let backward = kernels.backward.bind_at(gpu, &bindings);
-        Self { forward, backward }
+        targets: &Targets,
+    ) -> Vec<Self> {
+        let [by_mean, by_square, by_product] = targets.slopes.each_ref().map(Buffer::raw);
+        (targets.photos.buffers().iter().enumerate())
+            .map(|(place, photo)| {
+                let inputs = [lists.view.raw(), layer.image.raw(), photo.raw()];
+                let mut bindings: Vec<_> = (0..)
+                    .zip(inputs.into_iter().chain([by_mean, by_square, by_product]))
+                    .collect();
+                bindings.push((6, log.block_losses.raw()));
+                if let Some(masks) = &targets.masks {
+                    bindings.push((8, masks.buffers()[place].raw()));
+                }
+                if let Some(parameters) = &targets.parameters {
+                    bindings.push((9, parameters.raw()));
+                }
+                let forward = kernels.forward.bind_at(gpu, &bindings);
+                bindings[6] = (7, adjoint.image_gradient.raw());
+                let backward = kernels.backward.bind_at(gpu, &bindings);
+                Self { forward, backward }
+            })
+            .collect()
     }
 
     /// Records both passes.

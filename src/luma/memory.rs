@@ -38,7 +38,7 @@ const PHOTO_SHARE: u64 = 4;
 pub struct Demand {
     /// Pixels of the largest photo.
     pub max_pixels: u64,
-    /// Bytes of the photos on the device: all, or the largest if they are streamed.
+    /// Bytes of the photos and masks on the device: all, or the largest if they are streamed.
     pub photos: u64,
     /// Whether photos are brought to the device one at a time.
     pub streams: bool,
@@ -47,9 +47,11 @@ pub struct Demand {
 }
 
 impl Demand {
-    /// What photos by these cameras ask for within `limit` bytes, if there is one.
+    /// What photos by these cameras ask for within `limit` bytes, if there is one;
+    /// with masks, twice as much.
     pub fn of<'a>(
         cameras: impl Iterator<Item = &'a Camera>,
+        masked: bool,
         sh_degree: u32,
         limit: Option<u64>,
     ) -> Self {
@@ -59,9 +61,11 @@ impl Demand {
             max_pixels = max_pixels.max(pixels);
             photos += pixels.next_multiple_of(WORD);
         }
+        let pictures = 1 + u64::from(masked);
+        photos *= pictures;
         let streams = limit.is_some_and(|limit| photos > limit / PHOTO_SHARE);
         if streams {
-            photos = max_pixels.next_multiple_of(WORD);
+            photos = pictures * max_pixels.next_multiple_of(WORD);
         }
         Self {
             max_pixels,

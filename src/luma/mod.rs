@@ -11,6 +11,7 @@ mod view;
 mod workspace;
 
 pub use densify::DensifyParameters;
+pub use loss::{LossEffects, LumaLossParameters};
 pub use memory::Demand;
 pub use settings::{Densification, LumaSettings, Schedule};
 pub use trainer::{LumaProgress, LumaTrainer};

@@ -152,6 +152,9 @@ pub struct LumaSettings {
     pub prune_share: f64,
     /// Gaussians below this opacity are removed.
     pub prune_opacity: f64,
+    /// Residual, in gray, at which a pixel's weight ends up at a quarter; all count alike
+    /// when `None`.
+    pub robust: Option<f64>,
     /// Bytes that the training may take on the device; no limit when `None`.
     pub memory_limit: Option<u64>,
 }
@@ -171,6 +174,7 @@ impl LumaSettings {
             growth: 0.3,
             prune_share: 0.1,
             prune_opacity: 0.005,
+            robust: None,
             memory_limit: None,
         }
     }
@@ -204,6 +208,16 @@ impl LumaSettings {
         } = self.schedule;
         let settled = iteration.saturating_sub(settle_from) as f64;
         SETTLED.powf(settled / (iterations - settle_from).max(1) as f64)
+    }
+
+    /// Residual at which a pixel's weight is a quarter at `iteration`: falls from 1, where
+    /// all count, to [`Self::robust`] half-way, so that what is only not learned yet is
+    /// not taken for a defect (graduated non-convexity, Blake and Zisserman 1987).
+    pub fn residual_at(&self, iteration: usize) -> Option<f64> {
+        let last = self.robust?;
+        let half = (self.schedule.iterations / 2).max(1);
+        let t = (iteration as f64 / half as f64).min(1.0);
+        Some(last.powf(t))
     }
 
     /// Degree of the harmonics in use at `iteration`.

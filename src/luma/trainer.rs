@@ -12,15 +12,14 @@ use std::{sync::Arc, time::Instant};
 use super::{
     Densification, LumaSettings,
     densify::{self, Evidence, Target},
-    loss,
+    loss::{self, LossEffects, LumaLossParameters, Targets},
     memory::{Demand, ENTRIES_PER_SPLAT},
-    photos::Photos,
     relocation::{self, RelocationParameters},
     view::TrainingView,
     workspace::{Kernels, Workspace},
 };
 use crate::{
-    capture::Camera,
+    capture::{Camera, Exposure},
     gpu::{Buffer, Gpu, GpuError, Readback, Recorder},
     optimize::{AdamState, Load, view_at},
     raster::{Field, Geometry, Raster, StatusReadback, ViewUniform, constants::*, download},
@@ -74,10 +73,9 @@ pub struct LumaTrainer {
     /// Of each view; behind them, where training begins coarse, at half the size.
     cameras: Vec<Camera>,
     /// In the same order.
-    photos: Photos,
-    /// Views.
-    views: usize,
-    slopes: [Buffer<f32>; 3],
+    targets: Targets,
+    /// Of each view.
+    exposures: Vec<Exposure>,
     max_pixels: usize,
     max_tiles: usize,
     geometry: Geometry,
@@ -110,11 +108,16 @@ impl LumaTrainer {
     ) -> Result<Self, GpuError> {
         assert!(!views.is_empty(), "training needs a view");
         let gpu = raster.gpu.clone();
-        let kernels = Kernels::new(&gpu);
+        let effects = LossEffects {
+            exposed: views.iter().any(|view| view.exposure != Exposure::NONE),
+            masked: views.iter().any(|view| view.mask.is_some()),
+            robust: settings.robust.is_some(),
+        };
+        let kernels = Kernels::new(&gpu, effects);
         let near = NEAR_SHARE * extent;
         let (mut max_pixels, mut max_tiles) = (0, 0);
-        let (mut cameras, mut grays) = (Vec::new(), Vec::new());
-        let count = views.len();
+        let (mut cameras, mut grays, mut masks) = (Vec::new(), Vec::new(), Vec::new());
+        let exposures = views.iter().map(|view| view.exposure).collect();
         let coarse: Vec<TrainingView> = match settings.schedule.coarse_until {
             0 => Vec::new(),
             _ => views.iter().map(TrainingView::halved).collect(),
@@ -128,13 +131,22 @@ impl LumaTrainer {
             );
             max_pixels = max_pixels.max(uniform.pixel_count());
             max_tiles = max_tiles.max(uniform.tile_count());
+            if effects.masked {
+                let pixels = view.gray.len();
+                let mask = view.mask.unwrap_or_else(|| vec![255; pixels]);
+                assert_eq!(mask.len(), pixels, "mask and photo differ");
+                masks.push(mask);
+            }
             grays.push(view.gray);
             cameras.push(view.camera);
         }
-        let demand = Demand::of(cameras.iter(), splats.sh.degree, settings.memory_limit);
-        let photos = Photos::new(&gpu, grays.iter().map(Vec::as_slice), demand.streams)?;
-        let slopes = || Buffer::zeros(&gpu, "slopes", max_pixels);
-        let slopes = [slopes()?, slopes()?, slopes()?];
+        let demand = Demand::of(
+            cameras.iter(),
+            effects.masked,
+            splats.sh.degree,
+            settings.memory_limit,
+        );
+        let targets = Targets::new(&gpu, effects, &grays, &masks, demand.streams)?;
         let geometry = Geometry::upload(&gpu, splats)?;
         let field = Field::upload(&gpu, &splats.sh)?;
         let capacity = geometry.count * ENTRIES_PER_SPLAT;
@@ -145,8 +157,7 @@ impl LumaTrainer {
             &settings,
             &geometry,
             &field,
-            photos.buffers(),
-            &slopes,
+            &targets,
             [max_pixels, max_tiles],
             capacity,
             None,
@@ -159,9 +170,8 @@ impl LumaTrainer {
             extent,
             near,
             cameras,
-            photos,
-            views: count,
-            slopes,
+            targets,
+            exposures,
             max_pixels,
             max_tiles,
             geometry,
@@ -263,9 +273,12 @@ impl LumaTrainer {
 
     /// Records and submits one iteration.
     fn step(&self, iteration: usize) {
-        let mut index = view_at(self.settings.seed, self.views, iteration);
+        let views = self.exposures.len();
+        let mut index = view_at(self.settings.seed, views, iteration);
+        let parameters =
+            LumaLossParameters::new(self.exposures[index], self.settings.residual_at(iteration));
         if iteration < self.settings.schedule.coarse_until {
-            index += self.views;
+            index += views;
         }
         let workspace = self.workspace();
         let view = ViewUniform::new(
@@ -278,7 +291,7 @@ impl LumaTrainer {
         workspace.lists.set_view(&self.gpu, &view);
         workspace.lists.record(&self.raster, &mut recorder);
         workspace.layer.record(&self.raster, &mut recorder);
-        let photo = self.photos.show(&self.gpu, index);
+        let photo = self.targets.show(&self.gpu, index, parameters);
         workspace.losses[photo].record(&self.kernels.loss, &mut recorder, &view);
         let [x, y] = loss::blocks(&view);
         workspace.log.record(
@@ -418,8 +431,7 @@ impl LumaTrainer {
             &self.settings,
             &self.geometry,
             &self.field,
-            self.photos.buffers(),
-            &self.slopes,
+            &self.targets,
             [self.max_pixels, self.max_tiles],
             capacity,
             Some(moments),

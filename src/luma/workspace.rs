@@ -4,7 +4,7 @@
 use super::{
     LumaSettings,
     densify::DensifyKernels,
-    loss::{Loss, LossKernels},
+    loss::{Loss, LossEffects, LossKernels, Targets},
     relocation::{Relocation, RelocationKernel},
     settings::Densification,
     trainer::SYNC_EVERY,
@@ -25,10 +25,10 @@ pub struct Kernels {
 
 impl Kernels {
     /// Compiles them.
-    pub fn new(gpu: &Gpu) -> Self {
+    pub fn new(gpu: &Gpu, effects: LossEffects) -> Self {
         Self {
             sum_loss: SumLossKernel::new(gpu),
-            loss: LossKernels::new(gpu),
+            loss: LossKernels::new(gpu, effects),
             densify: DensifyKernels::new(gpu),
             relocation: RelocationKernel::new(gpu),
         }
@@ -64,8 +64,7 @@ impl Workspace {
         settings: &LumaSettings,
         geometry: &Geometry,
         field: &Field,
-        photos: &[Buffer<u32>],
-        slopes: &[Buffer<f32>; 3],
+        targets: &Targets,
         [max_pixels, max_tiles]: [usize; 2],
         capacity: usize,
         moments: Option<[[Buffer<f32>; 2]; 2]>,
@@ -86,21 +85,7 @@ impl Workspace {
         };
         let adjoint = LayerAdjoint::new(raster, geometry, &lists, field, &layer, &outcome)?;
         let log = LossLog::new(gpu, &kernels.sum_loss, &lists.status, max_tiles, SYNC_EVERY)?;
-        let losses = photos
-            .iter()
-            .map(|photo| {
-                Loss::new(
-                    gpu,
-                    &kernels.loss,
-                    &lists,
-                    &layer,
-                    &adjoint,
-                    &log,
-                    slopes,
-                    photo,
-                )
-            })
-            .collect();
+        let losses = Loss::all(gpu, &kernels.loss, &lists, &layer, &adjoint, &log, targets);
         let relocation = (settings.densification == Densification::Relocate)
             .then(|| {
                 let kernels = &kernels.relocation;

@@ -1,7 +1,8 @@
 //! The luma loss: 0.8 · L1 + 0.2 · (1 - SSIM), averaged over the pixels.
 //!
 //! SSIM after Wang et al. 2004 with an 11×11 Gaussian window; outside the
-//! image the window meets zeros, as in the reference splat trainer.
+//! image the window meets zeros, as in the reference splat trainer. [`LumaEffects`] may
+//! add an exposure, a mask and a robust weight.
 
 use super::constants::{SSIM_C1, SSIM_C2, SSIM_SIGMA, SSIM_WEIGHT, SSIM_WINDOW};
 use super::{Number, lift, seed};
@@ -54,6 +55,39 @@ fn ssim_at<T: Number>(
     luminance * structure
 }
 
+/// What the loss reckons with besides.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct LumaEffects<'a> {
+    /// Gain and offset: what the photo shows of the image.
+    pub exposure: Option<[f64; 2]>,
+    /// What each pixel counts, `[height · width]`.
+    pub mask: Option<&'a [f64]>,
+    /// Residual at which a pixel's weight is a quarter.
+    pub residual: Option<f64>,
+}
+
+impl LumaEffects<'_> {
+    /// The image as the photo would show it: where the photo is black or white, what
+    /// lies beyond is met.
+    fn shown<T: Number>(&self, x: T, y: f64) -> T {
+        let Some([gain, offset]) = self.exposure else {
+            return x;
+        };
+        let value = x * gain + offset;
+        let beyond = (y >= 1.0 && value.re() > 1.0) || (y <= 0.0 && value.re() < 0.0);
+        if beyond { T::from(y) } else { value }
+    }
+
+    /// What a pixel counts; no derivative passes through it.
+    fn weight(&self, pixel: usize, shown: f64, y: f64) -> f64 {
+        let robust = self.residual.map_or(1.0, |residual| {
+            let ratio = (shown - y) / residual;
+            (1.0 + ratio * ratio).powi(-2)
+        });
+        robust * self.mask.map_or(1.0, |mask| mask[pixel])
+    }
+}
+
 /// `|r|`, with slope zero at zero.
 fn absolute<T: Number>(r: T) -> T {
     if r.re() > 0.0 {
@@ -74,27 +108,67 @@ pub fn ssim_map<T: Number>(x: &[T], y: &[f64], width: usize, height: usize) -> V
 }
 
 /// The loss of a rendered image `x` against a photo `y`, both `[height · width]`.
-pub fn luma_loss<T: Number>(x: &[T], y: &[f64], width: usize, height: usize) -> T {
+pub fn luma_loss<T: Number>(
+    x: &[T],
+    y: &[f64],
+    width: usize,
+    height: usize,
+    effects: &LumaEffects,
+) -> T {
+    let shown: Vec<T> = x
+        .iter()
+        .zip(y)
+        .map(|(&x, &y)| effects.shown(x, y))
+        .collect();
+    let weights: Vec<f64> = (shown.iter().zip(y).enumerate())
+        .map(|(pixel, (shown, &y))| effects.weight(pixel, shown.re(), y))
+        .collect();
+    let weighted: Vec<T> = shown.iter().zip(&weights).map(|(&x, &w)| x * w).collect();
+    let wanted: Vec<f64> = y.iter().zip(&weights).map(|(y, w)| y * w).collect();
     let mut sum = T::zero();
-    for (pixel, ssim) in ssim_map(x, y, width, height).into_iter().enumerate() {
-        sum += absolute(x[pixel] - y[pixel]) * (1.0 - SSIM_WEIGHT);
-        sum += (T::one() - ssim) * SSIM_WEIGHT;
+    for (pixel, ssim) in ssim_map(&weighted, &wanted, width, height)
+        .into_iter()
+        .enumerate()
+    {
+        let difference = absolute(shown[pixel] - y[pixel]);
+        let term = difference * (1.0 - SSIM_WEIGHT) + (T::one() - ssim) * SSIM_WEIGHT;
+        sum += term * weights[pixel];
     }
     sum / (width * height) as f64
 }
 
 /// The loss's gradient with respect to `x`: each pixel in turn as a dual
 /// number, summed over the windows it lies in.
-pub fn luma_loss_gradient(x: &[f64], y: &[f64], width: usize, height: usize) -> Vec<f64> {
+pub fn luma_loss_gradient(
+    x: &[f64],
+    y: &[f64],
+    width: usize,
+    height: usize,
+    effects: &LumaEffects,
+) -> Vec<f64> {
     let window = window();
+    let shown: Vec<f64> = x
+        .iter()
+        .zip(y)
+        .map(|(&x, &y)| effects.shown(x, y))
+        .collect();
+    let weights: Vec<f64> = (shown.iter().zip(y).enumerate())
+        .map(|(pixel, (&shown, &y))| effects.weight(pixel, shown, y))
+        .collect();
+    let wanted: Vec<f64> = y.iter().zip(&weights).map(|(y, w)| y * w).collect();
     (0..width * height)
         .map(|varied| {
-            let dual = |i: usize| if i == varied { seed(x[i]) } else { lift(x[i]) };
-            let mut sum = absolute(dual(varied) - y[varied]) * (1.0 - SSIM_WEIGHT);
+            let dual = effects.shown(seed(x[varied]), y[varied]);
+            let weighted = |i: usize| {
+                let shown = if i == varied { dual } else { lift(shown[i]) };
+                shown * weights[i]
+            };
+            let mut sum = absolute(dual - y[varied]) * (1.0 - SSIM_WEIGHT) * weights[varied];
             for j in reach(varied / width, height) {
                 for i in reach(varied % width, width) {
-                    let ssim = ssim_at(dual, y, [width, height], j * width + i, &window);
-                    sum -= ssim * SSIM_WEIGHT;
+                    let pixel = j * width + i;
+                    let ssim = ssim_at(weighted, &wanted, [width, height], pixel, &window);
+                    sum -= ssim * SSIM_WEIGHT * weights[pixel];
                 }
             }
             sum.eps / (width * height) as f64
@@ -106,6 +180,12 @@ pub fn luma_loss_gradient(x: &[f64], y: &[f64], width: usize, height: usize) -> 
 mod tests {
     use super::super::random::Random;
     use super::*;
+
+    const PLAIN: LumaEffects = LumaEffects {
+        exposure: None,
+        mask: None,
+        residual: None,
+    };
 
     fn images(seed: u64, count: usize) -> [Vec<f64>; 2] {
         let mut random = Random::new(seed);
@@ -128,8 +208,8 @@ mod tests {
                 .iter()
                 .all(|s| (s - 1.0).abs() < 1e-12)
         );
-        assert!(luma_loss(&x, &x, 20, 17).abs() < 1e-12);
-        let gradient = luma_loss_gradient(&x, &x, 20, 17);
+        assert!(luma_loss(&x, &x, 20, 17, &PLAIN).abs() < 1e-12);
+        let gradient = luma_loss_gradient(&x, &x, 20, 17, &PLAIN);
         assert!(gradient.iter().all(|g| g.abs() < 1e-12));
     }
 
@@ -153,8 +233,8 @@ mod tests {
     fn black_and_white_are_finite() {
         for (x, y) in [(0.0, 0.0), (1.0, 1.0), (0.0, 1.0)] {
             let (x, y): (Vec<f64>, Vec<f64>) = (vec![x; 144], vec![y; 144]);
-            assert!(luma_loss(&x, &y, 12, 12).is_finite());
-            let gradient = luma_loss_gradient(&x, &y, 12, 12);
+            assert!(luma_loss(&x, &y, 12, 12, &PLAIN).is_finite());
+            let gradient = luma_loss_gradient(&x, &y, 12, 12, &PLAIN);
             assert!(gradient.iter().all(|g| g.is_finite()));
         }
     }
@@ -162,15 +242,79 @@ mod tests {
     #[test]
     fn gradient_agrees_with_finite_differences() {
         let [x, y] = images(32, 16 * 13);
-        let gradient = luma_loss_gradient(&x, &y, 16, 13);
+        let gradient = luma_loss_gradient(&x, &y, 16, 13, &PLAIN);
         for pixel in [0, 5, 15, 90, 100, 207] {
             let shifted = |by: f64| {
                 let mut x = x.clone();
                 x[pixel] += by;
-                luma_loss(&x, &y, 16, 13)
+                luma_loss(&x, &y, 16, 13, &PLAIN)
             };
             let difference = (shifted(1e-6) - shifted(-1e-6)) / 2e-6;
             assert!((difference - gradient[pixel]).abs() < 1e-9);
         }
+    }
+
+    #[test]
+    fn a_masked_pixel_is_as_good_as_outside() {
+        let [x, y] = images(33, 20 * 16);
+        // The image without its right half, or with a mask over it.
+        let mask: Vec<f64> = (0..320).map(|p| f64::from(u8::from(p % 20 < 10))).collect();
+        let effects = LumaEffects {
+            mask: Some(&mask),
+            ..PLAIN
+        };
+        let half = |image: &[f64]| -> Vec<f64> {
+            image
+                .chunks(20)
+                .flat_map(|row| row[..10].to_vec())
+                .collect()
+        };
+        let masked = luma_loss(&x, &y, 20, 16, &effects);
+        let alone = luma_loss(&half(&x), &half(&y), 10, 16, &PLAIN);
+        assert!((2.0 * masked - alone).abs() < 1e-12);
+        let gradient = luma_loss_gradient(&x, &y, 20, 16, &effects);
+        let of_half = luma_loss_gradient(&half(&x), &half(&y), 10, 16, &PLAIN);
+        for (p, slope) in gradient.iter().enumerate() {
+            let expected = if p % 20 < 10 {
+                0.5 * of_half[p / 20 * 10 + p % 20]
+            } else {
+                0.0
+            };
+            assert!((slope - expected).abs() < 1e-14);
+        }
+    }
+
+    #[test]
+    fn an_exposed_image_that_is_met_has_no_loss() {
+        let [x, _] = images(34, 17 * 12);
+        let effects = LumaEffects {
+            exposure: Some([1.4, -0.1]),
+            ..PLAIN
+        };
+        let y: Vec<f64> = x.iter().map(|x| (1.4 * x - 0.1).clamp(0.0, 1.0)).collect();
+        assert!(y.contains(&1.0) && y.contains(&0.0));
+        assert!(luma_loss(&x, &y, 17, 12, &effects).abs() < 1e-12);
+        let gradient = luma_loss_gradient(&x, &y, 17, 12, &effects);
+        assert!(gradient.iter().all(|g| g.abs() < 1e-12));
+    }
+
+    #[test]
+    fn a_robust_loss_hardly_counts_what_is_far_off() {
+        let [x, mut y] = images(35, 15 * 15);
+        for (x, y) in x.iter().zip(&mut y) {
+            *y = x + 0.01 * (*y - 0.5);
+        }
+        let effects = LumaEffects {
+            residual: Some(0.02),
+            ..PLAIN
+        };
+        let clean = luma_loss(&x, &y, 15, 15, &effects);
+        y[112] = x[112] + 1.0;
+        let spoiled = luma_loss(&x, &y, 15, 15, &effects);
+        // Its neighbours lose a window's middle, and that is all.
+        assert!((spoiled - clean).abs() < 1e-3, "{spoiled} {clean}");
+        assert!(luma_loss(&x, &y, 15, 15, &PLAIN) > clean + 3e-3);
+        let gradient = luma_loss_gradient(&x, &y, 15, 15, &effects);
+        assert!((gradient[112] * 225.0).abs() < 1e-4);
     }
 }

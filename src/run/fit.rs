@@ -87,7 +87,7 @@ pub fn fit(
     settings.schedule.coarse_until =
         (options.coarse * settings.schedule.iterations as f64) as usize;
     let cameras = scene.split.train.iter().map(|&i| &scene.photos[i].1);
-    let demand = Demand::of(cameras, settings.sh_degree, options.memory_limit);
+    let demand = Demand::of(cameras, false, settings.sh_degree, options.memory_limit);
     let fits = demand.largest_set(options.memory_limit, gpu.binding_limit());
     if fits == 0 {
         return Err(RunError::Gpu(GpuError::OverLimit {
@@ -117,9 +117,9 @@ pub fn fit(
         .split
         .train
         .iter()
-        .map(|&i| TrainingView {
-            camera: scene.photos[i].1.clone(),
-            gray: scene.photos[i].0.gray.clone(),
+        .map(|&i| {
+            let (photo, camera) = &scene.photos[i];
+            TrainingView::new(camera.clone(), photo.gray.clone())
         })
         .collect();
     let mut trainer = LumaTrainer::new(

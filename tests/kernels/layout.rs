@@ -8,6 +8,7 @@ use gs_chroma::{
     },
     gpu::shaders,
     luma::{
+        LumaLossParameters,
         densify::{DensifyParameters, Descent},
         relocation::RelocationParameters,
     },
@@ -102,6 +103,14 @@ fn twins() -> Vec<Twin> {
             }
         ),
         twin!("TileListsMode" = TileListsMode { emit }),
+        twin!(
+            "LumaLossParameters" = LumaLossParameters {
+                gain,
+                offset,
+                inverse_residual,
+                padding
+            }
+        ),
         twin!(
             "AdamParameters" = AdamParameters {
                 splat_count,

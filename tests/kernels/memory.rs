@@ -37,7 +37,7 @@ fn trainer(gpu: &Gpu, start: &Splats, limit: Option<u64>) -> Result<LumaTrainer,
         settings,
         1.0,
         start,
-        vec![TrainingView { camera, gray }],
+        vec![TrainingView::new(camera, gray)],
     )
 }
 
@@ -53,7 +53,7 @@ fn a_training_takes_what_was_estimated() {
         gpu.queue().submit([]);
         gpu.wait().unwrap();
         let taken = (gpu.allocated_bytes().unwrap() - before) as f64;
-        let demand = Demand::of([camera(&oblique_view())].iter(), sh_degree, None);
+        let demand = Demand::of([camera(&oblique_view())].iter(), false, sh_degree, None);
         let expected = demand.bytes(COUNT, 4 * COUNT) as f64;
         let ratio = taken / expected;
         assert!((0.98..1.02).contains(&ratio), "degree {sh_degree}: {ratio}");
@@ -83,16 +83,16 @@ fn streamed_photos_train_alike() {
     let camera = camera(&oblique_view());
     let pixels = (camera.width * camera.height) as usize;
     let views: Vec<TrainingView> = (0..20)
-        .map(|k| TrainingView {
-            camera: camera.clone(),
-            gray: (0..pixels).map(|p| (p * (k + 1)) as u8).collect(),
+        .map(|k| {
+            let gray = (0..pixels).map(|p| (p * (k + 1)) as u8).collect();
+            TrainingView::new(camera.clone(), gray)
         })
         .collect();
     let cameras = || views.iter().map(|view| &view.camera);
     let start = initial_splats(&[([0.0; 3], 0.5), ([0.1, 0.2, 0.0], 0.3)], 1.0, 0);
-    let all = Demand::of(cameras(), 0, None);
+    let all = Demand::of(cameras(), false, 0, None);
     let limit = 4 * all.photos - 4;
-    assert!(!all.streams && Demand::of(cameras(), 0, Some(limit)).streams);
+    assert!(!all.streams && Demand::of(cameras(), false, 0, Some(limit)).streams);
     let raster = Arc::new(Raster::new(&gpu));
     let trained = |memory_limit| {
         let settings = LumaSettings {

@@ -104,7 +104,7 @@ fn train(start: &Splats, target: &Splats) -> (Splats, Vec<LumaProgress>) {
         let camera = camera(&view);
         let picture = renderer.render(&camera).unwrap().remove(0);
         let gray = picture.pixels.iter().map(|v| (v * 255.0) as u8).collect();
-        TrainingView { camera, gray }
+        TrainingView::new(camera, gray)
     });
     let views = photos.collect();
     let mut trainer = LumaTrainer::new(raster(), settings, 4.0, start, views).unwrap();

@@ -84,6 +84,25 @@ fn broken_losses_and_steps_are_noticed() {
             "2.0 * x * square[k]",
             "x * square[k]",
         ),
+        // The exposed, the masked and the robust variant.
+        (
+            "losses",
+            "luma_loss_backward",
+            "select(parameters.gain, 0.0,",
+            "select(1.0, 0.0,",
+        ),
+        (
+            "losses",
+            "luma_loss",
+            "weight *= mask_at(p)",
+            "weight *= sqrt(mask_at(p))",
+        ),
+        (
+            "losses",
+            "luma_loss_backward",
+            "weight = falloff * falloff",
+            "weight = falloff",
+        ),
         (
             "chroma loss",
             "chroma_loss",

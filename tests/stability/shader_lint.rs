@@ -91,13 +91,23 @@ const REASONS: &[(&str, &str, &str)] = &[
     ),
     (
         "luma_loss_backward",
-        "(L1_WEIGHT * sign(x - y) - SSIM_WEIGHT * ssim_gradient) / f32(view.size.x * view.size.y)",
+        "slope(p) * (L1_WEIGHT * sign(x - y) - SSIM_WEIGHT * ssim_gradient) / pixels",
         "the kernel runs for images of at least one pixel",
     ),
     (
         "penalty",
         "(1.0 - kept) / decline",
         "in the branch where decline is positive; kept is at most 1",
+    ),
+    (
+        "luma_loss_backward",
+        "slope(p) * w * (L1_WEIGHT * sign(x - y) - SSIM_WEIGHT * ssim_gradient) / pixels",
+        "the kernel runs for images of at least one pixel",
+    ),
+    (
+        "mask_at",
+        "f32((mask[p / 4u] >> (8u * (p % 4u))) & 255u) / 255.0",
+        "a constant divisor",
     ),
     ("penalty", "1.0 / length", "a length is at least SMOOTHING"),
     ("penalty", "kept / length", "a length is at least SMOOTHING"),
@@ -243,6 +253,11 @@ const REASONS: &[(&str, &str, &str)] = &[
         "view_correction",
         "vec4f(sums[0], sums[256], sums[512], sums[768]) / views",
         "the host sets a count of at least one view",
+    ),
+    (
+        "weight",
+        "1.0 / (1.0 + r * r)",
+        "at least one is divided by",
     ),
 ];
 

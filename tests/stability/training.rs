@@ -164,10 +164,7 @@ fn trained_with(
     settings: LumaSettings,
 ) -> Result<(Splats, Vec<LumaProgress>), GpuError> {
     let views = (world.cameras.iter().zip(&world.photos))
-        .map(|(camera, gray)| TrainingView {
-            camera: camera.clone(),
-            gray: gray.clone(),
-        })
+        .map(|(camera, gray)| TrainingView::new(camera.clone(), gray.clone()))
         .collect();
     let mut trainer = LumaTrainer::new(RASTER.clone(), settings, world.extent, start, views)?;
     let mut reports = Vec::new();

@@ -1,14 +1,16 @@
-//! `luma_loss`, `luma_loss_backward` and `sum_loss`.
+//! `luma_loss` with each of its effects, `luma_loss_backward` and `sum_loss`.
 
 use std::sync::Arc;
 
 use crate::{
+    capture::Exposure,
     compare::widen,
     doctor::measured::{Allowance, Row, Sample},
-    gpu::{Buffer, Gpu, GpuError, Kernel, Recorder, shaders},
+    gpu::{Buffer, Gpu, GpuError, Kernel, Recorder},
+    luma::{LossEffects, LumaLossParameters},
     optimize::{LossLog, SumLossKernel},
     oracle::{
-        luma_loss::{luma_loss, luma_loss_gradient},
+        luma_loss::{LumaEffects, luma_loss, luma_loss_gradient},
         random::Random,
     },
     raster::{Raster, ViewUniform, constants::STATUS_WORDS},
@@ -67,66 +69,158 @@ fn luma_images(seed: u64, pixels: usize, (level, spread): Tone) -> (Vec<f32>, Ve
     (image, photo)
 }
 
-fn luma_on_device(
-    gpu: &Gpu,
+/// A picture against a photo, with the effects that a test turns on.
+struct Comparison {
     size: [usize; 2],
-    image: &[f32],
-    photo: &[u8],
-) -> Result<(f64, Vec<f32>), GpuError> {
-    let pixels = image.len();
-    let mut words = vec![0_u32; pixels.div_ceil(4)];
-    for (p, &gray) in photo.iter().enumerate() {
-        words[p / 4] |= u32::from(gray) << (8 * (p % 4));
-    }
-    let kernel = |name| Kernel::new(gpu, name, shaders::LUMA_LOSS);
-    let (forward, backward) = (kernel("luma_loss"), kernel("luma_loss_backward"));
-    let view = view(gpu, size)?;
-    let image = Buffer::from_slice(gpu, "image", image)?;
-    let photo = Buffer::from_slice(gpu, "photo", &words)?;
-    let slopes = || Buffer::<f32>::zeros(gpu, "slopes", pixels);
-    let slopes = [slopes()?, slopes()?, slopes()?];
-    let gradient = Buffer::<f32>::zeros(gpu, "gradient", pixels)?;
-    let [by_mean, by_square, by_product] = slopes.each_ref().map(Buffer::raw);
-    let inputs = [
-        view.raw(),
-        image.raw(),
-        photo.raw(),
-        by_mean,
-        by_square,
-        by_product,
-    ];
-    let [x, y] = size.map(|side| side.div_ceil(16) as u32);
-    let loss = logged(gpu, size, (x * y) as usize, |recorder, block_losses| {
-        let mut numbered: Vec<_> = (0..).zip(inputs).collect();
-        numbered.push((6, block_losses.raw()));
-        recorder.dispatch_grid(&forward, &forward.bind_at(gpu, &numbered), x, y);
-        numbered[6] = (7, gradient.raw());
-        recorder.dispatch_grid(&backward, &backward.bind_at(gpu, &numbered), x, y);
-    })?;
-    Ok((loss, gradient.read(gpu)?))
+    image: Vec<f32>,
+    photo: Vec<u8>,
+    exposure: Option<Exposure>,
+    mask: Option<Vec<u8>>,
+    residual: Option<f64>,
 }
 
-fn luma(gpu: &Gpu, tones: &[Tone]) -> Result<[Vec<Sample>; 2], GpuError> {
-    let (mut values, mut gradients) = (Vec::new(), Vec::new());
-    for (k, size) in SIZES.into_iter().enumerate() {
-        for &tone in tones {
-            let [width, height] = size;
-            let (image, photo) = luma_images(k as u64, width * height, tone);
-            let (loss, gradient) = luma_on_device(gpu, size, &image, &photo)?;
-            let x = widen(&image);
-            let y: Vec<f64> = photo.iter().map(|&gray| f64::from(gray) / 255.0).collect();
-            values.push(Sample::new(
-                vec![loss],
-                vec![luma_loss(&x, &y, width, height)],
-            ));
-            // By pixel, not by image: sizes are comparable.
-            let scale = (width * height) as f64;
-            let scaled = |values: Vec<f64>| values.into_iter().map(|v| v * scale).collect();
-            let expected = luma_loss_gradient(&x, &y, width, height);
-            gradients.push(Sample::new(scaled(widen(&gradient)), scaled(expected)));
+impl Comparison {
+    /// A comparison without effects.
+    fn plain(size: [usize; 2], (image, photo): (Vec<f32>, Vec<u8>)) -> Self {
+        Self {
+            size,
+            image,
+            photo,
+            exposure: None,
+            mask: None,
+            residual: None,
         }
     }
+
+    /// Value and gradient by the device.
+    fn on_device(&self, gpu: &Gpu) -> Result<(f64, Vec<f32>), GpuError> {
+        let effects = LossEffects {
+            exposed: self.exposure.is_some(),
+            masked: self.mask.is_some(),
+            robust: self.residual.is_some(),
+        };
+        let kernel = |name| Kernel::new(gpu, name, effects.shader());
+        let (forward, backward) = (kernel("luma_loss"), kernel("luma_loss_backward"));
+        let bytes = |label, bytes: &[u8]| {
+            let mut words = vec![0_u32; bytes.len().div_ceil(4)];
+            for (p, &byte) in bytes.iter().enumerate() {
+                words[p / 4] |= u32::from(byte) << (8 * (p % 4));
+            }
+            Buffer::from_slice(gpu, label, &words)
+        };
+        let pixels = self.image.len();
+        let view = view(gpu, self.size)?;
+        let image = Buffer::from_slice(gpu, "image", &self.image)?;
+        let photo = bytes("photo", &self.photo)?;
+        let slopes = || Buffer::<f32>::zeros(gpu, "slopes", pixels);
+        let slopes = [slopes()?, slopes()?, slopes()?];
+        let gradient = Buffer::<f32>::zeros(gpu, "gradient", pixels)?;
+        let mask = self.mask.as_deref().map(|mask| bytes("mask", mask));
+        let mask = mask.transpose()?;
+        let exposure = self.exposure.unwrap_or(Exposure::NONE);
+        let parameters = LumaLossParameters::new(exposure, self.residual);
+        let parameters = Buffer::uniform(gpu, "loss parameters", &parameters)?;
+        let [by_mean, by_square, by_product] = slopes.each_ref().map(Buffer::raw);
+        let inputs = [
+            view.raw(),
+            image.raw(),
+            photo.raw(),
+            by_mean,
+            by_square,
+            by_product,
+        ];
+        let [x, y] = self.size.map(|side| side.div_ceil(16) as u32);
+        let loss = logged(
+            gpu,
+            self.size,
+            (x * y) as usize,
+            |recorder, block_losses| {
+                let mut numbered: Vec<_> = (0..).zip(inputs).collect();
+                numbered.push((6, block_losses.raw()));
+                numbered.extend(mask.as_ref().map(|mask| (8, mask.raw())));
+                numbered.extend(effects.has_parameters().then(|| (9, parameters.raw())));
+                recorder.dispatch_grid(&forward, &forward.bind_at(gpu, &numbered), x, y);
+                numbered[6] = (7, gradient.raw());
+                recorder.dispatch_grid(&backward, &backward.bind_at(gpu, &numbered), x, y);
+            },
+        )?;
+        Ok((loss, gradient.read(gpu)?))
+    }
+
+    /// Value, and gradient times pixels, beside the oracle's: sizes are comparable then.
+    fn samples(&self, gpu: &Gpu) -> Result<[Sample; 2], GpuError> {
+        let (loss, gradient) = self.on_device(gpu)?;
+        let [width, height] = self.size;
+        let unit = |bytes: &[u8]| -> Vec<f64> {
+            bytes.iter().map(|&byte| f64::from(byte) / 255.0).collect()
+        };
+        let mask = self.mask.as_deref().map(unit);
+        let effects = LumaEffects {
+            exposure: self.exposure.map(|e| [e.gain, e.offset]),
+            mask: mask.as_deref(),
+            residual: self.residual,
+        };
+        let (x, y) = (widen(&self.image), unit(&self.photo));
+        let scale = (width * height) as f64;
+        let scaled = |values: Vec<f64>| values.into_iter().map(|v| v * scale).collect();
+        let expected = luma_loss_gradient(&x, &y, width, height, &effects);
+        let value = luma_loss(&x, &y, width, height, &effects);
+        Ok([
+            Sample::new(vec![loss], vec![value]),
+            Sample::new(scaled(widen(&gradient)), scaled(expected)),
+        ])
+    }
+}
+
+/// Samples of values and of gradients.
+fn sampled(
+    gpu: &Gpu,
+    comparisons: impl Iterator<Item = Comparison>,
+) -> Result<[Vec<Sample>; 2], GpuError> {
+    let (mut values, mut gradients) = (Vec::new(), Vec::new());
+    for comparison in comparisons {
+        let [value, gradient] = comparison.samples(gpu)?;
+        values.push(value);
+        gradients.push(gradient);
+    }
     Ok([values, gradients])
+}
+
+fn random(tones: &[Tone]) -> impl Iterator<Item = Comparison> {
+    (0..)
+        .zip(SIZES)
+        .flat_map(move |(k, size @ [width, height])| {
+            (tones.iter())
+                .map(move |&tone| Comparison::plain(size, luma_images(k, width * height, tone)))
+        })
+}
+
+/// Random pictures with an exposure, a mask, a robust weight, and all at once: pixels
+/// that count half, blocks that do not count at all, photos that the exposure clips.
+fn with_effects(which: usize) -> impl Iterator<Item = Comparison> {
+    // Every other size: the oracle takes its time.
+    random(&TONES[..1]).step_by(2).map(move |mut comparison| {
+        let mut random = Random::new(90);
+        if which == 0 || which == 3 {
+            comparison.exposure = Some(Exposure {
+                gain: 1.3,
+                offset: -0.12,
+            });
+        }
+        if which == 1 || which == 3 {
+            let [width, _] = comparison.size;
+            let mask = (0..comparison.photo.len()).map(|p| match p % width {
+                20..=33 => 0,
+                column if column % 5 == 1 => random.range(0.0, 256.0) as u8,
+                _ => 255,
+            });
+            comparison.mask = Some(mask.collect());
+        }
+        if which == 2 || which == 3 {
+            comparison.residual = Some(0.07);
+        }
+        comparison
+    })
 }
 
 /// Constant picture and photo: no variance at all, equal or as far apart as can
@@ -141,23 +235,11 @@ const CONSTANT: [(f32, u8); 7] = [
     (-2.0, 255),
 ];
 
-/// Values and gradients (by pixel) of constant pictures.
-fn constant(gpu: &Gpu) -> Result<[Vec<Sample>; 2], GpuError> {
-    let size @ [width, height] = [17, 33];
-    let pixels = width * height;
-    let (mut values, mut gradients) = (Vec::new(), Vec::new());
-    for (picture, photo) in CONSTANT {
-        let (image, photos) = (vec![picture; pixels], vec![photo; pixels]);
-        let (loss, gradient) = luma_on_device(gpu, size, &image, &photos)?;
-        let x = vec![f64::from(picture); pixels];
-        let y = vec![f64::from(photo) / 255.0; pixels];
-        let by_pixel = |values: Vec<f64>| values.iter().map(|v| v * pixels as f64).collect();
-        let expected = luma_loss_gradient(&x, &y, width, height);
-        let loss_expected = luma_loss(&x, &y, width, height);
-        values.push(Sample::new(vec![loss], vec![loss_expected]));
-        gradients.push(Sample::new(by_pixel(widen(&gradient)), by_pixel(expected)));
-    }
-    Ok([values, gradients])
+fn constant() -> impl Iterator<Item = Comparison> {
+    CONSTANT.into_iter().map(|(picture, photo)| {
+        let (size, pixels) = ([17, 33], 17 * 33);
+        Comparison::plain(size, (vec![picture; pixels], vec![photo; pixels]))
+    })
 }
 
 pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
@@ -174,10 +256,10 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
             samples,
         )
     };
-    let [luma_values, luma_gradients] = luma(gpu, &TONES)?;
-    let [flat_values, flat_gradients] = luma(gpu, &BRIGHT_AND_FLAT)?;
-    let [constant_values, constant_gradients] = constant(gpu)?;
-    Ok(vec![
+    let [luma_values, luma_gradients] = sampled(gpu, random(&TONES))?;
+    let [flat_values, flat_gradients] = sampled(gpu, random(&BRIGHT_AND_FLAT))?;
+    let [constant_values, constant_gradients] = sampled(gpu, constant())?;
+    let mut rows = vec![
         value("luma_loss", "value", 2.86e-7, &luma_values),
         gradient(
             "luma_loss",
@@ -206,5 +288,19 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
             allowed.relative(1.38e-4, 1.0),
             &constant_gradients,
         ),
-    ])
+    ];
+    for (which, (of_value, of_gradient)) in [
+        ("value, exposed", "gradient × pixels, exposed"),
+        ("value, masked", "gradient × pixels, masked"),
+        ("value, robust", "gradient × pixels, robust"),
+        ("value, all effects", "gradient × pixels, all effects"),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let [values, gradients] = sampled(gpu, with_effects(which))?;
+        rows.push(value("luma_loss", of_value, 1e-6, &values));
+        rows.push(gradient("luma_loss", of_gradient, 1e-6, 1e-5, &gradients));
+    }
+    Ok(rows)
 }

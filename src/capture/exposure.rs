@@ -1,0 +1,24 @@
+//! How bright a photo shows the scene.
+
+/// A photo shows `gain · luma + offset` of the scene's luma, both as encoded gray
+/// in [0, 1], as far as black and white allow.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Exposure {
+    /// Positive.
+    pub gain: f64,
+    /// In gray.
+    pub offset: f64,
+}
+
+impl Exposure {
+    /// The scene as it is.
+    pub const NONE: Self = Self {
+        gain: 1.0,
+        offset: 0.0,
+    };
+
+    /// What a photo shows of a luma.
+    pub fn shown(self, luma: f64) -> f64 {
+        (self.gain * luma + self.offset).clamp(0.0, 1.0)
+    }
+}
