@@ -556,8 +556,8 @@ fn faulty_tracks_name_their_place() {
     }
 }
 
-/// The bundled scene, of which pycolmap's summary says 21578 observations and a
-/// mean reprojection error of 0.108686 pixels.
+/// The bundled scene, in which pycolmap 4.2.1 finds 21578 observations at a mean of
+/// 0.11353800868335 pixels from where it projects their points.
 #[test]
 fn tracks_of_a_real_model_are_where_its_points_project() {
     let dir = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/demo");
@@ -574,5 +574,5 @@ fn tracks_of_a_real_model_are_where_its_points_project() {
     }
     assert_eq!(count, 21578);
     let mean = sum / f64::from(count);
-    assert!((mean - 0.108686).abs() < 1e-4, "{mean}");
+    assert!((mean - 0.113_538_008_683_35).abs() < 1e-9, "{mean}");
 }
