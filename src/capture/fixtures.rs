@@ -12,8 +12,8 @@ use super::{Capture, CaptureError};
 pub(super) struct Model {
     pub cameras: Vec<CameraRecord>,
     pub images: Vec<Image>,
-    /// Position, colour, length of the track.
-    pub points: Vec<([f64; 3], [u8; 3], usize)>,
+    /// Position, colour, track: image by its place in `images`, index of the 2D point.
+    pub points: Vec<([f64; 3], [u8; 3], Vec<(u32, u32)>)>,
 }
 
 #[derive(Clone)]
@@ -32,14 +32,16 @@ pub(super) struct Image {
     pub translation: [f64; 3],
     pub camera: u32,
     pub name: String,
-    pub observations: usize,
+    /// x, y and the point by its place in `points`, if it belongs to one.
+    pub observations: Vec<(f64, f64, Option<u64>)>,
 }
 
 /// Width and height of every photo.
 pub(super) const SIZE: (u32, u32) = (8, 6);
 
 impl Model {
-    /// Three views along x of two points, under two cameras.
+    /// Three views along x of two points, under two cameras: the first sees both
+    /// points and something else, the third the first point.
     pub fn example() -> Self {
         let camera = |id, model, parameters: &[f64]| CameraRecord {
             id,
@@ -48,12 +50,12 @@ impl Model {
             height: u64::from(SIZE.1),
             parameters: parameters.into(),
         };
-        let view = |name: &str, x: f64, camera: u32, observations: usize| Image {
+        let view = |name: &str, x: f64, camera: u32, observations: &[_]| Image {
             quaternion: [0.8, 0.0, 0.6, 0.0],
             translation: [x, 0.25, 2.0],
             camera,
             name: name.into(),
-            observations,
+            observations: observations.into(),
         };
         Self {
             cameras: vec![
@@ -61,13 +63,18 @@ impl Model {
                 camera(3, ("SIMPLE_PINHOLE", 0), &[12.0, 4.5, 3.5]),
             ],
             images: vec![
-                view("b.png", 1.0, 7, 2),
-                view("left/a c.png", -1.0, 3, 0),
-                view("a.png", 0.0, 7, 1),
+                view(
+                    "b.png",
+                    1.0,
+                    7,
+                    &[(1.5, 2.5, Some(1)), (3.25, 4.0, None), (5.0, 0.5, Some(0))],
+                ),
+                view("left/a c.png", -1.0, 3, &[]),
+                view("a.png", 0.0, 7, &[(6.5, 1.75, Some(0))]),
             ],
             points: vec![
-                ([0.5, -0.125, 6.0], [200, 100, 50], 2),
-                ([-1.5, 1.0, 8.0], [0, 255, 7], 0),
+                ([0.5, -0.125, 6.0], [200, 100, 50], vec![(0, 2), (2, 0)]),
+                ([-1.5, 1.0, 8.0], [0, 255, 7], vec![(0, 0)]),
             ],
         }
     }
@@ -90,8 +97,11 @@ impl Model {
             images.extend(image.camera.to_le_bytes());
             images.extend(image.name.bytes());
             images.push(0);
-            images.extend((image.observations as u64).to_le_bytes());
-            images.extend(vec![0xee; 24 * image.observations]);
+            images.extend((image.observations.len() as u64).to_le_bytes());
+            for (x, y, point) in &image.observations {
+                images.extend([x, y].into_iter().flat_map(|c| c.to_le_bytes()));
+                images.extend(point.unwrap_or(u64::MAX).to_le_bytes());
+            }
         }
         let mut points = (self.points.len() as u64).to_le_bytes().to_vec();
         for (id, (position, color, track)) in self.points.iter().enumerate() {
@@ -99,8 +109,10 @@ impl Model {
             points.extend(position.iter().flat_map(|p| p.to_le_bytes()));
             points.extend(color);
             points.extend(0.5_f64.to_le_bytes());
-            points.extend((*track as u64).to_le_bytes());
-            points.extend(vec![0xee; 8 * track]);
+            points.extend((track.len() as u64).to_le_bytes());
+            for (image, index) in track {
+                points.extend([image, index].into_iter().flat_map(|n| n.to_le_bytes()));
+            }
         }
         [cameras, images, points]
     }
@@ -126,12 +138,18 @@ impl Model {
         for (id, image) in self.images.iter().enumerate() {
             let pose = join(&image.quaternion) + " " + &join(&image.translation);
             images += &format!("{id} {pose} {} {}\n", image.camera, image.name);
-            images += &"1.5 2.5 -1 ".repeat(image.observations);
+            for (x, y, point) in &image.observations {
+                let point = point.map_or("-1".into(), |point| point.to_string());
+                images += &format!("{x} {y} {point} ");
+            }
             images += "\n";
         }
         let mut points = String::new();
         for (id, (position, [r, g, b], track)) in self.points.iter().enumerate() {
-            let track = " 1 2".repeat(*track);
+            let track = track
+                .iter()
+                .map(|(image, index)| format!(" {image} {index}"));
+            let track: String = track.collect();
             points += &format!("{id} {} {r} {g} {b} 0.5{track}\n", join(position));
         }
         [cameras, images, points].map(String::into_bytes)

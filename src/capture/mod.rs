@@ -58,12 +58,24 @@ pub struct View {
 }
 
 /// A point that COLMAP triangulated.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Point {
     /// World position; finite.
     pub position: DVec3,
     /// Encoded sRGB.
     pub color: [u8; 3],
+    /// Where views saw it, in the order of the file; empty where the model was
+    /// written without observations.
+    pub track: Vec<Observation>,
+}
+
+/// Where a view saw a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Observation {
+    /// Index into [`Capture::views`].
+    pub view: usize,
+    /// x and y in pixels of the view's camera, at the size of COLMAP's model; finite.
+    pub pixel: [f64; 2],
 }
 
 /// Something in the model that was left out.
@@ -110,14 +122,15 @@ impl Capture {
         if !photos.is_dir() {
             return Err(CaptureError::NoImagesFolder { dir: dir.into() });
         }
-        let mut model = colmap::read(dir)?;
-        model.images.sort_by(|a, b| a.name.cmp(&b.name));
-        if let Some(pair) = model
-            .images
+        let model = colmap::read(dir)?;
+        // Tracks know an image by its place in the file.
+        let mut images: Vec<_> = model.images.into_iter().enumerate().collect();
+        images.sort_by(|(_, a), (_, b)| a.name.cmp(&b.name));
+        if let Some(pair) = images
             .windows(2)
-            .find(|pair| pair[0].name == pair[1].name)
+            .find(|pair| pair[0].1.name == pair[1].1.name)
         {
-            let name = pair[0].name.clone();
+            let name = pair[0].1.name.clone();
             return Err(CaptureError::DuplicateName {
                 path: model.images_path,
                 name,
@@ -125,7 +138,8 @@ impl Capture {
         }
 
         let (mut views, mut rejected) = (Vec::new(), Vec::new());
-        for image in model.images {
+        let mut view_at = vec![None; images.len()];
+        for (place, image) in images {
             let colmap::Image {
                 name,
                 quaternion,
@@ -133,11 +147,14 @@ impl Capture {
                 intrinsics,
             } = image;
             match pose(quaternion, translation) {
-                Ok(rotation) => views.push(View {
-                    image_path: photos.join(&name),
-                    name,
-                    camera: intrinsics.camera(rotation, translation),
-                }),
+                Ok(rotation) => {
+                    view_at[place] = Some(views.len());
+                    views.push(View {
+                        image_path: photos.join(&name),
+                        name,
+                        camera: intrinsics.camera(rotation, translation),
+                    });
+                }
                 Err(reason) => rejected.push(Rejected { name, reason }),
             }
         }
@@ -173,6 +190,15 @@ impl Capture {
             });
         }
 
+        for point in &mut points {
+            point.track.retain_mut(|seen| match view_at[seen.view] {
+                Some(view) => {
+                    seen.view = view;
+                    true
+                }
+                None => false,
+            });
+        }
         let mut capture = Self {
             root: dir.into(),
             views,

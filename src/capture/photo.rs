@@ -35,6 +35,9 @@ pub struct Photo {
     pub gray: Vec<u8>,
     /// Colours, `[height · width]`, where the photo has a pixel that is not gray.
     pub rgb: Option<Vec<[u8; 3]>>,
+    /// What each pixel counts, `[height · width]`: 255 fully, 0 not at all. `None`
+    /// where every pixel counts.
+    pub mask: Option<Vec<u8>>,
 }
 
 impl Photo {
@@ -106,6 +109,7 @@ impl Pixels {
             height: self.height,
             gray,
             rgb,
+            mask: None,
         }
     }
 }

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
+use super::tracks::{Sighting, Sightings};
 use super::{
     Cameras, Image, Point, camera, insert, intrinsics, model_name, parameter_count, relative_name,
 };
@@ -21,6 +22,8 @@ const SMALLEST_POINT: u64 = 8 + 3 * 8 + 3 + 8 + 8;
 const OBSERVATION: u64 = 8 + 8 + 8;
 /// An image's id and the index of its observation.
 const TRACK_ELEMENT: u64 = 4 + 4;
+/// The point's id of a 2D point that belongs to none.
+const NO_POINT: u64 = u64::MAX;
 /// Linux's longest path; a name that goes on beyond it never ends.
 const LONGEST_NAME: u64 = 4096;
 
@@ -54,19 +57,35 @@ pub(super) fn cameras(path: &Path) -> Result<Cameras, CaptureError> {
     Ok(cameras)
 }
 
-pub(super) fn images(path: &Path, cameras: &Cameras) -> Result<Vec<Image>, CaptureError> {
+pub(super) fn images(
+    path: &Path,
+    cameras: &Cameras,
+) -> Result<(Vec<Image>, Sightings), CaptureError> {
     let mut records = Records::open(path, "image", SMALLEST_IMAGE)?;
     let mut images = Vec::with_capacity(records.capacity());
+    let mut sightings = Sightings::default();
     while records.next_record() {
-        records.u32("the id")?;
+        let id = records.u32("the id")?;
         let quaternion = records.f64s("the quaternion")?;
         let translation = DVec3::from(records.f64s::<3>("the translation")?);
         let camera_id = records.u32("the camera")?;
         let intrinsics = camera(cameras, camera_id).map_err(|reason| records.malformed(reason))?;
         let name = records.name()?;
         let name = relative_name(&name).map_err(|reason| records.malformed(reason))?;
-        let count = records.u64("the number of observations")?;
-        records.skip(count, OBSERVATION, "observations")?;
+        let count = records.elements("the number of observations", OBSERVATION, "observations")?;
+        let mut seen = Vec::new();
+        for index in 0..count {
+            let pixel = records.f64s("an observation")?;
+            let point = records.u64("an observation")?;
+            if point != NO_POINT {
+                seen.push(Sighting {
+                    index,
+                    point,
+                    pixel,
+                });
+            }
+        }
+        sightings.insert(id, images.len(), seen);
         images.push(Image {
             name,
             quaternion,
@@ -75,20 +94,29 @@ pub(super) fn images(path: &Path, cameras: &Cameras) -> Result<Vec<Image>, Captu
         });
     }
     records.finish()?;
-    Ok(images)
+    Ok((images, sightings))
 }
 
-pub(super) fn points(path: &Path) -> Result<Vec<Point>, CaptureError> {
+pub(super) fn points(path: &Path, sightings: &Sightings) -> Result<Vec<Point>, CaptureError> {
     let mut records = Records::open(path, "point", SMALLEST_POINT)?;
     let mut points = Vec::with_capacity(records.capacity());
     while records.next_record() {
-        records.u64("the id")?;
+        let id = records.u64("the id")?;
         let position = DVec3::from(records.f64s::<3>("the position")?);
         let color = records.bytes("the colour")?;
         records.f64("the error")?;
-        let count = records.u64("the track's length")?;
-        records.skip(count, TRACK_ELEMENT, "track elements")?;
-        points.push(Point { position, color });
+        let count = records.elements("the track's length", TRACK_ELEMENT, "track elements")?;
+        let mut track = Vec::new();
+        for _ in 0..count {
+            let image = records.u32("the track")?;
+            let index = records.u32("the track")?;
+            track.extend(sightings.observation(id, image, index));
+        }
+        points.push(Point {
+            position,
+            color,
+            track,
+        });
     }
     records.finish()?;
     Ok(points)
@@ -229,21 +257,15 @@ impl Records {
         Ok(name)
     }
 
-    /// Passes over `count` elements of `size` bytes.
-    fn skip(&mut self, count: u64, size: u64, what: &str) -> Result<(), CaptureError> {
-        // The error is in the count just read, so `field` stays with it.
-        if count > self.remaining() / size {
-            return Err(self.malformed(format!(
+    /// How many elements of `size` bytes follow, which the file can hold.
+    fn elements(&mut self, field: &str, size: u64, what: &str) -> Result<u32, CaptureError> {
+        let count = self.u64(field)?;
+        match u32::try_from(count) {
+            Ok(fits) if count <= self.remaining() / size => Ok(fits),
+            _ => Err(self.malformed(format!(
                 "{count} {what} do not fit into the file: it is cut off or damaged"
-            )));
+            ))),
         }
-        // No overflow: the product is at most the file's length.
-        let bytes = count * size;
-        self.reader
-            .seek_relative(bytes as i64)
-            .map_err(|source| self.read_error(source))?;
-        self.offset += bytes;
-        Ok(())
     }
 
     fn malformed(&self, reason: String) -> CaptureError {

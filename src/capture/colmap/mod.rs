@@ -1,10 +1,11 @@
 //! COLMAP's sparse models, as binary files and as text.
 //!
 //! Format: <https://colmap.github.io/format.html>. Only cameras, images and
-//! points3D are read; rigs, frames and 2D observations are of no use here.
+//! points3D are read; rigs and frames are of no use here.
 
 mod binary;
 mod text;
+mod tracks;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -18,7 +19,8 @@ use super::{Camera, Point};
 pub(super) struct Model {
     /// Images in the order of the file.
     pub images: Vec<Image>,
-    /// Points in the order of the file; their positions may be anything.
+    /// Points in the order of the file; their positions may be anything. The views
+    /// of their tracks are indices into `images`.
     pub points: Vec<Point>,
     /// The images file, for errors.
     pub images_path: PathBuf,
@@ -110,16 +112,12 @@ fn read_files(
 ) -> Result<Model, CaptureError> {
     let (images, points) = if extension == "bin" {
         let cameras = binary::cameras(&cameras)?;
-        (
-            binary::images(&images_path, &cameras)?,
-            binary::points(&points_path)?,
-        )
+        let (images, sightings) = binary::images(&images_path, &cameras)?;
+        (images, binary::points(&points_path, &sightings)?)
     } else {
         let cameras = text::cameras(&cameras)?;
-        (
-            text::images(&images_path, &cameras)?,
-            text::points(&points_path)?,
-        )
+        let (images, sightings) = text::images(&images_path, &cameras)?;
+        (images, text::points(&points_path, &sightings)?)
     };
     Ok(Model {
         images,

@@ -7,6 +7,7 @@ use std::str::{FromStr, SplitWhitespace};
 
 use glam::DVec3;
 
+use super::tracks::{Sighting, Sightings};
 use super::{Cameras, Image, Point, camera, insert, intrinsics, parameter_count, relative_name};
 use crate::capture::error::{CaptureError, Position};
 
@@ -45,12 +46,16 @@ pub(super) fn cameras(path: &Path) -> Result<Cameras, CaptureError> {
 
 /// `IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME`, then a line of `X Y POINT3D_ID`
 /// triples, which may be empty.
-pub(super) fn images(path: &Path, cameras: &Cameras) -> Result<Vec<Image>, CaptureError> {
+pub(super) fn images(
+    path: &Path,
+    cameras: &Cameras,
+) -> Result<(Vec<Image>, Sightings), CaptureError> {
     let mut lines = Lines::open(path, "image")?;
     let mut images = Vec::new();
+    let mut sightings = Sightings::default();
     while lines.next_record()? {
         let mut fields = lines.fields();
-        lines.field::<u32>(&mut fields, "the id")?;
+        let id = lines.field(&mut fields, "the id")?;
         let quaternion = lines.numbers(&mut fields, "the quaternion")?;
         let translation = DVec3::from(lines.numbers::<3>(&mut fields, "the translation")?);
         let camera_id = lines.field(&mut fields, "the camera")?;
@@ -58,6 +63,7 @@ pub(super) fn images(path: &Path, cameras: &Cameras) -> Result<Vec<Image>, Captu
         // The name is the tenth field and may contain spaces.
         let name = relative_name(after_fields(&lines.line, 9))
             .map_err(|reason| lines.malformed(reason))?;
+        let place = images.len();
         images.push(Image {
             name,
             quaternion,
@@ -66,29 +72,64 @@ pub(super) fn images(path: &Path, cameras: &Cameras) -> Result<Vec<Image>, Captu
         });
 
         // A file without the second lines would lose every other image.
-        if lines.next_line()? && lines.fields().count() % 3 != 0 {
-            return Err(lines.malformed(
+        let seen = if lines.next_line()? {
+            seen(&lines.line).ok_or_else(|| lines.malformed(
                 "this line should hold the observations, in threes, or be empty: an image takes two lines".into(),
-            ));
-        }
+            ))?
+        } else {
+            Vec::new()
+        };
+        sightings.insert(id, place, seen);
     }
-    Ok(images)
+    Ok((images, sightings))
 }
 
-/// `POINT3D_ID X Y Z R G B ERROR TRACK[]`
-pub(super) fn points(path: &Path) -> Result<Vec<Point>, CaptureError> {
+/// The 2D points of an image that belong to a 3D point; none where the line is no
+/// sequence of `X Y POINT3D_ID`.
+fn seen(line: &str) -> Option<Vec<Sighting>> {
+    /// The point's id of a 2D point that belongs to none.
+    const NO_POINT: &str = "-1";
+    let mut fields = line.split_whitespace();
+    let mut seen = Vec::new();
+    for index in 0.. {
+        let Some(x) = fields.next() else { break };
+        let (y, point) = (fields.next()?, fields.next()?);
+        if point != NO_POINT {
+            seen.push(Sighting {
+                index,
+                point: point.parse().ok()?,
+                pixel: [x.parse().ok()?, y.parse().ok()?],
+            });
+        }
+    }
+    Some(seen)
+}
+
+/// `POINT3D_ID X Y Z R G B ERROR TRACK[]`, the track being pairs of an image's id and
+/// the index of a 2D point.
+pub(super) fn points(path: &Path, sightings: &Sightings) -> Result<Vec<Point>, CaptureError> {
     let mut lines = Lines::open(path, "point")?;
     let mut points = Vec::new();
     while lines.next_record()? {
         let mut fields = lines.fields();
-        lines.field::<u64>(&mut fields, "the id")?;
+        let id = lines.field(&mut fields, "the id")?;
         let position = DVec3::from(lines.numbers::<3>(&mut fields, "the position")?);
         let mut color = [0; 3];
         for channel in &mut color {
             *channel = lines.field(&mut fields, "the colour")?;
         }
         lines.field::<f64>(&mut fields, "the error")?;
-        points.push(Point { position, color });
+        let mut track = Vec::new();
+        while fields.clone().next().is_some() {
+            let image = lines.field(&mut fields, "the track")?;
+            let index = lines.field(&mut fields, "the track")?;
+            track.extend(sightings.observation(id, image, index));
+        }
+        points.push(Point {
+            position,
+            color,
+            track,
+        });
     }
     Ok(points)
 }

@@ -1,0 +1,48 @@
+//! From 2D points in images and 3D points' tracks to observations.
+
+use std::collections::HashMap;
+
+use crate::capture::Observation;
+
+/// The 2D points of all images that belong to a 3D point.
+///
+/// Kept only while the points file is read. Most 2D points belong to none and
+/// are not held at all.
+#[derive(Default)]
+pub(super) struct Sightings {
+    /// By COLMAP's id: the image's place in the file, its sightings by index.
+    images: HashMap<u32, (usize, Vec<Sighting>)>,
+}
+
+/// A 2D point of an image that belongs to a 3D point.
+pub(super) struct Sighting {
+    /// Its number among the image's 2D points.
+    pub index: u32,
+    /// COLMAP's id of the 3D point.
+    pub point: u64,
+    /// x and y in pixels.
+    pub pixel: [f64; 2],
+}
+
+impl Sightings {
+    /// Adds the image at `place` in the file; `sightings` ascend by index.
+    pub fn insert(&mut self, image_id: u32, place: usize, sightings: Vec<Sighting>) {
+        self.images.insert(image_id, (place, sightings));
+    }
+
+    /// What an element of a point's track stands for, its `view` being the
+    /// image's place in the file.
+    ///
+    /// None where the image is unknown or does not say that it sees the point
+    /// there: some tools write tracks, but no 2D points.
+    pub fn observation(&self, point: u64, image_id: u32, index: u32) -> Option<Observation> {
+        let (view, sightings) = self.images.get(&image_id)?;
+        let found = sightings.binary_search_by_key(&index, |sighting| sighting.index);
+        let sighting = &sightings[found.ok()?];
+        let sound = sighting.point == point && sighting.pixel.iter().all(|c| c.is_finite());
+        sound.then_some(Observation {
+            view: *view,
+            pixel: sighting.pixel,
+        })
+    }
+}
