@@ -34,6 +34,12 @@ impl Camera {
         -(self.rotation.transpose() * self.translation)
     }
 
+    /// Where a world point is seen, in pixels; `None` behind the camera.
+    pub fn project(&self, point: DVec3) -> Option<[f64; 2]> {
+        let [x, y, z] = (self.rotation * point + self.translation).to_array();
+        (z > 0.0).then(|| [self.fx * x / z + self.cx, self.fy * y / z + self.cy])
+    }
+
     /// The same view at another image size; intrinsics scale with each axis.
     pub fn resized(&self, width: u32, height: u32) -> Self {
         let (sx, sy) = (
@@ -79,8 +85,13 @@ mod tests {
     }
 
     fn project(camera: &Camera, point: DVec3) -> [f64; 2] {
-        let [x, y, z] = (camera.rotation * point + camera.translation).to_array();
-        [camera.fx * x / z + camera.cx, camera.fy * y / z + camera.cy]
+        camera.project(point).unwrap()
+    }
+
+    #[test]
+    fn what_is_behind_is_not_seen() {
+        let behind = camera().center() - camera().rotation.transpose() * DVec3::Z;
+        assert_eq!(camera().project(behind), None);
     }
 
     #[test]

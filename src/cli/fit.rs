@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::{print, progress::Progress};
+use super::{effects::EffectArguments, print, progress::Progress};
 use crate::luma::Densification;
 use crate::report::timings_table;
 use crate::run::{FitOptions, Preset, RunError, fit};
@@ -38,9 +38,8 @@ pub struct Fit {
     /// Take no more of the device's memory than this; fewer Gaussians if need be.
     #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u32).range(1..))]
     memory_limit: Option<u32>,
-    /// Degree of the luminance's dependence on the direction of view.
-    #[arg(long, value_name = "0..3", value_parser = clap::value_parser!(u32).range(0..=3))]
-    sh_degree: Option<u32>,
+    #[command(flatten)]
+    effects: EffectArguments,
     /// Seed of every random choice: same seed, same bytes.
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
@@ -68,7 +67,7 @@ impl Fit {
             iterations: self.iterations.map(|n| n as usize),
             max_side: self.max_side,
             max_splats: self.max_splats.map(|n| n as usize),
-            sh_degree: self.sh_degree,
+            overrules: self.effects.overrules(),
             seed: self.seed,
             init: self.init,
             densification: match self.densify {

@@ -2,10 +2,12 @@
 
 mod colorize;
 mod doctor;
+mod effects;
 mod eval;
 mod export;
 mod fit;
 mod info;
+mod plan;
 mod progress;
 mod render;
 
@@ -29,6 +31,7 @@ pub struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    Plan(plan::Plan),
     Fit(fit::Fit),
     Colorize(colorize::Colorize),
     Render(render::Render),
@@ -45,6 +48,7 @@ impl Cli {
     /// Whatever stopped it, as one line that names the file and the remedy.
     pub fn run(self) -> Result<(), RunError> {
         match self.command {
+            Command::Plan(command) => command.run(),
             Command::Fit(command) => command.run(),
             Command::Colorize(command) => command.run(),
             Command::Render(command) => command.run(),

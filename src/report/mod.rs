@@ -3,11 +3,13 @@
 //! docs/run-folder.md describes every key.
 
 mod contact_sheet;
+mod effects;
 mod evaluation;
 mod page;
 mod timings;
 
 pub use contact_sheet::{Row, contact_sheet, to_image};
+pub use effects::EffectReport;
 pub use evaluation::{
     BetweenScore, ConsistencyScore, EVALUATION_VERSION, Evaluation, LumaScore, Method,
     PathConsistency, PathScore, PictureScore, Rules, Table, ViewScore,
@@ -15,7 +17,11 @@ pub use evaluation::{
 pub use page::{Figure, MAP_END, PageRow, error_map, evaluation_page};
 pub use timings::{KernelReport, kernel_reports, timings_table};
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
+
+use crate::capture::Exposure;
 
 /// Version of the report's layout; raised when a key changes its meaning.
 pub const REPORT_VERSION: u32 = 1;
@@ -35,6 +41,9 @@ pub struct Report {
     pub preset: String,
     /// Seed of every random choice.
     pub seed: u64,
+    /// What was decided about each effect of image formation.
+    #[serde(default)]
+    pub effects: Vec<EffectReport>,
     /// Stage 1.
     pub luma: LumaReport,
     /// Stage 2, once `colorize` has run.
@@ -106,6 +115,9 @@ pub struct LumaReport {
     /// to take on the device at most.
     #[serde(default)]
     pub estimated_device_memory: u64,
+    /// How bright each photo shows the scene, by name, where they differ.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub exposures: BTreeMap<String, Exposure>,
     /// Mean over the held-out views, if any.
     pub held_out: Option<LumaQuality>,
     /// Each held-out view.

@@ -1,6 +1,7 @@
 //! `colorize`: a teacher's colours into a trained scene.
 
 use std::{
+    collections::BTreeMap,
     fmt::Write,
     path::{Path, PathBuf},
     sync::Arc,
@@ -302,6 +303,7 @@ impl Source {
             },
             preset: String::new(),
             seed: 0,
+            effects: Vec::new(),
             luma: LumaReport {
                 iterations: 0,
                 sh_degree: 0,
@@ -318,6 +320,7 @@ impl Source {
                 peak_host_memory: None,
                 peak_device_memory: None,
                 estimated_device_memory: 0,
+                exposures: BTreeMap::new(),
                 held_out: None,
                 held_out_views: Vec::new(),
                 timings: None,

@@ -9,16 +9,18 @@ use std::{
 
 use super::{
     Event, Observer, Preset, RunError, RunFolder, Stage, files,
-    scene::{Scene, gray_pixels, read_splats},
+    scene::{Scene, counted, counts, gray_pixels, read_splats},
 };
 use crate::{
+    capture::{Exposure, Photo},
     color::gray_from_rgb,
+    effects::{Effect, Overrules},
     gpu::{Gpu, GpuError},
     luma::{Demand, Densification, LumaSettings, LumaTrainer, TrainingView},
     measure,
     raster::Raster,
     report::{
-        CaptureReport, DeviceReport, LumaQuality, LumaReport, LumaSeconds, LumaView,
+        CaptureReport, DeviceReport, EffectReport, LumaQuality, LumaReport, LumaSeconds, LumaView,
         REPORT_VERSION, Report, kernel_reports,
     },
     splats::{ShField, Splats, init::initial_splats, ply, sh},
@@ -42,8 +44,8 @@ pub struct FitOptions {
     pub max_side: Option<u32>,
     /// Cap on Gaussians.
     pub max_splats: Option<usize>,
-    /// Degree of the luma harmonics.
-    pub sh_degree: Option<u32>,
+    /// Effects that are on or off whatever the evidence.
+    pub overrules: Overrules,
     /// Seed.
     pub seed: u64,
     /// Gaussians to start from.
@@ -74,9 +76,12 @@ pub fn fit(
     let amounts = preset.amounts();
     let max_side = options.max_side.or(amounts.max_side);
     let scene = Scene::load(&options.colmap_dir, max_side, options.holdout, observe)?;
+    let plan = scene.plan(amounts.sh_degree, &options.overrules);
+    observe(Event::Note(plan.to_string()));
     let mut settings = LumaSettings {
         memory_limit: options.memory_limit,
-        sh_degree: options.sh_degree.unwrap_or(amounts.sh_degree),
+        sh_degree: plan.sh_degree,
+        robust: plan.robust(),
         max_splats: options.max_splats.unwrap_or(amounts.max_splats),
         seed: options.seed,
         ..LumaSettings::new(options.iterations.unwrap_or(amounts.iterations))
@@ -87,7 +92,12 @@ pub fn fit(
     settings.schedule.coarse_until =
         (options.coarse * settings.schedule.iterations as f64) as usize;
     let cameras = scene.split.train.iter().map(|&i| &scene.photos[i].1);
-    let demand = Demand::of(cameras, false, settings.sh_degree, options.memory_limit);
+    let demand = Demand::of(
+        cameras,
+        plan.has(Effect::Masks),
+        settings.sh_degree,
+        options.memory_limit,
+    );
     let fits = demand.largest_set(options.memory_limit, gpu.binding_limit());
     if fits == 0 {
         return Err(RunError::Gpu(GpuError::OverLimit {
@@ -119,7 +129,12 @@ pub fn fit(
         .iter()
         .map(|&i| {
             let (photo, camera) = &scene.photos[i];
-            TrainingView::new(camera.clone(), photo.gray.clone())
+            TrainingView {
+                camera: camera.clone(),
+                gray: photo.gray.clone(),
+                mask: photo.mask.clone().filter(|_| plan.has(Effect::Masks)),
+                exposure: plan.exposures[i],
+            }
         })
         .collect();
     let mut trainer = LumaTrainer::new(
@@ -154,7 +169,7 @@ pub fn fit(
     let train = begun.elapsed().as_secs_f64();
 
     let begun = Instant::now();
-    let held_out_views = measure_luma(&raster, &scene, &splats)?;
+    let held_out_views = measure_luma(&raster, &scene, &splats, &plan.exposures)?;
     let report = Report {
         version: REPORT_VERSION,
         program: env!("CARGO_PKG_VERSION").to_owned(),
@@ -166,6 +181,7 @@ pub fn fit(
         },
         preset: preset.name().to_owned(),
         seed: options.seed,
+        effects: EffectReport::of(&plan),
         luma: LumaReport {
             iterations: settings.schedule.iterations,
             sh_degree: settings.sh_degree,
@@ -182,6 +198,9 @@ pub fn fit(
             peak_host_memory: files::peak_host_memory(),
             peak_device_memory,
             estimated_device_memory: demand.peak_bytes(splats.len()),
+            exposures: (plan.has(Effect::Exposure))
+                .then(|| scene.by_name(&plan.exposures))
+                .unwrap_or_default(),
             held_out: mean_quality(&held_out_views),
             held_out_views,
             timings,
@@ -211,17 +230,15 @@ pub(super) fn comments() -> Vec<String> {
 }
 
 fn choose_preset(options: &FitOptions, gpu: &Gpu, observe: &mut Observer<'_>) -> Preset {
-    match options.preset {
-        Some(preset) => preset,
-        None if gpu.is_software() => {
+    options.preset.unwrap_or_else(|| {
+        if gpu.is_software() {
             observe(Event::Note(format!(
                 "{} has no GPU behind it: preset draft (--preset paper overrules)",
                 gpu.info().name
             )));
-            Preset::Draft
         }
-        None => Preset::Paper,
-    }
+        Preset::for_device(gpu)
+    })
 }
 
 fn first_splats(
@@ -287,6 +304,7 @@ fn measure_luma(
     raster: &Arc<Raster>,
     scene: &Scene,
     splats: &Splats,
+    exposures: &[Exposure],
 ) -> Result<Vec<LumaView>, RunError> {
     let mut renderer = scene.renderer(raster, splats, &[&splats.sh])?;
     scene
@@ -296,18 +314,33 @@ fn measure_luma(
         .map(|&i| {
             let (photo, camera) = &scene.photos[i];
             let picture = renderer.render(camera)?.remove(0);
-            let shown: Vec<f32> = picture.pixels.iter().map(|v| v.clamp(0.0, 1.0)).collect();
+            let shown: Vec<f32> = (picture.pixels.iter())
+                .map(|&luma| exposures[i].shown(f64::from(luma)) as f32)
+                .collect();
             let truth = gray_pixels(photo);
-            let (width, height) = (camera.width as usize, camera.height as usize);
             Ok(LumaView {
                 name: scene.capture.views[i].name.clone(),
-                quality: LumaQuality {
-                    psnr: measure::psnr(&shown, &truth).min(IDENTICAL_PSNR),
-                    ssim: measure::ssim(width, height, &shown, &truth),
-                },
+                quality: luma_quality(photo, &shown, &truth),
             })
         })
         .collect()
+}
+
+/// Quality of the pixels that count.
+fn luma_quality(photo: &Photo, shown: &[f32], truth: &[f32]) -> LumaQuality {
+    let (width, height) = (photo.width as usize, photo.height as usize);
+    let psnr = measure::psnr(&counted(photo, shown), &counted(photo, truth));
+    // Where a pixel does not count the picture is taken to be right, and the others
+    // answer for all that is wrong.
+    let pixels = 0..truth.len();
+    let patched: Vec<f32> = pixels
+        .map(|p| if counts(photo, p) { shown[p] } else { truth[p] })
+        .collect();
+    let share = counted(photo, truth).len() as f64 / truth.len() as f64;
+    LumaQuality {
+        psnr: psnr.min(IDENTICAL_PSNR),
+        ssim: 1.0 - (1.0 - measure::ssim(width, height, &patched, truth)) / share,
+    }
 }
 
 fn mean_quality(views: &[LumaView]) -> Option<LumaQuality> {

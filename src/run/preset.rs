@@ -3,6 +3,8 @@
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 
+use crate::gpu::Gpu;
+
 /// How much work to put into a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -31,6 +33,15 @@ pub(super) struct Amounts {
 }
 
 impl Preset {
+    /// What there is time for on a device.
+    pub(super) fn for_device(gpu: &Gpu) -> Self {
+        if gpu.is_software() {
+            Self::Draft
+        } else {
+            Self::Paper
+        }
+    }
+
     pub(super) fn amounts(self) -> Amounts {
         match self {
             Self::Draft => Amounts {

@@ -2,6 +2,7 @@
 //! renderer for its splats.
 
 use std::{
+    collections::BTreeMap,
     num::NonZero,
     path::Path,
     sync::{
@@ -17,6 +18,7 @@ use glam::DVec3;
 use super::{Event, Observer, RunError, Stage};
 use crate::{
     capture::{Camera, Capture, CaptureError, Photo, Split, View, split},
+    effects::{Overrules, Plan},
     gpu::GpuError,
     raster::{Field, Geometry, Raster, Renderer, constants::NEAR_SHARE},
     splats::{ShField, Splats, ply},
@@ -63,6 +65,24 @@ impl Scene {
         } else {
             ("test", &self.split.test)
         }
+    }
+
+    /// Which effects it calls for; `sh_degree` is the most that the preset has room for.
+    pub fn plan(&self, sh_degree: u32, overrules: &Overrules) -> Plan {
+        Plan::new(
+            &self.capture,
+            &self.photos,
+            &self.split,
+            sh_degree,
+            overrules,
+        )
+    }
+
+    /// Something that each view has, by the views' names.
+    pub fn by_name<T: Clone>(&self, values: &[T]) -> BTreeMap<String, T> {
+        (self.capture.views.iter().zip(values))
+            .map(|(view, value)| (view.name.clone(), value.clone()))
+            .collect()
     }
 
     /// A renderer of several fields over the geometry of `splats`.
@@ -159,6 +179,24 @@ pub(super) fn read_splats(
             .to_array();
     }
     Ok(splats)
+}
+
+/// Whether a pixel counts at least half.
+pub(super) fn counts(photo: &Photo, pixel: usize) -> bool {
+    photo.mask.as_ref().is_none_or(|mask| mask[pixel] >= 128)
+}
+
+/// The values of the pixels that count; of all where none does.
+pub(super) fn counted<T: Copy>(photo: &Photo, values: &[T]) -> Vec<T> {
+    let counted: Vec<T> = (values.iter().enumerate())
+        .filter(|&(pixel, _)| counts(photo, pixel))
+        .map(|(_, &value)| value)
+        .collect();
+    if counted.is_empty() {
+        values.to_vec()
+    } else {
+        counted
+    }
 }
 
 /// Gray pixels as floats in [0, 1].

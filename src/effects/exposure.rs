@@ -1,0 +1,279 @@
+//! Exposures of the views, from the same points seen by several.
+
+use super::tracks::Sample;
+use crate::capture::Exposure;
+
+/// Alternations between the points' lumas and the views' exposures. Each takes a few
+/// hundredths of a second for a large model; they settle after some ten.
+const ROUNDS: usize = 40;
+
+/// Samples that speak for no exposure at all: a view with as few is hardly moved.
+const PRIOR_SAMPLES: f64 = 10.0;
+
+/// Residuals beyond so many standard deviations count less and less (Huber's
+/// constant, 95 % efficient for normal noise).
+const HUBER: f64 = 1.345;
+
+/// A view's gain stays between this and its inverse: two stops.
+const GAIN_MIN: f64 = 0.25;
+
+/// Each view's exposure, and how sure it is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Exposures {
+    /// By view. Over the training views the gains' logarithms and the offsets have
+    /// mean zero.
+    pub views: Vec<Exposure>,
+    /// How far they move what the training views show, root mean square in gray.
+    pub spread: f64,
+    /// How large that would be by chance, from the noise of the samples.
+    pub noise: f64,
+}
+
+/// Finds the exposures under which the views agree best about the points: each view
+/// shows gain · luma + offset of a point's luma, up to noise with outliers.
+pub fn find_exposures(tracks: &[Vec<Sample>], views: usize, train: &[usize]) -> Exposures {
+    let mut exposures = vec![Exposure::NONE; views];
+    let mut scale = f64::INFINITY;
+    let mut lumas: Vec<f64> = Vec::new();
+    for _ in 0..ROUNDS {
+        lumas = (tracks.iter())
+            .map(|track| luma_of(track, &exposures, scale))
+            .collect();
+        let residuals = residuals(tracks, &lumas, &exposures);
+        scale = deviation(&mut residuals.clone());
+        exposures = regress(tracks, &lumas, &exposures, scale);
+        center(&mut exposures, train);
+    }
+    let (mut moved, mut expected, mut counted) = (0.0, 0.0, 0.0);
+    for &view in train {
+        let seen = (tracks.iter().zip(&lumas))
+            .flat_map(|(track, &luma)| track.iter().map(move |sample| (sample.view, luma)))
+            .filter(|&(of, _)| of == view)
+            .map(|(_, luma)| luma);
+        let Exposure { gain, offset } = exposures[view];
+        let (mut count, mut squares) = (0.0, 0.0);
+        for luma in seen {
+            count += 1.0;
+            squares += ((gain - 1.0) * luma + offset).powi(2);
+        }
+        if count > 0.0 {
+            moved += squares / count;
+            // Two numbers are fitted to a view's samples.
+            expected += 2.0 * scale * scale / count;
+            counted += 1.0;
+        }
+    }
+    let mean_root = |sum: f64| {
+        if counted > 0.0 {
+            (sum / counted).sqrt()
+        } else {
+            0.0
+        }
+    };
+    Exposures {
+        views: exposures,
+        spread: mean_root(moved),
+        noise: mean_root(expected),
+    }
+}
+
+/// What a view that shows `luma` shows of the scene.
+fn of_scene(sample: &Sample, exposure: Exposure) -> f64 {
+    (sample.luma - exposure.offset) / exposure.gain
+}
+
+/// A residual's weight.
+fn weight(residual: f64, scale: f64) -> f64 {
+    (HUBER * scale / residual.abs()).min(1.0)
+}
+
+/// The luma about which a point's views agree best: their median, then a weighted mean.
+fn luma_of(track: &[Sample], exposures: &[Exposure], scale: f64) -> f64 {
+    let mut lumas: Vec<f64> = (track.iter())
+        .map(|sample| of_scene(sample, exposures[sample.view]))
+        .collect();
+    lumas.sort_by(f64::total_cmp);
+    let middle = lumas[lumas.len() / 2];
+    let (mut sum, mut weights) = (0.0, 0.0);
+    for luma in lumas {
+        let weight = match luma - middle {
+            0.0 => 1.0,
+            residual => weight(residual, scale),
+        };
+        sum += weight * luma;
+        weights += weight;
+    }
+    sum / weights
+}
+
+fn residuals(tracks: &[Vec<Sample>], lumas: &[f64], exposures: &[Exposure]) -> Vec<f64> {
+    (tracks.iter().zip(lumas))
+        .flat_map(|(track, &luma)| {
+            (track.iter()).map(move |sample| {
+                let Exposure { gain, offset } = exposures[sample.view];
+                sample.luma - gain * luma - offset
+            })
+        })
+        .collect()
+}
+
+/// A robust standard deviation: 1.4826 times the median of the sizes.
+fn deviation(residuals: &mut [f64]) -> f64 {
+    if residuals.is_empty() {
+        return 0.0;
+    }
+    for residual in residuals.iter_mut() {
+        *residual = residual.abs();
+    }
+    let middle = residuals.len() / 2;
+    let (_, median, _) = residuals.select_nth_unstable_by(middle, f64::total_cmp);
+    // Photos in 256 levels are no more certain than this.
+    (1.4826 * *median).max(0.3 / 255.0)
+}
+
+/// Each view's weighted regression of what it shows on the points' lumas.
+fn regress(
+    tracks: &[Vec<Sample>],
+    lumas: &[f64],
+    exposures: &[Exposure],
+    scale: f64,
+) -> Vec<Exposure> {
+    // Weight, luma, shown, luma², luma·shown.
+    let mut sums = vec![[0.0; 5]; exposures.len()];
+    for (track, &luma) in tracks.iter().zip(lumas) {
+        for sample in track {
+            let Exposure { gain, offset } = exposures[sample.view];
+            let weight = weight(sample.luma - gain * luma - offset, scale);
+            let shown = sample.luma;
+            let terms = [1.0, luma, shown, luma * luma, luma * shown];
+            for (sum, term) in sums[sample.view].iter_mut().zip(terms) {
+                *sum += weight * term;
+            }
+        }
+    }
+    let mean_luma = lumas.iter().sum::<f64>() / lumas.len().max(1) as f64;
+    let variance =
+        lumas.iter().map(|l| (l - mean_luma).powi(2)).sum::<f64>() / lumas.len().max(1) as f64;
+    (sums.into_iter())
+        .map(|[weights, luma, shown, square, product]| {
+            // The prior's samples show what is there, at the scene's mean and spread.
+            let prior = PRIOR_SAMPLES;
+            let at = |sum: f64, of_prior: f64| (sum + prior * of_prior) / (weights + prior);
+            let (luma, shown) = (at(luma, mean_luma), at(shown, mean_luma));
+            let of_prior = variance + mean_luma * mean_luma;
+            let var = at(square, of_prior) - luma * luma;
+            let covariance = at(product, of_prior) - luma * shown;
+            if !(var > 0.0) {
+                return Exposure::NONE;
+            }
+            let gain = (covariance / var).clamp(GAIN_MIN, 1.0 / GAIN_MIN);
+            Exposure {
+                gain,
+                offset: shown - gain * luma,
+            }
+        })
+        .collect()
+}
+
+/// Brings the training views' mean to none: the scene is as bright as they are on
+/// average.
+fn center(exposures: &mut [Exposure], train: &[usize]) {
+    let count = train.len().max(1) as f64;
+    let gain = (train
+        .iter()
+        .map(|&view| exposures[view].gain.ln())
+        .sum::<f64>()
+        / count)
+        .exp();
+    for exposure in exposures.iter_mut() {
+        exposure.gain /= gain;
+    }
+    let offset = train
+        .iter()
+        .map(|&view| exposures[view].offset)
+        .sum::<f64>()
+        / count;
+    for exposure in exposures {
+        exposure.offset -= offset;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+
+    /// Points of random luma, each seen by `length` of `views` views, with noise.
+    fn tracks(truth: &[Exposure], points: usize, noise: f64) -> Vec<Vec<Sample>> {
+        let mut random = fastrand::Rng::with_seed(5);
+        (0..points)
+            .map(|_| {
+                let luma = 0.25 + 0.5 * random.f64();
+                let first = random.usize(..truth.len());
+                (0..4)
+                    .map(|k| {
+                        let view = (first + k * 3) % truth.len();
+                        // About normal; one in fifty is something else entirely.
+                        let normal: f64 = (0..12).map(|_| random.f64()).sum::<f64>() - 6.0;
+                        let shown = match random.u32(..50) {
+                            0 => random.f64(),
+                            _ => truth[view].gain * luma + truth[view].offset + noise * normal,
+                        };
+                        Sample {
+                            view,
+                            luma: shown,
+                            direction: DVec3::Z,
+                        }
+                    })
+                    .collect()
+            })
+            .collect()
+    }
+
+    #[test]
+    fn exposures_are_found_among_noise_and_outliers() {
+        let truth: Vec<Exposure> = (0..10)
+            .map(|v| Exposure {
+                gain: (0.2 * (f64::from(v) - 4.5) / 4.5).exp(),
+                offset: 0.03 * f64::from((v * 7) % 10 - 4) - 0.015,
+            })
+            .collect();
+        let train: Vec<usize> = (0..10).collect();
+        let found = find_exposures(&tracks(&truth, 3000, 0.02), 10, &train);
+        for (found, truth) in found.views.iter().zip(&truth) {
+            for luma in [0.3, 0.7] {
+                let difference = found.shown(luma) - truth.shown(luma);
+                assert!(difference.abs() < 0.008, "{found:?} {truth:?}");
+            }
+        }
+        assert!(
+            found.spread > 10.0 * found.noise,
+            "{} {}",
+            found.spread,
+            found.noise
+        );
+    }
+
+    #[test]
+    fn equal_exposures_spread_no_more_than_noise() {
+        let truth = [Exposure::NONE; 10];
+        let train: Vec<usize> = (1..10).collect();
+        let found = find_exposures(&tracks(&truth, 1000, 0.03), 10, &train);
+        assert!(
+            found.spread < 2.0 * found.noise,
+            "{} {}",
+            found.spread,
+            found.noise
+        );
+        let mean: f64 = train.iter().map(|&v| found.views[v].gain.ln()).sum();
+        assert!(mean.abs() < 1e-12);
+    }
+
+    #[test]
+    fn without_tracks_there_is_nothing_to_find() {
+        let found = find_exposures(&[], 3, &[0, 2]);
+        assert_eq!(found.views, [Exposure::NONE; 3]);
+        assert_eq!((found.spread, found.noise), (0.0, 0.0));
+    }
+}

@@ -1,0 +1,99 @@
+//! Whether photos show what the scene does not: dust, scratches, passers-by.
+//!
+//! Places half-way between neighbouring points mostly lie on the surface too. COLMAP
+//! matched nothing there, so that a defect has not driven the match away as it does at
+//! the points themselves. Where several views agree about such a place and one does not,
+//! that one shows something else.
+
+use std::collections::BTreeMap;
+
+use super::tracks::luma_at;
+use crate::{
+    capture::{Camera, Capture, Exposure, Photo},
+    splats::nearest_neighbors,
+};
+
+/// Neighbours of each point: more lie farther off, and so do the places between from
+/// the surface.
+const NEIGHBORS: usize = 3;
+
+/// Views that must agree about a place.
+const WITNESSES: usize = 3;
+
+/// They agree when their lumas lie within this, in gray.
+const AGREEMENT: f64 = 0.06;
+
+/// One disagrees when it is this far from their median, in gray.
+const DISAGREEMENT: f64 = 0.2;
+
+/// Share of the samples at places about which the other views agree that disagree with
+/// them; `None` where there is no such place.
+pub fn outlier_share(
+    capture: &Capture,
+    photos: &[(Photo, Camera)],
+    exposures: &[Exposure],
+) -> Option<f64> {
+    let positions: Vec<[f32; 3]> = (capture.points.iter())
+        .map(|point| point.position.as_vec3().to_array())
+        .collect();
+    let neighbors = nearest_neighbors(&positions, NEIGHBORS);
+    let (mut judged, mut disagreeing) = (0_u64, 0_u64);
+    let mut pairs = BTreeMap::new();
+    for (a, of_a) in neighbors.iter().enumerate() {
+        for &b in of_a {
+            let b = b as usize;
+            pairs.insert((a.min(b), a.max(b)), ());
+        }
+    }
+    for (a, b) in pairs.into_keys() {
+        let [first, second] = [a, b].map(|index| &capture.points[index]);
+        let middle = 0.5 * (first.position + second.position);
+        let mut lumas: Vec<f64> = (first.track.iter())
+            .filter(|seen| second.track.iter().any(|also| also.view == seen.view))
+            .filter_map(|seen| {
+                let (photo, camera) = &photos[seen.view];
+                let Exposure { gain, offset } = exposures[seen.view];
+                Some((luma_at(photo, camera.project(middle)?)? - offset) / gain)
+            })
+            .collect();
+        lumas.sort_by(f64::total_cmp);
+        let [total, without] = judge(&lumas);
+        judged += total;
+        disagreeing += without;
+    }
+    (judged > 0).then(|| disagreeing as f64 / judged as f64)
+}
+
+/// Of sorted lumas at one place: how many there are about which the others agree, and
+/// how many of these disagree with them.
+fn judge(lumas: &[f64]) -> [u64; 2] {
+    let n = lumas.len();
+    if n <= WITNESSES {
+        return [0, 0];
+    }
+    let mut counts = [0, 0];
+    for (i, &luma) in lumas.iter().enumerate() {
+        let other = |k: usize| lumas[if k < i { k } else { k + 1 }];
+        if other(n - 2) - other(0) <= AGREEMENT {
+            counts[0] += 1;
+            counts[1] += u64::from((luma - other((n - 1) / 2)).abs() > DISAGREEMENT);
+        }
+    }
+    counts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_against_all_is_an_outlier() {
+        assert_eq!(judge(&[0.1, 0.4, 0.41, 0.42]), [1, 1]);
+        assert_eq!(judge(&[0.4, 0.41, 0.42, 0.43]), [4, 0]);
+        // Nobody agrees, or nobody is there.
+        assert_eq!(judge(&[0.1, 0.2, 0.3, 0.4]), [0, 0]);
+        assert_eq!(judge(&[0.1, 0.4, 0.41]), [0, 0]);
+        // Two of one kind are not one against all.
+        assert_eq!(judge(&[0.1, 0.1, 0.4, 0.41, 0.42]), [0, 0]);
+    }
+}

@@ -1,0 +1,289 @@
+//! What each effect's evidence is and what follows from it.
+
+use std::fmt;
+
+use clap::ValueEnum;
+use serde::{Deserialize, Serialize};
+
+use super::{direction, exposure, outliers, tracks};
+use crate::capture::{Camera, Capture, Exposure, Photo, Split};
+
+/// Exposures that move what the views show by less, root mean square in gray levels, are
+/// invisible beside what any scene is missed by.
+const EXPOSURE_LEVELS: f64 = 2.0;
+
+/// And they must exceed what noise alone would make of them by this factor.
+const EXPOSURE_OVER_NOISE: f64 = 3.0;
+
+/// Share of places at which one view disagrees with all others from which on photos are
+/// taken to have defects: clean photos stay below 0.3 %, 1.5 % of dust gives 1 to 3 %.
+const OUTLIER_SHARE: f64 = 0.006;
+
+/// Residual, in gray, at which a pixel's weight is a quarter.
+const ROBUST_RESIDUAL: f64 = 0.15;
+
+/// Share of the error of foretelling a view's luma that harmonics must take away.
+const DIRECTION_SHARE: f64 = 0.03;
+
+/// An effect of image formation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Effect {
+    /// Some pixels of the photos do not count
+    Masks,
+    /// Photos differ in exposure, or flicker
+    Exposure,
+    /// Photos show dust, scratches or passers-by
+    Robust,
+    /// Luma depends on the direction of view
+    LumaDegree,
+}
+
+impl Effect {
+    /// All of them, in the order of the table.
+    pub const ALL: [Self; 4] = [Self::Masks, Self::Exposure, Self::Robust, Self::LumaDegree];
+
+    /// As on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Masks => "masks",
+            Self::Exposure => "exposure",
+            Self::Robust => "robust",
+            Self::LumaDegree => "luma-degree",
+        }
+    }
+
+    /// What the evidence counts.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Masks => "% of pixels masked",
+            Self::Exposure => "gray levels between views",
+            Self::Robust => "% of places disagree",
+            Self::LumaDegree => "% of error explained",
+        }
+    }
+
+    /// What it costs while it is on (docs/effects.md has the measurements).
+    pub fn cost(self) -> &'static str {
+        match self {
+            Self::Masks => "one byte a pixel",
+            Self::Exposure | Self::Robust => "16 bytes",
+            Self::LumaDegree => "36, 96 or 180 bytes a Gaussian for degree 1, 2 or 3",
+        }
+    }
+}
+
+/// Who decided.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Decider {
+    /// The evidence against its threshold.
+    Evidence,
+    /// `--with` or `--without`, or an option that says the same.
+    User,
+    /// The preset, which has no room for it.
+    Preset,
+}
+
+/// What is decided about an effect.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Decision {
+    /// Which.
+    pub effect: Effect,
+    /// Whether it is simulated.
+    pub on: bool,
+    /// The number that speaks for it; `None` where the capture says nothing.
+    pub evidence: Option<f64>,
+    /// From this on it is called for.
+    pub threshold: f64,
+    /// Who decided.
+    pub decided_by: Decider,
+}
+
+impl Decision {
+    /// What follows from the evidence alone.
+    pub fn new(effect: Effect, evidence: Option<f64>, threshold: f64) -> Self {
+        Self {
+            effect,
+            on: evidence.is_some_and(|evidence| evidence > threshold),
+            evidence,
+            threshold,
+            decided_by: Decider::Evidence,
+        }
+    }
+}
+
+/// What the user wants regardless of evidence.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Overrules {
+    /// On.
+    pub with: Vec<Effect>,
+    /// Off.
+    pub without: Vec<Effect>,
+    /// Degree of the luma harmonics.
+    pub sh_degree: Option<u32>,
+}
+
+/// Which effects are simulated, and how.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plan {
+    /// About each effect, in the order of [`Effect::ALL`].
+    pub decisions: Vec<Decision>,
+    /// Of each view of the capture; none at all while the effect is off.
+    pub exposures: Vec<Exposure>,
+    /// Degree of the luma harmonics.
+    pub sh_degree: u32,
+}
+
+impl Plan {
+    /// Examines a capture with its photos at working size. `sh_degree` is the most that
+    /// the preset has room for.
+    pub fn new(
+        capture: &Capture,
+        photos: &[(Photo, Camera)],
+        split: &Split,
+        sh_degree: u32,
+        overrules: &Overrules,
+    ) -> Self {
+        let samples = tracks::sample_tracks(capture, photos);
+        let found = exposure::find_exposures(&samples, photos.len(), &split.train);
+        let exposure = {
+            let evidence = (!samples.is_empty()).then_some(255.0 * found.spread);
+            let noise = EXPOSURE_OVER_NOISE * 255.0 * found.noise;
+            let decision = Decision::new(Effect::Exposure, evidence, EXPOSURE_LEVELS.max(noise));
+            overruled(decision, overrules)
+        };
+        // Views of one exposure are judged as they are.
+        let exposures = match exposure.on {
+            true => found.views,
+            false => vec![Exposure::NONE; photos.len()],
+        };
+        let robust = {
+            let evidence = outliers::outlier_share(capture, photos, &exposures);
+            let percent = evidence.map(|share| 100.0 * share);
+            Decision::new(Effect::Robust, percent, 100.0 * OUTLIER_SHARE)
+        };
+        let (degree, sh_degree) = degree(&samples, &exposures, sh_degree, overrules);
+        let decisions = vec![
+            overruled(masks(photos), overrules),
+            exposure,
+            overruled(robust, overrules),
+            degree,
+        ];
+        Self {
+            decisions,
+            exposures,
+            sh_degree,
+        }
+    }
+
+    /// Whether an effect is simulated.
+    pub fn has(&self, effect: Effect) -> bool {
+        (self.decisions.iter()).any(|decision| decision.effect == effect && decision.on)
+    }
+
+    /// Residual, in gray, at which a pixel's weight is a quarter, if the loss levels off.
+    pub fn robust(&self) -> Option<f64> {
+        self.has(Effect::Robust).then_some(ROBUST_RESIDUAL)
+    }
+}
+
+/// A decision after the user has had a say.
+fn overruled(decision: Decision, overrules: &Overrules) -> Decision {
+    let is = |list: &[Effect]| list.contains(&decision.effect);
+    let on = match (is(&overrules.with), is(&overrules.without)) {
+        (true, _) => true,
+        (_, true) => false,
+        _ => return decision,
+    };
+    Decision {
+        on,
+        decided_by: Decider::User,
+        ..decision
+    }
+}
+
+/// Masks count when there are any.
+fn masks(photos: &[(Photo, Camera)]) -> Decision {
+    let (mut masked, mut pixels) = (0.0, 0.0);
+    let mut any = false;
+    for (photo, _) in photos {
+        pixels += photo.gray.len() as f64;
+        if let Some(mask) = &photo.mask {
+            any = true;
+            masked += mask
+                .iter()
+                .map(|&m| 1.0 - f64::from(m) / 255.0)
+                .sum::<f64>();
+        }
+    }
+    Decision::new(Effect::Masks, any.then_some(100.0 * masked / pixels), 0.0)
+}
+
+/// Whether luma depends on direction, and the degree of harmonics that says how: at most
+/// `room` unless the user says otherwise.
+fn degree(
+    samples: &[Vec<tracks::Sample>],
+    exposures: &[Exposure],
+    room: u32,
+    overrules: &Overrules,
+) -> (Decision, u32) {
+    let explained = direction::left_out_errors(samples, exposures)
+        .map(|errors| errors.map(|error| 1.0 - error / errors[0].max(f64::MIN_POSITIVE)));
+    let best = explained.map(|shares| shares.into_iter().fold(0.0, f64::max));
+    let evidence = best.map(|best| 100.0 * best);
+    let decision = Decision::new(Effect::LumaDegree, evidence, 100.0 * DIRECTION_SHARE);
+    // The lowest degree that is about as good as the best.
+    let wanted = (explained.zip(best)).map(|(shares, best)| {
+        let nearly = |share: &f64| best - share <= DIRECTION_SHARE;
+        shares.iter().position(nearly).unwrap_or(0) as u32
+    });
+    let is = |list: &[Effect]| list.contains(&Effect::LumaDegree);
+    let (degree, decided_by) = match (overrules.sh_degree, wanted) {
+        (Some(degree), _) => (degree, Decider::User),
+        _ if is(&overrules.with) => (room.max(1), Decider::User),
+        _ if is(&overrules.without) => (0, Decider::User),
+        (None, Some(wanted)) if wanted <= room => (wanted, Decider::Evidence),
+        _ => (room, Decider::Preset),
+    };
+    let decision = Decision {
+        on: degree > 0,
+        decided_by,
+        ..decision
+    };
+    (decision, degree)
+}
+
+impl fmt::Display for Plan {
+    /// The table that a user sees.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{:<12} {:<4} {:>9} {:>10}",
+            "effect", "", "evidence", "threshold"
+        )?;
+        for decision in &self.decisions {
+            let Decision { effect, on, .. } = *decision;
+            let evidence = decision
+                .evidence
+                .map_or("none".to_owned(), |e| format!("{e:.2}"));
+            let on = if on { "on" } else { "off" };
+            let by = match decision.decided_by {
+                Decider::Evidence => "",
+                Decider::User => "; you said so",
+                Decider::Preset => "; by the preset",
+            };
+            write!(
+                f,
+                "\n{:<12} {on:<4} {evidence:>9} {:>10.2} {}{by}",
+                effect.name(),
+                decision.threshold,
+                effect.unit(),
+            )?;
+            if decision.on {
+                write!(f, "; costs {}", effect.cost())?;
+            }
+        }
+        Ok(())
+    }
+}
