@@ -17,6 +17,8 @@ pub use timings::{KernelReport, kernel_reports, timings_table};
 
 use serde::{Deserialize, Serialize};
 
+use crate::raster::RasterOptions;
+
 /// Version of the report's layout; raised when a key changes its meaning.
 pub const REPORT_VERSION: u32 = 1;
 
@@ -87,6 +89,9 @@ pub struct LumaReport {
     pub sh_degree: u32,
     /// Cap on Gaussians.
     pub max_splats: usize,
+    /// Whether opacities fall by what the blur of the projection spreads.
+    #[serde(default)]
+    pub antialiased: bool,
     /// Gaussians at the end.
     pub splats: usize,
     /// Gaussians that the last views culled for values that are not finite.
@@ -275,6 +280,15 @@ pub struct ColorView {
     /// Its quality.
     #[serde(flatten)]
     pub quality: ColorQuality,
+}
+
+impl LumaReport {
+    /// How the scene is drawn.
+    pub fn raster_options(&self) -> RasterOptions {
+        RasterOptions {
+            antialiased: self.antialiased,
+        }
+    }
 }
 
 impl Report {
