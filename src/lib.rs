@@ -10,6 +10,7 @@ pub mod cli;
 pub mod color;
 pub mod compare;
 pub mod doctor;
+pub mod effects;
 pub mod gpu;
 pub mod luma;
 pub mod measure;

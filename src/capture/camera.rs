@@ -34,6 +34,23 @@ impl Camera {
         -(self.rotation.transpose() * self.translation)
     }
 
+    /// Depth of a place: its z in camera space, world units.
+    pub fn depth(&self, place: DVec3) -> f64 {
+        (self.rotation * place + self.translation).z
+    }
+
+    /// The pixel at which a place is seen; `None` behind the camera or outside the image.
+    pub fn pixel_of(&self, place: DVec3) -> Option<[f64; 2]> {
+        let at = self.rotation * place + self.translation;
+        let pixel = [
+            self.fx * at.x / at.z + self.cx,
+            self.fy * at.y / at.z + self.cy,
+        ];
+        let inside = |at: f64, side: u32| at >= 0.0 && at < f64::from(side);
+        let seen = at.z > 0.0 && inside(pixel[0], self.width) && inside(pixel[1], self.height);
+        seen.then_some(pixel)
+    }
+
     /// The same view at another image size; intrinsics scale with each axis.
     pub fn resized(&self, width: u32, height: u32) -> Self {
         let (sx, sy) = (
