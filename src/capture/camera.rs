@@ -34,10 +34,21 @@ impl Camera {
         -(self.rotation.transpose() * self.translation)
     }
 
-    /// Where a world point is seen, in pixels; `None` behind the camera.
-    pub fn project(&self, point: DVec3) -> Option<[f64; 2]> {
-        let [x, y, z] = (self.rotation * point + self.translation).to_array();
-        (z > 0.0).then(|| [self.fx * x / z + self.cx, self.fy * y / z + self.cy])
+    /// Depth of a place: its z in camera space, world units.
+    pub fn depth(&self, place: DVec3) -> f64 {
+        (self.rotation * place + self.translation).z
+    }
+
+    /// The pixel at which a place is seen; `None` behind the camera or outside the image.
+    pub fn pixel_of(&self, place: DVec3) -> Option<[f64; 2]> {
+        let at = self.rotation * place + self.translation;
+        let pixel = [
+            self.fx * at.x / at.z + self.cx,
+            self.fy * at.y / at.z + self.cy,
+        ];
+        let inside = |at: f64, side: u32| at >= 0.0 && at < f64::from(side);
+        let seen = at.z > 0.0 && inside(pixel[0], self.width) && inside(pixel[1], self.height);
+        seen.then_some(pixel)
     }
 
     /// The same view at another image size; intrinsics scale with each axis.
@@ -85,13 +96,17 @@ mod tests {
     }
 
     fn project(camera: &Camera, point: DVec3) -> [f64; 2] {
-        camera.project(point).unwrap()
+        let at = camera.rotation * point + camera.translation;
+        [
+            camera.fx * at.x / at.z + camera.cx,
+            camera.fy * at.y / at.z + camera.cy,
+        ]
     }
 
     #[test]
     fn what_is_behind_is_not_seen() {
         let behind = camera().center() - camera().rotation.transpose() * DVec3::Z;
-        assert_eq!(camera().project(behind), None);
+        assert_eq!(camera().pixel_of(behind), None);
     }
 
     #[test]

@@ -7,7 +7,7 @@
 
 use std::collections::BTreeMap;
 
-use super::tracks::luma_at;
+use super::tracks::Sums;
 use crate::{
     capture::{Camera, Capture, Exposure, Photo},
     splats::nearest_neighbors,
@@ -16,6 +16,9 @@ use crate::{
 /// Neighbours of each point: more lie farther off, and so do the places between from
 /// the surface.
 const NEIGHBORS: usize = 3;
+
+/// Side of the square over which a photo's luma is averaged, in pixels: specks are small.
+const SIDE: f64 = 1.0;
 
 /// Views that must agree about a place.
 const WITNESSES: usize = 3;
@@ -36,6 +39,7 @@ pub fn outlier_share(
     let positions: Vec<[f32; 3]> = (capture.points.iter())
         .map(|point| point.position.as_vec3().to_array())
         .collect();
+    let sums: Vec<Sums> = photos.iter().map(|(photo, _)| Sums::of(photo)).collect();
     let neighbors = nearest_neighbors(&positions, NEIGHBORS);
     let (mut judged, mut disagreeing) = (0_u64, 0_u64);
     let mut pairs = BTreeMap::new();
@@ -51,9 +55,9 @@ pub fn outlier_share(
         let mut lumas: Vec<f64> = (first.track.iter())
             .filter(|seen| second.track.iter().any(|also| also.view == seen.view))
             .filter_map(|seen| {
-                let (photo, camera) = &photos[seen.view];
+                let camera = &photos[seen.view].1;
                 let Exposure { gain, offset } = exposures[seen.view];
-                Some((luma_at(photo, camera.project(middle)?)? - offset) / gain)
+                Some((sums[seen.view].mean(camera.pixel_of(middle)?, SIDE)? - offset) / gain)
             })
             .collect();
         lumas.sort_by(f64::total_cmp);

@@ -5,7 +5,7 @@ use std::fmt;
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 
-use super::{direction, exposure, outliers, tracks};
+use super::{background::Backdrop, direction, exposure, outliers, sampling, tracks};
 use crate::capture::{Camera, Capture, Exposure, Photo, Split};
 
 /// Exposures that move what the views show by less, root mean square in gray levels, are
@@ -22,8 +22,19 @@ const OUTLIER_SHARE: f64 = 0.006;
 /// Residual, in gray, at which a pixel's weight is a quarter.
 const ROBUST_RESIDUAL: f64 = 0.15;
 
-/// Share of the error of foretelling a view's luma that harmonics must take away.
-const DIRECTION_SHARE: f64 = 0.03;
+/// Ratio of the finest to the coarsest view of a place from which on opacities must answer
+/// to size: below, one blur fits all (docs/decisions.md).
+const SAMPLING_SPREAD: f64 = 1.5;
+
+/// Share of the photos that no point explains from which on there is a background.
+const UNEXPLAINED_SHARE: f64 = 0.1;
+
+/// What the direction of view must explain of a point's luma, root mean square in gray
+/// levels. Matt scenes show 2 to 4: perspective changes a little what lies in a pixel.
+const DIRECTION_LEVELS: f64 = 4.0;
+
+/// A higher degree must explain so much more, in gray levels, to be worth its memory.
+const DEGREE_LEVELS: f64 = 1.0;
 
 /// An effect of image formation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ValueEnum, Serialize, Deserialize)]
@@ -35,13 +46,24 @@ pub enum Effect {
     Exposure,
     /// Photos show dust, scratches or passers-by
     Robust,
+    /// Views see the same places in very different size
+    Antialias,
+    /// Parts of the photos show what no point explains
+    Background,
     /// Luma depends on the direction of view
     LumaDegree,
 }
 
 impl Effect {
     /// All of them, in the order of the table.
-    pub const ALL: [Self; 4] = [Self::Masks, Self::Exposure, Self::Robust, Self::LumaDegree];
+    pub const ALL: [Self; 6] = [
+        Self::Masks,
+        Self::Exposure,
+        Self::Robust,
+        Self::Antialias,
+        Self::Background,
+        Self::LumaDegree,
+    ];
 
     /// As on the command line.
     pub fn name(self) -> &'static str {
@@ -49,6 +71,8 @@ impl Effect {
             Self::Masks => "masks",
             Self::Exposure => "exposure",
             Self::Robust => "robust",
+            Self::Antialias => "antialias",
+            Self::Background => "background",
             Self::LumaDegree => "luma-degree",
         }
     }
@@ -59,7 +83,9 @@ impl Effect {
             Self::Masks => "% of pixels masked",
             Self::Exposure => "gray levels between views",
             Self::Robust => "% of places disagree",
-            Self::LumaDegree => "% of error explained",
+            Self::Antialias => "times finer the finest view",
+            Self::Background => "% of the photos unexplained",
+            Self::LumaDegree => "gray levels by direction",
         }
     }
 
@@ -68,6 +94,8 @@ impl Effect {
         match self {
             Self::Masks => "one byte a pixel",
             Self::Exposure | Self::Robust => "16 bytes",
+            Self::Antialias => "nothing measurable",
+            Self::Background => "Gaussians far behind the scene",
             Self::LumaDegree => "36, 96 or 180 bytes a Gaussian for degree 1, 2 or 3",
         }
     }
@@ -163,11 +191,21 @@ impl Plan {
             let percent = evidence.map(|share| 100.0 * share);
             Decision::new(Effect::Robust, percent, 100.0 * OUTLIER_SHARE)
         };
+        let antialias = {
+            let spread = sampling::sampling_spread(capture, photos);
+            Decision::new(Effect::Antialias, Some(spread), SAMPLING_SPREAD)
+        };
+        let background = {
+            let percent = 100.0 * Backdrop::of(capture, photos).share();
+            Decision::new(Effect::Background, Some(percent), 100.0 * UNEXPLAINED_SHARE)
+        };
         let (degree, sh_degree) = degree(&samples, &exposures, sh_degree, overrules);
         let decisions = vec![
             overruled(masks(photos), overrules),
             exposure,
             overruled(robust, overrules),
+            overruled(antialias, overrules),
+            overruled(background, overrules),
             degree,
         ];
         Self {
@@ -228,15 +266,18 @@ fn degree(
     room: u32,
     overrules: &Overrules,
 ) -> (Decision, u32) {
-    let explained = direction::left_out_errors(samples, exposures)
-        .map(|errors| errors.map(|error| 1.0 - error / errors[0].max(f64::MIN_POSITIVE)));
-    let best = explained.map(|shares| shares.into_iter().fold(0.0, f64::max));
-    let evidence = best.map(|best| 100.0 * best);
-    let decision = Decision::new(Effect::LumaDegree, evidence, 100.0 * DIRECTION_SHARE);
-    // The lowest degree that is about as good as the best.
-    let wanted = (explained.zip(best)).map(|(shares, best)| {
-        let nearly = |share: &f64| best - share <= DIRECTION_SHARE;
-        shares.iter().position(nearly).unwrap_or(0) as u32
+    let explained = direction::left_out_errors(samples, exposures).map(|errors| {
+        let [constant, ..] = errors;
+        errors.map(|error| 255.0 * (constant * constant - error * error).max(0.0).sqrt())
+    });
+    let evidence = explained.map(|levels| levels.into_iter().fold(0.0, f64::max));
+    let decision = Decision::new(Effect::LumaDegree, evidence, DIRECTION_LEVELS);
+    let wanted = explained.zip(evidence).map(|(levels, best)| {
+        let nearly = |level: &f64| best - level <= DEGREE_LEVELS;
+        match decision.on {
+            true => levels.iter().position(nearly).unwrap_or(0) as u32,
+            false => 0,
+        }
     });
     let is = |list: &[Effect]| list.contains(&Effect::LumaDegree);
     let (degree, decided_by) = match (overrules.sh_degree, wanted) {

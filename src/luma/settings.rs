@@ -1,5 +1,7 @@
 //! What stage 1 can be told, with the 3DGS values (Kerbl et al. 2023) as default.
 
+use crate::raster::RasterOptions;
+
 /// Learning rates of Adam.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LearningRates {
@@ -148,7 +150,8 @@ pub struct LumaSettings {
     /// A densification splits at most this share of the Gaussians.
     pub growth: f64,
     /// Gaussians larger than this share of the extent are removed after the
-    /// first opacity reset.
+    /// first opacity reset; with a [`background`](Self::background), of the distance to
+    /// the cameras' mean where that is longer.
     pub prune_share: f64,
     /// Gaussians below this opacity are removed.
     pub prune_opacity: f64,
@@ -157,6 +160,12 @@ pub struct LumaSettings {
     pub robust: Option<f64>,
     /// Bytes that the training may take on the device; no limit when `None`.
     pub memory_limit: Option<u64>,
+    /// Whether opacities fall by what the blur of the projection spreads
+    /// ([`RasterOptions::antialiased`]); the scene must then be drawn the same way.
+    pub antialiased: bool,
+    /// Whether some of the Gaussians stand for a background far behind the scene: how
+    /// large one may be then grows with its distance.
+    pub background: bool,
 }
 
 impl LumaSettings {
@@ -176,6 +185,8 @@ impl LumaSettings {
             prune_opacity: 0.005,
             robust: None,
             memory_limit: None,
+            antialiased: false,
+            background: false,
         }
     }
 
@@ -190,6 +201,13 @@ impl LumaSettings {
             self.schedule.densify_every = (self.schedule.iterations / 20).clamp(25, 100);
         }
         self
+    }
+
+    /// How the scene is drawn.
+    pub fn raster_options(&self) -> RasterOptions {
+        RasterOptions {
+            antialiased: self.antialiased,
+        }
     }
 
     /// Learning rate of the means at `iteration`, in world units.

@@ -14,11 +14,11 @@ use super::{
 use crate::{
     capture::{Exposure, Photo},
     color::gray_from_rgb,
-    effects::{Effect, Overrules},
+    effects::{Backdrop, Effect, Overrules},
     gpu::{Gpu, GpuError},
     luma::{Demand, Densification, LumaSettings, LumaTrainer, TrainingView},
     measure,
-    raster::Raster,
+    raster::{Raster, RasterOptions},
     report::{
         CaptureReport, DeviceReport, EffectReport, LumaQuality, LumaReport, LumaSeconds, LumaView,
         REPORT_VERSION, Report, kernel_reports,
@@ -82,6 +82,8 @@ pub fn fit(
         memory_limit: options.memory_limit,
         sh_degree: plan.sh_degree,
         robust: plan.robust(),
+        antialiased: plan.has(Effect::Antialias),
+        background: plan.has(Effect::Background),
         max_splats: options.max_splats.unwrap_or(amounts.max_splats),
         seed: options.seed,
         ..LumaSettings::new(options.iterations.unwrap_or(amounts.iterations))
@@ -119,7 +121,7 @@ pub fn fit(
         None => RunFolder::for_capture(&options.colmap_dir),
     };
     files::make_folder(folder.path())?;
-    let raster = Arc::new(Raster::new(&gpu));
+    let raster = Arc::new(Raster::with(&gpu, settings.raster_options()));
     let load = begun.elapsed().as_secs_f64();
 
     let begun = Instant::now();
@@ -186,6 +188,7 @@ pub fn fit(
             iterations: settings.schedule.iterations,
             sh_degree: settings.sh_degree,
             max_splats: settings.max_splats,
+            antialiased: settings.antialiased,
             splats: splats.len(),
             poisoned: last.map_or(0, |progress| progress.poisoned),
             refused: last.map_or(0, |progress| progress.refused),
@@ -212,7 +215,8 @@ pub fn fit(
         files::remove(&stale)?;
     }
     folder.forget_evaluation()?;
-    ply::write_ply(&folder.luma(), &splats, glam::DVec3::ZERO, &comments())?;
+    let comments = comments(settings.raster_options());
+    ply::write_ply(&folder.luma(), &splats, glam::DVec3::ZERO, &comments)?;
     files::write(&folder.log(), log.as_bytes())?;
     folder.write_report(&report)?;
     Ok((folder, report))
@@ -224,9 +228,11 @@ pub(super) fn open_gpu(timed: bool) -> Result<Gpu, RunError> {
     Ok(if timed { gpu.timed()? } else { gpu })
 }
 
-/// Comments in the header of every splat file.
-pub(super) fn comments() -> Vec<String> {
-    vec![format!("gs-chroma {}", env!("CARGO_PKG_VERSION"))]
+/// Comments in the header of every splat file; one says how it wants to be drawn.
+pub(super) fn comments(options: RasterOptions) -> Vec<String> {
+    let program = format!("gs-chroma {}", env!("CARGO_PKG_VERSION"));
+    let mode = options.antialiased.then(|| ply::ANTIALIASED.to_owned());
+    std::iter::once(program).chain(mode).collect()
 }
 
 fn choose_preset(options: &FitOptions, gpu: &Gpu, observe: &mut Observer<'_>) -> Preset {
@@ -261,13 +267,36 @@ fn first_splats(
             })
             .collect();
         let mut splats = initial_splats(&points, scene.extent as f32, settings.sh_degree);
-        truncate(&mut splats, settings.max_splats);
+        let dome = settings.background.then(|| background(scene, settings));
+        let taken = dome.as_ref().map_or(0, Splats::len);
+        truncate(&mut splats, settings.max_splats - taken);
+        dome.into_iter().for_each(|dome| splats.append(dome));
         return Ok(splats);
     };
-    let mut splats = read_splats(path, scene.capture.offset, observe)?.to_luma();
+    let (splats, options) = read_splats(path, scene.capture.offset, observe)?;
+    if options != settings.raster_options() {
+        let [is, is_not] = ["antialiased", "not antialiased"];
+        let (file, run) = if options.antialiased {
+            (is, is_not)
+        } else {
+            (is_not, is)
+        };
+        observe(Event::Note(format!(
+            "{} was trained {file}, this run is {run}: small Gaussians will have to adapt",
+            path.display()
+        )));
+    }
+    let mut splats = splats.to_luma();
     splats.sh = at_degree(&splats.sh, splats.means.len(), settings.sh_degree);
     truncate(&mut splats, settings.max_splats);
     Ok(splats)
+}
+
+/// Gaussians for what no point explains, at most a quarter of all that there may be.
+fn background(scene: &Scene, settings: &LumaSettings) -> Splats {
+    let backdrop = Backdrop::of(&scene.capture, &scene.photos);
+    let most = settings.max_splats / 4;
+    backdrop.dome(&scene.capture, scene.extent, most, settings.sh_degree)
 }
 
 /// The field cut or filled up with zeros to another degree.
