@@ -51,10 +51,7 @@ fn load(run: &Path, teacher: &Path) -> Fallible<Problem> {
         Some(&run.join("teacher")),
         &TeacherSettings::default(),
     )?;
-    let split = split(
-        capture.views.len(),
-        noted["holdout"].as_bool().unwrap_or(true),
-    );
+    let split = split(&capture.views, noted["holdout"].as_bool().unwrap_or(true));
     let mut views = Vec::new();
     for &i in &split.train {
         let (photo, camera) = Photo::load(&capture.views[i], max_side)?;

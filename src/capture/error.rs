@@ -79,9 +79,9 @@ pub enum CaptureError {
         /// What is wrong.
         reason: String,
     },
-    /// A camera is not a pinhole.
+    /// A camera's model is not one of COLMAP's.
     #[error(
-        "{path}: camera {camera_id} has the model {model}; only PINHOLE and SIMPLE_PINHOLE can be used: run COLMAP's image_undistorter and give its output folder"
+        "{path}: camera {camera_id} has the model {model}, which is none of COLMAP 4.2's; run its image_undistorter and give the output folder"
     )]
     CameraModel {
         /// The cameras file.
@@ -90,6 +90,20 @@ pub enum CaptureError {
         camera_id: u32,
         /// COLMAP's name of the model, or its number where it is unknown.
         model: String,
+    },
+    /// A camera's calibration cannot be a lens's.
+    #[error(
+        "{path}: camera {camera_id}, {model}: {reason}; calibrate it anew, or run COLMAP's image_undistorter and give the output folder"
+    )]
+    Lens {
+        /// The cameras file.
+        path: PathBuf,
+        /// COLMAP's id of the camera.
+        camera_id: u32,
+        /// COLMAP's name of the model.
+        model: &'static str,
+        /// What is wrong.
+        reason: String,
     },
     /// The model holds no images.
     #[error("{path}: holds no images; COLMAP registered none, so its mapper has to run again")]

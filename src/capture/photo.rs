@@ -41,7 +41,8 @@ pub struct Photo {
 }
 
 impl Photo {
-    /// Decodes the photo of a view and resizes its camera to it.
+    /// Decodes the photo of a view, takes its lens's distortion out where the view
+    /// says so, and resizes its camera to it.
     ///
     /// Reads JPEG and PNG with 8 bits a channel. Transparency, colour profiles
     /// and the EXIF orientation are ignored, the last because COLMAP ignores it.
@@ -53,9 +54,19 @@ impl Photo {
     /// colours, is cut off, or has neither its camera's size to within a pixel
     /// a side nor its aspect ratio to within 1 %, or would take more than 512 MiB.
     pub fn load(view: &View, max_side: Option<u32>) -> Result<(Self, Camera), CaptureError> {
-        let pixels = decode(&view.image_path, &view.camera)?.shrunk_to(max_side);
-        let camera = view.camera.resized(pixels.width, pixels.height);
-        Ok((pixels.into_photo(), camera))
+        let (expected, camera) = (view.photo_size(), &view.camera);
+        let lens = view.undistortion.as_ref();
+        let side = lens.map_or(max_side, |lens| lens.photo_side(camera, max_side));
+        let photo = decode(&view.image_path, expected)?
+            .shrunk_to(side)
+            .into_photo();
+        Ok(match lens {
+            Some(lens) => lens.apply(&photo, camera, max_side),
+            None => {
+                let camera = camera.resized(photo.width, photo.height);
+                (photo, camera)
+            }
+        })
     }
 }
 
@@ -114,7 +125,7 @@ impl Pixels {
     }
 }
 
-fn decode(path: &Path, camera: &Camera) -> Result<Pixels, CaptureError> {
+fn decode(path: &Path, expected: [u32; 2]) -> Result<Pixels, CaptureError> {
     let failure = |reason: String| CaptureError::Photo {
         path: path.into(),
         reason,
@@ -141,11 +152,11 @@ fn decode(path: &Path, camera: &Camera) -> Result<Pixels, CaptureError> {
         .map_err(unreadable)?;
     // Before any pixel is allocated: the size that the file announces may be a lie.
     let (width, height) = decoder.dimensions();
-    if !fits(camera, width, height) {
+    if !fits(expected, width, height) {
         return Err(CaptureError::PhotoSize {
             path: path.into(),
             photo: [width, height],
-            camera: [camera.width, camera.height],
+            camera: expected,
         });
     }
     if decoder.total_bytes() > LARGEST_FILE {
@@ -200,11 +211,11 @@ fn check_jpeg(file: &[u8]) -> Result<(), String> {
 }
 
 /// Whether a photo of this size can be the camera's.
-fn fits(camera: &Camera, width: u32, height: u32) -> bool {
+fn fits(expected: [u32; 2], width: u32, height: u32) -> bool {
     let near =
-        camera.width.abs_diff(width) <= SIZE_SLACK && camera.height.abs_diff(height) <= SIZE_SLACK;
+        expected[0].abs_diff(width) <= SIZE_SLACK && expected[1].abs_diff(height) <= SIZE_SLACK;
     let aspect = |width: u32, height: u32| f64::from(width) / f64::from(height);
-    let ratio = aspect(width, height) / aspect(camera.width, camera.height);
+    let ratio = aspect(width, height) / aspect(expected[0], expected[1]);
     near || (ratio - 1.0).abs() <= ASPECT_SLACK
 }
 

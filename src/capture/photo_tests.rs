@@ -11,6 +11,8 @@ use crate::color::gray_from_rgb;
 fn view(path: &Path, width: u32, height: u32) -> View {
     View {
         name: "photo".into(),
+        photo: "photo".into(),
+        undistortion: None,
         image_path: path.into(),
         camera: Camera {
             width,

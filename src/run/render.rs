@@ -13,7 +13,7 @@ use super::{
     scene::{gray_to_rgb, read_splats, shown_rgb},
 };
 use crate::{
-    capture::{Capture, Photo, split},
+    capture::{Capture, CaptureOptions, Photo, split},
     gpu::Gpu,
     raster::{Field, Geometry, Raster, Renderer, constants::NEAR_SHARE},
     report::to_image,
@@ -79,7 +79,11 @@ pub fn render(options: &RenderOptions, observe: &mut Observer<'_>) -> Result<usi
             (file, colmap, capture.max_side, capture.holdout, true)
         }
     };
-    let capture = Capture::load(&colmap)?;
+    let lens = CaptureOptions {
+        max_side,
+        ..CaptureOptions::default()
+    };
+    let capture = Capture::load_with(&colmap, &lens)?;
     // A run's own files are moved already; others lie where COLMAP has the cameras.
     let offset = if moved { DVec3::ZERO } else { capture.offset };
     let splats = read_splats(&file, offset, observe)?;
@@ -88,7 +92,7 @@ pub fn render(options: &RenderOptions, observe: &mut Observer<'_>) -> Result<usi
     } else {
         splats
     };
-    let split = split(capture.views.len(), holdout);
+    let split = split(&capture.views, holdout);
     let chosen: Vec<usize> = match options.views {
         Some(Views::Train) => split.train,
         Some(Views::Test) => split.test,

@@ -17,7 +17,7 @@ use glam::DVec3;
 
 use super::{Event, Observer, RunError, Stage};
 use crate::{
-    capture::{Camera, Capture, CaptureError, Photo, Split, View, split},
+    capture::{Camera, Capture, CaptureError, CaptureOptions, Photo, Split, View, split},
     effects::{Overrules, Plan},
     gpu::GpuError,
     raster::{Field, Geometry, Raster, Renderer, constants::NEAR_SHARE},
@@ -41,17 +41,20 @@ impl Scene {
         holdout: bool,
         observe: &mut Observer<'_>,
     ) -> Result<Self, RunError> {
-        let capture = Capture::load(colmap_dir)?;
+        let options = CaptureOptions {
+            max_side,
+            ..CaptureOptions::default()
+        };
+        let capture = Capture::load_with(colmap_dir, &options)?;
         for rejected in &capture.rejected {
             observe(Event::Note(format!(
                 "left out {}: {}",
                 rejected.name, rejected.reason
             )));
         }
-        let total = capture.views.len();
         let photos = decode(&capture.views, max_side, observe)?;
         Ok(Self {
-            split: split(total, holdout),
+            split: split(&capture.views, holdout),
             extent: capture.extent(),
             capture,
             photos,
