@@ -60,7 +60,7 @@ fn load(run: &Path, teacher: &Path) -> Fallible<Problem> {
             height: photo.height,
             pixels: &photo.gray,
         };
-        if let Some(wanted) = teacher.colorize(&capture.views[i].name, gray, None)? {
+        if let Some(wanted) = teacher.colorize(capture.views[i].name.as_str(), gray, None)? {
             views.push(ChromaView {
                 camera,
                 wanted,

@@ -28,6 +28,16 @@ impl Undistortion {
         max_side.map(|side| ((f64::from(side) * photo / picture) as u32).max(1))
     }
 
+    /// Width and height of the photo at which its middle has the scale of `camera`,
+    /// which is the view's at any size.
+    pub fn photo_size(&self, camera: &Camera) -> [u32; 2] {
+        let focal = self.lens.pinhole().focal;
+        let side = |length: u32, scale: f64| ((f64::from(length) * scale).round() as u32).max(1);
+        // Faces have one focal length for both axes: their mean.
+        let scale = ((camera.fx * camera.fy) / (focal.x * focal.y)).sqrt();
+        [side(self.lens.width, scale), side(self.lens.height, scale)]
+    }
+
     /// The view's picture of a photo of any size, and its camera, `camera` being the
     /// view's at the size of COLMAP's model. No side exceeds `max_side`.
     ///
