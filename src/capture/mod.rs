@@ -3,14 +3,22 @@
 mod arrangement;
 pub mod camera;
 mod colmap;
+mod decode;
 mod error;
 mod exposure;
 mod jpeg;
 pub mod lens;
+mod loader;
+mod mask;
+mod options;
 mod photo;
 mod resample;
 mod split;
+mod tiff;
+mod tone;
 
+#[cfg(test)]
+mod depth_tests;
 #[cfg(test)]
 mod fixtures;
 #[cfg(test)]
@@ -19,12 +27,15 @@ mod tests;
 use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DQuat, DVec3};
+use serde::{Deserialize, Serialize};
 
 use arrangement::Arrangement;
 pub use camera::Camera;
 pub use error::{CaptureError, Position};
 pub use exposure::Exposure;
 use lens::Undistortion;
+pub use loader::{Loader, first_views, kinds};
+pub use options::{Channel, Encoding, LoadOptions, MaskSource, MaskUse, Normalize};
 pub use photo::Photo;
 pub use resample::downscale;
 pub use split::{Split, split};
@@ -60,7 +71,7 @@ pub struct View {
     /// The photo's file; it exists when the capture is loaded.
     pub image_path: PathBuf,
     /// The pinhole that shows the view, in the size of COLMAP's model; the file may
-    /// differ, see [`Photo::load`].
+    /// differ, see [`Loader::load`].
     pub camera: Camera,
     /// How the view's picture comes from its photo; none where it is the photo.
     pub undistortion: Option<Undistortion>,
@@ -77,7 +88,8 @@ impl View {
 }
 
 /// Whether something is done: where the photos call for it, always or never.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Choice {
     /// Where its effect can be seen.
     #[default]

@@ -5,7 +5,10 @@ use std::fs;
 use glam::{DMat3, DVec3};
 
 use super::fixtures::{Model, folder, load, load_files, write};
-use super::{Capture, CaptureError, CaptureOptions, Choice, Observation, Photo, Position, split};
+use super::{
+    Capture, CaptureError, CaptureOptions, Choice, LoadOptions, Loader, Observation, Position,
+    split,
+};
 
 /// The error's one line, which must name the file.
 fn message(result: Result<Capture, CaptureError>, file: &str) -> String {
@@ -206,11 +209,12 @@ fn wide_photos_become_faces_of_one_photo() {
     ];
     assert_eq!(names, expected);
     let centre = capture.views[0].camera.center();
+    let loader = Loader::new(LoadOptions::default());
     for view in &capture.views[..5] {
         assert_eq!(view.photo, "a.png");
         assert_eq!(view.photo_size(), [8, 6]);
         assert!(view.camera.center().distance(centre) < 1e-12);
-        assert!(Photo::load(view, None).is_ok());
+        assert!(loader.load(view).is_ok());
     }
     // Three photos: the first is held out.
     assert_eq!(split(&capture.views, true).test, [0, 1, 2, 3, 4]);

@@ -3,7 +3,7 @@
 
 use std::{fmt::Write, fs};
 
-use gs_chroma::capture::{Capture, Photo};
+use gs_chroma::capture::{Capture, LoadOptions, Loader};
 use proptest::prelude::*;
 
 const POISON: [&str; 12] = [
@@ -83,7 +83,9 @@ fn load(camera: &str, change: Option<(usize, usize, usize, &str)>) -> Result<Cap
         .iter()
         .filter(|view| view.photo == "photo1.png")
     {
-        let (photo, camera) = Photo::load(view, None).map_err(|error| error.to_string())?;
+        let (photo, camera) = Loader::new(LoadOptions::default())
+            .load(view)
+            .map_err(|error| error.to_string())?;
         assert_eq!((photo.width, photo.height), (camera.width, camera.height));
     }
     Ok(capture)

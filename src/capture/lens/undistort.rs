@@ -44,14 +44,7 @@ impl Undistortion {
     /// Pixels that show nothing of the photo do not count in the mask.
     pub fn apply(&self, photo: &Photo, camera: &Camera, max_side: Option<u32>) -> (Photo, Camera) {
         let size = [photo.width, photo.height];
-        let side = |length: u32, photo: u32, lens: u32| {
-            let scaled = f64::from(length) * f64::from(photo) / f64::from(lens);
-            (scaled.round() as u32).clamp(1, max_side.unwrap_or(u32::MAX).max(1))
-        };
-        let camera = camera.resized(
-            side(camera.width, photo.width, self.lens.width),
-            side(camera.height, photo.height, self.lens.height),
-        );
+        let camera = self.camera(size, camera, max_side);
         let sources = self.sources(&camera, size);
         let bytes = |values: &[u8]| -> Vec<u8> {
             sample(values, size, &sources, |&value| [f32::from(value)])
@@ -80,6 +73,18 @@ impl Undistortion {
             mask: mask.iter().any(|&counts| counts < 255).then_some(mask),
         };
         (undistorted, camera)
+    }
+
+    /// The camera that [`Self::apply`] gives for a photo of this width and height.
+    pub fn camera(&self, size: [u32; 2], camera: &Camera, max_side: Option<u32>) -> Camera {
+        let side = |length: u32, photo: u32, lens: u32| {
+            let scaled = f64::from(length) * f64::from(photo) / f64::from(lens);
+            (scaled.round() as u32).clamp(1, max_side.unwrap_or(u32::MAX).max(1))
+        };
+        camera.resized(
+            side(camera.width, size[0], self.lens.width),
+            side(camera.height, size[1], self.lens.height),
+        )
     }
 
     /// Any picture of `N` channels of the photo, `size` being its width and height,
