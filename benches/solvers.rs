@@ -12,7 +12,7 @@
 use std::{fmt::Write, fs, path::Path, path::PathBuf, process::ExitCode, sync::Arc, time::Instant};
 
 use gs_chroma::{
-    capture::{Capture, Photo, split},
+    capture::{Capture, LoadOptions, Loader, split},
     chroma::{
         ChromaSettings, ChromaView, Distiller, Solver,
         teacher::{GrayImage, Teacher, TeacherSettings},
@@ -44,26 +44,24 @@ fn load(run: &Path, teacher: &Path) -> Fallible<Problem> {
     let report: serde_json::Value = serde_json::from_slice(&fs::read(run.join("report.json"))?)?;
     let noted = &report["capture"];
     let colmap = PathBuf::from(noted["path"].as_str().ok_or("report.json has no path")?);
-    let max_side = noted["max_side"].as_u64().map(|side| side as u32);
-    let capture = Capture::load(&colmap)?;
+    let options: LoadOptions = serde_json::from_value(noted.clone())?;
+    let capture = Capture::load_with(&colmap, &options.capture())?;
     let mut teacher = Teacher::open(
         teacher,
         Some(&run.join("teacher")),
         &TeacherSettings::default(),
     )?;
-    let split = split(
-        capture.views.len(),
-        noted["holdout"].as_bool().unwrap_or(true),
-    );
+    let split = split(&capture.views, options.holdout);
+    let loader = Loader::open(&capture, &options)?;
     let mut views = Vec::new();
     for &i in &split.train {
-        let (photo, camera) = Photo::load(&capture.views[i], max_side)?;
+        let (photo, camera) = loader.load(&capture.views[i])?;
         let gray = GrayImage {
             width: photo.width,
             height: photo.height,
             pixels: &photo.gray,
         };
-        if let Some(wanted) = teacher.colorize(&capture.views[i].name, gray, None)? {
+        if let Some(wanted) = teacher.colorize(capture.views[i].name.as_str(), gray, None)? {
             views.push(ChromaView {
                 camera,
                 wanted,

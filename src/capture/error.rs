@@ -79,9 +79,9 @@ pub enum CaptureError {
         /// What is wrong.
         reason: String,
     },
-    /// A camera is not a pinhole.
+    /// A camera's model is not one of COLMAP's.
     #[error(
-        "{path}: camera {camera_id} has the model {model}; only PINHOLE and SIMPLE_PINHOLE can be used: run COLMAP's image_undistorter and give its output folder"
+        "{path}: camera {camera_id} has the model {model}, which is none of COLMAP 4.2's; run its image_undistorter and give the output folder"
     )]
     CameraModel {
         /// The cameras file.
@@ -90,6 +90,20 @@ pub enum CaptureError {
         camera_id: u32,
         /// COLMAP's name of the model, or its number where it is unknown.
         model: String,
+    },
+    /// A camera's calibration cannot be a lens's.
+    #[error(
+        "{path}: camera {camera_id}, {model}: {reason}; calibrate it anew, or run COLMAP's image_undistorter and give the output folder"
+    )]
+    Lens {
+        /// The cameras file.
+        path: PathBuf,
+        /// COLMAP's id of the camera.
+        camera_id: u32,
+        /// COLMAP's name of the model.
+        model: &'static str,
+        /// What is wrong.
+        reason: String,
     },
     /// The model holds no images.
     #[error("{path}: holds no images; COLMAP registered none, so its mapper has to run again")]
@@ -135,10 +149,10 @@ pub enum CaptureError {
         /// How many photos the model names.
         total: usize,
     },
-    /// A photo cannot be decoded.
+    /// A photo or a mask cannot be decoded.
     #[error("{path}: {reason}")]
     Photo {
-        /// The photo.
+        /// The file.
         path: PathBuf,
         /// What is wrong and what helps.
         reason: String,
@@ -155,5 +169,61 @@ pub enum CaptureError {
         photo: [u32; 2],
         /// The camera's width and height.
         camera: [u32; 2],
+    },
+    /// One range was to serve photos whose values mean different things.
+    #[error(
+        "{path}: has {depth} a channel but {other} has {other_depth}: one range cannot normalise both; convert one of them, or give --normalize off"
+    )]
+    MixedDepths {
+        /// A photo.
+        path: PathBuf,
+        /// What its values are.
+        depth: String,
+        /// A photo of another kind.
+        other: PathBuf,
+        /// What its values are.
+        other_depth: String,
+    },
+    /// The folder of masks is not there.
+    #[error("{dir}: no such folder of masks; name another with --masks, or leave it out")]
+    NoMaskFolder {
+        /// The folder.
+        dir: PathBuf,
+    },
+    /// No mask has the name of a photo.
+    #[error(
+        "{dir}: holds no mask for any photo, such as {example}; name masks like COLMAP does, or give --masks off"
+    )]
+    NoMasks {
+        /// The folder of masks.
+        dir: PathBuf,
+        /// What the first photo's mask would be called.
+        example: PathBuf,
+    },
+    /// A mask has another shape than its photo.
+    #[error(
+        "{path}: the mask is {}×{} pixels but {photo} is {}×{}; make it of the photo's size or aspect",
+        .mask[0], .mask[1], .size[0], .size[1]
+    )]
+    MaskSize {
+        /// The mask.
+        path: PathBuf,
+        /// Its width and height.
+        mask: [u32; 2],
+        /// The photo.
+        photo: PathBuf,
+        /// The photo's width and height.
+        size: [u32; 2],
+    },
+    /// Nothing of a photo is left.
+    #[error(
+        "{path}: {}; mend it, or remove the photo with COLMAP's image_deleter",
+        .mask.as_ref().map_or("has no finite value".into(), |m| format!("its mask {} leaves no pixel", m.display()))
+    )]
+    NothingCounts {
+        /// The photo.
+        path: PathBuf,
+        /// Its mask, if it has one.
+        mask: Option<PathBuf>,
     },
 }

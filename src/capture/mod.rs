@@ -1,14 +1,24 @@
 //! What was photographed: COLMAP models, pinhole cameras, photos and splits.
 
+mod arrangement;
 pub mod camera;
 mod colmap;
+mod decode;
 mod error;
 mod exposure;
 mod jpeg;
+pub mod lens;
+mod loader;
+mod mask;
+mod options;
 mod photo;
 mod resample;
 mod split;
+mod tiff;
+mod tone;
 
+#[cfg(test)]
+mod depth_tests;
 #[cfg(test)]
 mod fixtures;
 #[cfg(test)]
@@ -17,10 +27,15 @@ mod tests;
 use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DQuat, DVec3};
+use serde::{Deserialize, Serialize};
 
+use arrangement::Arrangement;
 pub use camera::Camera;
 pub use error::{CaptureError, Position};
 pub use exposure::Exposure;
+use lens::Undistortion;
+pub use loader::{Loader, first_views, kinds};
+pub use options::{Channel, Encoding, LoadOptions, MaskSource, MaskUse, Normalize};
 pub use photo::Photo;
 pub use resample::downscale;
 pub use split::{Split, split};
@@ -45,16 +60,55 @@ const EXTENT_MARGIN: f64 = 1.1;
 /// for the scene's size, in one place.
 const COINCIDENT: f64 = 1e-4;
 
-/// One photo with its camera.
+/// One photo, or one face of a photo that is too wide for one, with its camera.
 #[derive(Clone, Debug, PartialEq)]
 pub struct View {
-    /// Path below `images/`, with `/` between folders.
+    /// The photo's name; of a face `@` and the face's name before the extension:
+    /// `left/0001@front.jpg`.
     pub name: String,
+    /// The photo's path below `images/`, with `/` between folders.
+    pub photo: String,
     /// The photo's file; it exists when the capture is loaded.
     pub image_path: PathBuf,
-    /// The camera that took it, in the size of COLMAP's model; the file may
-    /// differ, see [`Photo::load`].
+    /// The pinhole that shows the view, in the size of COLMAP's model; the file may
+    /// differ, see [`Loader::load`].
     pub camera: Camera,
+    /// How the view's picture comes from its photo; none where it is the photo.
+    pub undistortion: Option<Undistortion>,
+}
+
+impl View {
+    /// Width and height of the photo in the size of COLMAP's model.
+    pub fn photo_size(&self) -> [u32; 2] {
+        match &self.undistortion {
+            Some(Undistortion { lens, .. }) => [lens.width, lens.height],
+            None => [self.camera.width, self.camera.height],
+        }
+    }
+}
+
+/// Whether something is done: where the photos call for it, always or never.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Choice {
+    /// Where its effect can be seen.
+    #[default]
+    Auto,
+    /// Wherever it has any effect.
+    On,
+    /// Never.
+    Off,
+}
+
+/// How to load a capture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct CaptureOptions {
+    /// Whether the lens's distortion is taken out of photos; without it lenses are
+    /// taken for pinholes of their focal length.
+    pub lens: Choice,
+    /// The longest side that photos will be shrunk to, in pixels: it decides what
+    /// can be seen.
+    pub max_side: Option<u32>,
 }
 
 /// A point that COLMAP triangulated.
@@ -92,7 +146,7 @@ pub struct Rejected {
 pub struct Capture {
     /// The COLMAP folder.
     pub root: PathBuf,
-    /// The usable views, sorted by name; at least one.
+    /// The usable views, sorted by photo and then by name; at least one.
     pub views: Vec<View>,
     /// The usable points in the order of the file; at least one.
     pub points: Vec<Point>,
@@ -102,9 +156,21 @@ pub struct Capture {
     /// Views without a usable pose, sorted by name, and one entry for all points
     /// without a usable position.
     pub rejected: Vec<Rejected>,
+    /// The farthest that a camera's lens displaces a pixel from where its pinhole
+    /// would show it, over all cameras, in pixels at working size; whether that is
+    /// taken out or not.
+    pub distortion: f64,
 }
 
 impl Capture {
+    /// Loads a COLMAP folder with the default options; see [`Capture::load_with`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn load(dir: &Path) -> Result<Self, CaptureError> {
+        Self::load_with(dir, &CaptureOptions::default())
+    }
+
     /// Loads a COLMAP folder: `images/` and a model in `sparse/0/`, `sparse/` or
     /// the folder itself, `.bin` before `.txt`.
     ///
@@ -112,9 +178,10 @@ impl Capture {
     /// left out and named in `rejected`. Photos are checked to exist, not read.
     ///
     /// # Errors
-    /// If a folder, a file or a photo is missing, a file is damaged, a camera is
-    /// not a pinhole, a name leads out of `images/`, or nothing usable is left.
-    pub fn load(dir: &Path) -> Result<Self, CaptureError> {
+    /// If a folder, a file or a photo is missing, a file is damaged, a camera's model
+    /// is unknown or its calibration no lens's, a name leads out of `images/`, or
+    /// nothing usable is left.
+    pub fn load_with(dir: &Path, options: &CaptureOptions) -> Result<Self, CaptureError> {
         if !dir.is_dir() {
             return Err(CaptureError::NoFolder { dir: dir.into() });
         }
@@ -137,23 +204,36 @@ impl Capture {
             });
         }
 
+        let mut distortion: f64 = 0.0;
+        let mut cameras = Vec::with_capacity(model.cameras.len());
+        for camera in model.cameras {
+            let lens_model = camera.lens.model;
+            let arranged = Arrangement::new(camera.lens, options);
+            let arranged = arranged.map_err(|reason| CaptureError::Lens {
+                path: model.cameras_path.clone(),
+                camera_id: camera.id,
+                model: lens_model,
+                reason,
+            })?;
+            distortion = distortion.max(arranged.displacement);
+            cameras.push(arranged);
+        }
+
         let (mut views, mut rejected) = (Vec::new(), Vec::new());
+        // Of each image its first view and its camera.
         let mut view_at = vec![None; images.len()];
         for (place, image) in images {
             let colmap::Image {
                 name,
                 quaternion,
                 translation,
-                intrinsics,
+                camera,
             } = image;
             match pose(quaternion, translation) {
                 Ok(rotation) => {
-                    view_at[place] = Some(views.len());
-                    views.push(View {
-                        image_path: photos.join(&name),
-                        name,
-                        camera: intrinsics.camera(rotation, translation),
-                    });
+                    view_at[place] = Some((views.len(), camera));
+                    let image_path = photos.join(&name);
+                    views.extend(cameras[camera].views(&name, &image_path, rotation, translation));
                 }
                 Err(reason) => rejected.push(Rejected { name, reason }),
             }
@@ -192,10 +272,7 @@ impl Capture {
 
         for point in &mut points {
             point.track.retain_mut(|seen| match view_at[seen.view] {
-                Some(view) => {
-                    seen.view = view;
-                    true
-                }
+                Some((first, camera)) => cameras[camera].place(seen, first),
                 None => false,
             });
         }
@@ -205,6 +282,7 @@ impl Capture {
             points,
             offset: DVec3::ZERO,
             rejected,
+            distortion,
         };
         capture.recentre();
         Ok(capture)

@@ -1,15 +1,9 @@
 //! Photos as the program uses them.
 
-use std::fs;
-use std::io::Cursor;
-use std::path::Path;
-
-use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader};
-
+use super::View;
 use super::error::CaptureError;
-use super::jpeg;
-use super::resample::downscale;
-use super::{Camera, View};
+use super::options::MaskUse;
+use super::resample::{downscale, downscale_masked};
 use crate::color::GrayTable;
 
 /// A photo may differ from its camera by so many pixels a side: undistortion
@@ -18,10 +12,6 @@ const SIZE_SLACK: u32 = 1;
 
 /// Or be scaled, if its aspect ratio is the camera's to within this part.
 const ASPECT_SLACK: f64 = 0.01;
-
-/// The most a decoded file may take, in bytes: 178 million RGB pixels, more
-/// than any camera's, and little enough to fail with words instead of by force.
-const LARGEST_FILE: u64 = 512 << 20;
 
 /// A decoded photo, row by row from the top left, 8-bit encoded sRGB.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -40,172 +30,123 @@ pub struct Photo {
     pub mask: Option<Vec<u8>>,
 }
 
-impl Photo {
-    /// Decodes the photo of a view and resizes its camera to it.
-    ///
-    /// Reads JPEG and PNG with 8 bits a channel. Transparency, colour profiles
-    /// and the EXIF orientation are ignored, the last because COLMAP ignores it.
-    /// A photo whose longer side exceeds `max_side` is downscaled to it by area
-    /// averaging of the encoded values, at its aspect ratio.
-    ///
-    /// # Errors
-    /// If the file cannot be read or decoded, has 16 bits a channel or CMYK
-    /// colours, is cut off, or has neither its camera's size to within a pixel
-    /// a side nor its aspect ratio to within 1 %, or would take more than 512 MiB.
-    pub fn load(view: &View, max_side: Option<u32>) -> Result<(Self, Camera), CaptureError> {
-        let pixels = decode(&view.image_path, &view.camera)?.shrunk_to(max_side);
-        let camera = view.camera.resized(pixels.width, pixels.height);
-        Ok((pixels.into_photo(), camera))
-    }
+/// A decoded file, encoded for display.
+pub(super) struct Pixels {
+    pub width: u32,
+    pub height: u32,
+    pub values: Values,
+    /// As [`Photo::mask`].
+    pub mask: Option<Vec<u8>>,
 }
 
-/// A decoded file.
-struct Pixels {
-    width: u32,
-    height: u32,
-    values: Values,
-}
-
-enum Values {
+pub(super) enum Values {
     Gray(Vec<[u8; 1]>),
     Rgb(Vec<[u8; 3]>),
 }
 
 impl Pixels {
-    fn shrunk_to(self, max_side: Option<u32>) -> Self {
-        let longer = self.width.max(self.height);
-        let target = max_side.unwrap_or(longer).max(1);
-        if target >= longer {
+    /// Lets only that count which `mask`, of the same size, lets as well.
+    pub fn cover(&mut self, mask: Option<Vec<u8>>) {
+        let Some(mut mask) = mask else { return };
+        if let Some(own) = &self.mask {
+            mask.iter_mut()
+                .zip(own)
+                .for_each(|(m, &own)| *m = own.min(*m));
+        }
+        self.mask = mask.iter().any(|&count| count < u8::MAX).then_some(mask);
+    }
+
+    /// The same with a longer side of at most `max_side`.
+    pub fn shrunk_to(self, max_side: Option<u32>) -> Self {
+        let size = [self.width, self.height];
+        let smaller = working_size(size, max_side);
+        if smaller == size {
             return self;
         }
-        let shrunk = |side: u32| {
-            let exact = f64::from(side) * f64::from(target) / f64::from(longer);
-            (exact.round() as u32).max(1)
-        };
-        let (width, height) = (shrunk(self.width), shrunk(self.height));
-        let from = [self.width as usize, self.height as usize];
-        let to = [width as usize, height as usize];
-        let values = match self.values {
-            Values::Gray(gray) => Values::Gray(downscale(&gray, from, to)),
-            Values::Rgb(rgb) => Values::Rgb(downscale(&rgb, from, to)),
+        let [from, to] = [size, smaller].map(|size| size.map(|side| side as usize));
+        let (values, mask) = match (self.values, self.mask) {
+            (Values::Gray(gray), None) => (Values::Gray(downscale(&gray, from, to)), None),
+            (Values::Rgb(rgb), None) => (Values::Rgb(downscale(&rgb, from, to)), None),
+            (Values::Gray(gray), Some(mask)) => {
+                let (gray, mask) = downscale_masked(&gray, &mask, from, to);
+                (Values::Gray(gray), Some(mask))
+            }
+            (Values::Rgb(rgb), Some(mask)) => {
+                let (rgb, mask) = downscale_masked(&rgb, &mask, from, to);
+                (Values::Rgb(rgb), Some(mask))
+            }
         };
         Self {
-            width,
-            height,
+            width: smaller[0],
+            height: smaller[1],
             values,
+            mask,
         }
     }
 
-    fn into_photo(self) -> Photo {
-        let (gray, rgb) = match self.values {
+    /// The photo; with [`MaskUse::Remove`] what the mask leaves, before black.
+    pub fn into_photo(self, masked: MaskUse) -> Photo {
+        let (mut gray, mut rgb) = match self.values {
             Values::Gray(gray) => (gray.into_flattened(), None),
             Values::Rgb(rgb) => {
                 let table = GrayTable::new();
                 (rgb.iter().map(|&c| table.gray(c)).collect(), Some(rgb))
             }
         };
+        if let (Some(mask), MaskUse::Remove) = (&self.mask, masked) {
+            before_black(&mut gray, mask);
+            for (pixel, &count) in rgb.iter_mut().flatten().zip(mask) {
+                before_black(pixel, &[count; 3]);
+            }
+        }
         Photo {
             width: self.width,
             height: self.height,
             gray,
             rgb,
-            mask: None,
+            mask: self.mask,
         }
     }
 }
 
-fn decode(path: &Path, camera: &Camera) -> Result<Pixels, CaptureError> {
-    let failure = |reason: String| CaptureError::Photo {
-        path: path.into(),
-        reason,
-    };
-    let file = fs::read(path).map_err(|source| CaptureError::Read {
-        path: path.into(),
-        source,
-    })?;
-    let format = match image::guess_format(&file) {
-        Ok(format @ (ImageFormat::Jpeg | ImageFormat::Png)) => format,
-        _ => {
-            return Err(failure(
-                "is neither JPEG nor PNG; convert it (its name may stay)".into(),
-            ));
-        }
-    };
-    if format == ImageFormat::Jpeg {
-        check_jpeg(&file).map_err(failure)?;
+/// Blends encoded values with black, as splats are blended.
+fn before_black(values: &mut [u8], counts: &[u8]) {
+    for (value, &count) in values.iter_mut().zip(counts) {
+        *value = ((u16::from(*value) * u16::from(count) + 127) / 255) as u8;
     }
+}
 
-    let unreadable = |error| failure(format!("cannot be decoded ({error}); save it anew"));
-    let decoder = ImageReader::with_format(Cursor::new(file), format)
-        .into_decoder()
-        .map_err(unreadable)?;
-    // Before any pixel is allocated: the size that the file announces may be a lie.
-    let (width, height) = decoder.dimensions();
-    if !fits(camera, width, height) {
-        return Err(CaptureError::PhotoSize {
-            path: path.into(),
-            photo: [width, height],
-            camera: [camera.width, camera.height],
-        });
+/// A photo's size once its longer side is at most `max_side`, at its aspect ratio.
+pub(super) fn working_size(size: [u32; 2], max_side: Option<u32>) -> [u32; 2] {
+    let longer = size[0].max(size[1]);
+    let target = max_side.unwrap_or(longer).max(1);
+    if target >= longer {
+        return size;
     }
-    if decoder.total_bytes() > LARGEST_FILE {
-        return Err(failure(format!(
-            "announces {width}×{height} pixels, too many to decode; run image_undistorter with --max_image_size"
-        )));
-    }
-    match decoder.color_type() {
-        ColorType::L8 | ColorType::La8 | ColorType::Rgb8 | ColorType::Rgba8 => {}
-        other => {
-            let bits = 8 * u16::from(other.bytes_per_pixel()) / u16::from(other.channel_count());
-            return Err(failure(format!(
-                "has {bits} bits a channel; convert it to 8 bits"
-            )));
-        }
-    }
-    let values = match DynamicImage::from_decoder(decoder).map_err(unreadable)? {
-        DynamicImage::ImageLuma8(gray) => Values::Gray(pixels(&gray)),
-        image @ DynamicImage::ImageLumaA8(_) => Values::Gray(pixels(&image.into_luma8())),
-        image => {
-            let rgb = pixels(&image.into_rgb8());
-            if rgb.iter().all(|[r, g, b]| r == g && g == b) {
-                Values::Gray(rgb.iter().map(|&[gray, ..]| [gray]).collect())
-            } else {
-                Values::Rgb(rgb)
-            }
-        }
-    };
-    Ok(Pixels {
-        width,
-        height,
-        values,
+    size.map(|side| {
+        let exact = f64::from(side) * f64::from(target) / f64::from(longer);
+        (exact.round() as u32).max(1)
     })
 }
 
-fn pixels<const N: usize>(samples: &[u8]) -> Vec<[u8; N]> {
-    samples.as_chunks().0.to_vec()
-}
-
-fn check_jpeg(file: &[u8]) -> Result<(), String> {
-    match jpeg::inspect(file) {
-        None => Err("ends before its end-of-image marker; copy it again".into()),
-        Some(frame) if frame.precision != 8 => Err(format!(
-            "has {} bits a channel; convert it to 8 bits",
-            frame.precision
-        )),
-        Some(frame) if frame.components == 4 => {
-            Err("has CMYK colours; convert it to RGB or gray".into())
-        }
-        Some(_) => Ok(()),
+/// Refuses a photo that cannot be the view's camera's.
+pub(super) fn check_size(view: &View, photo: [u32; 2]) -> Result<(), CaptureError> {
+    let camera = view.photo_size();
+    if same_shape(photo, camera) {
+        return Ok(());
     }
+    Err(CaptureError::PhotoSize {
+        path: view.image_path.clone(),
+        photo,
+        camera,
+    })
 }
 
-/// Whether a photo of this size can be the camera's.
-fn fits(camera: &Camera, width: u32, height: u32) -> bool {
-    let near =
-        camera.width.abs_diff(width) <= SIZE_SLACK && camera.height.abs_diff(height) <= SIZE_SLACK;
-    let aspect = |width: u32, height: u32| f64::from(width) / f64::from(height);
-    let ratio = aspect(width, height) / aspect(camera.width, camera.height);
-    near || (ratio - 1.0).abs() <= ASPECT_SLACK
+/// Whether two pictures can be of one shape: they differ by rounding, or in scale.
+pub(super) fn same_shape(a: [u32; 2], b: [u32; 2]) -> bool {
+    let near = (0..2).all(|axis| a[axis].abs_diff(b[axis]) <= SIZE_SLACK);
+    let aspect = |[width, height]: [u32; 2]| f64::from(width) / f64::from(height);
+    near || (aspect(a) / aspect(b) - 1.0).abs() <= ASPECT_SLACK
 }
 
 #[cfg(test)]

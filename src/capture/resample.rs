@@ -12,6 +12,46 @@ pub fn downscale<const N: usize>(
     from: [usize; 2],
     to: [usize; 2],
 ) -> Vec<[u8; N]> {
+    let means = average(from, to, |i| picture[i].map(f32::from));
+    means.iter().map(|mean| mean.map(rounded)).collect()
+}
+
+/// [`downscale`] of pixels that count differently, and of what they count, 0 to 255:
+/// each new pixel is the mean of what counts, so that nothing that does not spills
+/// over the border. Where nothing counts it is the plain mean.
+pub(super) fn downscale_masked<const N: usize>(
+    picture: &[[u8; N]],
+    mask: &[u8],
+    from: [usize; 2],
+    to: [usize; 2],
+) -> (Vec<[u8; N]>, Vec<u8>) {
+    let counts = average(from, to, |i| [f32::from(mask[i])]);
+    let plain = average(from, to, |i| picture[i].map(f32::from));
+    let counted = average(from, to, |i| {
+        picture[i].map(|v| f32::from(v) * f32::from(mask[i]))
+    });
+    let pixels = counts.iter().zip(plain.iter().zip(&counted));
+    let smaller = pixels.map(|(&[count], (plain, counted))| match count > 0.0 {
+        true => counted.map(|sum| rounded(sum / count)),
+        false => plain.map(rounded),
+    });
+    (
+        smaller.collect(),
+        counts.iter().map(|&[count]| rounded(count)).collect(),
+    )
+}
+
+/// `value` to the nearest of 0 to 255.
+fn rounded(value: f32) -> u8 {
+    value.round() as u8
+}
+
+/// Means over the old pixels, whose values `at` gives.
+fn average<const N: usize>(
+    from: [usize; 2],
+    to: [usize; 2],
+    at: impl Fn(usize) -> [f32; N],
+) -> Vec<[f32; N]> {
     let columns = coverage(from[0], to[0]);
     let rows = coverage(from[1], to[1]);
     let mut smaller = Vec::with_capacity(to[0] * to[1]);
@@ -19,9 +59,8 @@ pub fn downscale<const N: usize>(
     for span in &rows {
         blended.fill([0.0; N]);
         for (y, weight) in span.pixels() {
-            let row = &picture[y * from[0]..(y + 1) * from[0]];
-            for (sum, pixel) in blended.iter_mut().zip(row) {
-                add(sum, &pixel.map(f32::from), weight);
+            for (x, sum) in blended.iter_mut().enumerate() {
+                add(sum, &at(y * from[0] + x), weight);
             }
         }
         smaller.extend(columns.iter().map(|span| {
@@ -29,7 +68,7 @@ pub fn downscale<const N: usize>(
             for (x, weight) in span.pixels() {
                 add(&mut sum, &blended[x], weight);
             }
-            sum.map(|value| value.round() as u8)
+            sum
         }));
     }
     smaller
@@ -87,6 +126,16 @@ mod tests {
         // Three to two: 1 + half of the middle, over 1.5.
         let picture = [[0_u8, 90], [90, 0], [240, 240]];
         assert_eq!(downscale(&picture, [3, 1], [2, 1]), [[30, 60], [190, 160]]);
+    }
+
+    #[test]
+    fn what_does_not_count_does_not_spill() {
+        let picture = [[10_u8], [200], [30], [50], [90], [90], [90], [90]];
+        let mask = [255, 0, 255, 85, 0, 0, 0, 0];
+        let (smaller, counts) = downscale_masked(&picture, &mask, [8, 1], [4, 1]);
+        // (30 · 255 + 50 · 85) / 340 = 35; nothing counts in the rest.
+        assert_eq!(smaller, [[10], [35], [90], [90]]);
+        assert_eq!(counts, [128, 170, 0, 0]);
     }
 
     #[test]

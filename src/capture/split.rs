@@ -1,9 +1,11 @@
 //! Which views train and which test.
 
+use super::View;
+
 /// Every how many views one is held out, as in the LLFF and Mip-NeRF 360 benchmarks.
 const HOLDOUT_STEP: usize = 8;
 
-/// The fewest views that can train a scene: depth needs two.
+/// The fewest photos that can train a scene: depth needs two.
 const MIN_TRAIN: usize = 2;
 
 /// Indices of views for training and for testing, each ascending.
@@ -15,10 +17,29 @@ pub struct Split {
     pub test: Vec<usize>,
 }
 
-/// Splits `count` views, sorted by name: with `holdout`, views 0, 8, 16, … test.
+/// Splits views, sorted by photo: with `holdout`, photos 0, 8, 16, … test. Faces of
+/// one photo stay together.
 ///
-/// Without it, or where fewer than 2 views would be left to train on, all train.
-pub fn split(count: usize, holdout: bool) -> Split {
+/// Without it, or where fewer than 2 photos would be left to train on, all train.
+pub fn split(views: &[View], holdout: bool) -> Split {
+    let photos: Vec<&[View]> = views.chunk_by(|a, b| a.photo == b.photo).collect();
+    let by_photo = split_photos(photos.len(), holdout);
+    let starts: Vec<usize> = (photos.iter())
+        .scan(0, |next, faces| {
+            Some(std::mem::replace(next, *next + faces.len()))
+        })
+        .collect();
+    let views = |chosen: Vec<usize>| {
+        let faces = |&i: &usize| starts[i]..starts[i] + photos[i].len();
+        chosen.iter().flat_map(faces).collect()
+    };
+    Split {
+        train: views(by_photo.train),
+        test: views(by_photo.test),
+    }
+}
+
+fn split_photos(count: usize, holdout: bool) -> Split {
     let (test, train): (Vec<_>, Vec<_>) =
         (0..count).partition(|index| holdout && index % HOLDOUT_STEP == 0);
     if train.len() < MIN_TRAIN {
@@ -37,7 +58,7 @@ mod tests {
 
     #[test]
     fn every_eighth_is_held_out() {
-        let split = split(18, true);
+        let split = split_photos(18, true);
         assert_eq!(split.test, [0, 8, 16]);
         assert_eq!(split.train.len(), 15);
         assert!(split.train.iter().all(|i| !split.test.contains(i)));
@@ -45,12 +66,12 @@ mod tests {
 
     #[test]
     fn all_train_when_asked_or_when_few() {
-        assert_eq!(split(18, false).train.len(), 18);
-        assert!(split(18, false).test.is_empty());
+        assert_eq!(split_photos(18, false).train.len(), 18);
+        assert!(split_photos(18, false).test.is_empty());
         for count in 0..=2 {
-            assert_eq!(split(count, true).train.len(), count);
-            assert!(split(count, true).test.is_empty());
+            assert_eq!(split_photos(count, true).train.len(), count);
+            assert!(split_photos(count, true).test.is_empty());
         }
-        assert_eq!(split(3, true).train, [1, 2]);
+        assert_eq!(split_photos(3, true).train, [1, 2]);
     }
 }

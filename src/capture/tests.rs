@@ -5,7 +5,10 @@ use std::fs;
 use glam::{DMat3, DVec3};
 
 use super::fixtures::{Model, folder, load, load_files, write};
-use super::{Capture, CaptureError, Observation, Position};
+use super::{
+    Capture, CaptureError, CaptureOptions, Choice, LoadOptions, Loader, Observation, Position,
+    split,
+};
 
 /// The error's one line, which must name the file.
 fn message(result: Result<Capture, CaptureError>, file: &str) -> String {
@@ -102,27 +105,161 @@ fn missing_folders_and_files_are_named() {
 }
 
 #[test]
-fn other_camera_models_name_the_remedy() {
-    for (number, name) in [(2, "SIMPLE_RADIAL"), (5, "OPENCV_FISHEYE")] {
+fn unknown_camera_models_name_the_remedy() {
+    for number in [-1, 18, i32::MAX] {
         let mut model = Model::example();
-        model.cameras[1].model = (name, number);
-        let words = ["camera 3", name, "image_undistorter"];
-        assert_says(load(&model), "cameras.bin", &words);
-        assert_says(
-            load_files(&model, model.text(), "txt"),
-            "cameras.txt",
-            &words,
-        );
-    }
-    for number in [-1, 12, i32::MAX] {
-        let mut model = Model::example();
-        model.cameras[0].model.1 = number;
+        model.cameras[0].model = ("WARP", number);
+        let words = ["camera 7", "image_undistorter"];
+        let number = number.to_string();
         assert_says(
             load(&model),
             "cameras.bin",
-            &["camera 7", &number.to_string()],
+            &[&words[..], &[&number]].concat(),
         );
+        let text = load_files(&model, model.text(), "txt");
+        assert_says(text, "cameras.txt", &[&words[..], &["WARP"]].concat());
     }
+}
+
+/// The example with a lens for its first camera.
+fn with_lens(model: (&'static str, i32), parameters: &[f64]) -> Model {
+    let mut example = Model::example();
+    example.cameras[0].model = model;
+    example.cameras[0].parameters = parameters.into();
+    example
+}
+
+/// Loads with a choice about lenses.
+fn load_choosing(model: &Model, lens: Choice) -> Result<Capture, CaptureError> {
+    let dir = folder(model);
+    write(dir.path(), "sparse/0", model.binary(), "bin");
+    let options = CaptureOptions {
+        lens,
+        max_side: None,
+    };
+    Capture::load_with(dir.path(), &options)
+}
+
+#[test]
+fn lenses_are_taken_out_where_they_show_or_as_asked() {
+    // 0.2 · 0.5³ at the corner, times 10.
+    let model = with_lens(("SIMPLE_RADIAL", 2), &[10.0, 4.0, 3.0, 0.2]);
+    let text = load_files(&model, model.text(), "txt").unwrap();
+    let binary = load(&model).unwrap();
+    assert_eq!(
+        (&text.views[0].camera, text.distortion),
+        (&binary.views[0].camera, binary.distortion)
+    );
+    assert!(
+        (0.18..0.26).contains(&binary.distortion),
+        "{}",
+        binary.distortion
+    );
+    let undistorted = |capture: Capture| -> Vec<bool> {
+        let views = capture.views.iter();
+        views.map(|view| view.undistortion.is_some()).collect()
+    };
+    // The third view's camera is a pinhole.
+    assert_eq!(undistorted(binary), [false; 3]);
+    assert_eq!(
+        undistorted(load_choosing(&model, Choice::On).unwrap()),
+        [true, true, false]
+    );
+    let strong = with_lens(("SIMPLE_RADIAL", 2), &[10.0, 4.0, 3.0, 2.0]);
+    assert_eq!(undistorted(load(&strong).unwrap()), [true, true, false]);
+    assert_eq!(
+        undistorted(load_choosing(&strong, Choice::Off).unwrap()),
+        [false; 3]
+    );
+    // What cannot be seen at working size is none.
+    let dir = folder(&strong);
+    write(dir.path(), "sparse/0", strong.binary(), "bin");
+    let options = CaptureOptions {
+        lens: Choice::Auto,
+        max_side: Some(1),
+    };
+    let small = Capture::load_with(dir.path(), &options).unwrap();
+    assert!(small.distortion < 0.5, "{}", small.distortion);
+    assert_eq!(undistorted(small), [false; 3]);
+}
+
+#[test]
+fn wide_photos_become_faces_of_one_photo() {
+    let model = with_lens(("SIMPLE_FISHEYE", 14), &[3.0, 4.0, 3.0]);
+    let dir = folder(&model);
+    write(dir.path(), "sparse/0", model.binary(), "bin");
+    let capture = Capture::load(dir.path()).unwrap();
+    let names: Vec<&str> = capture
+        .views
+        .iter()
+        .map(|view| view.name.as_str())
+        .collect();
+    let expected = [
+        "a@down.png",
+        "a@front.png",
+        "a@left.png",
+        "a@right.png",
+        "a@up.png",
+        "b@down.png",
+        "b@front.png",
+        "b@left.png",
+        "b@right.png",
+        "b@up.png",
+        "left/a c.png",
+    ];
+    assert_eq!(names, expected);
+    let centre = capture.views[0].camera.center();
+    let loader = Loader::new(LoadOptions::default());
+    for view in &capture.views[..5] {
+        assert_eq!(view.photo, "a.png");
+        assert_eq!(view.photo_size(), [8, 6]);
+        assert!(view.camera.center().distance(centre) < 1e-12);
+        assert!(loader.load(view).is_ok());
+    }
+    // Three photos: the first is held out.
+    assert_eq!(split(&capture.views, true).test, [0, 1, 2, 3, 4]);
+    // The pixel (5, 0.5) is right of and above the middle: 2.5 of 3 rad·px up.
+    let track = &capture.points[0].track;
+    let seen = |i: usize| capture.views[track[i].view].name.as_str();
+    assert_eq!(
+        (track.len(), seen(0), seen(1)),
+        (2, "b@up.png", "a@right.png")
+    );
+    for seen in track {
+        let camera = &capture.views[seen.view].camera;
+        let within = |c: f64, side: u32| (0.0..=f64::from(side)).contains(&c);
+        assert!(within(seen.pixel[0], camera.width) && within(seen.pixel[1], camera.height));
+    }
+    let flat = load_choosing(&model, Choice::Off).unwrap();
+    assert_eq!(flat.views.len(), 3);
+    assert_eq!(
+        tracks(&flat)[0],
+        [("b.png", [5.0, 0.5]), ("a.png", [6.5, 1.75])]
+    );
+}
+
+#[test]
+fn tracks_move_with_the_lens() {
+    let model = with_lens(("SIMPLE_RADIAL", 2), &[10.0, 4.0, 3.0, 2.0]);
+    let capture = load(&model).unwrap();
+    let seen = capture.points[0].track[0];
+    let camera = &capture.views[seen.view].camera;
+    // Back through the formula: from the pinhole's pixel to the photo's.
+    let u = (seen.pixel[0] - camera.cx) / camera.fx;
+    let v = (seen.pixel[1] - camera.cy) / camera.fy;
+    let scale = 1.0 + 2.0 * (u * u + v * v);
+    assert!((10.0 * u * scale + 4.0 - 5.0).abs() < 1e-9);
+    assert!((10.0 * v * scale + 3.0 - 0.5).abs() < 1e-9);
+}
+
+#[test]
+fn calibrations_of_no_lens_name_the_camera() {
+    let folded = with_lens(("SIMPLE_RADIAL", 2), &[10.0, 4.0, 3.0, -1e9]);
+    let words = ["camera 7", "SIMPLE_RADIAL", "folds"];
+    assert_says(load(&folded), "cameras.bin", &words);
+    assert!(load_choosing(&folded, Choice::Off).is_ok());
+    let strange = with_lens(("EUCM", 16), &[10.0, 10.0, 4.0, 3.0, 2.0, 1.0]);
+    assert_says(load(&strange), "cameras.bin", &["camera 1 of 2", "alpha"]);
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::{effects::EffectArguments, print, progress::Progress};
+use super::{effects::EffectArguments, photos::Photos, print, progress::Progress};
 use crate::luma::Densification;
 use crate::report::timings_table;
 use crate::run::{FitOptions, Preset, RunError, fit};
@@ -23,9 +23,8 @@ pub struct Fit {
     /// Luma iterations, instead of the preset's.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     iterations: Option<u32>,
-    /// Scale photos down until their longer side has this many pixels.
-    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(16..))]
-    max_side: Option<u32>,
+    #[command(flatten)]
+    photos: Photos,
     /// Never keep more Gaussians than this.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     max_splats: Option<u32>,
@@ -46,9 +45,6 @@ pub struct Fit {
     /// Start from these Gaussians instead of COLMAP's points.
     #[arg(long, value_name = "FILE.ply")]
     init: Option<PathBuf>,
-    /// Train on all views; by default every 8th is held out to measure with.
-    #[arg(long)]
-    no_holdout: bool,
     /// Time every kernel, and print a table of it.
     #[arg(long)]
     timings: bool,
@@ -65,7 +61,7 @@ impl Fit {
             output: self.output,
             preset: self.preset,
             iterations: self.iterations.map(|n| n as usize),
-            max_side: self.max_side,
+            load: self.photos.options(),
             max_splats: self.max_splats.map(|n| n as usize),
             overrules: self.effects.overrules(),
             seed: self.seed,
@@ -76,7 +72,6 @@ impl Fit {
             },
             coarse: self.coarse,
             memory_limit: self.memory_limit.map(|mib| u64::from(mib) << 20),
-            holdout: !self.no_holdout,
             timings: self.timings,
         };
         let (folder, report) = fit(&options, &mut |event| progress.show(&event))?;

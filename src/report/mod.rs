@@ -21,7 +21,10 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::{capture::Exposure, raster::RasterOptions};
+use crate::{
+    capture::{Exposure, LoadOptions},
+    raster::RasterOptions,
+};
 
 /// Version of the report's layout; raised when a key changes its meaning.
 pub const REPORT_VERSION: u32 = 1;
@@ -66,14 +69,19 @@ pub struct CaptureReport {
     pub points: usize,
     /// Views or points left out, with the reason.
     pub rejected: Vec<String>,
-    /// Longer side to which photos were scaled down, in pixels.
-    pub max_side: Option<u32>,
+    /// How the photos were loaded.
+    #[serde(flatten)]
+    pub load: LoadOptions,
+    /// Views whose photo has a mask file.
+    #[serde(default)]
+    pub masked_views: usize,
+    /// Pixels of all photos, at the files' sizes, whose values are not finite.
+    #[serde(default)]
+    pub not_finite: usize,
     /// Radius of the cameras as 3DGS takes it, in world units.
     pub extent: f64,
     /// What was subtracted from the world's coordinates, in world units.
     pub offset: [f64; 3],
-    /// Whether every 8th view was held out.
-    pub holdout: bool,
 }
 
 /// What it ran on.

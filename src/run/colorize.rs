@@ -19,7 +19,7 @@ use super::{
     teach::{TeachOptions, Teachers},
 };
 use crate::{
-    capture::Camera,
+    capture::{Camera, LoadOptions},
     chroma::{
         ChosenDegree, ChromaProgress, ChromaView, bake, choose_degree, distil, teacher::Upsample,
     },
@@ -73,9 +73,8 @@ pub fn colorize(
     let mut teachers = Teachers::open(&options.teach, cache.as_deref())?;
     let gpu = open_gpu(options.timings)?;
     let mut report = source.report(&gpu);
-    let (max_side, holdout) = (report.capture.max_side, report.capture.holdout);
     let colmap_dir = source.colmap_dir(options, &report.capture)?;
-    let scene = Scene::load(&colmap_dir, max_side, holdout, observe)?;
+    let scene = Scene::load(&colmap_dir, &report.capture.load, observe)?;
     // A run's own files are moved already; others lie where COLMAP has the cameras.
     let offset = match source.folder {
         Some(_) => glam::DVec3::ZERO,
@@ -84,7 +83,7 @@ pub fn colorize(
     let (luma, drawn) = read_splats(&source.splats, offset, observe)?;
     let luma = luma.to_luma();
     if source.report.is_none() {
-        report.capture = capture_report(&colmap_dir, &scene, max_side, holdout);
+        report.capture = capture_report(&colmap_dir, &scene);
         (report.luma.splats, report.luma.sh_degree) = (luma.len(), luma.sh.degree);
         report.luma.antialiased = drawn.antialiased;
     }
@@ -290,14 +289,11 @@ impl Source {
                 test: 0,
                 points: 0,
                 rejected: Vec::new(),
-                max_side: if gpu.is_software() {
-                    Preset::Draft.amounts().max_side
-                } else {
-                    None
-                },
+                load: Preset::for_device(gpu).load_options(&LoadOptions::default()),
+                masked_views: 0,
+                not_finite: 0,
                 extent: 0.0,
                 offset: [0.0; 3],
-                holdout: true,
             },
             device: DeviceReport {
                 name: gpu.describe(),

@@ -12,7 +12,7 @@ use super::{
     scene::{Scene, counted, counts, gray_pixels, read_splats},
 };
 use crate::{
-    capture::{Exposure, Photo},
+    capture::{Exposure, LoadOptions, Photo},
     color::gray_from_rgb,
     effects::{Backdrop, Effect, Overrules},
     gpu::{Gpu, GpuError},
@@ -40,8 +40,8 @@ pub struct FitOptions {
     pub preset: Option<Preset>,
     /// Iterations.
     pub iterations: Option<usize>,
-    /// Longer side of the photos in pixels.
-    pub max_side: Option<u32>,
+    /// How photos are loaded; the longer side is the preset's where it is `None`.
+    pub load: LoadOptions,
     /// Cap on Gaussians.
     pub max_splats: Option<usize>,
     /// Effects that are on or off whatever the evidence.
@@ -56,8 +56,6 @@ pub struct FitOptions {
     pub coarse: f64,
     /// Bytes that training may take on the device.
     pub memory_limit: Option<u64>,
-    /// Whether every 8th view is held out.
-    pub holdout: bool,
     /// Whether the report says where the device's time went.
     pub timings: bool,
 }
@@ -74,8 +72,8 @@ pub fn fit(
     let gpu = open_gpu(options.timings)?;
     let preset = choose_preset(options, &gpu, observe);
     let amounts = preset.amounts();
-    let max_side = options.max_side.or(amounts.max_side);
-    let scene = Scene::load(&options.colmap_dir, max_side, options.holdout, observe)?;
+    let load = preset.load_options(&options.load);
+    let scene = Scene::load(&options.colmap_dir, &load, observe)?;
     let plan = scene.plan(amounts.sh_degree, &options.overrules);
     observe(Event::Note(plan.to_string()));
     let mut settings = LumaSettings {
@@ -175,7 +173,7 @@ pub fn fit(
     let report = Report {
         version: REPORT_VERSION,
         program: env!("CARGO_PKG_VERSION").to_owned(),
-        capture: capture_report(&options.colmap_dir, &scene, max_side, options.holdout),
+        capture: capture_report(&options.colmap_dir, &scene),
         device: DeviceReport {
             name: gpu.describe(),
             backend: format!("{:?}", gpu.info().backend),
@@ -383,12 +381,7 @@ fn mean_quality(views: &[LumaView]) -> Option<LumaQuality> {
 }
 
 /// What a report says about the photos.
-pub(super) fn capture_report(
-    colmap_dir: &Path,
-    scene: &Scene,
-    max_side: Option<u32>,
-    holdout: bool,
-) -> CaptureReport {
+pub(super) fn capture_report(colmap_dir: &Path, scene: &Scene) -> CaptureReport {
     let capture = &scene.capture;
     let path = std::fs::canonicalize(colmap_dir).unwrap_or_else(|_| colmap_dir.to_owned());
     CaptureReport {
@@ -402,10 +395,11 @@ pub(super) fn capture_report(
             .iter()
             .map(|rejected| format!("{}: {}", rejected.name, rejected.reason))
             .collect(),
-        max_side,
+        load: scene.options.clone(),
+        masked_views: scene.masked_views,
+        not_finite: scene.not_finite,
         extent: scene.extent,
         offset: capture.offset.to_array(),
-        holdout,
     }
 }
 

@@ -6,7 +6,10 @@ use glam::DVec3;
 use serde_json::{Value, json};
 
 use super::{RunError, RunFolder, files, fit::comments};
-use crate::{capture::Capture, splats::ply};
+use crate::{
+    capture::{Capture, LoadOptions, Loader, Normalize, kinds},
+    splats::ply,
+};
 
 /// What a run folder, a splat file or a COLMAP folder holds.
 ///
@@ -27,8 +30,16 @@ pub fn info(path: &Path) -> Result<Value, RunError> {
         .iter()
         .map(|view| [view.camera.width, view.camera.height])
         .collect();
+    let views = &capture.views;
+    let options = LoadOptions {
+        normalize: Normalize::Off,
+        ..LoadOptions::default()
+    };
+    let masked = Loader::open(&capture, &options)?.masked_views(views);
     Ok(json!({
         "kind": "COLMAP folder",
+        "photos": kinds(views)?,
+        "masked_views": masked,
         "views": capture.views.len(),
         "points": capture.points.len(),
         "rejected": capture.rejected.iter().map(|r| format!("{}: {}", r.name, r.reason)).collect::<Vec<_>>(),

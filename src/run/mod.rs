@@ -102,6 +102,8 @@ pub enum RunError {
 /// A part of a run that takes time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
+    /// Looking at the range of the photos' values.
+    Survey,
     /// Reading photos.
     Photos,
     /// Stage 1.
@@ -123,6 +125,7 @@ pub enum Stage {
 impl fmt::Display for Stage {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(match self {
+            Self::Survey => "survey",
             Self::Photos => "photos",
             Self::Luma => "luma",
             Self::Teacher => "teacher",

@@ -3,7 +3,10 @@
 use std::path::PathBuf;
 
 use super::{Observer, Preset, RunError, fit::open_gpu, scene::Scene};
-use crate::effects::{Overrules, Plan};
+use crate::{
+    capture::LoadOptions,
+    effects::{Overrules, Plan},
+};
 
 /// What `plan` is asked to do; `None` leaves it to the preset.
 #[derive(Clone, Debug)]
@@ -12,12 +15,10 @@ pub struct PlanOptions {
     pub colmap_dir: PathBuf,
     /// Amount of work; `paper` on a GPU and `draft` on a software adapter by default.
     pub preset: Option<Preset>,
-    /// Longer side of the photos in pixels.
-    pub max_side: Option<u32>,
+    /// How photos are loaded; the longer side is the preset's where it is `None`.
+    pub load: LoadOptions,
     /// What is on or off whatever the evidence.
     pub overrules: Overrules,
-    /// Whether every 8th view is held out.
-    pub holdout: bool,
 }
 
 /// Examines a capture as `fit` would.
@@ -30,7 +31,7 @@ pub fn plan(options: &PlanOptions, observe: &mut Observer<'_>) -> Result<Plan, R
         None => Preset::for_device(&open_gpu(false)?),
     };
     let amounts = preset.amounts();
-    let max_side = options.max_side.or(amounts.max_side);
-    let scene = Scene::load(&options.colmap_dir, max_side, options.holdout, observe)?;
+    let load = preset.load_options(&options.load);
+    let scene = Scene::load(&options.colmap_dir, &load, observe)?;
     Ok(scene.plan(amounts.sh_degree, &options.overrules))
 }

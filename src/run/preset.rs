@@ -3,7 +3,7 @@
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 
-use crate::gpu::Gpu;
+use crate::{capture::LoadOptions, gpu::Gpu};
 
 /// How much work to put into a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
@@ -66,6 +66,14 @@ impl Preset {
                 max_side: None,
                 sh_degree: 3,
             },
+        }
+    }
+
+    /// The options with the preset's longer side where they leave it open.
+    pub(super) fn load_options(self, asked: &LoadOptions) -> LoadOptions {
+        LoadOptions {
+            max_side: asked.max_side.or(self.amounts().max_side),
+            ..asked.clone()
         }
     }
 

@@ -13,7 +13,7 @@ use super::{
     scene::{gray_to_rgb, read_splats, shown_rgb},
 };
 use crate::{
-    capture::{Capture, Photo, split},
+    capture::{Capture, LoadOptions, Loader, split},
     gpu::Gpu,
     raster::{Field, Geometry, Raster, Renderer, constants::NEAR_SHARE},
     report::to_image,
@@ -54,13 +54,13 @@ pub fn render(options: &RenderOptions, observe: &mut Observer<'_>) -> Result<usi
         path.extension()
             .is_some_and(|e| e.eq_ignore_ascii_case("ply"))
     };
-    let (file, colmap, max_side, holdout, run) = match &options.run {
+    let (file, colmap, load, run) = match &options.run {
         Some(path) if is_file(path) => {
             let colmap = options
                 .colmap
                 .clone()
                 .ok_or_else(|| RunError::NoCameras(path.clone()))?;
-            (path.clone(), colmap, None, true, None)
+            (path.clone(), colmap, LoadOptions::default(), None)
         }
         run => {
             let folder = match run {
@@ -77,10 +77,10 @@ pub fn render(options: &RenderOptions, observe: &mut Observer<'_>) -> Result<usi
             };
             let noted = PathBuf::from(&capture.path);
             let colmap = options.colmap.clone().unwrap_or(noted);
-            (file, colmap, capture.max_side, capture.holdout, Some(drawn))
+            (file, colmap, capture.load, Some(drawn))
         }
     };
-    let capture = Capture::load(&colmap)?;
+    let capture = Capture::load_with(&colmap, &load.capture())?;
     // A run's own files are moved already; others lie where COLMAP has the cameras.
     let offset = run.map_or(capture.offset, |_| DVec3::ZERO);
     let (splats, drawn) = read_splats(&file, offset, observe)?;
@@ -89,7 +89,8 @@ pub fn render(options: &RenderOptions, observe: &mut Observer<'_>) -> Result<usi
     } else {
         splats
     };
-    let split = split(capture.views.len(), holdout);
+    let split = split(&capture.views, load.holdout);
+    let loader = Loader::new(load);
     let chosen: Vec<usize> = match options.views {
         Some(Views::Train) => split.train,
         Some(Views::Test) => split.test,
@@ -117,7 +118,7 @@ pub fn render(options: &RenderOptions, observe: &mut Observer<'_>) -> Result<usi
             message: view.name.clone(),
         });
         // The photo decides the size, which the model's camera may miss by a pixel.
-        let (_, camera) = Photo::load(view, max_side)?;
+        let camera = loader.camera(view)?;
         let picture = renderer.render(&camera)?.remove(0);
         let pixels = match picture.channels {
             1 => gray_to_rgb(&picture.pixels),

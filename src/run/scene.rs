@@ -17,7 +17,10 @@ use glam::DVec3;
 
 use super::{Event, Observer, RunError, Stage};
 use crate::{
-    capture::{Camera, Capture, CaptureError, Photo, Split, View, split},
+    capture::{
+        Camera, Capture, CaptureError, LoadOptions, Loader, Normalize, Photo, Split, View,
+        first_views, split,
+    },
     effects::{Overrules, Plan},
     gpu::GpuError,
     raster::{Field, Geometry, Raster, RasterOptions, Renderer, constants::NEAR_SHARE},
@@ -28,8 +31,14 @@ use crate::{
 pub(super) struct Scene {
     pub capture: Capture,
     pub split: Split,
+    /// How the photos were loaded; nothing in it is left open.
+    pub options: LoadOptions,
     /// Photo and camera of each view, at working size.
     pub photos: Vec<(Photo, Camera)>,
+    /// Views whose photo has a mask file.
+    pub masked_views: usize,
+    /// Pixels of all photos whose values are not finite.
+    pub not_finite: usize,
     pub extent: f64,
 }
 
@@ -37,24 +46,43 @@ impl Scene {
     /// Reads a COLMAP folder and decodes its photos.
     pub fn load(
         colmap_dir: &Path,
-        max_side: Option<u32>,
-        holdout: bool,
+        options: &LoadOptions,
         observe: &mut Observer<'_>,
     ) -> Result<Self, RunError> {
-        let capture = Capture::load(colmap_dir)?;
+        let capture = Capture::load_with(colmap_dir, &options.capture())?;
         for rejected in &capture.rejected {
             observe(Event::Note(format!(
                 "left out {}: {}",
                 rejected.name, rejected.reason
             )));
         }
-        let total = capture.views.len();
-        let photos = decode(&capture.views, max_side, observe)?;
+        let mut loader = Loader::open(&capture, options)?;
+        if loader.undecided() {
+            let photos: Vec<&View> = first_views(&capture.views).collect();
+            let samples = of_each(&photos, Stage::Survey, |view| loader.sample(view), observe)?;
+            loader.decide(samples.concat());
+            if let Normalize::Range([low, high]) = loader.options().normalize {
+                observe(Event::Note(format!(
+                    "photos are normalised: {low:.6} becomes black and {high:.6} white (--normalize off leaves them)"
+                )));
+            }
+        }
+        let views: Vec<&View> = capture.views.iter().collect();
+        let photos = of_each(&views, Stage::Photos, |view| loader.load(view), observe)?;
+        if loader.not_finite() > 0 {
+            observe(Event::Note(format!(
+                "{} pixels of the photos are not finite and do not count",
+                loader.not_finite()
+            )));
+        }
         Ok(Self {
-            split: split(total, holdout),
+            split: split(&capture.views, options.holdout),
+            options: loader.options().clone(),
+            photos,
+            masked_views: loader.masked_views(&capture.views),
+            not_finite: loader.not_finite(),
             extent: capture.extent(),
             capture,
-            photos,
         })
     }
 
@@ -102,19 +130,20 @@ impl Scene {
     }
 }
 
-/// Decodes the photos of all views, as many at a time as there are processors. Of
-/// several that cannot be, the first is named, as if they were read in order.
-fn decode(
-    views: &[View],
-    max_side: Option<u32>,
+/// Does `work` on all views, on as many at a time as there are processors. Of
+/// several that fail, the first is named, as if they were taken in order.
+fn of_each<T: Send>(
+    views: &[&View],
+    stage: Stage,
+    work: impl Fn(&View) -> Result<T, CaptureError> + Sync,
     observe: &mut Observer<'_>,
-) -> Result<Vec<(Photo, Camera)>, CaptureError> {
+) -> Result<Vec<T>, CaptureError> {
     let workers = thread::available_parallelism().map_or(1, NonZero::get);
     let next = AtomicUsize::new(0);
-    let (sender, decoded) = mpsc::channel();
+    let (sender, finished) = mpsc::channel();
     thread::scope(|scope| {
         for _ in 0..workers.min(views.len()) {
-            let (sender, next) = (sender.clone(), &next);
+            let (sender, next, work) = (sender.clone(), &next, &work);
             scope.spawn(move || {
                 loop {
                     let index = next.fetch_add(1, Ordering::Relaxed);
@@ -122,24 +151,24 @@ fn decode(
                         break;
                     };
                     // The receiver stays until every sender is gone.
-                    let _ = sender.send((index, Photo::load(view, max_side)));
+                    let _ = sender.send((index, work(view)));
                 }
             });
         }
         drop(sender);
-        let mut photos: Vec<_> = views.iter().map(|_| None).collect();
+        let mut results: Vec<_> = views.iter().map(|_| None).collect();
         let mut failure: Option<(usize, CaptureError)> = None;
-        for (done, (index, result)) in decoded.iter().enumerate() {
+        for (done, (index, result)) in finished.iter().enumerate() {
             observe(Event::Progress {
-                stage: Stage::Photos,
+                stage,
                 done,
                 total: views.len(),
                 message: views[index].name.clone(),
             });
             match result {
-                Ok(photo) => photos[index] = Some(photo),
+                Ok(result) => results[index] = Some(result),
                 Err(error) => {
-                    // Whatever comes before this one is being decoded already.
+                    // Whatever comes before this one is in work already.
                     next.store(views.len(), Ordering::Relaxed);
                     if failure.as_ref().is_none_or(|(first, _)| index < *first) {
                         failure = Some((index, error));
@@ -149,7 +178,7 @@ fn decode(
         }
         match failure {
             Some((_, error)) => Err(error),
-            None => Ok(photos.into_iter().flatten().collect()),
+            None => Ok(results.into_iter().flatten().collect()),
         }
     })
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::{Event, Observer, RunError, Stage, scene::Scene};
 use crate::{
     chroma::teacher::{
-        AbImage, GrayImage, HintFolder, HintImage, Teacher, TeacherInfo, TeacherSettings,
+        AbImage, Asked, GrayImage, HintFolder, HintImage, Teacher, TeacherInfo, TeacherSettings,
     },
     report::TeacherReport,
 };
@@ -153,8 +153,9 @@ impl Teachers {
         // Which teachers have an answer for a training view, and whether there
         // is a hint for one.
         let (mut covers, mut hints_cover) = (vec![false; self.teachers.len()], false);
-        for (i, (photo, _)) in scene.photos.iter().enumerate() {
-            let name = &scene.capture.views[i].name;
+        for (i, (photo, camera)) in scene.photos.iter().enumerate() {
+            let view = &scene.capture.views[i];
+            let (name, asked) = (&view.name, Asked::view(view, camera));
             observe(Event::Progress {
                 stage: Stage::Teacher,
                 done: i,
@@ -170,7 +171,7 @@ impl Teachers {
             let folder = self
                 .hints
                 .as_ref()
-                .map(|(_, folder)| folder.load(name, gray));
+                .map(|(_, folder)| folder.load(asked, gray));
             let mut hints = folder.transpose()?.flatten();
             hints_cover |= trained && hints.is_some();
             if hints.as_ref().is_some_and(HintImage::is_empty) {
@@ -181,7 +182,7 @@ impl Teachers {
             }
             let mut answers = Vec::new();
             for (member, covers) in self.teachers.iter_mut().zip(&mut covers) {
-                if let Some(answer) = member.teacher.colorize(name, gray, hints.as_ref())? {
+                if let Some(answer) = member.teacher.colorize(asked, gray, hints.as_ref())? {
                     answers.push((answer, member.weight));
                     *covers |= trained;
                 }

@@ -3,7 +3,7 @@
 
 use std::{fmt::Write, fs};
 
-use gs_chroma::capture::Capture;
+use gs_chroma::capture::{Capture, LoadOptions, Loader};
 use proptest::prelude::*;
 
 const POISON: [&str; 12] = [
@@ -21,10 +21,23 @@ const POISON: [&str; 12] = [
     "x",
 ];
 
+const PINHOLE: &str = "1 PINHOLE 8 6 7.5 7.5 4 3";
+
+/// A lens of every kind of formula, wide enough for the fisheyes to become faces.
+const LENSES: [&str; 7] = [
+    "1 FULL_OPENCV 8 6 7.5 7.5 4 3 -0.2 0.05 0.01 -0.01 0.01 0.1 0.02 0.01",
+    "1 THIN_PRISM_FISHEYE 8 6 3.5 3.5 4 3 -0.02 0.05 0.01 -0.01 0.01 0.01 0.02 0.01",
+    "1 RAD_TAN_THIN_PRISM_FISHEYE 8 6 3 3 4 3 0.1 0 0 0 0 0 0.01 0.01 0.01 0 0.01 0",
+    "1 FOV 8 6 4 4 4 3 0.9",
+    "1 DIVISION 8 6 7.5 7.5 4 3 -0.3",
+    "1 EUCM 8 6 7.5 7.5 4 3 0.6 1.1",
+    "1 EQUIRECTANGULAR 8 6 8 6",
+];
+
 /// The numbers of a small model, file by file and line by line.
-fn model() -> [Vec<Vec<String>>; 3] {
+fn model(camera: &str) -> [Vec<Vec<String>>; 3] {
     let words = |line: &str| line.split(' ').map(str::to_owned).collect::<Vec<_>>();
-    let cameras = vec![words("1 PINHOLE 8 6 7.5 7.5 4 3")];
+    let cameras = vec![words(camera)];
     let mut images = Vec::new();
     for i in 1..=9 {
         images.push(words(&format!(
@@ -39,8 +52,9 @@ fn model() -> [Vec<Vec<String>>; 3] {
     [cameras, images, points]
 }
 
-/// Writes the model with the number at `(file, line, word)` replaced, and reads it back.
-fn load(change: Option<(usize, usize, usize, &str)>) -> Result<Capture, String> {
+/// Writes the model of a camera with the number at `(file, line, word)` replaced, and
+/// reads it and its first photo back.
+fn load(camera: &str, change: Option<(usize, usize, usize, &str)>) -> Result<Capture, String> {
     let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap();
     let sparse = folder.path().join("sparse/0");
     fs::create_dir_all(&sparse).unwrap();
@@ -49,7 +63,7 @@ fn load(change: Option<(usize, usize, usize, &str)>) -> Result<Capture, String> 
         let photo = folder.path().join(format!("images/photo{i}.png"));
         image::GrayImage::new(8, 6).save(photo).unwrap();
     }
-    let mut model = model();
+    let mut model = model(camera);
     if let Some((file, line, word, poison)) = change {
         let lines = &mut model[file];
         let line = line % lines.len();
@@ -63,11 +77,28 @@ fn load(change: Option<(usize, usize, usize, &str)>) -> Result<Capture, String> 
         }
         fs::write(sparse.join(format!("{name}.txt")), text).unwrap();
     }
-    Capture::load(folder.path()).map_err(|error| error.to_string())
+    let capture = Capture::load(folder.path()).map_err(|error| error.to_string())?;
+    for view in capture
+        .views
+        .iter()
+        .filter(|view| view.photo == "photo1.png")
+    {
+        let (photo, camera) = Loader::new(LoadOptions::default())
+            .load(view)
+            .map_err(|error| error.to_string())?;
+        assert_eq!((photo.width, photo.height), (camera.width, camera.height));
+    }
+    Ok(capture)
 }
 
-fn check(file: usize, line: usize, word: usize, poison: &str) -> Result<(), TestCaseError> {
-    match load(Some((file, line, word, poison))) {
+fn check(
+    camera: &str,
+    file: usize,
+    line: usize,
+    word: usize,
+    poison: &str,
+) -> Result<(), TestCaseError> {
+    match load(camera, Some((file, line, word, poison))) {
         Err(message) => {
             prop_assert_eq!(message.lines().count(), 1);
             let named = ["cameras", "images", "points3D", "photo", "camera", "sparse"];
@@ -88,7 +119,12 @@ fn check(file: usize, line: usize, word: usize, poison: &str) -> Result<(), Test
             }
             for point in &capture.points {
                 prop_assert!(point.position.is_finite());
+                for seen in &point.track {
+                    prop_assert!(seen.view < capture.views.len());
+                    prop_assert!(seen.pixel.iter().all(|c| c.is_finite()));
+                }
             }
+            prop_assert!((0.0..1e9).contains(&capture.distortion));
             let extent = capture.extent();
             prop_assert!(extent.is_finite() && extent > 0.0, "extent {}", extent);
         }
@@ -98,8 +134,13 @@ fn check(file: usize, line: usize, word: usize, poison: &str) -> Result<(), Test
 
 #[test]
 fn the_model_itself_is_sound() {
-    let capture = load(None).unwrap();
+    let capture = load(PINHOLE, None).unwrap();
     assert_eq!((capture.views.len(), capture.points.len()), (9, 6));
+    for camera in LENSES {
+        let capture = load(camera, None).unwrap();
+        assert_eq!(capture.views.len() % 9, 0, "{camera}");
+        assert!(capture.distortion > 0.05, "{camera}");
+    }
 }
 
 /// Every poison in every number of one camera, one image and one point.
@@ -108,8 +149,21 @@ fn every_poison_in_every_number() {
     for (file, words) in [(0, 8), (1, 10), (2, 12)] {
         for word in 0..words {
             for poison in POISON {
-                check(file, 0, word, poison)
+                check(PINHOLE, file, 0, word, poison)
                     .unwrap_or_else(|reason| panic!("{poison} in {file}, word {word}: {reason}"));
+            }
+        }
+    }
+}
+
+/// Every poison in every number of every lens.
+#[test]
+fn every_poison_in_a_lens() {
+    for camera in LENSES {
+        for word in 0..camera.split(' ').count() {
+            for poison in POISON {
+                check(camera, 0, 0, word, poison)
+                    .unwrap_or_else(|reason| panic!("{poison} in {camera}, word {word}: {reason}"));
             }
         }
     }
@@ -128,6 +182,6 @@ proptest! {
             proptest::num::f64::ANY.prop_map(|v| v.to_string()),
         ],
     ) {
-        check(file, line, word, &value)?;
+        check(PINHOLE, file, line, word, &value)?;
     }
 }

@@ -7,13 +7,12 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 
 use super::tracks::{Sighting, Sightings};
-use super::{
-    Cameras, Image, Point, camera, insert, intrinsics, model_name, parameter_count, relative_name,
-};
+use super::{Cameras, Image, Point, lens, relative_name};
 use crate::capture::error::{CaptureError, Position};
+use crate::capture::lens::{MOST_PARAMETERS, ModelName};
 
-/// Id, model, width, height and the 3 parameters of SIMPLE_PINHOLE.
-const SMALLEST_CAMERA: u64 = 4 + 4 + 8 + 8 + 3 * 8;
+/// Id, model, width, height and the 2 parameters of EQUIRECTANGULAR.
+const SMALLEST_CAMERA: u64 = 4 + 4 + 8 + 8 + 2 * 8;
 /// Id, quaternion, translation, camera, an ended empty name, a zero count.
 const SMALLEST_IMAGE: u64 = 4 + 4 * 8 + 3 * 8 + 4 + 1 + 8;
 /// Id, position, colour, error, a zero count.
@@ -29,28 +28,25 @@ const LONGEST_NAME: u64 = 4096;
 
 pub(super) fn cameras(path: &Path) -> Result<Cameras, CaptureError> {
     let mut records = Records::open(path, "camera", SMALLEST_CAMERA)?;
-    let mut cameras = Cameras::new();
+    let mut cameras = Cameras::default();
     while records.next_record() {
         let id = records.u32("the id")?;
         let number = records.i32("the model")?;
-        let model = model_name(number);
-        let Some(count) = model.and_then(parameter_count) else {
+        let Some(model) = ModelName::numbered(number) else {
             return Err(CaptureError::CameraModel {
                 path: path.into(),
                 camera_id: id,
-                model: model.map_or_else(
-                    || format!("number {number}, which COLMAP does not define"),
-                    Into::into,
-                ),
+                model: format!("number {number}"),
             });
         };
         let (width, height) = (records.u64("the width")?, records.u64("the height")?);
-        let mut parameters = [0.0; 4];
-        for parameter in &mut parameters[..count] {
+        let mut parameters = [0.0; MOST_PARAMETERS];
+        let parameters = &mut parameters[..model.parameters];
+        for parameter in &mut *parameters {
             *parameter = records.f64("the parameters")?;
         }
-        let checked = intrinsics(width, height, &parameters[..count])
-            .and_then(|intrinsics| insert(&mut cameras, id, intrinsics));
+        let checked =
+            lens(model, width, height, parameters).and_then(|lens| cameras.insert(id, lens));
         checked.map_err(|reason| records.malformed(reason))?;
     }
     records.finish()?;
@@ -69,7 +65,9 @@ pub(super) fn images(
         let quaternion = records.f64s("the quaternion")?;
         let translation = DVec3::from(records.f64s::<3>("the translation")?);
         let camera_id = records.u32("the camera")?;
-        let intrinsics = camera(cameras, camera_id).map_err(|reason| records.malformed(reason))?;
+        let camera = cameras
+            .place(camera_id)
+            .map_err(|reason| records.malformed(reason))?;
         let name = records.name()?;
         let name = relative_name(&name).map_err(|reason| records.malformed(reason))?;
         let count = records.elements("the number of observations", OBSERVATION, "observations")?;
@@ -90,7 +88,7 @@ pub(super) fn images(
             name,
             quaternion,
             translation,
-            intrinsics,
+            camera,
         });
     }
     records.finish()?;

@@ -10,18 +10,23 @@ mod tracks;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 
+use super::Point;
 use super::error::CaptureError;
-use super::{Camera, Point};
+use super::lens::{Lens, ModelName};
 
 /// What the three files of a model say.
 pub(super) struct Model {
+    /// Cameras in the order of the file.
+    pub cameras: Vec<Camera>,
     /// Images in the order of the file.
     pub images: Vec<Image>,
     /// Points in the order of the file; their positions may be anything. The views
     /// of their tracks are indices into `images`.
     pub points: Vec<Point>,
+    /// The cameras file, for errors.
+    pub cameras_path: PathBuf,
     /// The images file, for errors.
     pub images_path: PathBuf,
     /// The points file, for errors.
@@ -36,46 +41,23 @@ pub(super) struct Image {
     pub quaternion: [f64; 4],
     /// World-to-camera translation.
     pub translation: DVec3,
-    pub intrinsics: Intrinsics,
+    /// Index into [`Model::cameras`].
+    pub camera: usize,
 }
 
-/// A pinhole camera's size and calibration in pixels: checked to be usable.
-#[derive(Clone, Copy)]
-pub(super) struct Intrinsics {
-    pub width: u32,
-    pub height: u32,
-    pub fx: f64,
-    pub fy: f64,
-    pub cx: f64,
-    pub cy: f64,
+/// A camera that images share.
+pub(super) struct Camera {
+    /// COLMAP's id.
+    pub id: u32,
+    pub lens: Lens,
 }
 
-impl Intrinsics {
-    /// The camera with this calibration and a world-to-camera pose.
-    pub fn camera(self, rotation: DMat3, translation: DVec3) -> Camera {
-        let Self {
-            width,
-            height,
-            fx,
-            fy,
-            cx,
-            cy,
-        } = self;
-        Camera {
-            width,
-            height,
-            fx,
-            fy,
-            cx,
-            cy,
-            rotation,
-            translation,
-        }
-    }
+/// Cameras in the order of the file, and their places by COLMAP's id.
+#[derive(Default)]
+struct Cameras {
+    cameras: Vec<Camera>,
+    places: BTreeMap<u32, usize>,
 }
-
-/// Cameras by COLMAP's id.
-type Cameras = BTreeMap<u32, Intrinsics>;
 
 /// Images no camera makes; beyond this a size is taken for a damaged field.
 const MAX_SIDE: u64 = 1 << 20;
@@ -107,21 +89,23 @@ pub(super) fn read(root: &Path) -> Result<Model, CaptureError> {
 }
 
 fn read_files(
-    [cameras, images_path, points_path]: [PathBuf; 3],
+    [cameras_path, images_path, points_path]: [PathBuf; 3],
     extension: &str,
 ) -> Result<Model, CaptureError> {
-    let (images, points) = if extension == "bin" {
-        let cameras = binary::cameras(&cameras)?;
+    let (cameras, images, points) = if extension == "bin" {
+        let cameras = binary::cameras(&cameras_path)?;
         let (images, sightings) = binary::images(&images_path, &cameras)?;
-        (images, binary::points(&points_path, &sightings)?)
+        (cameras, images, binary::points(&points_path, &sightings)?)
     } else {
-        let cameras = text::cameras(&cameras)?;
+        let cameras = text::cameras(&cameras_path)?;
         let (images, sightings) = text::images(&images_path, &cameras)?;
-        (images, text::points(&points_path, &sightings)?)
+        (cameras, images, text::points(&points_path, &sightings)?)
     };
     Ok(Model {
+        cameras: cameras.cameras,
         images,
         points,
+        cameras_path,
         images_path,
         points_path,
     })
@@ -135,65 +119,13 @@ pub(super) fn file_name(path: &Path) -> String {
         .into_owned()
 }
 
-/// COLMAP's name of a camera model number, where it is known.
-fn model_name(id: i32) -> Option<&'static str> {
-    const NAMES: [&str; 12] = [
-        "SIMPLE_PINHOLE",
-        "PINHOLE",
-        "SIMPLE_RADIAL",
-        "RADIAL",
-        "OPENCV",
-        "OPENCV_FISHEYE",
-        "FULL_OPENCV",
-        "FOV",
-        "SIMPLE_RADIAL_FISHEYE",
-        "RADIAL_FISHEYE",
-        "THIN_PRISM_FISHEYE",
-        "RAD_TAN_THIN_PRISM_FISHEYE",
-    ];
-    NAMES.get(usize::try_from(id).ok()?).copied()
-}
-
-/// The number of parameters of a supported camera model: f, cx, cy or fx, fy, cx, cy.
-fn parameter_count(model: &str) -> Option<usize> {
-    match model {
-        "SIMPLE_PINHOLE" => Some(3),
-        "PINHOLE" => Some(4),
-        _ => None,
-    }
-}
-
-/// Checks a camera record; `parameters` holds 3 or 4 values.
-fn intrinsics(width: u64, height: u64, parameters: &[f64]) -> Result<Intrinsics, String> {
+/// Checks a camera record.
+fn lens(model: ModelName, width: u64, height: u64, parameters: &[f64]) -> Result<Lens, String> {
     let side = |name: &str, value: u64| match u32::try_from(value) {
         Ok(side) if (1..=MAX_SIDE).contains(&value) => Ok(side),
         _ => Err(format!("the {name} of {value} pixels is no image's")),
     };
-    let (fx, fy, cx, cy) = match *parameters {
-        [f, cx, cy] => (f, f, cx, cy),
-        [fx, fy, cx, cy] => (fx, fy, cx, cy),
-        _ => {
-            return Err(format!(
-                "{} parameters do not make a pinhole",
-                parameters.len()
-            ));
-        }
-    };
-    let positive = |f: f64| f.is_finite() && f > 0.0;
-    if !(positive(fx) && positive(fy)) {
-        return Err(format!("the focal length {fx}, {fy} is not positive"));
-    }
-    if !(cx.is_finite() && cy.is_finite()) {
-        return Err(format!("the principal point {cx}, {cy} is not finite"));
-    }
-    Ok(Intrinsics {
-        width: side("width", width)?,
-        height: side("height", height)?,
-        fx,
-        fy,
-        cx,
-        cy,
-    })
+    model.lens(side("width", width)?, side("height", height)?, parameters)
 }
 
 /// An image's name as a path below `images/` with `/` between folders.
@@ -216,21 +148,26 @@ fn relative_name(name: &str) -> Result<String, String> {
     Ok(parts.join("/"))
 }
 
-/// The camera with this id.
-fn camera(cameras: &Cameras, id: u32) -> Result<Intrinsics, String> {
-    cameras.get(&id).copied().ok_or_else(|| {
-        format!(
-            "camera {id} is not among the {} of the cameras file",
-            cameras.len()
-        )
-    })
-}
+impl Cameras {
+    /// The place of the camera with this id.
+    fn place(&self, id: u32) -> Result<usize, String> {
+        self.places.get(&id).copied().ok_or_else(|| {
+            format!(
+                "camera {id} is not among the {} of the cameras file",
+                self.places.len()
+            )
+        })
+    }
 
-/// Adds a camera; ids are unique.
-fn insert(cameras: &mut Cameras, id: u32, intrinsics: Intrinsics) -> Result<(), String> {
-    match cameras.insert(id, intrinsics) {
-        None => Ok(()),
-        Some(_) => Err(format!("camera {id} is there twice")),
+    /// Adds a camera; ids are unique.
+    fn insert(&mut self, id: u32, lens: Lens) -> Result<(), String> {
+        match self.places.insert(id, self.cameras.len()) {
+            None => {
+                self.cameras.push(Camera { id, lens });
+                Ok(())
+            }
+            Some(_) => Err(format!("camera {id} is there twice")),
+        }
     }
 }
 
@@ -260,14 +197,10 @@ mod tests {
     }
 
     #[test]
-    fn intrinsics_are_checked() {
-        assert!(intrinsics(4, 3, &[5.0, 2.0, 1.5]).is_ok());
-        assert!(intrinsics(0, 3, &[5.0, 2.0, 1.5]).is_err());
-        assert!(intrinsics(4, u64::MAX, &[5.0, 2.0, 1.5]).is_err());
-        for focal in [0.0, -5.0, f64::NAN, f64::INFINITY] {
-            assert!(intrinsics(4, 3, &[5.0, focal, 2.0, 1.5]).is_err());
-        }
-        assert!(intrinsics(4, 3, &[5.0, 5.0, f64::NAN, 1.5]).is_err());
-        assert!(intrinsics(4, 3, &[5.0, 5.0]).is_err());
+    fn sizes_are_checked() {
+        let model = ModelName::named("SIMPLE_PINHOLE").unwrap();
+        assert!(lens(model, 4, 3, &[5.0, 2.0, 1.5]).is_ok());
+        assert!(lens(model, 0, 3, &[5.0, 2.0, 1.5]).is_err());
+        assert!(lens(model, 4, u64::MAX, &[5.0, 2.0, 1.5]).is_err());
     }
 }

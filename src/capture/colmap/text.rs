@@ -8,37 +8,40 @@ use std::str::{FromStr, SplitWhitespace};
 use glam::DVec3;
 
 use super::tracks::{Sighting, Sightings};
-use super::{Cameras, Image, Point, camera, insert, intrinsics, parameter_count, relative_name};
+use super::{Cameras, Image, Point, lens, relative_name};
 use crate::capture::error::{CaptureError, Position};
+use crate::capture::lens::{MOST_PARAMETERS, ModelName};
 
 /// `CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]`
 pub(super) fn cameras(path: &Path) -> Result<Cameras, CaptureError> {
     let mut lines = Lines::open(path, "camera")?;
-    let mut cameras = Cameras::new();
+    let mut cameras = Cameras::default();
     while lines.next_record()? {
         let mut fields = lines.fields();
         let id = lines.field(&mut fields, "the id")?;
-        let model: String = lines.field(&mut fields, "the model")?;
-        let Some(count) = parameter_count(&model) else {
+        let name: String = lines.field(&mut fields, "the model")?;
+        let Some(model) = ModelName::named(&name) else {
             return Err(CaptureError::CameraModel {
                 path: path.into(),
                 camera_id: id,
-                model,
+                model: name,
             });
         };
         let width = lines.field(&mut fields, "the width")?;
         let height = lines.field(&mut fields, "the height")?;
-        let mut parameters = [0.0; 4];
-        for parameter in &mut parameters[..count] {
+        let mut parameters = [0.0; MOST_PARAMETERS];
+        let parameters = &mut parameters[..model.parameters];
+        for parameter in &mut *parameters {
             *parameter = lines.field(&mut fields, "the parameters")?;
         }
         if fields.next().is_some() {
             return Err(lines.malformed(format!(
-                "{model} has {count} parameters, and more are there"
+                "{name} has {} parameters, and more are there",
+                model.parameters
             )));
         }
-        let checked = intrinsics(width, height, &parameters[..count])
-            .and_then(|intrinsics| insert(&mut cameras, id, intrinsics));
+        let checked =
+            lens(model, width, height, parameters).and_then(|lens| cameras.insert(id, lens));
         checked.map_err(|reason| lines.malformed(reason))?;
     }
     Ok(cameras)
@@ -59,7 +62,9 @@ pub(super) fn images(
         let quaternion = lines.numbers(&mut fields, "the quaternion")?;
         let translation = DVec3::from(lines.numbers::<3>(&mut fields, "the translation")?);
         let camera_id = lines.field(&mut fields, "the camera")?;
-        let intrinsics = camera(cameras, camera_id).map_err(|reason| lines.malformed(reason))?;
+        let camera = cameras
+            .place(camera_id)
+            .map_err(|reason| lines.malformed(reason))?;
         // The name is the tenth field and may contain spaces.
         let name = relative_name(after_fields(&lines.line, 9))
             .map_err(|reason| lines.malformed(reason))?;
@@ -68,7 +73,7 @@ pub(super) fn images(
             name,
             quaternion,
             translation,
-            intrinsics,
+            camera,
         });
 
         // A file without the second lines would lose every other image.

@@ -1,7 +1,7 @@
 //! A folder of coloured images as a teacher.
 
 use super::named_images::NamedImages;
-use super::{AbImage, GrayImage, TeacherError, TeacherInfo, file_name};
+use super::{AbImage, Asked, GrayImage, TeacherError, TeacherInfo, file_name};
 use crate::color::srgb_to_lab;
 use std::path::{Path, PathBuf};
 
@@ -43,27 +43,31 @@ impl FolderTeacher {
         }
     }
 
-    /// Colours of the photo's image at the image's size; none where there is no
+    /// Colours of the photo's image at the image's size, or at the photo's where the
+    /// image is of the photo before its lens was taken out; none where there is no
     /// image.
-    pub(super) fn colorize(
+    pub(super) fn colorize<'a>(
         &self,
-        name: &str,
+        asked: impl Into<Asked<'a>>,
         photo: GrayImage<'_>,
     ) -> Result<Option<AbImage>, TeacherError> {
-        let Some((_, image)) = self.images.load(name, photo)? else {
+        let Some(found) = self.images.load(asked.into(), photo)? else {
             return Ok(None);
         };
-        let (width, height) = (image.width(), image.height());
-        let rgb = image.into_rgb32f();
+        let size = [found.image.width(), found.image.height()];
+        let rgb = found.image.into_rgb32f();
         let ab = rgb.pixels().map(|rgb| {
             let [_, a, b] = srgb_to_lab(rgb.0.map(f64::from));
             [a as f32, b as f32]
         });
-        Ok(Some(AbImage {
-            width,
-            height,
-            ab: ab.collect(),
-        }))
+        let (ab, [width, height]) = match found.original {
+            Some(original) => (
+                original.shown(ab.collect(), size),
+                [photo.width, photo.height],
+            ),
+            None => (ab.collect(), size),
+        };
+        Ok(Some(AbImage { width, height, ab }))
     }
 }
 
@@ -71,8 +75,11 @@ impl FolderTeacher {
 mod tests {
     use super::super::Upsample;
     use super::*;
+    use crate::capture::lens::{ModelName, Undistortion};
+    use crate::capture::{Camera, View};
     use image::{Rgb, RgbImage};
     use std::fs;
+    use std::sync::Arc;
     use tempfile::TempDir;
 
     const GRAY: [u8; 64] = [128; 64];
@@ -194,6 +201,74 @@ mod tests {
             assert!(error.contains(name), "{error}");
             assert!(!error.contains('\n'));
         }
+    }
+
+    /// A view of a photo of 40 × 30 pixels through a fisheye that sees 140°.
+    fn face(name: &str) -> View {
+        let lens = ModelName::named("SIMPLE_FISHEYE").unwrap();
+        let focal = 20.0 / 70_f64.to_radians();
+        let lens = Arc::new(lens.lens(40, 30, &[focal, 20.0, 15.0]).unwrap());
+        let cuts = lens.cuts().unwrap();
+        let cut = cuts.iter().find(|cut| cut.face == Some("front")).unwrap();
+        View {
+            name: name.into(),
+            photo: "a/b.jpg".into(),
+            image_path: "b.jpg".into(),
+            camera: cut.camera.clone(),
+            undistortion: Some(Undistortion {
+                lens: lens.clone(),
+                rotation: cut.rotation,
+            }),
+        }
+    }
+
+    #[test]
+    fn images_of_photos_are_seen_through_their_lens() {
+        let folder = tempfile::tempdir().unwrap();
+        // Red left of the middle and blue right of it, at twice the photo's size.
+        let mut halves = RgbImage::new(80, 60);
+        for (x, _, pixel) in halves.enumerate_pixels_mut() {
+            *pixel = Rgb(if x < 40 { [255, 0, 0] } else { [0, 0, 255] });
+        }
+        fs::create_dir(folder.path().join("a")).unwrap();
+        halves.save(folder.path().join("a/b.png")).unwrap();
+        let teacher = FolderTeacher::open(folder.path()).unwrap();
+        let view = face("a/b@front.jpg");
+        let Camera { width, height, .. } = view.camera;
+        let pixels = vec![128; (width * height) as usize];
+        let gray = GrayImage {
+            width,
+            height,
+            pixels: &pixels,
+        };
+        let asked = || Asked::view(&view, &view.camera);
+        let answer = teacher.colorize(asked(), gray).unwrap().unwrap();
+        assert_eq!((answer.width, answer.height), (width, height));
+        let row = &answer.ab[(height / 2 * width) as usize..][..width as usize];
+        let middle = width as usize / 2;
+        let red = srgb_to_lab([1.0, 0.0, 0.0])[2] as f32;
+        let blue = srgb_to_lab([0.0, 0.0, 1.0])[2] as f32;
+        for (x, [_, b]) in row.iter().enumerate() {
+            let expected = if x < middle { red } else { blue };
+            // The filter reaches two pixels over the border between them.
+            if x.abs_diff(middle) > 3 {
+                assert!((b - expected).abs() < 0.1, "{x}: {b}");
+            }
+        }
+        // Its own image goes before the photo's.
+        save(&folder, "a/b@front.png", width, height, [0, 255, 0]);
+        let teacher = FolderTeacher::open(folder.path()).unwrap();
+        let answer = teacher.colorize(asked(), gray).unwrap().unwrap();
+        assert!(answer.ab.iter().all(|ab| ab[0] < -80.0));
+        // An image of another cut of the photo is still refused.
+        save(&folder, "a/b.png", 60, 60, [0, 255, 0]);
+        fs::remove_file(folder.path().join("a/b@front.png")).unwrap();
+        let teacher = FolderTeacher::open(folder.path()).unwrap();
+        let error = teacher.colorize(asked(), gray).unwrap_err().to_string();
+        assert!(
+            error.contains("a/b.jpg") && error.contains("40 x 30"),
+            "{error}"
+        );
     }
 
     #[cfg(unix)]

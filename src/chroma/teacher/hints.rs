@@ -2,7 +2,7 @@
 
 use super::images::{Filter, resample};
 use super::named_images::NamedImages;
-use super::{GrayImage, TeacherError};
+use super::{Asked, GrayImage, TeacherError};
 use crate::color::srgb_to_lab;
 use std::path::Path;
 
@@ -34,28 +34,30 @@ impl HintFolder {
         Ok(Self { images })
     }
 
-    /// The paint on a photo at its own size; none where there is no image.
-    /// `name` is the photo's path relative to the photo folder.
+    /// The paint on a photo, at the paint's own size or, where it is painted on the
+    /// photo before its lens was taken out, at the photo's; none where there is no
+    /// image. A photo may be given by its path relative to the photo folder.
     ///
     /// # Errors
     /// [`TeacherError::NoTransparency`] where the image has no alpha channel;
     /// otherwise as for a folder teacher's image.
-    pub fn load(
+    pub fn load<'a>(
         &self,
-        name: &str,
+        asked: impl Into<Asked<'a>>,
         photo: GrayImage<'_>,
     ) -> Result<Option<HintImage>, TeacherError> {
-        photo.check(name)?;
-        let Some((path, image)) = self.images.load(name, photo)? else {
+        let asked = asked.into();
+        photo.check(asked.name)?;
+        let Some(found) = self.images.load(asked, photo)? else {
             return Ok(None);
         };
-        if !image.color().has_alpha() {
+        if !found.image.color().has_alpha() {
             return Err(TeacherError::NoTransparency {
-                path: path.to_path_buf(),
+                path: found.path.to_path_buf(),
             });
         }
-        let (width, height) = (image.width(), image.height());
-        let rgba = image.into_rgba32f();
+        let size = [found.image.width(), found.image.height()];
+        let rgba = found.image.into_rgba32f();
         let paint = rgba.pixels().map(|rgba| match rgba.0 {
             // Most of a hint is transparent, and its colour means nothing.
             [.., 0.0] => [0.0; 3],
@@ -64,10 +66,21 @@ impl HintFolder {
                 [alpha * a as f32, alpha * b as f32, alpha]
             }
         });
+        let (mut paint, [width, height]) = match found.original {
+            Some(original) => (
+                original.shown(paint.collect(), size),
+                [photo.width, photo.height],
+            ),
+            None => (paint.collect(), size),
+        };
+        // Interpolation overshoots beside an edge.
+        for paint in &mut paint {
+            paint[2] = paint[2].clamp(0.0, 1.0);
+        }
         Ok(Some(HintImage {
             width,
             height,
-            paint: paint.collect(),
+            paint,
         }))
     }
 }

@@ -4,6 +4,7 @@
 //! that somebody or something else has coloured. Both answer with CIELAB a, b
 //! for a whole photo; lightness always stays the photo's.
 
+mod asked;
 mod cache;
 mod error;
 mod folder;
@@ -16,6 +17,7 @@ mod profile;
 pub(crate) mod runtime;
 mod upsample;
 
+pub use asked::Asked;
 pub use error::TeacherError;
 pub use folder::FolderTeacher;
 pub use hints::{HintFolder, HintImage};
@@ -116,7 +118,7 @@ impl Teacher {
         }
     }
 
-    /// Colours one photo. `name` is its path relative to the photo folder;
+    /// Colours one photo, which may be given by its path relative to the photo folder;
     /// `hints` are told to a network that takes hints.
     ///
     /// Answers at the photo's size; `None` where a folder has no image for this
@@ -126,16 +128,17 @@ impl Teacher {
     /// A [`TeacherError`] that names the photo where the network fails or
     /// answers with numbers that are not finite, or where the folder's image is
     /// damaged or has another aspect than the photo.
-    pub fn colorize(
+    pub fn colorize<'a>(
         &mut self,
-        name: &str,
+        asked: impl Into<Asked<'a>>,
         photo: GrayImage<'_>,
         hints: Option<&HintImage>,
     ) -> Result<Option<AbImage>, TeacherError> {
-        photo.check(name)?;
+        let asked = asked.into();
+        photo.check(asked.name)?;
         let answer = match &mut self.source {
-            Source::Network(network) => Some(network.colorize(name, photo, hints)?),
-            Source::Folder(folder) => folder.colorize(name, photo)?,
+            Source::Network(network) => Some(network.colorize(asked.name, photo, hints)?),
+            Source::Folder(folder) => folder.colorize(asked, photo)?,
         };
         Ok(answer.map(|answer| answer.upsampled(photo, self.upsample)))
     }

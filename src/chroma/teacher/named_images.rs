@@ -1,7 +1,8 @@
 //! A folder of images that belong to photos by name.
 
+use super::asked::Original;
 use super::error::first_line;
-use super::{GrayImage, TeacherError};
+use super::{Asked, GrayImage, TeacherError};
 use image::DynamicImage;
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
@@ -19,6 +20,15 @@ const ASPECT_TOLERANCE: f64 = 0.02;
 pub(super) struct NamedImages {
     /// Images by path below the folder, without extension.
     images: BTreeMap<String, PathBuf>,
+}
+
+/// An image that belongs to a photo.
+pub(super) struct Found<'a> {
+    /// Where it lies.
+    pub path: &'a Path,
+    pub image: DynamicImage,
+    /// Set where the image is of the photo before its lens was taken out.
+    pub original: Option<Original<'a>>,
 }
 
 impl NamedImages {
@@ -68,19 +78,31 @@ impl NamedImages {
         self.images.contains_key(&key(Path::new(name)))
     }
 
-    /// The image for a photo and where it lies; none where there is none.
+    /// The image for a photo; none where there is none. A face of a photo may have
+    /// an image of its own; otherwise it is part of the photo's.
     ///
     /// # Errors
     /// [`TeacherError::BadImage`] where it is damaged, [`TeacherError::Aspect`]
     /// where it shows another cut of the photo, [`TeacherError::Io`].
-    pub fn load(
-        &self,
-        name: &str,
+    pub fn load<'a>(
+        &'a self,
+        asked: Asked<'a>,
         photo: GrayImage<'_>,
-    ) -> Result<Option<(&Path, DynamicImage)>, TeacherError> {
-        let Some(path) = self.images.get(&key(Path::new(name))) else {
+    ) -> Result<Option<Found<'a>>, TeacherError> {
+        let find = |name: &str| self.images.get(&key(Path::new(name)));
+        let whole = || {
+            let original = asked.original?;
+            Some((original.name, find(original.name)?, Some(original)))
+        };
+        // A view with its photo's name has no image of its own, but its photo's.
+        let own = match asked.original {
+            Some(original) if original.name == asked.name => None,
+            _ => find(asked.name).map(|path| (asked.name, path, None)),
+        };
+        let Some((name, path, original)) = own.or_else(whole) else {
             return Ok(None);
         };
+        let photo_size = original.map_or([photo.width, photo.height], |original| original.size());
         let reader = image::ImageReader::open(path).map_err(TeacherError::io(path))?;
         // A .png that is really a JPEG is a common slip and does no harm.
         let reader = reader.with_guessed_format();
@@ -90,17 +112,21 @@ impl NamedImages {
             reason: first_line(error),
         })?;
         let (width, height) = (image.width(), image.height());
-        let aspect = f64::from(width) * f64::from(photo.height)
-            / (f64::from(height) * f64::from(photo.width));
+        let aspect = f64::from(width) * f64::from(photo_size[1])
+            / (f64::from(height) * f64::from(photo_size[0]));
         if (aspect - 1.0).abs() > ASPECT_TOLERANCE {
             return Err(TeacherError::Aspect {
                 path: path.clone(),
                 size: [width, height],
                 photo: name.to_string(),
-                photo_size: [photo.width, photo.height],
+                photo_size,
             });
         }
-        Ok(Some((path, image)))
+        Ok(Some(Found {
+            path,
+            image,
+            original,
+        }))
     }
 }
 

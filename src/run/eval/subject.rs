@@ -58,8 +58,7 @@ impl Subject {
             Some(path) => path.clone(),
             None => PathBuf::from(&report.capture.path),
         };
-        let capture = &report.capture;
-        let scene = Scene::load(&colmap, capture.max_side, capture.holdout, observe)?;
+        let scene = Scene::load(&colmap, &report.capture.load, observe)?;
         Ok(Self {
             folder,
             report,

@@ -13,7 +13,7 @@ use super::{
 use crate::{
     chroma::{
         ChromaSettings, RgbView, fit_rgb, native_rgb,
-        teacher::{AbImage, GrayImage, Teacher, TeacherSettings},
+        teacher::{AbImage, Asked, GrayImage, Teacher, TeacherSettings},
     },
     raster::{Picture, Raster},
     run::{Event, Observer, RunError, Stage},
@@ -53,8 +53,8 @@ impl EvalTeacher {
         }
         let scene = &subject.scene;
         let mut answers = Vec::with_capacity(scene.photos.len());
-        for (done, ((photo, _), view)) in scene.photos.iter().zip(&scene.capture.views).enumerate()
-        {
+        let views = scene.photos.iter().zip(&scene.capture.views);
+        for (done, ((photo, camera), view)) in views.enumerate() {
             observe(Event::Progress {
                 stage: Stage::Teacher,
                 done,
@@ -66,7 +66,7 @@ impl EvalTeacher {
                 height: photo.height,
                 pixels: &photo.gray,
             };
-            answers.push(teacher.colorize(&view.name, gray, None)?);
+            answers.push(teacher.colorize(Asked::view(view, camera), gray, None)?);
         }
         if answers.iter().all(Option::is_none) {
             return Err(RunError::TeacherCoversNothing {

@@ -60,6 +60,13 @@ fn save_16_bits(place: &Place) {
     image.save(place.path(PHOTO)).expect("writable");
 }
 
+fn save_mask(place: &Place, name: &str, [width, height]: [u32; 2], value: u8) {
+    let path = place.path(name);
+    std::fs::create_dir_all(path.parent().expect("a folder")).expect("writable");
+    let image = image::GrayImage::from_pixel(width, height, image::Luma([value]));
+    image.save(path).expect("writable");
+}
+
 fn save_turned(place: &Place) {
     let image = image::GrayImage::new(SIZE[1], SIZE[0]);
     image.save(place.path(PHOTO)).expect("writable");
@@ -208,7 +215,7 @@ pub(super) const CASES: &[Case] = &[
         "no image",
         |p| p.write(PHOTO, "GIF89a, or rather not"),
         FIT,
-        &["03.png", "neither JPEG nor PNG", "convert"],
+        &["03.png", "neither JPEG, PNG nor TIFF", "convert"],
     ),
     case(
         "a cut photo",
@@ -224,10 +231,40 @@ pub(super) const CASES: &[Case] = &[
         &["03.png", "CMYK", "convert it to RGB or gray"],
     ),
     case(
-        "16 bits",
+        "16 bits among 8",
         save_16_bits,
         FIT,
-        &["03.png", "16 bits", "convert it to 8 bits"],
+        &["03.png", "16 bits", "02.png", "8 bits", "--normalize off"],
+    ),
+    case(
+        "a cut TIFF",
+        |p| p.write(PHOTO, b"II*\0\x08\0\0\0\x0c\0\0\x01"),
+        FIT,
+        &["03.png", "cannot be decoded", "save it anew"],
+    ),
+    case(
+        "a mask of another shape",
+        |p| save_mask(p, "scene/masks/03.png.png", [48, 64], 255),
+        FIT,
+        &["03.png.png", "48×64", "64×48", "aspect"],
+    ),
+    case(
+        "a mask that leaves nothing",
+        |p| save_mask(p, "scene/masks/03.png", SIZE, 0),
+        FIT,
+        &["images/03.png", "masks/03.png", "leaves no pixel"],
+    ),
+    case(
+        "masks of other names",
+        |p| save_mask(p, "scene/masks/mask3.png", SIZE, 255),
+        FIT,
+        &["scene/masks", "00.png.png", "--masks off"],
+    ),
+    case(
+        "a folder of masks that is not there",
+        nothing,
+        "fit scene --preset draft --masks nowhere -o out",
+        &["nowhere", "no such folder of masks", "--masks"],
     ),
     case(
         "a turned photo",

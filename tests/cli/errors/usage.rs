@@ -47,6 +47,16 @@ pub(super) const CASES: &[Case] = &[
         "colorize --teacher t --sh-degree 4",
         &["4", "--sh-degree"],
     ),
+    usage(
+        "a range upside down",
+        "fit scene --normalize 200,100",
+        &["200,100", "--normalize", "LOW,HIGH"],
+    ),
+    usage(
+        "no such channel",
+        "fit scene --channel ir",
+        &["ir", "--channel"],
+    ),
     usage("a negative seed", "fit scene --seed=-1", &["-1", "--seed"]),
     usage(
         "no such preset",

@@ -68,7 +68,7 @@ impl Scene {
     /// Reads a COLMAP folder with its photos in the size of its model.
     pub fn read(folder: &Path) -> Result<Self, Error> {
         let capture = Capture::load(folder)?;
-        let held_out = capture::split(capture.views.len(), true).test;
+        let held_out = capture::split(&capture.views, true).test;
         let views = capture.views.iter().enumerate().map(|(index, view)| {
             // The capture may have been moved to the origin: move it back.
             let camera = view.camera.recentred(-capture.offset);

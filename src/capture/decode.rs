@@ -1,0 +1,211 @@
+//! Photo files as numbers.
+
+use std::fmt;
+use std::fs::File;
+use std::io::{BufRead, BufReader, Cursor, Read, Seek};
+use std::path::Path;
+
+use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader};
+
+use super::error::CaptureError;
+use super::{jpeg, tiff};
+
+/// The most a decoded file may take, in bytes: 178 million 8-bit RGB pixels, more
+/// than any camera's, and little enough to fail with words instead of by force.
+pub(super) const LARGEST_FILE: u64 = 512 << 20;
+
+/// The longest of the formats' magic numbers, in bytes.
+const MAGIC: u64 = 16;
+
+/// How exactly a file tells the brightness of a pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Depth {
+    /// Whole numbers from 0 to 255.
+    Eight,
+    /// Whole numbers from 0 to 65,535.
+    Sixteen,
+    /// Floats.
+    Float,
+}
+
+impl Depth {
+    /// The value of white where nobody says another.
+    pub fn white(self) -> f64 {
+        match self {
+            Self::Eight => f64::from(u8::MAX),
+            Self::Sixteen => f64::from(u16::MAX),
+            Self::Float => 1.0,
+        }
+    }
+}
+
+impl fmt::Display for Depth {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Eight => "8 bits",
+            Self::Sixteen => "16 bits",
+            Self::Float => "floats",
+        })
+    }
+}
+
+/// What a file announces.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Header {
+    /// Width and height in pixels.
+    pub size: [u32; 2],
+    pub depth: Depth,
+    /// 1 gray, 2 gray and alpha, 3 RGB, 4 RGB and alpha.
+    pub channels: usize,
+}
+
+/// A decoded file.
+pub(super) struct Picture {
+    pub header: Header,
+    /// `[height, width, channels]`.
+    pub samples: Samples,
+}
+
+/// Values as they stand in the file.
+pub(super) enum Samples {
+    Eight(Vec<u8>),
+    Sixteen(Vec<u16>),
+    Float(Vec<f32>),
+}
+
+/// Reads what a file announces, and of TIFF and PNG files nothing else.
+pub(super) fn header(path: &Path) -> Result<Header, CaptureError> {
+    let file = File::open(path).map_err(unread(path))?;
+    Ok(open(path, Box::new(BufReader::new(file)))?.0)
+}
+
+/// Decodes a file once `check` has agreed to its size: before any pixel is
+/// allocated, since what a file announces may be a lie.
+pub(super) fn decode(
+    path: &Path,
+    check: impl FnOnce([u32; 2]) -> Result<(), CaptureError>,
+) -> Result<Picture, CaptureError> {
+    let file = std::fs::read(path).map_err(unread(path))?;
+    if image::guess_format(&file).ok() == Some(ImageFormat::Jpeg) {
+        check_jpeg(&file).map_err(failure(path))?;
+    }
+    let (header, source) = open(path, Box::new(Cursor::new(file)))?;
+    check(header.size)?;
+    let [width, height] = header.size;
+    let samples = u64::from(width) * u64::from(height) * header.channels as u64;
+    let bytes = match header.depth {
+        Depth::Eight => 1,
+        Depth::Sixteen => 2,
+        Depth::Float => 4,
+    };
+    if samples.saturating_mul(bytes) > LARGEST_FILE {
+        return Err(failure(path)(format!(
+            "announces {width}×{height} pixels, too many to decode; run image_undistorter with --max_image_size"
+        )));
+    }
+    let samples = match source {
+        Source::Image(decoder) => {
+            let unreadable = |e| format!("cannot be decoded ({e}); save it anew");
+            DynamicImage::from_decoder(decoder)
+                .map_err(unreadable)
+                .and_then(samples_of)
+        }
+        Source::Tiff(mut decoder) => tiff::samples(&mut decoder, header),
+    };
+    Ok(Picture {
+        header,
+        samples: samples.map_err(failure(path))?,
+    })
+}
+
+/// Where a file's bytes come from.
+pub(super) trait Bytes: BufRead + Seek {}
+impl<T: BufRead + Seek> Bytes for T {}
+
+/// A file whose header has been read.
+enum Source {
+    Image(Box<dyn ImageDecoder>),
+    Tiff(tiff::Decoder),
+}
+
+fn open(path: &Path, mut bytes: Box<dyn Bytes>) -> Result<(Header, Source), CaptureError> {
+    let mut magic = Vec::new();
+    let format = (&mut bytes)
+        .take(MAGIC)
+        .read_to_end(&mut magic)
+        .and_then(|_| bytes.rewind())
+        .map(|()| image::guess_format(&magic))
+        .map_err(unread(path))?;
+    let format = match format {
+        Ok(ImageFormat::Tiff) => {
+            let (header, decoder) = tiff::open(bytes).map_err(failure(path))?;
+            return Ok((header, Source::Tiff(decoder)));
+        }
+        Ok(format @ (ImageFormat::Jpeg | ImageFormat::Png)) => format,
+        _ => {
+            return Err(failure(path)(
+                "is neither JPEG, PNG nor TIFF; convert it (its name may stay)".into(),
+            ));
+        }
+    };
+    let decoder = ImageReader::with_format(bytes, format)
+        .into_decoder()
+        .map_err(|error| format!("cannot be decoded ({error}); save it anew"))
+        .map_err(failure(path))?;
+    let (width, height) = decoder.dimensions();
+    let color = decoder.color_type();
+    let header = Header {
+        size: [width, height],
+        depth: match color {
+            ColorType::L16 | ColorType::La16 | ColorType::Rgb16 | ColorType::Rgba16 => {
+                Depth::Sixteen
+            }
+            _ => Depth::Eight,
+        },
+        channels: color.channel_count().into(),
+    };
+    Ok((header, Source::Image(Box::new(decoder))))
+}
+
+/// The values of what PNG and JPEG files can hold.
+fn samples_of(picture: DynamicImage) -> Result<Samples, String> {
+    Ok(match picture {
+        DynamicImage::ImageLuma8(p) => Samples::Eight(p.into_raw()),
+        DynamicImage::ImageLumaA8(p) => Samples::Eight(p.into_raw()),
+        DynamicImage::ImageRgb8(p) => Samples::Eight(p.into_raw()),
+        DynamicImage::ImageRgba8(p) => Samples::Eight(p.into_raw()),
+        DynamicImage::ImageLuma16(p) => Samples::Sixteen(p.into_raw()),
+        DynamicImage::ImageLumaA16(p) => Samples::Sixteen(p.into_raw()),
+        DynamicImage::ImageRgb16(p) => Samples::Sixteen(p.into_raw()),
+        DynamicImage::ImageRgba16(p) => Samples::Sixteen(p.into_raw()),
+        _ => return Err("holds neither gray nor RGB; convert it to 8 or 16 bits".into()),
+    })
+}
+
+fn check_jpeg(file: &[u8]) -> Result<(), String> {
+    match jpeg::inspect(file) {
+        None => Err("ends before its end-of-image marker; copy it again".into()),
+        Some(frame) if frame.precision != 8 => Err(format!(
+            "has {} bits a channel; convert it to 8 bits",
+            frame.precision
+        )),
+        Some(frame) if frame.components == 4 => {
+            Err("has CMYK colours; convert it to RGB or gray".into())
+        }
+        Some(_) => Ok(()),
+    }
+}
+
+fn unread(path: &Path) -> impl Fn(std::io::Error) -> CaptureError {
+    |source| CaptureError::Read {
+        path: path.into(),
+        source,
+    }
+}
+
+fn failure(path: &Path) -> impl Fn(String) -> CaptureError {
+    |reason| CaptureError::Photo {
+        path: path.into(),
+        reason,
+    }
+}

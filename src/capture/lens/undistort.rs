@@ -1,0 +1,184 @@
+//! Resampling a photo to a pinhole picture.
+
+use std::sync::Arc;
+
+use glam::{DMat3, DVec2, DVec3, UVec2};
+
+use super::Lens;
+use crate::capture::{Camera, Photo};
+
+/// How a view's picture comes from its photo.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Undistortion {
+    /// The lens that took the photo.
+    pub lens: Arc<Lens>,
+    /// From the photo's camera axes to the view's.
+    pub rotation: DMat3,
+}
+
+impl Undistortion {
+    /// How long the photo's longer side may be for the picture of `camera` to keep
+    /// to `max_side` at the scale of the photo's middle.
+    ///
+    /// The photo is first shrunk to that, by area averaging, and then sampled once:
+    /// so no pixel is left out and none is blurred twice.
+    pub fn photo_side(&self, camera: &Camera, max_side: Option<u32>) -> Option<u32> {
+        let photo = f64::from(self.lens.width.max(self.lens.height));
+        let picture = f64::from(camera.width.max(camera.height));
+        max_side.map(|side| ((f64::from(side) * photo / picture) as u32).max(1))
+    }
+
+    /// Width and height of the photo at which its middle has the scale of `camera`,
+    /// which is the view's at any size.
+    pub fn photo_size(&self, camera: &Camera) -> [u32; 2] {
+        let focal = self.lens.pinhole().focal;
+        let side = |length: u32, scale: f64| ((f64::from(length) * scale).round() as u32).max(1);
+        // Faces have one focal length for both axes: their mean.
+        let scale = ((camera.fx * camera.fy) / (focal.x * focal.y)).sqrt();
+        [side(self.lens.width, scale), side(self.lens.height, scale)]
+    }
+
+    /// The view's picture of a photo of any size, and its camera, `camera` being the
+    /// view's at the size of COLMAP's model. No side exceeds `max_side`.
+    ///
+    /// Pixels that show nothing of the photo do not count in the mask.
+    pub fn apply(&self, photo: &Photo, camera: &Camera, max_side: Option<u32>) -> (Photo, Camera) {
+        let size = [photo.width, photo.height];
+        let camera = self.camera(size, camera, max_side);
+        let sources = self.sources(&camera, size);
+        let bytes = |values: &[u8]| -> Vec<u8> {
+            sample(values, size, &sources, |&value| [f32::from(value)])
+                .map(|[value]| value.round() as u8)
+                .collect()
+        };
+        let rgb = photo.rgb.as_ref().map(|rgb| {
+            sample(rgb, size, &sources, |color| color.map(f32::from))
+                .map(|color| color.map(|value| value.round() as u8))
+                .collect()
+        });
+        let mut mask = match &photo.mask {
+            Some(mask) => bytes(mask),
+            None => vec![255; sources.len()],
+        };
+        for (counts, source) in mask.iter_mut().zip(&sources) {
+            if !shows(*source, size) {
+                *counts = 0;
+            }
+        }
+        let undistorted = Photo {
+            width: camera.width,
+            height: camera.height,
+            gray: bytes(&photo.gray),
+            rgb,
+            mask: mask.iter().any(|&counts| counts < 255).then_some(mask),
+        };
+        (undistorted, camera)
+    }
+
+    /// The camera that [`Self::apply`] gives for a photo of this width and height.
+    pub fn camera(&self, size: [u32; 2], camera: &Camera, max_side: Option<u32>) -> Camera {
+        let side = |length: u32, photo: u32, lens: u32| {
+            let scaled = f64::from(length) * f64::from(photo) / f64::from(lens);
+            (scaled.round() as u32).clamp(1, max_side.unwrap_or(u32::MAX).max(1))
+        };
+        camera.resized(
+            side(camera.width, size[0], self.lens.width),
+            side(camera.height, size[1], self.lens.height),
+        )
+    }
+
+    /// Any picture of `N` channels of the photo, `size` being its width and height,
+    /// as the view's picture of `camera`, that camera being of any size; zeros where
+    /// the photo shows nothing.
+    pub fn resample<const N: usize>(
+        &self,
+        picture: &[[f32; N]],
+        size: [u32; 2],
+        camera: &Camera,
+    ) -> Vec<[f32; N]> {
+        let sources = self.sources(camera, size);
+        let seen = sources.iter().map(|&source| shows(source, size));
+        sample(picture, size, &sources, |&value| value)
+            .zip(seen)
+            .map(|(value, seen)| if seen { value } else { [0.0; N] })
+            .collect()
+    }
+
+    /// Where in a photo of this size each pixel of the camera's picture lies, in
+    /// pixels; NaN where no ray meets the photo's plane.
+    fn sources(&self, camera: &Camera, size: [u32; 2]) -> Vec<[f32; 2]> {
+        let scale = DVec2::new(
+            f64::from(size[0]) / f64::from(self.lens.width),
+            f64::from(size[1]) / f64::from(self.lens.height),
+        );
+        // Farther out nothing differs, and coordinates fit into integers.
+        let beyond = DVec2::splat(8.0);
+        let (lowest, highest) = (-beyond, UVec2::from(size).as_dvec2() + beyond);
+        let back = self.rotation.transpose();
+        let mut sources = Vec::with_capacity((camera.width * camera.height) as usize);
+        for y in 0..camera.height {
+            for x in 0..camera.width {
+                let ray = back
+                    * DVec3::new(
+                        (f64::from(x) + 0.5 - camera.cx) / camera.fx,
+                        (f64::from(y) + 0.5 - camera.cy) / camera.fy,
+                        1.0,
+                    );
+                let source = self.lens.pixel(ray).unwrap_or(DVec2::NAN) * scale;
+                sources.push(source.clamp(lowest, highest).as_vec2().to_array());
+            }
+        }
+        sources
+    }
+}
+
+/// Whether a place lies in a photo of this size.
+fn shows(source: [f32; 2], size: [u32; 2]) -> bool {
+    source
+        .iter()
+        .zip(size)
+        .all(|(&c, side)| (0.0..=side as f32).contains(&c))
+}
+
+/// A picture's values at several places, by cubic interpolation (Keys 1981,
+/// a = −1/2) between pixel centres; beyond the border it goes on as it ends. Next to
+/// an edge a result may exceed all values by a twelfth of their range. NaN gives zeros.
+fn sample<'a, T, const N: usize>(
+    picture: &'a [T],
+    size: [u32; 2],
+    sources: &'a [[f32; 2]],
+    value: impl Fn(&T) -> [f32; N] + 'a,
+) -> impl Iterator<Item = [f32; N]> + 'a {
+    let [width, height] = size.map(|side| side as i64);
+    sources.iter().map(move |&[x, y]| {
+        let mut sum = [0.0; N];
+        if x.is_nan() || y.is_nan() {
+            return sum;
+        }
+        let ((left, across), (top, down)) = (taps(x), taps(y));
+        for (dy, weight_y) in (0..).zip(down) {
+            let row = (top + dy).clamp(0, height - 1) * width;
+            for (dx, weight_x) in (0..).zip(across) {
+                let pixel = value(&picture[(row + (left + dx).clamp(0, width - 1)) as usize]);
+                for (sum, pixel) in sum.iter_mut().zip(pixel) {
+                    *sum += weight_x * weight_y * pixel;
+                }
+            }
+        }
+        sum
+    })
+}
+
+/// The first of four pixels around a coordinate and the weights of all.
+fn taps(at: f32) -> (i64, [f32; 4]) {
+    let base = (at - 0.5).floor();
+    let t = at - 0.5 - base;
+    let (t2, t3) = (t * t, t * t * t);
+    let weights = [
+        -0.5 * t3 + t2 - 0.5 * t,
+        1.5 * t3 - 2.5 * t2 + 1.0,
+        -1.5 * t3 + 2.0 * t2 + 0.5 * t,
+        0.5 * t3 - 0.5 * t2,
+    ];
+    (base as i64 - 1, weights)
+}

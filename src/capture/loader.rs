@@ -1,0 +1,271 @@
+//! All photos of a capture, loaded alike.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use super::decode::{self, Depth};
+use super::error::CaptureError;
+use super::mask::{self, MaskFolder};
+use super::options::{LoadOptions, MaskSource, Normalize};
+use super::photo::{Photo, check_size, working_size};
+use super::tone;
+use super::{Camera, Capture, View};
+
+/// Of each photo so many pixels are looked at to find the range of all: of 20 photos,
+/// 400 lie beyond each of the two percentiles.
+const SAMPLED_PIXELS: usize = 4096;
+
+/// The share of all values that may lie beyond either end of the range: specular
+/// highlights, dead pixels.
+const BEYOND: f64 = 0.005;
+
+/// Photos whose range fills less of the scale than this are normalised: the device
+/// keeps 8 bits, and one of them would say nothing.
+const FULL_ENOUGH: f64 = 0.5;
+
+/// Loads photos, all with the same options.
+#[derive(Debug)]
+pub struct Loader {
+    options: LoadOptions,
+    masks: Option<MaskFolder>,
+    /// How their values are kept; `None` where it is not needed.
+    depth: Option<Depth>,
+    /// Of each photo loaded, pixels whose values are not finite; a photo may be loaded
+    /// for several views.
+    not_finite: Mutex<BTreeMap<String, usize>>,
+}
+
+impl Loader {
+    /// Loads single photos: without masks, and with [`Normalize::Auto`] taken for
+    /// [`Normalize::Off`].
+    pub fn new(options: LoadOptions) -> Self {
+        Self {
+            options: LoadOptions {
+                normalize: match options.normalize {
+                    Normalize::Auto => Normalize::Off,
+                    decided => decided,
+                },
+                masks: MaskSource::Off,
+                ..options
+            },
+            masks: None,
+            depth: None,
+            not_finite: Mutex::default(),
+        }
+    }
+
+    /// Looks at a capture's masks and at the headers of its photos.
+    ///
+    /// # Errors
+    /// If the masks that the options name are not there, a photo cannot be read, or
+    /// photos whose values mean different things were to be normalised together.
+    pub fn open(capture: &Capture, options: &LoadOptions) -> Result<Self, CaptureError> {
+        let masks = MaskFolder::open(capture, &options.masks)?;
+        let mut loader = Self::new(options.clone());
+        loader.options.masks = match masks {
+            None => MaskSource::Off,
+            Some(_) => absolute(&options.masks),
+        };
+        loader.masks = masks;
+        if options.normalize == Normalize::Off {
+            return Ok(loader);
+        }
+        let mut first: Option<(&View, Depth)> = None;
+        for view in first_views(&capture.views) {
+            let depth = decode::header(&view.image_path)?.depth;
+            match first {
+                Some((other, other_depth)) if other_depth != depth => {
+                    return Err(CaptureError::MixedDepths {
+                        path: view.image_path.clone(),
+                        depth: depth.to_string(),
+                        other: other.image_path.clone(),
+                        other_depth: other_depth.to_string(),
+                    });
+                }
+                _ => first = Some((view, depth)),
+            }
+        }
+        loader.depth = first.map(|(_, depth)| depth);
+        if loader.depth > Some(Depth::Eight) {
+            loader.options.normalize = options.normalize;
+        }
+        Ok(loader)
+    }
+
+    /// Whether [`Self::sample`]s of all photos are needed before one can be loaded.
+    pub fn undecided(&self) -> bool {
+        self.options.normalize == Normalize::Auto
+    }
+
+    /// Some of a photo's values, evenly spread over it.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn sample(&self, view: &View) -> Result<Vec<f32>, CaptureError> {
+        let picture = decode::decode(&view.image_path, |size| check_size(view, size))?;
+        let mask = self.mask(view, picture.header.size)?;
+        let channel = self.options.channel;
+        Ok(tone::sample(
+            &picture,
+            mask.as_deref(),
+            channel,
+            SAMPLED_PIXELS,
+        ))
+    }
+
+    /// Chooses the range from [`Self::sample`]s of all photos, in any order.
+    pub fn decide(&mut self, mut samples: Vec<f32>) {
+        let white = self.depth.map_or(1.0, Depth::white);
+        let range = percentiles(&mut samples);
+        self.options.normalize = match range {
+            Some([low, high]) if !fills(low / white, high / white) => Normalize::Range([low, high]),
+            _ => Normalize::Off,
+        };
+    }
+
+    /// Decodes the photo of a view, with its mask, takes its lens's distortion out where
+    /// the view says so, and resizes its camera to it.
+    ///
+    /// Reads JPEG, PNG and TIFF: 8 or 16 bits a channel or floats, gray or RGB.
+    /// Transparency, colour profiles and the EXIF orientation are ignored, the last
+    /// because COLMAP ignores it. A photo whose longer side exceeds `max_side` is
+    /// downscaled to it by area averaging of the encoded values, at its aspect ratio.
+    ///
+    /// # Errors
+    /// If the photo or its mask cannot be read or decoded, is of another kind, is cut
+    /// off or would take more than 512 MiB; if the photo has neither its camera's size
+    /// to within a pixel a side nor its aspect ratio to within 1 %, or the mask not the
+    /// photo's; or if no pixel counts.
+    pub fn load(&self, view: &View) -> Result<(Photo, Camera), CaptureError> {
+        let picture = decode::decode(&view.image_path, |size| check_size(view, size))?;
+        let mask = self.mask(view, picture.header.size)?;
+        let mut pixels = tone::develop(picture, &self.options);
+        let not_finite = pixels.mask.iter().flatten().filter(|&&count| count == 0);
+        self.counts().insert(view.photo.clone(), not_finite.count());
+        pixels.cover(mask);
+        if pixels
+            .mask
+            .as_ref()
+            .is_some_and(|mask| mask.iter().all(|&count| count == 0))
+        {
+            return Err(CaptureError::NothingCounts {
+                path: view.image_path.clone(),
+                mask: self.masks.as_ref().and_then(|masks| masks.of(view)),
+            });
+        }
+        let (lens, max_side) = (view.undistortion.as_ref(), self.options.max_side);
+        let photo = pixels
+            .shrunk_to(self.photo_side(view))
+            .into_photo(self.options.masked);
+        Ok(match lens {
+            Some(lens) => lens.apply(&photo, &view.camera, max_side),
+            None => {
+                let camera = view.camera.resized(photo.width, photo.height);
+                (photo, camera)
+            }
+        })
+    }
+
+    /// The longest side that the photo of a view may have.
+    fn photo_side(&self, view: &View) -> Option<u32> {
+        match &view.undistortion {
+            Some(lens) => lens.photo_side(&view.camera, self.options.max_side),
+            None => self.options.max_side,
+        }
+    }
+
+    /// The camera that [`Self::load`] gives, from the photo's header alone.
+    ///
+    /// # Errors
+    /// If the header cannot be read or announces another shape than the camera's.
+    pub fn camera(&self, view: &View) -> Result<Camera, CaptureError> {
+        let size = decode::header(&view.image_path)?.size;
+        check_size(view, size)?;
+        let size = working_size(size, self.photo_side(view));
+        Ok(match &view.undistortion {
+            Some(lens) => lens.camera(size, &view.camera, self.options.max_side),
+            None => view.camera.resized(size[0], size[1]),
+        })
+    }
+
+    /// The options with what `Auto` came to, as the report keeps them.
+    pub fn options(&self) -> &LoadOptions {
+        &self.options
+    }
+
+    /// How many of the views have a mask.
+    pub fn masked_views(&self, views: &[View]) -> usize {
+        self.masks.as_ref().map_or(0, |masks| masks.count(views))
+    }
+
+    /// Pixels of the photos loaded so far, at the files' sizes, whose values are not
+    /// finite: they count nothing.
+    pub fn not_finite(&self) -> usize {
+        self.counts().values().sum()
+    }
+
+    fn counts(&self) -> MutexGuard<'_, BTreeMap<String, usize>> {
+        // A count is whole even where a thread has panicked.
+        self.not_finite
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn mask(&self, view: &View, size: [u32; 2]) -> Result<Option<Vec<u8>>, CaptureError> {
+        let path = self.masks.as_ref().and_then(|masks| masks.of(view));
+        path.map(|path| mask::read(&path, &view.image_path, size))
+            .transpose()
+    }
+}
+
+/// The first view of each photo; all views of a photo are neighbours.
+pub fn first_views(views: &[View]) -> impl Iterator<Item = &View> {
+    views
+        .chunk_by(|a, b| a.photo == b.photo)
+        .map(|views| &views[0])
+}
+
+/// What the photos of a capture are, in words, and how many of each kind.
+///
+/// # Errors
+/// If the header of one cannot be read.
+pub fn kinds(views: &[View]) -> Result<BTreeMap<String, usize>, CaptureError> {
+    let mut kinds = BTreeMap::new();
+    for view in first_views(views) {
+        let header = decode::header(&view.image_path)?;
+        let color = ["gray", "gray and alpha", "RGB", "RGB and alpha"];
+        let color = color[header.channels.clamp(1, 4) - 1];
+        *kinds
+            .entry(format!("{color}, {}", header.depth))
+            .or_default() += 1;
+    }
+    Ok(kinds)
+}
+
+/// A folder's path that holds wherever the program runs next.
+fn absolute(source: &MaskSource) -> MaskSource {
+    match source {
+        MaskSource::Folder(path) => {
+            MaskSource::Folder(path.canonicalize().unwrap_or_else(|_| PathBuf::from(path)))
+        }
+        other => other.clone(),
+    }
+}
+
+/// Values below which, and above which, a share of [`BEYOND`] lies; `None` where there
+/// is no value, or but one.
+fn percentiles(values: &mut [f32]) -> Option<[f64; 2]> {
+    let last = values.len().checked_sub(1)?;
+    let mut rank = |share: f64| {
+        let rank = (share * last as f64).round() as usize;
+        f64::from(*values.select_nth_unstable_by(rank, f32::total_cmp).1)
+    };
+    let range = [rank(BEYOND), rank(1.0 - BEYOND)];
+    (range[0] < range[1]).then_some(range)
+}
+
+/// Whether a range, in shares of the scale, can stay as it is.
+fn fills(low: f64, high: f64) -> bool {
+    low >= 0.0 && high <= 1.0 && high - low >= FULL_ENOUGH
+}

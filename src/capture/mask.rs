@@ -1,0 +1,134 @@
+//! Mask files: which pixels of a photo count.
+
+use std::path::{Path, PathBuf};
+
+use super::decode::{self, Depth, Picture, Samples};
+use super::error::CaptureError;
+use super::options::MaskSource;
+use super::photo::same_shape;
+use super::resample::downscale;
+use super::{Capture, View};
+
+/// Where masks lie unless told otherwise.
+const BESIDE: &str = "masks";
+
+/// A folder of masks with COLMAP's names: for `images/a/b.jpg` the file
+/// `a/b.jpg.png`, and where there is none, `a/b.png`.
+#[derive(Debug)]
+pub(super) struct MaskFolder(PathBuf);
+
+impl MaskFolder {
+    /// The folder that `source` names, if there is one.
+    ///
+    /// # Errors
+    /// If a folder is named that is not there or holds the photos themselves, or if
+    /// it has no mask for any photo.
+    pub fn open(capture: &Capture, source: &MaskSource) -> Result<Option<Self>, CaptureError> {
+        let images = capture.root.join("images");
+        let masks = match source {
+            MaskSource::Off => return Ok(None),
+            MaskSource::Beside => capture.root.join(BESIDE),
+            MaskSource::Folder(path) => path.clone(),
+        };
+        if !masks.is_dir() {
+            return match source {
+                MaskSource::Folder(_) => Err(CaptureError::NoMaskFolder { dir: masks }),
+                _ => Ok(None),
+            };
+        }
+        let folder = Self(masks);
+        if same_folder(&folder.0, &images) || folder.count(&capture.views) == 0 {
+            return Err(CaptureError::NoMasks {
+                dir: folder.0,
+                example: with_png(Path::new(&capture.views[0].photo)),
+            });
+        }
+        Ok(Some(folder))
+    }
+
+    /// How many of the views have a mask.
+    pub fn count(&self, views: &[View]) -> usize {
+        views.iter().filter(|view| self.of(view).is_some()).count()
+    }
+
+    /// The view's mask, if it has one.
+    pub fn of(&self, view: &View) -> Option<PathBuf> {
+        let name = Path::new(&view.photo);
+        let candidates = [with_png(name), name.with_extension("png")];
+        candidates
+            .into_iter()
+            .map(|name| self.0.join(name))
+            .find(|path| path.is_file())
+    }
+}
+
+fn with_png(name: &Path) -> PathBuf {
+    let mut name = name.as_os_str().to_owned();
+    name.push(".png");
+    name.into()
+}
+
+fn same_folder(a: &Path, b: &Path) -> bool {
+    matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
+}
+
+/// Reads the mask of a photo of `size` pixels: what each pixel counts, `[height,
+/// width]`. Of a colour mask the lightest channel counts, alpha never. A mask of
+/// nothing but 0 and 1 is one of numbers, not of grays, and 1 counts fully.
+///
+/// # Errors
+/// If the file cannot be read or decoded, is not of 8 bits, or has another shape.
+pub(super) fn read(path: &Path, photo: &Path, size: [u32; 2]) -> Result<Vec<u8>, CaptureError> {
+    let Picture { header, samples } = decode::decode(path, |mask| {
+        if same_shape(mask, size) {
+            return Ok(());
+        }
+        Err(CaptureError::MaskSize {
+            path: path.into(),
+            mask,
+            photo: photo.into(),
+            size,
+        })
+    })?;
+    let Samples::Eight(values) = samples else {
+        debug_assert_ne!(header.depth, Depth::Eight);
+        return Err(CaptureError::Photo {
+            path: path.into(),
+            reason: format!(
+                "is a mask of {} a channel; save it with 8 bits or 1 bit",
+                header.depth
+            ),
+        });
+    };
+    let colors = if header.channels < 3 { 1 } else { 3 };
+    let mut mask: Vec<u8> = values
+        .chunks_exact(header.channels)
+        .map(|pixel| pixel[..colors].iter().copied().max().unwrap_or_default())
+        .collect();
+    if mask.iter().all(|&value| value <= 1) {
+        mask.iter_mut().for_each(|value| *value *= u8::MAX);
+    }
+    Ok(resized(mask, header.size, size))
+}
+
+/// The mask at the photo's size: area means, or where it is the smaller one, the
+/// nearest pixel.
+fn resized(mask: Vec<u8>, from: [u32; 2], to: [u32; 2]) -> Vec<u8> {
+    let as_sizes = |size: [u32; 2]| size.map(|side| side as usize);
+    let (from, to) = (as_sizes(from), as_sizes(to));
+    if from == to {
+        return mask;
+    }
+    if from[0] >= to[0] && from[1] >= to[1] {
+        return downscale(mask.as_chunks::<1>().0, from, to).into_flattened();
+    }
+    let nearest = |i: usize, axis: usize| (2 * i + 1) * from[axis] / (2 * to[axis]);
+    (0..to[1])
+        .flat_map(|y| (0..to[0]).map(move |x| (x, y)))
+        .map(|(x, y)| mask[nearest(y, 1) * from[0] + nearest(x, 0)])
+        .collect()
+}
+
+#[cfg(test)]
+#[path = "mask_tests.rs"]
+mod tests;

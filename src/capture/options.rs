@@ -1,0 +1,267 @@
+//! What photos become when they are loaded.
+
+use std::fmt;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use clap::ValueEnum;
+use serde::{Deserialize, Serialize};
+
+use super::{CaptureOptions, Choice};
+
+/// How a capture's photos are loaded. `report.json` keeps it, so that every later
+/// command loads them alike.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LoadOptions {
+    /// Longer side to which larger photos are scaled down, in pixels.
+    pub max_side: Option<u32>,
+    /// Whether every 8th view is held out.
+    pub holdout: bool,
+    /// Whether the lens's distortion is taken out.
+    #[serde(default)]
+    pub lens: Choice,
+    /// What of a colour photo becomes gray.
+    #[serde(default)]
+    pub channel: Channel,
+    /// What the files' values are.
+    #[serde(default)]
+    pub encoding: Encoding,
+    /// Which of the files' values become black and white.
+    #[serde(default = "Normalize::off")]
+    pub normalize: Normalize,
+    /// Where masks are.
+    #[serde(default = "MaskSource::off")]
+    pub masks: MaskSource,
+    /// What is where a mask is black.
+    #[serde(default)]
+    pub masked: MaskUse,
+}
+
+impl Default for LoadOptions {
+    fn default() -> Self {
+        Self {
+            max_side: None,
+            holdout: true,
+            lens: Choice::default(),
+            channel: Channel::default(),
+            encoding: Encoding::default(),
+            normalize: Normalize::default(),
+            masks: MaskSource::default(),
+            masked: MaskUse::default(),
+        }
+    }
+}
+
+impl LoadOptions {
+    /// What of it the capture itself depends on.
+    pub fn capture(&self) -> CaptureOptions {
+        CaptureOptions {
+            lens: self.lens,
+            max_side: self.max_side,
+        }
+    }
+}
+
+/// What of a colour photo becomes gray; a gray photo is what it is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Channel {
+    /// The gray with the same `L*`.
+    #[default]
+    Luma,
+    /// Red. Infra-red cameras with a filter leave their signal in one channel.
+    R,
+    /// Green.
+    G,
+    /// Blue.
+    B,
+}
+
+impl Channel {
+    /// The samples of an R, G, B pixel that say something.
+    pub(super) fn samples(self) -> std::ops::Range<usize> {
+        match self {
+            Self::Luma => 0..3,
+            Self::R => 0..1,
+            Self::G => 1..2,
+            Self::B => 2..3,
+        }
+    }
+}
+
+/// What a file's values are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Encoding {
+    /// Linear light in files of floats, sRGB in all others.
+    #[default]
+    Auto,
+    /// Encoded for display.
+    Srgb,
+    /// In proportion to the light, as a sensor counts it.
+    Linear,
+}
+
+/// Which of the files' values, in their own unit, become black and white; the same
+/// for all photos of a capture, since what changes from photo to photo flickers.
+///
+/// In JSON two numbers, or `null` for `Off`: what `Auto` comes to is known once the
+/// photos have been seen.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(into = "Option<[f64; 2]>", from = "Option<[f64; 2]>")]
+pub enum Normalize {
+    /// `Off` for 8 bits and for photos that fill their range anyway, else from the
+    /// 0.5th to the 99.5th percentile of all photos.
+    #[default]
+    Auto,
+    /// 0 and 255, 65,535 or, of floats, 1.
+    Off,
+    /// These, the first below the second.
+    Range([f64; 2]),
+}
+
+impl Normalize {
+    fn off() -> Self {
+        Self::Off
+    }
+}
+
+impl From<Normalize> for Option<[f64; 2]> {
+    fn from(normalize: Normalize) -> Self {
+        match normalize {
+            Normalize::Range(range) => Some(range),
+            Normalize::Auto | Normalize::Off => None,
+        }
+    }
+}
+
+impl From<Option<[f64; 2]>> for Normalize {
+    fn from(range: Option<[f64; 2]>) -> Self {
+        range.map_or(Self::Off, Self::Range)
+    }
+}
+
+impl FromStr for Normalize {
+    type Err = String;
+
+    /// `auto`, `off` or `LOW,HIGH`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let number = |text: &str| text.trim().parse().ok().filter(|v: &f64| v.is_finite());
+        match text {
+            "auto" => Ok(Self::Auto),
+            "off" => Ok(Self::Off),
+            _ => match text.split_once(',').map(|(a, b)| (number(a), number(b))) {
+                Some((Some(low), Some(high))) if low < high => Ok(Self::Range([low, high])),
+                _ => Err("must be auto, off or two numbers, the lower first: LOW,HIGH".into()),
+            },
+        }
+    }
+}
+
+/// Where masks are: for `images/a/b.jpg` in the file `a/b.jpg.png` or `a/b.png`.
+///
+/// In JSON `beside`, `off` or the folder.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(into = "String", from = "String")]
+pub enum MaskSource {
+    /// In `masks/` beside `images/`, if it is there.
+    #[default]
+    Beside,
+    /// Nowhere.
+    Off,
+    /// In this folder.
+    Folder(PathBuf),
+}
+
+impl MaskSource {
+    fn off() -> Self {
+        Self::Off
+    }
+}
+
+impl fmt::Display for MaskSource {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Beside => f.write_str("beside"),
+            Self::Off => f.write_str("off"),
+            Self::Folder(path) => write!(f, "{}", path.display()),
+        }
+    }
+}
+
+impl From<MaskSource> for String {
+    fn from(source: MaskSource) -> Self {
+        source.to_string()
+    }
+}
+
+impl From<String> for MaskSource {
+    fn from(text: String) -> Self {
+        match text.as_str() {
+            "beside" => Self::Beside,
+            "off" => Self::Off,
+            _ => Self::Folder(text.into()),
+        }
+    }
+}
+
+/// What is where a mask is black.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum MaskUse {
+    /// Anything: the photo does not say.
+    #[default]
+    Ignore,
+    /// Nothing: what the mask leaves stands before black.
+    Remove,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_are_read() {
+        assert_eq!("auto".parse(), Ok(Normalize::Auto));
+        assert_eq!("off".parse(), Ok(Normalize::Off));
+        let range = Normalize::Range([-10.0, 25.5]);
+        assert_eq!("-10,25.5".parse(), Ok(range));
+        assert_eq!("-10, 25.5".parse(), Ok(range));
+        for text in ["", "1", "1,1", "2,1", "0,nan", "0,inf", "0,1,2", "on"] {
+            let error = text.parse::<Normalize>().unwrap_err();
+            assert!(error.contains("LOW,HIGH"), "{text:?}: {error}");
+        }
+    }
+
+    #[test]
+    fn reports_keep_every_option() {
+        let options = LoadOptions {
+            max_side: Some(640),
+            holdout: false,
+            lens: Choice::Off,
+            channel: Channel::R,
+            encoding: Encoding::Linear,
+            normalize: Normalize::Range([0.125, 20.0]),
+            masks: MaskSource::Folder("/photos/masks".into()),
+            masked: MaskUse::Remove,
+        };
+        let text = serde_json::to_string(&options).unwrap();
+        assert_eq!(
+            text,
+            r#"{"max_side":640,"holdout":false,"lens":"off","channel":"r","encoding":"linear","normalize":[0.125,20.0],"masks":"/photos/masks","masked":"remove"}"#
+        );
+        assert_eq!(serde_json::from_str::<LoadOptions>(&text).unwrap(), options);
+    }
+
+    #[test]
+    fn reports_of_earlier_versions_had_8_bits_and_no_masks() {
+        let options: LoadOptions =
+            serde_json::from_str(r#"{"max_side":null,"holdout":true}"#).unwrap();
+        let expected = LoadOptions {
+            normalize: Normalize::Off,
+            masks: MaskSource::Off,
+            ..LoadOptions::default()
+        };
+        assert_eq!(options, expected);
+    }
+}

@@ -1,0 +1,161 @@
+//! From a file's values to 8-bit pixels.
+
+use super::decode::{Depth, Header, Picture, Samples};
+use super::options::{Channel, Encoding, LoadOptions, Normalize};
+use super::photo::{Pixels, Values};
+use crate::color::linear_to_srgb;
+
+/// A photo's pixels, encoded sRGB of 8 bits. Those with a value that is not finite
+/// count nothing and are black.
+///
+/// `options.normalize` must be decided; `Auto` is taken for `Off`.
+pub(super) fn develop(picture: Picture, options: &LoadOptions) -> Pixels {
+    let Picture { header, samples } = picture;
+    let mask = match &samples {
+        Samples::Float(values) => finite(values, header.channels, options.channel),
+        _ => None,
+    };
+    let levels = Tone::of(header.depth, options).levels(samples);
+    let rgb = |step| levels.chunks_exact(step).map(|p| [p[0], p[1], p[2]]);
+    let values = match (header.channels, options.channel) {
+        (1, _) => Values::Gray(levels.as_chunks().0.to_vec()),
+        (2, _) => Values::Gray(levels.chunks_exact(2).map(|p| [p[0]]).collect()),
+        (step, Channel::Luma) if rgb(step).all(|[r, g, b]| r == g && g == b) => {
+            Values::Gray(rgb(step).map(|[gray, ..]| [gray]).collect())
+        }
+        (step, Channel::Luma) => Values::Rgb(rgb(step).collect()),
+        // The other channels are of another light; together they are no colour.
+        (step, channel) => {
+            let at = channel.samples().start;
+            Values::Gray(levels.chunks_exact(step).map(|p| [p[at]]).collect())
+        }
+    };
+    let [width, height] = header.size;
+    Pixels {
+        width,
+        height,
+        values,
+        mask,
+    }
+}
+
+/// 255 where all values in use are finite, else 0; `None` where they are everywhere.
+fn finite(values: &[f32], channels: usize, channel: Channel) -> Option<Vec<u8>> {
+    let used = used(channels, channel);
+    if values.iter().all(|v| v.is_finite()) {
+        return None;
+    }
+    let mask: Vec<u8> = values
+        .chunks_exact(channels)
+        .map(
+            |pixel| match pixel[used.clone()].iter().all(|v| v.is_finite()) {
+                true => u8::MAX,
+                false => 0,
+            },
+        )
+        .collect();
+    mask.contains(&0).then_some(mask)
+}
+
+/// The samples of a pixel of so many channels that say something.
+fn used(channels: usize, channel: Channel) -> std::ops::Range<usize> {
+    if channels < 3 {
+        0..1
+    } else {
+        channel.samples()
+    }
+}
+
+/// Values of pixels on an even grid of at most about `most`, in the file's unit: of a
+/// colour photo those of every channel in use. Values that are not finite and pixels
+/// that count nothing are left out.
+pub(super) fn sample(
+    picture: &Picture,
+    mask: Option<&[u8]>,
+    channel: Channel,
+    most: usize,
+) -> Vec<f32> {
+    let Header {
+        size: [width, height],
+        channels,
+        ..
+    } = picture.header;
+    let (width, height) = (width as usize, height as usize);
+    let step = (((width * height) as f64 / most as f64).sqrt().ceil() as usize).max(1);
+    let used = used(channels, channel);
+    let value = |i: usize| match &picture.samples {
+        Samples::Eight(values) => f32::from(values[i]),
+        Samples::Sixteen(values) => f32::from(values[i]),
+        Samples::Float(values) => values[i],
+    };
+    // From the middle of the steps, so that no border is preferred; small photos have no middle.
+    let along = |length: usize| (step / 2).min(length.saturating_sub(1));
+    (along(height)..height)
+        .step_by(step)
+        .flat_map(|y| {
+            (along(width)..width)
+                .step_by(step)
+                .map(move |x| y * width + x)
+        })
+        .filter(|&pixel| mask.is_none_or(|mask| mask[pixel] > 0))
+        .flat_map(|pixel| used.clone().map(move |c| pixel * channels + c))
+        .map(value)
+        .filter(|v| v.is_finite())
+        .collect()
+}
+
+/// What a value becomes.
+struct Tone {
+    low: f64,
+    high: f64,
+    linear: bool,
+}
+
+impl Tone {
+    fn of(depth: Depth, options: &LoadOptions) -> Self {
+        let [low, high] = match options.normalize {
+            Normalize::Range(range) => range,
+            Normalize::Auto | Normalize::Off => [0.0, depth.white()],
+        };
+        Self {
+            low,
+            high,
+            linear: match options.encoding {
+                Encoding::Auto => depth == Depth::Float,
+                Encoding::Srgb => false,
+                Encoding::Linear => true,
+            },
+        }
+    }
+
+    /// The encoded level. NaN is black.
+    fn level(&self, value: f64) -> u8 {
+        let share = ((value - self.low) / (self.high - self.low)).clamp(0.0, 1.0);
+        let encoded = if self.linear {
+            linear_to_srgb(share)
+        } else {
+            share
+        };
+        (255.0 * encoded).round() as u8
+    }
+
+    fn levels(&self, samples: Samples) -> Vec<u8> {
+        let table = |count: u32| {
+            (0..count)
+                .map(|v| self.level(v.into()))
+                .collect::<Vec<u8>>()
+        };
+        match samples {
+            Samples::Eight(mut values) => {
+                let table = table(1 << 8);
+                values.iter_mut().for_each(|v| *v = table[usize::from(*v)]);
+                values
+            }
+            Samples::Sixteen(values) => {
+                let table = table(1 << 16);
+                values.iter().map(|&v| table[usize::from(v)]).collect()
+            }
+            Samples::Float(values) => values.iter().map(|&v| self.level(v.into())).collect(),
+        }
+    }
+}

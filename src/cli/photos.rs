@@ -1,0 +1,55 @@
+//! Options about photos, of every command that reads a capture anew.
+
+use clap::Args;
+
+use crate::capture::{Channel, Encoding, LoadOptions, MaskSource, MaskUse, Normalize};
+
+/// How photos are loaded.
+#[derive(Args)]
+pub(super) struct Photos {
+    /// Scale photos down until their longer side has this many pixels.
+    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(16..))]
+    max_side: Option<u32>,
+    /// Train on all views; by default every 8th is held out to measure with.
+    #[arg(long)]
+    no_holdout: bool,
+    /// What of a colour photo becomes gray: an infra-red camera may have its signal in one channel.
+    #[arg(long, value_enum, default_value_t = Channel::Luma)]
+    channel: Channel,
+    /// What the files' values are; auto: linear light in floats, sRGB in all others.
+    #[arg(long, value_enum, default_value_t = Encoding::Auto)]
+    encoding: Encoding,
+    /// Which of the files' values become black and white, of all photos alike; auto: of more than
+    /// 8 bits, where the range is not used, the 0.5th and 99.5th percentile of all photos.
+    #[arg(
+        long,
+        value_name = "auto|off|LOW,HIGH",
+        default_value = "auto",
+        allow_hyphen_values = true
+    )]
+    normalize: Normalize,
+    /// Folder of masks, b.jpg.png or b.png for the photo b.jpg, black where nothing counts
+    /// [default: masks/ beside images/, if it is there].
+    #[arg(long, value_name = "DIR|off")]
+    masks: Option<String>,
+    /// What is where a mask is black: anything, or nothing.
+    #[arg(long, value_enum, default_value_t = MaskUse::Ignore)]
+    masked: MaskUse,
+}
+
+impl Photos {
+    pub(super) fn options(self) -> LoadOptions {
+        LoadOptions {
+            max_side: self.max_side,
+            holdout: !self.no_holdout,
+            channel: self.channel,
+            encoding: self.encoding,
+            normalize: self.normalize,
+            masks: self
+                .masks
+                .map_or_else(MaskSource::default, MaskSource::from),
+            masked: self.masked,
+            ..LoadOptions::default()
+        }
+    }
+}
