@@ -61,6 +61,11 @@ fn main() {
         let suffix: String = features.iter().map(|effect| format!("_{effect}")).collect();
         compile(&out, "luma_loss", &suffix, &features);
     }
+    // Antialiasing is in the projection only where a scene calls for it.
+    let mip = ["luma", "geometry", "mip", "step"];
+    compile(&out, "project", "_mip", &mip[2..3]);
+    compile(&out, "project_backward", "_mip", &mip[..3]);
+    compile(&out, "project_backward", "_mip_step", &mip);
     // The solver sums over the views, and needs the loss's curvature.
     compile(&out, "shade_backward", "_chroma_add", &["chroma", "add"]);
     compile(&out, "chroma_loss", "_curvature", &["curvature"]);
@@ -80,6 +85,7 @@ fn compile(out: &str, kernel: &str, suffix: &str, features: &[&str]) {
         "exposed",
         "masked",
         "robust",
+        "mip",
     ] {
         compiler.set_feature(feature, features.contains(&feature));
     }

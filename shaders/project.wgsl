@@ -1,9 +1,13 @@
 // Means, quaternions, log-scales and opacity logits to centres, conics and
 // opacities on the image plane. One thread a Gaussian.
 //
+// With `mip` opacities are what they show, not what is stored: the blur spreads a
+// Gaussian, and its opacity falls by as much (docs/architecture.md).
+//
 // Culling tests are written so that NaN fails them.
 import package::common::constants::{ALPHA_MIN, INVISIBLE, PLANE_LOG_SCALE, PLANE_MEAN, PLANE_OPACITY, PLANE_QUAT, QUAT_NORM_MIN_SQ, STATUS_POISONED};
 import package::common::geometry::{Footprint, determinant_of, footprint};
+@if(mip) import package::common::geometry::compensation;
 import package::common::numeric::{all_finite3, all_finite4, is_finite, linear_group, sigmoid};
 import package::common::projected::{Projected, power_cutoff};
 import package::common::view::View;
@@ -40,15 +44,19 @@ fn project(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups:
         atomicAdd(&status[STATUS_POISONED], 1u);
         return;
     }
-    let opacity = sigmoid(logit);
     let f = footprint(view, mean, quat * inverseSqrt(norm_sq), scale);
-    if !(f.camera.z > view.center_near.w) || !(opacity >= ALPHA_MIN) {
+    if !(f.camera.z > view.center_near.w) {
         return;
     }
     let determinant = determinant_of(f);
     let conic = vec3f(f.covariance.z, -f.covariance.y, f.covariance.x) / determinant;
     // Overflow of a huge Gaussian ends here: an infinite determinant gives no conic.
     if !(determinant > 0.0 && is_finite(determinant) && all_finite3(conic) && conic.x > 0.0 && conic.z > 0.0) {
+        return;
+    }
+    @if(!mip) let opacity = sigmoid(logit);
+    @if(mip) let opacity = sigmoid(logit) * compensation(f, determinant);
+    if !(opacity >= ALPHA_MIN) {
         return;
     }
     let center = view.intrinsics.xy * f.camera.xy / f.camera.z + view.intrinsics.zw;

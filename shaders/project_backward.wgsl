@@ -7,7 +7,8 @@ import package::common::constants::{INVISIBLE, PLANE_LOG_SCALE, PLANE_MEAN, PLAN
 @if(step) import package::common::constants::STATUS_REFUSED;
 import package::common::geometry::footprint;
 import package::common::numeric::linear_group;
-@if(step) import package::common::numeric::{is_within, sigmoid};
+@if(step) import package::common::numeric::is_within;
+@if(step || mip) import package::common::numeric::sigmoid;
 import package::common::partials::{PARTIAL_PULL, PARTIAL_STRIDE};
 import package::common::projected::Projected;
 import package::common::rotation::{quat_gradient, rotation_from_quat};
@@ -115,13 +116,24 @@ fn project_backward(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups
     let q = projected[i].conic_opacity;
     let conic = mat2x2f(q.x, q.y, q.y, q.z);
     let v_q = mat2x2f(v_conic.x, 0.5 * v_conic.y, 0.5 * v_conic.y, v_conic.z);
-    let v_covariance = conic * v_q * conic;
+    @if(!mip) let v_covariance = conic * v_q * conic;
+    // The opacity shown is the one stored times |ρx × ρy| / √det Σ, and -½ d log det Σ
+    // is -½ tr(Q dΣ).
+    @if(mip) let v_log_opacity = v_opacity * q.w;
+    @if(mip) let v_covariance = conic * v_q * conic + (0.5 * v_log_opacity) * conic;
     let v_xx = -v_covariance[0].x;
     let v_xy = -2.0 * v_covariance[0].y;
     let v_yy = -v_covariance[1].y;
 
-    let v_row_x = 2.0 * v_xx * f.row_x + v_xy * f.row_y;
-    let v_row_y = 2.0 * v_yy * f.row_y + v_xy * f.row_x;
+    var v_row_x = 2.0 * v_xx * f.row_x + v_xy * f.row_y;
+    var v_row_y = 2.0 * v_yy * f.row_y + v_xy * f.row_x;
+    // d log|n| = n·dn / |n|², n = ρx × ρy. What is shown has |n| ≥ ALPHA_MIN √det Σ.
+    @if(mip) {
+        let normal = cross(f.row_x, f.row_y);
+        let share = v_log_opacity / dot(normal, normal);
+        v_row_x += share * cross(f.row_y, normal);
+        v_row_y += share * cross(normal, f.row_x);
+    }
 
     // row_x = fx/z (r0 - slope.x r2), row_y alike; r are the rows of W·axes.
     let inverse_z = 1.0 / f.camera.z;
@@ -158,7 +170,9 @@ fn project_backward(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups
     for (var k = 0u; k < 4u; k++) {
         store(PLANE_QUAT + k, i, v_quat[k]);
     }
-    store(PLANE_OPACITY, i, v_opacity * q.w * (1.0 - q.w) + pull_on_opacity);
+    @if(!mip) let stored_opacity = q.w;
+    @if(mip) let stored_opacity = sigmoid(plane(PLANE_OPACITY, i));
+    store(PLANE_OPACITY, i, v_opacity * q.w * (1.0 - stored_opacity) + pull_on_opacity);
 
     if overflow {
         return;

@@ -51,3 +51,9 @@ fn determinant_of(f: Footprint) -> f32 {
     let normal = cross(f.row_x, f.row_y);
     return dot(normal, normal) + BLUR * (f.covariance.x + f.covariance.z - BLUR);
 }
+
+// What the blur must take from the opacity for a Gaussian to show as much as without it:
+// √(det Gram / det(Gram + BLUR·I)) (Mip-Splatting, Yu et al. 2024, equation 9), below 1.
+@if(mip) fn compensation(f: Footprint, determinant: f32) -> f32 {
+    return length(cross(f.row_x, f.row_y)) / sqrt(determinant);
+}

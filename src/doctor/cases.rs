@@ -158,6 +158,15 @@ fn seen_through(change: impl FnOnce(&mut View)) -> Hard {
     sound((random_scene_before(&view, 5, COUNT, 1), view))
 }
 
+/// The same, antialiased.
+fn antialiased(hard: Hard) -> Hard {
+    let view = View {
+        antialiased: true,
+        ..hard.view
+    };
+    Hard { view, ..hard }
+}
+
 macro_rules! cases {
     ($($name:literal, $trouble:literal, $make:expr, [$forward:literal, $gradient:literal];)*) => {
         &[$(Case { name: $name, trouble: $trouble, make: || $make, seen: [$forward, $gradient] }),*]
@@ -286,6 +295,20 @@ pub const CASES: &[Case] = cases! {
         scaled(1e4), [4.53e-7, 2.41e-6];
     "telephoto", "long focal lengths multiply rounding",
         seen_through(|v| (v.fx, v.fy) = (5000.0, 5000.0)), [3.44e-5, 4.37e-5];
+    "antialiased", "the measure of the next ones",
+        antialiased(sound(random_scene(1, COUNT, 3))), [5.60e-7, 8.90e-7];
+    "antialiased needle", "the root of a determinant next to zero",
+        antialiased(with(|s, _| s.log_scales[ODD] = [-0.5, -6.0, -6.0])), [5.45e-7, 3.15e-5];
+    "antialiased disc seen edge-on", "a projected area of zero: 0/0 in the root's adjoint",
+        antialiased({ let view = straight_view(48, 40); let mut s = random_scene_before(&view, 29, COUNT, 1);
+          s.means[ODD] = [0.0, 0.0, 4.0]; s.quats[ODD] = [1.0, 0.0, 0.0, 0.0]; s.log_scales[ODD] = [-1.5, -120.0, -1.5];
+          Hard { broken: vec![ODD], ..sound((s, view)) } }), [2.45e-7, 6.35e-7];
+    "antialiased, a tenth of a pixel", "1/c where c² is left of the opacity",
+        antialiased(with(|s, _| { s.log_scales[ODD] = [-5.3; 3]; s.opacity_logits[ODD] = 6.0; })), [4.35e-7, 2.95e-6];
+    "antialiased, variances underflow", "1/0 in the root's adjoint",
+        antialiased(broken(0, |s| s.log_scales[ODD] = [-50.0; 3])), [4.35e-7, 2.95e-6];
+    "antialiased, determinant overflows", "infinity by infinity",
+        antialiased(broken(0, |s| s.log_scales[ODD] = [35.0; 3])), [4.35e-7, 2.95e-6];
     "very wide lens", "slopes of the rays near the clamp",
         seen_through(|v| (v.fx, v.fy) = (9.0, 9.0)), [8.34e-7, 1.52e-6];
 };

@@ -9,8 +9,8 @@ use crate::{
     gpu::{Buffer, GpuError, Recorder},
     oracle::scene::{Scene, View},
     raster::{
-        Field, Geometry, Layer, LayerAdjoint, Lists, Outcome, Projected, Raster, Status,
-        ViewUniform, constants::*,
+        Field, Geometry, Layer, LayerAdjoint, Lists, Outcome, Projected, Raster, RasterOptions,
+        Status, ViewUniform, constants::*,
     },
     splats::{ShField, Splats},
 };
@@ -71,7 +71,7 @@ impl Stage {
         Self::with_capacity(raster, splats, view, splats.len() * columns * rows)
     }
 
-    /// A stage with room for so many tile-list entries.
+    /// A stage with room for so many tile-list entries, antialiased if the view is.
     ///
     /// # Errors
     /// [`GpuError::TooLarge`].
@@ -81,20 +81,23 @@ impl Stage {
         view: &View,
         capacity: usize,
     ) -> Result<Self, GpuError> {
+        let raster = raster.drawing(RasterOptions {
+            antialiased: view.antialiased,
+        });
         let (gpu, near) = (&raster.gpu, view.near);
         let degree = splats.sh.degree;
         let view = ViewUniform::new(&camera(view), near, splats.len(), degree);
         let (pixels, tiles) = (view.pixel_count(), view.tile_count());
         let geometry = Geometry::upload(gpu, splats)?;
         let field = Field::upload(gpu, &splats.sh)?;
-        let lists = Lists::new(raster, &geometry, tiles, capacity)?;
-        let layer = Layer::new(raster, &geometry, &lists, &field, pixels, tiles)?;
+        let lists = Lists::new(&raster, &geometry, tiles, capacity)?;
+        let layer = Layer::new(&raster, &geometry, &lists, &field, pixels, tiles)?;
         let trained = field.kind.channels() < 3;
         let adjoint = trained
             .then(|| {
                 let gradient = Buffer::zeros(gpu, "field gradient", field.planes.len())?;
                 let outcome = Outcome::Gradient(&gradient);
-                LayerAdjoint::new(raster, &geometry, &lists, &field, &layer, &outcome)
+                LayerAdjoint::new(&raster, &geometry, &lists, &field, &layer, &outcome)
                     .map(|adjoint| (adjoint, gradient))
             })
             .transpose()?;
@@ -102,7 +105,7 @@ impl Stage {
             view,
             lists,
             layer,
-            raster: raster.clone(),
+            raster,
             count: splats.len(),
             adjoint,
         })

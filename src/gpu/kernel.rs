@@ -15,7 +15,8 @@ pub fn groups_for(elements: usize) -> u32 {
     u32::try_from(elements.div_ceil(LINEAR_WORKGROUP as usize)).unwrap_or(u32::MAX)
 }
 
-/// One compiled entry point.
+/// One compiled entry point; clones share it.
+#[derive(Clone)]
 pub struct Kernel {
     pipeline: wgpu::ComputePipeline,
     layout: wgpu::BindGroupLayout,

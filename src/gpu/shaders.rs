@@ -44,6 +44,12 @@ shaders! {
     PROJECT_BACKWARD = "project_backward";
     /// Adjoint of the projection, with Adam's step.
     PROJECT_BACKWARD_STEP = "project_backward_step";
+    /// Projection, antialiased.
+    PROJECT_MIP = "project_mip";
+    /// Adjoint of the projection, antialiased.
+    PROJECT_BACKWARD_MIP = "project_backward_mip";
+    /// Adjoint of the projection, antialiased, with Adam's step.
+    PROJECT_BACKWARD_MIP_STEP = "project_backward_mip_step";
     /// What densification by relocation adds to a step.
     RELOCATION = "relocation";
     /// Prefix sum.

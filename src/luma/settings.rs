@@ -1,5 +1,7 @@
 //! What stage 1 can be told, with the 3DGS values (Kerbl et al. 2023) as default.
 
+use crate::raster::RasterOptions;
+
 /// Learning rates of Adam.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LearningRates {
@@ -157,6 +159,9 @@ pub struct LumaSettings {
     pub robust: Option<f64>,
     /// Bytes that the training may take on the device; no limit when `None`.
     pub memory_limit: Option<u64>,
+    /// Whether opacities fall by what the blur of the projection spreads
+    /// ([`RasterOptions::antialiased`]); the scene must then be drawn the same way.
+    pub antialiased: bool,
 }
 
 impl LumaSettings {
@@ -176,6 +181,7 @@ impl LumaSettings {
             prune_opacity: 0.005,
             robust: None,
             memory_limit: None,
+            antialiased: false,
         }
     }
 
@@ -190,6 +196,13 @@ impl LumaSettings {
             self.schedule.densify_every = (self.schedule.iterations / 20).clamp(25, 100);
         }
         self
+    }
+
+    /// How the scene is drawn.
+    pub fn raster_options(&self) -> RasterOptions {
+        RasterOptions {
+            antialiased: self.antialiased,
+        }
     }
 
     /// Learning rate of the means at `iteration`, in world units.

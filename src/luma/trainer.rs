@@ -107,6 +107,7 @@ impl LumaTrainer {
         views: Vec<TrainingView>,
     ) -> Result<Self, GpuError> {
         assert!(!views.is_empty(), "training needs a view");
+        let raster = raster.drawing(settings.raster_options());
         let gpu = raster.gpu.clone();
         let effects = LossEffects {
             exposed: views.iter().any(|view| view.exposure != Exposure::NONE),

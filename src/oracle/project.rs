@@ -1,7 +1,8 @@
 //! Projection of one Gaussian: mean, screen covariance, conic, opacity.
 //!
 //! EWA splatting (Zwicker et al. 2001) as 3D Gaussian splatting uses it
-//! (Kerbl et al. 2023), with the guards of `docs/hard-cases.md`.
+//! (Kerbl et al. 2023), with the guards of `docs/hard-cases.md`; antialiased as in
+//! Mip-Splatting (Yu et al. 2024).
 
 use super::Number;
 use super::constants::{ALPHA_MIN, BLUR, FRUSTUM_MARGIN, QUAT_NORM_MIN_SQ};
@@ -17,7 +18,8 @@ pub struct Projected<T> {
     pub cov2d: [T; 3],
     /// Inverse of the covariance, `xx, xy, yy`.
     pub conic: [T; 3],
-    /// Opacity at the centre, in [`ALPHA_MIN`], 1.
+    /// Opacity at the centre, in [`ALPHA_MIN`], 1; antialiased, the one stored times what
+    /// the blur leaves of it.
     pub opacity: T,
     /// z in camera space; what splats are sorted by.
     pub depth: T,
@@ -140,7 +142,13 @@ pub fn project<T: Number>(
     }
     let conic = [yy / determinant, -xy / determinant, xx / determinant];
 
-    let opacity = ((-opacity_logit).exp() + 1.0).recip();
+    let mut opacity = ((-opacity_logit).exp() + 1.0).recip();
+    if view.antialiased {
+        // √(det A·Aᵀ / det (A·Aᵀ + blur)): what it shows in all stays what it was.
+        let [[a, b, c], [d, e, f]] = footprint;
+        let normal = [b * f - c * e, c * d - a * f, a * e - b * d];
+        opacity *= (dot(&normal, &normal) / determinant).sqrt();
+    }
     let reaches_a_pixel = opacity.re() >= ALPHA_MIN;
     if !reaches_a_pixel {
         return Err(Cull::Opacity);

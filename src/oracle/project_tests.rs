@@ -19,6 +19,7 @@ fn view() -> View {
         width: 48,
         height: 40,
         near: 0.2,
+        antialiased: false,
     }
 }
 

@@ -56,6 +56,7 @@ pub fn oblique_view() -> View {
         width: 48,
         height: 40,
         near: round(0.1),
+        antialiased: false,
     }
 }
 
@@ -96,6 +97,7 @@ pub fn random_view(seed: u64) -> View {
         width,
         height,
         near: round(0.1),
+        antialiased: false,
     }
 }
 

@@ -109,6 +109,7 @@ mod tests {
             width: 48,
             height: 40,
             near: 0.1,
+            antialiased: false,
         }
     }
 

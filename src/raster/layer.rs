@@ -9,6 +9,7 @@ use super::{
 };
 use crate::gpu::{Bindings, Buffer, Gpu, GpuError, Kernel, Recorder, groups_for, shaders};
 
+#[derive(Clone)]
 pub(super) struct LayerKernels {
     shade: Kernel,
     blend: Kernel,
@@ -28,6 +29,7 @@ impl LayerKernels {
     }
 }
 
+#[derive(Clone)]
 pub(super) struct AdjointKernels {
     blend: Kernel,
     sum: Kernel,
@@ -430,13 +432,13 @@ impl LayerAdjoint {
                     .collect();
                 let project = match outcome {
                     Outcome::Gradient(_) | Outcome::Sum(_) => {
-                        raster.project_backward.bind_at(gpu, &bindings)
+                        raster.projection.backward.bind_at(gpu, &bindings)
                     }
                     Outcome::Step { geometry, .. } => {
                         bindings.retain(|&(binding, _)| binding != 5);
                         bindings.extend([(9, geometry.parameters)]);
                         bindings.extend([(10, geometry.first.raw()), (11, geometry.second.raw())]);
-                        raster.project_step.bind_at(gpu, &bindings)
+                        raster.projection.step.bind_at(gpu, &bindings)
                     }
                 };
                 Ok(GeometryAdjoint {
@@ -469,8 +471,8 @@ impl LayerAdjoint {
         recorder.dispatch(shade, &self.shade, groups);
         if let Some(geometry) = &self.geometry {
             let project = match self.ending {
-                Ending::Steps => &raster.project_step,
-                Ending::Replaces | Ending::Adds => &raster.project_backward,
+                Ending::Steps => &raster.projection.step,
+                Ending::Replaces | Ending::Adds => &raster.projection.backward,
             };
             recorder.dispatch(project, &geometry.project, groups);
         }

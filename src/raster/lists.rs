@@ -73,8 +73,8 @@ impl StatusReadback {
     }
 }
 
+#[derive(Clone)]
 pub(super) struct ListKernels {
-    project: Kernel,
     compact: Kernel,
     tile_lists: Kernel,
     tile_ranges: Kernel,
@@ -83,7 +83,6 @@ pub(super) struct ListKernels {
 impl ListKernels {
     pub(super) fn new(gpu: &Gpu) -> Self {
         Self {
-            project: Kernel::new(gpu, "project", shaders::PROJECT),
             compact: Kernel::new(gpu, "compact", shaders::COMPACT),
             tile_lists: Kernel::new(gpu, "tile_lists", shaders::TILE_LISTS),
             tile_ranges: Kernel::new(gpu, "tile_ranges", shaders::TILE_RANGES),
@@ -181,7 +180,7 @@ impl Lists {
             capacity,
         )?;
         let kernels = &raster.lists;
-        let project = kernels.project.bind(
+        let project = raster.projection.project.bind(
             gpu,
             &[
                 view.raw(),
@@ -288,7 +287,7 @@ impl Lists {
     pub fn record(&self, raster: &Raster, recorder: &mut Recorder) {
         let kernels = &raster.lists;
         let groups = groups_for(self.count);
-        recorder.dispatch(&kernels.project, &self.project, groups);
+        recorder.dispatch(&raster.projection.project, &self.project, groups);
         self.scan_visible.record(&raster.scan, recorder);
         recorder.dispatch(&kernels.compact, &self.compact, groups);
         self.by_depth.record(&raster.sort, &raster.scan, recorder);

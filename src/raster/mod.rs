@@ -22,6 +22,8 @@ pub use renderer::{Picture, Renderer};
 pub use splats::{Field, Geometry, download};
 pub use view::ViewUniform;
 
+use std::sync::Arc;
+
 use crate::gpu::{Gpu, Kernel, shaders};
 use layer::{AdjointKernels, LayerKernels};
 use lists::ListKernels;
@@ -72,25 +74,73 @@ impl ColorKind {
     }
 }
 
+/// Effects of image formation that the rasterizer is compiled with. What is off is not in
+/// the kernels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RasterOptions {
+    /// A Gaussian's opacity falls by what the blur of
+    /// [`BLUR`](constants::BLUR) px² spreads it (Mip-Splatting, Yu et al. 2024): its size
+    /// in pixels does not change how much it shows.
+    pub antialiased: bool,
+}
+
 /// The compiled kernels of the rasterizer.
+#[derive(Clone)]
 pub struct Raster {
     /// The device they run on.
     pub gpu: Gpu,
+    options: RasterOptions,
     scan: ScanKernels,
     sort: SortKernels,
     lists: ListKernels,
     layers: [LayerKernels; 3],
     adjoints: [AdjointKernels; 2],
-    project_backward: Kernel,
+    projection: ProjectionKernels,
     shade_step: Kernel,
-    project_step: Kernel,
+}
+
+/// The kernels that the options make a difference to.
+#[derive(Clone)]
+struct ProjectionKernels {
+    project: Kernel,
+    backward: Kernel,
+    step: Kernel,
+}
+
+impl ProjectionKernels {
+    fn new(gpu: &Gpu, options: RasterOptions) -> Self {
+        let [project, backward, step] = if options.antialiased {
+            [
+                shaders::PROJECT_MIP,
+                shaders::PROJECT_BACKWARD_MIP,
+                shaders::PROJECT_BACKWARD_MIP_STEP,
+            ]
+        } else {
+            [
+                shaders::PROJECT,
+                shaders::PROJECT_BACKWARD,
+                shaders::PROJECT_BACKWARD_STEP,
+            ]
+        };
+        Self {
+            project: Kernel::new(gpu, "project", project),
+            backward: Kernel::new(gpu, "project_backward", backward),
+            step: Kernel::new(gpu, "project_backward", step),
+        }
+    }
 }
 
 impl Raster {
-    /// Compiles all kernels.
+    /// Compiles all kernels, without any effect.
     pub fn new(gpu: &Gpu) -> Self {
+        Self::with(gpu, RasterOptions::default())
+    }
+
+    /// Compiles all kernels with these effects.
+    pub fn with(gpu: &Gpu, options: RasterOptions) -> Self {
         Self {
             gpu: gpu.clone(),
+            options,
             scan: ScanKernels::new(gpu),
             sort: SortKernels::new(gpu),
             lists: ListKernels::new(gpu),
@@ -98,10 +148,27 @@ impl Raster {
                 .map(|kind| LayerKernels::new(gpu, kind)),
             adjoints: [ColorKind::Luma, ColorKind::Chroma]
                 .map(|kind| AdjointKernels::new(gpu, kind)),
-            project_backward: Kernel::new(gpu, "project_backward", shaders::PROJECT_BACKWARD),
+            projection: ProjectionKernels::new(gpu, options),
             shade_step: Kernel::new(gpu, "shade_backward", shaders::SHADE_BACKWARD_STEP),
-            project_step: Kernel::new(gpu, "project_backward", shaders::PROJECT_BACKWARD_STEP),
         }
+    }
+
+    /// The rasterizer with these effects: this one where they are its own, else one that
+    /// shares the kernels that they do not concern.
+    pub fn drawing(self: &Arc<Self>, options: RasterOptions) -> Arc<Self> {
+        if self.options == options {
+            return self.clone();
+        }
+        Arc::new(Self {
+            options,
+            projection: ProjectionKernels::new(&self.gpu, options),
+            ..Self::clone(self)
+        })
+    }
+
+    /// The effects it was compiled with.
+    pub fn options(&self) -> RasterOptions {
+        self.options
     }
 
     /// The kernels of the prefix sum.

@@ -20,6 +20,7 @@ pub struct ScanParameters {
 }
 
 /// The three entry points.
+#[derive(Clone)]
 pub struct ScanKernels {
     reduce: Kernel,
     sums: Kernel,

@@ -24,6 +24,7 @@ pub struct SortParameters {
 }
 
 /// The two entry points.
+#[derive(Clone)]
 pub struct SortKernels {
     count: Kernel,
     scatter: Kernel,

@@ -21,7 +21,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::capture::Exposure;
+use crate::{capture::Exposure, raster::RasterOptions};
 
 /// Version of the report's layout; raised when a key changes its meaning.
 pub const REPORT_VERSION: u32 = 1;
@@ -96,6 +96,9 @@ pub struct LumaReport {
     pub sh_degree: u32,
     /// Cap on Gaussians.
     pub max_splats: usize,
+    /// Whether opacities fall by what the blur of the projection spreads.
+    #[serde(default)]
+    pub antialiased: bool,
     /// Gaussians at the end.
     pub splats: usize,
     /// Gaussians that the last views culled for values that are not finite.
@@ -287,6 +290,15 @@ pub struct ColorView {
     /// Its quality.
     #[serde(flatten)]
     pub quality: ColorQuality,
+}
+
+impl LumaReport {
+    /// How the scene is drawn.
+    pub fn raster_options(&self) -> RasterOptions {
+        RasterOptions {
+            antialiased: self.antialiased,
+        }
+    }
 }
 
 impl Report {

@@ -81,11 +81,14 @@ pub fn colorize(
         Some(_) => glam::DVec3::ZERO,
         None => scene.capture.offset,
     };
-    let luma = read_splats(&source.splats, offset, observe)?.to_luma();
+    let (luma, drawn) = read_splats(&source.splats, offset, observe)?;
+    let luma = luma.to_luma();
     if source.report.is_none() {
         report.capture = capture_report(&colmap_dir, &scene, max_side, holdout);
         (report.luma.splats, report.luma.sh_degree) = (luma.len(), luma.sh.degree);
+        report.luma.antialiased = drawn.antialiased;
     }
+    let drawn = report.luma.raster_options();
     let preset = source.preset(&report, &gpu);
     let iterations = adam_iterations(options, preset, report.luma.iterations)?;
     let output = Output {
@@ -102,7 +105,7 @@ pub fn colorize(
     let seconds_teacher = begun.elapsed().as_secs_f64();
 
     let begun = Instant::now();
-    let raster = Arc::new(Raster::new(&gpu));
+    let raster = Arc::new(Raster::with(&gpu, drawn));
     let views: Vec<ChromaView> = scene
         .split
         .train
@@ -203,7 +206,7 @@ pub fn colorize(
         views: measured.views,
         timings,
     });
-    ply::write_ply(&output.ply, &baked, offset, &comments())?;
+    ply::write_ply(&output.ply, &baked, offset, &comments(drawn))?;
     if let Some(folder) = &source.folder {
         if output.ply == folder.color() {
             folder.write_chroma(&chroma)?;
@@ -308,6 +311,7 @@ impl Source {
                 iterations: 0,
                 sh_degree: 0,
                 max_splats: 0,
+                antialiased: false,
                 splats: 0,
                 poisoned: 0,
                 refused: 0,

@@ -18,7 +18,7 @@ use crate::{
     gpu::{Gpu, GpuError},
     luma::{Demand, Densification, LumaSettings, LumaTrainer, TrainingView},
     measure,
-    raster::Raster,
+    raster::{Raster, RasterOptions},
     report::{
         CaptureReport, DeviceReport, EffectReport, LumaQuality, LumaReport, LumaSeconds, LumaView,
         REPORT_VERSION, Report, kernel_reports,
@@ -119,7 +119,7 @@ pub fn fit(
         None => RunFolder::for_capture(&options.colmap_dir),
     };
     files::make_folder(folder.path())?;
-    let raster = Arc::new(Raster::new(&gpu));
+    let raster = Arc::new(Raster::with(&gpu, settings.raster_options()));
     let load = begun.elapsed().as_secs_f64();
 
     let begun = Instant::now();
@@ -186,6 +186,7 @@ pub fn fit(
             iterations: settings.schedule.iterations,
             sh_degree: settings.sh_degree,
             max_splats: settings.max_splats,
+            antialiased: settings.antialiased,
             splats: splats.len(),
             poisoned: last.map_or(0, |progress| progress.poisoned),
             refused: last.map_or(0, |progress| progress.refused),
@@ -212,7 +213,8 @@ pub fn fit(
         files::remove(&stale)?;
     }
     folder.forget_evaluation()?;
-    ply::write_ply(&folder.luma(), &splats, glam::DVec3::ZERO, &comments())?;
+    let comments = comments(settings.raster_options());
+    ply::write_ply(&folder.luma(), &splats, glam::DVec3::ZERO, &comments)?;
     files::write(&folder.log(), log.as_bytes())?;
     folder.write_report(&report)?;
     Ok((folder, report))
@@ -224,9 +226,11 @@ pub(super) fn open_gpu(timed: bool) -> Result<Gpu, RunError> {
     Ok(if timed { gpu.timed()? } else { gpu })
 }
 
-/// Comments in the header of every splat file.
-pub(super) fn comments() -> Vec<String> {
-    vec![format!("gs-chroma {}", env!("CARGO_PKG_VERSION"))]
+/// Comments in the header of every splat file; one says how it wants to be drawn.
+pub(super) fn comments(options: RasterOptions) -> Vec<String> {
+    let program = format!("gs-chroma {}", env!("CARGO_PKG_VERSION"));
+    let mode = options.antialiased.then(|| ply::ANTIALIASED.to_owned());
+    std::iter::once(program).chain(mode).collect()
 }
 
 fn choose_preset(options: &FitOptions, gpu: &Gpu, observe: &mut Observer<'_>) -> Preset {
@@ -264,7 +268,20 @@ fn first_splats(
         truncate(&mut splats, settings.max_splats);
         return Ok(splats);
     };
-    let mut splats = read_splats(path, scene.capture.offset, observe)?.to_luma();
+    let (splats, options) = read_splats(path, scene.capture.offset, observe)?;
+    if options != settings.raster_options() {
+        let [is, is_not] = ["antialiased", "not antialiased"];
+        let (file, run) = if options.antialiased {
+            (is, is_not)
+        } else {
+            (is_not, is)
+        };
+        observe(Event::Note(format!(
+            "{} was trained {file}, this run is {run}: small Gaussians will have to adapt",
+            path.display()
+        )));
+    }
+    let mut splats = splats.to_luma();
     splats.sh = at_degree(&splats.sh, splats.means.len(), settings.sh_degree);
     truncate(&mut splats, settings.max_splats);
     Ok(splats)

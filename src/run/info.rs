@@ -54,6 +54,7 @@ fn splat_info(path: &Path) -> Result<Value, RunError> {
         "splats": splats.len(),
         "skipped": read.skipped,
         "sh_degree": splats.sh.degree,
+        "antialiased": read.antialiased,
         // Half an 8-bit step: what no viewer shows as a colour.
         "gray": splats.is_gray(0.5 / 255.0),
         "lowest": bound(f32::min, f32::INFINITY),
@@ -84,7 +85,7 @@ pub fn export(run: Option<&Path>, output: &Path, luma: bool) -> Result<usize, Ru
         output,
         &splats,
         DVec3::from(report.capture.offset),
-        &comments(),
+        &comments(report.luma.raster_options()),
     )?;
     Ok(splats.len())
 }

@@ -54,20 +54,21 @@ pub fn render(options: &RenderOptions, observe: &mut Observer<'_>) -> Result<usi
         path.extension()
             .is_some_and(|e| e.eq_ignore_ascii_case("ply"))
     };
-    let (file, colmap, max_side, holdout, moved) = match &options.run {
+    let (file, colmap, max_side, holdout, run) = match &options.run {
         Some(path) if is_file(path) => {
             let colmap = options
                 .colmap
                 .clone()
                 .ok_or_else(|| RunError::NoCameras(path.clone()))?;
-            (path.clone(), colmap, None, true, false)
+            (path.clone(), colmap, None, true, None)
         }
         run => {
             let folder = match run {
                 Some(path) => RunFolder::at(path),
                 None => RunFolder::newest()?,
             };
-            let capture = folder.read_report()?.capture;
+            let report = folder.read_report()?;
+            let (capture, drawn) = (report.capture, report.luma.raster_options());
             let colored = !options.luma && folder.color().exists();
             let file = if colored {
                 folder.color()
@@ -76,13 +77,13 @@ pub fn render(options: &RenderOptions, observe: &mut Observer<'_>) -> Result<usi
             };
             let noted = PathBuf::from(&capture.path);
             let colmap = options.colmap.clone().unwrap_or(noted);
-            (file, colmap, capture.max_side, capture.holdout, true)
+            (file, colmap, capture.max_side, capture.holdout, Some(drawn))
         }
     };
     let capture = Capture::load(&colmap)?;
     // A run's own files are moved already; others lie where COLMAP has the cameras.
-    let offset = if moved { DVec3::ZERO } else { capture.offset };
-    let splats = read_splats(&file, offset, observe)?;
+    let offset = run.map_or(capture.offset, |_| DVec3::ZERO);
+    let (splats, drawn) = read_splats(&file, offset, observe)?;
     let splats = if options.luma {
         splats.to_luma()
     } else {
@@ -100,7 +101,7 @@ pub fn render(options: &RenderOptions, observe: &mut Observer<'_>) -> Result<usi
     }
     files::make_folder(&options.output)?;
     let gpu = Gpu::open()?;
-    let raster = Arc::new(Raster::new(&gpu));
+    let raster = Arc::new(Raster::with(&gpu, run.unwrap_or(drawn)));
     let mut renderer = Renderer::new(
         raster,
         Geometry::upload(&gpu, &splats)?,

@@ -20,7 +20,7 @@ use crate::{
     capture::{Camera, Capture, CaptureError, Photo, Split, View, split},
     effects::{Overrules, Plan},
     gpu::GpuError,
-    raster::{Field, Geometry, Raster, Renderer, constants::NEAR_SHARE},
+    raster::{Field, Geometry, Raster, RasterOptions, Renderer, constants::NEAR_SHARE},
     splats::{ShField, Splats, ply},
 };
 
@@ -155,12 +155,12 @@ fn decode(
 }
 
 /// Reads a splat file that has at least one Gaussian and subtracts `offset`, in
-/// world units, from its centres.
+/// world units, from its centres; also gives how the file wants to be drawn.
 pub(super) fn read_splats(
     path: &Path,
     offset: DVec3,
     observe: &mut Observer<'_>,
-) -> Result<Splats, RunError> {
+) -> Result<(Splats, RasterOptions), RunError> {
     let read = ply::read_ply(path)?;
     if read.skipped > 0 {
         observe(Event::Note(format!(
@@ -178,7 +178,10 @@ pub(super) fn read_splats(
             .as_vec3()
             .to_array();
     }
-    Ok(splats)
+    let options = RasterOptions {
+        antialiased: read.antialiased,
+    };
+    Ok((splats, options))
 }
 
 /// Whether a pixel counts at least half.

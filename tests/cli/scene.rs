@@ -60,6 +60,7 @@ pub fn view(view: usize, offset: [f64; 3]) -> View {
         height: SIZE[1] as usize,
         // The program's: a hundredth of the extent, which no disc comes near.
         near: 0.02,
+        antialiased: false,
     }
 }
 

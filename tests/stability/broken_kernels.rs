@@ -64,6 +64,28 @@ fn a_jacobian_without_its_clamp_is_noticed() {
 }
 
 #[test]
+fn an_opacity_that_stays_is_noticed() {
+    let failing = failing(
+        "project",
+        "sigmoid(logit) * compensation(f, determinant)",
+        "sigmoid(logit)",
+    );
+    assert!(failing.contains(&"antialiased"), "{failing:?}");
+    assert!(!failing.contains(&"ordinary scene"), "{failing:?}");
+}
+
+#[test]
+fn a_compensation_without_its_gradient_is_noticed() {
+    let failing = failing(
+        "project_backward",
+        "v_row_x += share * cross(f.row_y, normal);",
+        "",
+    );
+    assert!(failing.contains(&"antialiased"), "{failing:?}");
+    assert!(!failing.contains(&"ordinary scene"), "{failing:?}");
+}
+
+#[test]
 fn an_untouched_kernel_is_not() {
     assert_eq!(failing("project", "no such line", ""), [""; 0]);
 }

@@ -40,6 +40,16 @@ const REASONS: &[(&str, &str, &str)] = &[
         "the kernel runs for images of at least one pixel",
     ),
     (
+        "compensation",
+        "length(cross(f.row_x, f.row_y)) / sqrt(determinant)",
+        "project culls determinants that are not positive and finite before it asks",
+    ),
+    (
+        "compensation",
+        "sqrt",
+        "project culls determinants that are not positive and finite before it asks",
+    ),
+    (
         "densify_geometry",
         "inverseSqrt",
         "only visible Gaussians are split; they passed QUAT_NORM_MIN_SQ",
@@ -152,6 +162,11 @@ const REASONS: &[(&str, &str, &str)] = &[
         "project_backward",
         "1.0 / f.camera.z",
         "visible Gaussians lie beyond the near plane",
+    ),
+    (
+        "project_backward",
+        "v_log_opacity / dot(normal, normal)",
+        "visible Gaussians show ALPHA_MIN, so the root of this is ALPHA_MIN √det Σ or more",
     ),
     (
         "project_backward",
@@ -358,6 +373,16 @@ fn every_operation_that_can_leave_the_numbers_has_a_reason() {
     let stale: Vec<_> = reasons.difference(&found).collect();
     assert!(stale.is_empty(), "a reason for nothing: {stale:#?}");
     assert!(REASONS.iter().all(|(_, _, reason)| reason.len() > 10));
+}
+
+/// An effect that is off leaves nothing in the kernels; one that is on is there.
+#[test]
+fn only_antialiased_kernels_know_of_the_compensation() {
+    let traces = ["compensation", "v_log_opacity"];
+    for (name, source) in shaders::ALL {
+        let found = traces.iter().any(|trace| source.contains(trace));
+        assert_eq!(found, name.contains("mip"), "{name}");
+    }
 }
 
 #[test]

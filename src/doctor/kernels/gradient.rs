@@ -104,41 +104,59 @@ fn added(raster: &Arc<Raster>, scenes: &[(Scene<f64, 2>, View)]) -> Result<Vec<S
 }
 
 /// Scenes of every degree before views of odd sizes, and opaque stacks.
-fn scenes<const C: usize>() -> Vec<(Scene<f64, C>, View)> {
+fn scenes<const C: usize>(antialiased: bool) -> Vec<(Scene<f64, C>, View)> {
     let loose = (20..26).map(|seed| {
-        let view = random_view(seed);
+        let view = View {
+            antialiased,
+            ..random_view(seed)
+        };
         let scene = random_scene_before(&view, seed, 60, seed as usize % 4);
         (scene, view)
     });
     loose
-        .chain((30..32).map(|seed| opaque_stack(seed, 40, 3)))
+        .chain((30..32).map(|seed| {
+            let (scene, view) = opaque_stack(seed, 40, 3);
+            let view = View {
+                antialiased,
+                ..view
+            };
+            (scene, view)
+        }))
         .collect()
 }
 
 pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
     let allowed = Allowance::of(&raster.gpu);
     let bounds_of = |l2, worst| allowed.gradient(l2, allowed.relative(worst, 1.0));
-    let bounds = [
-        bounds_of(3.16e-6, 1.52e-5),
-        bounds_of(4.34e-6, 5.29e-6),
-        bounds_of(1.44e-6, 2.69e-6),
-        bounds_of(2.02e-6, 8.40e-7),
-        bounds_of(1.97e-6, 1.98e-6),
-        bounds_of(4.03e-7, 5.6e-6),
-    ];
+    let bounds = |opacity| {
+        [
+            bounds_of(3.16e-6, 1.52e-5),
+            bounds_of(4.34e-6, 5.29e-6),
+            bounds_of(1.44e-6, 2.69e-6),
+            bounds_of(opacity, 8.40e-7),
+            bounds_of(1.97e-6, 1.98e-6),
+            bounds_of(4.03e-7, 5.6e-6),
+        ]
+    };
     let chroma = bounds_of(1.94e-6, 2.22e-6);
     let mut rows = Vec::new();
-    for ((name, samples), bounds) in measure::<1>(raster, &scenes())?.into_iter().zip(bounds) {
-        rows.push(Row::gradient("luma adjoint", name, bounds, &samples));
+    for (kernel, antialiased, opacity) in [
+        ("luma adjoint", false, 2.02e-6),
+        ("luma adjoint, antialiased", true, 3.21e-6),
+    ] {
+        let groups = measure::<1>(raster, &scenes(antialiased))?;
+        for ((name, samples), bounds) in groups.into_iter().zip(bounds(opacity)) {
+            rows.push(Row::gradient(kernel, name, bounds, &samples));
+        }
     }
-    for (name, samples) in measure::<2>(raster, &scenes())? {
+    for (name, samples) in measure::<2>(raster, &scenes(false))? {
         rows.push(Row::gradient("chroma adjoint", name, chroma, &samples));
     }
     rows.push(Row::elementwise(
         "chroma adjoint",
         "sh, added to what is there",
         allowed.relative(4.36e-8, 1.0),
-        &added(raster, &scenes())?,
+        &added(raster, &scenes(false))?,
     ));
     Ok(rows)
 }

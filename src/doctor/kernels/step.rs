@@ -15,8 +15,11 @@ use crate::{
         adam::{Moments, adam},
         random::{Random, random_scene_before, random_view},
         relocation::relocation_pull,
+        scene::View,
     },
-    raster::{Field, Geometry, Layer, LayerAdjoint, Lists, Outcome, Raster, constants::*},
+    raster::{
+        Field, Geometry, Layer, LayerAdjoint, Lists, Outcome, Raster, RasterOptions, constants::*,
+    },
     splats::Splats,
 };
 
@@ -97,10 +100,29 @@ fn pull(geometry: &[f32], at: usize, count: usize) -> f64 {
 }
 
 pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
+    let mut rows = measure(raster, ["project_backward", "shade_backward"])?;
+    let antialiased = raster.drawing(RasterOptions { antialiased: true });
+    let names = ["project_backward, antialiased", "shade_backward"];
+    // Shading is the same either way.
+    rows.extend(
+        measure(&antialiased, names)?
+            .into_iter()
+            .take(QUANTITIES.len()),
+    );
+    Ok(rows)
+}
+
+/// What a step leaves.
+const QUANTITIES: [&str; 3] = ["value after a step", "first moment", "second moment"];
+
+fn measure(raster: &Arc<Raster>, kernels: [&'static str; 2]) -> Result<Vec<Row>, GpuError> {
     let (gpu, allowed) = (&raster.gpu, Allowance::of(&raster.gpu));
     let mut samples: [[Vec<Sample>; 3]; 2] = Default::default();
     for seed in 40..43 {
-        let view = random_view(seed);
+        let view = View {
+            antialiased: raster.options().antialiased,
+            ..random_view(seed)
+        };
         let scene = random_scene_before::<1>(&view, seed, 300, seed as usize % 4);
         let splats = splats(&scene);
         let stage = Stage::new(raster, &splats, &view)?;
@@ -152,11 +174,9 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
         allowed.relative(6.0e-7, 1e-3),
         allowed.relative(5.4e-7, 1e-6),
     ];
-    let quantities = ["value after a step", "first moment", "second moment"];
-    let kernels = ["project_backward", "shade_backward"];
     let mut rows = Vec::new();
     for (kernel, samples) in kernels.into_iter().zip(&samples) {
-        for ((what, bound), samples) in quantities.into_iter().zip(bounds).zip(samples) {
+        for ((what, bound), samples) in QUANTITIES.into_iter().zip(bounds).zip(samples) {
             rows.push(Row::elementwise(kernel, what, bound, samples));
         }
     }

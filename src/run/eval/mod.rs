@@ -81,7 +81,8 @@ pub fn eval(
         )?),
         None => None,
     };
-    let raster = Arc::new(Raster::new(&open_gpu(false)?));
+    let drawn = subject.report.luma.raster_options();
+    let raster = Arc::new(Raster::with(&open_gpu(false)?, drawn));
     let splats = match &teacher {
         Some(teacher) if options.baselines => Some(teacher.rgb_splats(&raster, &subject, observe)?),
         _ => None,

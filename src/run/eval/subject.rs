@@ -42,8 +42,8 @@ impl Subject {
         }
         // A run's own files are moved already.
         let offset = glam::DVec3::ZERO;
-        let luma = read_splats(&folder.luma(), offset, observe)?.to_luma();
-        let exported = read_splats(&color, offset, observe)?;
+        let luma = read_splats(&folder.luma(), offset, observe)?.0.to_luma();
+        let exported = read_splats(&color, offset, observe)?.0;
         if exported.means != luma.means || exported.sh.channels != 3 {
             return Err(refused(color, "its Gaussians are not those of luma.ply"));
         }

@@ -77,6 +77,20 @@ pub(super) fn read_header(path: &Path, file: &mut impl BufRead) -> Result<Header
     Ok(header)
 }
 
+/// Whether the header's comments say that the Gaussians were trained antialiased, as
+/// Brush or Postshot write it; the last one counts.
+pub(super) fn is_antialiased(comments: &[String]) -> bool {
+    let modes = comments.iter().filter_map(|comment| {
+        let words: Vec<_> = comment.split_whitespace().collect();
+        match words[..] {
+            ["SplatRenderMode:", mode] => Some(mode == "mip"),
+            ["antialiased", flag] => Some(flag == "1"),
+            _ => None,
+        }
+    });
+    modes.last().unwrap_or(false)
+}
+
 impl VertexLayout {
     /// Finds the properties of a Gaussian among those of the vertex element.
     pub fn new(path: &Path, vertex: &ElementDef) -> Result<Self, PlyError> {

@@ -17,6 +17,10 @@ pub use write::write_ply;
 
 use super::sh::{MAX_DEGREE, coefficient_count};
 
+/// The comment that tells readers to draw with opacities that fall by what the blur
+/// spreads: Brush's, which splat-transform reads as well.
+pub const ANTIALIASED: &str = "SplatRenderMode: mip";
+
 /// Colour channels of a splat file.
 const CHANNELS: usize = 3;
 

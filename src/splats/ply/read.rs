@@ -1,6 +1,6 @@
 //! Reading splat files of any make.
 
-use super::header::{VertexLayout, byte_size, decode, read_header};
+use super::header::{VertexLayout, byte_size, decode, is_antialiased, read_header};
 use super::{CHANNELS, PlyError, sh_position};
 use crate::splats::{ShField, Splats, sh::coefficient_count};
 use ply_rs_bw::ply::{ElementDef, Encoding, PropertyType, ScalarType};
@@ -23,6 +23,9 @@ pub struct ReadSplats {
     /// Gaussians that were left out because a number was not finite or the
     /// quaternion zero. Viewers draw nothing sensible for those.
     pub skipped: usize,
+    /// Whether the header says that the Gaussians were trained antialiased
+    /// ([`ANTIALIASED`](super::ANTIALIASED), or Postshot's `antialiased 1`).
+    pub antialiased: bool,
 }
 
 /// Reads an uncompressed 3D Gaussian Splatting `.ply` file.
@@ -40,6 +43,7 @@ pub fn read_ply(path: &Path) -> Result<ReadSplats, PlyError> {
     let file_bytes = file.metadata().map_err(PlyError::io(path))?.len();
     let mut file = BufReader::with_capacity(CHUNK_BYTES, file);
     let header = read_header(path, &mut file)?;
+    let antialiased = is_antialiased(&header.comments);
     let mut body = Body {
         path,
         encoding: header.encoding,
@@ -63,7 +67,11 @@ pub fn read_ply(path: &Path) -> Result<ReadSplats, PlyError> {
         if element.count as u128 * min_row_bytes as u128 > u128::from(file_bytes) + 1 {
             return Err(body.truncated(element));
         }
-        return body.read_vertices(element, &layout);
+        let read = body.read_vertices(element, &layout)?;
+        return Ok(ReadSplats {
+            antialiased,
+            ..read
+        });
     }
     Err(PlyError::MissingProperty {
         path: path.to_path_buf(),
@@ -237,7 +245,10 @@ impl Collector {
             },
         };
         Self {
-            read: ReadSplats { splats, skipped: 0 },
+            read: ReadSplats {
+                splats,
+                ..ReadSplats::default()
+            },
             sh_positions,
         }
     }

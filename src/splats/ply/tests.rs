@@ -154,6 +154,23 @@ fn offset_is_added_before_rounding() {
 }
 
 #[test]
+fn the_header_says_how_to_draw() {
+    let (_folder, file) = folder_and_file();
+    let read = |comments: &[&str]| {
+        let comments: Vec<String> = comments.iter().map(|&c| c.to_owned()).collect();
+        write_ply(&file, &splats(0, 3), DVec3::ZERO, &comments).unwrap();
+        read_ply(&file).unwrap().antialiased
+    };
+    assert!(read(&["gs-chroma 1.0", ANTIALIASED]));
+    assert!(read(&["antialiased 1"]));
+    assert!(!read(&["gs-chroma 1.0", "antialiased, they say"]));
+    assert!(!read(&["SplatRenderMode: default"]));
+    // The last one counts.
+    assert!(!read(&[ANTIALIASED, "antialiased 0"]));
+    assert!(!read(&[]));
+}
+
+#[test]
 fn long_comments_do_not_make_a_long_header() {
     let (_folder, file) = folder_and_file();
     let comments = vec!["x".repeat(3000); 5];
