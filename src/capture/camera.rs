@@ -40,6 +40,18 @@ impl Camera {
         (z > 0.0).then(|| [self.fx * x / z + self.cx, self.fy * y / z + self.cy])
     }
 
+    /// The same; `None` outside the image as well.
+    pub fn pixel_of(&self, point: DVec3) -> Option<[f64; 2]> {
+        let inside = |at: f64, side: u32| at >= 0.0 && at < f64::from(side);
+        self.project(point)
+            .filter(|&[u, v]| inside(u, self.width) && inside(v, self.height))
+    }
+
+    /// Depth of a world point: its z in camera space, in world units.
+    pub fn depth(&self, point: DVec3) -> f64 {
+        (self.rotation * point + self.translation).z
+    }
+
     /// The same view at another image size; intrinsics scale with each axis.
     pub fn resized(&self, width: u32, height: u32) -> Self {
         let (sx, sy) = (

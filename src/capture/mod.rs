@@ -241,7 +241,7 @@ impl Capture {
     }
 
     /// The mean of the camera centres.
-    fn center(&self) -> DVec3 {
+    pub fn center(&self) -> DVec3 {
         let sum: DVec3 = self.views.iter().map(|view| view.camera.center()).sum();
         sum / self.views.len().max(1) as f64
     }

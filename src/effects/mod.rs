@@ -3,14 +3,20 @@
 //! Each effect has a number that speaks for it, found in the capture or in a short
 //! probing training, and a threshold. What is off is in no kernel and no buffer.
 
+mod background;
 mod direction;
 mod exposure;
+#[cfg(test)]
+mod fixtures;
 mod outliers;
 mod plan;
+mod sampling;
 mod tracks;
 
+pub use background::Backdrop;
 pub use direction::left_out_errors;
 pub use exposure::{Exposures, find_exposures};
 pub use outliers::outlier_share;
 pub use plan::{Decider, Decision, Effect, Overrules, Plan};
+pub use sampling::sampling_spread;
 pub use tracks::{Sample, sample_tracks};

@@ -62,6 +62,8 @@ pub struct Evidence<'a> {
     pub statistics: &'a [f32],
     /// The scene's extent in world units.
     pub extent: f64,
+    /// The mean of the cameras' centres.
+    pub center: [f64; 3],
     /// Whether oversized Gaussians go as well.
     pub prune_large: bool,
 }
@@ -78,9 +80,17 @@ pub fn plan(settings: &LumaSettings, evidence: &Evidence<'_>) -> Vec<Descent> {
             .fold(0.0, f64::max)
     };
     let opacity = |i: usize| 1.0 / (1.0 + f64::from(-at(PLANE_OPACITY, i)).exp());
+    let reach = |i: usize| {
+        if !settings.background {
+            return evidence.extent;
+        }
+        let away = (0..3).map(|axis| f64::from(at(PLANE_MEAN + axis, i)) - evidence.center[axis]);
+        let distance = away.map(|d| d * d).sum::<f64>().sqrt();
+        evidence.extent.max(distance)
+    };
     // Positively written: whatever is not a number does not survive.
     let lives = |i: usize| {
-        let fits = !evidence.prune_large || largest(i) <= settings.prune_share * evidence.extent;
+        let fits = !evidence.prune_large || largest(i) <= settings.prune_share * reach(i);
         opacity(i) >= settings.prune_opacity
             && fits
             && (0..GEOMETRY_PLANES).all(|p| at(p, i).is_finite())
@@ -257,6 +267,7 @@ mod tests {
             geometry: &geometry,
             statistics: &statistics,
             extent: 1.0,
+            center: [0.0; 3],
             prune_large,
         };
         plan(settings, &evidence)
@@ -293,6 +304,26 @@ mod tests {
     }
 
     #[test]
+    fn a_background_may_be_as_large_as_it_is_far() {
+        let (mut geometry, statistics) = evidence(&[HUGE, HUGE]);
+        // The second one, 0.2 wide, at a distance of 3.
+        geometry[2 * PLANE_MEAN + 1] = 3.0;
+        let evidence = Evidence {
+            geometry: &geometry,
+            statistics: &statistics,
+            extent: 1.0,
+            center: [0.0; 3],
+            prune_large: true,
+        };
+        assert_eq!(plan(&eager(), &evidence), []);
+        let background = LumaSettings {
+            background: true,
+            ..eager()
+        };
+        assert_eq!(sources(&plan(&background, &evidence)), [(1, 1)]);
+    }
+
+    #[test]
     fn cap_and_growth_hold_and_the_strongest_come_first() {
         let stronger = (0.005, 0.5, 4e-3);
         let gaussians = [PULLED, stronger, CALM];
@@ -322,6 +353,7 @@ mod tests {
             geometry: &geometry,
             statistics: &statistics,
             extent: 1.0,
+            center: [0.0; 3],
             prune_large: false,
         };
         assert_eq!(sources(&plan(&eager(), &evidence)), [(1, 1)]);

@@ -252,6 +252,7 @@ mod tests {
             geometry: &geometry(logits),
             statistics: &[],
             extent: 1.0,
+            center: [0.0; 3],
             prune_large: false,
         };
         plan(settings, &evidence, 7)

@@ -150,7 +150,8 @@ pub struct LumaSettings {
     /// A densification splits at most this share of the Gaussians.
     pub growth: f64,
     /// Gaussians larger than this share of the extent are removed after the
-    /// first opacity reset.
+    /// first opacity reset; with a [`background`](Self::background), of the distance to
+    /// the cameras' mean where that is longer.
     pub prune_share: f64,
     /// Gaussians below this opacity are removed.
     pub prune_opacity: f64,
@@ -162,6 +163,9 @@ pub struct LumaSettings {
     /// Whether opacities fall by what the blur of the projection spreads
     /// ([`RasterOptions::antialiased`]); the scene must then be drawn the same way.
     pub antialiased: bool,
+    /// Whether some of the Gaussians stand for a background far behind the scene: how
+    /// large one may be then grows with its distance.
+    pub background: bool,
 }
 
 impl LumaSettings {
@@ -182,6 +186,7 @@ impl LumaSettings {
             robust: None,
             memory_limit: None,
             antialiased: false,
+            background: false,
         }
     }
 

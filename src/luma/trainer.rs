@@ -9,6 +9,8 @@
 
 use std::{sync::Arc, time::Instant};
 
+use glam::DVec3;
+
 use super::{
     Densification, LumaSettings,
     densify::{self, Evidence, Target},
@@ -447,6 +449,7 @@ impl LumaTrainer {
             geometry: &self.geometry.planes.read(&self.gpu)?,
             statistics: &self.workspace().statistics().read(&self.gpu)?,
             extent: self.extent,
+            center: center(&self.cameras),
             prune_large: iteration > self.settings.schedule.reset_every,
         };
         let plan = match self.settings.densification {
@@ -504,4 +507,10 @@ impl LumaTrainer {
         }
         Ok(())
     }
+}
+
+/// The mean of the cameras' centres.
+fn center(cameras: &[Camera]) -> [f64; 3] {
+    let sum: DVec3 = cameras.iter().map(Camera::center).sum();
+    (sum / cameras.len().max(1) as f64).to_array()
 }

@@ -14,7 +14,7 @@ use super::{
 use crate::{
     capture::{Exposure, Photo},
     color::gray_from_rgb,
-    effects::{Effect, Overrules},
+    effects::{Backdrop, Effect, Overrules},
     gpu::{Gpu, GpuError},
     luma::{Demand, Densification, LumaSettings, LumaTrainer, TrainingView},
     measure,
@@ -265,7 +265,10 @@ fn first_splats(
             })
             .collect();
         let mut splats = initial_splats(&points, scene.extent as f32, settings.sh_degree);
-        truncate(&mut splats, settings.max_splats);
+        let dome = settings.background.then(|| background(scene, settings));
+        let taken = dome.as_ref().map_or(0, Splats::len);
+        truncate(&mut splats, settings.max_splats - taken);
+        dome.into_iter().for_each(|dome| splats.append(dome));
         return Ok(splats);
     };
     let (splats, options) = read_splats(path, scene.capture.offset, observe)?;
@@ -285,6 +288,13 @@ fn first_splats(
     splats.sh = at_degree(&splats.sh, splats.means.len(), settings.sh_degree);
     truncate(&mut splats, settings.max_splats);
     Ok(splats)
+}
+
+/// Gaussians for what no point explains, at most a quarter of all that there may be.
+fn background(scene: &Scene, settings: &LumaSettings) -> Splats {
+    let backdrop = Backdrop::of(&scene.capture, &scene.photos);
+    let most = settings.max_splats / 4;
+    backdrop.dome(&scene.capture, scene.extent, most, settings.sh_degree)
 }
 
 /// The field cut or filled up with zeros to another degree.

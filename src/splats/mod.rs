@@ -1,6 +1,7 @@
 //! The Gaussians: arrays on the host, spherical harmonics, initialisation and
 //! splat files.
 
+pub mod dome;
 pub mod init;
 mod neighbors;
 pub mod npy;
@@ -33,6 +34,19 @@ impl Splats {
     /// The number of Gaussians.
     pub fn len(&self) -> usize {
         self.means.len()
+    }
+
+    /// Puts others, with a field of the same degree and channels, behind these.
+    pub fn append(&mut self, mut others: Self) {
+        debug_assert_eq!(
+            [self.sh.degree, self.sh.channels as u32],
+            [others.sh.degree, others.sh.channels as u32]
+        );
+        self.means.append(&mut others.means);
+        self.quats.append(&mut others.quats);
+        self.log_scales.append(&mut others.log_scales);
+        self.opacity_logits.append(&mut others.opacity_logits);
+        self.sh.coefficients.append(&mut others.sh.coefficients);
     }
 
     /// Whether there is no Gaussian at all.

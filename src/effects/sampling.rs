@@ -1,0 +1,76 @@
+//! How finely the views see the same places.
+
+use crate::capture::{Camera, Capture, Photo, Point};
+
+/// Share of the points whose spread the figure is not below: a few points seen from
+/// oddly near or far do not make a scene of mixed distances.
+const PERCENTILE: f64 = 0.9;
+
+/// How far apart the finest and the coarsest view of a place are: the ratio of their
+/// sampling rates (focal length by depth, pixels on one world unit), 90th percentile
+/// over the points. At least 1, and 1 where no point has two views.
+///
+/// `photos` are those of the capture's views at working size.
+pub fn sampling_spread(capture: &Capture, photos: &[(Photo, Camera)]) -> f64 {
+    let mut spreads: Vec<f64> = (capture.points.iter())
+        .filter_map(|point| spread(point, photos))
+        .collect();
+    let at = (spreads.len() as f64 * PERCENTILE) as usize;
+    match spreads.len() {
+        0 => 1.0,
+        count => *(spreads.select_nth_unstable_by(at.min(count - 1), f64::total_cmp)).1,
+    }
+}
+
+/// The highest by the lowest sampling rate of a point, if two views see it.
+fn spread(point: &Point, photos: &[(Photo, Camera)]) -> Option<f64> {
+    let rate = |camera: &Camera| {
+        let depth = camera.depth(point.position);
+        (depth > 0.0).then(|| (camera.fx * camera.fy).sqrt() / depth)
+    };
+    let rates: Vec<f64> = if point.track.is_empty() {
+        let inside = photos.iter().map(|(_, camera)| camera);
+        let inside = inside.filter(|camera| camera.pixel_of(point.position).is_some());
+        inside.filter_map(rate).collect()
+    } else {
+        let seen = point.track.iter().map(|seen| &photos[seen.view].1);
+        seen.filter_map(rate).collect()
+    };
+    let highest = rates.iter().copied().fold(0.0, f64::max);
+    let lowest = rates.iter().copied().fold(f64::INFINITY, f64::min);
+    (rates.len() >= 2).then(|| highest / lowest)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::fixtures::{capture, looking_along_z, photo};
+    use glam::DVec3;
+
+    /// Views along z from these distances, all of the same points at 0, in photos as wide.
+    fn spread_of(distances: &[(f64, u32)]) -> f64 {
+        let photos: Vec<_> = (distances.iter())
+            .map(|&(distance, width)| {
+                let camera = looking_along_z(DVec3::new(0.0, 0.0, -distance), width);
+                (photo(&camera, |_, _| 0), camera)
+            })
+            .collect();
+        let points = (0..20).map(|i| DVec3::new(0.0, 0.0, 1e-6 * f64::from(i)));
+        sampling_spread(&capture(&photos, points), &photos)
+    }
+
+    #[test]
+    fn distance_and_size_count() {
+        assert!((spread_of(&[(2.0, 64), (2.0, 64)]) - 1.0).abs() < 1e-4);
+        assert!((spread_of(&[(2.0, 64), (6.0, 64), (3.0, 64)]) - 3.0).abs() < 1e-4);
+        assert!((spread_of(&[(2.0, 64), (2.0, 16)]) - 4.0).abs() < 1e-4);
+        // Far, but with so many more pixels.
+        assert!((spread_of(&[(2.0, 16), (8.0, 64)]) - 1.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn one_view_has_no_spread() {
+        assert_eq!(spread_of(&[(2.0, 64)]), 1.0);
+        assert_eq!(spread_of(&[(2.0, 64), (-5.0, 64)]), 1.0);
+    }
+}
