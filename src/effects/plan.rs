@@ -5,7 +5,9 @@ use std::fmt;
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 
-use super::{direction, exposure, outliers, tracks};
+use super::{
+    background::Backdrop, direction, exposure, outliers, sampling::sampling_spread, tracks,
+};
 use crate::capture::{Camera, Capture, Exposure, Photo, Split};
 
 /// Exposures that move what the views show by less, root mean square in gray levels, are
@@ -22,6 +24,14 @@ const OUTLIER_SHARE: f64 = 0.006;
 /// Residual, in gray, at which a pixel's weight is a quarter.
 const ROBUST_RESIDUAL: f64 = 0.15;
 
+/// Ratio of the sampling rates of near and far views from which on a blur of one size
+/// makes far views too thick or near ones too faint.
+const SAMPLING_SPREAD: f64 = 1.5;
+
+/// Share of the photos' area without points from which on they are taken to show
+/// something behind the scene.
+const UNEXPLAINED_SHARE: f64 = 0.3;
+
 /// Share of the error of foretelling a view's luma that harmonics must take away.
 const DIRECTION_SHARE: f64 = 0.03;
 
@@ -35,13 +45,24 @@ pub enum Effect {
     Exposure,
     /// Photos show dust, scratches or passers-by
     Robust,
+    /// Views show the same places from near and from far
+    Antialias,
+    /// Photos show what no point explains, such as the sky
+    Background,
     /// Luma depends on the direction of view
     LumaDegree,
 }
 
 impl Effect {
     /// All of them, in the order of the table.
-    pub const ALL: [Self; 4] = [Self::Masks, Self::Exposure, Self::Robust, Self::LumaDegree];
+    pub const ALL: [Self; 6] = [
+        Self::Masks,
+        Self::Exposure,
+        Self::Robust,
+        Self::Antialias,
+        Self::Background,
+        Self::LumaDegree,
+    ];
 
     /// As on the command line.
     pub fn name(self) -> &'static str {
@@ -49,6 +70,8 @@ impl Effect {
             Self::Masks => "masks",
             Self::Exposure => "exposure",
             Self::Robust => "robust",
+            Self::Antialias => "antialias",
+            Self::Background => "background",
             Self::LumaDegree => "luma-degree",
         }
     }
@@ -59,6 +82,8 @@ impl Effect {
             Self::Masks => "% of pixels masked",
             Self::Exposure => "gray levels between views",
             Self::Robust => "% of places disagree",
+            Self::Antialias => "times finer from near than from far",
+            Self::Background => "% of the photos without points",
             Self::LumaDegree => "% of error explained",
         }
     }
@@ -68,6 +93,8 @@ impl Effect {
         match self {
             Self::Masks => "one byte a pixel",
             Self::Exposure | Self::Robust => "16 bytes",
+            Self::Antialias => "viewers that know of it",
+            Self::Background => "at most a quarter of the Gaussians",
             Self::LumaDegree => "36, 96 or 180 bytes a Gaussian for degree 1, 2 or 3",
         }
     }
@@ -163,11 +190,24 @@ impl Plan {
             let percent = evidence.map(|share| 100.0 * share);
             Decision::new(Effect::Robust, percent, 100.0 * OUTLIER_SHARE)
         };
+        let antialias = Decision::new(
+            Effect::Antialias,
+            sampling_spread(capture, photos),
+            SAMPLING_SPREAD,
+        );
+        let unexplained = 100.0 * Backdrop::of(capture, photos).share();
+        let background = Decision::new(
+            Effect::Background,
+            Some(unexplained),
+            100.0 * UNEXPLAINED_SHARE,
+        );
         let (degree, sh_degree) = degree(&samples, &exposures, sh_degree, overrules);
         let decisions = vec![
             overruled(masks(photos), overrules),
             exposure,
             overruled(robust, overrules),
+            overruled(antialias, overrules),
+            overruled(background, overrules),
             degree,
         ];
         Self {

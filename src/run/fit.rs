@@ -82,6 +82,8 @@ pub fn fit(
         memory_limit: options.memory_limit,
         sh_degree: plan.sh_degree,
         robust: plan.robust(),
+        antialiased: plan.has(Effect::Antialias),
+        background: plan.has(Effect::Background),
         max_splats: options.max_splats.unwrap_or(amounts.max_splats),
         seed: options.seed,
         ..LumaSettings::new(options.iterations.unwrap_or(amounts.iterations))
