@@ -28,9 +28,8 @@ const ROBUST_RESIDUAL: f64 = 0.15;
 /// makes far views too thick or near ones too faint.
 const SAMPLING_SPREAD: f64 = 1.5;
 
-/// Share of the photos' area without points from which on they are taken to show
-/// something behind the scene.
-const UNEXPLAINED_SHARE: f64 = 0.3;
+/// Share of the photos' area from which on something behind the scene is worth Gaussians.
+const BACKGROUND_SHARE: f64 = 0.05;
 
 /// Share of the error of foretelling a view's luma that harmonics must take away.
 const DIRECTION_SHARE: f64 = 0.03;
@@ -83,7 +82,7 @@ impl Effect {
             Self::Exposure => "gray levels between views",
             Self::Robust => "% of places disagree",
             Self::Antialias => "times finer from near than from far",
-            Self::Background => "% of the photos without points",
+            Self::Background => "% of the photos far behind all points",
             Self::LumaDegree => "% of error explained",
         }
     }
@@ -195,12 +194,8 @@ impl Plan {
             sampling_spread(capture, photos),
             SAMPLING_SPREAD,
         );
-        let unexplained = 100.0 * Backdrop::of(capture, photos).share();
-        let background = Decision::new(
-            Effect::Background,
-            Some(unexplained),
-            100.0 * UNEXPLAINED_SHARE,
-        );
+        let behind = 100.0 * Backdrop::of(capture, photos, &split.train).share();
+        let background = Decision::new(Effect::Background, Some(behind), 100.0 * BACKGROUND_SHARE);
         let (degree, sh_degree) = degree(&samples, &exposures, sh_degree, overrules);
         let decisions = vec![
             overruled(masks(photos), overrules),
