@@ -29,7 +29,7 @@ const ROBUST_RESIDUAL: f64 = 0.15;
 const SAMPLING_SPREAD: f64 = 1.5;
 
 /// Share of the photos' area from which on something behind the scene is worth Gaussians.
-const BACKGROUND_SHARE: f64 = 0.05;
+const BACKGROUND_SHARE: f64 = 0.02;
 
 /// Share of the error of foretelling a view's luma that harmonics must take away.
 const DIRECTION_SHARE: f64 = 0.03;
