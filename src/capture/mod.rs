@@ -33,6 +33,7 @@ use arrangement::Arrangement;
 pub use camera::Camera;
 pub use error::{CaptureError, Position};
 pub use exposure::Exposure;
+pub use lens::IMPERCEPTIBLE;
 use lens::Undistortion;
 pub use loader::{Loader, first_views, kinds};
 pub use options::{Channel, Encoding, LoadOptions, MaskSource, MaskUse, Normalize};

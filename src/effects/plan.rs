@@ -5,8 +5,10 @@ use std::fmt;
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 
-use super::{background::Backdrop, direction, exposure, outliers, sampling, tracks};
-use crate::capture::{Camera, Capture, Exposure, Photo, Split};
+use super::{
+    background::Backdrop, direction, exposure, outliers, sampling::sampling_spread, tracks,
+};
+use crate::capture::{Camera, Capture, Choice, Exposure, IMPERCEPTIBLE, Photo, Split};
 
 /// Exposures that move what the views show by less, root mean square in gray levels, are
 /// invisible beside what any scene is missed by.
@@ -22,16 +24,16 @@ const OUTLIER_SHARE: f64 = 0.006;
 /// Residual, in gray, at which a pixel's weight is a quarter.
 const ROBUST_RESIDUAL: f64 = 0.15;
 
-/// Ratio of the finest to the coarsest view of a place from which on opacities must answer
-/// to size: below, one blur fits all (docs/decisions.md).
+/// Ratio of the sampling rates of near and far views from which on a blur of one size
+/// makes far views too thick or near ones too faint.
 const SAMPLING_SPREAD: f64 = 1.5;
 
-/// Share of the photos that no point explains from which on there is a background.
-const UNEXPLAINED_SHARE: f64 = 0.1;
+/// Share of the photos' area from which on something behind the scene is worth Gaussians.
+const BACKGROUND_SHARE: f64 = 0.02;
 
 /// What the direction of view must explain of a point's luma, root mean square in gray
 /// levels. Matt scenes show 2 to 4: perspective changes a little what lies in a pixel.
-const DIRECTION_LEVELS: f64 = 4.0;
+const DIRECTION_LEVELS: f64 = 5.0;
 
 /// A higher degree must explain so much more, in gray levels, to be worth its memory.
 const DEGREE_LEVELS: f64 = 1.0;
@@ -40,15 +42,17 @@ const DEGREE_LEVELS: f64 = 1.0;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Effect {
+    /// The lens bends straight lines
+    Lens,
     /// Some pixels of the photos do not count
     Masks,
     /// Photos differ in exposure, or flicker
     Exposure,
     /// Photos show dust, scratches or passers-by
     Robust,
-    /// Views see the same places in very different size
+    /// Views show the same places from near and from far
     Antialias,
-    /// Parts of the photos show what no point explains
+    /// Photos show what no point explains, such as the sky
     Background,
     /// Luma depends on the direction of view
     LumaDegree,
@@ -56,7 +60,8 @@ pub enum Effect {
 
 impl Effect {
     /// All of them, in the order of the table.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
+        Self::Lens,
         Self::Masks,
         Self::Exposure,
         Self::Robust,
@@ -68,6 +73,7 @@ impl Effect {
     /// As on the command line.
     pub fn name(self) -> &'static str {
         match self {
+            Self::Lens => "lens",
             Self::Masks => "masks",
             Self::Exposure => "exposure",
             Self::Robust => "robust",
@@ -80,11 +86,12 @@ impl Effect {
     /// What the evidence counts.
     pub fn unit(self) -> &'static str {
         match self {
+            Self::Lens => "pixels that the lens displaces",
             Self::Masks => "% of pixels masked",
             Self::Exposure => "gray levels between views",
             Self::Robust => "% of places disagree",
-            Self::Antialias => "times finer the finest view",
-            Self::Background => "% of the photos unexplained",
+            Self::Antialias => "times finer from near than from far",
+            Self::Background => "% of the photos far behind all points",
             Self::LumaDegree => "gray levels by direction",
         }
     }
@@ -92,10 +99,11 @@ impl Effect {
     /// What it costs while it is on (docs/effects.md has the measurements).
     pub fn cost(self) -> &'static str {
         match self {
+            Self::Lens => "nothing once photos are read",
             Self::Masks => "one byte a pixel",
             Self::Exposure | Self::Robust => "16 bytes",
-            Self::Antialias => "nothing measurable",
-            Self::Background => "Gaussians far behind the scene",
+            Self::Antialias => "viewers that know of it",
+            Self::Background => "at most a quarter of the Gaussians",
             Self::LumaDegree => "36, 96 or 180 bytes a Gaussian for degree 1, 2 or 3",
         }
     }
@@ -152,6 +160,19 @@ pub struct Overrules {
     pub sh_degree: Option<u32>,
 }
 
+impl Overrules {
+    /// What they say about an effect that is decided when photos are loaded.
+    pub fn choice(&self, effect: Effect) -> Choice {
+        if self.with.contains(&effect) {
+            Choice::On
+        } else if self.without.contains(&effect) {
+            Choice::Off
+        } else {
+            Choice::Auto
+        }
+    }
+}
+
 /// Which effects are simulated, and how.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
@@ -191,16 +212,17 @@ impl Plan {
             let percent = evidence.map(|share| 100.0 * share);
             Decision::new(Effect::Robust, percent, 100.0 * OUTLIER_SHARE)
         };
-        let antialias = {
-            let spread = sampling::sampling_spread(capture, photos);
-            Decision::new(Effect::Antialias, Some(spread), SAMPLING_SPREAD)
-        };
-        let background = {
-            let percent = 100.0 * Backdrop::of(capture, photos).share();
-            Decision::new(Effect::Background, Some(percent), 100.0 * UNEXPLAINED_SHARE)
-        };
+        let antialias = Decision::new(
+            Effect::Antialias,
+            sampling_spread(capture, photos),
+            SAMPLING_SPREAD,
+        );
+        let behind = 100.0 * Backdrop::of(capture, photos, &split.train).share();
+        let background = Decision::new(Effect::Background, Some(behind), 100.0 * BACKGROUND_SHARE);
         let (degree, sh_degree) = degree(&samples, &exposures, sh_degree, overrules);
+        let lens = Decision::new(Effect::Lens, Some(capture.distortion), IMPERCEPTIBLE);
         let decisions = vec![
+            overruled(lens, overrules),
             overruled(masks(photos), overrules),
             exposure,
             overruled(robust, overrules),
@@ -228,11 +250,9 @@ impl Plan {
 
 /// A decision after the user has had a say.
 fn overruled(decision: Decision, overrules: &Overrules) -> Decision {
-    let is = |list: &[Effect]| list.contains(&decision.effect);
-    let on = match (is(&overrules.with), is(&overrules.without)) {
-        (true, _) => true,
-        (_, true) => false,
-        _ => return decision,
+    let on = match overrules.choice(decision.effect) {
+        Choice::Auto => return decision,
+        choice => choice == Choice::On,
     };
     Decision {
         on,
@@ -279,12 +299,12 @@ fn degree(
             false => 0,
         }
     });
-    let is = |list: &[Effect]| list.contains(&Effect::LumaDegree);
-    let (degree, decided_by) = match (overrules.sh_degree, wanted) {
-        (Some(degree), _) => (degree, Decider::User),
-        _ if is(&overrules.with) => (room.max(1), Decider::User),
-        _ if is(&overrules.without) => (0, Decider::User),
-        (None, Some(wanted)) if wanted <= room => (wanted, Decider::Evidence),
+    let choice = overrules.choice(Effect::LumaDegree);
+    let (degree, decided_by) = match (overrules.sh_degree, choice, wanted) {
+        (Some(degree), ..) => (degree, Decider::User),
+        (_, Choice::On, _) => (room.max(1), Decider::User),
+        (_, Choice::Off, _) => (0, Decider::User),
+        (_, Choice::Auto, Some(wanted)) if wanted <= room => (wanted, Decider::Evidence),
         _ => (room, Decider::Preset),
     };
     let decision = Decision {

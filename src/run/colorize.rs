@@ -23,6 +23,7 @@ use crate::{
     chroma::{
         ChosenDegree, ChromaProgress, ChromaView, bake, choose_degree, distil, teacher::Upsample,
     },
+    effects::Overrules,
     gpu::Gpu,
     raster::Raster,
     report::{
@@ -289,7 +290,8 @@ impl Source {
                 test: 0,
                 points: 0,
                 rejected: Vec::new(),
-                load: Preset::for_device(gpu).load_options(&LoadOptions::default()),
+                load: Preset::for_device(gpu)
+                    .load_options(&LoadOptions::default(), &Overrules::default()),
                 masked_views: 0,
                 not_finite: 0,
                 extent: 0.0,

@@ -8,7 +8,9 @@ use std::{
 };
 
 use super::{
-    Event, Observer, Preset, RunError, RunFolder, Stage, files,
+    Event, Observer, Preset, RunError, RunFolder, Stage,
+    carve::{self, carved},
+    files,
     scene::{Scene, counted, counts, gray_pixels, read_splats},
 };
 use crate::{
@@ -72,7 +74,7 @@ pub fn fit(
     let gpu = open_gpu(options.timings)?;
     let preset = choose_preset(options, &gpu, observe);
     let amounts = preset.amounts();
-    let load = preset.load_options(&options.load);
+    let load = preset.load_options(&options.load, &options.overrules);
     let scene = Scene::load(&options.colmap_dir, &load, observe)?;
     let plan = scene.plan(amounts.sh_degree, &options.overrules);
     observe(Event::Note(plan.to_string()));
@@ -91,13 +93,10 @@ pub fn fit(
     }
     settings.schedule.coarse_until =
         (options.coarse * settings.schedule.iterations as f64) as usize;
+    // What masks remove is black in the photos, and learned as such.
+    let ignores = plan.has(Effect::Masks) && !scene.removes_masked();
     let cameras = scene.split.train.iter().map(|&i| &scene.photos[i].1);
-    let demand = Demand::of(
-        cameras,
-        plan.has(Effect::Masks),
-        settings.sh_degree,
-        options.memory_limit,
-    );
+    let demand = Demand::of(cameras, ignores, settings.sh_degree, options.memory_limit);
     let fits = demand.largest_set(options.memory_limit, gpu.binding_limit());
     if fits == 0 {
         return Err(RunError::Gpu(GpuError::OverLimit {
@@ -132,7 +131,7 @@ pub fn fit(
             TrainingView {
                 camera: camera.clone(),
                 gray: photo.gray.clone(),
-                mask: photo.mask.clone().filter(|_| plan.has(Effect::Masks)),
+                mask: photo.mask.clone().filter(|_| ignores),
                 exposure: plan.exposures[i],
             }
         })
@@ -162,7 +161,10 @@ pub fn fit(
         last = Some(progress);
         peak_device_memory = peak_device_memory.max(gpu.allocated_bytes());
     })?;
-    let splats = trainer.splats()?;
+    let mut splats = trainer.splats()?;
+    if scene.removes_masked() {
+        splats = carved(&scene, &splats);
+    }
     let timings = (options.timings)
         .then(|| Ok::<_, RunError>(kernel_reports(&gpu.timings()?, &trainer.load())))
         .transpose()?;
@@ -265,6 +267,9 @@ fn first_splats(
             })
             .collect();
         let mut splats = initial_splats(&points, scene.extent as f32, settings.sh_degree);
+        if scene.removes_masked() {
+            splats = carved(scene, &splats);
+        }
         let dome = settings.background.then(|| background(scene, settings));
         let taken = dome.as_ref().map_or(0, Splats::len);
         truncate(&mut splats, settings.max_splats - taken);
@@ -292,9 +297,8 @@ fn first_splats(
 
 /// Gaussians for what no point explains, at most a quarter of all that there may be.
 fn background(scene: &Scene, settings: &LumaSettings) -> Splats {
-    let backdrop = Backdrop::of(&scene.capture, &scene.photos);
     let most = settings.max_splats / 4;
-    backdrop.dome(&scene.capture, scene.extent, most, settings.sh_degree)
+    Backdrop::of(&scene.capture, &scene.photos, &scene.split.train).dome(most, settings.sh_degree)
 }
 
 /// The field cut or filled up with zeros to another degree.
@@ -315,16 +319,8 @@ fn truncate(splats: &mut Splats, max: usize) {
     if count <= max {
         return;
     }
-    let chosen: Vec<usize> = (0..max).map(|k| k * count / max).collect();
-    let stride = splats.sh.coefficients.len() / count;
-    splats.sh.coefficients = chosen
-        .iter()
-        .flat_map(|&i| splats.sh.coefficients[i * stride..(i + 1) * stride].to_vec())
-        .collect();
-    splats.means = chosen.iter().map(|&i| splats.means[i]).collect();
-    splats.quats = chosen.iter().map(|&i| splats.quats[i]).collect();
-    splats.log_scales = chosen.iter().map(|&i| splats.log_scales[i]).collect();
-    splats.opacity_logits = chosen.iter().map(|&i| splats.opacity_logits[i]).collect();
+    let kept: Vec<usize> = (0..max).map(|k| k * count / max).collect();
+    *splats = carve::chosen(splats, &kept);
 }
 
 fn measure_luma(

@@ -1,5 +1,6 @@
 //! Whole runs: what a command does from its options to its files.
 
+mod carve;
 mod chroma_options;
 mod color_quality;
 mod colorize;

@@ -31,7 +31,7 @@ pub fn plan(options: &PlanOptions, observe: &mut Observer<'_>) -> Result<Plan, R
         None => Preset::for_device(&open_gpu(false)?),
     };
     let amounts = preset.amounts();
-    let load = preset.load_options(&options.load);
+    let load = preset.load_options(&options.load, &options.overrules);
     let scene = Scene::load(&options.colmap_dir, &load, observe)?;
     Ok(scene.plan(amounts.sh_degree, &options.overrules))
 }

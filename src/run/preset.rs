@@ -3,7 +3,11 @@
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 
-use crate::{capture::LoadOptions, gpu::Gpu};
+use crate::{
+    capture::LoadOptions,
+    effects::{Effect, Overrules},
+    gpu::Gpu,
+};
 
 /// How much work to put into a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
@@ -69,10 +73,12 @@ impl Preset {
         }
     }
 
-    /// The options with the preset's longer side where they leave it open.
-    pub(super) fn load_options(self, asked: &LoadOptions) -> LoadOptions {
+    /// The options with the preset's longer side where they leave it open, and with
+    /// what is overruled about the lens.
+    pub(super) fn load_options(self, asked: &LoadOptions, overrules: &Overrules) -> LoadOptions {
         LoadOptions {
             max_side: asked.max_side.or(self.amounts().max_side),
+            lens: overrules.choice(Effect::Lens),
             ..asked.clone()
         }
     }

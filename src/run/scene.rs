@@ -18,7 +18,7 @@ use glam::DVec3;
 use super::{Event, Observer, RunError, Stage};
 use crate::{
     capture::{
-        Camera, Capture, CaptureError, LoadOptions, Loader, Normalize, Photo, Split, View,
+        Camera, Capture, CaptureError, LoadOptions, Loader, MaskUse, Normalize, Photo, Split, View,
         first_views, split,
     },
     effects::{Overrules, Plan},
@@ -93,6 +93,11 @@ impl Scene {
         } else {
             ("test", &self.split.test)
         }
+    }
+
+    /// Whether nothing is where masks are black.
+    pub fn removes_masked(&self) -> bool {
+        self.masked_views > 0 && self.options.masked == MaskUse::Remove
     }
 
     /// Which effects it calls for; `sh_degree` is the most that the preset has room for.
