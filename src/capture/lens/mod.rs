@@ -14,6 +14,8 @@ mod undistort;
 #[cfg(test)]
 mod colmap_tests;
 #[cfg(test)]
+mod quality_tests;
+#[cfg(test)]
 mod tests;
 
 use glam::{DVec2, DVec3};
