@@ -34,7 +34,7 @@ pub enum CaptureError {
         dir: PathBuf,
     },
     /// The folder holds no `images/`.
-    #[error("{dir}: holds no images/ folder; put the undistorted photos there")]
+    #[error("{dir}: holds no images/ folder; put the photos that COLMAP saw there")]
     NoImagesFolder {
         /// The folder that was given.
         dir: PathBuf,
@@ -159,7 +159,7 @@ pub enum CaptureError {
     },
     /// A photo has another shape than its camera.
     #[error(
-        "{path}: is {}×{} pixels but its camera is {}×{}; use the photos that COLMAP's image_undistorter wrote with this model, not turned or cropped",
+        "{path}: is {}×{} pixels but its camera is {}×{}; use the photos that COLMAP saw, not turned or cropped",
         .photo[0], .photo[1], .camera[0], .camera[1]
     )]
     PhotoSize {

@@ -12,9 +12,11 @@ use super::{Capture, CaptureError};
 pub(super) struct Model {
     pub cameras: Vec<CameraRecord>,
     pub images: Vec<Image>,
-    /// Position, colour, track: image by its place in `images`, index of the 2D point.
-    pub points: Vec<([f64; 3], [u8; 3], Vec<(u32, u32)>)>,
+    pub points: Vec<PointRecord>,
 }
+
+/// Position, colour, track: image by its place in `images`, index of the 2D point.
+pub(super) type PointRecord = ([f64; 3], [u8; 3], Vec<(u32, u32)>);
 
 #[derive(Clone)]
 pub(super) struct CameraRecord {

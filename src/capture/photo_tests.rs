@@ -125,7 +125,7 @@ fn sizes_near_the_camera_or_of_its_aspect_are_taken() {
         assert!((camera.fx - 30.0 * 100.0 / f64::from(width)).abs() < 1e-12);
     }
     for size in [(75, 100), (100, 77), (98, 75), (800, 800)] {
-        assert_fails(&path, size, &["100×75", "image_undistorter"]);
+        assert_fails(&path, size, &["100×75", "COLMAP saw"]);
     }
 }
 

@@ -14,6 +14,8 @@ mod undistort;
 #[cfg(test)]
 mod colmap_tests;
 #[cfg(test)]
+mod quality_tests;
+#[cfg(test)]
 mod tests;
 
 use glam::{DVec2, DVec3};
@@ -77,7 +79,7 @@ impl Projection {
                 let plane = DVec2::new(ray.x.atan2(ray.z), ray.y.atan2(level));
                 (level + ray.y.abs() > 0.0).then_some(plane)
             }
-            Self::Perspective | Self::Fisheye if !(ray.z > 0.0) => None,
+            _ if ray.z.is_nan() || ray.z <= 0.0 => None,
             Self::Perspective => Some(ray.truncate() / ray.z),
             Self::Fisheye if across == 0.0 => Some(DVec2::ZERO),
             Self::Fisheye => Some(ray.truncate() * (across.atan2(ray.z) / across)),

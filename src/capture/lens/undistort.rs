@@ -5,7 +5,12 @@ use std::sync::Arc;
 use glam::{DMat3, DVec2, DVec3, UVec2};
 
 use super::Lens;
-use crate::capture::{Camera, Photo};
+use crate::capture::{Camera, Photo, downscale};
+
+/// A picture smaller than its photo is sampled this finely along each axis, from a
+/// photo shrunk to that scale, and then averaged. Sampling a photo of the picture's
+/// own scale blurs it; docs/decisions.md has the figures.
+const OVERSAMPLING: u32 = 2;
 
 /// How a view's picture comes from its photo.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,14 +23,12 @@ pub struct Undistortion {
 
 impl Undistortion {
     /// How long the photo's longer side may be for the picture of `camera` to keep
-    /// to `max_side` at the scale of the photo's middle.
-    ///
-    /// The photo is first shrunk to that, by area averaging, and then sampled once:
-    /// so no pixel is left out and none is blurred twice.
+    /// to `max_side`: at most [`OVERSAMPLING`] times the picture's scale.
     pub fn photo_side(&self, camera: &Camera, max_side: Option<u32>) -> Option<u32> {
         let photo = f64::from(self.lens.width.max(self.lens.height));
         let picture = f64::from(camera.width.max(camera.height));
-        max_side.map(|side| ((f64::from(side) * photo / picture) as u32).max(1))
+        let scale = f64::from(OVERSAMPLING) * photo / picture;
+        max_side.map(|side| ((f64::from(side) * scale).ceil() as u32).max(1))
     }
 
     /// Width and height of the photo at which its middle has the scale of `camera`,
@@ -44,32 +47,31 @@ impl Undistortion {
     /// Pixels that show nothing of the photo do not count in the mask.
     pub fn apply(&self, photo: &Photo, camera: &Camera, max_side: Option<u32>) -> (Photo, Camera) {
         let size = [photo.width, photo.height];
+        let full = f64::from(camera.width) * f64::from(size[0]) / f64::from(self.lens.width);
         let camera = self.camera(size, camera, max_side);
-        let sources = self.sources(&camera, size);
-        let bytes = |values: &[u8]| -> Vec<u8> {
-            sample(values, size, &sources, |&value| [f32::from(value)])
-                .map(|[value]| value.round() as u8)
-                .collect()
-        };
-        let rgb = photo.rgb.as_ref().map(|rgb| {
-            sample(rgb, size, &sources, |color| color.map(f32::from))
-                .map(|color| color.map(|value| value.round() as u8))
-                .collect()
-        });
-        let mut mask = match &photo.mask {
-            Some(mask) => bytes(mask),
-            None => vec![255; sources.len()],
+        let finer = full / f64::from(camera.width);
+        let times = (finer.round() as u32).clamp(1, OVERSAMPLING);
+        let large = camera.resized(times * camera.width, times * camera.height);
+        let sources = self.sources(&large, size);
+        let from = [large.width as usize, large.height as usize];
+        let to = [camera.width as usize, camera.height as usize];
+        let mut mask: Vec<[u8; 1]> = match &photo.mask {
+            Some(mask) => sampled(mask, size, &sources, |&counts| [counts]),
+            None => vec![[255]; sources.len()],
         };
         for (counts, source) in mask.iter_mut().zip(&sources) {
             if !shows(*source, size) {
-                *counts = 0;
+                *counts = [0];
             }
         }
+        let mask = downscale(&mask, from, to).into_flattened();
+        let gray = sampled(&photo.gray, size, &sources, |&value| [value]);
+        let rgb = photo.rgb.as_ref();
         let undistorted = Photo {
             width: camera.width,
             height: camera.height,
-            gray: bytes(&photo.gray),
-            rgb,
+            gray: downscale(&gray, from, to).into_flattened(),
+            rgb: rgb.map(|rgb| downscale(&sampled(rgb, size, &sources, |&c| c), from, to)),
             mask: mask.iter().any(|&counts| counts < 255).then_some(mask),
         };
         (undistorted, camera)
@@ -77,14 +79,12 @@ impl Undistortion {
 
     /// The camera that [`Self::apply`] gives for a photo of this width and height.
     pub fn camera(&self, size: [u32; 2], camera: &Camera, max_side: Option<u32>) -> Camera {
-        let side = |length: u32, photo: u32, lens: u32| {
-            let scaled = f64::from(length) * f64::from(photo) / f64::from(lens);
-            (scaled.round() as u32).clamp(1, max_side.unwrap_or(u32::MAX).max(1))
-        };
-        camera.resized(
-            side(camera.width, size[0], self.lens.width),
-            side(camera.height, size[1], self.lens.height),
-        )
+        let width = f64::from(camera.width) * f64::from(size[0]) / f64::from(self.lens.width);
+        let height = f64::from(camera.height) * f64::from(size[1]) / f64::from(self.lens.height);
+        let longest = max_side.map_or(f64::INFINITY, f64::from);
+        let shrink = (longest / width.max(height)).min(1.0);
+        let side = |length: f64| ((length * shrink).round() as u32).max(1);
+        camera.resized(side(width), side(height))
     }
 
     /// Any picture of `N` channels of the photo, `size` being its width and height,
@@ -106,7 +106,7 @@ impl Undistortion {
 
     /// Where in a photo of this size each pixel of the camera's picture lies, in
     /// pixels; NaN where no ray meets the photo's plane.
-    fn sources(&self, camera: &Camera, size: [u32; 2]) -> Vec<[f32; 2]> {
+    pub(super) fn sources(&self, camera: &Camera, size: [u32; 2]) -> Vec<[f32; 2]> {
         let scale = DVec2::new(
             f64::from(size[0]) / f64::from(self.lens.width),
             f64::from(size[1]) / f64::from(self.lens.height),
@@ -140,10 +140,22 @@ fn shows(source: [f32; 2], size: [u32; 2]) -> bool {
         .all(|(&c, side)| (0.0..=side as f32).contains(&c))
 }
 
+/// [`sample`] of bytes.
+fn sampled<T, const N: usize>(
+    picture: &[T],
+    size: [u32; 2],
+    sources: &[[f32; 2]],
+    value: impl Fn(&T) -> [u8; N],
+) -> Vec<[u8; N]> {
+    sample(picture, size, sources, |pixel| value(pixel).map(f32::from))
+        .map(|values| values.map(|value| value.round() as u8))
+        .collect()
+}
+
 /// A picture's values at several places, by cubic interpolation (Keys 1981,
 /// a = −1/2) between pixel centres; beyond the border it goes on as it ends. Next to
 /// an edge a result may exceed all values by a twelfth of their range. NaN gives zeros.
-fn sample<'a, T, const N: usize>(
+pub(super) fn sample<'a, T, const N: usize>(
     picture: &'a [T],
     size: [u32; 2],
     sources: &'a [[f32; 2]],

@@ -201,15 +201,10 @@ pub(super) const CASES: &[Case] = &[
         ],
     ),
     case(
-        "a distorted camera",
-        |p| patch(p, CAMERAS, 12, &2_i32.to_le_bytes()),
+        "an unknown camera model",
+        |p| patch(p, CAMERAS, 12, &18_i32.to_le_bytes()),
         FIT,
-        &[
-            "cameras.bin",
-            "camera 1",
-            "SIMPLE_RADIAL",
-            "image_undistorter",
-        ],
+        &["cameras.bin", "camera 1", "number 18", "image_undistorter"],
     ),
     case(
         "no image",
@@ -270,7 +265,7 @@ pub(super) const CASES: &[Case] = &[
         "a turned photo",
         save_turned,
         FIT,
-        &["03.png", "48×64", "64×48", "image_undistorter"],
+        &["03.png", "48×64", "64×48", "COLMAP saw"],
     ),
     case("a lying photo", |p| announce(p, 20_000), FIT, &["03.png"]),
     case(
