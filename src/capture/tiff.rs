@@ -7,7 +7,7 @@ use tiff::tags::Tag;
 use super::decode::{Bytes, Depth, Header, LARGEST_FILE, Samples};
 
 /// A TIFF file whose header has been read.
-pub(super) type Decoder = tiff::decoder::Decoder<Box<dyn Bytes>>;
+pub(super) type Decoder = Box<tiff::decoder::Decoder<Box<dyn Bytes>>>;
 
 /// The tag's value where each channel is a picture of its own.
 const PLANAR: u16 = 2;
@@ -18,7 +18,8 @@ pub(super) fn open(bytes: Box<dyn Bytes>) -> Result<(Header, Decoder), String> {
     // Doubles take twice what their floats will.
     limits.decoding_buffer_size = 2 * LARGEST_FILE as usize;
     limits.intermediate_buffer_size = limits.decoding_buffer_size;
-    let mut decoder = Decoder::new(bytes).map_err(unreadable)?.with_limits(limits);
+    let decoder = tiff::decoder::Decoder::new(bytes).map_err(unreadable)?;
+    let mut decoder = Box::new(decoder.with_limits(limits));
     let (width, height) = decoder.dimensions().map_err(unreadable)?;
     let (bits, channels) = match decoder.colortype().map_err(unreadable)? {
         ColorType::Gray(bits) => (bits, 1),

@@ -11,6 +11,7 @@ mod documented;
 mod errors;
 mod eval;
 mod inspect;
+mod photos;
 mod picture;
 mod program;
 mod repeat;
