@@ -8,18 +8,16 @@ const PERCENTILE: f64 = 0.9;
 
 /// How far apart the finest and the coarsest view of a place are: the ratio of their
 /// sampling rates (focal length by depth, pixels on one world unit), 90th percentile
-/// over the points. At least 1, and 1 where no point has two views.
+/// over the points. At least 1; `None` where no point has two views.
 ///
 /// `photos` are those of the capture's views at working size.
-pub fn sampling_spread(capture: &Capture, photos: &[(Photo, Camera)]) -> f64 {
+pub fn sampling_spread(capture: &Capture, photos: &[(Photo, Camera)]) -> Option<f64> {
     let mut spreads: Vec<f64> = (capture.points.iter())
         .filter_map(|point| spread(point, photos))
         .collect();
-    let at = (spreads.len() as f64 * PERCENTILE) as usize;
-    match spreads.len() {
-        0 => 1.0,
-        count => *(spreads.select_nth_unstable_by(at.min(count - 1), f64::total_cmp)).1,
-    }
+    let last = spreads.len().checked_sub(1)?;
+    let at = (last as f64 * PERCENTILE) as usize;
+    Some(*spreads.select_nth_unstable_by(at, f64::total_cmp).1)
 }
 
 /// The highest by the lowest sampling rate of a point, if two views see it.
@@ -48,7 +46,7 @@ mod tests {
     use glam::DVec3;
 
     /// Views along z from these distances, all of the same points at 0, in photos as wide.
-    fn spread_of(distances: &[(f64, u32)]) -> f64 {
+    fn spread_of(distances: &[(f64, u32)]) -> Option<f64> {
         let photos: Vec<_> = (distances.iter())
             .map(|&(distance, width)| {
                 let camera = looking_along_z(DVec3::new(0.0, 0.0, -distance), width);
@@ -61,16 +59,20 @@ mod tests {
 
     #[test]
     fn distance_and_size_count() {
-        assert!((spread_of(&[(2.0, 64), (2.0, 64)]) - 1.0).abs() < 1e-4);
-        assert!((spread_of(&[(2.0, 64), (6.0, 64), (3.0, 64)]) - 3.0).abs() < 1e-4);
-        assert!((spread_of(&[(2.0, 64), (2.0, 16)]) - 4.0).abs() < 1e-4);
+        let is = |views: &[(f64, u32)], wanted: f64| {
+            let found = spread_of(views).expect("two views");
+            assert!((found - wanted).abs() < 1e-4, "{found} for {views:?}");
+        };
+        is(&[(2.0, 64), (2.0, 64)], 1.0);
+        is(&[(2.0, 64), (6.0, 64), (3.0, 64)], 3.0);
+        is(&[(2.0, 64), (2.0, 16)], 4.0);
         // Far, but with so many more pixels.
-        assert!((spread_of(&[(2.0, 16), (8.0, 64)]) - 1.0).abs() < 1e-4);
+        is(&[(2.0, 16), (8.0, 64)], 1.0);
     }
 
     #[test]
     fn one_view_has_no_spread() {
-        assert_eq!(spread_of(&[(2.0, 64)]), 1.0);
-        assert_eq!(spread_of(&[(2.0, 64), (-5.0, 64)]), 1.0);
+        assert_eq!(spread_of(&[(2.0, 64)]), None);
+        assert_eq!(spread_of(&[(2.0, 64), (-5.0, 64)]), None);
     }
 }

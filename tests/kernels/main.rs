@@ -12,6 +12,7 @@ use gs_chroma::{
 };
 
 mod adam;
+mod antialiasing;
 mod blend;
 mod depth;
 mod gradient;

@@ -8,7 +8,7 @@ use std::{
 
 use glam::{DMat3, DVec3};
 use gs_chroma::{
-    capture::Camera,
+    capture::{Camera, downscale},
     gpu::GpuError,
     luma::{LumaProgress, LumaSettings, LumaTrainer, TrainingView},
     measure::psnr,
@@ -134,9 +134,18 @@ fn world(frame: Frame, views: usize) -> World {
 }
 
 fn pictures(splats: &Splats, cameras: &[Camera], extent: f64) -> Vec<Vec<f32>> {
+    pictures_with(&RASTER, splats, cameras, extent)
+}
+
+fn pictures_with(
+    raster: &Arc<Raster>,
+    splats: &Splats,
+    cameras: &[Camera],
+    extent: f64,
+) -> Vec<Vec<f32>> {
     let geometry = Geometry::upload(gpu(), splats).unwrap();
     let field = Field::upload(gpu(), &splats.sh).unwrap();
-    let mut renderer = Renderer::new(RASTER.clone(), geometry, vec![field], 0.01 * extent).unwrap();
+    let mut renderer = Renderer::new(raster.clone(), geometry, vec![field], 0.01 * extent).unwrap();
     (cameras.iter())
         .map(|camera| renderer.render(camera).unwrap().remove(0).pixels)
         .collect()
@@ -181,7 +190,11 @@ fn train(world: &World) -> f64 {
 }
 
 fn mean_psnr(world: &World, splats: &Splats) -> f64 {
-    let pictures = pictures(splats, &world.cameras, world.extent);
+    mean_psnr_with(&RASTER, world, splats)
+}
+
+fn mean_psnr_with(raster: &Arc<Raster>, world: &World, splats: &Splats) -> f64 {
+    let pictures = pictures_with(raster, splats, &world.cameras, world.extent);
     let wanted = |photo: &[u8]| {
         photo
             .iter()
@@ -256,6 +269,37 @@ fn worlds_of_any_size_place_and_attitude_train_alike() {
             "{name}: {psnr:.2} dB, {away:+.2} from its twin"
         );
     }
+}
+
+/// Photos of which every other one is a quarter as wide, cameras as well.
+fn mixed_sizes(mut world: World) -> World {
+    for index in (1..world.cameras.len()).step_by(2) {
+        let camera = &mut world.cameras[index];
+        let (width, height) = (camera.width as usize, camera.height as usize);
+        let pixels: Vec<[u8; 1]> = world.photos[index].iter().map(|&v| [v]).collect();
+        let small = [width / 4, height / 4];
+        world.photos[index] = downscale(&pixels, [width, height], small).into_flattened();
+        *camera = camera.resized(small[0] as u32, small[1] as u32);
+    }
+    world
+}
+
+#[test]
+fn mixed_sizes_train_better_antialiased() {
+    let world = mixed_sizes(world(Frame::ORDINARY, 8));
+    let start = initial_splats(&world.points, world.extent as f32, 1);
+    let [plain, antialiased] = [false, true].map(|antialiased| {
+        let settings = LumaSettings {
+            antialiased,
+            ..settings(&start, ITERATIONS)
+        };
+        let raster = RASTER.drawing(settings.raster_options());
+        let (splats, reports) = trained_with(&world, &start, settings).unwrap();
+        assert_sound(&splats, &reports);
+        mean_psnr_with(&raster, &world, &splats)
+    });
+    println!("{plain:.2} dB without, {antialiased:.2} dB with");
+    assert!(antialiased > plain + 0.3, "{antialiased} and {plain}");
 }
 
 #[test]
