@@ -22,12 +22,22 @@ const DOME_BEYOND_POINTS: f64 = 2.0;
 /// Gaussians on the whole sphere, 3.2° apart: a photo of 60° sees some 300.
 const DOME_COUNT: usize = 4_000;
 
-/// The parts of the photos that no point explains.
+/// What photos show of one far place may differ by so many gray levels: noise and the sun
+/// move less, a textured wall that is not far moves more.
+const AGREEMENT: f64 = 8.0;
+
+/// What lies behind the scene: the parts of the photos that no point explains, where the
+/// photos agree if these are put far away. A wall without points that stands near does
+/// not agree, unless it has no texture either; then its gray is right behind it as well.
 #[derive(Clone, Debug)]
 pub struct Backdrop<'a> {
-    photos: &'a [(Photo, Camera)],
+    /// Those that may be looked at.
+    photos: Vec<&'a (Photo, Camera)>,
     /// One a photo.
     holes: Vec<Holes>,
+    /// The cameras' mean, and how far from it the background stands.
+    center: DVec3,
+    radius: f64,
 }
 
 /// The cells of one photo.
@@ -69,27 +79,22 @@ impl Holes {
         let index = row * self.columns + column.min(self.columns - 1);
         self.empty[index.min(self.empty.len() - 1)]
     }
+
+    /// The middle of each empty cell, in pixels.
+    fn middles(&self) -> impl Iterator<Item = [f64; 2]> {
+        let empty = self.empty.iter().enumerate().filter(|(_, empty)| **empty);
+        empty.map(|(index, _)| {
+            [index % self.columns, index / self.columns].map(|at| (at as f64 + 0.5) * self.side)
+        })
+    }
 }
 
 impl<'a> Backdrop<'a> {
-    /// Looks where points lie in the photos, those of the capture's views at working size.
-    pub fn of(capture: &Capture, photos: &'a [(Photo, Camera)]) -> Self {
+    /// Looks where points lie in the photos of the views `train`; `photos` are those of all
+    /// the capture's views, at working size.
+    pub fn of(capture: &Capture, photos: &'a [(Photo, Camera)], train: &[usize]) -> Self {
+        let photos: Vec<_> = train.iter().map(|&view| &photos[view]).collect();
         let holes = photos.iter().map(|(_, camera)| Holes::of(capture, camera));
-        Self {
-            photos,
-            holes: holes.collect(),
-        }
-    }
-
-    /// Share of all photos' area that no point explains, 0 to 1.
-    pub fn share(&self) -> f64 {
-        let cells = || self.holes.iter().flat_map(|holes| &holes.empty);
-        cells().filter(|&&empty| empty).count() as f64 / cells().count().max(1) as f64
-    }
-
-    /// Gaussians far behind the scene that show what no point explains, at most `max`; one
-    /// channel of degree `sh_degree`. `extent` is the scene's.
-    pub fn dome(&self, capture: &Capture, extent: f64, max: usize, sh_degree: u32) -> Splats {
         let center = capture.center();
         let mut distances: Vec<f64> = (capture.points.iter())
             .map(|point| point.position.distance(center))
@@ -98,27 +103,84 @@ impl<'a> Backdrop<'a> {
         // The last percent may be failures of the triangulation.
         let farthest = distances.get(distances.len() * 99 / 100);
         let beyond = DOME_BEYOND_POINTS * farthest.copied().unwrap_or_default();
-        let radius = (DOME_EXTENTS * extent).max(beyond);
+        Self {
+            holes: holes.collect(),
+            photos,
+            center,
+            radius: (DOME_EXTENTS * capture.extent()).max(beyond),
+        }
+    }
+
+    /// Share of all photos' area that lies behind the scene, 0 to 1.
+    pub fn share(&self) -> f64 {
+        let cells: usize = self.holes.iter().map(|holes| holes.empty.len()).sum();
+        let behind = self
+            .holes
+            .iter()
+            .zip(&self.photos)
+            .map(|(holes, (_, camera))| {
+                let places = holes.middles().map(|pixel| self.far_along(camera, pixel));
+                places
+                    .filter(|&place| self.gray_at(place).is_some())
+                    .count()
+            });
+        behind.sum::<usize>() as f64 / cells.max(1) as f64
+    }
+
+    /// Gaussians far behind the scene, at most `max`; one channel of degree `sh_degree`.
+    pub fn dome(&self, max: usize, sh_degree: u32) -> Splats {
         let count = DOME_COUNT.min(max);
-        dome(center, radius, count, sh_degree, |place| {
+        dome(self.center, self.radius, count, sh_degree, |place| {
             self.gray_at(place)
         })
     }
 
-    /// The mean gray, encoded, 0 to 1, that the unexplained parts of the photos show at a
-    /// place; `None` where no photo shows it there.
-    pub fn gray_at(&self, position: DVec3) -> Option<f32> {
-        let seen = self.photos.iter().zip(&self.holes);
-        let grays = seen.filter_map(|((photo, camera), holes)| {
-            let pixel = camera.pixel_of(position)?;
-            let [x, y] = pixel.map(|at| at as usize);
-            let index = y * photo.width as usize + x;
-            let counts = photo.mask.as_ref().is_none_or(|mask| mask[index] > 0);
-            (counts && holes.holds(pixel)).then(|| f32::from(photo.gray[index]) / 255.0)
-        });
-        let (sum, count) = grays.fold((0.0, 0.0), |(sum, count), gray| (sum + gray, count + 1.0));
-        (count > 0.0).then(|| sum / count)
+    /// The place that far away which a camera sees at a pixel.
+    fn far_along(&self, camera: &Camera, [u, v]: [f64; 2]) -> DVec3 {
+        let ray = DVec3::new(
+            (u - camera.cx) / camera.fx,
+            (v - camera.cy) / camera.fy,
+            1.0,
+        );
+        camera.center() + camera.rotation.transpose() * ray.normalize() * self.radius
     }
+
+    /// The gray, encoded, 0 to 1, of a place behind the scene: the median of what the
+    /// unexplained parts of the photos show there; `None` unless at least two of them, and
+    /// two thirds, agree with it.
+    fn gray_at(&self, place: DVec3) -> Option<f32> {
+        let seen = self.photos.iter().zip(&self.holes);
+        let mut grays: Vec<f64> = (seen.filter_map(|((photo, camera), holes)| {
+            let pixel = camera.pixel_of(place)?;
+            holes.holds(pixel).then(|| gray_around(photo, pixel))?
+        }))
+        .collect();
+        let middle = grays.len() / 2;
+        let median = match grays.len() {
+            0 => return None,
+            _ => *grays.select_nth_unstable_by(middle, f64::total_cmp).1,
+        };
+        let near = |gray: &&f64| (**gray - median).abs() <= AGREEMENT;
+        let agree = grays.iter().filter(near).count();
+        (agree >= 2 && 3 * agree >= 2 * grays.len()).then_some((median / 255.0) as f32)
+    }
+}
+
+/// Mean gray level of the pixels around a place in a photo; `None` where one is masked.
+fn gray_around(photo: &Photo, pixel: [f64; 2]) -> Option<f64> {
+    let [x, y] = pixel.map(|at| at as usize);
+    let (width, height) = (photo.width as usize, photo.height as usize);
+    let (mut sum, mut count) = (0.0, 0.0);
+    for y in y.saturating_sub(1)..(y + 2).min(height) {
+        for at in (x.saturating_sub(1)..(x + 2).min(width)).map(|x| y * width + x) {
+            if photo.mask.as_ref().is_some_and(|mask| mask[at] == 0) {
+                return None;
+            }
+            sum += f64::from(photo.gray[at]);
+            count += 1.0;
+        }
+    }
+    Some(sum / count)
 }
 
 #[cfg(test)]
@@ -126,69 +188,88 @@ mod tests {
     use super::*;
     use crate::effects::fixtures::{capture, looking_along_z, photo};
 
-    /// 64 × 64 pixels, dark above and bright below, points in the lower half only.
-    fn half_sky() -> (Capture, Vec<(Photo, Camera)>) {
-        let camera = looking_along_z(DVec3::ZERO, 64);
-        let photo = photo(&camera, |_, y| if y < 32 { 51 } else { 204 });
-        let photos = vec![(photo, camera)];
-        let points = (0..64 * 28).map(|i| {
-            let [x, y] = [i % 64, 36 + i / 64].map(|at| f64::from(at) + 0.5);
+    /// Two views of 64 × 64 pixels, side by side: a textured floor with points below; above,
+    /// stripes that stand as far away as is said.
+    fn half_sky(distance: f64) -> (Capture, Vec<(Photo, Camera)>) {
+        let photos: Vec<_> = [-0.5, 0.5]
+            .map(|x| {
+                let camera = looking_along_z(DVec3::new(x, 0.0, 0.0), 64);
+                let stripes = |u: u32, v: u32| {
+                    let place = x + (f64::from(u) + 0.5 - 32.0) / 64.0 * distance;
+                    let wave = (place / distance * 20.0).sin();
+                    if v < 32 {
+                        (128.0 + 90.0 * wave) as u8
+                    } else {
+                        204
+                    }
+                };
+                (photo(&camera, stripes), camera)
+            })
+            .into();
+        let points = (-40..64 + 40).flat_map(|x| (36..64).map(move |y| [x, y]));
+        let points = points.map(|pixel| {
+            let [x, y] = pixel.map(|at| f64::from(at) + 0.5 - 32.0);
             // A focal length of as many pixels as the photo is wide.
-            DVec3::new((x - 32.0) / 64.0, (y - 32.0) / 64.0, 1.0) * 5.0
+            DVec3::new(x / 64.0, y / 64.0, 1.0) * 5.0
         });
         (capture(&photos, points), photos)
     }
 
     #[test]
-    fn holes_are_what_is_away_from_points() {
-        let (capture, photos) = half_sky();
-        let backdrop = Backdrop::of(&capture, &photos);
+    fn far_stripes_lie_behind_near_ones_do_not() {
+        let (capture, photos) = half_sky(1e4);
+        let far = Backdrop::of(&capture, &photos, &[0, 1]).share();
         // 16 rows, points from the 10th on; the row beside them counts as explained.
-        assert!((backdrop.share() - 8.0 / 16.0).abs() < 1e-12);
-        let at = |x: f64, y: f64| backdrop.gray_at(DVec3::new(x, y, 1.0) * 1e3);
-        assert_eq!(at(0.0, -0.4), Some(0.2));
-        assert_eq!(at(0.0, 0.4), None);
-        assert_eq!(at(2.0, 0.0), None);
+        assert!((0.35..=0.5).contains(&far), "{far}");
+        let (capture, photos) = half_sky(4.0);
+        let near = Backdrop::of(&capture, &photos, &[0, 1]).share();
+        assert!(near < 0.15, "{near}");
     }
 
     #[test]
     fn the_dome_stands_where_there_is_sky_behind_everything() {
-        let (capture, photos) = half_sky();
-        let backdrop = Backdrop::of(&capture, &photos);
-        let dome = backdrop.dome(&capture, 2.0, 100_000, 1);
+        let (capture, photos) = half_sky(1e4);
+        let dome = Backdrop::of(&capture, &photos, &[0, 1]).dome(100_000, 1);
         assert!(dome.len() > 50, "{}", dome.len());
+        let radius = DOME_EXTENTS * capture.extent();
         for mean in &dome.means {
             let place = DVec3::from(mean.map(f64::from));
-            assert!(
-                (place.length() - 60.0).abs() < 1e-3,
-                "behind the cameras' mean"
-            );
+            assert!((place.length() / radius - 1.0).abs() < 1e-3, "{place}");
             assert!(place.y < 0.0 && place.z > 0.0);
         }
-        assert!(backdrop.dome(&capture, 2.0, 50, 1).len() <= 50);
-        // Points farther than the extents ask for.
-        let far = backdrop.dome(&capture, 0.1, 4_000, 1).means[0];
-        let far = DVec3::from(far.map(f64::from)).length();
-        assert!((10.0..15.0).contains(&far), "{far}");
+        let few = Backdrop::of(&capture, &photos, &[0, 1]).dome(50, 1);
+        assert!(few.len() <= 50);
     }
 
     #[test]
-    fn masked_pixels_say_nothing() {
-        let (capture, mut photos) = half_sky();
-        photos[0].0.mask = Some(vec![0; 64 * 64]);
-        let backdrop = Backdrop::of(&capture, &photos);
-        assert_eq!(backdrop.gray_at(DVec3::new(0.0, -0.4, 1.0)), None);
+    fn it_stands_beyond_points_that_are_farther_than_the_extents_ask_for() {
+        let (mut capture, photos) = half_sky(1e4);
+        for point in &mut capture.points {
+            point.position *= 100.0;
+        }
+        let dome = Backdrop::of(&capture, &photos, &[0, 1]).dome(4_000, 0);
+        let place = DVec3::from(dome.means[0].map(f64::from));
+        assert!(place.length() > 1_000.0, "{place}");
+    }
+
+    #[test]
+    fn masked_pixels_and_single_views_say_nothing() {
+        let (capture, mut photos) = half_sky(1e4);
+        for (photo, _) in &mut photos {
+            photo.mask = Some(vec![0; 64 * 64]);
+        }
+        assert_eq!(Backdrop::of(&capture, &photos, &[0, 1]).share(), 0.0);
+        let (capture, photos) = half_sky(1e4);
+        assert_eq!(Backdrop::of(&capture, &photos, &[1]).share(), 0.0);
     }
 
     #[test]
     fn photos_of_any_size_have_cells() {
         for width in [1, 2, 17] {
             let camera = looking_along_z(DVec3::ZERO, width);
-            let photos = vec![(photo(&camera, |_, _| 255), camera)];
-            let empty = capture(&photos, [DVec3::new(0.0, 0.0, -1.0)]);
-            let backdrop = Backdrop::of(&empty, &photos);
-            assert_eq!(backdrop.share(), 1.0);
-            assert_eq!(backdrop.gray_at(DVec3::new(0.0, 0.0, 9.0)), Some(1.0));
+            let photos = vec![(photo(&camera, |_, _| 255), camera); 2];
+            let nothing = capture(&photos, [DVec3::new(0.0, 0.0, -1.0)]);
+            assert_eq!(Backdrop::of(&nothing, &photos, &[0, 1]).share(), 1.0);
         }
     }
 }

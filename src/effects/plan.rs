@@ -26,8 +26,8 @@ const ROBUST_RESIDUAL: f64 = 0.15;
 /// to size: below, one blur fits all (docs/decisions.md).
 const SAMPLING_SPREAD: f64 = 1.5;
 
-/// Share of the photos that no point explains from which on there is a background.
-const UNEXPLAINED_SHARE: f64 = 0.1;
+/// Share of the photos' area from which on something behind the scene is worth Gaussians.
+const BACKGROUND_SHARE: f64 = 0.02;
 
 /// What the direction of view must explain of a point's luma, root mean square in gray
 /// levels. Matt scenes show 2 to 4: perspective changes a little what lies in a pixel.
@@ -84,7 +84,7 @@ impl Effect {
             Self::Exposure => "gray levels between views",
             Self::Robust => "% of places disagree",
             Self::Antialias => "times finer the finest view",
-            Self::Background => "% of the photos unexplained",
+            Self::Background => "% of the photos behind all points",
             Self::LumaDegree => "gray levels by direction",
         }
     }
@@ -193,11 +193,11 @@ impl Plan {
         };
         let antialias = {
             let spread = sampling::sampling_spread(capture, photos);
-            Decision::new(Effect::Antialias, Some(spread), SAMPLING_SPREAD)
+            Decision::new(Effect::Antialias, spread, SAMPLING_SPREAD)
         };
         let background = {
-            let percent = 100.0 * Backdrop::of(capture, photos).share();
-            Decision::new(Effect::Background, Some(percent), 100.0 * UNEXPLAINED_SHARE)
+            let percent = 100.0 * Backdrop::of(capture, photos, &split.train).share();
+            Decision::new(Effect::Background, Some(percent), 100.0 * BACKGROUND_SHARE)
         };
         let (degree, sh_degree) = degree(&samples, &exposures, sh_degree, overrules);
         let decisions = vec![

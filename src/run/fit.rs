@@ -292,9 +292,8 @@ fn first_splats(
 
 /// Gaussians for what no point explains, at most a quarter of all that there may be.
 fn background(scene: &Scene, settings: &LumaSettings) -> Splats {
-    let backdrop = Backdrop::of(&scene.capture, &scene.photos);
     let most = settings.max_splats / 4;
-    backdrop.dome(&scene.capture, scene.extent, most, settings.sh_degree)
+    Backdrop::of(&scene.capture, &scene.photos, &scene.split.train).dome(most, settings.sh_degree)
 }
 
 /// The field cut or filled up with zeros to another degree.
