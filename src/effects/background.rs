@@ -11,10 +11,10 @@ use crate::{
 /// three cells is wider than the gaps between them.
 const CELLS_ACROSS: u32 = 16;
 
-/// Radius of the dome in extents, at least: the cameras then see its places at most
-/// 1/15 rad apart from each other, and the means' rate, a share of the extent, leaves it
-/// where it is.
-const DOME_EXTENTS: f64 = 30.0;
+/// Radius of the dome in extents, at least: two cameras an extent apart then see a place
+/// 1/300 rad apart, a pixel of a photo 300 wide. It must be right from the start: the
+/// means' rate, a share of the extent, leaves it where it is.
+const DOME_EXTENTS: f64 = 300.0;
 
 /// Radius of the dome by the distance of the farthest points, at least: behind all of them.
 const DOME_BEYOND_POINTS: f64 = 2.0;
@@ -196,7 +196,7 @@ mod tests {
                 let camera = looking_along_z(DVec3::new(x, 0.0, 0.0), 64);
                 let stripes = |u: u32, v: u32| {
                     let place = x + (f64::from(u) + 0.5 - 32.0) / 64.0 * distance;
-                    let wave = (place / distance * 20.0).sin();
+                    let wave = (place / distance * 10.0).sin();
                     if v < 32 {
                         (128.0 + 90.0 * wave) as u8
                     } else {
