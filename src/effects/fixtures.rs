@@ -37,8 +37,10 @@ pub fn photo(camera: &Camera, gray: impl Fn(u32, u32) -> u8) -> Photo {
 pub fn capture(photos: &[(Photo, Camera)], points: impl IntoIterator<Item = DVec3>) -> Capture {
     let views = photos.iter().enumerate().map(|(i, (_, camera))| View {
         name: format!("{i}.png"),
+        photo: format!("{i}.png"),
         image_path: format!("{i}.png").into(),
         camera: camera.clone(),
+        undistortion: None,
     });
     Capture {
         root: ".".into(),
@@ -52,5 +54,6 @@ pub fn capture(photos: &[(Photo, Camera)], points: impl IntoIterator<Item = DVec
             .collect(),
         offset: DVec3::ZERO,
         rejected: Vec::new(),
+        distortion: 0.0,
     }
 }
