@@ -126,6 +126,10 @@ def main() -> int:
     parser.add_argument("--program", default="target/release/gs-chroma")
     parser.add_argument("--maker", default="target/release/examples/make_variants")
     parser.add_argument("--variants", nargs="*", default=[], help="only these, with controls")
+    parser.add_argument(
+        "--also", nargs=2, action="append", default=[], metavar=("FOLDER", "EFFECT"),
+        help="a COLMAP folder that is there and calls for an effect",
+    )  # fmt: skip
     parser.add_argument("--iterations", type=int, default=500)
     parser.add_argument("--seeds", type=int, nargs="+", default=[0])
     parser.add_argument("--fit", default="", help="more flags for fit, as one word")
@@ -138,13 +142,15 @@ def main() -> int:
     print("| scene | effect | plan | evidence / threshold | PSNR with / without | seconds with / without | host MiB with / without |")
     print("|---|---|---|---|---|---|---|")
     failures = []
-    for name, effect in members(options.variants):
-        folder = options.output / name
+    scenes = [(name, effect, options.output / name) for name, effect in members(options.variants)]
+    for name, _, folder in scenes:
         shutil.rmtree(folder, ignore_errors=True)
         done, _ = run([options.maker, str(options.scene), name, str(folder)])
         if done.returncode != 0:
             print(done.stderr, file=sys.stderr, end="")
             return 1
+    scenes += [(Path(folder).name, effect, Path(folder)) for folder, effect in options.also]
+    for name, effect, folder in scenes:
         choice, evidence = planned(options.program, folder, effect) if effect else ("", "")
         if effect and choice != ("off" if name.endswith("-control") else "on"):
             failures.append(f"{name}: {effect} is {choice} in the plan ({evidence})")
