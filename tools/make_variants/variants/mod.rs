@@ -56,7 +56,7 @@ pub enum Variant {
     MaskedControl,
     /// Patches of the scene brighten to one side and darken to the other
     Gloss,
-    /// The same photos, matt
+    /// The same photos, with no more shine than they have
     GlossControl,
     /// 16-bit gray PNG that uses 0.2 to 0.35 of the range
     Sixteen,
