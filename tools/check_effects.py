@@ -41,6 +41,10 @@ NO_CONTROL = ["infrared-tiff"]
 # The scene's own shine calls for it too, so nothing is expected of the control.
 NOT_JUDGED = ["gloss-control"]
 
+# These stay as the plan has them while another effect is in question; the others are
+# off, for one may do the work of another.
+INNOCENT = ["lens", "masks"]
+
 # Of draft the degree is 0, whatever the evidence.
 PLAN_PRESET = "balanced"
 
@@ -68,19 +72,22 @@ def first_line(text: str) -> str:
     return (lines or text.splitlines() or ["no words"])[0]
 
 
-def planned(program: str, folder: Path, effect: str) -> tuple[str, str]:
-    """The plan's choice, and its evidence against the threshold."""
+def planned(program: str, folder: Path, effect: str) -> tuple[str, str, list[str]]:
+    """The plan's choice, its evidence against the threshold, and flags against other effects."""
     done, _ = run([program, "plan", str(folder), "--json", "--preset", PLAN_PRESET])
     if done.returncode != 0:
-        return "–", first_line(done.stderr)
-    found = [one for one in json.loads(done.stdout)["effects"] if one["name"] == effect]
+        return "–", first_line(done.stderr), []
+    effects = json.loads(done.stdout)["effects"]
+    found = [one for one in effects if one["name"] == effect]
     if not found:
-        return "–", "not in the plan"
+        return "–", "not in the plan", []
+    others = [one["name"] for one in effects if one["name"] not in (effect, *INNOCENT)]
+    without = [flag for name in others for flag in ("--without", name)]
     one = found[0]
     numbers = [f"{one[key]:.3g}" if isinstance(one.get(key), (int, float)) else str(one.get(key))
                for key in ("evidence", "threshold")]  # fmt: skip
     on = one["on"]
-    return ("on" if on is True else "off" if on is False else str(on)), " / ".join(numbers)
+    return ("on" if on is True else "off" if on is False else str(on)), " / ".join(numbers), without
 
 
 def fits(options: argparse.Namespace, folder: Path, flags: list[str]) -> Fits:
@@ -157,10 +164,12 @@ def main() -> int:
             return 1
     scenes += [(Path(folder).name, effect, Path(folder)) for folder, effect in options.also]
     for name, effect, folder in scenes:
-        choice, evidence = planned(options.program, folder, effect) if effect else ("", "")
+        choice, evidence, without = "", "", []
+        if effect:
+            choice, evidence, without = planned(options.program, folder, effect)
         if effect and name not in NOT_JUDGED and choice != ("off" if name.endswith("-control") else "on"):
             failures.append(f"{name}: {effect} is {choice} in the plan ({evidence})")
-        flags = [["--with", effect], ["--without", effect]] if effect else [[]]
+        flags = [[flag, effect, *without] for flag in ("--with", "--without")] if effect else [[]]
         runs = [] if options.plan_only else [fits(options, folder, one) for one in flags]
         failures += [f"{name}: {one.failure}" for one in runs if one.failure]
         print(
