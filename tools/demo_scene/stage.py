@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import bpy
@@ -61,19 +62,27 @@ def settings(width: int, height: int, samples: int, exposure: float = 0.0) -> No
     scene.render.resolution_x, scene.render.resolution_y = width, height
     scene.render.resolution_percentage = 100
     scene.render.image_settings.file_format = "PNG"
+    scene.render.image_settings.color_mode = "RGB"
     scene.view_settings.view_transform = "AgX"
     scene.view_settings.look = "AgX - Medium High Contrast"
     scene.view_settings.exposure = exposure
 
 
-def shoot(cameras: list[Camera], folder: Path) -> None:
-    """Renders every camera to `folder`/NAME.png; pictures already there are kept."""
+def shoot(
+    cameras: list[Camera], folder: Path, change_lens: Callable[[], None] | None = None
+) -> None:
+    """Renders every camera to `folder`/NAME.png; pictures already there are kept.
+
+    `change_lens` may make another lens of the scene's camera before the first.
+    """
     scene = bpy.context.scene
     lens = bpy.data.cameras.new("lens")
     lens.lens, lens.sensor_width = LENS_MM, SENSOR_MM
     tripod = bpy.data.objects.new("camera", lens)
     scene.collection.objects.link(tripod)
     scene.camera = tripod
+    if change_lens:
+        change_lens()
     folder.mkdir(parents=True, exist_ok=True)
     for camera in cameras:
         target = folder / f"{camera.name}.png"

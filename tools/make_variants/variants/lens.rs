@@ -28,6 +28,9 @@ pub enum Lens {
 /// More than enough for the lenses made here: the error shrinks by a third or better each.
 const ROUNDS: usize = 60;
 
+/// At unit depth; of a pixel, a billionth.
+const EXACT: f64 = 1e-13;
+
 impl Lens {
     /// COLMAP's name of the model.
     pub fn name(&self) -> &'static str {
@@ -74,16 +77,28 @@ impl Lens {
     pub fn straighten(&self, bent: [f64; 2]) -> [f64; 2] {
         match *self {
             Self::Pinhole => bent,
-            Self::OpenCv(_) => (0..ROUNDS).fold(bent, |ray, _| {
-                let now = self.bend(ray);
-                [0, 1].map(|k| ray[k] + bent[k] - now[k])
-            }),
+            Self::OpenCv(_) => {
+                let mut ray = bent;
+                for _ in 0..ROUNDS {
+                    let now = self.bend(ray);
+                    let step = [0, 1].map(|k| bent[k] - now[k]);
+                    ray = [0, 1].map(|k| ray[k] + step[k]);
+                    if step[0].hypot(step[1]) < EXACT {
+                        break;
+                    }
+                }
+                ray
+            }
             Self::Fisheye(k) => {
                 let r = bent[0].hypot(bent[1]);
-                let theta = (0..ROUNDS).fold(r.min(1.0), |theta, _| {
+                let mut theta = r.min(1.0);
+                for _ in 0..ROUNDS {
                     let (value, slope) = fisheye(k, theta);
-                    theta - (value - r) / slope
-                });
+                    theta -= (value - r) / slope;
+                    if (value - r).abs() < EXACT {
+                        break;
+                    }
+                }
                 let scale = if r > 0.0 { theta.tan() / r } else { 1.0 };
                 bent.map(|v| v * scale)
             }

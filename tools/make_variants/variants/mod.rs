@@ -14,6 +14,9 @@ mod sky;
 mod warp;
 mod write;
 
+#[cfg(test)]
+mod tests;
+
 use std::path::Path;
 
 pub use error::Error;
@@ -43,7 +46,7 @@ pub enum Variant {
     Dust,
     /// The same photos, clean
     DustControl,
-    /// The far third of the points is missing
+    /// The farther four fifths of the points are missing
     Sky,
     /// As many points are missing, from anywhere
     SkyControl,
@@ -53,7 +56,7 @@ pub enum Variant {
     MaskedControl,
     /// Patches of the scene brighten to one side and darken to the other
     Gloss,
-    /// The same photos, matt
+    /// The same photos, with no more shine than they have
     GlossControl,
     /// 16-bit gray PNG that uses 0.2 to 0.35 of the range
     Sixteen,

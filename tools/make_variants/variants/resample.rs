@@ -2,9 +2,6 @@
 
 use image::{Rgb, RgbImage};
 
-/// Samples along each side of a pixel: the picture may become smaller in places.
-const SAMPLES: u32 = 2;
-
 /// A picture of `size` whose pixel at `p` shows what `picture` has at `source(p)`, both
 /// in pixels, the centre of the top left one at (0.5, 0.5).
 pub fn remap(
@@ -12,18 +9,9 @@ pub fn remap(
     [width, height]: [u32; 2],
     source: impl Fn([f64; 2]) -> [f64; 2],
 ) -> RgbImage {
-    let offsets: Vec<f64> = (0..SAMPLES)
-        .map(|k| (f64::from(k) + 0.5) / f64::from(SAMPLES))
-        .collect();
     RgbImage::from_fn(width, height, |x, y| {
-        let mut sum = [0.0; 3];
-        for dy in &offsets {
-            for dx in &offsets {
-                let value = cubic(picture, source([f64::from(x) + dx, f64::from(y) + dy]));
-                sum = [0, 1, 2].map(|c| sum[c] + value[c]);
-            }
-        }
-        Rgb(sum.map(|v| byte(v / f64::from(SAMPLES * SAMPLES))))
+        let place = source([x, y].map(|k| f64::from(k) + 0.5));
+        Rgb(cubic(picture, place).map(byte))
     })
 }
 

@@ -3,7 +3,7 @@
 use super::scene::Scene;
 
 /// Share of the points that go missing.
-const MISSING: f64 = 1.0 / 3.0;
+const MISSING: f64 = 0.8;
 
 /// Drops the points farthest from the cameras.
 pub fn uncover(scene: &mut Scene) -> String {
