@@ -30,7 +30,7 @@ const COLORED: &[&str] = &["blend", "shade"];
 const ADJOINT: &[&str] = &["blend_backward", "shade_backward", "sum_instances"];
 
 /// Effects of the photos that the luma loss may reckon with.
-const LOSS_EFFECTS: &[&str] = &["exposed", "masked", "robust"];
+const LOSS_EFFECTS: &[&str] = &["exposed", "masked"];
 
 fn main() {
     println!("cargo::rerun-if-changed=shaders");
@@ -84,7 +84,6 @@ fn compile(out: &str, kernel: &str, suffix: &str, features: &[&str]) {
         "curvature",
         "exposed",
         "masked",
-        "robust",
         "mip",
     ] {
         compiler.set_feature(feature, features.contains(&feature));

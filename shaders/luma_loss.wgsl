@@ -9,9 +9,7 @@
 // `exposed`: the photo shows gain · picture + offset; where the photo is black or
 //   white, what lies beyond is met.
 // `masked`: a pixel counts as much as its mask says.
-// `robust`: a pixel that the picture misses by far counts little (Geman and
-//   McClure 1987); the weight is held fixed when differentiating.
-// A weight multiplies both images, as if the pixel lay outside for zero, and the
+// The weight multiplies both images, as if the pixel lay outside for zero, and the
 // terms of the window around it.
 import package::common::view::View;
 
@@ -41,14 +39,12 @@ const SSIM_WEIGHT: f32 = 0.2;
 @group(0) @binding(7) var<storage, read_write> image_gradient: array<f32>;
 // Packed as the photo.
 @if(masked) @group(0) @binding(8) var<storage, read> mask: array<u32>;
-@if(exposed || robust) @group(0) @binding(9) var<uniform> parameters: LumaLossParameters;
+@if(exposed) @group(0) @binding(9) var<uniform> parameters: LumaLossParameters;
 
-@if(exposed || robust) struct LumaLossParameters {
+@if(exposed) struct LumaLossParameters {
     gain: f32,
     offset: f32,
-    // One over the residual at which a pixel's weight is a quarter.
-    inverse_residual: f32,
-    padding: u32,
+    padding: vec2u,
 }
 
 fn photo_at(p: u32) -> f32 {
@@ -75,20 +71,9 @@ fn photo_at(p: u32) -> f32 {
     return select(parameters.gain, 0.0, is_beyond(p, value));
 }
 
-@if(masked) fn mask_at(p: u32) -> f32 {
-    return f32((mask[p / 4u] >> (8u * (p % 4u))) & 255u) / 255.0;
-}
-
 // What a pixel counts.
-@if(masked || robust) fn weight(p: u32, x: f32, y: f32) -> f32 {
-    var weight = 1.0;
-    @if(robust) {
-        let r = (x - y) * parameters.inverse_residual;
-        let falloff = 1.0 / (1.0 + r * r);
-        weight = falloff * falloff;
-    }
-    @if(masked) { weight *= mask_at(p); }
-    return weight;
+@if(masked) fn weight(p: u32) -> f32 {
+    return f32((mask[p / 4u] >> (8u * (p % 4u))) & 255u) / 255.0;
 }
 
 // Sums along rows, `[moment, row, column]`: five moments in the first pass, three
@@ -158,13 +143,9 @@ fn photo_quad(s: Span, k: i32) -> vec4f {
     return select(vec4f(0.0), vec4f(photo_at(p.x), photo_at(p.y), photo_at(p.z), photo_at(p.w)), has(s, k));
 }
 
-@if(masked || robust) fn weight_quad(s: Span, k: i32, x: vec4f, y: vec4f) -> vec4f {
+@if(masked) fn weight_quad(s: Span, k: i32) -> vec4f {
     let p = indices(s, k);
-    return vec4f(weight(p.x, x.x, y.x), weight(p.y, x.y, y.y), weight(p.z, x.z, y.z), weight(p.w, x.w, y.w));
-}
-
-@if(masked || robust) fn weights(s: Span, x: Run, y: Run) -> Run {
-    return Run(weight_quad(s, 0, x.a, y.a), weight_quad(s, 4, x.b, y.b), weight_quad(s, 8, x.c, y.c), weight_quad(s, 12, x.d, y.d));
+    return vec4f(weight(p.x), weight(p.y), weight(p.z), weight(p.w));
 }
 
 // Puts four sums along a row where `column_sums` finds them.
@@ -195,8 +176,8 @@ fn luma_loss(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) group
         let s = span(group, row, quad);
         var x = Run(image_quad(s, 0), image_quad(s, 4), image_quad(s, 8), image_quad(s, 12));
         var y = Run(photo_quad(s, 0), photo_quad(s, 4), photo_quad(s, 8), photo_quad(s, 12));
-        @if(masked || robust) {
-            let w = weights(s, x, y);
+        @if(masked) {
+            let w = Run(weight_quad(s, 0), weight_quad(s, 4), weight_quad(s, 8), weight_quad(s, 12));
             x = times(w, x);
             y = times(w, y);
         }
@@ -229,14 +210,14 @@ fn luma_loss(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) group
             let p = pixel.y * view.size.x + pixel.x;
             let x = shown(p);
             let y = photo_at(p);
-            @if(!(masked || robust)) {
+            @if(!masked) {
                 by_mean[p] = mean[k];
                 by_square[p] = square[k];
                 by_product[p] = product[k];
                 loss += L1_WEIGHT * abs(x - y) + SSIM_WEIGHT * (1.0 - ssim[k]);
             }
-            @if(masked || robust) {
-                let w = weight(p, x, y);
+            @if(masked) {
+                let w = weight(p);
                 by_mean[p] = w * mean[k];
                 by_square[p] = w * square[k];
                 by_product[p] = w * product[k];
@@ -293,12 +274,12 @@ fn luma_loss_backward(@builtin(workgroup_id) group: vec3u, @builtin(local_invoca
             let p = pixel.y * view.size.x + pixel.x;
             let x = shown(p);
             let y = photo_at(p);
-            @if(!(masked || robust)) {
+            @if(!masked) {
                 let ssim_gradient = mean[k] + 2.0 * x * square[k] + y * product[k];
                 image_gradient[p] = slope(p) * (L1_WEIGHT * sign(x - y) - SSIM_WEIGHT * ssim_gradient) / pixels;
             }
-            @if(masked || robust) {
-                let w = weight(p, x, y);
+            @if(masked) {
+                let w = weight(p);
                 let ssim_gradient = mean[k] + w * (2.0 * x * square[k] + y * product[k]);
                 image_gradient[p] = slope(p) * w * (L1_WEIGHT * sign(x - y) - SSIM_WEIGHT * ssim_gradient) / pixels;
             }

@@ -21,15 +21,12 @@ const EXPOSURE_OVER_NOISE: f64 = 3.0;
 /// taken to have defects: clean photos stay below 0.3 %, 1.5 % of dust gives 1 to 3 %.
 const OUTLIER_SHARE: f64 = 0.006;
 
-/// Residual, in gray, at which a pixel's weight is a quarter.
-const ROBUST_RESIDUAL: f64 = 0.15;
-
 /// Ratio of the sampling rates of near and far views from which on a blur of one size
 /// makes far views too thick or near ones too faint.
 const SAMPLING_SPREAD: f64 = 1.5;
 
 /// Share of the photos' area from which on something behind the scene is worth Gaussians.
-const BACKGROUND_SHARE: f64 = 0.02;
+const BACKGROUND_SHARE: f64 = 0.05;
 
 /// What the direction of view must explain of a point's luma, root mean square in gray
 /// levels. Matt scenes show 2 to 4: perspective changes a little what lies in a pixel.
@@ -101,7 +98,8 @@ impl Effect {
         match self {
             Self::Lens => "nothing once photos are read",
             Self::Masks => "one byte a pixel",
-            Self::Exposure | Self::Robust => "16 bytes",
+            Self::Exposure => "16 bytes",
+            Self::Robust => "one byte a pixel, and twice three drawings of each photo",
             Self::Antialias => "viewers that know of it",
             Self::Background => "at most a quarter of the Gaussians",
             Self::LumaDegree => "36, 96 or 180 bytes a Gaussian for degree 1, 2 or 3",
@@ -240,11 +238,6 @@ impl Plan {
     /// Whether an effect is simulated.
     pub fn has(&self, effect: Effect) -> bool {
         (self.decisions.iter()).any(|decision| decision.effect == effect && decision.on)
-    }
-
-    /// Residual, in gray, at which a pixel's weight is a quarter, if the loss levels off.
-    pub fn robust(&self) -> Option<f64> {
-        self.has(Effect::Robust).then_some(ROBUST_RESIDUAL)
     }
 }
 

@@ -28,16 +28,8 @@ shaders! {
     LUMA_LOSS_EXPOSED = "luma_loss_exposed";
     /// Luma loss of photos with masks.
     LUMA_LOSS_MASKED = "luma_loss_masked";
-    /// Luma loss that levels off.
-    LUMA_LOSS_ROBUST = "luma_loss_robust";
     /// Luma loss with exposures and masks.
     LUMA_LOSS_EXPOSED_MASKED = "luma_loss_exposed_masked";
-    /// Luma loss with exposures that levels off.
-    LUMA_LOSS_EXPOSED_ROBUST = "luma_loss_exposed_robust";
-    /// Luma loss with masks that levels off.
-    LUMA_LOSS_MASKED_ROBUST = "luma_loss_masked_robust";
-    /// Luma loss with exposures and masks that levels off.
-    LUMA_LOSS_EXPOSED_MASKED_ROBUST = "luma_loss_exposed_masked_robust";
     /// Projection.
     PROJECT = "project";
     /// Adjoint of the projection.

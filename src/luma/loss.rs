@@ -26,28 +26,17 @@ pub struct LossEffects {
     pub exposed: bool,
     /// Some pixels do not count.
     pub masked: bool,
-    /// Pixels that the picture misses by far count little.
-    pub robust: bool,
 }
 
 impl LossEffects {
     /// The kernels that have these effects and no others.
     pub fn shader(self) -> &'static str {
-        match (self.exposed, self.masked, self.robust) {
-            (false, false, false) => shaders::LUMA_LOSS,
-            (true, false, false) => shaders::LUMA_LOSS_EXPOSED,
-            (false, true, false) => shaders::LUMA_LOSS_MASKED,
-            (false, false, true) => shaders::LUMA_LOSS_ROBUST,
-            (true, true, false) => shaders::LUMA_LOSS_EXPOSED_MASKED,
-            (true, false, true) => shaders::LUMA_LOSS_EXPOSED_ROBUST,
-            (false, true, true) => shaders::LUMA_LOSS_MASKED_ROBUST,
-            (true, true, true) => shaders::LUMA_LOSS_EXPOSED_MASKED_ROBUST,
+        match (self.exposed, self.masked) {
+            (false, false) => shaders::LUMA_LOSS,
+            (true, false) => shaders::LUMA_LOSS_EXPOSED,
+            (false, true) => shaders::LUMA_LOSS_MASKED,
+            (true, true) => shaders::LUMA_LOSS_EXPOSED_MASKED,
         }
-    }
-
-    /// Whether the kernels bind [`LumaLossParameters`].
-    pub fn has_parameters(self) -> bool {
-        self.exposed || self.robust
     }
 }
 
@@ -59,21 +48,16 @@ pub struct LumaLossParameters {
     pub gain: f32,
     /// What is added then.
     pub offset: f32,
-    /// One over the residual at which a pixel's weight is a quarter; 0: all count alike.
-    pub inverse_residual: f32,
     /// Nothing.
-    pub padding: u32,
+    pub padding: [u32; 2],
 }
 
-impl LumaLossParameters {
-    /// For a photo of this exposure; `residual` is the one, in gray, at which a pixel's
-    /// weight is a quarter.
-    pub fn new(exposure: Exposure, residual: Option<f64>) -> Self {
+impl From<Exposure> for LumaLossParameters {
+    fn from(exposure: Exposure) -> Self {
         Self {
             gain: exposure.gain as f32,
             offset: exposure.offset as f32,
-            inverse_residual: residual.map_or(0.0, |residual| (1.0 / residual) as f32),
-            padding: 0,
+            padding: [0; 2],
         }
     }
 }
@@ -100,7 +84,7 @@ pub struct Targets {
     pub photos: Photos,
     /// Their masks in the same order, if pixels count differently.
     pub masks: Option<Photos>,
-    /// For photos with exposures or a loss that levels off.
+    /// If photos differ in exposure.
     pub parameters: Option<Buffer<LumaLossParameters>>,
     /// Three buffers with room for a float a pixel.
     pub slopes: [Buffer<f32>; 3],
@@ -126,7 +110,7 @@ impl Targets {
         Ok(Self {
             photos: packed(photos)?,
             masks: effects.masked.then(|| packed(masks)).transpose()?,
-            parameters: (effects.has_parameters())
+            parameters: (effects.exposed)
                 .then(|| Buffer::uniform(gpu, "loss parameters", &unset))
                 .transpose()?,
             slopes: [slopes()?, slopes()?, slopes()?],
@@ -134,12 +118,12 @@ impl Targets {
     }
 
     /// Readies a photo for what is submitted next, and gives its buffers' place.
-    pub fn show(&self, gpu: &Gpu, index: usize, parameters: LumaLossParameters) -> usize {
+    pub fn show(&self, gpu: &Gpu, index: usize, exposure: Exposure) -> usize {
         if let Some(masks) = &self.masks {
             masks.show(gpu, index);
         }
         if let Some(buffer) = &self.parameters {
-            buffer.write(gpu, &[parameters]);
+            buffer.write(gpu, &[exposure.into()]);
         }
         self.photos.show(gpu, index)
     }

@@ -3,6 +3,7 @@
 pub mod densify;
 mod loss;
 mod memory;
+pub mod outliers;
 mod photos;
 pub mod relocation;
 mod settings;

@@ -47,6 +47,15 @@ impl Photos {
         }
     }
 
+    /// Puts another picture of the same size in a photo's place.
+    pub fn replace(&mut self, gpu: &Gpu, index: usize, picture: &[u8]) {
+        let words = loss::pack(picture);
+        match self {
+            Self::Resident(buffers) => buffers[index].write(gpu, &words),
+            Self::Streamed { packed, .. } => packed[index] = words,
+        }
+    }
+
     /// Readies a photo for what is submitted next, and gives its buffer's place.
     pub fn show(&self, gpu: &Gpu, index: usize) -> usize {
         match self {

@@ -126,6 +126,10 @@ pub const SHORT_RUN: usize = 3_000;
 /// view at a time leave noise as large as they are.
 pub const SETTLED: f64 = 0.1;
 
+/// Shares of the iterations after which outliers are looked for: once the scene is
+/// there, and again when it is sharper.
+pub const OUTLIERS_AT: [f64; 2] = [0.4, 0.65];
+
 /// Luma iterations of ChromaDistill (WACV 2025, supplement).
 pub const PAPER_ITERATIONS: usize = 15_000;
 
@@ -155,9 +159,9 @@ pub struct LumaSettings {
     pub prune_share: f64,
     /// Gaussians below this opacity are removed.
     pub prune_opacity: f64,
-    /// Residual, in gray, at which a pixel's weight ends up at a quarter; all count alike
-    /// when `None`.
-    pub robust: Option<f64>,
+    /// Whether pixels that show something else than the scene are found on the way
+    /// ([`outliers`](super::outliers)) and no longer count.
+    pub robust: bool,
     /// Bytes that the training may take on the device; no limit when `None`.
     pub memory_limit: Option<u64>,
     /// Whether opacities fall by what the blur of the projection spreads
@@ -183,7 +187,7 @@ impl LumaSettings {
             growth: 0.3,
             prune_share: 0.1,
             prune_opacity: 0.005,
-            robust: None,
+            robust: false,
             memory_limit: None,
             antialiased: false,
             background: false,
@@ -228,14 +232,11 @@ impl LumaSettings {
         SETTLED.powf(settled / (iterations - settle_from).max(1) as f64)
     }
 
-    /// Residual at which a pixel's weight is a quarter at `iteration`: falls from 1, where
-    /// all count, to [`Self::robust`] half-way, so that what is only not learned yet is
-    /// not taken for a defect (graduated non-convexity, Blake and Zisserman 1987).
-    pub fn residual_at(&self, iteration: usize) -> Option<f64> {
-        let last = self.robust?;
-        let half = (self.schedule.iterations / 2).max(1);
-        let t = (iteration as f64 / half as f64).min(1.0);
-        Some(last.powf(t))
+    /// Whether pixels that show something else than the scene are looked for after
+    /// `iteration` (counted from 1).
+    pub fn finds_outliers_after(&self, iteration: usize) -> bool {
+        let due = |share: f64| (share * self.schedule.iterations as f64) as usize;
+        self.robust && OUTLIERS_AT.iter().any(|&share| iteration == due(share))
     }
 
     /// Degree of the harmonics in use at `iteration`.

@@ -14,8 +14,9 @@ use glam::DVec3;
 use super::{
     Densification, LumaSettings,
     densify::{self, Evidence, Target},
-    loss::{self, LossEffects, LumaLossParameters, Targets},
+    loss::{self, LossEffects, Targets},
     memory::{Demand, ENTRIES_PER_SPLAT},
+    outliers,
     relocation::{self, RelocationParameters},
     view::TrainingView,
     workspace::{Kernels, Workspace},
@@ -78,6 +79,8 @@ pub struct LumaTrainer {
     targets: Targets,
     /// Of each view.
     exposures: Vec<Exposure>,
+    /// Photo and mask of each view, where outliers are looked for.
+    pictures: Vec<(Vec<u8>, Vec<u8>)>,
     max_pixels: usize,
     max_tiles: usize,
     geometry: Geometry,
@@ -113,14 +116,14 @@ impl LumaTrainer {
         let gpu = raster.gpu.clone();
         let effects = LossEffects {
             exposed: views.iter().any(|view| view.exposure != Exposure::NONE),
-            masked: views.iter().any(|view| view.mask.is_some()),
-            robust: settings.robust.is_some(),
+            masked: settings.robust || views.iter().any(|view| view.mask.is_some()),
         };
         let kernels = Kernels::new(&gpu, effects);
         let near = NEAR_SHARE * extent;
         let (mut max_pixels, mut max_tiles) = (0, 0);
         let (mut cameras, mut grays, mut masks) = (Vec::new(), Vec::new(), Vec::new());
-        let exposures = views.iter().map(|view| view.exposure).collect();
+        let (count, settings_robust) = (views.len(), settings.robust);
+        let exposures: Vec<Exposure> = views.iter().map(|view| view.exposure).collect();
         let coarse: Vec<TrainingView> = match settings.schedule.coarse_until {
             0 => Vec::new(),
             _ => views.iter().map(TrainingView::halved).collect(),
@@ -174,6 +177,10 @@ impl LumaTrainer {
             near,
             cameras,
             targets,
+            pictures: match settings_robust {
+                true => grays.into_iter().zip(masks).take(count).collect(),
+                false => Vec::new(),
+            },
             exposures,
             max_pixels,
             max_tiles,
@@ -198,8 +205,9 @@ impl LumaTrainer {
         while iteration < self.settings.schedule.iterations {
             self.step(iteration);
             iteration += 1;
-            let changes =
-                self.settings.densifies_after(iteration) || self.settings.resets_after(iteration);
+            let changes = self.settings.densifies_after(iteration)
+                || self.settings.resets_after(iteration)
+                || self.settings.finds_outliers_after(iteration);
             let ends = iteration == self.settings.schedule.iterations;
             // The first views say how much room is needed: those lost to an overflow
             // are few if it is noticed early.
@@ -235,6 +243,9 @@ impl LumaTrainer {
             }
             if self.settings.densifies_after(iteration) {
                 self.densify(iteration)?;
+            }
+            if self.settings.finds_outliers_after(iteration) {
+                self.leave_out_outliers()?;
             }
             if self.settings.resets_after(iteration) {
                 self.reset_opacities()?;
@@ -278,8 +289,7 @@ impl LumaTrainer {
     fn step(&self, iteration: usize) {
         let views = self.exposures.len();
         let mut index = view_at(self.settings.seed, views, iteration);
-        let parameters =
-            LumaLossParameters::new(self.exposures[index], self.settings.residual_at(iteration));
+        let exposure = self.exposures[index];
         if iteration < self.settings.schedule.coarse_until {
             index += views;
         }
@@ -294,7 +304,7 @@ impl LumaTrainer {
         workspace.lists.set_view(&self.gpu, &view);
         workspace.lists.record(&self.raster, &mut recorder);
         workspace.layer.record(&self.raster, &mut recorder);
-        let photo = self.targets.show(&self.gpu, index, parameters);
+        let photo = self.targets.show(&self.gpu, index, exposure);
         workspace.losses[photo].record(&self.kernels.loss, &mut recorder, &view);
         let [x, y] = loss::blocks(&view);
         workspace.log.record(
@@ -486,6 +496,33 @@ impl LumaTrainer {
             .capacity
             .max(self.geometry.count * ENTRIES_PER_SPLAT);
         self.renew(capacity, iteration, moments)
+    }
+
+    /// Looks for pixels that show something else than the scene, and lets them count no
+    /// longer; those that were found before get another chance.
+    fn leave_out_outliers(&mut self) -> Result<(), GpuError> {
+        let scene = outliers::Scene {
+            raster: &self.raster,
+            geometry: &self.geometry,
+            field: &self.field,
+            near: self.near,
+            capacity: self.workspace().lists.capacity,
+        };
+        let photos: Vec<_> = (0..self.exposures.len())
+            .map(|index| outliers::Photo {
+                camera: &self.cameras[index],
+                gray: &self.pictures[index].0,
+                mask: &self.pictures[index].1,
+                exposure: self.exposures[index],
+            })
+            .collect();
+        let found = scene.masks(&photos)?;
+        if let Some(masks) = &mut self.targets.masks {
+            for (index, mask) in found.iter().enumerate() {
+                masks.replace(&self.gpu, index, mask);
+            }
+        }
+        Ok(())
     }
 
     /// Lowers every opacity and forgets its momentum.

@@ -2,12 +2,13 @@
 
 use glam::DVec3;
 
-use super::scene::{Scene, counts};
+use super::scene::Scene;
 use crate::splats::{ShField, Splats};
 
-/// A Gaussian goes when more than this share of the views that see its centre have it
-/// masked: the hull of the silhouettes, with some patience for masks drawn by hand.
-const MASKED_SHARE: f64 = 0.25;
+/// A Gaussian goes when more than this share of the views that see its centre show black
+/// there: the hull of the silhouettes, with patience for masks drawn by hand and for what
+/// is black by itself in some view.
+const BLACK_SHARE: f64 = 0.5;
 
 /// The Gaussians that lie inside the silhouettes of the training views; all of them where
 /// nothing would be left.
@@ -23,16 +24,16 @@ pub(super) fn carved(scene: &Scene, splats: &Splats) -> Splats {
 
 /// Whether enough views show something at a place.
 fn is_inside(scene: &Scene, place: DVec3) -> bool {
-    let (mut seen, mut masked) = (0.0, 0.0);
+    let (mut seen, mut black) = (0.0, 0.0);
     for &view in &scene.split.train {
         let (photo, camera) = &scene.photos[view];
         if let Some([x, y]) = camera.pixel_of(place) {
             let pixel = y as usize * photo.width as usize + x as usize;
             seen += 1.0;
-            masked += f64::from(u8::from(!counts(photo, pixel)));
+            black += f64::from(u8::from(photo.gray[pixel] == 0));
         }
     }
-    masked <= MASKED_SHARE * seen
+    black <= BLACK_SHARE * seen
 }
 
 /// Some of the Gaussians, in the order of `indices`.

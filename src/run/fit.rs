@@ -81,7 +81,7 @@ pub fn fit(
     let mut settings = LumaSettings {
         memory_limit: options.memory_limit,
         sh_degree: plan.sh_degree,
-        robust: plan.robust(),
+        robust: plan.has(Effect::Robust),
         antialiased: plan.has(Effect::Antialias),
         background: plan.has(Effect::Background),
         max_splats: options.max_splats.unwrap_or(amounts.max_splats),
@@ -93,8 +93,7 @@ pub fn fit(
     }
     settings.schedule.coarse_until =
         (options.coarse * settings.schedule.iterations as f64) as usize;
-    // What masks remove is black in the photos, and learned as such.
-    let ignores = plan.has(Effect::Masks) && !scene.removes_masked();
+    let ignores = plan.has(Effect::Masks) || plan.has(Effect::Robust);
     let cameras = scene.split.train.iter().map(|&i| &scene.photos[i].1);
     let demand = Demand::of(cameras, ignores, settings.sh_degree, options.memory_limit);
     let fits = demand.largest_set(options.memory_limit, gpu.binding_limit());
@@ -131,7 +130,7 @@ pub fn fit(
             TrainingView {
                 camera: camera.clone(),
                 gray: photo.gray.clone(),
-                mask: photo.mask.clone().filter(|_| ignores),
+                mask: photo.mask.clone().filter(|_| plan.has(Effect::Masks)),
                 exposure: plan.exposures[i],
             }
         })

@@ -95,7 +95,7 @@ impl Scene {
         }
     }
 
-    /// Whether nothing is where masks are black.
+    /// Whether nothing is where masks are black; photos are black there, and that counts.
     pub fn removes_masked(&self) -> bool {
         self.masked_views > 0 && self.options.masked == MaskUse::Remove
     }

@@ -107,7 +107,6 @@ fn twins() -> Vec<Twin> {
             "LumaLossParameters" = LumaLossParameters {
                 gain,
                 offset,
-                inverse_residual,
                 padding
             }
         ),

@@ -106,7 +106,7 @@ fn broken_losses_and_steps_are_noticed() {
             "2.0 * x * square[k]",
             "x * square[k]",
         ),
-        // The exposed, the masked and the robust variant.
+        // The exposed and the masked variant.
         (
             "losses",
             "luma_loss_backward",
@@ -116,14 +116,8 @@ fn broken_losses_and_steps_are_noticed() {
         (
             "losses",
             "luma_loss",
-            "weight *= mask_at(p)",
-            "weight *= sqrt(mask_at(p))",
-        ),
-        (
-            "losses",
-            "luma_loss_backward",
-            "weight = falloff * falloff",
-            "weight = falloff",
+            "let w = weight(p)",
+            "let w = sqrt(weight(p))",
         ),
         (
             "chroma loss",

@@ -115,7 +115,7 @@ const REASONS: &[(&str, &str, &str)] = &[
         "the kernel runs for images of at least one pixel",
     ),
     (
-        "mask_at",
+        "weight",
         "f32((mask[p / 4u] >> (8u * (p % 4u))) & 255u) / 255.0",
         "a constant divisor",
     ),

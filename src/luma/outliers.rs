@@ -1,0 +1,241 @@
+//! Pixels that show something else than the scene: dust, scratches, passers-by.
+//!
+//! A pixel that the picture misses by far may be one that is not learned yet; but then
+//! other views miss the same place as far. So each Gaussian is given the mean residual of
+//! all the pixels that it is drawn to (the adjoint of blending), these means are drawn
+//! like a colour, and a pixel is taken for a defect where its residual is far above
+//! what the scene leads to expect. One view alone barely moves the mean.
+
+use std::sync::Arc;
+
+use crate::{
+    capture::{Camera, Exposure},
+    gpu::{Buffer, Gpu, GpuError, Recorder},
+    raster::{Field, Geometry, Layer, LayerAdjoint, Lists, Outcome, Raster, ViewUniform},
+    splats::{ShField, sh},
+};
+
+/// Residuals, in gray, that noise and texture reach anywhere: smaller ones harm nobody.
+const RESIDUAL_MIN: f32 = 0.06;
+
+/// A defect's residual is so many times what the scene leads to expect.
+const EXCESS: f32 = 3.0;
+
+/// Residuals are averaged over squares this far from a pixel, and what is found grows by
+/// as much: single pixels are noise, and defects have soft borders.
+const REACH: usize = 1;
+
+/// A view with more than this share of defects is not seen through dust: it is posed
+/// wrongly, or its part of the scene is not learned yet.
+const SHARE_MAX: f64 = 0.3;
+
+/// What a photo shows, and what counts of it.
+pub struct Photo<'a> {
+    /// Where it was taken.
+    pub camera: &'a Camera,
+    /// 8-bit gray, `[height, width]`.
+    pub gray: &'a [u8],
+    /// 255 where a pixel counts, `[height, width]`.
+    pub mask: &'a [u8],
+    /// How bright it shows the scene.
+    pub exposure: Exposure,
+}
+
+/// The scene as it is learned so far.
+pub struct Scene<'a> {
+    /// The rasterizer.
+    pub raster: &'a Arc<Raster>,
+    /// Its Gaussians.
+    pub geometry: &'a Geometry,
+    /// Their luma.
+    pub field: &'a Field,
+    /// Nothing nearer is drawn, in world units.
+    pub near: f64,
+    /// Room for tile lists, at first.
+    pub capacity: usize,
+}
+
+impl Scene<'_> {
+    /// A mask for each photo: its own, and 0 where it shows something else.
+    ///
+    /// # Errors
+    /// [`GpuError`].
+    pub fn masks(&self, photos: &[Photo]) -> Result<Vec<Vec<u8>>, GpuError> {
+        let gpu = &self.raster.gpu;
+        let mut capacity = self.capacity;
+        let expected = loop {
+            let mut drawing = Drawing::new(self, photos, capacity)?;
+            match drawing.gather(self, photos)? {
+                None => break drawing.expect(gpu)?,
+                Some(needed) => capacity = needed + needed / 4,
+            }
+        };
+        (photos.iter())
+            .map(|photo| {
+                let [luma, expectation] = expected.draw(self, photo)?;
+                let residuals = residuals(photo, &luma);
+                let expectation: Vec<f32> = expectation
+                    .chunks_exact(2)
+                    .map(|pair| pair[0] / pair[1].max(f32::MIN_POSITIVE))
+                    .collect();
+                Ok(mask(photo, &residuals, &expectation))
+            })
+            .collect()
+    }
+}
+
+/// Luma and a pair of channels on the same tile lists.
+struct Drawing {
+    lists: Lists,
+    luma: Layer,
+    pair: Layer,
+    pair_field: Field,
+    adjoint: LayerAdjoint,
+    sums: Buffer<f32>,
+}
+
+impl Drawing {
+    fn new(scene: &Scene, photos: &[Photo], capacity: usize) -> Result<Self, GpuError> {
+        let (raster, geometry) = (scene.raster, scene.geometry);
+        let uniforms = || photos.iter().map(|photo| scene.view(photo.camera));
+        let pixels = uniforms().map(|view| view.pixel_count()).max().unwrap_or(0);
+        let tiles = uniforms().map(|view| view.tile_count()).max().unwrap_or(0);
+        let gpu = &raster.gpu;
+        let pair_field = Field::upload(gpu, &ShField::zeros(geometry.count, 0, 2))?;
+        let lists = Lists::new(raster, geometry, tiles, capacity)?;
+        let luma = Layer::new(raster, geometry, &lists, scene.field, pixels, tiles)?;
+        let pair = Layer::new(raster, geometry, &lists, &pair_field, pixels, tiles)?;
+        let sums = Buffer::zeros(gpu, "sums of residuals", pair_field.planes.len())?;
+        let outcome = Outcome::Sum(&sums);
+        let adjoint = LayerAdjoint::new(raster, geometry, &lists, &pair_field, &pair, &outcome)?;
+        Ok(Self {
+            lists,
+            luma,
+            pair,
+            pair_field,
+            adjoint,
+            sums,
+        })
+    }
+
+    /// Adds up, for each Gaussian, the residuals of the pixels it is drawn to and how much
+    /// it is drawn there. Gives the entries that the tile lists lacked, if they did.
+    fn gather(&mut self, scene: &Scene, photos: &[Photo]) -> Result<Option<usize>, GpuError> {
+        let gpu = &scene.raster.gpu;
+        for photo in photos {
+            let luma = self.draw(scene, photo)?[0].clone();
+            if let Some(needed) = self.lists.status(gpu)?.overflow {
+                return Ok(Some(needed));
+            }
+            let gradient: Vec<f32> = (residuals(photo, &luma).iter().zip(photo.mask))
+                .flat_map(|(residual, &count)| {
+                    let count = f32::from(count) / 255.0;
+                    [count * residual, count]
+                })
+                .collect();
+            self.adjoint.image_gradient.write_at(gpu, 0, &gradient);
+            let mut recorder = Recorder::new(gpu);
+            self.adjoint.record(scene.raster, &mut recorder);
+            recorder.submit();
+        }
+        Ok(None)
+    }
+
+    /// The same with each Gaussian's mean residual and one as the pair of channels.
+    fn expect(self, gpu: &Gpu) -> Result<Self, GpuError> {
+        let sums = self.sums.read(gpu)?;
+        let count = sums.len() / 2;
+        let constant = (1.0 / sh::C0) as f32;
+        let means = (0..count).map(|i| match sums[count + i] > 0.0 {
+            true => constant * sums[i] / sums[count + i],
+            // Nobody sees it.
+            false => 0.0,
+        });
+        let planes: Vec<f32> = means.chain((0..count).map(|_| constant)).collect();
+        self.pair_field.planes.write(gpu, &planes);
+        Ok(self)
+    }
+
+    /// Luma and pair as a photo's camera sees them.
+    fn draw(&self, scene: &Scene, photo: &Photo) -> Result<[Vec<f32>; 2], GpuError> {
+        let (raster, gpu) = (scene.raster, &scene.raster.gpu);
+        let view = scene.view(photo.camera);
+        let mut recorder = Recorder::new(gpu);
+        self.lists.set_view(gpu, &view);
+        self.lists.record(raster, &mut recorder);
+        self.luma.record(raster, &mut recorder);
+        recorder.submit();
+        // The pair has the constant harmonic alone.
+        self.lists.set_view(
+            gpu,
+            &ViewUniform {
+                sh_degree: 0,
+                ..view
+            },
+        );
+        let mut recorder = Recorder::new(gpu);
+        self.pair.record(raster, &mut recorder);
+        recorder.submit();
+        let pixels = view.pixel_count();
+        Ok([
+            self.luma.read_image(gpu, pixels)?,
+            self.pair.read_image(gpu, pixels)?,
+        ])
+    }
+}
+
+impl Scene<'_> {
+    fn view(&self, camera: &Camera) -> ViewUniform {
+        ViewUniform::new(camera, self.near, self.geometry.count, self.field.degree)
+    }
+}
+
+/// How far the picture is from the photo, each pixel with its neighbours.
+fn residuals(photo: &Photo, luma: &[f32]) -> Vec<f32> {
+    let sizes: Vec<f32> = (luma.iter().zip(photo.gray))
+        .map(|(&luma, &gray)| {
+            let shown = photo.exposure.shown(f64::from(luma)) as f32;
+            (shown - f32::from(gray) / 255.0).abs()
+        })
+        .collect();
+    around(photo.camera, &sizes, |values| {
+        let (sum, count) =
+            values.fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0));
+        sum / count
+    })
+}
+
+/// The photo's mask without the pixels whose residual is not to be expected.
+fn mask(photo: &Photo, residuals: &[f32], expectation: &[f32]) -> Vec<u8> {
+    let found: Vec<f32> = (residuals.iter().zip(expectation))
+        .map(|(&residual, &expected)| {
+            let defect = residual > RESIDUAL_MIN && residual > EXCESS * expected;
+            f32::from(u8::from(defect))
+        })
+        .collect();
+    let share = f64::from(found.iter().sum::<f32>()) / found.len() as f64;
+    if share > SHARE_MAX {
+        return photo.mask.to_vec();
+    }
+    let grown = around(photo.camera, &found, |values| values.fold(0.0, f32::max));
+    (grown.iter().zip(photo.mask))
+        .map(|(&defect, &count)| if defect > 0.0 { 0 } else { count })
+        .collect()
+}
+
+/// What `of` makes of each pixel's neighbourhood.
+fn around(
+    camera: &Camera,
+    values: &[f32],
+    of: impl Fn(&mut dyn Iterator<Item = f32>) -> f32,
+) -> Vec<f32> {
+    let [width, height] = [camera.width, camera.height].map(|side| side as usize);
+    (0..values.len())
+        .map(|pixel| {
+            let (x, y) = (pixel % width, pixel / width);
+            let rows = y.saturating_sub(REACH)..(y + REACH + 1).min(height);
+            let columns = x.saturating_sub(REACH)..(x + REACH + 1).min(width);
+            of(&mut rows.flat_map(|row| columns.clone().map(move |x| values[row * width + x])))
+        })
+        .collect()
+}
