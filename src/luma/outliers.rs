@@ -2,24 +2,24 @@
 //!
 //! A pixel that the picture misses by far may be one that is not learned yet; but then
 //! other views miss the same place as far. So each Gaussian is given the mean residual of
-//! all the pixels that it is drawn to (the adjoint of blending), these means are drawn
-//! like a colour, and a pixel is taken for a defect where its residual is far above
-//! what the scene leads to expect. One view alone barely moves the mean.
+//! the pixels that it is drawn to in all other views (the adjoint of blending), these
+//! means are drawn like a colour, and a pixel is taken for a defect where its residual is
+//! far above what the others lead to expect.
 
 use std::sync::Arc;
 
 use crate::{
     capture::{Camera, Exposure},
-    gpu::{Buffer, Gpu, GpuError, Recorder},
+    gpu::{Buffer, GpuError, Recorder},
     raster::{Field, Geometry, Layer, LayerAdjoint, Lists, Outcome, Raster, ViewUniform},
     splats::{ShField, sh},
 };
 
 /// Residuals, in gray, that noise and texture reach anywhere: smaller ones harm nobody.
-const RESIDUAL_MIN: f32 = 0.06;
+const RESIDUAL_MIN: f32 = 0.1;
 
 /// A defect's residual is so many times what the scene leads to expect.
-const EXCESS: f32 = 3.0;
+const EXCESS: f32 = 4.0;
 
 /// Residuals are averaged over squares this far from a pixel, and what is found grows by
 /// as much: single pixels are noise, and defects have soft borders.
@@ -28,6 +28,12 @@ const REACH: usize = 1;
 /// A view with more than this share of defects is not seen through dust: it is posed
 /// wrongly, or its part of the scene is not learned yet.
 const SHARE_MAX: f64 = 0.3;
+
+/// The others have seen a Gaussian when it covers so many of their pixels.
+const SEEN_MIN: f32 = 0.5;
+
+/// They know a pixel when Gaussians that they have seen cover so much of it.
+const KNOWN_MIN: f32 = 0.5;
 
 /// What a photo shows, and what counts of it.
 pub struct Photo<'a> {
@@ -63,21 +69,18 @@ impl Scene<'_> {
     pub fn masks(&self, photos: &[Photo]) -> Result<Vec<Vec<u8>>, GpuError> {
         let gpu = &self.raster.gpu;
         let mut capacity = self.capacity;
-        let expected = loop {
+        let drawing = loop {
             let mut drawing = Drawing::new(self, photos, capacity)?;
             match drawing.gather(self, photos)? {
-                None => break drawing.expect(gpu)?,
+                None => break drawing,
                 Some(needed) => capacity = needed + needed / 4,
             }
         };
+        let all = drawing.sums.read(gpu)?;
         (photos.iter())
             .map(|photo| {
-                let [luma, expectation] = expected.draw(self, photo)?;
-                let residuals = residuals(photo, &luma);
-                let expectation: Vec<f32> = expectation
-                    .chunks_exact(2)
-                    .map(|pair| pair[0] / pair[1].max(f32::MIN_POSITIVE))
-                    .collect();
+                let residuals = residuals(photo, &drawing.draw_luma(self, photo)?);
+                let expectation = drawing.expect(self, photo, &residuals, &all)?;
                 Ok(mask(photo, &residuals, &expectation))
             })
             .collect()
@@ -90,8 +93,11 @@ struct Drawing {
     luma: Layer,
     pair: Layer,
     pair_field: Field,
-    adjoint: LayerAdjoint,
+    /// Adds to `sums`, the other replaces `of_one`.
+    adding: LayerAdjoint,
+    replacing: LayerAdjoint,
     sums: Buffer<f32>,
+    of_one: Buffer<f32>,
 }
 
 impl Drawing {
@@ -106,15 +112,20 @@ impl Drawing {
         let luma = Layer::new(raster, geometry, &lists, scene.field, pixels, tiles)?;
         let pair = Layer::new(raster, geometry, &lists, &pair_field, pixels, tiles)?;
         let sums = Buffer::zeros(gpu, "sums of residuals", pair_field.planes.len())?;
-        let outcome = Outcome::Sum(&sums);
-        let adjoint = LayerAdjoint::new(raster, geometry, &lists, &pair_field, &pair, &outcome)?;
+        let of_one = Buffer::zeros(gpu, "sums of one view's residuals", sums.len())?;
+        let adjoint =
+            |outcome| LayerAdjoint::new(raster, geometry, &lists, &pair_field, &pair, &outcome);
+        let adding = adjoint(Outcome::Sum(&sums))?;
+        let replacing = adjoint(Outcome::Gradient(&of_one))?;
         Ok(Self {
             lists,
             luma,
             pair,
             pair_field,
-            adjoint,
+            adding,
+            replacing,
             sums,
+            of_one,
         })
     }
 
@@ -123,64 +134,88 @@ impl Drawing {
     fn gather(&mut self, scene: &Scene, photos: &[Photo]) -> Result<Option<usize>, GpuError> {
         let gpu = &scene.raster.gpu;
         for photo in photos {
-            let luma = self.draw(scene, photo)?[0].clone();
+            let luma = self.draw_luma(scene, photo)?;
             if let Some(needed) = self.lists.status(gpu)?.overflow {
                 return Ok(Some(needed));
             }
-            let gradient: Vec<f32> = (residuals(photo, &luma).iter().zip(photo.mask))
-                .flat_map(|(residual, &count)| {
-                    let count = f32::from(count) / 255.0;
-                    [count * residual, count]
-                })
-                .collect();
-            self.adjoint.image_gradient.write_at(gpu, 0, &gradient);
-            let mut recorder = Recorder::new(gpu);
-            self.adjoint.record(scene.raster, &mut recorder);
-            recorder.submit();
+            self.pull_back(scene, photo, &residuals(photo, &luma), &self.adding);
         }
         Ok(None)
     }
 
-    /// The same with each Gaussian's mean residual and one as the pair of channels.
-    fn expect(self, gpu: &Gpu) -> Result<Self, GpuError> {
-        let sums = self.sums.read(gpu)?;
-        let count = sums.len() / 2;
-        let constant = (1.0 / sh::C0) as f32;
-        let means = (0..count).map(|i| match sums[count + i] > 0.0 {
-            true => constant * sums[i] / sums[count + i],
-            // Nobody sees it.
-            false => 0.0,
-        });
-        let planes: Vec<f32> = means.chain((0..count).map(|_| constant)).collect();
-        self.pair_field.planes.write(gpu, &planes);
-        Ok(self)
+    /// Brings a photo's residuals, and what counts of it, to the Gaussians.
+    fn pull_back(&self, scene: &Scene, photo: &Photo, residuals: &[f32], adjoint: &LayerAdjoint) {
+        let gpu = &scene.raster.gpu;
+        let pairs: Vec<f32> = (residuals.iter().zip(photo.mask))
+            .flat_map(|(residual, &count)| {
+                let count = f32::from(count) / 255.0;
+                [count * residual, count]
+            })
+            .collect();
+        adjoint.image_gradient.write_at(gpu, 0, &pairs);
+        let mut recorder = Recorder::new(gpu);
+        adjoint.record(scene.raster, &mut recorder);
+        recorder.submit();
     }
 
-    /// Luma and pair as a photo's camera sees them.
-    fn draw(&self, scene: &Scene, photo: &Photo) -> Result<[Vec<f32>; 2], GpuError> {
+    /// The residuals that all views but this one lead to expect; `all` are the sums over
+    /// all of them. Infinite where no other view sees anything.
+    fn expect(
+        &self,
+        scene: &Scene,
+        photo: &Photo,
+        residuals: &[f32],
+        all: &[f32],
+    ) -> Result<Vec<f32>, GpuError> {
+        let gpu = &scene.raster.gpu;
+        self.pull_back(scene, photo, residuals, &self.replacing);
+        let own = self.of_one.read(gpu)?;
+        let count = all.len() / 2;
+        let of_others = |k: usize| (all[k] - own[k]).max(0.0);
+        // Weighted by how much the others see of a Gaussian: who is seen by none says nothing.
+        let seen = |i: usize| {
+            let weight = of_others(count + i);
+            (weight > SEEN_MIN).then(|| of_others(i) / weight)
+        };
+        let constant = (1.0 / sh::C0) as f32;
+        let means = (0..count).map(|i| constant * seen(i).unwrap_or(0.0));
+        let weights = (0..count).map(|i| constant * f32::from(u8::from(seen(i).is_some())));
+        let planes: Vec<f32> = means.chain(weights).collect();
+        self.pair_field.planes.write(gpu, &planes);
+        let pair = self.draw_pair(scene, photo)?;
+        Ok((pair.chunks_exact(2))
+            .map(|pair| match pair[1] > KNOWN_MIN {
+                true => pair[0] / pair[1],
+                false => f32::INFINITY,
+            })
+            .collect())
+    }
+
+    fn draw_luma(&self, scene: &Scene, photo: &Photo) -> Result<Vec<f32>, GpuError> {
         let (raster, gpu) = (scene.raster, &scene.raster.gpu);
         let view = scene.view(photo.camera);
         let mut recorder = Recorder::new(gpu);
         self.lists.set_view(gpu, &view);
         self.lists.record(raster, &mut recorder);
         self.luma.record(raster, &mut recorder);
+        // What the adjoints need of the pair.
+        self.pair.record(raster, &mut recorder);
         recorder.submit();
-        // The pair has the constant harmonic alone.
-        self.lists.set_view(
-            gpu,
-            &ViewUniform {
-                sh_degree: 0,
-                ..view
-            },
-        );
+        self.luma.read_image(gpu, view.pixel_count())
+    }
+
+    /// With the lists of the luma drawn last. The pair has the constant harmonic alone.
+    fn draw_pair(&self, scene: &Scene, photo: &Photo) -> Result<Vec<f32>, GpuError> {
+        let (raster, gpu) = (scene.raster, &scene.raster.gpu);
+        let view = ViewUniform {
+            sh_degree: 0,
+            ..scene.view(photo.camera)
+        };
+        self.lists.set_view(gpu, &view);
         let mut recorder = Recorder::new(gpu);
         self.pair.record(raster, &mut recorder);
         recorder.submit();
-        let pixels = view.pixel_count();
-        Ok([
-            self.luma.read_image(gpu, pixels)?,
-            self.pair.read_image(gpu, pixels)?,
-        ])
+        self.pair.read_image(gpu, view.pixel_count())
     }
 }
 
