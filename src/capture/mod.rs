@@ -23,6 +23,8 @@ mod depth_tests;
 mod fixtures;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod view_tests;
 
 use std::path::{Path, PathBuf};
 

@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec2, DVec3};
 
-use super::{GRID, Lens, Pinhole, Projection};
+use super::{Lens, Pinhole, Projection, SAMPLES};
 use crate::capture::Camera;
 
 /// A pinhole picture may stretch the photo by this factor at most, in any
@@ -24,6 +24,9 @@ const LEAST_FACE: f64 = 0.005;
 /// All pictures together have at most so many times the photo's pixels; faces of a
 /// fisheye of 180° have 1.2 times as many. Beyond it a calibration is no lens's.
 const MAX_GROWTH: f64 = 16.0;
+
+/// Samples across a face, an odd number: it is cut to those that show something.
+const GRID: usize = 33;
 
 /// Rays nearer to the picture's plane than this, of unit length, count as beside it.
 const GRAZING: f64 = 1e-3;
@@ -99,7 +102,7 @@ impl Lens {
             .samples()
             .filter_map(|pixel| Some((pixel, self.ray(pixel)?)))
             .collect();
-        let samples = (GRID * GRID) as f64;
+        let samples = (SAMPLES * SAMPLES) as f64;
         if (rays.len() as f64) < LEAST_SHOWN * samples {
             return Err(format!(
                 "its distortion folds {:.0} % of the photo over the rest",

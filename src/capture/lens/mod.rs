@@ -31,9 +31,9 @@ use distortion::Distortion;
 /// taken for a pinhole: COLMAP itself places features no better.
 pub const IMPERCEPTIBLE: f64 = 0.5;
 
-/// Samples across an image, an odd number so that its middle is one: enough to find
+/// Samples across a photo, an odd number so that its middle is one: enough to find
 /// bounds and extremes of mappings as smooth as a lens's.
-const GRID: usize = 33;
+const SAMPLES: usize = 17;
 
 /// A camera's calibration: which ray of light meets which pixel.
 ///
@@ -163,8 +163,8 @@ impl Lens {
     /// A grid of places over the photo, its border included.
     fn samples(&self) -> impl Iterator<Item = DVec2> + use<> {
         let size = DVec2::new(f64::from(self.width), f64::from(self.height));
-        (0..GRID * GRID).map(move |k| {
-            size * DVec2::new((k % GRID) as f64, (k / GRID) as f64) / (GRID - 1) as f64
+        (0..SAMPLES * SAMPLES).map(move |k| {
+            size * DVec2::new((k % SAMPLES) as f64, (k / SAMPLES) as f64) / (SAMPLES - 1) as f64
         })
     }
 }
