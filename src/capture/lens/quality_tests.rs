@@ -8,7 +8,7 @@ use glam::DVec2;
 
 use super::undistort::sample;
 use super::{Lens, ModelName, Undistortion};
-use crate::capture::{Camera, Capture, Photo, downscale};
+use crate::capture::{Camera, Capture, LoadOptions, Loader, Photo, downscale};
 
 /// A gray picture of width × height.
 type Gray = (Vec<u8>, [u32; 2]);
@@ -17,7 +17,8 @@ type Gray = (Vec<u8>, [u32; 2]);
 fn source() -> (Photo, Camera) {
     let demo = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/demo");
     let capture = Capture::load(&demo).unwrap();
-    Photo::load(&capture.views[3], None).unwrap()
+    let loader = Loader::new(LoadOptions::default());
+    loader.load(&capture.views[3]).unwrap()
 }
 
 /// A barrel of the pinhole's focal length whose photos have `size`.
