@@ -94,7 +94,8 @@ fn a_range_that_is_not_used_is_found() {
 #[test]
 fn masks_beside_the_photos_are_found_and_may_be_left_alone() {
     let place = place_with_scene();
-    place.succeed(&[&QUICK_FIT[..], &["-o", "plain"]].concat());
+    let alike = ["--without", "background", "-o", "plain"];
+    place.succeed(&[&QUICK_FIT[..], &alike].concat());
     for view in 0..scene::VIEWS {
         // Both of COLMAP's ways to name a mask.
         let name = scene::name(view) + [".png", ""][view % 2];
@@ -115,7 +116,8 @@ fn masks_beside_the_photos_are_found_and_may_be_left_alone() {
         (&["--masked", "remove"], "beside", scene::VIEWS, false),
         (&["--masks", "off"], "off", 0, true),
     ] {
-        place.succeed(&[&QUICK_FIT[..], options, &["-o", "masked"]].concat());
+        let alike = ["--without", "background", "-o", "masked"];
+        place.succeed(&[&QUICK_FIT[..], options, &alike].concat());
         let report = place.report("masked");
         splats.push(report["luma"]["splats"].as_u64().expect("a number"));
         let capture = &report["capture"];

@@ -115,7 +115,7 @@ pub(super) const CASES: &[Case] = &[
         "no images/",
         |p| std::fs::rename(p.path("scene/images"), p.path("scene/photos")).expect("a folder"),
         FIT,
-        &["scene", "images/", "put the undistorted photos there"],
+        &["scene", "images/", "put the photos that COLMAP saw there"],
     ),
     case(
         "no model",
