@@ -7,7 +7,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use super::decode::{self, Depth};
 use super::error::CaptureError;
 use super::mask::{self, MaskFolder};
-use super::options::{LoadOptions, MaskSource, MaskUse, Normalize};
+use super::options::{LoadOptions, MaskSource, Normalize};
 use super::photo::{Photo, check_size, working_size};
 use super::tone;
 use super::{Camera, Capture, View};
@@ -143,22 +143,21 @@ impl Loader {
         let mut pixels = tone::develop(picture, &self.options);
         let not_finite = pixels.mask.iter().flatten().filter(|&&count| count == 0);
         self.counts().insert(view.photo.clone(), not_finite.count());
-        let nothing = |counts: &[u8]| counts.iter().all(|&count| count == 0);
-        let nothing_counts = || CaptureError::NothingCounts {
-            path: view.image_path.clone(),
-            mask: self.masks.as_ref().and_then(|masks| masks.of(view)),
-        };
-        match (mask, self.options.masked) {
-            (Some(mask), _) if nothing(&mask) => return Err(nothing_counts()),
-            (Some(mask), MaskUse::Ignore) => pixels.cover(mask),
-            (Some(mask), MaskUse::Remove) => pixels.cut_out(&mask),
-            (None, _) => {}
-        }
-        if pixels.mask.as_deref().is_some_and(nothing) {
-            return Err(nothing_counts());
+        pixels.cover(mask);
+        if pixels
+            .mask
+            .as_ref()
+            .is_some_and(|mask| mask.iter().all(|&count| count == 0))
+        {
+            return Err(CaptureError::NothingCounts {
+                path: view.image_path.clone(),
+                mask: self.masks.as_ref().and_then(|masks| masks.of(view)),
+            });
         }
         let (lens, max_side) = (view.undistortion.as_ref(), self.options.max_side);
-        let photo = pixels.shrunk_to(self.photo_side(view)).into_photo();
+        let photo = pixels
+            .shrunk_to(self.photo_side(view))
+            .into_photo(self.options.masked);
         Ok(match lens {
             Some(lens) => lens.apply(&photo, &view.camera, max_side),
             None => {

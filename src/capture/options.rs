@@ -212,7 +212,7 @@ pub enum MaskUse {
     /// Anything: the photo does not say.
     #[default]
     Ignore,
-    /// Nothing: what the mask leaves stands before black, and that counts.
+    /// Nothing: what the mask leaves stands before black.
     Remove,
 }
 

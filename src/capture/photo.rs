@@ -2,6 +2,7 @@
 
 use super::View;
 use super::error::CaptureError;
+use super::options::MaskUse;
 use super::resample::{downscale, downscale_masked};
 use crate::color::GrayTable;
 
@@ -25,7 +26,7 @@ pub struct Photo {
     /// Colours, `[height · width]`, where the photo has a pixel that is not gray.
     pub rgb: Option<Vec<[u8; 3]>>,
     /// What each pixel counts, `[height · width]`: 255 fully, 0 not at all. `None`
-    /// where every pixel counts.
+    /// where every pixel counts. With [`MaskUse::Remove`], what is 0 is black as well.
     pub mask: Option<Vec<u8>>,
 }
 
@@ -45,31 +46,14 @@ pub(super) enum Values {
 
 impl Pixels {
     /// Lets only that count which `mask`, of the same size, lets as well.
-    pub fn cover(&mut self, mut mask: Vec<u8>) {
+    pub fn cover(&mut self, mask: Option<Vec<u8>>) {
+        let Some(mut mask) = mask else { return };
         if let Some(own) = &self.mask {
             mask.iter_mut()
                 .zip(own)
                 .for_each(|(m, &own)| *m = own.min(*m));
         }
         self.mask = mask.iter().any(|&count| count < u8::MAX).then_some(mask);
-    }
-
-    /// What `mask`, of the same size, leaves, before black: encoded values are
-    /// blended, as splats are.
-    pub fn cut_out(&mut self, mask: &[u8]) {
-        let before_black = |value: &mut u8, count: u8| {
-            *value = ((u16::from(*value) * u16::from(count) + 127) / 255) as u8;
-        };
-        match &mut self.values {
-            Values::Gray(gray) => {
-                (gray.iter_mut().zip(mask)).for_each(|([value], &count)| before_black(value, count))
-            }
-            Values::Rgb(rgb) => (rgb.iter_mut().zip(mask)).for_each(|(color, &count)| {
-                color
-                    .iter_mut()
-                    .for_each(|value| before_black(value, count));
-            }),
-        }
     }
 
     /// The same with a longer side of at most `max_side`.
@@ -100,15 +84,21 @@ impl Pixels {
         }
     }
 
-    /// The photo.
-    pub fn into_photo(self) -> Photo {
-        let (gray, rgb) = match self.values {
+    /// The photo; with [`MaskUse::Remove`] what the mask leaves, before black.
+    pub fn into_photo(self, masked: MaskUse) -> Photo {
+        let (mut gray, mut rgb) = match self.values {
             Values::Gray(gray) => (gray.into_flattened(), None),
             Values::Rgb(rgb) => {
                 let table = GrayTable::new();
                 (rgb.iter().map(|&c| table.gray(c)).collect(), Some(rgb))
             }
         };
+        if let (Some(mask), MaskUse::Remove) = (&self.mask, masked) {
+            before_black(&mut gray, mask);
+            for (pixel, &count) in rgb.iter_mut().flatten().zip(mask) {
+                before_black(pixel, &[count; 3]);
+            }
+        }
         Photo {
             width: self.width,
             height: self.height,
@@ -116,6 +106,13 @@ impl Pixels {
             rgb,
             mask: self.mask,
         }
+    }
+}
+
+/// Blends encoded values with black, as splats are blended.
+fn before_black(values: &mut [u8], counts: &[u8]) {
+    for (value, &count) in values.iter_mut().zip(counts) {
+        *value = ((u16::from(*value) * u16::from(count) + 127) / 255) as u8;
     }
 }
 

@@ -94,7 +94,8 @@ fn a_range_that_is_not_used_is_found() {
 #[test]
 fn masks_beside_the_photos_are_found_and_may_be_left_alone() {
     let place = place_with_scene();
-    place.succeed(&[&QUICK_FIT[..], &["-o", "plain"]].concat());
+    let alike = ["--without", "background", "-o", "plain"];
+    place.succeed(&[&QUICK_FIT[..], &alike].concat());
     for view in 0..scene::VIEWS {
         // Both of COLMAP's ways to name a mask.
         let name = scene::name(view) + [".png", ""][view % 2];
@@ -109,16 +110,25 @@ fn masks_beside_the_photos_are_found_and_may_be_left_alone() {
             .succeed(&["info", "scene"])
             .contains("masked_views: 10")
     );
+    let mut splats = Vec::new();
     for (options, source, views, same) in [
         (&[][..], "beside", scene::VIEWS, false),
         (&["--masked", "remove"], "beside", scene::VIEWS, false),
         (&["--masks", "off"], "off", 0, true),
     ] {
-        place.succeed(&[&QUICK_FIT[..], options, &["-o", "masked"]].concat());
-        let capture = &place.report("masked")["capture"];
+        let alike = ["--without", "background", "-o", "masked"];
+        place.succeed(&[&QUICK_FIT[..], options, &alike].concat());
+        let report = place.report("masked");
+        splats.push(report["luma"]["splats"].as_u64().expect("a number"));
+        let capture = &report["capture"];
         assert_eq!(capture["masks"], source);
         assert_eq!(capture["masked_views"], views);
         let equal = place.read("masked/luma.ply") == place.read("plain/luma.ply");
         assert_eq!(equal, same, "{options:?}");
     }
+    // What is removed is no longer there, and only then.
+    assert!(
+        splats[1] < splats[0] && splats[0] == splats[2],
+        "{splats:?}"
+    );
 }
