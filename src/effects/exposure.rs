@@ -163,7 +163,7 @@ fn regress(
             let of_prior = variance + mean_luma * mean_luma;
             let var = at(square, of_prior) - luma * luma;
             let covariance = at(product, of_prior) - luma * shown;
-            if !(var > 0.0) {
+            if var <= 0.0 || var.is_nan() {
                 return Exposure::NONE;
             }
             let gain = (covariance / var).clamp(GAIN_MIN, 1.0 / GAIN_MIN);

@@ -200,9 +200,11 @@ pub fn fit(
             peak_host_memory: files::peak_host_memory(),
             peak_device_memory,
             estimated_device_memory: demand.peak_bytes(splats.len()),
-            exposures: (plan.has(Effect::Exposure))
-                .then(|| scene.by_name(&plan.exposures))
-                .unwrap_or_default(),
+            exposures: if plan.has(Effect::Exposure) {
+                scene.by_name(&plan.exposures)
+            } else {
+                Default::default()
+            },
             held_out: mean_quality(&held_out_views),
             held_out_views,
             timings,

@@ -80,7 +80,7 @@ pub(super) fn read_header(path: &Path, file: &mut impl BufRead) -> Result<Header
 /// Whether the header's comments say that the Gaussians were trained antialiased, as
 /// Brush or Postshot write it; the last one counts.
 pub(super) fn is_antialiased(comments: &[String]) -> bool {
-    let modes = comments.iter().filter_map(|comment| {
+    let mut modes = comments.iter().filter_map(|comment| {
         let words: Vec<_> = comment.split_whitespace().collect();
         match words[..] {
             ["SplatRenderMode:", mode] => Some(mode == "mip"),
@@ -88,7 +88,7 @@ pub(super) fn is_antialiased(comments: &[String]) -> bool {
             _ => None,
         }
     });
-    modes.last().unwrap_or(false)
+    modes.next_back().unwrap_or(false)
 }
 
 impl VertexLayout {
