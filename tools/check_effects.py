@@ -38,9 +38,6 @@ VARIANTS = [
 ]
 NO_CONTROL = ["infrared-tiff"]
 
-# The scene's own shine calls for it too, so nothing is expected of the control.
-NOT_JUDGED = ["gloss-control"]
-
 # These stay as the plan has them while another effect is in question; the others are
 # off, for one may do the work of another.
 INNOCENT = ["lens", "masks"]
@@ -167,7 +164,7 @@ def main() -> int:
         choice, evidence, without = "", "", []
         if effect:
             choice, evidence, without = planned(options.program, folder, effect)
-        if effect and name not in NOT_JUDGED and choice != ("off" if name.endswith("-control") else "on"):
+        if effect and choice != ("off" if name.endswith("-control") else "on"):
             failures.append(f"{name}: {effect} is {choice} in the plan ({evidence})")
         flags = [[flag, effect, *without] for flag in ("--with", "--without")] if effect else [[]]
         runs = [] if options.plan_only else [fits(options, folder, one) for one in flags]

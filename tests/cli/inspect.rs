@@ -116,10 +116,17 @@ fn options_of_the_documentation_exist() {
         .map(|command| place.succeed(&[command, "--help"]))
         .concat();
     let known: Vec<&str> = help.split([' ', ',', '\n']).collect();
-    for page in ["README.md", "docs/guide.md"] {
+    for page in [
+        "README.md",
+        "docs/guide.md",
+        "docs/guide-film.md",
+        "docs/guide-infrared.md",
+        "docs/guide-monochrome.md",
+    ] {
         let path = format!("{}/{page}", env!("CARGO_MANIFEST_DIR"));
         let text = fs::read_to_string(path).expect("a page");
-        // Command lines of the program, and first cells of tables of options.
+        // Command lines of the program, and first cells of tables of options; some of
+        // these lines name an option of COLMAP or cargo beside.
         let pieces = text
             .lines()
             .filter_map(|line| match line.strip_prefix("| `-") {
@@ -128,9 +135,11 @@ fn options_of_the_documentation_exist() {
             });
         let options: Vec<&str> = pieces
             .flat_map(|piece| piece.split([' ', '`', ';', '.', ')']))
-            .filter(|word| word.starts_with("--") && !["--help", "--path"].contains(word))
+            .filter(|word| {
+                word.starts_with("--") && !["--help", "--path", "--ImageReader"].contains(word)
+            })
             .collect();
-        assert!(options.len() > 5, "{page}: {options:?}");
+        assert!(options.len() > 3, "{page}: {options:?}");
         for option in options {
             assert!(known.contains(&option), "{page}: {option}");
         }

@@ -22,4 +22,5 @@ mod splat_file;
 mod teach;
 mod teach_together;
 mod train;
+mod variants;
 mod view;
