@@ -26,7 +26,7 @@ const OUTLIER_SHARE: f64 = 0.006;
 const SAMPLING_SPREAD: f64 = 1.5;
 
 /// Share of the photos' area from which on something behind the scene is worth Gaussians.
-const BACKGROUND_SHARE: f64 = 0.05;
+const BACKGROUND_SHARE: f64 = 0.01;
 
 /// What the direction of view must explain of a point's luma, root mean square in gray
 /// levels. Matt scenes show 2 to 4: perspective changes a little what lies in a pixel.
@@ -200,13 +200,8 @@ impl Plan {
             let decision = Decision::new(Effect::Exposure, evidence, EXPOSURE_LEVELS.max(noise));
             overruled(decision, overrules)
         };
-        // Views of one exposure are judged as they are.
-        let exposures = match exposure.on {
-            true => found.views,
-            false => vec![Exposure::NONE; photos.len()],
-        };
         let robust = {
-            let evidence = outliers::outlier_share(capture, photos, &exposures);
+            let evidence = outliers::outlier_share(capture, photos, &found.views);
             let percent = evidence.map(|share| 100.0 * share);
             Decision::new(Effect::Robust, percent, 100.0 * OUTLIER_SHARE)
         };
@@ -217,7 +212,7 @@ impl Plan {
         );
         let behind = 100.0 * Backdrop::of(capture, photos, &split.train).share();
         let background = Decision::new(Effect::Background, Some(behind), 100.0 * BACKGROUND_SHARE);
-        let (degree, sh_degree) = degree(&samples, &exposures, sh_degree, overrules);
+        let (degree, sh_degree) = degree(&samples, &found.views, sh_degree, overrules);
         let lens = Decision::new(Effect::Lens, Some(capture.distortion), IMPERCEPTIBLE);
         let decisions = vec![
             overruled(lens, overrules),
@@ -228,6 +223,13 @@ impl Plan {
             overruled(background, overrules),
             degree,
         ];
+        let exposures = match decisions
+            .iter()
+            .any(|d| d.effect == Effect::Exposure && d.on)
+        {
+            true => found.views,
+            false => vec![Exposure::NONE; photos.len()],
+        };
         Self {
             decisions,
             exposures,

@@ -2,13 +2,23 @@
 
 use glam::DVec3;
 
-use super::scene::Scene;
-use crate::splats::{ShField, Splats};
+use super::scene::{Scene, counts};
+use crate::{
+    capture::Photo,
+    splats::{ShField, Splats},
+};
 
-/// A Gaussian goes when more than this share of the views that see its centre show black
-/// there: the hull of the silhouettes, with patience for masks drawn by hand and for what
-/// is black by itself in some view.
-const BLACK_SHARE: f64 = 0.5;
+/// A Gaussian goes when more than this share of the views that see its centre have it
+/// removed: the hull of the silhouettes, with some patience for masks drawn by hand.
+const REMOVED_SHARE: f64 = 0.25;
+
+/// What a photo does not say: what its mask removes is black, and that it says.
+pub(super) fn unknown(photo: &Photo) -> Option<Vec<u8>> {
+    let mask = photo.mask.as_ref()?;
+    let known =
+        (photo.gray.iter().zip(mask)).map(|(&gray, &count)| if gray == 0 { 255 } else { count });
+    Some(known.collect())
+}
 
 /// The Gaussians that lie inside the silhouettes of the training views; all of them where
 /// nothing would be left.
@@ -24,16 +34,17 @@ pub(super) fn carved(scene: &Scene, splats: &Splats) -> Splats {
 
 /// Whether enough views show something at a place.
 fn is_inside(scene: &Scene, place: DVec3) -> bool {
-    let (mut seen, mut black) = (0.0, 0.0);
+    let (mut seen, mut removed) = (0.0, 0.0);
     for &view in &scene.split.train {
         let (photo, camera) = &scene.photos[view];
         if let Some([x, y]) = camera.pixel_of(place) {
             let pixel = y as usize * photo.width as usize + x as usize;
+            let is_removed = photo.gray[pixel] == 0 && !counts(photo, pixel);
             seen += 1.0;
-            black += f64::from(u8::from(photo.gray[pixel] == 0));
+            removed += f64::from(u8::from(is_removed));
         }
     }
-    black <= BLACK_SHARE * seen
+    removed <= REMOVED_SHARE * seen
 }
 
 /// Some of the Gaussians, in the order of `indices`.

@@ -130,7 +130,10 @@ pub fn fit(
             TrainingView {
                 camera: camera.clone(),
                 gray: photo.gray.clone(),
-                mask: photo.mask.clone().filter(|_| plan.has(Effect::Masks)),
+                mask: match scene.removes_masked() {
+                    true => carve::unknown(photo),
+                    false => photo.mask.clone().filter(|_| plan.has(Effect::Masks)),
+                },
                 exposure: plan.exposures[i],
             }
         })

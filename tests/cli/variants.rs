@@ -33,6 +33,8 @@ fn the_plan_tells_pairs_apart() {
     let place = Place::new();
     let demo = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/demo");
     for (variant, control, effect) in [
+        (Variant::Barrel, Variant::BarrelControl, "lens"),
+        (Variant::Fisheye, Variant::FisheyeControl, "lens"),
         (Variant::Masked, Variant::MaskedControl, "masks"),
         (Variant::Exposure, Variant::ExposureControl, "exposure"),
         (Variant::Dust, Variant::DustControl, "robust"),

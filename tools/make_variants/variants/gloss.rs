@@ -4,14 +4,12 @@ use std::f64::consts::TAU;
 
 use glam::{DVec3, dvec3};
 
+use super::places::{CELL, between, inverse_depths};
 use super::resample::byte;
 use super::scene::{Scene, View};
 
 /// Logarithm of the largest gain: patches vary between 0.74 and 1.35.
 const STRENGTH: f64 = 0.3;
-
-/// Side of the cells in which depth is worked out, in pixels.
-const CELL: u32 = 8;
 
 /// Patches are as large as this part of the scene's width.
 const PATCH: f64 = 0.5;
@@ -87,20 +85,6 @@ fn sides(scene: &Scene) -> Vec<f64> {
     along.iter().map(|v| v / largest).collect()
 }
 
-/// Pixel and inverse depth of what each view observes.
-fn inverse_depths(scene: &Scene) -> Vec<Vec<([f64; 2], f64)>> {
-    let mut depths = vec![Vec::new(); scene.views.len()];
-    for point in &scene.points {
-        for seen in &point.track {
-            let z = scene.views[seen.view].seen(point.position).z;
-            if z > 0.0 {
-                depths[seen.view].push((seen.pixel, z.recip()));
-            }
-        }
-    }
-    depths
-}
-
 /// Multiplies the photo by the gain of the place that each pixel shows.
 fn shade(view: &mut View, depths: &[([f64; 2], f64)], gain: impl Fn(DVec3) -> f64) {
     if depths.is_empty() {
@@ -126,17 +110,4 @@ fn shade(view: &mut View, depths: &[([f64; 2], f64)], gain: impl Fn(DVec3) -> f6
             + t * ((1.0 - s) * at(column, row + 1) + s * at(column + 1, row + 1));
         pixel.0 = pixel.0.map(|value| byte(gain * f64::from(value)));
     }
-}
-
-/// Shepard's interpolation: every observation counts by its distance to the power of −4.
-fn between(depths: &[([f64; 2], f64)], [x, y]: [f64; 2]) -> f64 {
-    let (mut sum, mut weights) = (0.0, 0.0);
-    for ([u, v], depth) in depths {
-        // A pixel's square keeps an observation at the very place from dividing by zero.
-        let distance = (u - x).powi(2) + (v - y).powi(2) + 1.0;
-        let weight = distance.powi(-2);
-        sum += weight * depth;
-        weights += weight;
-    }
-    sum / weights
 }

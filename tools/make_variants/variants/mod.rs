@@ -8,6 +8,7 @@ mod error;
 mod exposure;
 mod gloss;
 mod lens;
+mod places;
 mod resample;
 mod scene;
 mod sky;
@@ -46,7 +47,7 @@ pub enum Variant {
     Dust,
     /// The same photos, clean
     DustControl,
-    /// The farther four fifths of the points are missing
+    /// The far part of the scene is a sky, and its points are missing
     Sky,
     /// As many points are missing, from anywhere
     SkyControl,
@@ -87,7 +88,7 @@ pub fn make(source: &Path, variant: Variant, out: &Path, seed: u64) -> Result<St
         Variant::Distances => distances::quarter(&mut scene),
         Variant::DistancesControl => distances::halve(&mut scene),
         Variant::Dust => defects::dust(&mut scene, seed),
-        Variant::Sky => sky::uncover(&mut scene),
+        Variant::Sky => sky::open(&mut scene),
         Variant::SkyControl => sky::thin(&mut scene, seed),
         Variant::Masked => defects::masked(&mut scene, seed),
         Variant::Gloss => gloss::polish(&mut scene, seed),

@@ -181,7 +181,7 @@ fn gloss_is_of_the_scene_and_not_of_the_photo() {
 #[test]
 fn as_many_points_without_the_far_ones() {
     let [mut far, mut even] = [read(), read()];
-    sky::uncover(&mut far);
+    sky::open(&mut far);
     sky::thin(&mut even, 1);
     assert_eq!(far.points.len(), even.points.len());
     let center = far.center();
