@@ -14,7 +14,7 @@ const HELD_BACK: usize = 5;
 
 /// A higher degree must lower the loss on the views held back by this share: less is
 /// within what the choice of these views amounts to.
-const LEAST_GAIN: f64 = 0.03;
+pub const LEAST_GAIN: f64 = 0.03;
 
 /// The degree that was chosen, and what each that was tried gave.
 #[derive(Clone, Debug, PartialEq)]

@@ -20,7 +20,7 @@ mod view;
 pub use bake_rgb::bake_rgb;
 pub use conjugate::{Conjugate, ConjugateParameters, System};
 pub use correction::{CorrectionParameters, Corrections, SUM_GROUPS, SUMS};
-pub use degree::{ChosenDegree, choose_degree};
+pub use degree::{ChosenDegree, LEAST_GAIN, choose_degree};
 pub use distil::{Distilled, SolverKind, distil};
 pub use distill::{ChromaProgress, Distiller};
 pub use fill::fill_unseen;

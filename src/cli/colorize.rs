@@ -63,7 +63,8 @@ pub struct Colorize {
     /// with irls, off with adam].
     #[arg(long, value_name = "UNITS|off", value_parser = robust)]
     robust: Option<f32>,
-    /// Bring the views' teachers, who disagree in saturation and tint, into line [default: on with irls].
+    /// Bring the views' teachers, who disagree in saturation and tint, into line [default: on with irls, where they
+    /// disagree about the same points].
     #[arg(long, value_enum, value_name = "on|off")]
     correct_views: Option<Switch>,
     /// Give Gaussians that no view sees well their neighbours' colour [default: on with irls].

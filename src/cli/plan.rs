@@ -36,7 +36,7 @@ impl Plan {
         let plan = plan(&options, &mut |event| progress.show(&event))?;
         progress.finish();
         if self.json {
-            let report = crate::report::EffectReport::of(&plan);
+            let report = crate::report::EffectReport::of(&plan.decisions);
             print(format_args!(
                 "{:#}",
                 serde_json::json!({ "effects": report })

@@ -35,7 +35,7 @@ pub fn left_out_errors(tracks: &[Vec<Sample>], exposures: &[Exposure]) -> Option
             let samples: Vec<_> = (track.iter().take(SAMPLES_MAX))
                 .map(|sample| {
                     let Exposure { gain, offset } = exposures[sample.view];
-                    (sample.direction, (sample.luma - offset) / gain)
+                    (sample.direction, (sample.value - offset) / gain)
                 })
                 .collect();
             let mut lumas: Vec<f64> = samples.iter().map(|&(_, luma)| luma).collect();
@@ -139,7 +139,7 @@ mod tests {
                         let direction = DVec3::new(angle.sin(), 0.0, angle.cos());
                         Sample {
                             view: view as usize,
-                            luma: base + gloss * direction.x + 0.02 * (random.f64() - 0.5),
+                            value: base + gloss * direction.x + 0.02 * (random.f64() - 0.5),
                             direction,
                         }
                     })

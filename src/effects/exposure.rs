@@ -79,7 +79,7 @@ pub fn find_exposures(tracks: &[Vec<Sample>], views: usize, train: &[usize]) -> 
 
 /// What a view that shows `luma` shows of the scene.
 fn of_scene(sample: &Sample, exposure: Exposure) -> f64 {
-    (sample.luma - exposure.offset) / exposure.gain
+    (sample.value - exposure.offset) / exposure.gain
 }
 
 /// A residual's weight.
@@ -111,7 +111,7 @@ fn residuals(tracks: &[Vec<Sample>], lumas: &[f64], exposures: &[Exposure]) -> V
         .flat_map(|(track, &luma)| {
             (track.iter()).map(move |sample| {
                 let Exposure { gain, offset } = exposures[sample.view];
-                sample.luma - gain * luma - offset
+                sample.value - gain * luma - offset
             })
         })
         .collect()
@@ -143,8 +143,8 @@ fn regress(
     for (track, &luma) in tracks.iter().zip(lumas) {
         for sample in track {
             let Exposure { gain, offset } = exposures[sample.view];
-            let weight = weight(sample.luma - gain * luma - offset, scale);
-            let shown = sample.luma;
+            let weight = weight(sample.value - gain * luma - offset, scale);
+            let shown = sample.value;
             let terms = [1.0, luma, shown, luma * luma, luma * shown];
             for (sum, term) in sums[sample.view].iter_mut().zip(terms) {
                 *sum += weight * term;
@@ -222,7 +222,7 @@ mod tests {
                         };
                         Sample {
                             view,
-                            luma: shown,
+                            value: shown,
                             direction: DVec3::Z,
                         }
                     })

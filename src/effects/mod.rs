@@ -11,12 +11,14 @@ mod fixtures;
 mod outliers;
 mod plan;
 mod sampling;
+mod teacher;
 mod tracks;
 
 pub use background::Backdrop;
 pub use direction::left_out_errors;
 pub use exposure::{Exposures, find_exposures};
 pub use outliers::outlier_share;
-pub use plan::{Decider, Decision, Effect, Overrules, Plan};
+pub use plan::{Decider, Decision, Effect, Overrules, Plan, table};
 pub use sampling::sampling_spread;
+pub use teacher::{TeacherSpread, teacher_spread};
 pub use tracks::{Sample, sample_tracks};

@@ -53,10 +53,16 @@ pub enum Effect {
     Background,
     /// Luma depends on the direction of view
     LumaDegree,
+    /// The teacher's views differ in saturation and tint
+    #[value(skip)]
+    TeacherCorrection,
+    /// Chroma depends on the direction of view
+    #[value(skip)]
+    ChromaDegree,
 }
 
 impl Effect {
-    /// All of them, in the order of the table.
+    /// Those of stage 1, in the order of the table.
     pub const ALL: [Self; 7] = [
         Self::Lens,
         Self::Masks,
@@ -77,6 +83,8 @@ impl Effect {
             Self::Antialias => "antialias",
             Self::Background => "background",
             Self::LumaDegree => "luma-degree",
+            Self::TeacherCorrection => "teacher-correction",
+            Self::ChromaDegree => "chroma-degree",
         }
     }
 
@@ -90,6 +98,8 @@ impl Effect {
             Self::Antialias => "times finer from near than from far",
             Self::Background => "% of the photos far behind all points",
             Self::LumaDegree => "gray levels by direction",
+            Self::TeacherCorrection => "CIELAB units between views",
+            Self::ChromaDegree => "% of the loss on views held back",
         }
     }
 
@@ -102,6 +112,8 @@ impl Effect {
             Self::Robust => "one byte a pixel, and twice three drawings of each photo",
             Self::Antialias => "viewers that know of it",
             Self::Background => "at most a quarter of the Gaussians",
+            Self::TeacherCorrection => "a sum over each view a round",
+            Self::ChromaDegree => "72, 192 or 360 bytes a Gaussian for degree 1, 2 or 3",
             Self::LumaDegree => "36, 96 or 180 bytes a Gaussian for degree 1, 2 or 3",
         }
     }
@@ -310,36 +322,45 @@ fn degree(
     (decision, degree)
 }
 
-impl fmt::Display for Plan {
-    /// The table that a user sees.
+impl fmt::Display for Decision {
+    /// A row of the table that a user sees.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let evidence = (self.evidence).map_or("none".to_owned(), |found| format!("{found:.2}"));
+        let by = match self.decided_by {
+            Decider::Evidence => "",
+            Decider::User => "; you said so",
+            Decider::Preset => "; by the preset",
+        };
         write!(
             f,
-            "{:<12} {:<4} {:>9} {:>10}",
-            "effect", "", "evidence", "threshold"
+            "{:<18} {:<4} {evidence:>9} {:>10.2} {}{by}",
+            self.effect.name(),
+            if self.on { "on" } else { "off" },
+            self.threshold,
+            self.effect.unit(),
         )?;
-        for decision in &self.decisions {
-            let Decision { effect, on, .. } = *decision;
-            let evidence = decision
-                .evidence
-                .map_or("none".to_owned(), |e| format!("{e:.2}"));
-            let on = if on { "on" } else { "off" };
-            let by = match decision.decided_by {
-                Decider::Evidence => "",
-                Decider::User => "; you said so",
-                Decider::Preset => "; by the preset",
-            };
-            write!(
-                f,
-                "\n{:<12} {on:<4} {evidence:>9} {:>10.2} {}{by}",
-                effect.name(),
-                decision.threshold,
-                effect.unit(),
-            )?;
-            if decision.on {
-                write!(f, "; costs {}", effect.cost())?;
-            }
+        match self.on {
+            true => write!(f, "; costs {}", self.effect.cost()),
+            false => Ok(()),
         }
-        Ok(())
+    }
+}
+
+/// The table of some decisions.
+pub fn table(decisions: &[Decision]) -> String {
+    let head = format!(
+        "{:<18} {:<4} {:>9} {:>10}",
+        "effect", "", "evidence", "threshold"
+    );
+    let rows = decisions.iter().map(Decision::to_string);
+    std::iter::once(head)
+        .chain(rows)
+        .collect::<Vec<_>>()
+        .join("\n")
+}
+
+impl fmt::Display for Plan {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&table(&self.decisions))
     }
 }

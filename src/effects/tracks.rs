@@ -19,8 +19,8 @@ const FOOTPRINT: f64 = 2.0;
 pub struct Sample {
     /// Index of the view.
     pub view: usize,
-    /// Encoded gray in [0, 1].
-    pub luma: f64,
+    /// Encoded gray, or another channel brought to [0, 1].
+    pub value: f64,
     /// Unit vector from the view's camera to the point.
     pub direction: DVec3,
 }
@@ -38,17 +38,13 @@ pub fn sample_tracks(capture: &Capture, photos: &[(Photo, Camera)]) -> Vec<Vec<S
             (point.track.iter())
                 .filter_map(|seen| {
                     let camera = &photos[seen.view].1;
-                    let of_model = &capture.views[seen.view].camera;
-                    let at = [
-                        seen.pixel[0] * f64::from(camera.width) / f64::from(of_model.width),
-                        seen.pixel[1] * f64::from(camera.height) / f64::from(of_model.height),
-                    ];
+                    let at = place_in(camera, &capture.views[seen.view].camera, seen.pixel);
                     let side = FOOTPRINT * sampling_rate(camera, point) / coarsest;
                     let luma = sums[seen.view].mean(at, side)?;
                     let direction = (point.position - camera.center()).try_normalize()?;
                     (luma > CLIPPED[0] && luma < CLIPPED[1]).then_some(Sample {
                         view: seen.view,
-                        luma,
+                        value: luma,
                         direction,
                     })
                 })
@@ -56,6 +52,14 @@ pub fn sample_tracks(capture: &Capture, photos: &[(Photo, Camera)]) -> Vec<Vec<S
         })
         .filter(|samples| samples.len() >= 2)
         .collect()
+}
+
+/// A pixel of the model's camera in that of the photo at working size.
+pub(super) fn place_in(camera: &Camera, of_model: &Camera, [x, y]: [f64; 2]) -> [f64; 2] {
+    [
+        x * f64::from(camera.width) / f64::from(of_model.width),
+        y * f64::from(camera.height) / f64::from(of_model.height),
+    ]
 }
 
 /// Pixels on one world unit at a point; at least a little, wherever it lies.

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::effects::{Decider, Effect, Plan};
+use crate::effects::{Decider, Decision, Effect};
 
 /// What was decided about an effect, and why.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -24,9 +24,9 @@ pub struct EffectReport {
 }
 
 impl EffectReport {
-    /// Everything that a plan decides.
-    pub fn of(plan: &Plan) -> Vec<Self> {
-        (plan.decisions.iter())
+    /// Everything that was decided.
+    pub fn of(decisions: &[Decision]) -> Vec<Self> {
+        (decisions.iter())
             .map(|decision| Self {
                 name: decision.effect,
                 on: decision.on,

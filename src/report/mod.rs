@@ -17,8 +17,6 @@ pub use evaluation::{
 pub use page::{Figure, MAP_END, PageRow, error_map, evaluation_page};
 pub use timings::{KernelReport, kernel_reports, timings_table};
 
-use std::collections::BTreeMap;
-
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -126,9 +124,9 @@ pub struct LumaReport {
     /// to take on the device at most.
     #[serde(default)]
     pub estimated_device_memory: u64,
-    /// How bright each photo shows the scene, by name, where they differ.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub exposures: BTreeMap<String, Exposure>,
+    /// How bright each photo shows the scene, where they differ.
+    #[serde(default)]
+    pub exposures: Vec<ViewExposure>,
     /// Mean over the held-out views, if any.
     pub held_out: Option<LumaQuality>,
     /// Each held-out view.
@@ -156,6 +154,16 @@ pub struct LumaQuality {
     pub psnr: f64,
     /// Structural similarity.
     pub ssim: f64,
+}
+
+/// How bright a photo shows the scene.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ViewExposure {
+    /// The photo's name.
+    pub name: String,
+    /// Its gain and offset.
+    #[serde(flatten)]
+    pub exposure: Exposure,
 }
 
 /// One held-out view of stage 1.
@@ -206,6 +214,9 @@ pub struct ChromaReport {
     /// Residual, in CIELAB units, at which the loss levels off; `None`: plain L1.
     #[serde(default)]
     pub robust: Option<f32>,
+    /// What was decided about each effect of stage 2.
+    #[serde(default)]
+    pub effects: Vec<EffectReport>,
     /// Whether each view's teacher was brought into line with the others.
     #[serde(default)]
     pub corrects_views: bool,

@@ -1,7 +1,6 @@
 //! `colorize`: a teacher's colours into a trained scene.
 
 use std::{
-    collections::BTreeMap,
     fmt::Write,
     path::{Path, PathBuf},
     sync::Arc,
@@ -11,6 +10,7 @@ use std::{
 use super::{
     Event, Observer, RunError, RunFolder, Stage,
     chroma_options::{ChromaOptions, Degree},
+    chroma_plan,
     color_quality::Measured,
     files,
     fit::{capture_report, comments, open_gpu},
@@ -19,16 +19,16 @@ use super::{
     teach::{TeachOptions, Teachers},
 };
 use crate::{
-    capture::{Camera, LoadOptions},
+    capture::{Camera, LoadOptions, Photo},
     chroma::{
         ChosenDegree, ChromaProgress, ChromaView, bake, choose_degree, distil, teacher::Upsample,
     },
-    effects::Overrules,
+    effects::{Overrules, table},
     gpu::Gpu,
     raster::Raster,
     report::{
-        CaptureReport, ChromaReport, ChromaSeconds, DeviceReport, LumaReport, LumaSeconds,
-        REPORT_VERSION, Report, contact_sheet, kernel_reports,
+        CaptureReport, ChromaReport, ChromaSeconds, DeviceReport, EffectReport, LumaReport,
+        LumaSeconds, REPORT_VERSION, Report, contact_sheet, kernel_reports,
     },
     splats::ply,
 };
@@ -112,24 +112,36 @@ pub fn colorize(
         .iter()
         .filter_map(|&i| {
             let taught = lesson.views[i].clone()?;
+            let (photo, camera) = &scene.photos[i];
             Some(ChromaView {
-                camera: scene.photos[i].1.clone(),
+                camera: camera.clone(),
                 wanted: taught.answer,
-                weights: taught.weights,
+                weights: masked_weights(taught.weights, photo),
             })
         })
         .collect();
     let colored_views = views.len();
-    let degree = match options.chroma.sh_degree {
-        Degree::Fixed(degree) => degree,
+    let correction = chroma_plan::correction(&scene, &lesson.views, &options.chroma);
+    let asked = ChromaOptions {
+        correct_views: Some(correction.on),
+        ..options.chroma.clone()
+    };
+    let chosen = match asked.sh_degree {
+        Degree::Fixed(_) => None,
         Degree::Auto => {
-            let settings = options.chroma.settings(iterations, 0, report.seed);
+            let settings = asked.settings(iterations, 0, report.seed);
             let chosen = choose_degree(&raster, &settings, scene.extent, &luma, &views)?;
             observe(Event::Note(describe(&chosen)));
-            chosen.degree
+            Some(chosen)
         }
     };
-    let settings = options.chroma.settings(iterations, degree, report.seed);
+    let degree = match (asked.sh_degree, &chosen) {
+        (Degree::Fixed(degree), _) => degree,
+        (Degree::Auto, chosen) => chosen.as_ref().map_or(0, |chosen| chosen.degree),
+    };
+    let effects = [correction, chroma_plan::degree(&asked, chosen.as_ref())];
+    observe(Event::Note(table(&effects)));
+    let settings = asked.settings(iterations, degree, report.seed);
     let (mut log, mut last, mut peak_device_memory) = (String::new(), None, None);
     let total = settings.steps_to_report();
     let told = &mut |progress: ChromaProgress| {
@@ -190,6 +202,7 @@ pub fn colorize(
         sh_degree: degree,
         coarser_scales: settings.coarser_scales,
         robust: settings.robust,
+        effects: EffectReport::of(&effects),
         corrects_views: settings.corrects_views,
         fills: settings.fills,
         loss: last.map_or(0.0, |progress| progress.loss),
@@ -216,6 +229,17 @@ pub fn colorize(
         folder.write_report(&report)?;
     }
     Ok((output, report))
+}
+
+/// Weights of the pixels that the photo's mask lets count.
+fn masked_weights(weights: Option<Vec<f32>>, photo: &Photo) -> Option<Vec<f32>> {
+    let Some(mask) = &photo.mask else {
+        return weights;
+    };
+    let weights = weights.unwrap_or_else(|| vec![1.0; mask.len()]);
+    let counted =
+        (weights.iter().zip(mask)).map(|(weight, &count)| weight * f32::from(count) / 255.0);
+    Some(counted.collect())
 }
 
 /// What the views held back say about the degree.
@@ -322,7 +346,7 @@ impl Source {
                 peak_host_memory: None,
                 peak_device_memory: None,
                 estimated_device_memory: 0,
-                exposures: BTreeMap::new(),
+                exposures: Vec::new(),
                 held_out: None,
                 held_out_views: Vec::new(),
                 timings: None,

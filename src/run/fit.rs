@@ -16,14 +16,14 @@ use super::{
 use crate::{
     capture::{Exposure, LoadOptions, Photo},
     color::gray_from_rgb,
-    effects::{Backdrop, Effect, Overrules},
+    effects::{Backdrop, Effect, Overrules, Plan},
     gpu::{Gpu, GpuError},
     luma::{Demand, Densification, LumaSettings, LumaTrainer, TrainingView},
     measure,
     raster::{Raster, RasterOptions},
     report::{
         CaptureReport, DeviceReport, EffectReport, LumaQuality, LumaReport, LumaSeconds, LumaView,
-        REPORT_VERSION, Report, kernel_reports,
+        REPORT_VERSION, Report, ViewExposure, kernel_reports,
     },
     splats::{ShField, Splats, init::initial_splats, ply, sh},
 };
@@ -185,7 +185,7 @@ pub fn fit(
         },
         preset: preset.name().to_owned(),
         seed: options.seed,
-        effects: EffectReport::of(&plan),
+        effects: EffectReport::of(&plan.decisions),
         luma: LumaReport {
             iterations: settings.schedule.iterations,
             sh_degree: settings.sh_degree,
@@ -203,11 +203,7 @@ pub fn fit(
             peak_host_memory: files::peak_host_memory(),
             peak_device_memory,
             estimated_device_memory: demand.peak_bytes(splats.len()),
-            exposures: if plan.has(Effect::Exposure) {
-                scene.by_name(&plan.exposures)
-            } else {
-                Default::default()
-            },
+            exposures: exposures(&scene, &plan),
             held_out: mean_quality(&held_out_views),
             held_out_views,
             timings,
@@ -349,6 +345,17 @@ fn measure_luma(
                 name: scene.capture.views[i].name.clone(),
                 quality: luma_quality(photo, &shown, &truth),
             })
+        })
+        .collect()
+}
+
+/// What a report says about exposures: nothing where they are alike.
+fn exposures(scene: &Scene, plan: &Plan) -> Vec<ViewExposure> {
+    let all = scene.capture.views.iter().zip(&plan.exposures);
+    all.filter(|_| plan.has(Effect::Exposure))
+        .map(|(view, &exposure)| ViewExposure {
+            name: view.name.clone(),
+            exposure,
         })
         .collect()
 }

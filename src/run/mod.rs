@@ -2,6 +2,7 @@
 
 mod carve;
 mod chroma_options;
+mod chroma_plan;
 mod color_quality;
 mod colorize;
 mod eval;

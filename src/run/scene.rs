@@ -2,7 +2,6 @@
 //! renderer for its splats.
 
 use std::{
-    collections::BTreeMap,
     num::NonZero,
     path::Path,
     sync::{
@@ -109,13 +108,6 @@ impl Scene {
             sh_degree,
             overrules,
         )
-    }
-
-    /// Something that each view has, by the views' names.
-    pub fn by_name<T: Clone>(&self, values: &[T]) -> BTreeMap<String, T> {
-        (self.capture.views.iter().zip(values))
-            .map(|(view, value)| (view.name.clone(), value.clone()))
-            .collect()
     }
 
     /// A renderer of several fields over the geometry of `splats`.

@@ -269,11 +269,6 @@ const REASONS: &[(&str, &str, &str)] = &[
         "vec4f(sums[0], sums[256], sums[512], sums[768]) / views",
         "the host sets a count of at least one view",
     ),
-    (
-        "weight",
-        "1.0 / (1.0 + r * r)",
-        "at least one is divided by",
-    ),
 ];
 
 /// What the lint found in one function.
