@@ -76,7 +76,8 @@ fn exported_files_come_back_to_their_photos() {
         let psnr = &place.report(run)["luma"]["held_out"]["psnr"];
         psnr.as_f64().expect("a number")
     };
-    let fit = ["fit", "scene", "--preset", "draft", "--iterations", "1"];
+    let mut fit = QUICK_FIT;
+    fit[5] = "1";
     place.succeed(&[&fit[..], &["-o", "runs/points"]].concat());
     place.succeed(&[&fit[..], &["-o", "runs/init", "--init", "far.ply"]].concat());
     let [trained, init, points] = ["runs/scene", "runs/init", "runs/points"].map(held_out);
