@@ -163,10 +163,11 @@ fn regress(
             let of_prior = variance + mean_luma * mean_luma;
             let var = at(square, of_prior) - luma * luma;
             let covariance = at(product, of_prior) - luma * shown;
-            if var <= 0.0 || var.is_nan() {
-                return Exposure::NONE;
-            }
-            let gain = (covariance / var).clamp(GAIN_MIN, 1.0 / GAIN_MIN);
+            // Points of one luma say nothing about gains.
+            let gain = match covariance / var {
+                gain if gain.is_finite() => gain.clamp(GAIN_MIN, 1.0 / GAIN_MIN),
+                _ => 1.0,
+            };
             Exposure {
                 gain,
                 offset: shown - gain * luma,

@@ -364,3 +364,85 @@ impl fmt::Display for Plan {
         f.write_str(&table(&self.decisions))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+    use crate::effects::fixtures::{capture, looking_along_z, photo};
+
+    fn plan(room: u32, overrules: &Overrules) -> Plan {
+        let photos: Vec<_> = (0..3)
+            .map(|k| {
+                let camera = looking_along_z(DVec3::new(0.1 * f64::from(k), 0.0, -3.0), 32);
+                (photo(&camera, |x, y| (x * 5 + y * 2) as u8), camera)
+            })
+            .collect();
+        let points = (0..100).map(|i| DVec3::new(f64::from(i % 10), f64::from(i / 10), 0.0) * 0.1);
+        let capture = capture(&photos, points);
+        let split = Split {
+            train: vec![0, 1, 2],
+            test: Vec::new(),
+        };
+        Plan::new(&capture, &photos, &split, room, overrules)
+    }
+
+    fn decided(plan: &Plan, effect: Effect) -> &Decision {
+        let mut decisions = plan.decisions.iter();
+        decisions
+            .find(|decision| decision.effect == effect)
+            .unwrap()
+    }
+
+    #[test]
+    fn every_effect_of_stage_1_is_decided_once() {
+        let plan = plan(3, &Overrules::default());
+        let order: Vec<Effect> = plan.decisions.iter().map(|d| d.effect).collect();
+        assert_eq!(order, Effect::ALL);
+        assert_eq!(plan.to_string().lines().count(), 1 + Effect::ALL.len());
+    }
+
+    #[test]
+    fn the_user_has_the_last_word() {
+        let overrules = Overrules {
+            with: vec![Effect::Exposure, Effect::LumaDegree],
+            without: vec![Effect::Background],
+            sh_degree: None,
+        };
+        let plan = plan(0, &overrules);
+        for (effect, on) in [
+            (Effect::Exposure, true),
+            (Effect::LumaDegree, true),
+            (Effect::Background, false),
+        ] {
+            let decision = decided(&plan, effect);
+            assert_eq!((decision.on, decision.decided_by), (on, Decider::User));
+        }
+        // Draft has room for none, but one was asked for.
+        assert_eq!(plan.sh_degree, 1);
+        assert_eq!(overrules.choice(Effect::Robust), Choice::Auto);
+    }
+
+    #[test]
+    fn without_tracks_the_preset_decides_the_degree() {
+        for room in [0, 2] {
+            let plan = plan(room, &Overrules::default());
+            let decision = decided(&plan, Effect::LumaDegree);
+            assert_eq!(decision.evidence, None);
+            assert_eq!(decision.decided_by, Decider::Preset);
+            assert_eq!((plan.sh_degree, decision.on), (room, room > 0));
+        }
+        let asked = Overrules {
+            sh_degree: Some(3),
+            ..Overrules::default()
+        };
+        assert_eq!(plan(0, &asked).sh_degree, 3);
+    }
+
+    #[test]
+    fn evidence_decides_by_its_threshold() {
+        let on = |evidence| Decision::new(Effect::Exposure, evidence, 2.0).on;
+        assert!(on(Some(2.1)) && !on(Some(2.0)) && !on(None) && !on(Some(f64::NAN)));
+    }
+}

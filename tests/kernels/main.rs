@@ -15,6 +15,7 @@ mod adam;
 mod antialiasing;
 mod blend;
 mod depth;
+mod effects;
 mod gradient;
 mod harness;
 mod layout;

@@ -43,6 +43,16 @@ pub(super) const CASES: &[Case] = &[
         &["4", "--sh-degree"],
     ),
     usage(
+        "an effect of no scene",
+        "plan scene --with fog",
+        &["fog", "--with"],
+    ),
+    usage(
+        "an effect on and off",
+        "fit scene --with lens --without exposure --without lens",
+        &["--with lens", "--without lens"],
+    ),
+    usage(
         "a chroma degree too high",
         "colorize --teacher t --sh-degree 4",
         &["4", "--sh-degree"],
