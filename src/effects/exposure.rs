@@ -10,6 +10,10 @@ const ROUNDS: usize = 40;
 /// Samples that speak for no exposure at all: a view with as few is hardly moved.
 const PRIOR_SAMPLES: f64 = 10.0;
 
+/// Standard deviation of the prior's samples at least, in gray: where points have one luma
+/// they say nothing about gains.
+const PRIOR_SPREAD: f64 = 0.03;
+
 /// Residuals beyond so many standard deviations count less and less (Huber's
 /// constant, 95 % efficient for normal noise).
 const HUBER: f64 = 1.345;
@@ -160,14 +164,11 @@ fn regress(
             let prior = PRIOR_SAMPLES;
             let at = |sum: f64, of_prior: f64| (sum + prior * of_prior) / (weights + prior);
             let (luma, shown) = (at(luma, mean_luma), at(shown, mean_luma));
-            let of_prior = variance + mean_luma * mean_luma;
+            let of_prior = variance.max(PRIOR_SPREAD * PRIOR_SPREAD) + mean_luma * mean_luma;
             let var = at(square, of_prior) - luma * luma;
             let covariance = at(product, of_prior) - luma * shown;
-            // Points of one luma say nothing about gains.
-            let gain = match covariance / var {
-                gain if gain.is_finite() => gain.clamp(GAIN_MIN, 1.0 / GAIN_MIN),
-                _ => 1.0,
-            };
+            // The prior has spread, so that its variance is positive.
+            let gain = (covariance / var).clamp(GAIN_MIN, 1.0 / GAIN_MIN);
             Exposure {
                 gain,
                 offset: shown - gain * luma,
