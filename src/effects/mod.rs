@@ -18,7 +18,7 @@ pub use background::Backdrop;
 pub use direction::left_out_errors;
 pub use exposure::{Exposures, find_exposures};
 pub use outliers::outlier_share;
-pub use plan::{Decider, Decision, Effect, Overrules, Plan, table};
+pub use plan::{Decider, Decision, Effect, Overrules, Plan, Room, table};
 pub use sampling::sampling_spread;
 pub use teacher::{TeacherSpread, teacher_spread};
 pub use tracks::{Sample, sample_tracks};

@@ -21,6 +21,10 @@ const EXPOSURE_OVER_NOISE: f64 = 3.0;
 /// taken to have defects: clean photos stay below 0.3 %, 1.5 % of dust gives 1 to 3 %.
 const OUTLIER_SHARE: f64 = 0.006;
 
+/// In a shorter run most of what is far off is only not learned yet, and leaving it out
+/// costs more than the defects do (docs/decisions.md).
+const ROBUST_ITERATIONS: usize = 1_200;
+
 /// Ratio of the sampling rates of near and far views from which on a blur of one size
 /// makes far views too thick or near ones too faint.
 const SAMPLING_SPREAD: f64 = 1.5;
@@ -159,6 +163,15 @@ impl Decision {
     }
 }
 
+/// What a training has room for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Room {
+    /// The highest degree of the luma harmonics.
+    pub sh_degree: u32,
+    /// Iterations.
+    pub iterations: usize,
+}
+
 /// What the user wants regardless of evidence.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Overrules {
@@ -195,13 +208,12 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Examines a capture with its photos at working size. `sh_degree` is the most that
-    /// the preset has room for.
+    /// Examines a capture with its photos at working size.
     pub fn new(
         capture: &Capture,
         photos: &[(Photo, Camera)],
         split: &Split,
-        sh_degree: u32,
+        room: Room,
         overrules: &Overrules,
     ) -> Self {
         let samples = tracks::sample_tracks(capture, photos);
@@ -215,7 +227,15 @@ impl Plan {
         let robust = {
             let evidence = outliers::outlier_share(capture, photos, &found.views);
             let percent = evidence.map(|share| 100.0 * share);
-            Decision::new(Effect::Robust, percent, 100.0 * OUTLIER_SHARE)
+            let decision = Decision::new(Effect::Robust, percent, 100.0 * OUTLIER_SHARE);
+            match decision.on && room.iterations < ROBUST_ITERATIONS {
+                true => Decision {
+                    on: false,
+                    decided_by: Decider::Preset,
+                    ..decision
+                },
+                false => decision,
+            }
         };
         let antialias = Decision::new(
             Effect::Antialias,
@@ -224,7 +244,7 @@ impl Plan {
         );
         let behind = 100.0 * Backdrop::of(capture, photos, &split.train).share();
         let background = Decision::new(Effect::Background, Some(behind), 100.0 * BACKGROUND_SHARE);
-        let (degree, sh_degree) = degree(&samples, &found.views, sh_degree, overrules);
+        let (degree, sh_degree) = degree(&samples, &found.views, room.sh_degree, overrules);
         let lens = Decision::new(Effect::Lens, Some(capture.distortion), IMPERCEPTIBLE);
         let decisions = vec![
             overruled(lens, overrules),
@@ -372,7 +392,7 @@ mod tests {
     use super::*;
     use crate::effects::fixtures::{capture, looking_along_z, photo};
 
-    fn plan(room: u32, overrules: &Overrules) -> Plan {
+    fn plan(sh_degree: u32, overrules: &Overrules) -> Plan {
         let photos: Vec<_> = (0..3)
             .map(|k| {
                 let camera = looking_along_z(DVec3::new(0.1 * f64::from(k), 0.0, -3.0), 32);
@@ -384,6 +404,10 @@ mod tests {
         let split = Split {
             train: vec![0, 1, 2],
             test: Vec::new(),
+        };
+        let room = Room {
+            sh_degree,
+            iterations: 700,
         };
         Plan::new(&capture, &photos, &split, room, overrules)
     }

@@ -16,7 +16,7 @@ use super::{
 use crate::{
     capture::{Exposure, LoadOptions, Photo},
     color::gray_from_rgb,
-    effects::{Backdrop, Effect, Overrules, Plan},
+    effects::{Backdrop, Effect, Overrules, Plan, Room},
     gpu::{Gpu, GpuError},
     luma::{Demand, Densification, LumaSettings, LumaTrainer, TrainingView},
     measure,
@@ -76,7 +76,12 @@ pub fn fit(
     let amounts = preset.amounts();
     let load = preset.load_options(&options.load, &options.overrules);
     let scene = Scene::load(&options.colmap_dir, &load, observe)?;
-    let plan = scene.plan(amounts.sh_degree, &options.overrules);
+    let iterations = options.iterations.unwrap_or(amounts.iterations);
+    let room = Room {
+        iterations,
+        ..amounts.room()
+    };
+    let plan = scene.plan(room, &options.overrules);
     observe(Event::Note(plan.to_string()));
     let mut settings = LumaSettings {
         memory_limit: options.memory_limit,
@@ -86,7 +91,7 @@ pub fn fit(
         background: plan.has(Effect::Background),
         max_splats: options.max_splats.unwrap_or(amounts.max_splats),
         seed: options.seed,
-        ..LumaSettings::new(options.iterations.unwrap_or(amounts.iterations))
+        ..LumaSettings::new(iterations)
     };
     if options.densification == Densification::Relocate {
         settings = settings.relocating();

@@ -33,5 +33,5 @@ pub fn plan(options: &PlanOptions, observe: &mut Observer<'_>) -> Result<Plan, R
     let amounts = preset.amounts();
     let load = preset.load_options(&options.load, &options.overrules);
     let scene = Scene::load(&options.colmap_dir, &load, observe)?;
-    Ok(scene.plan(amounts.sh_degree, &options.overrules))
+    Ok(scene.plan(amounts.room(), &options.overrules))
 }

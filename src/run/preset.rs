@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     capture::LoadOptions,
-    effects::{Effect, Overrules},
+    effects::{Effect, Overrules, Room},
     gpu::Gpu,
 };
 
@@ -34,6 +34,16 @@ pub(super) struct Amounts {
     pub max_side: Option<u32>,
     /// Degree of the luma harmonics.
     pub sh_degree: u32,
+}
+
+impl Amounts {
+    /// What there is room for.
+    pub fn room(&self) -> Room {
+        Room {
+            sh_degree: self.sh_degree,
+            iterations: self.iterations,
+        }
+    }
 }
 
 impl Preset {

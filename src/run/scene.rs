@@ -20,7 +20,7 @@ use crate::{
         Camera, Capture, CaptureError, LoadOptions, Loader, MaskUse, Normalize, Photo, Split, View,
         first_views, split,
     },
-    effects::{Overrules, Plan},
+    effects::{Overrules, Plan, Room},
     gpu::GpuError,
     raster::{Field, Geometry, Raster, RasterOptions, Renderer, constants::NEAR_SHARE},
     splats::{ShField, Splats, ply},
@@ -99,15 +99,9 @@ impl Scene {
         self.masked_views > 0 && self.options.masked == MaskUse::Remove
     }
 
-    /// Which effects it calls for; `sh_degree` is the most that the preset has room for.
-    pub fn plan(&self, sh_degree: u32, overrules: &Overrules) -> Plan {
-        Plan::new(
-            &self.capture,
-            &self.photos,
-            &self.split,
-            sh_degree,
-            overrules,
-        )
+    /// Which effects it calls for.
+    pub fn plan(&self, room: Room, overrules: &Overrules) -> Plan {
+        Plan::new(&self.capture, &self.photos, &self.split, room, overrules)
     }
 
     /// A renderer of several fields over the geometry of `splats`.
