@@ -52,3 +52,38 @@ fn the_plan_tells_pairs_apart() {
         }
     }
 }
+
+/// Photos of the demo as a teacher; each second one warmer by `tint`.
+fn teacher(place: &Place, name: &str, tint: f32) -> String {
+    let photos = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/demo/images");
+    std::fs::create_dir_all(place.path(name)).expect("a folder");
+    for (index, photo) in std::fs::read_dir(photos).expect("the demo").enumerate() {
+        let path = photo.expect("a photo").path();
+        let mut picture = image::open(&path).expect("a picture").into_rgb8();
+        let gain = 1.0 + tint * (index % 2) as f32;
+        for pixel in picture.pixels_mut() {
+            pixel[0] = (gain * f32::from(pixel[0])).min(255.0) as u8;
+            pixel[2] = (f32::from(pixel[2]) / gain) as u8;
+        }
+        let file = path.file_stem().expect("a name").to_string_lossy();
+        let to = place.path(name).join(format!("{file}.png"));
+        picture.save(to).expect("writable");
+    }
+    name.to_owned()
+}
+
+#[test]
+fn a_teacher_is_corrected_where_its_views_disagree() {
+    let place = Place::new();
+    let demo = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/demo");
+    let fit = ["fit", demo, "-o", "run", "--max-side", "120"];
+    place.succeed(&[&fit[..], &["--preset", "draft", "--iterations", "3"]].concat());
+    for (name, tint, on) in [("steady", 0.0, false), ("tinted", 0.25, true)] {
+        let teacher = teacher(&place, name, tint);
+        place.succeed(&["colorize", "run", "--teacher", &teacher, "--rounds", "1"]);
+        let effects = &place.report("run")["chroma"]["effects"];
+        assert_eq!(effects[0]["name"], "teacher-correction");
+        assert_eq!(effects[0]["on"], on, "{name}: {}", effects[0]);
+        assert_eq!(place.report("run")["chroma"]["corrects_views"], on);
+    }
+}
