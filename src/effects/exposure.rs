@@ -48,18 +48,19 @@ pub fn find_exposures(tracks: &[Vec<Sample>], views: usize, train: &[usize]) -> 
         exposures = regress(tracks, &lumas, &exposures, scale);
         center(&mut exposures, train);
     }
+    // Of each view its samples, and the squares of how far they are moved.
+    let mut sums = vec![[0.0; 2]; views];
+    for (track, &luma) in tracks.iter().zip(&lumas) {
+        for sample in track {
+            let Exposure { gain, offset } = exposures[sample.view];
+            let [count, squares] = &mut sums[sample.view];
+            *count += 1.0;
+            *squares += ((gain - 1.0) * luma + offset).powi(2);
+        }
+    }
     let (mut moved, mut expected, mut counted) = (0.0, 0.0, 0.0);
     for &view in train {
-        let seen = (tracks.iter().zip(&lumas))
-            .flat_map(|(track, &luma)| track.iter().map(move |sample| (sample.view, luma)))
-            .filter(|&(of, _)| of == view)
-            .map(|(_, luma)| luma);
-        let Exposure { gain, offset } = exposures[view];
-        let (mut count, mut squares) = (0.0, 0.0);
-        for luma in seen {
-            count += 1.0;
-            squares += ((gain - 1.0) * luma + offset).powi(2);
-        }
+        let [count, squares] = sums[view];
         if count > 0.0 {
             moved += squares / count;
             // Two numbers are fitted to a view's samples.

@@ -1,7 +1,7 @@
 //! Which effects of image formation a scene calls for.
 //!
-//! Each effect has a number that speaks for it, found in the capture or in a short
-//! probing training, and a threshold. What is off is in no kernel and no buffer.
+//! Each effect has a number that speaks for it, found in the capture, and a threshold.
+//! What is off is in no kernel and no buffer.
 
 mod background;
 mod direction;

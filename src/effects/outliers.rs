@@ -5,9 +5,9 @@
 //! the points themselves. Where several views agree about such a place and one does not,
 //! that one shows something else.
 
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
 
-use super::tracks::Sums;
+use super::tracks::mean_around;
 use crate::{
     capture::{Camera, Capture, Exposure, Photo},
     splats::nearest_neighbors,
@@ -39,25 +39,24 @@ pub fn outlier_share(
     let positions: Vec<[f32; 3]> = (capture.points.iter())
         .map(|point| point.position.as_vec3().to_array())
         .collect();
-    let sums: Vec<Sums> = photos.iter().map(|(photo, _)| Sums::of(photo)).collect();
     let neighbors = nearest_neighbors(&positions, NEIGHBORS);
     let (mut judged, mut disagreeing) = (0_u64, 0_u64);
-    let mut pairs = BTreeMap::new();
+    let mut pairs = BTreeSet::new();
     for (a, of_a) in neighbors.iter().enumerate() {
         for &b in of_a {
             let b = b as usize;
-            pairs.insert((a.min(b), a.max(b)), ());
+            pairs.insert((a.min(b), a.max(b)));
         }
     }
-    for (a, b) in pairs.into_keys() {
+    for (a, b) in pairs {
         let [first, second] = [a, b].map(|index| &capture.points[index]);
         let middle = 0.5 * (first.position + second.position);
         let mut lumas: Vec<f64> = (first.track.iter())
             .filter(|seen| second.track.iter().any(|also| also.view == seen.view))
             .filter_map(|seen| {
-                let camera = &photos[seen.view].1;
+                let (photo, camera) = &photos[seen.view];
                 let Exposure { gain, offset } = exposures[seen.view];
-                Some((sums[seen.view].mean(camera.pixel_of(middle)?, SIDE)? - offset) / gain)
+                Some((mean_around(photo, camera.pixel_of(middle)?, SIDE)? - offset) / gain)
             })
             .collect();
         lumas.sort_by(f64::total_cmp);

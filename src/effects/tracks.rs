@@ -29,7 +29,6 @@ pub struct Sample {
 ///
 /// `photos` are those of the capture's views at working size.
 pub fn sample_tracks(capture: &Capture, photos: &[(Photo, Camera)]) -> Vec<Vec<Sample>> {
-    let sums: Vec<Sums> = photos.iter().map(|(photo, _)| Sums::of(photo)).collect();
     (capture.points.iter())
         .map(|point| {
             let coarsest = (point.track.iter())
@@ -37,10 +36,10 @@ pub fn sample_tracks(capture: &Capture, photos: &[(Photo, Camera)]) -> Vec<Vec<S
                 .fold(f64::INFINITY, f64::min);
             (point.track.iter())
                 .filter_map(|seen| {
-                    let camera = &photos[seen.view].1;
+                    let (photo, camera) = &photos[seen.view];
                     let at = place_in(camera, &capture.views[seen.view].camera, seen.pixel);
                     let side = FOOTPRINT * sampling_rate(camera, point) / coarsest;
-                    let luma = sums[seen.view].mean(at, side)?;
+                    let luma = mean_around(photo, at, side)?;
                     let direction = (point.position - camera.center()).try_normalize()?;
                     (luma > CLIPPED[0] && luma < CLIPPED[1]).then_some(Sample {
                         view: seen.view,
@@ -68,72 +67,35 @@ fn sampling_rate(camera: &Camera, point: &Point) -> f64 {
     (camera.fx * camera.fy).sqrt() / distance.max(f64::MIN_POSITIVE)
 }
 
-/// A photo's gray and mask summed from the top left corner on, so that the mean over
-/// any rectangle takes four look-ups (Crow 1984).
-pub(super) struct Sums {
-    width: usize,
-    height: usize,
-    /// Gray and what does not count, `[height + 1, width + 1]`.
-    sums: Vec<[f64; 2]>,
-}
-
-impl Sums {
-    /// Sums up a photo.
-    pub fn of(photo: &Photo) -> Self {
-        let [width, height] = [photo.width, photo.height].map(|side| side as usize);
-        let columns = width + 1;
-        let mut sums = vec![[0.0; 2]; columns * (height + 1)];
-        for y in 0..height {
-            let mut row = [0.0; 2];
-            for x in 0..width {
-                let pixel = y * width + x;
-                let masked = photo.mask.as_ref().is_some_and(|mask| mask[pixel] < 255);
-                row[0] += f64::from(photo.gray[pixel]) / 255.0;
-                row[1] += f64::from(u8::from(masked));
-                let above = sums[y * columns + x + 1];
-                sums[(y + 1) * columns + x + 1] = [above[0] + row[0], above[1] + row[1]];
+/// The mean gray of a photo, in [0, 1], over a square around a place in pixels; `None` where
+/// the square leaves the photo or meets a masked pixel.
+pub(super) fn mean_around(photo: &Photo, at: [f64; 2], side: f64) -> Option<f64> {
+    let [left, top] = at.map(|along| along - 0.5 * side);
+    let [right, bottom] = at.map(|along| along + 0.5 * side);
+    let inside = left >= 0.0
+        && top >= 0.0
+        && right <= f64::from(photo.width)
+        && bottom <= f64::from(photo.height);
+    if !inside {
+        return None;
+    }
+    // How much of a pixel's side lies between two places.
+    let within = |pixel: usize, from: f64, to: f64| {
+        let pixel = pixel as f64;
+        (to.min(pixel + 1.0) - from.max(pixel)).max(0.0)
+    };
+    let mut sum = 0.0;
+    for y in top as usize..bottom.ceil() as usize {
+        for x in left as usize..right.ceil() as usize {
+            let pixel = y * photo.width as usize + x;
+            if photo.mask.as_ref().is_some_and(|mask| mask[pixel] < 255) {
+                return None;
             }
-        }
-        Self {
-            width,
-            height,
-            sums,
+            let area = within(x, left, right) * within(y, top, bottom);
+            sum += area * f64::from(photo.gray[pixel]) / 255.0;
         }
     }
-
-    /// The mean over a square around a place, in pixels; `None` where it leaves the
-    /// photo or meets a masked pixel.
-    pub fn mean(&self, at: [f64; 2], side: f64) -> Option<f64> {
-        let [left, top] = at.map(|along| along - 0.5 * side);
-        let [right, bottom] = at.map(|along| along + 0.5 * side);
-        let inside =
-            left >= 0.0 && top >= 0.0 && right <= self.width as f64 && bottom <= self.height as f64;
-        if !inside {
-            return None;
-        }
-        let corners = [
-            self.up_to(right, bottom),
-            self.up_to(left, bottom),
-            self.up_to(right, top),
-            self.up_to(left, top),
-        ];
-        let sum = |k: usize| corners[0][k] - corners[1][k] - corners[2][k] + corners[3][k];
-        (sum(1) < 1e-9).then(|| sum(0) / (side * side))
-    }
-
-    /// Sums over the rectangle from the corner to a place inside.
-    fn up_to(&self, x: f64, y: f64) -> [f64; 2] {
-        let (column, row) = (
-            (x as usize).min(self.width - 1),
-            (y as usize).min(self.height - 1),
-        );
-        let (dx, dy) = (x - column as f64, y - row as f64);
-        let at = |dx: usize, dy: usize| self.sums[(row + dy) * (self.width + 1) + column + dx];
-        let [a, b, c, d] = [at(0, 0), at(1, 0), at(0, 1), at(1, 1)];
-        std::array::from_fn(|k| {
-            (1.0 - dy) * ((1.0 - dx) * a[k] + dx * b[k]) + dy * ((1.0 - dx) * c[k] + dx * d[k])
-        })
-    }
+    Some(sum / (side * side))
 }
 
 #[cfg(test)]
@@ -152,24 +114,23 @@ mod tests {
 
     #[test]
     fn means_cover_parts_of_pixels() {
-        let sums = Sums::of(&photo());
+        let photo = photo();
         let close = |a: Option<f64>, b: f64| (a.unwrap() - b).abs() < 1e-12;
-        assert!(close(sums.mean([1.5, 0.5], 1.0), 0.2));
-        assert!(close(sums.mean([1.0, 1.0], 2.0), 0.4));
-        assert!(close(sums.mean([2.0, 1.0], 1.0), 0.6));
+        assert!(close(mean_around(&photo, [1.5, 0.5], 1.0), 0.2));
+        assert!(close(mean_around(&photo, [1.0, 1.0], 2.0), 0.4));
+        assert!(close(mean_around(&photo, [2.0, 1.0], 1.0), 0.6));
         // A quarter of each.
-        assert!(close(sums.mean([1.0, 0.5], 1.0), 0.1));
-        assert!(close(sums.mean([2.75, 1.75], 0.5), 1.0));
-        assert_eq!(sums.mean([0.4, 1.0], 1.0), None);
-        assert_eq!(sums.mean([1.5, 1.6], 1.0), None);
+        assert!(close(mean_around(&photo, [1.0, 0.5], 1.0), 0.1));
+        assert!(close(mean_around(&photo, [2.75, 1.75], 0.5), 1.0));
+        assert_eq!(mean_around(&photo, [0.4, 1.0], 1.0), None);
+        assert_eq!(mean_around(&photo, [1.5, 1.6], 1.0), None);
     }
 
     #[test]
     fn a_masked_neighbour_says_nothing() {
         let mut photo = photo();
         photo.mask = Some(vec![255, 255, 0, 255, 255, 255]);
-        let sums = Sums::of(&photo);
-        assert_eq!(sums.mean([2.2, 1.0], 1.0), None);
-        assert!(sums.mean([1.2, 1.0], 1.0).is_some());
+        assert_eq!(mean_around(&photo, [2.2, 1.0], 1.0), None);
+        assert!(mean_around(&photo, [1.2, 1.0], 1.0).is_some());
     }
 }

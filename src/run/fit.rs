@@ -339,6 +339,8 @@ fn measure_luma(
         .split
         .test
         .iter()
+        // A photo of which nothing counts says nothing.
+        .filter(|&&i| (0..scene.photos[i].0.gray.len()).any(|p| counts(&scene.photos[i].0, p)))
         .map(|&i| {
             let (photo, camera) = &scene.photos[i];
             let picture = renderer.render(camera)?.remove(0);

@@ -209,17 +209,12 @@ pub(super) fn counts(photo: &Photo, pixel: usize) -> bool {
     photo.mask.as_ref().is_none_or(|mask| mask[pixel] >= 128)
 }
 
-/// The values of the pixels that count; of all where none does.
+/// The values of the pixels that count.
 pub(super) fn counted<T: Copy>(photo: &Photo, values: &[T]) -> Vec<T> {
-    let counted: Vec<T> = (values.iter().enumerate())
+    (values.iter().enumerate())
         .filter(|&(pixel, _)| counts(photo, pixel))
         .map(|(_, &value)| value)
-        .collect();
-    if counted.is_empty() {
-        values.to_vec()
-    } else {
-        counted
-    }
+        .collect()
 }
 
 /// Gray pixels as floats in [0, 1].
