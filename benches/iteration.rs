@@ -16,14 +16,11 @@ use std::{
     collections::BTreeMap, fmt::Write, path::PathBuf, process::ExitCode, sync::Arc, time::Instant,
 };
 
-use glam::{DMat3, DVec3};
 use gs_chroma::{
-    capture::Camera,
     gpu::{Gpu, GpuError},
-    luma::{LumaSettings, LumaTrainer, TrainingView},
+    luma::{LumaSettings, LumaTrainer, TrainingView, frontal_camera, random_cloud},
     oracle::random::Random,
     raster::Raster,
-    splats::{ShField, Splats},
 };
 
 /// Iterations of a round, and rounds.
@@ -32,12 +29,6 @@ const ROUNDS: usize = 5;
 
 /// No further round of a size after so many seconds.
 const PATIENCE: f64 = 20.0;
-
-/// Gaussians that cover each pixel.
-const OVERDRAW: f64 = 8.0;
-
-/// Standard deviations to where a Gaussian of opacity 0.5 is seen: √(2 ln 127).
-const REACH: f64 = 3.1;
 
 /// What was measured of one size.
 struct Cost {
@@ -49,55 +40,9 @@ struct Cost {
     kernels: BTreeMap<&'static str, f64>,
 }
 
-fn camera(width: u32) -> Camera {
-    let height = width * 9 / 16;
-    Camera {
-        width,
-        height,
-        fx: f64::from(width),
-        fy: f64::from(width),
-        cx: f64::from(width) / 2.0,
-        cy: f64::from(height) / 2.0,
-        rotation: DMat3::IDENTITY,
-        translation: DVec3::ZERO,
-    }
-}
-
-fn cloud(count: usize, camera: &Camera) -> Splats {
-    let mut random = Random::new(1);
-    let pixels = f64::from(camera.width) * f64::from(camera.height);
-    let deviation =
-        (OVERDRAW * pixels / (std::f64::consts::PI * REACH * REACH * count as f64)).sqrt();
-    let (mut means, mut log_scales) = (Vec::new(), Vec::new());
-    for _ in 0..count {
-        let depth = random.range(2.0, 6.0);
-        let x = random.range(0.0, f64::from(camera.width)) - camera.cx;
-        let y = random.range(0.0, f64::from(camera.height)) - camera.cy;
-        means.push([x * depth / camera.fx, y * depth / camera.fy, depth].map(|v| v as f32));
-        let width = (deviation * depth / camera.fx).ln();
-        log_scales.push([0.0; 3].map(|_: f64| (width + random.range(-0.7, 0.7)) as f32));
-    }
-    let random_floats = |random: &mut Random, n: usize| -> Vec<f32> {
-        (0..n).map(|_| random.range(-1.0, 1.0) as f32).collect()
-    };
-    Splats {
-        means,
-        quats: (0..count)
-            .map(|_| random.array(-1.0, 1.0).map(|v| v as f32))
-            .collect(),
-        log_scales,
-        opacity_logits: random_floats(&mut random, count),
-        sh: ShField {
-            degree: 0,
-            channels: 1,
-            coefficients: random_floats(&mut random, count),
-        },
-    }
-}
-
 /// A trainer that has found its room already.
 fn trainer(gpu: &Gpu, count: usize, width: u32) -> Result<LumaTrainer, GpuError> {
-    let camera = camera(width);
+    let camera = frontal_camera(width, width * 9 / 16);
     let mut random = Random::new(2);
     let pixels = camera.width * camera.height;
     let gray = (0..pixels).map(|_| random.bits() as u8).collect();
@@ -106,7 +51,7 @@ fn trainer(gpu: &Gpu, count: usize, width: u32) -> Result<LumaTrainer, GpuError>
         max_splats: count,
         ..LumaSettings::new(ITERATIONS)
     };
-    let splats = cloud(count, &camera);
+    let splats = random_cloud(count, &camera);
     let raster = Arc::new(Raster::new(gpu));
     let views = vec![TrainingView::new(camera, gray)];
     let mut trainer = LumaTrainer::new(raster, settings, 5.0, &splats, views)?;

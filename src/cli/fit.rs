@@ -9,6 +9,9 @@ use crate::luma::Densification;
 use crate::report::timings_table;
 use crate::run::{FitOptions, Preset, RunError, fit};
 
+/// Rows of the curve that is printed.
+const CURVE_ROWS: usize = 8;
+
 /// Train geometry and luminance on a folder of photos with COLMAP poses.
 #[derive(Args)]
 pub struct Fit {
@@ -37,6 +40,20 @@ pub struct Fit {
     /// Take no more of the device's memory than this; fewer Gaussians if need be.
     #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u32).range(1..))]
     memory_limit: Option<u32>,
+    /// End where twice the iterations would bring less than so many dB on held-out views.
+    #[arg(long, value_name = "DB", num_args = 0..=1, require_equals = true, default_missing_value = "0.1", value_parser = decibels)]
+    stop_when_flat: Option<f64>,
+    /// Choose iterations, Gaussians and photo size so that all is done in so many minutes; with
+    /// --preset, no more work than that.
+    #[arg(long, value_name = "MIN", value_parser = minutes, conflicts_with = "iterations")]
+    time_limit: Option<f64>,
+    /// Try with more and more work until held-out views have this PSNR in dB; at most that of
+    /// --preset [default: paper].
+    #[arg(long, value_name = "DB", value_parser = decibels, conflicts_with = "iterations")]
+    target_psnr: Option<f64>,
+    /// Measure held-out views at this longer side instead of the one that is trained on.
+    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(16..))]
+    measure_side: Option<u32>,
     #[command(flatten)]
     effects: EffectArguments,
     /// Seed of every random choice: same seed, same bytes.
@@ -72,6 +89,10 @@ impl Fit {
             },
             coarse: self.coarse,
             memory_limit: self.memory_limit.map(|mib| u64::from(mib) << 20),
+            stop_when_flat: self.stop_when_flat,
+            time_limit: self.time_limit.map(|minutes| 60.0 * minutes),
+            target_psnr: self.target_psnr,
+            measure_side: self.measure_side,
             timings: self.timings,
         };
         let (folder, report) = fit(&options, &mut |event| progress.show(&event))?;
@@ -79,6 +100,9 @@ impl Fit {
         if self.json {
             print(report.to_json())?;
         } else {
+            if let Some(curve) = report.curve_table(CURVE_ROWS) {
+                print(curve)?;
+            }
             print(report.luma_summary())?;
             print(format_args!("wrote {}", folder.luma().display()))?;
             if let Some(rows) = &report.luma.timings {
@@ -103,4 +127,17 @@ fn share(text: &str) -> Result<f64, String> {
         Ok(share) if (0.0..=1.0).contains(&share) => Ok(share),
         _ => Err("not a number from 0 to 1".to_owned()),
     }
+}
+
+fn decibels(text: &str) -> Result<f64, String> {
+    positive(text).ok_or_else(|| "not a number of dB above 0".to_owned())
+}
+
+fn minutes(text: &str) -> Result<f64, String> {
+    positive(text).ok_or_else(|| "not a number of minutes above 0".to_owned())
+}
+
+fn positive(text: &str) -> Option<f64> {
+    let number: f64 = text.parse().ok()?;
+    (number > 0.0 && number.is_finite()).then_some(number)
 }

@@ -1,19 +1,24 @@
 //! Stage 1: geometry and luminance from grayscale photographs.
 
+mod curve;
 pub mod densify;
 mod loss;
 mod memory;
 pub mod outliers;
+mod pace;
 mod photos;
+mod rehearsal;
 pub mod relocation;
 mod settings;
 mod trainer;
 mod view;
 mod workspace;
 
+pub use curve::{CurvePoint, gain_of_doubling};
 pub use densify::DensifyParameters;
 pub use loss::{LossEffects, LumaLossParameters};
 pub use memory::Demand;
-pub use settings::{Densification, LumaSettings, Schedule};
-pub use trainer::{LumaProgress, LumaTrainer};
+pub use rehearsal::{frontal_camera, random_cloud, rehearse};
+pub use settings::{Densification, LearningRates, LumaSettings, Schedule};
+pub use trainer::{Look, LumaProgress, LumaTrainer};
 pub use view::TrainingView;

@@ -78,6 +78,8 @@ pub struct Schedule {
     pub settle_from: usize,
     /// Until here photos are seen at half their size: a quarter of the pixels.
     pub coarse_until: usize,
+    /// Where outliers are looked for, if they are.
+    pub find_outliers_at: [usize; 2],
 }
 
 impl Schedule {
@@ -115,7 +117,42 @@ impl Schedule {
                 iterations
             },
             coarse_until: 0,
+            find_outliers_at: OUTLIERS_AT.map(|share| (share * iterations as f64) as usize),
         }
+    }
+
+    /// Ends the run at `end` instead, seen from iteration `now`: what is still to come
+    /// is stretched or squeezed in proportion, what has begun stays.
+    pub fn end_at(&mut self, end: usize, now: usize) {
+        let before = self.iterations.saturating_sub(now).max(1) as f64;
+        let stretch = end.saturating_sub(now) as f64 / before;
+        let moved = |at: usize| match at.checked_sub(now) {
+            None | Some(0) => at,
+            Some(ahead) => now + (ahead as f64 * stretch).round() as usize,
+        };
+        *self = Self {
+            iterations: end.max(now),
+            densify_from: moved(self.densify_from),
+            densify_until: moved(self.densify_until),
+            settle_from: moved(self.settle_from),
+            coarse_until: moved(self.coarse_until),
+            find_outliers_at: self.find_outliers_at.map(moved),
+            ..*self
+        };
+    }
+
+    /// Lets the run settle from iteration `now` on, and end when it has: nothing that is
+    /// still to come changes the set any more.
+    pub fn settle_at(&mut self, now: usize) {
+        let end = now + (now as f64 * SETTLING_SHARE).ceil() as usize;
+        *self = Self {
+            iterations: self.iterations.min(end),
+            densify_until: self.densify_until.min(now),
+            settle_from: self.settle_from.min(now),
+            // Outliers do harm to the last; there is one more chance to find them.
+            find_outliers_at: self.find_outliers_at.map(|at| at.min(now + 1)),
+            ..*self
+        };
     }
 }
 
@@ -125,6 +162,10 @@ pub const SHORT_RUN: usize = 3_000;
 /// Share of its learning rates at which a short run ends: steps that answer to one
 /// view at a time leave noise as large as they are.
 pub const SETTLED: f64 = 0.1;
+
+/// A run that is made to settle early takes so many more iterations, as a share of those
+/// before: half of what a short run's schedule spends on it, for less is left to gain.
+pub const SETTLING_SHARE: f64 = 0.2;
 
 /// Shares of the iterations after which outliers are looked for: once the scene is
 /// there, and again when it is sharper.
@@ -170,6 +211,12 @@ pub struct LumaSettings {
     /// Whether some of the Gaussians stand for a background far behind the scene: how
     /// large one may be then grows with its distance.
     pub background: bool,
+    /// Seconds that a training may take: it ends where they are over, and its schedule is
+    /// stretched or squeezed to end there.
+    pub time_limit: Option<f64>,
+    /// A training settles and ends where twice the iterations would bring less than so
+    /// many dB in the views that are [watched](super::LumaTrainer::watch).
+    pub flat: Option<f64>,
 }
 
 impl LumaSettings {
@@ -191,6 +238,8 @@ impl LumaSettings {
             memory_limit: None,
             antialiased: false,
             background: false,
+            time_limit: None,
+            flat: None,
         }
     }
 
@@ -229,14 +278,13 @@ impl LumaSettings {
             ..
         } = self.schedule;
         let settled = iteration.saturating_sub(settle_from) as f64;
-        SETTLED.powf(settled / (iterations - settle_from).max(1) as f64)
+        SETTLED.powf(settled / iterations.saturating_sub(settle_from).max(1) as f64)
     }
 
     /// Whether pixels that show something else than the scene are looked for after
     /// `iteration` (counted from 1).
     pub fn finds_outliers_after(&self, iteration: usize) -> bool {
-        let due = |share: f64| (share * self.schedule.iterations as f64) as usize;
-        self.robust && OUTLIERS_AT.iter().any(|&share| iteration == due(share))
+        self.robust && self.schedule.find_outliers_at.contains(&iteration)
     }
 
     /// Degree of the harmonics in use at `iteration`.
@@ -279,6 +327,7 @@ mod tests {
                 raise_degree_every: 1_000,
                 settle_from: 15_000,
                 coarse_until: 0,
+                find_outliers_at: [6_000, 9_750],
             }
         );
         let settings = LumaSettings::new(PAPER_ITERATIONS);
@@ -314,5 +363,43 @@ mod tests {
         );
         // One iteration is all there is.
         assert_eq!(LumaSettings::new(1).settling(0), 1.0);
+    }
+
+    #[test]
+    fn a_run_that_ends_elsewhere_passes_through_the_same_phases() {
+        let mut schedule = Schedule::of(1_000);
+        let before = schedule.clone();
+        schedule.end_at(2_000, 0);
+        assert_eq!(schedule.iterations, 2_000);
+        assert_eq!(schedule.settle_from, 1_400);
+        assert_eq!(schedule.densify_until, 1_600);
+        assert_eq!(schedule.find_outliers_at, [800, 1_300]);
+        assert_eq!(schedule.reset_every, usize::MAX);
+        schedule.end_at(1_000, 0);
+        assert_eq!(schedule, before);
+
+        // Half-way: what lies behind stays, what lies ahead is twice as near.
+        schedule.end_at(750, 500);
+        assert_eq!(schedule.densify_from, before.densify_from);
+        assert_eq!(schedule.settle_from, 600);
+        assert_eq!(schedule.densify_until, 650);
+        assert_eq!(schedule.find_outliers_at, [400, 575]);
+        // Time is up.
+        schedule.end_at(100, 700);
+        assert_eq!(schedule.iterations, 700);
+        assert_eq!(schedule.settle_from, 600);
+    }
+
+    #[test]
+    fn a_run_that_is_flat_settles_and_ends() {
+        let mut schedule = Schedule::of(2_000);
+        schedule.settle_at(1_000);
+        assert_eq!(schedule.iterations, 1_200);
+        assert_eq!([schedule.densify_until, schedule.settle_from], [1_000; 2]);
+        assert_eq!(schedule.find_outliers_at, [800, 1_001]);
+        // One that settles already ends no later than it would have.
+        let mut schedule = Schedule::of(2_000);
+        schedule.settle_at(1_900);
+        assert_eq!([schedule.iterations, schedule.settle_from], [2_000, 1_400]);
     }
 }

@@ -8,13 +8,20 @@
 //! does not depend on when it noticed.
 
 mod changes;
+mod ends;
+mod watch;
+
+pub use watch::Look;
 
 use std::{sync::Arc, time::Instant};
+
+use watch::Watch;
 
 use super::{
     Densification, LumaSettings,
     loss::{self, LossEffects, Targets},
     memory::{Demand, ENTRIES_PER_SPLAT},
+    pace::Pace,
     relocation::{self, RelocationParameters},
     view::TrainingView,
     workspace::{Kernels, Workspace},
@@ -38,6 +45,8 @@ const HEADROOM: f64 = 1.25;
 pub struct LumaProgress {
     /// Iterations done.
     pub iteration: usize,
+    /// Iterations in all, as it looks now.
+    pub end: usize,
     /// Mean loss since the last report.
     pub loss: f64,
     /// Gaussians.
@@ -46,8 +55,10 @@ pub struct LumaProgress {
     pub poisoned: usize,
     /// Gradients refused for not being finite, since the set last changed.
     pub refused: usize,
-    /// Seconds since the training began.
+    /// Seconds of training, those of watching not counted.
     pub seconds: f64,
+    /// What the last look at the [watched](LumaTrainer::watch) views showed.
+    pub looked: Option<Look>,
 }
 
 /// An order on its way: the status and losses at the end of an iteration.
@@ -85,6 +96,10 @@ pub struct LumaTrainer {
     demand: Demand,
     /// Iteration at which the present workspace began to count steps.
     base: usize,
+    pace: Pace,
+    /// Iterations that the schedule began with.
+    planned: usize,
+    watch: Watch,
     /// Sums over the reports of what [`Self::load`] averages.
     seen: Load,
     /// Reports.
@@ -118,6 +133,7 @@ impl LumaTrainer {
         let (mut max_pixels, mut max_tiles) = (0, 0);
         let (mut cameras, mut grays, mut masks) = (Vec::new(), Vec::new(), Vec::new());
         let (count, settings_robust) = (views.len(), settings.robust);
+        let planned = settings.schedule.iterations;
         let exposures: Vec<Exposure> = views.iter().map(|view| view.exposure).collect();
         let coarse: Vec<TrainingView> = match settings.schedule.coarse_until {
             0 => Vec::new(),
@@ -184,30 +200,38 @@ impl LumaTrainer {
             workspace: Some(workspace),
             demand,
             base: 0,
+            pace: Pace::default(),
+            planned,
+            watch: Watch::default(),
             seen: Load::default(),
             reports: 0,
         })
     }
 
-    /// Trains to the end of the schedule, telling `observe` now and then.
+    /// Trains to the end of the schedule, or to where a time limit or a flat curve puts it,
+    /// telling `observe` now and then.
     ///
     /// # Errors
     /// [`GpuError`] when the device runs out of room or is lost.
     pub fn train(&mut self, observe: &mut dyn FnMut(LumaProgress)) -> Result<(), GpuError> {
         let begun = Instant::now();
+        self.pace = Pace::default();
         let mut iteration = 0;
         let mut pending: Option<Report> = None;
         while iteration < self.settings.schedule.iterations {
             self.step(iteration);
             iteration += 1;
-            let changes = self.settings.densifies_after(iteration)
-                || self.settings.resets_after(iteration)
-                || self.settings.finds_outliers_after(iteration);
-            let ends = iteration == self.settings.schedule.iterations;
+            let settings = &self.settings;
+            let densifies = settings.densifies_after(iteration);
+            let finds_outliers = settings.finds_outliers_after(iteration);
+            let resets = settings.resets_after(iteration);
+            let ends = iteration == settings.schedule.iterations;
+            let looks = self.watch.is_due(iteration, settings.schedule.iterations);
+            let pauses = densifies || finds_outliers || resets || looks || ends;
             // The first views say how much room is needed: those lost to an overflow
             // are few if it is noticed early.
             let early = iteration < SYNC_EVERY && iteration.is_power_of_two();
-            let told = changes || ends || iteration.is_multiple_of(SYNC_EVERY);
+            let told = pauses || iteration.is_multiple_of(SYNC_EVERY);
             if !(told || early) {
                 continue;
             }
@@ -217,9 +241,9 @@ impl LumaTrainer {
                 status: self.workspace().lists.status_later(&self.gpu),
                 losses: self.workspace().log.read_later(&self.gpu),
             };
-            // Before the set changes, and at the end, nothing may be left open.
+            // Before the set changes or is looked at, and at the end, nothing may be left open.
             let mut due: Vec<Report> = pending.take().into_iter().collect();
-            if changes || ends {
+            if pauses {
                 due.push(order);
             } else {
                 pending = Some(order);
@@ -236,17 +260,30 @@ impl LumaTrainer {
                 iteration = done;
                 continue;
             }
-            if self.settings.densifies_after(iteration) {
+            if looks {
+                let seconds = begun.elapsed().as_secs_f64() - self.watch.seconds;
+                self.look(iteration, seconds)?;
+                self.stop_when_flat(iteration);
+            }
+            if !ends {
+                self.keep_to_limit(iteration);
+            }
+            if densifies {
                 self.densify(iteration)?;
             }
-            if self.settings.finds_outliers_after(iteration) {
+            if finds_outliers {
                 self.leave_out_outliers()?;
             }
-            if self.settings.resets_after(iteration) {
+            if resets {
                 self.reset_opacities()?;
             }
         }
         Ok(())
+    }
+
+    /// What it trains with; of the schedule, what has become of it.
+    pub fn settings(&self) -> &LumaSettings {
+        &self.settings
     }
 
     /// Reads the trained Gaussians.
@@ -368,8 +405,7 @@ impl LumaTrainer {
         let status = report.status.wait(&self.gpu)?;
         if let Some(needed) = status.overflow {
             let done = self.base + status.steps;
-            let capacity = (needed as f64 * HEADROOM) as usize;
-            self.rebuild(capacity, done)?;
+            self.make_room(needed, done)?;
             return Ok(Some(done));
         }
         let losses = report.losses.wait(&self.gpu)?;
@@ -378,6 +414,8 @@ impl LumaTrainer {
         self.seen.instances += status.instances as f64;
         self.seen.capacity += self.workspace().lists.capacity as f64;
         self.reports += 1;
+        let all_seconds = begun.elapsed().as_secs_f64();
+        self.pace.note(report.iteration, all_seconds);
         if !report.told {
             return Ok(None);
         }
@@ -385,13 +423,20 @@ impl LumaTrainer {
         let recent = &losses[..report.iteration - since];
         observe(LumaProgress {
             iteration: report.iteration,
+            end: self.settings.schedule.iterations,
             loss: recent.iter().map(|&loss| f64::from(loss)).sum::<f64>() / recent.len() as f64,
             splats: self.geometry.count,
             poisoned: status.poisoned,
             refused: status.refused,
-            seconds: begun.elapsed().as_secs_f64(),
+            seconds: all_seconds - self.watch.seconds,
+            looked: self.watch.last(),
         });
         Ok(None)
+    }
+
+    /// Room for a view that needed so many entries of the tile lists.
+    fn make_room(&mut self, needed: usize, iteration: usize) -> Result<(), GpuError> {
+        self.rebuild((needed as f64 * HEADROOM) as usize, iteration)
     }
 
     /// A new workspace with the same Gaussians and moments.

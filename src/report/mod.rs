@@ -17,10 +17,13 @@ pub use evaluation::{
 pub use page::{Figure, MAP_END, PageRow, error_map, evaluation_page};
 pub use timings::{KernelReport, kernel_reports, timings_table};
 
+use std::fmt::Write;
+
 use serde::{Deserialize, Serialize};
 
 use crate::{
     capture::{Exposure, LoadOptions},
+    luma::CurvePoint,
     raster::RasterOptions,
 };
 
@@ -94,7 +97,7 @@ pub struct DeviceReport {
 }
 
 /// Stage 1.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LumaReport {
     /// Iterations.
     pub iterations: usize,
@@ -114,6 +117,9 @@ pub struct LumaReport {
     pub refused: usize,
     /// Loss at the end.
     pub loss: f64,
+    /// What the amount of work followed from, besides the preset.
+    #[serde(default)]
+    pub goal: GoalReport,
     /// Wall seconds.
     pub seconds: LumaSeconds,
     /// Largest resident memory of the process in bytes, where the system tells.
@@ -127,6 +133,16 @@ pub struct LumaReport {
     /// How bright each photo shows the scene, where they differ.
     #[serde(default)]
     pub exposures: Vec<ViewExposure>,
+    /// What the training gained with time.
+    #[serde(default)]
+    pub curve: Vec<CurvePoint>,
+    /// Views of which up to three were looked at for it: `test`, or `train` without
+    /// held-out ones.
+    #[serde(default)]
+    pub curve_on: String,
+    /// Longer side at which held-out views were measured, where it is not that of training.
+    #[serde(default)]
+    pub measured_side: Option<u32>,
     /// Mean over the held-out views, if any.
     pub held_out: Option<LumaQuality>,
     /// Each held-out view.
@@ -137,14 +153,33 @@ pub struct LumaReport {
 }
 
 /// Wall seconds of stage 1.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LumaSeconds {
     /// Reading poses and photos, placing the first Gaussians.
     pub load: f64,
     /// Training.
     pub train: f64,
+    /// Looking at views meanwhile.
+    #[serde(default)]
+    pub curve: f64,
     /// Measuring on held-out views.
     pub measure: f64,
+    /// The whole run but for writing its files, with attempts that were given up.
+    #[serde(default)]
+    pub all: f64,
+}
+
+/// What the amount of work of stage 1 followed from, besides the preset.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct GoalReport {
+    /// Seconds that the whole run was allowed.
+    pub time_limit: Option<f64>,
+    /// PSNR in dB that was to be reached.
+    pub target_psnr: Option<f64>,
+    /// Training was to end where twice the iterations would bring less than so many dB.
+    pub stop_when_flat: Option<f64>,
+    /// Trainings from the start, each with more work; the last or the best one counts.
+    pub attempts: usize,
 }
 
 /// Quality of gray pictures.
@@ -340,6 +375,34 @@ impl Report {
             "{} Gaussians after {} iterations in {:.0} s{quality}",
             luma.splats, luma.iterations, luma.seconds.train
         )
+    }
+
+    /// What the training gained with time, as a table of at most so many rows; nothing
+    /// where there was but one look.
+    pub fn curve_table(&self, rows: usize) -> Option<String> {
+        let curve = &self.luma.curve;
+        if curve.len() < 2 {
+            return None;
+        }
+        let every = curve.len().div_ceil(rows.max(1));
+        // The last look is shown, so the first ones may not be.
+        let skipped = (curve.len() - 1) % every;
+        let mut table = String::from("  seconds  iteration  Gaussians     PSNR  dB per minute");
+        let mut before: Option<&CurvePoint> = None;
+        for point in curve[skipped..].iter().step_by(every) {
+            // Writing to a string cannot fail.
+            let _ = write!(
+                table,
+                "\n{:>9.1}{:>11}{:>11}{:>9.2}",
+                point.seconds, point.iteration, point.splats, point.psnr
+            );
+            if let Some(before) = before {
+                let minutes = (point.seconds - before.seconds) / 60.0;
+                let _ = write!(table, "{:>+15.2}", (point.psnr - before.psnr) / minutes);
+            }
+            before = Some(point);
+        }
+        Some(table)
     }
 
     /// Stage 2 on one line.

@@ -28,7 +28,7 @@ use crate::{
     raster::Raster,
     report::{
         CaptureReport, ChromaReport, ChromaSeconds, DeviceReport, EffectReport, LumaReport,
-        LumaSeconds, REPORT_VERSION, Report, contact_sheet, kernel_reports,
+        REPORT_VERSION, Report, contact_sheet, kernel_reports,
     },
     splats::ply,
 };
@@ -329,28 +329,7 @@ impl Source {
             preset: String::new(),
             seed: 0,
             effects: Vec::new(),
-            luma: LumaReport {
-                iterations: 0,
-                sh_degree: 0,
-                max_splats: 0,
-                antialiased: false,
-                splats: 0,
-                poisoned: 0,
-                refused: 0,
-                loss: 0.0,
-                seconds: LumaSeconds {
-                    load: 0.0,
-                    train: 0.0,
-                    measure: 0.0,
-                },
-                peak_host_memory: None,
-                peak_device_memory: None,
-                estimated_device_memory: 0,
-                exposures: Vec::new(),
-                held_out: None,
-                held_out_views: Vec::new(),
-                timings: None,
-            },
+            luma: LumaReport::default(),
             chroma: None,
         })
     }

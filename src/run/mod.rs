@@ -87,6 +87,29 @@ pub enum RunError {
         /// Iterations of stage 1.
         luma: usize,
     },
+    /// A time limit within which nothing can be trained.
+    #[error(
+        "--time-limit {:.2}: reading, measuring and {} iterations take longer: give at least {:.2} minutes, or lower --max-side",
+        limit / 60.0, iterations, needed / 60.0
+    )]
+    TimeTooShort {
+        /// Seconds allowed.
+        limit: f64,
+        /// The fewest iterations that make sense.
+        iterations: usize,
+        /// Seconds that would do.
+        needed: f64,
+    },
+    /// A PSNR that was not reached; the best that was is written.
+    #[error(
+        "--target-psnr {target}: {reached:.2} dB is what could be reached, and is written: give more time, a higher --preset or a larger --max-splats if there is one"
+    )]
+    TargetMissed {
+        /// What was asked for, in dB.
+        target: f64,
+        /// What was reached, in dB.
+        reached: f64,
+    },
     /// The device computes something else than the reference.
     #[error(
         "{failed} of {checks} checks fail on {adapter}: update its driver, or choose another adapter with WGPU_ADAPTER_NAME, and please report the output of `gs-chroma doctor --json`"

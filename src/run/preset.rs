@@ -47,6 +47,43 @@ impl Amounts {
 }
 
 impl Preset {
+    /// All, by the work they are.
+    const ALL: [Self; 3] = [Self::Draft, Self::Balanced, Self::Paper];
+
+    /// Its place in [`Self::ALL`].
+    pub(super) fn level(self) -> f64 {
+        f64::from(self as u8)
+    }
+
+    /// The greatest preset that is no more work than a level.
+    pub(super) fn below(level: f64) -> Self {
+        Self::ALL[(level.max(0.0) as usize).min(2)]
+    }
+
+    /// Amounts between the presets, or below the first: for equal steps of the level they
+    /// grow by the same factor. `longest` is the longer side of the photos as they are.
+    pub(super) fn at_level(level: f64, longest: u32) -> Amounts {
+        let [draft, balanced, paper] = Self::ALL.map(Self::amounts);
+        let (from, to, share) = match level {
+            _ if level < 1.0 => (draft, balanced, level),
+            _ => (balanced, paper, level - 1.0),
+        };
+        let between = |amount: &dyn Fn(&Amounts) -> f64| {
+            let [from, to] = [&from, &to].map(amount);
+            (from * (to / from).powf(share)).round()
+        };
+        let degree = f64::from(from.sh_degree)
+            + share * (f64::from(to.sh_degree) - f64::from(from.sh_degree));
+        let side = |amounts: &Amounts| f64::from(amounts.max_side.unwrap_or(longest).min(longest));
+        Amounts {
+            iterations: between(&|a| a.iterations as f64) as usize,
+            until: between(&|a| a.until as f64) as usize,
+            max_splats: between(&|a| a.max_splats as f64) as usize,
+            max_side: Some(between(&side) as u32),
+            sh_degree: degree.max(0.0) as u32,
+        }
+    }
+
     /// What there is time for on a device.
     pub(super) fn for_device(gpu: &Gpu) -> Self {
         if gpu.is_software() {

@@ -4,7 +4,7 @@ use std::sync::{Arc, LazyLock};
 
 use gs_chroma::{
     doctor::stage,
-    luma::{LumaProgress, LumaSettings, LumaTrainer, TrainingView},
+    luma::{LearningRates, LumaProgress, LumaSettings, LumaTrainer, Schedule, TrainingView},
     optimize::view_at,
     raster::{Field, Geometry, Raster, Renderer},
     splats::Splats,
@@ -85,6 +85,19 @@ fn views() -> Vec<View> {
 /// Trains on pictures of a scene, starting beside it; gives the splats and
 /// what was reported.
 fn train(start: &Splats, target: &Splats) -> (Splats, Vec<LumaProgress>) {
+    let mut trainer = trainer(start, target);
+    let mut reports = Vec::new();
+    trainer
+        .train(&mut |progress| reports.push(progress))
+        .unwrap();
+    (trainer.splats().unwrap(), reports)
+}
+
+fn trainer(start: &Splats, target: &Splats) -> LumaTrainer {
+    LumaTrainer::new(raster(), settings(start), 4.0, start, photos(target)).unwrap()
+}
+
+fn settings(start: &Splats) -> LumaSettings {
     let mut settings = LumaSettings::new(60);
     settings.seed = FAR_FIRST;
     settings.sh_degree = 1;
@@ -97,22 +110,21 @@ fn train(start: &Splats, target: &Splats) -> (Splats, Vec<LumaProgress>) {
     settings.schedule.densify_until = 60;
     settings.schedule.reset_every = 40;
     settings.schedule.raise_degree_every = 20;
+    settings
+}
+
+/// What the views show of a scene.
+fn photos(target: &Splats) -> Vec<TrainingView> {
     let geometry = Geometry::upload(gpu(), target).unwrap();
     let field = Field::upload(gpu(), &target.sh).unwrap();
     let mut renderer = Renderer::new(raster(), geometry, vec![field], 0.01).unwrap();
-    let photos = views().into_iter().map(|view| {
+    let photo = |view| {
         let camera = camera(&view);
         let picture = renderer.render(&camera).unwrap().remove(0);
         let gray = picture.pixels.iter().map(|v| (v * 255.0) as u8).collect();
         TrainingView::new(camera, gray)
-    });
-    let views = photos.collect();
-    let mut trainer = LumaTrainer::new(raster(), settings, 4.0, start, views).unwrap();
-    let mut reports = Vec::new();
-    trainer
-        .train(&mut |progress| reports.push(progress))
-        .unwrap();
-    (trainer.splats().unwrap(), reports)
+    };
+    views().into_iter().map(photo).collect()
 }
 
 fn start_and_target() -> [Splats; 2] {
@@ -156,6 +168,106 @@ fn training_twice_gives_the_same_splats() {
     let least = losses.iter().copied().fold(f64::INFINITY, f64::min);
     assert!(least < losses[0], "training learns: {losses:?}");
     assert!(same(&train(&start, &target).0, first));
+}
+
+/// Looking on changes nothing, though the views that are looked at need more room in the
+/// lists than any before, and larger pictures.
+#[test]
+fn watching_changes_nothing() {
+    let [start, target] = start_and_target();
+    let mut larger = photos(&target).remove(1);
+    larger.camera = larger.camera.resized(160, 120);
+    larger.gray = vec![90; 160 * 120];
+    let mut trainer = trainer(&start, &target);
+    trainer.watch(vec![larger.clone(), larger]).unwrap();
+    let mut reports = Vec::new();
+    (trainer.train(&mut |progress| reports.push(progress))).unwrap();
+    assert!(same(&trainer.splats().unwrap(), &TRAINED.0));
+    let curve = trainer.curve();
+    let looks: Vec<_> = curve.iter().map(|point| point.iteration).collect();
+    assert_eq!(looks, [25, 50, 60]);
+    assert!(
+        curve
+            .iter()
+            .all(|point| point.psnr > 5.0 && point.psnr < 60.0)
+    );
+    assert_eq!(curve[2].splats, TRAINED.0.len());
+    assert!(curve.is_sorted_by(|a, b| a.seconds < b.seconds) && trainer.watched_seconds() > 0.0);
+    // What is reported at 40 was seen at 25.
+    let seen = |k: usize| reports[k].looked.map(|look| look.psnr);
+    assert_eq!([seen(0), seen(1)], [None, Some(curve[0].psnr)]);
+}
+
+/// A picture's PSNR is that of the photo against what the scene shows.
+#[test]
+fn a_scene_that_is_right_is_seen_to_be() {
+    let [_, target] = start_and_target();
+    let mut still = LumaSettings::new(50);
+    still.rates = LearningRates {
+        means: [1e-12; 2],
+        quats: 0.0,
+        log_scales: 0.0,
+        opacity_logits: 0.0,
+        sh_constant: 0.0,
+        sh_rest: 0.0,
+    };
+    still.sh_degree = 1;
+    still.max_splats = target.len();
+    still.schedule.raise_degree_every = 1;
+    let mut trainer =
+        LumaTrainer::new(raster(), still, 1.0, &target, photos(&target)).unwrap();
+    let [mut brighter, masked] = [0, 1].map(|k| photos(&target).remove(k));
+    brighter
+        .gray
+        .iter_mut()
+        .for_each(|v| *v = v.saturating_add(10));
+    let half = masked.gray.len() / 2;
+    let masked = TrainingView {
+        gray: (0..2 * half)
+            .map(|p| if p < half { masked.gray[p] } else { 200 })
+            .collect(),
+        mask: Some(
+            (0..2 * half)
+                .map(|p| if p < half { 255 } else { 0 })
+                .collect(),
+        ),
+        ..masked
+    };
+    let psnr = |trainer: &mut LumaTrainer, view| {
+        trainer.watch(vec![view]).unwrap();
+        trainer.train(&mut |_| {}).unwrap();
+        trainer.curve()[0].psnr
+    };
+    // Half a level in the mean; then 10 to 11.
+    let [right, off] = [masked, brighter].map(|view| psnr(&mut trainer, view));
+    assert!(right > 48.0 && (27.0..28.2).contains(&off), "{right} {off}");
+}
+
+/// A flat curve ends a training at the same iteration every time, and it settles first.
+#[test]
+fn a_flat_curve_ends_a_training() {
+    let [start, target] = start_and_target();
+    let run = |flat| {
+        let mut settings = LumaSettings {
+            flat,
+            ..settings(&start)
+        };
+        settings.schedule = Schedule::of(400);
+        settings.max_splats = start.len();
+        let mut trainer =
+            LumaTrainer::new(raster(), settings, 4.0, &start, photos(&target)).unwrap();
+        trainer.watch(photos(&target)).unwrap();
+        trainer.train(&mut |_| {}).unwrap();
+        let schedule = &trainer.settings().schedule;
+        let ends = [schedule.settle_from, schedule.iterations];
+        (trainer.splats().unwrap(), ends, trainer.curve().len())
+    };
+    let (_, ends, looks) = run(None);
+    assert_eq!((ends, looks), ([280, 400], 16));
+    // Nothing brings a hundred dB.
+    let (first, [settles, end], looks) = run(Some(100.0));
+    assert_eq!(([settles, end], looks), ([100, 120], 5));
+    assert!(same(&run(Some(100.0)).0, &first));
 }
 
 /// Gaussians behind every camera change nothing but the room that the lists

@@ -8,11 +8,10 @@ use super::{
 use crate::{
     capture::Photo,
     chroma::teacher::AbImage,
-    measure,
+    measure::{self, IDENTICAL_PSNR},
     report::{ColorError, LumaScore, Method, PictureScore, ViewScore, error_map},
     run::{
         RunError,
-        fit::IDENTICAL_PSNR,
         scene::{gray_pixels, gray_to_rgb, rgb_pixels},
     },
 };

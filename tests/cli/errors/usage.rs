@@ -43,6 +43,21 @@ pub(super) const CASES: &[Case] = &[
         &["4", "--sh-degree"],
     ),
     usage(
+        "no time",
+        "fit scene --time-limit 0",
+        &["--time-limit", "minutes above 0"],
+    ),
+    usage(
+        "a time limit and iterations",
+        "fit scene --time-limit 1 --iterations 100",
+        &["--time-limit", "--iterations"],
+    ),
+    usage(
+        "a target that is no number",
+        "fit scene --target-psnr high",
+        &["high", "--target-psnr", "dB above 0"],
+    ),
+    usage(
         "an effect of no scene",
         "plan scene --with fog",
         &["fog", "--with"],

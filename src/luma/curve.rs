@@ -1,0 +1,91 @@
+//! What a training gains with time.
+
+use serde::{Deserialize, Serialize};
+
+/// Fewer points than this say nothing about a slope.
+const POINTS_MIN: usize = 3;
+
+/// How good a scene was at one moment of its training.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CurvePoint {
+    /// Iterations done.
+    pub iteration: usize,
+    /// Seconds of training, those of watching not counted.
+    pub seconds: f64,
+    /// Gaussians.
+    pub splats: usize,
+    /// Mean PSNR of the views that are watched, in dB.
+    pub psnr: f64,
+}
+
+/// What twice as many iterations would bring by the last half of a curve, in dB: the slope
+/// of the least-squares line through PSNR against log₂ of the iteration. PSNR counts as the
+/// best so far, for a reset of the opacities throws it back for a while. `None` while there
+/// are too few points.
+pub fn gain_of_doubling(curve: &[CurvePoint]) -> Option<f64> {
+    let last = curve.last()?.iteration;
+    let best = curve.iter().scan(f64::NEG_INFINITY, |best, point| {
+        *best = best.max(point.psnr);
+        Some((point.iteration, *best))
+    });
+    let points: Vec<[f64; 2]> = best
+        .filter(|&(iteration, _)| 2 * iteration >= last)
+        .map(|(iteration, psnr)| [(iteration.max(1) as f64).log2(), psnr])
+        .collect();
+    let count = points.len() as f64;
+    let mean = |axis: usize| points.iter().map(|point| point[axis]).sum::<f64>() / count;
+    let [x, y] = [mean(0), mean(1)];
+    let spread: f64 = points.iter().map(|p| (p[0] - x).powi(2)).sum();
+    let together: f64 = points.iter().map(|p| (p[0] - x) * (p[1] - y)).sum();
+    (points.len() >= POINTS_MIN && spread > 0.0).then(|| together / spread)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn curve(psnr: impl Fn(usize) -> f64, iterations: &[usize]) -> Vec<CurvePoint> {
+        let point = |&iteration: &usize| CurvePoint {
+            iteration,
+            seconds: iteration as f64 / 10.0,
+            splats: 100,
+            psnr: psnr(iteration),
+        };
+        iterations.iter().map(point).collect()
+    }
+
+    const EVEN: [usize; 8] = [100, 200, 300, 400, 500, 600, 700, 800];
+
+    #[test]
+    fn a_logarithm_gains_the_same_with_every_doubling() {
+        let gain = gain_of_doubling(&curve(|i| 20.0 + 1.5 * (i as f64).log2(), &EVEN));
+        assert!((gain.unwrap() - 1.5).abs() < 1e-9, "{gain:?}");
+    }
+
+    #[test]
+    fn only_the_last_half_counts() {
+        let stalled = |i: usize| 20.0 + 5.0 * (i.min(300) as f64).log2();
+        let gain = gain_of_doubling(&curve(stalled, &EVEN)).unwrap();
+        assert!(gain.abs() < 1e-9, "{gain}");
+    }
+
+    #[test]
+    fn what_a_reset_throws_back_is_no_loss() {
+        let reset = |i: usize| {
+            if i == 700 {
+                12.0
+            } else {
+                20.0 + i as f64 / 100.0
+            }
+        };
+        let gain = gain_of_doubling(&curve(reset, &EVEN)).unwrap();
+        assert!(gain > 2.0, "{gain}");
+    }
+
+    #[test]
+    fn few_points_say_nothing() {
+        assert_eq!(gain_of_doubling(&[]), None);
+        assert_eq!(gain_of_doubling(&curve(|_| 20.0, &EVEN[..2])), None);
+        assert_eq!(gain_of_doubling(&curve(|_| 20.0, &[0, 0, 0])), None);
+    }
+}

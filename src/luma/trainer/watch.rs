@@ -1,0 +1,148 @@
+//! Views that are not trained on, looked at now and then.
+
+use std::time::Instant;
+
+use super::LumaTrainer;
+use crate::{
+    gpu::{GpuError, Recorder},
+    luma::{TrainingView, curve::CurvePoint},
+    measure::{self, IDENTICAL_PSNR},
+    raster::ViewUniform,
+};
+
+/// Looks in a run, at most, where it is no longer than so many times [`RARELY`].
+const LOOKS: usize = 16;
+
+/// Fewest and most iterations between two looks: fewer cost more than they tell, more
+/// would leave whoever waits in the dark.
+const OFTEN: usize = 25;
+const RARELY: usize = 500;
+
+/// What a look showed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Look {
+    /// Mean PSNR of the views, in dB.
+    pub psnr: f64,
+    /// How much it rose since the look before, in dB per minute of training.
+    pub per_minute: Option<f64>,
+}
+
+/// What a training is watched by.
+#[derive(Default)]
+pub(super) struct Watch {
+    views: Vec<TrainingView>,
+    every: usize,
+    pub curve: Vec<CurvePoint>,
+    /// Seconds spent on it.
+    pub seconds: f64,
+}
+
+impl Watch {
+    /// Whether there is a look after `iteration` (counted from 1) of `end`.
+    pub fn is_due(&self, iteration: usize, end: usize) -> bool {
+        !self.views.is_empty() && (iteration == end || iteration.is_multiple_of(self.every))
+    }
+
+    /// What the last look showed.
+    pub fn last(&self) -> Option<Look> {
+        let last = self.curve.last()?;
+        let rise = |before: &CurvePoint| {
+            let minutes = (last.seconds - before.seconds) / 60.0;
+            (minutes > 0.0).then(|| (last.psnr - before.psnr) / minutes)
+        };
+        let before = self.curve.iter().nth_back(1);
+        Some(Look {
+            psnr: last.psnr,
+            per_minute: before.and_then(rise),
+        })
+    }
+}
+
+impl LumaTrainer {
+    /// Looks at these views now and then while it trains. That changes nothing in what is
+    /// trained, but takes time.
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`] when a view is larger than those trained on and the adapter
+    /// cannot hold it.
+    pub fn watch(&mut self, views: Vec<TrainingView>) -> Result<(), GpuError> {
+        let before = [self.max_pixels, self.max_tiles];
+        for view in &views {
+            let uniform = ViewUniform::new(&view.camera, self.near, 0, 0);
+            self.max_pixels = self.max_pixels.max(uniform.pixel_count());
+            self.max_tiles = self.max_tiles.max(uniform.tile_count());
+        }
+        if before != [self.max_pixels, self.max_tiles] {
+            let capacity = self.workspace().lists.capacity;
+            self.rebuild(capacity, self.base)?;
+        }
+        self.watch = Watch {
+            views,
+            every: (self.settings.schedule.iterations / LOOKS).clamp(OFTEN, RARELY),
+            ..Watch::default()
+        };
+        Ok(())
+    }
+
+    /// What the looks showed so far.
+    pub fn curve(&self) -> &[CurvePoint] {
+        &self.watch.curve
+    }
+
+    /// Seconds that the looks took.
+    pub fn watched_seconds(&self) -> f64 {
+        self.watch.seconds
+    }
+
+    /// Looks, `seconds` of training after its beginning. Nothing may be on its way.
+    pub(super) fn look(&mut self, iteration: usize, seconds: f64) -> Result<(), GpuError> {
+        let begun = Instant::now();
+        let mut sum = 0.0;
+        for index in 0..self.watch.views.len() {
+            sum += self.psnr(index, iteration)?;
+        }
+        self.watch.curve.push(CurvePoint {
+            iteration,
+            seconds,
+            splats: self.geometry.count,
+            psnr: sum / self.watch.views.len() as f64,
+        });
+        self.watch.seconds += begun.elapsed().as_secs_f64();
+        Ok(())
+    }
+
+    /// PSNR of one view, over the pixels that count.
+    fn psnr(&mut self, index: usize, iteration: usize) -> Result<f64, GpuError> {
+        let pixels = loop {
+            let camera = &self.watch.views[index].camera;
+            let degree = self.settings.degree_at(iteration);
+            let view = ViewUniform::new(camera, self.near, self.geometry.count, degree);
+            let workspace = self.workspace();
+            let mut recorder = Recorder::new(&self.gpu);
+            workspace.lists.set_view(&self.gpu, &view);
+            workspace.lists.record(&self.raster, &mut recorder);
+            workspace.layer.record(&self.raster, &mut recorder);
+            recorder.submit();
+            match workspace.lists.status(&self.gpu)?.overflow {
+                None => break workspace.layer.read_image(&self.gpu, view.pixel_count())?,
+                Some(needed) => self.make_room(needed, iteration)?,
+            }
+        };
+        let TrainingView {
+            gray,
+            mask,
+            exposure,
+            ..
+        } = &self.watch.views[index];
+        let counts = |pixel: usize| mask.as_ref().is_none_or(|mask| mask[pixel] >= 128);
+        let (mut shown, mut truth) = (Vec::new(), Vec::new());
+        for pixel in (0..gray.len()).filter(|&pixel| counts(pixel)) {
+            shown.push(exposure.shown(f64::from(pixels[pixel])) as f32);
+            truth.push(f32::from(gray[pixel]) / 255.0);
+        }
+        Ok(match truth.is_empty() {
+            true => IDENTICAL_PSNR,
+            false => measure::psnr(&shown, &truth).min(IDENTICAL_PSNR),
+        })
+    }
+}

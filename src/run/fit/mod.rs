@@ -1,0 +1,197 @@
+//! `fit`: photos to geometry and luma.
+
+mod attempt;
+mod goal;
+mod quality;
+mod start;
+mod target;
+mod told;
+
+use std::{path::PathBuf, sync::Arc, time::Instant};
+
+use super::{Event, Observer, Preset, RunError, RunFolder, files, preset::Amounts, scene::Scene};
+use crate::{
+    capture::LoadOptions,
+    effects::{Effect, Overrules},
+    gpu::Gpu,
+    luma::Densification,
+    raster::{Raster, RasterOptions},
+    report::Report,
+    splats::ply,
+};
+use attempt::Job;
+use goal::{Family, SURELY};
+pub(super) use told::capture_report;
+
+/// What `fit` is asked to do; `None` leaves it to the preset.
+#[derive(Clone, Debug)]
+pub struct FitOptions {
+    /// The COLMAP folder.
+    pub colmap_dir: PathBuf,
+    /// The run folder; `runs/<folder name>` by default.
+    pub output: Option<PathBuf>,
+    /// Amount of work; `paper` on a GPU and `draft` on a software adapter by default.
+    /// With a time limit or a target, the most that is tried, `paper` by default.
+    pub preset: Option<Preset>,
+    /// Iterations; not together with a time limit or a target.
+    pub iterations: Option<usize>,
+    /// How photos are loaded; the longer side is the preset's where it is `None`.
+    pub load: LoadOptions,
+    /// Longer side at which held-out views are measured; that of training by default.
+    pub measure_side: Option<u32>,
+    /// Cap on Gaussians.
+    pub max_splats: Option<usize>,
+    /// Effects that are on or off whatever the evidence.
+    pub overrules: Overrules,
+    /// Seed.
+    pub seed: u64,
+    /// Gaussians to start from.
+    pub init: Option<PathBuf>,
+    /// How the set of Gaussians changes.
+    pub densification: Densification,
+    /// Share of the iterations, from the first on, that see photos at half their size.
+    pub coarse: f64,
+    /// Bytes that training may take on the device.
+    pub memory_limit: Option<u64>,
+    /// Training ends where twice the iterations would bring less than so many dB.
+    pub stop_when_flat: Option<f64>,
+    /// Seconds that the whole run may take.
+    pub time_limit: Option<f64>,
+    /// PSNR of the held-out views, in dB, that is to be reached with as little work as it
+    /// takes.
+    pub target_psnr: Option<f64>,
+    /// Whether the report says where the device's time went.
+    pub timings: bool,
+}
+
+/// Trains and writes the run folder.
+///
+/// # Errors
+/// [`RunError`]; files of an earlier run stay as they were until training is done.
+/// [`RunError::TargetMissed`] comes after the best that was reached is written.
+pub fn fit(
+    options: &FitOptions,
+    observe: &mut Observer<'_>,
+) -> Result<(RunFolder, Report), RunError> {
+    let begun = Instant::now();
+    let gpu = open_gpu(options.timings)?;
+    let preset = choose_preset(options, &gpu, observe);
+    let raster = Arc::new(Raster::new(&gpu));
+    let folder = match &options.output {
+        Some(path) => RunFolder::at(path),
+        None => RunFolder::for_capture(&options.colmap_dir),
+    };
+    files::make_folder(folder.path())?;
+    let asked = asked_amounts(options, preset);
+    let family = match options.time_limit.or(options.target_psnr) {
+        Some(_) => Some(Family::of(options, asked.max_side)?),
+        None => None,
+    };
+    let (mut level, mut each) = (preset.level(), 0.0);
+    let mut amounts = asked;
+    if let (Some(family), Some(limit), None) = (&family, options.time_limit, options.target_psnr) {
+        let seconds = SURELY * limit - begun.elapsed().as_secs_f64();
+        (level, each) = family.level_for(seconds, &raster, observe)?;
+        amounts = family.amounts(level);
+    }
+    if options.timings {
+        // What was rehearsed is no part of the run.
+        gpu.timings()?;
+    }
+
+    let load = LoadOptions {
+        max_side: amounts.max_side,
+        lens: options.overrules.choice(Effect::Lens),
+        ..options.load.clone()
+    };
+    let scene = Scene::load(&options.colmap_dir, &load, observe)?;
+    let judge = match options.measure_side {
+        Some(_) => {
+            let load = LoadOptions {
+                max_side: options.measure_side,
+                ..scene.options.clone()
+            };
+            // What is to be said about the photos has been said.
+            Some(Scene::load(&options.colmap_dir, &load, &mut |_| {})?)
+        }
+        None => None,
+    };
+    let job = Job {
+        options,
+        gpu: &gpu,
+        raster: &raster,
+        scene: &scene,
+        judge: judge.as_ref().unwrap_or(&scene),
+        begun,
+    };
+    let loading = begun.elapsed().as_secs_f64();
+    let (attempt, attempts) = match (&family, options.target_psnr) {
+        (Some(family), Some(target)) => {
+            let reached = job.reach(target, family, observe)?;
+            level = reached.level;
+            (reached.attempt, reached.attempts)
+        }
+        _ => {
+            let limit = job.time_for_training(each)?;
+            (job.attempt(&amounts, limit, observe)?, 1)
+        }
+    };
+    let preset = match &family {
+        Some(_) => Preset::below(level),
+        None => preset,
+    };
+    let missed = options
+        .target_psnr
+        .and_then(|target| attempt.misses(target));
+    let report = job.report(preset, loading, attempts, &attempt);
+    // The old colours do not belong to the new geometry.
+    for stale in [folder.color(), folder.chroma(), folder.contact_sheet()] {
+        files::remove(&stale)?;
+    }
+    folder.forget_evaluation()?;
+    let comments = comments(attempt.settings.raster_options());
+    let origin = glam::DVec3::ZERO;
+    ply::write_ply(&folder.luma(), &attempt.splats, origin, &comments)?;
+    files::write(&folder.log(), attempt.log.as_bytes())?;
+    folder.write_report(&report)?;
+    match missed {
+        Some(error) => Err(error),
+        None => Ok((folder, report)),
+    }
+}
+
+/// The preset's amounts where options do not say otherwise.
+fn asked_amounts(options: &FitOptions, preset: Preset) -> Amounts {
+    let amounts = preset.amounts();
+    Amounts {
+        iterations: options.iterations.unwrap_or(amounts.iterations),
+        max_splats: options.max_splats.unwrap_or(amounts.max_splats),
+        max_side: options.load.max_side.or(amounts.max_side),
+        ..amounts
+    }
+}
+
+/// The device; with `timed`, its dispatches are.
+pub(super) fn open_gpu(timed: bool) -> Result<Gpu, RunError> {
+    let gpu = Gpu::open()?;
+    Ok(if timed { gpu.timed()? } else { gpu })
+}
+
+/// Comments in the header of every splat file; one says how it wants to be drawn.
+pub(super) fn comments(options: RasterOptions) -> Vec<String> {
+    let program = format!("gs-chroma {}", env!("CARGO_PKG_VERSION"));
+    let mode = options.antialiased.then(|| ply::ANTIALIASED.to_owned());
+    std::iter::once(program).chain(mode).collect()
+}
+
+fn choose_preset(options: &FitOptions, gpu: &Gpu, observe: &mut Observer<'_>) -> Preset {
+    options.preset.unwrap_or_else(|| {
+        if gpu.is_software() && options.time_limit.is_none() {
+            observe(Event::Note(format!(
+                "{} has no GPU behind it: preset draft (--preset paper overrules)",
+                gpu.info().name
+            )));
+        }
+        Preset::for_device(gpu)
+    })
+}

@@ -1,0 +1,131 @@
+//! The Gaussians that a training starts from.
+
+use super::super::{
+    Event, Observer, RunError,
+    carve::{self, carved},
+    scene::{Scene, read_splats},
+};
+use super::FitOptions;
+use crate::{
+    color::gray_from_rgb,
+    effects::Backdrop,
+    luma::LumaSettings,
+    splats::{ShField, Splats, init::initial_splats, sh},
+};
+
+/// Those of `--init`, or one at each of COLMAP's points and a dome behind them.
+pub(super) fn first_splats(
+    options: &FitOptions,
+    scene: &Scene,
+    settings: &LumaSettings,
+    observe: &mut Observer<'_>,
+) -> Result<Splats, RunError> {
+    let Some(path) = &options.init else {
+        let points: Vec<_> = scene
+            .capture
+            .points
+            .iter()
+            .map(|point| {
+                let rgb = point.color.map(|v| f64::from(v) / 255.0);
+                (
+                    point.position.as_vec3().to_array(),
+                    gray_from_rgb(rgb) as f32,
+                )
+            })
+            .collect();
+        let mut splats = initial_splats(&points, scene.extent as f32, settings.sh_degree);
+        if scene.removes_masked() {
+            splats = carved(scene, &splats);
+        }
+        let dome = settings.background.then(|| background(scene, settings));
+        let taken = dome.as_ref().map_or(0, Splats::len);
+        truncate(&mut splats, settings.max_splats - taken);
+        dome.into_iter().for_each(|dome| splats.append(dome));
+        return Ok(splats);
+    };
+    let (splats, options) = read_splats(path, scene.capture.offset, observe)?;
+    if options != settings.raster_options() {
+        let [is, is_not] = ["antialiased", "not antialiased"];
+        let (file, run) = if options.antialiased {
+            (is, is_not)
+        } else {
+            (is_not, is)
+        };
+        observe(Event::Note(format!(
+            "{} was trained {file}, this run is {run}: small Gaussians will have to adapt",
+            path.display()
+        )));
+    }
+    let mut splats = splats.to_luma();
+    splats.sh = at_degree(&splats.sh, splats.means.len(), settings.sh_degree);
+    truncate(&mut splats, settings.max_splats);
+    Ok(splats)
+}
+
+/// Gaussians for what no point explains, at most a quarter of all that there may be.
+fn background(scene: &Scene, settings: &LumaSettings) -> Splats {
+    let most = settings.max_splats / 4;
+    Backdrop::of(&scene.capture, &scene.photos, &scene.split.train).dome(most, settings.sh_degree)
+}
+
+/// The field cut or filled up with zeros to another degree.
+fn at_degree(field: &ShField, count: usize, degree: u32) -> ShField {
+    let mut out = ShField::zeros(count, degree, field.channels);
+    let stride = sh::coefficient_count(degree) * field.channels;
+    for i in 0..count {
+        let from = field.of(i);
+        let shared = from.len().min(stride);
+        out.coefficients[i * stride..i * stride + shared].copy_from_slice(&from[..shared]);
+    }
+    out
+}
+
+/// Keeps an evenly spread choice of at most `max` Gaussians: a cap is a cap.
+fn truncate(splats: &mut Splats, max: usize) {
+    let count = splats.len();
+    if count <= max {
+        return;
+    }
+    let kept: Vec<usize> = (0..max).map(|k| k * count / max).collect();
+    *splats = carve::chosen(splats, &kept);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn numbered(count: usize, degree: u32) -> Splats {
+        let mut splats = Splats {
+            means: (0..count).map(|i| [i as f32; 3]).collect(),
+            quats: vec![[1.0, 0.0, 0.0, 0.0]; count],
+            log_scales: (0..count).map(|i| [-(i as f32); 3]).collect(),
+            opacity_logits: (0..count).map(|i| i as f32).collect(),
+            sh: ShField::zeros(count, degree, 1),
+        };
+        for (k, c) in splats.sh.coefficients.iter_mut().enumerate() {
+            *c = k as f32;
+        }
+        splats
+    }
+
+    #[test]
+    fn a_cap_is_a_cap_for_the_first_gaussians_too() {
+        let mut splats = numbered(10, 1);
+        truncate(&mut splats, 4);
+        assert_eq!(splats.opacity_logits, [0.0, 2.0, 5.0, 7.0]);
+        assert_eq!(splats.means[3], [7.0; 3]);
+        assert_eq!(splats.sh.of(2), [20.0, 21.0, 22.0, 23.0]);
+        let before = splats.clone();
+        truncate(&mut splats, 4);
+        assert_eq!(splats, before);
+    }
+
+    #[test]
+    fn harmonics_change_degree_without_moving() {
+        let splats = numbered(2, 1);
+        assert_eq!(at_degree(&splats.sh, 2, 0).coefficients, [0.0, 4.0]);
+        let raised = at_degree(&splats.sh, 2, 2);
+        assert_eq!(raised.of(1)[..5], [4.0, 5.0, 6.0, 7.0, 0.0]);
+        assert_eq!(raised.of(1).len(), 9);
+    }
+}

@@ -1,0 +1,109 @@
+//! What `fit` tells about itself.
+
+use std::path::Path;
+
+use super::super::{Preset, files, scene::Scene};
+use super::attempt::{Attempt, Job};
+use crate::{
+    effects::{Effect, Plan},
+    report::{
+        CaptureReport, DeviceReport, EffectReport, GoalReport, LumaReport, LumaSeconds,
+        REPORT_VERSION, Report, ViewExposure,
+    },
+};
+
+impl Job<'_> {
+    /// The report of the last of so many attempts; `loading` are the seconds until the
+    /// first began.
+    pub fn report(
+        &self,
+        preset: Preset,
+        loading: f64,
+        attempts: usize,
+        attempt: &Attempt,
+    ) -> Report {
+        let (options, settings, last) = (self.options, &attempt.settings, &attempt.last);
+        let [train, curve, measure] = attempt.seconds;
+        Report {
+            version: REPORT_VERSION,
+            program: env!("CARGO_PKG_VERSION").to_owned(),
+            capture: capture_report(&options.colmap_dir, self.scene),
+            device: DeviceReport {
+                name: self.gpu.describe(),
+                backend: format!("{:?}", self.gpu.info().backend),
+                software: self.gpu.is_software(),
+            },
+            preset: preset.name().to_owned(),
+            seed: options.seed,
+            effects: EffectReport::of(&attempt.plan.decisions),
+            luma: LumaReport {
+                iterations: settings.schedule.iterations,
+                sh_degree: settings.sh_degree,
+                max_splats: settings.max_splats,
+                antialiased: settings.antialiased,
+                splats: attempt.splats.len(),
+                poisoned: last.map_or(0, |progress| progress.poisoned),
+                refused: last.map_or(0, |progress| progress.refused),
+                loss: last.map_or(0.0, |progress| progress.loss),
+                goal: GoalReport {
+                    time_limit: options.time_limit,
+                    target_psnr: options.target_psnr,
+                    stop_when_flat: options.stop_when_flat,
+                    attempts,
+                },
+                seconds: LumaSeconds {
+                    load: loading + attempt.preparing,
+                    train,
+                    curve,
+                    measure,
+                    all: self.begun.elapsed().as_secs_f64(),
+                },
+                peak_host_memory: files::peak_host_memory(),
+                peak_device_memory: attempt.peak_device_memory,
+                estimated_device_memory: attempt.estimated_device_memory,
+                exposures: exposures(self.scene, &attempt.plan),
+                curve: attempt.curve.clone(),
+                curve_on: self.scene.measured().0.to_owned(),
+                measured_side: options.measure_side,
+                held_out: attempt.held_out(),
+                held_out_views: attempt.held_out_views.clone(),
+                timings: attempt.timings.clone(),
+            },
+            chroma: None,
+        }
+    }
+}
+
+/// What a report says about exposures: nothing where they are alike.
+fn exposures(scene: &Scene, plan: &Plan) -> Vec<ViewExposure> {
+    let all = scene.capture.views.iter().zip(&plan.exposures);
+    all.filter(|_| plan.has(Effect::Exposure))
+        .map(|(view, &exposure)| ViewExposure {
+            name: view.name.clone(),
+            exposure,
+        })
+        .collect()
+}
+
+/// What a report says about the photos.
+pub(in crate::run) fn capture_report(colmap_dir: &Path, scene: &Scene) -> CaptureReport {
+    let capture = &scene.capture;
+    let path = std::fs::canonicalize(colmap_dir).unwrap_or_else(|_| colmap_dir.to_owned());
+    CaptureReport {
+        path: path.to_string_lossy().into_owned(),
+        views: capture.views.len(),
+        train: scene.split.train.len(),
+        test: scene.split.test.len(),
+        points: capture.points.len(),
+        rejected: capture
+            .rejected
+            .iter()
+            .map(|rejected| format!("{}: {}", rejected.name, rejected.reason))
+            .collect(),
+        load: scene.options.clone(),
+        masked_views: scene.masked_views,
+        not_finite: scene.not_finite,
+        extent: scene.extent,
+        offset: capture.offset.to_array(),
+    }
+}
