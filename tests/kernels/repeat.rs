@@ -214,8 +214,7 @@ fn a_scene_that_is_right_is_seen_to_be() {
     still.sh_degree = 1;
     still.max_splats = target.len();
     still.schedule.raise_degree_every = 1;
-    let mut trainer =
-        LumaTrainer::new(raster(), still, 1.0, &target, photos(&target)).unwrap();
+    let mut trainer = LumaTrainer::new(raster(), still, 1.0, &target, photos(&target)).unwrap();
     let [mut brighter, masked] = [0, 1].map(|k| photos(&target).remove(k));
     brighter
         .gray
