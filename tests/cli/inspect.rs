@@ -115,7 +115,7 @@ fn options_of_the_documentation_exist() {
     let help = COMMANDS
         .map(|command| place.succeed(&[command, "--help"]))
         .concat();
-    let known: Vec<&str> = help.split([' ', ',', '\n']).collect();
+    let known: Vec<&str> = help.split([' ', ',', '[', '\n']).collect();
     for page in [
         "README.md",
         "docs/guide.md",
@@ -134,7 +134,7 @@ fn options_of_the_documentation_exist() {
                 None => line.contains("gs-chroma ").then_some(line),
             });
         let options: Vec<&str> = pieces
-            .flat_map(|piece| piece.split([' ', '`', ';', '.', ')']))
+            .flat_map(|piece| piece.split([' ', '`', ';', '.', ')', '=']))
             .filter(|word| {
                 word.starts_with("--") && !["--help", "--path", "--ImageReader"].contains(word)
             })
