@@ -12,18 +12,18 @@
 //! iterations each; the kernels' come from the device where it has timestamp queries.
 //! A harness of its own, because one round times all kernels at once.
 
+mod cloud;
+
 use std::{
     collections::BTreeMap, fmt::Write, path::PathBuf, process::ExitCode, sync::Arc, time::Instant,
 };
 
-use glam::{DMat3, DVec3};
+use cloud::{camera, cloud, median};
 use gs_chroma::{
-    capture::Camera,
     gpu::{Gpu, GpuError},
     luma::{LumaSettings, LumaTrainer, TrainingView},
     oracle::random::Random,
     raster::Raster,
-    splats::{ShField, Splats},
 };
 
 /// Iterations of a round, and rounds.
@@ -33,12 +33,6 @@ const ROUNDS: usize = 5;
 /// No further round of a size after so many seconds.
 const PATIENCE: f64 = 20.0;
 
-/// Gaussians that cover each pixel.
-const OVERDRAW: f64 = 8.0;
-
-/// Standard deviations to where a Gaussian of opacity 0.5 is seen: √(2 ln 127).
-const REACH: f64 = 3.1;
-
 /// What was measured of one size.
 struct Cost {
     splats: usize,
@@ -47,52 +41,6 @@ struct Cost {
     wall: f64,
     /// Seconds of each kernel in an iteration.
     kernels: BTreeMap<&'static str, f64>,
-}
-
-fn camera(width: u32) -> Camera {
-    let height = width * 9 / 16;
-    Camera {
-        width,
-        height,
-        fx: f64::from(width),
-        fy: f64::from(width),
-        cx: f64::from(width) / 2.0,
-        cy: f64::from(height) / 2.0,
-        rotation: DMat3::IDENTITY,
-        translation: DVec3::ZERO,
-    }
-}
-
-fn cloud(count: usize, camera: &Camera) -> Splats {
-    let mut random = Random::new(1);
-    let pixels = f64::from(camera.width) * f64::from(camera.height);
-    let deviation =
-        (OVERDRAW * pixels / (std::f64::consts::PI * REACH * REACH * count as f64)).sqrt();
-    let (mut means, mut log_scales) = (Vec::new(), Vec::new());
-    for _ in 0..count {
-        let depth = random.range(2.0, 6.0);
-        let x = random.range(0.0, f64::from(camera.width)) - camera.cx;
-        let y = random.range(0.0, f64::from(camera.height)) - camera.cy;
-        means.push([x * depth / camera.fx, y * depth / camera.fy, depth].map(|v| v as f32));
-        let width = (deviation * depth / camera.fx).ln();
-        log_scales.push([0.0; 3].map(|_: f64| (width + random.range(-0.7, 0.7)) as f32));
-    }
-    let random_floats = |random: &mut Random, n: usize| -> Vec<f32> {
-        (0..n).map(|_| random.range(-1.0, 1.0) as f32).collect()
-    };
-    Splats {
-        means,
-        quats: (0..count)
-            .map(|_| random.array(-1.0, 1.0).map(|v| v as f32))
-            .collect(),
-        log_scales,
-        opacity_logits: random_floats(&mut random, count),
-        sh: ShField {
-            degree: 0,
-            channels: 1,
-            coefficients: random_floats(&mut random, count),
-        },
-    }
 }
 
 /// A trainer that has found its room already.
@@ -106,17 +54,12 @@ fn trainer(gpu: &Gpu, count: usize, width: u32) -> Result<LumaTrainer, GpuError>
         max_splats: count,
         ..LumaSettings::new(ITERATIONS)
     };
-    let splats = cloud(count, &camera);
+    let splats = cloud(count, &camera, 0);
     let raster = Arc::new(Raster::new(gpu));
     let views = vec![TrainingView::new(camera, gray)];
     let mut trainer = LumaTrainer::new(raster, settings, 5.0, &splats, views)?;
     trainer.train(&mut |_| {})?;
     Ok(trainer)
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
 }
 
 fn measure(gpu: &Gpu, splats: usize, width: u32) -> Result<Cost, GpuError> {

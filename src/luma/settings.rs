@@ -1,5 +1,6 @@
 //! What stage 1 can be told, with the 3DGS values (Kerbl et al. 2023) as default.
 
+use super::Numerics;
 use crate::raster::RasterOptions;
 
 /// Learning rates of Adam.
@@ -170,6 +171,8 @@ pub struct LumaSettings {
     /// Whether some of the Gaussians stand for a background far behind the scene: how
     /// large one may be then grows with its distance.
     pub background: bool,
+    /// How accurately it computes.
+    pub numerics: Numerics,
 }
 
 impl LumaSettings {
@@ -191,6 +194,7 @@ impl LumaSettings {
             memory_limit: None,
             antialiased: false,
             background: false,
+            numerics: Numerics::default(),
         }
     }
 

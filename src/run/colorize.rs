@@ -334,6 +334,7 @@ impl Source {
                 sh_degree: 0,
                 max_splats: 0,
                 antialiased: false,
+                numerics: Default::default(),
                 splats: 0,
                 poisoned: 0,
                 refused: 0,

@@ -18,7 +18,7 @@ use crate::{
     color::gray_from_rgb,
     effects::{Backdrop, Effect, Overrules, Plan, Room},
     gpu::{Gpu, GpuError},
-    luma::{Demand, Densification, LumaSettings, LumaTrainer, TrainingView},
+    luma::{Demand, Densification, LumaSettings, LumaTrainer, Numerics, TrainingView},
     measure,
     raster::{Raster, RasterOptions},
     report::{
@@ -60,6 +60,8 @@ pub struct FitOptions {
     pub memory_limit: Option<u64>,
     /// Whether the report says where the device's time went.
     pub timings: bool,
+    /// How accurately training computes.
+    pub numerics: Numerics,
 }
 
 /// Trains and writes the run folder.
@@ -91,6 +93,7 @@ pub fn fit(
         background: plan.has(Effect::Background),
         max_splats: options.max_splats.unwrap_or(amounts.max_splats),
         seed: options.seed,
+        numerics: options.numerics,
         ..LumaSettings::new(iterations)
     };
     if options.densification == Densification::Relocate {
@@ -196,6 +199,7 @@ pub fn fit(
             sh_degree: settings.sh_degree,
             max_splats: settings.max_splats,
             antialiased: settings.antialiased,
+            numerics: settings.numerics,
             splats: splats.len(),
             poisoned: last.map_or(0, |progress| progress.poisoned),
             refused: last.map_or(0, |progress| progress.refused),

@@ -132,7 +132,11 @@ const REASONS: &[(&str, &str, &str)] = &[
         "log",
         "project culls opacities below ALPHA_MIN before it asks",
     ),
-    ("power_cutoff", "opacity / ALPHA_MIN", "a constant divisor"),
+    (
+        "power_cutoff",
+        "opacity / ALPHA_MIN",
+        "a divisor that the host keeps above 0",
+    ),
     (
         "preconditioned",
         "residual[k] / (parameters.diagonal_scale * diagonal[of_channel] + parameters.ridge)",
