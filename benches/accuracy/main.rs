@@ -91,29 +91,31 @@ fn run(options: &Options) -> Fallible<()> {
     let gpu = Gpu::open()?;
     let random = Subject::random(options.quick);
     let mut rows = measure(&gpu, &random)?;
-    if options.quick {
-        return finish(&gpu, options, &rows);
-    }
-    eprintln!("{}: 200 iterations of each", random.name);
-    for (row, drift) in rows.iter_mut().zip(training::drifts(&gpu, &random)?) {
-        row.drift = Some(drift);
-    }
-    // The bundled scene's run is kept from one measurement to the next, in target.
-    let (capture, own_run) = training::fitted()?;
-    let folder = RunFolder::at(options.run.as_deref().unwrap_or(&own_run));
-    let trained = Subject::trained(&folder)?;
-    let mut of_run = measure(&gpu, &trained)?;
-    if options.run.is_none() {
-        for (row, fit) in of_run.iter_mut().zip(training::fits(&capture)?) {
-            row.fit = Some(fit);
+    save(&gpu, options, &rows)?;
+    if !options.quick {
+        eprintln!("training random Gaussians");
+        for (row, drift) in rows.iter_mut().zip(training::drifts(&gpu, &random)?) {
+            row.drift = Some(drift);
         }
+        save(&gpu, options, &rows)?;
+        let first = rows.len();
+        let (capture, own_run) = training::fitted()?;
+        let folder = RunFolder::at(options.run.as_deref().unwrap_or(&own_run));
+        rows.extend(measure(&gpu, &Subject::trained(&folder)?)?);
+        save(&gpu, options, &rows)?;
+        if options.run.is_none() {
+            for (row, fit) in rows[first..].iter_mut().zip(training::fits(&capture)?) {
+                row.fit = Some(fit);
+            }
+        }
+        save(&gpu, options, &rows)?;
     }
-    rows.extend(of_run);
-    finish(&gpu, options, &rows)
+    println!("{}\n{}", gpu.describe(), table::markdown(&rows));
+    Ok(())
 }
 
-fn finish(gpu: &Gpu, options: &Options, rows: &[Row]) -> Fallible<()> {
-    println!("{}\n\n{}", gpu.describe(), table::markdown(rows));
+/// Writes what there is: whoever stops the program half-way keeps the half.
+fn save(gpu: &Gpu, options: &Options, rows: &[Row]) -> Fallible<()> {
     if let Some(file) = &options.csv {
         fs::write(file, table::csv(rows))?;
     }

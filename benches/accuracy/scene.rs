@@ -44,7 +44,7 @@ impl Subject {
     /// Gaussians before a camera; for the clock as many again behind it, before a second
     /// one that looks there, so that each view shows half of them.
     pub fn random(quick: bool) -> Self {
-        let (count, width) = if quick { (3_000, 240) } else { (10_000, 480) };
+        let (count, width) = if quick { (3_000, 240) } else { (10_000, 400) };
         let small_camera = camera(SMALL_SIDE);
         let small = cloud(2_000, &small_camera, 1);
         let gray = photo(&small, &small_camera);

@@ -16,7 +16,7 @@ const ITERATIONS: usize = 4;
 
 /// Rounds by the host's clock and by the device's; odd numbers, so that the median is one
 /// of them.
-const ROUNDS: usize = 7;
+const ROUNDS: usize = 5;
 const TIMED_ROUNDS: usize = 3;
 
 /// Kernels by what they do.

@@ -48,13 +48,9 @@ fn hard_cases_hold_with_records_at_half_the_size() {
             verdict.picture_error <= verdict.picture_bound,
             "{verdict:?}"
         );
-        // A record's error is at most 2⁻⁸ of it; a needle's records cancel.
-        let bound = if case.name.contains("needle") {
-            1e9
-        } else {
-            0.03
-        };
-        assert!(verdict.gradient_error <= bound, "{verdict:?}");
+        // A record's error is at most 2⁻⁸ of it, but records may cancel: by far the most
+        // in "needle across the pixels", where 0.18 was seen.
+        assert!(verdict.gradient_error <= 0.2, "{verdict:?}");
     }
 }
 

@@ -384,6 +384,30 @@ fn only_antialiased_kernels_know_of_the_compensation() {
     }
 }
 
+/// So with what training may trade for time.
+#[test]
+fn kernels_know_of_no_numerics_but_their_own() {
+    for (trace, variant) in [
+        ("upper_half", "blend_backward_luma_half"),
+        ("unpacked", "sum_instances_luma_half"),
+        ("RADIUS: u32 = 3u", "_window7"),
+        ("RADIUS: u32 = 2u", "_window5"),
+    ] {
+        for (name, source) in shaders::ALL {
+            assert_eq!(source.contains(trace), name.contains(variant), "{name}");
+        }
+    }
+    // Lazy steps store nothing for what the view does not show; the others do so twice.
+    for (name, source) in shaders::ALL {
+        if name.contains("_step") {
+            let stills = source.matches("ranks[i] == INVISIBLE").count();
+            assert_eq!(stills, 1, "{name}");
+            let at_once = source.contains("INVISIBLE {\n            return;");
+            assert_eq!(at_once, name.ends_with("_lazy"), "{name}");
+        }
+    }
+}
+
 #[test]
 fn the_lint_sees_what_it_is_for() {
     let source = "fn bad(x: f32, v: vec3f) -> f32 {
