@@ -32,6 +32,13 @@ const ADJOINT: &[&str] = &["blend_backward", "shade_backward", "sum_instances"];
 /// Effects of the photos that the luma loss may reckon with.
 const LOSS_EFFECTS: &[&str] = &["exposed", "masked"];
 
+/// SSIM's windows and what the names of the kernels say of them.
+const SSIM_WINDOWS: [(&str, &str); 3] = [
+    ("window11", ""),
+    ("window7", "_window7"),
+    ("window5", "_window5"),
+];
+
 fn main() {
     println!("cargo::rerun-if-changed=shaders");
     let out = env::var("OUT_DIR").expect("cargo sets OUT_DIR");
@@ -52,14 +59,26 @@ fn main() {
     for kernel in ["project_backward", "shade_backward"] {
         compile(&out, kernel, "_step", &["luma", "geometry", "step"]);
     }
+    // What training may trade for time (`src/luma/numerics.rs`): Adam steps for what the
+    // view shows alone, and gradients wait for their sums at half the size.
+    let lazy = ["luma", "geometry", "step", "lazy", "mip"];
+    compile(&out, "project_backward", "_step_lazy", &lazy[..4]);
+    compile(&out, "project_backward", "_mip_step_lazy", &lazy);
+    compile(&out, "shade_backward", "_step_lazy", &lazy[..4]);
+    for kernel in ["blend_backward", "sum_instances"] {
+        compile(&out, kernel, "_luma_half", &["luma", "geometry", "half"]);
+    }
     // Each effect of the photos is in the loss only where a scene calls for it.
     for subset in 0..1 << LOSS_EFFECTS.len() {
-        let features: Vec<&str> = (LOSS_EFFECTS.iter().enumerate())
+        let effects: Vec<&str> = (LOSS_EFFECTS.iter().enumerate())
             .filter(|(bit, _)| subset >> bit & 1 == 1)
             .map(|(_, &effect)| effect)
             .collect();
-        let suffix: String = features.iter().map(|effect| format!("_{effect}")).collect();
-        compile(&out, "luma_loss", &suffix, &features);
+        let suffix: String = effects.iter().map(|effect| format!("_{effect}")).collect();
+        for (window, name) in SSIM_WINDOWS {
+            let features = [&effects[..], &[window]].concat();
+            compile(&out, "luma_loss", &format!("{suffix}{name}"), &features);
+        }
     }
     // Antialiasing is in the projection only where a scene calls for it.
     let mip = ["luma", "geometry", "mip", "step"];
@@ -85,6 +104,11 @@ fn compile(out: &str, kernel: &str, suffix: &str, features: &[&str]) {
         "exposed",
         "masked",
         "mip",
+        "lazy",
+        "half",
+        "window11",
+        "window7",
+        "window5",
     ] {
         compiler.set_feature(feature, features.contains(&feature));
     }

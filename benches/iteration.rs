@@ -12,13 +12,16 @@
 //! iterations each; the kernels' come from the device where it has timestamp queries.
 //! A harness of its own, because one round times all kernels at once.
 
+mod cloud;
+
 use std::{
     collections::BTreeMap, fmt::Write, path::PathBuf, process::ExitCode, sync::Arc, time::Instant,
 };
 
+use cloud::{camera, cloud, median};
 use gs_chroma::{
     gpu::{Gpu, GpuError},
-    luma::{LumaSettings, LumaTrainer, TrainingView, frontal_camera, random_cloud},
+    luma::{LumaSettings, LumaTrainer, TrainingView},
     oracle::random::Random,
     raster::Raster,
 };
@@ -42,7 +45,7 @@ struct Cost {
 
 /// A trainer that has found its room already.
 fn trainer(gpu: &Gpu, count: usize, width: u32) -> Result<LumaTrainer, GpuError> {
-    let camera = frontal_camera(width, width * 9 / 16);
+    let camera = camera(width);
     let mut random = Random::new(2);
     let pixels = camera.width * camera.height;
     let gray = (0..pixels).map(|_| random.bits() as u8).collect();
@@ -51,17 +54,12 @@ fn trainer(gpu: &Gpu, count: usize, width: u32) -> Result<LumaTrainer, GpuError>
         max_splats: count,
         ..LumaSettings::new(ITERATIONS)
     };
-    let splats = random_cloud(count, &camera);
+    let splats = cloud(count, &camera, 0);
     let raster = Arc::new(Raster::new(gpu));
     let views = vec![TrainingView::new(camera, gray)];
     let mut trainer = LumaTrainer::new(raster, settings, 5.0, &splats, views)?;
     trainer.train(&mut |_| {})?;
     Ok(trainer)
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
 }
 
 fn measure(gpu: &Gpu, splats: usize, width: u32) -> Result<Cost, GpuError> {

@@ -13,7 +13,8 @@
 import package::common::color::{Color, color_dot};
 import package::common::constants::{ALPHA_MAX, ALPHA_MIN, TILE_SIDE};
 import package::common::numeric::linear_group;
-import package::common::partials::{PARTIAL_COLOR, PARTIAL_STRIDE};
+import package::common::partials::{PARTIAL_COLOR, PARTIAL_STRIDE, PARTIAL_WORDS, PartialWord};
+@if(half) import package::common::partials::packed;
 @if(geometry) import package::common::partials::PARTIAL_PULL;
 import package::common::projected::{Projected, power_cutoff, touches};
 import package::common::quad::{Quad, contributes, powers, quad_alpha};
@@ -36,8 +37,8 @@ const SHARE: u32 = PARTIAL_STRIDE | 1u;
 @group(0) @binding(5) var<storage, read> lasts: array<u32>;
 // Gradient of the loss with respect to each pixel.
 @group(0) @binding(6) var<storage, read> image_gradient: array<Color>;
-// `[instances, PARTIAL_STRIDE]` by emission slot.
-@group(0) @binding(7) var<storage, read_write> partials: array<f32>;
+// `[instances, PARTIAL_WORDS]` by emission slot.
+@group(0) @binding(7) var<storage, read_write> partials: array<PartialWord>;
 @if(geometry) @group(0) @binding(8) var<storage, read> colors: array<Color>;
 @if(geometry) @group(0) @binding(9) var<storage, read> image: array<Color>;
 
@@ -137,6 +138,26 @@ fn accumulate(
     }
 }
 
+// One figure of a batch's member, the shares of all threads added up.
+fn figure_sum(member: u32, figure: u32) -> f32 {
+    var parts = touched[member];
+    var sum = 0.0;
+    while parts != 0u {
+        let at = (member * THREADS + firstTrailingBit(parts) * PART) * SHARE + figure;
+        parts &= parts - 1u;
+        for (var t = 0u; t < PART; t++) {
+            sum += shares[at + t * SHARE];
+        }
+    }
+    return sum;
+}
+
+// A word of the member's record.
+@if(!half) fn record_word(member: u32, word: u32) -> f32 { return figure_sum(member, word); }
+@if(half) fn record_word(member: u32, word: u32) -> u32 {
+    return packed(figure_sum(member, 2u * word), figure_sum(member, 2u * word + 1u));
+}
+
 @compute @workgroup_size(THREADS)
 fn blend_backward(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) thread: u32) {
     let tile = linear_group(group, groups);
@@ -221,28 +242,19 @@ fn blend_backward(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) 
             }
         }
         workgroupBarrier();
-        for (var task = thread; task < PARTIAL_STRIDE * members; task += THREADS) {
-            let member = task / PARTIAL_STRIDE;
-            let figure = task % PARTIAL_STRIDE;
-            var parts = touched[member];
-            var sum = 0.0;
-            while parts != 0u {
-                let at = (member * THREADS + firstTrailingBit(parts) * PART) * SHARE + figure;
-                parts &= parts - 1u;
-                for (var t = 0u; t < PART; t++) {
-                    sum += shares[at + t * SHARE];
-                }
-            }
-            partials[batch_slots[member] * PARTIAL_STRIDE + figure] = sum;
+        for (var task = thread; task < PARTIAL_WORDS * members; task += THREADS) {
+            let member = task / PARTIAL_WORDS;
+            let word = task % PARTIAL_WORDS;
+            partials[batch_slots[member] * PARTIAL_WORDS + word] = record_word(member, word);
         }
         workgroupBarrier();
     }
     // Instances behind the last one used have no gradient, and must say so.
     let count = starts[tile + 1u] - start;
     for (var own = used + thread; own < count; own += THREADS) {
-        let at = slots[start + own] * PARTIAL_STRIDE;
-        for (var c = 0u; c < PARTIAL_STRIDE; c++) {
-            partials[at + c] = 0.0;
+        let at = slots[start + own] * PARTIAL_WORDS;
+        for (var c = 0u; c < PARTIAL_WORDS; c++) {
+            partials[at + c] = PartialWord();
         }
     }
 }

@@ -1,7 +1,7 @@
 // 0.8·L1 + 0.2·(1 - SSIM) over one channel, value and gradient, in two passes.
 //
-// SSIM after Wang et al. 2004 with the 11×11 Gaussian window of σ = 1.5 and
-// zeros outside the image, as 3DGS trains. The first pass writes what the
+// SSIM after Wang et al. 2004 with the 11×11 Gaussian window of σ = 1.5 (or a smaller
+// one, `common/ssim_window`) and zeros outside the image, as 3DGS trains. The first pass writes what the
 // second one needs: the derivatives of each window's SSIM with respect to the
 // window's mean, mean square and mean product.
 //
@@ -11,16 +11,10 @@
 // `masked`: a pixel counts as much as its mask says.
 // The weight multiplies both images, as if the pixel lay outside for zero, and the
 // terms of the window around it.
+import package::common::ssim_window::{HALO, RADIUS, Run, times, windowed};
 import package::common::view::View;
 
-const RADIUS: u32 = 5u;
 const SIDE: u32 = 16u;
-// Rows of a block with its halo.
-const HALO: u32 = 26u;
-// The window along one axis up to its middle; the rest mirrors it.
-const WINDOW: array<f32, 6> = array<f32, 6>(
-    0.00102838008447911, 0.007598758135239185, 0.03600077212843083,
-    0.10936068950970002, 0.2130055377112537, 0.26601172486179436);
 const C1: f32 = 0.0001;
 const C2: f32 = 0.0009;
 const L1_WEIGHT: f32 = 0.8;
@@ -78,31 +72,8 @@ fn photo_at(p: u32) -> f32 {
 
 // Sums along rows, `[moment, row, column]`: five moments in the first pass, three
 // slopes in the second.
-var<workgroup> rows: array<array<f32, 416>, 5>;
+var<workgroup> rows: array<array<f32, HALO * SIDE>, 5>;
 var<workgroup> losses: array<f32, 64>;
-
-// Sixteen neighbours, of which the last two are not used.
-struct Run {
-    a: vec4f,
-    b: vec4f,
-    c: vec4f,
-    d: vec4f,
-}
-
-// The window over the fourteen values from four places on. Four sums share most
-// of their values; each value is loaded once.
-fn windowed(v: Run) -> vec4f {
-    return WINDOW[0] * (v.a + vec4f(v.c.zw, v.d.xy))
-        + WINDOW[1] * (vec4f(v.a.yzw, v.b.x) + vec4f(v.c.yzw, v.d.x))
-        + WINDOW[2] * (vec4f(v.a.zw, v.b.xy) + v.c)
-        + WINDOW[3] * (vec4f(v.a.w, v.b.xyz) + vec4f(v.b.w, v.c.xyz))
-        + WINDOW[4] * (v.b + vec4f(v.b.zw, v.c.xy))
-        + WINDOW[5] * vec4f(v.b.yzw, v.c.x);
-}
-
-fn times(v: Run, w: Run) -> Run {
-    return Run(v.a * w.a, v.b * w.b, v.c * w.c, v.d * w.d);
-}
 
 // Where the run for four columns lies along a row of the block's halo.
 struct Span {
@@ -143,10 +114,21 @@ fn photo_quad(s: Span, k: i32) -> vec4f {
     return select(vec4f(0.0), vec4f(photo_at(p.x), photo_at(p.y), photo_at(p.z), photo_at(p.w)), has(s, k));
 }
 
+@if(window11) fn image_run(s: Span) -> Run { return Run(image_quad(s, 0), image_quad(s, 4), image_quad(s, 8), image_quad(s, 12)); }
+@if(window7) fn image_run(s: Span) -> Run { return Run(image_quad(s, 0), image_quad(s, 4), image_quad(s, 8)); }
+@if(window5) fn image_run(s: Span) -> Run { return Run(image_quad(s, 0), image_quad(s, 4)); }
+@if(window11) fn photo_run(s: Span) -> Run { return Run(photo_quad(s, 0), photo_quad(s, 4), photo_quad(s, 8), photo_quad(s, 12)); }
+@if(window7) fn photo_run(s: Span) -> Run { return Run(photo_quad(s, 0), photo_quad(s, 4), photo_quad(s, 8)); }
+@if(window5) fn photo_run(s: Span) -> Run { return Run(photo_quad(s, 0), photo_quad(s, 4)); }
+
 @if(masked) fn weight_quad(s: Span, k: i32) -> vec4f {
     let p = indices(s, k);
     return vec4f(weight(p.x), weight(p.y), weight(p.z), weight(p.w));
 }
+
+@if(masked && window11) fn weight_run(s: Span) -> Run { return Run(weight_quad(s, 0), weight_quad(s, 4), weight_quad(s, 8), weight_quad(s, 12)); }
+@if(masked && window7) fn weight_run(s: Span) -> Run { return Run(weight_quad(s, 0), weight_quad(s, 4), weight_quad(s, 8)); }
+@if(masked && window5) fn weight_run(s: Span) -> Run { return Run(weight_quad(s, 0), weight_quad(s, 4)); }
 
 // Puts four sums along a row where `column_sums` finds them.
 fn store(moment: u32, row: u32, quad: u32, sums: vec4f) {
@@ -164,8 +146,15 @@ fn column_quad(moment: u32, at: u32) -> vec4f {
 // The window over both axes for the four pixels of a column from row `4 y` on.
 fn column_sums(moment: u32, id: vec3u) -> vec4f {
     let at = id.y * 4u * SIDE + id.x;
-    let d = vec4f(rows[moment][at + 12u * SIDE], rows[moment][at + 13u * SIDE], 0.0, 0.0);
-    return windowed(Run(column_quad(moment, at), column_quad(moment, at + 4u * SIDE), column_quad(moment, at + 8u * SIDE), d));
+    @if(window11) {
+        let d = vec4f(rows[moment][at + 12u * SIDE], rows[moment][at + 13u * SIDE], 0.0, 0.0);
+        return windowed(Run(column_quad(moment, at), column_quad(moment, at + 4u * SIDE), column_quad(moment, at + 8u * SIDE), d));
+    }
+    @if(window7) {
+        let c = vec4f(rows[moment][at + 8u * SIDE], rows[moment][at + 9u * SIDE], 0.0, 0.0);
+        return windowed(Run(column_quad(moment, at), column_quad(moment, at + 4u * SIDE), c));
+    }
+    @if(window5) return windowed(Run(column_quad(moment, at), column_quad(moment, at + 4u * SIDE)));
 }
 
 @compute @workgroup_size(16, 4)
@@ -174,10 +163,10 @@ fn luma_loss(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) group
         let row = task / 4u;
         let quad = (task % 4u) * 4u;
         let s = span(group, row, quad);
-        var x = Run(image_quad(s, 0), image_quad(s, 4), image_quad(s, 8), image_quad(s, 12));
-        var y = Run(photo_quad(s, 0), photo_quad(s, 4), photo_quad(s, 8), photo_quad(s, 12));
+        var x = image_run(s);
+        var y = photo_run(s);
         @if(masked) {
-            let w = Run(weight_quad(s, 0), weight_quad(s, 4), weight_quad(s, 8), weight_quad(s, 12));
+            let w = weight_run(s);
             x = times(w, x);
             y = times(w, y);
         }
@@ -256,11 +245,23 @@ fn luma_loss_backward(@builtin(workgroup_id) group: vec3u, @builtin(local_invoca
         let s = span(group, row, quad);
         let a = slopes_quad(s, 0);
         let b = slopes_quad(s, 4);
-        let c = slopes_quad(s, 8);
-        let d = slopes_quad(s, 12);
-        store(0u, row, quad, windowed(Run(a[0], b[0], c[0], d[0])));
-        store(1u, row, quad, windowed(Run(a[1], b[1], c[1], d[1])));
-        store(2u, row, quad, windowed(Run(a[2], b[2], c[2], d[2])));
+        @if(!window5) let c = slopes_quad(s, 8);
+        @if(window11) let d = slopes_quad(s, 12);
+        @if(window11) {
+            store(0u, row, quad, windowed(Run(a[0], b[0], c[0], d[0])));
+            store(1u, row, quad, windowed(Run(a[1], b[1], c[1], d[1])));
+            store(2u, row, quad, windowed(Run(a[2], b[2], c[2], d[2])));
+        }
+        @if(window7) {
+            store(0u, row, quad, windowed(Run(a[0], b[0], c[0])));
+            store(1u, row, quad, windowed(Run(a[1], b[1], c[1])));
+            store(2u, row, quad, windowed(Run(a[2], b[2], c[2])));
+        }
+        @if(window5) {
+            store(0u, row, quad, windowed(Run(a[0], b[0])));
+            store(1u, row, quad, windowed(Run(a[1], b[1])));
+            store(2u, row, quad, windowed(Run(a[2], b[2])));
+        }
     }
     workgroupBarrier();
     let mean = column_sums(0u, id);

@@ -1,7 +1,8 @@
 // The adjoint of `project`: from centres, conics and opacities on the image
 // plane to means, quaternions, log-scales and opacity logits. Derivation in
 // docs/architecture.md. In training (`step`) Adam moves the parameters at once, and
-// their gradient is never stored.
+// their gradient is never stored; or (`lazy`) it moves those of the Gaussians that the view
+// shows, and the others keep their moments as well.
 @if(step) import package::common::adam::{AdamParameters, GRADIENT_MAX, adam_step};
 import package::common::constants::{INVISIBLE, PLANE_LOG_SCALE, PLANE_MEAN, PLANE_OPACITY, PLANE_QUAT, STAT_PULL, STAT_VIEWS, STATUS_OVERFLOW};
 @if(step) import package::common::constants::STATUS_REFUSED;
@@ -88,10 +89,11 @@ fn project_backward(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups
     // repeats the iteration.
     let overflow = atomicLoad(&status[STATUS_OVERFLOW]) != 0u;
     @if(step) { if overflow { return; } }
+    @if(lazy) { if ranks[i] == INVISIBLE { return; } }
     let scale = exp(log_scales(i));
     let pull_on_scale = scale_pull(scale);
     let pull_on_opacity = opacity_pull(plane(PLANE_OPACITY, i));
-    if ranks[i] == INVISIBLE {
+    @if(!lazy) if ranks[i] == INVISIBLE {
         for (var index = PLANE_MEAN; index < PLANE_LOG_SCALE; index++) {
             store(index, i, 0.0);
         }

@@ -1,6 +1,6 @@
 // The adjoint of `shade`: gradients of the spherical harmonics and, through the
 // direction of view, of the means. In training (`step`) Adam moves the harmonics at
-// once, and their gradient is never stored.
+// once, and their gradient is never stored; `lazy` as in `project_backward`.
 @if(step) import package::common::adam::{AdamParameters, GRADIENT_MAX, adam_step};
 import package::common::color::{CHANNELS, Color, color_dot, color_gradient};
 import package::common::constants::{INVISIBLE, PLANE_MEAN};
@@ -88,7 +88,8 @@ fn shade_backward(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) 
     // repeats the iteration.
     @if(step) { if atomicLoad(&status[STATUS_OVERFLOW]) != 0u { return; } }
     let count = (view.sh_degree + 1u) * (view.sh_degree + 1u);
-    if ranks[i] == INVISIBLE {
+    @if(lazy) { if ranks[i] == INVISIBLE { return; } }
+    @if(!lazy) if ranks[i] == INVISIBLE {
         @if(!add) for (var k = 0u; k < count; k++) {
             store(k, i, Color());
         }

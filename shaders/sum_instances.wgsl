@@ -3,13 +3,14 @@
 // power = ½(A dx² + C dy²) + B dx dy with d = pixel - centre, and alpha = opacity·exp(-power).
 import package::common::constants::{ALPHA_MIN, STATUS_INSTANCES, STATUS_VISIBLE};
 import package::common::numeric::linear_group;
-import package::common::partials::PARTIAL_STRIDE;
+import package::common::partials::{PARTIAL_STRIDE, PARTIAL_WORDS, PartialWord};
+@if(half) import package::common::partials::unpacked;
 @if(geometry) import package::common::projected::Projected;
 
 @group(0) @binding(0) var<storage, read> order: array<u32>;
 @group(0) @binding(1) var<storage, read> offsets: array<u32>;
 @group(0) @binding(2) var<storage, read> status: array<u32>;
-@group(0) @binding(3) var<storage, read> partials: array<f32>;
+@group(0) @binding(3) var<storage, read> partials: array<PartialWord>;
 // `[N, PARTIAL_STRIDE]`, written for visible Gaussians only.
 @group(0) @binding(4) var<storage, read_write> gradients: array<f32>;
 @if(geometry) @group(0) @binding(5) var<storage, read> projected: array<Projected>;
@@ -28,8 +29,14 @@ fn sum_instances(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) g
     }
     var sum: array<f32, PARTIAL_STRIDE>;
     for (var slot = begin; slot < end; slot++) {
-        for (var c = 0u; c < PARTIAL_STRIDE; c++) {
-            sum[c] += partials[slot * PARTIAL_STRIDE + c];
+        for (var c = 0u; c < PARTIAL_WORDS; c++) {
+            let word = partials[slot * PARTIAL_WORDS + c];
+            @if(!half) { sum[c] += word; }
+            @if(half) {
+                let figures = unpacked(word);
+                sum[2u * c] += figures.x;
+                sum[2u * c + 1u] += figures.y;
+            }
         }
     }
     let i = order[rank];

@@ -61,6 +61,9 @@ if have "$program"; then step doctor.json "$program" doctor --json; else skip do
 
 if have cargo; then step bench.txt cargo bench -- --full --csv "$out/cost.csv"; else skip bench "no cargo"; fi
 
+if have cargo; then step accuracy.md cargo bench --bench accuracy -- --csv "$out/accuracy.csv" --json "$out/accuracy.json"
+else skip accuracy "no cargo"; fi
+
 if [ $tests = no ]; then skip tests "--no-tests"
 elif have cargo; then step tests.txt cargo test --release
 else skip tests "no cargo"; fi

@@ -1,5 +1,7 @@
 // Constants of the rasterizer. `src/raster/constants.rs` holds the same values
-// and a test compares the two.
+// and a test compares the two. Those that training may trade for time
+// (`src/raster/numerics.rs`) are overridable: the host gives their value when it makes
+// the pipeline, and the device's compiler sees a constant.
 
 // Side of a square tile in pixels.
 const TILE_SIDE: u32 = 16u;
@@ -12,10 +14,10 @@ const BLUR: f32 = 0.3;
 const ALPHA_MAX: f32 = 0.99;
 
 // Below half an 8-bit step a contribution cannot be seen.
-const ALPHA_MIN: f32 = 0.00392156862745098;
+override ALPHA_MIN: f32 = 0.00392156862745098;
 
 // A pixel is finished when less than this passes through.
-const TRANSMITTANCE_MIN: f32 = 1e-4;
+override TRANSMITTANCE_MIN: f32 = 1e-4;
 
 // A larger colour is poison: its gradient times squared pixel distances, squared
 // again by Adam, would overflow.

@@ -14,7 +14,7 @@ use crate::{
     optimize::LossLog,
     raster::{
         AdjointScratch, Canvas, ColorKind, Field, Geometry, Layer, LayerAdjoint, Lists, Outcome,
-        Raster, Status, ViewUniform,
+        Raster, Status, Storage, ViewUniform,
     },
 };
 
@@ -82,7 +82,13 @@ impl Shared {
             log,
             corrections: Corrections::new(gpu, views)?,
             canvases,
-            scratch: AdjointScratch::new(gpu, ColorKind::Chroma, geometry.count, room.capacity)?,
+            scratch: AdjointScratch::new(
+                gpu,
+                ColorKind::Chroma,
+                Storage::Full,
+                geometry.count,
+                room.capacity,
+            )?,
             geometry,
             field,
             direction,

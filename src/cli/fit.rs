@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use super::{effects::EffectArguments, photos::Photos, print, progress::Progress};
-use crate::luma::Densification;
+use crate::luma::{Densification, Numerics};
 use crate::report::timings_table;
 use crate::run::{FitOptions, Preset, RunError, fit};
 
@@ -56,6 +56,11 @@ pub struct Fit {
     measure_side: Option<u32>,
     #[command(flatten)]
     effects: EffectArguments,
+    /// How accurately training computes: alpha-min=0.00001..0.1, transmittance-min=0..0.5,
+    /// depth-bits=32|24|16, storage=full|half, ssim-window=11|7|5, adam=exact|lazy. What is
+    /// measured, drawn and written is always computed as viewers do.
+    #[arg(long, value_name = "KEY=VALUE[,…]")]
+    numerics: Option<Numerics>,
     /// Seed of every random choice: same seed, same bytes.
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
@@ -94,6 +99,7 @@ impl Fit {
             target_psnr: self.target_psnr,
             measure_side: self.measure_side,
             timings: self.timings,
+            numerics: self.numerics.unwrap_or_default(),
         };
         let (folder, report) = fit(&options, &mut |event| progress.show(&event))?;
         progress.finish();

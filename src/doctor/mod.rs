@@ -14,8 +14,9 @@ use crate::{
     compare::{Elementwise, FlipBounds, widen},
     gpu::{Gpu, GpuError},
     oracle::{
-        constants::ALPHA_MIN,
+        constants::ALPHA_MAX,
         gradient::gradient,
+        numerics::Numerics,
         random::Random,
         render::render_pixels,
         scene::{Gaussian, Scene},
@@ -178,7 +179,20 @@ impl Diagnosis {
 /// # Errors
 /// [`GpuError`] when the device has no room for it or is lost.
 pub fn examine(raster: &Arc<Raster>, case: &Case) -> Result<Verdict, GpuError> {
-    let hard = (case.make)();
+    examine_with(raster, case, Numerics::DEFAULT)
+}
+
+/// Runs one case of which device and oracle leave out as much as this.
+///
+/// # Errors
+/// [`GpuError`] when the device has no room for it or is lost.
+pub fn examine_with(
+    raster: &Arc<Raster>,
+    case: &Case,
+    numerics: Numerics,
+) -> Result<Verdict, GpuError> {
+    let mut hard = (case.make)();
+    hard.view.numerics = numerics;
     let stage = Stage::new(raster, &splats(&hard.scene), &hard.view)?;
     let headroom = headroom(&raster.gpu);
     let [picture_bound, gradient_bound] = case.seen.map(|seen| (seen * headroom).max(TIGHTEST));
@@ -201,9 +215,8 @@ pub fn examine(raster: &Arc<Raster>, case: &Case) -> Result<Verdict, GpuError> {
             absolute: picture_bound * brightest,
             relative: 0.0,
         },
-        // What a contribution at the floor of alpha shows.
         jump: Elementwise {
-            absolute: 2.0 * ALPHA_MIN * brightest,
+            absolute: jump(&hard.view.numerics) * brightest,
             relative: 0.0,
         },
         cap: 0.02_f64.max(1.5 / expected.len() as f64),
@@ -251,6 +264,12 @@ pub fn examine(raster: &Arc<Raster>, case: &Case) -> Result<Verdict, GpuError> {
         poisoned,
         failure: (!failures.is_empty()).then(|| failures.join("; ")),
     })
+}
+
+/// What a contribution at the floor of alpha shows, or the last one that a transmittance
+/// at its floor lets through.
+fn jump(numerics: &Numerics) -> f64 {
+    (2.0 * numerics.alpha_min).max(numerics.transmittance_min / (1.0 - ALPHA_MAX))
 }
 
 /// The larger of two errors; one that is not a number is infinitely large.

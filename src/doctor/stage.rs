@@ -7,10 +7,13 @@ use glam::{DMat3, DVec3};
 use crate::{
     capture::Camera,
     gpu::{Buffer, GpuError, Recorder},
-    oracle::scene::{Scene, View},
+    oracle::{
+        numerics::Numerics,
+        scene::{Scene, View},
+    },
     raster::{
-        Field, Geometry, Layer, LayerAdjoint, Lists, Outcome, Projected, Raster, RasterOptions,
-        Status, ViewUniform, constants::*,
+        Field, Geometry, Layer, LayerAdjoint, Lists, Outcome, Projected, Raster, RasterNumerics,
+        RasterOptions, Status, ViewUniform, constants::*,
     },
     splats::{ShField, Splats},
 };
@@ -47,6 +50,16 @@ pub fn splats<const C: usize>(scene: &Scene<f64, C>) -> Splats {
     }
 }
 
+/// The rasterizer that leaves out what the oracle does.
+pub fn cutting(raster: &Arc<Raster>, numerics: &Numerics) -> Arc<Raster> {
+    raster.computing(RasterNumerics {
+        alpha_min: numerics.alpha_min,
+        transmittance_min: numerics.transmittance_min,
+        depth_bits: numerics.depth_bits,
+        ..raster.numerics()
+    })
+}
+
 /// One scene before one camera, with all its buffers.
 pub struct Stage {
     /// The view, which may be changed between two pictures.
@@ -71,7 +84,8 @@ impl Stage {
         Self::with_capacity(raster, splats, view, splats.len() * columns * rows)
     }
 
-    /// A stage with room for so many tile-list entries, antialiased if the view is.
+    /// A stage with room for so many tile-list entries, antialiased if the view is, that
+    /// leaves out what the view says.
     ///
     /// # Errors
     /// [`GpuError::TooLarge`].
@@ -84,6 +98,7 @@ impl Stage {
         let raster = raster.drawing(RasterOptions {
             antialiased: view.antialiased,
         });
+        let raster = cutting(&raster, &view.numerics);
         let (gpu, near) = (&raster.gpu, view.near);
         let degree = splats.sh.degree;
         let view = ViewUniform::new(&camera(view), near, splats.len(), degree);

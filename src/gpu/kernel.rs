@@ -27,6 +27,16 @@ impl Kernel {
     /// Compiles the entry point `name` of `source`. All bindings
     /// are in group 0.
     pub fn new(gpu: &Gpu, name: &'static str, source: &'static str) -> Self {
+        Self::with(gpu, name, source, &[])
+    }
+
+    /// The same with values for the overridable constants that `source` declares.
+    pub fn with(
+        gpu: &Gpu,
+        name: &'static str,
+        source: &'static str,
+        constants: &[(&str, f64)],
+    ) -> Self {
         let describe = |source| wgpu::ShaderModuleDescriptor {
             label: Some(name),
             source: wgpu::ShaderSource::Wgsl(source),
@@ -57,9 +67,9 @@ impl Kernel {
                 module: &module,
                 entry_point: Some(name),
                 compilation_options: wgpu::PipelineCompilationOptions {
+                    constants,
                     // Every kernel writes its workgroup memory before it reads it.
                     zero_initialize_workgroup_memory: false,
-                    ..Default::default()
                 },
                 cache: None,
             });

@@ -30,6 +30,22 @@ shaders! {
     LUMA_LOSS_MASKED = "luma_loss_masked";
     /// Luma loss with exposures and masks.
     LUMA_LOSS_EXPOSED_MASKED = "luma_loss_exposed_masked";
+    /// Luma loss, SSIM over 7 × 7 pixels.
+    LUMA_LOSS_WINDOW7 = "luma_loss_window7";
+    /// Luma loss, SSIM over 5 × 5 pixels.
+    LUMA_LOSS_WINDOW5 = "luma_loss_window5";
+    /// Luma loss of photos with exposures, SSIM over 7 × 7 pixels.
+    LUMA_LOSS_EXPOSED_WINDOW7 = "luma_loss_exposed_window7";
+    /// Luma loss of photos with exposures, SSIM over 5 × 5 pixels.
+    LUMA_LOSS_EXPOSED_WINDOW5 = "luma_loss_exposed_window5";
+    /// Luma loss of photos with masks, SSIM over 7 × 7 pixels.
+    LUMA_LOSS_MASKED_WINDOW7 = "luma_loss_masked_window7";
+    /// Luma loss of photos with masks, SSIM over 5 × 5 pixels.
+    LUMA_LOSS_MASKED_WINDOW5 = "luma_loss_masked_window5";
+    /// Luma loss with exposures and masks, SSIM over 7 × 7 pixels.
+    LUMA_LOSS_EXPOSED_MASKED_WINDOW7 = "luma_loss_exposed_masked_window7";
+    /// Luma loss with exposures and masks, SSIM over 5 × 5 pixels.
+    LUMA_LOSS_EXPOSED_MASKED_WINDOW5 = "luma_loss_exposed_masked_window5";
     /// Projection.
     PROJECT = "project";
     /// Adjoint of the projection.
@@ -42,6 +58,10 @@ shaders! {
     PROJECT_BACKWARD_MIP = "project_backward_mip";
     /// Adjoint of the projection, antialiased, with Adam's step.
     PROJECT_BACKWARD_MIP_STEP = "project_backward_mip_step";
+    /// Adjoint of the projection, with Adam's step for what the view shows.
+    PROJECT_BACKWARD_STEP_LAZY = "project_backward_step_lazy";
+    /// Adjoint of the projection, antialiased, with Adam's step for what the view shows.
+    PROJECT_BACKWARD_MIP_STEP_LAZY = "project_backward_mip_step_lazy";
     /// What densification by relocation adds to a step.
     RELOCATION = "relocation";
     /// Prefix sum.
@@ -72,18 +92,24 @@ shaders! {
     SHADE_RGB = "shade_rgb";
     /// Adjoint of blending, luma and geometry.
     BLEND_BACKWARD_LUMA = "blend_backward_luma";
+    /// Adjoint of blending, luma and geometry, its records at half the size.
+    BLEND_BACKWARD_LUMA_HALF = "blend_backward_luma_half";
     /// Adjoint of blending, chroma alone.
     BLEND_BACKWARD_CHROMA = "blend_backward_chroma";
     /// Adjoint of shading, luma and means.
     SHADE_BACKWARD_LUMA = "shade_backward_luma";
     /// Adjoint of shading, luma and means, with Adam's step.
     SHADE_BACKWARD_STEP = "shade_backward_step";
+    /// Adjoint of shading, luma and means, with Adam's step for what the view shows.
+    SHADE_BACKWARD_STEP_LAZY = "shade_backward_step_lazy";
     /// Adjoint of shading, chroma alone.
     SHADE_BACKWARD_CHROMA = "shade_backward_chroma";
     /// Adjoint of shading, chroma alone, added to what is there.
     SHADE_BACKWARD_CHROMA_ADD = "shade_backward_chroma_add";
     /// Sum of the instances' gradients, luma and geometry.
     SUM_INSTANCES_LUMA = "sum_instances_luma";
+    /// Sum of the instances' gradients, luma and geometry, of records at half the size.
+    SUM_INSTANCES_LUMA_HALF = "sum_instances_luma_half";
     /// Sum of the instances' gradients, chroma alone.
     SUM_INSTANCES_CHROMA = "sum_instances_chroma";
 }

@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::photos::Photos;
+use super::{SsimWindow, photos::Photos};
 use crate::{
     capture::Exposure,
     gpu::{Bindings, Buffer, Gpu, GpuError, Kernel, Recorder, shaders},
@@ -29,13 +29,22 @@ pub struct LossEffects {
 }
 
 impl LossEffects {
-    /// The kernels that have these effects and no others.
-    pub fn shader(self) -> &'static str {
-        match (self.exposed, self.masked) {
-            (false, false) => shaders::LUMA_LOSS,
-            (true, false) => shaders::LUMA_LOSS_EXPOSED,
-            (false, true) => shaders::LUMA_LOSS_MASKED,
-            (true, true) => shaders::LUMA_LOSS_EXPOSED_MASKED,
+    /// The kernels that have these effects and no others, with this window.
+    pub fn shader(self, window: SsimWindow) -> &'static str {
+        use SsimWindow::{Eleven, Five, Seven};
+        match (self.exposed, self.masked, window) {
+            (false, false, Eleven) => shaders::LUMA_LOSS,
+            (false, false, Seven) => shaders::LUMA_LOSS_WINDOW7,
+            (false, false, Five) => shaders::LUMA_LOSS_WINDOW5,
+            (true, false, Eleven) => shaders::LUMA_LOSS_EXPOSED,
+            (true, false, Seven) => shaders::LUMA_LOSS_EXPOSED_WINDOW7,
+            (true, false, Five) => shaders::LUMA_LOSS_EXPOSED_WINDOW5,
+            (false, true, Eleven) => shaders::LUMA_LOSS_MASKED,
+            (false, true, Seven) => shaders::LUMA_LOSS_MASKED_WINDOW7,
+            (false, true, Five) => shaders::LUMA_LOSS_MASKED_WINDOW5,
+            (true, true, Eleven) => shaders::LUMA_LOSS_EXPOSED_MASKED,
+            (true, true, Seven) => shaders::LUMA_LOSS_EXPOSED_MASKED_WINDOW7,
+            (true, true, Five) => shaders::LUMA_LOSS_EXPOSED_MASKED_WINDOW5,
         }
     }
 }
@@ -70,10 +79,11 @@ pub struct LossKernels {
 
 impl LossKernels {
     /// Compiles them.
-    pub fn new(gpu: &Gpu, effects: LossEffects) -> Self {
+    pub fn new(gpu: &Gpu, effects: LossEffects, window: SsimWindow) -> Self {
+        let source = effects.shader(window);
         Self {
-            forward: Kernel::new(gpu, "luma_loss", effects.shader()),
-            backward: Kernel::new(gpu, "luma_loss_backward", effects.shader()),
+            forward: Kernel::new(gpu, "luma_loss", source),
+            backward: Kernel::new(gpu, "luma_loss_backward", source),
         }
     }
 }

@@ -22,7 +22,7 @@ const SCRATCH_WORDS: f64 = 8.0 + 4.0 + 4.0 + 0.125 + 1.0 + 8.0 + 3.0 + STATISTIC
 const PLAN_WORDS: f64 = 12.0;
 
 /// Words of a tile-list entry: keys and places of the tile sort 4, its histogram, the
-/// Gaussian's index, the gradient's eight figures.
+/// Gaussian's index, the gradient's eight figures (stored in full; half storage takes less).
 const ENTRY_WORDS: f64 = 4.0 + 0.125 + 1.0 + 8.0;
 
 /// Words of a pixel: picture, last entry, gradient, three slopes of SSIM.

@@ -9,7 +9,7 @@ use crate::{
     capture::Camera,
     gpu::GpuError,
     raster::Raster,
-    splats::{ShField, Splats},
+    splats::{ShField, Splats, sh},
 };
 
 /// Iterations that are timed; as many before them find room for the lists and let the
@@ -24,7 +24,8 @@ const REACH: f64 = 3.1;
 
 /// Gaussians at random that fill the view of `camera`, which looks along its axis from the
 /// origin: as wide as lets eight cover each pixel, finer where there are more, as in scenes.
-pub fn random_cloud(count: usize, camera: &Camera) -> Splats {
+/// Luma has harmonics of `sh_degree`.
+pub fn random_cloud(count: usize, camera: &Camera, sh_degree: u32) -> Splats {
     let mut random = fastrand::Rng::with_seed(1);
     let mut range = |low: f64, high: f64| low + (high - low) * random.f64();
     let pixels = f64::from(camera.width) * f64::from(camera.height);
@@ -46,9 +47,11 @@ pub fn random_cloud(count: usize, camera: &Camera) -> Splats {
         quats: (0..count).map(|_| [0.0; 4].map(|_: f32| value())).collect(),
         opacity_logits: (0..count).map(|_| value()).collect(),
         sh: ShField {
-            degree: 0,
+            degree: sh_degree,
             channels: 1,
-            coefficients: (0..count).map(|_| value()).collect(),
+            coefficients: (0..count * sh::coefficient_count(sh_degree))
+                .map(|_| value())
+                .collect(),
         },
     }
 }
@@ -78,7 +81,7 @@ pub fn rehearse(raster: &Arc<Raster>, splats: usize, size: [u32; 2]) -> Result<f
         max_splats: splats,
         ..LumaSettings::new(ITERATIONS)
     };
-    let cloud = random_cloud(splats, &camera);
+    let cloud = random_cloud(splats, &camera, 0);
     let mut random = fastrand::Rng::with_seed(2);
     let gray = (0..camera.width * camera.height)
         .map(|_| random.u8(..))

@@ -1,5 +1,6 @@
 //! What stage 1 can be told, with the 3DGS values (Kerbl et al. 2023) as default.
 
+use super::Numerics;
 use crate::raster::RasterOptions;
 
 /// Learning rates of Adam.
@@ -217,6 +218,8 @@ pub struct LumaSettings {
     /// A training settles and ends where twice the iterations would bring less than so
     /// many dB in the views that are [watched](super::LumaTrainer::watch).
     pub flat: Option<f64>,
+    /// How accurately it computes.
+    pub numerics: Numerics,
 }
 
 impl LumaSettings {
@@ -240,6 +243,7 @@ impl LumaSettings {
             background: false,
             time_limit: None,
             flat: None,
+            numerics: Numerics::default(),
         }
     }
 

@@ -123,12 +123,13 @@ impl LumaTrainer {
     ) -> Result<Self, GpuError> {
         assert!(!views.is_empty(), "training needs a view");
         let raster = raster.drawing(settings.raster_options());
+        let raster = raster.computing(settings.numerics.raster);
         let gpu = raster.gpu.clone();
         let effects = LossEffects {
             exposed: views.iter().any(|view| view.exposure != Exposure::NONE),
             masked: settings.robust || views.iter().any(|view| view.mask.is_some()),
         };
-        let kernels = Kernels::new(&gpu, effects);
+        let kernels = Kernels::new(&gpu, effects, settings.numerics.ssim_window);
         let near = NEAR_SHARE * extent;
         let (mut max_pixels, mut max_tiles) = (0, 0);
         let (mut cameras, mut grays, mut masks) = (Vec::new(), Vec::new(), Vec::new());
@@ -310,6 +311,7 @@ impl LumaTrainer {
             tiles: self.max_tiles as f64,
             channels: 1.0,
             sh_planes: sh::coefficient_count(self.field.degree) as f64,
+            numerics: self.raster.numerics(),
         }
     }
 

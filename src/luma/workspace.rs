@@ -2,7 +2,7 @@
 //! the room of the tile lists.
 
 use super::{
-    LumaSettings,
+    LumaSettings, SsimWindow,
     densify::DensifyKernels,
     loss::{Loss, LossEffects, LossKernels, Targets},
     relocation::{Relocation, RelocationKernel},
@@ -25,10 +25,10 @@ pub struct Kernels {
 
 impl Kernels {
     /// Compiles them.
-    pub fn new(gpu: &Gpu, effects: LossEffects) -> Self {
+    pub fn new(gpu: &Gpu, effects: LossEffects, window: SsimWindow) -> Self {
         Self {
             sum_loss: SumLossKernel::new(gpu),
-            loss: LossKernels::new(gpu, effects),
+            loss: LossKernels::new(gpu, effects, window),
             densify: DensifyKernels::new(gpu),
             relocation: RelocationKernel::new(gpu),
         }

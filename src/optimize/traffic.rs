@@ -1,6 +1,8 @@
 //! What the kernels must read and write at least: the measure of how fast they
 //! could be.
 
+use crate::raster::{AdamSteps, RasterNumerics, Storage};
+
 /// Average size of what the kernels of a stage worked on, a dispatch.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Load {
@@ -20,6 +22,8 @@ pub struct Load {
     pub channels: f64,
     /// Spherical-harmonic planes of all channels.
     pub sh_planes: f64,
+    /// How accurately was computed.
+    pub numerics: RasterNumerics,
 }
 
 /// Bytes of a word.
@@ -47,6 +51,7 @@ pub fn minimum_bytes(kernel: &str, load: &Load) -> f64 {
         tiles,
         channels,
         sh_planes,
+        numerics,
     } = *load;
     let trains_geometry = channels == 1.0;
     let trained = f64::from(u8::from(trains_geometry));
@@ -56,7 +61,16 @@ pub fn minimum_bytes(kernel: &str, load: &Load) -> f64 {
     let sh_step = if trains_geometry { 6.0 } else { 1.0 } * sh_planes;
     // What an instance's gradient takes: seven figures for the geometry, the colour.
     let partial = channels + 7.0 * trained;
-    let digit_passes = [4.0, ((tiles + 1.0).log2() / 8.0).ceil().max(1.0)];
+    // And as it waits for its sum.
+    let halved = trains_geometry && numerics.storage == Storage::Half;
+    let stored = if halved { 0.5 } else { 1.0 } * partial;
+    // Gaussians whose parameters move.
+    let lazy = trains_geometry && numerics.adam == AdamSteps::Lazy;
+    let moved = if lazy { visible } else { splats };
+    let digit_passes = [
+        f64::from(numerics.depth_bits / 8),
+        ((tiles + 1.0).log2() / 8.0).ceil().max(1.0),
+    ];
     let passes = digit_passes[0] + digit_passes[1];
     let keys = (digit_passes[0] * visible + digit_passes[1] * instances) / passes;
     let histograms = (digit_passes[0] * splats + digit_passes[1] * capacity) / 2048.0 * 256.0;
@@ -89,14 +103,14 @@ pub fn minimum_bytes(kernel: &str, load: &Load) -> f64 {
         "conjugate_rho" | "conjugate_alpha" | "conjugate_beta" => planes / 256.0,
         "sum_loss" => tiles,
         "blend_backward" => {
-            (LISTED + channels + partial) * instances + (2.0 * channels + 1.0) * pixels
+            (LISTED + channels + stored) * instances + (2.0 * channels + 1.0) * pixels
         }
-        "sum_instances" => partial * instances + (partial + 2.0) * visible,
+        "sum_instances" => stored * instances + (partial + 2.0) * visible,
         "shade_backward" => {
-            splats + (3.0 + 2.0 * channels) * visible + (3.0 * trained + sh_step) * splats
+            splats + (3.0 + 2.0 * channels) * visible + (3.0 * trained + sh_step) * moved
         }
         "project_backward" => {
-            splats + (PROJECTED + partial + 7.0) * visible + GEOMETRY_STEP * splats
+            splats + (PROJECTED + partial + 7.0) * visible + GEOMETRY_STEP * moved
         }
         // Gradient, value and both moments in, the latter three out.
         "adam" => 7.0 * sh_planes * splats,

@@ -1,6 +1,7 @@
 //! Front-to-back alpha blending at one pixel and over an image.
 
-use super::constants::{ALPHA_MAX, ALPHA_MIN, TRANSMITTANCE_MIN};
+use super::constants::ALPHA_MAX;
+use super::numerics::Numerics;
 use super::{Number, relative_distance};
 
 /// What blending needs to know of a Gaussian.
@@ -33,6 +34,7 @@ pub struct Pixel<T, const C: usize> {
 /// Blends `splats`, sorted by depth, at the point `(x, y)` in pixels.
 pub fn blend_pixel<'a, T: Number, const C: usize>(
     splats: impl IntoIterator<Item = &'a ScreenSplat<T, C>>,
+    numerics: &Numerics,
     x: f64,
     y: f64,
 ) -> Pixel<T, C> {
@@ -58,13 +60,13 @@ pub fn blend_pixel<'a, T: Number, const C: usize>(
         }
 
         let mut alpha = splat.opacity * (-power).exp();
-        for threshold in [ALPHA_MIN, ALPHA_MAX] {
+        for threshold in [numerics.alpha_min, ALPHA_MAX] {
             pixel.margin = pixel.margin.min(relative_distance(alpha.re(), threshold));
         }
         if alpha.re() > ALPHA_MAX {
             alpha = T::from(ALPHA_MAX);
         }
-        let counts = alpha.re() >= ALPHA_MIN;
+        let counts = alpha.re() >= numerics.alpha_min;
         if !counts {
             continue;
         }
@@ -72,8 +74,8 @@ pub fn blend_pixel<'a, T: Number, const C: usize>(
         let next = pixel.transmittance * (T::one() - alpha);
         pixel.margin = pixel
             .margin
-            .min(relative_distance(next.re(), TRANSMITTANCE_MIN));
-        if next.re() < TRANSMITTANCE_MIN {
+            .min(relative_distance(next.re(), numerics.transmittance_min));
+        if next.re() < numerics.transmittance_min {
             break;
         }
         for (sum, &colour) in pixel.colour.iter_mut().zip(&splat.colour) {
@@ -93,13 +95,14 @@ pub fn pixel_centre(index: usize, width: usize) -> [f64; 2] {
 /// Blends `splats`, sorted by depth, over a whole image in row order.
 pub fn blend<T: Number, const C: usize>(
     splats: &[ScreenSplat<T, C>],
+    numerics: &Numerics,
     width: usize,
     height: usize,
 ) -> Vec<Pixel<T, C>> {
     (0..width * height)
         .map(|index| {
             let [x, y] = pixel_centre(index, width);
-            blend_pixel(splats, x, y)
+            blend_pixel(splats, numerics, x, y)
         })
         .collect()
 }
@@ -120,7 +123,7 @@ mod tests {
 
     #[test]
     fn one_splat_has_the_analytic_value() {
-        let pixel = blend_pixel(&[splat(0.8, 0.7)], 4.0, 0.0);
+        let pixel = blend_pixel(&[splat(0.8, 0.7)], &Numerics::DEFAULT, 4.0, 0.0);
         // d = (1, -2): ½·0.5·1 + ½·0.25·4 + 0.1·(-2) = 0.55
         let alpha = 0.8 * (-0.55_f64).exp();
         assert!((pixel.colour[0] - 0.7 * alpha).abs() < 1e-15);
@@ -129,7 +132,12 @@ mod tests {
 
     #[test]
     fn order_matters_front_to_back() {
-        let pixel = blend_pixel(&[splat(0.5, 1.0), splat(0.25, 8.0)], 3.0, 2.0);
+        let pixel = blend_pixel(
+            &[splat(0.5, 1.0), splat(0.25, 8.0)],
+            &Numerics::DEFAULT,
+            3.0,
+            2.0,
+        );
         assert_eq!(pixel.colour[0], 0.5 + 8.0 * 0.25 * 0.5);
         assert_eq!(pixel.transmittance, 0.375);
         assert_eq!(pixel.contributors, [0, 1]);
@@ -139,10 +147,10 @@ mod tests {
     fn opaque_stack_stops_before_the_floor() {
         // 0.99 twice leaves 1e-4, which is the floor itself up to rounding;
         // 0.985 twice leaves 2.25e-4, and a third would fall below.
-        let pixel = blend_pixel(&[splat(0.985, 1.0); 5], 3.0, 2.0);
+        let pixel = blend_pixel(&[splat(0.985, 1.0); 5], &Numerics::DEFAULT, 3.0, 2.0);
         assert_eq!(pixel.contributors, [0, 1]);
         assert!((pixel.transmittance - 2.25e-4).abs() < 1e-15);
-        let edge = blend_pixel(&[splat(1.0, 1.0); 5], 3.0, 2.0);
+        let edge = blend_pixel(&[splat(1.0, 1.0); 5], &Numerics::DEFAULT, 3.0, 2.0);
         assert!(edge.margin < 1e-9, "twice ALPHA_MAX is a coin toss");
     }
 
@@ -154,9 +162,9 @@ mod tests {
             opacity: seed(0.995),
             colour: [lift(1.0)],
         };
-        let pixel = blend_pixel(&[bright], 3.0, 2.0);
+        let pixel = blend_pixel(&[bright], &Numerics::DEFAULT, 3.0, 2.0);
         assert_eq!((pixel.colour[0].re, pixel.colour[0].eps), (0.99, 0.0));
-        let faint = blend_pixel(&[splat(0.0039, 1.0)], 3.0, 2.0);
+        let faint = blend_pixel(&[splat(0.0039, 1.0)], &Numerics::DEFAULT, 3.0, 2.0);
         assert_eq!(faint.colour[0], 0.0);
         assert_eq!(faint.transmittance, 1.0);
         assert!(faint.margin < 0.01);
@@ -166,7 +174,7 @@ mod tests {
     fn non_finite_exponents_are_skipped() {
         let mut broken = splat(0.8, 1.0);
         broken.conic[0] = f64::NAN;
-        let pixel = blend_pixel(&[broken, splat(0.5, 1.0)], 4.0, 2.0);
+        let pixel = blend_pixel(&[broken, splat(0.5, 1.0)], &Numerics::DEFAULT, 4.0, 2.0);
         assert_eq!(pixel.contributors, [1]);
         assert!(pixel.colour[0].is_finite());
     }

@@ -45,7 +45,7 @@ impl<'a, const C: usize> Tape<'a, C> {
         let mut pixels = vec![Vec::new(); list.len()];
         for index in 0..upstream.len() {
             let [x, y] = pixel_centre(index, view.width);
-            let pixel = blend_pixel(list.iter().map(|v| &v.splat), x, y);
+            let pixel = blend_pixel(list.iter().map(|v| &v.splat), &view.numerics, x, y);
             for &position in &pixel.contributors {
                 pixels[position].push(index);
             }
@@ -81,7 +81,7 @@ impl<'a, const C: usize> Tape<'a, C> {
                     &self.splats[other]
                 }
             });
-            let pixel = blend_pixel(splats, x, y);
+            let pixel = blend_pixel(splats, &self.view.numerics, x, y);
             let shares = self.upstream[index].iter().zip(pixel.colour);
             shares.map(|(v, out)| v * out.eps).sum()
         })
@@ -121,6 +121,18 @@ pub fn gradient<const C: usize>(
     shading: Shading,
     upstream: &[[f64; C]],
 ) -> Scene<f64, C> {
+    gradient_of(scene, view, shading, upstream, |_| true)
+}
+
+/// The same for those Gaussians alone of which `wanted` says so by their index; zero for
+/// the others.
+pub fn gradient_of<const C: usize>(
+    scene: &Scene<f64, C>,
+    view: &View,
+    shading: Shading,
+    upstream: &[[f64; C]],
+    wanted: impl Fn(usize) -> bool,
+) -> Scene<f64, C> {
     let tape = Tape::record(scene, view, shading, upstream);
     let mut rows: Vec<_> = (0..scene.len())
         .map(|i| {
@@ -130,6 +142,9 @@ pub fn gradient<const C: usize>(
         })
         .collect();
     for (position, &index) in tape.order.iter().enumerate() {
+        if !wanted(index) {
+            continue;
+        }
         let constant = scene.gaussian(index).to_dual();
         for (parameter, slot) in rows[index].parameters_mut().enumerate() {
             let mut varied = constant.clone();

@@ -7,21 +7,21 @@
 use super::constants::{SSIM_C1, SSIM_C2, SSIM_SIGMA, SSIM_WEIGHT, SSIM_WINDOW};
 use super::{Number, lift, seed};
 
-const RADIUS: usize = SSIM_WINDOW / 2;
-
-/// The window along one axis; sums to one.
-pub fn window() -> [f64; SSIM_WINDOW] {
-    let raw: [f64; SSIM_WINDOW] = std::array::from_fn(|i| {
-        let distance = i as f64 - RADIUS as f64;
+/// The window of `side` taps along one axis; sums to one.
+pub fn window(side: usize) -> Vec<f64> {
+    let raw = (0..side).map(|i| {
+        let distance = i as f64 - (side / 2) as f64;
         (-distance * distance / (2.0 * SSIM_SIGMA * SSIM_SIGMA)).exp()
     });
+    let raw: Vec<f64> = raw.collect();
     let sum: f64 = raw.iter().sum();
-    raw.map(|w| w / sum)
+    raw.into_iter().map(|w| w / sum).collect()
 }
 
-/// The pixels of a window around `centre` that lie in `0..size`.
-fn reach(centre: usize, size: usize) -> std::ops::Range<usize> {
-    centre.saturating_sub(RADIUS)..(centre + RADIUS + 1).min(size)
+/// The pixels of a window of `side` taps around `centre` that lie in `0..size`.
+fn reach(centre: usize, side: usize, size: usize) -> std::ops::Range<usize> {
+    let radius = side / 2;
+    centre.saturating_sub(radius)..(centre + radius + 1).min(size)
 }
 
 /// SSIM at one pixel. `x` and `y` are `[height · width]`.
@@ -30,14 +30,15 @@ fn ssim_at<T: Number>(
     y: &[f64],
     [width, height]: [usize; 2],
     pixel: usize,
-    window: &[f64; SSIM_WINDOW],
+    window: &[f64],
 ) -> T {
     let (column, row) = (pixel % width, pixel / width);
+    let (side, radius) = (window.len(), window.len() / 2);
     let [mut mean_x, mut xx, mut xy] = [T::zero(); 3];
     let [mut mean_y, mut yy] = [0.0; 2];
-    for j in reach(row, height) {
-        for i in reach(column, width) {
-            let weight = window[i + RADIUS - column] * window[j + RADIUS - row];
+    for j in reach(row, side, height) {
+        for i in reach(column, side, width) {
+            let weight = window[i + radius - column] * window[j + radius - row];
             let (a, b) = (x(j * width + i), y[j * width + i]);
             mean_x += a * weight;
             mean_y += b * weight;
@@ -56,12 +57,24 @@ fn ssim_at<T: Number>(
 }
 
 /// What the loss reckons with besides.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub struct LumaEffects<'a> {
+    /// Taps of SSIM's window along one axis.
+    pub ssim_window: usize,
     /// Gain and offset: what the photo shows of the image.
     pub exposure: Option<[f64; 2]>,
     /// What each pixel counts, `[height · width]`.
     pub mask: Option<&'a [f64]>,
+}
+
+impl Default for LumaEffects<'_> {
+    fn default() -> Self {
+        Self {
+            ssim_window: SSIM_WINDOW,
+            exposure: None,
+            mask: None,
+        }
+    }
 }
 
 impl LumaEffects<'_> {
@@ -93,9 +106,9 @@ fn absolute<T: Number>(r: T) -> T {
     }
 }
 
-/// The map of SSIM of `x` against `y`, `[height · width]`.
-pub fn ssim_map<T: Number>(x: &[T], y: &[f64], width: usize, height: usize) -> Vec<T> {
-    let window = window();
+/// The map of SSIM of `x` against `y` with a window of `side` taps, `[height · width]`.
+pub fn ssim_map<T: Number>(x: &[T], y: &[f64], width: usize, height: usize, side: usize) -> Vec<T> {
+    let window = window(side);
     (0..width * height)
         .map(|pixel| ssim_at(|i| x[i], y, [width, height], pixel, &window))
         .collect()
@@ -118,7 +131,7 @@ pub fn luma_loss<T: Number>(
     let weighted: Vec<T> = shown.iter().zip(&weights).map(|(&x, &w)| x * w).collect();
     let wanted: Vec<f64> = y.iter().zip(&weights).map(|(y, w)| y * w).collect();
     let mut sum = T::zero();
-    for (pixel, ssim) in ssim_map(&weighted, &wanted, width, height)
+    for (pixel, ssim) in ssim_map(&weighted, &wanted, width, height, effects.ssim_window)
         .into_iter()
         .enumerate()
     {
@@ -138,7 +151,8 @@ pub fn luma_loss_gradient(
     height: usize,
     effects: &LumaEffects,
 ) -> Vec<f64> {
-    let window = window();
+    let side = effects.ssim_window;
+    let window = window(side);
     let shown: Vec<f64> = x
         .iter()
         .zip(y)
@@ -154,8 +168,8 @@ pub fn luma_loss_gradient(
                 shown * weights[i]
             };
             let mut sum = absolute(dual - y[varied]) * (1.0 - SSIM_WEIGHT) * weights[varied];
-            for j in reach(varied / width, height) {
-                for i in reach(varied % width, width) {
+            for j in reach(varied / width, side, height) {
+                for i in reach(varied % width, side, width) {
                     let pixel = j * width + i;
                     let ssim = ssim_at(weighted, &wanted, [width, height], pixel, &window);
                     sum -= ssim * SSIM_WEIGHT * weights[pixel];
@@ -172,6 +186,7 @@ mod tests {
     use super::*;
 
     const PLAIN: LumaEffects = LumaEffects {
+        ssim_window: SSIM_WINDOW,
         exposure: None,
         mask: None,
     };
@@ -183,17 +198,19 @@ mod tests {
 
     #[test]
     fn window_is_normalised_and_symmetric() {
-        let w = window();
-        assert!((w.iter().sum::<f64>() - 1.0).abs() < 1e-15);
-        assert_eq!(w[0], w[10]);
-        assert!((w[5] / w[4] - (1.0 / 4.5_f64).exp()).abs() < 1e-12);
+        for side in [11, 7, 5] {
+            let (w, middle) = (window(side), side / 2);
+            assert!((w.iter().sum::<f64>() - 1.0).abs() < 1e-15);
+            assert_eq!(w[0], w[side - 1]);
+            assert!((w[middle] / w[middle - 1] - (1.0 / 4.5_f64).exp()).abs() < 1e-12);
+        }
     }
 
     #[test]
     fn identical_images_have_no_loss_and_no_slope() {
         let [x, _] = images(31, 20 * 17);
         assert!(
-            ssim_map(&x, &x, 20, 17)
+            ssim_map(&x, &x, 20, 17, 11)
                 .iter()
                 .all(|s| (s - 1.0).abs() < 1e-12)
         );
@@ -205,16 +222,16 @@ mod tests {
     #[test]
     fn constant_images_have_the_analytic_ssim() {
         let (x, y) = (vec![0.3; 24 * 24], vec![0.6; 24 * 24]);
-        let inside = ssim_map(&x, &y, 24, 24)[12 * 24 + 12];
+        let inside = ssim_map(&x, &y, 24, 24, 11)[12 * 24 + 12];
         let expected = (2.0 * 0.18 + SSIM_C1) / (0.09 + 0.36 + SSIM_C1);
         assert!((inside - expected).abs() < 1e-10);
         // In the corner, six of eleven taps of each axis see the image.
-        let share: f64 = window()[5..].iter().sum::<f64>().powi(2);
+        let share: f64 = window(11)[5..].iter().sum::<f64>().powi(2);
         let (a, b) = (0.3 * share, 0.6 * share);
         let luminance = (2.0 * a * b + SSIM_C1) / (a * a + b * b + SSIM_C1);
         let spread = share - share * share;
         let structure = (2.0 * 0.18 * spread + SSIM_C2) / (0.45 * spread + SSIM_C2);
-        let corner = ssim_map(&x, &y, 24, 24)[0];
+        let corner = ssim_map(&x, &y, 24, 24, 11)[0];
         assert!((corner - luminance * structure).abs() < 1e-10);
     }
 

@@ -20,6 +20,7 @@ pub mod gradient;
 mod gradient_tests;
 pub mod linear;
 pub mod luma_loss;
+pub mod numerics;
 pub mod project;
 #[cfg(test)]
 mod project_tests;

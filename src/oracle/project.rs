@@ -5,7 +5,7 @@
 //! Mip-Splatting (Yu et al. 2024).
 
 use super::Number;
-use super::constants::{ALPHA_MIN, BLUR, FRUSTUM_MARGIN, QUAT_NORM_MIN_SQ};
+use super::constants::{BLUR, FRUSTUM_MARGIN, QUAT_NORM_MIN_SQ};
 use super::linear::{apply, dot, rotation};
 use super::scene::View;
 
@@ -18,12 +18,12 @@ pub struct Projected<T> {
     pub cov2d: [T; 3],
     /// Inverse of the covariance, `xx, xy, yy`.
     pub conic: [T; 3],
-    /// Opacity at the centre, in [`ALPHA_MIN`], 1; antialiased, the one stored times what
-    /// the blur leaves of it.
+    /// Opacity at the centre, from the least that is blended to 1; antialiased, the one
+    /// stored times what the blur leaves of it.
     pub opacity: T,
     /// z in camera space; what splats are sorted by.
     pub depth: T,
-    /// The largest exponent that still reaches [`ALPHA_MIN`]: `ln(255 · opacity)`.
+    /// The largest exponent that still reaches the least alpha: `ln(opacity / alpha_min)`.
     pub cutoff: f64,
     /// Half sides of the box around the visible ellipse.
     pub half_extent: [f64; 2],
@@ -40,7 +40,7 @@ pub enum Cull {
     Quaternion,
     /// The screen covariance has no finite, positive determinant.
     Covariance,
-    /// Too transparent to reach [`ALPHA_MIN`] anywhere.
+    /// Too transparent to reach the least alpha anywhere.
     Opacity,
     /// The box around the visible ellipse misses the image.
     Outside,
@@ -149,11 +149,11 @@ pub fn project<T: Number>(
         let normal = [b * f - c * e, c * d - a * f, a * e - b * d];
         opacity *= (dot(&normal, &normal) / determinant).sqrt();
     }
-    let reaches_a_pixel = opacity.re() >= ALPHA_MIN;
+    let reaches_a_pixel = opacity.re() >= view.numerics.alpha_min;
     if !reaches_a_pixel {
         return Err(Cull::Opacity);
     }
-    let cutoff = (opacity.re() / ALPHA_MIN).ln();
+    let cutoff = (opacity.re() / view.numerics.alpha_min).ln();
     let half_extent = [xx, yy].map(|variance| (2.0 * cutoff * variance.re()).sqrt());
 
     let mean2d = [x / z * view.fx + view.cx, y / z * view.fy + view.cy];

@@ -4,6 +4,7 @@
 use super::constants::BLUR;
 use super::lift;
 use super::linear::{apply, dot, rotation, transpose};
+use super::numerics::Numerics;
 use super::project::{Cull, jacobian_limits, project};
 use super::random::oblique_view;
 use super::scene::View;
@@ -20,6 +21,7 @@ fn view() -> View {
         height: 40,
         near: 0.2,
         antialiased: false,
+        numerics: Numerics::DEFAULT,
     }
 }
 

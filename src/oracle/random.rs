@@ -3,6 +3,7 @@
 
 use super::constants::SH_C0;
 use super::linear::{apply, rotation, transpose};
+use super::numerics::Numerics;
 use super::scene::{Gaussian, Scene, View};
 use super::shade::Shading;
 
@@ -57,6 +58,7 @@ pub fn oblique_view() -> View {
         height: 40,
         near: round(0.1),
         antialiased: false,
+        numerics: Numerics::DEFAULT,
     }
 }
 
@@ -98,6 +100,7 @@ pub fn random_view(seed: u64) -> View {
         height,
         near: round(0.1),
         antialiased: false,
+        numerics: Numerics::DEFAULT,
     }
 }
 

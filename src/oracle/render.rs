@@ -57,7 +57,8 @@ pub fn visible<T: Number, const C: usize>(
             })
         })
         .collect();
-    list.sort_by(|a, b| a.projected.depth.re().total_cmp(&b.projected.depth.re()));
+    let key = |v: &Visible<T, C>| view.numerics.depth_key(v.projected.depth.re());
+    list.sort_by(|a, b| key(a).total_cmp(&key(b)));
     list
 }
 
@@ -72,7 +73,7 @@ pub fn render_pixels<T: Number, const C: usize>(
         .into_iter()
         .map(|v| v.splat)
         .collect();
-    blend(&splats, view.width, view.height)
+    blend(&splats, &view.numerics, view.width, view.height)
 }
 
 /// The picture, `[height · width][C]`.

@@ -1,5 +1,6 @@
 //! Scenes and views as plain arrays, and random ones to test with.
 
+use super::numerics::Numerics;
 use super::project::{Cull, Projected, jacobian_limits, project};
 use super::shade::{Shading, unclamped};
 use super::{Number, lift, relative_distance};
@@ -28,6 +29,8 @@ pub struct View {
     pub near: f64,
     /// Whether a Gaussian's opacity falls by what the blur spreads it.
     pub antialiased: bool,
+    /// What is left out.
+    pub numerics: Numerics,
 }
 
 impl View {
@@ -136,7 +139,7 @@ impl<const C: usize> Gaussian<f64, C> {
                 margin = margin.min(value.abs());
             }
         }
-        margin.min(relative_distance(p.opacity, super::constants::ALPHA_MIN))
+        margin.min(relative_distance(p.opacity, view.numerics.alpha_min))
     }
 }
 

@@ -94,7 +94,7 @@ pub fn shade<T: Number, const C: usize>(
 
 #[cfg(test)]
 mod tests {
-    use super::super::seed;
+    use super::super::{numerics::Numerics, seed};
     use super::*;
     use std::f64::consts::PI;
 
@@ -110,6 +110,7 @@ mod tests {
             height: 40,
             near: 0.1,
             antialiased: false,
+            numerics: Numerics::DEFAULT,
         }
     }
 

@@ -82,6 +82,7 @@ pub fn tiles(projected: &[Projected<f64>], grid: &TileGrid) -> Vec<Vec<usize>> {
 mod tests {
     use super::super::blend::{blend, blend_pixel};
     use super::super::constants::TILE;
+    use super::super::numerics::Numerics;
     use super::super::random::random_scene;
     use super::super::render::visible;
     use super::super::shade::Shading;
@@ -134,11 +135,15 @@ mod tests {
             let projected: Vec<_> = list.iter().map(|v| v.projected).collect();
             let splats: Vec<_> = list.iter().map(|v| v.splat).collect();
             let lists = tiles(&projected, &grid);
-            for (index, expected) in blend(&splats, 48, 40).into_iter().enumerate() {
+            for (index, expected) in blend(&splats, &Numerics::DEFAULT, 48, 40)
+                .into_iter()
+                .enumerate()
+            {
                 let (i, j) = (index % 48, index / 48);
                 let members = &lists[j / tile * grid.columns() + i / tile];
                 let tiled = blend_pixel(
                     members.iter().map(|&m| &splats[m]),
+                    &Numerics::DEFAULT,
                     i as f64 + 0.5,
                     j as f64 + 0.5,
                 );

@@ -2,68 +2,12 @@
 //! their adjoints down to the parameters.
 
 use super::{
-    ColorKind, Raster,
+    ColorKind, Raster, Storage,
     constants::*,
     lists::Lists,
     splats::{Field, Geometry},
 };
-use crate::gpu::{Bindings, Buffer, Gpu, GpuError, Kernel, Recorder, groups_for, shaders};
-
-#[derive(Clone)]
-pub(super) struct LayerKernels {
-    shade: Kernel,
-    blend: Kernel,
-}
-
-impl LayerKernels {
-    pub(super) fn new(gpu: &Gpu, kind: ColorKind) -> Self {
-        let (shade, blend) = match kind {
-            ColorKind::Luma => (shaders::SHADE_LUMA, shaders::BLEND_LUMA),
-            ColorKind::Chroma => (shaders::SHADE_CHROMA, shaders::BLEND_CHROMA),
-            ColorKind::Rgb => (shaders::SHADE_RGB, shaders::BLEND_RGB),
-        };
-        Self {
-            shade: Kernel::new(gpu, "shade", shade),
-            blend: Kernel::new(gpu, "blend", blend),
-        }
-    }
-}
-
-#[derive(Clone)]
-pub(super) struct AdjointKernels {
-    blend: Kernel,
-    sum: Kernel,
-    shade: Kernel,
-    /// Adds to the gradient instead of replacing it; chroma only.
-    shade_add: Option<Kernel>,
-}
-
-impl AdjointKernels {
-    /// # Panics
-    /// For RGB, which is shown but never trained.
-    pub(super) fn new(gpu: &Gpu, kind: ColorKind) -> Self {
-        let (blend, sum, shade) = match kind {
-            ColorKind::Luma => (
-                shaders::BLEND_BACKWARD_LUMA,
-                shaders::SUM_INSTANCES_LUMA,
-                shaders::SHADE_BACKWARD_LUMA,
-            ),
-            ColorKind::Chroma => (
-                shaders::BLEND_BACKWARD_CHROMA,
-                shaders::SUM_INSTANCES_CHROMA,
-                shaders::SHADE_BACKWARD_CHROMA,
-            ),
-            ColorKind::Rgb => panic!("RGB has no adjoint"),
-        };
-        Self {
-            blend: Kernel::new(gpu, "blend_backward", blend),
-            sum: Kernel::new(gpu, "sum_instances", sum),
-            shade: Kernel::new(gpu, "shade_backward", shade),
-            shade_add: (kind == ColorKind::Chroma)
-                .then(|| Kernel::new(gpu, "shade_backward", shaders::SHADE_BACKWARD_CHROMA_ADD)),
-        }
-    }
-}
+use crate::gpu::{Bindings, Buffer, Gpu, GpuError, Kernel, Recorder, groups_for};
 
 /// What a layer draws on. Layers that are drawn one after the other may share it.
 #[derive(Clone)]
@@ -206,24 +150,33 @@ impl Layer {
 /// share it.
 #[derive(Clone)]
 pub struct AdjointScratch {
-    partials: Buffer<f32>,
-    gradients: Buffer<f32>,
+    /// The gradient record of each list entry on the image plane, by emission slot, in
+    /// words: with [`Storage::Half`](super::Storage), luma's have two figures a word.
+    pub partials: Buffer<u32>,
+    /// The gradient record of each Gaussian on the image plane; stale where not visible.
+    pub gradients: Buffer<f32>,
 }
 
 impl AdjointScratch {
-    /// Scratch for so many Gaussians and entries of the tile lists.
+    /// Scratch for so many Gaussians and entries of the tile lists; `storage` of luma's
+    /// entries, chroma's are always stored in full.
     ///
     /// # Errors
     /// [`GpuError::TooLarge`].
     pub fn new(
         gpu: &Gpu,
         kind: ColorKind,
+        storage: Storage,
         splats: usize,
         capacity: usize,
     ) -> Result<Self, GpuError> {
         let record = kind.channels() + if kind == ColorKind::Luma { 7 } else { 0 };
+        let words = match kind {
+            ColorKind::Luma => storage.words(record),
+            ColorKind::Chroma | ColorKind::Rgb => record,
+        };
         Ok(Self {
-            partials: Buffer::zeros(gpu, "instance gradients", capacity * record)?,
+            partials: Buffer::zeros(gpu, "instance gradients", capacity * words)?,
             gradients: Buffer::zeros(gpu, "projected gradients", splats * record)?,
         })
     }
@@ -305,9 +258,14 @@ impl LayerAdjoint {
         layer: &Layer,
         outcome: &Outcome<'_>,
     ) -> Result<Self, GpuError> {
-        let gpu = &raster.gpu;
-        let image_gradient = Buffer::zeros(gpu, "image gradient", layer.image.len())?;
-        let scratch = AdjointScratch::new(gpu, field.kind, geometry.count, lists.capacity)?;
+        let image_gradient = Buffer::zeros(&raster.gpu, "image gradient", layer.image.len())?;
+        let scratch = AdjointScratch::new(
+            &raster.gpu,
+            field.kind,
+            raster.numerics.storage,
+            geometry.count,
+            lists.capacity,
+        )?;
         Self::on(
             raster,
             geometry,

@@ -3,7 +3,10 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::{Raster, constants::*, scan::Scan, sort::Sort, splats::Geometry, view::ViewUniform};
+use super::{
+    Raster, RasterNumerics, constants::*, scan::Scan, sort::Sort, splats::Geometry,
+    view::ViewUniform,
+};
 use crate::gpu::{
     Bindings, Buffer, Gpu, GpuError, Kernel, Readback, Recorder, groups_for, shaders,
 };
@@ -81,10 +84,15 @@ pub(super) struct ListKernels {
 }
 
 impl ListKernels {
-    pub(super) fn new(gpu: &Gpu) -> Self {
+    pub(super) fn new(gpu: &Gpu, numerics: &RasterNumerics) -> Self {
         Self {
             compact: Kernel::new(gpu, "compact", shaders::COMPACT),
-            tile_lists: Kernel::new(gpu, "tile_lists", shaders::TILE_LISTS),
+            tile_lists: Kernel::with(
+                gpu,
+                "tile_lists",
+                shaders::TILE_LISTS,
+                &numerics.alpha_cutoff(),
+            ),
             tile_ranges: Kernel::new(gpu, "tile_ranges", shaders::TILE_RANGES),
         }
     }
@@ -151,7 +159,7 @@ impl Lists {
             &status,
             STATUS_VISIBLE,
             n,
-            32,
+            32 - raster.numerics.depth_bits..32,
         )?;
         let tile_bits = usize::BITS - max_tiles.leading_zeros();
         let by_tile = Sort::new(
@@ -161,7 +169,7 @@ impl Lists {
             &status,
             STATUS_INSTANCES,
             capacity,
-            tile_bits,
+            0..tile_bits,
         )?;
         let scan_visible = Scan::new(
             gpu,

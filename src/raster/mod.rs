@@ -6,8 +6,10 @@
 //! [`LayerAdjoint`] their adjoints.
 
 pub mod constants;
+mod kernels;
 mod layer;
 mod lists;
+mod numerics;
 mod renderer;
 pub mod scan;
 pub mod sort;
@@ -18,14 +20,15 @@ pub use layer::{
     AdjointScratch, Canvas, GeometryAdjoint, Layer, LayerAdjoint, Outcome, StepBuffers,
 };
 pub use lists::{Lists, Projected, Status, StatusReadback, TileListsMode};
+pub use numerics::{AdamSteps, RasterNumerics, Storage};
 pub use renderer::{Picture, Renderer};
 pub use splats::{Field, Geometry, download};
 pub use view::ViewUniform;
 
 use std::sync::Arc;
 
-use crate::gpu::{Gpu, Kernel, shaders};
-use layer::{AdjointKernels, LayerKernels};
+use crate::gpu::{Gpu, Kernel};
+use kernels::{AdjointKernels, LayerKernels, ProjectionKernels, shade_step};
 use lists::ListKernels;
 use scan::ScanKernels;
 use sort::SortKernels;
@@ -90,6 +93,7 @@ pub struct Raster {
     /// The device they run on.
     pub gpu: Gpu,
     options: RasterOptions,
+    numerics: RasterNumerics,
     scan: ScanKernels,
     sort: SortKernels,
     lists: ListKernels,
@@ -97,37 +101,6 @@ pub struct Raster {
     adjoints: [AdjointKernels; 2],
     projection: ProjectionKernels,
     shade_step: Kernel,
-}
-
-/// The kernels that the options make a difference to.
-#[derive(Clone)]
-struct ProjectionKernels {
-    project: Kernel,
-    backward: Kernel,
-    step: Kernel,
-}
-
-impl ProjectionKernels {
-    fn new(gpu: &Gpu, options: RasterOptions) -> Self {
-        let [project, backward, step] = if options.antialiased {
-            [
-                shaders::PROJECT_MIP,
-                shaders::PROJECT_BACKWARD_MIP,
-                shaders::PROJECT_BACKWARD_MIP_STEP,
-            ]
-        } else {
-            [
-                shaders::PROJECT,
-                shaders::PROJECT_BACKWARD,
-                shaders::PROJECT_BACKWARD_STEP,
-            ]
-        };
-        Self {
-            project: Kernel::new(gpu, "project", project),
-            backward: Kernel::new(gpu, "project_backward", backward),
-            step: Kernel::new(gpu, "project_backward", step),
-        }
-    }
 }
 
 impl Raster {
@@ -138,18 +111,18 @@ impl Raster {
 
     /// Compiles all kernels with these effects.
     pub fn with(gpu: &Gpu, options: RasterOptions) -> Self {
+        let numerics = RasterNumerics::DEFAULT;
         Self {
             gpu: gpu.clone(),
             options,
+            numerics,
             scan: ScanKernels::new(gpu),
             sort: SortKernels::new(gpu),
-            lists: ListKernels::new(gpu),
-            layers: [ColorKind::Luma, ColorKind::Chroma, ColorKind::Rgb]
-                .map(|kind| LayerKernels::new(gpu, kind)),
-            adjoints: [ColorKind::Luma, ColorKind::Chroma]
-                .map(|kind| AdjointKernels::new(gpu, kind)),
-            projection: ProjectionKernels::new(gpu, options),
-            shade_step: Kernel::new(gpu, "shade_backward", shaders::SHADE_BACKWARD_STEP),
+            lists: ListKernels::new(gpu, &numerics),
+            layers: layers(gpu, &numerics),
+            adjoints: adjoints(gpu, &numerics),
+            projection: ProjectionKernels::new(gpu, options, &numerics),
+            shade_step: shade_step(gpu, &numerics),
         }
     }
 
@@ -161,7 +134,25 @@ impl Raster {
         }
         Arc::new(Self {
             options,
-            projection: ProjectionKernels::new(&self.gpu, options),
+            projection: ProjectionKernels::new(&self.gpu, options, &self.numerics),
+            ..Self::clone(self)
+        })
+    }
+
+    /// The rasterizer that computes as accurately as this: itself where it does so
+    /// already, else one that shares the kernels that it does not concern.
+    pub fn computing(self: &Arc<Self>, numerics: RasterNumerics) -> Arc<Self> {
+        if self.numerics == numerics {
+            return self.clone();
+        }
+        let gpu = &self.gpu;
+        Arc::new(Self {
+            numerics,
+            lists: ListKernels::new(gpu, &numerics),
+            layers: layers(gpu, &numerics),
+            adjoints: adjoints(gpu, &numerics),
+            projection: ProjectionKernels::new(gpu, self.options, &numerics),
+            shade_step: shade_step(gpu, &numerics),
             ..Self::clone(self)
         })
     }
@@ -169,6 +160,11 @@ impl Raster {
     /// The effects it was compiled with.
     pub fn options(&self) -> RasterOptions {
         self.options
+    }
+
+    /// How accurately it computes.
+    pub fn numerics(&self) -> RasterNumerics {
+        self.numerics
     }
 
     /// The kernels of the prefix sum.
@@ -188,4 +184,13 @@ impl Raster {
     fn adjoint(&self, kind: ColorKind) -> &AdjointKernels {
         &self.adjoints[kind.channels() - 1]
     }
+}
+
+fn layers(gpu: &Gpu, numerics: &RasterNumerics) -> [LayerKernels; 3] {
+    [ColorKind::Luma, ColorKind::Chroma, ColorKind::Rgb]
+        .map(|kind| LayerKernels::new(gpu, kind, numerics))
+}
+
+fn adjoints(gpu: &Gpu, numerics: &RasterNumerics) -> [AdjointKernels; 2] {
+    [ColorKind::Luma, ColorKind::Chroma].map(|kind| AdjointKernels::new(gpu, kind, numerics))
 }

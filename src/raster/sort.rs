@@ -1,5 +1,7 @@
 //! Stable radix sort of 32-bit keys with values (`shaders/sort.wgsl`).
 
+use std::ops::Range;
+
 use bytemuck::{Pod, Zeroable};
 
 use super::scan::{Scan, ScanKernels};
@@ -56,7 +58,7 @@ pub struct Sort {
 }
 
 impl Sort {
-    /// A sort of at most `capacity` keys by their lowest `bits` bits; how many
+    /// A sort of at most `capacity` keys by these `bits` of theirs, 0 the lowest; how many
     /// there are stands in `count_word` of `status`.
     ///
     /// # Errors
@@ -68,7 +70,7 @@ impl Sort {
         status: &Buffer<u32>,
         count_word: usize,
         capacity: usize,
-        bits: u32,
+        bits: Range<u32>,
     ) -> Result<Self, GpuError> {
         let buffer = |label| Buffer::<u32>::zeros(gpu, label, capacity);
         let keys = [buffer("sort keys")?, buffer("sort keys, other side")?];
@@ -76,12 +78,13 @@ impl Sort {
         let blocks = capacity.div_ceil(BLOCK).max(1);
         let histogram = Buffer::<u32>::zeros(gpu, "sort histogram", 256 * blocks)?;
         let mut passes = Vec::new();
-        for pass in 0..bits.div_ceil(DIGIT_BITS).max(1) {
+        let passes_needed = (bits.end - bits.start).div_ceil(DIGIT_BITS).max(1);
+        for pass in 0..passes_needed {
             let parameters = Buffer::uniform(
                 gpu,
                 "sort parameters",
                 &SortParameters {
-                    shift: pass * DIGIT_BITS,
+                    shift: bits.start + pass * DIGIT_BITS,
                     count_word: count_word as u32,
                     blocks: blocks as u32,
                 },

@@ -23,7 +23,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     capture::{Exposure, LoadOptions},
-    luma::CurvePoint,
+    luma::{CurvePoint, Numerics},
     raster::RasterOptions,
 };
 
@@ -108,6 +108,9 @@ pub struct LumaReport {
     /// Whether opacities fall by what the blur of the projection spreads.
     #[serde(default)]
     pub antialiased: bool,
+    /// How accurately training computed.
+    #[serde(default)]
+    pub numerics: Numerics,
     /// Gaussians at the end.
     pub splats: usize,
     /// Gaussians that the last views culled for values that are not finite.

@@ -71,6 +71,7 @@ pub fn timings_table(rows: &[KernelReport]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::raster::RasterNumerics;
 
     const LOAD: Load = Load {
         splats: 1000.0,
@@ -81,6 +82,7 @@ mod tests {
         tiles: 240.0,
         channels: 1.0,
         sh_planes: 1.0,
+        numerics: RasterNumerics::DEFAULT,
     };
 
     fn time(kernel: &'static str, dispatches: u64, seconds: f64) -> KernelTime {

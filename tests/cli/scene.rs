@@ -5,7 +5,7 @@ use std::path::Path;
 
 use image::{Rgb, RgbImage};
 
-use super::oracle::scene::View;
+use super::oracle::{numerics::Numerics, scene::View};
 
 /// Width and height of every photo.
 pub const SIZE: [u32; 2] = [64, 48];
@@ -61,6 +61,7 @@ pub fn view(view: usize, offset: [f64; 3]) -> View {
         // The program's: a hundredth of the extent, which no disc comes near.
         near: 0.02,
         antialiased: false,
+        numerics: Numerics::DEFAULT,
     }
 }
 

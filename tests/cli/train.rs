@@ -70,6 +70,41 @@ fn a_memory_limit_lowers_the_cap() {
     assert!(luma["max_splats"].as_u64() < Some(12_000), "{luma}");
 }
 
+/// What training computes with is in the report and changes what it makes.
+#[test]
+fn numerics_are_told_and_change_the_training() {
+    let place = place_with_scene();
+    let printed = place.json(&[&QUICK_FIT[..], &["--json"]].concat());
+    let usual = &printed["luma"]["numerics"];
+    assert_eq!(
+        *usual,
+        json!({
+            "alpha_min": 1.0 / 255.0,
+            "transmittance_min": 1e-4,
+            "depth_bits": 32,
+            "storage": "full",
+            "adam": "exact",
+            "ssim_window": 11,
+        })
+    );
+    let luma = |run: &str| fs::read(place.path(run)).expect("luma.ply");
+    let plain = luma("runs/scene/luma.ply");
+    let named =
+        "alpha-min=0.02,transmittance-min=0.01,depth-bits=16,storage=half,ssim-window=7,adam=lazy";
+    let words = ["--numerics", named, "--json", "-o", "runs/fast"];
+    let report = place.json(&[&QUICK_FIT[..], &words].concat());
+    let numerics = &report["luma"]["numerics"];
+    assert_eq!(numerics["alpha_min"], 0.02);
+    assert_eq!(numerics["storage"], "half");
+    assert_eq!(numerics["ssim_window"], 7);
+    assert!(luma("runs/fast/luma.ply") != plain);
+    // All that is named is the default: the same bytes.
+    let named = "depth-bits=32,storage=full,ssim-window=11,adam=exact";
+    let words = ["--numerics", named, "-o", "runs/named"];
+    place.succeed(&[&QUICK_FIT[..], &words].concat());
+    assert!(luma("runs/named/luma.ply") == plain);
+}
+
 #[test]
 fn timings_name_every_kernel() {
     let place = place_with_scene();

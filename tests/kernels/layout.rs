@@ -231,15 +231,15 @@ fn numbers(module: &Module, expression: Handle<Expression>) -> Vec<f64> {
     }
 }
 
-/// Every named constant of a module.
+/// Every named constant of a module, those that may be overridden with their usual value.
 fn constants_of(name: &str, source: &str) -> BTreeMap<String, Vec<f64>> {
     let module = parse(name, source);
-    let named = module.constants.iter();
-    named
-        .filter_map(|(_, constant)| {
-            let name = constant.name.clone()?;
-            Some((name, numbers(&module, constant.init)))
-        })
+    let constants = module.constants.iter();
+    let constants = constants.map(|(_, constant)| (&constant.name, Some(constant.init)));
+    let overrides = module.overrides.iter();
+    let overrides = overrides.map(|(_, constant)| (&constant.name, constant.init));
+    (constants.chain(overrides))
+        .filter_map(|(name, init)| Some((name.clone()?, numbers(&module, init?))))
         .collect()
 }
 
@@ -295,6 +295,8 @@ fn constants_are_those_of_the_oracle() {
         ("constants", common),
         ("sh", harmonics),
         ("luma_loss", shaders::LUMA_LOSS),
+        ("luma_loss_window7", shaders::LUMA_LOSS_WINDOW7),
+        ("luma_loss_window5", shaders::LUMA_LOSS_WINDOW5),
         ("chroma_loss", shaders::CHROMA_LOSS),
         ("view_correction", shaders::VIEW_CORRECTION),
         ("adam", shaders::ADAM),
@@ -321,7 +323,15 @@ fn constants_are_those_of_the_oracle() {
         ("sh", "SH_C1", vec![oracle::SH_C1]),
         ("sh", "SH_C2", oracle::SH_C2.to_vec()),
         ("sh", "SH_C3", oracle::SH_C3.to_vec()),
-        ("luma_loss", "WINDOW", window()[..6].to_vec()),
+        (
+            "luma_loss",
+            "WINDOW",
+            window(oracle::SSIM_WINDOW)[..6].to_vec(),
+        ),
+        ("luma_loss_window7", "WINDOW", window(7)[..4].to_vec()),
+        ("luma_loss_window7", "RADIUS", vec![3.0]),
+        ("luma_loss_window5", "WINDOW", window(5)[..3].to_vec()),
+        ("luma_loss_window5", "RADIUS", vec![2.0]),
         (
             "luma_loss",
             "RADIUS",

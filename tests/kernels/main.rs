@@ -21,6 +21,7 @@ mod harness;
 mod layout;
 mod losses;
 mod memory;
+mod numerics;
 mod poison;
 mod renderer;
 mod repeat;

@@ -8,7 +8,7 @@ fn check(name: &str, keys: &[u32], count: usize, bits: u32) {
     let mut places: Vec<u32> = (0..count as u32).collect();
     places.sort_by_key(|&place| keys[place as usize]);
     let sorted: Vec<u32> = places.iter().map(|&p| keys[p as usize]).collect();
-    let (keys, values) = sort_on(&raster(), keys, count, bits).unwrap();
+    let (keys, values) = sort_on(&raster(), keys, count, 0..bits).unwrap();
     assert!(keys == sorted, "{name}, {count} keys of {bits} bits");
     assert!(values == places, "{name}, {count} keys: ties out of order");
 }
@@ -23,7 +23,7 @@ fn counts_below_the_capacity_leave_the_rest_alone() {
     for count in [0, 1, 2048, 2049, 9_999] {
         check("part", &keys(10_000), count, 32);
     }
-    let nothing = sort_on(&raster(), &[], 0, 32).unwrap();
+    let nothing = sort_on(&raster(), &[], 0, 0..32).unwrap();
     assert_eq!(nothing, (Vec::new(), Vec::new()));
 }
 

@@ -205,6 +205,25 @@ fn broken_losses_and_steps_are_noticed() {
             "sqrt(v * correction.y)",
             "sqrt(v)",
         ),
+        (
+            "step",
+            "project_backward",
+            "if ranks[i] == INVISIBLE {\n            return;",
+            "if ranks[i] != INVISIBLE {\n            return;",
+        ),
+        (
+            "numerics",
+            "blend_backward",
+            "bits + 0x7fffu",
+            "bits + 0x8000u",
+        ),
+        (
+            "numerics",
+            "sum_instances",
+            "sum[2u * c + 1u] += figures.y",
+            "sum[2u * c + 1u] += figures.x",
+        ),
+        ("losses", "luma_loss", "0.27068214949642655", "0.28"),
         ("densify", "densify_geometry", "exp(log_scale)", "log_scale"),
         (
             "scan",

@@ -132,7 +132,11 @@ const REASONS: &[(&str, &str, &str)] = &[
         "log",
         "project culls opacities below ALPHA_MIN before it asks",
     ),
-    ("power_cutoff", "opacity / ALPHA_MIN", "a constant divisor"),
+    (
+        "power_cutoff",
+        "opacity / ALPHA_MIN",
+        "a divisor that the host keeps above 0",
+    ),
     (
         "preconditioned",
         "residual[k] / (parameters.diagonal_scale * diagonal[of_channel] + parameters.ridge)",
@@ -377,6 +381,30 @@ fn only_antialiased_kernels_know_of_the_compensation() {
     for (name, source) in shaders::ALL {
         let found = traces.iter().any(|trace| source.contains(trace));
         assert_eq!(found, name.contains("mip"), "{name}");
+    }
+}
+
+/// So with what training may trade for time.
+#[test]
+fn kernels_know_of_no_numerics_but_their_own() {
+    for (trace, variant) in [
+        ("upper_half", "blend_backward_luma_half"),
+        ("unpacked", "sum_instances_luma_half"),
+        ("RADIUS: u32 = 3u", "_window7"),
+        ("RADIUS: u32 = 2u", "_window5"),
+    ] {
+        for (name, source) in shaders::ALL {
+            assert_eq!(source.contains(trace), name.contains(variant), "{name}");
+        }
+    }
+    // Lazy steps store nothing for what the view does not show; the others do so twice.
+    for (name, source) in shaders::ALL {
+        if name.contains("_step") {
+            let stills = source.matches("ranks[i] == INVISIBLE").count();
+            assert_eq!(stills, 1, "{name}");
+            let at_once = source.contains("INVISIBLE {\n            return;");
+            assert_eq!(at_once, name.ends_with("_lazy"), "{name}");
+        }
     }
 }
 

@@ -21,7 +21,7 @@ use crate::{
 };
 
 /// Scenes of every degree before views of odd sizes, and opaque stacks.
-fn scenes<const C: usize>() -> Vec<(Scene<f64, C>, View)> {
+pub(super) fn scenes<const C: usize>() -> Vec<(Scene<f64, C>, View)> {
     let loose = (0..4).map(|seed| {
         let view = random_view(seed);
         let scene = random_scene_before(&view, seed, 150, seed as usize);
@@ -32,8 +32,11 @@ fn scenes<const C: usize>() -> Vec<(Scene<f64, C>, View)> {
         .collect()
 }
 
-fn pictures<const C: usize>(raster: &Arc<Raster>) -> Result<Vec<Sample>, GpuError> {
-    let pictures = scenes::<C>().into_iter().map(|(scene, view)| {
+pub(super) fn pictures<const C: usize>(
+    raster: &Arc<Raster>,
+    scenes: Vec<(Scene<f64, C>, View)>,
+) -> Result<Vec<Sample>, GpuError> {
+    let pictures = scenes.into_iter().map(|(scene, view)| {
         let actual = Stage::new(raster, &splats(&scene), &view)?.forward()?;
         let pixels = render_pixels(&scene, &view, Shading::of_channels(C));
         Ok(Sample {
@@ -64,19 +67,19 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
             "blend",
             "luma, 0 to 1",
             bounds(allowed, 1.27e-6, 1.0),
-            &pictures::<1>(raster)?,
+            &pictures::<1>(raster, scenes())?,
         ),
         Row::picture(
             "blend",
             "chroma, Lab units",
             bounds(allowed, 1.09e-6, 80.0),
-            &pictures::<2>(raster)?,
+            &pictures::<2>(raster, scenes())?,
         ),
         Row::picture(
             "blend",
             "RGB, 0 to 1",
             bounds(allowed, 1.34e-6, 1.0),
-            &pictures::<3>(raster)?,
+            &pictures::<3>(raster, scenes())?,
         ),
     ])
 }

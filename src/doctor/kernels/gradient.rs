@@ -23,7 +23,11 @@ use crate::{
 
 /// The gradient of a picture: one random number a value, none where a pixel
 /// stands close to a discontinuity.
-fn upstream<const C: usize>(seed: u64, scene: &Scene<f64, C>, view: &View) -> Vec<[f64; C]> {
+pub(super) fn upstream<const C: usize>(
+    seed: u64,
+    scene: &Scene<f64, C>,
+    view: &View,
+) -> Vec<[f64; C]> {
     let mut random = Random::new(seed);
     (decision_margin(scene, view).into_iter())
         .map(|margin| {
@@ -46,7 +50,7 @@ fn oracle_groups<const C: usize>(gradient: &Scene<f64, C>) -> Vec<Vec<f64>> {
 }
 
 /// Samples by group of parameters.
-fn measure<const C: usize>(
+pub(super) fn measure<const C: usize>(
     raster: &Arc<Raster>,
     scenes: &[(Scene<f64, C>, View)],
 ) -> Result<Vec<(&'static str, Vec<Sample>)>, GpuError> {
@@ -104,7 +108,7 @@ fn added(raster: &Arc<Raster>, scenes: &[(Scene<f64, 2>, View)]) -> Result<Vec<S
 }
 
 /// Scenes of every degree before views of odd sizes, and opaque stacks.
-fn scenes<const C: usize>(antialiased: bool) -> Vec<(Scene<f64, C>, View)> {
+pub(super) fn scenes<const C: usize>(antialiased: bool) -> Vec<(Scene<f64, C>, View)> {
     let loose = (20..26).map(|seed| {
         let view = View {
             antialiased,

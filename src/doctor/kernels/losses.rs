@@ -7,7 +7,7 @@ use crate::{
     compare::widen,
     doctor::measured::{Allowance, Row, Sample},
     gpu::{Buffer, Gpu, GpuError, Kernel, Recorder},
-    luma::{LossEffects, LumaLossParameters},
+    luma::{LossEffects, LumaLossParameters, SsimWindow},
     optimize::{LossLog, SumLossKernel},
     oracle::{
         luma_loss::{LumaEffects, luma_loss, luma_loss_gradient},
@@ -76,6 +76,7 @@ struct Comparison {
     photo: Vec<u8>,
     exposure: Option<Exposure>,
     mask: Option<Vec<u8>>,
+    window: SsimWindow,
 }
 
 impl Comparison {
@@ -87,6 +88,7 @@ impl Comparison {
             photo,
             exposure: None,
             mask: None,
+            window: SsimWindow::Eleven,
         }
     }
 
@@ -96,7 +98,7 @@ impl Comparison {
             exposed: self.exposure.is_some(),
             masked: self.mask.is_some(),
         };
-        let kernel = |name| Kernel::new(gpu, name, effects.shader());
+        let kernel = |name| Kernel::new(gpu, name, effects.shader(self.window));
         let (forward, backward) = (kernel("luma_loss"), kernel("luma_loss_backward"));
         let bytes = |label, bytes: &[u8]| {
             let mut words = vec![0_u32; bytes.len().div_ceil(4)];
@@ -153,6 +155,7 @@ impl Comparison {
         };
         let mask = self.mask.as_deref().map(unit);
         let effects = LumaEffects {
+            ssim_window: u32::from(self.window) as usize,
             exposure: self.exposure.map(|e| [e.gain, e.offset]),
             mask: mask.as_deref(),
         };
@@ -294,5 +297,33 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
         rows.push(value("luma_loss", of_value, 1e-6, &values));
         rows.push(gradient("luma_loss", of_gradient, 1e-6, 1e-5, &gradients));
     }
+    let mut flat: [Vec<Sample>; 2] = Default::default();
+    for (window, of_value, of_gradient) in [
+        (
+            SsimWindow::Seven,
+            "value, 7 × 7",
+            "gradient × pixels, 7 × 7",
+        ),
+        (SsimWindow::Five, "value, 5 × 5", "gradient × pixels, 5 × 5"),
+    ] {
+        let windowed = |comparison| Comparison {
+            window,
+            ..comparison
+        };
+        // Without effects, with an exposure, with a mask, with both.
+        let effects = (0..3).flat_map(with_effects);
+        let all = random(&TONES).chain(effects).map(windowed);
+        let [values, gradients] = sampled(gpu, all)?;
+        rows.push(value("luma_loss", of_value, 1e-6, &values));
+        rows.push(gradient("luma_loss", of_gradient, 1e-6, 1e-5, &gradients));
+        let [values, gradients] = sampled(gpu, random(&BRIGHT_AND_FLAT).map(windowed))?;
+        for (kind, samples) in flat.iter_mut().zip([values, gradients]) {
+            kind.extend(samples);
+        }
+    }
+    let what = "value, smaller windows, bright and flat";
+    rows.push(value("luma_loss", what, 1.13e-3, &flat[0]));
+    let what = "gradient × pixels, smaller windows, bright and flat";
+    rows.push(gradient("luma_loss", what, 4.63e-5, 3.8e-4, &flat[1]));
     Ok(rows)
 }

@@ -8,6 +8,7 @@ mod conjugate;
 mod densify;
 mod gradient;
 mod losses;
+pub mod numerics;
 mod project;
 mod relocation;
 mod scan;
@@ -28,7 +29,7 @@ use crate::{gpu::GpuError, raster::Raster};
 type Measure = fn(&Arc<Raster>) -> Result<Vec<Row>, GpuError>;
 
 /// The topics in the order in which an iteration meets them.
-pub const TOPICS: [(&str, Measure); 13] = [
+pub const TOPICS: [(&str, Measure); 14] = [
     ("project", project::rows),
     ("scan", scan::rows),
     ("sort", sort::rows),
@@ -36,6 +37,7 @@ pub const TOPICS: [(&str, Measure); 13] = [
     ("losses", losses::rows),
     ("chroma loss", chroma_loss::rows),
     ("adjoint", gradient::rows),
+    ("numerics", numerics::rows),
     ("step", step::rows),
     ("adam", adam::rows),
     ("densify", densify::rows),

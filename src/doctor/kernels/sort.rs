@@ -1,6 +1,6 @@
 //! `sort`: a stable radix sort.
 
-use std::sync::Arc;
+use std::{ops::Range, sync::Arc};
 
 use crate::{
     doctor::measured::{Row, Sample},
@@ -25,8 +25,8 @@ const PATTERNS: [Pattern; 6] = [
 /// Around the sizes of a workgroup and of its block.
 const LENGTHS: [usize; 10] = [1, 2, 255, 256, 257, 2047, 2048, 2049, 20_000, 100_000];
 
-/// Sorts the first `count` keys by their lowest `bits` bits on the device; gives
-/// them with the places they had.
+/// Sorts the first `count` keys by these `bits` of theirs on the device; gives them
+/// with the places they had.
 ///
 /// # Errors
 /// [`GpuError`].
@@ -34,7 +34,7 @@ pub fn sort_on(
     raster: &Raster,
     keys: &[u32],
     count: usize,
-    bits: u32,
+    bits: Range<u32>,
 ) -> Result<(Vec<u32>, Vec<u32>), GpuError> {
     let gpu = &raster.gpu;
     let mut words = [0; STATUS_WORDS];
@@ -65,7 +65,7 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
             let mut places: Vec<u32> = (0..length as u32).collect();
             places.sort_by_key(|&place| keys[place as usize]);
             let expected = places.iter().map(|&p| keys[p as usize]).collect();
-            let (keys, values) = sort_on(raster, &keys, length, 32)?;
+            let (keys, values) = sort_on(raster, &keys, length, 0..32)?;
             sorted.push(Sample::new(wide(keys), wide(expected)));
             origins.push(Sample::new(wide(values), wide(places)));
         }

@@ -18,7 +18,8 @@ use crate::{
         scene::View,
     },
     raster::{
-        Field, Geometry, Layer, LayerAdjoint, Lists, Outcome, Raster, RasterOptions, constants::*,
+        AdamSteps, Field, Geometry, Layer, LayerAdjoint, Lists, Outcome, Raster, RasterNumerics,
+        RasterOptions, constants::*,
     },
     splats::Splats,
 };
@@ -109,6 +110,23 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
             .into_iter()
             .take(QUANTITIES.len()),
     );
+    let lazily = |raster: &Arc<Raster>| {
+        raster.computing(RasterNumerics {
+            adam: AdamSteps::Lazy,
+            ..raster.numerics()
+        })
+    };
+    let names = ["project_backward, lazy", "shade_backward, lazy"];
+    rows.extend(measure(&lazily(raster), names)?);
+    let names = [
+        "project_backward, antialiased, lazy",
+        "shade_backward, lazy",
+    ];
+    rows.extend(
+        measure(&lazily(&antialiased), names)?
+            .into_iter()
+            .take(QUANTITIES.len()),
+    );
     Ok(rows)
 }
 
@@ -131,6 +149,11 @@ fn measure(raster: &Arc<Raster>, kernels: [&'static str; 2]) -> Result<Vec<Row>,
             .map(|_| random.range(-1.0, 1.0))
             .collect();
         let gradient = stage.backward(&upstream)?;
+        let lazy = raster.numerics().adam == AdamSteps::Lazy;
+        let still: Vec<bool> = (stage.projected()?.iter())
+            .map(|projected| lazy && projected.is_none())
+            .collect();
+        assert!(!lazy || still.contains(&true), "everything is in view");
         let starts = [
             Geometry::upload(gpu, &splats)?.planes.read(gpu)?,
             Field::upload(gpu, &splats.sh)?.planes.read(gpu)?,
@@ -159,7 +182,9 @@ fn measure(raster: &Arc<Raster>, kernels: [&'static str; 2]) -> Result<Vec<Row>,
                     slope += pull(&starts[0], at, splats.len());
                 }
                 let rate = f64::from(rate(at / splats.len()));
-                adam(&mut value, &mut moment, slope, rate, STEP as i32);
+                if !still[at % splats.len()] {
+                    adam(&mut value, &mut moment, slope, rate, STEP as i32);
+                }
                 expected[0].push(value);
                 expected[1].push(moment.first);
                 expected[2].push(moment.second);

@@ -214,6 +214,7 @@ impl Job<'_> {
             max_splats: amounts.max_splats,
             seed: options.seed,
             flat: options.stop_when_flat,
+            numerics: options.numerics,
             ..LumaSettings::new(amounts.iterations)
         };
         if options.densification == Densification::Relocate {

@@ -14,7 +14,7 @@ use crate::{
     capture::LoadOptions,
     effects::{Effect, Overrules},
     gpu::Gpu,
-    luma::Densification,
+    luma::{Densification, Numerics},
     raster::{Raster, RasterOptions},
     report::Report,
     splats::ply,
@@ -62,6 +62,34 @@ pub struct FitOptions {
     pub target_psnr: Option<f64>,
     /// Whether the report says where the device's time went.
     pub timings: bool,
+    /// How accurately training computes.
+    pub numerics: Numerics,
+}
+
+impl FitOptions {
+    /// All as the preset and the photos have it.
+    pub fn new(colmap_dir: PathBuf) -> Self {
+        Self {
+            colmap_dir,
+            output: None,
+            preset: None,
+            iterations: None,
+            load: LoadOptions::default(),
+            measure_side: None,
+            max_splats: None,
+            overrules: Overrules::default(),
+            seed: 0,
+            init: None,
+            densification: Densification::Split,
+            coarse: 0.0,
+            memory_limit: None,
+            stop_when_flat: None,
+            time_limit: None,
+            target_psnr: None,
+            timings: false,
+            numerics: Numerics::default(),
+        }
+    }
 }
 
 /// Trains and writes the run folder.

@@ -41,6 +41,7 @@ impl Job<'_> {
                 sh_degree: settings.sh_degree,
                 max_splats: settings.max_splats,
                 antialiased: settings.antialiased,
+                numerics: settings.numerics,
                 splats: attempt.splats.len(),
                 poisoned: last.map_or(0, |progress| progress.poisoned),
                 refused: last.map_or(0, |progress| progress.refused),

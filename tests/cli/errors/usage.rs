@@ -58,6 +58,21 @@ pub(super) const CASES: &[Case] = &[
         &["high", "--target-psnr", "dB above 0"],
     ),
     usage(
+        "numerics of no kind",
+        "fit scene --numerics alpha-min=0.01,speed=fast",
+        &[
+            "speed=fast",
+            "alpha-min=",
+            "depth-bits=32|24|16",
+            "--numerics",
+        ],
+    ),
+    usage(
+        "a cut-off of nothing",
+        "fit scene --numerics alpha-min=0",
+        &["alpha-min=0", "0.00001..0.1"],
+    ),
+    usage(
         "an effect of no scene",
         "plan scene --with fog",
         &["fog", "--with"],

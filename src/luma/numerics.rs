@@ -1,0 +1,188 @@
+//! What training may trade accuracy for time in: `fit --numerics`.
+
+use std::{fmt, str::FromStr};
+
+use serde::{Deserialize, Serialize};
+
+use crate::raster::{AdamSteps, RasterNumerics, Storage};
+
+/// How accurately stage 1 computes while it trains. What is measured, drawn and written
+/// afterwards is computed with the default, as viewers do.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Numerics {
+    /// Of the rasterizer and of its steps.
+    #[serde(flatten)]
+    pub raster: RasterNumerics,
+    /// Of SSIM in the loss.
+    pub ssim_window: SsimWindow,
+}
+
+/// Pixels along a side of SSIM's window, a Gaussian of σ = 1.5 cut off there.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(into = "u32", try_from = "u32")]
+pub enum SsimWindow {
+    /// As Wang et al. 2004.
+    #[default]
+    Eleven,
+    /// Up to two deviations: 95 % of the weight along a row.
+    Seven,
+    /// Up to 1.3 deviations: 82 % of the weight along a row.
+    Five,
+}
+
+impl From<SsimWindow> for u32 {
+    fn from(window: SsimWindow) -> Self {
+        match window {
+            SsimWindow::Eleven => 11,
+            SsimWindow::Seven => 7,
+            SsimWindow::Five => 5,
+        }
+    }
+}
+
+impl TryFrom<u32> for SsimWindow {
+    type Error = String;
+
+    fn try_from(side: u32) -> Result<Self, String> {
+        [Self::Eleven, Self::Seven, Self::Five]
+            .into_iter()
+            .find(|&window| u32::from(window) == side)
+            .ok_or_else(|| format!("SSIM has no window of {side} pixels: 11, 7 or 5"))
+    }
+}
+
+/// The keys with their values, for messages.
+const KEYS: &str = "alpha-min=0.00001..0.1, transmittance-min=0..0.5, depth-bits=32|24|16, \
+    storage=full|half, ssim-window=11|7|5, adam=exact|lazy";
+
+impl FromStr for Numerics {
+    type Err = String;
+
+    /// Reads `KEY=VALUE[,KEY=VALUE…]`; what is not named keeps its default.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let mut numerics = Self::default();
+        for pair in text.split(',') {
+            let taken = pair.split_once('=').and_then(|(key, value)| {
+                let raster = &mut numerics.raster;
+                match key.trim() {
+                    // Antialiased gradients grow with one over it.
+                    "alpha-min" => raster.alpha_min = number(value, 1e-5, 0.1)?,
+                    "transmittance-min" => raster.transmittance_min = number(value, 0.0, 0.5)?,
+                    "depth-bits" => {
+                        raster.depth_bits = one_of(value, [("32", 32), ("24", 24), ("16", 16)])?
+                    }
+                    "storage" => {
+                        raster.storage =
+                            one_of(value, [("full", Storage::Full), ("half", Storage::Half)])?;
+                    }
+                    "ssim-window" => {
+                        numerics.ssim_window =
+                            SsimWindow::try_from(value.trim().parse::<u32>().ok()?).ok()?;
+                    }
+                    "adam" => {
+                        raster.adam = one_of(
+                            value,
+                            [("exact", AdamSteps::Exact), ("lazy", AdamSteps::Lazy)],
+                        )?;
+                    }
+                    _ => return None,
+                }
+                Some(())
+            });
+            taken.ok_or_else(|| format!("{pair:?} is none of {KEYS}"))?;
+        }
+        Ok(numerics)
+    }
+}
+
+fn number(text: &str, low: f64, high: f64) -> Option<f64> {
+    let value = text.trim().parse().ok()?;
+    (low..=high).contains(&value).then_some(value)
+}
+
+fn one_of<T: Copy, const N: usize>(text: &str, values: [(&str, T); N]) -> Option<T> {
+    let found = values.iter().find(|(name, _)| *name == text.trim())?;
+    Some(found.1)
+}
+
+impl fmt::Display for Numerics {
+    /// What differs from the default, as [`FromStr`] reads it; nothing if nothing does.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (own, usual) = (&self.raster, &RasterNumerics::DEFAULT);
+        let pairs = [
+            (own.alpha_min != usual.alpha_min).then(|| format!("alpha-min={}", own.alpha_min)),
+            (own.transmittance_min != usual.transmittance_min)
+                .then(|| format!("transmittance-min={}", own.transmittance_min)),
+            (own.depth_bits != usual.depth_bits).then(|| format!("depth-bits={}", own.depth_bits)),
+            (own.storage == Storage::Half).then(|| "storage=half".to_owned()),
+            (self.ssim_window != SsimWindow::Eleven)
+                .then(|| format!("ssim-window={}", u32::from(self.ssim_window))),
+            (own.adam == AdamSteps::Lazy).then(|| "adam=lazy".to_owned()),
+        ];
+        f.write_str(&pairs.into_iter().flatten().collect::<Vec<_>>().join(","))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_written_is_read_again() {
+        assert_eq!(Numerics::default().to_string(), "");
+        for text in [
+            "alpha-min=0.015",
+            "transmittance-min=0",
+            "depth-bits=16",
+            "storage=half",
+            "ssim-window=5",
+            "adam=lazy",
+            "alpha-min=0.00001,transmittance-min=0.01,depth-bits=24,storage=half,ssim-window=7,adam=lazy",
+        ] {
+            let numerics: Numerics = text.parse().unwrap();
+            assert_ne!(numerics, Numerics::default(), "{text}");
+            assert_eq!(numerics.to_string(), text);
+            let json = serde_json::to_string(&numerics).unwrap();
+            assert_eq!(
+                serde_json::from_str::<Numerics>(&json).unwrap(),
+                numerics,
+                "{json}"
+            );
+        }
+    }
+
+    #[test]
+    fn defaults_may_be_named_and_reports_may_lack_keys() {
+        let named = "depth-bits=32,storage=full,ssim-window=11,adam=exact";
+        assert_eq!(named.parse(), Ok(Numerics::default()));
+        let old: Numerics = serde_json::from_str(r#"{ "storage": "half" }"#).unwrap();
+        assert_eq!(old.to_string(), "storage=half");
+    }
+
+    #[test]
+    fn what_is_wrong_is_named_with_all_that_there_is() {
+        for wrong in [
+            "",
+            "alpha-min",
+            "alpha-min=",
+            "alpha-min=0",
+            "alpha-min=nan",
+            "alpha-min=0.2",
+            "transmittance-min=-1",
+            "transmittance-min=0.6",
+            "depth-bits=8",
+            "storage=quarter",
+            "ssim-window=9",
+            "adam=slow",
+            "adam=lazy,",
+            "speed=11",
+        ] {
+            let message = wrong.parse::<Numerics>().unwrap_err();
+            assert!(
+                message.contains("is none of") && message.contains(KEYS),
+                "{message}"
+            );
+        }
+    }
+}

@@ -1,0 +1,97 @@
+//! What the rasterizer's accuracy may be traded for.
+//!
+//! docs/accuracy-and-time.md has what each costs and saves (`cargo bench --bench accuracy`).
+
+use serde::{Deserialize, Serialize};
+
+use super::constants::{ALPHA_MIN, TRANSMITTANCE_MIN};
+
+/// How accurately a rasterizer computes. [`DEFAULT`](Self::DEFAULT) is how viewers draw;
+/// anything else is for training alone.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct RasterNumerics {
+    /// Alpha below which a Gaussian does not count at a pixel. Also where its tile lists
+    /// end: a Gaussian of opacity o is seen up to √(2 ln(o / alpha_min)) deviations.
+    pub alpha_min: f64,
+    /// A pixel is finished before its transmittance falls below this.
+    pub transmittance_min: f64,
+    /// Highest bits of a depth (an `f32` above 0) that the sort looks at, a multiple of 8
+    /// up to 32; eight a pass. Gaussians that agree in all of them keep index order. Of
+    /// 16 bits, sign and exponent take nine: depths that differ by less than 1/128.
+    pub depth_bits: u32,
+    /// What the gradient records of luma's list entries are stored as.
+    pub storage: Storage,
+    /// Whose parameters Adam moves.
+    pub adam: AdamSteps,
+}
+
+/// How the gradient record of a list entry, eight figures, waits for its sum. Blending's
+/// adjoint writes and summing reads as many words as all else in these two together.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Storage {
+    /// As `f32`.
+    #[default]
+    Full,
+    /// As the upper half of an `f32`, rounded: a sign, its whole range, seven bits of
+    /// fraction. Relative errors up to 2⁻⁸ an entry; what is added up stays `f32`.
+    Half,
+}
+
+impl Storage {
+    /// Words that so many figures take.
+    pub fn words(self, figures: usize) -> usize {
+        match self {
+            Self::Full => figures,
+            Self::Half => figures.div_ceil(2),
+        }
+    }
+}
+
+/// Whose parameters Adam moves in an iteration.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum AdamSteps {
+    /// Everyone's, as Adam is defined: without a gradient moments decay, and parameters
+    /// move on by what is left of them.
+    #[default]
+    Exact,
+    /// Those of the Gaussians that the view shows; the others' moments stay too. Bias
+    /// corrections count all iterations.
+    Lazy,
+}
+
+impl RasterNumerics {
+    /// As 3D Gaussian splatting computes (Kerbl et al. 2023).
+    pub const DEFAULT: Self = Self {
+        alpha_min: 1.0 / 255.0,
+        transmittance_min: 1e-4,
+        depth_bits: 32,
+        storage: Storage::Full,
+        adam: AdamSteps::Exact,
+    };
+
+    /// For the kernels that look at alphas only.
+    pub(super) fn alpha_cutoff(&self) -> [(&'static str, f64); 1] {
+        [("ALPHA_MIN", self.alpha_min)]
+    }
+
+    /// For the kernels that stop as well.
+    pub(super) fn cutoffs(&self) -> [(&'static str, f64); 2] {
+        [
+            ("ALPHA_MIN", self.alpha_min),
+            ("TRANSMITTANCE_MIN", self.transmittance_min),
+        ]
+    }
+}
+
+impl Default for RasterNumerics {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
+}
+
+// The device sees `f32`: both must mean the same.
+const _: () = assert!(RasterNumerics::DEFAULT.alpha_min as f32 == ALPHA_MIN);
+const _: () = assert!(RasterNumerics::DEFAULT.transmittance_min as f32 == TRANSMITTANCE_MIN);

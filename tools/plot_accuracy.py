@@ -1,0 +1,71 @@
+#!/usr/bin/env python3
+"""Draws what `cargo bench --bench accuracy -- --csv F` wrote: errors of picture and gradient
+against the time of an iteration, a line a knob.
+
+    python3 tools/plot_accuracy.py accuracy.csv -o docs/images/accuracy.svg
+
+Needs matplotlib (tools/requirements.txt).
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+# Text stays text, and two runs write the same file.
+matplotlib.rcParams.update({"svg.fonttype": "none", "svg.hashsalt": "gs-chroma", "font.size": 9})
+
+import matplotlib.pyplot as plt  # noqa: E402
+
+# What is drawn of each knob: a changed loss or step is no error of a picture.
+ERRORS = {
+    "picture_rms": ("RMS error of the picture, levels of 255",
+                    ["alpha-min", "transmittance-min", "depth-bits", "together"]),
+    "gradient": ("relative error of the gradient",
+                 ["alpha-min", "transmittance-min", "depth-bits", "storage", "ssim-window",
+                  "together"]),
+}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("csv", type=Path)
+    parser.add_argument("-o", "--output", type=Path, required=True)
+    arguments = parser.parse_args()
+    with arguments.csv.open() as file:
+        rows = list(csv.DictReader(file))
+    subjects = list(dict.fromkeys(row["subject"] for row in rows))
+    figure, axes = plt.subplots(len(subjects), len(ERRORS), figsize=(9, 3.2 * len(subjects)),
+                                squeeze=False, layout="constrained")
+    for subject, line in zip(subjects, axes):
+        of_subject = [row for row in rows if row["subject"] == subject]
+        for axis, (key, (label, knobs)) in zip(line, ERRORS.items()):
+            default = next(row for row in of_subject if row["knob"] == "default")
+            for number, knob in enumerate(knobs):
+                points = [row for row in of_subject if row["knob"] == knob]
+                if len(points) > 1:
+                    points.append(default)
+                points.sort(key=lambda row: float(row["time"]))
+                axis.plot([float(p["time"]) for p in points], [float(p[key]) for p in points],
+                          marker="o", markersize=3, linewidth=0.8, color=f"C{number}", label=knob)
+                for point in points:
+                    if point is not default and knob != "together":
+                        axis.annotate(point["value"], (float(point["time"]), float(point[key])),
+                                      fontsize=6, xytext=(2, 2), textcoords="offset points")
+            axis.plot(float(default["time"]), float(default[key]), "k*", markersize=9,
+                      label="default")
+            axis.set_yscale("log")
+            axis.set_xlabel("time of an iteration, default = 1")
+            axis.set_ylabel(label)
+            axis.set_title(subject, fontsize=9)
+            axis.grid(alpha=0.3)
+    axes[0][-1].legend(frameon=False, fontsize=7)
+    figure.savefig(arguments.output, metadata={"Date": None})
+
+
+if __name__ == "__main__":
+    main()
