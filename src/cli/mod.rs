@@ -11,6 +11,7 @@ mod photos;
 mod plan;
 mod progress;
 mod render;
+mod tradeoff;
 
 use std::{
     fmt::Display,
@@ -38,6 +39,7 @@ enum Command {
     Render(render::Render),
     Eval(eval::Eval),
     Export(export::Export),
+    Tradeoff(tradeoff::Tradeoff),
     Info(info::Info),
     Doctor(doctor::Doctor),
 }
@@ -55,6 +57,7 @@ impl Cli {
             Command::Render(command) => command.run(),
             Command::Eval(command) => command.run(),
             Command::Export(command) => command.run(),
+            Command::Tradeoff(command) => command.run(),
             Command::Info(command) => command.run(),
             Command::Doctor(command) => command.run(),
         }

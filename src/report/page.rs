@@ -2,7 +2,10 @@
 
 use std::fmt::Write;
 
-use super::{Evaluation, Table};
+use super::{
+    Evaluation,
+    html::{TAIL, escaped, head, push_table},
+};
 
 /// Colours of a map of errors, from none to [`MAP_END`] and beyond.
 const RAMP: [[f64; 3]; 5] = [
@@ -50,7 +53,7 @@ pub fn error_map(errors: &[f64]) -> Vec<[f32; 3]> {
 
 /// The page's HTML: tables, a row of pictures a view, a strip of the path's frames.
 pub fn evaluation_page(evaluation: &Evaluation, rows: &[PageRow], strip: &[String]) -> String {
-    let mut html = String::from(HEAD);
+    let mut html = head("gs-chroma evaluation");
     // Writing to a string cannot fail.
     let _ = write!(
         html,
@@ -88,78 +91,13 @@ pub fn evaluation_page(evaluation: &Evaluation, rows: &[PageRow], strip: &[Strin
         }
         html.push_str("</div>\n");
     }
-    html.push_str("</main></body></html>\n");
+    html.push_str(TAIL);
     html
 }
-
-const HEAD: &str = r#"<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>gs-chroma evaluation</title>
-<style>
-:root { color-scheme: light; }
-body { margin: 0; background: #fbfaf8; color: #22252a; font: 15px/1.5 system-ui, sans-serif; }
-main { max-width: 1500px; margin: 0 auto; padding: 2rem 1.5rem 4rem; }
-h1 { font-size: 1.9rem; margin: 0; }
-h2 { font-size: 1.25rem; margin: 2.2rem 0 .6rem; }
-h3 { font-size: 1rem; margin: 1.4rem 0 .4rem; font-weight: 600; }
-.note { color: #656a73; max-width: 75rem; margin: .4rem 0; font-size: .85rem; }
-.scroll { overflow-x: auto; }
-table { border-collapse: collapse; background: #fff; box-shadow: 0 1px 3px #0002; border-radius: 6px; }
-th, td { padding: .4rem .8rem; text-align: right; white-space: nowrap; font-variant-numeric: tabular-nums; }
-th:first-child, td:first-child { text-align: left; }
-thead th { border-bottom: 2px solid #d8d5cf; font-weight: 600; }
-tbody tr + tr td { border-top: 1px solid #eeece8; }
-.row { display: grid; grid-template-columns: repeat(auto-fill, minmax(210px, 1fr)); gap: .8rem; }
-figure { margin: 0; background: #fff; border-radius: 6px; overflow: hidden; box-shadow: 0 1px 3px #0002; }
-figure img { display: block; width: 100%; }
-figcaption { padding: .3rem .6rem; font-size: .8rem; color: #454a52; }
-.strip { display: flex; gap: 4px; overflow-x: auto; }
-.strip img { height: 130px; border-radius: 4px; }
-.ramp { display: inline-block; width: 9rem; height: .8rem; border-radius: 3px; vertical-align: middle; }
-</style>
-</head>
-<body><main>
-"#;
 
 fn teacher_in_words(evaluation: &Evaluation) -> String {
     let name = evaluation.teacher.as_ref().and_then(|t| t["name"].as_str());
     name.map_or(String::new(), |name| format!("; teacher {}", escaped(name)))
-}
-
-fn push_table(html: &mut String, table: &Table) {
-    let _ = write!(
-        html,
-        "<h2>{}</h2>\n<div class=\"scroll\"><table>\n<thead><tr>",
-        escaped(&table.title)
-    );
-    for cell in &table.head {
-        let _ = write!(html, "<th>{}</th>", escaped(cell));
-    }
-    html.push_str("</tr></thead>\n<tbody>\n");
-    for row in &table.rows {
-        html.push_str("<tr>");
-        for cell in row {
-            let _ = write!(html, "<td>{}</td>", escaped(cell));
-        }
-        html.push_str("</tr>\n");
-    }
-    let notes: Vec<String> = table.notes.iter().map(|note| escaped(note)).collect();
-    let _ = write!(
-        html,
-        "</tbody></table></div>\n<p class=\"note\">{}</p>\n",
-        notes.join("<br>\n")
-    );
-}
-
-/// Text that HTML takes for text.
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
-        .replace('"', "&quot;")
 }
 
 #[cfg(test)]
@@ -174,10 +112,5 @@ mod tests {
         assert_eq!(map[2], RAMP[4].map(|v| v as f32));
         assert_eq!(map[3], map[2]);
         assert_eq!(map[4], [1.0; 3]);
-    }
-
-    #[test]
-    fn names_cannot_break_the_page() {
-        assert_eq!(escaped("<a \"&\">"), "&lt;a &quot;&amp;&quot;&gt;");
     }
 }

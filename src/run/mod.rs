@@ -15,6 +15,7 @@ mod preset;
 mod render;
 mod scene;
 mod teach;
+pub mod tradeoff;
 
 use std::{fmt, path::PathBuf};
 
@@ -110,6 +111,17 @@ pub enum RunError {
         /// What was reached, in dB.
         reached: f64,
     },
+    /// Nothing is held out, and quality cannot be weighed against time.
+    #[error("{}: no view is held out to measure on: name a folder with more photos", .0.display())]
+    NothingToMeasure(PathBuf),
+    /// What everything is compared with does not run.
+    #[error("{point}, which all other points are compared with, failed: {reason}")]
+    Base {
+        /// Its name.
+        point: String,
+        /// What the program said.
+        reason: String,
+    },
     /// The device computes something else than the reference.
     #[error(
         "{failed} of {checks} checks fail on {adapter}: update its driver, or choose another adapter with WGPU_ADAPTER_NAME, and please report the output of `gs-chroma doctor --json`"
@@ -145,6 +157,8 @@ pub enum Stage {
     Path,
     /// Drawing and comparing photographed views.
     Pairs,
+    /// Whole runs, one after the other; counted in seconds.
+    Sweep,
 }
 
 impl fmt::Display for Stage {
@@ -159,6 +173,7 @@ impl fmt::Display for Stage {
             Self::Measure => "measure",
             Self::Path => "path",
             Self::Pairs => "pairs",
+            Self::Sweep => "sweep",
         })
     }
 }

@@ -46,21 +46,30 @@ fn every_key_of_an_evaluation_and_no_other() {
 
 /// Whether the tables of a section of the page name the keys of a value and no other.
 fn are_documented(value: &Value, section: &str) {
+    let keys = keys(value);
+    assert!(keys.len() > 50, "{keys:?}");
+    assert_eq!(documented(&page(), section), keys);
+}
+
+/// Paths of all keys of a value.
+pub fn keys(value: &Value) -> BTreeSet<String> {
     let mut keys = BTreeSet::new();
     collect_keys(value, "", &mut keys);
-    assert!(keys.len() > 50, "{keys:?}");
+    keys
+}
+
+/// What the tables of a section of a page name.
+pub fn documented(page: &str, section: &str) -> BTreeSet<String> {
     // Rows of tables whose first cell is one or more paths.
-    let page = page();
     let (_, section) = page.split_once(section).expect("the section");
     let (section, _) = section.split_once("\n## ").unwrap_or((section, ""));
-    let documented: BTreeSet<String> = section
+    section
         .lines()
         .filter_map(|line| line.strip_prefix("| `")?.split('|').next())
         .flat_map(|cell| cell.split('`').step_by(2))
         .filter(|path| !path.trim().is_empty())
         .map(str::to_owned)
-        .collect();
-    assert_eq!(documented, keys);
+        .collect()
 }
 
 #[test]

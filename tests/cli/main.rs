@@ -21,6 +21,7 @@ mod solver;
 mod splat_file;
 mod teach;
 mod teach_together;
+mod tradeoff;
 mod train;
 mod variants;
 mod view;

@@ -148,5 +148,15 @@ pub(super) const CASES: &[Case] = &[
         "colorize --teacher t --upsample sharp",
         &["sharp", "--upsample"],
     ),
+    usage(
+        "no such knob",
+        "tradeoff scene --knobs coarse,speed",
+        &["speed", "--knobs", "max-side", "correct-views"],
+    ),
+    usage(
+        "no time at all",
+        "tradeoff scene --budget 0",
+        &["0", "--budget"],
+    ),
     usage("two folders", "fit scene scene", &["scene"]),
 ];

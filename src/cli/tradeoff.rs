@@ -1,0 +1,85 @@
+//! `gs-chroma tradeoff`.
+
+use std::path::PathBuf;
+
+use clap::{Args, builder::PossibleValuesParser};
+
+use super::{effects::EffectArguments, photos::Photos, print, progress::Progress};
+use crate::report::tradeoff::{PointStage, front_table};
+use crate::run::{
+    Preset, RunError,
+    tradeoff::{FILES, TradeoffOptions, knob_names, tradeoff},
+};
+
+/// Find out what quality costs in time, on these photos and this device: runs `fit` (and
+/// `colorize`) with knobs turned around the preset, and draws quality against seconds.
+#[derive(Args)]
+pub struct Tradeoff {
+    /// Folder with images/ and a COLMAP model (sparse/0, sparse or the folder itself).
+    colmap_dir: PathBuf,
+    /// Folder for points and results; one that has some goes on [default:
+    /// runs/<folder name>-tradeoff].
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+    /// A colorization network or a folder of coloured photos, for points in colour.
+    #[arg(long, value_name = "FILE.onnx|DIR")]
+    teacher: Option<PathBuf>,
+    /// What knobs are turned around [default: paper on a GPU, draft without one].
+    #[arg(long, value_enum)]
+    preset: Option<Preset>,
+    /// Luma iterations of the base, instead of the preset's.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    iterations: Option<u32>,
+    /// Minutes that all points may take together, earlier starts included; the base runs
+    /// anyway.
+    #[arg(long, value_name = "MINUTES", default_value_t = 30.0, value_parser = minutes)]
+    budget: f64,
+    /// Knobs to turn [default: all].
+    #[arg(long, value_name = "A,B,…", value_delimiter = ',', value_parser = PossibleValuesParser::new(knob_names()))]
+    knobs: Vec<String>,
+    #[command(flatten)]
+    photos: Photos,
+    #[command(flatten)]
+    effects: EffectArguments,
+    /// Print tradeoff.json.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Tradeoff {
+    pub(super) fn run(self) -> Result<(), RunError> {
+        let mut progress = Progress::default();
+        let options = TradeoffOptions {
+            colmap_dir: self.colmap_dir,
+            output: self.output,
+            preset: self.preset,
+            iterations: self.iterations.map(|n| n as usize),
+            load: self.photos.options(),
+            overrules: self.effects.overrules(),
+            teacher: self.teacher,
+            budget: 60.0 * self.budget,
+            knobs: self.knobs,
+        };
+        let (folder, sweep) = tradeoff(&options, &mut |event| progress.show(&event))?;
+        progress.finish();
+        if self.json {
+            return print(sweep.to_json());
+        }
+        for stage in [PointStage::Luma, PointStage::Color] {
+            if let Some(table) = front_table(&sweep, stage) {
+                print(format_args!("{table}\n"))?;
+            }
+        }
+        for file in FILES {
+            print(format_args!("wrote {}", folder.join(file).display()))?;
+        }
+        Ok(())
+    }
+}
+
+/// A budget.
+fn minutes(text: &str) -> Result<f64, String> {
+    let minutes = text.parse().ok();
+    let minutes = minutes.filter(|minutes: &f64| *minutes > 0.0 && minutes.is_finite());
+    minutes.ok_or_else(|| "must be a number above 0".to_owned())
+}

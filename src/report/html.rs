@@ -1,0 +1,74 @@
+//! What pages have in common.
+
+use std::fmt::Write;
+
+use super::Table;
+
+/// The look of every page.
+const STYLE: &str = include_str!("style.css");
+
+/// The end of every page.
+pub(super) const TAIL: &str = "</main></body></html>\n";
+
+/// A page up to where its contents begin.
+pub(super) fn head(title: &str) -> String {
+    format!(
+        r#"<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{}</title>
+<style>
+{STYLE}</style>
+</head>
+<body><main>
+"#,
+        escaped(title)
+    )
+}
+
+/// Text that HTML takes for text.
+pub(super) fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+        .replace('"', "&quot;")
+}
+
+/// A table under its title.
+pub(super) fn push_table(html: &mut String, table: &Table) {
+    let _ = write!(
+        html,
+        "<h2>{}</h2>\n<div class=\"scroll\"><table>\n<thead><tr>",
+        escaped(&table.title)
+    );
+    for cell in &table.head {
+        let _ = write!(html, "<th>{}</th>", escaped(cell));
+    }
+    html.push_str("</tr></thead>\n<tbody>\n");
+    for row in &table.rows {
+        html.push_str("<tr>");
+        for cell in row {
+            let _ = write!(html, "<td>{}</td>", escaped(cell));
+        }
+        html.push_str("</tr>\n");
+    }
+    let notes: Vec<String> = table.notes.iter().map(|note| escaped(note)).collect();
+    let _ = write!(
+        html,
+        "</tbody></table></div>\n<p class=\"note\">{}</p>\n",
+        notes.join("<br>\n")
+    );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_cannot_break_the_page() {
+        assert_eq!(escaped("<a \"&\">"), "&lt;a &quot;&amp;&quot;&gt;");
+        assert!(head("<b>").contains("<title>&lt;b&gt;</title>"));
+    }
+}

@@ -1,0 +1,78 @@
+//! The program, run by itself.
+
+use std::{
+    env,
+    fs::{self, File},
+    io,
+    path::Path,
+    process::{Child, Command, Stdio},
+    thread,
+    time::{Duration, Instant},
+};
+
+/// Set for a program that is to end when its standard input does.
+const TETHER: &str = "GS_CHROMA_ENDS_WITH_STDIN";
+
+/// How often a child is looked after.
+const PATIENCE: Duration = Duration::from_millis(50);
+
+/// How often the observer is told.
+const TELL: Duration = Duration::from_millis(500);
+
+/// Ends this program when the one that started it is gone, where that one asked for
+/// it: the other end of standard input then closes, whatever ended it, on every system.
+/// Files are written beside and renamed, so no moment is a bad one.
+pub fn end_with_parent() {
+    if env::var_os(TETHER).is_some() {
+        thread::spawn(|| {
+            let _ = io::copy(&mut io::stdin(), &mut io::sink());
+            std::process::exit(1);
+        });
+    }
+}
+
+/// Runs this program with `arguments`; what it says on standard error is in `log`
+/// afterwards. `tell` is called now and then.
+///
+/// # Errors
+/// The last line that it said and, unless it ended by itself, how it did.
+pub(super) fn run(arguments: &[String], log: &Path, tell: &mut dyn FnMut()) -> Result<(), String> {
+    let program = env::current_exe().map_err(|error| error.to_string())?;
+    let stderr = File::create(log).map_err(|error| format!("{}: {error}", log.display()))?;
+    let child = Command::new(program)
+        .args(arguments)
+        .env(TETHER, "1")
+        // Kept open until the child is done.
+        .stdin(Stdio::piped())
+        .stdout(Stdio::null())
+        .stderr(stderr)
+        .spawn()
+        .map_err(|error| error.to_string())?;
+    let status = wait(child, tell).map_err(|error| error.to_string())?;
+    if status.success() {
+        return Ok(());
+    }
+    let said = fs::read_to_string(log).unwrap_or_default();
+    let last = said.lines().rfind(|line| !line.trim().is_empty());
+    let last = last.unwrap_or_default();
+    let reason = last.strip_prefix("error: ").unwrap_or(last);
+    Err(match status.code() {
+        Some(1 | 2) if !reason.is_empty() => reason.to_owned(),
+        _ => format!("{status}: {reason}"),
+    })
+}
+
+fn wait(mut child: Child, tell: &mut dyn FnMut()) -> io::Result<std::process::ExitStatus> {
+    let mut told = Instant::now();
+    loop {
+        // Not `Child::wait`, which would close the child's standard input.
+        if let Some(status) = child.try_wait()? {
+            return Ok(status);
+        }
+        if told.elapsed() >= TELL {
+            tell();
+            told = Instant::now();
+        }
+        thread::sleep(PATIENCE);
+    }
+}

@@ -1,0 +1,491 @@
+//! What can be turned, and how far around the preset.
+
+use super::space::Value;
+use crate::report::{
+    Report,
+    tradeoff::{PointStage, Setting},
+};
+
+/// An option of `fit` or `colorize` and its value.
+pub(super) type Turn = (&'static str, String);
+
+/// Something that trades quality for time.
+pub(super) struct Knob {
+    /// Its name.
+    pub name: &'static str,
+    /// The stage whose time and quality it changes.
+    pub stage: PointStage,
+    /// Values to try, nearest to the base first.
+    values: fn(&Around) -> Vec<String>,
+    /// The options that a value stands for.
+    turn: fn(&str) -> Vec<Turn>,
+    /// The stage's time at a value over the base's, as long as nothing was measured.
+    time: fn(&Around, &str) -> f64,
+    /// Knobs that cannot be turned with it.
+    conflicts: &'static [&'static str],
+}
+
+/// The base, around which knobs are turned.
+#[derive(Clone, Debug)]
+pub(super) struct Around {
+    /// Iterations of luma.
+    pub iterations: usize,
+    /// Longer side at which photos are seen, in pixels.
+    pub side: u32,
+    /// Longer side of the largest photo, in pixels.
+    pub largest_side: u32,
+    /// Cap on Gaussians.
+    pub max_splats: usize,
+    /// Gaussians that there were at the end.
+    pub splats: usize,
+    /// Degree of the luma harmonics.
+    pub sh_degree: u32,
+    /// Iterations that Adam takes for chroma.
+    pub adam: usize,
+    /// How the base is coloured, once it is.
+    pub color: Option<ColorAround>,
+}
+
+/// How the base is coloured.
+#[derive(Clone, Debug)]
+pub(super) struct ColorAround {
+    /// Rounds of least squares at full size.
+    pub rounds: usize,
+    /// Whether views are brought into line.
+    pub corrects_views: bool,
+    /// Shorter side at which the network sees photos; `None` for a folder.
+    pub teacher_size: Option<u32>,
+}
+
+impl Around {
+    /// What the base's report says; `adam` as in [`Around::adam`].
+    pub fn new(base: &Report, largest_side: u32, adam: usize) -> Self {
+        let cap = base.capture.load.max_side.unwrap_or(largest_side);
+        Self {
+            iterations: base.luma.iterations,
+            side: cap.min(largest_side),
+            largest_side,
+            max_splats: base.luma.max_splats,
+            splats: base.luma.splats,
+            sh_degree: base.luma.sh_degree,
+            adam,
+            color: None,
+        }
+    }
+
+    /// With what the coloured base's report says.
+    pub fn colored(mut self, base: &Report) -> Self {
+        self.color = base.chroma.as_ref().map(|chroma| ColorAround {
+            rounds: chroma.iterations,
+            corrects_views: chroma.corrects_views,
+            teacher_size: (chroma.teacher.as_ref())
+                .and_then(|teacher| teacher.input_size)
+                .map(|[width, height]| width.min(height)),
+        });
+        self
+    }
+
+    /// The same of the colours; of nothing to try where there are none.
+    fn of_color(&self, values: impl Fn(&ColorAround) -> Vec<String>) -> Vec<String> {
+        self.color.as_ref().map_or(Vec::new(), values)
+    }
+}
+
+/// The knobs of both stages.
+const KNOBS: &[Knob] = &[
+    Knob {
+        name: YARDSTICK_OF_LUMA,
+        stage: PointStage::Luma,
+        values: |around| scaled(around.iterations, &[0.5, 2.0, 0.25]),
+        turn: |value| vec![("--iterations", value.to_owned())],
+        time: |around, value| number(value) / around.iterations as f64,
+        conflicts: &[],
+    },
+    Knob {
+        name: "max-side",
+        stage: PointStage::Luma,
+        values: |around| {
+            let fits = |side: &String| number(side) <= f64::from(around.largest_side);
+            let sides = scaled(around.side as usize, &[0.75, 1.5, 0.5]);
+            let readable = |side: &String| number(side) >= f64::from(LEAST_SIDE);
+            sides.into_iter().filter(fits).filter(readable).collect()
+        },
+        turn: |value| vec![("--max-side", value.to_owned())],
+        // Half of an iteration is about pixels, half about Gaussians.
+        time: |around, value| 0.5 + 0.5 * (number(value) / f64::from(around.side)).powi(2),
+        conflicts: &[],
+    },
+    Knob {
+        name: "max-splats",
+        stage: PointStage::Luma,
+        values: |around| {
+            let mut values = scaled(around.splats.min(around.max_splats), &[0.5, 0.25]);
+            // A cap that is not reached does nothing when it is raised.
+            if around.splats as f64 > 0.9 * around.max_splats as f64 {
+                values.extend(scaled(around.max_splats, &[2.0]));
+            }
+            values
+        },
+        turn: |value| vec![("--max-splats", value.to_owned())],
+        time: |around, value| 0.5 + 0.5 * number(value) / around.splats.max(1) as f64,
+        conflicts: &[],
+    },
+    Knob {
+        name: "sh-degree",
+        stage: PointStage::Luma,
+        values: |around| others(&["0", "1", "2", "3"], &around.sh_degree.to_string()),
+        turn: |value| vec![("--sh-degree", value.to_owned())],
+        time: |around, value| {
+            let cost = |degree: f64| 1.0 + 0.05 * (degree + 1.0).powi(2);
+            cost(number(value)) / cost(f64::from(around.sh_degree))
+        },
+        conflicts: &[],
+    },
+    Knob {
+        name: "coarse",
+        stage: PointStage::Luma,
+        values: |_| owned(&["0.25", "0.5"]),
+        turn: |value| vec![("--coarse", value.to_owned())],
+        time: |_, value| 1.0 - 0.4 * number(value),
+        conflicts: &[],
+    },
+    Knob {
+        name: "densify",
+        stage: PointStage::Luma,
+        values: |_| owned(&["relocate"]),
+        turn: |value| vec![("--densify", value.to_owned())],
+        time: |_, _| 1.0,
+        conflicts: &[],
+    },
+    Knob {
+        name: "solver",
+        stage: PointStage::Color,
+        values: |around| around.of_color(|_| owned(&["adam"])),
+        turn: |value| vec![("--solver", value.to_owned())],
+        time: |_, _| 1.0,
+        conflicts: &["rounds", "until", "correct-views"],
+    },
+    Knob {
+        name: YARDSTICK_OF_COLOR,
+        stage: PointStage::Color,
+        values: |around| around.of_color(|color| scaled(color.rounds, &[0.5, 2.0, 0.25])),
+        turn: |value| vec![("--rounds", value.to_owned())],
+        time: |around, value| {
+            let rounds = around.color.as_ref().map_or(1, |color| color.rounds);
+            number(value) / rounds.max(1) as f64
+        },
+        conflicts: &["solver", "until"],
+    },
+    Knob {
+        name: "until",
+        stage: PointStage::Color,
+        values: |around| {
+            around.of_color(|_| {
+                let iterations = scaled(around.adam, &[0.5, 2.0]);
+                let until = |n: &String| (number(n) as usize + around.iterations).to_string();
+                iterations.iter().map(until).collect()
+            })
+        },
+        // Only Adam counts iterations.
+        turn: |value| {
+            let solver = ("--solver", "adam".to_owned());
+            vec![solver, ("--until", value.to_owned())]
+        },
+        time: |around, value| {
+            (number(value) - around.iterations as f64) / around.adam.max(1) as f64
+        },
+        conflicts: &["solver", "rounds", "correct-views"],
+    },
+    Knob {
+        name: "scales",
+        stage: PointStage::Color,
+        values: |around| around.of_color(|_| owned(&["1", "2"])),
+        turn: |value| vec![("--scales", value.to_owned())],
+        time: |_, value| 1.0 + 0.25 * number(value),
+        conflicts: &[],
+    },
+    Knob {
+        name: "chroma-degree",
+        stage: PointStage::Color,
+        values: |around| around.of_color(|_| owned(&["1", "2"])),
+        turn: |value| vec![("--sh-degree", value.to_owned())],
+        time: |_, value| 1.0 + 0.1 * number(value),
+        conflicts: &[],
+    },
+    Knob {
+        name: "teacher-size",
+        stage: PointStage::Color,
+        values: |around| {
+            around.of_color(|color| {
+                let size = color.teacher_size.map(|size| size as usize);
+                size.map_or(Vec::new(), |size| scaled(size, &[0.5, 1.5]))
+            })
+        },
+        turn: |value| vec![("--teacher-size", value.to_owned())],
+        time: |_, _| 1.0,
+        conflicts: &[],
+    },
+    Knob {
+        name: "correct-views",
+        stage: PointStage::Color,
+        values: |around| {
+            around.of_color(|color| owned(&[if color.corrects_views { "off" } else { "on" }]))
+        },
+        turn: |value| vec![("--correct-views", value.to_owned())],
+        time: |_, _| 1.0,
+        conflicts: &["solver", "until"],
+    },
+];
+
+/// Knobs of the arithmetic of luma, all of which turn one option of `fit`: what several
+/// of them say is joined by commas (see [`merged`]).
+const NUMERIC_KNOBS: &[Knob] = &[
+    Knob {
+        name: "alpha-min",
+        stage: PointStage::Luma,
+        values: |_| owned(&["0.008", "0.016"]),
+        turn: |value| vec![(NUMERICS, format!("alpha-min={value}"))],
+        time: |_, _| 0.9,
+        conflicts: &[],
+    },
+    Knob {
+        name: "transmittance-min",
+        stage: PointStage::Luma,
+        values: |_| owned(&["0.001", "0.01"]),
+        turn: |value| vec![(NUMERICS, format!("transmittance-min={value}"))],
+        time: |_, _| 0.95,
+        conflicts: &[],
+    },
+    Knob {
+        name: "depth-bits",
+        stage: PointStage::Luma,
+        values: |_| owned(&["24", "16"]),
+        turn: |value| vec![(NUMERICS, format!("depth-bits={value}"))],
+        time: |_, _| 0.95,
+        conflicts: &[],
+    },
+    Knob {
+        name: "storage",
+        stage: PointStage::Luma,
+        values: |_| owned(&["half"]),
+        turn: |value| vec![(NUMERICS, format!("storage={value}"))],
+        time: |_, _| 1.0,
+        conflicts: &[],
+    },
+    Knob {
+        name: "ssim-window",
+        stage: PointStage::Luma,
+        values: |_| owned(&["7"]),
+        turn: |value| vec![(NUMERICS, format!("ssim-window={value}"))],
+        time: |_, _| 0.95,
+        conflicts: &[],
+    },
+    Knob {
+        name: "adam",
+        stage: PointStage::Luma,
+        values: |_| owned(&["lazy"]),
+        turn: |value| vec![(NUMERICS, format!("adam={value}"))],
+        time: |_, _| 0.95,
+        conflicts: &[],
+    },
+];
+
+/// The option that they turn.
+const NUMERICS: &str = "--numerics";
+
+/// Less than this `fit` refuses.
+const LEAST_SIDE: u32 = 16;
+
+/// The knob that the others of stage 1 are compared with: time buys quality with it on
+/// any scene.
+pub(super) const YARDSTICK_OF_LUMA: &str = "iterations";
+
+/// The same of stage 2.
+pub(super) const YARDSTICK_OF_COLOR: &str = "rounds";
+
+/// Every knob.
+fn knobs() -> impl Iterator<Item = &'static Knob> {
+    KNOBS.iter().chain(NUMERIC_KNOBS)
+}
+
+/// The names of all knobs.
+pub fn knob_names() -> impl Iterator<Item = &'static str> {
+    knobs().map(|knob| knob.name)
+}
+
+/// All values to try of the knobs that `wanted` names, or of all where it names none.
+pub(super) fn values(around: &Around, wanted: &[String]) -> Vec<Value> {
+    let chosen = knobs().filter(|knob| wanted.is_empty() || wanted.iter().any(|w| w == knob.name));
+    chosen
+        .flat_map(|knob| {
+            let values = (knob.values)(around).into_iter();
+            values.map(|value| Value {
+                stage: knob.stage,
+                time: (knob.time)(around, &value),
+                conflicts: knob.conflicts,
+                knob: knob.name,
+                value,
+            })
+        })
+        .collect()
+}
+
+/// The options that settings stand for, each once. Where two settings turn one option,
+/// their values are joined by a comma.
+pub(super) fn merged(settings: &[Setting]) -> Vec<Turn> {
+    joined(settings.iter().flat_map(|setting| {
+        let knob = knobs().find(|knob| knob.name == setting.knob);
+        knob.map_or(Vec::new(), |knob| (knob.turn)(&setting.value))
+    }))
+}
+
+fn joined(turns: impl Iterator<Item = Turn>) -> Vec<Turn> {
+    let mut merged: Vec<Turn> = Vec::new();
+    for (option, value) in turns {
+        match merged.iter_mut().find(|(known, _)| *known == option) {
+            Some((_, values)) => *values = format!("{values},{value}"),
+            None => merged.push((option, value)),
+        }
+    }
+    merged
+}
+
+/// These multiples of a count, rounded, without the count itself and without repeats.
+fn scaled(count: usize, factors: &[f64]) -> Vec<String> {
+    let mut values: Vec<String> = Vec::new();
+    for factor in factors {
+        let value = ((count as f64 * factor).round() as usize).max(1);
+        let text = value.to_string();
+        if value != count && !values.contains(&text) {
+            values.push(text);
+        }
+    }
+    values
+}
+
+fn owned(values: &[&str]) -> Vec<String> {
+    values.iter().map(|&value| value.to_owned()).collect()
+}
+
+fn others(values: &[&str], base: &str) -> Vec<String> {
+    let mut values = owned(values);
+    values.retain(|value| value != base);
+    values
+}
+
+/// The values of this table are numbers wherever one is needed.
+fn number(value: &str) -> f64 {
+    value.parse().unwrap_or(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn around() -> Around {
+        Around {
+            iterations: 700,
+            side: 400,
+            largest_side: 500,
+            max_splats: 12_000,
+            splats: 8_000,
+            sh_degree: 0,
+            adam: 150,
+            color: None,
+        }
+    }
+
+    fn of(around: &Around, knob: &str) -> Vec<String> {
+        let values = values(around, &[knob.to_owned()]);
+        values.into_iter().map(|value| value.value).collect()
+    }
+
+    #[test]
+    fn values_lie_around_the_base() {
+        let around = around();
+        assert_eq!(of(&around, "iterations"), ["350", "1400", "175"]);
+        assert_eq!(of(&around, "max-side"), ["300", "200"], "600 is no photo's");
+        assert_eq!(of(&around, "max-splats"), ["4000", "2000"]);
+        assert_eq!(of(&around, "sh-degree"), ["1", "2", "3"]);
+        let full = Around {
+            splats: 12_000,
+            ..around.clone()
+        };
+        assert_eq!(of(&full, "max-splats"), ["6000", "3000", "24000"]);
+        let tiny = Around { side: 20, ..around };
+        assert_eq!(
+            of(&tiny, "max-side"),
+            ["30"],
+            "15 is too small for fit; 10 too"
+        );
+    }
+
+    #[test]
+    fn colours_have_knobs_once_there_are_colours() {
+        let gray = values(&around(), &[]);
+        assert!(gray.iter().all(|value| value.stage == PointStage::Luma));
+        let mut colored = Around {
+            color: Some(ColorAround {
+                rounds: 4,
+                corrects_views: true,
+                teacher_size: Some(256),
+            }),
+            ..around()
+        };
+        assert_eq!(of(&colored, "rounds"), ["2", "8", "1"]);
+        assert_eq!(of(&colored, "until"), ["775", "1000"]);
+        assert_eq!(of(&colored, "teacher-size"), ["128", "384"]);
+        assert_eq!(of(&colored, "correct-views"), ["off"]);
+        if let Some(color) = &mut colored.color {
+            color.teacher_size = None;
+        }
+        assert!(of(&colored, "teacher-size").is_empty(), "a folder");
+    }
+
+    #[test]
+    fn times_are_guessed_relative_to_the_base() {
+        let all = values(&around(), &[]);
+        assert!(all.iter().all(|v| v.time > 0.0 && v.time < 5.0), "{all:?}");
+        let half = all.iter().find(|v| v.value == "350").expect("half");
+        assert_eq!(half.time, 0.5);
+    }
+
+    #[test]
+    fn an_option_is_given_once() {
+        let setting = |knob: &str, value: &str| Setting {
+            knob: knob.to_owned(),
+            value: value.to_owned(),
+        };
+        assert_eq!(
+            merged(&[setting("until", "775"), setting("scales", "1")]),
+            [
+                ("--solver", "adam".to_owned()),
+                ("--until", "775".to_owned()),
+                ("--scales", "1".to_owned())
+            ]
+        );
+        let two = [
+            ("--numbers", "a=1".to_owned()),
+            ("--numbers", "b=2".to_owned()),
+        ];
+        assert_eq!(
+            joined(two.into_iter()),
+            [("--numbers", "a=1,b=2".to_owned())]
+        );
+    }
+
+    #[test]
+    fn names_are_unique_and_conflicts_mutual() {
+        let mut names: Vec<&str> = knob_names().collect();
+        names.sort_unstable();
+        let count = names.len();
+        names.dedup();
+        assert_eq!(names.len(), count);
+        for knob in knobs() {
+            for other in knob.conflicts {
+                let other = knobs().find(|k| k.name == *other).expect("a knob");
+                assert!(other.conflicts.contains(&knob.name), "{}", knob.name);
+            }
+        }
+    }
+}

@@ -1,0 +1,163 @@
+//! `tradeoff.json`: what a sweep goes on from.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use super::FILES;
+use crate::{
+    report::tradeoff::{Phase, Point, Subject, TRADEOFF_VERSION, Tradeoff},
+    run::{RunError, files},
+};
+
+/// A sweep and its file.
+pub(super) struct State {
+    /// The file.
+    path: PathBuf,
+    /// What it holds.
+    pub sweep: Tradeoff,
+}
+
+impl State {
+    /// The sweep of a folder, or a new one. A base that failed is tried again.
+    ///
+    /// # Errors
+    /// [`RunError::File`] when the folder holds a sweep of something else.
+    pub fn open(folder: &Path, subject: Subject, budget: f64) -> Result<Self, RunError> {
+        let path = folder.join(FILES[1]);
+        let mut sweep = match fs::read_to_string(&path) {
+            Ok(text) => read(&text, &subject).map_err(|reason| RunError::File {
+                path: path.clone(),
+                reason,
+            })?,
+            Err(_) => Tradeoff {
+                version: TRADEOFF_VERSION,
+                program: env!("CARGO_PKG_VERSION").to_owned(),
+                subject,
+                device: None,
+                budget,
+                points: Vec::new(),
+            },
+        };
+        sweep.budget = budget;
+        let lost = |point: &Point| point.phase == Phase::Base && point.failed.is_some();
+        sweep.points.retain(|point| !lost(point));
+        Ok(Self { path, sweep })
+    }
+
+    /// Adds a point that has run.
+    pub fn add(&mut self, point: Point, device: Option<String>) {
+        self.sweep.points.push(point);
+        self.sweep.device = device.or(self.sweep.device.take());
+    }
+
+    /// Writes the file beside and renames.
+    pub fn write(&self) -> Result<(), RunError> {
+        files::write(&self.path, (self.sweep.to_json() + "\n").as_bytes())
+    }
+}
+
+/// A sweep of `subject`; else what is wrong and what to do.
+fn read(text: &str, subject: &Subject) -> Result<Tradeoff, String> {
+    const REMEDY: &str = "choose another folder with -o, or remove this one";
+    let sweep: Tradeoff =
+        serde_json::from_str(text).map_err(|error| format!("damaged ({error}): {REMEDY}"))?;
+    let there = &sweep.subject;
+    let differs = [
+        ("scene", there.scene != subject.scene),
+        ("preset", there.preset != subject.preset),
+        ("teacher", there.teacher != subject.teacher),
+        ("set of options of fit", there.options != subject.options),
+    ];
+    match differs.iter().find(|(_, differs)| *differs) {
+        Some((what, _)) => Err(format!("is a sweep with another {what}: {REMEDY}")),
+        None if sweep.version != TRADEOFF_VERSION => Err(format!(
+            "was written by gs-chroma {}: {REMEDY}",
+            sweep.program
+        )),
+        None => Ok(sweep),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::tradeoff::PointStage;
+
+    fn subject() -> Subject {
+        Subject {
+            scene: "/garden".to_owned(),
+            preset: "draft".to_owned(),
+            teacher: None,
+            options: vec!["--channel".to_owned(), "r".to_owned()],
+        }
+    }
+
+    fn point(name: &str, phase: Phase, failed: bool) -> Point {
+        Point {
+            name: name.to_owned(),
+            stage: PointStage::Luma,
+            phase,
+            settings: Vec::new(),
+            commands: Vec::new(),
+            took: 2.0,
+            failed: failed.then(|| "no memory".to_owned()),
+            outcome: None,
+        }
+    }
+
+    #[test]
+    fn a_sweep_goes_on_where_it_was() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mut state = State::open(folder.path(), subject(), 60.0).expect("new");
+        state.add(
+            point("base", Phase::Base, false),
+            Some("llvmpipe".to_owned()),
+        );
+        state.add(point("coarse-0.5", Phase::One, true), None);
+        state.write().expect("written");
+        let again = State::open(folder.path(), subject(), 90.0).expect("the same");
+        assert_eq!(again.sweep.points, state.sweep.points);
+        assert_eq!(again.sweep.device.as_deref(), Some("llvmpipe"));
+        assert_eq!((again.sweep.budget, again.sweep.spent()), (90.0, 4.0));
+    }
+
+    #[test]
+    fn a_base_that_failed_is_tried_again() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mut state = State::open(folder.path(), subject(), 60.0).expect("new");
+        state.add(point("base", Phase::Base, true), None);
+        state.write().expect("written");
+        let again = State::open(folder.path(), subject(), 60.0).expect("the same");
+        assert!(again.sweep.points.is_empty());
+    }
+
+    #[test]
+    fn another_subject_is_refused_with_a_remedy() {
+        let folder = tempfile::tempdir().expect("a folder");
+        State::open(folder.path(), subject(), 60.0)
+            .and_then(|state| state.write())
+            .expect("written");
+        let changes: [(&str, fn(&mut Subject)); 4] = [
+            ("scene", |s| s.scene.push('2')),
+            ("preset", |s| s.preset = "paper".to_owned()),
+            ("teacher", |s| s.teacher = Some("/t".to_owned())),
+            ("options", |s| s.options.clear()),
+        ];
+        for (what, change) in changes {
+            let mut other = subject();
+            change(&mut other);
+            let error = State::open(folder.path(), other, 60.0)
+                .err()
+                .expect("refused");
+            let error = error.to_string();
+            assert!(error.contains(what) && error.contains("-o"), "{error}");
+        }
+        fs::write(folder.path().join(FILES[1]), "{").expect("written");
+        let error = State::open(folder.path(), subject(), 60.0)
+            .err()
+            .expect("refused");
+        assert!(error.to_string().contains("damaged"), "{error}");
+    }
+}

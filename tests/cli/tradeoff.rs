@@ -1,0 +1,199 @@
+//! `tradeoff`: a sweep of tiny runs.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::process::Stdio;
+use std::thread;
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+
+use super::documented::{documented, keys};
+use super::program::Place;
+use super::shared::{onnx, place_with_scene};
+
+/// A sweep of `scene/` into `out/` whose points take a second or two.
+const QUICK: [&str; 12] = [
+    "tradeoff",
+    "scene",
+    "-o",
+    "out",
+    "--preset",
+    "draft",
+    "--iterations",
+    "4",
+    "--without",
+    "background",
+    "--budget",
+    "5",
+];
+
+fn sweep_in(place: &Place) -> Value {
+    serde_json::from_slice(&place.read("out/tradeoff.json")).expect("JSON")
+}
+
+fn points(sweep: &Value) -> &[Value] {
+    sweep["points"].as_array().expect("points")
+}
+
+fn names(sweep: &Value) -> Vec<&str> {
+    let names = points(sweep).iter().map(|point| point["name"].as_str());
+    names.map(|name| name.expect("a name")).collect()
+}
+
+#[test]
+fn a_sweep_in_gray_and_colour() {
+    let place = place_with_scene();
+    let teacher = onnx("ddcolor_tiny.onnx");
+    let knobs = ["--knobs", "densify,teacher-size,correct-views", "--json"];
+    let sweep = place.json(&[&QUICK[..], &["--teacher", &teacher], &knobs].concat());
+    assert_eq!(sweep, sweep_in(&place));
+    let names = names(&sweep);
+    assert_eq!(names[..2], ["base", "color"]);
+    for name in ["densify-relocate", "teacher-size-16", "teacher-size-48"] {
+        assert!(names.contains(&name), "{names:?}");
+    }
+    assert_eq!(names.iter().collect::<BTreeSet<_>>().len(), names.len());
+
+    for point in points(&sweep) {
+        let [name, outcome] = [&point["name"], &point["outcome"]];
+        // The network sees 32 pixels and no other size: the sweep went on after that.
+        let impossible = name.as_str().expect("a name").contains("teacher-size");
+        assert_eq!(outcome.is_null(), impossible, "{point}");
+        let reason = point["failed"].as_str().unwrap_or_default();
+        assert_eq!(reason.contains("--teacher-size"), impossible, "{point}");
+        if impossible {
+            continue;
+        }
+        let run = format!("out/points/{}", name.as_str().expect("a name"));
+        let report = place.report(&run);
+        assert_eq!(outcome["psnr"], report["luma"]["held_out"]["psnr"]);
+        assert_eq!(outcome["iterations"], report["luma"]["iterations"]);
+        assert_eq!(
+            outcome["delta_e"],
+            report["chroma"]["pictures"]["delta_e"]["mean"]
+        );
+        assert_eq!(outcome["consistency"].is_null(), point["stage"] == "luma");
+        let seconds = outcome["seconds"].as_object().expect("seconds");
+        let sum: f64 = (seconds.iter().filter(|(stage, _)| *stage != "total"))
+            .map(|(_, seconds)| seconds.as_f64().expect("a number"))
+            .sum();
+        assert!((sum - outcome["seconds"]["total"].as_f64().expect("a number")).abs() < 1e-9);
+        assert!(place.path(&run).join("views/00.png").is_file());
+    }
+    what_the_files_hold(&place, &sweep);
+    what_is_documented(&place, &sweep);
+
+    // All is done: the same again runs nothing, and prints the front.
+    let done = place.read("out/tradeoff.json");
+    let again = [&QUICK[..], &["--teacher", &teacher], &knobs[..2]].concat();
+    let printed = place.succeed(&again);
+    assert!(
+        printed.contains("| base ") && printed.contains("tradeoff.html"),
+        "{printed}"
+    );
+    assert!(place.read("out/tradeoff.json") == done);
+    // Another subject is refused.
+    let done = place.run(&[&QUICK[..], &["--channel", "r"]].concat());
+    assert_eq!(done.code, Some(1));
+    assert!(
+        done.stderr.contains("teacher") && done.stderr.contains("-o"),
+        "{}",
+        done.stderr
+    );
+}
+
+fn what_the_files_hold(place: &Place, sweep: &Value) {
+    let csv = String::from_utf8(place.read("out/tradeoff.csv")).expect("text");
+    let html = String::from_utf8(place.read("out/tradeoff.html")).expect("text");
+    assert_eq!(csv.lines().count(), 1 + points(sweep).len(), "{csv}");
+    for (name, row) in names(sweep).iter().zip(csv.lines().skip(1)) {
+        assert!(row.starts_with(&format!("{name},")), "{row}");
+        assert!(html.contains(&format!("id=\"point-{name}\"")), "{name}");
+    }
+    for piece in ["luma-0", "luma-1", "color-0", "color-1", "color-2"] {
+        assert!(
+            html.contains(&format!("Plotly.newPlot(\"{piece}\"")),
+            "{piece}"
+        );
+    }
+    // The photo, the points' pictures twice, on the page itself.
+    assert!(html.matches("data:image/jpeg;base64,").count() > points(sweep).len());
+    assert!(html.len() < 6_000_000 && !html.contains("<script src"));
+}
+
+fn what_is_documented(place: &Place, sweep: &Value) {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/tradeoff.md");
+    let page = fs::read_to_string(path).expect("the page");
+    assert_eq!(documented(&page, "## tradeoff.json"), keys(sweep));
+    let csv = String::from_utf8(place.read("out/tradeoff.csv")).expect("text");
+    let header = csv.lines().next().expect("a header");
+    let columns: BTreeSet<String> = header.split(',').map(str::to_owned).collect();
+    assert_eq!(documented(&page, "## tradeoff.csv"), columns);
+}
+
+#[test]
+fn a_sweep_that_was_killed_goes_on() {
+    let place = place_with_scene();
+    let arguments = [&QUICK[..], &["--knobs", "iterations"]].concat();
+    let mut command = place.command(&arguments);
+    command
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null());
+    let mut child = command.spawn().expect("the program starts");
+    let begun = Instant::now();
+    while !place.path("out/tradeoff.json").exists() {
+        assert!(begun.elapsed() < Duration::from_secs(60), "no point");
+        thread::sleep(Duration::from_millis(20));
+    }
+    // In the middle of the next point.
+    thread::sleep(Duration::from_millis(300));
+    child.kill().expect("killed");
+    child.wait().expect("gone");
+    let before = sweep_in(&place);
+    assert!(points(&before).len() < 4, "too late");
+    #[cfg(target_os = "linux")]
+    nobody_works_in(&place.path("out"));
+
+    let stderr = place.run(&arguments).stderr;
+    let after = sweep_in(&place);
+    assert_eq!(
+        names(&after),
+        ["base", "iterations-1", "iterations-2", "iterations-8"]
+    );
+    assert_eq!(points(&after)[..points(&before).len()], points(&before)[..]);
+    for name in names(&before) {
+        assert!(!stderr.contains(&format!("{name}: ")), "{stderr}");
+    }
+}
+
+/// The point that was running ends with its sweep.
+#[cfg(target_os = "linux")]
+fn nobody_works_in(folder: &std::path::Path) {
+    let folder = folder.to_string_lossy().into_owned();
+    let working = || {
+        let processes = fs::read_dir("/proc").expect("processes").flatten();
+        let commands = processes.filter_map(|p| fs::read(p.path().join("cmdline")).ok());
+        let commands: Vec<_> = commands
+            .map(|c| String::from_utf8_lossy(&c).into_owned())
+            .collect();
+        commands.iter().any(|command| command.contains(&folder))
+    };
+    let begun = Instant::now();
+    while working() {
+        assert!(begun.elapsed() < Duration::from_secs(5), "a point goes on");
+        thread::sleep(Duration::from_millis(20));
+    }
+}
+
+#[test]
+fn a_base_that_fails_ends_the_sweep() {
+    let place = place_with_scene();
+    let teacher = onnx("wrong_rank.onnx");
+    let done = place.run(&[&QUICK[..], &["--teacher", &teacher]].concat());
+    assert_eq!(done.code, Some(1), "{}", done.stderr);
+    let last = done.stderr.lines().last().expect("a line");
+    assert!(last.starts_with("error: color, which all"), "{last}");
+    assert!(last.contains("wrong_rank.onnx"), "{last}");
+}
