@@ -30,6 +30,10 @@ ERRORS = {
                   "together"]),
 }
 
+# The default's value of each knob that has several others: a line goes through them in order.
+DEFAULTS = {"alpha-min": 1 / 255, "transmittance-min": 1e-4, "depth-bits": 32, "ssim-window": 11}
+COLORS = {knob: f"C{number}" for number, knob in enumerate(ERRORS["gradient"][1])}
+
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -45,13 +49,13 @@ def main() -> None:
         of_subject = [row for row in rows if row["subject"] == subject]
         for axis, (key, (label, knobs)) in zip(line, ERRORS.items()):
             default = next(row for row in of_subject if row["knob"] == "default")
-            for number, knob in enumerate(knobs):
+            for knob in knobs:
                 points = [row for row in of_subject if row["knob"] == knob]
-                if len(points) > 1:
+                if knob in DEFAULTS:
                     points.append(default)
-                points.sort(key=lambda row: float(row["time"]))
+                    points.sort(key=lambda row: float(row["value"] or DEFAULTS[knob]))
                 axis.plot([float(p["time"]) for p in points], [float(p[key]) for p in points],
-                          marker="o", markersize=3, linewidth=0.8, color=f"C{number}", label=knob)
+                          marker="o", markersize=3, linewidth=0.8, color=COLORS[knob], label=knob)
                 for point in points:
                     if point is not default and knob != "together":
                         axis.annotate(point["value"], (float(point["time"]), float(point[key])),
