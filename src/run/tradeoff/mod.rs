@@ -19,7 +19,7 @@ use super::{Event, Observer, Preset, RunError, RunFolder, Stage, files, fit::ope
 use crate::{
     capture::{Capture, LoadOptions, split},
     effects::Overrules,
-    report::tradeoff::{Point, PointStage, Tradeoff, csv, page},
+    report::tradeoff::{Measure, Point, PointStage, Tradeoff, csv, page},
 };
 use knobs::Around;
 use pictures::Album;
@@ -163,10 +163,9 @@ fn in_words(point: &Point) -> String {
     match (&point.outcome, &point.failed) {
         (Some(outcome), _) => {
             let mut line = format!("{}: {:.1} s", point.name, outcome.seconds.total);
-            for &measure in crate::report::tradeoff::Measure::of(point.stage) {
+            for &measure in Measure::of(point.stage) {
                 if let Some(value) = measure.value(outcome) {
-                    let digits = measure.digits();
-                    line += &format!(", {} {value:.digits$}", measure.title());
+                    line += &format!(", {}", measure.in_words(value));
                 }
             }
             line
