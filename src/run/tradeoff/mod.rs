@@ -19,7 +19,7 @@ use super::{Event, Observer, Preset, RunError, RunFolder, Stage, files, fit::ope
 use crate::{
     capture::{Capture, LoadOptions, split},
     effects::Overrules,
-    report::tradeoff::{Measure, Point, PointStage, Tradeoff, csv, page},
+    report::tradeoff::{Measure, Phase, Point, PointStage, Tradeoff, csv, page},
 };
 use knobs::Around;
 use pictures::Album;
@@ -94,6 +94,12 @@ pub fn tradeoff(
                 reason,
             });
         }
+    }
+    if (state.sweep.points.iter()).all(|point| point.phase == Phase::Base) {
+        observe(Event::Note(format!(
+            "nothing but the base fits into {:.0} minutes: the same command with a larger --budget goes on from here",
+            options.budget / 60.0
+        )));
     }
     // An earlier start may have been stopped between its files.
     write(&folder, &state, &mut album)?;
