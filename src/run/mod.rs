@@ -112,7 +112,7 @@ pub enum RunError {
         reached: f64,
     },
     /// Nothing is held out, and quality cannot be weighed against time.
-    #[error("{}: no view is held out to measure on: name a folder with more photos", .0.display())]
+    #[error("{}: no view is held out to measure on: leave --no-holdout out, or name a folder with more photos", .0.display())]
     NothingToMeasure(PathBuf),
     /// What everything is compared with does not run.
     #[error("{point}, which all other points are compared with, failed: {reason}")]

@@ -212,15 +212,39 @@ impl Measure {
         }
     }
 
-    /// Name and unit.
-    pub fn title(self) -> &'static str {
+    /// Its name.
+    pub fn name(self) -> &'static str {
         match self {
-            Self::Psnr => "PSNR, dB",
+            Self::Psnr => "PSNR",
             Self::Ssim => "SSIM",
             Self::DeltaE => "ΔE00 to the photos",
-            Self::Consistency => "inconsistency between views, CIELAB units",
+            Self::Consistency => "inconsistency of views",
             Self::Colorfulness => "colourfulness",
         }
+    }
+
+    /// Its unit; empty where it has none or the name says it.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Psnr => "dB",
+            Self::Consistency => "a/b",
+            Self::Ssim | Self::DeltaE | Self::Colorfulness => "",
+        }
+    }
+
+    /// Name and unit, for axes and columns.
+    pub fn title(self) -> String {
+        match self.unit() {
+            "" => self.name().to_owned(),
+            unit => format!("{}, {unit}", self.name()),
+        }
+    }
+
+    /// A value in words.
+    pub fn in_words(self, value: f64) -> String {
+        let digits = self.digits();
+        let words = format!("{} {value:.digits$} {}", self.name(), self.unit());
+        words.trim_end().to_owned()
     }
 
     /// The figure of an outcome.

@@ -22,9 +22,11 @@ pub struct Pictures {
     pub points: BTreeMap<String, Vec<u8>>,
 }
 
-/// Shows the picture of the point under the pointer beside the photo.
+/// Fits the plots into their places, which they were drawn before, and shows the picture
+/// of the point under the pointer beside the photo.
 const SCRIPT: &str = r#"<script>
 for (const plot of document.querySelectorAll(".plotly-graph-div")) {
+  Plotly.Plots.resize(plot);
   plot.on("plotly_hover", (event) => {
     const name = event.points[0].customdata;
     const from = document.getElementById("point-" + name);
@@ -49,7 +51,7 @@ const STYLE: &str = "<style>
 .film .shown { border-bottom: 3px solid #3b6ea8; }
 .small img { display: block; width: 96px; border-radius: 3px; }
 td.small { padding: .25rem .4rem; }
-td.words { text-align: left; white-space: normal; min-width: 12rem; }
+th.words, td.words { text-align: left; white-space: normal; min-width: 12rem; }
 td.failed { color: #a33; }
 details code { display: block; max-width: 46rem; margin: .3rem 0; padding: .35rem .5rem; background: #f4f2ee; border-radius: 4px; font-size: .78rem; white-space: pre-wrap; overflow-wrap: anywhere; user-select: all; text-align: left; }
 summary { cursor: pointer; color: #3b6ea8; }
@@ -129,10 +131,9 @@ fn push_stage(html: &mut String, sweep: &Tradeoff, stage: PointStage, pictures: 
     }
     html.push_str("</div>\n");
     push_film(html, &sweep.front(stage, decisive), pictures);
-    for table in [front_table(sweep, stage), cost_table(sweep, stage)] {
-        if let Some(table) = table {
-            push_table(html, &table);
-        }
+    let tables = [front_table(sweep, stage), cost_table(sweep, stage)];
+    for table in tables.iter().flatten() {
+        push_table(html, table);
     }
     html.push_str("</section>\n");
 }
@@ -188,11 +189,17 @@ fn push_points(html: &mut String, sweep: &Tradeoff, stage: PointStage, pictures:
     };
     let _ = write!(
         html,
-        "<h2>{title}</h2>\n<div class=\"scroll\"><table>\n<thead><tr><th></th><th>point</th><th>seconds</th>"
+        "<h2>{title}</h2>\n<div class=\"scroll\"><table>\n<thead><tr><th></th><th class=\"words\">point</th><th>seconds</th>"
     );
-    let titles = measures.iter().map(|measure| measure.title());
-    let heads = stages.iter().copied().chain(titles);
-    for head in heads.chain(["Gaussians", "device MiB", "host MiB", ""]) {
+    let owned = |words: &[&str]| {
+        words
+            .iter()
+            .map(|&word| word.to_owned())
+            .collect::<Vec<_>>()
+    };
+    let titles = measures.iter().map(|measure| measure.title()).collect();
+    let rest = owned(&["Gaussians", "device MiB", "host MiB", ""]);
+    for head in [owned(stages), titles, rest].concat() {
         let _ = write!(html, "<th>{head}</th>");
     }
     html.push_str("</tr></thead>\n<tbody>\n");

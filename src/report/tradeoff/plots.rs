@@ -97,9 +97,10 @@ pub(super) fn plot(id: &str, sweep: &Tradeoff, stage: PointStage, measure: Measu
         let hover = points.iter().map(|point| in_words(point, base)).collect();
         let names: Vec<String> = points.iter().map(|point| point.name.clone()).collect();
         let on_front = |point: &&Point| front.iter().any(|found| found.name == point.name);
-        let sizes = points.iter().map(|point| match on_front(point) {
-            true => 12,
-            false => 8,
+        let sizes = points.iter().map(|point| match point.phase {
+            Phase::Base => 15,
+            _ if on_front(point) => 12,
+            _ => 8,
         });
         let symbol = match points[0].phase {
             Phase::Base => MarkerSymbol::Star,
@@ -126,7 +127,7 @@ pub(super) fn plot(id: &str, sweep: &Tradeoff, stage: PointStage, measure: Measu
         Configuration::new()
             .responsive(true)
             .display_logo(false)
-            .display_mode_bar(DisplayModeBar::Hover),
+            .display_mode_bar(DisplayModeBar::False),
     );
     plot.to_inline_html(Some(id))
 }
@@ -153,7 +154,7 @@ fn layout(measure: Measure) -> Layout {
     };
     Layout::new()
         .x_axis(axis("seconds").range_mode(RangeMode::ToZero))
-        .y_axis(axis(measure.title()))
+        .y_axis(axis(&measure.title()))
         .font(
             Font::new()
                 .family("system-ui, sans-serif")
@@ -198,7 +199,7 @@ fn in_words(point: &Point, base: Option<&Point>) -> String {
         let change = (against.and_then(|base| measure.value(base))).map_or(String::new(), |base| {
             format!(" ({:+.digits$})", value - base)
         });
-        lines.push(format!("{} {value:.digits$}{change}", measure.title()));
+        lines.push(measure.in_words(value) + &change);
     }
     lines.push(format!("{} Gaussians", outcome.splats));
     lines.join("<br>")

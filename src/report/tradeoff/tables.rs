@@ -29,7 +29,7 @@ pub fn front_table(sweep: &Tradeoff, stage: PointStage) -> Option<Table> {
         },
         head: head.chain(titles(&measures)).collect(),
         rows: rows.collect(),
-        notes: vec![format!("By {}.", decisive.title())],
+        notes: vec![format!("By {}.", decisive.name())],
     })
 }
 
@@ -107,12 +107,12 @@ fn change(measure: Measure, outcome: &Outcome, base: &Outcome) -> String {
 }
 
 fn titles(measures: &[Measure]) -> impl Iterator<Item = String> {
-    measures.iter().map(|measure| measure.title().to_owned())
+    measures.iter().map(|measure| measure.title())
 }
 
 fn base_in_words(measures: &[Measure], base: &Outcome) -> String {
     let figures: Vec<String> = (measures.iter())
-        .map(|&measure| format!("{} {}", measure.title(), figure(measure, base)))
+        .filter_map(|&measure| Some(measure.in_words(measure.value(base)?)))
         .collect();
     format!(
         "Relative to the base: {:.1} s, {}.",

@@ -1,9 +1,12 @@
 //! What can be turned, and how far around the preset.
 
 use super::space::Value;
-use crate::report::{
-    Report,
-    tradeoff::{PointStage, Setting},
+use crate::{
+    chroma::ChromaSettings,
+    report::{
+        Report,
+        tradeoff::{PointStage, Setting},
+    },
 };
 
 /// An option of `fit` or `colorize` and its value.
@@ -76,7 +79,8 @@ impl Around {
     /// With what the coloured base's report says.
     pub fn colored(mut self, base: &Report) -> Self {
         self.color = base.chroma.as_ref().map(|chroma| ColorAround {
-            rounds: chroma.iterations,
+            // The base is coloured by the default solver.
+            rounds: ChromaSettings::irls().rounds,
             corrects_views: chroma.corrects_views,
             teacher_size: (chroma.teacher.as_ref())
                 .and_then(|teacher| teacher.input_size)

@@ -19,7 +19,7 @@ use super::{Event, Observer, Preset, RunError, RunFolder, Stage, files, fit::ope
 use crate::{
     capture::{Capture, LoadOptions, split},
     effects::Overrules,
-    report::tradeoff::{Point, PointStage, Tradeoff, csv, page},
+    report::tradeoff::{Measure, Phase, Point, PointStage, Tradeoff, csv, page},
 };
 use knobs::Around;
 use pictures::Album;
@@ -95,6 +95,12 @@ pub fn tradeoff(
             });
         }
     }
+    if (state.sweep.points.iter()).all(|point| point.phase == Phase::Base) {
+        observe(Event::Note(format!(
+            "nothing but the base fits into {:.0} minutes: the same command with a larger --budget goes on from here",
+            options.budget / 60.0
+        )));
+    }
     // An earlier start may have been stopped between its files.
     write(&folder, &state, &mut album)?;
     Ok((folder, state.sweep))
@@ -163,10 +169,9 @@ fn in_words(point: &Point) -> String {
     match (&point.outcome, &point.failed) {
         (Some(outcome), _) => {
             let mut line = format!("{}: {:.1} s", point.name, outcome.seconds.total);
-            for &measure in crate::report::tradeoff::Measure::of(point.stage) {
+            for &measure in Measure::of(point.stage) {
                 if let Some(value) = measure.value(outcome) {
-                    let digits = measure.digits();
-                    line += &format!(", {} {value:.digits$}", measure.title());
+                    line += &format!(", {}", measure.in_words(value));
                 }
             }
             line

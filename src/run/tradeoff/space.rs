@@ -98,7 +98,15 @@ pub(super) fn expected(
     let factors = settings
         .iter()
         .map(|setting| factor(space, points, stage, own, setting));
-    Some((base.took - own).max(0.0) + own * factors.product::<f64>())
+    // Only the base, and whoever sees photos at another size, asks the teacher.
+    let asks = settings
+        .iter()
+        .any(|setting| setting.knob == "teacher-size");
+    let saved = match (stage, &base.outcome) {
+        (PointStage::Color, Some(outcome)) if !asks => outcome.seconds.teacher,
+        _ => 0.0,
+    };
+    Some((base.took - own - saved).max(0.0) + own * factors.product::<f64>())
 }
 
 fn factor(space: &Space, points: &[Point], stage: PointStage, base: f64, turned: &Setting) -> f64 {

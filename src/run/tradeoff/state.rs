@@ -139,7 +139,8 @@ mod tests {
         State::open(folder.path(), subject(), 60.0)
             .and_then(|state| state.write())
             .expect("written");
-        let changes: [(&str, fn(&mut Subject)); 4] = [
+        type Change = (&'static str, fn(&mut Subject));
+        let changes: [Change; 4] = [
             ("scene", |s| s.scene.push('2')),
             ("preset", |s| s.preset = "paper".to_owned()),
             ("teacher", |s| s.teacher = Some("/t".to_owned())),
