@@ -71,7 +71,9 @@ def main() -> int:
 
     for scene in arguments.scenes:
         preset = ["--preset", arguments.preset]
-        base = row(scene, f"`{' '.join(preset)}`", preset, lambda report, seconds: "")
+        base = {}
+        if shares or flats:
+            base = row(scene, f"`{' '.join(preset)}`", preset, lambda report, seconds: "")
         for limit in limits:
             row(
                 scene,

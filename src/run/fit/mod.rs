@@ -214,7 +214,8 @@ pub(super) fn comments(options: RasterOptions) -> Vec<String> {
 
 fn choose_preset(options: &FitOptions, gpu: &Gpu, observe: &mut Observer<'_>) -> Preset {
     options.preset.unwrap_or_else(|| {
-        if gpu.is_software() && options.time_limit.is_none() {
+        let goal = options.time_limit.or(options.target_psnr);
+        if gpu.is_software() && goal.is_none() {
             observe(Event::Note(format!(
                 "{} has no GPU behind it: preset draft (--preset paper overrules)",
                 gpu.info().name

@@ -1,0 +1,123 @@
+"""Draws the fronts of several sweeps beside each other and prints what each knob costs:
+docs/images/fronts.svg and the tables of docs/accuracy-and-time.md.
+
+    gs-chroma tradeoff SCENE -o runs/SCENE-tradeoff          # for each scene
+    python3 tools/plot_fronts.py runs/*-tradeoff/tradeoff.csv -o docs/images/fronts.svg
+
+Needs matplotlib (tools/requirements.txt). For one scene `tradeoff` draws a page by itself.
+"""
+
+import argparse
+import csv
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("svg")
+import matplotlib.pyplot as plt  # noqa: E402
+
+# Stages with the measure of each, whether more of it is better, its unit, its digits.
+STAGES = {
+    "luma": ("psnr_db", True, "held-out PSNR, dB", 2),
+    "color": ("delta_e00", False, "held-out ΔE00", 2),
+}
+
+
+def number(text):
+    return float(text) if text else None
+
+
+def read(path, stage):
+    """The points of a stage that did not fail: what was turned, seconds, measure, SSIM."""
+    measure = STAGES[stage][0]
+    with open(path, newline="", encoding="utf-8") as file:
+        rows = [row for row in csv.DictReader(file) if row["stage"] == stage and not row["failed"]]
+    points = [
+        {
+            "settings": row["settings"] or "base",
+            "phase": row["phase"],
+            "seconds": float(row["seconds"]),
+            "quality": number(row[measure]),
+            "ssim": number(row["ssim"]),
+            "splats": int(row["splats"]),
+        }
+        for row in rows
+    ]
+    return [point for point in points if point["quality"] is not None]
+
+
+def front(points, more):
+    """Those than which none is both faster and better, by time."""
+    best, kept = None, []
+    for point in sorted(points, key=lambda p: (p["seconds"], -p["quality"] if more else p["quality"])):
+        if best is None or (point["quality"] > best if more else point["quality"] < best):
+            best = point["quality"]
+            kept.append(point)
+    return kept
+
+
+def scene_of(path):
+    return Path(path).parent.name.removesuffix("-tradeoff")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("csv", nargs="+")
+    parser.add_argument("--stage", choices=STAGES, default="luma")
+    parser.add_argument("-o", "--output", required=True)
+    arguments = parser.parse_args()
+    _, more, label, digits = STAGES[arguments.stage]
+    sweeps = {scene_of(path): read(path, arguments.stage) for path in arguments.csv}
+    sweeps = {scene: points for scene, points in sweeps.items() if points}
+
+    knobs = sorted({p["settings"].split("=")[0] for ps in sweeps.values() for p in ps if p["phase"] == "one"})
+    colors = {knob: f"C{index % 10}" for index, knob in enumerate(knobs)}
+    marks = {knob: "os^vD<>ph*"[index // 10 % 10] for index, knob in enumerate(knobs)}
+    figure, panels = plt.subplots(1, len(sweeps), figsize=(4.6 * len(sweeps), 4.4), squeeze=False)
+    for panel, (scene, points) in zip(panels[0], sweeps.items()):
+        line = front(points, more)
+        panel.plot([p["seconds"] for p in line], [p["quality"] for p in line], "-", color="0.6", zorder=1, drawstyle="steps-post")
+        for point in points:
+            knob = point["settings"].split("=")[0] if point["phase"] == "one" else None
+            color = colors.get(knob, "black" if point["phase"] == "base" else "0.5")
+            mark = marks.get(knob, "X" if point["phase"] == "base" else "+")
+            panel.plot(point["seconds"], point["quality"], mark, color=color, markersize=7, label=knob or {"front": "combinations"}.get(point["phase"], point["phase"]))
+            if knob:
+                # Which knob, the colour says.
+                value = point["settings"].split("=")[1]
+                at = point["seconds"], point["quality"]
+                panel.annotate(value, at, textcoords="offset points", xytext=(6, -10), fontsize=7)
+        panel.set_title(scene)
+        panel.set_xlim(left=0)
+        panel.margins(0.08)
+        panel.set_xlabel("seconds")
+        panel.grid(True, which="both", alpha=0.25)
+        if not more:
+            panel.invert_yaxis()
+    panels[0][0].set_ylabel(label)
+    unique = {}
+    for panel in panels[0]:
+        for handle, name in zip(*panel.get_legend_handles_labels()):
+            unique.setdefault(name, handle)
+    figure.legend(unique.values(), unique.keys(), loc="lower center", ncols=min(len(unique), 9), fontsize=8)
+    figure.tight_layout(rect=(0, 0.07, 1, 1))
+    figure.savefig(arguments.output, metadata={"Date": None})
+
+    for scene, points in sweeps.items():
+        base = next(p for p in points if p["phase"] == "base")
+        line = front(points, more)
+        print(f"\n**{scene}**, base {base['seconds']:.0f} s, {base['quality']:.{digits}f}\n")
+        print(f"| point | time, base = 1 | {label} | to the base | Gaussians | on the front |")
+        print("|---|--:|--:|--:|--:|---|")
+        for point in sorted(points, key=lambda p: p["seconds"]):
+            ratio = point["seconds"] / base["seconds"]
+            change = point["quality"] - base["quality"]
+            mark = "yes" if point in line else ""
+            print(
+                f"| {point['settings']} | {ratio:.2f} | {point['quality']:.{digits}f} "
+                f"| {change:+.{digits}f} | {point['splats']:,} | {mark} |"
+            )
+
+
+if __name__ == "__main__":
+    main()
