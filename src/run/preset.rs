@@ -37,6 +37,19 @@ pub(super) struct Amounts {
 }
 
 impl Amounts {
+    /// The level of [`Self::SKETCH`].
+    pub const LOWEST: f64 = -0.5;
+
+    /// The least work that makes a scene. With fewer iterations there is none yet, so time
+    /// is saved on Gaussians and pixels (docs/accuracy-and-time.md).
+    pub const SKETCH: Self = Self {
+        iterations: 350,
+        until: 500,
+        max_splats: 3_000,
+        max_side: Some(240),
+        sh_degree: 0,
+    };
+
     /// What there is room for.
     pub fn room(&self) -> Room {
         Room {
@@ -60,11 +73,13 @@ impl Preset {
         Self::ALL[(level.max(0.0) as usize).min(2)]
     }
 
-    /// Amounts between the presets, or below the first: for equal steps of the level they
-    /// grow by the same factor. `longest` is the longer side of the photos as they are.
+    /// Amounts at a level from [`Amounts::LOWEST`] to 2: those of a preset at its own level,
+    /// and between two for equal steps each grown by the same factor. `longest` is the longer
+    /// side of the photos as they are.
     pub(super) fn at_level(level: f64, longest: u32) -> Amounts {
         let [draft, balanced, paper] = Self::ALL.map(Self::amounts);
         let (from, to, share) = match level {
+            _ if level < 0.0 => (Amounts::SKETCH, draft, 1.0 - level / Amounts::LOWEST),
             _ if level < 1.0 => (draft, balanced, level),
             _ => (balanced, paper, level - 1.0),
         };
@@ -80,7 +95,7 @@ impl Preset {
             until: between(&|a| a.until as f64) as usize,
             max_splats: between(&|a| a.max_splats as f64) as usize,
             max_side: Some(between(&side) as u32),
-            sh_degree: degree.max(0.0) as u32,
+            sh_degree: degree as u32,
         }
     }
 

@@ -1,9 +1,8 @@
 //! How much work there is time for.
 //!
-//! The presets are points of one family: from `draft` (level 0) over `balanced` (1) to
-//! `paper` (2) iterations, Gaussians and pixels grow together, each by the same factor for
-//! equal steps. That is what docs/accuracy-and-time.md finds to be the front, as near as one
-//! family comes to it.
+//! The presets are points of one family: from a sketch over `draft` (level 0) and `balanced`
+//! (1) to `paper` (2) iterations, Gaussians and pixels grow together, between two of these
+//! each by the same factor for equal steps.
 
 use std::sync::Arc;
 
@@ -19,8 +18,8 @@ use crate::{
     raster::Raster,
 };
 
-/// Where a family begins: half `draft`'s side, a third of its iterations.
-const LOWEST: f64 = -0.5;
+/// Where a family begins.
+const LOWEST: f64 = Amounts::LOWEST;
 
 /// Between two levels that are rehearsed.
 const STEP: f64 = 0.5;

@@ -6,7 +6,7 @@ use super::{
     goal::Family,
 };
 
-/// The first attempt: half of `draft`'s iterations.
+/// The first attempt: less than `draft`.
 const FIRST: f64 = -0.3;
 
 /// From one attempt to the next iterations double and Gaussians become three times as many,

@@ -381,7 +381,7 @@ mod tests {
         assert_eq!(
             commands[0].join(" "),
             "fit /my scene -o /out/points/here --channel r --normalize=-1,2 \
-             --without background --max-side 48"
+             --without background --max-side 48 --measure-side 64"
         );
         assert_eq!(commands[1][0], "render");
         assert_eq!(commands.len(), 2);
