@@ -46,7 +46,7 @@ fn what_is_off_is_in_no_kernel() {
     );
     assert_eq!(
         beyond(shaders::LUMA_LOSS_MASKED),
-        ["mask", "weight", "weight_quad"]
+        ["mask", "weight", "weight_quad", "weight_run"]
     );
     for word in ["mask", "weight(", "gain", "parameters"] {
         assert!(!shaders::LUMA_LOSS.contains(word), "{word}");
