@@ -75,6 +75,16 @@ impl Demand {
         }
     }
 
+    /// What is asked for when views by these cameras are looked at besides; their photos
+    /// stay on the host.
+    pub fn watching<'a>(mut self, cameras: impl Iterator<Item = &'a Camera>) -> Self {
+        for camera in cameras {
+            let pixels = ViewUniform::new(camera, 1.0, 0, 0).pixel_count() as u64;
+            self.max_pixels = self.max_pixels.max(pixels);
+        }
+        self
+    }
+
     fn parameters(&self) -> f64 {
         (GEOMETRY_PLANES + sh::coefficient_count(self.sh_degree)) as f64
     }

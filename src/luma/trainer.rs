@@ -97,8 +97,8 @@ pub struct LumaTrainer {
     /// Iteration at which the present workspace began to count steps.
     base: usize,
     pace: Pace,
-    /// Iterations that the schedule began with.
-    planned: usize,
+    /// Iterations that a run with time left may take.
+    longest: usize,
     watch: Watch,
     /// Sums over the reports of what [`Self::load`] averages.
     seen: Load,
@@ -134,7 +134,7 @@ impl LumaTrainer {
         let (mut max_pixels, mut max_tiles) = (0, 0);
         let (mut cameras, mut grays, mut masks) = (Vec::new(), Vec::new(), Vec::new());
         let (count, settings_robust) = (views.len(), settings.robust);
-        let planned = settings.schedule.iterations;
+        let longest = ends::LONGER * settings.schedule.iterations;
         let exposures: Vec<Exposure> = views.iter().map(|view| view.exposure).collect();
         let coarse: Vec<TrainingView> = match settings.schedule.coarse_until {
             0 => Vec::new(),
@@ -202,7 +202,7 @@ impl LumaTrainer {
             demand,
             base: 0,
             pace: Pace::default(),
-            planned,
+            longest,
             watch: Watch::default(),
             seen: Load::default(),
             reports: 0,

@@ -13,7 +13,7 @@ use crate::{
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Preset {
-    /// Small photos, few Gaussians: two minutes for twenty photos on two processor cores.
+    /// Small photos, few Gaussians: 108 s for 18 photos on two processor cores.
     Draft,
     /// About half the paper's work, for a GPU.
     Balanced,

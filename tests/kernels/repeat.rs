@@ -269,6 +269,36 @@ fn a_flat_curve_ends_a_training() {
     assert!(same(&run(Some(100.0)).0, &first));
 }
 
+/// A time limit moves the end either way, and what is flat ends whatever time is left.
+#[test]
+fn a_time_limit_moves_the_end() {
+    let [start, target] = start_and_target();
+    let ends = |limit, flat| {
+        let mut settings = LumaSettings {
+            time_limit: Some(limit),
+            flat,
+            ..settings(&start)
+        };
+        settings.schedule = Schedule::of(160);
+        settings.max_splats = start.len();
+        let mut trainer =
+            LumaTrainer::new(raster(), settings, 4.0, &start, photos(&target)).unwrap();
+        trainer.watch(photos(&target)).unwrap();
+        let mut last = 0;
+        trainer
+            .train(&mut |progress| last = progress.iteration)
+            .unwrap();
+        let schedule = &trainer.settings().schedule;
+        assert_eq!(last, schedule.iterations);
+        assert!(schedule.settle_from <= schedule.iterations);
+        last
+    };
+    assert!(ends(0.0, None) < 110);
+    assert_eq!(ends(1e9, None), 480);
+    // The first look after a quarter of 480, and a fifth of that to settle.
+    assert_eq!(ends(1e9, Some(100.0)), 150);
+}
+
 /// Gaussians behind every camera change nothing but the room that the lists
 /// begin with: with them nothing overflows, without them every near view does.
 #[test]

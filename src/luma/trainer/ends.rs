@@ -5,7 +5,7 @@ use crate::luma::curve::gain_of_doubling;
 
 /// A run with time left takes at most so many times its iterations: beyond, a larger set
 /// or larger photos would have been worth more.
-const LONGER: usize = 3;
+pub(super) const LONGER: usize = 3;
 
 /// No curve is called flat within this share of the iterations: the set still grows.
 const FLAT_FROM: f64 = 0.25;
@@ -25,7 +25,7 @@ impl LumaTrainer {
         let share = growing as f64 / left as f64;
         if let Some(end) = self.pace.end(limit, growth.max(1.0), share) {
             // The last iteration is one that is reported, so it is still to come.
-            let end = end.min(LONGER * self.planned).max(iteration + 1);
+            let end = end.min(self.longest).max(iteration + 1);
             self.settings.schedule.end_at(end, iteration);
         }
     }
@@ -38,6 +38,8 @@ impl LumaTrainer {
         let flat = |threshold: f64| gain.is_some_and(|gain| gain < threshold);
         if self.settings.flat.is_some_and(flat) && !early && iteration < schedule.settle_from {
             self.settings.schedule.settle_at(iteration);
+            // Time that is left is no reason to go on.
+            self.longest = self.settings.schedule.iterations;
         }
     }
 }

@@ -63,8 +63,8 @@ impl LumaTrainer {
     /// trained, but takes time.
     ///
     /// # Errors
-    /// [`GpuError::TooLarge`] when a view is larger than those trained on and the adapter
-    /// cannot hold it.
+    /// [`GpuError::TooLarge`] or [`GpuError::OverLimit`] when a view is larger than those
+    /// trained on and the adapter or the memory limit cannot hold it.
     pub fn watch(&mut self, views: Vec<TrainingView>) -> Result<(), GpuError> {
         let before = [self.max_pixels, self.max_tiles];
         for view in &views {
@@ -72,6 +72,7 @@ impl LumaTrainer {
             self.max_pixels = self.max_pixels.max(uniform.pixel_count());
             self.max_tiles = self.max_tiles.max(uniform.tile_count());
         }
+        self.demand = self.demand.watching(views.iter().map(|view| &view.camera));
         if before != [self.max_pixels, self.max_tiles] {
             let capacity = self.workspace().lists.capacity;
             self.rebuild(capacity, self.base)?;

@@ -235,7 +235,9 @@ impl Job<'_> {
         let (scene, limit) = (self.scene, self.options.memory_limit);
         let ignores = plan.has(Effect::Masks) || plan.has(Effect::Robust);
         let cameras = scene.split.train.iter().map(|&i| &scene.photos[i].1);
-        let demand = Demand::of(cameras, ignores, settings.sh_degree, limit);
+        let watched = self.watched();
+        let demand = Demand::of(cameras, ignores, settings.sh_degree, limit)
+            .watching(watched.iter().map(|&i| &scene.photos[i].1));
         let binding = self.gpu.binding_limit();
         let fits = demand.largest_set(limit, binding);
         if fits == 0 {
@@ -273,11 +275,17 @@ impl Job<'_> {
     }
 
     /// A few of the views that are measured, evenly spread.
-    fn watched_views(&self, plan: &Plan) -> Vec<TrainingView> {
+    /// The photos whose views training is watched by.
+    fn watched(&self) -> Vec<usize> {
         let measured = self.scene.measured().1;
         let count = measured.len().min(WATCHED);
-        let view = |k: usize| {
-            let i = measured[k * measured.len() / count];
+        (0..count)
+            .map(|k| measured[k * measured.len() / count])
+            .collect()
+    }
+
+    fn watched_views(&self, plan: &Plan) -> Vec<TrainingView> {
+        let view = |i: usize| {
             let (photo, camera) = &self.scene.photos[i];
             TrainingView {
                 camera: camera.clone(),
@@ -286,7 +294,7 @@ impl Job<'_> {
                 exposure: plan.exposures[i],
             }
         };
-        (0..count).map(view).collect()
+        self.watched().into_iter().map(view).collect()
     }
 }
 

@@ -9,8 +9,8 @@ use super::{
 /// The first attempt: less than `draft`.
 const FIRST: f64 = -0.3;
 
-/// From one attempt to the next iterations double and Gaussians become three times as many,
-/// so that all attempts before the last take less than it.
+/// From one attempt to the next; from `draft` on iterations double and Gaussians become three
+/// times as many, so that those before the last take no longer than it.
 const STEP: f64 = 0.3;
 
 /// An attempt that brings less than this, in dB, was worth nothing: a further one would not be.
