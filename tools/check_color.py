@@ -39,6 +39,8 @@ BAKE = (1.0, 3.0)
 # What `--ablation` tries: a name and colorize's flags.
 VARIANTS = {
     "as it is": "",
+    "small answers": "",
+    "small answers, guided off": "--upsample bilinear",
     "robust off": "--robust off",
     "correction off": "--correct-views off",
     "robust and correction off": "--robust off --correct-views off",
@@ -49,6 +51,9 @@ VARIANTS = {
     "degree 3": "--sh-degree 3",
     "Adam, 150 iterations": "--solver adam --until {until}",
 }
+
+# Answers of this side have to be enlarged, as a network's have to be.
+SMALL_SIDE = SIDE // 4
 
 HEAD = [
     "scene",
@@ -71,6 +76,16 @@ def run(command: list[str]) -> tuple[str, float]:
     begun = time.monotonic()
     done = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True)
     return done.stdout, time.monotonic() - begun
+
+
+def fitted(program: str, scene: Path, out: Path, iterations: int) -> None:
+    """Fits a scene, unless that was done before."""
+    if not (out / "luma.ply").is_file():
+        run(
+            [program, "fit", str(scene), "-o", str(out), "--preset", "draft"]
+            + ["--max-side", str(SIDE), "--max-splats", str(SCENES[scene.name])]
+            + ["--iterations", str(iterations)]
+        )
 
 
 def by_method(scores: list[dict]) -> dict[str, dict]:
@@ -139,10 +154,21 @@ def line(cells: list[str]) -> None:
     print("| " + " | ".join(cells) + " |", flush=True)
 
 
-def ablation(program: str, scene: str, out: Path) -> None:
+def unsteady(photos: Path, out: Path, side: int) -> Path:
+    """The folder of an unsteady teacher, made if it is not there."""
+    if not out.is_dir():
+        script = [sys.executable, str(TOOLS / "unsteady_teacher.py"), str(photos)]
+        run([*script, "-o", str(out), "--max-side", str(side)])
+    return out
+
+
+def ablation(program: str, scene: str, photos: Path, out: Path) -> None:
     """A row for each variant, of the exported file."""
-    teacher = str(out / "unsteady")
     for name, flags in VARIANTS.items():
+        if name.startswith("small answers"):
+            teacher = str(unsteady(photos, out / "unsteady-small", SMALL_SIDE))
+        else:
+            teacher = str(unsteady(photos, out / "unsteady", SIDE))
         luma = json.loads((out / "run" / "report.json").read_text())["luma"]
         flags = flags.format(until=luma["iterations"] + 150)
         asked = [str(out / "run"), "--teacher", teacher]
@@ -184,22 +210,20 @@ def main() -> int:
             print(f"{folder} is not there: skipped", file=sys.stderr)
             continue
         out = arguments.output / scene
-        if not (out / "run" / "luma.ply").is_file():
-            run(
-                [program, "fit", str(folder), "-o", str(out / "run"), "--preset", "draft"]
-                + ["--max-side", str(SIDE), "--max-splats", str(SCENES[scene])]
-                + ["--iterations", str(arguments.iterations)]
-            )
-        unsteady = out / "unsteady"
-        if "unsteady" in arguments.teachers and not unsteady.is_dir():
-            script = [sys.executable, str(TOOLS / "unsteady_teacher.py")]
-            run([*script, str(folder / "images"), "-o", str(unsteady), "--max-side", str(SIDE)])
+        fitted(program, folder, out / "run", arguments.iterations)
+        photos = folder / "images"
         if arguments.ablation:
-            ablation(program, scene, out)
+            ablation(program, scene, photos, out)
             continue
-        paths = {"oracle": folder / "images", "unsteady": unsteady, "network": arguments.network}
         for teacher in arguments.teachers:
-            asked = [str(out / "run"), "--teacher", str(paths[teacher])]
+            match teacher:
+                case "oracle":
+                    path = photos
+                case "unsteady":
+                    path = unsteady(photos, out / "unsteady", SIDE)
+                case _:
+                    path = arguments.network
+            asked = [str(out / "run"), "--teacher", str(path)]
             colorize = [program, "colorize", *asked, *shlex.split(arguments.colorize)]
             _, seconds = run(colorize)
             measure = [program, "eval", *asked, "--baselines", "--json"]

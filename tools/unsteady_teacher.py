@@ -7,6 +7,10 @@ Every photo keeps its L*. Its saturation is multiplied by a number between 0.6 a
 are shifted by normal numbers of standard deviation 8, and three rectangles of 15 to 25 % of a side
 get a wrong colour. Numbers depend on the seed and the photo's place among the names. Needs numpy
 and Pillow.
+
+`--mean` makes a teacher that agrees with itself instead: every photo has the saturation and the
+cast that those in training have on average, and no patch. No more than that can be learned from
+the unsteady one.
 """
 
 from __future__ import annotations
@@ -23,16 +27,29 @@ SATURATION = (0.6, 1.1)
 SHIFT = 8.0
 PATCHES = 3
 PATCH_SIDE = (0.15, 0.25)
+# Photos 0, 8, 16, … are held out by `fit`: what is said of them teaches nothing.
+HOLDOUT_STEP = 8
 # A wrong colour is as strong as a real one, and of any hue.
 PATCH_CHROMA = (20.0, 60.0)
 
 
-def unsteady(rgb: Array, chance: np.random.Generator, shift: float, patches: int) -> Array:
+def whim(chance: np.random.Generator, shift: float) -> Array:
+    """A view's saturation and the cast of its a and b."""
+    saturation = chance.uniform(*SATURATION)
+    return np.array([saturation, *chance.normal(0.0, shift, 2)])
+
+
+def mean_whim(seed: int, count: int, shift: float) -> Array:
+    """The mean over those of `count` views that are not held out, or over all if they are few."""
+    learned = [index for index in range(count) if index % HOLDOUT_STEP] if count > 2 else range(count)
+    return np.mean([whim(np.random.default_rng([seed, index]), shift) for index in learned], axis=0)
+
+
+def coloured(rgb: Array, whim: Array, patches: int, chance: np.random.Generator) -> Array:
     """An sRGB picture (height, width, 3) in [0, 1] with colours as of a whim."""
     lab = rgb_to_lab(rgb)
     height, width = lab.shape[:2]
-    lab[..., 1:] *= chance.uniform(*SATURATION)
-    lab[..., 1:] += chance.normal(0.0, shift, 2)
+    lab[..., 1:] = lab[..., 1:] * whim[0] + whim[1:]
     for _ in range(patches):
         w, h = (chance.uniform(*PATCH_SIDE, 2) * (width, height)).astype(int).clip(1)
         x, y = chance.integers(width - w + 1), chance.integers(height - h + 1)
@@ -68,6 +85,7 @@ def main() -> int:
     parser.add_argument("--max-side", type=int, default=0, help="shrink photos first (pixels)")
     parser.add_argument("--shift", type=float, default=SHIFT, help="deviation of a cast's a and b")
     parser.add_argument("--patches", type=int, default=PATCHES, help="wrong patches in a view")
+    parser.add_argument("--mean", action="store_true", help="the mean view, for all")
     arguments = parser.parse_args()
     known = {".png", ".jpg", ".jpeg"}
     found = arguments.photos.rglob("*")
@@ -75,14 +93,19 @@ def main() -> int:
     if not names:
         print(f"{arguments.photos}: holds no .png, .jpg or .jpeg image", file=sys.stderr)
         return 1
+    mean = mean_whim(arguments.seed, len(names), arguments.shift)
     for index, path in enumerate(names):
         chance = np.random.default_rng([arguments.seed, index])
+        view = whim(chance, arguments.shift)
         with Image.open(path) as opened:
             photo = opened.convert("RGB")
         if arguments.max_side:
             photo.thumbnail((arguments.max_side, arguments.max_side), Image.Resampling.BOX)
         rgb = np.asarray(photo, dtype=np.float64) / 255.0
-        picture = unsteady(rgb, chance, arguments.shift, arguments.patches)
+        if arguments.mean:
+            picture = coloured(rgb, mean, 0, chance)
+        else:
+            picture = coloured(rgb, view, arguments.patches, chance)
         out = arguments.output / path.relative_to(arguments.photos).with_suffix(".png")
         out.parent.mkdir(parents=True, exist_ok=True)
         Image.fromarray((picture * 255.0).round().astype(np.uint8)).save(out)

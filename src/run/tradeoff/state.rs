@@ -1,7 +1,7 @@
 //! `tradeoff.json`: what a sweep goes on from.
 
 use std::{
-    fs,
+    fs::{self, File, TryLockError},
     path::{Path, PathBuf},
 };
 
@@ -11,8 +11,13 @@ use crate::{
     run::{RunError, files},
 };
 
+/// Locked while a sweep runs, and left behind empty.
+const LOCK: &str = "tradeoff.lock";
+
 /// A sweep and its file.
 pub(super) struct State {
+    /// Keeps a second sweep away; whatever ends the process frees it.
+    _lock: Option<File>,
     /// The file.
     path: PathBuf,
     /// What it holds.
@@ -23,8 +28,9 @@ impl State {
     /// The sweep of a folder, or a new one. A base that failed is tried again.
     ///
     /// # Errors
-    /// [`RunError::File`] when the folder holds a sweep of something else.
+    /// [`RunError::File`] when the folder holds a sweep of something else, or one that runs.
     pub fn open(folder: &Path, subject: Subject, budget: f64) -> Result<Self, RunError> {
+        let lock = lock(&folder.join(LOCK))?;
         let path = folder.join(FILES[1]);
         let mut sweep = match fs::read_to_string(&path) {
             Ok(text) => read(&text, &subject).map_err(|reason| RunError::File {
@@ -43,7 +49,11 @@ impl State {
         sweep.budget = budget;
         let lost = |point: &Point| point.phase == Phase::Base && point.failed.is_some();
         sweep.points.retain(|point| !lost(point));
-        Ok(Self { path, sweep })
+        Ok(Self {
+            _lock: lock,
+            path,
+            sweep,
+        })
     }
 
     /// Adds a point that has run.
@@ -55,6 +65,22 @@ impl State {
     /// Writes the file beside and renames.
     pub fn write(&self) -> Result<(), RunError> {
         files::write(&self.path, (self.sweep.to_json() + "\n").as_bytes())
+    }
+}
+
+/// Locks a file; there is no lock where the file system knows none.
+fn lock(path: &Path) -> Result<Option<File>, RunError> {
+    let Ok(file) = File::create(path) else {
+        return Ok(None);
+    };
+    match file.try_lock() {
+        Ok(()) => Ok(Some(file)),
+        Err(TryLockError::Error(_)) => Ok(None),
+        Err(TryLockError::WouldBlock) => Err(RunError::File {
+            path: path.to_path_buf(),
+            reason: "another sweep runs in this folder: wait for it, or choose another with -o"
+                .to_owned(),
+        }),
     }
 }
 
@@ -117,8 +143,13 @@ mod tests {
         );
         state.add(point("coarse-0.5", Phase::One, true), None);
         state.write().expect("written");
+        let second = State::open(folder.path(), subject(), 90.0).err();
+        let refusal = second.expect("refused").to_string();
+        assert!(refusal.contains("another sweep runs"), "{refusal}");
+        let before = state.sweep.points.clone();
+        drop(state);
         let again = State::open(folder.path(), subject(), 90.0).expect("the same");
-        assert_eq!(again.sweep.points, state.sweep.points);
+        assert_eq!(again.sweep.points, before);
         assert_eq!(again.sweep.device.as_deref(), Some("llvmpipe"));
         assert_eq!((again.sweep.budget, again.sweep.spent()), (90.0, 4.0));
     }
@@ -129,6 +160,7 @@ mod tests {
         let mut state = State::open(folder.path(), subject(), 60.0).expect("new");
         state.add(point("base", Phase::Base, true), None);
         state.write().expect("written");
+        drop(state);
         let again = State::open(folder.path(), subject(), 60.0).expect("the same");
         assert!(again.sweep.points.is_empty());
     }
