@@ -12,6 +12,9 @@ pub fn downscale<const N: usize>(
     from: [usize; 2],
     to: [usize; 2],
 ) -> Vec<[u8; N]> {
+    if from == to {
+        return picture.to_vec();
+    }
     let means = average(from, to, |i| picture[i].map(f32::from));
     means.iter().map(|mean| mean.map(rounded)).collect()
 }
