@@ -77,6 +77,21 @@ def in_gamut(lab: Array) -> Array:
     return lab_to_rgb(scaled(inside))
 
 
+def photo_paths(folder: Path) -> list[Path]:
+    """The photos below a folder, in the order of their names."""
+    known = {".png", ".jpg", ".jpeg"}
+    return sorted(path for path in folder.rglob("*") if path.suffix.lower() in known)
+
+
+def read_photo(path: Path, max_side: int) -> Array:
+    """A photo as sRGB (height, width, 3) in [0, 1], shrunk unless `max_side` is 0."""
+    with Image.open(path) as opened:
+        photo = opened.convert("RGB")
+    if max_side:
+        photo.thumbnail((max_side, max_side), Image.Resampling.BOX)
+    return np.asarray(photo, dtype=np.float64) / 255.0
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("photos", type=Path)
@@ -87,9 +102,7 @@ def main() -> int:
     parser.add_argument("--patches", type=int, default=PATCHES, help="wrong patches in a view")
     parser.add_argument("--mean", action="store_true", help="the mean view, for all")
     arguments = parser.parse_args()
-    known = {".png", ".jpg", ".jpeg"}
-    found = arguments.photos.rglob("*")
-    names = sorted(path for path in found if path.suffix.lower() in known)
+    names = photo_paths(arguments.photos)
     if not names:
         print(f"{arguments.photos}: holds no .png, .jpg or .jpeg image", file=sys.stderr)
         return 1
@@ -97,11 +110,7 @@ def main() -> int:
     for index, path in enumerate(names):
         chance = np.random.default_rng([arguments.seed, index])
         view = whim(chance, arguments.shift)
-        with Image.open(path) as opened:
-            photo = opened.convert("RGB")
-        if arguments.max_side:
-            photo.thumbnail((arguments.max_side, arguments.max_side), Image.Resampling.BOX)
-        rgb = np.asarray(photo, dtype=np.float64) / 255.0
+        rgb = read_photo(path, arguments.max_side)
         if arguments.mean:
             picture = coloured(rgb, mean, 0, chance)
         else:
