@@ -23,6 +23,21 @@ pub fn psnr(a: &[f32], b: &[f32]) -> f64 {
     -10.0 * (sum / a.len() as f64).log10()
 }
 
+/// [`psnr`] as reports have it: at most [`IDENTICAL_PSNR`], and 0 where a value is not finite,
+/// for nothing is worse than no picture.
+///
+/// # Panics
+/// If the lengths differ or are zero.
+pub fn reported_psnr(a: &[f32], b: &[f32]) -> f64 {
+    let value = psnr(a, b);
+    // NaN fails the comparison.
+    if value > f64::NEG_INFINITY {
+        value.min(IDENTICAL_PSNR)
+    } else {
+        0.0
+    }
+}
+
 /// CIEDE2000 of two images.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DeltaE {
@@ -129,6 +144,18 @@ mod tests {
         assert!(one.percentile_95.abs() < 1e-9, "19 of 20 are the same");
         b[4] = [1.0; 3];
         assert!((mean_delta_e(&a, &b).percentile_95 - 100.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_picture_that_is_not_finite_is_not_reported_as_perfect() {
+        assert_eq!(reported_psnr(&[0.5], &[0.5]), IDENTICAL_PSNR);
+        assert_eq!(
+            reported_psnr(&[0.5, 0.6], &[0.5, 0.5]),
+            psnr(&[0.5, 0.6], &[0.5, 0.5])
+        );
+        for bad in [f32::NAN, f32::INFINITY] {
+            assert_eq!(reported_psnr(&[0.5, bad], &[0.5, 0.5]), 0.0);
+        }
     }
 
     #[test]

@@ -18,7 +18,9 @@ pub use consistency::{Consistency, DENOMINATOR_RULE, SCALE_RULE};
 pub use depth::DepthSteps;
 pub use flo::decode_flo;
 pub use flow::Flow;
-pub use image_error::{DeltaE, IDENTICAL_PSNR, ab_error, delta_e, mean_delta_e, psnr};
+pub use image_error::{
+    DeltaE, IDENTICAL_PSNR, ab_error, delta_e, mean_delta_e, psnr, reported_psnr,
+};
 pub use path::{camera_path, distance};
 pub use ssim::ssim;
 pub use visibility::{MASK_RULE, MIN_OPACITY, visible};

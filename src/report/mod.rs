@@ -21,7 +21,7 @@ pub use timings::{KernelReport, kernel_reports, timings_table};
 
 use std::fmt::Write;
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::{
     capture::{Exposure, LoadOptions},
@@ -55,6 +55,11 @@ pub struct Report {
     /// Stage 2, once `colorize` has run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub chroma: Option<ChromaReport>,
+}
+
+/// JSON has no NaN and is given `null`; a run that diverged can still be read.
+fn number_or_nan<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(deserializer)?.unwrap_or(f64::NAN))
 }
 
 /// What was photographed.
@@ -121,6 +126,7 @@ pub struct LumaReport {
     #[serde(default)]
     pub refused: usize,
     /// Loss at the end.
+    #[serde(deserialize_with = "number_or_nan")]
     pub loss: f64,
     /// What the amount of work followed from, besides the preset.
     #[serde(default)]
@@ -264,6 +270,7 @@ pub struct ChromaReport {
     #[serde(default)]
     pub fills: bool,
     /// Loss at the end, in CIELAB units.
+    #[serde(deserialize_with = "number_or_nan")]
     pub loss: f64,
     /// Wall seconds.
     pub seconds: ChromaSeconds,
@@ -424,5 +431,22 @@ impl Report {
             chroma.seconds.teacher + chroma.seconds.distill,
             chroma.bake.mean
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_run_that_diverged_can_be_read() {
+        let diverged = LumaReport {
+            loss: f64::NAN,
+            ..LumaReport::default()
+        };
+        let text = serde_json::to_string(&diverged).expect("written");
+        assert!(text.contains("\"loss\":null"), "{text}");
+        let read: LumaReport = serde_json::from_str(&text).expect("read");
+        assert!(read.loss.is_nan() && read.splats == diverged.splats);
     }
 }

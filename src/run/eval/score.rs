@@ -8,7 +8,7 @@ use super::{
 use crate::{
     capture::Photo,
     chroma::teacher::AbImage,
-    measure::{self, IDENTICAL_PSNR},
+    measure,
     report::{ColorError, LumaScore, Method, PictureScore, ViewScore, error_map},
     run::{
         RunError,
@@ -72,7 +72,7 @@ impl Scored {
         show("luma", "luma", drawn_gray.clone());
         let clamped: Vec<f32> = drawn_gray.iter().map(|rgb| rgb[0]).collect();
         let luma = LumaScore {
-            psnr: measure::psnr(&clamped, &gray).min(IDENTICAL_PSNR),
+            psnr: measure::reported_psnr(&clamped, &gray),
             ssim: measure::ssim(shape[0], shape[1], &clamped, &gray),
             lpips: match &mut lpips {
                 Some(lpips) => Some(lpips.distance(&drawn_gray, &gray_to_rgb(&gray), size)?),
@@ -86,9 +86,7 @@ impl Scored {
         let mut score = |method: Method, rgb: Vec<[f32; 3]>, ab: &[[f32; 2]]| {
             scores.push(PictureScore {
                 method,
-                psnr: truth.map(|t| {
-                    measure::psnr(rgb.as_flattened(), t.as_flattened()).min(IDENTICAL_PSNR)
-                }),
+                psnr: truth.map(|t| measure::reported_psnr(rgb.as_flattened(), t.as_flattened())),
                 ssim: truth.map(|t| rgb_ssim(shape, &rgb, t)),
                 delta_e: truth.map(|t| color_error(&rgb, t)),
                 ab_error: truth.map(|t| measure::ab_error(ab, &ab_of(t))),

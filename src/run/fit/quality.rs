@@ -8,7 +8,7 @@ use super::super::{
 };
 use crate::{
     capture::{Exposure, Photo},
-    measure::{self, IDENTICAL_PSNR},
+    measure,
     raster::Raster,
     report::{LumaQuality, LumaView},
     splats::Splats,
@@ -46,7 +46,7 @@ pub(super) fn measure_luma(
 /// Quality of the pixels that count.
 pub(super) fn luma_quality(photo: &Photo, shown: &[f32], truth: &[f32]) -> LumaQuality {
     let (width, height) = (photo.width as usize, photo.height as usize);
-    let psnr = measure::psnr(&counted(photo, shown), &counted(photo, truth));
+    let psnr = measure::reported_psnr(&counted(photo, shown), &counted(photo, truth));
     // Where a pixel does not count the picture is taken to be right, and the others
     // answer for all that is wrong.
     let pixels = 0..truth.len();
@@ -55,7 +55,7 @@ pub(super) fn luma_quality(photo: &Photo, shown: &[f32], truth: &[f32]) -> LumaQ
         .collect();
     let share = counted(photo, truth).len() as f64 / truth.len() as f64;
     LumaQuality {
-        psnr: psnr.min(IDENTICAL_PSNR),
+        psnr,
         ssim: 1.0 - (1.0 - measure::ssim(width, height, &patched, truth)) / share,
     }
 }
