@@ -162,9 +162,11 @@ def unsteady(photos: Path, out: Path, side: int) -> Path:
     return out
 
 
-def ablation(program: str, scene: str, photos: Path, out: Path) -> None:
-    """A row for each variant, of the exported file."""
+def ablation(program: str, scene: str, photos: Path, out: Path, wanted: list[str]) -> None:
+    """A row for each variant (that is wanted, if any is), of the exported file."""
     for name, flags in VARIANTS.items():
+        if wanted and name not in wanted:
+            continue
         if name.startswith("small answers"):
             teacher = str(unsteady(photos, out / "unsteady-small", SMALL_SIDE))
         else:
@@ -195,6 +197,7 @@ def main() -> int:
     parser.add_argument("--scenes", nargs="*", default=list(SCENES), choices=list(SCENES))
     parser.add_argument("--teachers", nargs="*", default=TEACHERS, choices=TEACHERS)
     parser.add_argument("--ablation", action="store_true")
+    parser.add_argument("--variants", nargs="*", default=[], choices=list(VARIANTS))
     arguments = parser.parse_args()
     program = arguments.program
     head = HEAD
@@ -213,7 +216,7 @@ def main() -> int:
         fitted(program, folder, out / "run", arguments.iterations)
         photos = folder / "images"
         if arguments.ablation:
-            ablation(program, scene, photos, out)
+            ablation(program, scene, photos, out, arguments.variants)
             continue
         for teacher in arguments.teachers:
             match teacher:

@@ -53,10 +53,10 @@ impl LearningRates {
 /// How the set of Gaussians changes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Densification {
-    /// Those that the loss pulls at are split, faint ones removed ([`densify`](super::densify)).
+    /// Those that the loss pulls at are split, faint ones removed (`luma::densify`).
     #[default]
     Split,
-    /// Faint ones are put where others are ([`relocation`](super::relocation)).
+    /// Faint ones are put where others are (`luma::relocation`).
     Relocate,
 }
 
@@ -190,7 +190,7 @@ pub struct LumaSettings {
     pub max_splats: usize,
     /// Seeds the order of the views.
     pub seed: u64,
-    /// Mean pull on a centre ([`STAT_PULL`](crate::raster::constants::STAT_PULL))
+    /// Mean pull on a centre (`STAT_PULL`)
     /// from which a Gaussian is split.
     pub pull_threshold: f64,
     /// A densification splits at most this share of the Gaussians.
@@ -202,7 +202,7 @@ pub struct LumaSettings {
     /// Gaussians below this opacity are removed.
     pub prune_opacity: f64,
     /// Whether pixels that show something else than the scene are found on the way
-    /// ([`outliers`](super::outliers)) and no longer count.
+    /// (`luma::outliers`) and no longer count.
     pub robust: bool,
     /// Bytes that the training may take on the device; no limit when `None`.
     pub memory_limit: Option<u64>,
