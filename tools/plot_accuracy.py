@@ -32,7 +32,16 @@ ERRORS = {
 
 # The default's value of each knob that has several others: a line goes through them in order.
 DEFAULTS = {"alpha-min": 1 / 255, "transmittance-min": 1e-4, "depth-bits": 32, "ssim-window": 11}
+# The default but for rounding: how far its time is from 1 is what noise looks like.
+AGAIN = ("alpha-min", "0.003922")
+# A label says nothing of what lies on the default.
+CLOSE = 0.05
 COLORS = {knob: f"C{number}" for number, knob in enumerate(ERRORS["gradient"][1])}
+
+
+def tells(point: dict[str, str], default: dict[str, str], key: str) -> bool:
+    """Whether a point's error is another than the default's."""
+    return abs(float(point[key]) / float(default[key]) - 1) > CLOSE
 
 
 def main() -> None:
@@ -49,20 +58,24 @@ def main() -> None:
         of_subject = [row for row in rows if row["subject"] == subject]
         for axis, (key, (label, knobs)) in zip(line, ERRORS.items()):
             default = next(row for row in of_subject if row["knob"] == "default")
+            again = next(row for row in of_subject if (row["knob"], row["value"]) == AGAIN)
+            band = [float(again[quartile]) for quartile in ("time_low", "time_high")]
+            axis.axvspan(min(1.0, *band), max(1.0, *band), color="0.92", label="default again")
             for knob in knobs:
-                points = [row for row in of_subject if row["knob"] == knob]
+                points = [row for row in of_subject if row["knob"] == knob and row is not again]
                 if knob in DEFAULTS:
                     points.append(default)
                     points.sort(key=lambda row: float(row["value"] or DEFAULTS[knob]))
                 axis.plot([float(p["time"]) for p in points], [float(p[key]) for p in points],
                           marker="o", markersize=3, linewidth=0.8, color=COLORS[knob], label=knob)
                 for point in points:
-                    if point is not default and knob != "together":
+                    if knob != "together" and tells(point, default, key):
                         axis.annotate(point["value"], (float(point["time"]), float(point[key])),
                                       fontsize=6, xytext=(2, 2), textcoords="offset points")
             axis.plot(float(default["time"]), float(default[key]), "k*", markersize=9,
                       label="default")
             axis.set_yscale("log")
+            axis.margins(x=0.12)
             axis.set_xlabel("time of an iteration, default = 1")
             axis.set_ylabel(label)
             axis.set_title(subject, fontsize=9)
