@@ -274,8 +274,7 @@ impl Job<'_> {
         scene.split.train.iter().map(view).collect()
     }
 
-    /// A few of the views that are measured, evenly spread.
-    /// The photos whose views training is watched by.
+    /// A few of the photos that are measured, evenly spread.
     fn watched(&self) -> Vec<usize> {
         let measured = self.scene.measured().1;
         let count = measured.len().min(WATCHED);
