@@ -54,16 +54,20 @@ def main() -> int:
     parser.add_argument("--targets", default="0.9,1.02", help="shares of the preset's PSNR")
     parser.add_argument("--preset", default="draft")
     parser.add_argument("--flat", default="0.1,0.3", help="dB")
+    parser.add_argument("--measure-side", help="pixels at which all are measured, to compare them")
     arguments = parser.parse_args()
     shares = [float(share) for share in arguments.targets.split(",") if share]
     limits = [float(limit) for limit in arguments.limits.split(",") if limit]
     flats = [float(flat) for flat in arguments.flat.split(",") if flat]
+    side = ["--measure-side", arguments.measure_side] if arguments.measure_side else []
 
     print("| scene | asked for | done | s | held-out PSNR | kept |")
     print("|---|---|---|--:|--:|---|")
 
     def row(scene: Path, asked: str, options: list[str], kept) -> dict:
-        report, seconds, error = fit(arguments.program, scene, arguments.output / scene.name, options)
+        report, seconds, error = fit(
+            arguments.program, scene, arguments.output / scene.name, [*options, *side]
+        )
         said = kept(report, seconds) if not error else error
         cells = [scene.name, asked, work(report), f"{seconds:.0f}", f"{psnr(report):.2f}", said]
         print("| " + " | ".join(cells) + " |", flush=True)
