@@ -1,15 +1,15 @@
 #!/usr/bin/env python3
-"""What no method can know of colours whose teacher gives every photo another cast.
+"""What is to be expected of colours whose teacher gives every photo another cast.
 
     python3 tools/check_casts.py --svg docs/images/casts.svg
 
 However well a scene is made from pictures of unsteady_teacher.py, it ends at best at the mean
 saturation and cast of those in training, and that mean is not the truth. For each scene below DATA
-(default ../shared/data) this gives the held-out photos that mean: their a/b error is the least to
-be expected. Geometry and light add to it what is left with the photos themselves as teacher, as
-independent errors add; that, and what ours and RGB splats reached, is read from the table that
-check_color.py printed into RESULTS (default docs/results.md). Prints the least beside what was
-reached, and draws it as a share of the teacher's own error for several strengths of the casts and
+(default ../shared/data) this gives the held-out photos that mean, and takes their a/b error. To what is
+expected of ours is added, as if the two were independent, what is left with the photos themselves
+as teacher; that, and what ours and RGB splats reached, is read from the table that
+check_color.py printed into RESULTS (default docs/results.md). An estimate, no bound: another method may
+err less on the photos themselves. Prints it beside what was reached, and draws it as a share of the teacher's own error for several strengths of the casts and
 many draws of them. No scene is trained. Needs numpy, Pillow and matplotlib.
 """
 
@@ -89,8 +89,8 @@ def errors(photos: list[Array], count: int, seed: int, cast: float) -> tuple[flo
 
 
 def shares(folder: Path, oracle: float, seeds: int) -> dict[float, Array]:
-    """For each cast and seed: the teacher's error, and the least as a share of it in the pictures
-    and on the geometry."""
+    """For each cast and seed: the teacher's error, and as shares of it the mean view's and what is
+    expected of ours."""
     paths = photo_paths(folder)
     photos = [read_photo(path, SIDE) for path in paths[::HOLDOUT_STEP]]
     found = {}
@@ -108,7 +108,7 @@ def draw(
     size = (3 * len(scenes), 3)
     figure, axes = plt.subplots(1, len(scenes), figsize=size, sharey=True, layout="constrained")
     for axis, (scene, found) in zip(np.atleast_1d(axes), scenes.items()):
-        for column, name in ((1, "least in pictures"), (2, "least on our geometry")):
+        for column, name in ((1, "the mean view"), (2, "expected of ours")):
             low, middle, high = np.percentile(
                 [rows[:, column] for rows in found.values()], [10, 50, 90], axis=1
             )
@@ -139,7 +139,7 @@ def main() -> int:
     parser.add_argument("--results", type=Path, default=Path("docs/results.md"))
     parser.add_argument("--seeds", type=int, default=20)
     arguments = parser.parse_args()
-    print("| scene | least in pictures | least on our geometry | ours | / teacher's: least, ours (≤ 0.4) | / RGB splats': least, ours (≤ 0.6) |")
+    print("| scene | the mean view | expected of ours | ours | / teacher's: expected, ours (≤ 0.4) | / RGB splats': expected, ours (≤ 0.6) |")
     print("|---|---|---|---|---|---|")
     of_scene = reached(arguments.results)
     scenes = {}

@@ -9,8 +9,8 @@ get a wrong colour. Numbers depend on the seed and the photo's place among the n
 and Pillow.
 
 `--mean` makes a teacher that agrees with itself instead: every photo has the saturation and the
-cast that those in training have on average, and no patch. No more than that can be learned from
-the unsteady one.
+cast that those in training have on average, and no patch. check_casts.py estimates from it
+what can be expected of the unsteady one.
 """
 
 from __future__ import annotations
