@@ -59,6 +59,9 @@ pub struct Colorize {
     /// Rounds of least squares at full size [default: 4].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
     rounds: Option<u32>,
+    /// Rounds of least squares at each of a quarter and half the size before [default: 8].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    coarse_rounds: Option<u32>,
     /// Difference in CIELAB units from which on a view is not believed, or `off` [default: 10
     /// with irls, off with adam].
     #[arg(long, value_name = "UNITS|off", value_parser = robust)]
@@ -159,6 +162,7 @@ impl Colorize {
     fn check_solver(&self) {
         let of_irls = [
             ("--rounds", self.rounds.is_some()),
+            ("--coarse-rounds", self.coarse_rounds.is_some()),
             ("--correct-views", self.correct_views == Some(Switch::On)),
             ("--fill", self.fill == Some(Switch::On)),
         ];
@@ -199,6 +203,7 @@ impl Colorize {
                 sh_degree: self.sh_degree,
                 scales: self.scales,
                 rounds: self.rounds.map(|n| n as usize),
+                coarse_rounds: self.coarse_rounds.map(|n| n as usize),
                 robust: self.robust,
                 correct_views: self.correct_views.map(|switch| switch == Switch::On),
                 fill: self.fill.map(|switch| switch == Switch::On),

@@ -22,6 +22,8 @@ pub struct ChromaOptions {
     pub scales: Option<u32>,
     /// Rounds of least squares at full size.
     pub rounds: Option<usize>,
+    /// Rounds on each coarser scale that least squares passes through on its way.
+    pub coarse_rounds: Option<usize>,
     /// Residual, in CIELAB units, at which the loss levels off; infinite: plain L1.
     pub robust: Option<f32>,
     /// Whether each view's teacher is brought into line with the others.
@@ -37,6 +39,7 @@ impl Default for ChromaOptions {
             sh_degree: Degree::Fixed(0),
             scales: None,
             rounds: None,
+            coarse_rounds: None,
             robust: None,
             correct_views: None,
             fill: None,
@@ -57,6 +60,7 @@ impl ChromaOptions {
             seed,
             coarser_scales: self.scales.unwrap_or(base.coarser_scales),
             rounds: self.rounds.unwrap_or(base.rounds),
+            warm_rounds: self.coarse_rounds.unwrap_or(base.warm_rounds),
             robust: match self.robust {
                 Some(residual) => Some(residual).filter(|r| r.is_finite()),
                 None => base.robust,

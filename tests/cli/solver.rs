@@ -55,11 +55,15 @@ fn options_of_the_other_solver_are_refused() {
     let place = place_with_run();
     let teacher = onnx("ddcolor_tiny.onnx");
     let adam = ["--solver", "adam"];
-    let cases: [(&[&str], &str); 4] = [
+    let cases: [(&[&str], &str); 5] = [
         (&["--until", "62"], "--until needs --solver adam"),
         (
             &[&adam[..], &["--rounds", "2"]].concat(),
             "--rounds needs --solver irls",
+        ),
+        (
+            &[&adam[..], &["--coarse-rounds", "2"]].concat(),
+            "--coarse-rounds needs --solver irls",
         ),
         (
             &[&adam[..], &["--fill", "on"]].concat(),
@@ -81,6 +85,7 @@ fn options_of_the_other_solver_are_refused() {
         ["--sh-degree", "4"],
         ["--scales", "5"],
         ["--rounds", "0"],
+        ["--coarse-rounds", "0"],
     ] {
         let done = place.run(&[&["colorize", "--teacher", &teacher], &wrong[..]].concat());
         assert_eq!(done.code, Some(2), "{wrong:?}");

@@ -54,6 +54,8 @@ pub(super) struct Around {
 pub(super) struct ColorAround {
     /// Rounds of least squares at full size.
     pub rounds: usize,
+    /// Rounds on each coarser scale.
+    pub coarse_rounds: usize,
     /// Whether views are brought into line.
     pub corrects_views: bool,
     /// Shorter side at which the network sees photos; `None` for a folder.
@@ -81,6 +83,7 @@ impl Around {
         self.color = base.chroma.as_ref().map(|chroma| ColorAround {
             // The base is coloured by the default solver.
             rounds: ChromaSettings::irls().rounds,
+            coarse_rounds: ChromaSettings::irls().warm_rounds,
             corrects_views: chroma.corrects_views,
             teacher_size: (chroma.teacher.as_ref())
                 .and_then(|teacher| teacher.input_size)
@@ -167,7 +170,7 @@ const KNOBS: &[Knob] = &[
         values: |around| around.of_color(|_| owned(&["adam"])),
         turn: |value| vec![("--solver", value.to_owned())],
         time: |_, _| 1.0,
-        conflicts: &["rounds", "until", "correct-views"],
+        conflicts: &["rounds", "coarse-rounds", "until", "correct-views"],
     },
     Knob {
         name: YARDSTICK_OF_COLOR,
@@ -177,6 +180,18 @@ const KNOBS: &[Knob] = &[
         time: |around, value| {
             let rounds = around.color.as_ref().map_or(1, |color| color.rounds);
             number(value) / rounds.max(1) as f64
+        },
+        conflicts: &["solver", "until"],
+    },
+    Knob {
+        name: "coarse-rounds",
+        stage: PointStage::Color,
+        values: |around| around.of_color(|color| scaled(color.coarse_rounds, &[0.5, 0.25, 2.0])),
+        turn: |value| vec![("--coarse-rounds", value.to_owned())],
+        // They take two thirds of the time (docs/performance.md).
+        time: |around, value| {
+            let rounds = around.color.as_ref().map_or(1, |color| color.coarse_rounds);
+            (1.0 + 2.0 * number(value) / rounds.max(1) as f64) / 3.0
         },
         conflicts: &["solver", "until"],
     },
@@ -198,7 +213,7 @@ const KNOBS: &[Knob] = &[
         time: |around, value| {
             (number(value) - around.iterations as f64) / around.adam.max(1) as f64
         },
-        conflicts: &["solver", "rounds", "correct-views"],
+        conflicts: &["solver", "rounds", "coarse-rounds", "correct-views"],
     },
     Knob {
         name: "scales",
@@ -431,12 +446,14 @@ mod tests {
         let mut colored = Around {
             color: Some(ColorAround {
                 rounds: 4,
+                coarse_rounds: 8,
                 corrects_views: true,
                 teacher_size: Some(256),
             }),
             ..around()
         };
         assert_eq!(of(&colored, "rounds"), ["2", "8", "1"]);
+        assert_eq!(of(&colored, "coarse-rounds"), ["4", "2", "16"]);
         assert_eq!(of(&colored, "until"), ["775", "1000"]);
         assert_eq!(of(&colored, "teacher-size"), ["128", "384"]);
         assert_eq!(of(&colored, "correct-views"), ["off"]);
