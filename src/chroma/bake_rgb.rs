@@ -18,6 +18,10 @@ const HALF_RANGE: [f64; 2] = [0.01, 0.25];
 /// that of the nearer bound does (measured in docs/decisions.md).
 const LIKELY_GRAY: [f64; 2] = [0.2, 0.8];
 
+/// Chroma in CIELAB units up to which a Gaussian's own a/b decide what they do to RGB;
+/// stronger ones do as much more of the same (measured in docs/decisions.md).
+const LIKELY_CHROMA: f64 = 25.0;
+
 /// RGB Gaussians that look like `luma` (one channel) with `chroma` (a, b).
 ///
 /// # Panics
@@ -37,14 +41,9 @@ pub fn bake_rgb(luma: &Splats, chroma: &ShField) -> Splats {
 
 fn bake_one(luma: &[f32], chroma: &[f32], out: &mut [f32]) {
     let at = |ab: [f64; 2], gray: f64| color(gray, ab);
-    let gray = 0.5 + sh::C0 * f64::from(luma[0]);
+    let gray = shown_gray(luma);
     let ab = [chroma[0], chroma[1]].map(|c| sh::C0 * f64::from(c));
     let mean = at(ab, gray);
-    // Parseval: the mean square over the sphere is the sum of squares over 4π.
-    let spread = |terms: &mut dyn Iterator<Item = f32>| {
-        let squares: f64 = terms.map(|c| f64::from(c).powi(2)).sum();
-        (squares / (4.0 * std::f64::consts::PI)).sqrt()
-    };
     let half = spread(&mut luma[1..].iter().copied()).clamp(HALF_RANGE[0], HALF_RANGE[1]);
     let (above, below) = (at(ab, gray + half), at(ab, gray - half));
     for channel in 0..3 {
@@ -73,15 +72,38 @@ fn bake_one(luma: &[f32], chroma: &[f32], out: &mut [f32]) {
     }
 }
 
-/// sRGB of a gray with a/b: the gray itself plus what the a/b change at a lightness at
-/// which the pixel may well be.
+/// Root mean square over the sphere of the harmonics with these coefficients
+/// (Parseval: the mean square is the sum of squares over 4π).
+fn spread(terms: &mut dyn Iterator<Item = f32>) -> f64 {
+    let squares: f64 = terms.map(|c| f64::from(c).powi(2)).sum();
+    (squares / (4.0 * std::f64::consts::PI)).sqrt()
+}
+
+/// The mean gray, of a Gaussian that is black from everywhere the brightest that looks
+/// the same: of a darker one, which is drawn as black, the channels that its colour
+/// raises would stay black too.
+///
+/// The squares of all K basis functions beyond the constant one sum to K / 4π in every
+/// direction (Unsöld 1927), so √K times their spread bounds what they add.
+fn shown_gray(luma: &[f32]) -> f64 {
+    let mean = 0.5 + sh::C0 * f64::from(luma[0]);
+    let rest = &luma[1..];
+    let most = (rest.len() as f64).sqrt() * spread(&mut rest.iter().copied());
+    mean.max(-most)
+}
+
+/// sRGB of a gray with a/b: the gray itself plus what the a/b change at a lightness and
+/// chroma at which the pixel may well be.
 ///
 /// A single Gaussian is often darker than black or brighter than white, where no
-/// colour is left: what it adds to a pixel of middling gray would be lost. Nor is it
-/// brought into the gamut: the sum is what is shown, and viewers clip that.
+/// colour is left: what it adds to a pixel of middling gray would be lost. So it is with
+/// a/b beyond any pixel's, which others outweigh. Nor is it brought into the gamut: the
+/// sum is what is shown, and viewers clip that.
 fn color(gray: f64, ab: [f64; 2]) -> [f64; 3] {
     let likely = gray.clamp(LIKELY_GRAY[0], LIKELY_GRAY[1]);
-    lab_to_srgb([gray_to_lightness(likely), ab[0], ab[1]]).map(|v| v + gray - likely)
+    let excess = (ab[0].hypot(ab[1]) / LIKELY_CHROMA).max(1.0);
+    lab_to_srgb([gray_to_lightness(likely), ab[0] / excess, ab[1] / excess])
+        .map(|v| gray + excess * (v - likely))
 }
 
 #[cfg(test)]
@@ -121,7 +143,7 @@ mod tests {
 
     #[test]
     fn a_constant_colour_is_exact() {
-        let (gray, ab) = (0.55, [20.0, -30.0]);
+        let (gray, ab) = (0.55, [12.0, -18.0]);
         let luma = [((gray - 0.5) / sh::C0) as f32];
         let baked = one(&luma, &ab.map(|v| (v / sh::C0) as f32), [0, 0]);
         let wanted = lab_to_srgb([gray_to_lightness(gray), ab[0], ab[1]]);
@@ -131,24 +153,61 @@ mod tests {
         }
     }
 
-    /// A pair that blends to a middling gray keeps its colour, wherever each stands.
+    /// A pair that blends to a middling gray keeps its colour, wherever each stands that is
+    /// not drawn as black.
     #[test]
-    fn colours_survive_beyond_black_and_white() {
+    fn colours_survive_beyond_white() {
         let ab = [20.0, -30.0];
         let shown = |gray: f64| {
             let luma = [((gray - 0.5) / sh::C0) as f32];
             let baked = one(&luma, &ab.map(|v| (v / sh::C0) as f32), [0, 0]);
-            [0, 1, 2].map(|channel| 0.5 + sh::C0 * f64::from(baked[channel]))
+            [0, 1, 2].map(|channel| (0.5 + sh::C0 * f64::from(baked[channel])).max(0.0))
         };
-        let (dark, bright) = (shown(-0.3), shown(1.3));
+        let (dark, bright) = (shown(0.1), shown(1.3));
         let blended = [0, 1, 2].map(|channel| (dark[channel] + bright[channel]) / 2.0);
-        let wanted = lab_to_srgb([gray_to_lightness(0.5), ab[0], ab[1]]);
+        let wanted = lab_to_srgb([gray_to_lightness(0.7), ab[0], ab[1]]);
         for channel in 0..3 {
             assert!(
                 (blended[channel] - wanted[channel]).abs() < 0.03,
                 "{blended:?} {wanted:?}"
             );
         }
+    }
+
+    #[test]
+    fn what_others_outweigh_is_outweighed() {
+        let gray = 0.3;
+        let shown = |ab: [f64; 2]| {
+            let luma = [((gray - 0.5) / sh::C0) as f32];
+            let baked = one(&luma, &ab.map(|v| (v / sh::C0) as f32), [0, 0]);
+            [0, 1, 2].map(|channel| 0.5 + sh::C0 * f64::from(baked[channel]))
+        };
+        // Far outside any gamut; a quarter of it with three quarters of nearly gray.
+        let (strong, weak) = (shown([-100.0, 80.0]), shown([10.0, -8.0]));
+        let wanted = lab_to_srgb([gray_to_lightness(gray), -17.5, 14.0]);
+        for channel in 0..3 {
+            let blended = 0.25 * strong[channel] + 0.75 * weak[channel];
+            assert!(
+                (blended - wanted[channel]).abs() < 0.02,
+                "{strong:?} {weak:?} {wanted:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn black_takes_the_channels_that_its_colour_raises() {
+        let shown = |luma: &[f32], degree| {
+            let ab = [-20.0, 15.0].map(|v: f64| (v / sh::C0) as f32);
+            let baked = one(luma, &ab, [degree, 0]);
+            0.5 + sh::C0 * f64::from(baked[1])
+        };
+        let luma = |gray: f64| ((gray - 0.5) / sh::C0) as f32;
+        let black = shown(&[luma(0.0)], 0);
+        assert!(black > 0.02, "green is raised: {black}");
+        assert!((shown(&[luma(-0.6)], 0) - black).abs() < 1e-6);
+        // What may be lit from somewhere stays as dark as it was from elsewhere.
+        let lit = [luma(-0.1), 0.0, 0.5, 0.0];
+        assert!(shown(&lit, 1) < black - 0.09);
     }
 
     #[test]

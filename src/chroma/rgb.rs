@@ -17,6 +17,11 @@ const UNITS: f32 = 100.0;
 /// Views that the bake is measured against at most; more of one scene say little new.
 const BAKE_VIEWS: usize = 16;
 
+/// Times that the bake is fitted to what is missing. The solver does not know that no
+/// Gaussian gets darker than black nor a pixel brighter than white: another time works
+/// on what is really shown.
+const BAKE_TIMES: usize = 2;
+
 /// A view and the colours wanted in its picture.
 #[derive(Clone, Debug)]
 pub struct RgbView {
@@ -62,47 +67,77 @@ pub fn bake(
     chroma: &ShField,
     cameras: &[Camera],
 ) -> Result<Splats, GpuError> {
-    let mut baked = bake_rgb(luma, chroma);
-    let gpu = &raster.gpu;
-    let fields = [&luma.sh, chroma, &baked.sh];
-    let fields = fields.map(|field| Field::upload(gpu, field));
-    let mut renderer = Renderer::new(
-        raster.clone(),
-        Geometry::upload(gpu, luma)?,
-        fields.into_iter().collect::<Result<_, _>>()?,
-        NEAR_SHARE * extent,
-    )?;
     let step = cameras.len().div_ceil(BAKE_VIEWS).max(1);
-    let mut views = Vec::new();
-    for camera in cameras.iter().step_by(step) {
-        let pictures = renderer.render(camera)?;
-        let native = native_rgb(&pictures[0], &pictures[1]);
-        let shown = pictures[2].pixels.chunks_exact(3);
-        let missing = |(native, shown): (&[f32; 3], &[f32])| {
-            // Viewers clip what they show: nothing is missing beyond white.
-            [0, 1, 2].map(|c| native[c] - shown[c].clamp(0.0, 1.0))
-        };
-        views.push(RgbView {
-            camera: camera.clone(),
-            wanted: native.iter().zip(shown).map(missing).collect(),
-        });
-    }
+    let cameras: Vec<&Camera> = cameras.iter().step_by(step).collect();
+    let mut renderer = renderer(raster, extent, luma, &[&luma.sh, chroma])?;
+    let native = (cameras.iter())
+        .map(|camera| {
+            let pictures = renderer.render(camera)?;
+            Ok(native_rgb(&pictures[0], &pictures[1]))
+        })
+        .collect::<Result<Vec<_>, GpuError>>()?;
     drop(renderer);
     let settings = ChromaSettings {
         warm_scales: 1,
-        rounds: 2,
+        rounds: 1,
         steps: 4,
         ..ChromaSettings::exact()
     };
-    let moved = solve(raster, &settings, extent, luma, &views)?;
-    let stride = 3 * sh::coefficient_count(baked.sh.degree);
-    let of_splat = baked.sh.coefficients.chunks_exact_mut(stride);
-    for (out, by) in of_splat.zip(moved.coefficients.chunks_exact(3)) {
-        for channel in 0..3 {
-            out[channel] += by[channel];
+    let mut baked = bake_rgb(luma, chroma);
+    for _ in 0..BAKE_TIMES {
+        let views = missing(raster, extent, &baked, &cameras, &native)?;
+        let moved = solve(raster, &settings, extent, luma, &views)?;
+        let stride = 3 * sh::coefficient_count(baked.sh.degree);
+        let of_splat = baked.sh.coefficients.chunks_exact_mut(stride);
+        for (out, by) in of_splat.zip(moved.coefficients.chunks_exact(3)) {
+            for channel in 0..3 {
+                out[channel] += by[channel];
+            }
         }
     }
     Ok(baked)
+}
+
+/// Draws `fields` on the geometry of `splats`.
+fn renderer(
+    raster: &Arc<Raster>,
+    extent: f64,
+    splats: &Splats,
+    fields: &[&ShField],
+) -> Result<Renderer, GpuError> {
+    let gpu = &raster.gpu;
+    let fields = fields.iter().map(|field| Field::upload(gpu, field));
+    Renderer::new(
+        raster.clone(),
+        Geometry::upload(gpu, splats)?,
+        fields.collect::<Result<_, _>>()?,
+        NEAR_SHARE * extent,
+    )
+}
+
+/// What the pictures of RGB Gaussians lack to be those wanted, `[views][pixels]`.
+fn missing(
+    raster: &Arc<Raster>,
+    extent: f64,
+    splats: &Splats,
+    cameras: &[&Camera],
+    wanted: &[Vec<[f32; 3]>],
+) -> Result<Vec<RgbView>, GpuError> {
+    let mut renderer = renderer(raster, extent, splats, &[&splats.sh])?;
+    (cameras.iter().zip(wanted))
+        .map(|(&camera, wanted)| {
+            let pictures = renderer.render(camera)?;
+            let shown = pictures[0].pixels.chunks_exact(3);
+            let missing = |(wanted, shown): (&[f32; 3], &[f32])| {
+                // Viewers clip what they show: nothing is missing beyond white.
+                [0, 1, 2].map(|c| wanted[c] - shown[c].clamp(0.0, 1.0))
+            };
+            Ok(RgbView {
+                camera: camera.clone(),
+                wanted: wanted.iter().zip(shown).map(missing).collect(),
+            })
+        })
+        .collect()
 }
 
 /// The field whose blend is wanted, without the offset of mid-gray.
