@@ -14,7 +14,7 @@ use crate::{
 /// The solver's loss is made for CIELAB units, 100 of which span black to white.
 const UNITS: f32 = 100.0;
 
-/// Views that the bake is measured against at most; more of one scene say little new.
+/// Views that the bake is fitted to at most; more of one scene say little new.
 const BAKE_VIEWS: usize = 16;
 
 /// Times that the bake is fitted to what is missing. The solver does not know that no
