@@ -29,11 +29,13 @@ pub struct RgbView {
     pub camera: Camera,
     /// sRGB-encoded, `[height, width]`; differences may be negative.
     pub wanted: Vec<[f32; 3]>,
+    /// How much each pixel counts, `[height, width]`; `None` where all count 1.
+    pub weights: Option<Vec<f32>>,
 }
 
-/// Fits RGB harmonics of `degree` on the frozen geometry of `luma` to coloured
-/// pictures: what training RGB splats on a teacher's pictures would give on this
-/// geometry. Plain L1, with the rounds and steps of `settings`.
+/// Fits RGB harmonics to coloured pictures on the frozen geometry of `luma`: what training
+/// RGB splats on a teacher's pictures would give on this geometry. Degree, loss, rounds and
+/// steps are those of `settings`.
 ///
 /// # Errors
 /// [`GpuError`] when it does not fit or the device is lost.
@@ -44,14 +46,16 @@ pub fn fit_rgb(
     luma: &Splats,
     views: &[RgbView],
 ) -> Result<ShField, GpuError> {
-    let mut field = solve(raster, settings, extent, luma, views)?;
-    let stride = 3 * sh::coefficient_count(field.degree);
-    for of_splat in field.coefficients.chunks_exact_mut(stride) {
+    let mut sh = solve(raster, settings, extent, luma, views)?;
+    let stride = 3 * sh::coefficient_count(sh.degree);
+    for of_splat in sh.coefficients.chunks_exact_mut(stride) {
         for constant in &mut of_splat[..3] {
             *constant -= (0.5 / sh::C0) as f32;
         }
     }
-    Ok(field)
+    let mut splats = Splats { sh, ..luma.clone() };
+    refine(raster, settings, extent, &mut splats, views, 1)?;
+    Ok(splats.sh)
 }
 
 /// RGB Gaussians that look like `luma` with `chroma`: each Gaussian by itself first
@@ -68,34 +72,54 @@ pub fn bake(
     cameras: &[Camera],
 ) -> Result<Splats, GpuError> {
     let step = cameras.len().div_ceil(BAKE_VIEWS).max(1);
-    let cameras: Vec<&Camera> = cameras.iter().step_by(step).collect();
     let mut renderer = renderer(raster, extent, luma, &[&luma.sh, chroma])?;
-    let native = (cameras.iter())
+    let views = (cameras.iter().step_by(step))
         .map(|camera| {
             let pictures = renderer.render(camera)?;
-            Ok(native_rgb(&pictures[0], &pictures[1]))
+            Ok(RgbView {
+                camera: camera.clone(),
+                wanted: native_rgb(&pictures[0], &pictures[1]),
+                weights: None,
+            })
         })
         .collect::<Result<Vec<_>, GpuError>>()?;
     drop(renderer);
+    let mut baked = bake_rgb(luma, chroma);
+    let settings = ChromaSettings::exact();
+    refine(raster, &settings, extent, &mut baked, &views, BAKE_TIMES)?;
+    Ok(baked)
+}
+
+/// Moves the harmonics of RGB Gaussians, up to the degree of `settings`, by what their
+/// pictures lack, so many times.
+fn refine(
+    raster: &Arc<Raster>,
+    settings: &ChromaSettings,
+    extent: f64,
+    splats: &mut Splats,
+    views: &[RgbView],
+    times: usize,
+) -> Result<(), GpuError> {
     let settings = ChromaSettings {
         warm_scales: 1,
+        warm_rounds: 1,
         rounds: 1,
         steps: 4,
-        ..ChromaSettings::exact()
+        fills: false,
+        ..settings.clone()
     };
-    let mut baked = bake_rgb(luma, chroma);
-    for _ in 0..BAKE_TIMES {
-        let views = missing(raster, extent, &baked, &cameras, &native)?;
-        let moved = solve(raster, &settings, extent, luma, &views)?;
-        let stride = 3 * sh::coefficient_count(baked.sh.degree);
-        let of_splat = baked.sh.coefficients.chunks_exact_mut(stride);
-        for (out, by) in of_splat.zip(moved.coefficients.chunks_exact(3)) {
-            for channel in 0..3 {
-                out[channel] += by[channel];
+    let stride = |degree| 3 * sh::coefficient_count(degree);
+    for _ in 0..times {
+        let missing = missing(raster, extent, splats, views)?;
+        let moved = solve(raster, &settings, extent, splats, &missing)?;
+        let of_splat = (splats.sh.coefficients).chunks_exact_mut(stride(splats.sh.degree));
+        for (out, by) in of_splat.zip(moved.coefficients.chunks_exact(stride(moved.degree))) {
+            for (value, by) in out.iter_mut().zip(by) {
+                *value += by;
             }
         }
     }
-    Ok(baked)
+    Ok(())
 }
 
 /// Draws `fields` on the geometry of `splats`.
@@ -115,26 +139,25 @@ fn renderer(
     )
 }
 
-/// What the pictures of RGB Gaussians lack to be those wanted, `[views][pixels]`.
+/// What the pictures of RGB Gaussians lack to be those wanted.
 fn missing(
     raster: &Arc<Raster>,
     extent: f64,
     splats: &Splats,
-    cameras: &[&Camera],
-    wanted: &[Vec<[f32; 3]>],
+    views: &[RgbView],
 ) -> Result<Vec<RgbView>, GpuError> {
     let mut renderer = renderer(raster, extent, splats, &[&splats.sh])?;
-    (cameras.iter().zip(wanted))
-        .map(|(&camera, wanted)| {
-            let pictures = renderer.render(camera)?;
+    (views.iter())
+        .map(|view| {
+            let pictures = renderer.render(&view.camera)?;
             let shown = pictures[0].pixels.chunks_exact(3);
             let missing = |(wanted, shown): (&[f32; 3], &[f32])| {
                 // Viewers clip what they show: nothing is missing beyond white.
                 [0, 1, 2].map(|c| wanted[c] - shown[c].clamp(0.0, 1.0))
             };
             Ok(RgbView {
-                camera: camera.clone(),
-                wanted: wanted.iter().zip(shown).map(missing).collect(),
+                wanted: view.wanted.iter().zip(shown).map(missing).collect(),
+                ..view.clone()
             })
         })
         .collect()
@@ -165,7 +188,7 @@ fn solve(
                     })
                     .collect(),
             },
-            weights: None,
+            weights: view.weights.clone(),
         };
         let views: Vec<ChromaView> = views.iter().map(pair).collect();
         let mut solver = Solver::new(raster.clone(), settings, extent, splats, &views)?;

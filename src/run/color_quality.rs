@@ -6,8 +6,10 @@ use super::{
     RunError,
     scene::{Scene, gray_to_rgb, rgb_pixels, shown_rgb},
     teach::Taught,
+    yardstick::Yardstick,
 };
 use crate::{
+    capture::Exposure,
     chroma::{native_rgb, teacher::AbImage},
     measure,
     raster::{Picture, Raster},
@@ -29,19 +31,21 @@ pub(super) struct Measured {
 }
 
 impl Measured {
-    /// Draws and measures the held-out views, or all where none is.
+    /// Draws and measures the held-out views, or all where none is: `luma` with `chroma`
+    /// against `baked`, and that against the photos.
     pub fn of(
         raster: &Arc<Raster>,
         scene: &Scene,
-        luma: &Splats,
+        exposures: &[Exposure],
+        [luma, baked]: [&Splats; 2],
         chroma: &ShField,
-        baked: &Splats,
         taught: &[Option<Taught>],
     ) -> Result<Self, RunError> {
         let mut renderer = scene.renderer(raster, luma, &[&luma.sh, chroma, &baked.sh])?;
         let (mut errors, mut views, mut rows) = (Vec::new(), Vec::new(), Vec::new());
         for &i in scene.measured().1 {
             let (photo, camera) = &scene.photos[i];
+            let yardstick = Yardstick::of(scene, exposures, i);
             let pictures = renderer.render(camera)?;
             let native = native_rgb(&pictures[0], &pictures[1]);
             let exported = shown_rgb(&pictures[2].pixels);
@@ -53,21 +57,19 @@ impl Measured {
             let taught = taught[i]
                 .as_ref()
                 .map(|taught| teacher_picture(&photo.gray, &taught.answer));
-            let truth = photo.rgb.as_ref().map(|_| rgb_pixels(photo));
-            views.push(ColorView {
-                name: scene.capture.views[i].name.clone(),
-                quality: ColorQuality {
-                    delta_e: truth.as_ref().map(|truth| {
-                        let error = measure::mean_delta_e(&exported, truth);
-                        ColorError {
-                            mean: error.mean,
-                            percentile_95: error.percentile_95,
-                        }
-                    }),
-                    colorfulness: measure::colorfulness(&exported),
-                    teacher_colorfulness: taught.as_deref().map(measure::colorfulness),
-                },
-            });
+            if yardstick.measures() {
+                let shown = yardstick.shown(&exported);
+                let colorful = |rgb: &Vec<[f32; 3]>| yardstick.colorfulness(rgb);
+                views.push(ColorView {
+                    name: scene.capture.views[i].name.clone(),
+                    quality: ColorQuality {
+                        delta_e: (yardstick.rgb())
+                            .map(|truth| yardstick.color_error(&shown, &truth)),
+                        colorfulness: colorful(&shown),
+                        teacher_colorfulness: taught.as_ref().map(colorful),
+                    },
+                });
+            }
             if rows.len() < SHEET_ROWS {
                 rows.push(Row {
                     width: camera.width,
@@ -90,7 +92,7 @@ impl Measured {
 
     /// The mean over the views.
     pub fn mean(&self) -> ColorQuality {
-        let count = self.views.len() as f64;
+        let count = self.views.len().max(1) as f64;
         let errors: Vec<ColorError> = self
             .views
             .iter()

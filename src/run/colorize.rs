@@ -15,11 +15,12 @@ use super::{
     files,
     fit::{capture_report, comments, open_gpu},
     preset::Preset,
-    scene::{Scene, read_splats},
+    scene::{Scene, masked_weights, read_splats},
     teach::{TeachOptions, Teachers},
+    yardstick,
 };
 use crate::{
-    capture::{Camera, LoadOptions, Photo},
+    capture::{Camera, LoadOptions},
     chroma::{
         ChosenDegree, ChromaProgress, ChromaView, bake, choose_degree, distil, teacher::Upsample,
     },
@@ -175,7 +176,15 @@ pub fn colorize(
         .map(|&i| scene.photos[i].1.clone())
         .collect();
     let baked = bake(&raster, scene.extent, &luma, &chroma, &cameras)?;
-    let measured = Measured::of(&raster, &scene, &luma, &chroma, &baked, &lesson.views)?;
+    let exposures = yardstick::exposures(&scene, &report.luma.exposures);
+    let measured = Measured::of(
+        &raster,
+        &scene,
+        &exposures,
+        [&luma, &baked],
+        &chroma,
+        &lesson.views,
+    )?;
     report.chroma = Some(ChromaReport {
         teacher: match &teachers.describe()[..] {
             [only] => Some(only.clone()),
@@ -229,17 +238,6 @@ pub fn colorize(
         folder.write_report(&report)?;
     }
     Ok((output, report))
-}
-
-/// Weights of the pixels that the photo's mask lets count.
-fn masked_weights(weights: Option<Vec<f32>>, photo: &Photo) -> Option<Vec<f32>> {
-    let Some(mask) = &photo.mask else {
-        return weights;
-    };
-    let weights = weights.unwrap_or_else(|| vec![1.0; mask.len()]);
-    let counted =
-        (weights.iter().zip(mask)).map(|(weight, &count)| weight * f32::from(count) / 255.0);
-    Some(counted.collect())
 }
 
 /// What the views held back say about the degree.

@@ -16,6 +16,7 @@ mod render;
 mod scene;
 mod teach;
 pub mod tradeoff;
+mod yardstick;
 
 use std::{fmt, path::PathBuf};
 

@@ -209,12 +209,15 @@ pub(super) fn counts(photo: &Photo, pixel: usize) -> bool {
     photo.mask.as_ref().is_none_or(|mask| mask[pixel] >= 128)
 }
 
-/// The values of the pixels that count.
-pub(super) fn counted<T: Copy>(photo: &Photo, values: &[T]) -> Vec<T> {
-    (values.iter().enumerate())
-        .filter(|&(pixel, _)| counts(photo, pixel))
-        .map(|(_, &value)| value)
-        .collect()
+/// Weights of the pixels that the photo's mask lets count.
+pub(super) fn masked_weights(weights: Option<Vec<f32>>, photo: &Photo) -> Option<Vec<f32>> {
+    let Some(mask) = &photo.mask else {
+        return weights;
+    };
+    let weights = weights.unwrap_or_else(|| vec![1.0; mask.len()]);
+    let counted =
+        (weights.iter().zip(mask)).map(|(weight, &count)| weight * f32::from(count) / 255.0);
+    Some(counted.collect())
 }
 
 /// Gray pixels as floats in [0, 1].

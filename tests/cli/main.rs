@@ -10,6 +10,7 @@ mod doctor;
 mod documented;
 mod errors;
 mod eval;
+mod eval_photos;
 mod inspect;
 mod photos;
 mod picture;

@@ -11,11 +11,14 @@ use super::{
     subject::Subject,
 };
 use crate::{
-    capture::Camera,
+    capture::{Camera, Photo},
     chroma::teacher::AbImage,
     measure::{Consistency, Flow, camera_path, decode_flo, visible},
     report::{BetweenScore, ConsistencyScore, Method, PathConsistency, PathScore, to_image},
-    run::{Event, Observer, RunError, Stage, scene::rgb_pixels},
+    run::{
+        Event, Observer, RunError, Stage,
+        scene::{counts, rgb_pixels},
+    },
 };
 
 /// Distances in frames: short range as in the literature, with 1 beside 10, and long
@@ -212,7 +215,9 @@ pub(super) fn between_views(
             let truth = to_picture(&truth.resized(camera.width, camera.height));
             drawing.layers.push((Method::Photo, Layer::Ab(truth)));
         }
-        frames.push(Frame::of(drawing, painter.depth(&camera)?));
+        let mut depth = painter.depth(&camera)?;
+        hide_masked(&views[i].0, &camera, &mut depth);
+        frames.push(Frame::of(drawing, depth));
     }
     let points = &subject.scene.capture.points;
     let every = points.len().div_ceil(MAX_POINTS);
@@ -249,6 +254,20 @@ pub(super) fn between_views(
 fn median(mut values: Vec<f64>) -> Option<f64> {
     let middle = values.len() / 2;
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
+/// Takes the depth from where the photo does not count: what someone who walks by hides
+/// cannot be compared.
+fn hide_masked(photo: &Photo, camera: &Camera, depth: &mut [f32]) {
+    let (width, height) = (camera.width as usize, camera.height as usize);
+    let across = |at: usize, from: usize, to: u32| at * to as usize / from;
+    for (pixel, depth) in depth.iter_mut().enumerate() {
+        let column = across(pixel % width, width, photo.width);
+        let row = across(pixel / width, height, photo.height);
+        if !counts(photo, row * photo.width as usize + column) {
+            *depth = f32::NAN;
+        }
+    }
 }
 
 /// The camera at no more than [`MAX_SIDE`] pixels.

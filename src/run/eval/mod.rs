@@ -102,9 +102,12 @@ pub fn eval(
             total: measured.len(),
             message: name.clone(),
         });
-        let (photo, camera) = &subject.scene.photos[i];
-        let drawing = painter.draw(camera, name)?;
-        let scored = Scored::of(name, photo, &drawing, painter.answer(i), lpips.as_mut())?;
+        let yardstick = subject.yardstick(i);
+        if !yardstick.measures() {
+            continue;
+        }
+        let drawing = painter.draw(&subject.scene.photos[i].1, name)?;
+        let scored = Scored::of(name, yardstick, &drawing, painter.answer(i), lpips.as_mut())?;
         if rows.len() < MAX_ROWS {
             rows.push(page_row(made.path(), rows.len(), &scored)?);
         }

@@ -6,13 +6,13 @@ use super::{
     subject::Subject,
 };
 use crate::{
-    capture::Photo,
     chroma::teacher::AbImage,
     measure,
     report::{ColorError, LumaScore, Method, PictureScore, ViewScore, error_map},
     run::{
         RunError,
-        scene::{gray_pixels, gray_to_rgb, rgb_pixels},
+        scene::{gray_to_rgb, rgb_pixels},
+        yardstick::Yardstick,
     },
 };
 
@@ -47,19 +47,20 @@ const SHOWN: [(Method, &str, &str); 4] = [
 ];
 
 impl Scored {
-    /// Measures what was drawn, and the teacher's answer, against a photo.
+    /// Measures what was drawn, and the teacher's answer, against a photo: what was drawn
+    /// as the photo would show it.
     pub fn of(
         name: &str,
-        photo: &Photo,
+        yardstick: Yardstick<'_>,
         drawing: &Drawing,
         answer: Option<&AbImage>,
         mut lpips: Option<&mut Lpips>,
     ) -> Result<Self, RunError> {
+        let photo = yardstick.photo;
         let size = [photo.width, photo.height];
-        let shape = size.map(|side| side as usize);
-        let gray = gray_pixels(photo);
         let shown = rgb_pixels(photo);
-        let drawn_gray = gray_to_rgb(&drawing.gray.pixels);
+        let luma_shown = yardstick.luma_shown(&drawing.gray.pixels);
+        let drawn_gray = gray_to_rgb(&luma_shown);
         let mut shots = Vec::new();
         let mut show = |file, caption, pixels| {
             shots.push(Shot {
@@ -70,39 +71,59 @@ impl Scored {
         };
         show("photo", "photo", shown.clone());
         show("luma", "luma", drawn_gray.clone());
-        let clamped: Vec<f32> = drawn_gray.iter().map(|rgb| rgb[0]).collect();
+        let quality = yardstick.luma_quality(&luma_shown);
         let luma = LumaScore {
-            psnr: measure::reported_psnr(&clamped, &gray),
-            ssim: measure::ssim(shape[0], shape[1], &clamped, &gray),
+            psnr: quality.psnr,
+            ssim: quality.ssim,
             lpips: match &mut lpips {
-                Some(lpips) => Some(lpips.distance(&drawn_gray, &gray_to_rgb(&gray), size)?),
+                Some(lpips) => {
+                    let gray = gray_to_rgb(&yardstick.gray());
+                    Some(lpips.distance(&yardstick.patched(&drawn_gray, &gray), &gray, size)?)
+                }
                 None => None,
             },
         };
         // Fidelity to a gray photo's colours is no figure.
-        let truth = photo.rgb.as_ref().map(|_| &shown);
+        let truth = yardstick.rgb();
+        let truth = truth.as_deref();
         let mut scores = Vec::new();
         let mut rendered = Vec::new();
         let mut score = |method: Method, rgb: Vec<[f32; 3]>, ab: &[[f32; 2]]| {
+            let counted = yardstick.counted(&rgb);
+            let wanted = truth.map(|truth| yardstick.counted(truth));
+            let wanted = wanted.as_deref();
             scores.push(PictureScore {
                 method,
-                psnr: truth.map(|t| measure::reported_psnr(rgb.as_flattened(), t.as_flattened())),
-                ssim: truth.map(|t| rgb_ssim(shape, &rgb, t)),
-                delta_e: truth.map(|t| color_error(&rgb, t)),
-                ab_error: truth.map(|t| measure::ab_error(ab, &ab_of(t))),
-                colorfulness: measure::colorfulness(&rgb),
-                colorfulness_absolute: measure::colorfulness_absolute(&rgb),
+                psnr: wanted
+                    .map(|t| measure::reported_psnr(counted.as_flattened(), t.as_flattened())),
+                ssim: truth.map(|t| rgb_ssim(yardstick, &rgb, t)),
+                delta_e: truth.map(|t| yardstick.color_error(&rgb, t)),
+                ab_error: wanted.map(|t| measure::ab_error(&yardstick.counted(ab), &ab_of(t))),
+                colorfulness: measure::colorfulness(&counted),
+                colorfulness_absolute: measure::colorfulness_absolute(&counted),
                 lpips: match (&mut lpips, truth) {
-                    (Some(lpips), Some(t)) => Some(lpips.distance(&rgb, t, size)?),
+                    (Some(lpips), Some(t)) => {
+                        Some(lpips.distance(&yardstick.patched(&rgb, t), t, size)?)
+                    }
                     _ => None,
                 },
             });
             rendered.push((method, rgb));
             Ok::<_, RunError>(())
         };
+        let (mut native, mut exported) = (None, None);
         for (method, layer) in &drawing.layers {
-            score(*method, layer.rgb(&drawing.gray), &layer.ab())?;
+            let drawn = layer.rgb(&drawing.gray);
+            match method {
+                Method::Native => native = Some(drawn.clone()),
+                Method::Exported => exported = Some(drawn.clone()),
+                _ => {}
+            }
+            score(*method, yardstick.shown(&drawn), &layer.ab())?;
         }
+        let bake = native
+            .zip(exported)
+            .map(|(native, exported)| yardstick.color_error(&native, &exported));
         if let Some(answer) = answer {
             let layer = Layer::Ab(to_picture(answer));
             score(Method::Teacher, layer.rgb(&gray_picture(photo)), &answer.ab)?;
@@ -113,9 +134,6 @@ impl Scored {
                 .find(|(m, _)| *m == method)
                 .map(|(_, rgb)| rgb)
         };
-        let bake = of(Method::Native)
-            .zip(of(Method::Exported))
-            .map(|(native, exported)| color_error(native, exported));
         for (method, file, caption) in SHOWN {
             if let Some(rgb) = of(method) {
                 show(file, caption, rgb.clone());
@@ -123,7 +141,15 @@ impl Scored {
         }
         if let (Some(truth), Some(exported)) = (truth, of(Method::Exported)) {
             let wanted = ab_of(truth);
-            let mut map = |file, caption, errors: &[f64]| show(file, caption, error_map(errors));
+            let nothing = vec![0.0; wanted.len()];
+            // What does not count is no error.
+            let mut map = |file, caption, errors: &[f64]| {
+                show(
+                    file,
+                    caption,
+                    error_map(&yardstick.patched(errors, &nothing)),
+                );
+            };
             map("delta-e", "ΔE00, ours", &measure::delta_e(exported, truth));
             map(
                 "ab",
@@ -141,8 +167,8 @@ impl Scored {
             ssim: None,
             delta_e: None,
             ab_error: None,
-            colorfulness: measure::colorfulness(&shown),
-            colorfulness_absolute: measure::colorfulness_absolute(&shown),
+            colorfulness: yardstick.colorfulness(&shown),
+            colorfulness_absolute: measure::colorfulness_absolute(&yardstick.counted(&shown)),
             lpips: None,
         });
         Ok(Self {
@@ -164,18 +190,10 @@ fn distances(ab: &[[f32; 2]], wanted: &[[f32; 2]]) -> Vec<f64> {
     ab.iter().zip(wanted).map(apart).collect()
 }
 
-fn rgb_ssim([width, height]: [usize; 2], a: &[[f32; 3]], b: &[[f32; 3]]) -> f64 {
+fn rgb_ssim(yardstick: Yardstick<'_>, shown: &[[f32; 3]], truth: &[[f32; 3]]) -> f64 {
     let channel = |pixels: &[[f32; 3]], c: usize| pixels.iter().map(|p| p[c]).collect::<Vec<_>>();
-    let of = |c| measure::ssim(width, height, &channel(a, c), &channel(b, c));
+    let of = |c| yardstick.ssim(&channel(shown, c), &channel(truth, c));
     (of(0) + of(1) + of(2)) / 3.0
-}
-
-fn color_error(a: &[[f32; 3]], b: &[[f32; 3]]) -> ColorError {
-    let error = measure::mean_delta_e(a, b);
-    ColorError {
-        mean: error.mean,
-        percentile_95: error.percentile_95,
-    }
 }
 
 /// The mean of those that are there.
@@ -206,7 +224,8 @@ pub(super) fn teacher_colorfulness(painter: &Painter<'_>, subject: &Subject) -> 
     let photos = subject.scene.photos.iter().enumerate();
     mean(photos.map(|(i, (photo, _))| {
         let layer = Layer::Ab(to_picture(painter.answer(i)?));
-        Some(measure::colorfulness(&layer.rgb(&gray_picture(photo))))
+        let yardstick = subject.yardstick(i);
+        (yardstick.measures()).then(|| yardstick.colorfulness(&layer.rgb(&gray_picture(photo))))
     }))
 }
 

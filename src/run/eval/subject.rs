@@ -4,10 +4,12 @@ use std::path::PathBuf;
 
 use super::EvalOptions;
 use crate::{
+    capture::Exposure,
     report::Report,
     run::{
         Event, Observer, RunError, RunFolder,
         scene::{Scene, read_splats},
+        yardstick::{Yardstick, exposures},
     },
     splats::{ShField, Splats},
 };
@@ -17,6 +19,8 @@ pub(super) struct Subject {
     pub folder: RunFolder,
     pub report: Report,
     pub scene: Scene,
+    /// How bright each view's photo shows the scene.
+    pub exposures: Vec<Exposure>,
     /// Geometry and luma.
     pub luma: Splats,
     /// Native a/b, where the run has them.
@@ -60,6 +64,7 @@ impl Subject {
         };
         let scene = Scene::load(&colmap, &report.capture.load, observe)?;
         Ok(Self {
+            exposures: exposures(&scene, &report.luma.exposures),
             folder,
             report,
             scene,
@@ -67,6 +72,11 @@ impl Subject {
             chroma,
             exported: exported.sh,
         })
+    }
+
+    /// A view's photo.
+    pub fn yardstick(&self, view: usize) -> Yardstick<'_> {
+        Yardstick::of(&self.scene, &self.exposures, view)
     }
 
     /// The name of the photos' folder.

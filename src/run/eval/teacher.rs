@@ -16,7 +16,7 @@ use crate::{
         teacher::{AbImage, Asked, GrayImage, Teacher, TeacherSettings},
     },
     raster::{Picture, Raster},
-    run::{Event, Observer, RunError, Stage},
+    run::{Event, Observer, RunError, Stage, scene::masked_weights},
     splats::{ShField, sh},
 };
 
@@ -95,7 +95,7 @@ impl EvalTeacher {
 
     /// RGB splats on the run's geometry, fitted to the teacher's pictures of the training
     /// views: harmonics of degree 3 as splat trainers have, with the rounds and steps
-    /// that `colorize` takes by default.
+    /// that `colorize` takes by default. They are told what `fit` knew: exposures, masks.
     pub fn rgb_splats(
         &self,
         raster: &Arc<Raster>,
@@ -114,11 +114,12 @@ impl EvalTeacher {
         let views: Vec<RgbView> = (scene.split.train.iter())
             .filter_map(|&i| {
                 let (photo, camera) = &scene.photos[i];
-                let wanted =
-                    native_rgb(&gray_picture(photo), &to_picture(self.answers[i].as_ref()?));
+                let answer = to_picture(self.answers[i].as_ref()?);
+                let colored = native_rgb(&gray_picture(photo), &answer);
                 Some(RgbView {
                     camera: camera.clone(),
-                    wanted,
+                    wanted: subject.yardstick(i).unexposed(&colored),
+                    weights: masked_weights(None, photo),
                 })
             })
             .collect();

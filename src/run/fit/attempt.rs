@@ -6,15 +6,17 @@ use super::super::{
     Event, Observer, RunError, Stage,
     carve::{self, carved},
     preset::Amounts,
-    scene::{Scene, gray_pixels},
+    scene::Scene,
+    yardstick::Yardstick,
 };
 use super::{
     FitOptions,
     goal::{ITERATIONS_MIN, WRITING},
-    quality::{luma_quality, mean_quality, measure_luma},
+    quality::{mean_quality, measure_luma},
     start::first_splats,
 };
 use crate::{
+    capture::Exposure,
     effects::{Effect, Plan, Room},
     gpu::{Gpu, GpuError},
     luma::{
@@ -109,11 +111,14 @@ impl Job<'_> {
         let Some(&first) = views.first() else {
             return 0.0;
         };
-        let photo = &self.judge.photos[first].0;
-        let gray = gray_pixels(photo);
+        let yardstick = Yardstick {
+            photo: &self.judge.photos[first].0,
+            exposure: Exposure::NONE,
+        };
+        let gray = yardstick.gray();
         let begun = Instant::now();
         // Of the photo against itself: it is only about the time.
-        std::hint::black_box(luma_quality(photo, &gray, &gray));
+        std::hint::black_box(yardstick.luma_quality(&gray));
         let pixels = |scene: &Scene| scene.photos[first].0.gray.len() as f64;
         let drawing = each * pixels(self.judge) / pixels(self.scene).max(1.0);
         views.len() as f64 * (begun.elapsed().as_secs_f64() + drawing)

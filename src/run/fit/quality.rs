@@ -2,13 +2,9 @@
 
 use std::sync::Arc;
 
-use super::super::{
-    RunError,
-    scene::{Scene, counted, counts, gray_pixels},
-};
+use super::super::{RunError, scene::Scene, yardstick::Yardstick};
 use crate::{
-    capture::{Exposure, Photo},
-    measure,
+    capture::Exposure,
     raster::Raster,
     report::{LumaQuality, LumaView},
     splats::Splats,
@@ -26,38 +22,17 @@ pub(super) fn measure_luma(
         .split
         .test
         .iter()
-        // A photo of which nothing counts says nothing.
-        .filter(|&&i| (0..scene.photos[i].0.gray.len()).any(|p| counts(&scene.photos[i].0, p)))
-        .map(|&i| {
-            let (photo, camera) = &scene.photos[i];
-            let picture = renderer.render(camera)?.remove(0);
-            let shown: Vec<f32> = (picture.pixels.iter())
-                .map(|&luma| exposures[i].shown(f64::from(luma)) as f32)
-                .collect();
-            let truth = gray_pixels(photo);
+        .map(|&i| (i, Yardstick::of(scene, exposures, i)))
+        .filter(|(_, yardstick)| yardstick.measures())
+        .map(|(i, yardstick)| {
+            let picture = renderer.render(&scene.photos[i].1)?.remove(0);
+            let shown = yardstick.luma_shown(&picture.pixels);
             Ok(LumaView {
                 name: scene.capture.views[i].name.clone(),
-                quality: luma_quality(photo, &shown, &truth),
+                quality: yardstick.luma_quality(&shown),
             })
         })
         .collect()
-}
-
-/// Quality of the pixels that count.
-pub(super) fn luma_quality(photo: &Photo, shown: &[f32], truth: &[f32]) -> LumaQuality {
-    let (width, height) = (photo.width as usize, photo.height as usize);
-    let psnr = measure::reported_psnr(&counted(photo, shown), &counted(photo, truth));
-    // Where a pixel does not count the picture is taken to be right, and the others
-    // answer for all that is wrong.
-    let pixels = 0..truth.len();
-    let patched: Vec<f32> = pixels
-        .map(|p| if counts(photo, p) { shown[p] } else { truth[p] })
-        .collect();
-    let share = counted(photo, truth).len() as f64 / truth.len() as f64;
-    LumaQuality {
-        psnr,
-        ssim: 1.0 - (1.0 - measure::ssim(width, height, &patched, truth)) / share,
-    }
 }
 
 /// Their mean, if there are any.

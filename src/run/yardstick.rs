@@ -1,0 +1,199 @@
+//! A photo as what pictures of the scene are held against.
+
+use std::collections::HashMap;
+
+use super::scene::{Scene, counts, gray_pixels, rgb_pixels};
+use crate::{
+    capture::{Exposure, Photo},
+    measure,
+    report::{ColorError, LumaQuality, ViewExposure},
+};
+
+/// A photo, how bright it shows the scene, and which of its pixels count.
+///
+/// Pictures that are measured are those that the photo would show ([`Yardstick::luma_shown`],
+/// [`Yardstick::shown`]), for how bright a photo became is no matter of the scene.
+#[derive(Clone, Copy)]
+pub(super) struct Yardstick<'a> {
+    pub photo: &'a Photo,
+    pub exposure: Exposure,
+}
+
+/// By view of `scene`, the exposures that a report tells; none where it tells none.
+pub(super) fn exposures(scene: &Scene, told: &[ViewExposure]) -> Vec<Exposure> {
+    let by_name: HashMap<&str, Exposure> = (told.iter())
+        .map(|view| (view.name.as_str(), view.exposure))
+        .collect();
+    let of = |name: &str| by_name.get(name).copied().unwrap_or(Exposure::NONE);
+    (scene.capture.views.iter())
+        .map(|view| of(&view.name))
+        .collect()
+}
+
+impl<'a> Yardstick<'a> {
+    /// The photo of a view, where `exposures` are those of all views.
+    pub fn of(scene: &'a Scene, exposures: &[Exposure], view: usize) -> Self {
+        Self {
+            photo: &scene.photos[view].0,
+            exposure: exposures[view],
+        }
+    }
+
+    /// Whether any pixel counts; a photo of which none does measures nothing.
+    pub fn measures(&self) -> bool {
+        (0..self.photo.gray.len()).any(|pixel| counts(self.photo, pixel))
+    }
+
+    /// Gray in [0, 1], `[height, width]`.
+    pub fn gray(&self) -> Vec<f32> {
+        gray_pixels(self.photo)
+    }
+
+    /// RGB in [0, 1], `[height, width]`, where the photo has colours.
+    pub fn rgb(&self) -> Option<Vec<[f32; 3]>> {
+        self.photo.rgb.as_ref().map(|_| rgb_pixels(self.photo))
+    }
+
+    /// What the photo would show of a gray picture, in [0, 1].
+    pub fn luma_shown(&self, luma: &[f32]) -> Vec<f32> {
+        luma.iter().map(|&value| self.channel(value)).collect()
+    }
+
+    /// What the photo would show of an RGB picture, in [0, 1]: an exposure treats all
+    /// channels alike.
+    pub fn shown(&self, rgb: &[[f32; 3]]) -> Vec<[f32; 3]> {
+        (rgb.iter())
+            .map(|rgb| rgb.map(|value| self.channel(value)))
+            .collect()
+    }
+
+    /// The picture of which the photo shows `rgb`; it may leave [0, 1].
+    pub fn unexposed(&self, rgb: &[[f32; 3]]) -> Vec<[f32; 3]> {
+        let Exposure { gain, offset } = self.exposure;
+        let of_scene = |value: f32| ((f64::from(value) - offset) / gain) as f32;
+        rgb.iter().map(|rgb| rgb.map(of_scene)).collect()
+    }
+
+    fn channel(&self, value: f32) -> f32 {
+        self.exposure.shown(f64::from(value)) as f32
+    }
+
+    /// The values of the pixels that count.
+    pub fn counted<T: Copy>(&self, values: &[T]) -> Vec<T> {
+        (values.iter().enumerate())
+            .filter(|&(pixel, _)| counts(self.photo, pixel))
+            .map(|(_, &value)| value)
+            .collect()
+    }
+
+    /// `picture`, but `truth` where a pixel does not count.
+    pub fn patched<T: Copy>(&self, picture: &[T], truth: &[T]) -> Vec<T> {
+        (picture.iter().zip(truth).enumerate())
+            .map(|(pixel, (&ours, &right))| {
+                if counts(self.photo, pixel) {
+                    ours
+                } else {
+                    right
+                }
+            })
+            .collect()
+    }
+
+    /// Quality of a gray picture.
+    pub fn luma_quality(&self, shown: &[f32]) -> LumaQuality {
+        let truth = self.gray();
+        LumaQuality {
+            psnr: measure::reported_psnr(&self.counted(shown), &self.counted(&truth)),
+            ssim: self.ssim(shown, &truth),
+        }
+    }
+
+    /// Structural similarity. Where a pixel does not count the picture is taken to be
+    /// right, and the others answer for all that is wrong.
+    pub fn ssim(&self, shown: &[f32], truth: &[f32]) -> f64 {
+        let (width, height) = (self.photo.width as usize, self.photo.height as usize);
+        let share = self.counted(truth).len() as f64 / truth.len() as f64;
+        1.0 - (1.0 - measure::ssim(width, height, &self.patched(shown, truth), truth)) / share
+    }
+
+    /// ΔE00 between two pictures.
+    pub fn color_error(&self, a: &[[f32; 3]], b: &[[f32; 3]]) -> ColorError {
+        let error = measure::mean_delta_e(&self.counted(a), &self.counted(b));
+        ColorError {
+            mean: error.mean,
+            percentile_95: error.percentile_95,
+        }
+    }
+
+    /// Colourfulness of a picture.
+    pub fn colorfulness(&self, rgb: &[[f32; 3]]) -> f64 {
+        measure::colorfulness(&self.counted(rgb))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two pixels, of which the second does not count.
+    fn photo() -> Photo {
+        Photo {
+            width: 2,
+            height: 1,
+            gray: vec![100, 200],
+            rgb: Some(vec![[120, 90, 60], [255, 0, 0]]),
+            mask: Some(vec![255, 0]),
+        }
+    }
+
+    #[test]
+    fn what_does_not_count_changes_nothing() {
+        let photo = photo();
+        let yardstick = Yardstick {
+            photo: &photo,
+            exposure: Exposure::NONE,
+        };
+        let truth = yardstick.rgb().expect("colours");
+        let mut other = truth.clone();
+        other[1] = [0.0, 1.0, 0.0];
+        assert_eq!(yardstick.color_error(&other, &truth).mean, 0.0);
+        assert_eq!(
+            yardstick.colorfulness(&other),
+            yardstick.colorfulness(&truth)
+        );
+        let gray = yardstick.gray();
+        let quality = yardstick.luma_quality(&[gray[0], 0.0]);
+        assert_eq!((quality.psnr, quality.ssim), (measure::IDENTICAL_PSNR, 1.0));
+        // What counts does.
+        other[0][0] += 0.1;
+        assert!(yardstick.color_error(&other, &truth).mean > 1.0);
+        assert!(yardstick.luma_quality(&[gray[0] + 0.1, gray[1]]).psnr < 21.0);
+    }
+
+    #[test]
+    fn a_photo_shows_the_scene_as_bright_as_it_was_exposed() {
+        let photo = photo();
+        let yardstick = Yardstick {
+            photo: &photo,
+            exposure: Exposure {
+                gain: 1.25,
+                offset: -0.05,
+            },
+        };
+        let scene = [[0.4, 0.2, 0.02], [0.9, 0.6, 0.5]];
+        let shown = yardstick.shown(&scene);
+        for (shown, want) in (shown.as_flattened().iter()).zip([0.45, 0.2, 0.0, 1.0, 0.7, 0.575]) {
+            assert!((shown - want).abs() < 1e-6, "{shown} {want}");
+        }
+        assert_eq!(
+            yardstick.luma_shown(&[0.4, 0.02]),
+            [shown[0][0], shown[0][2]]
+        );
+        // And back, where black and white did not cut.
+        let back = yardstick.unexposed(&shown);
+        for (pixel, channel) in [(0, 0), (0, 1), (1, 1), (1, 2)] {
+            let (back, want) = (back[pixel][channel], scene[pixel][channel]);
+            assert!((back - want).abs() < 1e-6, "{back} {want}");
+        }
+    }
+}
