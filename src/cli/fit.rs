@@ -5,9 +5,10 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use super::{effects::EffectArguments, photos::Photos, print, progress::Progress};
+use crate::chroma::teacher::TeacherSettings;
 use crate::luma::{Densification, Numerics};
 use crate::report::timings_table;
-use crate::run::{FitOptions, Preset, RunError, fit};
+use crate::run::{AheadOptions, FitOptions, Preset, RunError, fit};
 
 /// Rows of the curve that is printed.
 const CURVE_ROWS: usize = 8;
@@ -61,6 +62,16 @@ pub struct Fit {
     /// measured, drawn and written is always computed as viewers do.
     #[arg(long, value_name = "KEY=VALUE[,…]")]
     numerics: Option<Numerics>,
+    /// Ask this colorization network about the photos while luma trains, so that `colorize` need
+    /// not; may be given more than once.
+    #[arg(long, value_name = "FILE.onnx")]
+    teacher: Vec<PathBuf>,
+    /// What the network takes and gives, as for `colorize`.
+    #[arg(long, value_name = "NAME|FILE.toml", requires = "teacher")]
+    teacher_profile: Option<String>,
+    /// Side in pixels at which it sees photos, as for `colorize`.
+    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(1..=8192), requires = "teacher")]
+    teacher_size: Option<u32>,
     /// Seed of every random choice: same seed, same bytes.
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
@@ -100,6 +111,14 @@ impl Fit {
             measure_side: self.measure_side,
             timings: self.timings,
             numerics: self.numerics.unwrap_or_default(),
+            ahead: AheadOptions {
+                teachers: self.teacher,
+                settings: TeacherSettings {
+                    profile: self.teacher_profile,
+                    size: self.teacher_size,
+                    ..TeacherSettings::default()
+                },
+            },
         };
         let (folder, report) = fit(&options, &mut |event| progress.show(&event))?;
         progress.finish();

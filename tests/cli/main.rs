@@ -5,6 +5,7 @@
 
 use gs_chroma::oracle;
 
+mod ahead;
 mod coordinates;
 mod doctor;
 mod documented;

@@ -142,6 +142,19 @@ impl Teacher {
         };
         Ok(answer.map(|answer| answer.upsampled(photo, self.upsample)))
     }
+
+    /// Has a network answer for a photo without hints and keep the answer, so that
+    /// [`Self::colorize`] need not wait for it. Nothing is asked of a folder.
+    ///
+    /// # Errors
+    /// As for [`Self::colorize`].
+    pub fn prepare(&mut self, name: &str, photo: GrayImage<'_>) -> Result<(), TeacherError> {
+        photo.check(name)?;
+        match &mut self.source {
+            Source::Network(network) => network.colorize(name, photo, None).map(drop),
+            Source::Folder(_) => Ok(()),
+        }
+    }
 }
 
 /// The last part of a path, for reports.

@@ -1,5 +1,6 @@
 //! `fit`: photos to geometry and luma.
 
+mod ahead;
 mod attempt;
 mod goal;
 mod quality;
@@ -19,6 +20,8 @@ use crate::{
     report::Report,
     splats::ply,
 };
+use ahead::Ahead;
+pub use ahead::AheadOptions;
 use attempt::Job;
 use goal::{Family, SURELY};
 pub(super) use told::capture_report;
@@ -64,6 +67,8 @@ pub struct FitOptions {
     pub timings: bool,
     /// How accurately training computes.
     pub numerics: Numerics,
+    /// Who is to colour the photos meanwhile.
+    pub ahead: AheadOptions,
 }
 
 impl FitOptions {
@@ -88,6 +93,7 @@ impl FitOptions {
             target_psnr: None,
             timings: false,
             numerics: Numerics::default(),
+            ahead: AheadOptions::default(),
         }
     }
 }
@@ -110,6 +116,7 @@ pub fn fit(
         None => RunFolder::for_capture(&options.colmap_dir),
     };
     files::make_folder(folder.path())?;
+    let ahead = Ahead::open(&options.ahead, &folder)?;
     let asked = asked_amounts(options, preset);
     let family = match options.time_limit.or(options.target_psnr) {
         Some(_) => Some(Family::of(options, asked.max_side)?),
@@ -153,17 +160,19 @@ pub fn fit(
         begun,
     };
     let loading = begun.elapsed().as_secs_f64();
-    let (attempt, attempts) = match (&family, options.target_psnr) {
-        (Some(family), Some(target)) => {
-            let reached = job.reach(target, family, observe)?;
-            level = reached.level;
-            (reached.attempt, reached.attempts)
+    let (attempt, attempts) = ahead.meanwhile(&scene, observe, |observe| {
+        match (&family, options.target_psnr) {
+            (Some(family), Some(target)) => {
+                let reached = job.reach(target, family, observe)?;
+                level = reached.level;
+                Ok((reached.attempt, reached.attempts))
+            }
+            _ => {
+                let limit = job.time_for_training(each)?;
+                Ok((job.attempt(&amounts, limit, observe)?, 1))
+            }
         }
-        _ => {
-            let limit = job.time_for_training(each)?;
-            (job.attempt(&amounts, limit, observe)?, 1)
-        }
-    };
+    })?;
     let preset = match &family {
         Some(_) => Preset::below(level),
         None => preset,
