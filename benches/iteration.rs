@@ -5,11 +5,14 @@
 //! cargo bench                                # 10⁴ and 10⁵ Gaussians, 320 to 1,280 pixels
 //! cargo bench -- --full                      # 10⁴ to 10⁶, 320 to 3,840
 //! cargo bench -- --full --csv cost.csv       # for tools/plot_cost.py
+//! cargo bench --bench iteration -- --behind  # all Gaussians behind the camera
 //! ```
 //!
 //! Gaussians fill the view at random, as wide as lets eight cover each pixel: finer
 //! where there are more, as in scenes. Times are medians over up to five rounds of four
 //! iterations each; the kernels' come from the device where it has timestamp queries.
+//! With `--behind`, nothing is in view: what kernels that work on what is seen take then is
+//! the cost of workgroups that find nothing to do.
 //! A harness of its own, because one round times all kernels at once.
 
 mod cloud;
@@ -33,6 +36,9 @@ const ROUNDS: usize = 5;
 /// No further round of a size after so many seconds.
 const PATIENCE: f64 = 20.0;
 
+/// Gaussians, and pixels across.
+type Size = (usize, u32);
+
 /// What was measured of one size.
 struct Cost {
     splats: usize,
@@ -44,7 +50,7 @@ struct Cost {
 }
 
 /// A trainer that has found its room already.
-fn trainer(gpu: &Gpu, count: usize, width: u32) -> Result<LumaTrainer, GpuError> {
+fn trainer(gpu: &Gpu, (count, width): Size, behind: bool) -> Result<LumaTrainer, GpuError> {
     let camera = camera(width);
     let mut random = Random::new(2);
     let pixels = camera.width * camera.height;
@@ -54,7 +60,12 @@ fn trainer(gpu: &Gpu, count: usize, width: u32) -> Result<LumaTrainer, GpuError>
         max_splats: count,
         ..LumaSettings::new(ITERATIONS)
     };
-    let splats = cloud(count, &camera, 0);
+    let mut splats = cloud(count, &camera, 0);
+    if behind {
+        for [_, _, z] in &mut splats.means {
+            *z = -*z;
+        }
+    }
     let raster = Arc::new(Raster::new(gpu));
     let views = vec![TrainingView::new(camera, gray)];
     let mut trainer = LumaTrainer::new(raster, settings, 5.0, &splats, views)?;
@@ -62,8 +73,8 @@ fn trainer(gpu: &Gpu, count: usize, width: u32) -> Result<LumaTrainer, GpuError>
     Ok(trainer)
 }
 
-fn measure(gpu: &Gpu, splats: usize, width: u32) -> Result<Cost, GpuError> {
-    let mut plain = trainer(gpu, splats, width)?;
+fn measure(gpu: &Gpu, size: Size, behind: bool) -> Result<Cost, GpuError> {
+    let mut plain = trainer(gpu, size, behind)?;
     let mut walls = Vec::new();
     let first = Instant::now();
     while walls.len() < ROUNDS && (walls.is_empty() || first.elapsed().as_secs_f64() < PATIENCE) {
@@ -73,7 +84,7 @@ fn measure(gpu: &Gpu, splats: usize, width: u32) -> Result<Cost, GpuError> {
     }
     drop(plain);
     let timed = gpu.timed()?;
-    let mut trainer = trainer(&timed, splats, width)?;
+    let mut trainer = trainer(&timed, size, behind)?;
     timed.timings()?;
     let mut rounds: BTreeMap<&'static str, Vec<f64>> = BTreeMap::new();
     for _ in 0..walls.len() {
@@ -84,8 +95,8 @@ fn measure(gpu: &Gpu, splats: usize, width: u32) -> Result<Cost, GpuError> {
         }
     }
     Ok(Cost {
-        splats,
-        width,
+        splats: size.0,
+        width: size.1,
         wall: median(walls.clone()),
         kernels: rounds
             .into_iter()
@@ -138,16 +149,17 @@ fn csv(costs: &[Cost]) -> String {
 }
 
 fn main() -> ExitCode {
-    let (mut full, mut file) = (false, None);
+    let (mut full, mut behind, mut file) = (false, false, None);
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
             // Cargo passes it.
             "--bench" => {}
             "--full" => full = true,
+            "--behind" => behind = true,
             "--csv" => file = arguments.next().map(PathBuf::from),
             other => {
-                eprintln!("error: unknown argument {other}: give --full or --csv FILE");
+                eprintln!("error: unknown argument {other}: give --full, --behind or --csv FILE");
                 return ExitCode::from(2);
             }
         }
@@ -167,7 +179,7 @@ fn main() -> ExitCode {
     let mut costs = Vec::new();
     for &count in counts {
         for &width in widths {
-            match measure(&gpu, count, width) {
+            match measure(&gpu, (count, width), behind) {
                 Ok(cost) => {
                     eprintln!("{count} Gaussians at {width} px: {:.1} ms", 1e3 * cost.wall);
                     costs.push(cost);
