@@ -1,7 +1,9 @@
 //! Exposures of the views, from the same points seen by several.
 
+use std::iter;
+
 use super::tracks::Sample;
-use crate::capture::Exposure;
+use crate::capture::{Exposure, View};
 
 /// Alternations between the points' lumas and the views' exposures. Each takes a few
 /// hundredths of a second for a large model; they settle after some ten.
@@ -24,8 +26,8 @@ const GAIN_MIN: f64 = 0.25;
 /// Each view's exposure, and how sure it is.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Exposures {
-    /// By view. Over the training views the gains' logarithms and the offsets have
-    /// mean zero.
+    /// By view. Over the training views, or photos, the gains' logarithms and the offsets
+    /// have mean zero.
     pub views: Vec<Exposure>,
     /// How far they move what the training views show, root mean square in gray.
     pub spread: f64,
@@ -79,6 +81,32 @@ pub fn find_exposures(tracks: &[Vec<Sample>], views: usize, train: &[usize]) -> 
         views: exposures,
         spread: mean_root(moved),
         noise: mean_root(expected),
+    }
+}
+
+/// The same for views of which some may be faces of one photo: they share its exposure, and
+/// one that sees few points has it from the others. `views` are sorted by photo.
+pub fn find_photo_exposures(tracks: &[Vec<Sample>], views: &[View], train: &[usize]) -> Exposures {
+    let faces = views.chunk_by(|a, b| a.photo == b.photo).enumerate();
+    let photo_of: Vec<usize> = faces
+        .flat_map(|(photo, faces)| iter::repeat_n(photo, faces.len()))
+        .collect();
+    let of_photos: Vec<Vec<Sample>> = (tracks.iter())
+        .map(|track| {
+            let of_photo = |sample: &Sample| Sample {
+                view: photo_of[sample.view],
+                ..*sample
+            };
+            track.iter().map(of_photo).collect()
+        })
+        .collect();
+    let mut trained: Vec<usize> = train.iter().map(|&view| photo_of[view]).collect();
+    trained.dedup();
+    let photos = photo_of.last().map_or(0, |last| last + 1);
+    let found = find_exposures(&of_photos, photos, &trained);
+    Exposures {
+        views: photo_of.iter().map(|&photo| found.views[photo]).collect(),
+        ..found
     }
 }
 
@@ -206,6 +234,7 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
+    use crate::effects::fixtures::{capture, looking_along_z, photo};
 
     /// Points of random luma, each seen by `length` of `views` views, with noise.
     fn tracks(truth: &[Exposure], points: usize, noise: f64) -> Vec<Vec<Sample>> {
@@ -274,9 +303,42 @@ mod tests {
     }
 
     #[test]
+    fn faces_of_a_photo_share_its_exposure() {
+        let camera = looking_along_z(DVec3::ZERO, 10);
+        let photos: Vec<_> = (0..6)
+            .map(|_| (photo(&camera, |_, _| 0), camera.clone()))
+            .collect();
+        let mut views = capture(&photos, []).views;
+        for (view, name) in views.iter_mut().zip(["a", "a", "b", "b", "c", "d"]) {
+            view.photo = name.to_owned();
+        }
+        // The second face of `a` sees nothing that others see.
+        let of_photo = [0.04, 0.04, -0.02, -0.02, -0.01, -0.01];
+        let truth = of_photo.map(|offset| Exposure { gain: 1.0, offset });
+        let mut tracks = tracks(&truth, 2000, 0.005);
+        for track in &mut tracks {
+            track.retain(|sample| sample.view != 1);
+        }
+        tracks.retain(|track| track.len() >= 2);
+        let train = [0, 1, 2, 3, 4, 5];
+        let found = find_photo_exposures(&tracks, &views, &train);
+        assert_eq!(found.views[0], found.views[1]);
+        assert_eq!(found.views[2], found.views[3]);
+        for (found, truth) in found.views.iter().zip(&truth) {
+            assert!(
+                (found.shown(0.5) - truth.shown(0.5)).abs() < 0.005,
+                "{found:?} {truth:?}"
+            );
+        }
+        let apart = find_exposures(&tracks, 6, &train);
+        assert!((apart.views[1].shown(0.5) - truth[1].shown(0.5)).abs() > 0.02);
+    }
+
+    #[test]
     fn without_tracks_there_is_nothing_to_find() {
         let found = find_exposures(&[], 3, &[0, 2]);
         assert_eq!(found.views, [Exposure::NONE; 3]);
+        assert_eq!(find_photo_exposures(&[], &[], &[]).views, []);
         assert_eq!((found.spread, found.noise), (0.0, 0.0));
     }
 }

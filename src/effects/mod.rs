@@ -16,7 +16,7 @@ mod tracks;
 
 pub use background::Backdrop;
 pub use direction::left_out_errors;
-pub use exposure::{Exposures, find_exposures};
+pub use exposure::{Exposures, find_exposures, find_photo_exposures};
 pub use outliers::outlier_share;
 pub use plan::{Decider, Decision, Effect, Overrules, Plan, Room, table};
 pub use sampling::sampling_spread;

@@ -217,7 +217,7 @@ impl Plan {
         overrules: &Overrules,
     ) -> Self {
         let samples = tracks::sample_tracks(capture, photos);
-        let found = exposure::find_exposures(&samples, photos.len(), &split.train);
+        let found = exposure::find_photo_exposures(&samples, &capture.views, &split.train);
         let exposure = {
             let evidence = (!samples.is_empty()).then_some(255.0 * found.spread);
             let noise = EXPOSURE_OVER_NOISE * 255.0 * found.noise;
