@@ -36,6 +36,14 @@ DEFAULTS = {"alpha-min": 1 / 255, "transmittance-min": 1e-4, "depth-bits": 32, "
 AGAIN = ("alpha-min", "0.003922")
 # A label says nothing of what lies on the default.
 CLOSE = 0.05
+# Where labels stand beside their points, so that those of two knobs keep clear of each other.
+CORNER = {"xytext": (2, 2), "ha": "left"}
+CORNERS = {
+    "transmittance-min": {"xytext": (3, -7), "ha": "left"},
+    "depth-bits": {"xytext": (-3, -2), "ha": "right"},
+    "ssim-window": {"xytext": (-3, -7), "ha": "right"},
+}
+
 COLORS = {knob: f"C{number}" for number, knob in enumerate(ERRORS["gradient"][1])}
 
 
@@ -71,7 +79,8 @@ def main() -> None:
                 for point in points:
                     if knob != "together" and tells(point, default, key):
                         axis.annotate(point["value"], (float(point["time"]), float(point[key])),
-                                      fontsize=6, xytext=(2, 2), textcoords="offset points")
+                                      fontsize=6, color=COLORS[knob], textcoords="offset points",
+                                      **CORNERS.get(knob, CORNER))
             axis.plot(float(default["time"]), float(default[key]), "k*", markersize=9,
                       label="default")
             axis.set_yscale("log")
