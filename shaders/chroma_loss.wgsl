@@ -1,6 +1,6 @@
-// Smoothed L1 between rendered and wanted a/b, value and gradient. It may decline to
-// a constant for large residuals, so that a teacher who is plainly wrong does not
-// count. For the solver (`curvature`), the slope over the residual as well: the
+// Smoothed L1 between rendered and wanted a/b, value and gradient: of each channel, or
+// of their distance in the a, b plane. It may decline to a constant for large
+// residuals, so that a teacher who is plainly wrong does not count. For the solver (`curvature`), the slope over the residual as well: the
 // weight of the pixel in the quadratic that touches the loss from above.
 import package::common::correction::{Correction, corrected};
 import package::common::numeric::linear_group;
@@ -36,7 +36,8 @@ struct ChromaLossWeights {
     view_index: u32,
     // 1 where pixel_weights has a weight for each pixel.
     weighted: u32,
-    padding: u32,
+    // 1 where a and b are judged together, by their distance.
+    joint: u32,
 }
 
 struct Penalty {
@@ -47,13 +48,16 @@ struct Penalty {
 
 var<workgroup> losses: array<f32, 256>;
 
-fn penalty(residual: vec2f, decline: f32) -> Penalty {
-    let length = sqrt(residual * residual + SMOOTHING * SMOOTHING);
+fn penalty(residual: vec2f, decline: f32, joint: bool) -> Penalty {
+    let squares = residual * residual;
+    let length = sqrt(select(squares, vec2f(squares.x + squares.y), joint) + SMOOTHING * SMOOTHING);
+    // Half of a distance is each channel's.
+    let share = select(1.0, 0.5, joint);
     if decline > 0.0 {
         let kept = exp(-decline * (length - SMOOTHING));
-        return Penalty((1.0 - kept) / decline, kept / length);
+        return Penalty(share * (1.0 - kept) / decline, kept / length);
     }
-    return Penalty(length - SMOOTHING, 1.0 / length);
+    return Penalty(share * (length - SMOOTHING), 1.0 / length);
 }
 
 // Bilinear sample of the coarser image at this pixel, half-pixel centres.
@@ -89,14 +93,14 @@ fn chroma_loss(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) gro
             target_ab = corrected(corrections[weights.view_index], target_ab);
         }
         let residual = image[p] - target_ab;
-        let taught = penalty(residual, select(weights.decline, 0.0, painted));
+        let taught = penalty(residual, select(weights.decline, 0.0, painted), weights.joint != 0u);
         weight *= weights.teacher;
         var loss = weight * taught.value;
         var curvature = weight * taught.curvature;
         var gradient = curvature * residual;
         if weights.agreement > 0.0 {
             let drift = image[p] - upsampled(vec2u(p % view.size.x, p / view.size.x));
-            let agreed = penalty(drift, 0.0);
+            let agreed = penalty(drift, 0.0, false);
             loss += weights.agreement * agreed.value;
             curvature += weights.agreement * agreed.curvature;
             gradient += weights.agreement * agreed.curvature * drift;

@@ -255,10 +255,8 @@ impl Distiller {
                 &view.at_scale(scale),
                 chain.last(),
                 ChromaLossWeights {
-                    teacher: 1.0,
                     agreement: self.settings.agreement,
-                    decline: self.settings.robust.map_or(0.0, |residual| 1.0 / residual),
-                    ..ChromaLossWeights::default()
+                    ..ChromaLossWeights::robust(self.settings.robust)
                 },
             )?;
             chain.push(pass);

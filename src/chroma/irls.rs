@@ -37,7 +37,8 @@ struct Round {
     scales: Vec<usize>,
     /// Weight of the agreement between scales.
     agreement: f32,
-    /// Residual at which the loss levels off, if it does.
+    /// Residual at which the loss of a and b together levels off; without one, each has
+    /// its own.
     robust: Option<f32>,
     /// Whether the views' corrections are found anew after it.
     corrects: bool,
@@ -50,8 +51,9 @@ fn rounds(settings: &ChromaSettings) -> Vec<Round> {
     let round = |scales: Vec<usize>, agreement, settled: bool| Round {
         scales,
         agreement,
-        // Plain at first: what is far off now may be right once the rest is in place.
-        robust: settings.robust.filter(|_| settled),
+        // It never levels off at first: what is far off now may be right once the rest is
+        // in place.
+        robust: (settings.robust).map(|residual| if settled { residual } else { f32::INFINITY }),
         corrects: settings.corrects_views,
     };
     let coarsest = settings.warm_scales as usize;
@@ -333,14 +335,13 @@ impl Solver {
             let finest = round.scales.last().copied();
             for &scale in &round.scales {
                 let row = &mut rows[scale];
-                let decline = round.robust.map_or(0.0, |residual| 1.0 / residual);
                 // There is nothing to agree with where the coarser scale is not drawn.
                 let agreement = if round.scales.contains(&(scale + 1)) {
                     round.agreement
                 } else {
                     0.0
                 };
-                row.weigh_by(&self.gpu, agreement, decline);
+                row.weigh_by(&self.gpu, agreement, round.robust);
                 let mut recorder = Recorder::new(&self.gpu);
                 row.linearize(raster, shared, &mut recorder);
                 if Some(scale) == finest {

@@ -24,8 +24,22 @@ pub struct ChromaLossWeights {
     pub view_index: u32,
     /// 1 where each pixel has a weight.
     pub weighted: u32,
-    /// Unused; keeps the size a multiple of 16.
-    pub padding: u32,
+    /// 1 where a and b are judged together, by their distance.
+    pub joint: u32,
+}
+
+impl ChromaLossWeights {
+    /// The teacher's part of a loss that levels off at the residual `robust` in CIELAB
+    /// units, and then judges a and b together: a colour that is wrong in one is not to be
+    /// believed in the other. Without it, L1 of each.
+    pub(super) fn robust(robust: Option<f32>) -> Self {
+        Self {
+            teacher: 1.0,
+            decline: robust.map_or(0.0, |residual| 1.0 / residual),
+            joint: u32::from(robust.is_some()),
+            ..Self::default()
+        }
+    }
 }
 
 /// Twin of `struct Correction`: wanted a/b become gain · ab + offset.

@@ -249,12 +249,14 @@ impl Rows {
         }
     }
 
-    /// Sets how the next [`Rows::linearize`] weighs the coarser scale and declines.
-    pub fn weigh_by(&mut self, gpu: &Gpu, agreement: f32, decline: f32) {
+    /// Sets how the next [`Rows::linearize`] weighs the coarser scale and at which residual
+    /// its loss levels off.
+    pub fn weigh_by(&mut self, gpu: &Gpu, agreement: f32, robust: Option<f32>) {
         if self.loss_weights.coarser_size != [1, 1] {
             self.loss_weights.agreement = agreement;
         }
-        self.loss_weights.decline = decline;
+        let ChromaLossWeights { decline, joint, .. } = ChromaLossWeights::robust(robust);
+        (self.loss_weights.decline, self.loss_weights.joint) = (decline, joint);
         self.weights.write(gpu, &[self.loss_weights]);
     }
 

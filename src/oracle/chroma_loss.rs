@@ -1,8 +1,8 @@
-//! The chroma loss: a smooth L1, averaged over pixels and both channels; for the
-//! solver, with what weighs and corrects the teacher.
+//! The chroma loss: a smooth L1, averaged over pixels and both channels, or of the
+//! distance of a/b; for the solver, with what weighs and corrects the teacher.
 
 use super::constants::CHROMA_EPSILON;
-use super::{Number, seed};
+use super::{Number, lift, seed};
 
 /// `√(r² + ε²) - ε` of a residual in Lab units (Charbonnier et al. 1994).
 pub fn smooth_l1<T: Number>(residual: T) -> T {
@@ -12,7 +12,16 @@ pub fn smooth_l1<T: Number>(residual: T) -> T {
 /// `(1 - exp(-decline · ρ)) / decline` of the smooth L1 ρ (Welsch's function, of ρ instead
 /// of its square): levels off at `1 / decline`. With a decline of 0, ρ itself.
 pub fn declining<T: Number>(residual: T, decline: f64) -> T {
-    let length = smooth_l1(residual);
+    levelled(smooth_l1(residual), decline)
+}
+
+/// [`declining`] of the distance of both residuals, `√(a² + b² + ε²) - ε`.
+pub fn declining_distance<T: Number>([a, b]: [T; 2], decline: f64) -> T {
+    let squares = a * a + b * b + CHROMA_EPSILON * CHROMA_EPSILON;
+    levelled(squares.sqrt() - CHROMA_EPSILON, decline)
+}
+
+fn levelled<T: Number>(length: T, decline: f64) -> T {
     if decline > 0.0 {
         (T::one() - (-length * decline).exp()) / decline
     } else {
@@ -59,6 +68,8 @@ pub struct Teaching {
     pub offset: [f64; 2],
     /// See [`declining`]; painted pixels never decline.
     pub decline: f64,
+    /// Whether a and b are judged by their distance, half of which is each one's.
+    pub joint: bool,
 }
 
 impl Teaching {
@@ -77,9 +88,12 @@ impl Teaching {
         let mut sum = T::zero();
         for (p, r) in rendered.iter().enumerate() {
             let (target, decline) = self.of(p);
-            for c in 0..2 {
-                sum += declining(r[c] - target[c], decline) * self.weights[p];
-            }
+            let apart = [0, 1].map(|c| r[c] - target[c]);
+            let both = match self.joint {
+                true => declining_distance(apart, decline),
+                false => declining(apart[0], decline) + declining(apart[1], decline),
+            };
+            sum += both * self.weights[p];
         }
         sum / (2 * rendered.len()) as f64
     }
@@ -87,24 +101,34 @@ impl Teaching {
     /// For each pixel and channel, slope of the loss and slope over residual.
     pub fn slopes(&self, rendered: &[[f64; 2]]) -> [Vec<[f64; 2]>; 2] {
         let count = (2 * rendered.len()) as f64;
-        let each = |of: &dyn Fn(f64, f64) -> f64| {
+        let each = |of: &dyn Fn([f64; 2], f64) -> [f64; 2]| {
             (rendered.iter().enumerate())
                 .map(|(p, r)| {
                     let (target, decline) = self.of(p);
-                    [0, 1].map(|c| self.weights[p] * of(r[c] - target[c], decline) / count)
+                    let apart = [0, 1].map(|c| r[c] - target[c]);
+                    of(apart, decline).map(|slope| self.weights[p] * slope / count)
                 })
                 .collect()
         };
-        [
-            each(&|residual, decline| declining(seed(residual), decline).eps),
-            each(&curvature),
-        ]
+        let slopes = |apart: [f64; 2], decline| match self.joint {
+            true => [0, 1].map(|c| {
+                let mut dual = apart.map(lift);
+                dual[c].eps = 1.0;
+                declining_distance(dual, decline).eps
+            }),
+            false => apart.map(|residual| declining(seed(residual), decline).eps),
+        };
+        let curvatures = |apart: [f64; 2], decline| match self.joint {
+            // The distance's own, in either direction.
+            true => [curvature(apart[0].hypot(apart[1]), decline); 2],
+            false => apart.map(|residual| curvature(residual, decline)),
+        };
+        [each(&slopes), each(&curvatures)]
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::lift;
     use super::*;
 
     #[test]
@@ -171,6 +195,30 @@ mod tests {
         }
     }
 
+    /// Turning the a, b plane turns the slope and changes nothing else.
+    #[test]
+    fn a_distance_knows_no_axes() {
+        let at = |[a, b]: [f64; 2], joint: bool| {
+            let teaching = Teaching {
+                wanted: vec![[0.0; 2]],
+                weights: vec![1.0],
+                gain: [[1.0, 0.0], [0.0, 1.0]],
+                offset: [0.0; 2],
+                decline: 0.1,
+                joint,
+            };
+            (teaching.loss(&[[a, b]]), teaching.slopes(&[[a, b]])[1][0])
+        };
+        let (loss, curves) = at([13.0, 0.0], true);
+        let (turned, turned_curves) = at([5.0, -12.0], true);
+        assert!((loss - turned).abs() < 1e-14 && loss == 0.5 * declining(13.0, 0.1));
+        assert_eq!(curves[0], curves[1]);
+        assert!((curves[0] - turned_curves[0]).abs() < 1e-14);
+        // Channel by channel, the one that is right is believed fully.
+        let [wrong, right] = at([40.0, 0.0], false).1;
+        assert!(right > 1000.0 * wrong);
+    }
+
     fn teaching() -> Teaching {
         Teaching {
             wanted: vec![[9.0, -3.0], [0.0, 60.0], [-7.0, 7.25], [30.0, 1.0]],
@@ -178,26 +226,33 @@ mod tests {
             gain: [[1.2, -0.1], [0.2, 0.8]],
             offset: [2.0, -1.0],
             decline: 0.2,
+            joint: false,
         }
     }
 
     #[test]
     fn slopes_are_those_of_the_whole_taught_loss() {
         let rendered = [[10.0, -3.0], [0.2, 55.0], [7.0, 7.0], [29.0, -4.0]];
-        let teaching = teaching();
-        let [slopes, curvatures] = teaching.slopes(&rendered);
-        for p in 0..4 {
-            for c in 0..2 {
-                let mut dual = rendered.map(|p| p.map(lift));
-                dual[p][c].eps = 1.0;
-                let whole = teaching.loss(&dual).eps;
-                assert!((whole - slopes[p][c]).abs() < 1e-15, "{p} {c}");
-                let (target, _) = teaching.of(p);
-                let through = curvatures[p][c] * (rendered[p][c] - target[c]);
-                assert!((through - slopes[p][c]).abs() < 1e-15, "{p} {c}");
+        for joint in [false, true] {
+            let teaching = Teaching {
+                joint,
+                ..teaching()
+            };
+            let [slopes, curvatures] = teaching.slopes(&rendered);
+            for p in 0..4 {
+                for c in 0..2 {
+                    let mut dual = rendered.map(|p| p.map(lift));
+                    dual[p][c].eps = 1.0;
+                    let whole = teaching.loss(&dual).eps;
+                    assert!((whole - slopes[p][c]).abs() < 1e-15, "{p} {c}");
+                    let (target, _) = teaching.of(p);
+                    let through = curvatures[p][c] * (rendered[p][c] - target[c]);
+                    assert!((through - slopes[p][c]).abs() < 1e-15, "{p} {c}");
+                }
             }
+            assert_eq!(slopes[2], [0.0; 2]);
         }
-        assert_eq!(slopes[2], [0.0; 2]);
+        let teaching = teaching();
         // A painted pixel is taken as it is, and not doubted.
         assert_eq!(teaching.of(3), ([30.0, 1.0], 0.0));
         let painted = 50.0 / 8.0 * (smooth_l1(-1.0) + smooth_l1(-5.0_f64));

@@ -143,7 +143,7 @@ fn twins() -> Vec<Twin> {
                 decline,
                 view_index,
                 weighted,
-                padding
+                joint
             }
         ),
         twin!(

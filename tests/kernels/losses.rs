@@ -66,6 +66,14 @@ fn what_is_plainly_wrong_has_no_slope() {
         assert_eq!(pair[0], 0.0);
         assert!((f64::from(pair[1]) * 90.0 - 2.0).abs() < 1e-5, "{pair:?}");
     }
+    // Judged together, the channel that happens to be right is not believed either.
+    let joint = ChromaLossWeights {
+        joint: 1,
+        ..declining
+    };
+    let output = input(&image, joint).run(gpu(), true).unwrap();
+    assert!((output.loss - 5.0).abs() < 1e-5, "{}", output.loss);
+    assert!(output.curvatures.iter().all(|&curvature| curvature == 0.0));
     let painted = ChromaInput {
         pixel_weights: &[50.0; 45],
         ..input(

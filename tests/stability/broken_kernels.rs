@@ -134,6 +134,12 @@ fn broken_losses_and_steps_are_noticed() {
         (
             "chroma loss",
             "chroma_loss",
+            "weights.joint != 0u",
+            "weights.joint == 2u",
+        ),
+        (
+            "chroma loss",
+            "chroma_loss",
             "curvatures[p] = scale * curvature",
             "curvatures[p] = -scale * curvature",
         ),

@@ -106,7 +106,7 @@ const REASONS: &[(&str, &str, &str)] = &[
     ),
     (
         "penalty",
-        "(1.0 - kept) / decline",
+        "share * (1.0 - kept) / decline",
         "in the branch where decline is positive; kept is at most 1",
     ),
     (

@@ -142,6 +142,8 @@ struct Terms {
     /// Whether pixels have weights and the teacher is corrected.
     weighed: bool,
     curved: bool,
+    /// Whether a and b are judged together.
+    joint: bool,
 }
 
 const PLAIN: Terms = Terms {
@@ -149,6 +151,7 @@ const PLAIN: Terms = Terms {
     decline: 0.0,
     weighed: false,
     curved: false,
+    joint: false,
 };
 
 /// Weights that decide differently: unknown, half known, ordinary, painted.
@@ -189,6 +192,7 @@ fn measure(gpu: &Gpu, terms: Terms) -> Result<[Vec<Sample>; 3], GpuError> {
             gain: [[1.0, 0.0], [0.0, 1.0]],
             offset: [0.0; 2],
             decline: round(terms.decline),
+            joint: terms.joint,
             wanted,
         };
         if terms.weighed {
@@ -222,7 +226,7 @@ fn measure(gpu: &Gpu, terms: Terms) -> Result<[Vec<Sample>; 3], GpuError> {
                 decline: terms.decline as f32,
                 view_index: if terms.weighed { 2 } else { 0 },
                 weighted: u32::from(terms.weighed),
-                padding: 0,
+                joint: u32::from(terms.joint),
             },
         };
         let output = input.run(gpu, terms.curved)?;
@@ -308,9 +312,14 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
         ..PLAIN
     };
     let [weighed_values, weighed_gradients, weighed_curvatures] = measure(gpu, solver)?;
+    let together = Terms {
+        joint: true,
+        ..solver
+    };
+    let [joint_values, joint_gradients, joint_curvatures] = measure(gpu, together)?;
     let all = Terms {
         agreement: 0.5,
-        ..solver
+        ..together
     };
     let [all_values, all_gradients, all_curvatures] = measure(gpu, all)?;
     Ok(vec![
@@ -340,17 +349,30 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
             2.62e-6,
             &weighed_curvatures,
         ),
-        value("value, all terms", 1.33e-7, &all_values),
+        value("value, a and b together", 7.92e-8, &joint_values),
+        gradient(
+            "gradient × pixels, a and b together",
+            2.17e-7,
+            4.42e-6,
+            &joint_gradients,
+        ),
+        gradient(
+            "curvature × pixels, a and b together",
+            1.34e-7,
+            1.86e-6,
+            &joint_curvatures,
+        ),
+        value("value, all terms", 6.70e-8, &all_values),
         gradient(
             "gradient × pixels, all terms",
-            1.01e-7,
-            4.60e-6,
+            7.90e-8,
+            3.80e-6,
             &all_gradients,
         ),
         gradient(
             "curvature × pixels, all terms",
-            3.83e-7,
-            2.62e-6,
+            1.43e-7,
+            1.83e-6,
             &all_curvatures,
         ),
         Row::exact("weigh", "weighted picture", &weigh(gpu)?),
