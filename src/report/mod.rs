@@ -26,6 +26,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 use crate::{
     capture::{Exposure, LoadOptions},
     luma::{CurvePoint, Numerics},
+    measure::DeltaE,
     raster::RasterOptions,
 };
 
@@ -335,6 +336,20 @@ pub struct ColorError {
     pub mean: f64,
     /// Mean over the views of each view's 95th percentile.
     pub percentile_95: f64,
+}
+
+impl From<DeltaE> for ColorError {
+    fn from(
+        DeltaE {
+            mean,
+            percentile_95,
+        }: DeltaE,
+    ) -> Self {
+        Self {
+            mean,
+            percentile_95,
+        }
+    }
 }
 
 /// Quality of coloured pictures.

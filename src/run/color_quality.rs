@@ -49,11 +49,7 @@ impl Measured {
             let pictures = renderer.render(camera)?;
             let native = native_rgb(&pictures[0], &pictures[1]);
             let exported = shown_rgb(&pictures[2].pixels);
-            let error = measure::mean_delta_e(&native, &exported);
-            errors.push(ColorError {
-                mean: error.mean,
-                percentile_95: error.percentile_95,
-            });
+            errors.push(ColorError::from(measure::mean_delta_e(&native, &exported)));
             let taught = taught[i]
                 .as_ref()
                 .map(|taught| teacher_picture(&photo.gray, &taught.answer));

@@ -118,11 +118,7 @@ impl<'a> Yardstick<'a> {
 
     /// ΔE00 between two pictures.
     pub fn color_error(&self, a: &[[f32; 3]], b: &[[f32; 3]]) -> ColorError {
-        let error = measure::mean_delta_e(&self.counted(a), &self.counted(b));
-        ColorError {
-            mean: error.mean,
-            percentile_95: error.percentile_95,
-        }
+        measure::mean_delta_e(&self.counted(a), &self.counted(b)).into()
     }
 
     /// Colourfulness of a picture.

@@ -111,19 +111,10 @@ impl Scored {
             rendered.push((method, rgb));
             Ok::<_, RunError>(())
         };
-        let (mut native, mut exported) = (None, None);
         for (method, layer) in &drawing.layers {
-            let drawn = layer.rgb(&drawing.gray);
-            match method {
-                Method::Native => native = Some(drawn.clone()),
-                Method::Exported => exported = Some(drawn.clone()),
-                _ => {}
-            }
-            score(*method, yardstick.shown(&drawn), &layer.ab())?;
+            let rgb = yardstick.shown(&layer.rgb(&drawing.gray));
+            score(*method, rgb, &layer.ab())?;
         }
-        let bake = native
-            .zip(exported)
-            .map(|(native, exported)| yardstick.color_error(&native, &exported));
         if let Some(answer) = answer {
             let layer = Layer::Ab(to_picture(answer));
             score(Method::Teacher, layer.rgb(&gray_picture(photo)), &answer.ab)?;
@@ -177,11 +168,21 @@ impl Scored {
                 luma,
                 pictures: scores,
             },
-            bake,
+            bake: bake(drawing),
             size,
             shots,
         })
     }
+}
+
+/// What the export costs, of the scene as it is.
+fn bake(drawing: &Drawing) -> Option<ColorError> {
+    let of = |method| {
+        let layer = drawing.layers.iter().find(|(m, _)| *m == method);
+        layer.map(|(_, layer)| layer.rgb(&drawing.gray))
+    };
+    let (native, exported) = (of(Method::Native)?, of(Method::Exported)?);
+    Some(measure::mean_delta_e(&native, &exported).into())
 }
 
 /// Distance of each pixel's colours in the a, b plane.
