@@ -1,7 +1,8 @@
 // Smoothed L1 between rendered and wanted a/b, value and gradient: of each channel, or
 // of their distance in the a, b plane. It may decline to a constant for large
-// residuals, so that a teacher who is plainly wrong does not count. For the solver (`curvature`), the slope over the residual as well: the
-// weight of the pixel in the quadratic that touches the loss from above.
+// residuals, so that a teacher who is plainly wrong does not count. For the solver
+// (`curvature`), the slope over the residual as well: the weight of the pixel in the
+// quadratic that touches the loss from above.
 import package::common::correction::{Correction, corrected};
 import package::common::numeric::linear_group;
 import package::common::view::View;

@@ -121,8 +121,7 @@ pub(super) fn along_path(
             message: String::new(),
         });
         let drawing = painter.draw(camera, &format!("frame {index}"))?;
-        let exported = drawing.layers.iter().find(|(m, _)| *m == Method::Exported);
-        if let Some((_, layer)) = exported {
+        if let Some(layer) = drawing.layer(Method::Exported) {
             let pixels = layer.rgb(&drawing.gray);
             keep(index, to_image(camera.width, camera.height, &pixels))?;
         }

@@ -115,6 +115,14 @@ impl<'a> Painter<'a> {
     }
 }
 
+impl Drawing {
+    /// A method's picture, where there is one.
+    pub fn layer(&self, method: Method) -> Option<&Layer> {
+        let found = self.layers.iter().find(|(m, _)| *m == method);
+        found.map(|(_, layer)| layer)
+    }
+}
+
 impl Layer {
     /// a and b of each pixel, `[height, width]`.
     pub fn ab(&self) -> Vec<[f32; 2]> {

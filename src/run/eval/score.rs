@@ -142,11 +142,10 @@ impl Scored {
                 );
             };
             map("delta-e", "ΔE00, ours", &measure::delta_e(exported, truth));
-            map(
-                "ab",
-                "a/b error, ours",
-                &distances(&ab_of(exported), &wanted),
-            );
+            if let Some(layer) = drawing.layer(Method::Exported) {
+                let errors = distances(&layer.ab(), &wanted);
+                map("ab", "a/b error, ours", &errors);
+            }
             if let Some(answer) = answer {
                 let errors = distances(&answer.ab, &wanted);
                 map("ab-teacher", "a/b error, teacher", &errors);
@@ -177,10 +176,7 @@ impl Scored {
 
 /// What the export costs, of the scene as it is.
 fn bake(drawing: &Drawing) -> Option<ColorError> {
-    let of = |method| {
-        let layer = drawing.layers.iter().find(|(m, _)| *m == method);
-        layer.map(|(_, layer)| layer.rgb(&drawing.gray))
-    };
+    let of = |method| Some(drawing.layer(method)?.rgb(&drawing.gray));
     let (native, exported) = (of(Method::Native)?, of(Method::Exported)?);
     Some(measure::mean_delta_e(&native, &exported).into())
 }
