@@ -25,6 +25,7 @@ mod numerics;
 mod poison;
 mod renderer;
 mod repeat;
+mod rgb;
 mod scan;
 mod solver;
 mod sort;

@@ -1,0 +1,147 @@
+//! RGB harmonics fitted to pictures, as a viewer would draw them: black is as dark as a
+//! Gaussian gets.
+
+use gs_chroma::{
+    capture::Camera,
+    chroma::{ChromaSettings, RgbView, bake, bake_rgb, fit_rgb, native_rgb},
+    raster::{Field, Geometry, Renderer, constants::NEAR_SHARE},
+    splats::{ShField, Splats, sh},
+};
+
+use crate::{
+    harness::{bits, camera, gpu, raster, splats},
+    oracle::{
+        random::{oblique_view, random_scene},
+        scene::View,
+    },
+};
+
+const EXTENT: f64 = 1.0;
+
+fn cameras() -> Vec<Camera> {
+    (0..5)
+        .map(|k| {
+            let view = oblique_view();
+            let [x, y, z] = view.translation;
+            let shift = 0.15 * f64::from(k) - 0.3;
+            camera(&View {
+                translation: [x + shift, y, z],
+                ..view
+            })
+        })
+        .collect()
+}
+
+/// Gaussians large enough to cover one another.
+fn scene<const C: usize>(count: usize) -> Splats {
+    let mut splats = splats(&random_scene::<C>(12, count, 0).0);
+    let scales = splats.log_scales.as_flattened_mut();
+    scales.iter_mut().for_each(|scale| *scale += 0.9);
+    splats
+}
+
+/// `fields` on the geometry of `splats`, for each camera a picture of each.
+fn drawn(splats: &Splats, fields: &[&ShField]) -> Vec<Vec<gs_chroma::raster::Picture>> {
+    let geometry = Geometry::upload(gpu(), splats).unwrap();
+    let fields = (fields.iter())
+        .map(|field| Field::upload(gpu(), field).unwrap())
+        .collect();
+    let mut renderer = Renderer::new(raster(), geometry, fields, NEAR_SHARE * EXTENT).unwrap();
+    (cameras().iter())
+        .map(|camera| renderer.render(camera).unwrap())
+        .collect()
+}
+
+/// What a viewer shows.
+fn shown(splats: &Splats) -> Vec<Vec<[f32; 3]>> {
+    (drawn(splats, &[&splats.sh]).iter())
+        .map(|pictures| {
+            let pixels = pictures[0].pixels.chunks_exact(3);
+            pixels
+                .map(|rgb| [0, 1, 2].map(|c| rgb[c].clamp(0.0, 1.0)))
+                .collect()
+        })
+        .collect()
+}
+
+/// Mean distance of two sets of pictures, channel by channel.
+fn distance(a: &[Vec<[f32; 3]>], b: &[Vec<[f32; 3]>]) -> f64 {
+    let pairs = a.iter().flatten().zip(b.iter().flatten());
+    let differences: Vec<f64> = pairs
+        .flat_map(|(a, b)| [0, 1, 2].map(|c| f64::from((a[c] - b[c]).abs())))
+        .collect();
+    differences.iter().sum::<f64>() / differences.len() as f64
+}
+
+/// Colours of which some are far below black.
+fn colourful() -> Splats {
+    let mut splats = scene::<3>(60);
+    for (k, value) in splats.sh.coefficients.iter_mut().enumerate() {
+        let level = (k * 37 % 101) as f64 / 100.0;
+        *value = ((1.6 * level - 0.6 - 0.5) / sh::C0) as f32;
+    }
+    splats
+}
+
+fn settings() -> ChromaSettings {
+    ChromaSettings {
+        corrects_views: false,
+        robust: None,
+        fills: false,
+        ..ChromaSettings::irls()
+    }
+}
+
+#[test]
+fn rgb_harmonics_are_fitted_to_what_is_shown() {
+    let truth = colourful();
+    let pictures = shown(&truth);
+    let fitted = |spoilt: f32| {
+        let views: Vec<RgbView> = (cameras().into_iter().zip(&pictures))
+            .map(|(camera, wanted)| {
+                let mut wanted = wanted.clone();
+                let mut weights = vec![1.0; wanted.len()];
+                for pixel in 0..wanted.len() / 10 {
+                    wanted[pixel] = [spoilt; 3];
+                    weights[pixel] = 0.0;
+                }
+                RgbView {
+                    camera,
+                    wanted,
+                    weights: Some(weights),
+                }
+            })
+            .collect();
+        fit_rgb(&raster(), &settings(), EXTENT, &truth, &views).unwrap()
+    };
+    let sh = fitted(0.0);
+    let error = distance(
+        &shown(&Splats {
+            sh: sh.clone(),
+            ..truth.clone()
+        }),
+        &pictures,
+    );
+    // 0.0028 without the second fit, which knows what is black.
+    assert!(error < 0.0025, "{error}");
+    // What does not count does not count.
+    assert_eq!(bits(&sh.coefficients), bits(&fitted(1.0).coefficients));
+}
+
+#[test]
+fn the_bake_comes_closer_than_each_gaussian_by_itself() {
+    let luma = scene::<1>(60);
+    let mut chroma = ShField::zeros(luma.len(), 0, 2);
+    for (k, value) in chroma.coefficients.iter_mut().enumerate() {
+        *value = ((k * 53 % 81) as f64 - 40.0) as f32 / sh::C0 as f32;
+    }
+    let native: Vec<Vec<[f32; 3]>> = (drawn(&luma, &[&luma.sh, &chroma]).iter())
+        .map(|pictures| native_rgb(&pictures[0], &pictures[1]))
+        .collect();
+    let alone = distance(&shown(&bake_rgb(&luma, &chroma)), &native);
+    let baked = bake(&raster(), EXTENT, &luma, &chroma, &cameras()).unwrap();
+    let together = distance(&shown(&baked), &native);
+    assert!(together < 0.8 * alone, "{together} {alone}");
+    // Nothing but colours has moved.
+    assert_eq!(baked.means, luma.means);
+}
