@@ -19,6 +19,7 @@ mod effects;
 mod gradient;
 mod harness;
 mod layout;
+mod least_squares;
 mod losses;
 mod memory;
 mod numerics;

@@ -120,8 +120,6 @@ fn around(length: u32, new_length: u32) -> Vec<(usize, Vec<f32>)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::color::{GrayTable, srgb_to_lab};
-    use std::time::Instant;
 
     fn gray(width: u32, height: u32, pixels: &[u8]) -> GrayImage<'_> {
         GrayImage {
@@ -194,53 +192,5 @@ mod tests {
             .upsampled(gray(64, 1, &pixels), Upsample::Guided);
         let plain = answer.upsampled(gray(64, 1, &pixels), Upsample::Bilinear);
         assert!(rms(&guided, &plain) < 2.0, "{}", rms(&guided, &plain));
-    }
-
-    /// The table of docs/decisions.md: true a, b of colour photos, made 3.1 times
-    /// smaller and enlarged again. Photos are halved first, for JPEG files hold
-    /// half of their colours' resolution.
-    ///
-    /// `PHOTOS=FOLDER cargo test --release --lib colours_of_photos -- --ignored --nocapture`
-    #[test]
-    #[ignore = "a measurement that needs colour photos"]
-    fn colours_of_photos() {
-        let folder = std::env::var("PHOTOS").expect("PHOTOS names a folder of colour photos");
-        let table = GrayTable::new();
-        let (mut errors, mut seconds, mut count) = ([0.0; 2], [0.0; 2], 0.0);
-        let mut pixels = 0.0;
-        for file in std::fs::read_dir(folder).unwrap() {
-            let photo = image::open(file.unwrap().path()).unwrap().into_rgb8();
-            let (width, height) = (photo.width() / 2, photo.height() / 2);
-            let filter = image::imageops::FilterType::Triangle;
-            let photo = image::imageops::resize(&photo, width, height, filter);
-            let level: Vec<u8> = photo.pixels().map(|rgb| table.gray(rgb.0)).collect();
-            let ab = photo.pixels().map(|rgb| {
-                let [_, a, b] = srgb_to_lab(rgb.0.map(|value| f64::from(value) / 255.0));
-                [a as f32, b as f32]
-            });
-            let truth = AbImage {
-                width,
-                height,
-                ab: ab.collect(),
-            };
-            let side = (f64::from(width) / 3.125) as u32;
-            for (k, upsample) in [Upsample::Bilinear, Upsample::Guided]
-                .into_iter()
-                .enumerate()
-            {
-                let small = truth.resized(side, side);
-                let begun = Instant::now();
-                let large = small.upsampled(gray(width, height, &level), upsample);
-                seconds[k] += begun.elapsed().as_secs_f64();
-                errors[k] += rms(&large, &truth).powi(2);
-            }
-            count += 1.0;
-            pixels += f64::from(width) * f64::from(height);
-        }
-        let errors = errors.map(|sum: f64| (sum / count).sqrt());
-        let cost = seconds.map(|sum| sum / pixels * 1e9);
-        println!(
-            "{count} photos, bilinear and guided: rms {errors:.3?}, ms a megapixel {cost:.1?}"
-        );
     }
 }

@@ -6,7 +6,7 @@ use super::LumaTrainer;
 use crate::{
     gpu::{GpuError, Recorder},
     luma::{TrainingView, curve::CurvePoint},
-    measure::{self, IDENTICAL_PSNR},
+    measure,
     raster::ViewUniform,
 };
 
@@ -59,13 +59,14 @@ impl Watch {
 }
 
 impl LumaTrainer {
-    /// Looks at these views now and then while it trains. That changes nothing in what is
-    /// trained, but takes time.
+    /// Looks at these views now and then while it trains, but for those of which nothing
+    /// counts. That changes nothing in what is trained, but takes time.
     ///
     /// # Errors
     /// [`GpuError::TooLarge`] or [`GpuError::OverLimit`] when a view is larger than those
     /// trained on and the adapter or the memory limit cannot hold it.
-    pub fn watch(&mut self, views: Vec<TrainingView>) -> Result<(), GpuError> {
+    pub fn watch(&mut self, mut views: Vec<TrainingView>) -> Result<(), GpuError> {
+        views.retain(|view| (0..view.gray.len()).any(|pixel| counts(view, pixel)));
         let before = [self.max_pixels, self.max_tiles];
         for view in &views {
             let uniform = ViewUniform::new(&view.camera, self.near, 0, 0);
@@ -129,21 +130,17 @@ impl LumaTrainer {
                 Some(needed) => self.make_room(needed, iteration)?,
             }
         };
-        let TrainingView {
-            gray,
-            mask,
-            exposure,
-            ..
-        } = &self.watch.views[index];
-        let counts = |pixel: usize| mask.as_ref().is_none_or(|mask| mask[pixel] >= 128);
+        let watched = &self.watch.views[index];
         let (mut shown, mut truth) = (Vec::new(), Vec::new());
-        for pixel in (0..gray.len()).filter(|&pixel| counts(pixel)) {
-            shown.push(exposure.shown(f64::from(pixels[pixel])) as f32);
-            truth.push(f32::from(gray[pixel]) / 255.0);
+        for pixel in (0..watched.gray.len()).filter(|&pixel| counts(watched, pixel)) {
+            shown.push(watched.exposure.shown(f64::from(pixels[pixel])) as f32);
+            truth.push(f32::from(watched.gray[pixel]) / 255.0);
         }
-        Ok(match truth.is_empty() {
-            true => IDENTICAL_PSNR,
-            false => measure::reported_psnr(&shown, &truth),
-        })
+        Ok(measure::reported_psnr(&shown, &truth))
     }
+}
+
+/// Whether a pixel of the photo is not masked.
+fn counts(view: &TrainingView, pixel: usize) -> bool {
+    view.mask.as_ref().is_none_or(|mask| mask[pixel] >= 128)
 }

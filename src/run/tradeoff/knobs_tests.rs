@@ -1,0 +1,112 @@
+//! What is tried around a base.
+
+use super::*;
+
+fn around() -> Around {
+    Around {
+        iterations: 700,
+        side: 400,
+        largest_side: 500,
+        max_splats: 12_000,
+        splats: 8_000,
+        sh_degree: 0,
+        adam: 150,
+        color: None,
+    }
+}
+
+fn of(around: &Around, knob: &str) -> Vec<String> {
+    let values = values(around, &[knob.to_owned()]);
+    values.into_iter().map(|value| value.value).collect()
+}
+
+#[test]
+fn values_lie_around_the_base() {
+    let around = around();
+    assert_eq!(of(&around, "iterations"), ["350", "1400", "175"]);
+    assert_eq!(of(&around, "max-side"), ["300", "200"], "600 is no photo's");
+    assert_eq!(of(&around, "max-splats"), ["4000", "2000"]);
+    assert_eq!(of(&around, "sh-degree"), ["1", "2", "3"]);
+    let full = Around {
+        splats: 12_000,
+        ..around.clone()
+    };
+    assert_eq!(of(&full, "max-splats"), ["6000", "3000", "24000"]);
+    let tiny = Around { side: 20, ..around };
+    assert_eq!(
+        of(&tiny, "max-side"),
+        ["30"],
+        "15 is too small for fit; 10 too"
+    );
+}
+
+#[test]
+fn colours_have_knobs_once_there_are_colours() {
+    let gray = values(&around(), &[]);
+    assert!(gray.iter().all(|value| value.stage == PointStage::Luma));
+    let mut colored = Around {
+        color: Some(ColorAround {
+            rounds: 4,
+            coarse_rounds: 8,
+            corrects_views: true,
+            teacher_size: Some(256),
+        }),
+        ..around()
+    };
+    assert_eq!(of(&colored, "rounds"), ["2", "8", "1"]);
+    assert_eq!(of(&colored, "coarse-rounds"), ["4", "2", "16"]);
+    assert_eq!(of(&colored, "until"), ["775", "1000"]);
+    assert_eq!(of(&colored, "teacher-size"), ["128", "384"]);
+    assert_eq!(of(&colored, "correct-views"), ["off"]);
+    if let Some(color) = &mut colored.color {
+        color.teacher_size = None;
+    }
+    assert!(of(&colored, "teacher-size").is_empty(), "a folder");
+}
+
+#[test]
+fn times_are_guessed_relative_to_the_base() {
+    let all = values(&around(), &[]);
+    assert!(all.iter().all(|v| v.time > 0.0 && v.time < 5.0), "{all:?}");
+    let half = all.iter().find(|v| v.value == "350").expect("half");
+    assert_eq!(half.time, 0.5);
+}
+
+#[test]
+fn an_option_is_given_once() {
+    let setting = |knob: &str, value: &str| Setting {
+        knob: knob.to_owned(),
+        value: value.to_owned(),
+    };
+    assert_eq!(
+        merged(&[setting("until", "775"), setting("scales", "1")]),
+        [
+            ("--solver", "adam".to_owned()),
+            ("--until", "775".to_owned()),
+            ("--scales", "1".to_owned())
+        ]
+    );
+    let two = [
+        ("--numbers", "a=1".to_owned()),
+        ("--numbers", "b=2".to_owned()),
+    ];
+    assert_eq!(
+        joined(two.into_iter()),
+        [("--numbers", "a=1,b=2".to_owned())]
+    );
+}
+
+#[test]
+fn names_are_unique_and_conflicts_mutual() {
+    let mut names: Vec<&str> = knob_names().collect();
+    names.sort_unstable();
+    let count = names.len();
+    names.dedup();
+    assert_eq!(names.len(), count);
+    for knob in knobs() {
+        for other in knob.conflicts {
+            let other = knobs().find(|k| k.name == *other).expect("a knob");
+            assert!(other.conflicts.contains(&knob.name), "{}", knob.name);
+        }
+    }
+}
