@@ -12,13 +12,7 @@ use gs_chroma::{
 };
 use naga::front::wgsl;
 
-use crate::{
-    harness::{bits, camera, gpu, raster, splats},
-    oracle::{
-        random::{oblique_view, random_scene},
-        scene::View,
-    },
-};
+use crate::harness::{bits, cameras, gpu, overlapping, raster};
 
 /// Names of all that a shader declares: bindings, structs, functions, constants.
 fn names(source: &str) -> BTreeSet<String> {
@@ -57,33 +51,12 @@ fn what_is_off_is_in_no_kernel() {
     }
 }
 
-fn views() -> Vec<Camera> {
-    (0..5)
-        .map(|k| {
-            let view = oblique_view();
-            let shift = 0.15 * f64::from(k) - 0.3;
-            let [x, y, z] = view.translation;
-            camera(&View {
-                translation: [x + shift, y, z],
-                ..view
-            })
-        })
-        .collect()
-}
-
-fn scene() -> Splats {
-    let mut splats = splats(&random_scene::<1>(12, 60, 0).0);
-    let scales = splats.log_scales.as_flattened_mut();
-    scales.iter_mut().for_each(|scale| *scale += 0.9);
-    splats
-}
-
 /// What the cameras see of the scene, in 8 bits.
 fn photos(splats: &Splats) -> Vec<(Camera, Vec<u8>)> {
     let geometry = Geometry::upload(gpu(), splats).unwrap();
     let field = Field::upload(gpu(), &splats.sh).unwrap();
     let mut renderer = Renderer::new(raster(), geometry, vec![field], 0.01).unwrap();
-    (views().into_iter())
+    (cameras().into_iter())
         .map(|camera| {
             let picture = renderer.render(&camera).unwrap().remove(0);
             let gray = picture.pixels.iter().map(|v| (v * 255.0).round() as u8);
@@ -101,7 +74,7 @@ fn is_spoilt(camera: &Camera, pixel: usize) -> bool {
 
 #[test]
 fn a_defect_is_found_where_it_is_and_nowhere_else() {
-    let splats = scene();
+    let splats = overlapping::<1>();
     let mut photos = photos(&splats);
     const SPOILT: usize = 2;
     let (camera, gray) = &mut photos[SPOILT];
@@ -150,7 +123,7 @@ fn a_defect_is_found_where_it_is_and_nowhere_else() {
 
 #[test]
 fn training_with_all_effects_repeats_and_leaves_the_defect_out() {
-    let target = scene();
+    let target = overlapping::<1>();
     let mut start = target.clone();
     for value in start.sh.coefficients.iter_mut() {
         *value *= 0.5;

@@ -3,6 +3,7 @@
 use std::sync::{Arc, LazyLock};
 
 use gs_chroma::{
+    capture::Camera,
     doctor::stage,
     gpu::Gpu,
     raster::{Projected, Raster, Status},
@@ -11,7 +12,10 @@ use gs_chroma::{
 
 pub use gs_chroma::doctor::stage::{Gradient, camera, splats};
 
-use crate::oracle::scene::View;
+use crate::oracle::{
+    random::{oblique_view, random_scene},
+    scene::View,
+};
 
 static RASTER: LazyLock<Arc<Raster>> = LazyLock::new(|| {
     let gpu = Gpu::open().unwrap_or_else(|error| panic!("{error}"));
@@ -31,6 +35,29 @@ pub fn gpu() -> &'static Gpu {
 /// The bits of each value: equality of these is what "the same" means.
 pub fn bits(values: &[f32]) -> Vec<u32> {
     values.iter().map(|v| v.to_bits()).collect()
+}
+
+/// Five cameras in a row.
+pub fn cameras() -> Vec<Camera> {
+    (0..5)
+        .map(|k| {
+            let view = oblique_view();
+            let [x, y, z] = view.translation;
+            let shift = 0.15 * f64::from(k) - 0.3;
+            camera(&View {
+                translation: [x + shift, y, z],
+                ..view
+            })
+        })
+        .collect()
+}
+
+/// Sixty Gaussians before them, large enough to cover one another.
+pub fn overlapping<const C: usize>() -> Splats {
+    let mut splats = splats(&random_scene::<C>(12, 60, 0).0);
+    let scales = splats.log_scales.as_flattened_mut();
+    scales.iter_mut().for_each(|scale| *scale += 0.9);
+    splats
 }
 
 /// A stage on the one device.

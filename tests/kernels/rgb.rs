@@ -2,46 +2,17 @@
 //! Gaussian gets.
 
 use gs_chroma::{
-    capture::Camera,
     chroma::{ChromaSettings, RgbView, bake, bake_rgb, fit_rgb, native_rgb},
-    raster::{Field, Geometry, Renderer, constants::NEAR_SHARE},
+    raster::{Field, Geometry, Picture, Renderer, constants::NEAR_SHARE},
     splats::{ShField, Splats, sh},
 };
 
-use crate::{
-    harness::{bits, camera, gpu, raster, splats},
-    oracle::{
-        random::{oblique_view, random_scene},
-        scene::View,
-    },
-};
+use crate::harness::{bits, cameras, gpu, overlapping, raster};
 
 const EXTENT: f64 = 1.0;
 
-fn cameras() -> Vec<Camera> {
-    (0..5)
-        .map(|k| {
-            let view = oblique_view();
-            let [x, y, z] = view.translation;
-            let shift = 0.15 * f64::from(k) - 0.3;
-            camera(&View {
-                translation: [x + shift, y, z],
-                ..view
-            })
-        })
-        .collect()
-}
-
-/// Gaussians large enough to cover one another.
-fn scene<const C: usize>(count: usize) -> Splats {
-    let mut splats = splats(&random_scene::<C>(12, count, 0).0);
-    let scales = splats.log_scales.as_flattened_mut();
-    scales.iter_mut().for_each(|scale| *scale += 0.9);
-    splats
-}
-
 /// `fields` on the geometry of `splats`, for each camera a picture of each.
-fn drawn(splats: &Splats, fields: &[&ShField]) -> Vec<Vec<gs_chroma::raster::Picture>> {
+fn drawn(splats: &Splats, fields: &[&ShField]) -> Vec<Vec<Picture>> {
     let geometry = Geometry::upload(gpu(), splats).unwrap();
     let fields = (fields.iter())
         .map(|field| Field::upload(gpu(), field).unwrap())
@@ -75,7 +46,7 @@ fn distance(a: &[Vec<[f32; 3]>], b: &[Vec<[f32; 3]>]) -> f64 {
 
 /// Colours of which some are far below black.
 fn colourful() -> Splats {
-    let mut splats = scene::<3>(60);
+    let mut splats = overlapping::<3>();
     for (k, value) in splats.sh.coefficients.iter_mut().enumerate() {
         let level = (k * 37 % 101) as f64 / 100.0;
         *value = ((1.6 * level - 0.6 - 0.5) / sh::C0) as f32;
@@ -130,7 +101,7 @@ fn rgb_harmonics_are_fitted_to_what_is_shown() {
 
 #[test]
 fn the_bake_comes_closer_than_each_gaussian_by_itself() {
-    let luma = scene::<1>(60);
+    let luma = overlapping::<1>();
     let mut chroma = ShField::zeros(luma.len(), 0, 2);
     for (k, value) in chroma.coefficients.iter_mut().enumerate() {
         *value = ((k * 53 % 81) as f64 - 40.0) as f32 / sh::C0 as f32;
