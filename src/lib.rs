@@ -4,6 +4,7 @@
 //! `raster` → `gpu` → `splats`, `capture`, `color`. [`doctor`] compares the kernels
 //! of `raster` with the [`oracle`], which uses nothing else of the crate.
 
+mod beside;
 pub mod capture;
 pub mod chroma;
 pub mod cli;

@@ -22,8 +22,8 @@ import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
-# What make_variants makes, and the effect that it calls for. Each but the last has a
-# control. "fit" only: formats, which no effect stands for.
+# What make_variants makes, and the effect that it calls for: none does for a format, which
+# is only fitted.
 VARIANTS = [
     ("barrel", "lens"),
     ("fisheye", "lens"),
@@ -35,8 +35,10 @@ VARIANTS = [
     ("gloss", "luma-degree"),
     ("sixteen", None),
     ("infrared-tiff", None),
+    ("heavy-dust", "robust"),
 ]
-NO_CONTROL = ["infrared-tiff"]
+# Others have one. Heavy dust shares that of dust.
+NO_CONTROL = ["infrared-tiff", "heavy-dust"]
 
 # These stay as the plan has them while another effect is in question; the others are
 # off, for one may do the work of another.

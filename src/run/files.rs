@@ -9,6 +9,7 @@ use std::{
 use image::RgbImage;
 
 use super::RunError;
+use crate::beside::{beside, folder_of};
 
 /// Turns a system error into one that names the path.
 pub(super) fn at(path: &Path) -> impl FnOnce(std::io::Error) -> RunError {
@@ -19,25 +20,10 @@ pub(super) fn at(path: &Path) -> impl FnOnce(std::io::Error) -> RunError {
     }
 }
 
-/// The folder of a file.
-fn folder_of(path: &Path) -> &Path {
-    match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    }
-}
-
 /// Writes beside and renames.
 pub(super) fn write(path: &Path, bytes: &[u8]) -> Result<(), RunError> {
-    let mut file = tempfile::NamedTempFile::new_in(folder_of(path)).map_err(at(path))?;
+    let mut file = beside(path).map_err(at(path))?;
     file.write_all(bytes).map_err(at(path))?;
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        // Temporary files are private; this one is to be shared like any other.
-        let public = fs::Permissions::from_mode(0o644);
-        file.as_file().set_permissions(public).map_err(at(path))?;
-    }
     file.persist(path).map_err(|error| at(path)(error.error))?;
     Ok(())
 }
@@ -120,13 +106,6 @@ pub(super) fn check_page(folder: &Path) -> Result<(), RunError> {
 pub(super) fn replace_page(made: tempfile::TempDir, folder: &Path) -> Result<(), RunError> {
     check_page(folder)?;
     remove_page(folder)?;
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        // As in `write`.
-        let public = fs::Permissions::from_mode(0o755);
-        fs::set_permissions(made.path(), public).map_err(at(made.path()))?;
-    }
     fs::rename(made.path(), folder).map_err(at(folder))?;
     // What it would remove is elsewhere now.
     let _ = made.keep();

@@ -15,9 +15,9 @@ use variants::Variant;
 /// Makes a COLMAP folder from another, such that it calls for one effect, or just does not.
 ///
 /// The same arguments give the same bytes. Photos become PNG, the model text; poses are
-/// kept, observations move along. In exposure, dust and masked the held-out photos (every
-/// 8th by name, the first included) stay clean: their PSNR tells of the scene and not of
-/// the defect.
+/// kept, observations move along. In exposure, dust, heavy-dust and masked the held-out
+/// photos (every 8th by name, the first included) stay clean: their PSNR tells of the scene
+/// and not of the defect.
 #[derive(Parser)]
 struct Arguments {
     /// COLMAP folder whose photos have no lens distortion

@@ -1,6 +1,7 @@
 //! Answers of a network on disk, so that each photo is coloured once.
 
 use super::{AbImage, GrayImage, TeacherError};
+use crate::beside::beside;
 use npyz::{WriteOptions, WriterBuilder};
 use sha2::{Digest, Sha256};
 use std::fs::{self, File};
@@ -38,7 +39,7 @@ impl Cache {
     pub fn store(&self, key: &str, image: &AbImage) -> Result<(), TeacherError> {
         let path = self.path(key);
         let stored = || -> io::Result<()> {
-            let mut file = tempfile::NamedTempFile::new_in(&self.folder)?;
+            let mut file = beside(&path)?;
             file.write_all(&encode(image)?)?;
             file.persist(&path)?;
             Ok(())

@@ -1,6 +1,7 @@
 //! Writing splat files that every viewer accepts.
 
 use super::{CENTER, CHANNELS, NORMALS, PlyError, SHAPE, rest_count, sh_names, sh_position};
+use crate::beside::beside;
 use crate::splats::{Splats, sh};
 use glam::DVec3;
 use std::fmt::Write as _;
@@ -36,18 +37,7 @@ pub fn write_ply(
     comments: &[String],
 ) -> Result<(), PlyError> {
     check_arrays(path, splats)?;
-    let folder = match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
-    let mut builder = tempfile::Builder::new();
-    #[cfg(unix)]
-    {
-        // Temporary files are private by default; this one becomes the user's.
-        use std::os::unix::fs::PermissionsExt;
-        builder.permissions(std::fs::Permissions::from_mode(0o666));
-    }
-    let mut file = builder.tempfile_in(folder).map_err(PlyError::io(path))?;
+    let mut file = beside(path).map_err(PlyError::io(path))?;
 
     let header = header(splats.len(), splats.sh.degree, comments);
     let io_error = PlyError::io;

@@ -7,13 +7,16 @@ use super::brush::Stroke;
 use super::scene::Scene;
 
 /// Share of a photo that specks, hairs and scratches cover.
-const DUST_AREA: f64 = 0.015;
+pub const DUST_AREA: f64 = 0.015;
+
+/// The same of worn film.
+pub const HEAVY_DUST_AREA: f64 = 0.05;
 
 /// One training photo in so many has a passer-by.
 const PASSER_BY_STEP: usize = 3;
 
-/// Dust on every training photo, a passer-by on each third.
-pub fn dust(scene: &mut Scene, seed: u64) -> String {
+/// Dust on so much of every training photo, a passer-by on each third.
+pub fn dust(scene: &mut Scene, area: f64, seed: u64) -> String {
     for (order, (index, view)) in scene.training().enumerate() {
         let mut random = super::random(seed, index);
         let size = view.camera.size.map(f64::from);
@@ -23,13 +26,13 @@ pub fn dust(scene: &mut Scene, seed: u64) -> String {
             }
         }
         let mut covered = 0.0;
-        while covered < DUST_AREA * size[0] * size[1] {
+        while covered < area * size[0] * size[1] {
             covered += speck(&mut random, size).paint(&mut view.picture);
         }
     }
     format!(
         "dust on {} % of each training photo, held-out ones clean",
-        100.0 * DUST_AREA
+        100.0 * area
     )
 }
 

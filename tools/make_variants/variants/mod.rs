@@ -23,8 +23,8 @@ use std::path::Path;
 pub use error::Error;
 use scene::Scene;
 
-/// What can be made of a scene. For each but the last there is a control: made in the
-/// same way, without the effect.
+/// What can be made of a scene. For each but the last two there is a control: made in
+/// the same way, without the effect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Variant {
     /// A wide lens: COLMAP's OPENCV model, which bends the corners by a tenth
@@ -65,6 +65,9 @@ pub enum Variant {
     SixteenControl,
     /// 32-bit float TIFF of linear radiance
     InfraredTiff,
+    /// Dust on three times as much of each photo, as on worn film; the clean photos are
+    /// `dust-control`'s
+    HeavyDust,
 }
 
 /// Makes a variant of the scene in the folder `source` and writes it to the folder `out`.
@@ -87,7 +90,8 @@ pub fn make(source: &Path, variant: Variant, out: &Path, seed: u64) -> Result<St
         Variant::ExposureControl => exposure::vary(&mut scene, 0.01, seed),
         Variant::Distances => distances::quarter(&mut scene),
         Variant::DistancesControl => distances::halve(&mut scene),
-        Variant::Dust => defects::dust(&mut scene, seed),
+        Variant::Dust => defects::dust(&mut scene, defects::DUST_AREA, seed),
+        Variant::HeavyDust => defects::dust(&mut scene, defects::HEAVY_DUST_AREA, seed),
         Variant::Sky => sky::open(&mut scene),
         Variant::SkyControl => sky::thin(&mut scene, seed),
         Variant::Masked => defects::masked(&mut scene, seed),
