@@ -157,23 +157,27 @@ def line(cells: list[str]) -> None:
     print("| " + " | ".join(cells) + " |", flush=True)
 
 
-def unsteady(photos: Path, out: Path, side: int) -> Path:
+def unsteady(photos: Path, out: Path, side: int, seed: int) -> Path:
     """The folder of an unsteady teacher, made if it is not there."""
+    if seed:
+        out = out.with_name(f"{out.name}-{seed}")
     if not out.is_dir():
         script = [sys.executable, str(TOOLS / "unsteady_teacher.py"), str(photos)]
-        run([*script, "-o", str(out), "--max-side", str(side)])
+        run([*script, "-o", str(out), "--max-side", str(side), "--seed", str(seed)])
     return out
 
 
-def ablation(program: str, scene: str, photos: Path, out: Path, wanted: list[str]) -> None:
+def ablation(
+    program: str, scene: str, photos: Path, out: Path, wanted: list[str], seed: int
+) -> None:
     """A row for each variant (that is wanted, if any is), of the exported file."""
     for name, flags in VARIANTS.items():
         if wanted and name not in wanted:
             continue
         if name.startswith("small answers"):
-            teacher = str(unsteady(photos, out / "unsteady-small", SMALL_SIDE))
+            teacher = str(unsteady(photos, out / "unsteady-small", SMALL_SIDE, seed))
         else:
-            teacher = str(unsteady(photos, out / "unsteady", SIDE))
+            teacher = str(unsteady(photos, out / "unsteady", SIDE, seed))
         luma = json.loads((out / "run" / "report.json").read_text())["luma"]
         flags = flags.format(until=luma["iterations"] + 150)
         asked = [str(out / "run"), "--teacher", teacher]
@@ -199,6 +203,7 @@ def main() -> int:
     parser.add_argument("--frames", type=int, default=60)
     parser.add_argument("--scenes", nargs="*", default=list(SCENES), choices=list(SCENES))
     parser.add_argument("--teachers", nargs="*", default=TEACHERS, choices=TEACHERS)
+    parser.add_argument("--seed", type=int, default=0, help="of the unsteady teacher")
     parser.add_argument("--ablation", action="store_true")
     parser.add_argument("--variants", nargs="*", default=[], choices=list(VARIANTS))
     arguments = parser.parse_args()
@@ -219,14 +224,14 @@ def main() -> int:
         fitted(program, folder, out / "run", arguments.iterations)
         photos = folder / "images"
         if arguments.ablation:
-            ablation(program, scene, photos, out, arguments.variants)
+            ablation(program, scene, photos, out, arguments.variants, arguments.seed)
             continue
         for teacher in arguments.teachers:
             match teacher:
                 case "oracle":
                     path = photos
                 case "unsteady":
-                    path = unsteady(photos, out / "unsteady", SIDE)
+                    path = unsteady(photos, out / "unsteady", SIDE, arguments.seed)
                 case _:
                     path = arguments.network
             asked = [str(out / "run"), "--teacher", str(path)]
