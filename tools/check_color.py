@@ -239,7 +239,8 @@ def main() -> int:
             _, seconds = run(colorize)
             measure = [program, "eval", *asked, "--baselines", "--json"]
             found, _ = run([*measure, "--frames", str(arguments.frames)])
-            (out / f"eval-{teacher}.json").write_text(found)
+            draw = f"-{arguments.seed}" if teacher == "unsteady" and arguments.seed else ""
+            (out / f"eval-{teacher}{draw}.json").write_text(found)
             line(row(scene, teacher, arguments.method, json.loads(found), seconds))
     return 0
 
