@@ -3,6 +3,10 @@
 //
 // The matrix is AᵀWA + ridge; the caller makes `product` = AᵀWA · direction between
 // `conjugate_direction` and `conjugate_product`.
+//
+// Unknowns may have floors. One that stands at its floor when a round begins, and would go
+// below, is held there for the round; the others go where they like, and those that end
+// below their floor are put onto it in the end (after Bertsekas 1982, projected Newton).
 import package::common::numeric::linear_group;
 
 struct ConjugateParameters {
@@ -31,6 +35,10 @@ const BETA: u32 = 2u;
 @group(0) @binding(5) var<storage, read> diagonal: array<f32>;
 @group(0) @binding(6) var<storage, read_write> block_sums: array<f32>;
 @group(0) @binding(7) var<storage, read_write> scalars: array<f32>;
+// The least that each unknown may be.
+@group(0) @binding(8) var<storage, read> floors: array<f32>;
+// What residuals are multiplied by: 0 for the unknowns that are held.
+@group(0) @binding(9) var<storage, read_write> preconditioner: array<f32>;
 
 var<workgroup> sums: array<f32, 256>;
 
@@ -47,12 +55,12 @@ fn sum_of_group(local: u32, own: f32) -> f32 {
     return sums[0];
 }
 
-// The residual divided by an estimate of the matrix's diagonal. Blend weights sum to at
-// most one a pixel, so the sum of a Gaussian's weights bounds its row.
-fn preconditioned(k: u32) -> f32 {
+// One over an estimate of the matrix's diagonal. Blend weights sum to at most one a pixel,
+// so the sum of a Gaussian's weights bounds its row.
+fn inverse_diagonal(k: u32) -> f32 {
     let n = parameters.splats;
     let of_channel = (k / n) % 2u * n + k % n;
-    return residual[k] / (parameters.diagonal_scale * diagonal[of_channel] + parameters.ridge);
+    return 1.0 / (parameters.diagonal_scale * diagonal[of_channel] + parameters.ridge);
 }
 
 // Leaves the workgroup's sum for the kernel that adds up the blocks.
@@ -72,7 +80,9 @@ fn conjugate_begin(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups)
     var own = 0.0;
     if k < parameters.length {
         residual[k] = -residual[k] - parameters.ridge * unknowns[k];
-        let z = preconditioned(k);
+        let held = unknowns[k] <= floors[k] && residual[k] <= 0.0;
+        preconditioner[k] = select(inverse_diagonal(k), 0.0, held);
+        let z = residual[k] * preconditioner[k];
         direction[k] = z;
         own = residual[k] * z;
     }
@@ -101,7 +111,7 @@ fn conjugate_step(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) 
         let alpha = scalars[ALPHA];
         unknowns[k] += alpha * direction[k];
         residual[k] -= alpha * (product[k] + parameters.ridge * direction[k]);
-        own = residual[k] * preconditioned(k);
+        own = residual[k] * (residual[k] * preconditioner[k]);
     }
     leave_sum(block, local, own);
 }
@@ -111,7 +121,16 @@ fn conjugate_step(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) 
 fn conjugate_direction(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
     let k = linear_group(group, groups) * 256u + local;
     if k < parameters.length {
-        direction[k] = preconditioned(k) + scalars[BETA] * direction[k];
+        direction[k] = residual[k] * preconditioner[k] + scalars[BETA] * direction[k];
+    }
+}
+
+// The end of a round.
+@compute @workgroup_size(256)
+fn conjugate_end(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
+    let k = linear_group(group, groups) * 256u + local;
+    if k < parameters.length {
+        unknowns[k] = max(unknowns[k], floors[k]);
     }
 }
 

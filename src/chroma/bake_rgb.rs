@@ -82,14 +82,19 @@ fn spread(terms: &mut dyn Iterator<Item = f32>) -> f64 {
 /// The mean gray, of a Gaussian that is black from everywhere the brightest that looks
 /// the same: of a darker one, which is drawn as black, the channels that its colour
 /// raises would stay black too.
-///
-/// The squares of all K basis functions beyond the constant one sum to K / 4π in every
-/// direction (Unsöld 1927), so √K times their spread bounds what they add.
 fn shown_gray(luma: &[f32]) -> f64 {
     let mean = 0.5 + sh::C0 * f64::from(luma[0]);
-    let rest = &luma[1..];
-    let most = (rest.len() as f64).sqrt() * spread(&mut rest.iter().copied());
-    mean.max(-most)
+    mean.max(darkest(&mut luma[1..].iter().copied()))
+}
+
+/// The least mean of a value that shows from somewhere, black being 0 and `rest` its
+/// harmonics beyond the constant one.
+///
+/// The squares of all K of their basis functions sum to K / 4π in every direction
+/// (Unsöld 1927), so √K times their spread bounds what they add.
+pub(super) fn darkest(rest: &mut dyn Iterator<Item = f32>) -> f64 {
+    let rest: Vec<f32> = rest.collect();
+    -(rest.len() as f64).sqrt() * spread(&mut rest.iter().copied())
 }
 
 /// sRGB of a gray with a/b: the gray itself plus what the a/b change at a lightness and

@@ -37,24 +37,30 @@ pub struct System {
     /// The adjoint of the weights themselves, of which the planes of the constant
     /// harmonic count.
     pub diagonal: Buffer<f32>,
+    /// The least that each unknown may be; [`UNBOUNDED`] where nothing bounds it.
+    pub floors: Buffer<f32>,
 }
+
+/// The floor of an unknown that has none.
+pub const UNBOUNDED: f32 = f32::MIN;
 
 /// The kernels tied to one system.
 pub struct Conjugate {
-    kernels: [Kernel; 7],
-    bindings: [Bindings; 7],
+    kernels: [Kernel; 8],
+    bindings: [Bindings; 8],
     blocks: u32,
 }
 
 /// Entry points in the order of `Conjugate::kernels`.
-const ENTRIES: [(&str, &[u32]); 7] = [
-    ("conjugate_begin", &[0, 1, 2, 3, 5, 6]),
+const ENTRIES: [(&str, &[u32]); 8] = [
+    ("conjugate_begin", &[0, 1, 2, 3, 5, 6, 8, 9]),
     ("conjugate_rho", &[0, 6, 7]),
     ("conjugate_product", &[0, 3, 4, 6]),
     ("conjugate_alpha", &[0, 6, 7]),
-    ("conjugate_step", &[0, 1, 2, 3, 4, 5, 6, 7]),
+    ("conjugate_step", &[0, 1, 2, 3, 4, 6, 7, 9]),
     ("conjugate_beta", &[0, 6, 7]),
-    ("conjugate_direction", &[0, 2, 3, 5, 7]),
+    ("conjugate_direction", &[0, 2, 3, 7, 9]),
+    ("conjugate_end", &[0, 1, 8]),
 ];
 
 impl Conjugate {
@@ -79,6 +85,7 @@ impl Conjugate {
         )?;
         let block_sums = Buffer::<f32>::zeros(gpu, "conjugate sums", blocks as usize)?;
         let scalars = Buffer::<f32>::zeros(gpu, "conjugate scalars", 3)?;
+        let preconditioner = Buffer::<f32>::zeros(gpu, "preconditioner", length)?;
         let buffers = [
             parameters.raw(),
             system.unknowns.raw(),
@@ -88,6 +95,8 @@ impl Conjugate {
             system.diagonal.raw(),
             block_sums.raw(),
             scalars.raw(),
+            system.floors.raw(),
+            preconditioner.raw(),
         ];
         let kernels = ENTRIES.map(|(name, _)| Kernel::new(gpu, name, shaders::CONJUGATE));
         let bindings = std::array::from_fn(|k| {
@@ -125,5 +134,11 @@ impl Conjugate {
         for entry in 2..7 {
             self.run(recorder, entry);
         }
+    }
+
+    /// Records the end of a round: what went below its floor is put onto it. The residual
+    /// is not that of the unknowns any more.
+    pub fn end(&self, recorder: &mut Recorder) {
+        self.run(recorder, 7);
     }
 }

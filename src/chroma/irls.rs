@@ -196,6 +196,15 @@ impl Solver {
         })
     }
 
+    /// Lets no constant harmonic fall below these, `[2, N]`, nor start there.
+    ///
+    /// # Panics
+    /// When there are not two for each Gaussian.
+    pub fn set_floors(&mut self, floors: &[f32]) {
+        assert_eq!(floors.len(), 2 * self.shared.geometry.count);
+        self.shared.system.floors.write_at(&self.gpu, 0, floors);
+    }
+
     /// Rounds that [`Solver::run`] takes.
     pub fn round_count(&self) -> usize {
         self.rounds.len()
@@ -227,6 +236,9 @@ impl Solver {
             for _ in 0..self.steps {
                 self.step(&round);
             }
+            let mut recorder = Recorder::new(&self.gpu);
+            self.conjugate.end(&mut recorder);
+            recorder.submit();
             self.done = index + 1;
             let log = self.shared.log.read_later(&self.gpu);
             let due = pending.replace((index, self.passes, log));

@@ -18,7 +18,7 @@ pub mod teacher;
 mod view;
 
 pub use bake_rgb::bake_rgb;
-pub use conjugate::{Conjugate, ConjugateParameters, System};
+pub use conjugate::{Conjugate, ConjugateParameters, System, UNBOUNDED};
 pub use correction::{CorrectionParameters, Corrections, SUM_GROUPS, SUMS};
 pub use degree::{ChosenDegree, LEAST_GAIN, choose_degree};
 pub use distil::{Distilled, SolverKind, distil};

@@ -3,7 +3,12 @@
 
 use std::sync::Arc;
 
-use super::{ChromaSettings, ChromaView, Solver, bake_rgb, native_rgb, teacher::AbImage};
+use super::{
+    ChromaSettings, ChromaView, Solver, UNBOUNDED,
+    bake_rgb::{bake_rgb, darkest},
+    native_rgb,
+    teacher::AbImage,
+};
 use crate::{
     capture::Camera,
     gpu::GpuError,
@@ -46,7 +51,7 @@ pub fn fit_rgb(
     luma: &Splats,
     views: &[RgbView],
 ) -> Result<ShField, GpuError> {
-    let mut sh = solve(raster, settings, extent, luma, views)?;
+    let mut sh = solve(raster, settings, extent, luma, views, false)?;
     let stride = 3 * sh::coefficient_count(sh.degree);
     for of_splat in sh.coefficients.chunks_exact_mut(stride) {
         for constant in &mut of_splat[..3] {
@@ -91,7 +96,7 @@ pub fn bake(
 }
 
 /// Moves the harmonics of RGB Gaussians, up to the degree of `settings`, by what their
-/// pictures lack, so many times.
+/// pictures lack, so many times. Constant harmonics stay where something shows.
 fn refine(
     raster: &Arc<Raster>,
     settings: &ChromaSettings,
@@ -109,9 +114,20 @@ fn refine(
         ..settings.clone()
     };
     let stride = |degree| 3 * sh::coefficient_count(degree);
+    // What harmonics beyond the constant one become is not known before.
+    let bounded = settings.sh_degree == 0;
+    if bounded {
+        let least = least_constants(splats);
+        let constants = (splats.sh.coefficients).chunks_exact_mut(stride(splats.sh.degree));
+        for (of_splat, least) in constants.zip(least) {
+            for (constant, least) in of_splat.iter_mut().zip(least) {
+                *constant = constant.max(least);
+            }
+        }
+    }
     for _ in 0..times {
         let missing = missing(raster, extent, splats, views)?;
-        let moved = solve(raster, &settings, extent, splats, &missing)?;
+        let moved = solve(raster, &settings, extent, splats, &missing, bounded)?;
         let of_splat = (splats.sh.coefficients).chunks_exact_mut(stride(splats.sh.degree));
         for (out, by) in of_splat.zip(moved.coefficients.chunks_exact(stride(moved.degree))) {
             for (value, by) in out.iter_mut().zip(by) {
@@ -163,13 +179,44 @@ fn missing(
         .collect()
 }
 
-/// The field whose blend is wanted, without the offset of mid-gray.
+/// The least constant harmonics of RGB Gaussians with which they show from somewhere:
+/// viewers draw no channel darker than black, so below these nothing changes any more.
+fn least_constants(splats: &Splats) -> Vec<[f32; 3]> {
+    let stride = 3 * sh::coefficient_count(splats.sh.degree);
+    let of_splat = |coefficients: &[f32]| {
+        [0, 1, 2].map(|channel| {
+            let mut rest = coefficients[3..].iter().skip(channel).step_by(3).copied();
+            ((darkest(&mut rest) - 0.5) / sh::C0) as f32
+        })
+    };
+    (splats.sh.coefficients.chunks_exact(stride))
+        .map(of_splat)
+        .collect()
+}
+
+/// How far the constant harmonics of `channels` may fall, in the solver's units, `[2, N]`.
+fn floors(splats: &Splats, channels: &[usize]) -> Vec<f32> {
+    let n = splats.len();
+    let stride = 3 * sh::coefficient_count(splats.sh.degree);
+    let mut floors = vec![UNBOUNDED; 2 * n];
+    for (i, least) in least_constants(splats).into_iter().enumerate() {
+        for (plane, &channel) in channels.iter().enumerate() {
+            let constant = splats.sh.coefficients[i * stride + channel];
+            floors[plane * n + i] = UNITS * (least[channel] - constant).min(0.0);
+        }
+    }
+    floors
+}
+
+/// The field whose blend is wanted, without the offset of mid-gray: `bounded` to where
+/// `splats` with it are not darker than black.
 fn solve(
     raster: &Arc<Raster>,
     settings: &ChromaSettings,
     extent: f64,
     splats: &Splats,
     views: &[RgbView],
+    bounded: bool,
 ) -> Result<ShField, GpuError> {
     let mut rgb = ShField::zeros(splats.len(), settings.sh_degree, 3);
     for channels in [&[0, 1][..], &[2]] {
@@ -192,6 +239,9 @@ fn solve(
         };
         let views: Vec<ChromaView> = views.iter().map(pair).collect();
         let mut solver = Solver::new(raster.clone(), settings, extent, splats, &views)?;
+        if bounded {
+            solver.set_floors(&floors(splats, channels));
+        }
         solver.run(&mut |_| ())?;
         let found = solver.chroma()?;
         let (from, to) = (

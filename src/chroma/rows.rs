@@ -4,7 +4,7 @@
 use std::rc::Rc;
 
 use super::{
-    conjugate::System,
+    conjugate::{System, UNBOUNDED},
     correction::Corrections,
     loss::{ChromaLossWeights, LOSS_BLOCK},
     view::ChromaView,
@@ -68,6 +68,7 @@ impl Shared {
             direction: direction.planes.clone(),
             product: zeros("product")?,
             diagonal: zeros("diagonal")?,
+            floors: Buffer::from_slice(gpu, "floors", &vec![UNBOUNDED; field.planes.len()])?,
         };
         let canvases = (room.pixels.iter())
             .map(|&pixels| {

@@ -95,10 +95,11 @@ pub fn minimum_bytes(kernel: &str, load: &Load) -> f64 {
         "weigh" => 3.0 * channels * pixels,
         // Picture, wanted a/b and curvature.
         "view_correction_sums" => 3.0 * channels * pixels,
-        "conjugate_begin" => 4.0 * planes + 2.0 * splats,
+        "conjugate_begin" => 6.0 * planes + 2.0 * splats,
         "conjugate_product" => 2.0 * planes,
-        "conjugate_step" => 6.0 * planes + 2.0 * splats,
-        "conjugate_direction" => 3.0 * planes + 2.0 * splats,
+        "conjugate_step" => 7.0 * planes,
+        "conjugate_direction" => 4.0 * planes,
+        "conjugate_end" => 3.0 * planes,
         // One partial sum for every 256 unknowns.
         "conjugate_rho" | "conjugate_alpha" | "conjugate_beta" => planes / 256.0,
         "sum_loss" => tiles,

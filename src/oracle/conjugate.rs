@@ -1,5 +1,5 @@
 //! Preconditioned conjugate gradients (Hestenes, Stiefel 1952; Saad 2003, algorithm
-//! 9.1), and elimination to compare with.
+//! 9.1), with floors (Bertsekas 1982), and elimination to compare with.
 
 /// A symmetric matrix, rows.
 pub type Matrix = Vec<Vec<f64>>;
@@ -22,16 +22,34 @@ pub struct Conjugate {
     pub residual: Vec<f64>,
     /// The direction of the next step.
     pub direction: Vec<f64>,
+    /// What residuals are multiplied by; 0 for what is held at its floor.
     preconditioner: Vec<f64>,
+    floors: Vec<f64>,
     rho: f64,
 }
 
 impl Conjugate {
-    /// Begins at `unknowns`, whose residual is given. `preconditioner` is a positive
-    /// diagonal, by which the residual is divided.
-    pub fn new(unknowns: Vec<f64>, residual: Vec<f64>, preconditioner: Vec<f64>) -> Self {
+    /// Begins at `unknowns`, whose residual is given. `diagonal` is positive; residuals are
+    /// divided by it.
+    pub fn new(unknowns: Vec<f64>, residual: Vec<f64>, diagonal: &[f64]) -> Self {
+        let floors = vec![f64::NEG_INFINITY; unknowns.len()];
+        Self::with_floors(unknowns, residual, diagonal, floors)
+    }
+
+    /// The same for unknowns none of which may fall below its floor: those that stand
+    /// there and would are held.
+    pub fn with_floors(
+        unknowns: Vec<f64>,
+        residual: Vec<f64>,
+        diagonal: &[f64],
+        floors: Vec<f64>,
+    ) -> Self {
+        let held = |k: usize| unknowns[k] <= floors[k] && residual[k] <= 0.0;
+        let preconditioner: Vec<f64> = (0..unknowns.len())
+            .map(|k| if held(k) { 0.0 } else { 1.0 / diagonal[k] })
+            .collect();
         let direction: Vec<f64> = (residual.iter().zip(&preconditioner))
-            .map(|(r, m)| r / m)
+            .map(|(r, p)| r * p)
             .collect();
         Self {
             rho: dot(&residual, &direction),
@@ -39,6 +57,15 @@ impl Conjugate {
             residual,
             direction,
             preconditioner,
+            floors,
+        }
+    }
+
+    /// Puts what went below its floor onto it. The residual is not that of the unknowns
+    /// any more.
+    pub fn end(&mut self) {
+        for (unknown, floor) in self.unknowns.iter_mut().zip(&self.floors) {
+            *unknown = unknown.max(*floor);
         }
     }
 
@@ -55,7 +82,7 @@ impl Conjugate {
             self.residual[k] -= alpha * p;
         }
         let preconditioned: Vec<f64> = (self.residual.iter().zip(&self.preconditioner))
-            .map(|(r, m)| r / m)
+            .map(|(r, p)| r * p)
             .collect();
         let rho = dot(&self.residual, &preconditioned);
         let beta = if self.rho > 0.0 { rho / self.rho } else { 0.0 };
@@ -127,7 +154,7 @@ mod tests {
         let matrix = random_matrix(&mut random, 9);
         let right: Vec<f64> = (0..9).map(|_| random.range(-1.0, 1.0)).collect();
         let diagonal: Vec<f64> = (0..9).map(|k| matrix[k][k]).collect();
-        let mut cg = Conjugate::new(vec![0.0; 9], right.clone(), diagonal);
+        let mut cg = Conjugate::new(vec![0.0; 9], right.clone(), &diagonal);
         for _ in 0..9 {
             let before = cg.direction.clone();
             cg.step(&multiply(&matrix, &before));
@@ -138,9 +165,44 @@ mod tests {
         let close = |(a, b): (&f64, &f64)| (a - b).abs() < 1e-9;
         assert!(cg.unknowns.iter().zip(&wanted).all(close));
         // Nothing left to do moves nothing, and divides by no zero.
-        let mut done = Conjugate::new(vec![1.0], vec![0.0], vec![2.0]);
+        let mut done = Conjugate::new(vec![1.0], vec![0.0], &[2.0]);
         done.step(&[0.0]);
         assert_eq!(done.unknowns, [1.0]);
         assert_eq!(done.direction, [0.0]);
+    }
+
+    /// Round after round it comes to where no unknown can gain: the residual is none where
+    /// an unknown is above its floor, and points below where it stands on it.
+    #[test]
+    fn rounds_end_where_floors_allow_no_more() {
+        let mut random = Random::new(3);
+        let matrix = random_matrix(&mut random, 14);
+        let right: Vec<f64> = (0..14).map(|_| random.range(-1.0, 1.0)).collect();
+        let diagonal: Vec<f64> = (0..14).map(|k| matrix[k][k]).collect();
+        let floors: Vec<f64> = (0..14).map(|_| random.range(-0.2, 0.1)).collect();
+        let residual = |x: &[f64]| -> Vec<f64> {
+            (right.iter().zip(multiply(&matrix, x)))
+                .map(|(b, ax)| b - ax)
+                .collect()
+        };
+        let mut x = floors.clone();
+        for _ in 0..40 {
+            let mut cg = Conjugate::with_floors(x.clone(), residual(&x), &diagonal, floors.clone());
+            for _ in 0..3 {
+                cg.step(&multiply(&matrix, &cg.direction.clone()));
+            }
+            cg.end();
+            x = cg.unknowns;
+        }
+        let left = residual(&x);
+        let on_floor = (0..14).filter(|&k| x[k] <= floors[k]).count();
+        assert!((3..12).contains(&on_floor), "{on_floor}");
+        for k in 0..14 {
+            if x[k] > floors[k] {
+                assert!(left[k].abs() < 1e-9, "{k}: {}", left[k]);
+            } else {
+                assert!(x[k] == floors[k] && left[k] <= 0.0, "{k}: {}", left[k]);
+            }
+        }
     }
 }

@@ -169,9 +169,21 @@ fn broken_losses_and_steps_are_noticed() {
         ),
         (
             "conjugate",
+            "conjugate_begin",
+            "unknowns[k] <= floors[k] && residual[k] <= 0.0",
+            "unknowns[k] <= floors[k]",
+        ),
+        (
+            "conjugate",
             "conjugate_alpha",
             "block += 256u",
             "block += 512u",
+        ),
+        (
+            "conjugate",
+            "conjugate_end",
+            "max(unknowns[k], floors[k])",
+            "max(unknowns[k], 0.0)",
         ),
         (
             "view correction",
