@@ -20,7 +20,7 @@ pub struct CurvePoint {
 
 /// What twice as many iterations would bring by the last half of a curve, in dB: the slope
 /// of the least-squares line through PSNR against log₂ of the iteration. PSNR counts as the
-/// best so far, for a reset of the opacities throws it back for a while. `None` while there
+/// best so far, for a change of the set may throw it back for a while. `None` while there
 /// are too few points.
 pub fn gain_of_doubling(curve: &[CurvePoint]) -> Option<f64> {
     let last = curve.last()?.iteration;
@@ -70,15 +70,15 @@ mod tests {
     }
 
     #[test]
-    fn what_a_reset_throws_back_is_no_loss() {
-        let reset = |i: usize| {
+    fn what_is_thrown_back_for_a_while_is_no_loss() {
+        let dip = |i: usize| {
             if i == 700 {
                 12.0
             } else {
                 20.0 + i as f64 / 100.0
             }
         };
-        let gain = gain_of_doubling(&curve(reset, &EVEN)).unwrap();
+        let gain = gain_of_doubling(&curve(dip, &EVEN)).unwrap();
         assert!(gain > 2.0, "{gain}");
     }
 

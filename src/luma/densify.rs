@@ -60,12 +60,6 @@ pub struct Evidence<'a> {
     pub geometry: &'a [f32],
     /// Statistics planes `[2, N]`.
     pub statistics: &'a [f32],
-    /// The scene's extent in world units.
-    pub extent: f64,
-    /// The mean of the cameras' centres.
-    pub center: [f64; 3],
-    /// Whether oversized Gaussians go as well.
-    pub prune_large: bool,
 }
 
 /// Plans one densification: survivors in their old order, then the halves of
@@ -74,26 +68,10 @@ pub struct Evidence<'a> {
 pub fn plan(settings: &LumaSettings, evidence: &Evidence<'_>) -> Vec<Descent> {
     let n = evidence.geometry.len() / GEOMETRY_PLANES;
     let at = |plane: usize, i: usize| evidence.geometry[plane * n + i];
-    let largest = |i: usize| {
-        (0..3)
-            .map(|axis| f64::from(at(PLANE_LOG_SCALE + axis, i)).exp())
-            .fold(0.0, f64::max)
-    };
     let opacity = |i: usize| 1.0 / (1.0 + f64::from(-at(PLANE_OPACITY, i)).exp());
-    let reach = |i: usize| {
-        if !settings.background {
-            return evidence.extent;
-        }
-        let away = (0..3).map(|axis| f64::from(at(PLANE_MEAN + axis, i)) - evidence.center[axis]);
-        let distance = away.map(|d| d * d).sum::<f64>().sqrt();
-        evidence.extent.max(distance)
-    };
     // Positively written: whatever is not a number does not survive.
     let lives = |i: usize| {
-        let fits = !evidence.prune_large || largest(i) <= settings.prune_share * reach(i);
-        opacity(i) >= settings.prune_opacity
-            && fits
-            && (0..GEOMETRY_PLANES).all(|p| at(p, i).is_finite())
+        opacity(i) >= settings.prune_opacity && (0..GEOMETRY_PLANES).all(|p| at(p, i).is_finite())
     };
     let pull = |i: usize| {
         let views = evidence.statistics[STAT_VIEWS * n + i];
@@ -257,18 +235,11 @@ mod tests {
         (geometry, statistics)
     }
 
-    fn planned(
-        settings: &LumaSettings,
-        gaussians: &[(f32, f32, f32)],
-        prune_large: bool,
-    ) -> Vec<Descent> {
+    fn planned(settings: &LumaSettings, gaussians: &[(f32, f32, f32)]) -> Vec<Descent> {
         let (geometry, statistics) = evidence(gaussians);
         let evidence = Evidence {
             geometry: &geometry,
             statistics: &statistics,
-            extent: 1.0,
-            center: [0.0; 3],
-            prune_large,
         };
         plan(settings, &evidence)
     }
@@ -287,40 +258,20 @@ mod tests {
     const CALM: (f32, f32, f32) = (0.005, 0.5, 1e-5);
     const PULLED: (f32, f32, f32) = (0.005, 0.5, 2e-3);
     const FAINT: (f32, f32, f32) = (0.005, 0.004, 1e-2);
-    const HUGE: (f32, f32, f32) = (0.2, 0.5, 1e-5);
+    const HUGE: (f32, f32, f32) = (200.0, 0.5, 1e-5);
 
     #[test]
     fn pulled_ones_are_split_faint_ones_removed() {
-        let plan = planned(&eager(), &[CALM, PULLED, FAINT], false);
+        let plan = planned(&eager(), &[CALM, PULLED, FAINT]);
         assert_eq!(sources(&plan), [(0, 1), (1, 0), (1, 0)]);
         assert_eq!(plan[0].offset, [0.0; 3]);
         assert_eq!(plan[1].offset, plan[2].offset.map(|x| -x));
     }
 
+    /// Far away, or in a view of little else, it may well be what is there.
     #[test]
-    fn oversized_ones_go_only_when_asked() {
-        assert_eq!(planned(&eager(), &[HUGE, CALM], false).len(), 2);
-        assert_eq!(sources(&planned(&eager(), &[HUGE, CALM], true)), [(1, 1)]);
-    }
-
-    #[test]
-    fn a_background_may_be_as_large_as_it_is_far() {
-        let (mut geometry, statistics) = evidence(&[HUGE, HUGE]);
-        // The second one, 0.2 wide, at a distance of 3.
-        geometry[2 * PLANE_MEAN + 1] = 3.0;
-        let evidence = Evidence {
-            geometry: &geometry,
-            statistics: &statistics,
-            extent: 1.0,
-            center: [0.0; 3],
-            prune_large: true,
-        };
-        assert_eq!(plan(&eager(), &evidence), []);
-        let background = LumaSettings {
-            background: true,
-            ..eager()
-        };
-        assert_eq!(sources(&plan(&background, &evidence)), [(1, 1)]);
+    fn size_is_no_reason_to_go() {
+        assert_eq!(sources(&planned(&eager(), &[HUGE, CALM])), [(0, 1), (1, 1)]);
     }
 
     #[test]
@@ -332,17 +283,17 @@ mod tests {
             max_splats: 4,
             ..eager()
         };
-        assert_eq!(sources(&planned(&capped, &gaussians, false)), first);
+        assert_eq!(sources(&planned(&capped, &gaussians)), first);
         let full = LumaSettings {
             max_splats: 2,
             ..eager()
         };
-        assert_eq!(planned(&full, &gaussians, false).len(), 3);
+        assert_eq!(planned(&full, &gaussians).len(), 3);
         let slow = LumaSettings {
             growth: 0.3,
             ..eager()
         };
-        assert_eq!(sources(&planned(&slow, &gaussians, false)), first);
+        assert_eq!(sources(&planned(&slow, &gaussians)), first);
     }
 
     #[test]
@@ -352,9 +303,6 @@ mod tests {
         let evidence = Evidence {
             geometry: &geometry,
             statistics: &statistics,
-            extent: 1.0,
-            center: [0.0; 3],
-            prune_large: false,
         };
         assert_eq!(sources(&plan(&eager(), &evidence)), [(1, 1)]);
     }

@@ -251,9 +251,6 @@ mod tests {
         let evidence = Evidence {
             geometry: &geometry(logits),
             statistics: &[],
-            extent: 1.0,
-            center: [0.0; 3],
-            prune_large: false,
         };
         plan(settings, &evidence, 7)
     }

@@ -71,8 +71,6 @@ pub struct Schedule {
     pub densify_until: usize,
     /// Iterations between densifications.
     pub densify_every: usize,
-    /// Iterations between opacity resets.
-    pub reset_every: usize,
     /// Iterations between two degrees of spherical harmonics.
     pub raise_degree_every: usize,
     /// From here on all learning rates fall, to [`SETTLED`] at the end.
@@ -84,31 +82,22 @@ pub struct Schedule {
 }
 
 impl Schedule {
-    /// The paper's schedule is written for 15,000 iterations; a shorter run
-    /// passes through the same phases in proportion. Below some 6,000 iterations
-    /// an opacity reset costs more than the run can recover, so there is none.
+    /// The paper's schedule is written for 15,000 iterations; a shorter run passes
+    /// through the same phases in proportion. There are no opacity resets, and splitting
+    /// ends with four fifths of the run (measured in docs/decisions.md).
     pub fn of(iterations: usize) -> Self {
         let share = |of_paper: usize| (of_paper * iterations).div_ceil(PAPER_ITERATIONS);
         let short = iterations < PAPER_ITERATIONS;
         Self {
             iterations,
             densify_from: if short { share(500).max(100) } else { 500 },
-            // A run needs time to settle after the last split; the paper's has stage 2.
-            densify_until: if short {
-                share(12_000)
-            } else {
-                PAPER_ITERATIONS
-            },
+            // A run needs time to settle after the last split.
+            densify_until: share(12_000).min(PAPER_ITERATIONS),
             // Some five looks at the pulls, each over enough iterations to be worth one.
             densify_every: if iterations < SHORT_RUN {
                 (iterations / 5).clamp(50, 200)
             } else {
                 100
-            },
-            reset_every: if iterations < 6_000 {
-                usize::MAX
-            } else {
-                3_000
             },
             raise_degree_every: if short { share(1_000).max(1) } else { 1_000 },
             // A long run's only rate that is still large, the means', falls by itself.
@@ -195,10 +184,6 @@ pub struct LumaSettings {
     pub pull_threshold: f64,
     /// A densification splits at most this share of the Gaussians.
     pub growth: f64,
-    /// Gaussians larger than this share of the extent are removed after the
-    /// first opacity reset; with a [`background`](Self::background), of the distance to
-    /// the cameras' mean where that is longer.
-    pub prune_share: f64,
     /// Gaussians below this opacity are removed.
     pub prune_opacity: f64,
     /// Whether pixels that show something else than the scene are found on the way
@@ -235,7 +220,6 @@ impl LumaSettings {
             // gsplat's advice for absolute gradients.
             pull_threshold: 8e-4,
             growth: 0.3,
-            prune_share: 0.1,
             prune_opacity: 0.005,
             robust: false,
             memory_limit: None,
@@ -247,13 +231,12 @@ impl LumaSettings {
         }
     }
 
-    /// The same with densification by relocation: no opacity reset, and a set that
+    /// The same with densification by relocation: a set that
     /// grows by 5 % a time as in the paper; in a short run oftener and by 10 %.
     pub fn relocating(mut self) -> Self {
         let short = self.schedule.iterations < SHORT_RUN;
         self.densification = Densification::Relocate;
         self.growth = if short { 0.1 } else { 0.05 };
-        self.schedule.reset_every = usize::MAX;
         if short {
             self.schedule.densify_every = (self.schedule.iterations / 20).clamp(25, 100);
         }
@@ -305,12 +288,6 @@ impl LumaSettings {
             && iteration < schedule.densify_until
             && iteration.is_multiple_of(schedule.densify_every)
     }
-
-    /// Whether opacities are reset after `iteration` (counted from 1).
-    pub fn resets_after(&self, iteration: usize) -> bool {
-        iteration < self.schedule.densify_until
-            && iteration.is_multiple_of(self.schedule.reset_every)
-    }
 }
 
 #[cfg(test)]
@@ -318,16 +295,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_papers_schedule_is_3dgs() {
+    fn the_papers_schedule() {
         let schedule = Schedule::of(PAPER_ITERATIONS);
         assert_eq!(
             schedule,
             Schedule {
                 iterations: 15_000,
                 densify_from: 500,
-                densify_until: 15_000,
+                densify_until: 12_000,
                 densify_every: 100,
-                reset_every: 3_000,
                 raise_degree_every: 1_000,
                 settle_from: 15_000,
                 coarse_until: 0,
@@ -336,7 +312,6 @@ mod tests {
         );
         let settings = LumaSettings::new(PAPER_ITERATIONS);
         assert!(!settings.densifies_after(500) && settings.densifies_after(600));
-        assert!(settings.resets_after(3_000) && !settings.resets_after(15_000));
         assert_eq!(
             [0, 999, 1_000, 2_500, 9_000].map(|i| settings.degree_at(i)),
             [0, 0, 1, 2, 3]
@@ -378,7 +353,6 @@ mod tests {
         assert_eq!(schedule.settle_from, 1_400);
         assert_eq!(schedule.densify_until, 1_600);
         assert_eq!(schedule.find_outliers_at, [800, 1_300]);
-        assert_eq!(schedule.reset_every, usize::MAX);
         schedule.end_at(1_000, 0);
         assert_eq!(schedule, before);
 

@@ -225,10 +225,9 @@ impl LumaTrainer {
             let settings = &self.settings;
             let densifies = settings.densifies_after(iteration);
             let finds_outliers = settings.finds_outliers_after(iteration);
-            let resets = settings.resets_after(iteration);
             let ends = iteration == settings.schedule.iterations;
             let looks = self.watch.is_due(iteration, settings.schedule.iterations);
-            let pauses = densifies || finds_outliers || resets || looks || ends;
+            let pauses = densifies || finds_outliers || looks || ends;
             // The first views say how much room is needed: those lost to an overflow
             // are few if it is noticed early.
             let early = iteration < SYNC_EVERY && iteration.is_power_of_two();
@@ -274,9 +273,6 @@ impl LumaTrainer {
             }
             if finds_outliers {
                 self.leave_out_outliers()?;
-            }
-            if resets {
-                self.reset_opacities()?;
             }
         }
         Ok(())

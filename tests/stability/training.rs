@@ -367,26 +367,6 @@ fn black_white_and_constant_photos_train() {
     }
 }
 
-/// A reset leaves Gaussians so faint that some reach 1/255 nowhere and have no
-/// gradient; the others must bring the picture back.
-#[test]
-fn an_opacity_reset_is_recovered_from() {
-    let world = world(Frame::ORDINARY, 5);
-    let start = initial_splats(&world.points, world.extent as f32, 1);
-    let mut settings = settings(&start, 300);
-    settings.schedule.reset_every = 100;
-    settings.schedule.densify_until = 150;
-    let (splats, reports) = trained_with(&world, &start, settings).unwrap();
-    assert_sound(&splats, &reports);
-    let loss_at = |iteration| {
-        let report = reports.iter().find(|report| report.iteration == iteration);
-        report.unwrap().loss
-    };
-    assert!(loss_at(125) > 2.0 * loss_at(100), "there was a reset");
-    let psnr = mean_psnr(&world, &splats);
-    assert!(psnr > 24.0, "{psnr} dB");
-}
-
 /// Where a rule would remove every Gaussian, it removes none.
 #[test]
 fn a_rule_that_would_remove_all_removes_none() {

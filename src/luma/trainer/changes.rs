@@ -1,10 +1,7 @@
 //! What changes between two iterations, beside the steps of Adam.
 
-use glam::DVec3;
-
 use super::LumaTrainer;
 use crate::{
-    capture::Camera,
     gpu::{Buffer, GpuError},
     luma::{
         Densification,
@@ -12,11 +9,8 @@ use crate::{
         memory::ENTRIES_PER_SPLAT,
         outliers, relocation,
     },
-    raster::{Geometry, constants::PLANE_OPACITY},
+    raster::Geometry,
 };
-
-/// Opacity to which a reset lowers (3DGS).
-const RESET_OPACITY: f32 = 0.01;
 
 impl LumaTrainer {
     /// Splits, moves and removes Gaussians.
@@ -24,9 +18,6 @@ impl LumaTrainer {
         let evidence = Evidence {
             geometry: &self.geometry.planes.read(&self.gpu)?,
             statistics: &self.workspace().statistics().read(&self.gpu)?,
-            extent: self.extent,
-            center: center(&self.cameras),
-            prune_large: iteration > self.settings.schedule.reset_every,
         };
         let plan = match self.settings.densification {
             Densification::Split => densify::plan(&self.settings, &evidence),
@@ -90,30 +81,4 @@ impl LumaTrainer {
         }
         Ok(())
     }
-
-    /// Lowers every opacity and forgets its momentum.
-    pub(super) fn reset_opacities(&self) -> Result<(), GpuError> {
-        let n = self.geometry.count;
-        let first = PLANE_OPACITY * n;
-        let ceiling = (RESET_OPACITY / (1.0 - RESET_OPACITY)).ln();
-        let planes = self.geometry.planes.read(&self.gpu)?;
-        let lowered: Vec<f32> = planes[first..first + n]
-            .iter()
-            .map(|&logit| logit.min(ceiling))
-            .collect();
-        self.geometry.planes.write_at(&self.gpu, first, &lowered);
-        for moment in [
-            &self.workspace().adam_geometry.first,
-            &self.workspace().adam_geometry.second,
-        ] {
-            moment.write_at(&self.gpu, first, &vec![0.0; n]);
-        }
-        Ok(())
-    }
-}
-
-/// The mean of the cameras' centres.
-fn center(cameras: &[Camera]) -> [f64; 3] {
-    let sum: DVec3 = cameras.iter().map(Camera::center).sum();
-    (sum / cameras.len().max(1) as f64).to_array()
 }
