@@ -27,6 +27,10 @@ const BAKE_VIEWS: usize = 16;
 /// on what is really shown.
 const BAKE_TIMES: usize = 2;
 
+/// Steps of each of these times where harmonics have floors; without, more than four make
+/// views worse that are not fitted to (docs/decisions.md).
+const BOUNDED_STEPS: usize = 6;
+
 /// A view and the colours wanted in its picture.
 #[derive(Clone, Debug)]
 pub struct RgbView {
@@ -105,17 +109,17 @@ fn refine(
     views: &[RgbView],
     times: usize,
 ) -> Result<(), GpuError> {
+    // What harmonics beyond the constant one become is not known before.
+    let bounded = settings.sh_degree == 0;
     let settings = ChromaSettings {
         warm_scales: 1,
         warm_rounds: 1,
         rounds: 1,
-        steps: 4,
+        steps: if bounded { BOUNDED_STEPS } else { 4 },
         fills: false,
         ..settings.clone()
     };
     let stride = |degree| 3 * sh::coefficient_count(degree);
-    // What harmonics beyond the constant one become is not known before.
-    let bounded = settings.sh_degree == 0;
     if bounded {
         let least = least_constants(splats);
         let constants = (splats.sh.coefficients).chunks_exact_mut(stride(splats.sh.degree));
