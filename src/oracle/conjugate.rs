@@ -22,7 +22,7 @@ pub struct Conjugate {
     pub residual: Vec<f64>,
     /// The direction of the next step.
     pub direction: Vec<f64>,
-    /// What residuals are multiplied by; 0 for what is held at its floor.
+    /// What residuals are divided by; infinite for what is held at its floor.
     preconditioner: Vec<f64>,
     floors: Vec<f64>,
     rho: f64,
@@ -46,10 +46,10 @@ impl Conjugate {
     ) -> Self {
         let held = |k: usize| unknowns[k] <= floors[k] && residual[k] <= 0.0;
         let preconditioner: Vec<f64> = (0..unknowns.len())
-            .map(|k| if held(k) { 0.0 } else { 1.0 / diagonal[k] })
+            .map(|k| if held(k) { f64::INFINITY } else { diagonal[k] })
             .collect();
         let direction: Vec<f64> = (residual.iter().zip(&preconditioner))
-            .map(|(r, p)| r * p)
+            .map(|(r, m)| r / m)
             .collect();
         Self {
             rho: dot(&residual, &direction),
@@ -82,7 +82,7 @@ impl Conjugate {
             self.residual[k] -= alpha * p;
         }
         let preconditioned: Vec<f64> = (self.residual.iter().zip(&self.preconditioner))
-            .map(|(r, p)| r * p)
+            .map(|(r, m)| r / m)
             .collect();
         let rho = dot(&self.residual, &preconditioned);
         let beta = if self.rho > 0.0 { rho / self.rho } else { 0.0 };
