@@ -183,7 +183,7 @@ fn broken_losses_and_steps_are_noticed() {
             "conjugate",
             "conjugate_end",
             "max(unknowns[k], floors[k])",
-            "max(unknowns[k], 0.0)",
+            "min(unknowns[k], floors[k])",
         ),
         (
             "view correction",

@@ -65,6 +65,11 @@ const REASONS: &[(&str, &str, &str)] = &[
         "project culls what is not beyond the near plane before it uses the result",
     ),
     (
+        "inverse_diagonal",
+        "1.0 / (parameters.diagonal_scale * diagonal[of_channel] + parameters.ridge)",
+        "the ridge is positive, sums of weights are not negative",
+    ),
+    (
         "least_power",
         "-conic.y * nearest.x / conic.z",
         "project culls conics whose diagonal is not positive",
@@ -136,11 +141,6 @@ const REASONS: &[(&str, &str, &str)] = &[
         "power_cutoff",
         "opacity / ALPHA_MIN",
         "a divisor that the host keeps above 0",
-    ),
-    (
-        "preconditioned",
-        "residual[k] / (parameters.diagonal_scale * diagonal[of_channel] + parameters.ridge)",
-        "the ridge is positive, sums of weights are not negative",
     ),
     (
         "project",
