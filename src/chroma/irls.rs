@@ -196,7 +196,7 @@ impl Solver {
         })
     }
 
-    /// Lets no constant harmonic fall below these, `[2, N]`, nor start there.
+    /// Lets no constant harmonic fall below these, `[2, N]`.
     ///
     /// # Panics
     /// When there are not two for each Gaussian.

@@ -150,7 +150,7 @@ impl Schedule {
 pub const SHORT_RUN: usize = 3_000;
 
 /// A run with fewer iterations learns at other rates than 3DGS and settles in the end;
-/// with 7,000 that is worth 0.1 to 0.2 dB (docs/decisions.md), with more it was not measured.
+/// with 7,000 that is worth 0.1 to 0.7 dB (docs/decisions.md), with more it was not measured.
 pub const LONG_RUN: usize = 10_000;
 
 /// Share of its learning rates at which a run that settles ends: steps that answer to one
@@ -235,8 +235,8 @@ impl LumaSettings {
         }
     }
 
-    /// The same with densification by relocation: a set that
-    /// grows by 5 % a time as in the paper; in a short run oftener and by 10 %.
+    /// The same with densification by relocation: a set that grows by 5 % a time as in the
+    /// paper; in a short run oftener and by 10 %.
     pub fn relocating(mut self) -> Self {
         let short = self.schedule.iterations < SHORT_RUN;
         self.densification = Densification::Relocate;
