@@ -30,6 +30,9 @@ pub struct Tradeoff {
     /// Luma iterations of the base, instead of the preset's.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     iterations: Option<u32>,
+    /// Most Gaussians of the base, instead of the preset's.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    max_splats: Option<u32>,
     /// Minutes that all points may take together, earlier starts included; the base runs
     /// anyway.
     #[arg(long, value_name = "MINUTES", default_value_t = 30.0, value_parser = minutes)]
@@ -54,6 +57,7 @@ impl Tradeoff {
             output: self.output,
             preset: self.preset,
             iterations: self.iterations.map(|n| n as usize),
+            max_splats: self.max_splats.map(|n| n as usize),
             load: self.photos.options(),
             overrules: self.effects.overrules(),
             teacher: self.teacher,

@@ -136,7 +136,7 @@ fn what_is_documented(place: &Place, sweep: &Value) {
 #[test]
 fn a_sweep_that_was_killed_goes_on() {
     let place = place_with_scene();
-    let arguments = [&QUICK[..], &["--knobs", "iterations"]].concat();
+    let arguments = [&QUICK[..], &["--knobs", "iterations", "--max-splats", "60"]].concat();
     let mut command = place.command(&arguments);
     command
         .stdin(Stdio::null())
@@ -164,6 +164,9 @@ fn a_sweep_that_was_killed_goes_on() {
         ["base", "iterations-1", "iterations-2", "iterations-8"]
     );
     assert_eq!(points(&after)[..points(&before).len()], points(&before)[..]);
+    for point in points(&after) {
+        assert_eq!(point["outcome"]["splats"], 60, "{point}");
+    }
     for name in names(&before) {
         assert!(!stderr.contains(&format!("{name}: ")), "{stderr}");
     }

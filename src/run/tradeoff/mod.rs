@@ -38,6 +38,8 @@ pub struct TradeoffOptions {
     pub preset: Option<Preset>,
     /// Iterations of the base.
     pub iterations: Option<usize>,
+    /// Cap on Gaussians of the base.
+    pub max_splats: Option<usize>,
     /// How photos are loaded; some have to be held out.
     pub load: LoadOptions,
     /// Effects that are on or off in every point.

@@ -69,6 +69,7 @@ impl Bench {
             options: [
                 vec![("--preset", Some(preset.name().to_owned()))],
                 given(options.iterations, "--iterations"),
+                given(options.max_splats, "--max-splats"),
                 load_options(&options.load)?,
                 overruled(&options.overrules),
             ]
