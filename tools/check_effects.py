@@ -28,6 +28,7 @@ VARIANTS = [
     ("barrel", "lens"),
     ("fisheye", "lens"),
     ("exposure", "exposure"),
+    ("flicker", "exposure"),
     ("distances", "antialias"),
     ("dust", "robust"),
     ("sky", "background"),
@@ -37,8 +38,8 @@ VARIANTS = [
     ("infrared-tiff", None),
     ("heavy-dust", "robust"),
 ]
-# Others have one. Heavy dust shares that of dust.
-NO_CONTROL = ["infrared-tiff", "heavy-dust"]
+# Others have one. Heavy dust shares that of dust, flicker that of exposure.
+NO_CONTROL = ["infrared-tiff", "heavy-dust", "flicker"]
 
 # These stay as the plan has them while another effect is in question; the others are
 # off, for one may do the work of another.

@@ -14,6 +14,14 @@ use crate::capture::{Camera, Capture, Choice, Exposure, IMPERCEPTIBLE, Photo, Sp
 /// invisible beside what any scene is missed by.
 const EXPOSURE_LEVELS: f64 = 2.0;
 
+/// From here on points alone are believed. Below, they may say that exposures differ where in
+/// truth most of them lie on something that shines otherwise from every side.
+const EXPOSURE_SURE: f64 = 8.0;
+
+/// Per cent by which a short training must fit the photos better with exposures than without:
+/// exposures of 4 levels that are real bring 3, imagined ones of 5 cost 0.5.
+const TRIAL_GAIN: f64 = 1.0;
+
 /// And they must exceed what noise alone would make of them by this factor.
 const EXPOSURE_OVER_NOISE: f64 = 3.0;
 
@@ -129,6 +137,8 @@ impl Effect {
 pub enum Decider {
     /// The evidence against its threshold.
     Evidence,
+    /// Two short trainings, for the evidence leaves it open.
+    Trial,
     /// `--with` or `--without`, or an option that says the same.
     User,
     /// The preset, which has no room for it.
@@ -148,6 +158,9 @@ pub struct Decision {
     pub threshold: f64,
     /// Who decided.
     pub decided_by: Decider,
+    /// Per cent by which a short training fitted the photos better with it than without, where
+    /// that was tried.
+    pub trial: Option<f64>,
 }
 
 impl Decision {
@@ -159,6 +172,20 @@ impl Decision {
             evidence,
             threshold,
             decided_by: Decider::Evidence,
+            trial: None,
+        }
+    }
+
+    /// What follows from a trial, which is asked only where the evidence says yes.
+    fn after(self, trial: Option<f64>) -> Self {
+        match trial {
+            Some(gain) => Self {
+                on: gain >= TRIAL_GAIN,
+                decided_by: Decider::Trial,
+                trial,
+                ..self
+            },
+            None => self,
         }
     }
 }
@@ -208,22 +235,29 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Examines a capture with its photos at working size.
+    /// Examines a capture with its photos at working size. `trial` is what a training
+    /// [that was asked for](Self::needs_trial) said: per cent by which it fits the photos better
+    /// with exposures than without.
     pub fn new(
         capture: &Capture,
         photos: &[(Photo, Camera)],
         split: &Split,
         room: Room,
         overrules: &Overrules,
+        trial: Option<f64>,
     ) -> Self {
         let samples = tracks::sample_tracks(capture, photos);
-        let found = exposure::find_photo_exposures(&samples, &capture.views, &split.train);
+        let mut found = exposure::find_photo_exposures(&samples, &capture.views, &split.train);
         let exposure = {
             let evidence = (!samples.is_empty()).then_some(255.0 * found.spread);
             let noise = EXPOSURE_OVER_NOISE * 255.0 * found.noise;
             let decision = Decision::new(Effect::Exposure, evidence, EXPOSURE_LEVELS.max(noise));
-            overruled(decision, overrules)
+            overruled(decision.after(trial), overrules)
         };
+        if exposure.decided_by == Decider::Trial && !exposure.on {
+            // What points show differently then has another reason.
+            found.views.fill(Exposure::NONE);
+        }
         let robust = {
             let evidence = outliers::outlier_share(capture, photos, &found.views);
             let percent = evidence.map(|share| 100.0 * share);
@@ -267,6 +301,17 @@ impl Plan {
             exposures,
             sh_degree,
         }
+    }
+
+    /// Whether two short trainings, with exposures and without, should tell what the photos
+    /// alone do not.
+    pub fn needs_trial(&self) -> bool {
+        (self.decisions.iter()).any(|decision| {
+            decision.effect == Effect::Exposure
+                && decision.on
+                && decision.decided_by == Decider::Evidence
+                && (decision.evidence).is_some_and(|evidence| evidence < EXPOSURE_SURE)
+        })
     }
 
     /// Whether an effect is simulated.
@@ -347,9 +392,10 @@ impl fmt::Display for Decision {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let evidence = (self.evidence).map_or("none".to_owned(), |found| format!("{found:.2}"));
         let by = match self.decided_by {
-            Decider::Evidence => "",
-            Decider::User => "; you said so",
-            Decider::Preset => "; by the preset",
+            Decider::Evidence => "".to_owned(),
+            Decider::Trial => in_words(self.trial),
+            Decider::User => "; you said so".to_owned(),
+            Decider::Preset => "; by the preset".to_owned(),
         };
         write!(
             f,
@@ -364,6 +410,13 @@ impl fmt::Display for Decision {
             false => Ok(()),
         }
     }
+}
+
+/// What a trial showed.
+fn in_words(trial: Option<f64>) -> String {
+    let gain = trial.unwrap_or(0.0);
+    let how = if gain < 0.0 { "worse" } else { "better" };
+    format!("; a trial training fits {:.1} % {how} with it", gain.abs())
 }
 
 /// The table of some decisions.
@@ -386,87 +439,5 @@ impl fmt::Display for Plan {
 }
 
 #[cfg(test)]
-mod tests {
-    use glam::DVec3;
-
-    use super::*;
-    use crate::effects::fixtures::{capture, looking_along_z, photo};
-
-    fn plan(sh_degree: u32, overrules: &Overrules) -> Plan {
-        let photos: Vec<_> = (0..3)
-            .map(|k| {
-                let camera = looking_along_z(DVec3::new(0.1 * f64::from(k), 0.0, -3.0), 32);
-                (photo(&camera, |x, y| (x * 5 + y * 2) as u8), camera)
-            })
-            .collect();
-        let points = (0..100).map(|i| DVec3::new(f64::from(i % 10), f64::from(i / 10), 0.0) * 0.1);
-        let capture = capture(&photos, points);
-        let split = Split {
-            train: vec![0, 1, 2],
-            test: Vec::new(),
-        };
-        let room = Room {
-            sh_degree,
-            iterations: 700,
-        };
-        Plan::new(&capture, &photos, &split, room, overrules)
-    }
-
-    fn decided(plan: &Plan, effect: Effect) -> &Decision {
-        let mut decisions = plan.decisions.iter();
-        decisions
-            .find(|decision| decision.effect == effect)
-            .unwrap()
-    }
-
-    #[test]
-    fn every_effect_of_stage_1_is_decided_once() {
-        let plan = plan(3, &Overrules::default());
-        let order: Vec<Effect> = plan.decisions.iter().map(|d| d.effect).collect();
-        assert_eq!(order, Effect::ALL);
-        assert_eq!(plan.to_string().lines().count(), 1 + Effect::ALL.len());
-    }
-
-    #[test]
-    fn the_user_has_the_last_word() {
-        let overrules = Overrules {
-            with: vec![Effect::Exposure, Effect::LumaDegree],
-            without: vec![Effect::Background],
-            sh_degree: None,
-        };
-        let plan = plan(0, &overrules);
-        for (effect, on) in [
-            (Effect::Exposure, true),
-            (Effect::LumaDegree, true),
-            (Effect::Background, false),
-        ] {
-            let decision = decided(&plan, effect);
-            assert_eq!((decision.on, decision.decided_by), (on, Decider::User));
-        }
-        // Draft has room for none, but one was asked for.
-        assert_eq!(plan.sh_degree, 1);
-        assert_eq!(overrules.choice(Effect::Robust), Choice::Auto);
-    }
-
-    #[test]
-    fn without_tracks_the_preset_decides_the_degree() {
-        for room in [0, 2] {
-            let plan = plan(room, &Overrules::default());
-            let decision = decided(&plan, Effect::LumaDegree);
-            assert_eq!(decision.evidence, None);
-            assert_eq!(decision.decided_by, Decider::Preset);
-            assert_eq!((plan.sh_degree, decision.on), (room, room > 0));
-        }
-        let asked = Overrules {
-            sh_degree: Some(3),
-            ..Overrules::default()
-        };
-        assert_eq!(plan(0, &asked).sh_degree, 3);
-    }
-
-    #[test]
-    fn evidence_decides_by_its_threshold() {
-        let on = |evidence| Decision::new(Effect::Exposure, evidence, 2.0).on;
-        assert!(on(Some(2.1)) && !on(Some(2.0)) && !on(None) && !on(Some(f64::NAN)));
-    }
-}
+#[path = "plan_tests.rs"]
+mod tests;

@@ -144,6 +144,8 @@ pub enum Stage {
     Survey,
     /// Reading photos.
     Photos,
+    /// Short trainings that tell whether the scene calls for an effect.
+    Trial,
     /// Stage 1.
     Luma,
     /// Asking the teacher.
@@ -167,6 +169,7 @@ impl fmt::Display for Stage {
         f.pad(match self {
             Self::Survey => "survey",
             Self::Photos => "photos",
+            Self::Trial => "trial",
             Self::Luma => "luma",
             Self::Teacher => "teacher",
             Self::Chroma => "chroma",

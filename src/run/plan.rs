@@ -1,11 +1,16 @@
-//! `plan`: which effects a capture calls for, without training.
+//! `plan`: which effects a capture calls for.
 
-use std::path::PathBuf;
+use std::{path::PathBuf, sync::Arc};
 
-use super::{Observer, Preset, RunError, fit::open_gpu, scene::Scene};
+use super::{
+    Observer, Preset, RunError,
+    fit::{open_gpu, planned},
+    scene::Scene,
+};
 use crate::{
     capture::LoadOptions,
     effects::{Overrules, Plan},
+    raster::Raster,
 };
 
 /// What `plan` is asked to do; `None` leaves it to the preset.
@@ -33,5 +38,6 @@ pub fn plan(options: &PlanOptions, observe: &mut Observer<'_>) -> Result<Plan, R
     let amounts = preset.amounts();
     let load = preset.load_options(&options.load, &options.overrules);
     let scene = Scene::load(&options.colmap_dir, &load, observe)?;
-    Ok(scene.plan(amounts.room(), &options.overrules))
+    let raster = || Ok(Arc::new(Raster::new(&open_gpu(false)?)));
+    planned(&scene, amounts.room(), &options.overrules, raster, observe)
 }

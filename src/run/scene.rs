@@ -99,9 +99,10 @@ impl Scene {
         self.masked_views > 0 && self.options.masked == MaskUse::Remove
     }
 
-    /// Which effects it calls for.
-    pub fn plan(&self, room: Room, overrules: &Overrules) -> Plan {
-        Plan::new(&self.capture, &self.photos, &self.split, room, overrules)
+    /// Which effects it calls for, as far as the photos tell, and the `trial` if there was one.
+    pub fn plan(&self, room: Room, overrules: &Overrules, trial: Option<f64>) -> Plan {
+        let (capture, photos, split) = (&self.capture, &self.photos, &self.split);
+        Plan::new(capture, photos, split, room, overrules, trial)
     }
 
     /// A renderer of several fields over the geometry of `splats`.

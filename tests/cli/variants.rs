@@ -49,6 +49,10 @@ fn the_plan_tells_pairs_apart() {
             let effects = plan["effects"].as_array().expect("effects");
             let found = effects.iter().find(|found| found["name"] == effect);
             assert_eq!(found.expect(effect)["on"], on, "{name}: {found:?}");
+            // Patches that brighten look like exposures at the points: two trainings tell.
+            let exposure = effects.iter().find(|found| found["name"] == "exposure");
+            let trial = exposure.expect("exposure")["trial"].as_f64();
+            assert_eq!(trial.is_some(), name == "gloss", "{name}: {exposure:?}");
         }
     }
 }

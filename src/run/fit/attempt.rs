@@ -14,6 +14,7 @@ use super::{
     goal::{ITERATIONS_MIN, WRITING},
     quality::{mean_quality, measure_luma},
     start::first_splats,
+    trial::{TRIAL_FROM, planned},
 };
 use crate::{
     capture::Exposure,
@@ -140,7 +141,20 @@ impl Job<'_> {
             iterations: amounts.iterations,
             ..amounts.room()
         };
-        let plan = scene.plan(room, &options.overrules);
+        let plan = match options.time_limit {
+            Some(limit) if limit < TRIAL_FROM => scene.plan(room, &options.overrules, None),
+            _ => planned(
+                scene,
+                room,
+                &options.overrules,
+                || Ok(self.raster.clone()),
+                observe,
+            )?,
+        };
+        if options.timings {
+            // A trial is no part of the run.
+            self.gpu.timings()?;
+        }
         observe(Event::Note(plan.to_string()));
         let mut settings = self.settings(amounts, &plan);
         let demand = self.fit_memory(&mut settings, &plan, observe)?;
@@ -149,7 +163,11 @@ impl Job<'_> {
         settings.time_limit = time_limit.map(|limit| limit - preparing);
 
         let begun = Instant::now();
-        let views = self.training_views(&plan);
+        let train = &scene.split.train;
+        let views = train
+            .iter()
+            .map(|&i| training_view(scene, &plan, i))
+            .collect();
         let raster = self.raster.clone();
         let mut trainer = LumaTrainer::new(raster, settings, scene.extent, &start, views)?;
         trainer.watch(self.watched_views(&plan))?;
@@ -262,23 +280,6 @@ impl Job<'_> {
         Ok(demand)
     }
 
-    fn training_views(&self, plan: &Plan) -> Vec<TrainingView> {
-        let scene = self.scene;
-        let view = |&i: &usize| {
-            let (photo, camera) = &scene.photos[i];
-            TrainingView {
-                camera: camera.clone(),
-                gray: photo.gray.clone(),
-                mask: match scene.removes_masked() {
-                    true => carve::unknown(photo),
-                    false => photo.mask.clone().filter(|_| plan.has(Effect::Masks)),
-                },
-                exposure: plan.exposures[i],
-            }
-        };
-        scene.split.train.iter().map(view).collect()
-    }
-
     /// A few of the photos that are measured, evenly spread.
     fn watched(&self) -> Vec<usize> {
         let measured = self.scene.measured().1;
@@ -299,6 +300,20 @@ impl Job<'_> {
             }
         };
         self.watched().into_iter().map(view).collect()
+    }
+}
+
+/// What a training sees of a photo.
+pub(super) fn training_view(scene: &Scene, plan: &Plan, view: usize) -> TrainingView {
+    let (photo, camera) = &scene.photos[view];
+    TrainingView {
+        camera: camera.clone(),
+        gray: photo.gray.clone(),
+        mask: match scene.removes_masked() {
+            true => carve::unknown(photo),
+            false => photo.mask.clone().filter(|_| plan.has(Effect::Masks)),
+        },
+        exposure: plan.exposures[view],
     }
 }
 

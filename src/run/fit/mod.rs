@@ -7,6 +7,7 @@ mod quality;
 mod start;
 mod target;
 mod told;
+mod trial;
 
 use std::{path::PathBuf, sync::Arc, time::Instant};
 
@@ -25,6 +26,7 @@ pub use ahead::AheadOptions;
 use attempt::Job;
 use goal::{Family, SURELY};
 pub(super) use told::capture_report;
+pub(super) use trial::planned;
 
 /// What `fit` is asked to do; `None` leaves it to the preset.
 #[derive(Clone, Debug)]

@@ -21,27 +21,7 @@ pub(super) fn first_splats(
     observe: &mut Observer<'_>,
 ) -> Result<Splats, RunError> {
     let Some(path) = &options.init else {
-        let points: Vec<_> = scene
-            .capture
-            .points
-            .iter()
-            .map(|point| {
-                let rgb = point.color.map(|v| f64::from(v) / 255.0);
-                (
-                    point.position.as_vec3().to_array(),
-                    gray_from_rgb(rgb) as f32,
-                )
-            })
-            .collect();
-        let mut splats = initial_splats(&points, scene.extent as f32, settings.sh_degree);
-        if scene.removes_masked() {
-            splats = carved(scene, &splats);
-        }
-        let dome = settings.background.then(|| background(scene, settings));
-        let taken = dome.as_ref().map_or(0, Splats::len);
-        truncate(&mut splats, settings.max_splats - taken);
-        dome.into_iter().for_each(|dome| splats.append(dome));
-        return Ok(splats);
+        return Ok(placed_splats(scene, settings));
     };
     let (splats, options) = read_splats(path, scene.capture.offset, observe)?;
     if options != settings.raster_options() {
@@ -60,6 +40,26 @@ pub(super) fn first_splats(
     splats.sh = at_degree(&splats.sh, splats.means.len(), settings.sh_degree);
     truncate(&mut splats, settings.max_splats);
     Ok(splats)
+}
+
+/// One at each of COLMAP's points, and a dome behind them.
+pub(super) fn placed_splats(scene: &Scene, settings: &LumaSettings) -> Splats {
+    let points: Vec<_> = (scene.capture.points.iter())
+        .map(|point| {
+            let rgb = point.color.map(|v| f64::from(v) / 255.0);
+            let position = point.position.as_vec3().to_array();
+            (position, gray_from_rgb(rgb) as f32)
+        })
+        .collect();
+    let mut splats = initial_splats(&points, scene.extent as f32, settings.sh_degree);
+    if scene.removes_masked() {
+        splats = carved(scene, &splats);
+    }
+    let dome = settings.background.then(|| background(scene, settings));
+    let taken = dome.as_ref().map_or(0, Splats::len);
+    truncate(&mut splats, settings.max_splats - taken);
+    dome.into_iter().for_each(|dome| splats.append(dome));
+    splats
 }
 
 /// Gaussians for what no point explains, at most a quarter of all that there may be.

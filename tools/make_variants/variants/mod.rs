@@ -23,7 +23,7 @@ use std::path::Path;
 pub use error::Error;
 use scene::Scene;
 
-/// What can be made of a scene. For each but the last two there is a control: made in
+/// What can be made of a scene. For each but the last two and `flicker` there is a control: made in
 /// the same way, without the effect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Variant {
@@ -39,6 +39,8 @@ pub enum Variant {
     Exposure,
     /// Gains and offsets a hundredth of these
     ExposureControl,
+    /// Gains and offsets a fifth of these; `exposure-control` is its control too
+    Flicker,
     /// Every other photo has a quarter of the size
     Distances,
     /// All photos have half the size
@@ -88,6 +90,7 @@ pub fn make(source: &Path, variant: Variant, out: &Path, seed: u64) -> Result<St
         Variant::FisheyeControl => warp::fisheye(&mut scene, false),
         Variant::Exposure => exposure::vary(&mut scene, 1.0, seed),
         Variant::ExposureControl => exposure::vary(&mut scene, 0.01, seed),
+        Variant::Flicker => exposure::vary(&mut scene, 0.2, seed),
         Variant::Distances => distances::quarter(&mut scene),
         Variant::DistancesControl => distances::halve(&mut scene),
         Variant::Dust => defects::dust(&mut scene, defects::DUST_AREA, seed),

@@ -1,0 +1,171 @@
+//! What follows from evidence, trials and the user's word.
+
+use glam::DVec3;
+
+use super::*;
+use crate::{
+    capture::Observation,
+    effects::fixtures::{capture, looking_along_z, photo},
+};
+
+fn plan(sh_degree: u32, overrules: &Overrules) -> Plan {
+    let photos: Vec<_> = (0..3)
+        .map(|k| {
+            let camera = looking_along_z(DVec3::new(0.1 * f64::from(k), 0.0, -3.0), 32);
+            (photo(&camera, |x, y| (x * 5 + y * 2) as u8), camera)
+        })
+        .collect();
+    let points = (0..100).map(|i| DVec3::new(f64::from(i % 10), f64::from(i / 10), 0.0) * 0.1);
+    let capture = capture(&photos, points);
+    let split = Split {
+        train: vec![0, 1, 2],
+        test: Vec::new(),
+    };
+    let room = Room {
+        sh_degree,
+        iterations: 700,
+    };
+    Plan::new(&capture, &photos, &split, room, overrules, None)
+}
+
+fn decided(plan: &Plan, effect: Effect) -> &Decision {
+    let mut decisions = plan.decisions.iter();
+    decisions
+        .find(|decision| decision.effect == effect)
+        .unwrap()
+}
+
+#[test]
+fn every_effect_of_stage_1_is_decided_once() {
+    let plan = plan(3, &Overrules::default());
+    let order: Vec<Effect> = plan.decisions.iter().map(|d| d.effect).collect();
+    assert_eq!(order, Effect::ALL);
+    assert_eq!(plan.to_string().lines().count(), 1 + Effect::ALL.len());
+}
+
+#[test]
+fn the_user_has_the_last_word() {
+    let overrules = Overrules {
+        with: vec![Effect::Exposure, Effect::LumaDegree],
+        without: vec![Effect::Background],
+        sh_degree: None,
+    };
+    let plan = plan(0, &overrules);
+    for (effect, on) in [
+        (Effect::Exposure, true),
+        (Effect::LumaDegree, true),
+        (Effect::Background, false),
+    ] {
+        let decision = decided(&plan, effect);
+        assert_eq!((decision.on, decision.decided_by), (on, Decider::User));
+    }
+    // Draft has room for none, but one was asked for.
+    assert_eq!(plan.sh_degree, 1);
+    assert_eq!(overrules.choice(Effect::Robust), Choice::Auto);
+}
+
+#[test]
+fn without_tracks_the_preset_decides_the_degree() {
+    for room in [0, 2] {
+        let plan = plan(room, &Overrules::default());
+        let decision = decided(&plan, Effect::LumaDegree);
+        assert_eq!(decision.evidence, None);
+        assert_eq!(decision.decided_by, Decider::Preset);
+        assert_eq!((plan.sh_degree, decision.on), (room, room > 0));
+    }
+    let asked = Overrules {
+        sh_degree: Some(3),
+        ..Overrules::default()
+    };
+    assert_eq!(plan(0, &asked).sh_degree, 3);
+}
+
+#[test]
+fn a_trial_decides_where_the_evidence_is_in_doubt() {
+    let exposure = |evidence| Decision::new(Effect::Exposure, Some(evidence), 2.0);
+    let needs = |decision: Decision| {
+        let plan = Plan {
+            decisions: vec![decision],
+            exposures: Vec::new(),
+            sh_degree: 0,
+        };
+        plan.needs_trial()
+    };
+    assert!(needs(exposure(5.0)));
+    assert!(!needs(exposure(1.9)) && !needs(exposure(8.1)));
+    let asked = Overrules {
+        with: vec![Effect::Exposure],
+        ..Overrules::default()
+    };
+    assert!(!needs(overruled(exposure(5.0), &asked)));
+    let other = Decision::new(Effect::LumaDegree, Some(5.5), 5.0);
+    assert!(!needs(other));
+
+    for (gain, on) in [(3.0, true), (0.9, false), (-2.0, false), (f64::NAN, false)] {
+        let decision = exposure(5.0).after(Some(gain));
+        assert_eq!((decision.on, decision.decided_by), (on, Decider::Trial));
+        assert!(!needs(decision));
+    }
+    assert_eq!(exposure(5.0).after(None), exposure(5.0));
+    let row = exposure(5.0).after(Some(-2.0)).to_string();
+    assert!(
+        row.ends_with("; a trial training fits 2.0 % worse with it"),
+        "{row}"
+    );
+}
+
+#[test]
+fn what_a_trial_rejects_is_not_simulated() {
+    let camera = looking_along_z(DVec3::new(0.0, 0.0, -3.0), 32);
+    let photos: Vec<_> = (0..4)
+        .map(|k| {
+            (
+                photo(&camera, |x, y| (40 + k * 4 + x * 2 + y) as u8),
+                camera.clone(),
+            )
+        })
+        .collect();
+    let mut capture = capture(
+        &photos,
+        (0..100).map(|i| DVec3::new(f64::from(i % 10) - 4.5, f64::from(i / 10) - 4.5, 0.0) * 0.1),
+    );
+    for point in &mut capture.points {
+        point.track = (0..4)
+            .map(|view| Observation {
+                view,
+                pixel: [point.position.x, point.position.y].map(|x| 32.0 * x / 3.0 + 16.0),
+            })
+            .collect();
+    }
+    let split = Split {
+        train: vec![0, 1, 2, 3],
+        test: Vec::new(),
+    };
+    let room = Room {
+        sh_degree: 0,
+        iterations: 700,
+    };
+    let plan = |trial| {
+        Plan::new(
+            &capture,
+            &photos,
+            &split,
+            room,
+            &Overrules::default(),
+            trial,
+        )
+    };
+    let asked = plan(None);
+    assert!(asked.needs_trial(), "{asked}");
+    assert!(asked.exposures.iter().any(|&e| e != Exposure::NONE));
+    assert_eq!(plan(Some(1.5)).exposures, asked.exposures);
+    let rejected = plan(Some(0.5));
+    assert!(!rejected.has(Effect::Exposure));
+    assert_eq!(rejected.exposures, [Exposure::NONE; 4]);
+}
+
+#[test]
+fn evidence_decides_by_its_threshold() {
+    let on = |evidence| Decision::new(Effect::Exposure, evidence, 2.0).on;
+    assert!(on(Some(2.1)) && !on(Some(2.0)) && !on(None) && !on(Some(f64::NAN)));
+}

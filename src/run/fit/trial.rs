@@ -1,0 +1,99 @@
+//! Short trainings that tell what the photos alone do not.
+
+use std::sync::Arc;
+
+use super::super::{Event, Observer, RunError, Stage, scene::Scene};
+use super::{attempt::training_view, start::placed_splats};
+use crate::{
+    capture::Exposure,
+    effects::{Overrules, Plan, Room},
+    luma::{LumaSettings, LumaTrainer, TrainingView},
+    raster::Raster,
+};
+
+/// Iterations of a trial: with 150 there is no scene yet that could fit one way or the other.
+const ITERATIONS: usize = 400;
+
+/// Its cap on Gaussians, and how large and how many its photos are at most: half the work of
+/// the least scene (`Amounts::SKETCH`), twice.
+const MAX_SPLATS: usize = 3_000;
+const MAX_SIDE: u32 = 160;
+const MAX_VIEWS: usize = 32;
+
+/// Runs that may take no longer, in seconds, do without: on a slow device a trial would take a
+/// good part of it.
+pub(super) const TRIAL_FROM: f64 = 300.0;
+
+/// The plan of a scene, after a trial on the device that `raster` gives where it needs one.
+///
+/// # Errors
+/// [`RunError`] of the device.
+pub(in crate::run) fn planned(
+    scene: &Scene,
+    room: Room,
+    overrules: &Overrules,
+    raster: impl FnOnce() -> Result<Arc<Raster>, RunError>,
+    observe: &mut Observer<'_>,
+) -> Result<Plan, RunError> {
+    let plan = scene.plan(room, overrules, None);
+    if !plan.needs_trial() {
+        return Ok(plan);
+    }
+    let gain = exposure_gain(scene, &raster()?, &plan, observe)?;
+    Ok(scene.plan(room, overrules, Some(gain)))
+}
+
+/// Per cent by which a small scene that is trained with the plan's exposures has less loss
+/// than one trained without.
+fn exposure_gain(
+    scene: &Scene,
+    raster: &Arc<Raster>,
+    plan: &Plan,
+    observe: &mut Observer<'_>,
+) -> Result<f64, RunError> {
+    let train = &scene.split.train;
+    let count = train.len().min(MAX_VIEWS);
+    let exposed: Vec<TrainingView> = (0..count)
+        .map(|k| small(training_view(scene, plan, train[k * train.len() / count])))
+        .collect();
+    let mut unexposed = exposed.clone();
+    for view in &mut unexposed {
+        view.exposure = Exposure::NONE;
+    }
+    let settings = LumaSettings {
+        sh_degree: 0,
+        max_splats: MAX_SPLATS,
+        ..LumaSettings::new(ITERATIONS)
+    };
+    let start = placed_splats(scene, &settings);
+    let mut losses = [0.0; 2];
+    for (which, (views, loss)) in [exposed, unexposed]
+        .into_iter()
+        .zip(&mut losses)
+        .enumerate()
+    {
+        let (raster, settings) = (raster.clone(), settings.clone());
+        LumaTrainer::new(raster, settings, scene.extent, &start, views)?.train(
+            &mut |progress| {
+                *loss = progress.loss;
+                observe(Event::Progress {
+                    stage: Stage::Trial,
+                    done: which * ITERATIONS + progress.iteration,
+                    total: 2 * ITERATIONS,
+                    message: ["with exposures", "without"][which].to_owned(),
+                });
+            },
+        )?;
+    }
+    let [with, without] = losses;
+    Ok(100.0 * (1.0 - with / without))
+}
+
+/// The same photo, halved until it is small.
+fn small(view: TrainingView) -> TrainingView {
+    let mut view = view;
+    while view.camera.width.max(view.camera.height) > MAX_SIDE {
+        view = view.halved();
+    }
+    view
+}
