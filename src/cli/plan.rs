@@ -7,7 +7,7 @@ use clap::Args;
 use super::{effects::EffectArguments, photos::Photos, print, progress::Progress};
 use crate::run::{PlanOptions, Preset, RunError, plan};
 
-/// Say which effects a capture calls for, and why, without training.
+/// Say which effects a capture calls for, and why, without fitting it.
 #[derive(Args)]
 pub struct Plan {
     /// Folder with images/ and a COLMAP model (sparse/0, sparse or the folder itself).
