@@ -28,7 +28,6 @@ VARIANTS = [
     ("barrel", "lens"),
     ("fisheye", "lens"),
     ("exposure", "exposure"),
-    ("flicker", "exposure"),
     ("distances", "antialias"),
     ("dust", "robust"),
     ("sky", "background"),
@@ -37,6 +36,7 @@ VARIANTS = [
     ("sixteen", None),
     ("infrared-tiff", None),
     ("heavy-dust", "robust"),
+    ("flicker", "exposure"),
 ]
 # Others have one. Heavy dust shares that of dust, flicker that of exposure.
 NO_CONTROL = ["infrared-tiff", "heavy-dust", "flicker"]

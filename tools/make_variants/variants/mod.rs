@@ -23,7 +23,7 @@ use std::path::Path;
 pub use error::Error;
 use scene::Scene;
 
-/// What can be made of a scene. For each but the last two and `flicker` there is a control: made in
+/// What can be made of a scene. For each but the last three there is a control: made in
 /// the same way, without the effect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Variant {
@@ -39,8 +39,6 @@ pub enum Variant {
     Exposure,
     /// Gains and offsets a hundredth of these
     ExposureControl,
-    /// Gains and offsets a fifth of these; `exposure-control` is its control too
-    Flicker,
     /// Every other photo has a quarter of the size
     Distances,
     /// All photos have half the size
@@ -70,6 +68,8 @@ pub enum Variant {
     /// Dust on three times as much of each photo, as on worn film; the clean photos are
     /// `dust-control`'s
     HeavyDust,
+    /// A fifth of the gains and offsets of `exposure`, whose control is this one's too
+    Flicker,
 }
 
 /// Makes a variant of the scene in the folder `source` and writes it to the folder `out`.
