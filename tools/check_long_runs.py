@@ -22,7 +22,7 @@ from pathlib import Path
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("scenes", nargs="+", type=Path, help="COLMAP folders")
+    parser.add_argument("scenes", nargs="+", type=Path, help="COLMAP folders of at least 8 photos")
     parser.add_argument("-o", "--output", type=Path, default=Path("target/long"))
     parser.add_argument("--program", default="target/release/gs-chroma")
     parser.add_argument("--preset", default="balanced")
@@ -45,7 +45,8 @@ def main() -> int:
             done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
             seconds = time.monotonic() - begun
             if done.returncode != 0:
-                print(f"| {scene.name} | {done.stderr.splitlines()[-1]} | | | | | |", flush=True)
+                reason = done.stderr.strip().splitlines()[-1:] or [f"exit code {done.returncode}"]
+                print(f"| {scene.name} | {reason[0]} | | | | | | |", flush=True)
                 continue
             luma = json.loads(done.stdout)["luma"]
             end, best = luma["held_out"], max(luma["curve"], key=lambda look: look["psnr"])

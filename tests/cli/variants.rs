@@ -53,6 +53,8 @@ fn the_plan_tells_pairs_apart() {
             let exposure = effects.iter().find(|found| found["name"] == "exposure");
             let trial = exposure.expect("exposure")["trial"].as_f64();
             assert_eq!(trial.is_some(), name == "gloss", "{name}: {exposure:?}");
+            // All patches together do change how bright a photo is.
+            assert!(trial.is_none_or(|gain| gain > 0.0), "{exposure:?}");
         }
     }
 }
