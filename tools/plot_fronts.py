@@ -1,5 +1,5 @@
-"""Draws the fronts of several sweeps beside each other and prints what each knob costs:
-docs/images/fronts.svg and the tables of docs/accuracy-and-time.md.
+"""Draws the fronts of several sweeps beside each other and prints what each knob costs, and the
+combinations that lie on a front: docs/images/fronts.svg and the tables of docs/accuracy-and-time.md.
 
     gs-chroma tradeoff SCENE -o runs/SCENE-tradeoff          # for each scene
     python3 tools/plot_fronts.py runs/*-tradeoff/tradeoff.csv -o docs/images/fronts.svg
@@ -113,6 +113,9 @@ def main():
             ratio = point["seconds"] / base["seconds"]
             change = point["quality"] - base["quality"]
             mark = "yes" if point in line else ""
+            # What combines knobs and gains nothing says nothing that they do not say alone.
+            if point["phase"] == "front" and not mark:
+                continue
             print(
                 f"| {point['settings']} | {ratio:.2f} | {point['quality']:.{digits}f} "
                 f"| {change:+.{digits}f} | {point['splats']:,} | {mark} |"
