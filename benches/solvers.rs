@@ -2,14 +2,18 @@
 //! view passes, on a run that `fit` made.
 //!
 //! ```sh
-//! cargo bench --bench solvers -- RUN TEACHER [--csv F] [--iterations N]
+//! cargo bench --bench solvers -- RUN TEACHER [--csv F] [--iterations N] [--scales N]
 //! ```
 //!
 //! TEACHER is an `.onnx` file or a folder, as for `colorize --teacher`. Both solvers get
-//! the same views, wanted a/b and scales; the loss of each stage on the way is measured
-//! by the same code, its time left out. `tools/plot_solvers.py` draws the CSV.
+//! the same views and wanted a/b; the loss at full size of each stage on the way is measured
+//! by the same code, its time left out. Adam minimises it together with the losses at N coarser
+//! scales, two as in the paper, least squares alone. `tools/plot_solvers.py` draws the CSV.
 
-use std::{fmt::Write, fs, path::Path, path::PathBuf, process::ExitCode, sync::Arc, time::Instant};
+use std::{
+    fmt::Write, fs, path::Path, path::PathBuf, process::ExitCode, str::FromStr, sync::Arc,
+    time::Instant,
+};
 
 use gs_chroma::{
     capture::{Capture, LoadOptions, Loader, split},
@@ -87,7 +91,8 @@ fn stops(last: usize) -> Vec<usize> {
     stops
 }
 
-fn compare(problem: &Problem, iterations: usize) -> Fallible<Vec<Point>> {
+fn compare(problem: &Problem, paper: ChromaSettings) -> Fallible<Vec<Point>> {
+    let iterations = paper.iterations;
     let mut points = Vec::new();
     let settings = ChromaSettings {
         rounds: 8,
@@ -122,7 +127,6 @@ fn compare(problem: &Problem, iterations: usize) -> Fallible<Vec<Point>> {
         println!("{}", line(points.last().expect("just pushed")));
     }
     drop(solver);
-    let paper = ChromaSettings::adam(iterations);
 
     let begun = Instant::now();
     let mut adam = Distiller::new(raster.clone(), paper, *extent, luma, views.clone())?;
@@ -167,18 +171,19 @@ fn summary(points: &[Point]) {
     }
 }
 
+fn number<T: FromStr>(argument: Option<String>, default: T) -> T {
+    (argument.and_then(|word| word.parse().ok())).unwrap_or(default)
+}
+
 fn main() -> ExitCode {
     let mut arguments = std::env::args().skip(1).filter(|a| a != "--bench");
-    let (mut places, mut csv, mut iterations) = (Vec::new(), None, 15_000);
+    let (mut places, mut csv) = (Vec::new(), None);
+    let mut paper = ChromaSettings::adam(15_000);
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
             "--csv" => csv = arguments.next(),
-            "--iterations" => {
-                iterations = arguments
-                    .next()
-                    .and_then(|n| n.parse().ok())
-                    .unwrap_or(15_000);
-            }
+            "--iterations" => paper.iterations = number(arguments.next(), paper.iterations),
+            "--scales" => paper.coarser_scales = number(arguments.next(), paper.coarser_scales),
             _ => places.push(PathBuf::from(argument)),
         }
     }
@@ -187,7 +192,7 @@ fn main() -> ExitCode {
         println!("solvers: no RUN and TEACHER named: skipped");
         return ExitCode::SUCCESS;
     };
-    let result = load(run, teacher).and_then(|problem| compare(&problem, iterations));
+    let result = load(run, teacher).and_then(|problem| compare(&problem, paper));
     match result {
         Ok(points) => {
             summary(&points);
