@@ -10,8 +10,8 @@ const PLAIN: &[&str] = &[
     "adam",
     "chroma_loss",
     "compact",
-    "conjugate",
     "densify",
+    "lbfgs",
     "project",
     "relocation",
     "scan",
@@ -20,7 +20,6 @@ const PLAIN: &[&str] = &[
     "tile_lists",
     "tile_ranges",
     "view_correction",
-    "weigh",
 ];
 
 /// Kernels compiled once for each kind of colour.

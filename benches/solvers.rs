@@ -91,12 +91,18 @@ fn stops(last: usize) -> Vec<usize> {
     stops
 }
 
+/// Rounds of least squares at full size.
+const ROUNDS: usize = 110;
+
+/// Next to none: Adam has none.
+const RIDGE: f64 = 1e-5;
+
 fn compare(problem: &Problem, paper: ChromaSettings) -> Fallible<Vec<Point>> {
     let iterations = paper.iterations;
     let mut points = Vec::new();
     let settings = ChromaSettings {
-        rounds: 8,
-        steps: 5,
+        rounds: ROUNDS,
+        ridge: RIDGE,
         ..ChromaSettings::exact()
     };
     let Problem {

@@ -24,6 +24,8 @@ import matplotlib.pyplot as plt  # noqa: E402
 
 NAMES = {"irls": "least squares", "adam": "Adam"}
 Point = dict[str, float]
+# Losses up to this many times the least are shown: where the curves meet.
+SHOWN = 1.3
 
 
 def read(path: Path) -> dict[str, list[Point]]:
@@ -80,6 +82,8 @@ def main() -> None:
             axis.set_xlabel(label)
             axis.set_title(scene)
             axis.grid(alpha=0.3)
+        least = min(point["objective"] for points in curves.values() for point in points)
+        axes[0].set_ylim(0.99 * least, SHOWN * least)
         axes[0].set_ylabel("loss, CIELAB units")
         axes[0].legend(frameon=False)
     figure.savefig(arguments.output, metadata={"Date": None})

@@ -13,7 +13,7 @@ use crate::{
 /// How chroma is solved for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum SolverKind {
-    /// Reweighted least squares over all views by conjugate gradients.
+    /// Reweighted least squares over all views, sped up by L-BFGS.
     Irls,
     /// The paper's: stochastic steps of Adam, coarse to fine.
     Adam,

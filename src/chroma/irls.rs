@@ -1,13 +1,13 @@
 //! The fast solver: with the geometry frozen, a/b at each pixel are linear in the
 //! unknowns, so the distillation is a robust linear regression. Iteratively reweighted
-//! least squares, each round a few steps of preconditioned conjugate gradients over all
-//! views, all of it on the device.
+//! least squares, whose steps L-BFGS makes longer, over all views and all of it on the
+//! device.
 
 use std::{rc::Rc, sync::Arc, time::Instant};
 
 use super::{
     ChromaProgress, ChromaSettings, ChromaView,
-    conjugate::Conjugate,
+    lbfgs::Lbfgs,
     loss::LOSS_BLOCK,
     pass::exact_capacity,
     rows::{Room, Rows, Shared},
@@ -22,10 +22,6 @@ use crate::{
 /// Bytes of the tile lists for each Gaussian and each entry ([`Lists`] and the scratch
 /// of its sorts).
 const LIST_BYTES: [usize; 2] = [64, 20];
-
-/// The ridge in pixels: a Gaussian that a hundredth of a pixel depends on is left
-/// where the others' share ends, instead of running after rounding errors.
-const RIDGE_PIXELS: f64 = 0.01;
 
 /// Residual, in CIELAB units, of a pixel that counts as one.
 const TYPICAL_RESIDUAL: f64 = 3.0;
@@ -70,17 +66,16 @@ fn rounds(settings: &ChromaSettings) -> Vec<Round> {
 }
 
 /// Rounds before the loss levels off.
-const PLAIN_ROUNDS: usize = 2;
+const PLAIN_ROUNDS: usize = 4;
 
 /// Solves for chroma harmonics.
 pub struct Solver {
     raster: Arc<Raster>,
     gpu: Gpu,
     shared: Shared,
-    conjugate: Conjugate,
+    lbfgs: Lbfgs,
     sum_loss: SumLossKernel,
     rounds: Vec<Round>,
-    steps: usize,
     /// `[views][scales]`, full size first.
     rows: Vec<Vec<Rows>>,
     /// Of the largest view.
@@ -110,7 +105,7 @@ impl Solver {
         let near = NEAR_SHARE * extent;
         let geometry = Geometry::upload(&gpu, splats)?;
         let zeros = ShField::zeros(splats.len(), settings.sh_degree, 2);
-        let fields = [Field::upload(&gpu, &zeros)?, Field::upload(&gpu, &zeros)?];
+        let field = Field::upload(&gpu, &zeros)?;
         let rounds = rounds(settings);
         let scales = (rounds.iter().flat_map(|round| &round.scales))
             .max()
@@ -146,13 +141,11 @@ impl Solver {
         let status = Buffer::zeros(&gpu, "status", STATUS_WORDS)?;
         let sum_loss = SumLossKernel::new(&gpu);
         let blocks = pixels[0].div_ceil(LOSS_BLOCK);
-        // One more for the loss of a field that is asked for.
-        let entries = (rounds.len() + 1) * views.len();
-        let log = LossLog::new(&gpu, &sum_loss, &status, blocks, entries)?;
+        let log = LossLog::new(&gpu, &sum_loss, &status, blocks, scales * views.len())?;
         let room = Room { pixels, capacity };
-        let ridge = RIDGE_PIXELS * 0.5 / room.pixels[0] as f64 * sh::C0 * sh::C0;
-        let shared = Shared::new(&gpu, geometry, fields, log, views.len(), &room)?;
-        let conjugate = Conjugate::new(&gpu, &shared.system, splats.len(), ridge as f32)?;
+        let ridge = settings.ridge * 0.5 / room.pixels[0] as f64 * sh::C0 * sh::C0;
+        let shared = Shared::new(&gpu, geometry, field, log, views.len(), &room)?;
+        let lbfgs = Lbfgs::new(&gpu, &shared.system, splats.len(), ridge as f32)?;
 
         // The views beyond `cache_bytes` share one set of lists.
         let mut spare: Option<Rc<Lists>> = None;
@@ -185,10 +178,9 @@ impl Solver {
             gpu,
             raster,
             shared,
-            conjugate,
+            lbfgs,
             sum_loss,
             rounds,
-            steps: settings.steps,
             rows,
             pixels: room.pixels[0],
             passes: 0.0,
@@ -232,15 +224,25 @@ impl Solver {
         let until = until.min(self.rounds.len());
         for index in self.done..until {
             let round = self.rounds[index].clone();
-            self.linearize(index, &round);
-            for _ in 0..self.steps {
-                self.step(&round);
+            if index > 0 && self.rounds[index - 1] != round {
+                self.lbfgs.restart(&self.gpu);
             }
+            self.draw(&round, true);
+            let log = self.shared.log.read_later(&self.gpu);
             let mut recorder = Recorder::new(&self.gpu);
-            self.conjugate.end(&mut recorder);
+            // The first picture is gray and says nothing about the teachers.
+            if round.corrects && index > 0 {
+                self.shared.corrections.solve(&mut recorder);
+            }
+            self.lbfgs.step(&mut recorder);
             recorder.submit();
             self.done = index + 1;
-            let log = self.shared.log.read_later(&self.gpu);
+            if self.done == self.rounds.len() {
+                self.draw(&round, false);
+                let mut recorder = Recorder::new(&self.gpu);
+                self.lbfgs.end(&mut recorder);
+                recorder.submit();
+            }
             let due = pending.replace((index, self.passes, log));
             let last = if self.done == until {
                 pending.take()
@@ -249,11 +251,9 @@ impl Solver {
             };
             for (index, passes, losses) in due.into_iter().chain(last) {
                 let losses = losses.wait(&self.gpu)?;
-                let views = self.rows.len();
-                let of_round = &losses[index * views..][..views];
                 observe(ChromaProgress {
                     iteration: index + 1,
-                    loss: of_round.iter().map(|&loss| f64::from(loss)).sum::<f64>() / views as f64,
+                    loss: self.mean_loss(&self.rounds[index], &losses),
                     passes,
                     seconds: begun.elapsed().as_secs_f64(),
                 });
@@ -273,19 +273,18 @@ impl Solver {
         let mut recorder = Recorder::new(&self.gpu);
         recorder.copy(planes.raw(), self.shared.field.planes.raw());
         recorder.submit();
-        let (index, passes) = (self.rounds.len(), self.passes);
+        let passes = self.passes;
         let plain = Round {
             scales: vec![0],
             agreement: 0.0,
             robust: None,
             corrects: false,
         };
-        self.linearize(index, &plain);
+        self.draw(&plain, false);
         self.passes = passes;
+        self.lbfgs.restart(&self.gpu);
         let losses = self.shared.log.read_later(&self.gpu).wait(&self.gpu)?;
-        let views = self.rows.len();
-        let of_field = &losses[index * views..][..views];
-        Ok(of_field.iter().map(|&loss| f64::from(loss)).sum::<f64>() / views as f64)
+        Ok(self.mean_loss(&plain, &losses))
     }
 
     /// How far the views decide each Gaussian's colour, in pixels that show it fully and
@@ -334,17 +333,19 @@ impl Solver {
         })
     }
 
-    /// Draws every view as it is, and sets up the least squares that touch the loss
-    /// there.
-    fn linearize(&mut self, index: usize, round: &Round) {
+    /// Draws every view as it is for its loss, and with `adjoint` finds the gradient and
+    /// the sums of the corrections.
+    fn draw(&mut self, round: &Round, adjoint: bool) {
         let (raster, shared) = (&self.raster, &self.shared);
         let mut recorder = Recorder::new(&self.gpu);
-        recorder.clear(shared.system.residual.raw());
-        recorder.clear(shared.system.diagonal.raw());
+        recorder.clear(shared.log.losses.raw());
+        if adjoint {
+            recorder.clear(shared.system.gradient.raw());
+            recorder.clear(shared.system.diagonal.raw());
+        }
         recorder.submit();
         let views = self.rows.len();
         for (view, rows) in self.rows.iter_mut().enumerate() {
-            let finest = round.scales.last().copied();
             for &scale in &round.scales {
                 let row = &mut rows[scale];
                 // There is nothing to agree with where the coarser scale is not drawn.
@@ -355,52 +356,38 @@ impl Solver {
                 };
                 row.weigh_by(&self.gpu, agreement, round.robust);
                 let mut recorder = Recorder::new(&self.gpu);
-                row.linearize(raster, shared, &mut recorder);
-                if Some(scale) == finest {
-                    if round.corrects {
+                row.draw(raster, shared, &mut recorder);
+                shared.log.record(
+                    &self.gpu,
+                    &self.sum_loss,
+                    &mut recorder,
+                    row.blocks(),
+                    row.view.pixel_count(),
+                    scale * views + view,
+                );
+                self.passes += if adjoint { 1.0 } else { DRAWING } * share(scale);
+                if adjoint {
+                    if round.corrects && Some(&scale) == round.scales.last() {
                         row.sum_correction(shared, &mut recorder);
                     }
-                    shared.log.record(
-                        &self.gpu,
-                        &self.sum_loss,
-                        &mut recorder,
-                        row.blocks(),
-                        row.view.pixel_count(),
-                        index * views + view,
-                    );
+                    row.add_gradient(raster, &mut recorder);
                 }
                 recorder.submit();
-                self.passes += share(scale);
             }
         }
-        let mut recorder = Recorder::new(&self.gpu);
-        // The first picture is gray and says nothing about the teachers.
-        if round.corrects && index > 0 {
-            shared.corrections.solve(&mut recorder);
-        }
-        self.conjugate.begin(&mut recorder);
-        recorder.submit();
     }
 
-    /// One step of conjugate gradients over all views.
-    fn step(&mut self, round: &Round) {
-        let (raster, shared) = (&self.raster, &self.shared);
-        let mut recorder = Recorder::new(&self.gpu);
-        recorder.clear(shared.system.product.raw());
-        recorder.submit();
-        for rows in &mut self.rows {
-            for &scale in &round.scales {
-                let mut recorder = Recorder::new(&self.gpu);
-                rows[scale].multiply(raster, shared, &mut recorder);
-                recorder.submit();
-                self.passes += share(scale);
-            }
-        }
-        let mut recorder = Recorder::new(&self.gpu);
-        self.conjugate.step(&mut recorder);
-        recorder.submit();
+    /// The mean over the views at the finest scale of a round.
+    fn mean_loss(&self, round: &Round, losses: &[f32]) -> f64 {
+        let views = self.rows.len();
+        let finest = round.scales.last().copied().unwrap_or(0);
+        let of_views = losses[finest * views..][..views].iter();
+        of_views.map(|&loss| f64::from(loss)).sum::<f64>() / views as f64
     }
 }
+
+/// What drawing a view is of a pass over it, its adjoint included.
+const DRAWING: f64 = 0.5;
 
 /// What a pass over one scale is of a pass at full size.
 pub(super) fn share(scale: usize) -> f64 {

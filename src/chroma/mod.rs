@@ -1,13 +1,13 @@
 //! Stage 2: colour, distilled from a teacher into frozen geometry.
 
 mod bake_rgb;
-mod conjugate;
 mod correction;
 mod degree;
 mod distil;
 mod distill;
 mod fill;
 mod irls;
+mod lbfgs;
 mod loss;
 mod pass;
 mod picture;
@@ -18,13 +18,13 @@ pub mod teacher;
 mod view;
 
 pub use bake_rgb::bake_rgb;
-pub use conjugate::{Conjugate, ConjugateParameters, System, UNBOUNDED};
 pub use correction::{CorrectionParameters, Corrections, SUM_GROUPS, SUMS};
 pub use degree::{ChosenDegree, LEAST_GAIN, choose_degree};
 pub use distil::{Distilled, SolverKind, distil};
 pub use distill::{ChromaProgress, Distiller};
 pub use fill::fill_unseen;
 pub use irls::Solver;
+pub use lbfgs::{Lbfgs, LbfgsParameters, System, UNBOUNDED};
 pub use loss::{ChromaLossWeights, Correction};
 pub use picture::native_rgb;
 pub use rgb::{RgbView, bake, fit_rgb};

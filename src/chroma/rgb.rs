@@ -27,9 +27,13 @@ const BAKE_VIEWS: usize = 16;
 /// on what is really shown.
 const BAKE_TIMES: usize = 2;
 
-/// Steps of each of these times where harmonics have floors; without, more than four make
-/// views worse that are not fitted to (docs/decisions.md).
-const BOUNDED_STEPS: usize = 6;
+/// Rounds at half the size, and at full size, of each of these times, where harmonics have
+/// floors; without, more make views worse that are not fitted to (docs/decisions.md).
+const BOUNDED_ROUNDS: usize = 6;
+
+/// Times as many rounds for RGB splats as for a/b: harmonics of degree 3 settle more slowly than those of degree 0, and what they are
+/// compared with shall not win by that.
+const MORE_ROUNDS: usize = 3;
 
 /// A view and the colours wanted in its picture.
 #[derive(Clone, Debug)]
@@ -43,8 +47,8 @@ pub struct RgbView {
 }
 
 /// Fits RGB harmonics to coloured pictures on the frozen geometry of `luma`: what training
-/// RGB splats on a teacher's pictures would give on this geometry. Degree, loss, rounds and
-/// steps are those of `settings`.
+/// RGB splats on a teacher's pictures would give on this geometry. Degree and loss
+/// are those of `settings`, rounds three times as many.
 ///
 /// # Errors
 /// [`GpuError`] when it does not fit or the device is lost.
@@ -55,7 +59,12 @@ pub fn fit_rgb(
     luma: &Splats,
     views: &[RgbView],
 ) -> Result<ShField, GpuError> {
-    let mut sh = solve(raster, settings, extent, luma, views, false)?;
+    let longer = ChromaSettings {
+        warm_rounds: MORE_ROUNDS * settings.warm_rounds,
+        rounds: MORE_ROUNDS * settings.rounds,
+        ..settings.clone()
+    };
+    let mut sh = solve(raster, &longer, extent, luma, views, false)?;
     let stride = 3 * sh::coefficient_count(sh.degree);
     for of_splat in sh.coefficients.chunks_exact_mut(stride) {
         for constant in &mut of_splat[..3] {
@@ -111,11 +120,11 @@ fn refine(
 ) -> Result<(), GpuError> {
     // What harmonics beyond the constant one become is not known before.
     let bounded = settings.sh_degree == 0;
+    let rounds = if bounded { BOUNDED_ROUNDS } else { 4 };
     let settings = ChromaSettings {
         warm_scales: 1,
-        warm_rounds: 1,
-        rounds: 1,
-        steps: if bounded { BOUNDED_STEPS } else { 4 },
+        warm_rounds: rounds,
+        rounds,
         fills: false,
         ..settings.clone()
     };

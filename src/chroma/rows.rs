@@ -4,13 +4,13 @@
 use std::rc::Rc;
 
 use super::{
-    conjugate::{System, UNBOUNDED},
     correction::Corrections,
+    lbfgs::{System, UNBOUNDED},
     loss::{ChromaLossWeights, LOSS_BLOCK},
     view::ChromaView,
 };
 use crate::{
-    gpu::{Bindings, Buffer, Gpu, GpuError, Kernel, Recorder, groups_for, shaders},
+    gpu::{Bindings, Buffer, Gpu, GpuError, Kernel, Recorder},
     optimize::LossLog,
     raster::{
         AdjointScratch, Canvas, ColorKind, Field, Geometry, Layer, LayerAdjoint, Lists, Outcome,
@@ -24,8 +24,6 @@ pub struct Shared {
     pub geometry: Geometry,
     /// The chroma that is solved for; its planes are the system's unknowns.
     pub field: Field,
-    /// The direction of a step; its planes are the system's.
-    pub direction: Field,
     /// The system.
     pub system: System,
     /// The losses.
@@ -37,7 +35,6 @@ pub struct Shared {
     /// What adjoints write on the way.
     pub scratch: AdjointScratch,
     loss: Kernel,
-    weigh: Kernel,
 }
 
 /// Sizes that [`Shared`] must have room for.
@@ -56,7 +53,7 @@ impl Shared {
     pub fn new(
         gpu: &Gpu,
         geometry: Geometry,
-        [field, direction]: [Field; 2],
+        field: Field,
         log: LossLog,
         views: usize,
         room: &Room,
@@ -64,11 +61,10 @@ impl Shared {
         let zeros = |label| Buffer::<f32>::zeros(gpu, label, field.planes.len());
         let system = System {
             unknowns: field.planes.clone(),
-            residual: zeros("residual")?,
-            direction: direction.planes.clone(),
-            product: zeros("product")?,
+            gradient: zeros("gradient")?,
             diagonal: zeros("diagonal")?,
             floors: Buffer::from_slice(gpu, "floors", &vec![UNBOUNDED; field.planes.len()])?,
+            losses: log.losses.clone(),
         };
         let canvases = (room.pixels.iter())
             .map(|&pixels| {
@@ -92,9 +88,7 @@ impl Shared {
             )?,
             geometry,
             field,
-            direction,
             loss: super::loss::curvature_kernel(gpu),
-            weigh: Kernel::new(gpu, "weigh", shaders::WEIGH),
         })
     }
 }
@@ -107,15 +101,12 @@ pub struct Rows {
     /// Whether the lists are this view's alone, and hold it already.
     own_lists: Option<bool>,
     chroma: Layer,
-    direction: Layer,
     weights: Buffer<ChromaLossWeights>,
     loss_weights: ChromaLossWeights,
     loss: Bindings,
     sums: Bindings,
-    weigh: Bindings,
-    residual: LayerAdjoint,
+    gradient: LayerAdjoint,
     diagonal: LayerAdjoint,
-    product: LayerAdjoint,
 }
 
 impl Rows {
@@ -144,9 +135,8 @@ impl Rows {
         let (lists, own) = lists;
         let tiles = uniform.tile_count();
         let (canvas, image_gradient) = &shared.canvases[scale];
-        let layer =
-            |field: &Field| Layer::on(raster, geometry, &lists, field, canvas.clone(), tiles);
-        let (chroma, direction) = (layer(&shared.field), layer(&shared.direction));
+        let canvas = canvas.clone();
+        let chroma = Layer::on(raster, geometry, &lists, &shared.field, canvas, tiles);
         let wanted = Buffer::from_slice(gpu, "wanted a/b", &view.wanted.ab)?;
         let pixel_weights = Buffer::from_slice(
             gpu,
@@ -188,15 +178,6 @@ impl Rows {
             ],
             (&pixel_weights, view.weights.is_some()),
         )?;
-        let weigh = shared.weigh.bind(
-            gpu,
-            &[
-                lists.view.raw(),
-                direction.image.raw(),
-                curvatures.raw(),
-                image_gradient.raw(),
-            ],
-        );
         let adjoint = |from: &Buffer<f32>, to: &Buffer<f32>| {
             LayerAdjoint::on(
                 raster,
@@ -210,19 +191,16 @@ impl Rows {
             )
         };
         Ok(Self {
-            residual: adjoint(image_gradient, &shared.system.residual)?,
+            gradient: adjoint(image_gradient, &shared.system.gradient)?,
             diagonal: adjoint(&curvatures, &shared.system.diagonal)?,
-            product: adjoint(image_gradient, &shared.system.product)?,
             view: uniform,
             lists,
             own_lists: own.then_some(false),
             chroma,
-            direction,
             weights,
             loss_weights,
             loss,
             sums,
-            weigh,
         })
     }
 
@@ -250,7 +228,7 @@ impl Rows {
         }
     }
 
-    /// Sets how the next [`Rows::linearize`] weighs the coarser scale and at which residual
+    /// Sets how the next [`Rows::draw`] weighs the coarser scale and at which residual
     /// its loss levels off.
     pub fn weigh_by(&mut self, gpu: &Gpu, agreement: f32, robust: Option<f32>) {
         if self.loss_weights.coarser_size != [1, 1] {
@@ -261,27 +239,22 @@ impl Rows {
         self.weights.write(gpu, &[self.loss_weights]);
     }
 
-    /// Records the present picture, its loss and curvature, and adds the gradient to
-    /// the residual and the curvature's adjoint to the diagonal.
-    pub fn linearize(&mut self, raster: &Raster, shared: &Shared, recorder: &mut Recorder) {
+    /// Records the present picture, its loss and curvature.
+    pub fn draw(&mut self, raster: &Raster, shared: &Shared, recorder: &mut Recorder) {
         self.list(raster, recorder);
         self.chroma.record(raster, recorder);
         recorder.dispatch(&shared.loss, &self.loss, self.blocks());
-        self.residual.record(raster, recorder);
+    }
+
+    /// Records what adds the gradient and the curvature's adjoint to those of the other
+    /// rows; after [`Rows::draw`].
+    pub fn add_gradient(&self, raster: &Raster, recorder: &mut Recorder) {
+        self.gradient.record(raster, recorder);
         self.diagonal.record(raster, recorder);
     }
 
-    /// Records the sums for this view's correction; after [`Rows::linearize`].
+    /// Records the sums for this view's correction; after [`Rows::draw`].
     pub fn sum_correction(&self, shared: &Shared, recorder: &mut Recorder) {
         shared.corrections.sum(&self.sums, recorder);
-    }
-
-    /// Records the direction's share of the product AᵀWA · direction.
-    pub fn multiply(&mut self, raster: &Raster, shared: &Shared, recorder: &mut Recorder) {
-        self.list(raster, recorder);
-        self.direction.record(raster, recorder);
-        let groups = groups_for(self.view.pixel_count());
-        recorder.dispatch(&shared.weigh, &self.weigh, groups);
-        self.product.record(raster, recorder);
     }
 }

@@ -32,12 +32,13 @@ pub struct ChromaSettings {
     pub corrects_views: bool,
     /// Coarser scales that least squares passes through on its way.
     pub warm_scales: u32,
-    /// Rounds of reweighting on each of them.
+    /// Rounds on each of them: in each all views are drawn, reweighted, and a step taken.
     pub warm_rounds: usize,
-    /// Rounds of reweighting at full size.
+    /// Rounds at full size.
     pub rounds: usize,
-    /// Steps of conjugate gradients in each round.
-    pub steps: usize,
+    /// How strongly least squares draws every Gaussian towards gray, in pixels that show it:
+    /// what depends on less stays where the others leave it.
+    pub ridge: f64,
     /// Whether Gaussians that no view sees well take their neighbours' colour after
     /// least squares.
     pub fills: bool,
@@ -45,6 +46,11 @@ pub struct ChromaSettings {
     /// those of the other views are made anew whenever they come up.
     pub cache_bytes: usize,
 }
+
+/// In pixels. Less than it says, for the loss of a residual does not grow with its square as
+/// this does: a Gaussian of 30 units is held like one that a third of a pixel wants gray. A
+/// hundredth of it fits the teacher better and held-out photos worse (docs/decisions.md).
+const RIDGE: f64 = 0.01;
 
 /// Leaves room for the rest on devices of 4 GiB.
 const CACHE_BYTES: usize = 2 << 30;
@@ -77,9 +83,9 @@ impl ChromaSettings {
             seed: 0,
             corrects_views: true,
             warm_scales: 2,
-            warm_rounds: 8,
-            rounds: 4,
-            steps: 3,
+            warm_rounds: 10,
+            rounds: 10,
+            ridge: RIDGE,
             fills: true,
             cache_bytes: CACHE_BYTES,
         }
@@ -91,7 +97,7 @@ impl ChromaSettings {
         Self {
             robust: None,
             corrects_views: false,
-            warm_rounds: 1,
+            warm_rounds: 4,
             fills: false,
             ..Self::irls()
         }

@@ -56,10 +56,10 @@ pub struct Colorize {
     /// Adam's last iteration, counted from the start of `fit` [default: the preset's].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     until: Option<u32>,
-    /// Rounds of least squares at full size [default: 4].
+    /// Rounds of least squares at full size [default: 10].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
     rounds: Option<u32>,
-    /// Rounds of least squares at each of a quarter and half the size before [default: 8].
+    /// Rounds of least squares at each of a quarter and half the size before [default: 10].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
     coarse_rounds: Option<u32>,
     /// Difference in CIELAB units from which on a view is not believed, or `off` [default: 10

@@ -18,10 +18,10 @@ shaders! {
     CHROMA_LOSS_CURVATURE = "chroma_loss_curvature";
     /// Keys of the depth sort.
     COMPACT = "compact";
-    /// Conjugate gradients.
-    CONJUGATE = "conjugate";
     /// Copies along a densification plan.
     DENSIFY = "densify";
+    /// L-BFGS.
+    LBFGS = "lbfgs";
     /// Luma loss.
     LUMA_LOSS = "luma_loss";
     /// Luma loss of photos with exposures.
@@ -76,8 +76,6 @@ shaders! {
     TILE_RANGES = "tile_ranges";
     /// Corrections of the views' teachers.
     VIEW_CORRECTION = "view_correction";
-    /// A picture times its weights.
-    WEIGH = "weigh";
     /// Blending of luma.
     BLEND_LUMA = "blend_luma";
     /// Blending of chroma.

@@ -92,16 +92,17 @@ pub fn minimum_bytes(kernel: &str, load: &Load) -> f64 {
         "luma_loss" => 4.25 * pixels,
         "luma_loss_backward" => 5.25 * pixels,
         "chroma_loss" => 3.25 * channels * pixels,
-        "weigh" => 3.0 * channels * pixels,
         // Picture, wanted a/b and curvature.
         "view_correction_sums" => 3.0 * channels * pixels,
-        "conjugate_begin" => 6.0 * planes + 2.0 * splats,
-        "conjugate_product" => 2.0 * planes,
-        "conjugate_step" => 7.0 * planes,
-        "conjugate_direction" => 4.0 * planes,
-        "conjugate_end" => 3.0 * planes,
+        "lbfgs_ridge" | "lbfgs_add" | "lbfgs_precondition" => 3.0 * planes,
+        "lbfgs_pair" => 8.0 * planes,
+        "lbfgs_begin" => 5.0 * planes + 2.0 * splats,
+        "lbfgs_dot" | "lbfgs_spread" => 2.0 * planes,
+        "lbfgs_step" => 5.0 * planes,
         // One partial sum for every 256 unknowns.
-        "conjugate_rho" | "conjugate_alpha" | "conjugate_beta" => planes / 256.0,
+        "lbfgs_judge" | "lbfgs_curvature" | "lbfgs_scale" | "lbfgs_alpha" | "lbfgs_beta" => {
+            planes / 256.0
+        }
         "sum_loss" => tiles,
         "blend_backward" => {
             (LISTED + channels + stored) * instances + (2.0 * channels + 1.0) * pixels

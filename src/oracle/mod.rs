@@ -1,7 +1,7 @@
 //! The oracle: every kernel once more, in `f64` and plain loops.
 //!
 //! One file a kernel, under the kernel's own name: [`project`], [`shade`],
-//! [`tiles`], [`blend`], [`luma_loss`], [`chroma_loss`], [`conjugate`],
+//! [`tiles`], [`blend`], [`luma_loss`], [`chroma_loss`], [`lbfgs`],
 //! [`view_correction`], [`adam`], [`relocation`]. [`render`] chains the first four
 //! without tiles; [`gradient`] differentiates the chain
 //! with dual numbers, so no derivative in here was worked out by hand.
@@ -13,11 +13,11 @@
 pub mod adam;
 pub mod blend;
 pub mod chroma_loss;
-pub mod conjugate;
 pub mod constants;
 pub mod gradient;
 #[cfg(test)]
 mod gradient_tests;
+pub mod lbfgs;
 pub mod linear;
 pub mod luma_loss;
 pub mod numerics;

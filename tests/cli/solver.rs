@@ -8,7 +8,7 @@ use super::scene;
 use super::shared::{LUMA, onnx, place_with_run};
 
 /// Rounds on the two coarser scales, which come before those at full size.
-const WARM: usize = 16;
+const WARM: usize = 20;
 
 /// Two rounds at full size; one would do to be quick, but then nothing is repeated.
 const QUICK: [&str; 5] = ["colorize", "--rounds", "2", "--json", "--teacher"];
@@ -25,8 +25,8 @@ fn the_default_solver_says_what_it_did() {
     assert_eq!(chroma["corrects_views"], true);
     assert_eq!(chroma["fills"], true);
     assert_eq!(chroma["coarser_scales"], 0);
-    // Eight views, four drawings a round: all at full size, 1/4 and 1/16 before.
-    let passes = 8.0 * 4.0 * (2.0 + 8.0 / 4.0 + 8.0 / 16.0);
+    // Eight views a round: all at full size, 1/4 and 1/16 before; in the end half a pass.
+    let passes = 8.0 * (2.5 + 10.0 / 4.0 + 10.0 / 16.0);
     assert_eq!(chroma["passes"], passes);
 
     let plain = ["--robust", "off", "--correct-views", "off", "--fill", "off"];

@@ -4,7 +4,7 @@ use std::{collections::BTreeMap, mem::offset_of};
 
 use gs_chroma::{
     chroma::{
-        ChromaLossWeights, ConjugateParameters, Correction, CorrectionParameters, SUM_GROUPS, SUMS,
+        ChromaLossWeights, Correction, CorrectionParameters, LbfgsParameters, SUM_GROUPS, SUMS,
     },
     gpu::shaders,
     luma::{
@@ -162,7 +162,7 @@ fn twins() -> Vec<Twin> {
             }
         ),
         twin!(
-            "ConjugateParameters" = ConjugateParameters {
+            "LbfgsParameters" = LbfgsParameters {
                 length,
                 splats,
                 blocks,

@@ -250,8 +250,7 @@ fn a_wrong_view_moves_nothing_unless_it_counts() {
         // Until all has settled.
         let settings = ChromaSettings {
             robust,
-            rounds: 15,
-            steps: 8,
+            rounds: 80,
             ..settings()
         };
         let of = |views| inner(&solved(&settings, &wall(), views));

@@ -70,6 +70,16 @@ const REASONS: &[(&str, &str, &str)] = &[
         "the ridge is positive, sums of weights are not negative",
     ),
     (
+        "lbfgs_scale",
+        "1.0 / curvature",
+        "in the branch where it is above a share of a positive sum",
+    ),
+    (
+        "lbfgs_scale",
+        "curvature / sum",
+        "in the branch where the divisor is positive",
+    ),
+    (
         "least_power",
         "-conic.y * nearest.x / conic.z",
         "project culls conics whose diagonal is not positive",
@@ -237,11 +247,6 @@ const REASONS: &[(&str, &str, &str)] = &[
         "normal3",
         "sqrt",
         "the logarithm of at most 1 is not positive",
-    ),
-    (
-        "ratio",
-        "above / below",
-        "in the branch where the divisor is positive",
     ),
     (
         "relocation_noise",

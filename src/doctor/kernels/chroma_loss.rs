@@ -1,4 +1,4 @@
-//! `chroma_loss`, with and without the curvature, `sum_loss` of many blocks, and `weigh`.
+//! `chroma_loss`, with and without the curvature, and `sum_loss` of many blocks.
 
 use std::sync::Arc;
 
@@ -7,7 +7,7 @@ use crate::{
     chroma::{ChromaLossWeights, Correction},
     compare::widen,
     doctor::measured::{Allowance, Row, Sample},
-    gpu::{Buffer, Gpu, GpuError, Kernel, Recorder, groups_for, shaders},
+    gpu::{Buffer, Gpu, GpuError, Kernel, groups_for, shaders},
     oracle::{
         chroma_loss::{Teaching, chroma_loss, chroma_loss_gradient, curvature},
         random::{Random, round},
@@ -256,39 +256,6 @@ fn measure(gpu: &Gpu, terms: Terms) -> Result<[Vec<Sample>; 3], GpuError> {
     Ok(samples)
 }
 
-/// A picture times its weights; a product rounds once.
-fn weigh(gpu: &Gpu) -> Result<Vec<Sample>, GpuError> {
-    let kernel = Kernel::new(gpu, "weigh", shaders::WEIGH);
-    (SIZES.into_iter().enumerate())
-        .map(|(seed, size)| {
-            let mut random = Random::new(seed as u64);
-            let mut draw = |low, high| -> Vec<[f64; 2]> {
-                (0..size[0] * size[1])
-                    .map(|_| random.array(low, high))
-                    .collect()
-            };
-            let (image, weights) = (draw(-90.0, 90.0), draw(0.0, 1e-4));
-            let buffers = [pixels(gpu, &image)?, pixels(gpu, &weights)?];
-            let weighted = Buffer::<f32>::zeros(gpu, "weighted", buffers[0].len())?;
-            let view = view(gpu, size)?;
-            let bound = [
-                view.raw(),
-                buffers[0].raw(),
-                buffers[1].raw(),
-                weighted.raw(),
-            ];
-            let mut recorder = Recorder::new(gpu);
-            let groups = groups_for(size[0] * size[1]);
-            recorder.dispatch(&kernel, &kernel.bind(gpu, &bound), groups);
-            recorder.submit();
-            let expected = (image.as_flattened().iter().zip(weights.as_flattened()))
-                .map(|(x, w)| round(x * w))
-                .collect();
-            Ok(Sample::new(widen(&weighted.read(gpu)?), expected))
-        })
-        .collect()
-}
-
 pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
     let gpu = &raster.gpu;
     let allowed = Allowance::of(gpu);
@@ -375,6 +342,5 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
             1.83e-6,
             &all_curvatures,
         ),
-        Row::exact("weigh", "weighted picture", &weigh(gpu)?),
     ])
 }

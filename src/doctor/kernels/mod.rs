@@ -4,9 +4,9 @@
 mod adam;
 mod blend;
 mod chroma_loss;
-mod conjugate;
 mod densify;
 mod gradient;
+mod lbfgs;
 mod losses;
 pub mod numerics;
 mod project;
@@ -43,5 +43,5 @@ pub const TOPICS: [(&str, Measure); 14] = [
     ("densify", densify::rows),
     ("relocation", relocation::rows),
     ("view correction", view_correction::rows),
-    ("conjugate", conjugate::rows),
+    ("lbfgs", lbfgs::rows),
 ];

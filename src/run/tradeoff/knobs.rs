@@ -179,7 +179,7 @@ const KNOBS: &[Knob] = &[
         turn: |value| vec![("--rounds", value.to_owned())],
         time: |around, value| {
             let rounds = around.color.as_ref().map_or(1, |color| color.rounds);
-            (2.0 + number(value) / rounds.max(1) as f64) / 3.0
+            (1.0 + number(value) / rounds.max(1) as f64) / 2.0
         },
         conflicts: &["solver", "until"],
     },
@@ -188,10 +188,11 @@ const KNOBS: &[Knob] = &[
         stage: PointStage::Color,
         values: |around| around.of_color(|color| scaled(color.coarse_rounds, &[0.5, 0.25, 2.0])),
         turn: |value| vec![("--coarse-rounds", value.to_owned())],
-        // They take two thirds of the time, those at full size the rest (docs/performance.md).
+        // They take about half of the time, those at full size the rest: there are as many
+        // Gaussians at every scale (docs/performance.md).
         time: |around, value| {
             let rounds = around.color.as_ref().map_or(1, |color| color.coarse_rounds);
-            (1.0 + 2.0 * number(value) / rounds.max(1) as f64) / 3.0
+            (1.0 + number(value) / rounds.max(1) as f64) / 2.0
         },
         conflicts: &["solver", "until"],
     },
