@@ -8,7 +8,8 @@ not there are skipped with a word. A scene is fitted once (and not again while i
 then coloured and evaluated with each teacher: the photos themselves (oracle), the photos made
 unsteady by unsteady_teacher.py, and the bundled network. Needs numpy and Pillow.
 
-`--colorize="--sh-degree 1"` hands flags to `gs-chroma colorize`. `--ablation` prints another table:
+`--colorize="--sh-degree 1"` hands flags to `gs-chroma colorize`, `--eval="--rgb-rounds 1"` to `eval`.
+`--ablation` prints another table:
 each part of the solver off, or its degree raised, with the unsteady teacher.
 """
 
@@ -199,6 +200,7 @@ def main() -> int:
     parser.add_argument("--network", default="assets/teacher/demo-teacher.onnx")
     parser.add_argument("--iterations", type=int, default=1000, help="of fit")
     parser.add_argument("--colorize", default="", help="more flags for colorize, as one word")
+    parser.add_argument("--eval", default="", help="more flags for eval, as one word")
     parser.add_argument("--method", choices=["exported", "native"], default="exported")
     parser.add_argument("--frames", type=int, default=60)
     parser.add_argument("--scenes", nargs="*", default=list(SCENES), choices=list(SCENES))
@@ -237,7 +239,7 @@ def main() -> int:
             asked = [str(out / "run"), "--teacher", str(path)]
             colorize = [program, "colorize", *asked, *shlex.split(arguments.colorize)]
             _, seconds = run(colorize)
-            measure = [program, "eval", *asked, "--baselines", "--json"]
+            measure = [program, "eval", *asked, "--baselines", "--json", *shlex.split(arguments.eval)]
             found, _ = run([*measure, "--frames", str(arguments.frames)])
             draw = f"-{arguments.seed}" if teacher == "unsteady" and arguments.seed else ""
             (out / f"eval-{teacher}{draw}.json").write_text(found)

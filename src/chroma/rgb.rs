@@ -31,10 +31,6 @@ const BAKE_TIMES: usize = 2;
 /// floors; without, more make views worse that are not fitted to (docs/decisions.md).
 const BOUNDED_ROUNDS: usize = 6;
 
-/// Times as many rounds for RGB splats as for a/b: harmonics of degree 3 settle more slowly than those of degree 0, and what they are
-/// compared with shall not win by that.
-const MORE_ROUNDS: usize = 3;
-
 /// A view and the colours wanted in its picture.
 #[derive(Clone, Debug)]
 pub struct RgbView {
@@ -47,8 +43,7 @@ pub struct RgbView {
 }
 
 /// Fits RGB harmonics to coloured pictures on the frozen geometry of `luma`: what training
-/// RGB splats on a teacher's pictures would give on this geometry. Degree and loss
-/// are those of `settings`, rounds three times as many.
+/// RGB splats on a teacher's pictures would give on this geometry.
 ///
 /// # Errors
 /// [`GpuError`] when it does not fit or the device is lost.
@@ -59,12 +54,7 @@ pub fn fit_rgb(
     luma: &Splats,
     views: &[RgbView],
 ) -> Result<ShField, GpuError> {
-    let longer = ChromaSettings {
-        warm_rounds: MORE_ROUNDS * settings.warm_rounds,
-        rounds: MORE_ROUNDS * settings.rounds,
-        ..settings.clone()
-    };
-    let mut sh = solve(raster, &longer, extent, luma, views, false)?;
+    let mut sh = solve(raster, settings, extent, luma, views, false)?;
     let stride = 3 * sh::coefficient_count(sh.degree);
     for of_splat in sh.coefficients.chunks_exact_mut(stride) {
         for constant in &mut of_splat[..3] {

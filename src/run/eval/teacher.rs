@@ -94,12 +94,13 @@ impl EvalTeacher {
     }
 
     /// RGB splats on the run's geometry, fitted to the teacher's pictures of the training
-    /// views: harmonics of degree 3 as splat trainers have, with the rounds and steps
+    /// views: harmonics of degree 3 as splat trainers have, in so many times the rounds
     /// that `colorize` takes by default. They are told what `fit` knew: exposures, masks.
     pub fn rgb_splats(
         &self,
         raster: &Arc<Raster>,
         subject: &Subject,
+        rounds: usize,
         observe: &mut Observer<'_>,
     ) -> Result<ShField, RunError> {
         let scene = &subject.scene;
@@ -129,11 +130,14 @@ impl EvalTeacher {
                 example: scene.capture.views[scene.split.train[0]].name.clone(),
             });
         }
+        let ours = ChromaSettings::irls();
         let settings = ChromaSettings {
             sh_degree: sh::MAX_DEGREE,
             robust: None,
             corrects_views: false,
-            ..ChromaSettings::irls()
+            warm_rounds: rounds * ours.warm_rounds,
+            rounds: rounds * ours.rounds,
+            ..ours
         };
         Ok(fit_rgb(
             raster,
