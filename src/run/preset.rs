@@ -13,9 +13,10 @@ use crate::{
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Preset {
-    /// Small photos, few Gaussians: 108 s for 18 photos on two processor cores.
+    /// Small photos, few Gaussians: the bundled garden in 30 s on two processor cores, 23.6 dB of
+    /// its held-out photos.
     Draft,
-    /// About half the paper's work, for a GPU.
+    /// About half the paper's work, for a GPU: the garden in 56 times the work, 24.9 dB.
     Balanced,
     /// The schedule of the ChromaDistill paper, for a GPU: 15,000 luma iterations, chroma until 30,000.
     Paper,
