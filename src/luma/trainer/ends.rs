@@ -34,7 +34,10 @@ impl LumaTrainer {
     pub(super) fn stop_when_flat(&mut self, iteration: usize) {
         let schedule = &self.settings.schedule;
         let early = (iteration as f64) < FLAT_FROM * schedule.iterations as f64;
-        let gain = gain_of_doubling(self.curve());
+        // What small photos have taught says nothing about what large ones will.
+        let curve = self.curve();
+        let small = curve.partition_point(|look| look.iteration <= schedule.coarse_until);
+        let gain = gain_of_doubling(&curve[small..]);
         let flat = |threshold: f64| gain.is_some_and(|gain| gain < threshold);
         if self.settings.flat.is_some_and(flat) && !early && iteration < schedule.settle_from {
             self.settings.schedule.settle_at(iteration);

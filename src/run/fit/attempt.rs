@@ -236,7 +236,7 @@ impl Job<'_> {
             background: plan.has(Effect::Background),
             max_splats: amounts.max_splats,
             seed: options.seed,
-            flat: options.stop_when_flat,
+            flat: options.stop_when_flat.or(amounts.flat),
             numerics: options.numerics,
             ..LumaSettings::new(amounts.iterations)
         };

@@ -58,7 +58,8 @@ pub struct FitOptions {
     pub coarse: f64,
     /// Bytes that training may take on the device.
     pub memory_limit: Option<u64>,
-    /// Training ends where twice the iterations would bring less than so many dB.
+    /// Training ends where twice the iterations would bring less than so many dB; without it,
+    /// and without `iterations`, as the preset has it.
     pub stop_when_flat: Option<f64>,
     /// Seconds that the whole run may take.
     pub time_limit: Option<f64>,
@@ -206,6 +207,8 @@ fn asked_amounts(options: &FitOptions, preset: Preset) -> Amounts {
         iterations: options.iterations.unwrap_or(amounts.iterations),
         max_splats: options.max_splats.unwrap_or(amounts.max_splats),
         max_side: options.load.max_side.or(amounts.max_side),
+        // Who says how many iterations wants them all.
+        flat: amounts.flat.filter(|_| options.iterations.is_none()),
         ..amounts
     }
 }
@@ -234,4 +237,20 @@ fn choose_preset(options: &FitOptions, gpu: &Gpu, observe: &mut Observer<'_>) ->
         }
         Preset::for_device(gpu)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn balanced_ends_where_flat_unless_told_how_long() {
+        let mut options = FitOptions::new(PathBuf::from("scene"));
+        let flat = |options: &FitOptions, preset| asked_amounts(options, preset).flat;
+        assert_eq!(flat(&options, Preset::Balanced), Some(0.1));
+        assert_eq!(flat(&options, Preset::Draft), None);
+        assert_eq!(flat(&options, Preset::Paper), None);
+        options.iterations = Some(7_000);
+        assert_eq!(flat(&options, Preset::Balanced), None);
+    }
 }

@@ -49,7 +49,7 @@ impl Job<'_> {
                 goal: GoalReport {
                     time_limit: options.time_limit,
                     target_psnr: options.target_psnr,
-                    stop_when_flat: options.stop_when_flat,
+                    stop_when_flat: settings.flat,
                     attempts,
                 },
                 seconds: LumaSeconds {
