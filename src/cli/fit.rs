@@ -24,7 +24,7 @@ pub struct Fit {
     /// How much work to put in [default: paper on a GPU, draft without one].
     #[arg(long, value_enum)]
     preset: Option<Preset>,
-    /// Luma iterations, instead of the preset's; all of them, also where `balanced` would end earlier.
+    /// Luma iterations instead of the preset's; all of them, also where the curve is flat.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     iterations: Option<u32>,
     #[command(flatten)]
@@ -42,7 +42,7 @@ pub struct Fit {
     #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u32).range(1..))]
     memory_limit: Option<u32>,
     /// End where twice the iterations would bring less than so many dB on held-out views
-    /// [default: 0.1 with --preset balanced, else never].
+    /// [default: 0.1 with --preset balanced and paper, else never].
     #[arg(long, value_name = "DB", num_args = 0..=1, require_equals = true, default_missing_value = "0.1", value_parser = decibels)]
     stop_when_flat: Option<f64>,
     /// Choose iterations, Gaussians and photo size so that all is done in so many minutes; with

@@ -150,7 +150,8 @@ impl Schedule {
 pub const SHORT_RUN: usize = 3_000;
 
 /// A run with fewer iterations learns at other rates than 3DGS and settles in the end;
-/// with 7,000 that is worth 0.1 to 0.7 dB (docs/decisions.md), with more it was not measured.
+/// with 7,000 that is worth 0.1 to 0.7 dB, with 15,000 it helps one scene and harms another
+/// (docs/decisions.md).
 pub const LONG_RUN: usize = 10_000;
 
 /// Share of its learning rates at which a run that settles ends: steps that answer to one
