@@ -3,7 +3,9 @@
 enough to do that without one, and prints as Markdown where the held-out PSNR ended and
 where it was best on the way.
 
-    cargo build --release && python3 tools/check_long_runs.py ../shared/data/fern-llff -o target/long
+    cargo build --release && python3 tools/check_long_runs.py ../shared/data/fern-llff --iterations 7000 -o target/long
+
+Without `--iterations` a preset may end earlier, where its curve is flat.
 
 A training that falls far below its best was harmed by its own schedule, or has learnt its
 photos instead of the scene: the loss on the photos in training, low or not, tells which.
