@@ -8,7 +8,7 @@ use super::{effects::EffectArguments, photos::Photos, print, progress::Progress}
 use crate::chroma::teacher::TeacherSettings;
 use crate::luma::{Densification, Numerics};
 use crate::report::timings_table;
-use crate::run::{AheadOptions, FitOptions, Preset, RunError, fit};
+use crate::run::{AheadOptions, FLAT, FitOptions, Preset, RunError, fit};
 
 /// Rows of the curve that is printed.
 const CURVE_ROWS: usize = 8;
@@ -42,9 +42,10 @@ pub struct Fit {
     #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u32).range(1..))]
     memory_limit: Option<u32>,
     /// End where twice the iterations would bring less than so many dB on held-out views
-    /// [default: 0.1 with --preset balanced and paper, else never].
-    #[arg(long, value_name = "DB", num_args = 0..=1, require_equals = true, default_missing_value = "0.1", value_parser = decibels)]
-    stop_when_flat: Option<f64>,
+    /// (0.1 if no number follows) [default: 0.1 in the presets balanced and paper, unless
+    /// --iterations, --time-limit or --target-psnr says how much is to be done; else never].
+    #[arg(long, value_name = "DB", num_args = 0..=1, require_equals = true, value_parser = decibels)]
+    stop_when_flat: Option<Option<f64>>,
     /// Choose iterations, Gaussians and photo size so that all is done in so many minutes; with
     /// --preset, no more work than that.
     #[arg(long, value_name = "MIN", value_parser = minutes, conflicts_with = "iterations")]
@@ -106,7 +107,7 @@ impl Fit {
             },
             coarse: self.coarse,
             memory_limit: self.memory_limit.map(|mib| u64::from(mib) << 20),
-            stop_when_flat: self.stop_when_flat,
+            stop_when_flat: self.stop_when_flat.map(|gain| gain.unwrap_or(FLAT)),
             time_limit: self.time_limit.map(|minutes| 60.0 * minutes),
             target_psnr: self.target_psnr,
             measure_side: self.measure_side,

@@ -27,7 +27,7 @@ pub use fit::{AheadOptions, FitOptions, fit};
 pub use folder::RunFolder;
 pub use info::{export, info};
 pub use plan::{PlanOptions, plan};
-pub use preset::Preset;
+pub use preset::{FLAT, Preset};
 pub use render::{RenderOptions, Views, render};
 pub use teach::{HINT_WEIGHT, Taught, TeachOptions};
 

@@ -24,9 +24,10 @@ pub enum Preset {
     Paper,
 }
 
-/// Gain of twice the iterations, in dB, below which long presets end. Where that ended a real scene
-/// early, what came after was worth -0.9 to +0.14 dB (docs/accuracy-and-time.md).
-const FLAT: f64 = 0.1;
+/// Gain of twice the iterations, in dB, below which long presets end, and others that are asked
+/// to. Where that ended a real scene early, what came after was worth -0.9 to +0.14 dB
+/// (docs/accuracy-and-time.md).
+pub const FLAT: f64 = 0.1;
 
 /// What a preset stands for.
 #[derive(Clone, Copy, Debug)]
