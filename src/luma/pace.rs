@@ -28,6 +28,15 @@ impl Pace {
         self.reports.push((iteration, seconds));
     }
 
+    /// Notes that after `seconds` all was as it had been at an earlier `iteration`.
+    pub fn back_to(&mut self, iteration: usize, seconds: f64) {
+        self.reports.retain(|&(earlier, _)| earlier <= iteration);
+        let lost = self.reports.last().map_or(0.0, |&(_, then)| seconds - then);
+        for (_, when) in &mut self.reports {
+            *when += lost;
+        }
+    }
+
     /// Seconds of one iteration of late; `None` as long as nobody knows.
     fn cost(&self) -> Option<f64> {
         let &(last, now) = self.reports.last()?;
@@ -75,6 +84,17 @@ mod tests {
         assert_eq!(Pace::default().end(100.0, 1.0, 0.0), None);
         assert_eq!(steady(25).end(100.0, 1.0, 0.0), None);
         assert!(steady(50).end(100.0, 1.0, 0.0).is_some());
+    }
+
+    /// Time that was given up is lost, and the pace does not show it.
+    #[test]
+    fn what_is_given_up_cost_its_time() {
+        let mut pace = steady(500);
+        pace.back_to(300, 51.0);
+        assert_eq!(pace.end(101.0, 1.0, 0.0), Some(800));
+        let mut none = Pace::default();
+        none.back_to(0, 3.0);
+        assert_eq!(none.end(101.0, 1.0, 0.0), None);
     }
 
     #[test]

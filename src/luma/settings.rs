@@ -1,4 +1,5 @@
-//! What stage 1 can be told, with the 3DGS values (Kerbl et al. 2023) as default.
+//! What stage 1 can be told. Rates are of the 3DGS paper (Kerbl et al. 2023) unless
+//! another reason is given.
 
 use super::Numerics;
 use crate::raster::RasterOptions;
@@ -21,31 +22,19 @@ pub struct LearningRates {
     pub sh_rest: f64,
 }
 
-impl LearningRates {
-    /// The 3DGS rates for the 30,000 iterations they were tuned for; in a run
-    /// below [`LONG_RUN`] sizes and attitudes learn twice as fast, colours four
-    /// times, opacities half as fast, and the means' rate falls by half a decade
-    /// instead of two: there is little time to move in (measured in
+impl Default for LearningRates {
+    /// Beside the 3DGS rates, which were tuned for 30,000 iterations, sizes and attitudes
+    /// learn twice as fast, colours four times, opacities half as fast, and the means' rate
+    /// falls by half a decade instead of two: there is little time to move in (measured in
     /// docs/decisions.md).
-    pub fn of(iterations: usize) -> Self {
-        let long = Self {
-            means: [1.6e-4, 1.6e-6],
-            quats: 1e-3,
-            log_scales: 5e-3,
-            opacity_logits: 5e-2,
-            sh_constant: 2.5e-3,
-            sh_rest: 2.5e-3 / 20.0,
-        };
-        if iterations >= LONG_RUN {
-            return long;
-        }
+    fn default() -> Self {
         Self {
             means: [1.6e-4, 4.8e-5],
             quats: 2e-3,
             log_scales: 1e-2,
             opacity_logits: 2.5e-2,
             sh_constant: 1e-2,
-            ..long
+            sh_rest: 2.5e-3 / 20.0,
         }
     }
 }
@@ -100,12 +89,7 @@ impl Schedule {
                 100
             },
             raise_degree_every: if short { share(1_000).max(1) } else { 1_000 },
-            // A long run's only rate that is still large, the means', falls by itself.
-            settle_from: if iterations < LONG_RUN {
-                iterations * 7 / 10
-            } else {
-                iterations
-            },
+            settle_from: iterations * 7 / 10,
             coarse_until: 0,
             find_outliers_at: OUTLIERS_AT.map(|share| (share * iterations as f64) as usize),
         }
@@ -148,11 +132,6 @@ impl Schedule {
 
 /// In a run with fewer iterations the set of Gaussians changes at a pace of its own.
 pub const SHORT_RUN: usize = 3_000;
-
-/// A run with fewer iterations learns at other rates than 3DGS and settles in the end;
-/// with 7,000 that is worth 0.1 to 0.7 dB, with 15,000 it helps one scene and harms another
-/// (docs/decisions.md).
-pub const LONG_RUN: usize = 10_000;
 
 /// Share of its learning rates at which a run that settles ends: steps that answer to one
 /// view at a time leave noise as large as they are.
@@ -205,8 +184,9 @@ pub struct LumaSettings {
     /// Seconds that a training may take: it ends where they are over, and its schedule is
     /// stretched or squeezed to end there.
     pub time_limit: Option<f64>,
-    /// A training settles and ends where twice the iterations would bring less than so
-    /// many dB in the views that are [watched](super::LumaTrainer::watch).
+    /// A training goes back to its best, settles and ends where twice the iterations would
+    /// bring less than so many dB in the views that are
+    /// [watched](super::LumaTrainer::watch).
     pub flat: Option<f64>,
     /// How accurately it computes.
     pub numerics: Numerics,
@@ -216,7 +196,7 @@ impl LumaSettings {
     /// The defaults for a run of so many iterations.
     pub fn new(iterations: usize) -> Self {
         Self {
-            rates: LearningRates::of(iterations),
+            rates: LearningRates::default(),
             schedule: Schedule::of(iterations),
             densification: Densification::Split,
             sh_degree: 3,
@@ -286,6 +266,11 @@ impl LumaSettings {
             .min(u32::try_from(raised).unwrap_or(u32::MAX))
     }
 
+    /// The iteration from which on all harmonics are in use.
+    pub fn full_degree_from(&self) -> usize {
+        self.sh_degree as usize * self.schedule.raise_degree_every
+    }
+
     /// Whether the set changes after `iteration` (counted from 1).
     pub fn densifies_after(&self, iteration: usize) -> bool {
         let schedule = &self.schedule;
@@ -310,7 +295,7 @@ mod tests {
                 densify_until: 12_000,
                 densify_every: 100,
                 raise_degree_every: 1_000,
-                settle_from: 15_000,
+                settle_from: 10_500,
                 coarse_until: 0,
                 find_outliers_at: [6_000, 9_750],
             }
@@ -327,19 +312,15 @@ mod tests {
     fn rates_of_means_decay_from_end_to_end() {
         let settings = LumaSettings::new(PAPER_ITERATIONS);
         assert!((settings.means_rate(0, 2.0) - 3.2e-4).abs() < 1e-12);
-        assert!((settings.means_rate(15_000, 2.0) - 3.2e-6).abs() < 1e-14);
-        assert!((settings.means_rate(7_500, 2.0) - 3.2e-5).abs() < 1e-12);
-        // A short run ends where it still learns.
-        let short = LumaSettings::new(1_000);
-        assert!(short.means_rate(1_000, 2.0) > 20.0 * settings.means_rate(15_000, 2.0));
+        assert!((settings.means_rate(15_000, 2.0) - 9.6e-5).abs() < 1e-12);
+        let half_way = 3.2e-4 * 0.3_f64.sqrt();
+        assert!((settings.means_rate(7_500, 2.0) - half_way).abs() < 1e-12);
     }
 
     #[test]
-    fn short_runs_settle() {
-        let long = LumaSettings::new(PAPER_ITERATIONS);
-        assert!([0, 14_999, 15_000].iter().all(|&i| long.settling(i) == 1.0));
-        let short = LumaSettings::new(1_000);
-        let at = [0, 700, 850, 1_000].map(|i| short.settling(i));
+    fn runs_settle() {
+        let settings = LumaSettings::new(1_000);
+        let at = [0, 700, 850, 1_000].map(|i| settings.settling(i));
         let wanted = [1.0, 1.0, 0.1_f64.sqrt(), 0.1];
         assert!(
             at.iter().zip(wanted).all(|(a, w)| (a - w).abs() < 1e-12),

@@ -7,6 +7,7 @@
 //! how many it took, grows the lists and repeats from there, so that the result
 //! does not depend on when it noticed.
 
+mod best;
 mod changes;
 mod ends;
 mod watch;
@@ -210,7 +211,8 @@ impl LumaTrainer {
     }
 
     /// Trains to the end of the schedule, or to where a time limit or a flat curve puts it,
-    /// telling `observe` now and then.
+    /// telling `observe` now and then. Where it goes back to the best on the way, iterations
+    /// are counted from there again.
     ///
     /// # Errors
     /// [`GpuError`] when the device runs out of room or is lost.
@@ -263,12 +265,17 @@ impl LumaTrainer {
             if looks {
                 let seconds = begun.elapsed().as_secs_f64() - self.watch.seconds;
                 self.look(iteration, seconds)?;
-                self.stop_when_flat(iteration);
+                if let Some(best) = self.stop_when_flat(iteration)? {
+                    iteration = best;
+                    self.pace.back_to(best, begun.elapsed().as_secs_f64());
+                    self.keep_to_limit(best);
+                    continue;
+                }
             }
             if !ends {
                 self.keep_to_limit(iteration);
             }
-            if densifies {
+            if self.settings.densifies_after(iteration) {
                 self.densify(iteration)?;
             }
             if finds_outliers {
@@ -454,17 +461,16 @@ impl LumaTrainer {
             keep(&self.workspace().adam_geometry)?,
             keep(&self.workspace().adam_field)?,
         ];
-        // Statistics since the last densification and losses since the last report go on.
+        // Statistics since the last densification go on.
         let statistics = self.workspace().statistics().clone();
-        let losses = self.workspace().log.losses.clone();
         self.renew(capacity, iteration, moments)?;
         let mut recorder = Recorder::new(&self.gpu);
         recorder.copy(statistics.raw(), self.workspace().statistics().raw());
-        recorder.copy(losses.raw(), self.workspace().log.losses.raw());
         recorder.submit();
         Ok(())
     }
 
+    /// A new workspace for the present Gaussians with these moments.
     fn renew(
         &mut self,
         capacity: usize,
@@ -473,6 +479,8 @@ impl LumaTrainer {
     ) -> Result<(), GpuError> {
         let limit = self.settings.memory_limit;
         self.demand.check(limit, self.geometry.count, capacity)?;
+        // Losses since the last report go on.
+        let losses = self.workspace().log.losses.clone();
         self.workspace = None;
         // Only now the device frees what it held.
         self.gpu.wait()?;
@@ -488,6 +496,9 @@ impl LumaTrainer {
             Some(moments),
         );
         self.workspace = Some(workspace.map_err(|error| error.of_splats(self.geometry.count))?);
+        let mut recorder = Recorder::new(&self.gpu);
+        recorder.copy(losses.raw(), self.workspace().log.losses.raw());
+        recorder.submit();
         self.base = iteration;
         Ok(())
     }

@@ -107,8 +107,11 @@ pub struct DeviceReport {
 /// Stage 1.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LumaReport {
-    /// Iterations.
+    /// Iterations that led to the set that was kept.
     pub iterations: usize,
+    /// The iteration at which training went back to an earlier one, where it was best.
+    #[serde(default)]
+    pub given_up: Option<usize>,
     /// Degree of the luma harmonics.
     pub sh_degree: u32,
     /// Cap on Gaussians.
@@ -398,8 +401,11 @@ impl Report {
                 quality.psnr, quality.ssim
             )
         });
+        let given_up = luma.given_up.map_or(String::new(), |iteration| {
+            format!(" (gone back to where it was best after {iteration})")
+        });
         format!(
-            "{} Gaussians after {} iterations in {:.0} s{quality}",
+            "{} Gaussians after {} iterations{given_up} in {:.0} s{quality}",
             luma.splats, luma.iterations, luma.seconds.train
         )
     }

@@ -2,7 +2,8 @@
 
 use std::fs;
 
-use serde_json::json;
+use image::GrayImage;
+use serde_json::{Value, json};
 
 use super::program::Place;
 use super::scene;
@@ -342,7 +343,7 @@ fn the_curve_is_printed_and_reported() {
     assert_eq!(iterations, [25, 50, 75, 100]);
     assert_eq!(luma["curve_on"], "test");
     // Two views are held out, and both are looked at.
-    let psnr = |value: &serde_json::Value| value["psnr"].as_f64().expect("dB");
+    let psnr = |value: &Value| value["psnr"].as_f64().expect("dB");
     let last = psnr(curve.last().expect("points"));
     assert!((last - psnr(&luma["held_out"])).abs() < 1e-3, "{luma}");
     let all = luma["seconds"]["all"].as_f64().expect("seconds");
@@ -360,6 +361,36 @@ fn a_flat_curve_ends_the_run() {
     let luma = &place.report("runs/scene")["luma"];
     assert_eq!(luma["iterations"], 120);
     assert_eq!(luma["goal"]["stop_when_flat"], 50.0);
+}
+
+#[test]
+fn what_made_it_worse_is_given_up() {
+    let place = place_with_scene();
+    // Held-out photos that are black, as nothing is: the better the rest is learnt, the worse.
+    for view in [0, 8] {
+        let photo = GrayImage::new(scene::SIZE[0], scene::SIZE[1]);
+        let path = place.path("scene/images").join(scene::name(view));
+        photo.save(path).expect("writable");
+    }
+    let mut fit = QUICK_FIT;
+    fit[5] = "400";
+    let ends = ["--stop-when-flat", "--without", "exposure"];
+    let printed = place.succeed(&[&fit[..], &ends].concat());
+    let luma = &place.report("runs/scene")["luma"];
+    let [kept, given_up] = ["iterations", "given_up"].map(|key| luma[key].as_u64());
+    assert!(kept < given_up, "{luma}");
+    let looks = luma["curve"].as_array().expect("a curve");
+    let best = |a: &&Value, b: &&Value| a["psnr"].as_f64().partial_cmp(&b["psnr"].as_f64());
+    let best = looks.iter().max_by(|a, b| best(a, b).expect("numbers"));
+    let best = best.expect("looks")["iteration"]
+        .as_u64()
+        .expect("a number");
+    assert_eq!(kept, Some(best + best.div_ceil(5)));
+    let words = format!(
+        "(gone back to where it was best after {})",
+        given_up.unwrap()
+    );
+    assert!(printed.contains(&words), "{printed}");
 }
 
 #[test]

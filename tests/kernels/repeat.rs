@@ -196,10 +196,8 @@ fn watching_changes_nothing() {
     assert_eq!([seen(0), seen(1)], [None, Some(curve[0].psnr)]);
 }
 
-/// A picture's PSNR is that of the photo against what the scene shows.
-#[test]
-fn a_scene_that_is_right_is_seen_to_be() {
-    let [_, target] = start_and_target();
+/// Settings of a training of 50 iterations that moves nothing.
+fn still(start: &Splats) -> LumaSettings {
     let mut still = LumaSettings::new(50);
     still.rates = LearningRates {
         means: [1e-12; 2],
@@ -210,8 +208,16 @@ fn a_scene_that_is_right_is_seen_to_be() {
         sh_rest: 0.0,
     };
     still.sh_degree = 1;
-    still.max_splats = target.len();
+    still.max_splats = start.len();
     still.schedule.raise_degree_every = 1;
+    still
+}
+
+/// A picture's PSNR is that of the photo against what the scene shows.
+#[test]
+fn a_scene_that_is_right_is_seen_to_be() {
+    let [_, target] = start_and_target();
+    let still = still(&target);
     let mut trainer = LumaTrainer::new(raster(), still, 1.0, &target, photos(&target)).unwrap();
     let [mut brighter, masked] = [0, 1].map(|k| photos(&target).remove(k));
     brighter
@@ -265,11 +271,78 @@ fn a_flat_curve_ends_a_training() {
         (trainer.splats().unwrap(), ends, trainer.curve().len())
     };
     let (_, ends, looks) = run(None);
-    assert_eq!((ends, looks), ([280, 400], 16));
+    assert_eq!((ends, looks), ([280, 400], 15));
     // Nothing brings a hundred dB.
     let (first, [settles, end], looks) = run(Some(100.0));
     assert_eq!(([settles, end], looks), ([100, 120], 5));
     assert!(same(&run(Some(100.0)).0, &first));
+}
+
+/// What is no gain is given up: the bytes are those of a training that never went beyond.
+#[test]
+fn a_training_that_gets_worse_goes_back_to_its_best() {
+    let [start, target] = start_and_target();
+    let trainer = |flat| {
+        let mut settings = LumaSettings {
+            flat,
+            ..settings(&start)
+        };
+        settings.schedule = Schedule::of(400);
+        settings.schedule.densify_from = 20;
+        settings.schedule.densify_every = 30;
+        settings.schedule.raise_degree_every = 20;
+        // One that does not depend on where the end is.
+        settings.rates.means = [1.6e-4; 2];
+        if flat.is_none() {
+            settings.schedule.settle_at(25);
+        }
+        let mut trainer =
+            LumaTrainer::new(raster(), settings, 4.0, &start, photos(&target)).unwrap();
+        // What it starts from is farther away with every look.
+        trainer.watch(photos(&start)).unwrap();
+        trainer.train(&mut |_| {}).unwrap();
+        trainer
+    };
+    let looks = |trainer: &LumaTrainer| -> Vec<usize> {
+        let looks = trainer.curve().iter();
+        looks.map(|look| look.iteration).collect()
+    };
+    let [beyond, straight] = [Some(0.1), None].map(trainer);
+    assert_eq!(looks(&beyond), [25, 50, 75, 100, 30]);
+    assert!(beyond.curve()[3].splats > start.len());
+    assert_eq!(beyond.given_up(), Some(100));
+    assert_eq!(
+        (looks(&straight), straight.given_up()),
+        (vec![25, 30], None)
+    );
+    assert!(same(&beyond.splats().unwrap(), &straight.splats().unwrap()));
+}
+
+/// Losses of a set that has changed since are in the mean all the same.
+#[test]
+fn losses_outlive_a_change_of_the_set() {
+    let target = start_and_target()[1].clone();
+    let losses = |densify_until| {
+        let mut still = still(&target);
+        still.schedule.densify_from = 0;
+        still.schedule.densify_every = 30;
+        still.schedule.densify_until = densify_until;
+        let dark = photos(&target).into_iter().map(|view| TrainingView {
+            gray: vec![0; view.gray.len()],
+            ..view
+        });
+        let mut trainer = LumaTrainer::new(raster(), still, 1.0, &target, dark.collect()).unwrap();
+        let mut losses = Vec::new();
+        (trainer.train(&mut |progress| losses.push((progress.iteration, progress.loss)))).unwrap();
+        losses
+    };
+    let [changed, same] = [40, 0].map(losses);
+    let at_50 = |losses: &[(usize, f64)]| {
+        let at = losses.iter().find(|&&(iteration, _)| iteration == 50);
+        at.unwrap().1
+    };
+    assert_eq!(changed[1].0, 30);
+    assert!(at_50(&same) > 0.01 && at_50(&changed) == at_50(&same));
 }
 
 /// A time limit moves the end either way, and what is flat ends whatever time is left.

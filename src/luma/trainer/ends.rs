@@ -1,14 +1,18 @@
 //! When a training ends, where its schedule alone does not say.
 
 use super::LumaTrainer;
-use crate::luma::curve::gain_of_doubling;
+use crate::{gpu::GpuError, luma::curve::gain_of_doubling};
 
 /// A run with time left takes at most so many times its iterations: beyond, a larger set
 /// or larger photos would have been worth more.
 pub(super) const LONGER: usize = 3;
 
-/// No curve is called flat within this share of the iterations: the set still grows.
+/// No curve is called flat before this share of the iterations, or [`GROWN`] if that is
+/// less: the set still grows.
 const FLAT_FROM: f64 = 0.25;
+
+/// After so many iterations a set has had seventeen chances to grow by 30 %.
+const GROWN: usize = 1_750;
 
 impl LumaTrainer {
     /// Moves the end to where the time limit will be reached.
@@ -30,19 +34,31 @@ impl LumaTrainer {
         }
     }
 
-    /// Lets the run settle where little is left to gain.
-    pub(super) fn stop_when_flat(&mut self, iteration: usize) {
+    /// Lets the run settle where little is left to gain, from where it was best: when it has
+    /// gone back there, the iteration that it goes on from.
+    pub(super) fn stop_when_flat(&mut self, iteration: usize) -> Result<Option<usize>, GpuError> {
         let schedule = &self.settings.schedule;
-        let early = (iteration as f64) < FLAT_FROM * schedule.iterations as f64;
-        // What small photos have taught says nothing about what large ones will.
-        let curve = self.curve();
-        let small = curve.partition_point(|look| look.iteration <= schedule.coarse_until);
-        let gain = gain_of_doubling(&curve[small..]);
-        let flat = |threshold: f64| gain.is_some_and(|gain| gain < threshold);
-        if self.settings.flat.is_some_and(flat) && !early && iteration < schedule.settle_from {
-            self.settings.schedule.settle_at(iteration);
-            // Time that is left is no reason to go on.
-            self.longest = self.settings.schedule.iterations;
+        let Some(threshold) = self.settings.flat else {
+            return Ok(None);
+        };
+        // What small photos and few harmonics have taught says nothing about what more will.
+        let whole = schedule.coarse_until.max(self.settings.full_degree_from());
+        if iteration <= whole || iteration >= schedule.settle_from {
+            return Ok(None);
         }
+        self.keep_best(iteration)?;
+        let schedule = &self.settings.schedule;
+        let early = (FLAT_FROM * schedule.iterations as f64).min(GROWN as f64);
+        let curve = self.curve();
+        let counts = curve.partition_point(|look| look.iteration <= whole);
+        let flat = gain_of_doubling(&curve[counts..]).is_some_and(|gain| gain < threshold);
+        if !flat || (iteration as f64) < early {
+            return Ok(None);
+        }
+        let best = self.back_to_best(iteration)?;
+        self.settings.schedule.settle_at(best.unwrap_or(iteration));
+        // Time that is left is no reason to go on.
+        self.longest = self.settings.schedule.iterations;
+        Ok(best)
     }
 }

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use super::LumaTrainer;
+use super::{LumaTrainer, SYNC_EVERY, best::Best};
 use crate::{
     gpu::{GpuError, Recorder},
     luma::{TrainingView, curve::CurvePoint},
@@ -10,13 +10,20 @@ use crate::{
     raster::ViewUniform,
 };
 
-/// Looks in a run, at most, where it is no longer than so many times [`RARELY`].
-const LOOKS: usize = 16;
+/// From look to look iterations grow by this share: what time brings is told by the
+/// logarithm of the iteration ([`crate::luma::curve`]).
+const STEP: f64 = 0.15;
 
 /// Fewest and most iterations between two looks: fewer cost more than they tell, more
 /// would leave whoever waits in the dark.
 const OFTEN: usize = 25;
 const RARELY: usize = 500;
+
+/// The look after that at `iteration`, always after a report.
+fn next_look(iteration: usize) -> usize {
+    let step = (STEP * iteration as f64) as usize;
+    iteration + (step / SYNC_EVERY * SYNC_EVERY).clamp(OFTEN, RARELY)
+}
 
 /// What a look showed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,16 +38,21 @@ pub struct Look {
 #[derive(Default)]
 pub(super) struct Watch {
     views: Vec<TrainingView>,
-    every: usize,
+    /// The next look is after this iteration.
+    next: usize,
     pub curve: Vec<CurvePoint>,
     /// Seconds spent on it.
     pub seconds: f64,
+    /// The best set that was looked at, while the training may go back to it.
+    pub best: Option<Best>,
+    /// The iteration that it went back from.
+    pub given_up: Option<usize>,
 }
 
 impl Watch {
     /// Whether there is a look after `iteration` (counted from 1) of `end`.
     pub fn is_due(&self, iteration: usize, end: usize) -> bool {
-        !self.views.is_empty() && (iteration == end || iteration.is_multiple_of(self.every))
+        !self.views.is_empty() && (iteration == end || iteration == self.next)
     }
 
     /// What the last look showed.
@@ -80,7 +92,7 @@ impl LumaTrainer {
         }
         self.watch = Watch {
             views,
-            every: (self.settings.schedule.iterations / LOOKS).clamp(OFTEN, RARELY),
+            next: next_look(0),
             ..Watch::default()
         };
         Ok(())
@@ -89,6 +101,12 @@ impl LumaTrainer {
     /// What the looks showed so far.
     pub fn curve(&self) -> &[CurvePoint] {
         &self.watch.curve
+    }
+
+    /// The iteration at which it gave up what the last looks had shown to be no gain, and
+    /// went back to the best before.
+    pub fn given_up(&self) -> Option<usize> {
+        self.watch.given_up
     }
 
     /// Seconds that the looks took.
@@ -109,6 +127,7 @@ impl LumaTrainer {
             splats: self.geometry.count,
             psnr: sum / self.watch.views.len() as f64,
         });
+        self.watch.next = next_look(iteration);
         self.watch.seconds += begun.elapsed().as_secs_f64();
         Ok(())
     }

@@ -53,6 +53,7 @@ pub(super) struct Attempt {
     /// `train.csv`.
     pub log: String,
     pub curve: Vec<CurvePoint>,
+    pub given_up: Option<usize>,
     pub last: Option<LumaProgress>,
     pub peak_device_memory: Option<u64>,
     pub estimated_device_memory: u64,
@@ -206,6 +207,7 @@ impl Job<'_> {
         let begun = Instant::now();
         let settings = trainer.settings().clone();
         let curve = trainer.curve().to_vec();
+        let given_up = trainer.given_up();
         // What it holds on the device is not needed for measuring.
         drop(trainer);
         let drawn = self.raster.drawing(settings.raster_options());
@@ -219,6 +221,7 @@ impl Job<'_> {
             splats,
             log,
             curve,
+            given_up,
             last,
             peak_device_memory,
             held_out_views,

@@ -38,6 +38,7 @@ impl Job<'_> {
             effects: EffectReport::of(&attempt.plan.decisions),
             luma: LumaReport {
                 iterations: settings.schedule.iterations,
+                given_up: attempt.given_up,
                 sh_degree: settings.sh_degree,
                 max_splats: settings.max_splats,
                 antialiased: settings.antialiased,
