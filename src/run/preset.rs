@@ -25,7 +25,7 @@ pub enum Preset {
 }
 
 /// Gain of twice the iterations, in dB, below which long presets end, and others that are asked
-/// to. Where that ended a real scene early, what came after was worth -0.9 to +0.14 dB
+/// to. Where that ended a real scene early, what came after was worth -1.1 to +0.14 dB
 /// (docs/accuracy-and-time.md).
 pub const FLAT: f64 = 0.1;
 
