@@ -10,6 +10,7 @@
 mod best;
 mod changes;
 mod ends;
+mod room;
 mod watch;
 
 pub use watch::Look;
@@ -29,17 +30,14 @@ use super::{
 };
 use crate::{
     capture::{Camera, Exposure},
-    gpu::{Buffer, Gpu, GpuError, Readback, Recorder},
-    optimize::{AdamState, Load, view_at},
+    gpu::{Gpu, GpuError, Readback, Recorder},
+    optimize::{Load, view_at},
     raster::{Field, Geometry, Raster, StatusReadback, ViewUniform, constants::*, download},
     splats::{Splats, sh},
 };
 
 /// Iterations between two looks at the device.
 pub(super) const SYNC_EVERY: usize = 25;
-
-/// Room left above what an overflowing view needed.
-const HEADROOM: f64 = 1.25;
 
 /// How far a training is.
 #[derive(Clone, Copy, Debug)]
@@ -437,69 +435,5 @@ impl LumaTrainer {
             looked: self.watch.last(),
         });
         Ok(None)
-    }
-
-    /// Room for a view that needed so many entries of the tile lists.
-    fn make_room(&mut self, needed: usize, iteration: usize) -> Result<(), GpuError> {
-        self.rebuild((needed as f64 * HEADROOM) as usize, iteration)
-    }
-
-    /// A new workspace with the same Gaussians and moments.
-    fn rebuild(&mut self, capacity: usize, iteration: usize) -> Result<(), GpuError> {
-        let keep = |adam: &AdamState| -> Result<[Buffer<f32>; 2], GpuError> {
-            let copies = [
-                Buffer::zeros(&self.gpu, "first moments", adam.first.len())?,
-                Buffer::zeros(&self.gpu, "second moments", adam.second.len())?,
-            ];
-            let mut recorder = Recorder::new(&self.gpu);
-            recorder.copy(adam.first.raw(), copies[0].raw());
-            recorder.copy(adam.second.raw(), copies[1].raw());
-            recorder.submit();
-            Ok(copies)
-        };
-        let moments = [
-            keep(&self.workspace().adam_geometry)?,
-            keep(&self.workspace().adam_field)?,
-        ];
-        // Statistics since the last densification go on.
-        let statistics = self.workspace().statistics().clone();
-        self.renew(capacity, iteration, moments)?;
-        let mut recorder = Recorder::new(&self.gpu);
-        recorder.copy(statistics.raw(), self.workspace().statistics().raw());
-        recorder.submit();
-        Ok(())
-    }
-
-    /// A new workspace for the present Gaussians with these moments.
-    fn renew(
-        &mut self,
-        capacity: usize,
-        iteration: usize,
-        moments: [[Buffer<f32>; 2]; 2],
-    ) -> Result<(), GpuError> {
-        let limit = self.settings.memory_limit;
-        self.demand.check(limit, self.geometry.count, capacity)?;
-        // Losses since the last report go on.
-        let losses = self.workspace().log.losses.clone();
-        self.workspace = None;
-        // Only now the device frees what it held.
-        self.gpu.wait()?;
-        let workspace = Workspace::new(
-            &self.raster,
-            &self.kernels,
-            &self.settings,
-            &self.geometry,
-            &self.field,
-            &self.targets,
-            [self.max_pixels, self.max_tiles],
-            capacity,
-            Some(moments),
-        );
-        self.workspace = Some(workspace.map_err(|error| error.of_splats(self.geometry.count))?);
-        let mut recorder = Recorder::new(&self.gpu);
-        recorder.copy(losses.raw(), self.workspace().log.losses.raw());
-        recorder.submit();
-        self.base = iteration;
-        Ok(())
     }
 }
