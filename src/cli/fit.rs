@@ -42,8 +42,9 @@ pub struct Fit {
     #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u32).range(1..))]
     memory_limit: Option<u32>,
     /// End where twice the iterations would bring less than so many dB on held-out views
-    /// (0.1 if no number follows), with what was best on the way [default: 0.1 in the presets balanced and paper, unless
-    /// --iterations, --time-limit or --target-psnr says how much is to be done; else never].
+    /// (0.1 if no number follows), with what was best on the way [default: 0.3 in the preset
+    /// balanced, 0.1 in paper, unless --iterations, --time-limit or --target-psnr says how much
+    /// is to be done; else never].
     #[arg(long, value_name = "DB", num_args = 0..=1, require_equals = true, value_parser = decibels)]
     stop_when_flat: Option<Option<f64>>,
     /// Choose iterations, Gaussians and photo size so that all is done in so many minutes; with

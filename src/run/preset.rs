@@ -26,10 +26,12 @@ pub enum Preset {
     Paper,
 }
 
-/// Gain of twice the iterations, in dB, below which long presets end, and others that are asked
-/// to. Where that ended a real scene early, what came after was worth -1.1 to +0.14 dB
-/// (docs/accuracy-and-time.md).
+/// Gain of twice the iterations, in dB, below which `paper` ends, and what is asked to end
+/// where flat.
 pub const FLAT: f64 = 0.1;
+
+/// The same for `balanced`: a gain that is worth twice the time to few.
+const BALANCED_FLAT: f64 = 0.3;
 
 /// What a preset stands for.
 #[derive(Clone, Copy, Debug)]
@@ -140,7 +142,7 @@ impl Preset {
                 max_splats: 500_000,
                 max_side: Some(1_600),
                 sh_degree: 2,
-                flat: Some(FLAT),
+                flat: Some(BALANCED_FLAT),
             },
             Self::Paper => Amounts {
                 iterations: 15_000,

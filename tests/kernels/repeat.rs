@@ -255,12 +255,13 @@ fn a_scene_that_is_right_is_seen_to_be() {
 #[test]
 fn a_flat_curve_ends_a_training() {
     let [start, target] = start_and_target();
-    let run = |flat| {
+    let run = |flat, raise_degree_every| {
         let mut settings = LumaSettings {
             flat,
             ..settings(&start)
         };
         settings.schedule = Schedule::of(400);
+        settings.schedule.raise_degree_every = raise_degree_every;
         settings.max_splats = start.len();
         let mut trainer =
             LumaTrainer::new(raster(), settings, 4.0, &start, photos(&target)).unwrap();
@@ -270,12 +271,14 @@ fn a_flat_curve_ends_a_training() {
         let ends = [schedule.settle_from, schedule.iterations];
         (trainer.splats().unwrap(), ends, trainer.curve().len())
     };
-    let (_, ends, looks) = run(None);
+    let (_, ends, looks) = run(None, 20);
     assert_eq!((ends, looks), ([280, 400], 15));
     // Nothing brings a hundred dB.
-    let (first, [settles, end], looks) = run(Some(100.0));
+    let (first, [settles, end], looks) = run(Some(100.0), 20);
     assert_eq!(([settles, end], looks), ([100, 120], 5));
-    assert!(same(&run(Some(100.0)).0, &first));
+    assert!(same(&run(Some(100.0), 20).0, &first));
+    // The first look when the last harmonics have had a quarter of their 110 iterations.
+    assert_eq!(run(Some(100.0), 110).1, [150, 180]);
 }
 
 /// What is no gain is given up: the bytes are those of a training that never went beyond.
@@ -371,8 +374,8 @@ fn a_time_limit_moves_the_end() {
     };
     assert!(ends(0.0, None) < 110);
     assert_eq!(ends(1e9, None), 480);
-    // The first look after a quarter of 480, and a fifth of that to settle.
-    assert_eq!(ends(1e9, Some(100.0)), 150);
+    // The first look after 15 % of 480, and a fifth of that to settle.
+    assert_eq!(ends(1e9, Some(100.0)), 120);
 }
 
 /// Gaussians behind every camera change nothing but the room that the lists

@@ -7,12 +7,12 @@ use crate::{gpu::GpuError, luma::curve::gain_of_doubling};
 /// or larger photos would have been worth more.
 pub(super) const LONGER: usize = 3;
 
-/// No curve is called flat before this share of the iterations, or [`GROWN`] if that is
-/// less: the set still grows.
-const FLAT_FROM: f64 = 0.25;
+/// No curve is called flat before this share of the iterations: the set still grows.
+const FLAT_FROM: f64 = 0.15;
 
-/// After so many iterations a set has had seventeen chances to grow by 30 %.
-const GROWN: usize = 1_750;
+/// Nor before so many times the iterations after which the last harmonics came: they need
+/// time to show what they bring.
+const HARMONICS_SHOW: f64 = 1.25;
 
 impl LumaTrainer {
     /// Moves the end to where the time limit will be reached.
@@ -37,20 +37,22 @@ impl LumaTrainer {
     /// Lets the run settle where little is left to gain, from where it was best: when it has
     /// gone back there, the iteration that it goes on from.
     pub(super) fn stop_when_flat(&mut self, iteration: usize) -> Result<Option<usize>, GpuError> {
-        let schedule = &self.settings.schedule;
         let Some(threshold) = self.settings.flat else {
             return Ok(None);
         };
+        let schedule = self.settings.schedule.clone();
         // What small photos and few harmonics have taught says nothing about what more will.
-        let whole = schedule.coarse_until.max(self.settings.full_degree_from());
+        let degrees = self.settings.full_degree_from();
+        let whole = schedule.coarse_until.max(degrees);
         if iteration <= whole || iteration >= schedule.settle_from {
             return Ok(None);
         }
         self.keep_best(iteration)?;
-        let schedule = &self.settings.schedule;
-        let early = (FLAT_FROM * schedule.iterations as f64).min(GROWN as f64);
+        let early = (FLAT_FROM * schedule.iterations as f64).max(HARMONICS_SHOW * degrees as f64);
         let curve = self.curve();
-        let counts = curve.partition_point(|look| look.iteration <= whole);
+        // Nothing would be gained while photos are small, and much by the first look after it;
+        // harmonics that are yet to come only make a curve steeper.
+        let counts = curve.partition_point(|look| look.iteration <= schedule.coarse_until);
         let flat = gain_of_doubling(&curve[counts..]).is_some_and(|gain| gain < threshold);
         if !flat || (iteration as f64) < early {
             return Ok(None);

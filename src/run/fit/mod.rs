@@ -247,7 +247,7 @@ mod tests {
     fn long_presets_end_where_flat_unless_told_how_long() {
         let mut options = FitOptions::new(PathBuf::from("scene"));
         let flat = |options: &FitOptions, preset| asked_amounts(options, preset).flat;
-        assert_eq!(flat(&options, Preset::Balanced), Some(0.1));
+        assert_eq!(flat(&options, Preset::Balanced), Some(0.3));
         assert_eq!(flat(&options, Preset::Draft), None);
         assert_eq!(flat(&options, Preset::Paper), Some(0.1));
         options.iterations = Some(7_000);
