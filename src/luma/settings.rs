@@ -79,7 +79,13 @@ impl Schedule {
         let short = iterations < PAPER_ITERATIONS;
         Self {
             iterations,
-            densify_from: if short { share(500).max(100) } else { 500 },
+            // What is split before it has found its place is split in vain; the pace of
+            // longer runs is in iterations, so is this.
+            densify_from: if iterations < SHORT_RUN {
+                share(500).max(100)
+            } else {
+                500
+            },
             // A run needs time to settle after the last split.
             densify_until: share(12_000).min(PAPER_ITERATIONS),
             // Some five looks at the pulls, each over enough iterations to be worth one.
