@@ -226,8 +226,7 @@ fn presets_and_what_overrules_them() {
     let place = place_with_scene();
     let presets = [
         ("draft", 12_000, 0, json!(400)),
-        ("balanced", 500_000, 2, json!(1600)),
-        // Or as many as the device has room for.
+        ("balanced", 2_000_000, 2, json!(1600)),
         ("paper", 3_000_000, 3, json!(null)),
     ];
     for (preset, max_splats, degree, max_side) in presets {
@@ -243,7 +242,8 @@ fn presets_and_what_overrules_them() {
         let report = place.json(&fit);
         assert_eq!(report["preset"], preset);
         let cap = report["luma"]["max_splats"].as_u64();
-        assert!(cap == Some(max_splats) || preset == "paper" && cap < Some(max_splats));
+        // Or as many as the device has room for.
+        assert!(cap == Some(max_splats) || preset != "draft" && cap < Some(max_splats));
         assert_eq!(report["luma"]["sh_degree"], degree);
         assert_eq!(report["capture"]["max_side"], max_side);
     }
@@ -359,7 +359,7 @@ fn a_flat_curve_ends_the_run() {
     fit[5] = "400";
     place.succeed(&[&fit[..], &["--stop-when-flat=50"]].concat());
     let luma = &place.report("runs/scene")["luma"];
-    assert_eq!(luma["iterations"], 120);
+    assert_eq!(luma["iterations"], 150);
     assert_eq!(luma["goal"]["stop_when_flat"], 50.0);
 }
 
@@ -473,5 +473,5 @@ fn a_time_limit_is_kept_or_refused() {
     // How well it is kept shows on real scenes (docs/accuracy-and-time.md); that it is what
     // ends the run, here: no preset has such a number of iterations.
     assert_eq!(luma["goal"]["time_limit"], 12.0);
-    assert!(![700, 7_000, 15_000].contains(&luma["iterations"].as_u64().expect("a number")));
+    assert!(![700, 3_500, 15_000].contains(&luma["iterations"].as_u64().expect("a number")));
 }

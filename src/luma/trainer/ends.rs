@@ -7,8 +7,12 @@ use crate::{gpu::GpuError, luma::curve::gain_of_doubling};
 /// or larger photos would have been worth more.
 pub(super) const LONGER: usize = 3;
 
-/// No curve is called flat before this share of the iterations: the set still grows.
-const FLAT_FROM: f64 = 0.15;
+/// No curve is called flat before this share of the iterations, or [`GROWN`] if that is
+/// less: the set still grows.
+const FLAT_FROM: f64 = 0.3;
+
+/// In so many iterations a set that begins to grow after 500 grows twelve times, by 30 % each.
+const GROWN: f64 = 1_750.0;
 
 /// Nor before so many times the iterations after which the last harmonics came: they need
 /// time to show what they bring.
@@ -48,7 +52,8 @@ impl LumaTrainer {
             return Ok(None);
         }
         self.keep_best(iteration)?;
-        let early = (FLAT_FROM * schedule.iterations as f64).max(HARMONICS_SHOW * degrees as f64);
+        let grown = (FLAT_FROM * schedule.iterations as f64).min(GROWN);
+        let early = grown.max(HARMONICS_SHOW * degrees as f64);
         let curve = self.curve();
         // Nothing would be gained while photos are small, and much by the first look after it;
         // harmonics that are yet to come only make a curve steeper.

@@ -11,7 +11,7 @@ mod trial;
 
 use std::{path::PathBuf, sync::Arc, time::Instant};
 
-use super::{Event, Observer, Preset, RunError, RunFolder, files, preset::Amounts, scene::Scene};
+use super::{Event, Observer, Preset, RunError, RunFolder, files, scene::Scene};
 use crate::{
     capture::LoadOptions,
     effects::{Effect, Overrules},
@@ -120,7 +120,11 @@ pub fn fit(
     };
     files::make_folder(folder.path())?;
     let ahead = Ahead::open(&options.ahead, &folder)?;
-    let asked = asked_amounts(options, preset);
+    let asked = preset.asked(
+        options.iterations,
+        options.max_splats,
+        options.load.max_side,
+    );
     let family = match options.time_limit.or(options.target_psnr) {
         Some(_) => Some(Family::of(options, asked.max_side)?),
         None => None,
@@ -200,19 +204,6 @@ pub fn fit(
     }
 }
 
-/// The preset's amounts where options do not say otherwise.
-fn asked_amounts(options: &FitOptions, preset: Preset) -> Amounts {
-    let amounts = preset.amounts();
-    Amounts {
-        iterations: options.iterations.unwrap_or(amounts.iterations),
-        max_splats: options.max_splats.unwrap_or(amounts.max_splats),
-        max_side: options.load.max_side.or(amounts.max_side),
-        // Who says how many iterations wants them all.
-        flat: amounts.flat.filter(|_| options.iterations.is_none()),
-        ..amounts
-    }
-}
-
 /// The device; with `timed`, its dispatches are.
 pub(super) fn open_gpu(timed: bool) -> Result<Gpu, RunError> {
     let gpu = Gpu::open()?;
@@ -237,20 +228,4 @@ fn choose_preset(options: &FitOptions, gpu: &Gpu, observe: &mut Observer<'_>) ->
         }
         Preset::for_device(gpu)
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn long_presets_end_where_flat_unless_told_how_long() {
-        let mut options = FitOptions::new(PathBuf::from("scene"));
-        let flat = |options: &FitOptions, preset| asked_amounts(options, preset).flat;
-        assert_eq!(flat(&options, Preset::Balanced), Some(0.3));
-        assert_eq!(flat(&options, Preset::Draft), None);
-        assert_eq!(flat(&options, Preset::Paper), Some(0.1));
-        options.iterations = Some(7_000);
-        assert_eq!(flat(&options, Preset::Balanced), None);
-    }
 }
