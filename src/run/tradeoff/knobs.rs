@@ -7,6 +7,7 @@ use crate::{
         Report,
         tradeoff::{PointStage, Setting},
     },
+    run::preset::Amounts,
 };
 
 /// An option of `fit` or `colorize` and its value.
@@ -45,6 +46,8 @@ pub(super) struct Around {
     pub sh_degree: u32,
     /// Iterations that Adam takes for chroma.
     pub adam: usize,
+    /// The names of the other presets, and the work of each over the base's.
+    pub presets: Vec<(&'static str, f64)>,
     /// How the base is coloured, once it is.
     pub color: Option<ColorAround>,
 }
@@ -74,8 +77,35 @@ impl Around {
             splats: base.luma.splats,
             sh_degree: base.luma.sh_degree,
             adam,
+            presets: Vec::new(),
             color: None,
         }
+    }
+
+    /// What amounts of work are over the base's, which was asked for `base`. Rather too much:
+    /// Gaussians may stay below their cap.
+    pub fn work(&self, amounts: &Amounts, base: &Amounts) -> f64 {
+        let ratio = |amount: f64, base: usize| amount / base.max(1) as f64;
+        let iterations = match amounts.flat.and(base.flat) {
+            // Both end where the curve is flat, which may be long before.
+            Some(_) => base.iterations,
+            None => self.iterations,
+        };
+        let side = amounts.max_side.unwrap_or(self.largest_side);
+        let side = ratio(side.min(self.largest_side).into(), self.side as usize);
+        // Where its own cap left room to the base, so will another.
+        let splats = match self.reaches_cap() {
+            true => amounts.max_splats,
+            false => amounts.max_splats.min(self.splats),
+        };
+        let splats = ratio(splats as f64, self.splats);
+        let each = PIXELS_SHARE * side.powi(2) + (1.0 - PIXELS_SHARE) * splats;
+        ratio(amounts.iterations as f64, iterations) * each
+    }
+
+    /// Whether its cap kept the base from having more Gaussians.
+    fn reaches_cap(&self) -> bool {
+        self.splats as f64 > 0.9 * self.max_splats as f64
     }
 
     /// With what the coloured base's report says.
@@ -109,6 +139,23 @@ const KNOBS: &[Knob] = &[
         conflicts: &[],
     },
     Knob {
+        name: PRESET,
+        stage: PointStage::Luma,
+        values: |around| {
+            around
+                .presets
+                .iter()
+                .map(|(name, _)| (*name).to_owned())
+                .collect()
+        },
+        turn: |value| vec![("--preset", value.to_owned())],
+        time: |around, value| {
+            let known = around.presets.iter().find(|(name, _)| *name == value);
+            known.map_or(1.0, |(_, work)| *work)
+        },
+        conflicts: &[],
+    },
+    Knob {
         name: "max-side",
         stage: PointStage::Luma,
         values: |around| {
@@ -118,8 +165,10 @@ const KNOBS: &[Knob] = &[
             sides.into_iter().filter(fits).filter(readable).collect()
         },
         turn: |value| vec![("--max-side", value.to_owned())],
-        // Half of an iteration is about pixels, half about Gaussians.
-        time: |around, value| 0.5 + 0.5 * (number(value) / f64::from(around.side)).powi(2),
+        time: |around, value| {
+            let side = number(value) / f64::from(around.side);
+            1.0 - PIXELS_SHARE + PIXELS_SHARE * side.powi(2)
+        },
         conflicts: &[],
     },
     Knob {
@@ -128,13 +177,16 @@ const KNOBS: &[Knob] = &[
         values: |around| {
             let mut values = scaled(around.splats.min(around.max_splats), &[0.5, 0.25]);
             // A cap that is not reached does nothing when it is raised.
-            if around.splats as f64 > 0.9 * around.max_splats as f64 {
+            if around.reaches_cap() {
                 values.extend(scaled(around.max_splats, &[2.0]));
             }
             values
         },
         turn: |value| vec![("--max-splats", value.to_owned())],
-        time: |around, value| 0.5 + 0.5 * number(value) / around.splats.max(1) as f64,
+        time: |around, value| {
+            let splats = number(value) / around.splats.max(1) as f64;
+            PIXELS_SHARE + (1.0 - PIXELS_SHARE) * splats
+        },
         conflicts: &[],
     },
     Knob {
@@ -320,7 +372,13 @@ const LEAST_SIDE: u32 = 16;
 /// any scene.
 pub(super) const YARDSTICK_OF_LUMA: &str = "iterations";
 
-/// The same of stage 2.
+/// The knob that turns many at once, and is not turned with others.
+pub(super) const PRESET: &str = "preset";
+
+/// Share of an iteration of stage 1 that goes by pixels and not by Gaussians: about half.
+const PIXELS_SHARE: f64 = 0.5;
+
+/// The same as [`YARDSTICK_OF_LUMA`] of stage 2.
 pub(super) const YARDSTICK_OF_COLOR: &str = "rounds";
 
 /// Every knob.

@@ -11,6 +11,7 @@ fn around() -> Around {
         splats: 8_000,
         sh_degree: 0,
         adam: 150,
+        presets: vec![("balanced", 2.5), ("paper", 4.0)],
         color: None,
     }
 }
@@ -70,6 +71,36 @@ fn times_are_guessed_relative_to_the_base() {
     assert!(all.iter().all(|v| v.time > 0.0 && v.time < 5.0), "{all:?}");
     let half = all.iter().find(|v| v.value == "350").expect("half");
     assert_eq!(half.time, 0.5);
+}
+
+#[test]
+fn another_preset_is_as_much_work_as_its_amounts_say() {
+    let amounts = |iterations, flat| Amounts {
+        iterations,
+        max_splats: 24_000,
+        max_side: None,
+        flat,
+        ..Amounts::SKETCH
+    };
+    let around = around();
+    let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{a} {b}");
+    // Twice the iterations, of 500 pixels instead of 400, with Gaussians below any cap.
+    let pixels = 0.5 * 1.25_f64.powi(2);
+    let (base, twice) = (amounts(700, None), amounts(1_400, Some(0.1)));
+    close(around.work(&twice, &base), 2.0 * (pixels + 0.5));
+    // A base of 2,800 that ended after 700; one that ends early too, and one that does not.
+    let base = amounts(2_800, Some(0.3));
+    close(around.work(&twice, &base), 0.5 * (pixels + 0.5));
+    let all = amounts(1_400, None);
+    close(around.work(&all, &base), 2.0 * (pixels + 0.5));
+    let full = Around {
+        splats: 12_000,
+        ..around
+    };
+    close(full.work(&all, &base), 2.0 * (pixels + 1.0));
+    let presets = values(&full, &["preset".to_owned()]);
+    let times: Vec<_> = presets.iter().map(|v| (&v.value[..], v.time)).collect();
+    assert_eq!(times, [("balanced", 2.5), ("paper", 4.0)]);
 }
 
 #[test]

@@ -136,6 +136,14 @@ fn next(
         let amounts = preset.amounts();
         let adam = amounts.until - amounts.iterations;
         let mut around = Around::new(&report(PointStage::Luma)?, largest_side, adam);
+        let asked = |preset: Preset| {
+            let side = options.load.max_side;
+            preset.asked(options.iterations, options.max_splats, side)
+        };
+        let others = Preset::ALL.into_iter().filter(|&other| other != preset);
+        around.presets = others
+            .map(|other| (other.name(), around.work(&asked(other), &asked(preset))))
+            .collect();
         if done(PointStage::Color) {
             around = around.colored(&report(PointStage::Color)?);
         }

@@ -5,7 +5,7 @@
 //! that a sweep that goes on asks for what one without a break would have asked for.
 
 use super::{
-    knobs::{YARDSTICK_OF_COLOR, YARDSTICK_OF_LUMA},
+    knobs::{PRESET, YARDSTICK_OF_COLOR, YARDSTICK_OF_LUMA},
     space::{Space, Task, Value, base_name, expected, find, name},
 };
 use crate::report::tradeoff::{Measure, Phase, Point, PointStage, Setting};
@@ -125,7 +125,7 @@ fn combinations(
     at_least: usize,
 ) -> Vec<Vec<Setting>> {
     let mut proven: Vec<(f64, &Value)> = (space.values.iter())
-        .filter(|value| value.stage == stage && value.knob != yardstick(stage))
+        .filter(|value| value.stage == stage && ![yardstick(stage), PRESET].contains(&value.knob))
         .filter_map(|value| {
             let point = find(points, &name(stage, &[value.setting()]))?;
             let gain = gain(points, point)?;

@@ -18,6 +18,9 @@ const LUMA: [Effect; 5] = [
     ("sh-degree", "3", 2.0, -0.5),
 ];
 
+/// Worth more still.
+const PAPER: Effect = ("preset", "paper", 1.1, 0.9);
+
 const COLOR: [Effect; 4] = [
     ("rounds", "2", 0.5, 0.5),
     ("rounds", "8", 2.0, -0.1),
@@ -55,8 +58,8 @@ fn model(settings: &[Setting], effects: &[Effect]) -> (f64, f64) {
     settings
         .iter()
         .fold((1.0, 0.0), |(time, quality), setting| {
-            let known = effects
-                .iter()
+            let known = (effects.iter())
+                .chain([&PAPER])
                 .find(|e| e.0 == setting.knob && e.1 == setting.value);
             let (factor, change) = known.map_or_else(
                 || {
@@ -167,6 +170,21 @@ fn what_proved_itself_is_combined_at_few_iterations_first() {
             .count()
     };
     assert_eq!((at("-175"), at("-1400")), (3, 1), "{names:?}");
+}
+
+/// A preset is many knobs: as well as it does, none is turned with it.
+#[test]
+fn a_preset_stands_alone() {
+    let mut space = space(false);
+    let mut preset = space.values[3].clone();
+    (preset.knob, preset.value) = ("preset", "paper".to_owned());
+    space.values.push(preset);
+    let points = sweep(&space, Vec::new(), PLENTY);
+    let with: Vec<&str> = names(&points)
+        .into_iter()
+        .filter(|name| name.contains("preset"))
+        .collect();
+    assert_eq!(with, ["preset-paper"]);
 }
 
 #[test]
