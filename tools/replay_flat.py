@@ -3,7 +3,7 @@
 a flat curve (`src/luma/trainer/ends.rs`), by the curves in their `report.json`.
 
     gs-chroma fit ../shared/data/banana-object --preset balanced --max-side 160 --max-splats 5000 --iterations 7000 -o target/flat/banana
-    python3 tools/replay_flat.py target/flat/* --gains 0.1,0.3 --shares 0.15,0.25
+    python3 tools/replay_flat.py target/flat/* --gains 0.1,0.3 --from 1050,1750
 
 What a run would have ended with only a run tells: of what remains after a verdict, the table
 has the best look before it and the best that was still to come.
@@ -41,9 +41,9 @@ def full_degree_from(iterations: int, degree: int) -> int:
     return degree * ceil(PAPER_RAISE_EVERY * iterations / PAPER_ITERATIONS)
 
 
-def verdict(curve: list[Point], iterations: int, degree: int, gain: float, share: float) -> int | None:
+def verdict(curve: list[Point], iterations: int, degree: int, gain: float, begin: int) -> int | None:
     """Index of the look after which the curve is called flat."""
-    first = max(share * iterations, HARMONICS_SHOW * full_degree_from(iterations, degree))
+    first = max(begin, HARMONICS_SHOW * full_degree_from(iterations, degree))
     for index, (iteration, _) in enumerate(curve):
         slope = gain_of_doubling(curve[: index + 1])
         if first <= iteration < SETTLE_FROM * iterations and slope is not None and slope < gain:
@@ -55,11 +55,11 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("runs", nargs="+", type=Path, help="folders of `fit --iterations`")
     parser.add_argument("--gains", default="0.1,0.3", help="in dB for twice the iterations")
-    parser.add_argument("--shares", default="0.15", help="of the iterations, no verdict before")
+    parser.add_argument("--from", dest="begins", default="1050", help="no verdict before so many iterations")
     arguments = parser.parse_args()
     rules = [
-        (float(gain), float(share))
-        for share in arguments.shares.split(",")
+        (float(gain), int(begin))
+        for begin in arguments.begins.split(",")
         for gain in arguments.gains.split(",")
     ]
     print("| run | flat below, from | verdict after | best look before | iterations in all | best look of all |")
@@ -70,14 +70,14 @@ def main() -> int:
         iterations, degree = luma["iterations"], luma["sh_degree"]
         whole = full_degree_from(iterations, degree)
         best_of_all = max(curve, key=lambda point: point[1])
-        for gain, share in rules:
-            index = verdict(curve, iterations, degree, gain, share)
+        for gain, begin in rules:
+            index = verdict(curve, iterations, degree, gain, begin)
             row = ["never", "", str(iterations)]
             if index is not None:
                 best = max((p for p in curve[: index + 1] if p[0] > whole), key=lambda p: p[1])
                 settling = ceil(SETTLING_SHARE * best[0])
                 row = [str(curve[index][0]), shown(best), str(curve[index][0] + settling)]
-            print(f"| {run.name} | {gain} dB, {share} | {' | '.join(row)} | {shown(best_of_all)} |")
+            print(f"| {run.name} | {gain} dB, {begin} | {' | '.join(row)} | {shown(best_of_all)} |")
     return 0
 
 
