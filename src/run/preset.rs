@@ -17,8 +17,8 @@ pub enum Preset {
     /// its held-out photos.
     Draft,
     /// For a GPU; goes back to its best and ends where twice the iterations would bring less than
-    /// 0.3 dB: small photos of three scenes in 1.6 to 5.6 times the time of a draft, for 0.5 to
-    /// 1.9 dB more.
+    /// 0.3 dB: on two processor cores small photos of three scenes took 1.6 to 5.6 times as long
+    /// as a draft with as many Gaussians, for 0.5 to 1.9 dB more.
     Balanced,
     /// The schedule of the ChromaDistill paper, for a GPU: 15,000 luma iterations, chroma until
     /// 30,000; luma ends as in `balanced`, below 0.1 dB. Pays where `balanced` still gains when it
@@ -138,7 +138,7 @@ impl Preset {
             },
             Self::Balanced => Amounts {
                 // Twice the Gaussians in half of the iterations are better and no slower
-                // (docs/accuracy-and-time.md).
+                // (docs/decisions.md).
                 iterations: 3_500,
                 until: 6_500,
                 max_splats: 2_000_000,
