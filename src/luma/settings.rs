@@ -72,11 +72,11 @@ pub struct Schedule {
 
 impl Schedule {
     /// The paper's schedule is written for 15,000 iterations; a shorter run passes
-    /// through the same phases in proportion. There are no opacity resets, and splitting
-    /// ends with four fifths of the run (measured in docs/decisions.md).
+    /// through the same phases in proportion. There are no opacity resets, splitting
+    /// ends with four fifths of the run, and harmonics come sooner than every 1,000
+    /// iterations (measured in docs/decisions.md).
     pub fn of(iterations: usize) -> Self {
         let share = |of_paper: usize| (of_paper * iterations).div_ceil(PAPER_ITERATIONS);
-        let short = iterations < PAPER_ITERATIONS;
         Self {
             iterations,
             // What is split before it has found its place is split in vain; the pace of
@@ -94,7 +94,7 @@ impl Schedule {
             } else {
                 100
             },
-            raise_degree_every: if short { share(1_000).max(1) } else { 1_000 },
+            raise_degree_every: share(1_000).clamp(1, RAISED_BY),
             settle_from: iterations * 7 / 10,
             coarse_until: 0,
             find_outliers_at: OUTLIERS_AT.map(|share| (share * iterations as f64) as usize),
@@ -138,6 +138,10 @@ impl Schedule {
 
 /// In a run with fewer iterations the set of Gaussians changes at a pace of its own.
 pub const SHORT_RUN: usize = 3_000;
+
+/// The next degree of harmonics waits no longer than this: a run whose curve is soon flat
+/// ends with what it has learnt by then.
+const RAISED_BY: usize = 250;
 
 /// Share of its learning rates at which a run that settles ends: steps that answer to one
 /// view at a time leave noise as large as they are.
@@ -300,7 +304,7 @@ mod tests {
                 densify_from: 500,
                 densify_until: 12_000,
                 densify_every: 100,
-                raise_degree_every: 1_000,
+                raise_degree_every: 250,
                 settle_from: 10_500,
                 coarse_until: 0,
                 find_outliers_at: [6_000, 9_750],
@@ -309,7 +313,7 @@ mod tests {
         let settings = LumaSettings::new(PAPER_ITERATIONS);
         assert!(!settings.densifies_after(500) && settings.densifies_after(600));
         assert_eq!(
-            [0, 999, 1_000, 2_500, 9_000].map(|i| settings.degree_at(i)),
+            [0, 249, 250, 600, 9_000].map(|i| settings.degree_at(i)),
             [0, 0, 1, 2, 3]
         );
     }
