@@ -23,6 +23,7 @@ SETTLING_SHARE = 0.2
 HARMONICS_SHOW = 1.25
 SETTLE_FROM = 0.7
 PAPER_ITERATIONS, PAPER_RAISE_EVERY = 15_000, 1_000
+RAISED_BY = 250
 POINTS_MIN = 3
 
 Point = tuple[int, float]
@@ -38,7 +39,7 @@ def gain_of_doubling(curve: list[Point]) -> float | None:
 
 
 def full_degree_from(iterations: int, degree: int) -> int:
-    return degree * ceil(PAPER_RAISE_EVERY * iterations / PAPER_ITERATIONS)
+    return degree * min(ceil(PAPER_RAISE_EVERY * iterations / PAPER_ITERATIONS), RAISED_BY)
 
 
 def verdict(curve: list[Point], iterations: int, degree: int, gain: float, begin: int) -> int | None:
