@@ -15,7 +15,6 @@ pub mod effects;
 pub mod gpu;
 pub mod luma;
 pub mod measure;
-pub mod optimize;
 pub mod oracle;
 pub mod raster;
 pub mod report;

@@ -5,8 +5,7 @@ use std::sync::Arc;
 use super::{ChromaProgress, ChromaSettings, ChromaView, Distiller, Solver, fill_unseen};
 use crate::{
     gpu::GpuError,
-    optimize::Load,
-    raster::Raster,
+    raster::{Load, Raster},
     splats::{ShField, Splats},
 };
 

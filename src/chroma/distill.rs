@@ -9,9 +9,11 @@ use super::{
     pass::{Pass, Shared},
 };
 use crate::{
+    capture::view_at,
     gpu::{Buffer, Gpu, GpuError, Recorder},
-    optimize::{Adam, AdamKernel, Load, LossLog, SumLossKernel, view_at},
-    raster::{Field, Geometry, Raster, constants::*},
+    raster::{
+        Adam, AdamKernel, Field, Geometry, Load, LossLog, Raster, SumLossKernel, constants::*,
+    },
     splats::{ShField, Splats, sh},
 };
 

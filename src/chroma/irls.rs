@@ -14,8 +14,9 @@ use super::{
 };
 use crate::{
     gpu::{Buffer, Gpu, GpuError, Readback, Recorder},
-    optimize::{Load, LossLog, SumLossKernel},
-    raster::{Field, Geometry, Lists, Raster, ViewUniform, constants::*},
+    raster::{
+        Field, Geometry, Lists, Load, LossLog, Raster, SumLossKernel, ViewUniform, constants::*,
+    },
     splats::{ShField, Splats, sh},
 };
 

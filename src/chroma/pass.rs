@@ -6,8 +6,9 @@ use super::{
 };
 use crate::{
     gpu::{Bindings, Buffer, Gpu, GpuError, Kernel, Recorder},
-    optimize::{Load, LossLog},
-    raster::{Field, Geometry, Layer, LayerAdjoint, Lists, Outcome, Raster, ViewUniform},
+    raster::{
+        Field, Geometry, Layer, LayerAdjoint, Lists, Load, LossLog, Outcome, Raster, ViewUniform,
+    },
 };
 
 /// What all passes share.

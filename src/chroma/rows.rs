@@ -11,10 +11,9 @@ use super::{
 };
 use crate::{
     gpu::{Bindings, Buffer, Gpu, GpuError, Kernel, Recorder},
-    optimize::LossLog,
     raster::{
-        AdjointScratch, Canvas, ColorKind, Field, Geometry, Layer, LayerAdjoint, Lists, Outcome,
-        Raster, Status, Storage, ViewUniform,
+        AdjointScratch, Canvas, ColorKind, Field, Geometry, Layer, LayerAdjoint, Lists, LossLog,
+        Outcome, Raster, Status, Storage, ViewUniform,
     },
 };
 

@@ -6,8 +6,7 @@ use super::{SsimWindow, photos::Photos};
 use crate::{
     capture::Exposure,
     gpu::{Bindings, Buffer, Gpu, GpuError, Kernel, Recorder, shaders},
-    optimize::LossLog,
-    raster::{Layer, LayerAdjoint, Lists, ViewUniform},
+    raster::{Layer, LayerAdjoint, Lists, LossLog, ViewUniform},
 };
 
 /// Pixels on the side of a workgroup's block.

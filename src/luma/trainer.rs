@@ -29,10 +29,9 @@ use super::{
     workspace::{Kernels, Workspace},
 };
 use crate::{
-    capture::{Camera, Exposure},
+    capture::{Camera, Exposure, view_at},
     gpu::{Gpu, GpuError, Readback, Recorder},
-    optimize::{Load, view_at},
-    raster::{Field, Geometry, Raster, StatusReadback, ViewUniform, constants::*, download},
+    raster::{Field, Geometry, Load, Raster, StatusReadback, ViewUniform, constants::*, download},
     splats::{Splats, sh},
 };
 

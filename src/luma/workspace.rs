@@ -11,8 +11,10 @@ use super::{
 };
 use crate::{
     gpu::{Buffer, Gpu, GpuError},
-    optimize::{AdamState, LossLog, SumLossKernel},
-    raster::{Field, Geometry, Layer, LayerAdjoint, Lists, Outcome, Raster},
+    raster::{
+        AdamState, Field, Geometry, Layer, LayerAdjoint, Lists, LossLog, Outcome, Raster,
+        SumLossKernel,
+    },
 };
 
 /// The kernels of a step besides the rasterizer's.

@@ -5,24 +5,30 @@
 //! geometry alone, [`Layer`] those that draw one field of colour over it,
 //! [`LayerAdjoint`] their adjoints.
 
+mod adam;
 pub mod constants;
 mod kernels;
 mod layer;
 mod lists;
 mod numerics;
 mod renderer;
+mod roofline;
 pub mod scan;
 pub mod sort;
 mod splats;
+mod sum_loss;
 mod view;
 
+pub use adam::{Adam, AdamKernel, AdamParameters, AdamState};
 pub use layer::{
     AdjointScratch, Canvas, GeometryAdjoint, Layer, LayerAdjoint, Outcome, StepBuffers,
 };
 pub use lists::{Lists, Projected, Status, StatusReadback, TileListsMode};
 pub use numerics::{AdamSteps, RasterNumerics, Storage};
 pub use renderer::{Picture, Renderer};
+pub use roofline::{Load, minimum_words};
 pub use splats::{Field, Geometry, download};
+pub use sum_loss::{LossLog, SumLossKernel, SumLossParameters};
 pub use view::ViewUniform;
 
 use std::sync::Arc;

@@ -5,9 +5,23 @@ use std::fmt::Write;
 use serde::{Deserialize, Serialize};
 
 use crate::{
+    chroma,
     gpu::KernelTime,
-    optimize::{Load, minimum_bytes},
+    luma,
+    raster::{self, Load},
 };
+
+/// Bytes of a word on the device.
+const WORD: f64 = 4.0;
+
+/// Bytes that a dispatch of `kernel` must read and write at least, each input read once;
+/// `None` for a name that is no kernel's.
+pub fn minimum_bytes(kernel: &str, load: &Load) -> Option<f64> {
+    let words = raster::minimum_words(kernel, load)
+        .or_else(|| luma::minimum_words(kernel, load))
+        .or_else(|| chroma::minimum_words(kernel, load))?;
+    Some(WORD * words)
+}
 
 /// One kernel's row.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -33,7 +47,7 @@ pub fn kernel_reports(times: &[KernelTime], load: &Load) -> Vec<KernelReport> {
             dispatches: time.dispatches,
             seconds: time.seconds,
             share: if all > 0.0 { time.seconds / all } else { 0.0 },
-            minimum_bytes: minimum_bytes(time.kernel, load),
+            minimum_bytes: minimum_bytes(time.kernel, load).unwrap_or_default(),
         })
         .collect();
     rows.sort_by(|a, b| b.seconds.total_cmp(&a.seconds));
@@ -110,6 +124,28 @@ mod tests {
         );
         // 0.66 MB in 150 ms.
         assert!(table.contains("0.660 |   0.00 |"), "{table}");
+    }
+
+    /// A kernel that is new has to say what it reads and writes.
+    #[test]
+    fn every_kernel_of_the_shaders_is_known() {
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/shaders");
+        let mut kernels = 0;
+        for file in std::fs::read_dir(folder).unwrap() {
+            let path = file.unwrap().path();
+            if path.is_dir() {
+                continue;
+            }
+            let shader = std::fs::read_to_string(&path).unwrap();
+            for entry in shader.split("@compute").skip(1) {
+                let (_, name) = entry.split_once("fn ").unwrap();
+                let (name, _) = name.split_once('(').unwrap();
+                assert!(minimum_bytes(name, &LOAD).is_some(), "{name}");
+                kernels += 1;
+            }
+        }
+        assert!(kernels > 30, "{kernels}");
+        assert_eq!(minimum_bytes("no_kernel", &LOAD), None);
     }
 
     #[test]

@@ -2,8 +2,8 @@
 
 use gs_chroma::{
     gpu::{Buffer, Recorder},
-    optimize::{Adam, AdamKernel},
     raster::constants::*,
+    raster::{Adam, AdamKernel},
 };
 
 use crate::harness::{bits, gpu};

@@ -12,10 +12,9 @@ use gs_chroma::{
         densify::{DensifyParameters, Descent},
         relocation::RelocationParameters,
     },
-    optimize::{AdamParameters, SumLossParameters},
     raster::{
-        Projected, TileListsMode, ViewUniform, constants, scan::ScanParameters,
-        sort::SortParameters,
+        AdamParameters, Projected, SumLossParameters, TileListsMode, ViewUniform, constants,
+        scan::ScanParameters, sort::SortParameters,
     },
 };
 use naga::{Expression, Handle, Literal, Module, TypeInner, front::wgsl};

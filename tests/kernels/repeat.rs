@@ -3,9 +3,9 @@
 use std::sync::{Arc, LazyLock};
 
 use gs_chroma::{
+    capture::view_at,
     doctor::stage,
     luma::{LearningRates, LumaProgress, LumaSettings, LumaTrainer, Schedule, TrainingView},
-    optimize::view_at,
     raster::{Field, Geometry, Raster, Renderer},
     splats::Splats,
 };

@@ -6,12 +6,11 @@ use crate::{
     compare::widen,
     doctor::measured::{Allowance, Row, Sample},
     gpu::{Buffer, Gpu, GpuError, Recorder},
-    optimize::{Adam, AdamKernel},
     oracle::{
         adam::{Moments, adam},
         random::Random,
     },
-    raster::{Raster, constants::*},
+    raster::{Adam, AdamKernel, Raster, constants::*},
 };
 
 const STEPS: u32 = 20;

@@ -8,12 +8,11 @@ use crate::{
     doctor::measured::{Allowance, Row, Sample},
     gpu::{Buffer, Gpu, GpuError, Kernel, Recorder},
     luma::{LossEffects, LumaLossParameters, SsimWindow},
-    optimize::{LossLog, SumLossKernel},
     oracle::{
         luma_loss::{LumaEffects, luma_loss, luma_loss_gradient},
         random::Random,
     },
-    raster::{Raster, ViewUniform, constants::STATUS_WORDS},
+    raster::{LossLog, Raster, SumLossKernel, ViewUniform, constants::STATUS_WORDS},
 };
 
 /// Blocks cut short on either side, images smaller than the window, whole blocks.

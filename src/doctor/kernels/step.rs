@@ -10,7 +10,6 @@ use crate::{
         stage::{Stage, splats},
     },
     gpu::{Buffer, GpuError, Recorder},
-    optimize::AdamState,
     oracle::{
         adam::{Moments, adam},
         random::{Random, random_scene_before, random_view},
@@ -18,8 +17,8 @@ use crate::{
         scene::View,
     },
     raster::{
-        AdamSteps, Field, Geometry, Layer, LayerAdjoint, Lists, Outcome, Raster, RasterNumerics,
-        RasterOptions, constants::*,
+        AdamState, AdamSteps, Field, Geometry, Layer, LayerAdjoint, Lists, Outcome, Raster,
+        RasterNumerics, RasterOptions, constants::*,
     },
     splats::Splats,
 };

@@ -4,8 +4,7 @@
 use super::LumaTrainer;
 use crate::{
     gpu::{Buffer, GpuError},
-    optimize::AdamState,
-    raster::Geometry,
+    raster::{AdamState, Geometry},
 };
 
 /// All that a training changes but what it leaves out as outliers, in host memory: the

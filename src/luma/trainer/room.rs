@@ -4,7 +4,7 @@ use super::LumaTrainer;
 use crate::{
     gpu::{Buffer, GpuError, Recorder},
     luma::workspace::Workspace,
-    optimize::AdamState,
+    raster::AdamState,
 };
 
 /// Room left above what an overflowing view needed.

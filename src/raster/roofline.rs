@@ -1,7 +1,7 @@
-//! What the kernels must read and write at least: the measure of how fast they
-//! could be.
+//! What the kernels must read and write at least, if every input is read once and the
+//! caches hold the rest: the measure of how fast they could be.
 
-use crate::raster::{AdamSteps, RasterNumerics, Storage};
+use super::{AdamSteps, RasterNumerics, Storage};
 
 /// Average size of what the kernels of a stage worked on, a dispatch.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -26,22 +26,19 @@ pub struct Load {
     pub numerics: RasterNumerics,
 }
 
-/// Bytes of a word.
-const WORD: f64 = 4.0;
-
 /// Words of a projected Gaussian.
 const PROJECTED: f64 = 8.0;
 
-/// Words that a tile list leads blending to: slot, index, centre, conic and
-/// opacity; the colour comes on top.
+/// Words that a tile list leads blending to: slot, index, center, conic and
+/// opacity; the color comes on top.
 const LISTED: f64 = 8.0;
 
 /// Words of a step of one Gaussian's geometry: value and both moments, in and out.
 const GEOMETRY_STEP: f64 = 6.0 * 11.0;
 
-/// Bytes that a dispatch of `kernel` must read and write at least, if every input is
-/// read once and the caches hold the rest.
-pub fn minimum_bytes(kernel: &str, load: &Load) -> f64 {
+/// 32-bit words that a dispatch of one of this module's kernels must read and write at
+/// least; `None` for a kernel of another.
+pub fn minimum_words(kernel: &str, load: &Load) -> Option<f64> {
     let Load {
         splats,
         visible,
@@ -55,11 +52,9 @@ pub fn minimum_bytes(kernel: &str, load: &Load) -> f64 {
     } = *load;
     let trains_geometry = channels == 1.0;
     let trained = f64::from(u8::from(trains_geometry));
-    // Unknowns of the solver.
-    let planes = sh_planes * splats;
     // With the geometry, Adam's step is taken at once: value and moments in and out.
     let sh_step = if trains_geometry { 6.0 } else { 1.0 } * sh_planes;
-    // What an instance's gradient takes: seven figures for the geometry, the colour.
+    // What an instance's gradient takes: seven figures for the geometry, the color.
     let partial = channels + 7.0 * trained;
     // And as it waits for its sum.
     let halved = trains_geometry && numerics.storage == Storage::Half;
@@ -89,20 +84,6 @@ pub fn minimum_bytes(kernel: &str, load: &Load) -> f64 {
         "tile_ranges" => 2.0 * tiles,
         "shade" => splats + (3.0 + sh_planes + channels) * visible,
         "blend" => (LISTED + channels) * instances + (channels + 1.0) * pixels,
-        "luma_loss" => 4.25 * pixels,
-        "luma_loss_backward" => 5.25 * pixels,
-        "chroma_loss" => 3.25 * channels * pixels,
-        // Picture, wanted a/b and curvature.
-        "view_correction_sums" => 3.0 * channels * pixels,
-        "lbfgs_ridge" | "lbfgs_add" | "lbfgs_precondition" => 3.0 * planes,
-        "lbfgs_pair" => 8.0 * planes,
-        "lbfgs_begin" => 5.0 * planes + 2.0 * splats,
-        "lbfgs_dot" | "lbfgs_spread" => 2.0 * planes,
-        "lbfgs_step" => 5.0 * planes,
-        // One partial sum for every 256 unknowns.
-        "lbfgs_judge" | "lbfgs_curvature" | "lbfgs_scale" | "lbfgs_alpha" | "lbfgs_beta" => {
-            planes / 256.0
-        }
         "sum_loss" => tiles,
         "blend_backward" => {
             (LISTED + channels + stored) * instances + (2.0 * channels + 1.0) * pixels
@@ -116,11 +97,7 @@ pub fn minimum_bytes(kernel: &str, load: &Load) -> f64 {
         }
         // Gradient, value and both moments in, the latter three out.
         "adam" => 7.0 * sh_planes * splats,
-        // The average of geometry, harmonics and the moments of both.
-        "densify_geometry" => 2.0 * 11.0 * splats,
-        "densify_sh" => 2.0 * sh_planes * splats,
-        "densify_moments" => (11.0 + sh_planes) * splats,
-        _ => 0.0,
+        _ => return None,
     };
-    WORD * words
+    Some(words)
 }

@@ -2,10 +2,8 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::{
-    gpu::{Bindings, Buffer, Gpu, GpuError, Kernel, Recorder, groups_for, shaders},
-    raster::StepBuffers,
-};
+use super::StepBuffers;
+use crate::gpu::{Bindings, Buffer, Gpu, GpuError, Kernel, Recorder, groups_for, shaders};
 
 const BETA1: f64 = 0.9;
 const BETA2: f64 = 0.999;
