@@ -99,7 +99,6 @@ impl Distiller {
             &gradient,
             &field.planes,
             geometry.count,
-            None,
         )?;
         let chains = views.iter().map(|_| None).collect();
         Ok(Self {

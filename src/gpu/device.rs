@@ -78,6 +78,11 @@ pub enum GpuError {
         "device {0}: read-back failed ({1}): the driver may have reset; run again with fewer splats or smaller images"
     )]
     Lost(String, String),
+    /// A training that had no room is asked to go on.
+    #[error(
+        "the training had no room on the device and cannot go on: start it again with fewer Gaussians"
+    )]
+    NoWorkspace,
 }
 
 impl GpuError {

@@ -13,7 +13,7 @@ use bytemuck::{Pod, Zeroable};
 use super::LumaSettings;
 use crate::{
     gpu::{Buffer, Gpu, GpuError, Kernel, Recorder, groups_for, shaders},
-    raster::constants::*,
+    raster::{AdamMoments, Field, Geometry, Model, constants::*},
 };
 
 /// Both halves of a split together let as much light through as this power of
@@ -167,6 +167,38 @@ impl DensifyKernels {
             sh: kernel("densify_sh"),
             moments: kernel("densify_moments"),
         }
+    }
+
+    /// The model after a plan.
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`].
+    pub fn carry_out(
+        &self,
+        gpu: &Gpu,
+        plan: &Buffer<Descent>,
+        model: &Model,
+    ) -> Result<Model, GpuError> {
+        let apply =
+            |source: &Buffer<f32>, target| self.apply(gpu, plan, model.len(), source, target);
+        let moments = |moments: &AdamMoments| -> Result<_, GpuError> {
+            Ok(AdamMoments {
+                first: apply(&moments.first, Target::Moments)?,
+                second: apply(&moments.second, Target::Moments)?,
+            })
+        };
+        Ok(Model {
+            geometry_moments: moments(&model.geometry_moments)?,
+            field_moments: moments(&model.field_moments)?,
+            geometry: Geometry {
+                count: plan.len(),
+                planes: apply(&model.geometry.planes, Target::Geometry)?,
+            },
+            field: Field {
+                planes: apply(&model.field.planes, Target::Field)?,
+                ..model.field
+            },
+        })
     }
 
     /// Applies a plan to one array of planes and gives the new one.

@@ -4,6 +4,9 @@
 use super::Numerics;
 use crate::raster::RasterOptions;
 
+/// Iterations between two looks at the device.
+pub(super) const SYNC_EVERY: usize = 25;
+
 /// Learning rates of Adam.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LearningRates {

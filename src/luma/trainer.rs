@@ -25,18 +25,16 @@ use super::{
     memory::{Demand, ENTRIES_PER_SPLAT},
     pace::Pace,
     relocation::{self, RelocationParameters},
+    settings::SYNC_EVERY,
     view::TrainingView,
     workspace::{Kernels, Workspace},
 };
 use crate::{
     capture::{Camera, Exposure, view_at},
     gpu::{Gpu, GpuError, Readback, Recorder},
-    raster::{Field, Geometry, Load, Raster, StatusReadback, ViewUniform, constants::*, download},
+    raster::{Load, Model, Raster, StatusReadback, ViewUniform, constants::*},
     splats::{Splats, sh},
 };
-
-/// Iterations between two looks at the device.
-pub(super) const SYNC_EVERY: usize = 25;
 
 /// How far a training is.
 #[derive(Clone, Copy, Debug)]
@@ -87,9 +85,9 @@ pub struct LumaTrainer {
     pictures: Vec<(Vec<u8>, Vec<u8>)>,
     max_pixels: usize,
     max_tiles: usize,
-    geometry: Geometry,
-    field: Field,
-    /// None only while a new one is made, which the old one would crowd out.
+    model: Model,
+    /// None while a new one is made, which the old one would crowd out, or when there was
+    /// no room for it.
     workspace: Option<Workspace>,
     demand: Demand,
     /// Iteration at which the present workspace began to count steps.
@@ -163,20 +161,17 @@ impl LumaTrainer {
             settings.memory_limit,
         );
         let targets = Targets::new(&gpu, effects, &grays, &masks, demand.streams)?;
-        let geometry = Geometry::upload(&gpu, splats)?;
-        let field = Field::upload(&gpu, &splats.sh)?;
-        let capacity = geometry.count * ENTRIES_PER_SPLAT;
-        demand.check(settings.memory_limit, geometry.count, capacity)?;
+        let capacity = splats.len() * ENTRIES_PER_SPLAT;
+        demand.check(settings.memory_limit, splats.len(), capacity)?;
+        let model = Model::upload(&gpu, splats)?;
         let workspace = Workspace::new(
             &raster,
             &kernels,
             &settings,
-            &geometry,
-            &field,
+            &model,
             &targets,
             [max_pixels, max_tiles],
             capacity,
-            None,
         )?;
         Ok(Self {
             raster,
@@ -194,8 +189,7 @@ impl LumaTrainer {
             exposures,
             max_pixels,
             max_tiles,
-            geometry,
-            field,
+            model,
             workspace: Some(workspace),
             demand,
             base: 0,
@@ -219,7 +213,7 @@ impl LumaTrainer {
         let mut iteration = 0;
         let mut pending: Option<Report> = None;
         while iteration < self.settings.schedule.iterations {
-            self.step(iteration);
+            self.step(iteration)?;
             iteration += 1;
             let settings = &self.settings;
             let densifies = settings.densifies_after(iteration);
@@ -237,8 +231,8 @@ impl LumaTrainer {
             let order = Report {
                 iteration,
                 told,
-                status: self.workspace().lists.status_later(&self.gpu),
-                losses: self.workspace().log.read_later(&self.gpu),
+                status: self.workspace()?.lists.status_later(&self.gpu),
+                losses: self.workspace()?.log.read_later(&self.gpu),
             };
             // Before the set changes or is looked at, and at the end, nothing may be left open.
             let mut due: Vec<Report> = pending.take().into_iter().collect();
@@ -292,7 +286,7 @@ impl LumaTrainer {
     /// # Errors
     /// [`GpuError::Lost`].
     pub fn splats(&self) -> Result<Splats, GpuError> {
-        download(&self.gpu, &self.geometry, &self.field)
+        self.model.download(&self.gpu)
     }
 
     /// What an iteration worked on, the mean over the reports.
@@ -310,28 +304,30 @@ impl LumaTrainer {
             pixels: pixels.sum::<f64>() / self.cameras.len() as f64,
             tiles: self.max_tiles as f64,
             channels: 1.0,
-            sh_planes: sh::coefficient_count(self.field.degree) as f64,
+            sh_planes: sh::coefficient_count(self.model.field.degree) as f64,
             numerics: self.raster.numerics(),
         }
     }
 
-    fn workspace(&self) -> &Workspace {
-        self.workspace.as_ref().expect("one is always put back")
+    /// # Errors
+    /// [`GpuError::NoWorkspace`] after one could not be made.
+    fn workspace(&self) -> Result<&Workspace, GpuError> {
+        self.workspace.as_ref().ok_or(GpuError::NoWorkspace)
     }
 
     /// Records and submits one iteration.
-    fn step(&self, iteration: usize) {
+    fn step(&self, iteration: usize) -> Result<(), GpuError> {
         let views = self.exposures.len();
         let mut index = view_at(self.settings.seed, views, iteration);
         let exposure = self.exposures[index];
         if iteration < self.settings.schedule.coarse_until {
             index += views;
         }
-        let workspace = self.workspace();
+        let workspace = self.workspace()?;
         let view = ViewUniform::new(
             &self.cameras[index],
             self.near,
-            self.geometry.count,
+            self.model.len(),
             self.settings.degree_at(iteration),
         );
         let mut recorder = Recorder::new(&self.gpu);
@@ -352,10 +348,10 @@ impl LumaTrainer {
         let step = u32::try_from(iteration + 1).unwrap_or(u32::MAX);
         let weights = match self.settings.densification {
             Densification::Split => [0.0; 2],
-            Densification::Relocate => relocation::weights(self.geometry.count, self.extent),
+            Densification::Relocate => relocation::weights(self.model.len(), self.extent),
         };
         let rates = self.geometry_rates(iteration);
-        let (geometry, field) = (&workspace.adam_geometry, &workspace.adam_field);
+        let (geometry, field) = (&workspace.geometry_step, &workspace.field_step);
         geometry.set(&self.gpu, step, &rates, weights);
         field.set(&self.gpu, step, &self.field_rates(iteration), [0.0; 2]);
         workspace.adjoint.record(&self.raster, &mut recorder);
@@ -367,10 +363,11 @@ impl LumaTrainer {
                 &self.gpu,
                 &self.kernels.relocation,
                 &mut recorder,
-                &RelocationParameters::new(self.geometry.count, seed, iteration, rate),
+                &RelocationParameters::new(self.model.len(), seed, iteration, rate),
             );
         }
         recorder.submit();
+        Ok(())
     }
 
     fn geometry_rates(&self, iteration: usize) -> [f32; GEOMETRY_PLANES] {
@@ -391,7 +388,7 @@ impl LumaTrainer {
         let rates = &self.settings.rates;
         let settling = self.settings.settling(iteration);
         let rest = (settling * rates.sh_rest) as f32;
-        let mut planes = vec![rest; sh::coefficient_count(self.field.degree)];
+        let mut planes = vec![rest; sh::coefficient_count(self.model.field.degree)];
         planes[0] = (settling * rates.sh_constant) as f32;
         planes
     }
@@ -411,10 +408,10 @@ impl LumaTrainer {
             return Ok(Some(done));
         }
         let losses = report.losses.wait(&self.gpu)?;
-        self.seen.splats += self.geometry.count as f64;
+        self.seen.splats += self.model.len() as f64;
         self.seen.visible += status.visible as f64;
         self.seen.instances += status.instances as f64;
-        self.seen.capacity += self.workspace().lists.capacity as f64;
+        self.seen.capacity += self.workspace()?.lists.capacity as f64;
         self.reports += 1;
         let all_seconds = begun.elapsed().as_secs_f64();
         self.pace.note(report.iteration, all_seconds);
@@ -427,7 +424,7 @@ impl LumaTrainer {
             iteration: report.iteration,
             end: self.settings.schedule.iterations,
             loss: recent.iter().map(|&loss| f64::from(loss)).sum::<f64>() / recent.len() as f64,
-            splats: self.geometry.count,
+            splats: self.model.len(),
             poisoned: status.poisoned,
             refused: status.refused,
             seconds: all_seconds - self.watch.seconds,

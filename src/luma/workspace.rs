@@ -6,15 +6,15 @@ use super::{
     densify::DensifyKernels,
     loss::{Loss, LossEffects, LossKernels, Targets},
     relocation::{Relocation, RelocationKernel},
-    settings::Densification,
-    trainer::SYNC_EVERY,
+    settings::{Densification, SYNC_EVERY},
 };
 use crate::{
     gpu::{Buffer, Gpu, GpuError},
     raster::{
-        AdamState, Field, Geometry, Layer, LayerAdjoint, Lists, LossLog, Outcome, Raster,
-        SumLossKernel,
+        AdamStep, Layer, LayerAdjoint, Lists, LossLog, Model, Outcome, Raster, SumLossKernel,
+        constants::GEOMETRY_PLANES,
     },
+    splats::sh,
 };
 
 /// The kernels of a step besides the rasterizer's.
@@ -42,8 +42,10 @@ pub struct Workspace {
     pub lists: Lists,
     pub layer: Layer,
     pub adjoint: LayerAdjoint,
-    pub adam_geometry: AdamState,
-    pub adam_field: AdamState,
+    /// Rates of the geometry.
+    pub geometry_step: AdamStep,
+    /// Rates of the harmonics.
+    pub field_step: AdamStep,
     pub log: LossLog,
     pub losses: Vec<Loss>,
     /// When the set changes by relocation.
@@ -51,39 +53,30 @@ pub struct Workspace {
 }
 
 impl Workspace {
-    /// A workspace for tile lists of `capacity` entries; Adam goes on from
-    /// `moments` (of geometry and field) or starts from rest.
+    /// A workspace to train `model` with tile lists of `capacity` entries.
     ///
     /// # Errors
     /// [`GpuError::TooLarge`].
-    #[allow(
-        clippy::too_many_arguments,
-        reason = "called from two places that own the parts separately"
-    )]
     pub fn new(
         raster: &Raster,
         kernels: &Kernels,
         settings: &LumaSettings,
-        geometry: &Geometry,
-        field: &Field,
+        model: &Model,
         targets: &Targets,
         [max_pixels, max_tiles]: [usize; 2],
         capacity: usize,
-        moments: Option<[[Buffer<f32>; 2]; 2]>,
     ) -> Result<Self, GpuError> {
         let gpu = &raster.gpu;
+        let (geometry, field) = (&model.geometry, &model.field);
         let lists = Lists::new(raster, geometry, max_tiles, capacity)?;
         let layer = Layer::new(raster, geometry, &lists, field, max_pixels, max_tiles)?;
-        let (of_geometry, of_field) = match moments {
-            Some([geometry, field]) => (Some(geometry), Some(field)),
-            None => (None, None),
-        };
         let count = geometry.count;
-        let adam_geometry = AdamState::new(gpu, geometry.planes.len(), count, of_geometry)?;
-        let adam_field = AdamState::new(gpu, field.planes.len(), count, of_field)?;
+        let geometry_step = AdamStep::new(gpu, GEOMETRY_PLANES, count)?;
+        let planes = sh::coefficient_count(field.degree);
+        let field_step = AdamStep::new(gpu, planes, count)?;
         let outcome = Outcome::Step {
-            geometry: adam_geometry.step_buffers(),
-            field: adam_field.step_buffers(),
+            geometry: geometry_step.of(&model.geometry_moments),
+            field: field_step.of(&model.field_moments),
         };
         let adjoint = LayerAdjoint::new(raster, geometry, &lists, field, &layer, &outcome)?;
         let log = LossLog::new(gpu, &kernels.sum_loss, &lists.status, max_tiles, SYNC_EVERY)?;
@@ -98,8 +91,8 @@ impl Workspace {
             lists,
             layer,
             adjoint,
-            adam_geometry,
-            adam_field,
+            geometry_step,
+            field_step,
             log,
             losses,
             relocation,

@@ -2,7 +2,6 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::StepBuffers;
 use crate::gpu::{Bindings, Buffer, Gpu, GpuError, Kernel, Recorder, groups_for, shaders};
 
 const BETA1: f64 = 0.9;
@@ -43,61 +42,56 @@ impl AdamKernel {
     }
 }
 
-/// Adam's state for one buffer of parameters.
-pub struct AdamState {
-    /// First moments.
+/// First and second moments of planes of parameters, in the same layout. Clones share them.
+#[derive(Clone)]
+pub struct AdamMoments {
+    /// Running mean of the gradient.
     pub first: Buffer<f32>,
-    /// Second moments.
+    /// Running mean of its square.
     pub second: Buffer<f32>,
+}
+
+impl AdamMoments {
+    /// AdamMoments at rest of `len` parameters.
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`].
+    pub fn zeros(gpu: &Gpu, len: usize) -> Result<Self, GpuError> {
+        Ok(Self {
+            first: Buffer::zeros(gpu, "first moments", len)?,
+            second: Buffer::zeros(gpu, "second moments", len)?,
+        })
+    }
+}
+
+/// Learning rates and bias corrections of a step.
+pub struct AdamStep {
     parameters: Buffer<AdamParameters>,
     planes: usize,
     count: usize,
 }
 
-impl AdamState {
-    /// For planes of `count` elements, `len` in all, starting from the given moments,
-    /// or from rest.
+impl AdamStep {
+    /// For at most 48 `planes` of `count` elements each.
     ///
     /// # Errors
     /// [`GpuError::TooLarge`].
-    pub fn new(
-        gpu: &Gpu,
-        len: usize,
-        count: usize,
-        moments: Option<[Buffer<f32>; 2]>,
-    ) -> Result<Self, GpuError> {
-        let zeros = |label| Buffer::zeros(gpu, label, len);
-        let [first, second] = match moments {
-            Some(moments) => moments,
-            None => [zeros("first moments")?, zeros("second moments")?],
-        };
+    pub fn new(gpu: &Gpu, planes: usize, count: usize) -> Result<Self, GpuError> {
         Ok(Self {
-            first,
-            second,
             parameters: Buffer::uniform(gpu, "adam parameters", &AdamParameters::zeroed())?,
-            planes: len / count.max(1),
+            planes,
             count,
         })
     }
 
-    /// What an adjoint that steps at once binds.
-    pub fn step_buffers(&self) -> StepBuffers<'_> {
-        StepBuffers {
-            parameters: self.parameters.raw(),
-            first: &self.first,
-            second: &self.second,
-        }
-    }
-
-    /// Chooses a learning rate for each plane for what is submitted next. `step`
-    /// counts from 1 and sets the bias correction. `weights` are those of each opacity
-    /// and each standard deviation in the loss.
-    ///
-    /// # Panics
-    /// When there are fewer rates than planes, or more than 48 planes.
+    /// Chooses a learning rate for each plane for what is submitted next; a plane without
+    /// one stays. `step` counts from 1 and sets the bias correction. `weights` are those of
+    /// each opacity and each standard deviation in the loss.
     pub fn set(&self, gpu: &Gpu, step: u32, rates: &[f32], weights: [f32; 2]) {
         let mut learning_rates = [0.0; MAX_PLANES];
-        learning_rates[..self.planes].copy_from_slice(&rates[..self.planes]);
+        for (to, &rate) in learning_rates.iter_mut().zip(rates).take(self.planes) {
+            *to = rate;
+        }
         let correction = |beta: f64| (1.0 / (1.0 - beta.powf(f64::from(step)))) as f32;
         self.parameters.write(
             gpu,
@@ -113,18 +107,35 @@ impl AdamState {
             }],
         );
     }
+
+    /// What an adjoint that steps at once binds.
+    pub fn of<'a>(&'a self, moments: &'a AdamMoments) -> StepBuffers<'a> {
+        StepBuffers {
+            parameters: &self.parameters,
+            moments,
+        }
+    }
+}
+
+/// What Adam needs for a step.
+#[derive(Clone, Copy)]
+pub struct StepBuffers<'a> {
+    /// Uniform with rates and corrections.
+    pub parameters: &'a Buffer<AdamParameters>,
+    /// The parameters' moments.
+    pub moments: &'a AdamMoments,
 }
 
 /// Adam on a stored gradient.
 pub struct Adam {
-    /// Moments and rates.
-    pub state: AdamState,
+    /// Of the values.
+    pub moments: AdamMoments,
+    step: AdamStep,
     bindings: Bindings,
 }
 
 impl Adam {
-    /// Adam on `values` (planes of `count` elements) with `gradient`, starting
-    /// from the given moments, or from rest.
+    /// Adam on `values` (planes of `count` elements) with `gradient`, from rest.
     ///
     /// # Errors
     /// [`GpuError::TooLarge`].
@@ -135,27 +146,28 @@ impl Adam {
         gradient: &Buffer<f32>,
         values: &Buffer<f32>,
         count: usize,
-        moments: Option<[Buffer<f32>; 2]>,
     ) -> Result<Self, GpuError> {
-        let state = AdamState::new(gpu, values.len(), count, moments)?;
+        let moments = AdamMoments::zeros(gpu, values.len())?;
+        let step = AdamStep::new(gpu, values.len() / count.max(1), count)?;
         let bindings = kernel.0.bind(
             gpu,
             &[
-                state.parameters.raw(),
+                step.parameters.raw(),
                 status.raw(),
                 gradient.raw(),
                 values.raw(),
-                state.first.raw(),
-                state.second.raw(),
+                moments.first.raw(),
+                moments.second.raw(),
             ],
         );
-        Ok(Self { state, bindings })
+        Ok(Self {
+            moments,
+            step,
+            bindings,
+        })
     }
 
-    /// Records one step as [`AdamState::set`] describes it.
-    ///
-    /// # Panics
-    /// When there are fewer rates than planes, or more than 48 planes.
+    /// Records one step as [`AdamStep::set`] describes it.
     pub fn record(
         &self,
         gpu: &Gpu,
@@ -164,8 +176,8 @@ impl Adam {
         step: u32,
         rates: &[f32],
     ) {
-        self.state.set(gpu, step, rates, [0.0; 2]);
-        let elements = self.state.count * self.state.planes;
+        self.step.set(gpu, step, rates, [0.0; 2]);
+        let elements = self.step.count * self.step.planes;
         recorder.dispatch(&kernel.0, &self.bindings, groups_for(elements));
     }
 }

@@ -2,7 +2,7 @@
 //! their adjoints down to the parameters.
 
 use super::{
-    ColorKind, Raster, Storage,
+    ColorKind, Raster, StepBuffers, Storage,
     constants::*,
     lists::Lists,
     splats::{Field, Geometry},
@@ -222,17 +222,6 @@ pub enum Outcome<'a> {
     },
 }
 
-/// What Adam needs for a step.
-#[derive(Clone, Copy)]
-pub struct StepBuffers<'a> {
-    /// Uniform with rates and corrections.
-    pub parameters: &'a wgpu::Buffer,
-    /// First moments.
-    pub first: &'a Buffer<f32>,
-    /// Second moments.
-    pub second: &'a Buffer<f32>,
-}
-
 /// The part of the adjoint that reaches the geometry.
 pub struct GeometryAdjoint {
     /// Gradient planes `[11, N]`; empty where Adam steps at once.
@@ -361,8 +350,11 @@ impl LayerAdjoint {
             bindings.extend([(6, field.planes.raw()), (7, mean_gradient.raw())]);
         }
         if let Outcome::Step { field, .. } = outcome {
-            bindings.extend([(8, field.parameters), (9, lists.status.raw())]);
-            bindings.extend([(10, field.first.raw()), (11, field.second.raw())]);
+            bindings.extend([(8, field.parameters.raw()), (9, lists.status.raw())]);
+            bindings.extend([
+                (10, field.moments.first.raw()),
+                (11, field.moments.second.raw()),
+            ]);
         }
         let shade = raster
             .shade_backward(field.kind, ending)
@@ -394,8 +386,11 @@ impl LayerAdjoint {
                     }
                     Outcome::Step { geometry, .. } => {
                         bindings.retain(|&(binding, _)| binding != 5);
-                        bindings.extend([(9, geometry.parameters)]);
-                        bindings.extend([(10, geometry.first.raw()), (11, geometry.second.raw())]);
+                        bindings.extend([(9, geometry.parameters.raw())]);
+                        bindings.extend([
+                            (10, geometry.moments.first.raw()),
+                            (11, geometry.moments.second.raw()),
+                        ]);
                         raster.projection.step.bind_at(gpu, &bindings)
                     }
                 };

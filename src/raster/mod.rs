@@ -10,6 +10,7 @@ pub mod constants;
 mod kernels;
 mod layer;
 mod lists;
+mod model;
 mod numerics;
 mod renderer;
 mod roofline;
@@ -19,15 +20,14 @@ mod splats;
 mod sum_loss;
 mod view;
 
-pub use adam::{Adam, AdamKernel, AdamParameters, AdamState};
-pub use layer::{
-    AdjointScratch, Canvas, GeometryAdjoint, Layer, LayerAdjoint, Outcome, StepBuffers,
-};
+pub use adam::{Adam, AdamKernel, AdamMoments, AdamParameters, AdamStep, StepBuffers};
+pub use layer::{AdjointScratch, Canvas, GeometryAdjoint, Layer, LayerAdjoint, Outcome};
 pub use lists::{Lists, Projected, Status, StatusReadback, TileListsMode};
+pub use model::{Model, Snapshot};
 pub use numerics::{AdamSteps, RasterNumerics, Storage};
 pub use renderer::{Picture, Renderer};
 pub use roofline::{Load, minimum_words};
-pub use splats::{Field, Geometry, download};
+pub use splats::{Field, Geometry};
 pub use sum_loss::{LossLog, SumLossKernel, SumLossParameters};
 pub use view::ViewUniform;
 

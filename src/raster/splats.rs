@@ -37,6 +37,29 @@ impl Geometry {
             planes: Buffer::from_slice(gpu, "geometry", &planes)?,
         })
     }
+
+    /// Reads geometry and field back into host arrays.
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`].
+    pub fn download(&self, gpu: &Gpu, field: &Field) -> Result<Splats, GpuError> {
+        let planes = self.planes.read(gpu)?;
+        let n = self.count;
+        let at = |plane: usize, i: usize| planes[plane * n + i];
+        Ok(Splats {
+            means: (0..n)
+                .map(|i| std::array::from_fn(|k| at(PLANE_MEAN + k, i)))
+                .collect(),
+            quats: (0..n)
+                .map(|i| std::array::from_fn(|k| at(PLANE_QUAT + k, i)))
+                .collect(),
+            log_scales: (0..n)
+                .map(|i| std::array::from_fn(|k| at(PLANE_LOG_SCALE + k, i)))
+                .collect(),
+            opacity_logits: (0..n).map(|i| at(PLANE_OPACITY, i)).collect(),
+            sh: field.download(gpu)?,
+        })
+    }
 }
 
 /// Spherical-harmonic planes `[(degree + 1)², channels, N]`.
@@ -91,27 +114,4 @@ impl Field {
             coefficients,
         })
     }
-}
-
-/// Reads geometry and field back into host arrays.
-///
-/// # Errors
-/// [`GpuError::Lost`].
-pub fn download(gpu: &Gpu, geometry: &Geometry, field: &Field) -> Result<Splats, GpuError> {
-    let planes = geometry.planes.read(gpu)?;
-    let n = geometry.count;
-    let at = |plane: usize, i: usize| planes[plane * n + i];
-    Ok(Splats {
-        means: (0..n)
-            .map(|i| std::array::from_fn(|k| at(PLANE_MEAN + k, i)))
-            .collect(),
-        quats: (0..n)
-            .map(|i| std::array::from_fn(|k| at(PLANE_QUAT + k, i)))
-            .collect(),
-        log_scales: (0..n)
-            .map(|i| std::array::from_fn(|k| at(PLANE_LOG_SCALE + k, i)))
-            .collect(),
-        opacity_logits: (0..n).map(|i| at(PLANE_OPACITY, i)).collect(),
-        sh: field.download(gpu)?,
-    })
 }

@@ -16,14 +16,14 @@ fn after_an_overflow_nothing_moves() {
     let mut words = [0; STATUS_WORDS];
     words[STATUS_OVERFLOW] = 1;
     let status = Buffer::from_slice(gpu(), "status", &words).unwrap();
-    let adam = Adam::new(gpu(), &kernel, &status, &slope, &values, 2, None).unwrap();
+    let adam = Adam::new(gpu(), &kernel, &status, &slope, &values, 2).unwrap();
     let mut recorder = Recorder::new(gpu());
     adam.record(gpu(), &kernel, &mut recorder, 1, &[0.1]);
     recorder.submit();
     for (buffer, expected) in [
         (&values, [1.0, 2.0]),
-        (&adam.state.first, [0.0; 2]),
-        (&adam.state.second, [0.0; 2]),
+        (&adam.moments.first, [0.0; 2]),
+        (&adam.moments.second, [0.0; 2]),
     ] {
         assert_eq!(bits(&buffer.read(gpu()).unwrap()), bits(&expected));
     }
@@ -37,7 +37,7 @@ fn refused_gradients_are_counted() {
     let values = Buffer::from_slice(gpu(), "values", &[1.0; 5]).unwrap();
     let slope = Buffer::from_slice(gpu(), "gradient", &slopes).unwrap();
     let status = Buffer::from_slice(gpu(), "status", &[0; STATUS_WORDS]).unwrap();
-    let adam = Adam::new(gpu(), &kernel, &status, &slope, &values, 5, None).unwrap();
+    let adam = Adam::new(gpu(), &kernel, &status, &slope, &values, 5).unwrap();
     let mut recorder = Recorder::new(gpu());
     adam.record(gpu(), &kernel, &mut recorder, 1, &[0.1]);
     recorder.submit();
@@ -46,6 +46,6 @@ fn refused_gradients_are_counted() {
         .map(|&v| v != 1.0)
         .collect();
     assert_eq!(moved, [true, false, false, false, true]);
-    let second = adam.state.second.read(gpu()).unwrap();
+    let second = adam.moments.second.read(gpu()).unwrap();
     assert!(second.iter().all(|v| v.is_finite()));
 }

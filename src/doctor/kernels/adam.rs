@@ -57,7 +57,7 @@ fn run(gpu: &Gpu, [planes, count]: [usize; 2]) -> Result<[Sample; 3], GpuError> 
     let values = Buffer::from_slice(gpu, "values", &start)?;
     let slope = Buffer::zeros(gpu, "gradient", len)?;
     let status = Buffer::zeros(gpu, "status", STATUS_WORDS)?;
-    let optimizer = Adam::new(gpu, &kernel, &status, &slope, &values, count, None)?;
+    let optimizer = Adam::new(gpu, &kernel, &status, &slope, &values, count)?;
     for step in 1..=STEPS {
         let gradient = gradient(&mut random, len);
         slope.write(gpu, &gradient);
@@ -81,8 +81,8 @@ fn run(gpu: &Gpu, [planes, count]: [usize; 2]) -> Result<[Sample; 3], GpuError> 
     };
     Ok([
         Sample::new(read(&values)?, expected),
-        by_size(1, read(&optimizer.state.first)?, first),
-        by_size(2, read(&optimizer.state.second)?, second),
+        by_size(1, read(&optimizer.moments.first)?, first),
+        by_size(2, read(&optimizer.moments.second)?, second),
     ])
 }
 

@@ -17,8 +17,8 @@ use crate::{
         scene::View,
     },
     raster::{
-        AdamState, AdamSteps, Field, Geometry, Layer, LayerAdjoint, Lists, Outcome, Raster,
-        RasterNumerics, RasterOptions, constants::*,
+        AdamMoments, AdamStep, AdamSteps, Field, Geometry, Layer, LayerAdjoint, Lists, Model,
+        Outcome, Raster, RasterNumerics, RasterOptions, constants::*,
     },
     splats::Splats,
 };
@@ -47,27 +47,26 @@ fn stepped(
 ) -> Result<[Planes; 2], GpuError> {
     let gpu = &raster.gpu;
     let (pixels, tiles) = (stage.view.pixel_count(), stage.view.tile_count());
-    let geometry = Geometry::upload(gpu, splats)?;
-    let field = Field::upload(gpu, &splats.sh)?;
-    let lists = Lists::new(raster, &geometry, tiles, splats.len() * tiles)?;
-    let layer = Layer::new(raster, &geometry, &lists, &field, pixels, tiles)?;
-    let state = |values: &Buffer<f32>, [first, second]: &[Vec<f32>; 2]| {
-        let moments = [
-            Buffer::from_slice(gpu, "first moments", first)?,
-            Buffer::from_slice(gpu, "second moments", second)?,
-        ];
-        let state = AdamState::new(gpu, values.len(), splats.len(), Some(moments))?;
-        let rates: Vec<f32> = (0..values.len() / splats.len()).map(rate).collect();
-        state.set(gpu, STEP, &rates, WEIGHTS);
-        Ok::<_, GpuError>(state)
+    let mut model = Model::upload(gpu, splats)?;
+    let step = |to: &mut AdamMoments, [first, second]: &[Vec<f32>; 2]| {
+        to.first.write(gpu, first);
+        to.second.write(gpu, second);
+        let planes = first.len() / splats.len();
+        let step = AdamStep::new(gpu, planes, splats.len())?;
+        let rates: Vec<f32> = (0..planes).map(rate).collect();
+        step.set(gpu, STEP, &rates, WEIGHTS);
+        Ok::<_, GpuError>(step)
     };
-    let of_geometry = state(&geometry.planes, &moments[0])?;
-    let of_field = state(&field.planes, &moments[1])?;
+    let geometry_step = step(&mut model.geometry_moments, &moments[0])?;
+    let field_step = step(&mut model.field_moments, &moments[1])?;
+    let (geometry, field) = (&model.geometry, &model.field);
+    let lists = Lists::new(raster, geometry, tiles, splats.len() * tiles)?;
+    let layer = Layer::new(raster, geometry, &lists, field, pixels, tiles)?;
     let outcome = Outcome::Step {
-        geometry: of_geometry.step_buffers(),
-        field: of_field.step_buffers(),
+        geometry: geometry_step.of(&model.geometry_moments),
+        field: field_step.of(&model.field_moments),
     };
-    let adjoint = LayerAdjoint::new(raster, &geometry, &lists, &field, &layer, &outcome)?;
+    let adjoint = LayerAdjoint::new(raster, geometry, &lists, field, &layer, &outcome)?;
     adjoint.image_gradient.write(gpu, upstream);
     let mut recorder = Recorder::new(gpu);
     lists.set_view(gpu, &stage.view);
@@ -75,16 +74,16 @@ fn stepped(
     layer.record(raster, &mut recorder);
     adjoint.record(raster, &mut recorder);
     recorder.submit();
-    let planes = |values: &Buffer<f32>, state: &AdamState| {
+    let planes = |values: &Buffer<f32>, moments: &AdamMoments| {
         Ok::<_, GpuError>([
             values.read(gpu)?,
-            state.first.read(gpu)?,
-            state.second.read(gpu)?,
+            moments.first.read(gpu)?,
+            moments.second.read(gpu)?,
         ])
     };
     Ok([
-        planes(&geometry.planes, &of_geometry)?,
-        planes(&field.planes, &of_field)?,
+        planes(&geometry.planes, &model.geometry_moments)?,
+        planes(&field.planes, &model.field_moments)?,
     ])
 }
 

@@ -2,21 +2,14 @@
 //! its time.
 
 use super::LumaTrainer;
-use crate::{
-    gpu::{Buffer, GpuError},
-    raster::{AdamState, Geometry},
-};
+use crate::{gpu::GpuError, raster::Snapshot};
 
 /// All that a training changes but what it leaves out as outliers, in host memory: the
 /// device may have no room for a second set.
 pub(super) struct Best {
     iteration: usize,
     psnr: f64,
-    count: usize,
-    geometry: Vec<f32>,
-    field: Vec<f32>,
-    /// Of geometry and field, the first and the second.
-    moments: [[Vec<f32>; 2]; 2],
+    model: Snapshot,
 }
 
 impl LumaTrainer {
@@ -30,20 +23,10 @@ impl LumaTrainer {
         if best.is_some_and(|best| best.psnr >= psnr) {
             return Ok(());
         }
-        let moments = |adam: &AdamState| -> Result<_, GpuError> {
-            Ok([adam.first.read(&self.gpu)?, adam.second.read(&self.gpu)?])
-        };
-        let workspace = self.workspace();
         self.watch.best = Some(Best {
             iteration,
             psnr,
-            count: self.geometry.count,
-            geometry: self.geometry.planes.read(&self.gpu)?,
-            field: self.field.planes.read(&self.gpu)?,
-            moments: [
-                moments(&workspace.adam_geometry)?,
-                moments(&workspace.adam_field)?,
-            ],
+            model: self.model.snapshot(&self.gpu)?,
         });
         Ok(())
     }
@@ -55,15 +38,8 @@ impl LumaTrainer {
         let Some(best) = best.filter(|best| best.iteration < iteration) else {
             return Ok(None);
         };
-        let upload = |data: &Vec<f32>| Buffer::from_slice(&self.gpu, "best set", data);
-        let [[g1, g2], [f1, f2]] = best.moments.each_ref().map(|of| of.each_ref().map(upload));
-        let moments = [[g1?, g2?], [f1?, f2?]];
-        self.field.planes = upload(&best.field)?;
-        self.geometry = Geometry {
-            count: best.count,
-            planes: upload(&best.geometry)?,
-        };
-        self.renew(self.workspace().lists.capacity, best.iteration, moments)?;
+        self.model.restore(&self.gpu, &best.model)?;
+        self.renew(self.workspace()?.lists.capacity, best.iteration)?;
         self.watch.given_up = Some(iteration);
         Ok(Some(best.iteration))
     }

@@ -5,19 +5,18 @@ use crate::{
     gpu::{Buffer, GpuError},
     luma::{
         Densification,
-        densify::{self, Evidence, Target},
+        densify::{self, Evidence},
         memory::ENTRIES_PER_SPLAT,
         outliers, relocation,
     },
-    raster::Geometry,
 };
 
 impl LumaTrainer {
     /// Splits, moves and removes Gaussians.
     pub(super) fn densify(&mut self, iteration: usize) -> Result<(), GpuError> {
         let evidence = Evidence {
-            geometry: &self.geometry.planes.read(&self.gpu)?,
-            statistics: &self.workspace().statistics().read(&self.gpu)?,
+            geometry: &self.model.geometry.planes.read(&self.gpu)?,
+            statistics: &self.workspace()?.statistics().read(&self.gpu)?,
         };
         let plan = match self.settings.densification {
             Densification::Split => densify::plan(&self.settings, &evidence),
@@ -28,31 +27,13 @@ impl LumaTrainer {
             return Ok(());
         }
         let plan = Buffer::from_slice(&self.gpu, "plan", &plan)?;
-        let apply = |source: &Buffer<f32>, target| {
-            self.kernels
-                .densify
-                .apply(&self.gpu, &plan, self.geometry.count, source, target)
-        };
-        let moments = [
-            &self.workspace().adam_geometry,
-            &self.workspace().adam_field,
-        ]
-        .map(|adam| [&adam.first, &adam.second].map(|moment| apply(moment, Target::Moments)));
-        let planes = apply(&self.geometry.planes, Target::Geometry)?;
-        let field = apply(&self.field.planes, Target::Field)?;
-        let [[g1, g2], [f1, f2]] = moments;
-        let moments = [[g1?, g2?], [f1?, f2?]];
-        self.geometry = Geometry {
-            count: plan.len(),
-            planes,
-        };
-        self.field.planes = field;
-        let capacity = self
-            .workspace()
-            .lists
-            .capacity
-            .max(self.geometry.count * ENTRIES_PER_SPLAT);
-        self.renew(capacity, iteration, moments)
+        self.model = self
+            .kernels
+            .densify
+            .carry_out(&self.gpu, &plan, &self.model)?;
+        let present = self.workspace()?.lists.capacity;
+        let capacity = present.max(self.model.len() * ENTRIES_PER_SPLAT);
+        self.renew(capacity, iteration)
     }
 
     /// Looks for pixels that show something else than the scene, and lets them count no
@@ -60,10 +41,10 @@ impl LumaTrainer {
     pub(super) fn leave_out_outliers(&mut self) -> Result<(), GpuError> {
         let scene = outliers::Scene {
             raster: &self.raster,
-            geometry: &self.geometry,
-            field: &self.field,
+            geometry: &self.model.geometry,
+            field: &self.model.field,
             near: self.near,
-            capacity: self.workspace().lists.capacity,
+            capacity: self.workspace()?.lists.capacity,
         };
         let photos: Vec<_> = (0..self.exposures.len())
             .map(|index| outliers::Photo {

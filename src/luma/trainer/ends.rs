@@ -28,7 +28,7 @@ impl LumaTrainer {
         let left = schedule.iterations.saturating_sub(iteration).max(1);
         let growing = schedule.densify_until.saturating_sub(iteration).min(left);
         let densifications = growing as f64 / schedule.densify_every as f64;
-        let room = self.settings.max_splats as f64 / self.geometry.count as f64;
+        let room = self.settings.max_splats as f64 / self.model.len() as f64;
         let growth = (1.0 + self.settings.growth).powf(densifications).min(room);
         let share = growing as f64 / left as f64;
         if let Some(end) = self.pace.end(limit, growth.max(1.0), share) {

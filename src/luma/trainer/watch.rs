@@ -2,10 +2,10 @@
 
 use std::time::Instant;
 
-use super::{LumaTrainer, SYNC_EVERY, best::Best};
+use super::{LumaTrainer, best::Best};
 use crate::{
     gpu::{GpuError, Recorder},
-    luma::{TrainingView, curve::CurvePoint},
+    luma::{TrainingView, curve::CurvePoint, settings::SYNC_EVERY},
     measure,
     raster::ViewUniform,
 };
@@ -87,7 +87,7 @@ impl LumaTrainer {
         }
         self.demand = self.demand.watching(views.iter().map(|view| &view.camera));
         if before != [self.max_pixels, self.max_tiles] {
-            let capacity = self.workspace().lists.capacity;
+            let capacity = self.workspace()?.lists.capacity;
             self.rebuild(capacity, self.base)?;
         }
         self.watch = Watch {
@@ -124,7 +124,7 @@ impl LumaTrainer {
         self.watch.curve.push(CurvePoint {
             iteration,
             seconds,
-            splats: self.geometry.count,
+            splats: self.model.len(),
             psnr: sum / self.watch.views.len() as f64,
         });
         self.watch.next = next_look(iteration);
@@ -137,8 +137,8 @@ impl LumaTrainer {
         let pixels = loop {
             let camera = &self.watch.views[index].camera;
             let degree = self.settings.degree_at(iteration);
-            let view = ViewUniform::new(camera, self.near, self.geometry.count, degree);
-            let workspace = self.workspace();
+            let view = ViewUniform::new(camera, self.near, self.model.len(), degree);
+            let workspace = self.workspace()?;
             let mut recorder = Recorder::new(&self.gpu);
             workspace.lists.set_view(&self.gpu, &view);
             workspace.lists.record(&self.raster, &mut recorder);

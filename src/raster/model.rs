@@ -1,0 +1,114 @@
+//! What a training changes: planes of parameters and Adam's moments, with one owner.
+
+use super::{AdamMoments, Field, Geometry};
+use crate::{
+    gpu::{Buffer, Gpu, GpuError},
+    splats::Splats,
+};
+
+/// Gaussians that are trained.
+pub struct Model {
+    /// Means, quaternions, log-scales and opacity logits.
+    pub geometry: Geometry,
+    /// Harmonics.
+    pub field: Field,
+    /// AdamMoments of the geometry.
+    pub geometry_moments: AdamMoments,
+    /// AdamMoments of the harmonics.
+    pub field_moments: AdamMoments,
+}
+
+impl Model {
+    /// Uploads Gaussians; Adam starts from rest.
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`].
+    pub fn upload(gpu: &Gpu, splats: &Splats) -> Result<Self, GpuError> {
+        let geometry = Geometry::upload(gpu, splats)?;
+        let field = Field::upload(gpu, &splats.sh)?;
+        Ok(Self {
+            geometry_moments: AdamMoments::zeros(gpu, geometry.planes.len())?,
+            field_moments: AdamMoments::zeros(gpu, field.planes.len())?,
+            geometry,
+            field,
+        })
+    }
+
+    /// Number of Gaussians.
+    pub fn len(&self) -> usize {
+        self.geometry.count
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Reads the Gaussians.
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`].
+    pub fn download(&self, gpu: &Gpu) -> Result<Splats, GpuError> {
+        self.geometry.download(gpu, &self.field)
+    }
+
+    /// A copy in host memory.
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`].
+    pub fn snapshot(&self, gpu: &Gpu) -> Result<Snapshot, GpuError> {
+        let mut planes = Vec::new();
+        for buffer in self.buffers() {
+            planes.push(buffer.read(gpu)?);
+        }
+        Ok(Snapshot {
+            count: self.geometry.count,
+            planes,
+        })
+    }
+
+    /// Puts what a snapshot of this model holds in the place of what there is now.
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`].
+    pub fn restore(&mut self, gpu: &Gpu, snapshot: &Snapshot) -> Result<(), GpuError> {
+        self.geometry.count = snapshot.count;
+        let planes = snapshot.planes.iter();
+        for (buffer, planes) in self.buffers_mut().into_iter().zip(planes) {
+            *buffer = Buffer::from_slice(gpu, "restored model", planes)?;
+        }
+        Ok(())
+    }
+
+    fn buffers(&self) -> [&Buffer<f32>; 6] {
+        let (geometry, field) = (&self.geometry_moments, &self.field_moments);
+        [
+            &self.geometry.planes,
+            &self.field.planes,
+            &geometry.first,
+            &geometry.second,
+            &field.first,
+            &field.second,
+        ]
+    }
+
+    fn buffers_mut(&mut self) -> [&mut Buffer<f32>; 6] {
+        let (geometry, field) = (&mut self.geometry_moments, &mut self.field_moments);
+        [
+            &mut self.geometry.planes,
+            &mut self.field.planes,
+            &mut geometry.first,
+            &mut geometry.second,
+            &mut field.first,
+            &mut field.second,
+        ]
+    }
+}
+
+/// A [`Model`] in host memory: what a training can go back to.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Snapshot {
+    count: usize,
+    /// In the order of the model's buffers.
+    planes: Vec<Vec<f32>>,
+}
