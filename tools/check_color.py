@@ -8,7 +8,7 @@ not there are skipped with a word. A scene is fitted once (and not again while i
 then coloured and evaluated with each teacher: the photos themselves (oracle), the photos made
 unsteady by unsteady_teacher.py, and the bundled network. Needs numpy and Pillow.
 
-`--colorize="--sh-degree 1"` hands flags to `gs-chroma colorize`, `--eval="--rgb-rounds 1"` to `eval`.
+`--colorize="--sh-degree 1"` hands flags to `gs-chroma colorize`, `--eval="--lpips lpips.onnx"` to `eval`.
 `--ablation` prints another table:
 each part of the solver off, or its degree raised, with the unsteady teacher.
 """

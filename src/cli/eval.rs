@@ -26,10 +26,6 @@ pub struct Eval {
     /// and the teacher on each drawn gray frame.
     #[arg(long, requires = "teacher")]
     baselines: bool,
-    /// Rounds for these RGB splats, as times those that `colorize` takes: harmonics of degree 3
-    /// settle more slowly than a colour for each Gaussian.
-    #[arg(long, value_name = "TIMES", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=100), requires = "baselines")]
-    rgb_rounds: u32,
     /// Frames of the rendered path.
     #[arg(long, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u32).range(2..=9999))]
     frames: u32,
@@ -62,7 +58,6 @@ impl Eval {
             colmap: self.colmap,
             frames: self.frames as usize,
             baselines: self.baselines,
-            rgb_rounds: self.rgb_rounds as usize,
             flow: self.flow,
             lpips: self.lpips,
         };

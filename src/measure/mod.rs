@@ -13,7 +13,7 @@ mod path;
 mod ssim;
 mod visibility;
 
-pub use colorfulness::{colorfulness, colorfulness_absolute};
+pub use colorfulness::colorfulness;
 pub use consistency::{Consistency, DENOMINATOR_RULE, SCALE_RULE};
 pub use depth::DepthSteps;
 pub use flo::decode_flo;

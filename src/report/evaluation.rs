@@ -101,8 +101,6 @@ pub struct PictureScore {
     pub ab_error: Option<f64>,
     /// Colourfulness (Hasler and Süsstrunk 2003).
     pub colorfulness: f64,
-    /// The same with absolute values of the opponent axes.
-    pub colorfulness_absolute: f64,
     /// Learned perceptual distance to the photo, with `--lpips`.
     pub lpips: Option<f64>,
 }
@@ -243,7 +241,6 @@ impl Evaluation {
             "95 %",
             "a/b error",
             "colourful",
-            "absolute",
             "LPIPS",
         ];
         let luma = vec![
@@ -266,7 +263,6 @@ impl Evaluation {
                 figure(score.delta_e.map(|e| e.percentile_95), 2),
                 figure(score.ab_error, 2),
                 figure(Some(score.colorfulness), 1),
-                figure(Some(score.colorfulness_absolute), 1),
                 figure(score.lpips, 3),
             ]
         });

@@ -48,8 +48,6 @@ pub struct EvalOptions {
     pub frames: usize,
     /// Whether other ways to colour a scene are measured beside it.
     pub baselines: bool,
-    /// Times as many rounds for the RGB splats among them as `colorize` takes by default.
-    pub rgb_rounds: usize,
     /// Folder of `.flo` files between the path's frames; geometric flow by default.
     pub flow: Option<PathBuf>,
     /// A network that tells how far two pictures are apart.
@@ -86,9 +84,7 @@ pub fn eval(
     let drawn = subject.report.luma.raster_options();
     let raster = Arc::new(Raster::with(&open_gpu(false)?, drawn));
     let splats = match &teacher {
-        Some(teacher) if options.baselines => {
-            Some(teacher.rgb_splats(&raster, &subject, options.rgb_rounds, observe)?)
-        }
+        Some(teacher) if options.baselines => Some(teacher.rgb_splats(&raster, &subject, observe)?),
         _ => None,
     };
     let mut rgb = vec![(Method::Exported, &subject.exported)];

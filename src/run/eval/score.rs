@@ -100,7 +100,6 @@ impl Scored {
                 delta_e: truth.map(|t| yardstick.color_error(&rgb, t)),
                 ab_error: wanted.map(|t| measure::ab_error(&yardstick.counted(ab), &ab_of(t))),
                 colorfulness: measure::colorfulness(&counted),
-                colorfulness_absolute: measure::colorfulness_absolute(&counted),
                 lpips: match (&mut lpips, truth) {
                     (Some(lpips), Some(t)) => {
                         Some(lpips.distance(&yardstick.patched(&rgb, t), t, size)?)
@@ -158,7 +157,6 @@ impl Scored {
             delta_e: None,
             ab_error: None,
             colorfulness: yardstick.colorfulness(&shown),
-            colorfulness_absolute: measure::colorfulness_absolute(&yardstick.counted(&shown)),
             lpips: None,
         });
         Ok(Self {
@@ -248,8 +246,6 @@ pub(super) fn mean_pictures(views: &[Scored]) -> Vec<PictureScore> {
                 delta_e: mean_error(own().map(|s| s.delta_e)),
                 ab_error: mean(own().map(|s| s.ab_error)),
                 colorfulness: mean(own().map(|s| Some(s.colorfulness))).unwrap_or(f64::NAN),
-                colorfulness_absolute: mean(own().map(|s| Some(s.colorfulness_absolute)))
-                    .unwrap_or(f64::NAN),
                 lpips: mean(own().map(|s| s.lpips)),
             }
         })

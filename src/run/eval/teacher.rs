@@ -20,6 +20,10 @@ use crate::{
     splats::{ShField, sh},
 };
 
+/// RGB splats get so many times the rounds of `colorize`: harmonics of degree 3 settle more
+/// slowly than a color for each Gaussian.
+const RGB_ROUNDS: usize = 3;
+
 /// A teacher and its answers for the photos.
 pub(super) struct EvalTeacher {
     path: PathBuf,
@@ -94,13 +98,12 @@ impl EvalTeacher {
     }
 
     /// RGB splats on the run's geometry, fitted to the teacher's pictures of the training
-    /// views: harmonics of degree 3 as splat trainers have, in so many times the rounds
-    /// that `colorize` takes by default. They are told what `fit` knew: exposures, masks.
+    /// views: harmonics of degree 3 as splat trainers have, in [`RGB_ROUNDS`] times the
+    /// rounds that `colorize` takes by default. They are told what `fit` knew: exposures, masks.
     pub fn rgb_splats(
         &self,
         raster: &Arc<Raster>,
         subject: &Subject,
-        rounds: usize,
         observe: &mut Observer<'_>,
     ) -> Result<ShField, RunError> {
         let scene = &subject.scene;
@@ -135,8 +138,8 @@ impl EvalTeacher {
             sh_degree: sh::MAX_DEGREE,
             robust: None,
             corrects_views: false,
-            warm_rounds: rounds * ours.warm_rounds,
-            rounds: rounds * ours.rounds,
+            warm_rounds: RGB_ROUNDS * ours.warm_rounds,
+            rounds: RGB_ROUNDS * ours.rounds,
             ..ours
         };
         Ok(fit_rgb(
