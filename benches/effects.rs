@@ -16,7 +16,7 @@ use glam::{DMat3, DVec3};
 use gs_chroma::{
     capture::{Camera, Capture, CaptureError, Choice, Exposure, LoadOptions, Loader},
     gpu::{Gpu, GpuError},
-    luma::{LumaSettings, LumaTrainer, TrainingView},
+    luma::{LumaSettings, LumaTrainer, Schedule, TrainingView},
     oracle::random::Random,
     raster::{Raster, RasterOptions},
     splats::{ShField, Splats, dome::dome, sh},
@@ -103,7 +103,7 @@ fn trainer(gpu: &Gpu, effects: Effects) -> Result<(LumaTrainer, u64), GpuError> 
             view
         })
         .collect();
-    let mut settings = LumaSettings {
+    let settings = LumaSettings {
         sh_degree: effects.sh_degree,
         max_splats: 2 * SPLATS,
         antialiased: effects.antialiased,
@@ -118,9 +118,6 @@ fn trainer(gpu: &Gpu, effects: Effects) -> Result<(LumaTrainer, u64), GpuError> 
             usize::MAX
         }
     };
-    settings.schedule.find_outliers_at = [0, 1].map(never);
-    // All harmonics from the start, as in most of a training.
-    settings.schedule.raise_degree_every = 1;
     let raster = Raster::with(
         gpu,
         RasterOptions {
@@ -137,6 +134,12 @@ fn trainer(gpu: &Gpu, effects: Effects) -> Result<(LumaTrainer, u64), GpuError> 
     }
     let raster = Arc::new(raster);
     let mut trainer = LumaTrainer::new(raster, settings, 5.0, &splats, views)?;
+    trainer.follow(Schedule {
+        find_outliers_at: [0, 1].map(never),
+        // All harmonics from the start, as in most of a training.
+        raise_degree_every: 1,
+        ..trainer.schedule().clone()
+    });
     trainer.train(&mut |_| {})?;
     let taken = gpu.allocated_bytes().zip(before);
     Ok((

@@ -53,7 +53,7 @@ def main() -> int:
             luma = json.loads(done.stdout)["luma"]
             end, best = luma["held_out"], max(luma["curve"], key=lambda look: look["psnr"])
             print(
-                f"| {scene.name} | {luma['iterations']:,} | {luma['sh_degree']}"
+                f"| {scene.name} | {luma['iterations']:,} | {luma['settings']['sh_degree']}"
                 f" | {end['psnr']:.2f}, {end['ssim']:.3f}"
                 f" | {best['psnr']:.2f} at {best['iteration']:,} | {luma['loss']:.4f}"
                 f" | {luma['splats']:,} | {seconds:.0f} |",

@@ -68,7 +68,7 @@ def main() -> int:
     for run in arguments.runs:
         luma = json.loads((run / "report.json").read_text())["luma"]
         curve = [(point["iteration"], point["psnr"]) for point in luma["curve"]]
-        iterations, degree = luma["iterations"], luma["sh_degree"]
+        iterations, degree = luma["iterations"], luma["settings"]["sh_degree"]
         whole = full_degree_from(iterations, degree)
         best_of_all = max(curve, key=lambda point: point[1])
         for gain, begin in rules:

@@ -4,7 +4,7 @@ use std::{array, collections::BTreeMap, sync::Arc, time::Instant};
 
 use gs_chroma::{
     gpu::{Gpu, GpuError},
-    luma::{LumaSettings, LumaTrainer, Numerics},
+    luma::{LumaSettings, LumaTrainer, Numerics, Schedule},
     raster::Raster,
 };
 use serde::Serialize;
@@ -56,17 +56,20 @@ pub struct Time {
 
 /// A trainer that has found its room already.
 fn trainer(raster: &Arc<Raster>, subject: &Subject, numerics: Numerics) -> Fallible<LumaTrainer> {
-    let mut settings = LumaSettings {
+    let settings = LumaSettings {
         sh_degree: subject.large.sh.degree,
         max_splats: subject.large.len(),
         numerics,
         ..LumaSettings::new(ITERATIONS)
     };
-    // All harmonics from the start, as in most of a training.
-    settings.schedule.raise_degree_every = 1;
     let views = subject.views.clone();
     let raster = raster.clone();
     let mut trainer = LumaTrainer::new(raster, settings, subject.extent, &subject.large, views)?;
+    trainer.follow(Schedule {
+        // All harmonics from the start, as in most of a training.
+        raise_degree_every: 1,
+        ..trainer.schedule().clone()
+    });
     trainer.train(&mut |_| {})?;
     Ok(trainer)
 }

@@ -8,7 +8,7 @@ use std::{
 use gs_chroma::{
     capture::LoadOptions,
     gpu::Gpu,
-    luma::{LumaSettings, LumaTrainer, Numerics},
+    luma::{LumaSettings, LumaTrainer, Numerics, Schedule},
     raster::Raster,
     run::{FitOptions, Preset, fit},
     splats::Splats,
@@ -58,16 +58,19 @@ fn groups(splats: &Splats) -> Vec<Vec<f64>> {
 pub fn drifts(gpu: &Gpu, subject: &Subject) -> Fallible<Vec<f64>> {
     let raster = Arc::new(Raster::new(gpu));
     let train = |numerics: Numerics| -> Fallible<Vec<Vec<f64>>> {
-        let mut settings = LumaSettings {
+        let settings = LumaSettings {
             sh_degree: subject.small.sh.degree,
             max_splats: subject.small.len(),
             numerics,
             ..LumaSettings::new(DRIFT_ITERATIONS)
         };
-        settings.schedule.densify_until = 0;
         let views = vec![subject.view.clone()];
         let (raster, start) = (raster.clone(), &subject.small);
         let mut trainer = LumaTrainer::new(raster, settings, subject.extent, start, views)?;
+        trainer.follow(Schedule {
+            densify_until: 0,
+            ..trainer.schedule().clone()
+        });
         trainer.train(&mut |_| {})?;
         Ok(groups(&trainer.splats()?))
     };

@@ -6,9 +6,9 @@ use clap::{Args, ValueEnum};
 
 use super::{effects::EffectArguments, photos::Photos, print, progress::Progress};
 use crate::chroma::teacher::TeacherSettings;
-use crate::luma::{Densification, Numerics};
+use crate::luma::{Densification, FLAT, Numerics};
 use crate::report::timings_table;
-use crate::run::{AheadOptions, FLAT, FitOptions, Preset, RunError, fit};
+use crate::run::{AheadOptions, FitOptions, Preset, RunError, fit};
 
 /// Rows of the curve that is printed.
 const CURVE_ROWS: usize = 8;

@@ -20,7 +20,7 @@ use std::{sync::Arc, time::Instant};
 use watch::Watch;
 
 use super::{
-    Densification, LumaSettings,
+    Densification, Goal, LumaSettings, Schedule,
     loss::{self, LossEffects, Targets},
     memory::{Demand, ENTRIES_PER_SPLAT},
     pace::Pace,
@@ -73,6 +73,9 @@ pub struct LumaTrainer {
     gpu: Gpu,
     kernels: Kernels,
     settings: LumaSettings,
+    /// What has become of the schedule that the settings stand for.
+    schedule: Schedule,
+    goal: Goal,
     extent: f64,
     near: f64,
     /// Of each view; behind them, where training begins coarse, at half the size.
@@ -130,9 +133,10 @@ impl LumaTrainer {
         let (mut max_pixels, mut max_tiles) = (0, 0);
         let (mut cameras, mut grays, mut masks) = (Vec::new(), Vec::new(), Vec::new());
         let (count, settings_robust) = (views.len(), settings.robust);
-        let longest = ends::LONGER * settings.schedule.iterations;
+        let longest = ends::LONGER * settings.iterations;
+        let schedule = Schedule::of(&settings);
         let exposures: Vec<Exposure> = views.iter().map(|view| view.exposure).collect();
-        let coarse: Vec<TrainingView> = match settings.schedule.coarse_until {
+        let coarse: Vec<TrainingView> = match schedule.coarse_until {
             0 => Vec::new(),
             _ => views.iter().map(TrainingView::halved).collect(),
         };
@@ -178,6 +182,8 @@ impl LumaTrainer {
             gpu,
             kernels,
             settings,
+            schedule,
+            goal: Goal::Fixed,
             extent,
             near,
             cameras,
@@ -212,14 +218,15 @@ impl LumaTrainer {
         self.pace = Pace::default();
         let mut iteration = 0;
         let mut pending: Option<Report> = None;
-        while iteration < self.settings.schedule.iterations {
+        while iteration < self.schedule.end {
             self.step(iteration)?;
             iteration += 1;
-            let settings = &self.settings;
-            let densifies = settings.densifies_after(iteration);
-            let finds_outliers = settings.finds_outliers_after(iteration);
-            let ends = iteration == settings.schedule.iterations;
-            let looks = self.watch.is_due(iteration, settings.schedule.iterations);
+            let schedule = &self.schedule;
+            let densifies = schedule.densifies_after(iteration);
+            let finds_outliers =
+                self.settings.robust && schedule.find_outliers_at.contains(&iteration);
+            let ends = iteration == schedule.end;
+            let looks = self.watch.is_due(iteration, schedule.end);
             let pauses = densifies || finds_outliers || looks || ends;
             // The first views say how much room is needed: those lost to an overflow
             // are few if it is noticed early.
@@ -266,7 +273,7 @@ impl LumaTrainer {
             if !ends {
                 self.keep_to_limit(iteration);
             }
-            if self.settings.densifies_after(iteration) {
+            if self.schedule.densifies_after(iteration) {
                 self.densify(iteration)?;
             }
             if finds_outliers {
@@ -276,9 +283,28 @@ impl LumaTrainer {
         Ok(())
     }
 
-    /// What it trains with; of the schedule, what has become of it.
+    /// Trains towards `goal` instead of to the end of the schedule.
+    pub fn aim(&mut self, goal: Goal) {
+        self.goal = goal;
+    }
+
+    /// Trains by another schedule than that of its settings, with photos at half their size as
+    /// long as it has them.
+    pub fn follow(&mut self, schedule: Schedule) {
+        self.schedule = Schedule {
+            coarse_until: self.schedule.coarse_until,
+            ..schedule
+        };
+    }
+
+    /// What it trains with.
     pub fn settings(&self) -> &LumaSettings {
         &self.settings
+    }
+
+    /// When things happen; once it is trained, when they did.
+    pub fn schedule(&self) -> &Schedule {
+        &self.schedule
     }
 
     /// Reads the trained Gaussians.
@@ -320,7 +346,7 @@ impl LumaTrainer {
         let views = self.exposures.len();
         let mut index = view_at(self.settings.seed, views, iteration);
         let exposure = self.exposures[index];
-        if iteration < self.settings.schedule.coarse_until {
+        if iteration < self.schedule.coarse_until {
             index += views;
         }
         let workspace = self.workspace()?;
@@ -328,7 +354,7 @@ impl LumaTrainer {
             &self.cameras[index],
             self.near,
             self.model.len(),
-            self.settings.degree_at(iteration),
+            self.degree_at(iteration),
         );
         let mut recorder = Recorder::new(&self.gpu);
         workspace.lists.set_view(&self.gpu, &view);
@@ -346,7 +372,7 @@ impl LumaTrainer {
             iteration,
         );
         let step = u32::try_from(iteration + 1).unwrap_or(u32::MAX);
-        let weights = match self.settings.densification {
+        let weights = match self.settings.densify {
             Densification::Split => [0.0; 2],
             Densification::Relocate => relocation::weights(self.model.len(), self.extent),
         };
@@ -356,8 +382,7 @@ impl LumaTrainer {
         field.set(&self.gpu, step, &self.field_rates(iteration), [0.0; 2]);
         workspace.adjoint.record(&self.raster, &mut recorder);
         if let Some(relocation) = &workspace.relocation {
-            let rate = self.settings.settling(iteration)
-                * self.settings.means_rate(iteration, self.extent);
+            let rate = self.schedule.settling(iteration) * self.means_rate(iteration);
             let seed = self.settings.seed;
             relocation.record(
                 &self.gpu,
@@ -370,13 +395,24 @@ impl LumaTrainer {
         Ok(())
     }
 
+    /// Learning rate of the means at `iteration`, in world units.
+    fn means_rate(&self, iteration: usize) -> f64 {
+        let rates = &self.settings.rates;
+        rates.means_at(self.schedule.share_over(iteration), self.extent)
+    }
+
+    /// Degree of the harmonics in use at `iteration`.
+    fn degree_at(&self, iteration: usize) -> u32 {
+        self.schedule.degree_at(iteration, self.settings.sh_degree)
+    }
+
     fn geometry_rates(&self, iteration: usize) -> [f32; GEOMETRY_PLANES] {
         let rates = &self.settings.rates;
-        let settling = self.settings.settling(iteration);
+        let settling = self.schedule.settling(iteration);
         std::array::from_fn(|plane| {
             (settling
                 * match plane {
-                    PLANE_MEAN..PLANE_QUAT => self.settings.means_rate(iteration, self.extent),
+                    PLANE_MEAN..PLANE_QUAT => self.means_rate(iteration),
                     PLANE_QUAT..PLANE_LOG_SCALE => rates.quats,
                     PLANE_LOG_SCALE..PLANE_OPACITY => rates.log_scales,
                     _ => rates.opacity_logits,
@@ -386,7 +422,7 @@ impl LumaTrainer {
 
     fn field_rates(&self, iteration: usize) -> Vec<f32> {
         let rates = &self.settings.rates;
-        let settling = self.settings.settling(iteration);
+        let settling = self.schedule.settling(iteration);
         let rest = (settling * rates.sh_rest) as f32;
         let mut planes = vec![rest; sh::coefficient_count(self.model.field.degree)];
         planes[0] = (settling * rates.sh_constant) as f32;
@@ -422,7 +458,7 @@ impl LumaTrainer {
         let recent = &losses[..report.iteration - since];
         observe(LumaProgress {
             iteration: report.iteration,
-            end: self.settings.schedule.iterations,
+            end: self.schedule.end,
             loss: recent.iter().map(|&loss| f64::from(loss)).sum::<f64>() / recent.len() as f64,
             splats: self.model.len(),
             poisoned: status.poisoned,

@@ -81,7 +81,7 @@ impl Workspace {
         let adjoint = LayerAdjoint::new(raster, geometry, &lists, field, &layer, &outcome)?;
         let log = LossLog::new(gpu, &kernels.sum_loss, &lists.status, max_tiles, SYNC_EVERY)?;
         let losses = Loss::all(gpu, &kernels.loss, &lists, &layer, &adjoint, &log, targets);
-        let relocation = (settings.densification == Densification::Relocate)
+        let relocation = (settings.densify == Densification::Relocate)
             .then(|| {
                 let kernels = &kernels.relocation;
                 Relocation::new(gpu, kernels, &lists.status, &geometry.planes)

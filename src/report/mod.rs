@@ -25,13 +25,12 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::{
     capture::{Exposure, LoadOptions},
-    luma::{CurvePoint, Numerics},
+    luma::{CurvePoint, LumaSettings, Preset},
     measure::DeltaE,
-    raster::RasterOptions,
 };
 
 /// Version of the report's layout; raised when a key changes its meaning.
-pub const REPORT_VERSION: u32 = 1;
+pub const REPORT_VERSION: u32 = 2;
 
 /// `report.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -44,12 +43,9 @@ pub struct Report {
     pub capture: CaptureReport,
     /// What it ran on.
     pub device: DeviceReport,
-    /// `draft`, `balanced` or `paper`.
-    pub preset: String,
-    /// Seed of every random choice.
-    pub seed: u64,
+    /// The preset that settings come from where nothing else was asked for.
+    pub preset: Preset,
     /// What was decided about each effect of image formation.
-    #[serde(default)]
     pub effects: Vec<EffectReport>,
     /// Stage 1.
     pub luma: LumaReport,
@@ -82,10 +78,8 @@ pub struct CaptureReport {
     #[serde(flatten)]
     pub load: LoadOptions,
     /// Views whose photo has a mask file.
-    #[serde(default)]
     pub masked_views: usize,
     /// Pixels of all photos, at the files' sizes, whose values are not finite.
-    #[serde(default)]
     pub not_finite: usize,
     /// Radius of the cameras as 3DGS takes it, in world units.
     pub extent: f64,
@@ -107,33 +101,22 @@ pub struct DeviceReport {
 /// Stage 1.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LumaReport {
+    /// What it was trained with.
+    pub settings: LumaSettings,
     /// Iterations that led to the set that was kept.
     pub iterations: usize,
     /// The iteration at which training went back to an earlier one, where it was best.
-    #[serde(default)]
     pub given_up: Option<usize>,
-    /// Degree of the luma harmonics.
-    pub sh_degree: u32,
-    /// Cap on Gaussians.
-    pub max_splats: usize,
-    /// Whether opacities fall by what the blur of the projection spreads.
-    #[serde(default)]
-    pub antialiased: bool,
-    /// How accurately training computed.
-    #[serde(default)]
-    pub numerics: Numerics,
     /// Gaussians at the end.
     pub splats: usize,
     /// Gaussians that the last views culled for values that are not finite.
     pub poisoned: usize,
     /// Gradients refused for not being finite, since the set last changed.
-    #[serde(default)]
     pub refused: usize,
     /// Loss at the end.
     #[serde(deserialize_with = "number_or_nan")]
     pub loss: f64,
     /// What the amount of work followed from, besides the preset.
-    #[serde(default)]
     pub goal: GoalReport,
     /// Wall seconds.
     pub seconds: LumaSeconds,
@@ -143,20 +126,15 @@ pub struct LumaReport {
     pub peak_device_memory: Option<u64>,
     /// Bytes that a training of as many Gaussians as there are at the end was expected
     /// to take on the device at most.
-    #[serde(default)]
     pub estimated_device_memory: u64,
     /// How bright each photo shows the scene, where they differ.
-    #[serde(default)]
     pub exposures: Vec<ViewExposure>,
     /// What the training gained with time.
-    #[serde(default)]
     pub curve: Vec<CurvePoint>,
     /// Views of which up to three were looked at for it: `test`, or `train` without
     /// held-out ones.
-    #[serde(default)]
     pub curve_on: String,
     /// Longer side at which held-out views were measured, where it is not that of training.
-    #[serde(default)]
     pub measured_side: Option<u32>,
     /// Mean over the held-out views, if any.
     pub held_out: Option<LumaQuality>,
@@ -175,12 +153,10 @@ pub struct LumaSeconds {
     /// Training.
     pub train: f64,
     /// Looking at views meanwhile.
-    #[serde(default)]
     pub curve: f64,
     /// Measuring on held-out views.
     pub measure: f64,
     /// The whole run but for writing its files, with attempts that were given up.
-    #[serde(default)]
     pub all: f64,
 }
 
@@ -191,8 +167,6 @@ pub struct GoalReport {
     pub time_limit: Option<f64>,
     /// PSNR in dB that was to be reached.
     pub target_psnr: Option<f64>,
-    /// Training was to end where twice the iterations would bring less than so many dB.
-    pub stop_when_flat: Option<f64>,
     /// Trainings from the start, each with more work; the last or the best one counts.
     pub attempts: usize,
 }
@@ -374,15 +348,6 @@ pub struct ColorView {
     /// Its quality.
     #[serde(flatten)]
     pub quality: ColorQuality,
-}
-
-impl LumaReport {
-    /// How the scene is drawn.
-    pub fn raster_options(&self) -> RasterOptions {
-        RasterOptions {
-            antialiased: self.antialiased,
-        }
-    }
 }
 
 impl Report {

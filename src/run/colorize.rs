@@ -8,13 +8,12 @@ use std::{
 };
 
 use super::{
-    Event, Observer, RunError, RunFolder, Stage,
+    Event, Observer, Preset, RunError, RunFolder, Stage,
     chroma_options::{ChromaOptions, Degree},
     chroma_plan,
     color_quality::Measured,
     files,
     fit::{capture_report, comments, open_gpu},
-    preset::Preset,
     scene::{Scene, masked_weights, read_splats},
     teach::{TeachOptions, Teachers},
     yardstick,
@@ -86,12 +85,12 @@ pub fn colorize(
     let luma = luma.to_luma();
     if source.report.is_none() {
         report.capture = capture_report(&colmap_dir, &scene);
-        (report.luma.splats, report.luma.sh_degree) = (luma.len(), luma.sh.degree);
-        report.luma.antialiased = drawn.antialiased;
+        report.luma.splats = luma.len();
+        report.luma.settings.sh_degree = luma.sh.degree;
+        report.luma.settings.antialiased = drawn.antialiased;
     }
-    let drawn = report.luma.raster_options();
-    let preset = source.preset(&report, &gpu);
-    let iterations = adam_iterations(options, preset, report.luma.iterations)?;
+    let drawn = report.luma.settings.raster_options();
+    let iterations = adam_iterations(options, report.preset, report.luma.iterations)?;
     let output = Output {
         ply: options
             .output
@@ -130,7 +129,7 @@ pub fn colorize(
     let chosen = match asked.sh_degree {
         Degree::Fixed(_) => None,
         Degree::Auto => {
-            let settings = asked.settings(iterations, 0, report.seed);
+            let settings = asked.settings(iterations, 0, report.luma.settings.seed);
             let chosen = choose_degree(&raster, &settings, scene.extent, &luma, &views)?;
             observe(Event::Note(describe(&chosen)));
             Some(chosen)
@@ -142,7 +141,7 @@ pub fn colorize(
     };
     let effects = [correction, chroma_plan::degree(&asked, chosen.as_ref())];
     observe(Event::Note(table(&effects)));
-    let settings = asked.settings(iterations, degree, report.seed);
+    let settings = asked.settings(iterations, degree, report.luma.settings.seed);
     let (mut log, mut last, mut peak_device_memory) = (String::new(), None, None);
     let total = settings.steps_to_report();
     let told = &mut |progress: ChromaProgress| {
@@ -302,6 +301,7 @@ impl Source {
 
     /// The run's report, or an empty one for a splat file.
     fn report(&self, gpu: &Gpu) -> Report {
+        let preset = Preset::for_device(gpu);
         self.report.clone().unwrap_or_else(|| Report {
             version: REPORT_VERSION,
             program: env!("CARGO_PKG_VERSION").to_owned(),
@@ -312,8 +312,7 @@ impl Source {
                 test: 0,
                 points: 0,
                 rejected: Vec::new(),
-                load: Preset::for_device(gpu)
-                    .load_options(&LoadOptions::default(), &Overrules::default()),
+                load: preset.load_options(&LoadOptions::default(), &Overrules::default()),
                 masked_views: 0,
                 not_finite: 0,
                 extent: 0.0,
@@ -324,21 +323,11 @@ impl Source {
                 backend: format!("{:?}", gpu.info().backend),
                 software: gpu.is_software(),
             },
-            preset: String::new(),
-            seed: 0,
+            preset,
             effects: Vec::new(),
             luma: LumaReport::default(),
             chroma: None,
         })
-    }
-
-    fn preset(&self, report: &Report, gpu: &Gpu) -> Preset {
-        match report.preset.as_str() {
-            "draft" => Preset::Draft,
-            "balanced" => Preset::Balanced,
-            "" if gpu.is_software() => Preset::Draft,
-            _ => Preset::Paper,
-        }
     }
 
     fn default_output(&self) -> PathBuf {
@@ -363,10 +352,7 @@ fn adam_iterations(
         Some(until) if until <= luma => Err(RunError::NothingUntil { until, luma }),
         Some(until) => Ok(until - luma),
         // As many as the preset's, however many stage 1 really took.
-        None => {
-            let amounts = preset.amounts();
-            Ok(amounts.until - amounts.iterations)
-        }
+        None => Ok(preset.adam_iterations()),
     }
 }
 

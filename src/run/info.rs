@@ -96,7 +96,7 @@ pub fn export(run: Option<&Path>, output: &Path, luma: bool) -> Result<usize, Ru
         output,
         &splats,
         DVec3::from(report.capture.offset),
-        &comments(report.luma.raster_options()),
+        &comments(report.luma.settings.raster_options()),
     )?;
     Ok(splats.len())
 }

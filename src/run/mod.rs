@@ -27,10 +27,10 @@ pub use fit::{AheadOptions, FitOptions, fit};
 pub use folder::RunFolder;
 pub use info::{export, info};
 pub use plan::{PlanOptions, plan};
-pub use preset::{FLAT, Preset};
 pub use render::{RenderOptions, Views, render};
 pub use teach::{HINT_WEIGHT, Taught, TeachOptions};
 
+pub use crate::luma::Preset;
 use crate::{
     capture::CaptureError, chroma::teacher::TeacherError, gpu::GpuError, splats::ply::PlyError,
 };

@@ -35,9 +35,14 @@ pub fn plan(options: &PlanOptions, observe: &mut Observer<'_>) -> Result<Plan, R
         Some(preset) => preset,
         None => Preset::for_device(&open_gpu(false)?),
     };
-    let amounts = preset.amounts();
     let load = preset.load_options(&options.load, &options.overrules);
     let scene = Scene::load(&options.colmap_dir, &load, observe)?;
     let raster = || Ok(Arc::new(Raster::new(&open_gpu(false)?)));
-    planned(&scene, amounts.room(), &options.overrules, raster, observe)
+    planned(
+        &scene,
+        preset.work().room(),
+        &options.overrules,
+        raster,
+        observe,
+    )
 }

@@ -68,7 +68,7 @@ pub fn render(options: &RenderOptions, observe: &mut Observer<'_>) -> Result<usi
                 None => RunFolder::newest()?,
             };
             let report = folder.read_report()?;
-            let (capture, drawn) = (report.capture, report.luma.raster_options());
+            let (capture, drawn) = (report.capture, report.luma.settings.raster_options());
             let colored = !options.luma && folder.color().exists();
             let file = if colored {
                 folder.color()

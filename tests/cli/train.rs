@@ -37,7 +37,7 @@ fn json_is_the_report() {
     let place = place_with_scene();
     let printed = place.json(&[&QUICK_FIT[..], &["--json", "--seed", "5"]].concat());
     assert_eq!(printed, place.report("runs/scene"));
-    assert_eq!(printed["seed"], 5);
+    assert_eq!(printed["luma"]["settings"]["seed"], 5);
     assert_eq!(printed["preset"], "draft");
     assert_eq!(printed["luma"]["iterations"], 3);
     let capture = &printed["capture"];
@@ -68,7 +68,8 @@ fn a_memory_limit_lowers_the_cap() {
         luma["estimated_device_memory"].as_u64() <= Some(1 << 20),
         "{luma}"
     );
-    assert!(luma["max_splats"].as_u64() < Some(12_000), "{luma}");
+    let cap = &luma["settings"]["max_splats"];
+    assert!(cap.as_u64() < Some(12_000), "{luma}");
 }
 
 /// What training computes with is in the report and changes what it makes.
@@ -76,7 +77,7 @@ fn a_memory_limit_lowers_the_cap() {
 fn numerics_are_told_and_change_the_training() {
     let place = place_with_scene();
     let printed = place.json(&[&QUICK_FIT[..], &["--json"]].concat());
-    let usual = &printed["luma"]["numerics"];
+    let usual = &printed["luma"]["settings"]["numerics"];
     assert_eq!(
         *usual,
         json!({
@@ -94,7 +95,7 @@ fn numerics_are_told_and_change_the_training() {
         "alpha-min=0.02,transmittance-min=0.01,depth-bits=16,storage=half,ssim-window=7,adam=lazy";
     let words = ["--numerics", named, "--json", "-o", "runs/fast"];
     let report = place.json(&[&QUICK_FIT[..], &words].concat());
-    let numerics = &report["luma"]["numerics"];
+    let numerics = &report["luma"]["settings"]["numerics"];
     assert_eq!(numerics["alpha_min"], 0.02);
     assert_eq!(numerics["storage"], "half");
     assert_eq!(numerics["ssim_window"], 7);
@@ -190,7 +191,7 @@ fn max_splats_is_a_cap() {
         assert!(count <= cap, "{count} of {cap}");
         assert!(count > cap / 2, "{count} of {cap}");
         let report = place.report("runs/scene");
-        assert_eq!(report["luma"]["max_splats"], cap);
+        assert_eq!(report["luma"]["settings"]["max_splats"], cap);
         assert_eq!(report["luma"]["splats"], count);
     }
     assert!(place.report("runs/scene")["luma"]["splats"].as_u64() > Some(64));
@@ -241,16 +242,16 @@ fn presets_and_what_overrules_them() {
         ];
         let report = place.json(&fit);
         assert_eq!(report["preset"], preset);
-        let cap = report["luma"]["max_splats"].as_u64();
+        let cap = report["luma"]["settings"]["max_splats"].as_u64();
         // Or as many as the device has room for.
         assert!(cap == Some(max_splats) || preset != "draft" && cap < Some(max_splats));
-        assert_eq!(report["luma"]["sh_degree"], degree);
+        assert_eq!(report["luma"]["settings"]["sh_degree"], degree);
         assert_eq!(report["capture"]["max_side"], max_side);
     }
     let own = ["--max-side", "32", "--max-splats", "99", "--sh-degree", "0"];
     let report = place.json(&[&QUICK_FIT[..], &own, &["--json"]].concat());
-    assert_eq!(report["luma"]["max_splats"], 99);
-    assert_eq!(report["luma"]["sh_degree"], 0);
+    assert_eq!(report["luma"]["settings"]["max_splats"], 99);
+    assert_eq!(report["luma"]["settings"]["sh_degree"], 0);
     assert_eq!(report["capture"]["max_side"], 32);
 }
 
@@ -360,7 +361,8 @@ fn a_flat_curve_ends_the_run() {
     place.succeed(&[&fit[..], &["--stop-when-flat=50"]].concat());
     let luma = &place.report("runs/scene")["luma"];
     assert_eq!(luma["iterations"], 150);
-    assert_eq!(luma["goal"]["stop_when_flat"], 50.0);
+    assert_eq!(luma["settings"]["iterations"], 400);
+    assert_eq!(luma["settings"]["stop_when_flat"], 50.0);
 }
 
 #[test]

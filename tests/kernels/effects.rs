@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use gs_chroma::{
     capture::{Camera, Exposure},
     gpu::shaders,
-    luma::{LumaSettings, LumaTrainer, TrainingView, outliers},
+    luma::{LumaSettings, LumaTrainer, Schedule, TrainingView, outliers},
     raster::{Field, Geometry, Renderer},
     splats::Splats,
 };
@@ -156,8 +156,11 @@ fn training_with_all_effects_repeats_and_leaves_the_defect_out() {
         settings.sh_degree = 0;
         settings.robust = robust;
         settings.max_splats = start.len();
-        settings.schedule.densify_until = 0;
         let mut trainer = LumaTrainer::new(raster(), settings, 4.0, &start, views).unwrap();
+        trainer.follow(Schedule {
+            densify_until: 0,
+            ..trainer.schedule().clone()
+        });
         let mut loss = 0.0;
         trainer.train(&mut |progress| loss = progress.loss).unwrap();
         (trainer.splats().unwrap(), loss)

@@ -5,7 +5,7 @@ use std::sync::{Arc, LazyLock};
 use gs_chroma::{
     capture::view_at,
     doctor::stage,
-    luma::{LearningRates, LumaProgress, LumaSettings, LumaTrainer, Schedule, TrainingView},
+    luma::{Goal, LearningRates, LumaProgress, LumaSettings, LumaTrainer, Schedule, TrainingView},
     raster::{Field, Geometry, Raster, Renderer},
     splats::Splats,
 };
@@ -94,7 +94,27 @@ fn train(start: &Splats, target: &Splats) -> (Splats, Vec<LumaProgress>) {
 }
 
 fn trainer(start: &Splats, target: &Splats) -> LumaTrainer {
-    LumaTrainer::new(raster(), settings(start), 4.0, start, photos(target)).unwrap()
+    let settings = settings(start);
+    let schedule = Schedule {
+        densify_from: 20,
+        densify_every: 25,
+        densify_until: 60,
+        raise_degree_every: 20,
+        ..Schedule::of(&settings)
+    };
+    trainer_by(settings, schedule, 4.0, start, photos(target))
+}
+
+fn trainer_by(
+    settings: LumaSettings,
+    schedule: Schedule,
+    extent: f64,
+    start: &Splats,
+    photos: Vec<TrainingView>,
+) -> LumaTrainer {
+    let mut trainer = LumaTrainer::new(raster(), settings, extent, start, photos).unwrap();
+    trainer.follow(schedule);
+    trainer
 }
 
 fn settings(start: &Splats) -> LumaSettings {
@@ -104,10 +124,6 @@ fn settings(start: &Splats) -> LumaSettings {
     settings.pull_threshold = 1e-6;
     // Ten more, however many bystanders there are.
     settings.max_splats = start.len() + 10;
-    settings.schedule.densify_from = 20;
-    settings.schedule.densify_every = 25;
-    settings.schedule.densify_until = 60;
-    settings.schedule.raise_degree_every = 20;
     settings
 }
 
@@ -209,7 +225,6 @@ fn still(start: &Splats) -> LumaSettings {
     };
     still.sh_degree = 1;
     still.max_splats = start.len();
-    still.schedule.raise_degree_every = 1;
     still
 }
 
@@ -218,7 +233,11 @@ fn still(start: &Splats) -> LumaSettings {
 fn a_scene_that_is_right_is_seen_to_be() {
     let [_, target] = start_and_target();
     let still = still(&target);
-    let mut trainer = LumaTrainer::new(raster(), still, 1.0, &target, photos(&target)).unwrap();
+    let schedule = Schedule {
+        raise_degree_every: 1,
+        ..Schedule::of(&still)
+    };
+    let mut trainer = trainer_by(still, schedule, 1.0, &target, photos(&target));
     let [mut brighter, masked] = [0, 1].map(|k| photos(&target).remove(k));
     brighter
         .gray
@@ -255,20 +274,22 @@ fn a_scene_that_is_right_is_seen_to_be() {
 #[test]
 fn a_flat_curve_ends_a_training() {
     let [start, target] = start_and_target();
-    let run = |flat, raise_degree_every| {
-        let mut settings = LumaSettings {
-            flat,
+    let run = |stop_when_flat, raise_degree_every| {
+        let settings = LumaSettings {
+            iterations: 400,
+            max_splats: start.len(),
+            stop_when_flat,
             ..settings(&start)
         };
-        settings.schedule = Schedule::of(400);
-        settings.schedule.raise_degree_every = raise_degree_every;
-        settings.max_splats = start.len();
-        let mut trainer =
-            LumaTrainer::new(raster(), settings, 4.0, &start, photos(&target)).unwrap();
+        let schedule = Schedule {
+            raise_degree_every,
+            ..Schedule::of(&settings)
+        };
+        let mut trainer = trainer_by(settings, schedule, 4.0, &start, photos(&target));
         trainer.watch(photos(&target)).unwrap();
         trainer.train(&mut |_| {}).unwrap();
-        let schedule = &trainer.settings().schedule;
-        let ends = [schedule.settle_from, schedule.iterations];
+        let schedule = trainer.schedule();
+        let ends = [schedule.settle_from, schedule.end];
         (trainer.splats().unwrap(), ends, trainer.curve().len())
     };
     let (_, ends, looks) = run(None, 20);
@@ -285,22 +306,24 @@ fn a_flat_curve_ends_a_training() {
 #[test]
 fn a_training_that_gets_worse_goes_back_to_its_best() {
     let [start, target] = start_and_target();
-    let trainer = |flat| {
+    let trainer = |stop_when_flat: Option<f64>| {
         let mut settings = LumaSettings {
-            flat,
+            iterations: 400,
+            stop_when_flat,
             ..settings(&start)
         };
-        settings.schedule = Schedule::of(400);
-        settings.schedule.densify_from = 20;
-        settings.schedule.densify_every = 30;
-        settings.schedule.raise_degree_every = 20;
+        let mut schedule = Schedule {
+            densify_from: 20,
+            densify_every: 30,
+            raise_degree_every: 20,
+            ..Schedule::of(&settings)
+        };
         // One that does not depend on where the end is.
         settings.rates.means = [1.6e-4; 2];
-        if flat.is_none() {
-            settings.schedule.settle_at(25);
+        if stop_when_flat.is_none() {
+            schedule.settle_at(25);
         }
-        let mut trainer =
-            LumaTrainer::new(raster(), settings, 4.0, &start, photos(&target)).unwrap();
+        let mut trainer = trainer_by(settings, schedule, 4.0, &start, photos(&target));
         // What it starts from is farther away with every look.
         trainer.watch(photos(&start)).unwrap();
         trainer.train(&mut |_| {}).unwrap();
@@ -326,15 +349,19 @@ fn a_training_that_gets_worse_goes_back_to_its_best() {
 fn losses_outlive_a_change_of_the_set() {
     let target = start_and_target()[1].clone();
     let losses = |densify_until| {
-        let mut still = still(&target);
-        still.schedule.densify_from = 0;
-        still.schedule.densify_every = 30;
-        still.schedule.densify_until = densify_until;
+        let still = still(&target);
+        let schedule = Schedule {
+            densify_from: 0,
+            densify_every: 30,
+            densify_until,
+            raise_degree_every: 1,
+            ..Schedule::of(&still)
+        };
         let dark = photos(&target).into_iter().map(|view| TrainingView {
             gray: vec![0; view.gray.len()],
             ..view
         });
-        let mut trainer = LumaTrainer::new(raster(), still, 1.0, &target, dark.collect()).unwrap();
+        let mut trainer = trainer_by(still, schedule, 1.0, &target, dark.collect());
         let mut losses = Vec::new();
         (trainer.train(&mut |progress| losses.push((progress.iteration, progress.loss)))).unwrap();
         losses
@@ -352,24 +379,24 @@ fn losses_outlive_a_change_of_the_set() {
 #[test]
 fn a_time_limit_moves_the_end() {
     let [start, target] = start_and_target();
-    let ends = |limit, flat| {
-        let mut settings = LumaSettings {
-            time_limit: Some(limit),
-            flat,
+    let ends = |seconds, stop_when_flat| {
+        let settings = LumaSettings {
+            iterations: 160,
+            max_splats: start.len(),
+            stop_when_flat,
             ..settings(&start)
         };
-        settings.schedule = Schedule::of(160);
-        settings.max_splats = start.len();
-        let mut trainer =
-            LumaTrainer::new(raster(), settings, 4.0, &start, photos(&target)).unwrap();
+        let schedule = Schedule::of(&settings);
+        let mut trainer = trainer_by(settings, schedule, 4.0, &start, photos(&target));
+        trainer.aim(Goal::Within { seconds });
         trainer.watch(photos(&target)).unwrap();
         let mut last = 0;
         trainer
             .train(&mut |progress| last = progress.iteration)
             .unwrap();
-        let schedule = &trainer.settings().schedule;
-        assert_eq!(last, schedule.iterations);
-        assert!(schedule.settle_from <= schedule.iterations);
+        let schedule = trainer.schedule();
+        assert_eq!(last, schedule.end);
+        assert!(schedule.settle_from <= schedule.end);
         last
     };
     assert!(ends(0.0, None) < 110);

@@ -10,7 +10,7 @@ use glam::{DMat3, DVec3};
 use gs_chroma::{
     capture::{Camera, downscale},
     gpu::GpuError,
-    luma::{LumaProgress, LumaSettings, LumaTrainer, TrainingView},
+    luma::{LumaProgress, LumaSettings, LumaTrainer, Schedule, TrainingView},
     measure::psnr,
     oracle::random::Random,
     raster::{Field, Geometry, Raster, Renderer},
@@ -172,10 +172,21 @@ fn trained_with(
     start: &Splats,
     settings: LumaSettings,
 ) -> Result<(Splats, Vec<LumaProgress>), GpuError> {
+    let schedule = Schedule::of(&settings);
+    trained_by(world, start, settings, schedule)
+}
+
+fn trained_by(
+    world: &World,
+    start: &Splats,
+    settings: LumaSettings,
+    schedule: Schedule,
+) -> Result<(Splats, Vec<LumaProgress>), GpuError> {
     let views = (world.cameras.iter().zip(&world.photos))
         .map(|(camera, gray)| TrainingView::new(camera.clone(), gray.clone()))
         .collect();
     let mut trainer = LumaTrainer::new(RASTER.clone(), settings, world.extent, start, views)?;
+    trainer.follow(schedule);
     let mut reports = Vec::new();
     trainer.train(&mut |progress| reports.push(progress))?;
     Ok((trainer.splats()?, reports))
@@ -374,9 +385,12 @@ fn a_rule_that_would_remove_all_removes_none() {
     let start = initial_splats(&world.points, world.extent as f32, 0);
     let mut settings = settings(&start, ITERATIONS);
     settings.prune_opacity = 1.1;
-    settings.schedule.densify_from = 0;
-    settings.schedule.densify_every = 30;
-    let (splats, reports) = trained_with(&world, &start, settings).unwrap();
+    let schedule = Schedule {
+        densify_from: 0,
+        densify_every: 30,
+        ..Schedule::of(&settings)
+    };
+    let (splats, reports) = trained_by(&world, &start, settings, schedule).unwrap();
     assert_sound(&splats, &reports);
     assert_eq!(splats.len(), start.len());
 }

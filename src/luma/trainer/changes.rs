@@ -18,7 +18,7 @@ impl LumaTrainer {
             geometry: &self.model.geometry.planes.read(&self.gpu)?,
             statistics: &self.workspace()?.statistics().read(&self.gpu)?,
         };
-        let plan = match self.settings.densification {
+        let plan = match self.settings.densify {
             Densification::Split => densify::plan(&self.settings, &evidence),
             Densification::Relocate => relocation::plan(&self.settings, &evidence, iteration),
         };

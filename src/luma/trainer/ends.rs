@@ -21,11 +21,11 @@ const HARMONICS_SHOW: f64 = 1.25;
 impl LumaTrainer {
     /// Moves the end to where the time limit will be reached.
     pub(super) fn keep_to_limit(&mut self, iteration: usize) {
-        let Some(limit) = self.settings.time_limit else {
+        let Some(limit) = self.goal.seconds() else {
             return;
         };
-        let schedule = &self.settings.schedule;
-        let left = schedule.iterations.saturating_sub(iteration).max(1);
+        let schedule = &self.schedule;
+        let left = schedule.end.saturating_sub(iteration).max(1);
         let growing = schedule.densify_until.saturating_sub(iteration).min(left);
         let densifications = growing as f64 / schedule.densify_every as f64;
         let room = self.settings.max_splats as f64 / self.model.len() as f64;
@@ -34,25 +34,25 @@ impl LumaTrainer {
         if let Some(end) = self.pace.end(limit, growth.max(1.0), share) {
             // The last iteration is one that is reported, so it is still to come.
             let end = end.min(self.longest).max(iteration + 1);
-            self.settings.schedule.end_at(end, iteration);
+            self.schedule.end_at(end, iteration);
         }
     }
 
     /// Lets the run settle where little is left to gain, from where it was best: when it has
     /// gone back there, the iteration that it goes on from.
     pub(super) fn stop_when_flat(&mut self, iteration: usize) -> Result<Option<usize>, GpuError> {
-        let Some(threshold) = self.settings.flat else {
+        let Some(threshold) = self.settings.stop_when_flat else {
             return Ok(None);
         };
-        let schedule = self.settings.schedule.clone();
+        let schedule = self.schedule.clone();
         // What small photos and few harmonics have taught says nothing about what more will.
-        let degrees = self.settings.full_degree_from();
+        let degrees = schedule.degree_from(self.settings.sh_degree);
         let whole = schedule.coarse_until.max(degrees);
         if iteration <= whole || iteration >= schedule.settle_from {
             return Ok(None);
         }
         self.keep_best(iteration)?;
-        let grown = (FLAT_FROM * schedule.iterations as f64).min(GROWN);
+        let grown = (FLAT_FROM * schedule.end as f64).min(GROWN);
         let early = grown.max(HARMONICS_SHOW * degrees as f64);
         let curve = self.curve();
         // Nothing would be gained while photos are small, and much by the first look after it;
@@ -63,9 +63,9 @@ impl LumaTrainer {
             return Ok(None);
         }
         let best = self.back_to_best(iteration)?;
-        self.settings.schedule.settle_at(best.unwrap_or(iteration));
+        self.schedule.settle_at(best.unwrap_or(iteration));
         // Time that is left is no reason to go on.
-        self.longest = self.settings.schedule.iterations;
+        self.longest = self.schedule.end;
         Ok(best)
     }
 }

@@ -136,7 +136,7 @@ impl LumaTrainer {
     fn psnr(&mut self, index: usize, iteration: usize) -> Result<f64, GpuError> {
         let pixels = loop {
             let camera = &self.watch.views[index].camera;
-            let degree = self.settings.degree_at(iteration);
+            let degree = self.degree_at(iteration);
             let view = ViewUniform::new(camera, self.near, self.model.len(), degree);
             let workspace = self.workspace()?;
             let mut recorder = Recorder::new(&self.gpu);

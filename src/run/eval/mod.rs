@@ -81,7 +81,7 @@ pub fn eval(
         )?),
         None => None,
     };
-    let drawn = subject.report.luma.raster_options();
+    let drawn = subject.report.luma.settings.raster_options();
     let raster = Arc::new(Raster::with(&open_gpu(false)?, drawn));
     let splats = match &teacher {
         Some(teacher) if options.baselines => Some(teacher.rgb_splats(&raster, &subject, observe)?),

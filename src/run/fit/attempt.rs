@@ -5,7 +5,7 @@ use std::{fmt::Write, sync::Arc, time::Instant};
 use super::super::{
     Event, Observer, RunError, Stage,
     carve::{self, carved},
-    preset::Amounts,
+    preset::Work,
     scene::Scene,
     yardstick::Yardstick,
 };
@@ -18,10 +18,11 @@ use super::{
 };
 use crate::{
     capture::Exposure,
-    effects::{Effect, Plan, Room},
+    effects::{Effect, Plan},
     gpu::{Gpu, GpuError},
     luma::{
-        CurvePoint, Demand, Densification, LumaProgress, LumaSettings, LumaTrainer, TrainingView,
+        CurvePoint, Demand, Densification, Goal, LumaProgress, LumaSettings, LumaTrainer,
+        TrainingView,
     },
     raster::Raster,
     report::{KernelReport, LumaQuality, LumaView, kernel_reports},
@@ -46,8 +47,9 @@ pub(super) struct Job<'a> {
 
 /// What came of one.
 pub(super) struct Attempt {
-    /// Of the schedule, what became of it.
     pub settings: LumaSettings,
+    /// Iterations that led to the splats.
+    pub iterations: usize,
     pub plan: Plan,
     pub splats: Splats,
     /// `train.csv`.
@@ -132,16 +134,13 @@ impl Job<'_> {
     /// [`RunError`].
     pub fn attempt(
         &self,
-        amounts: &Amounts,
+        work: &Work,
         time_limit: Option<f64>,
         observe: &mut Observer<'_>,
     ) -> Result<Attempt, RunError> {
         let begun = Instant::now();
         let (options, scene) = (self.options, self.scene);
-        let room = Room {
-            iterations: amounts.iterations,
-            ..amounts.room()
-        };
+        let room = work.room();
         let plan = match options.time_limit {
             Some(limit) if limit < TRIAL_FROM => scene.plan(room, &options.overrules, None),
             _ => planned(
@@ -157,11 +156,10 @@ impl Job<'_> {
             self.gpu.timings()?;
         }
         observe(Event::Note(plan.to_string()));
-        let mut settings = self.settings(amounts, &plan);
+        let mut settings = self.settings(work, &plan);
         let demand = self.fit_memory(&mut settings, &plan, observe)?;
         let start = first_splats(options, scene, &settings, observe)?;
         let preparing = begun.elapsed().as_secs_f64();
-        settings.time_limit = time_limit.map(|limit| limit - preparing);
 
         let begun = Instant::now();
         let train = &scene.split.train;
@@ -171,6 +169,10 @@ impl Job<'_> {
             .collect();
         let raster = self.raster.clone();
         let mut trainer = LumaTrainer::new(raster, settings, scene.extent, &start, views)?;
+        if let Some(limit) = time_limit {
+            let seconds = limit - preparing;
+            trainer.aim(Goal::Within { seconds });
+        }
         trainer.watch(self.watched_views(&plan))?;
         let mut log = String::from("iteration,loss,splats,seconds,poisoned\n");
         let (mut last, mut peak_device_memory) = (None, None);
@@ -206,6 +208,7 @@ impl Job<'_> {
 
         let begun = Instant::now();
         let settings = trainer.settings().clone();
+        let iterations = trainer.schedule().end;
         let curve = trainer.curve().to_vec();
         let given_up = trainer.given_up();
         // What it holds on the device is not needed for measuring.
@@ -217,6 +220,7 @@ impl Job<'_> {
             preparing,
             seconds: [training, watching, begun.elapsed().as_secs_f64()],
             settings,
+            iterations,
             plan,
             splats,
             log,
@@ -229,7 +233,7 @@ impl Job<'_> {
         })
     }
 
-    fn settings(&self, amounts: &Amounts, plan: &Plan) -> LumaSettings {
+    fn settings(&self, work: &Work, plan: &Plan) -> LumaSettings {
         let options = self.options;
         let mut settings = LumaSettings {
             memory_limit: options.memory_limit,
@@ -237,17 +241,15 @@ impl Job<'_> {
             robust: plan.has(Effect::Robust),
             antialiased: plan.has(Effect::Antialias),
             background: plan.has(Effect::Background),
-            max_splats: amounts.max_splats,
             seed: options.seed,
-            flat: options.stop_when_flat.or(amounts.flat),
+            stop_when_flat: options.stop_when_flat.or(work.settings.stop_when_flat),
             numerics: options.numerics,
-            ..LumaSettings::new(amounts.iterations)
+            coarse: options.coarse,
+            ..work.settings.clone()
         };
         if options.densification == Densification::Relocate {
-            settings = settings.relocating();
+            settings.relocate();
         }
-        settings.schedule.coarse_until =
-            (options.coarse * settings.schedule.iterations as f64) as usize;
         settings
     }
 

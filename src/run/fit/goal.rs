@@ -6,20 +6,17 @@
 
 use std::sync::Arc;
 
-use super::super::{
-    Event, Observer, RunError,
-    preset::{Amounts, Preset},
-};
+use super::super::{Event, Observer, Preset, RunError, preset::Work};
 use super::FitOptions;
 use crate::{
     capture::{Capture, CaptureOptions},
     gpu::GpuError,
-    luma::{Schedule, rehearse},
+    luma::{LumaSettings, Schedule, rehearse},
     raster::Raster,
 };
 
-/// Where a family begins.
-const LOWEST: f64 = Amounts::LOWEST;
+/// Where a family begins: the level of the sketch.
+const LOWEST: f64 = -0.5;
 
 /// Between two levels that are rehearsed.
 const STEP: f64 = 0.5;
@@ -33,6 +30,57 @@ pub(super) const WRITING: f64 = 0.01;
 /// Share of a time limit that is taken to be for training as long as nobody knows how long
 /// photos take to read.
 pub(super) const SURELY: f64 = 0.9;
+
+/// The least work that makes a scene. With fewer iterations there is none yet, so time
+/// is saved on Gaussians and pixels (docs/accuracy-and-time.md).
+fn sketch() -> Work {
+    Work {
+        settings: LumaSettings {
+            max_splats: 3_000,
+            sh_degree: 0,
+            ..LumaSettings::new(350)
+        },
+        max_side: Some(240),
+    }
+}
+
+/// A preset's level.
+pub(super) fn level_of(preset: Preset) -> f64 {
+    f64::from(preset as u8)
+}
+
+/// The greatest preset that is no more work than a level.
+pub(super) fn preset_below(level: f64) -> Preset {
+    Preset::ALL[(level.max(0.0) as usize).min(2)]
+}
+
+/// The work at a level from [`LOWEST`] to 2: that of a preset at its own level, and between
+/// two for equal steps each amount grown by the same factor. `longest` is the longer side of
+/// the photos as they are.
+fn at_level(level: f64, longest: u32) -> Work {
+    let [draft, balanced, paper] = Preset::ALL.map(Preset::work);
+    let (from, to, share) = match level {
+        _ if level < 0.0 => (sketch(), draft, 1.0 - level / LOWEST),
+        _ if level < 1.0 => (draft, balanced, level),
+        _ => (balanced, paper, level - 1.0),
+    };
+    let between = |amount: &dyn Fn(&Work) -> f64| {
+        let [from, to] = [&from, &to].map(amount);
+        (from * (to / from).powf(share)).round()
+    };
+    let degree = |work: &Work| f64::from(work.settings.sh_degree);
+    let degree = degree(&from) + share * (degree(&to) - degree(&from));
+    let side = |work: &Work| f64::from(work.max_side.unwrap_or(longest).min(longest));
+    Work {
+        settings: LumaSettings {
+            max_splats: between(&|work| work.settings.max_splats as f64) as usize,
+            sh_degree: degree as u32,
+            // What says how much is to be done is the level.
+            ..LumaSettings::new(between(&|work| work.settings.iterations as f64) as usize)
+        },
+        max_side: Some(between(&side) as u32),
+    }
+}
 
 /// What a run may do, and on what.
 pub(super) struct Family {
@@ -61,7 +109,7 @@ impl Family {
         let sizes = || capture.views.iter().map(|view| view.photo_size());
         let [width, height] = sizes().next().unwrap_or([1, 1]).map(f64::from);
         Ok(Self {
-            highest: options.preset.unwrap_or(Preset::Paper).level(),
+            highest: level_of(options.preset.unwrap_or(Preset::Paper)),
             max_splats: options.max_splats,
             longest_side: sizes().flatten().max().unwrap_or(1),
             max_side: match options.target_psnr {
@@ -73,31 +121,29 @@ impl Family {
         })
     }
 
-    /// Amounts at a level.
-    pub fn amounts(&self, level: f64) -> Amounts {
-        let amounts = Preset::at_level(level.clamp(LOWEST, self.highest), self.longest_side);
-        Amounts {
-            max_splats: self.max_splats.unwrap_or(amounts.max_splats),
-            max_side: self.max_side.or(amounts.max_side),
-            ..amounts
-        }
+    /// The work at a level.
+    pub fn work(&self, level: f64) -> Work {
+        let mut work = at_level(level.clamp(LOWEST, self.highest), self.longest_side);
+        let settings = &mut work.settings;
+        settings.max_splats = self.max_splats.unwrap_or(settings.max_splats);
+        work.max_side = self.max_side.or(work.max_side);
+        work
     }
 
     /// Gaussians, in the mean over a run.
-    fn mean_splats(&self, amounts: &Amounts) -> usize {
-        let schedule = Schedule::of(amounts.iterations);
+    fn mean_splats(&self, settings: &LumaSettings) -> usize {
+        let schedule = Schedule::of(settings);
         let densifications = schedule.densify_until / schedule.densify_every;
-        let grown = self.points as f64 * 1.3_f64.powf(densifications as f64);
-        let last = grown.min(amounts.max_splats as f64);
+        let grown = self.points as f64 * (1.0 + settings.growth).powf(densifications as f64);
+        let last = grown.min(settings.max_splats as f64);
         let first = last.min(self.points as f64);
         ((first + last) / 2.0).max(1.0) as usize
     }
 
     /// The size of the photos.
-    fn size(&self, amounts: &Amounts) -> [u32; 2] {
+    fn size(&self, work: &Work) -> [u32; 2] {
         let side = f64::from(
-            amounts
-                .max_side
+            work.max_side
                 .map_or(self.longest_side, |side| side.min(self.longest_side)),
         );
         let (width, height) = match self.aspect {
@@ -119,9 +165,10 @@ impl Family {
         observe: &mut Observer<'_>,
     ) -> Result<(f64, f64), RunError> {
         let rehearsed = |level: f64| -> Result<Option<[f64; 2]>, RunError> {
-            let amounts = self.amounts(level);
-            match rehearse(raster, self.mean_splats(&amounts), self.size(&amounts)) {
-                Ok(each) => Ok(Some([each * amounts.iterations as f64, each])),
+            let work = self.work(level);
+            let splats = self.mean_splats(&work.settings);
+            match rehearse(raster, splats, self.size(&work)) {
+                Ok(each) => Ok(Some([each * work.settings.iterations as f64, each])),
                 Err(GpuError::TooLarge { .. } | GpuError::TooManySplats { .. }) => Ok(None),
                 Err(error) => Err(error.into()),
             }
@@ -150,12 +197,12 @@ impl Family {
             }
             (low, known) = (high, next);
         }
-        let amounts = self.amounts(low);
+        let work = self.work(low);
         observe(Event::Note(format!(
             "time for about {} iterations with {} Gaussians on photos of {} pixels",
-            amounts.iterations,
-            amounts.max_splats,
-            self.size(&amounts).map(|side| side.to_string()).join("×")
+            work.settings.iterations,
+            work.settings.max_splats,
+            self.size(&work).map(|side| side.to_string()).join("×")
         )));
         Ok((low, known[1]))
     }
@@ -181,22 +228,21 @@ mod tests {
             (1.0, Preset::Balanced),
             (2.0, Preset::Paper),
         ] {
-            let (is, wanted) = (FAMILY.amounts(level), preset.amounts());
-            assert_eq!(is.iterations, wanted.iterations);
-            assert_eq!(is.max_splats, wanted.max_splats);
-            assert_eq!(is.sh_degree, wanted.sh_degree);
-            assert_eq!(is.max_side, Some(wanted.max_side.unwrap_or(4_000)));
+            let (is, mut wanted) = (FAMILY.work(level), preset.settings());
+            wanted.stop_when_flat = None;
+            assert_eq!(is.settings, wanted);
+            assert_eq!(is.max_side, Some(preset.max_side().unwrap_or(4_000)));
         }
     }
 
     #[test]
     fn work_grows_with_the_level() {
-        let all: Vec<Amounts> = (-5..=20)
-            .map(|l| FAMILY.amounts(f64::from(l) / 10.0))
+        let all: Vec<Work> = (-5..=20)
+            .map(|l| FAMILY.work(f64::from(l) / 10.0))
             .collect();
         for pair in all.windows(2) {
-            assert!(pair[0].iterations < pair[1].iterations);
-            assert!(pair[0].max_splats < pair[1].max_splats);
+            let [a, b] = [0, 1].map(|k| &pair[k].settings);
+            assert!(a.iterations < b.iterations && a.max_splats < b.max_splats);
             assert!(pair[0].max_side < pair[1].max_side);
         }
     }
@@ -209,15 +255,16 @@ mod tests {
             highest: 0.0,
             ..FAMILY
         };
-        let amounts = family.amounts(1.7);
-        assert_eq!(amounts.iterations, Preset::Draft.amounts().iterations);
-        assert_eq!((amounts.max_splats, amounts.max_side), (5_000, Some(320)));
-        assert_eq!(family.size(&amounts), [320, 240]);
+        let work = family.work(1.7);
+        assert_eq!(work.settings.iterations, 700);
+        let caps = (work.settings.max_splats, work.max_side);
+        assert_eq!(caps, (5_000, Some(320)));
+        assert_eq!(family.size(&work), [320, 240]);
         let upright = Family {
             aspect: 1.5,
             ..family
         };
-        assert_eq!(upright.size(&amounts), [213, 320]);
+        assert_eq!(upright.size(&work), [213, 320]);
     }
 
     #[test]
@@ -227,7 +274,7 @@ mod tests {
             ..FAMILY
         };
         for level in [0.0, 1.0, 1.5, 2.0] {
-            assert!(family.amounts(level).max_side.unwrap() <= 500);
+            assert!(family.work(level).max_side.unwrap() <= 500);
         }
     }
 }

@@ -24,7 +24,7 @@ use crate::{
 use ahead::Ahead;
 pub use ahead::AheadOptions;
 use attempt::Job;
-use goal::{Family, SURELY};
+use goal::{Family, SURELY, level_of, preset_below};
 pub(super) use told::capture_report;
 pub(super) use trial::planned;
 
@@ -129,12 +129,12 @@ pub fn fit(
         Some(_) => Some(Family::of(options, asked.max_side)?),
         None => None,
     };
-    let (mut level, mut each) = (preset.level(), 0.0);
-    let mut amounts = asked;
+    let (mut level, mut each) = (level_of(preset), 0.0);
+    let mut work = asked.clone();
     if let (Some(family), Some(limit), None) = (&family, options.time_limit, options.target_psnr) {
         let seconds = SURELY * limit - begun.elapsed().as_secs_f64();
         (level, each) = family.level_for(seconds, &raster, observe)?;
-        amounts = family.amounts(level);
+        work = family.work(level);
     }
     if options.timings {
         // What was rehearsed is no part of the run.
@@ -142,7 +142,7 @@ pub fn fit(
     }
 
     let load = LoadOptions {
-        max_side: amounts.max_side,
+        max_side: work.max_side,
         lens: options.overrules.choice(Effect::Lens),
         ..options.load.clone()
     };
@@ -176,12 +176,12 @@ pub fn fit(
             }
             _ => {
                 let limit = job.time_for_training(each)?;
-                Ok((job.attempt(&amounts, limit, observe)?, 1))
+                Ok((job.attempt(&work, limit, observe)?, 1))
             }
         }
     })?;
     let preset = match &family {
-        Some(_) => Preset::below(level),
+        Some(_) => preset_below(level),
         None => preset,
     };
     let missed = options

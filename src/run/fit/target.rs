@@ -1,6 +1,6 @@
 //! As much work as a PSNR takes, and no more.
 
-use super::super::{Event, Observer, RunError, preset::Amounts};
+use super::super::{Event, Observer, RunError, preset::Work};
 use super::{
     attempt::{Attempt, Job},
     goal::Family,
@@ -42,13 +42,13 @@ impl Job<'_> {
     ) -> Result<Reached, RunError> {
         let mut level = FIRST.min(family.highest);
         let mut limit = self.time_for_training(0.0)?;
-        let mut attempt = self.attempt(&family.amounts(level), limit, observe)?;
+        let mut attempt = self.attempt(&family.work(level), limit, observe)?;
         let mut attempts = 1;
         loop {
             let psnr = attempt.psnr().unwrap_or(f64::NEG_INFINITY);
             observe(Event::Note(format!(
                 "attempt {attempts}: {} iterations, {} Gaussians, {psnr:.2} dB of {target:.2} dB",
-                attempt.settings.schedule.iterations,
+                attempt.iterations,
                 attempt.splats.len(),
             )));
             let next_level = (level + STEP).min(family.highest);
@@ -60,17 +60,17 @@ impl Job<'_> {
             if psnr >= target || next_level == level {
                 return Ok(reached);
             }
-            let [amounts, before] = [next_level, level].map(|level| family.amounts(level));
-            let more = |of: fn(&Amounts) -> usize| of(&amounts) as f64 / of(&before) as f64;
+            let [work, before] = [next_level, level].map(|level| family.work(level));
+            let more = |of: fn(&Work) -> usize| of(&work) as f64 / of(&before) as f64;
             let expected = reached.attempt.seconds.iter().sum::<f64>()
-                * more(|a| a.iterations)
-                * (1.0 + more(|a| a.max_splats))
+                * more(|work| work.settings.iterations)
+                * (1.0 + more(|work| work.settings.max_splats))
                 / 2.0;
             limit = self.time_for_training(0.0).unwrap_or(Some(0.0));
             if limit.is_some_and(|limit| limit < expected) {
                 return Ok(reached);
             }
-            let next = self.attempt(&amounts, limit, observe)?;
+            let next = self.attempt(&work, limit, observe)?;
             attempts += 1;
             let gain = next.psnr().unwrap_or(f64::NEG_INFINITY) - psnr;
             if gain < GAIN_MIN && next.psnr().is_none_or(|psnr| psnr < target) {

@@ -22,7 +22,7 @@ impl Job<'_> {
         attempts: usize,
         attempt: &Attempt,
     ) -> Report {
-        let (options, settings, last) = (self.options, &attempt.settings, &attempt.last);
+        let (options, last) = (self.options, &attempt.last);
         let [train, curve, measure] = attempt.seconds;
         Report {
             version: REPORT_VERSION,
@@ -33,16 +33,12 @@ impl Job<'_> {
                 backend: format!("{:?}", self.gpu.info().backend),
                 software: self.gpu.is_software(),
             },
-            preset: preset.name().to_owned(),
-            seed: options.seed,
+            preset,
             effects: EffectReport::of(&attempt.plan.decisions),
             luma: LumaReport {
-                iterations: settings.schedule.iterations,
+                settings: attempt.settings.clone(),
+                iterations: attempt.iterations,
                 given_up: attempt.given_up,
-                sh_degree: settings.sh_degree,
-                max_splats: settings.max_splats,
-                antialiased: settings.antialiased,
-                numerics: settings.numerics,
                 splats: attempt.splats.len(),
                 poisoned: last.map_or(0, |progress| progress.poisoned),
                 refused: last.map_or(0, |progress| progress.refused),
@@ -50,7 +46,6 @@ impl Job<'_> {
                 goal: GoalReport {
                     time_limit: options.time_limit,
                     target_psnr: options.target_psnr,
-                    stop_when_flat: settings.flat,
                     attempts,
                 },
                 seconds: LumaSeconds {

@@ -7,7 +7,7 @@ use crate::{
         Report,
         tradeoff::{PointStage, Setting},
     },
-    run::preset::Amounts,
+    run::preset::Work,
 };
 
 /// An option of `fit` or `colorize` and its value.
@@ -73,34 +73,35 @@ impl Around {
             iterations: base.luma.iterations,
             side: cap.min(largest_side),
             largest_side,
-            max_splats: base.luma.max_splats,
+            max_splats: base.luma.settings.max_splats,
             splats: base.luma.splats,
-            sh_degree: base.luma.sh_degree,
+            sh_degree: base.luma.settings.sh_degree,
             adam,
             presets: Vec::new(),
             color: None,
         }
     }
 
-    /// What amounts of work are over the base's, which was asked for `base`. Rather too much:
+    /// What an amount of work is over the base's, which was asked for `base`. Rather too much:
     /// Gaussians may stay below their cap.
-    pub fn work(&self, amounts: &Amounts, base: &Amounts) -> f64 {
+    pub fn work(&self, work: &Work, base: &Work) -> f64 {
+        let (settings, base) = (&work.settings, &base.settings);
         let ratio = |amount: f64, base: usize| amount / base.max(1) as f64;
-        let iterations = match amounts.flat.and(base.flat) {
+        let iterations = match settings.stop_when_flat.and(base.stop_when_flat) {
             // Both end where the curve is flat, which may be long before.
             Some(_) => base.iterations,
             None => self.iterations,
         };
-        let side = amounts.max_side.unwrap_or(self.largest_side);
+        let side = work.max_side.unwrap_or(self.largest_side);
         let side = ratio(side.min(self.largest_side).into(), self.side as usize);
         // Where its own cap left room to the base, so will another.
         let splats = match self.reaches_cap() {
-            true => amounts.max_splats,
-            false => amounts.max_splats.min(self.splats),
+            true => settings.max_splats,
+            false => settings.max_splats.min(self.splats),
         };
         let splats = ratio(splats as f64, self.splats);
         let each = PIXELS_SHARE * side.powi(2) + (1.0 - PIXELS_SHARE) * splats;
-        ratio(amounts.iterations as f64, iterations) * each
+        ratio(settings.iterations as f64, iterations) * each
     }
 
     /// Whether its cap kept the base from having more Gaussians.

@@ -1,6 +1,7 @@
 //! What is tried around a base.
 
 use super::*;
+use crate::luma::LumaSettings;
 
 fn around() -> Around {
     Around {
@@ -75,12 +76,13 @@ fn times_are_guessed_relative_to_the_base() {
 
 #[test]
 fn another_preset_is_as_much_work_as_its_amounts_say() {
-    let amounts = |iterations, flat| Amounts {
-        iterations,
-        max_splats: 24_000,
+    let amounts = |iterations, stop_when_flat| Work {
+        settings: LumaSettings {
+            max_splats: 24_000,
+            stop_when_flat,
+            ..LumaSettings::new(iterations)
+        },
         max_side: None,
-        flat,
-        ..Amounts::SKETCH
     };
     let around = around();
     let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{a} {b}");

@@ -133,8 +133,7 @@ fn next(
         ..Space::default()
     };
     if done(PointStage::Luma) {
-        let amounts = preset.amounts();
-        let adam = amounts.until - amounts.iterations;
+        let adam = preset.adam_iterations();
         let mut around = Around::new(&report(PointStage::Luma)?, largest_side, adam);
         let asked = |preset: Preset| {
             let side = options.load.max_side;
