@@ -91,13 +91,16 @@ fn options(capture: &Path, output: &Path, seed: u64, numerics: Numerics) -> FitO
     FitOptions {
         output: Some(output.to_owned()),
         preset: Some(Preset::Draft),
-        iterations: Some(FIT_ITERATIONS),
+        settings: Box::new(move |settings| {
+            settings.iterations = FIT_ITERATIONS;
+            settings.stop_when_flat = None;
+            settings.seed = seed;
+            settings.numerics = numerics;
+        }),
         load: LoadOptions {
             max_side: Some(FIT_SIDE),
             ..LoadOptions::default()
         },
-        seed,
-        numerics,
         ..FitOptions::new(capture.to_owned())
     }
 }

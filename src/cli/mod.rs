@@ -7,6 +7,7 @@ mod eval;
 mod export;
 mod fit;
 mod info;
+mod luma;
 mod photos;
 mod plan;
 mod progress;

@@ -177,7 +177,7 @@ mod tests {
     fn short_runs_relocate_more_often() {
         let every = |iterations| {
             let mut settings = LumaSettings::new(iterations);
-            settings.relocate();
+            settings.densify_by(Densification::Relocate);
             Schedule::of(&settings).densify_every
         };
         assert_eq!([700, SHORT_RUN].map(every), [35, 100]);

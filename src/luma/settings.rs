@@ -67,6 +67,9 @@ pub enum Densification {
     Relocate,
 }
 
+/// Growth by splitting.
+const GROWTH: f64 = 0.3;
+
 /// Settings of one training: what presets produce, the command line overlays and the report
 /// holds. What happens when follows from them ([`Schedule`](super::Schedule)).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -129,7 +132,7 @@ impl LumaSettings {
             coarse: 0.0,
             stop_when_flat: None,
             densify: Densification::Split,
-            growth: 0.3,
+            growth: GROWTH,
             // gsplat's advice for absolute gradients.
             pull_threshold: 8e-4,
             prune_opacity: 0.005,
@@ -142,14 +145,14 @@ impl LumaSettings {
         }
     }
 
-    /// Densifies by relocation: a set that grows by 5 % a time as in the paper; by 10 % in a
-    /// short training, which also densifies more often.
-    pub fn relocate(&mut self) {
-        self.densify = Densification::Relocate;
-        self.growth = if self.iterations < SHORT_RUN {
-            0.1
-        } else {
-            0.05
+    /// Densifies so, with as much growth as goes with it: by relocation 5 % a time as in the
+    /// paper; 10 % in a short training, which also densifies more often.
+    pub fn densify_by(&mut self, densify: Densification) {
+        self.densify = densify;
+        self.growth = match densify {
+            Densification::Split => GROWTH,
+            Densification::Relocate if self.iterations < SHORT_RUN => 0.1,
+            Densification::Relocate => 0.05,
         };
     }
 
@@ -180,7 +183,7 @@ mod tests {
             memory_limit: Some(1 << 30),
             ..LumaSettings::new(700)
         };
-        settings.relocate();
+        settings.densify_by(Densification::Relocate);
         let text = serde_json::to_string(&settings).unwrap();
         assert_eq!(
             serde_json::from_str::<LumaSettings>(&text).unwrap(),

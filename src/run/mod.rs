@@ -23,7 +23,7 @@ use std::{fmt, path::PathBuf};
 pub use chroma_options::{ChromaOptions, Degree};
 pub use colorize::{ColorizeOptions, Output, colorize};
 pub use eval::{EvalOptions, eval};
-pub use fit::{AheadOptions, FitOptions, fit};
+pub use fit::{AheadOptions, FitOptions, Overlay, fit};
 pub use folder::RunFolder;
 pub use info::{export, info};
 pub use plan::{PlanOptions, plan};

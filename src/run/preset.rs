@@ -17,6 +17,18 @@ pub(super) struct Work {
 }
 
 impl Work {
+    /// A preset's where nothing else is asked for.
+    pub fn asked(
+        preset: Preset,
+        overlay: &dyn Fn(&mut LumaSettings),
+        max_side: Option<u32>,
+    ) -> Self {
+        let mut work = preset.work();
+        overlay(&mut work.settings);
+        work.max_side = max_side.or(work.max_side);
+        work
+    }
+
     /// What there is room for.
     pub fn room(&self) -> Room {
         Room {
@@ -53,24 +65,6 @@ impl Preset {
         }
     }
 
-    /// Its work where nothing else is asked for.
-    pub(super) fn asked(
-        self,
-        iterations: Option<usize>,
-        max_splats: Option<usize>,
-        max_side: Option<u32>,
-    ) -> Work {
-        let mut work = self.work();
-        if let Some(iterations) = iterations {
-            work.settings.iterations = iterations;
-            // Who says how many iterations wants them all.
-            work.settings.stop_when_flat = None;
-        }
-        work.settings.max_splats = max_splats.unwrap_or(work.settings.max_splats);
-        work.max_side = max_side.or(work.max_side);
-        work
-    }
-
     /// The options with the preset's longer side where they leave it open, and with
     /// what is overruled about the lens.
     pub(super) fn load_options(self, asked: &LoadOptions, overrules: &Overrules) -> LoadOptions {
@@ -79,22 +73,5 @@ impl Preset {
             lens: overrules.choice(Effect::Lens),
             ..asked.clone()
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn long_presets_end_where_flat_unless_told_how_long() {
-        let flat = |preset: Preset, iterations| {
-            let asked = preset.asked(iterations, None, None);
-            asked.settings.stop_when_flat
-        };
-        assert_eq!(flat(Preset::Draft, None), None);
-        assert_eq!(flat(Preset::Balanced, None), Some(0.3));
-        assert_eq!(flat(Preset::Paper, None), Some(0.1));
-        assert_eq!(flat(Preset::Balanced, Some(3_500)), None);
     }
 }

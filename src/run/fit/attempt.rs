@@ -20,10 +20,7 @@ use crate::{
     capture::Exposure,
     effects::{Effect, Plan},
     gpu::{Gpu, GpuError},
-    luma::{
-        CurvePoint, Demand, Densification, Goal, LumaProgress, LumaSettings, LumaTrainer,
-        TrainingView,
-    },
+    luma::{CurvePoint, Demand, Goal, LumaProgress, LumaSettings, LumaTrainer, TrainingView},
     raster::Raster,
     report::{KernelReport, LumaQuality, LumaView, kernel_reports},
     splats::Splats,
@@ -156,7 +153,7 @@ impl Job<'_> {
             self.gpu.timings()?;
         }
         observe(Event::Note(plan.to_string()));
-        let mut settings = self.settings(work, &plan);
+        let mut settings = settings(work, &plan);
         let demand = self.fit_memory(&mut settings, &plan, observe)?;
         let start = first_splats(options, scene, &settings, observe)?;
         let preparing = begun.elapsed().as_secs_f64();
@@ -233,26 +230,6 @@ impl Job<'_> {
         })
     }
 
-    fn settings(&self, work: &Work, plan: &Plan) -> LumaSettings {
-        let options = self.options;
-        let mut settings = LumaSettings {
-            memory_limit: options.memory_limit,
-            sh_degree: plan.sh_degree,
-            robust: plan.has(Effect::Robust),
-            antialiased: plan.has(Effect::Antialias),
-            background: plan.has(Effect::Background),
-            seed: options.seed,
-            stop_when_flat: options.stop_when_flat.or(work.settings.stop_when_flat),
-            numerics: options.numerics,
-            coarse: options.coarse,
-            ..work.settings.clone()
-        };
-        if options.densification == Densification::Relocate {
-            settings.relocate();
-        }
-        settings
-    }
-
     /// Lowers the cap on Gaussians to what there is memory for.
     fn fit_memory(
         &self,
@@ -260,7 +237,7 @@ impl Job<'_> {
         plan: &Plan,
         observe: &mut Observer<'_>,
     ) -> Result<Demand, RunError> {
-        let (scene, limit) = (self.scene, self.options.memory_limit);
+        let (scene, limit) = (self.scene, settings.memory_limit);
         let ignores = plan.has(Effect::Masks) || plan.has(Effect::Robust);
         let cameras = scene.split.train.iter().map(|&i| &scene.photos[i].1);
         let watched = self.watched();
@@ -305,6 +282,17 @@ impl Job<'_> {
             }
         };
         self.watched().into_iter().map(view).collect()
+    }
+}
+
+/// What goes into training: of some settings the plan decides.
+fn settings(work: &Work, plan: &Plan) -> LumaSettings {
+    LumaSettings {
+        sh_degree: plan.sh_degree,
+        robust: plan.has(Effect::Robust),
+        antialiased: plan.has(Effect::Antialias),
+        background: plan.has(Effect::Background),
+        ..work.settings.clone()
     }
 }
 

@@ -7,7 +7,7 @@
 use std::sync::Arc;
 
 use super::super::{Event, Observer, Preset, RunError, preset::Work};
-use super::FitOptions;
+use super::{FitOptions, Overlay};
 use crate::{
     capture::{Capture, CaptureOptions},
     gpu::GpuError,
@@ -83,11 +83,11 @@ fn at_level(level: f64, longest: u32) -> Work {
 }
 
 /// What a run may do, and on what.
-pub(super) struct Family {
+pub(super) struct Family<'a> {
     /// The highest level, that of the preset asked for.
     pub highest: f64,
-    /// Options that hold at every level.
-    pub max_splats: Option<usize>,
+    /// Holds at every level.
+    pub overlay: &'a Overlay,
     /// The longer side of the photos as they are.
     pub longest_side: u32,
     /// The longer side at every level.
@@ -98,19 +98,19 @@ pub(super) struct Family {
     pub points: usize,
 }
 
-impl Family {
+impl<'a> Family<'a> {
     /// What there is for the capture and the options; `max_side` holds at every level where
     /// there is a target, for PSNR at different sizes cannot be compared.
     ///
     /// # Errors
     /// [`RunError::Capture`].
-    pub fn of(options: &FitOptions, max_side: Option<u32>) -> Result<Self, RunError> {
+    pub fn of(options: &'a FitOptions, max_side: Option<u32>) -> Result<Self, RunError> {
         let capture = Capture::load_with(&options.colmap_dir, &CaptureOptions::default())?;
         let sizes = || capture.views.iter().map(|view| view.photo_size());
         let [width, height] = sizes().next().unwrap_or([1, 1]).map(f64::from);
         Ok(Self {
             highest: level_of(options.preset.unwrap_or(Preset::Paper)),
-            max_splats: options.max_splats,
+            overlay: &options.settings,
             longest_side: sizes().flatten().max().unwrap_or(1),
             max_side: match options.target_psnr {
                 Some(_) => max_side,
@@ -124,8 +124,7 @@ impl Family {
     /// The work at a level.
     pub fn work(&self, level: f64) -> Work {
         let mut work = at_level(level.clamp(LOWEST, self.highest), self.longest_side);
-        let settings = &mut work.settings;
-        settings.max_splats = self.max_splats.unwrap_or(settings.max_splats);
+        (self.overlay)(&mut work.settings);
         work.max_side = self.max_side.or(work.max_side);
         work
     }
@@ -212,14 +211,20 @@ impl Family {
 mod tests {
     use super::*;
 
-    const FAMILY: Family = Family {
-        highest: 2.0,
-        max_splats: None,
-        longest_side: 4_000,
-        max_side: None,
-        aspect: 0.75,
-        points: 10_000,
-    };
+    fn family(overlay: &Overlay) -> Family<'_> {
+        Family {
+            highest: 2.0,
+            overlay,
+            longest_side: 4_000,
+            max_side: None,
+            aspect: 0.75,
+            points: 10_000,
+        }
+    }
+
+    fn nothing() -> Overlay {
+        Box::new(|_| {})
+    }
 
     #[test]
     fn presets_are_members() {
@@ -228,7 +233,7 @@ mod tests {
             (1.0, Preset::Balanced),
             (2.0, Preset::Paper),
         ] {
-            let (is, mut wanted) = (FAMILY.work(level), preset.settings());
+            let (is, mut wanted) = (family(&nothing()).work(level), preset.settings());
             wanted.stop_when_flat = None;
             assert_eq!(is.settings, wanted);
             assert_eq!(is.max_side, Some(preset.max_side().unwrap_or(4_000)));
@@ -238,7 +243,7 @@ mod tests {
     #[test]
     fn work_grows_with_the_level() {
         let all: Vec<Work> = (-5..=20)
-            .map(|l| FAMILY.work(f64::from(l) / 10.0))
+            .map(|l| family(&nothing()).work(f64::from(l) / 10.0))
             .collect();
         for pair in all.windows(2) {
             let [a, b] = [0, 1].map(|k| &pair[k].settings);
@@ -249,11 +254,11 @@ mod tests {
 
     #[test]
     fn what_was_asked_for_holds_at_every_level() {
+        let overlay: Overlay = Box::new(|settings| settings.max_splats = 5_000);
         let family = Family {
-            max_splats: Some(5_000),
             max_side: Some(320),
             highest: 0.0,
-            ..FAMILY
+            ..family(&overlay)
         };
         let work = family.work(1.7);
         assert_eq!(work.settings.iterations, 700);
@@ -269,9 +274,10 @@ mod tests {
 
     #[test]
     fn small_photos_stay_small() {
+        let overlay = nothing();
         let family = Family {
             longest_side: 500,
-            ..FAMILY
+            ..family(&overlay)
         };
         for level in [0.0, 1.0, 1.5, 2.0] {
             assert!(family.work(level).max_side.unwrap() <= 500);

@@ -11,12 +11,12 @@ mod trial;
 
 use std::{path::PathBuf, sync::Arc, time::Instant};
 
-use super::{Event, Observer, Preset, RunError, RunFolder, files, scene::Scene};
+use super::{Event, Observer, Preset, RunError, RunFolder, files, preset::Work, scene::Scene};
 use crate::{
     capture::LoadOptions,
     effects::{Effect, Overrules},
     gpu::Gpu,
-    luma::{Densification, Numerics},
+    luma::LumaSettings,
     raster::{Raster, RasterOptions},
     report::Report,
     splats::ply,
@@ -28,8 +28,10 @@ use goal::{Family, SURELY, level_of, preset_below};
 pub(super) use told::capture_report;
 pub(super) use trial::planned;
 
+/// Changes settings: what is asked for over what a preset or a time limit has chosen.
+pub type Overlay = Box<dyn Fn(&mut LumaSettings)>;
+
 /// What `fit` is asked to do; `None` leaves it to the preset.
-#[derive(Clone, Debug)]
 pub struct FitOptions {
     /// The COLMAP folder.
     pub colmap_dir: PathBuf,
@@ -38,29 +40,17 @@ pub struct FitOptions {
     /// Amount of work; `paper` on a GPU and `draft` on a software adapter by default.
     /// With a time limit or a target, the most that is tried, `paper` by default.
     pub preset: Option<Preset>,
-    /// Iterations; not together with a time limit or a target.
-    pub iterations: Option<usize>,
+    /// What is asked for instead of the preset's settings. Not the iterations together with a
+    /// time limit or a target, nor what the plan of effects decides.
+    pub settings: Overlay,
     /// How photos are loaded; the longer side is the preset's where it is `None`.
     pub load: LoadOptions,
     /// Longer side at which held-out views are measured; that of training by default.
     pub measure_side: Option<u32>,
-    /// Cap on Gaussians.
-    pub max_splats: Option<usize>,
     /// Effects that are on or off whatever the evidence.
     pub overrules: Overrules,
-    /// Seed.
-    pub seed: u64,
     /// Gaussians to start from.
     pub init: Option<PathBuf>,
-    /// How the set of Gaussians changes.
-    pub densification: Densification,
-    /// Share of the iterations, from the first on, that see photos at half their size.
-    pub coarse: f64,
-    /// Bytes that training may take on the device.
-    pub memory_limit: Option<u64>,
-    /// Training ends where twice the iterations would bring less than so many dB; without it,
-    /// and without `iterations`, as the preset has it.
-    pub stop_when_flat: Option<f64>,
     /// Seconds that the whole run may take.
     pub time_limit: Option<f64>,
     /// PSNR of the held-out views, in dB, that is to be reached with as little work as it
@@ -68,8 +58,6 @@ pub struct FitOptions {
     pub target_psnr: Option<f64>,
     /// Whether the report says where the device's time went.
     pub timings: bool,
-    /// How accurately training computes.
-    pub numerics: Numerics,
     /// Who is to colour the photos meanwhile.
     pub ahead: AheadOptions,
 }
@@ -81,21 +69,14 @@ impl FitOptions {
             colmap_dir,
             output: None,
             preset: None,
-            iterations: None,
+            settings: Box::new(|_| {}),
             load: LoadOptions::default(),
             measure_side: None,
-            max_splats: None,
             overrules: Overrules::default(),
-            seed: 0,
             init: None,
-            densification: Densification::Split,
-            coarse: 0.0,
-            memory_limit: None,
-            stop_when_flat: None,
             time_limit: None,
             target_psnr: None,
             timings: false,
-            numerics: Numerics::default(),
             ahead: AheadOptions::default(),
         }
     }
@@ -120,11 +101,7 @@ pub fn fit(
     };
     files::make_folder(folder.path())?;
     let ahead = Ahead::open(&options.ahead, &folder)?;
-    let asked = preset.asked(
-        options.iterations,
-        options.max_splats,
-        options.load.max_side,
-    );
+    let asked = Work::asked(preset, &options.settings, options.load.max_side);
     let family = match options.time_limit.or(options.target_psnr) {
         Some(_) => Some(Family::of(options, asked.max_side)?),
         None => None,

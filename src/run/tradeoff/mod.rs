@@ -15,10 +15,13 @@ use std::path::{Path, PathBuf};
 pub use child::end_with_parent;
 pub use knobs::knob_names;
 
-use super::{Event, Observer, Preset, RunError, RunFolder, Stage, files, fit::open_gpu};
+use super::{
+    Event, Observer, Preset, RunError, RunFolder, Stage, files, fit::open_gpu, preset::Work,
+};
 use crate::{
     capture::{Capture, LoadOptions, split},
     effects::Overrules,
+    luma::LumaSettings,
     report::tradeoff::{Measure, Phase, Point, PointStage, Tradeoff, csv, page},
 };
 use knobs::Around;
@@ -136,8 +139,14 @@ fn next(
         let adam = preset.adam_iterations();
         let mut around = Around::new(&report(PointStage::Luma)?, largest_side, adam);
         let asked = |preset: Preset| {
-            let side = options.load.max_side;
-            preset.asked(options.iterations, options.max_splats, side)
+            let overlay = |settings: &mut LumaSettings| {
+                if let Some(iterations) = options.iterations {
+                    settings.iterations = iterations;
+                    settings.stop_when_flat = None;
+                }
+                settings.max_splats = options.max_splats.unwrap_or(settings.max_splats);
+            };
+            Work::asked(preset, &overlay, options.load.max_side)
         };
         let others = Preset::ALL.into_iter().filter(|&other| other != preset);
         around.presets = others

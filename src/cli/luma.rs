@@ -1,0 +1,158 @@
+//! Options that overlay the settings of stage 1.
+
+use clap::{Args, ValueEnum};
+
+use crate::luma::{Densification, FLAT, LumaSettings, Numerics};
+
+/// What is asked for instead of the preset's settings.
+#[derive(Args)]
+pub(super) struct LumaArguments {
+    /// Luma iterations instead of the preset's; all of them, also where the curve is flat.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    iterations: Option<u32>,
+    /// Never keep more Gaussians than this.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    max_splats: Option<u32>,
+    /// How Gaussians come and go: split where the loss pulls, or put faint ones where others are
+    /// [default: split].
+    #[arg(long, value_enum)]
+    densify: Option<Densify>,
+    /// Share of the iterations, from the first on, that see photos at half their size [default: 0].
+    #[arg(long, value_name = "0..1", value_parser = share)]
+    coarse: Option<f64>,
+    /// Take no more of the device's memory than this; fewer Gaussians if need be.
+    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u32).range(1..))]
+    memory_limit: Option<u32>,
+    /// End where twice the iterations would bring less than so many dB on held-out views
+    /// (0.1 if no number follows), with what was best on the way [default: 0.3 in the preset
+    /// balanced, 0.1 in paper, unless --iterations, --time-limit or --target-psnr says how much
+    /// is to be done; else never].
+    #[arg(long, value_name = "DB", num_args = 0..=1, require_equals = true, value_parser = decibels)]
+    stop_when_flat: Option<Option<f64>>,
+    /// How accurately training computes: alpha-min=0.00001..0.1, transmittance-min=0..0.5,
+    /// depth-bits=32|24|16, storage=full|half, ssim-window=11|7|5, adam=exact|lazy. What is
+    /// measured, drawn and written is always computed as viewers do.
+    #[arg(long, value_name = "KEY=VALUE[,…]")]
+    numerics: Option<Numerics>,
+    /// Seed of every random choice: same seed, same bytes [default: 0].
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+}
+
+impl LumaArguments {
+    /// Puts what was given in the place of what is there.
+    pub(super) fn apply(&self, settings: &mut LumaSettings) {
+        if let Some(iterations) = self.iterations {
+            settings.iterations = iterations as usize;
+            // Who says how many iterations wants them all.
+            settings.stop_when_flat = None;
+        }
+        if let Some(max_splats) = self.max_splats {
+            settings.max_splats = max_splats as usize;
+        }
+        if let Some(densify) = self.densify {
+            settings.densify_by(match densify {
+                Densify::Split => Densification::Split,
+                Densify::Relocate => Densification::Relocate,
+            });
+        }
+        if let Some(coarse) = self.coarse {
+            settings.coarse = coarse;
+        }
+        if let Some(mib) = self.memory_limit {
+            settings.memory_limit = Some(u64::from(mib) << 20);
+        }
+        if let Some(gain) = self.stop_when_flat {
+            settings.stop_when_flat = Some(gain.unwrap_or(FLAT));
+        }
+        if let Some(numerics) = self.numerics {
+            settings.numerics = numerics;
+        }
+        if let Some(seed) = self.seed {
+            settings.seed = seed;
+        }
+    }
+}
+
+/// Ways in which Gaussians come and go.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Densify {
+    /// 3D Gaussian Splatting's way.
+    Split,
+    /// The way of 3DGS as Markov chain Monte Carlo.
+    Relocate,
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(share) if (0.0..=1.0).contains(&share) => Ok(share),
+        _ => Err("not a number from 0 to 1".to_owned()),
+    }
+}
+
+/// A number of dB above 0.
+pub(super) fn decibels(text: &str) -> Result<f64, String> {
+    positive(text).ok_or_else(|| "not a number of dB above 0".to_owned())
+}
+
+/// A finite number above 0.
+pub(super) fn positive(text: &str) -> Option<f64> {
+    let number: f64 = text.parse().ok()?;
+    (number > 0.0 && number.is_finite()).then_some(number)
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+    use crate::luma::Preset;
+
+    #[derive(Parser)]
+    struct Only {
+        #[command(flatten)]
+        arguments: LumaArguments,
+    }
+
+    fn overlaid(preset: Preset, words: &[&str]) -> LumaSettings {
+        let words = ["program"].iter().chain(words);
+        let mut settings = preset.settings();
+        Only::parse_from(words).arguments.apply(&mut settings);
+        settings
+    }
+
+    #[test]
+    fn nothing_changes_nothing() {
+        for preset in Preset::ALL {
+            assert_eq!(overlaid(preset, &[]), preset.settings());
+        }
+    }
+
+    #[test]
+    fn whoever_says_how_many_iterations_wants_them_all() {
+        let balanced = |words: &[&str]| overlaid(Preset::Balanced, words).stop_when_flat;
+        assert_eq!(balanced(&[]), Some(0.3));
+        assert_eq!(balanced(&["--iterations", "3500"]), None);
+        let both = ["--iterations", "3500", "--stop-when-flat"];
+        assert_eq!(balanced(&both), Some(FLAT));
+        assert_eq!(balanced(&["--stop-when-flat=0.2"]), Some(0.2));
+    }
+
+    #[test]
+    fn every_option_has_its_place() {
+        let words = "--iterations 70 --max-splats 9 --densify relocate --coarse 0.5 \
+            --memory-limit 3 --numerics storage=half --seed 4";
+        let words: Vec<&str> = words.split_whitespace().collect();
+        let mut wanted = LumaSettings {
+            iterations: 70,
+            max_splats: 9,
+            coarse: 0.5,
+            memory_limit: Some(3 << 20),
+            numerics: "storage=half".parse().unwrap(),
+            seed: 4,
+            ..Preset::Draft.settings()
+        };
+        wanted.densify_by(Densification::Relocate);
+        assert_eq!(overlaid(Preset::Draft, &words), wanted);
+    }
+}
