@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, fmt::Write};
 use super::{
     Measure, Point, PointStage, Tradeoff,
     base64::base64,
-    plots::{groups, library, plot},
+    plots::{groups, plot},
     shell_line,
     tables::{cost_table, figure, front_table, measures, memory},
 };
@@ -22,17 +22,15 @@ pub struct Pictures {
     pub points: BTreeMap<String, Vec<u8>>,
 }
 
-/// Fits the plots into their places, which they were drawn before, and shows the picture
-/// of the point under the pointer beside the photo.
+/// Shows the picture of the point under the pointer beside the photo.
 const SCRIPT: &str = r#"<script>
-for (const plot of document.querySelectorAll(".plotly-graph-div")) {
-  Plotly.Plots.resize(plot);
-  plot.on("plotly_hover", (event) => {
-    const name = event.points[0].customdata;
-    const from = document.getElementById("point-" + name);
-    const figure = plot.closest("section").querySelector(".shown");
-    if (!from || !figure) return;
-    figure.querySelector("img").src = from.querySelector("img").src;
+for (const point of document.querySelectorAll(".point")) {
+  point.addEventListener("pointerenter", () => {
+    const from = document.getElementById("point-" + point.dataset.name);
+    const figure = point.closest("section").querySelector(".shown");
+    const picture = from && from.querySelector("img");
+    if (!picture || !figure) return;
+    figure.querySelector("img").src = picture.src;
     figure.querySelector("figcaption").textContent = from.dataset.label;
   });
 }
@@ -43,6 +41,10 @@ for (const plot of document.querySelectorAll(".plotly-graph-div")) {
 const STYLE: &str = "<style>
 .plots { display: grid; grid-template-columns: repeat(auto-fit, minmax(380px, 1fr)); gap: 1rem; }
 .plots > div { background: #fff; border-radius: 6px; box-shadow: 0 1px 3px #0002; min-width: 0; padding: .3rem; }
+.plots svg { display: block; width: 100%; }
+.point { stroke: #fff; stroke-width: 1; }
+.point > * { vector-effect: non-scaling-stroke; }
+.point:hover { stroke: #22252a; }
 .legend { display: flex; flex-wrap: wrap; gap: .2rem 1.1rem; margin: .5rem 0; font-size: .85rem; color: #454a52; }
 .legend i { display: inline-block; width: .7rem; height: .7rem; border-radius: 50%; margin-right: .35rem; }
 .film { display: flex; gap: .8rem; overflow-x: auto; margin: 1rem 0; padding-bottom: .3rem; }
@@ -62,7 +64,6 @@ summary { cursor: pointer; color: #3b6ea8; }
 pub fn page(sweep: &Tradeoff, pictures: &Pictures) -> String {
     let mut html = head("gs-chroma trade-off");
     html.push_str(STYLE);
-    html.push_str(&library());
     let subject = &sweep.subject;
     let scene = subject.scene.rsplit(['/', '\\']).next().unwrap_or_default();
     let teacher = subject.teacher.as_ref();
@@ -122,9 +123,8 @@ fn push_stage(html: &mut String, sweep: &Tradeoff, stage: PointStage, pictures: 
         );
     }
     html.push_str("</div>\n<div class=\"plots\">\n");
-    for (index, &measure) in Measure::of(stage).iter().enumerate() {
-        let id = format!("{}-{index}", stage.name());
-        let plot = plot(&id, sweep, stage, measure);
+    for &measure in Measure::of(stage) {
+        let plot = plot(sweep, stage, measure);
         if !plot.is_empty() {
             let _ = writeln!(html, "<div>{plot}</div>");
         }
@@ -313,7 +313,8 @@ mod tests {
         ] {
             assert!(!html.contains(piece), "{piece}");
         }
-        assert!(html.len() < 6_000_000, "{}", html.len());
+        assert_eq!(html.matches("<svg").count(), 2);
+        assert!(html.len() < 30_000, "{}", html.len());
     }
 
     #[test]

@@ -1,12 +1,7 @@
-//! Quality against seconds, drawn by plotly.
+//! Quality against seconds as SVG, drawn into the page: nothing is fetched, and a
+//! browser shows a point's `<title>` under the pointer.
 
-use plotly::{
-    Configuration, Layout, Plot, Scatter,
-    color::NamedColor,
-    common::{DashType, Font, HoverInfo, Label, Line, LineShape, Marker, MarkerSymbol, Mode},
-    configuration::DisplayModeBar,
-    layout::{Axis, HoverMode, Margin, RangeMode},
-};
+use std::fmt::Write;
 
 use super::{Measure, Phase, Point, PointStage, Tradeoff};
 use crate::report::html::escaped;
@@ -64,114 +59,198 @@ fn group_of(point: &Point) -> &str {
     }
 }
 
-/// One plot as HTML, for the element of this name; empty without points.
-pub(super) fn plot(id: &str, sweep: &Tradeoff, stage: PointStage, measure: Measure) -> String {
-    let place = |point: &Point| Some((point.seconds()?, measure.value(point.outcome.as_ref()?)?));
-    if !sweep.of(stage).any(|point| place(point).is_some()) {
+/// One plot as SVG; empty without points.
+pub(super) fn plot(sweep: &Tradeoff, stage: PointStage, measure: Measure) -> String {
+    let place = |point: &Point| Some([point.seconds()?, measure.value(point.outcome.as_ref()?)?]);
+    let placed: Vec<(&Point, [f64; 2])> = (sweep.of(stage))
+        .filter_map(|point| Some((point, place(point)?)))
+        .filter(|(_, at)| at.iter().all(|value| value.is_finite()))
+        .collect();
+    if placed.is_empty() {
         return String::new();
     }
-    let mut plot = Plot::new();
-    let front = sweep.front(stage, measure);
-    if measure.sign().is_some() {
-        let (x, y): (Vec<f64>, Vec<f64>) = front.iter().filter_map(|point| place(point)).unzip();
-        plot.add_trace(
-            Scatter::new(x, y)
-                .name("front")
-                .mode(Mode::Lines)
-                .hover_info(HoverInfo::Skip)
-                .line(
-                    Line::new()
-                        .color(INK)
-                        .width(1.2)
-                        .dash(DashType::Dot)
-                        .shape(LineShape::Hv),
-                ),
-        );
-    }
-    let base = sweep.base(stage);
-    for group in groups(sweep, stage) {
-        let points: Vec<&Point> = (sweep.of(stage))
-            .filter(|point| group_of(point) == group.name && place(point).is_some())
-            .collect();
-        let (x, y): (Vec<f64>, Vec<f64>) = points.iter().filter_map(|point| place(point)).unzip();
-        let hover = points.iter().map(|point| in_words(point, base)).collect();
-        let names: Vec<String> = points.iter().map(|point| point.name.clone()).collect();
-        let on_front = |point: &&Point| front.iter().any(|found| found.name == point.name);
-        let sizes = points.iter().map(|point| match point.phase {
-            Phase::Base => 15,
-            _ if on_front(point) => 12,
-            _ => 8,
-        });
-        let symbol = match points[0].phase {
-            Phase::Base => MarkerSymbol::Star,
-            Phase::One => MarkerSymbol::Circle,
-            Phase::Front => MarkerSymbol::Diamond,
-        };
-        let marker = Marker::new()
-            .color(group.color)
-            .symbol(symbol)
-            .size_array(sizes.collect())
-            .line(Line::new().color("#ffffff").width(1.0));
-        plot.add_trace(
-            Scatter::new(x, y)
-                .name(&group.name)
-                .mode(Mode::Markers)
-                .marker(marker)
-                .custom_data(names)
-                .hover_text_array(hover)
-                .hover_info(HoverInfo::Text),
-        );
-    }
-    plot.set_layout(layout(measure));
-    plot.set_configuration(
-        Configuration::new()
-            .responsive(true)
-            .display_logo(false)
-            .display_mode_bar(DisplayModeBar::False),
-    );
-    plot.to_inline_html(Some(id))
-}
-
-/// The library itself, which all plots of a page need once.
-pub(super) fn library() -> String {
-    const END: &str = "</script>";
-    let scripts = Plot::offline_js_sources();
-    // The second script sets formulas, of which there are none.
-    match scripts.find(END) {
-        Some(end) => scripts[..end + END.len()].to_owned(),
-        None => scripts,
-    }
-}
-
-fn layout(measure: Measure) -> Layout {
-    let axis = |title: &str| {
-        Axis::new()
-            .title(title)
-            .grid_color("#eeece8")
-            .line_color("#d8d5cf")
-            .zero_line(false)
-            .auto_margin(true)
+    let values = |axis: usize| placed.iter().map(move |(_, at)| at[axis]);
+    let seconds = Scale::around(values(0).chain([0.0]), [LEFT, RIGHT], 8);
+    let quality = Scale::around(values(1), [BOTTOM, TOP], 6);
+    let mut svg = axes(&seconds, &quality, &measure.title());
+    let front = match measure.sign() {
+        Some(_) => sweep.front(stage, measure),
+        None => Vec::new(),
     };
-    Layout::new()
-        .x_axis(axis("seconds").range_mode(RangeMode::ToZero))
-        .y_axis(axis(&measure.title()))
-        .font(
-            Font::new()
-                .family("system-ui, sans-serif")
-                .size(13)
-                .color("#454a52"),
-        )
-        .margin(Margin::new().left(56).right(16).top(14).bottom(44))
-        .height(360)
-        .show_legend(false)
-        .hover_mode(HoverMode::Closest)
-        .hover_label(
-            Label::new()
-                .background_color("#ffffff")
-                .font(Font::new().size(13).color(INK)),
-        )
-        .paper_background_color(NamedColor::White)
-        .plot_background_color(NamedColor::White)
+    push_front(
+        &mut svg,
+        front.iter().filter_map(|point| place(point)),
+        &seconds,
+        &quality,
+    );
+    let groups = groups(sweep, stage);
+    let base = sweep.base(stage);
+    for (point, at) in &placed {
+        let group = groups.iter().find(|group| group.name == group_of(point));
+        let size = match point.phase {
+            Phase::Base => 8.0,
+            _ if front.iter().any(|found| found.name == point.name) => 6.0,
+            _ => 4.0,
+        };
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            svg,
+            "<g class=\"point\" data-name=\"{}\" fill=\"{}\" transform=\"translate({:.1} {:.1}) scale({size})\"><title>{}</title>{}</g>",
+            escaped(&point.name),
+            group.map_or(INK, |group| group.color),
+            seconds.at(at[0]),
+            quality.at(at[1]),
+            escaped(&in_words(point, base)),
+            mark(point.phase),
+        );
+    }
+    svg.push_str("</svg>");
+    svg
+}
+
+/// Size of a plot in SVG units, and where its axes end.
+const SIZE: [f64; 2] = [560.0, 360.0];
+const LEFT: f64 = 62.0;
+const RIGHT: f64 = SIZE[0] - 14.0;
+const TOP: f64 = 14.0;
+const BOTTOM: f64 = SIZE[1] - 46.0;
+
+/// A linear axis with round steps.
+struct Scale {
+    /// Values at the ends of the axis.
+    values: [f64; 2],
+    /// SVG coordinates of its ends.
+    ends: [f64; 2],
+    /// Distance of its ticks.
+    step: f64,
+}
+
+impl Scale {
+    /// An axis that holds all these values, from a tick to a tick, with about so many ticks.
+    fn around(values: impl Iterator<Item = f64>, ends: [f64; 2], ticks: usize) -> Self {
+        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
+            (low.min(v), high.max(v))
+        });
+        // One value alone stands in the middle of something.
+        let span = match high > low {
+            true => high - low,
+            false => high.abs().max(1.0) * 0.1,
+        };
+        let step = round_step(span / ticks as f64);
+        // A point at the very end would be half outside; nothing is below no seconds.
+        let room = 0.04 * span;
+        let low = match low == 0.0 {
+            true => 0.0,
+            false => ((low - room) / step).floor() * step,
+        };
+        let high = ((high + room) / step).ceil() * step;
+        Self {
+            values: [low, high],
+            ends,
+            step,
+        }
+    }
+
+    /// Where a value lies.
+    fn at(&self, value: f64) -> f64 {
+        let [low, high] = self.values;
+        let [first, last] = self.ends;
+        first + (last - first) * (value - low) / (high - low)
+    }
+
+    /// Its ticks: where they lie, and what they say.
+    fn ticks(&self) -> impl Iterator<Item = (f64, String)> {
+        let digits = (-self.step.log10().floor()).clamp(0.0, 12.0) as usize;
+        let [low, high] = self.values;
+        let steps = ((high - low) / self.step).round() as usize;
+        (0..=steps).map(move |index| {
+            let value = low + index as f64 * self.step;
+            (self.at(value), format!("{value:.digits$}"))
+        })
+    }
+}
+
+/// The smallest of 1, 2, 5 times a power of ten that is no smaller.
+fn round_step(step: f64) -> f64 {
+    let power = 10_f64.powf(step.log10().floor());
+    let rounds = [1.0, 2.0, 5.0, 10.0].map(|factor| factor * power);
+    // A step just above a round one by rounding alone is that one.
+    let fits = |round: &f64| *round >= step * (1.0 - 1e-9);
+    rounds.into_iter().find(fits).unwrap_or(step)
+}
+
+/// The SVG's beginning: grid, ticks and titles.
+fn axes(seconds: &Scale, quality: &Scale, title: &str) -> String {
+    let [width, height] = SIZE;
+    let title = escaped(title);
+    let mut svg = format!(
+        "<svg viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{title} against seconds\" font-family=\"system-ui, sans-serif\" font-size=\"12\" fill=\"#454a52\">\n<g stroke=\"#eeece8\">"
+    );
+    for (x, _) in seconds.ticks() {
+        let _ = write!(svg, "<path d=\"M{x:.1} {TOP}V{BOTTOM}\"/>");
+    }
+    for (y, _) in quality.ticks() {
+        let _ = write!(svg, "<path d=\"M{LEFT} {y:.1}H{RIGHT}\"/>");
+    }
+    svg.push_str("</g>\n<g text-anchor=\"middle\">");
+    for (x, words) in seconds.ticks() {
+        let _ = write!(
+            svg,
+            "<text x=\"{x:.1}\" y=\"{}\">{words}</text>",
+            BOTTOM + 16.0
+        );
+    }
+    let [middle, bottom] = [(LEFT + RIGHT) / 2.0, SIZE[1] - 8.0];
+    let _ = write!(svg, "<text x=\"{middle}\" y=\"{bottom}\">seconds</text>");
+    let middle = (TOP + BOTTOM) / 2.0;
+    let _ = write!(
+        svg,
+        "<text transform=\"translate(14 {middle}) rotate(-90)\">{title}</text></g>\n<g text-anchor=\"end\">"
+    );
+    for (y, words) in quality.ticks() {
+        let _ = write!(
+            svg,
+            "<text x=\"{}\" y=\"{:.1}\">{words}</text>",
+            LEFT - 6.0,
+            y + 4.0
+        );
+    }
+    svg.push_str("</g>\n");
+    svg
+}
+
+/// The front as steps: between two of its points the faster one is the best to be had.
+fn push_front(
+    svg: &mut String,
+    places: impl Iterator<Item = [f64; 2]>,
+    seconds: &Scale,
+    quality: &Scale,
+) {
+    let mut path = String::new();
+    for [x, y] in places {
+        let (x, y) = (seconds.at(x), quality.at(y));
+        let _ = match path.is_empty() {
+            true => write!(path, "M{x:.1} {y:.1}"),
+            false => write!(path, "H{x:.1}V{y:.1}"),
+        };
+    }
+    if !path.is_empty() {
+        let _ = writeln!(
+            svg,
+            "<path d=\"{path}\" fill=\"none\" stroke=\"{INK}\" stroke-width=\"1.2\" stroke-dasharray=\"2 3\"/>"
+        );
+    }
+}
+
+/// The shape of a point about the origin, of size 1.
+fn mark(phase: Phase) -> &'static str {
+    match phase {
+        Phase::Base => {
+            "<path d=\"M0-1 .26-.36.95-.31.42.14.59.81 0 .44-.59.81-.42.14-.95-.31-.26-.36Z\"/>"
+        }
+        Phase::One => "<circle r=\"1\"/>",
+        Phase::Front => "<path d=\"M0-1.1 1.1 0 0 1.1-1.1 0Z\"/>",
+    }
 }
 
 /// What is shown of a point under the pointer.
@@ -188,7 +267,7 @@ fn in_words(point: &Point, base: Option<&Point>) -> String {
         )
     });
     let mut lines = vec![
-        format!("<b>{}</b>", escaped(&point.label())),
+        point.label(),
         format!("{:.1} s{factor}", outcome.seconds.total),
     ];
     for &measure in Measure::of(point.stage) {
@@ -202,7 +281,7 @@ fn in_words(point: &Point, base: Option<&Point>) -> String {
         lines.push(measure.in_words(value) + &change);
     }
     lines.push(format!("{} Gaussians", outcome.splats));
-    lines.join("<br>")
+    lines.join("\n")
 }
 
 #[cfg(test)]
@@ -213,17 +292,28 @@ mod tests {
     #[test]
     fn a_plot_holds_every_point_and_the_front() {
         let mut odd = luma("max-side-<200>", 5.0, 22.0);
-        odd.name = "</script>".to_owned();
+        odd.name = "\"><script>".to_owned();
         let sweep = sweep(vec![luma("base", 10.0, 24.0), failed("sh-3", "no"), odd]);
-        let html = plot("here", &sweep, PointStage::Luma, Measure::Psnr);
+        let svg = plot(&sweep, PointStage::Luma, Measure::Psnr);
+        assert!(svg.starts_with("<svg ") && svg.ends_with("</svg>"), "{svg}");
+        assert_eq!(svg.matches("class=\"point\"").count(), 2, "{svg}");
+        assert!(svg.contains("data-name=\"base\""), "{svg}");
+        assert!(svg.contains("<title>base\n10.0 s\nPSNR 24.00 dB"), "{svg}");
         assert!(
-            html.contains("id=\"here\"") && html.contains("\"shape\":\"hv\""),
-            "{html}"
+            svg.contains("5.0 s (× 0.50)\nPSNR 22.00 dB (-2.00)"),
+            "{svg}"
         );
-        assert!(html.contains("[5.0,10.0]"), "{html}");
-        assert_eq!(html.matches("</script>").count(), 1, "{html}");
-        assert!(!html.contains("<200>") && html.contains("&amp;lt;") | html.contains("lt;200"));
-        assert!(plot("here", &sweep, PointStage::Color, Measure::DeltaE).is_empty());
+        // From the faster point along its quality to the slower one's time, then up.
+        let front = format!(
+            "M{x0:.1} {y0:.1}H{x1:.1}V{y1:.1}\"",
+            x0 = LEFT + (RIGHT - LEFT) * 5.0 / 12.0,
+            x1 = LEFT + (RIGHT - LEFT) * 10.0 / 12.0,
+            y0 = BOTTOM - (BOTTOM - TOP) * 0.5 / 3.0,
+            y1 = BOTTOM - (BOTTOM - TOP) * 2.5 / 3.0,
+        );
+        assert!(svg.contains(&front), "{front} in {svg}");
+        assert!(!svg.contains("<200>") && !svg.contains("<script>"), "{svg}");
+        assert!(plot(&sweep, PointStage::Color, Measure::DeltaE).is_empty());
         let names: Vec<String> = groups(&sweep, PointStage::Luma)
             .into_iter()
             .map(|g| g.name)
@@ -232,10 +322,30 @@ mod tests {
     }
 
     #[test]
-    fn the_library_is_there_and_nothing_is_fetched() {
-        let library = library();
-        assert!(library.starts_with("<script") && library.ends_with("</script>"));
-        assert!(library.len() > 1 << 20 && library.len() < 6_000_000);
-        assert!(!library.contains("<script src"));
+    fn axes_end_at_round_values_and_hold_every_point() {
+        for values in [
+            vec![0.0, 0.0],
+            vec![24.0],
+            vec![-3.0, 5.0],
+            vec![0.81234, 0.81301],
+            vec![0.0, 12_345.6],
+        ] {
+            let scale = Scale::around(values.iter().copied(), [0.0, 100.0], 6);
+            let ticks: Vec<(f64, String)> = scale.ticks().collect();
+            assert!((2..=10).contains(&ticks.len()), "{values:?}: {ticks:?}");
+            assert!(
+                ticks
+                    .iter()
+                    .all(|(x, _)| (-1e-6..=100.0 + 1e-6).contains(x))
+            );
+            assert!(values.iter().all(|&v| (0.0..=100.0).contains(&scale.at(v))));
+            let mut words: Vec<&String> = ticks.iter().map(|(_, words)| words).collect();
+            words.dedup();
+            assert_eq!(words.len(), ticks.len(), "{ticks:?}");
+        }
+        assert_eq!(
+            [0.3, 1.0, 1.2, 4.0, 70.0].map(round_step),
+            [0.5, 1.0, 2.0, 5.0, 100.0]
+        );
     }
 }
