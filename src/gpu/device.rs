@@ -106,6 +106,9 @@ impl GpuError {
     }
 }
 
+/// Storage buffers that a kernel binds, at most.
+pub const STORAGE_BUFFERS: u32 = 9;
+
 /// A device and its queue, cheap to clone.
 #[derive(Clone)]
 pub struct Gpu {
@@ -154,6 +157,29 @@ impl Gpu {
             adapter: info.name.clone(),
             reason: error.to_string(),
         })?;
+        Self::on(device, queue, info)
+    }
+
+    /// The device of a program that has one already, such as a viewer's; `info` is its
+    /// adapter's. It should have been made with the adapter's own limits: large scenes need
+    /// large bindings.
+    ///
+    /// # Errors
+    /// [`GpuError::NoDevice`] when it was made for fewer than [`STORAGE_BUFFERS`] in a kernel.
+    pub fn on(
+        device: wgpu::Device,
+        queue: wgpu::Queue,
+        info: wgpu::AdapterInfo,
+    ) -> Result<Self, GpuError> {
+        let binds = device.limits().max_storage_buffers_per_shader_stage;
+        if binds < STORAGE_BUFFERS {
+            return Err(GpuError::NoDevice {
+                adapter: info.name,
+                reason: format!(
+                    "kernels bind {STORAGE_BUFFERS} storage buffers, it allows {binds}"
+                ),
+            });
+        }
         Ok(Self {
             inner: Arc::new(Inner {
                 device,

@@ -7,6 +7,6 @@ pub mod shaders;
 mod stopwatch;
 
 pub use buffer::{Buffer, Readback};
-pub use device::{Gpu, GpuError};
+pub use device::{Gpu, GpuError, STORAGE_BUFFERS};
 pub use kernel::{Bindings, Kernel, Recorder, groups_for};
 pub use stopwatch::KernelTime;

@@ -6,7 +6,7 @@ use gs_chroma::{
     chroma::{
         ChromaLossWeights, Correction, CorrectionParameters, LbfgsParameters, SUM_GROUPS, SUMS,
     },
-    gpu::shaders,
+    gpu::{STORAGE_BUFFERS, shaders},
     luma::{
         LumaLossParameters,
         densify::{DensifyParameters, Descent},
@@ -17,7 +17,11 @@ use gs_chroma::{
         scan::ScanParameters, sort::SortParameters,
     },
 };
-use naga::{Expression, Handle, Literal, Module, TypeInner, front::wgsl};
+use naga::{
+    AddressSpace, Expression, Handle, Literal, Module, TypeInner,
+    front::wgsl,
+    valid::{Capabilities, ValidationFlags, Validator},
+};
 
 use crate::oracle::{constants as oracle, luma_loss::window};
 
@@ -370,4 +374,22 @@ fn sums_of_a_view_have_the_shape_that_the_host_makes_room_for() {
     let wgsl = constants_of("view_correction", shaders::VIEW_CORRECTION);
     assert_eq!(wgsl["SUM_GROUPS"], [SUM_GROUPS as f64]);
     assert_eq!(wgsl["SUMS"], [SUMS as f64]);
+}
+
+#[test]
+fn no_kernel_binds_more_storage_than_is_asked_of_a_device() {
+    let mut most = 0;
+    for (name, source) in shaders::ALL {
+        let module = parse(name, source);
+        let mut validator = Validator::new(ValidationFlags::all(), Capabilities::all());
+        let info = validator.validate(&module).unwrap();
+        for entry in 0..module.entry_points.len() {
+            let bound = module.global_variables.iter().filter(|(handle, global)| {
+                matches!(global.space, AddressSpace::Storage { .. })
+                    && !info.get_entry_point(entry)[*handle].is_empty()
+            });
+            most = most.max(bound.count());
+        }
+    }
+    assert_eq!(most, STORAGE_BUFFERS as usize);
 }

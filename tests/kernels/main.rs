@@ -15,6 +15,7 @@ mod adam;
 mod antialiasing;
 mod blend;
 mod depth;
+mod device;
 mod effects;
 mod gradient;
 mod harness;
