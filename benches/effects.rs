@@ -15,8 +15,8 @@ use std::{error::Error, fs, path::Path, process::ExitCode, sync::Arc, time::Inst
 use glam::{DMat3, DVec3};
 use gs_chroma::{
     capture::{Camera, Capture, CaptureError, Choice, Exposure, LoadOptions, Loader},
-    gpu::{Gpu, GpuError},
-    luma::{LumaSettings, LumaTrainer, Schedule, TrainingView},
+    gpu::Gpu,
+    luma::{LumaError, LumaSettings, LumaTrainer, Schedule, TrainingView},
     oracle::random::Random,
     raster::{Raster, RasterOptions},
     splats::{ShField, Splats, dome::dome, sh},
@@ -78,10 +78,10 @@ fn cloud(sh_degree: u32) -> Splats {
 }
 
 /// A trainer that has found its room already, and what it takes on the device.
-fn trainer(gpu: &Gpu, effects: Effects) -> Result<(LumaTrainer, u64), GpuError> {
+fn trainer(gpu: &Gpu, effects: Effects) -> Result<(LumaTrainer, u64), LumaError> {
     let mut random = Random::new(2);
     let before = gpu.allocated_bytes();
-    let views = (0..VIEWS)
+    let views: Vec<TrainingView> = (0..VIEWS)
         .map(|view| {
             let camera = camera(view);
             let pixels = (camera.width * camera.height) as usize;
@@ -148,7 +148,7 @@ fn trainer(gpu: &Gpu, effects: Effects) -> Result<(LumaTrainer, u64), GpuError> 
     ))
 }
 
-fn seconds(trainer: &mut LumaTrainer) -> Result<f64, GpuError> {
+fn seconds(trainer: &mut LumaTrainer) -> Result<f64, LumaError> {
     let begun = Instant::now();
     trainer.train(&mut |_| {})?;
     Ok(begun.elapsed().as_secs_f64())
@@ -175,7 +175,7 @@ fn ratios<E>(
     Ok(ratios)
 }
 
-fn compare(gpu: &Gpu, name: &str, effects: Effects) -> Result<(), GpuError> {
+fn compare(gpu: &Gpu, name: &str, effects: Effects) -> Result<(), LumaError> {
     let (mut plain, plain_bytes) = trainer(gpu, Effects::default())?;
     let (mut with, bytes) = trainer(gpu, effects)?;
     let ratios = ratios(|| seconds(&mut plain), || seconds(&mut with))?;
@@ -190,7 +190,7 @@ fn compare(gpu: &Gpu, name: &str, effects: Effects) -> Result<(), GpuError> {
 }
 
 /// What a search for outliers takes, in iterations, for each photo.
-fn search(gpu: &Gpu) -> Result<f64, GpuError> {
+fn search(gpu: &Gpu) -> Result<f64, LumaError> {
     let robust = |searches| Effects {
         robust: true,
         searches,

@@ -23,8 +23,8 @@ use std::{
 
 use cloud::{camera, cloud, median};
 use gs_chroma::{
-    gpu::{Gpu, GpuError},
-    luma::{LumaSettings, LumaTrainer, TrainingView},
+    gpu::Gpu,
+    luma::{LumaError, LumaSettings, LumaTrainer, TrainingView},
     oracle::random::Random,
     raster::Raster,
 };
@@ -50,7 +50,7 @@ struct Cost {
 }
 
 /// A trainer that has found its room already.
-fn trainer(gpu: &Gpu, (count, width): Size, behind: bool) -> Result<LumaTrainer, GpuError> {
+fn trainer(gpu: &Gpu, (count, width): Size, behind: bool) -> Result<LumaTrainer, LumaError> {
     let camera = camera(width);
     let mut random = Random::new(2);
     let pixels = camera.width * camera.height;
@@ -73,7 +73,7 @@ fn trainer(gpu: &Gpu, (count, width): Size, behind: bool) -> Result<LumaTrainer,
     Ok(trainer)
 }
 
-fn measure(gpu: &Gpu, size: Size, behind: bool) -> Result<Cost, GpuError> {
+fn measure(gpu: &Gpu, size: Size, behind: bool) -> Result<Cost, LumaError> {
     let mut plain = trainer(gpu, size, behind)?;
     let mut walls = Vec::new();
     let first = Instant::now();

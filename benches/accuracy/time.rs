@@ -3,8 +3,8 @@
 use std::{array, collections::BTreeMap, sync::Arc, time::Instant};
 
 use gs_chroma::{
-    gpu::{Gpu, GpuError},
-    luma::{LumaSettings, LumaTrainer, Numerics, Schedule},
+    gpu::Gpu,
+    luma::{LumaError, LumaSettings, LumaTrainer, Numerics, Schedule},
     raster::Raster,
 };
 use serde::Serialize;
@@ -79,8 +79,8 @@ fn trainer(raster: &Arc<Raster>, subject: &Subject, numerics: Numerics) -> Falli
 /// changes as well, for whoever follows may find the caches cold.
 fn rounds<const N: usize>(
     count: usize,
-    mut turn: impl FnMut(usize) -> Result<[f64; N], GpuError>,
-) -> Result<Vec<Vec<[f64; N]>>, GpuError> {
+    mut turn: impl FnMut(usize) -> Result<[f64; N], LumaError>,
+) -> Result<Vec<Vec<[f64; N]>>, LumaError> {
     (0..count)
         .map(|round| {
             let mut ratios = vec![[1.0; N]; KNOBS.len()];

@@ -3,9 +3,11 @@
 mod arrangement;
 pub mod camera;
 mod colmap;
+mod dataset;
 mod decode;
 mod error;
 mod exposure;
+mod in_order;
 mod jpeg;
 pub mod lens;
 mod loader;
@@ -34,8 +36,10 @@ use serde::{Deserialize, Serialize};
 
 use arrangement::Arrangement;
 pub use camera::Camera;
+pub use dataset::{Dataset, Notice};
 pub use error::{CaptureError, Position};
 pub use exposure::Exposure;
+pub(crate) use in_order::in_order;
 pub use lens::IMPERCEPTIBLE;
 use lens::Undistortion;
 pub use loader::{Loader, first_views, kinds};

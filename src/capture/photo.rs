@@ -30,6 +30,13 @@ pub struct Photo {
     pub mask: Option<Vec<u8>>,
 }
 
+impl Photo {
+    /// Whether a pixel, by its place in `[height, width]`, counts at least half.
+    pub fn counts(&self, pixel: usize) -> bool {
+        self.mask.as_ref().is_none_or(|mask| mask[pixel] >= 128)
+    }
+}
+
 /// A decoded file, encoded for display.
 pub(super) struct Pixels {
     pub width: u32,

@@ -26,14 +26,20 @@ const DOME_COUNT: usize = 4_000;
 /// move less, a textured wall that is not far moves more.
 const AGREEMENT: f64 = 8.0;
 
+/// Views that are looked at, at most: each place is looked up in all of them, and so many
+/// photos around a scene show all of its background more than once.
+const VIEWS_MAX: usize = 128;
+
 /// What lies behind the scene: the parts of the photos that no point explains, where the
 /// photos agree if these are put far away. A wall without points that stands near does
 /// not agree, unless it has no texture either; then its gray is right behind it as well.
 #[derive(Clone, Debug)]
-pub struct Backdrop<'a> {
-    /// Those that may be looked at.
-    photos: Vec<&'a (Photo, Camera)>,
-    /// One a photo.
+pub struct Backdrop {
+    /// The views whose photos are looked at.
+    views: Vec<usize>,
+    /// Their cameras.
+    cameras: Vec<Camera>,
+    /// Their cells.
     holes: Vec<Holes>,
     /// The cameras' mean, and how far from it the background stands.
     center: DVec3,
@@ -89,12 +95,14 @@ impl Holes {
     }
 }
 
-impl<'a> Backdrop<'a> {
-    /// Looks where points lie in the photos of the views `train`; `photos` are those of all
-    /// the capture's views, at working size.
-    pub fn of(capture: &Capture, photos: &'a [(Photo, Camera)], train: &[usize]) -> Self {
-        let photos: Vec<_> = train.iter().map(|&view| &photos[view]).collect();
-        let holes = photos.iter().map(|(_, camera)| Holes::of(capture, camera));
+impl Backdrop {
+    /// Looks where points lie in the training views `train`, in [`VIEWS_MAX`] of them at
+    /// most; `cameras` are those of all the capture's views, at working size.
+    pub fn of(capture: &Capture, cameras: &[Camera], train: &[usize]) -> Self {
+        let count = train.len().min(VIEWS_MAX);
+        let views: Vec<usize> = (0..count).map(|k| train[k * train.len() / count]).collect();
+        let cameras: Vec<Camera> = views.iter().map(|&view| cameras[view].clone()).collect();
+        let holes = cameras.iter().map(|camera| Holes::of(capture, camera));
         let center = capture.center();
         let mut distances: Vec<f64> = (capture.points.iter())
             .map(|point| point.position.distance(center))
@@ -104,35 +112,67 @@ impl<'a> Backdrop<'a> {
         let farthest = distances.get(distances.len() * 99 / 100);
         let beyond = DOME_BEYOND_POINTS * farthest.copied().unwrap_or_default();
         Self {
+            views,
             holes: holes.collect(),
-            photos,
+            cameras,
             center,
             radius: (DOME_EXTENTS * capture.extent()).max(beyond),
         }
     }
 
-    /// Share of all photos' area that lies behind the scene, 0 to 1.
-    pub fn share(&self) -> f64 {
-        let cells: usize = self.holes.iter().map(|holes| holes.empty.len()).sum();
-        let behind = self
-            .holes
-            .iter()
-            .zip(&self.photos)
-            .map(|(holes, (_, camera))| {
-                let places = holes.middles().map(|pixel| self.far_along(camera, pixel));
-                places
-                    .filter(|&place| self.gray_at(place).is_some())
-                    .count()
-            });
-        behind.sum::<usize>() as f64 / cells.max(1) as f64
+    /// The views whose photos tell what lies behind, ascending.
+    pub fn views(&self) -> &[usize] {
+        &self.views
     }
 
-    /// Gaussians far behind the scene, at most `max`; one channel of degree `sh_degree`.
-    pub fn dome(&self, max: usize, sh_degree: u32) -> Splats {
-        let count = DOME_COUNT.min(max);
-        dome(self.center, self.radius, count, sh_degree, |place| {
-            self.gray_at(place)
+    /// The middles of all empty cells, as far away as the background stands.
+    pub(super) fn behind_cells(&self) -> FarPlaces {
+        let cells = self.cameras.iter().zip(&self.holes);
+        FarPlaces::of(cells.flat_map(|(camera, holes)| {
+            let middles = holes.middles();
+            middles.map(|pixel| self.far_along(camera, pixel))
+        }))
+    }
+
+    /// Share of all photos' area that lies behind the scene, 0 to 1; `places` are
+    /// [`Self::behind_cells`], once all photos have been looked at.
+    pub(super) fn share(&self, places: &FarPlaces) -> f64 {
+        let cells: usize = self.holes.iter().map(|holes| holes.empty.len()).sum();
+        let behind = places.grays().flatten().count();
+        behind as f64 / cells.max(1) as f64
+    }
+
+    /// The places of at most `max` Gaussians far behind the scene.
+    pub fn dome_places(&self, max: usize) -> FarPlaces {
+        let mut places = Vec::new();
+        let _: Splats = dome(self.center, self.radius, DOME_COUNT.min(max), 0, |place| {
+            places.push(place);
+            None
+        });
+        FarPlaces::of(places)
+    }
+
+    /// Gaussians far behind the scene; one channel of degree `sh_degree`. `places` are
+    /// [`Self::dome_places`], once the photos of all [`Self::views`] have been looked at.
+    pub fn dome(&self, places: &FarPlaces, sh_degree: u32) -> Splats {
+        let mut grays = places.grays();
+        let count = places.places.len();
+        dome(self.center, self.radius, count, sh_degree, |_| {
+            grays.next().flatten()
         })
+    }
+
+    /// Takes what the photo of a view, at working size, shows of `places`; of a view that is
+    /// none of [`Self::views`], nothing.
+    pub fn look(&self, view: usize, photo: &Photo, places: &mut FarPlaces) {
+        let Ok(index) = self.views.binary_search(&view) else {
+            return;
+        };
+        let (camera, holes) = (&self.cameras[index], &self.holes[index]);
+        for (place, grays) in places.places.iter().zip(&mut places.grays) {
+            let pixel = camera.pixel_of(*place).filter(|&pixel| holes.holds(pixel));
+            grays.extend(pixel.and_then(|pixel| gray_around(photo, pixel)));
+        }
     }
 
     /// The place that far away which a camera sees at a pixel.
@@ -144,26 +184,42 @@ impl<'a> Backdrop<'a> {
         );
         camera.center() + camera.rotation.transpose() * ray.normalize() * self.radius
     }
+}
 
-    /// The gray, encoded, 0 to 1, of a place behind the scene: the median of what the
-    /// unexplained parts of the photos show there; `None` unless at least two of them, and
-    /// two thirds, agree with it.
-    fn gray_at(&self, place: DVec3) -> Option<f32> {
-        let seen = self.photos.iter().zip(&self.holes);
-        let mut grays: Vec<f64> = (seen.filter_map(|((photo, camera), holes)| {
-            let pixel = camera.pixel_of(place)?;
-            holes.holds(pixel).then(|| gray_around(photo, pixel))?
-        }))
-        .collect();
-        let middle = grays.len() / 2;
-        let median = match grays.len() {
-            0 => return None,
-            _ => *grays.select_nth_unstable_by(middle, f64::total_cmp).1,
-        };
-        let near = |gray: &&f64| (**gray - median).abs() <= AGREEMENT;
-        let agree = grays.iter().filter(near).count();
-        (agree >= 2 && 3 * agree >= 2 * grays.len()).then_some((median / 255.0) as f32)
+/// Places far away, and what the unexplained parts of photos show there, in gray levels.
+#[derive(Clone, Debug)]
+pub struct FarPlaces {
+    places: Vec<DVec3>,
+    /// Of each place, one a photo that shows it.
+    grays: Vec<Vec<f64>>,
+}
+
+impl FarPlaces {
+    fn of(places: impl IntoIterator<Item = DVec3>) -> Self {
+        let places: Vec<DVec3> = places.into_iter().collect();
+        Self {
+            grays: vec![Vec::new(); places.len()],
+            places,
+        }
     }
+
+    /// The gray, encoded, 0 to 1, of each place: the median of what photos show there;
+    /// `None` unless at least two of them, and two thirds, agree with it.
+    fn grays(&self) -> impl Iterator<Item = Option<f32>> {
+        self.grays.iter().map(|grays| agreed(grays.clone()))
+    }
+}
+
+/// The median of gray levels that agree.
+fn agreed(mut grays: Vec<f64>) -> Option<f32> {
+    let middle = grays.len() / 2;
+    let median = match grays.len() {
+        0 => return None,
+        _ => *grays.select_nth_unstable_by(middle, f64::total_cmp).1,
+    };
+    let near = |gray: &&f64| (**gray - median).abs() <= AGREEMENT;
+    let agree = grays.iter().filter(near).count();
+    (agree >= 2 && 3 * agree >= 2 * grays.len()).then_some((median / 255.0) as f32)
 }
 
 /// Mean gray level of the pixels around a place in a photo; `None` where one is masked.
@@ -215,21 +271,47 @@ mod tests {
         (capture(&photos, points), photos)
     }
 
+    /// The backdrop, with what photos show of the places that `of` gives.
+    fn looked(
+        capture: &Capture,
+        photos: &[(Photo, Camera)],
+        train: &[usize],
+        of: impl Fn(&Backdrop) -> FarPlaces,
+    ) -> (Backdrop, FarPlaces) {
+        let cameras: Vec<Camera> = photos.iter().map(|(_, camera)| camera.clone()).collect();
+        let backdrop = Backdrop::of(capture, &cameras, train);
+        let mut places = of(&backdrop);
+        for (view, (photo, _)) in photos.iter().enumerate() {
+            backdrop.look(view, photo, &mut places);
+        }
+        (backdrop, places)
+    }
+
+    fn share(capture: &Capture, photos: &[(Photo, Camera)], train: &[usize]) -> f64 {
+        let (backdrop, places) = looked(capture, photos, train, Backdrop::behind_cells);
+        backdrop.share(&places)
+    }
+
+    fn dome_of(capture: &Capture, photos: &[(Photo, Camera)], max: usize, degree: u32) -> Splats {
+        let (backdrop, places) = looked(capture, photos, &[0, 1], |b| b.dome_places(max));
+        backdrop.dome(&places, degree)
+    }
+
     #[test]
     fn far_stripes_lie_behind_near_ones_do_not() {
         let (capture, photos) = half_sky(1e4);
-        let far = Backdrop::of(&capture, &photos, &[0, 1]).share();
+        let far = share(&capture, &photos, &[0, 1]);
         // 16 rows, points from the 10th on; the row beside them counts as explained.
         assert!((0.35..=0.5).contains(&far), "{far}");
         let (capture, photos) = half_sky(4.0);
-        let near = Backdrop::of(&capture, &photos, &[0, 1]).share();
+        let near = share(&capture, &photos, &[0, 1]);
         assert!(near < 0.15, "{near}");
     }
 
     #[test]
     fn the_dome_stands_where_there_is_sky_behind_everything() {
         let (capture, photos) = half_sky(1e4);
-        let dome = Backdrop::of(&capture, &photos, &[0, 1]).dome(100_000, 1);
+        let dome = dome_of(&capture, &photos, 100_000, 1);
         assert!(dome.len() > 50, "{}", dome.len());
         let radius = DOME_EXTENTS * capture.extent();
         for mean in &dome.means {
@@ -237,7 +319,7 @@ mod tests {
             assert!((place.length() / radius - 1.0).abs() < 1e-3, "{place}");
             assert!(place.y < 0.0 && place.z > 0.0);
         }
-        let few = Backdrop::of(&capture, &photos, &[0, 1]).dome(50, 1);
+        let few = dome_of(&capture, &photos, 50, 1);
         assert!(few.len() <= 50);
     }
 
@@ -247,7 +329,7 @@ mod tests {
         for point in &mut capture.points {
             point.position *= 100.0;
         }
-        let dome = Backdrop::of(&capture, &photos, &[0, 1]).dome(4_000, 0);
+        let dome = dome_of(&capture, &photos, 4_000, 0);
         let place = DVec3::from(dome.means[0].map(f64::from));
         assert!(place.length() > 1_000.0, "{place}");
     }
@@ -258,9 +340,9 @@ mod tests {
         for (photo, _) in &mut photos {
             photo.mask = Some(vec![0; 64 * 64]);
         }
-        assert_eq!(Backdrop::of(&capture, &photos, &[0, 1]).share(), 0.0);
+        assert_eq!(share(&capture, &photos, &[0, 1]), 0.0);
         let (capture, photos) = half_sky(1e4);
-        assert_eq!(Backdrop::of(&capture, &photos, &[1]).share(), 0.0);
+        assert_eq!(share(&capture, &photos, &[1]), 0.0);
     }
 
     #[test]
@@ -269,7 +351,7 @@ mod tests {
             let camera = looking_along_z(DVec3::ZERO, width);
             let photos = vec![(photo(&camera, |_, _| 255), camera); 2];
             let nothing = capture(&photos, [DVec3::new(0.0, 0.0, -1.0)]);
-            assert_eq!(Backdrop::of(&nothing, &photos, &[0, 1]).share(), 1.0);
+            assert_eq!(share(&nothing, &photos, &[0, 1]), 1.0);
         }
     }
 }

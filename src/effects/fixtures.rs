@@ -2,7 +2,8 @@
 
 use glam::{DMat3, DVec3};
 
-use crate::capture::{Camera, Capture, Photo, Point, View};
+use super::{Evidence, Survey};
+use crate::capture::{Camera, Capture, Photo, Point, Split, View};
 
 /// A camera at `center` that looks along z, of square photos, its focal length as many
 /// pixels as they are wide.
@@ -56,4 +57,18 @@ pub fn capture(photos: &[(Photo, Camera)], points: impl IntoIterator<Item = DVec
         rejected: Vec::new(),
         distortion: 0.0,
     }
+}
+
+/// What all the photos say, all of them trained on.
+pub fn evidence(capture: &Capture, photos: &[(Photo, Camera)]) -> Evidence {
+    let cameras: Vec<Camera> = photos.iter().map(|(_, camera)| camera.clone()).collect();
+    let split = Split {
+        train: (0..photos.len()).collect(),
+        test: Vec::new(),
+    };
+    let mut survey = Survey::new(capture, &cameras, &split);
+    for (view, (photo, _)) in photos.iter().enumerate() {
+        survey.look(view, photo);
+    }
+    survey.finish()
 }

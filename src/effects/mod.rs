@@ -5,20 +5,22 @@
 
 mod background;
 mod direction;
+mod evidence;
 mod exposure;
 #[cfg(test)]
 mod fixtures;
+mod look_ups;
 mod outliers;
 mod plan;
 mod sampling;
 mod teacher;
 mod tracks;
 
-pub use background::Backdrop;
+pub use background::{Backdrop, FarPlaces};
 pub use direction::left_out_errors;
+pub use evidence::{Evidence, Survey};
 pub use exposure::{Exposures, find_exposures, find_photo_exposures};
-pub use outliers::outlier_share;
 pub use plan::{Decider, Decision, Effect, Overrules, Plan, Room, table};
 pub use sampling::sampling_spread;
 pub use teacher::{TeacherSpread, teacher_spread};
-pub use tracks::{Sample, sample_tracks};
+pub use tracks::Sample;

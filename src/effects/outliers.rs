@@ -7,7 +7,7 @@
 
 use std::collections::BTreeSet;
 
-use super::tracks::mean_around;
+use super::look_ups::LookUps;
 use crate::{
     capture::{Camera, Capture, Exposure, Photo},
     splats::nearest_neighbors,
@@ -29,42 +29,73 @@ const AGREEMENT: f64 = 0.06;
 /// One disagrees when it is this far from their median, in gray.
 const DISAGREEMENT: f64 = 0.2;
 
-/// Share of the samples at places about which the other views agree that disagree with
-/// them; `None` where there is no such place.
-pub fn outlier_share(
-    capture: &Capture,
-    photos: &[(Photo, Camera)],
-    exposures: &[Exposure],
-) -> Option<f64> {
-    let positions: Vec<[f32; 3]> = (capture.points.iter())
-        .map(|point| point.position.as_vec3().to_array())
-        .collect();
-    let neighbors = nearest_neighbors(&positions, NEIGHBORS);
-    let (mut judged, mut disagreeing) = (0_u64, 0_u64);
-    let mut pairs = BTreeSet::new();
-    for (a, of_a) in neighbors.iter().enumerate() {
-        for &b in of_a {
-            let b = b as usize;
-            pairs.insert((a.min(b), a.max(b)));
-        }
-    }
-    for (a, b) in pairs {
-        let [first, second] = [a, b].map(|index| &capture.points[index]);
-        let middle = 0.5 * (first.position + second.position);
-        let mut lumas: Vec<f64> = (first.track.iter())
-            .filter(|seen| second.track.iter().any(|also| also.view == seen.view))
-            .filter_map(|seen| {
-                let (photo, camera) = &photos[seen.view];
-                let Exposure { gain, offset } = exposures[seen.view];
-                Some((mean_around(photo, camera.pixel_of(middle)?, SIDE)? - offset) / gain)
-            })
+/// Places half-way between neighbouring points, and what the views that see both show there.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Midpoints {
+    /// Of each place the views.
+    views: Vec<Vec<usize>>,
+    look_ups: LookUps,
+}
+
+impl Midpoints {
+    /// The places of a capture, of which nothing is known yet; `cameras` are those of its
+    /// views at working size.
+    pub fn of(capture: &Capture, cameras: &[Camera]) -> Self {
+        let positions: Vec<[f32; 3]> = (capture.points.iter())
+            .map(|point| point.position.as_vec3().to_array())
             .collect();
-        lumas.sort_by(f64::total_cmp);
-        let [total, without] = judge(&lumas);
-        judged += total;
-        disagreeing += without;
+        let neighbors = nearest_neighbors(&positions, NEIGHBORS);
+        let mut pairs = BTreeSet::new();
+        for (a, of_a) in neighbors.iter().enumerate() {
+            for &b in of_a {
+                let b = b as usize;
+                pairs.insert((a.min(b), a.max(b)));
+            }
+        }
+        let mut look_ups = LookUps::of(cameras.len());
+        let mut views = Vec::with_capacity(pairs.len());
+        for (a, b) in pairs {
+            let [first, second] = [a, b].map(|index| &capture.points[index]);
+            let middle = 0.5 * (first.position + second.position);
+            let mut seeing = Vec::new();
+            for seen in &first.track {
+                if second.track.iter().all(|also| also.view != seen.view) {
+                    continue;
+                }
+                if let Some(pixel) = cameras[seen.view].pixel_of(middle) {
+                    look_ups.ask(seen.view, pixel, SIDE);
+                    seeing.push(seen.view);
+                }
+            }
+            views.push(seeing);
+        }
+        Self { views, look_ups }
     }
-    (judged > 0).then(|| disagreeing as f64 / judged as f64)
+
+    /// Takes what is wanted of the photo of a view.
+    pub fn look(&mut self, view: usize, photo: &Photo) {
+        self.look_ups.look(view, photo);
+    }
+
+    /// Share of the samples at places about which the other views agree that disagree with
+    /// them; `None` where there is no such place.
+    pub fn outlier_share(&self, exposures: &[Exposure]) -> Option<f64> {
+        let (mut judged, mut disagreeing) = (0_u64, 0_u64);
+        let mut means = self.look_ups.means();
+        for views in &self.views {
+            let mut lumas: Vec<f64> = (views.iter().zip(&mut means))
+                .filter_map(|(&view, mean)| {
+                    let Exposure { gain, offset } = exposures[view];
+                    Some((mean? - offset) / gain)
+                })
+                .collect();
+            lumas.sort_by(f64::total_cmp);
+            let [total, without] = judge(&lumas);
+            judged += total;
+            disagreeing += without;
+        }
+        (judged > 0).then(|| disagreeing as f64 / judged as f64)
+    }
 }
 
 /// Of sorted lumas at one place: how many there are about which the others agree, and

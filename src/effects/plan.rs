@@ -5,10 +5,8 @@ use std::fmt;
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 
-use super::{
-    background::Backdrop, direction, exposure, outliers, sampling::sampling_spread, tracks,
-};
-use crate::capture::{Camera, Capture, Choice, Exposure, IMPERCEPTIBLE, Photo, Split};
+use super::{direction, evidence::Evidence, tracks};
+use crate::capture::{Choice, Exposure, IMPERCEPTIBLE};
 
 /// Exposures that move what the views show by less, root mean square in gray levels, are
 /// invisible beside what any scene is missed by.
@@ -235,74 +233,6 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Examines a capture with its photos at working size. `trial` is what a training
-    /// [that was asked for](Self::needs_trial) said: per cent by which it fits the photos better
-    /// with exposures than without.
-    pub fn new(
-        capture: &Capture,
-        photos: &[(Photo, Camera)],
-        split: &Split,
-        room: Room,
-        overrules: &Overrules,
-        trial: Option<f64>,
-    ) -> Self {
-        let samples = tracks::sample_tracks(capture, photos);
-        let mut found = exposure::find_photo_exposures(&samples, &capture.views, &split.train);
-        let exposure = {
-            let evidence = (!samples.is_empty()).then_some(255.0 * found.spread);
-            let noise = EXPOSURE_OVER_NOISE * 255.0 * found.noise;
-            let decision = Decision::new(Effect::Exposure, evidence, EXPOSURE_LEVELS.max(noise));
-            overruled(decision.after(trial), overrules)
-        };
-        if exposure.decided_by == Decider::Trial && !exposure.on {
-            // What points show differently then has another reason.
-            found.views.fill(Exposure::NONE);
-        }
-        let robust = {
-            let evidence = outliers::outlier_share(capture, photos, &found.views);
-            let percent = evidence.map(|share| 100.0 * share);
-            let decision = Decision::new(Effect::Robust, percent, 100.0 * OUTLIER_SHARE);
-            match decision.on && room.iterations < ROBUST_ITERATIONS {
-                true => Decision {
-                    on: false,
-                    decided_by: Decider::Preset,
-                    ..decision
-                },
-                false => decision,
-            }
-        };
-        let antialias = Decision::new(
-            Effect::Antialias,
-            sampling_spread(capture, photos),
-            SAMPLING_SPREAD,
-        );
-        let behind = 100.0 * Backdrop::of(capture, photos, &split.train).share();
-        let background = Decision::new(Effect::Background, Some(behind), 100.0 * BACKGROUND_SHARE);
-        let (degree, sh_degree) = degree(&samples, &found.views, room.sh_degree, overrules);
-        let lens = Decision::new(Effect::Lens, Some(capture.distortion), IMPERCEPTIBLE);
-        let decisions = vec![
-            overruled(lens, overrules),
-            overruled(masks(photos), overrules),
-            exposure,
-            overruled(robust, overrules),
-            overruled(antialias, overrules),
-            overruled(background, overrules),
-            degree,
-        ];
-        let exposures = match decisions
-            .iter()
-            .any(|d| d.effect == Effect::Exposure && d.on)
-        {
-            true => found.views,
-            false => vec![Exposure::NONE; photos.len()],
-        };
-        Self {
-            decisions,
-            exposures,
-            sh_degree,
-        }
-    }
-
     /// Whether two short trainings, with exposures and without, should tell what the photos
     /// alone do not.
     pub fn needs_trial(&self) -> bool {
@@ -320,6 +250,65 @@ impl Plan {
     }
 }
 
+impl Evidence {
+    /// The plan that follows. `trial` is what a training
+    /// [that was asked for](Plan::needs_trial) said: per cent by which it fits the photos better
+    /// with exposures than without.
+    pub fn decide(&self, room: Room, overrules: &Overrules, trial: Option<f64>) -> Plan {
+        let mut found = self.exposures.clone();
+        let exposure = {
+            let evidence = (!self.samples.is_empty()).then_some(255.0 * found.spread);
+            let noise = EXPOSURE_OVER_NOISE * 255.0 * found.noise;
+            let decision = Decision::new(Effect::Exposure, evidence, EXPOSURE_LEVELS.max(noise));
+            overruled(decision.after(trial), overrules)
+        };
+        if exposure.decided_by == Decider::Trial && !exposure.on {
+            // What points show differently then has another reason.
+            found.views.fill(Exposure::NONE);
+        }
+        let robust = {
+            let evidence = self.midpoints.outlier_share(&found.views);
+            let percent = evidence.map(|share| 100.0 * share);
+            let decision = Decision::new(Effect::Robust, percent, 100.0 * OUTLIER_SHARE);
+            match decision.on && room.iterations < ROBUST_ITERATIONS {
+                true => Decision {
+                    on: false,
+                    decided_by: Decider::Preset,
+                    ..decision
+                },
+                false => decision,
+            }
+        };
+        let antialias = Decision::new(Effect::Antialias, self.sampling_spread, SAMPLING_SPREAD);
+        let behind = 100.0 * self.behind;
+        let background = Decision::new(Effect::Background, Some(behind), 100.0 * BACKGROUND_SHARE);
+        let (degree, sh_degree) = degree(&self.samples, &found.views, room.sh_degree, overrules);
+        let lens = Decision::new(Effect::Lens, Some(self.distortion), IMPERCEPTIBLE);
+        let masks = Decision::new(Effect::Masks, self.masked, 0.0);
+        let decisions = vec![
+            overruled(lens, overrules),
+            overruled(masks, overrules),
+            exposure,
+            overruled(robust, overrules),
+            overruled(antialias, overrules),
+            overruled(background, overrules),
+            degree,
+        ];
+        let exposures = match decisions
+            .iter()
+            .any(|d| d.effect == Effect::Exposure && d.on)
+        {
+            true => found.views,
+            false => vec![Exposure::NONE; self.exposures.views.len()],
+        };
+        Plan {
+            decisions,
+            exposures,
+            sh_degree,
+        }
+    }
+}
+
 /// A decision after the user has had a say.
 fn overruled(decision: Decision, overrules: &Overrules) -> Decision {
     let on = match overrules.choice(decision.effect) {
@@ -331,23 +320,6 @@ fn overruled(decision: Decision, overrules: &Overrules) -> Decision {
         decided_by: Decider::User,
         ..decision
     }
-}
-
-/// Masks count when there are any.
-fn masks(photos: &[(Photo, Camera)]) -> Decision {
-    let (mut masked, mut pixels) = (0.0, 0.0);
-    let mut any = false;
-    for (photo, _) in photos {
-        pixels += photo.gray.len() as f64;
-        if let Some(mask) = &photo.mask {
-            any = true;
-            masked += mask
-                .iter()
-                .map(|&m| 1.0 - f64::from(m) / 255.0)
-                .sum::<f64>();
-        }
-    }
-    Decision::new(Effect::Masks, any.then_some(100.0 * masked / pixels), 0.0)
 }
 
 /// Whether luma depends on direction, and the degree of harmonics that says how: at most

@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::*;
 use crate::{
     capture::Observation,
-    effects::fixtures::{capture, looking_along_z, photo},
+    effects::fixtures::{capture, evidence, looking_along_z, photo},
 };
 
 fn plan(sh_degree: u32, overrules: &Overrules) -> Plan {
@@ -17,15 +17,11 @@ fn plan(sh_degree: u32, overrules: &Overrules) -> Plan {
         .collect();
     let points = (0..100).map(|i| DVec3::new(f64::from(i % 10), f64::from(i / 10), 0.0) * 0.1);
     let capture = capture(&photos, points);
-    let split = Split {
-        train: vec![0, 1, 2],
-        test: Vec::new(),
-    };
     let room = Room {
         sh_degree,
         iterations: 700,
     };
-    Plan::new(&capture, &photos, &split, room, overrules, None)
+    evidence(&capture, &photos).decide(room, overrules, None)
 }
 
 fn decided(plan: &Plan, effect: Effect) -> &Decision {
@@ -137,24 +133,12 @@ fn what_a_trial_rejects_is_not_simulated() {
             })
             .collect();
     }
-    let split = Split {
-        train: vec![0, 1, 2, 3],
-        test: Vec::new(),
-    };
     let room = Room {
         sh_degree: 0,
         iterations: 700,
     };
-    let plan = |trial| {
-        Plan::new(
-            &capture,
-            &photos,
-            &split,
-            room,
-            &Overrules::default(),
-            trial,
-        )
-    };
+    let evidence = evidence(&capture, &photos);
+    let plan = |trial| evidence.decide(room, &Overrules::default(), trial);
     let asked = plan(None);
     assert!(asked.needs_trial(), "{asked}");
     assert!(asked.exposures.iter().any(|&e| e != Exposure::NONE));

@@ -1,6 +1,6 @@
 //! How finely the views see the same places.
 
-use crate::capture::{Camera, Capture, Photo, Point};
+use crate::capture::{Camera, Capture, Point};
 
 /// Share of the points whose spread the figure is not below: a few points seen from
 /// oddly near or far do not make a scene of mixed distances.
@@ -10,10 +10,10 @@ const PERCENTILE: f64 = 0.9;
 /// sampling rates (focal length by depth, pixels on one world unit), 90th percentile
 /// over the points. At least 1; `None` where no point has two views.
 ///
-/// `photos` are those of the capture's views at working size.
-pub fn sampling_spread(capture: &Capture, photos: &[(Photo, Camera)]) -> Option<f64> {
+/// `cameras` are those of the capture's views at working size.
+pub fn sampling_spread(capture: &Capture, cameras: &[Camera]) -> Option<f64> {
     let mut spreads: Vec<f64> = (capture.points.iter())
-        .filter_map(|point| spread(point, photos))
+        .filter_map(|point| spread(point, cameras))
         .collect();
     let last = spreads.len().checked_sub(1)?;
     let at = (last as f64 * PERCENTILE) as usize;
@@ -21,17 +21,17 @@ pub fn sampling_spread(capture: &Capture, photos: &[(Photo, Camera)]) -> Option<
 }
 
 /// The highest by the lowest sampling rate of a point, if two views see it.
-fn spread(point: &Point, photos: &[(Photo, Camera)]) -> Option<f64> {
+fn spread(point: &Point, cameras: &[Camera]) -> Option<f64> {
     let rate = |camera: &Camera| {
         let depth = camera.depth(point.position);
         (depth > 0.0).then(|| (camera.fx * camera.fy).sqrt() / depth)
     };
     let rates: Vec<f64> = if point.track.is_empty() {
-        let inside = photos.iter().map(|(_, camera)| camera);
+        let inside = cameras.iter();
         let inside = inside.filter(|camera| camera.pixel_of(point.position).is_some());
         inside.filter_map(rate).collect()
     } else {
-        let seen = point.track.iter().map(|seen| &photos[seen.view].1);
+        let seen = point.track.iter().map(|seen| &cameras[seen.view]);
         seen.filter_map(rate).collect()
     };
     let highest = rates.iter().copied().fold(0.0, f64::max);
@@ -54,7 +54,8 @@ mod tests {
             })
             .collect();
         let points = (0..20).map(|i| DVec3::new(0.0, 0.0, 1e-6 * f64::from(i)));
-        sampling_spread(&capture(&photos, points), &photos)
+        let cameras: Vec<Camera> = photos.iter().map(|(_, camera)| camera.clone()).collect();
+        sampling_spread(&capture(&photos, points), &cameras)
     }
 
     #[test]

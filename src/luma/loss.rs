@@ -2,10 +2,12 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::{SsimWindow, photos::Photos};
+use std::sync::Arc;
+
+use super::{LumaError, SsimWindow, TrainingViews, photos::Photos};
 use crate::{
     capture::Exposure,
-    gpu::{Bindings, Buffer, Gpu, GpuError, Kernel, Recorder, shaders},
+    gpu::{Bindings, Buffer, Gpu, Kernel, Recorder, shaders},
     raster::{Layer, LayerAdjoint, Lists, LossLog, ViewUniform},
 };
 
@@ -91,8 +93,6 @@ impl LossKernels {
 pub struct Targets {
     /// The photos.
     pub photos: Photos,
-    /// Their masks in the same order, if pixels count differently.
-    pub masks: Option<Photos>,
     /// If photos differ in exposure.
     pub parameters: Option<Buffer<LumaLossParameters>>,
     /// Three buffers with room for a float a pixel.
@@ -100,25 +100,23 @@ pub struct Targets {
 }
 
 impl Targets {
-    /// Photos as 8-bit gray and their masks; empty masks if `effects` has none.
+    /// The photos of `views`, of at most `max_pixels` pixels, and if it is `coarse` at half
+    /// the size as well; where `streamed`, one at a time.
     ///
     /// # Errors
-    /// [`GpuError::TooLarge`].
+    /// [`LumaError`].
     pub fn new(
         gpu: &Gpu,
         effects: LossEffects,
-        photos: &[Vec<u8>],
-        masks: &[Vec<u8>],
+        views: &Arc<dyn TrainingViews>,
+        max_pixels: usize,
+        coarse: bool,
         streamed: bool,
-    ) -> Result<Self, GpuError> {
-        let packed =
-            |pictures: &[Vec<u8>]| Photos::new(gpu, pictures.iter().map(Vec::as_slice), streamed);
-        let largest = photos.iter().map(Vec::len).max().unwrap_or(0);
-        let slopes = || Buffer::zeros(gpu, "slopes", largest);
+    ) -> Result<Self, LumaError> {
+        let slopes = || Buffer::zeros(gpu, "slopes", max_pixels);
         let unset = LumaLossParameters::zeroed();
         Ok(Self {
-            photos: packed(photos)?,
-            masks: effects.masked.then(|| packed(masks)).transpose()?,
+            photos: Photos::new(gpu, views, coarse, effects.masked, streamed)?,
             parameters: (effects.exposed)
                 .then(|| Buffer::uniform(gpu, "loss parameters", &unset))
                 .transpose()?,
@@ -126,15 +124,22 @@ impl Targets {
         })
     }
 
-    /// Readies a photo for what is submitted next, and gives its buffers' place.
-    pub fn show(&self, gpu: &Gpu, index: usize, exposure: Exposure) -> usize {
-        if let Some(masks) = &self.masks {
-            masks.show(gpu, index);
-        }
+    /// Readies a photo for what is submitted next, and gives its buffers' place; the photos
+    /// of `next` come after it.
+    ///
+    /// # Errors
+    /// [`LumaError`] of the photo.
+    pub fn show(
+        &mut self,
+        gpu: &Gpu,
+        photo: usize,
+        exposure: Exposure,
+        next: impl Iterator<Item = usize>,
+    ) -> Result<usize, LumaError> {
         if let Some(buffer) = &self.parameters {
             buffer.write(gpu, &[exposure.into()]);
         }
-        self.photos.show(gpu, index)
+        self.photos.show(gpu, photo, next)
     }
 }
 
@@ -156,15 +161,15 @@ impl Loss {
         targets: &Targets,
     ) -> Vec<Self> {
         let [by_mean, by_square, by_product] = targets.slopes.each_ref().map(Buffer::raw);
-        (targets.photos.buffers().iter().enumerate())
-            .map(|(place, photo)| {
-                let inputs = [lists.view.raw(), layer.image.raw(), photo.raw()];
+        (targets.photos.pictures().iter())
+            .map(|picture| {
+                let inputs = [lists.view.raw(), layer.image.raw(), picture.gray.raw()];
                 let mut bindings: Vec<_> = (0..)
                     .zip(inputs.into_iter().chain([by_mean, by_square, by_product]))
                     .collect();
                 bindings.push((6, log.block_losses.raw()));
-                if let Some(masks) = &targets.masks {
-                    bindings.push((8, masks.buffers()[place].raw()));
+                if let Some(mask) = &picture.mask {
+                    bindings.push((8, mask.raw()));
                 }
                 if let Some(parameters) = &targets.parameters {
                     bindings.push((9, parameters.raw()));

@@ -33,6 +33,10 @@ const PIXEL_WORDS: u64 = 6;
 /// bring.
 const PHOTO_SHARE: u64 = 4;
 
+/// Without a limit, photos stay on the device while they take at most so many bytes: 1,000
+/// photos of a megapixel, and little beside what the Gaussians of such a capture take.
+const RESIDENT_MAX: u64 = 1 << 30;
+
 /// What does not depend on the number of Gaussians.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Demand {
@@ -63,7 +67,7 @@ impl Demand {
         }
         let pictures = 1 + u64::from(masked);
         photos *= pictures;
-        let streams = limit.is_some_and(|limit| photos > limit / PHOTO_SHARE);
+        let streams = photos > limit.map_or(RESIDENT_MAX, |limit| limit / PHOTO_SHARE);
         if streams {
             photos = pictures * max_pixels.next_multiple_of(WORD);
         }

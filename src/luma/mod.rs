@@ -1,7 +1,9 @@
 //! Stage 1: geometry and luminance from grayscale photographs.
 
+pub mod carve;
 mod curve;
 pub mod densify;
+mod error;
 mod goal;
 mod loss;
 mod memory;
@@ -9,6 +11,8 @@ mod numerics;
 pub mod outliers;
 mod pace;
 mod photos;
+mod planned;
+mod prefetch;
 mod preset;
 mod rehearsal;
 pub mod relocation;
@@ -21,14 +25,16 @@ mod workspace;
 
 pub use curve::{CurvePoint, gain_of_doubling};
 pub use densify::DensifyParameters;
+pub use error::LumaError;
 pub use goal::Goal;
 pub use loss::{LossEffects, LumaLossParameters};
 pub use memory::Demand;
 pub use numerics::{Numerics, SsimWindow};
+pub use planned::PlannedViews;
 pub use preset::{FLAT, Preset};
 pub use rehearsal::{frontal_camera, random_cloud, rehearse};
 pub use roofline::minimum_words;
 pub use schedule::{PAPER_ITERATIONS, Schedule};
 pub use settings::{Densification, LearningRates, LumaSettings};
 pub use trainer::{Look, LumaProgress, LumaTrainer};
-pub use view::TrainingView;
+pub use view::{TrainingView, TrainingViews};

@@ -8,6 +8,7 @@
 
 use std::sync::Arc;
 
+use super::{LumaError, TrainingViews, view};
 use crate::{
     capture::{Camera, Exposure},
     gpu::{Buffer, GpuError, Recorder},
@@ -36,15 +37,27 @@ const SEEN_MIN: f32 = 0.5;
 const KNOWN_MIN: f32 = 0.5;
 
 /// What a photo shows, and what counts of it.
-pub struct Photo<'a> {
+struct Photo {
     /// Where it was taken.
-    pub camera: &'a Camera,
+    camera: Camera,
     /// 8-bit gray, `[height, width]`.
-    pub gray: &'a [u8],
+    gray: Vec<u8>,
     /// 255 where a pixel counts, `[height, width]`.
-    pub mask: &'a [u8],
+    mask: Vec<u8>,
     /// How bright it shows the scene.
-    pub exposure: Exposure,
+    exposure: Exposure,
+}
+
+impl Photo {
+    fn load(views: &dyn TrainingViews, view: usize) -> Result<Self, LumaError> {
+        let mut view = view::load(views, view)?;
+        Ok(Self {
+            mask: view.counts(),
+            camera: view.camera,
+            gray: view.gray,
+            exposure: view.exposure,
+        })
+    }
 }
 
 /// The scene as it is learned so far.
@@ -62,28 +75,32 @@ pub struct Scene<'a> {
 }
 
 impl Scene<'_> {
-    /// A mask for each photo: its own, and 0 where it shows something else.
+    /// Hands `take` a mask for each view: its own, and 0 where it shows something else.
     ///
     /// # Errors
-    /// [`GpuError`].
-    pub fn masks(&self, photos: &[Photo]) -> Result<Vec<Vec<u8>>, GpuError> {
+    /// [`LumaError`].
+    pub fn masks(
+        &self,
+        views: &dyn TrainingViews,
+        mut take: impl FnMut(usize, Vec<u8>),
+    ) -> Result<(), LumaError> {
         let gpu = &self.raster.gpu;
         let mut capacity = self.capacity;
         let drawing = loop {
-            let mut drawing = Drawing::new(self, photos, capacity)?;
-            match drawing.gather(self, photos)? {
+            let drawing = Drawing::new(self, views, capacity)?;
+            match drawing.gather(self, views)? {
                 None => break drawing,
                 Some(needed) => capacity = needed + needed / 4,
             }
         };
         let all = drawing.sums.read(gpu)?;
-        (photos.iter())
-            .map(|photo| {
-                let residuals = residuals(photo, &drawing.draw_luma(self, photo)?);
-                let expectation = drawing.expect(self, photo, &residuals, &all)?;
-                Ok(mask(photo, &residuals, &expectation))
-            })
-            .collect()
+        for view in 0..views.count() {
+            let photo = Photo::load(views, view)?;
+            let residuals = residuals(&photo, &drawing.draw_luma(self, &photo)?);
+            let expected = drawing.expected(self, &photo, &residuals, &all)?;
+            take(view, mask(&photo, &residuals, &expected));
+        }
+        Ok(())
     }
 }
 
@@ -101,9 +118,9 @@ struct Drawing {
 }
 
 impl Drawing {
-    fn new(scene: &Scene, photos: &[Photo], capacity: usize) -> Result<Self, GpuError> {
+    fn new(scene: &Scene, views: &dyn TrainingViews, capacity: usize) -> Result<Self, GpuError> {
         let (raster, geometry) = (scene.raster, scene.geometry);
-        let uniforms = || photos.iter().map(|photo| scene.view(photo.camera));
+        let uniforms = || (0..views.count()).map(|view| scene.view(views.camera(view)));
         let pixels = uniforms().map(|view| view.pixel_count()).max().unwrap_or(0);
         let tiles = uniforms().map(|view| view.tile_count()).max().unwrap_or(0);
         let gpu = &raster.gpu;
@@ -131,14 +148,15 @@ impl Drawing {
 
     /// Adds up, for each Gaussian, the residuals of the pixels it is drawn to and how much
     /// it is drawn there. Gives the entries that the tile lists lacked, if they did.
-    fn gather(&mut self, scene: &Scene, photos: &[Photo]) -> Result<Option<usize>, GpuError> {
+    fn gather(&self, scene: &Scene, views: &dyn TrainingViews) -> Result<Option<usize>, LumaError> {
         let gpu = &scene.raster.gpu;
-        for photo in photos {
-            let luma = self.draw_luma(scene, photo)?;
+        for view in 0..views.count() {
+            let photo = Photo::load(views, view)?;
+            let luma = self.draw_luma(scene, &photo)?;
             if let Some(needed) = self.lists.status(gpu)?.overflow {
                 return Ok(Some(needed));
             }
-            self.pull_back(scene, photo, &residuals(photo, &luma), &self.adding);
+            self.pull_back(scene, &photo, &residuals(&photo, &luma), &self.adding);
         }
         Ok(None)
     }
@@ -146,7 +164,7 @@ impl Drawing {
     /// Brings a photo's residuals, and what counts of it, to the Gaussians.
     fn pull_back(&self, scene: &Scene, photo: &Photo, residuals: &[f32], adjoint: &LayerAdjoint) {
         let gpu = &scene.raster.gpu;
-        let pairs: Vec<f32> = (residuals.iter().zip(photo.mask))
+        let pairs: Vec<f32> = (residuals.iter().zip(&photo.mask))
             .flat_map(|(residual, &count)| {
                 let count = f32::from(count) / 255.0;
                 [count * residual, count]
@@ -160,7 +178,7 @@ impl Drawing {
 
     /// The residuals that all views but this one lead to expect; `all` are the sums over
     /// all of them. Infinite where no other view sees anything.
-    fn expect(
+    fn expected(
         &self,
         scene: &Scene,
         photo: &Photo,
@@ -193,7 +211,7 @@ impl Drawing {
 
     fn draw_luma(&self, scene: &Scene, photo: &Photo) -> Result<Vec<f32>, GpuError> {
         let (raster, gpu) = (scene.raster, &scene.raster.gpu);
-        let view = scene.view(photo.camera);
+        let view = scene.view(&photo.camera);
         let mut recorder = Recorder::new(gpu);
         self.lists.set_view(gpu, &view);
         self.lists.record(raster, &mut recorder);
@@ -209,7 +227,7 @@ impl Drawing {
         let (raster, gpu) = (scene.raster, &scene.raster.gpu);
         let view = ViewUniform {
             sh_degree: 0,
-            ..scene.view(photo.camera)
+            ..scene.view(&photo.camera)
         };
         self.lists.set_view(gpu, &view);
         let mut recorder = Recorder::new(gpu);
@@ -227,13 +245,13 @@ impl Scene<'_> {
 
 /// How far the picture is from the photo, each pixel with its neighbours.
 fn residuals(photo: &Photo, luma: &[f32]) -> Vec<f32> {
-    let sizes: Vec<f32> = (luma.iter().zip(photo.gray))
+    let sizes: Vec<f32> = (luma.iter().zip(&photo.gray))
         .map(|(&luma, &gray)| {
             let shown = photo.exposure.shown(f64::from(luma)) as f32;
             (shown - f32::from(gray) / 255.0).abs()
         })
         .collect();
-    around(photo.camera, &sizes, |values| {
+    around(&photo.camera, &sizes, |values| {
         let (sum, count) =
             values.fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0));
         sum / count
@@ -250,10 +268,10 @@ fn mask(photo: &Photo, residuals: &[f32], expectation: &[f32]) -> Vec<u8> {
         .collect();
     let share = f64::from(found.iter().sum::<f32>()) / found.len() as f64;
     if share > SHARE_MAX {
-        return photo.mask.to_vec();
+        return photo.mask.clone();
     }
-    let grown = around(photo.camera, &found, |values| values.fold(0.0, f32::max));
-    (grown.iter().zip(photo.mask))
+    let grown = around(&photo.camera, &found, |values| values.fold(0.0, f32::max));
+    (grown.iter().zip(&photo.mask))
         .map(|(&defect, &count)| if defect > 0.0 { 0 } else { count })
         .collect()
 }

@@ -1,69 +1,162 @@
 //! The photos on the device: all of them, or one at a time.
 
-use super::loss;
-use crate::gpu::{Buffer, Gpu, GpuError};
+use std::{collections::HashMap, sync::Arc};
 
-/// Photos by number, 8-bit gray, four pixels a word.
-pub enum Photos {
-    /// Each has a buffer of its own.
-    Resident(Vec<Buffer<u32>>),
-    /// They stay with the host and take turns in one buffer.
-    Streamed {
-        /// The photos.
-        packed: Vec<Vec<u32>>,
-        /// Room for the largest.
-        buffer: Buffer<u32>,
-    },
+use super::{
+    LumaError, TrainingView, TrainingViews, loss,
+    prefetch::Prefetch,
+    view::{self, halved},
+};
+use crate::{
+    capture::in_order,
+    gpu::{Buffer, Gpu, GpuError},
+};
+
+/// What a photo shows and what counts of it: 8 bits a pixel, four pixels a word.
+pub struct Picture {
+    /// Gray.
+    pub gray: Buffer<u32>,
+    /// What each pixel counts, where some do not.
+    pub mask: Option<Buffer<u32>>,
+}
+
+/// Photos by number; behind those of the views come, where training begins coarse, the same
+/// at half the size.
+pub struct Photos {
+    /// One for each photo, or one in which they take turns.
+    pictures: Vec<Picture>,
+    stream: Option<Stream>,
+}
+
+/// Photos that stay where they are.
+struct Stream {
+    prefetch: Prefetch<Result<TrainingView, LumaError>>,
+    /// Of some views the pixels that no longer count, a bit each.
+    left_out: HashMap<usize, Vec<u8>>,
 }
 
 impl Photos {
-    /// Photos as bytes, `[height, width]` each.
+    /// The photos of `views`, which are loaded now or, `streamed`, when they are shown.
     ///
     /// # Errors
-    /// [`GpuError::TooLarge`].
-    pub fn new<'a>(
+    /// [`LumaError`].
+    pub fn new(
         gpu: &Gpu,
-        photos: impl Iterator<Item = &'a [u8]>,
+        views: &Arc<dyn TrainingViews>,
+        coarse: bool,
+        masked: bool,
         streamed: bool,
-    ) -> Result<Self, GpuError> {
-        let packed = photos.map(loss::pack);
-        if !streamed {
-            let buffers = packed.map(|photo| Buffer::from_slice(gpu, "photo", &photo));
-            return Ok(Self::Resident(buffers.collect::<Result<_, _>>()?));
+    ) -> Result<Self, LumaError> {
+        let count = views.count();
+        let pixels = |view: usize| {
+            let camera = views.camera(view);
+            camera.width as usize * camera.height as usize
+        };
+        if streamed {
+            let words = (0..count).map(pixels).max().unwrap_or(0).div_ceil(4);
+            let views = views.clone();
+            let load = move |photo| view::load(&*views, photo);
+            return Ok(Self {
+                pictures: vec![Picture::zeros(gpu, words, masked)?],
+                stream: Some(Stream {
+                    prefetch: Prefetch::new(Arc::new(load)),
+                    left_out: HashMap::new(),
+                }),
+            });
         }
-        let packed: Vec<Vec<u32>> = packed.collect();
-        let largest = packed.iter().map(Vec::len).max().unwrap_or(0);
-        Ok(Self::Streamed {
-            packed,
-            buffer: Buffer::zeros(gpu, "photo", largest)?,
+        let mut pictures = Vec::new();
+        for photo in 0..count {
+            pictures.push(Picture::zeros(gpu, pixels(photo).div_ceil(4), masked)?);
+        }
+        for photo in (0..count).filter(|_| coarse) {
+            let camera = halved(views.camera(photo));
+            let pixels = camera.width as usize * camera.height as usize;
+            pictures.push(Picture::zeros(gpu, pixels.div_ceil(4), masked)?);
+        }
+        let all: Vec<usize> = (0..count).collect();
+        in_order(
+            &all,
+            |&photo| view::load(&**views, photo),
+            |&photo, view| {
+                let view = view?;
+                if coarse {
+                    pictures[count + photo].write(gpu, view.halved());
+                }
+                pictures[photo].write(gpu, view);
+                Ok::<_, LumaError>(())
+            },
+        )?;
+        Ok(Self {
+            pictures,
+            stream: None,
         })
     }
 
-    /// The buffers that a photo may stand in.
-    pub fn buffers(&self) -> &[Buffer<u32>] {
-        match self {
-            Self::Resident(buffers) => buffers,
-            Self::Streamed { buffer, .. } => std::slice::from_ref(buffer),
-        }
+    /// What a photo may stand in.
+    pub fn pictures(&self) -> &[Picture] {
+        &self.pictures
     }
 
-    /// Puts another picture of the same size in a photo's place.
-    pub fn replace(&mut self, gpu: &Gpu, index: usize, picture: &[u8]) {
-        let words = loss::pack(picture);
-        match self {
-            Self::Resident(buffers) => buffers[index].write(gpu, &words),
-            Self::Streamed { packed, .. } => packed[index] = words,
-        }
-    }
-
-    /// Readies a photo for what is submitted next, and gives its buffer's place.
-    pub fn show(&self, gpu: &Gpu, index: usize) -> usize {
-        match self {
-            Self::Resident(_) => index,
-            Self::Streamed { packed, buffer } => {
-                buffer.write(gpu, &packed[index]);
-                0
+    /// Lets only what `mask` says count of a photo.
+    pub fn leave_out(&mut self, gpu: &Gpu, photo: usize, mask: &[u8]) {
+        match &mut self.stream {
+            None => {
+                if let Some(buffer) = &self.pictures[photo].mask {
+                    buffer.write(gpu, &loss::pack(mask));
+                }
             }
+            Some(stream) => {
+                let bits = mask.chunks(8).map(|pixels| {
+                    let bits = pixels.iter().enumerate();
+                    bits.fold(0, |bits, (bit, &count)| bits | u8::from(count == 0) << bit)
+                });
+                stream.left_out.insert(photo, bits.collect());
+            }
+        }
+    }
+
+    /// Readies a photo for what is submitted next, and gives its picture's place; those of
+    /// `next` are loaded meanwhile.
+    ///
+    /// # Errors
+    /// [`LumaError`] of the photo.
+    pub fn show(
+        &mut self,
+        gpu: &Gpu,
+        photo: usize,
+        next: impl Iterator<Item = usize>,
+    ) -> Result<usize, LumaError> {
+        let Some(stream) = &mut self.stream else {
+            return Ok(photo);
+        };
+        let mut view = stream.prefetch.take(photo, next)?;
+        if let Some(left_out) = stream.left_out.get(&photo) {
+            let mut mask = view.counts();
+            for (pixel, count) in mask.iter_mut().enumerate() {
+                if left_out[pixel / 8] >> (pixel % 8) & 1 == 1 {
+                    *count = 0;
+                }
+            }
+            view.mask = Some(mask);
+        }
+        self.pictures[0].write(gpu, view);
+        Ok(0)
+    }
+}
+
+impl Picture {
+    fn zeros(gpu: &Gpu, words: usize, masked: bool) -> Result<Self, GpuError> {
+        let zeros = |label| Buffer::zeros(gpu, label, words);
+        Ok(Self {
+            gray: zeros("photo")?,
+            mask: masked.then(|| zeros("mask")).transpose()?,
+        })
+    }
+
+    fn write(&self, gpu: &Gpu, mut view: TrainingView) {
+        self.gray.write(gpu, &loss::pack(&view.gray));
+        if let Some(mask) = &self.mask {
+            mask.write(gpu, &loss::pack(&view.counts()));
         }
     }
 }

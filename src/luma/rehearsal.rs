@@ -4,10 +4,9 @@ use std::{sync::Arc, time::Instant};
 
 use glam::{DMat3, DVec3};
 
-use super::{LumaSettings, LumaTrainer, TrainingView};
+use super::{LumaError, LumaSettings, LumaTrainer, TrainingView};
 use crate::{
     capture::Camera,
-    gpu::GpuError,
     raster::Raster,
     splats::{ShField, Splats, sh},
 };
@@ -73,8 +72,8 @@ pub fn frontal_camera(width: u32, height: u32) -> Camera {
 /// Seconds of an iteration with so many random Gaussians and pixels.
 ///
 /// # Errors
-/// [`GpuError::TooLarge`] when the device cannot hold them.
-pub fn rehearse(raster: &Arc<Raster>, splats: usize, size: [u32; 2]) -> Result<f64, GpuError> {
+/// [`LumaError::Gpu`] when the device cannot hold them.
+pub fn rehearse(raster: &Arc<Raster>, splats: usize, size: [u32; 2]) -> Result<f64, LumaError> {
     let camera = frontal_camera(size[0], size[1]);
     let settings = LumaSettings {
         sh_degree: 0,

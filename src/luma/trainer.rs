@@ -20,13 +20,13 @@ use std::{sync::Arc, time::Instant};
 use watch::Watch;
 
 use super::{
-    Densification, Goal, LumaSettings, Schedule,
+    Densification, Goal, LumaError, LumaSettings, Schedule,
     loss::{self, LossEffects, Targets},
     memory::{Demand, ENTRIES_PER_SPLAT},
     pace::Pace,
     relocation::{self, RelocationParameters},
     settings::SYNC_EVERY,
-    view::TrainingView,
+    view::{TrainingViews, halved},
     workspace::{Kernels, Workspace},
 };
 use crate::{
@@ -78,14 +78,8 @@ pub struct LumaTrainer {
     goal: Goal,
     extent: f64,
     near: f64,
-    /// Of each view; behind them, where training begins coarse, at half the size.
-    cameras: Vec<Camera>,
-    /// In the same order.
+    views: Arc<dyn TrainingViews>,
     targets: Targets,
-    /// Of each view.
-    exposures: Vec<Exposure>,
-    /// Photo and mask of each view, where outliers are looked for.
-    pictures: Vec<(Vec<u8>, Vec<u8>)>,
     max_pixels: usize,
     max_tiles: usize,
     model: Model,
@@ -109,64 +103,50 @@ impl LumaTrainer {
     /// A trainer that starts from `splats` (one channel of the settings' degree).
     ///
     /// # Errors
-    /// [`GpuError::TooLarge`] when the adapter cannot hold it.
-    ///
-    /// # Panics
-    /// Without views, or when a photo's size is not its camera's.
+    /// [`LumaError::Gpu`] when the adapter cannot hold it, [`LumaError::NoViews`], or what is
+    /// wrong with a photo.
     pub fn new(
         raster: Arc<Raster>,
         settings: LumaSettings,
         extent: f64,
         splats: &Splats,
-        views: Vec<TrainingView>,
-    ) -> Result<Self, GpuError> {
-        assert!(!views.is_empty(), "training needs a view");
+        views: impl TrainingViews + 'static,
+    ) -> Result<Self, LumaError> {
+        let views: Arc<dyn TrainingViews> = Arc::new(views);
+        let all = 0..views.count();
+        if all.is_empty() {
+            return Err(LumaError::NoViews);
+        }
         let raster = raster.drawing(settings.raster_options());
         let raster = raster.computing(settings.numerics.raster);
         let gpu = raster.gpu.clone();
         let effects = LossEffects {
-            exposed: views.iter().any(|view| view.exposure != Exposure::NONE),
-            masked: settings.robust || views.iter().any(|view| view.mask.is_some()),
+            exposed: (all.clone()).any(|view| views.exposure(view) != Exposure::NONE),
+            masked: settings.robust || views.masked(),
         };
         let kernels = Kernels::new(&gpu, effects, settings.numerics.ssim_window);
         let near = NEAR_SHARE * extent;
         let (mut max_pixels, mut max_tiles) = (0, 0);
-        let (mut cameras, mut grays, mut masks) = (Vec::new(), Vec::new(), Vec::new());
-        let (count, settings_robust) = (views.len(), settings.robust);
-        let longest = ends::LONGER * settings.iterations;
-        let schedule = Schedule::of(&settings);
-        let exposures: Vec<Exposure> = views.iter().map(|view| view.exposure).collect();
-        let coarse: Vec<TrainingView> = match schedule.coarse_until {
-            0 => Vec::new(),
-            _ => views.iter().map(TrainingView::halved).collect(),
-        };
-        for view in views.into_iter().chain(coarse) {
-            let uniform = ViewUniform::new(&view.camera, near, 0, 0);
-            assert_eq!(
-                view.gray.len(),
-                uniform.pixel_count(),
-                "photo and camera differ"
-            );
+        for view in all.clone() {
+            let uniform = ViewUniform::new(views.camera(view), near, 0, 0);
             max_pixels = max_pixels.max(uniform.pixel_count());
             max_tiles = max_tiles.max(uniform.tile_count());
-            if effects.masked {
-                let pixels = view.gray.len();
-                let mask = view.mask.unwrap_or_else(|| vec![255; pixels]);
-                assert_eq!(mask.len(), pixels, "mask and photo differ");
-                masks.push(mask);
-            }
-            grays.push(view.gray);
-            cameras.push(view.camera);
         }
+        let schedule = Schedule::of(&settings);
+        let coarse = schedule.coarse_until > 0;
+        let small: Vec<Camera> = (all.clone().filter(|_| coarse))
+            .map(|view| halved(views.camera(view)))
+            .collect();
         let demand = Demand::of(
-            cameras.iter(),
+            all.map(|view| views.camera(view)).chain(&small),
             effects.masked,
             splats.sh.degree,
             settings.memory_limit,
         );
-        let targets = Targets::new(&gpu, effects, &grays, &masks, demand.streams)?;
+        let longest = ends::LONGER * settings.iterations;
         let capacity = splats.len() * ENTRIES_PER_SPLAT;
         demand.check(settings.memory_limit, splats.len(), capacity)?;
+        let targets = Targets::new(&gpu, effects, &views, max_pixels, coarse, demand.streams)?;
         let model = Model::upload(&gpu, splats)?;
         let workspace = Workspace::new(
             &raster,
@@ -186,13 +166,8 @@ impl LumaTrainer {
             goal: Goal::Fixed,
             extent,
             near,
-            cameras,
+            views,
             targets,
-            pictures: match settings_robust {
-                true => grays.into_iter().zip(masks).take(count).collect(),
-                false => Vec::new(),
-            },
-            exposures,
             max_pixels,
             max_tiles,
             model,
@@ -213,7 +188,7 @@ impl LumaTrainer {
     ///
     /// # Errors
     /// [`GpuError`] when the device runs out of room or is lost.
-    pub fn train(&mut self, observe: &mut dyn FnMut(LumaProgress)) -> Result<(), GpuError> {
+    pub fn train(&mut self, observe: &mut dyn FnMut(LumaProgress)) -> Result<(), LumaError> {
         let begun = Instant::now();
         self.pace = Pace::default();
         let mut iteration = 0;
@@ -318,16 +293,17 @@ impl LumaTrainer {
     /// What an iteration worked on, the mean over the reports.
     pub fn load(&self) -> Load {
         let mean = |sum: f64| sum / self.reports.max(1) as f64;
-        let pixels = self
-            .cameras
-            .iter()
-            .map(|c| f64::from(c.width) * f64::from(c.height));
+        let count = self.views.count();
+        let pixels = (0..count).map(|view| {
+            let camera = self.views.camera(view);
+            f64::from(camera.width) * f64::from(camera.height)
+        });
         Load {
             splats: mean(self.seen.splats),
             visible: mean(self.seen.visible),
             instances: mean(self.seen.instances),
             capacity: mean(self.seen.capacity),
-            pixels: pixels.sum::<f64>() / self.cameras.len() as f64,
+            pixels: pixels.sum::<f64>() / count as f64,
             tiles: self.max_tiles as f64,
             channels: 1.0,
             sh_planes: sh::coefficient_count(self.model.field.degree) as f64,
@@ -342,16 +318,28 @@ impl LumaTrainer {
     }
 
     /// Records and submits one iteration.
-    fn step(&self, iteration: usize) -> Result<(), GpuError> {
-        let views = self.exposures.len();
-        let mut index = view_at(self.settings.seed, views, iteration);
-        let exposure = self.exposures[index];
-        if iteration < self.schedule.coarse_until {
-            index += views;
-        }
+    fn step(&mut self, iteration: usize) -> Result<(), LumaError> {
+        let views = self.views.count();
+        // Behind the photos of all views come the same at half the size.
+        let (seed, coarse_until) = (self.settings.seed, self.schedule.coarse_until);
+        let photo_at = |iteration| {
+            let view = view_at(seed, views, iteration);
+            if iteration < coarse_until {
+                views + view
+            } else {
+                view
+            }
+        };
+        let photo = photo_at(iteration);
+        let index = photo % views;
+        let exposure = self.views.exposure(index);
+        let next = (iteration + 1..self.schedule.end).map(photo_at);
+        let picture = self.targets.show(&self.gpu, photo, exposure, next)?;
+        let camera = self.views.camera(index);
+        let small = (photo >= views).then(|| halved(camera));
         let workspace = self.workspace()?;
         let view = ViewUniform::new(
-            &self.cameras[index],
+            small.as_ref().unwrap_or(camera),
             self.near,
             self.model.len(),
             self.degree_at(iteration),
@@ -360,8 +348,7 @@ impl LumaTrainer {
         workspace.lists.set_view(&self.gpu, &view);
         workspace.lists.record(&self.raster, &mut recorder);
         workspace.layer.record(&self.raster, &mut recorder);
-        let photo = self.targets.show(&self.gpu, index, exposure);
-        workspace.losses[photo].record(&self.kernels.loss, &mut recorder, &view);
+        workspace.losses[picture].record(&self.kernels.loss, &mut recorder, &view);
         let [x, y] = loss::blocks(&view);
         workspace.log.record(
             &self.gpu,

@@ -1,6 +1,7 @@
 //! What training looks at.
 
-use crate::capture::{Camera, Exposure, downscale};
+use super::LumaError;
+use crate::capture::{Camera, CaptureError, Exposure, downscale};
 
 /// One photograph to train on.
 #[derive(Clone, Debug)]
@@ -29,18 +30,99 @@ impl TrainingView {
 
     /// The same at half the size, each side rounded up.
     pub fn halved(&self) -> Self {
-        let sides = [self.camera.width, self.camera.height];
-        let half = sides.map(|side| side.div_ceil(2));
-        let as_size = |sides: [u32; 2]| sides.map(|side| side as usize);
+        let camera = halved(&self.camera);
+        let as_size = |camera: &Camera| [camera.width, camera.height].map(|side| side as usize);
         let halve = |values: &[u8]| {
             let pixels: Vec<[u8; 1]> = values.iter().map(|&v| [v]).collect();
-            downscale(&pixels, as_size(sides), as_size(half)).into_flattened()
+            downscale(&pixels, as_size(&self.camera), as_size(&camera)).into_flattened()
         };
         Self {
-            camera: self.camera.resized(half[0], half[1]),
             gray: halve(&self.gray),
             mask: self.mask.as_deref().map(halve),
             exposure: self.exposure,
+            camera,
         }
     }
+
+    /// What each pixel counts, where some do not as where all do.
+    pub(super) fn counts(&mut self) -> Vec<u8> {
+        let pixels = self.gray.len();
+        self.mask.take().unwrap_or_else(|| vec![255; pixels])
+    }
+}
+
+/// The camera of a photo at half its size, each side rounded up.
+pub(super) fn halved(camera: &Camera) -> Camera {
+    let half = [camera.width, camera.height].map(|side| side.div_ceil(2));
+    camera.resized(half[0], half[1])
+}
+
+/// The views of a training. Photos are loaded when they are needed, by several threads; a
+/// `Vec` of views has them all.
+pub trait TrainingViews: Send + Sync {
+    /// How many there are.
+    fn count(&self) -> usize;
+
+    /// Where one was taken.
+    fn camera(&self, view: usize) -> &Camera;
+
+    /// How bright it shows the scene.
+    fn exposure(&self, view: usize) -> Exposure;
+
+    /// Whether some pixels of some of them do not count.
+    fn masked(&self) -> bool;
+
+    /// A view with its photo, the same whenever it is loaded.
+    ///
+    /// # Errors
+    /// [`CaptureError`] of its photo.
+    fn load(&self, view: usize) -> Result<TrainingView, CaptureError>;
+}
+
+impl TrainingViews for Vec<TrainingView> {
+    fn count(&self) -> usize {
+        self.len()
+    }
+
+    fn camera(&self, view: usize) -> &Camera {
+        &self[view].camera
+    }
+
+    fn exposure(&self, view: usize) -> Exposure {
+        self[view].exposure
+    }
+
+    fn masked(&self) -> bool {
+        self.iter().any(|view| view.mask.is_some())
+    }
+
+    fn load(&self, view: usize) -> Result<TrainingView, CaptureError> {
+        Ok(self[view].clone())
+    }
+}
+
+/// A view with its photo, at half its size if `view` is not below their number: coarse
+/// views come behind the others.
+///
+/// # Errors
+/// [`LumaError`] of a photo that cannot be loaded or has not its camera's size.
+pub(super) fn load(views: &dyn TrainingViews, view: usize) -> Result<TrainingView, LumaError> {
+    let count = views.count();
+    let loaded = views.load(view % count)?;
+    let expected = loaded.camera.width as usize * loaded.camera.height as usize;
+    let masked = loaded.mask.as_ref().map_or(expected, Vec::len);
+    for pixels in [loaded.gray.len(), masked] {
+        if pixels != expected {
+            return Err(LumaError::Size {
+                view: view % count,
+                pixels,
+                expected,
+            });
+        }
+    }
+    Ok(if view < count {
+        loaded
+    } else {
+        loaded.halved()
+    })
 }

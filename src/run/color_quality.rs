@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{
     RunError,
-    scene::{Scene, gray_to_rgb, rgb_pixels, shown_rgb},
+    scene::{Scene, gray_to_rgb, renderer, rgb_pixels, shown_rgb},
     teach::Taught,
     yardstick::Yardstick,
 };
@@ -41,7 +41,7 @@ impl Measured {
         chroma: &ShField,
         taught: &[Option<Taught>],
     ) -> Result<Self, RunError> {
-        let mut renderer = scene.renderer(raster, luma, &[&luma.sh, chroma, &baked.sh])?;
+        let mut renderer = renderer(scene, raster, luma, &[&luma.sh, chroma, &baked.sh])?;
         let (mut errors, mut views, mut rows) = (Vec::new(), Vec::new(), Vec::new());
         for &i in scene.measured().1 {
             let (photo, camera) = &scene.photos[i];

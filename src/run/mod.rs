@@ -1,6 +1,5 @@
 //! Whole runs: what a command does from its options to its files.
 
-mod carve;
 mod chroma_options;
 mod chroma_plan;
 mod color_quality;
@@ -32,7 +31,8 @@ pub use teach::{HINT_WEIGHT, Taught, TeachOptions};
 
 pub use crate::luma::Preset;
 use crate::{
-    capture::CaptureError, chroma::teacher::TeacherError, gpu::GpuError, splats::ply::PlyError,
+    capture::CaptureError, chroma::teacher::TeacherError, gpu::GpuError, luma::LumaError,
+    splats::ply::PlyError,
 };
 
 /// What can stop a run.
@@ -58,6 +58,9 @@ pub enum RunError {
         /// What is wrong with it and what to do.
         reason: String,
     },
+    /// Training.
+    #[error(transparent)]
+    Luma(LumaError),
     /// There is no run to go on with.
     #[error("no run under runs/: train one with `gs-chroma fit COLMAP_DIR`, or name a run folder")]
     NoRun,
@@ -135,6 +138,16 @@ pub enum RunError {
         /// The adapter's name.
         adapter: String,
     },
+}
+
+impl From<LumaError> for RunError {
+    fn from(error: LumaError) -> Self {
+        match error {
+            LumaError::Gpu(error) => error.into(),
+            LumaError::Capture(error) => error.into(),
+            other => Self::Luma(other),
+        }
+    }
 }
 
 /// A part of a run that takes time.

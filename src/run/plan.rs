@@ -5,7 +5,7 @@ use std::{path::PathBuf, sync::Arc};
 use super::{
     Observer, Preset, RunError,
     fit::{open_gpu, planned},
-    scene::Scene,
+    scene::{examine, open},
 };
 use crate::{
     capture::LoadOptions,
@@ -36,10 +36,12 @@ pub fn plan(options: &PlanOptions, observe: &mut Observer<'_>) -> Result<Plan, R
         None => Preset::for_device(&open_gpu(false)?),
     };
     let load = preset.load_options(&options.load, &options.overrules);
-    let scene = Scene::load(&options.colmap_dir, &load, observe)?;
+    let dataset = Arc::new(open(&options.colmap_dir, &load, observe)?);
+    let evidence = examine(&dataset, observe)?;
     let raster = || Ok(Arc::new(Raster::new(&open_gpu(false)?)));
     planned(
-        &scene,
+        &dataset,
+        &evidence,
         preset.work().room(),
         &options.overrules,
         raster,

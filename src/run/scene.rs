@@ -1,44 +1,32 @@
 //! What several commands need of a capture: its photos at working size, a
 //! renderer for its splats.
 
-use std::{
-    num::NonZero,
-    path::Path,
-    sync::{
-        Arc,
-        atomic::{AtomicUsize, Ordering},
-        mpsc,
-    },
-    thread,
-};
+use std::{ops::Deref, path::Path, sync::Arc};
 
 use glam::DVec3;
 
 use super::{Event, Observer, RunError, Stage};
 use crate::{
-    capture::{
-        Camera, Capture, CaptureError, LoadOptions, Loader, MaskUse, Normalize, Photo, Split, View,
-        first_views, split,
-    },
-    effects::{Overrules, Plan, Room},
+    capture::{Camera, CaptureError, Dataset, LoadOptions, Notice, Photo, Rejected},
+    effects::{Evidence, Survey},
     gpu::GpuError,
     raster::{Field, Geometry, Raster, RasterOptions, Renderer, constants::NEAR_SHARE},
     splats::{ShField, Splats, ply},
 };
 
-/// A capture with its photos decoded.
+/// A capture with all its photos decoded, colors and all.
 pub(super) struct Scene {
-    pub capture: Capture,
-    pub split: Split,
-    /// How the photos were loaded; nothing in it is left open.
-    pub options: LoadOptions,
+    pub dataset: Dataset,
     /// Photo and camera of each view, at working size.
     pub photos: Vec<(Photo, Camera)>,
-    /// Views whose photo has a mask file.
-    pub masked_views: usize,
-    /// Pixels of all photos whose values are not finite.
-    pub not_finite: usize,
-    pub extent: f64,
+}
+
+impl Deref for Scene {
+    type Target = Dataset;
+
+    fn deref(&self) -> &Dataset {
+        &self.dataset
+    }
 }
 
 impl Scene {
@@ -48,131 +36,95 @@ impl Scene {
         options: &LoadOptions,
         observe: &mut Observer<'_>,
     ) -> Result<Self, RunError> {
-        let capture = Capture::load_with(colmap_dir, &options.capture())?;
-        for rejected in &capture.rejected {
-            observe(Event::Note(format!(
-                "left out {}: {}",
-                rejected.name, rejected.reason
-            )));
-        }
-        let mut loader = Loader::open(&capture, options)?;
-        if loader.undecided() {
-            let photos: Vec<&View> = first_views(&capture.views).collect();
-            let samples = of_each(&photos, Stage::Survey, |view| loader.sample(view), observe)?;
-            loader.decide(samples.concat());
-            if let Normalize::Range([low, high]) = loader.options().normalize {
-                observe(Event::Note(format!(
-                    "photos are normalised: {low:.6} becomes black and {high:.6} white (--normalize off leaves them)"
-                )));
-            }
-        }
-        let views: Vec<&View> = capture.views.iter().collect();
-        let photos = of_each(&views, Stage::Photos, |view| loader.load(view), observe)?;
-        if loader.not_finite() > 0 {
-            observe(Event::Note(format!(
-                "{} pixels of the photos are not finite and do not count",
-                loader.not_finite()
-            )));
-        }
-        Ok(Self {
-            split: split(&capture.views, options.holdout),
-            options: loader.options().clone(),
-            photos,
-            masked_views: loader.masked_views(&capture.views),
-            not_finite: loader.not_finite(),
-            extent: capture.extent(),
-            capture,
-        })
-    }
-
-    /// The views to measure on: the held-out ones, or all where none is.
-    pub fn measured(&self) -> (&'static str, &[usize]) {
-        if self.split.test.is_empty() {
-            ("train", &self.split.train)
-        } else {
-            ("test", &self.split.test)
-        }
-    }
-
-    /// Whether nothing is where masks are black; photos are black there, and that counts.
-    pub fn removes_masked(&self) -> bool {
-        self.masked_views > 0 && self.options.masked == MaskUse::Remove
-    }
-
-    /// Which effects it calls for, as far as the photos tell, and the `trial` if there was one.
-    pub fn plan(&self, room: Room, overrules: &Overrules, trial: Option<f64>) -> Plan {
-        let (capture, photos, split) = (&self.capture, &self.photos, &self.split);
-        Plan::new(capture, photos, split, room, overrules, trial)
-    }
-
-    /// A renderer of several fields over the geometry of `splats`.
-    pub fn renderer(
-        &self,
-        raster: &Arc<Raster>,
-        splats: &Splats,
-        fields: &[&ShField],
-    ) -> Result<Renderer, GpuError> {
-        let gpu = &raster.gpu;
-        let fields = fields
-            .iter()
-            .map(|field| Field::upload(gpu, field))
-            .collect::<Result<_, _>>()?;
-        let geometry = Geometry::upload(gpu, splats)?;
-        Renderer::new(raster.clone(), geometry, fields, NEAR_SHARE * self.extent)
+        let dataset = open(colmap_dir, options, observe)?;
+        let total = dataset.cameras.len();
+        let mut photos = Vec::with_capacity(total);
+        let all: Vec<usize> = (0..total).collect();
+        dataset.visit_colors(&all, |view, photo| {
+            photos.push((photo, dataset.cameras[view].clone()));
+            observe(Event::Progress {
+                stage: Stage::Photos,
+                done: view,
+                total,
+                message: dataset.capture.views[view].name.clone(),
+            });
+            Ok::<_, CaptureError>(())
+        })?;
+        tell_not_finite(&dataset, observe);
+        Ok(Self { dataset, photos })
     }
 }
 
-/// Does `work` on all views, on as many at a time as there are processors. Of
-/// several that fail, the first is named, as if they were taken in order.
-fn of_each<T: Send>(
-    views: &[&View],
-    stage: Stage,
-    work: impl Fn(&View) -> Result<T, CaptureError> + Sync,
+/// Opens a COLMAP folder; nothing is decoded but what [`Dataset::open`] has to.
+pub(super) fn open(
+    colmap_dir: &Path,
+    options: &LoadOptions,
     observe: &mut Observer<'_>,
-) -> Result<Vec<T>, CaptureError> {
-    let workers = thread::available_parallelism().map_or(1, NonZero::get);
-    let next = AtomicUsize::new(0);
-    let (sender, finished) = mpsc::channel();
-    thread::scope(|scope| {
-        for _ in 0..workers.min(views.len()) {
-            let (sender, next, work) = (sender.clone(), &next, &work);
-            scope.spawn(move || {
-                loop {
-                    let index = next.fetch_add(1, Ordering::Relaxed);
-                    let Some(view) = views.get(index) else {
-                        break;
-                    };
-                    // The receiver stays until every sender is gone.
-                    let _ = sender.send((index, work(view)));
-                }
-            });
-        }
-        drop(sender);
-        let mut results: Vec<_> = views.iter().map(|_| None).collect();
-        let mut failure: Option<(usize, CaptureError)> = None;
-        for (done, (index, result)) in finished.iter().enumerate() {
-            observe(Event::Progress {
-                stage,
-                done,
-                total: views.len(),
-                message: views[index].name.clone(),
-            });
-            match result {
-                Ok(result) => results[index] = Some(result),
-                Err(error) => {
-                    // Whatever comes before this one is in work already.
-                    next.store(views.len(), Ordering::Relaxed);
-                    if failure.as_ref().is_none_or(|(first, _)| index < *first) {
-                        failure = Some((index, error));
-                    }
-                }
+) -> Result<Dataset, RunError> {
+    Ok(Dataset::open(colmap_dir, options, &mut |notice| {
+        observe(match notice {
+            Notice::LeftOut(Rejected { name, reason }) => {
+                Event::Note(format!("left out {name}: {reason}"))
             }
-        }
-        match failure {
-            Some((_, error)) => Err(error),
-            None => Ok(results.into_iter().flatten().collect()),
-        }
-    })
+            Notice::Sampled { done, total, name } => Event::Progress {
+                stage: Stage::Survey,
+                done,
+                total,
+                message: name.to_owned(),
+            },
+            Notice::Normalized([low, high]) => Event::Note(format!(
+                "photos are normalised: {low:.6} becomes black and {high:.6} white (--normalize off leaves them)"
+            )),
+        });
+    })?)
+}
+
+/// Examines all photos, each decoded once.
+pub(super) fn examine(dataset: &Dataset, observe: &mut Observer<'_>) -> Result<Evidence, RunError> {
+    let mut survey = Survey::new(&dataset.capture, &dataset.cameras, &dataset.split);
+    let all: Vec<usize> = (0..dataset.cameras.len()).collect();
+    dataset.visit(&all, |view, photo| {
+        survey.look(view, photo);
+        observe(Event::Progress {
+            stage: Stage::Photos,
+            done: view,
+            total: all.len(),
+            message: dataset.capture.views[view].name.clone(),
+        });
+        Ok::<_, CaptureError>(())
+    })?;
+    tell_not_finite(dataset, observe);
+    Ok(survey.finish())
+}
+
+fn tell_not_finite(dataset: &Dataset, observe: &mut Observer<'_>) {
+    let count = dataset.not_finite();
+    if count > 0 {
+        observe(Event::Note(format!(
+            "{count} pixels of the photos are not finite and do not count"
+        )));
+    }
+}
+
+/// A renderer of several fields over the geometry of `splats`.
+pub(super) fn renderer(
+    dataset: &Dataset,
+    raster: &Arc<Raster>,
+    splats: &Splats,
+    fields: &[&ShField],
+) -> Result<Renderer, GpuError> {
+    let gpu = &raster.gpu;
+    let fields = fields
+        .iter()
+        .map(|field| Field::upload(gpu, field))
+        .collect::<Result<_, _>>()?;
+    let geometry = Geometry::upload(gpu, splats)?;
+    Renderer::new(
+        raster.clone(),
+        geometry,
+        fields,
+        NEAR_SHARE * dataset.extent,
+    )
 }
 
 /// Reads a splat file that has at least one Gaussian and subtracts `offset`, in
@@ -207,7 +159,7 @@ pub(super) fn read_splats(
 
 /// Whether a pixel counts at least half.
 pub(super) fn counts(photo: &Photo, pixel: usize) -> bool {
-    photo.mask.as_ref().is_none_or(|mask| mask[pixel] >= 128)
+    photo.counts(pixel)
 }
 
 /// Weights of the pixels that the photo's mask lets count.

@@ -25,7 +25,7 @@ pub fn dome(
     radius: f64,
     count: usize,
     sh_degree: u32,
-    gray_at: impl Fn(DVec3) -> Option<f32>,
+    mut gray_at: impl FnMut(DVec3) -> Option<f32>,
 ) -> Splats {
     let golden_angle = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
     let places = (0..count).filter_map(|i| {

@@ -85,24 +85,19 @@ fn a_defect_is_found_where_it_is_and_nowhere_else() {
     }
     let geometry = Geometry::upload(gpu(), &splats).unwrap();
     let field = Field::upload(gpu(), &splats.sh).unwrap();
-    let mask = vec![255; photos[0].1.len()];
     let seen: Vec<_> = (photos.iter())
-        .map(|(camera, gray)| outliers::Photo {
-            camera,
-            gray,
-            mask: &mask,
-            exposure: Exposure::NONE,
-        })
+        .map(|(camera, gray)| TrainingView::new(camera.clone(), gray.clone()))
         .collect();
+    let mut masks = Vec::new();
     // Too little room at first: it is made.
-    let masks = outliers::Scene {
+    outliers::Scene {
         raster: &raster(),
         geometry: &geometry,
         field: &field,
         near: 0.01,
         capacity: 8,
     }
-    .masks(&seen)
+    .masks(&seen, |_, mask| masks.push(mask))
     .unwrap();
     for (index, ((camera, _), mask)) in photos.iter().zip(&masks).enumerate() {
         let left_out = |pixel: usize| mask[pixel] == 0;
@@ -129,7 +124,7 @@ fn training_with_all_effects_repeats_and_leaves_the_defect_out() {
         *value *= 0.5;
     }
     let train = |robust: bool| {
-        let views = (photos(&target).into_iter().enumerate())
+        let views: Vec<TrainingView> = (photos(&target).into_iter().enumerate())
             .map(|(index, (camera, mut gray))| {
                 let exposure = Exposure {
                     gain: 0.8 + 0.1 * index as f64,

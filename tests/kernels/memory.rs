@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use gs_chroma::{
     gpu::{Gpu, GpuError},
-    luma::{Demand, LumaSettings, LumaTrainer, TrainingView},
+    luma::{Demand, LumaError, LumaSettings, LumaTrainer, TrainingView},
     raster::Raster,
     splats::{Splats, init::initial_splats},
 };
@@ -24,7 +24,7 @@ fn start(sh_degree: u32) -> Splats {
     initial_splats(&points, 1.0, sh_degree)
 }
 
-fn trainer(gpu: &Gpu, start: &Splats, limit: Option<u64>) -> Result<LumaTrainer, GpuError> {
+fn trainer(gpu: &Gpu, start: &Splats, limit: Option<u64>) -> Result<LumaTrainer, LumaError> {
     let camera = camera(&oblique_view());
     let gray = vec![128; (camera.width * camera.height) as usize];
     let settings = LumaSettings {
@@ -66,7 +66,7 @@ fn what_is_beyond_the_limit_is_refused_before_it_is_taken() {
     let start = start(0);
     let before = gpu.allocated_bytes().unwrap();
     let refused = trainer(&gpu, &start, Some(30 << 20)).err().unwrap();
-    let GpuError::OverLimit { splats, needed, .. } = refused else {
+    let LumaError::Gpu(GpuError::OverLimit { splats, needed, .. }) = refused else {
         panic!("{refused}");
     };
     assert_eq!(splats, COUNT);

@@ -9,8 +9,7 @@ use std::{
 use glam::{DMat3, DVec3};
 use gs_chroma::{
     capture::{Camera, downscale},
-    gpu::GpuError,
-    luma::{LumaProgress, LumaSettings, LumaTrainer, Schedule, TrainingView},
+    luma::{LumaError, LumaProgress, LumaSettings, LumaTrainer, Schedule, TrainingView},
     measure::psnr,
     oracle::random::Random,
     raster::{Field, Geometry, Raster, Renderer},
@@ -155,7 +154,7 @@ fn trained_from(
     world: &World,
     start: &Splats,
     iterations: usize,
-) -> Result<(Splats, Vec<LumaProgress>), GpuError> {
+) -> Result<(Splats, Vec<LumaProgress>), LumaError> {
     trained_with(world, start, settings(start, iterations))
 }
 
@@ -171,7 +170,7 @@ fn trained_with(
     world: &World,
     start: &Splats,
     settings: LumaSettings,
-) -> Result<(Splats, Vec<LumaProgress>), GpuError> {
+) -> Result<(Splats, Vec<LumaProgress>), LumaError> {
     let schedule = Schedule::of(&settings);
     trained_by(world, start, settings, schedule)
 }
@@ -181,8 +180,8 @@ fn trained_by(
     start: &Splats,
     settings: LumaSettings,
     schedule: Schedule,
-) -> Result<(Splats, Vec<LumaProgress>), GpuError> {
-    let views = (world.cameras.iter().zip(&world.photos))
+) -> Result<(Splats, Vec<LumaProgress>), LumaError> {
+    let views: Vec<TrainingView> = (world.cameras.iter().zip(&world.photos))
         .map(|(camera, gray)| TrainingView::new(camera.clone(), gray.clone()))
         .collect();
     let mut trainer = LumaTrainer::new(RASTER.clone(), settings, world.extent, start, views)?;

@@ -4,7 +4,7 @@ use super::LumaTrainer;
 use crate::{
     gpu::{Buffer, GpuError},
     luma::{
-        Densification,
+        Densification, LumaError,
         densify::{self, Evidence},
         memory::ENTRIES_PER_SPLAT,
         outliers, relocation,
@@ -38,7 +38,7 @@ impl LumaTrainer {
 
     /// Looks for pixels that show something else than the scene, and lets them count no
     /// longer; those that were found before get another chance.
-    pub(super) fn leave_out_outliers(&mut self) -> Result<(), GpuError> {
+    pub(super) fn leave_out_outliers(&mut self) -> Result<(), LumaError> {
         let scene = outliers::Scene {
             raster: &self.raster,
             geometry: &self.model.geometry,
@@ -46,20 +46,9 @@ impl LumaTrainer {
             near: self.near,
             capacity: self.workspace()?.lists.capacity,
         };
-        let photos: Vec<_> = (0..self.exposures.len())
-            .map(|index| outliers::Photo {
-                camera: &self.cameras[index],
-                gray: &self.pictures[index].0,
-                mask: &self.pictures[index].1,
-                exposure: self.exposures[index],
-            })
-            .collect();
-        let found = scene.masks(&photos)?;
-        if let Some(masks) = &mut self.targets.masks {
-            for (index, mask) in found.iter().enumerate() {
-                masks.replace(&self.gpu, index, mask);
-            }
-        }
-        Ok(())
+        let (gpu, photos) = (&self.gpu, &mut self.targets.photos);
+        scene.masks(&*self.views, |view, mask| {
+            photos.leave_out(gpu, view, &mask)
+        })
     }
 }

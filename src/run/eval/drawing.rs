@@ -12,7 +12,7 @@ use crate::{
     report::Method,
     run::{
         RunError,
-        scene::{gray_pixels, shown_rgb},
+        scene::{gray_pixels, renderer, shown_rgb},
     },
     splats::ShField,
 };
@@ -60,7 +60,7 @@ impl<'a> Painter<'a> {
         Ok(Self {
             raster: raster.clone(),
             subject,
-            renderer: scene.renderer(raster, &subject.luma, &fields)?,
+            renderer: renderer(scene, raster, &subject.luma, &fields)?,
             has_native: subject.chroma.is_some(),
             rgb: rgb.iter().map(|(method, _)| *method).collect(),
             teacher,
@@ -97,7 +97,7 @@ impl<'a> Painter<'a> {
         let steps = DepthSteps::new(&self.subject.luma, camera);
         let fields: Vec<&ShField> = steps.fields.iter().collect();
         let luma = &self.subject.luma;
-        let renderer = self.subject.scene.renderer(&self.raster, luma, &fields)?;
+        let renderer = renderer(&self.subject.scene, &self.raster, luma, &fields)?;
         // Zeros and ones can be drawn.
         let mut renderer = renderer.with_one_list();
         let pixels = camera.width as usize * camera.height as usize;

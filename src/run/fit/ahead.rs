@@ -6,8 +6,11 @@ use std::{
     thread,
 };
 
-use super::super::{Event, Observer, RunError, RunFolder, scene::Scene};
-use crate::chroma::teacher::{GrayImage, Teacher, TeacherError, TeacherSettings};
+use super::super::{Event, Observer, RunError, RunFolder};
+use crate::{
+    capture::Dataset,
+    chroma::teacher::{GrayImage, Teacher, TeacherSettings},
+};
 
 /// Teachers that are asked while luma trains; may be none.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -26,7 +29,7 @@ pub(super) struct Ahead(Vec<Teacher>);
 #[derive(Default)]
 struct Came {
     answers: usize,
-    failure: Option<TeacherError>,
+    failure: Option<String>,
 }
 
 impl Ahead {
@@ -49,7 +52,7 @@ impl Ahead {
     /// Those of `work`: a network that fails is a note, and `colorize`'s to mend.
     pub fn meanwhile<T>(
         mut self,
-        scene: &Scene,
+        dataset: &Dataset,
         observe: &mut Observer<'_>,
         work: impl FnOnce(&mut Observer<'_>) -> Result<T, RunError>,
     ) -> Result<T, RunError> {
@@ -57,10 +60,10 @@ impl Ahead {
         if self.0.is_empty() {
             return work(observe);
         }
-        let wanted = self.0.len() * scene.photos.len();
+        let wanted = self.0.len() * dataset.cameras.len();
         let stop = AtomicBool::new(false);
         let (done, came) = thread::scope(|scope| {
-            let asking = scope.spawn(|| ask(&mut self.0, scene, &stop));
+            let asking = scope.spawn(|| ask(&mut self.0, dataset, &stop));
             let done = work(observe);
             stop.store(true, Ordering::Relaxed);
             // A network that panics says so itself.
@@ -75,9 +78,19 @@ impl Ahead {
     }
 }
 
-fn ask(teachers: &mut [Teacher], scene: &Scene, stop: &AtomicBool) -> Came {
+fn ask(teachers: &mut [Teacher], dataset: &Dataset, stop: &AtomicBool) -> Came {
     let mut came = Came::default();
-    for ((photo, _), view) in scene.photos.iter().zip(&scene.capture.views) {
+    for (index, view) in dataset.capture.views.iter().enumerate() {
+        if stop.load(Ordering::Relaxed) {
+            return came;
+        }
+        let photo = match dataset.photo(index) {
+            Ok(photo) => photo,
+            Err(error) => {
+                came.failure = Some(error.to_string());
+                return came;
+            }
+        };
         let gray = GrayImage {
             width: photo.width,
             height: photo.height,
@@ -90,7 +103,7 @@ fn ask(teachers: &mut [Teacher], scene: &Scene, stop: &AtomicBool) -> Came {
             match teacher.prepare(&view.name, gray) {
                 Ok(()) => came.answers += 1,
                 Err(error) => {
-                    came.failure = Some(error);
+                    came.failure = Some(error.to_string());
                     return came;
                 }
             }

@@ -2,13 +2,7 @@
 
 use std::{fmt::Write, sync::Arc, time::Instant};
 
-use super::super::{
-    Event, Observer, RunError, Stage,
-    carve::{self, carved},
-    preset::Work,
-    scene::Scene,
-    yardstick::Yardstick,
-};
+use super::super::{Event, Observer, RunError, Stage, preset::Work, yardstick::Yardstick};
 use super::{
     FitOptions,
     goal::{ITERATIONS_MIN, WRITING},
@@ -17,10 +11,13 @@ use super::{
     trial::{TRIAL_FROM, planned},
 };
 use crate::{
-    capture::Exposure,
-    effects::{Effect, Plan},
+    capture::{CaptureError, Dataset, Exposure},
+    effects::{Effect, Evidence, Plan},
     gpu::{Gpu, GpuError},
-    luma::{CurvePoint, Demand, Goal, LumaProgress, LumaSettings, LumaTrainer, TrainingView},
+    luma::{
+        CurvePoint, Demand, Goal, LumaProgress, LumaSettings, LumaTrainer, PlannedViews,
+        TrainingView, carve::carved,
+    },
     raster::Raster,
     report::{KernelReport, LumaQuality, LumaView, kernel_reports},
     splats::Splats,
@@ -35,9 +32,11 @@ pub(super) struct Job<'a> {
     pub gpu: &'a Gpu,
     pub raster: &'a Arc<Raster>,
     /// Photos at the size that is trained on.
-    pub scene: &'a Scene,
+    pub dataset: &'a Arc<Dataset>,
+    /// What they say.
+    pub evidence: &'a Evidence,
     /// Photos at the size that is measured at.
-    pub judge: &'a Scene,
+    pub judge: &'a Dataset,
     /// When the run began.
     pub begun: Instant,
 }
@@ -94,7 +93,7 @@ impl Job<'_> {
             return Ok(None);
         };
         let before = self.begun.elapsed().as_secs_f64();
-        let left = (1.0 - WRITING) * limit - before - self.measuring(each);
+        let left = (1.0 - WRITING) * limit - before - self.measuring(each)?;
         let least = ITERATIONS_MIN as f64 * each;
         if left < least {
             return Err(RunError::TimeTooShort {
@@ -107,22 +106,26 @@ impl Job<'_> {
     }
 
     /// Seconds that measuring will take, where an iteration takes about `each`.
-    fn measuring(&self, each: f64) -> f64 {
+    fn measuring(&self, each: f64) -> Result<f64, CaptureError> {
         let views = &self.judge.split.test;
         let Some(&first) = views.first() else {
-            return 0.0;
+            return Ok(0.0);
         };
+        let photo = self.judge.photo(first)?;
         let yardstick = Yardstick {
-            photo: &self.judge.photos[first].0,
+            photo: &photo,
             exposure: Exposure::NONE,
         };
         let gray = yardstick.gray();
         let begun = Instant::now();
         // Of the photo against itself: it is only about the time.
         std::hint::black_box(yardstick.luma_quality(&gray));
-        let pixels = |scene: &Scene| scene.photos[first].0.gray.len() as f64;
-        let drawing = each * pixels(self.judge) / pixels(self.scene).max(1.0);
-        views.len() as f64 * (begun.elapsed().as_secs_f64() + drawing)
+        let pixels = |dataset: &Dataset| {
+            let camera = &dataset.cameras[first];
+            f64::from(camera.width) * f64::from(camera.height)
+        };
+        let drawing = each * pixels(self.judge) / pixels(self.dataset).max(1.0);
+        Ok(views.len() as f64 * (begun.elapsed().as_secs_f64() + drawing))
     }
 
     /// Trains and measures, within `time_limit` seconds if there is one.
@@ -136,12 +139,15 @@ impl Job<'_> {
         observe: &mut Observer<'_>,
     ) -> Result<Attempt, RunError> {
         let begun = Instant::now();
-        let (options, scene) = (self.options, self.scene);
+        let (options, dataset) = (self.options, self.dataset);
         let room = work.room();
         let plan = match options.time_limit {
-            Some(limit) if limit < TRIAL_FROM => scene.plan(room, &options.overrules, None),
+            Some(limit) if limit < TRIAL_FROM => {
+                self.evidence.decide(room, &options.overrules, None)
+            }
             _ => planned(
-                scene,
+                dataset,
+                self.evidence,
                 room,
                 &options.overrules,
                 || Ok(self.raster.clone()),
@@ -155,22 +161,18 @@ impl Job<'_> {
         observe(Event::Note(plan.to_string()));
         let mut settings = settings(work, &plan);
         let demand = self.fit_memory(&mut settings, &plan, observe)?;
-        let start = first_splats(options, scene, &settings, observe)?;
+        let start = first_splats(options, dataset, self.evidence, &settings, observe)?;
         let preparing = begun.elapsed().as_secs_f64();
 
         let begun = Instant::now();
-        let train = &scene.split.train;
-        let views = train
-            .iter()
-            .map(|&i| training_view(scene, &plan, i))
-            .collect();
+        let views = PlannedViews::new(dataset.clone(), self.evidence, &plan);
         let raster = self.raster.clone();
-        let mut trainer = LumaTrainer::new(raster, settings, scene.extent, &start, views)?;
+        let mut trainer = LumaTrainer::new(raster, settings, dataset.extent, &start, views)?;
         if let Some(limit) = time_limit {
             let seconds = limit - preparing;
             trainer.aim(Goal::Within { seconds });
         }
-        trainer.watch(self.watched_views(&plan))?;
+        trainer.watch(self.watched_views(&plan)?)?;
         let mut log = String::from("iteration,loss,splats,seconds,poisoned\n");
         let (mut last, mut peak_device_memory) = (None, None);
         trainer.train(&mut |progress| {
@@ -194,8 +196,8 @@ impl Job<'_> {
             peak_device_memory = peak_device_memory.max(self.gpu.allocated_bytes());
         })?;
         let mut splats = trainer.splats()?;
-        if scene.removes_masked() {
-            splats = carved(scene, &splats);
+        if dataset.removes_masked() {
+            splats = carved(dataset, &splats)?;
         }
         let timings = (options.timings)
             .then(|| Ok::<_, RunError>(kernel_reports(&self.gpu.timings()?, &trainer.load())))
@@ -237,12 +239,12 @@ impl Job<'_> {
         plan: &Plan,
         observe: &mut Observer<'_>,
     ) -> Result<Demand, RunError> {
-        let (scene, limit) = (self.scene, settings.memory_limit);
+        let (dataset, limit) = (self.dataset, settings.memory_limit);
         let ignores = plan.has(Effect::Masks) || plan.has(Effect::Robust);
-        let cameras = scene.split.train.iter().map(|&i| &scene.photos[i].1);
+        let cameras = dataset.split.train.iter().map(|&i| &dataset.cameras[i]);
         let watched = self.watched();
         let demand = Demand::of(cameras, ignores, settings.sh_degree, limit)
-            .watching(watched.iter().map(|&i| &scene.photos[i].1));
+            .watching(watched.iter().map(|&i| &dataset.cameras[i]));
         let binding = self.gpu.binding_limit();
         let fits = demand.largest_set(limit, binding);
         if fits == 0 {
@@ -264,22 +266,22 @@ impl Job<'_> {
 
     /// A few of the photos that are measured, evenly spread.
     fn watched(&self) -> Vec<usize> {
-        let measured = self.scene.measured().1;
+        let measured = self.dataset.measured().1;
         let count = measured.len().min(WATCHED);
         (0..count)
             .map(|k| measured[k * measured.len() / count])
             .collect()
     }
 
-    fn watched_views(&self, plan: &Plan) -> Vec<TrainingView> {
+    fn watched_views(&self, plan: &Plan) -> Result<Vec<TrainingView>, CaptureError> {
         let view = |i: usize| {
-            let (photo, camera) = &self.scene.photos[i];
-            TrainingView {
-                camera: camera.clone(),
+            let photo = self.dataset.photo(i)?;
+            Ok(TrainingView {
+                camera: self.dataset.cameras[i].clone(),
                 gray: photo.gray.clone(),
                 mask: photo.mask.clone(),
                 exposure: plan.exposures[i],
-            }
+            })
         };
         self.watched().into_iter().map(view).collect()
     }
@@ -293,20 +295,6 @@ fn settings(work: &Work, plan: &Plan) -> LumaSettings {
         antialiased: plan.has(Effect::Antialias),
         background: plan.has(Effect::Background),
         ..work.settings.clone()
-    }
-}
-
-/// What a training sees of a photo.
-pub(super) fn training_view(scene: &Scene, plan: &Plan, view: usize) -> TrainingView {
-    let (photo, camera) = &scene.photos[view];
-    TrainingView {
-        camera: camera.clone(),
-        gray: photo.gray.clone(),
-        mask: match scene.removes_masked() {
-            true => carve::unknown(photo),
-            false => photo.mask.clone().filter(|_| plan.has(Effect::Masks)),
-        },
-        exposure: plan.exposures[view],
     }
 }
 

@@ -11,7 +11,7 @@ use super::{FitOptions, Overlay};
 use crate::{
     capture::{Capture, CaptureOptions},
     gpu::GpuError,
-    luma::{LumaSettings, Schedule, rehearse},
+    luma::{LumaError, LumaSettings, Schedule, rehearse},
     raster::Raster,
 };
 
@@ -168,7 +168,9 @@ impl<'a> Family<'a> {
             let splats = self.mean_splats(&work.settings);
             match rehearse(raster, splats, self.size(&work)) {
                 Ok(each) => Ok(Some([each * work.settings.iterations as f64, each])),
-                Err(GpuError::TooLarge { .. } | GpuError::TooManySplats { .. }) => Ok(None),
+                Err(LumaError::Gpu(GpuError::TooLarge { .. } | GpuError::TooManySplats { .. })) => {
+                    Ok(None)
+                }
                 Err(error) => Err(error.into()),
             }
         };

@@ -11,7 +11,11 @@ mod trial;
 
 use std::{path::PathBuf, sync::Arc, time::Instant};
 
-use super::{Event, Observer, Preset, RunError, RunFolder, files, preset::Work, scene::Scene};
+use super::{
+    Event, Observer, Preset, RunError, RunFolder, files,
+    preset::Work,
+    scene::{examine, open},
+};
 use crate::{
     capture::LoadOptions,
     effects::{Effect, Overrules},
@@ -123,28 +127,30 @@ pub fn fit(
         lens: options.overrules.choice(Effect::Lens),
         ..options.load.clone()
     };
-    let scene = Scene::load(&options.colmap_dir, &load, observe)?;
+    let dataset = Arc::new(open(&options.colmap_dir, &load, observe)?);
     let judge = match options.measure_side {
         Some(_) => {
             let load = LoadOptions {
                 max_side: options.measure_side,
-                ..scene.options.clone()
+                ..dataset.options.clone()
             };
-            // What is to be said about the photos has been said.
-            Some(Scene::load(&options.colmap_dir, &load, &mut |_| {})?)
+            // What is to be said about the photos is said of those that are trained on.
+            Some(open(&options.colmap_dir, &load, &mut |_| {})?)
         }
         None => None,
     };
+    let evidence = examine(&dataset, observe)?;
     let job = Job {
         options,
         gpu: &gpu,
         raster: &raster,
-        scene: &scene,
-        judge: judge.as_ref().unwrap_or(&scene),
+        dataset: &dataset,
+        evidence: &evidence,
+        judge: judge.as_ref().unwrap_or(&*dataset),
         begun,
     };
     let loading = begun.elapsed().as_secs_f64();
-    let (attempt, attempts) = ahead.meanwhile(&scene, observe, |observe| {
+    let (attempt, attempts) = ahead.meanwhile(&dataset, observe, |observe| {
         match (&family, options.target_psnr) {
             (Some(family), Some(target)) => {
                 let reached = job.reach(target, family, observe)?;

@@ -2,37 +2,39 @@
 
 use std::sync::Arc;
 
-use super::super::{RunError, scene::Scene, yardstick::Yardstick};
+use super::super::{RunError, scene::renderer, yardstick::Yardstick};
 use crate::{
-    capture::Exposure,
+    capture::{Dataset, Exposure},
     raster::Raster,
     report::{LumaQuality, LumaView},
     splats::Splats,
 };
 
-/// Each held-out view of `scene`.
+/// Each held-out view of `dataset`.
 pub(super) fn measure_luma(
     raster: &Arc<Raster>,
-    scene: &Scene,
+    dataset: &Dataset,
     splats: &Splats,
     exposures: &[Exposure],
 ) -> Result<Vec<LumaView>, RunError> {
-    let mut renderer = scene.renderer(raster, splats, &[&splats.sh])?;
-    scene
-        .split
-        .test
-        .iter()
-        .map(|&i| (i, Yardstick::of(scene, exposures, i)))
-        .filter(|(_, yardstick)| yardstick.measures())
-        .map(|(i, yardstick)| {
-            let picture = renderer.render(&scene.photos[i].1)?.remove(0);
+    let mut renderer = renderer(dataset, raster, splats, &[&splats.sh])?;
+    let mut views = Vec::new();
+    dataset.visit(&dataset.split.test, |view, photo| {
+        let yardstick = Yardstick {
+            photo,
+            exposure: exposures[view],
+        };
+        if yardstick.measures() {
+            let picture = renderer.render(&dataset.cameras[view])?.remove(0);
             let shown = yardstick.luma_shown(&picture.pixels);
-            Ok(LumaView {
-                name: scene.capture.views[i].name.clone(),
+            views.push(LumaView {
+                name: dataset.capture.views[view].name.clone(),
                 quality: yardstick.luma_quality(&shown),
-            })
-        })
-        .collect()
+            });
+        }
+        Ok::<_, RunError>(())
+    })?;
+    Ok(views)
 }
 
 /// Their mean, if there are any.

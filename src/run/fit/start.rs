@@ -1,29 +1,30 @@
 //! The Gaussians that a training starts from.
 
-use super::super::{
-    Event, Observer, RunError,
-    carve::{self, carved},
-    scene::{Scene, read_splats},
-};
+use super::super::{Event, Observer, RunError, scene::read_splats};
 use super::FitOptions;
 use crate::{
+    capture::{CaptureError, Dataset},
     color::gray_from_rgb,
-    effects::Backdrop,
-    luma::LumaSettings,
+    effects::Evidence,
+    luma::{
+        LumaSettings,
+        carve::{self, carved},
+    },
     splats::{ShField, Splats, init::initial_splats, sh},
 };
 
 /// Those of `--init`, or one at each of COLMAP's points and a dome behind them.
 pub(super) fn first_splats(
     options: &FitOptions,
-    scene: &Scene,
+    dataset: &Dataset,
+    evidence: &Evidence,
     settings: &LumaSettings,
     observe: &mut Observer<'_>,
 ) -> Result<Splats, RunError> {
     let Some(path) = &options.init else {
-        return Ok(placed_splats(scene, settings));
+        return Ok(placed_splats(dataset, evidence, settings)?);
     };
-    let (splats, options) = read_splats(path, scene.capture.offset, observe)?;
+    let (splats, options) = read_splats(path, dataset.capture.offset, observe)?;
     if options != settings.raster_options() {
         let [is, is_not] = ["antialiased", "not antialiased"];
         let (file, run) = if options.antialiased {
@@ -43,29 +44,48 @@ pub(super) fn first_splats(
 }
 
 /// One at each of COLMAP's points, and a dome behind them.
-pub(super) fn placed_splats(scene: &Scene, settings: &LumaSettings) -> Splats {
-    let points: Vec<_> = (scene.capture.points.iter())
+///
+/// # Errors
+/// [`CaptureError`] of a photo.
+pub(super) fn placed_splats(
+    dataset: &Dataset,
+    evidence: &Evidence,
+    settings: &LumaSettings,
+) -> Result<Splats, CaptureError> {
+    let points: Vec<_> = (dataset.capture.points.iter())
         .map(|point| {
             let rgb = point.color.map(|v| f64::from(v) / 255.0);
             let position = point.position.as_vec3().to_array();
             (position, gray_from_rgb(rgb) as f32)
         })
         .collect();
-    let mut splats = initial_splats(&points, scene.extent as f32, settings.sh_degree);
-    if scene.removes_masked() {
-        splats = carved(scene, &splats);
+    let mut splats = initial_splats(&points, dataset.extent as f32, settings.sh_degree);
+    if dataset.removes_masked() {
+        splats = carved(dataset, &splats)?;
     }
-    let dome = settings.background.then(|| background(scene, settings));
+    let dome = match settings.background {
+        true => Some(background(dataset, evidence, settings)?),
+        false => None,
+    };
     let taken = dome.as_ref().map_or(0, Splats::len);
     truncate(&mut splats, settings.max_splats - taken);
     dome.into_iter().for_each(|dome| splats.append(dome));
-    splats
+    Ok(splats)
 }
 
 /// Gaussians for what no point explains, at most a quarter of all that there may be.
-fn background(scene: &Scene, settings: &LumaSettings) -> Splats {
-    let most = settings.max_splats / 4;
-    Backdrop::of(&scene.capture, &scene.photos, &scene.split.train).dome(most, settings.sh_degree)
+fn background(
+    dataset: &Dataset,
+    evidence: &Evidence,
+    settings: &LumaSettings,
+) -> Result<Splats, CaptureError> {
+    let backdrop = evidence.backdrop();
+    let mut places = backdrop.dome_places(settings.max_splats / 4);
+    dataset.visit(backdrop.views(), |view, photo| {
+        backdrop.look(view, photo, &mut places);
+        Ok::<_, CaptureError>(())
+    })?;
+    Ok(backdrop.dome(&places, settings.sh_degree))
 }
 
 /// The field cut or filled up with zeros to another degree.

@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
-use super::super::{Preset, files, scene::Scene};
+use super::super::{Preset, files};
 use super::attempt::{Attempt, Job};
 use crate::{
+    capture::Dataset,
     effects::{Effect, Plan},
     report::{
         CaptureReport, DeviceReport, EffectReport, GoalReport, LumaReport, LumaSeconds,
@@ -27,7 +28,7 @@ impl Job<'_> {
         Report {
             version: REPORT_VERSION,
             program: env!("CARGO_PKG_VERSION").to_owned(),
-            capture: capture_report(&options.colmap_dir, self.scene),
+            capture: capture_report(&options.colmap_dir, self.dataset),
             device: DeviceReport {
                 name: self.gpu.describe(),
                 backend: format!("{:?}", self.gpu.info().backend),
@@ -58,9 +59,9 @@ impl Job<'_> {
                 peak_host_memory: files::peak_host_memory(),
                 peak_device_memory: attempt.peak_device_memory,
                 estimated_device_memory: attempt.estimated_device_memory,
-                exposures: exposures(self.scene, &attempt.plan),
+                exposures: exposures(self.dataset, &attempt.plan),
                 curve: attempt.curve.clone(),
-                curve_on: self.scene.measured().0.to_owned(),
+                curve_on: self.dataset.measured().0.to_owned(),
                 measured_side: options.measure_side,
                 held_out: attempt.held_out(),
                 held_out_views: attempt.held_out_views.clone(),
@@ -72,8 +73,8 @@ impl Job<'_> {
 }
 
 /// What a report says about exposures: nothing where they are alike.
-fn exposures(scene: &Scene, plan: &Plan) -> Vec<ViewExposure> {
-    let all = scene.capture.views.iter().zip(&plan.exposures);
+fn exposures(dataset: &Dataset, plan: &Plan) -> Vec<ViewExposure> {
+    let all = dataset.capture.views.iter().zip(&plan.exposures);
     all.filter(|_| plan.has(Effect::Exposure))
         .map(|(view, &exposure)| ViewExposure {
             name: view.name.clone(),
@@ -83,24 +84,24 @@ fn exposures(scene: &Scene, plan: &Plan) -> Vec<ViewExposure> {
 }
 
 /// What a report says about the photos.
-pub(in crate::run) fn capture_report(colmap_dir: &Path, scene: &Scene) -> CaptureReport {
-    let capture = &scene.capture;
+pub(in crate::run) fn capture_report(colmap_dir: &Path, dataset: &Dataset) -> CaptureReport {
+    let capture = &dataset.capture;
     let path = std::fs::canonicalize(colmap_dir).unwrap_or_else(|_| colmap_dir.to_owned());
     CaptureReport {
         path: path.to_string_lossy().into_owned(),
         views: capture.views.len(),
-        train: scene.split.train.len(),
-        test: scene.split.test.len(),
+        train: dataset.split.train.len(),
+        test: dataset.split.test.len(),
         points: capture.points.len(),
         rejected: capture
             .rejected
             .iter()
             .map(|rejected| format!("{}: {}", rejected.name, rejected.reason))
             .collect(),
-        load: scene.options.clone(),
-        masked_views: scene.masked_views,
-        not_finite: scene.not_finite,
-        extent: scene.extent,
+        load: dataset.options.clone(),
+        masked_views: dataset.masked_views,
+        not_finite: dataset.not_finite(),
+        extent: dataset.extent,
         offset: capture.offset.to_array(),
     }
 }

@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use super::super::{Event, Observer, RunError, Stage, scene::Scene};
-use super::{attempt::training_view, start::placed_splats};
+use super::super::{Event, Observer, RunError, Stage};
+use super::start::placed_splats;
 use crate::{
-    capture::Exposure,
-    effects::{Overrules, Plan, Room},
-    luma::{LumaSettings, LumaTrainer, TrainingView},
+    capture::{Dataset, Exposure},
+    effects::{Evidence, Overrules, Plan, Room},
+    luma::{LumaSettings, LumaTrainer, PlannedViews, TrainingView},
     raster::Raster,
 };
 
@@ -29,33 +29,36 @@ pub(super) const TRIAL_FROM: f64 = 300.0;
 /// # Errors
 /// [`RunError`] of the device.
 pub(in crate::run) fn planned(
-    scene: &Scene,
+    dataset: &Arc<Dataset>,
+    evidence: &Evidence,
     room: Room,
     overrules: &Overrules,
     raster: impl FnOnce() -> Result<Arc<Raster>, RunError>,
     observe: &mut Observer<'_>,
 ) -> Result<Plan, RunError> {
-    let plan = scene.plan(room, overrules, None);
+    let plan = evidence.decide(room, overrules, None);
     if !plan.needs_trial() {
         return Ok(plan);
     }
-    let gain = exposure_gain(scene, &raster()?, &plan, observe)?;
-    Ok(scene.plan(room, overrules, Some(gain)))
+    let gain = exposure_gain(dataset, evidence, &raster()?, &plan, observe)?;
+    Ok(evidence.decide(room, overrules, Some(gain)))
 }
 
 /// Per cent by which a small scene that is trained with the plan's exposures has less loss
 /// than one trained without.
 fn exposure_gain(
-    scene: &Scene,
+    dataset: &Arc<Dataset>,
+    evidence: &Evidence,
     raster: &Arc<Raster>,
     plan: &Plan,
     observe: &mut Observer<'_>,
 ) -> Result<f64, RunError> {
-    let train = &scene.split.train;
+    let views = PlannedViews::new(dataset.clone(), evidence, plan);
+    let train = &dataset.split.train;
     let count = train.len().min(MAX_VIEWS);
     let exposed: Vec<TrainingView> = (0..count)
-        .map(|k| small(training_view(scene, plan, train[k * train.len() / count])))
-        .collect();
+        .map(|k| views.of(train[k * train.len() / count]).map(small))
+        .collect::<Result<_, _>>()?;
     let mut unexposed = exposed.clone();
     for view in &mut unexposed {
         view.exposure = Exposure::NONE;
@@ -65,7 +68,7 @@ fn exposure_gain(
         max_splats: MAX_SPLATS,
         ..LumaSettings::new(ITERATIONS)
     };
-    let start = placed_splats(scene, &settings);
+    let start = placed_splats(dataset, evidence, &settings)?;
     let mut losses = [0.0; 2];
     for (which, (views, loss)) in [exposed, unexposed]
         .into_iter()
@@ -73,7 +76,7 @@ fn exposure_gain(
         .enumerate()
     {
         let (raster, settings) = (raster.clone(), settings.clone());
-        LumaTrainer::new(raster, settings, scene.extent, &start, views)?.train(
+        LumaTrainer::new(raster, settings, dataset.extent, &start, views)?.train(
             &mut |progress| {
                 *loss = progress.loss;
                 observe(Event::Progress {

@@ -2,9 +2,8 @@
 
 use glam::DVec3;
 
-use super::scene::{Scene, counts};
 use crate::{
-    capture::Photo,
+    capture::{CaptureError, Dataset, Photo},
     splats::{ShField, Splats},
 };
 
@@ -22,33 +21,39 @@ pub(super) fn unknown(photo: &Photo) -> Option<Vec<u8>> {
 
 /// The Gaussians that lie inside the silhouettes of the training views; all of them where
 /// nothing would be left.
-pub(super) fn carved(scene: &Scene, splats: &Splats) -> Splats {
-    let kept: Vec<usize> = (0..splats.len())
-        .filter(|&i| is_inside(scene, DVec3::from(splats.means[i].map(f64::from))))
+///
+/// # Errors
+/// [`CaptureError`] of a photo.
+pub fn carved(dataset: &Dataset, splats: &Splats) -> Result<Splats, CaptureError> {
+    let places: Vec<DVec3> = (splats.means.iter())
+        .map(|mean| DVec3::from(mean.map(f64::from)))
         .collect();
-    match kept.len() {
+    // Views that see it, and those that have it removed.
+    let mut counted = vec![[0_u32; 2]; places.len()];
+    dataset.visit(&dataset.split.train, |view, photo| {
+        let camera = &dataset.cameras[view];
+        for (&place, [seen, removed]) in places.iter().zip(&mut counted) {
+            if let Some([x, y]) = camera.pixel_of(place) {
+                let pixel = y as usize * photo.width as usize + x as usize;
+                *seen += 1;
+                *removed += u32::from(photo.gray[pixel] == 0 && !photo.counts(pixel));
+            }
+        }
+        Ok::<_, CaptureError>(())
+    })?;
+    let inside = |&i: &usize| {
+        let [seen, removed] = counted[i].map(f64::from);
+        removed <= REMOVED_SHARE * seen
+    };
+    let kept: Vec<usize> = (0..splats.len()).filter(inside).collect();
+    Ok(match kept.len() {
         0 => splats.clone(),
         _ => chosen(splats, &kept),
-    }
-}
-
-/// Whether enough views show something at a place.
-fn is_inside(scene: &Scene, place: DVec3) -> bool {
-    let (mut seen, mut removed) = (0.0, 0.0);
-    for &view in &scene.split.train {
-        let (photo, camera) = &scene.photos[view];
-        if let Some([x, y]) = camera.pixel_of(place) {
-            let pixel = y as usize * photo.width as usize + x as usize;
-            let is_removed = photo.gray[pixel] == 0 && !counts(photo, pixel);
-            seen += 1.0;
-            removed += f64::from(u8::from(is_removed));
-        }
-    }
-    removed <= REMOVED_SHARE * seen
+    })
 }
 
 /// Some of the Gaussians, in the order of `indices`.
-pub(super) fn chosen(splats: &Splats, indices: &[usize]) -> Splats {
+pub fn chosen(splats: &Splats, indices: &[usize]) -> Splats {
     let field = &splats.sh;
     Splats {
         means: indices.iter().map(|&i| splats.means[i]).collect(),

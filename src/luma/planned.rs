@@ -1,0 +1,87 @@
+//! A dataset's training views as its plan has them.
+
+use std::sync::Arc;
+
+use super::{TrainingView, TrainingViews, carve};
+use crate::{
+    capture::{Camera, CaptureError, Dataset, Exposure},
+    effects::{Effect, Evidence, Plan},
+};
+
+/// Training views whose photos come from a [`Dataset`].
+#[derive(Clone, Debug)]
+pub struct PlannedViews {
+    dataset: Arc<Dataset>,
+    /// Of all views of the dataset.
+    exposures: Vec<Exposure>,
+    masks: Masks,
+    masked: bool,
+}
+
+/// What becomes of masks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Masks {
+    /// All pixels count.
+    Off,
+    /// What is masked does not count.
+    Count,
+    /// What is masked is not there.
+    Remove,
+}
+
+impl PlannedViews {
+    /// The dataset's training views.
+    pub fn new(dataset: Arc<Dataset>, evidence: &Evidence, plan: &Plan) -> Self {
+        let masks = match (dataset.removes_masked(), plan.has(Effect::Masks)) {
+            (true, _) => Masks::Remove,
+            (false, true) => Masks::Count,
+            (false, false) => Masks::Off,
+        };
+        Self {
+            exposures: plan.exposures.clone(),
+            masked: masks != Masks::Off && evidence.masks_any(&dataset.split.train),
+            masks,
+            dataset,
+        }
+    }
+
+    /// Any view of the dataset, as training sees its own.
+    ///
+    /// # Errors
+    /// [`CaptureError`] of its photo.
+    pub fn of(&self, view: usize) -> Result<TrainingView, CaptureError> {
+        let photo = self.dataset.photo(view)?;
+        Ok(TrainingView {
+            camera: self.dataset.cameras[view].clone(),
+            mask: match self.masks {
+                Masks::Off => None,
+                Masks::Count => photo.mask.clone(),
+                Masks::Remove => carve::unknown(&photo),
+            },
+            gray: photo.gray.clone(),
+            exposure: self.exposures[view],
+        })
+    }
+}
+
+impl TrainingViews for PlannedViews {
+    fn count(&self) -> usize {
+        self.dataset.split.train.len()
+    }
+
+    fn camera(&self, view: usize) -> &Camera {
+        &self.dataset.cameras[self.dataset.split.train[view]]
+    }
+
+    fn exposure(&self, view: usize) -> Exposure {
+        self.exposures[self.dataset.split.train[view]]
+    }
+
+    fn masked(&self) -> bool {
+        self.masked
+    }
+
+    fn load(&self, view: usize) -> Result<TrainingView, CaptureError> {
+        self.of(self.dataset.split.train[view])
+    }
+}
