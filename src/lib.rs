@@ -1,6 +1,6 @@
 //! gs-chroma: coloured 3D Gaussian scenes from grayscale photographs.
 //!
-//! Imports go down only: `cli` → `run`, `report` → `luma`, `chroma`, `measure` →
+//! Imports go down only: `cli` → `tradeoff` → `run`, `report` → `luma`, `chroma`, `measure` →
 //! `raster` → `gpu` → `splats`, `capture`, `color`. [`doctor`] compares the kernels
 //! of `raster` with the [`oracle`], which uses nothing else of the crate.
 
@@ -20,3 +20,4 @@ pub mod raster;
 pub mod report;
 pub mod run;
 pub mod splats;
+pub mod tradeoff;

@@ -7,7 +7,7 @@ use gs_chroma::cli::Cli;
 
 fn main() -> ExitCode {
     quiet_device_selection();
-    gs_chroma::run::tradeoff::end_with_parent();
+    gs_chroma::tradeoff::end_with_parent();
     match Cli::parse().run() {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

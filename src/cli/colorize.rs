@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use clap::{Args, CommandFactory, ValueEnum, error::ErrorKind};
 
-use super::{Cli, print, progress::Progress};
+use super::{Cli, CliError, print, progress::Progress};
 use crate::chroma::{SolverKind, teacher};
 use crate::report::timings_table;
-use crate::run::{ChromaOptions, ColorizeOptions, Degree, RunError, TeachOptions, colorize};
+use crate::run::{ChromaOptions, ColorizeOptions, Degree, TeachOptions, colorize};
 
 /// How a teacher's small picture becomes as large as the photo.
 #[derive(Clone, Copy, ValueEnum)]
@@ -178,7 +178,7 @@ impl Colorize {
         }
     }
 
-    pub(super) fn run(self) -> Result<(), RunError> {
+    pub(super) fn run(self) -> Result<(), CliError> {
         self.check_solver();
         let mut progress = Progress::default();
         let options = ColorizeOptions {

@@ -2,7 +2,7 @@
 
 use clap::Args;
 
-use super::{print, progress};
+use super::{CliError, print, progress};
 use crate::{
     doctor::{Diagnosis, STEPS, measured},
     gpu::Gpu,
@@ -18,13 +18,14 @@ pub struct Doctor {
 }
 
 impl Doctor {
-    pub(super) fn run(self) -> Result<(), RunError> {
-        let gpu = Gpu::open()?;
+    pub(super) fn run(self) -> Result<(), CliError> {
+        let gpu = Gpu::open().map_err(RunError::from)?;
         let bar = progress::bar("checks", STEPS);
         let diagnosis = Diagnosis::of(&gpu, &mut |index, name| {
             bar.set_position(index as u64);
             bar.set_message(name);
-        })?;
+        })
+        .map_err(RunError::from)?;
         bar.finish_and_clear();
         if self.json {
             // Numbers and strings only: this cannot fail.
@@ -53,7 +54,7 @@ impl Doctor {
         }
         match diagnosis.failures() {
             0 => Ok(()),
-            failed => Err(RunError::Unsound {
+            failed => Err(CliError::Unsound {
                 failed,
                 checks: diagnosis.checks(),
                 adapter: diagnosis.adapter,

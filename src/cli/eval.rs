@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{print, progress::Progress};
+use super::{CliError, print, progress::Progress};
 use crate::chroma::teacher::TeacherSettings;
-use crate::run::{EvalOptions, RunError, eval};
+use crate::run::{EvalOptions, eval};
 
 /// Measure a coloured run: fidelity, colourfulness, and whether views agree.
 #[derive(Args)]
@@ -45,7 +45,7 @@ pub struct Eval {
 }
 
 impl Eval {
-    pub(super) fn run(self) -> Result<(), RunError> {
+    pub(super) fn run(self) -> Result<(), CliError> {
         let mut progress = Progress::default();
         let options = EvalOptions {
             run: self.run,

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::print;
-use crate::run::{RunError, export};
+use super::{CliError, print};
+use crate::run::export;
 
 /// Write a run's scene as a splat file in the photos' own coordinates.
 #[derive(Args)]
@@ -21,7 +21,7 @@ pub struct Export {
 }
 
 impl Export {
-    pub(super) fn run(self) -> Result<(), RunError> {
+    pub(super) fn run(self) -> Result<(), CliError> {
         let count = export(self.run.as_deref(), &self.output, self.luma)?;
         print(format_args!(
             "wrote {count} Gaussians to {}",

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::{
+    CliError,
     effects::EffectArguments,
     luma::{LumaArguments, decibels, positive},
     photos::Photos,
@@ -13,7 +14,7 @@ use super::{
 };
 use crate::chroma::teacher::TeacherSettings;
 use crate::report::timings_table;
-use crate::run::{AheadOptions, FitOptions, Preset, RunError, fit};
+use crate::run::{AheadOptions, FitOptions, Preset, fit};
 
 /// Rows of the curve that is printed.
 const CURVE_ROWS: usize = 8;
@@ -68,7 +69,7 @@ pub struct Fit {
 }
 
 impl Fit {
-    pub(super) fn run(self) -> Result<(), RunError> {
+    pub(super) fn run(self) -> Result<(), CliError> {
         let mut progress = Progress::default();
         let options = FitOptions {
             colmap_dir: self.colmap_dir,

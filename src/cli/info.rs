@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::print;
-use crate::run::{RunError, info};
+use super::{CliError, print};
+use crate::run::info;
 
 /// Say what a run, a splat file or a COLMAP folder holds.
 #[derive(Args)]
@@ -18,7 +18,7 @@ pub struct Info {
 }
 
 impl Info {
-    pub(super) fn run(self) -> Result<(), RunError> {
+    pub(super) fn run(self) -> Result<(), CliError> {
         let value = info(&self.path)?;
         if self.json {
             print(format_args!("{value:#}"))?;
@@ -30,7 +30,7 @@ impl Info {
 }
 
 /// Prints a JSON value as `key: value` lines, nested keys joined by dots.
-fn print_lines(key: &str, value: &serde_json::Value) -> Result<(), RunError> {
+fn print_lines(key: &str, value: &serde_json::Value) -> Result<(), CliError> {
     match value {
         serde_json::Value::Object(map) => {
             for (name, value) in map {

@@ -3,6 +3,7 @@
 mod colorize;
 mod doctor;
 mod effects;
+mod error;
 mod eval;
 mod export;
 mod fit;
@@ -21,6 +22,8 @@ use std::{
 };
 
 use clap::{Parser, Subcommand};
+
+pub use error::CliError;
 
 use crate::run::RunError;
 
@@ -49,8 +52,8 @@ impl Cli {
     /// Runs the command.
     ///
     /// # Errors
-    /// Whatever stopped it, as one line that names the file and the remedy.
-    pub fn run(self) -> Result<(), RunError> {
+    /// [`CliError`].
+    pub fn run(self) -> Result<(), CliError> {
         match self.command {
             Command::Plan(command) => command.run(),
             Command::Fit(command) => command.run(),
@@ -67,12 +70,14 @@ impl Cli {
 
 /// Prints a line to standard output. A reader that has seen enough (`| head`) is
 /// no error.
-fn print(line: impl Display) -> Result<(), RunError> {
+fn print(line: impl Display) -> Result<(), CliError> {
     match writeln!(io::stdout(), "{line}") {
-        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(RunError::File {
-            path: PathBuf::from("standard output"),
-            reason: error.to_string(),
-        }),
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+            Err(CliError::Run(RunError::File {
+                path: PathBuf::from("standard output"),
+                reason: error.to_string(),
+            }))
+        }
         _ => Ok(()),
     }
 }

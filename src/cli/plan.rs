@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{effects::EffectArguments, photos::Photos, print, progress::Progress};
-use crate::run::{PlanOptions, Preset, RunError, plan};
+use super::{CliError, effects::EffectArguments, photos::Photos, print, progress::Progress};
+use crate::run::{PlanOptions, Preset, plan};
 
 /// Say which effects a capture calls for, and why, without fitting it.
 #[derive(Args)]
@@ -25,7 +25,7 @@ pub struct Plan {
 }
 
 impl Plan {
-    pub(super) fn run(self) -> Result<(), RunError> {
+    pub(super) fn run(self) -> Result<(), CliError> {
         let mut progress = Progress::default();
         let options = PlanOptions {
             colmap_dir: self.colmap_dir,

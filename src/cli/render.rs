@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{print, progress::Progress};
-use crate::run::{RenderOptions, RunError, Views, render};
+use super::{CliError, print, progress::Progress};
+use crate::run::{RenderOptions, Views, render};
 
 /// Draw a scene from the photographed viewpoints, one PNG a view.
 #[derive(Args)]
@@ -27,7 +27,7 @@ pub struct Render {
 }
 
 impl Render {
-    pub(super) fn run(self) -> Result<(), RunError> {
+    pub(super) fn run(self) -> Result<(), CliError> {
         let mut progress = Progress::default();
         let options = RenderOptions {
             run: self.run,

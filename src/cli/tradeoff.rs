@@ -4,12 +4,9 @@ use std::path::PathBuf;
 
 use clap::{Args, builder::PossibleValuesParser};
 
-use super::{effects::EffectArguments, photos::Photos, print, progress::Progress};
-use crate::report::tradeoff::{PointStage, front_table};
-use crate::run::{
-    Preset, RunError,
-    tradeoff::{FILES, TradeoffOptions, knob_names, tradeoff},
-};
+use super::{CliError, effects::EffectArguments, photos::Photos, print, progress::Progress};
+use crate::run::Preset;
+use crate::tradeoff::{FILES, PointStage, TradeoffOptions, front_table, knob_names, tradeoff};
 
 /// Find out what quality costs in time, on these photos and this device: runs `fit` (and
 /// `colorize`) with knobs turned around the preset, and draws quality against seconds.
@@ -50,7 +47,7 @@ pub struct Tradeoff {
 }
 
 impl Tradeoff {
-    pub(super) fn run(self) -> Result<(), RunError> {
+    pub(super) fn run(self) -> Result<(), CliError> {
         let mut progress = Progress::default();
         let options = TradeoffOptions {
             colmap_dir: self.colmap_dir,

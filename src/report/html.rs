@@ -8,10 +8,10 @@ use super::Table;
 const STYLE: &str = include_str!("style.css");
 
 /// The end of every page.
-pub(super) const TAIL: &str = "</main></body></html>\n";
+pub(crate) const TAIL: &str = "</main></body></html>\n";
 
 /// A page up to where its contents begin.
-pub(super) fn head(title: &str) -> String {
+pub(crate) fn head(title: &str) -> String {
     format!(
         r#"<!DOCTYPE html>
 <html lang="en">
@@ -29,7 +29,7 @@ pub(super) fn head(title: &str) -> String {
 }
 
 /// Text that HTML takes for text.
-pub(super) fn escaped(text: &str) -> String {
+pub(crate) fn escaped(text: &str) -> String {
     text.replace('&', "&amp;")
         .replace('<', "&lt;")
         .replace('>', "&gt;")
@@ -37,7 +37,7 @@ pub(super) fn escaped(text: &str) -> String {
 }
 
 /// A table under its title.
-pub(super) fn push_table(html: &mut String, table: &Table) {
+pub(crate) fn push_table(html: &mut String, table: &Table) {
     let _ = write!(
         html,
         "<h2>{}</h2>\n<div class=\"scroll\"><table>\n<thead><tr>",

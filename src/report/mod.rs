@@ -5,10 +5,9 @@
 mod contact_sheet;
 mod effects;
 mod evaluation;
-mod html;
+pub(crate) mod html;
 mod page;
 mod timings;
-pub mod tradeoff;
 
 pub use contact_sheet::{Row, contact_sheet, to_image};
 pub use effects::EffectReport;

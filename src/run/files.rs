@@ -12,7 +12,7 @@ use super::RunError;
 use crate::beside::{beside, folder_of};
 
 /// Turns a system error into one that names the path.
-pub(super) fn at(path: &Path) -> impl FnOnce(std::io::Error) -> RunError {
+pub(crate) fn at(path: &Path) -> impl FnOnce(std::io::Error) -> RunError {
     let path = path.to_owned();
     move |error| RunError::File {
         path,
@@ -21,7 +21,7 @@ pub(super) fn at(path: &Path) -> impl FnOnce(std::io::Error) -> RunError {
 }
 
 /// Writes beside and renames.
-pub(super) fn write(path: &Path, bytes: &[u8]) -> Result<(), RunError> {
+pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), RunError> {
     let mut file = beside(path).map_err(at(path))?;
     file.write_all(bytes).map_err(at(path))?;
     file.persist(path).map_err(|error| at(path)(error.error))?;
@@ -42,7 +42,7 @@ pub(super) fn write_png(path: &Path, image: &RgbImage) -> Result<(), RunError> {
 
 /// Makes a folder and those above it, and tries whether it can be written to:
 /// better now than after hours of work.
-pub(super) fn make_folder(path: &Path) -> Result<(), RunError> {
+pub(crate) fn make_folder(path: &Path) -> Result<(), RunError> {
     let refused = |reason: String| RunError::File {
         path: path.to_owned(),
         reason,

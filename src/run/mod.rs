@@ -5,7 +5,7 @@ mod chroma_plan;
 mod color_quality;
 mod colorize;
 mod eval;
-mod files;
+pub(crate) mod files;
 mod fit;
 mod folder;
 mod info;
@@ -14,7 +14,6 @@ mod preset;
 mod render;
 mod scene;
 mod teach;
-pub mod tradeoff;
 mod yardstick;
 
 use std::{fmt, path::PathBuf};
@@ -34,6 +33,8 @@ use crate::{
     capture::CaptureError, chroma::teacher::TeacherError, gpu::GpuError, luma::LumaError,
     splats::ply::PlyError,
 };
+pub(crate) use fit::open_gpu;
+pub(crate) use preset::Work;
 
 /// What can stop a run.
 #[derive(Debug, thiserror::Error)]
@@ -114,29 +115,6 @@ pub enum RunError {
         target: f64,
         /// What was reached, in dB.
         reached: f64,
-    },
-    /// Nothing is held out, and quality cannot be weighed against time.
-    #[error("{}: no view is held out to measure on: leave --no-holdout out, or name a folder with more photos", .0.display())]
-    NothingToMeasure(PathBuf),
-    /// What everything is compared with does not run.
-    #[error("{point}, which all other points are compared with, failed: {reason}")]
-    Base {
-        /// Its name.
-        point: String,
-        /// What the program said.
-        reason: String,
-    },
-    /// The device computes something else than the reference.
-    #[error(
-        "{failed} of {checks} checks fail on {adapter}: update its driver, or choose another adapter with WGPU_ADAPTER_NAME, and please report the output of `gs-chroma doctor --json`"
-    )]
-    Unsound {
-        /// Checks that failed.
-        failed: usize,
-        /// Checks in all.
-        checks: usize,
-        /// The adapter's name.
-        adapter: String,
     },
 }
 

@@ -9,7 +9,7 @@ use crate::{
 
 /// An amount of work.
 #[derive(Clone, Debug)]
-pub(super) struct Work {
+pub(crate) struct Work {
     /// How luma is trained.
     pub settings: LumaSettings,
     /// Longer side of the photos.
@@ -40,7 +40,7 @@ impl Work {
 
 impl Preset {
     /// What there is time for on a device.
-    pub(super) fn for_device(gpu: &Gpu) -> Self {
+    pub(crate) fn for_device(gpu: &Gpu) -> Self {
         if gpu.is_software() {
             Self::Draft
         } else {
@@ -49,7 +49,7 @@ impl Preset {
     }
 
     /// As much work as it is.
-    pub(super) fn work(self) -> Work {
+    pub(crate) fn work(self) -> Work {
         Work {
             settings: self.settings(),
             max_side: self.max_side(),
@@ -57,7 +57,7 @@ impl Preset {
     }
 
     /// Iterations of Adam in stage 2.
-    pub(super) fn adam_iterations(self) -> usize {
+    pub(crate) fn adam_iterations(self) -> usize {
         match self {
             Self::Draft => 150,
             Self::Balanced => 3_000,
@@ -67,7 +67,7 @@ impl Preset {
 
     /// The options with the preset's longer side where they leave it open, and with
     /// what is overruled about the lens.
-    pub(super) fn load_options(self, asked: &LoadOptions, overrules: &Overrules) -> LoadOptions {
+    pub(crate) fn load_options(self, asked: &LoadOptions, overrules: &Overrules) -> LoadOptions {
         LoadOptions {
             max_side: asked.max_side.or(self.max_side()),
             lens: overrules.choice(Effect::Lens),

@@ -188,7 +188,7 @@ pub fn fit(
 }
 
 /// The device; with `timed`, its dispatches are.
-pub(super) fn open_gpu(timed: bool) -> Result<Gpu, RunError> {
+pub(crate) fn open_gpu(timed: bool) -> Result<Gpu, RunError> {
     let gpu = Gpu::open()?;
     Ok(if timed { gpu.timed()? } else { gpu })
 }

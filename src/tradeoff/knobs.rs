@@ -1,14 +1,10 @@
 //! What can be turned, and how far around the preset.
 
-use super::space::Value;
-use crate::{
-    chroma::ChromaSettings,
-    report::{
-        Report,
-        tradeoff::{PointStage, Setting},
-    },
-    run::preset::Work,
+use super::{
+    report::{PointStage, Setting},
+    space::Value,
 };
+use crate::{chroma::ChromaSettings, report::Report, run::Work};
 
 /// An option of `fit` or `colorize` and its value.
 pub(super) type Turn = (&'static str, String);

@@ -1,6 +1,6 @@
 //! What a sweep may try.
 
-use crate::report::tradeoff::{Phase, Point, PointStage, Setting};
+use super::report::{Phase, Point, PointStage, Setting};
 
 /// A knob's value.
 #[derive(Clone, Debug)]

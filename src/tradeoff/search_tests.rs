@@ -1,8 +1,8 @@
 //! The search, on models of quality and time.
 
+use super::report::{Outcome, Point, PointStage, Seconds, Setting};
 use super::search::next;
 use super::space::{Space, Task, Value, base_name};
-use crate::report::tradeoff::{Outcome, Point, PointStage, Seconds, Setting};
 
 /// How a knob's value changes the stage's time and its quality, in dB or ΔE00.
 type Effect = (&'static str, &'static str, f64, f64);

@@ -1,4 +1,4 @@
-//! What `tradeoff` found: `tradeoff.json`, `tradeoff.csv` and `tradeoff.html`.
+//! What a sweep found: `tradeoff.json`, `tradeoff.csv` and `tradeoff.html`.
 //! docs/tradeoff.md describes every key and column.
 
 mod base64;

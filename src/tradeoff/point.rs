@@ -9,17 +9,15 @@ use std::{
 use clap::ValueEnum;
 
 use super::{
-    TradeoffOptions, child,
+    TradeoffError, TradeoffOptions, child,
     knobs::merged,
+    report::{Outcome, Point, PointStage, Seconds, Subject},
     space::{Task, base_name, find},
 };
 use crate::{
     capture::{LoadOptions, MaskSource, Normalize},
     effects::Overrules,
-    report::{
-        Evaluation, Method,
-        tradeoff::{Outcome, Point, PointStage, Seconds, Subject},
-    },
+    report::{Evaluation, Method},
     run::{Preset, RunError, RunFolder, files},
 };
 
@@ -195,7 +193,7 @@ impl Bench {
     }
 
     /// What the reports of a point say.
-    fn outcome(&self, task: &Task, points: &[Point]) -> Result<Outcome, RunError> {
+    fn outcome(&self, task: &Task, points: &[Point]) -> Result<Outcome, TradeoffError> {
         let folder = self.folder(&task.name);
         let report = folder.read_report()?;
         let luma = &report.luma;
@@ -232,7 +230,7 @@ impl Bench {
         outcome.seconds = outcome.seconds.summed();
         match outcome.psnr {
             Some(_) => Ok(outcome),
-            None => Err(RunError::NothingToMeasure(self.scene.clone())),
+            None => Err(TradeoffError::NothingToMeasure(self.scene.clone())),
         }
     }
 }
@@ -338,7 +336,7 @@ mod tests {
     use crate::{
         capture::Channel,
         effects::Effect,
-        report::tradeoff::{Phase, Setting},
+        tradeoff::report::{Phase, Setting},
     };
 
     fn bench() -> Bench {

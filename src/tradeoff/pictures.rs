@@ -6,11 +6,13 @@ use image::{DynamicImage, RgbImage, codecs::jpeg::JpegEncoder};
 
 use crate::{
     capture::{Capture, Loader, View, split},
-    report::tradeoff::{Pictures, PointStage, Tradeoff},
     run::RunFolder,
 };
 
-use super::space::base_name;
+use super::{
+    report::{Pictures, PointStage, Tradeoff},
+    space::base_name,
+};
 
 /// The folder in a point's with its pictures of the held-out views.
 pub(super) const FOLDER: &str = "views";

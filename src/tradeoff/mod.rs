@@ -4,6 +4,7 @@ mod child;
 mod knobs;
 mod pictures;
 mod point;
+mod report;
 mod search;
 #[cfg(test)]
 mod search_tests;
@@ -14,19 +15,18 @@ use std::path::{Path, PathBuf};
 
 pub use child::end_with_parent;
 pub use knobs::knob_names;
+pub use report::{PointStage, Tradeoff, front_table};
 
-use super::{
-    Event, Observer, Preset, RunError, RunFolder, Stage, files, fit::open_gpu, preset::Work,
-};
 use crate::{
     capture::{Capture, LoadOptions, split},
     effects::Overrules,
     luma::LumaSettings,
-    report::tradeoff::{Measure, Phase, Point, PointStage, Tradeoff, csv, page},
+    run::{Event, Observer, Preset, RunError, RunFolder, Stage, Work, files, open_gpu},
 };
 use knobs::Around;
 use pictures::Album;
 use point::Bench;
+use report::{Measure, Phase, Point, csv, page};
 use space::{Space, Task, base_name, find};
 use state::State;
 
@@ -55,6 +55,25 @@ pub struct TradeoffOptions {
     pub knobs: Vec<String>,
 }
 
+/// What can stop a sweep.
+#[derive(Debug, thiserror::Error)]
+pub enum TradeoffError {
+    /// The photos, the device or the file system.
+    #[error(transparent)]
+    Run(#[from] RunError),
+    /// Nothing is held out, and quality cannot be weighed against time.
+    #[error("{}: no view is held out to measure on: leave --no-holdout out, or name a folder with more photos", .0.display())]
+    NothingToMeasure(PathBuf),
+    /// What everything is compared with does not run.
+    #[error("{point}, which all other points are compared with, failed: {reason}")]
+    Base {
+        /// Its name.
+        point: String,
+        /// What the program said.
+        reason: String,
+    },
+}
+
 /// What `tradeoff` writes, beside the points' folders.
 pub const FILES: [&str; 3] = ["tradeoff.csv", "tradeoff.json", "tradeoff.html"];
 
@@ -62,12 +81,12 @@ pub const FILES: [&str; 3] = ["tradeoff.csv", "tradeoff.json", "tradeoff.html"];
 /// them. The files are written anew after every point.
 ///
 /// # Errors
-/// [`RunError`]: the folder holds another sweep, or a base fails. What the points
+/// [`TradeoffError`]: the folder holds another sweep, or a base fails. What the points
 /// that ran have shown is kept. A point that fails otherwise is part of the result.
 pub fn tradeoff(
     options: &TradeoffOptions,
     observe: &mut Observer<'_>,
-) -> Result<(PathBuf, Tradeoff), RunError> {
+) -> Result<(PathBuf, Tradeoff), TradeoffError> {
     let preset = match options.preset {
         Some(preset) => preset,
         None => Preset::for_device(&open_gpu(false)?),
@@ -76,9 +95,9 @@ pub fn tradeoff(
         .output
         .clone()
         .unwrap_or_else(|| default_folder(&options.colmap_dir));
-    let capture = Capture::load(&options.colmap_dir)?;
+    let capture = Capture::load(&options.colmap_dir).map_err(RunError::from)?;
     if split(&capture.views, options.load.holdout).test.is_empty() {
-        return Err(RunError::NothingToMeasure(options.colmap_dir.clone()));
+        return Err(TradeoffError::NothingToMeasure(options.colmap_dir.clone()));
     }
     let sides = capture.views.iter().flat_map(|view| view.photo_size());
     let largest_side = sides.max().unwrap_or(0);
@@ -94,7 +113,7 @@ pub fn tradeoff(
         state.add(point, bench.device(&task));
         write(&folder, &state, &mut album)?;
         if let (None, Some(reason)) = (task.expected, failed) {
-            return Err(RunError::Base {
+            return Err(TradeoffError::Base {
                 point: task.name,
                 reason,
             });
@@ -128,7 +147,7 @@ fn next(
     sweep: &Tradeoff,
     preset: Preset,
     largest_side: u32,
-) -> Result<Option<Task>, RunError> {
+) -> Result<Option<Task>, TradeoffError> {
     let done = |stage| find(&sweep.points, base_name(stage)).is_some();
     let report = |stage| bench.folder(base_name(stage)).read_report();
     let mut space = Space {

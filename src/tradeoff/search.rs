@@ -4,11 +4,11 @@
 //! Everything follows from the points that are there and the seconds that are left, so
 //! that a sweep that goes on asks for what one without a break would have asked for.
 
+use super::report::{Measure, Phase, Point, PointStage, Setting};
 use super::{
     knobs::{PRESET, YARDSTICK_OF_COLOR, YARDSTICK_OF_LUMA},
     space::{Space, Task, Value, base_name, expected, find, name},
 };
-use crate::report::tradeoff::{Measure, Phase, Point, PointStage, Setting};
 
 /// Share of the budget that bases and single knobs may take before combinations have had
 /// their turn.

@@ -5,11 +5,11 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::FILES;
-use crate::{
-    report::tradeoff::{Phase, Point, Subject, TRADEOFF_VERSION, Tradeoff},
-    run::{RunError, files},
+use super::{
+    FILES,
+    report::{Phase, Point, Subject, TRADEOFF_VERSION, Tradeoff},
 };
+use crate::run::{RunError, files};
 
 /// Locked while a sweep runs, and left behind empty.
 const LOCK: &str = "tradeoff.lock";
@@ -109,7 +109,7 @@ fn read(text: &str, subject: &Subject) -> Result<Tradeoff, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::tradeoff::PointStage;
+    use crate::tradeoff::report::PointStage;
 
     fn subject() -> Subject {
         Subject {
