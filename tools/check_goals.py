@@ -91,7 +91,7 @@ def main() -> int:
                 scene,
                 f"`--target-psnr {target}`",
                 ["--target-psnr", str(target), "--preset", arguments.preset],
-                lambda report, seconds: f"{report['luma']['goal']['attempts']} attempts",
+                lambda report, seconds: f"{psnr(report) - target:+.2f} dB",
             )
         for flat in flats:
             row(

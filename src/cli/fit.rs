@@ -13,6 +13,7 @@ use super::{
     progress::Progress,
 };
 use crate::chroma::teacher::TeacherSettings;
+use crate::luma::Goal;
 use crate::report::timings_table;
 use crate::run::{AheadOptions, FitOptions, Preset, fit};
 
@@ -38,7 +39,7 @@ pub struct Fit {
     /// --preset, no more work than that.
     #[arg(long, value_name = "MIN", value_parser = minutes, conflicts_with = "iterations")]
     time_limit: Option<f64>,
-    /// Try with more and more work until held-out views have this PSNR in dB; at most that of
+    /// End once held-out views have this PSNR in dB, and have settled; at most with the work of
     /// --preset [default: paper].
     #[arg(long, value_name = "DB", value_parser = decibels, conflicts_with = "iterations")]
     target_psnr: Option<f64>,
@@ -71,16 +72,21 @@ pub struct Fit {
 impl Fit {
     pub(super) fn run(self) -> Result<(), CliError> {
         let mut progress = Progress::default();
+        let seconds = self.time_limit.map(|minutes| 60.0 * minutes);
+        let goal = match (self.target_psnr, seconds) {
+            (Some(psnr), within) => Goal::Reach { psnr, within },
+            (None, Some(seconds)) => Goal::Within { seconds },
+            (None, None) => Goal::Fixed,
+        };
         let options = FitOptions {
             colmap_dir: self.colmap_dir,
             output: self.output,
             preset: self.preset,
-            settings: Box::new(move |settings| self.luma.apply(settings)),
+            settings: self.luma.overlay()?,
             load: self.photos.options(),
             overrules: self.effects.overrules(),
             init: self.init,
-            time_limit: self.time_limit.map(|minutes| 60.0 * minutes),
-            target_psnr: self.target_psnr,
+            goal,
             measure_side: self.measure_side,
             timings: self.timings,
             ahead: AheadOptions {

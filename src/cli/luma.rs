@@ -1,8 +1,14 @@
 //! Options that overlay the settings of stage 1.
 
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
 use clap::{Args, ValueEnum};
 
 use crate::luma::{Densification, FLAT, LumaSettings, Numerics};
+use crate::run::{Overlay, RunError};
 
 /// What is asked for instead of the preset's settings.
 #[derive(Args)]
@@ -25,8 +31,8 @@ pub(super) struct LumaArguments {
     memory_limit: Option<u32>,
     /// End where twice the iterations would bring less than so many dB on held-out views
     /// (0.1 if no number follows), with what was best on the way [default: 0.3 in the preset
-    /// balanced, 0.1 in paper, unless --iterations, --time-limit or --target-psnr says how much
-    /// is to be done; else never].
+    /// balanced, 0.1 in paper, unless --iterations or --time-limit says how much is to be done;
+    /// else never]. With --target-psnr only where that will not be reached.
     #[arg(long, value_name = "DB", num_args = 0..=1, require_equals = true, value_parser = decibels)]
     stop_when_flat: Option<Option<f64>>,
     /// How accurately training computes: alpha-min=0.00001..0.1, transmittance-min=0..0.5,
@@ -37,11 +43,28 @@ pub(super) struct LumaArguments {
     /// Seed of every random choice: same seed, same bytes [default: 0].
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
+    /// Settings to start from instead of the preset's, as `luma.settings` of a report.
+    #[arg(long, value_name = "FILE.json", hide = true)]
+    settings: Option<PathBuf>,
 }
 
 impl LumaArguments {
+    /// What changes the preset's settings.
+    ///
+    /// # Errors
+    /// [`RunError::File`] when there is a file of settings that holds none.
+    pub(super) fn overlay(self) -> Result<Overlay, RunError> {
+        let file = self.settings.as_deref().map(read).transpose()?;
+        Ok(Box::new(move |settings| {
+            if let Some(file) = &file {
+                settings.clone_from(file);
+            }
+            self.apply(settings);
+        }))
+    }
+
     /// Puts what was given in the place of what is there.
-    pub(super) fn apply(&self, settings: &mut LumaSettings) {
+    fn apply(&self, settings: &mut LumaSettings) {
         if let Some(iterations) = self.iterations {
             settings.iterations = iterations as usize;
             // Who says how many iterations wants them all.
@@ -72,6 +95,19 @@ impl LumaArguments {
             settings.seed = seed;
         }
     }
+}
+
+/// The settings in a file.
+fn read(path: &Path) -> Result<LumaSettings, RunError> {
+    let file = |reason| RunError::File {
+        path: path.to_owned(),
+        reason,
+    };
+    let text = fs::read_to_string(path).map_err(|error| file(error.to_string()))?;
+    let settings: LumaSettings = serde_json::from_str(&text)
+        .map_err(|error| file(format!("no settings of luma: {error}")))?;
+    settings.check().map_err(file)?;
+    Ok(settings)
 }
 
 /// Ways in which Gaussians come and go.

@@ -4,7 +4,10 @@ use std::path::PathBuf;
 
 use clap::{Args, builder::PossibleValuesParser};
 
-use super::{CliError, effects::EffectArguments, photos::Photos, print, progress::Progress};
+use super::{
+    CliError, effects::EffectArguments, luma::LumaArguments, photos::Photos, print,
+    progress::Progress,
+};
 use crate::run::Preset;
 use crate::tradeoff::{FILES, PointStage, TradeoffOptions, front_table, knob_names, tradeoff};
 
@@ -24,12 +27,8 @@ pub struct Tradeoff {
     /// What knobs are turned around [default: paper on a GPU, draft without one].
     #[arg(long, value_enum)]
     preset: Option<Preset>,
-    /// Luma iterations of the base, instead of the preset's.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
-    iterations: Option<u32>,
-    /// Most Gaussians of the base, instead of the preset's.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
-    max_splats: Option<u32>,
+    #[command(flatten)]
+    luma: LumaArguments,
     /// Minutes that all points may take together, earlier starts included; the base runs
     /// anyway.
     #[arg(long, value_name = "MINUTES", default_value_t = 30.0, value_parser = minutes)]
@@ -53,8 +52,7 @@ impl Tradeoff {
             colmap_dir: self.colmap_dir,
             output: self.output,
             preset: self.preset,
-            iterations: self.iterations.map(|n| n as usize),
-            max_splats: self.max_splats.map(|n| n as usize),
+            settings: self.luma.overlay()?,
             load: self.photos.options(),
             overrules: self.effects.overrules(),
             teacher: self.teacher,

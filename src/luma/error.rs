@@ -13,6 +13,9 @@ pub enum LumaError {
     /// A photo.
     #[error(transparent)]
     Capture(#[from] CaptureError),
+    /// Whoever was told of the progress wanted it to end.
+    #[error("cancelled")]
+    Cancelled,
     /// There is nothing to train on.
     #[error("no view to train on")]
     NoViews,

@@ -61,7 +61,17 @@ impl FromStr for Numerics {
 
     /// Reads `KEY=VALUE[,KEY=VALUE…]`; what is not named keeps its default.
     fn from_str(text: &str) -> Result<Self, String> {
-        let mut numerics = Self::default();
+        Self::default().with(text)
+    }
+}
+
+impl Numerics {
+    /// The same but for what `KEY=VALUE[,KEY=VALUE…]` names.
+    ///
+    /// # Errors
+    /// What is wrong, with all keys and values that there are.
+    pub fn with(self, text: &str) -> Result<Self, String> {
+        let mut numerics = self;
         for pair in text.split(',') {
             let taken = pair.split_once('=').and_then(|(key, value)| {
                 let raster = &mut numerics.raster;

@@ -156,6 +156,23 @@ impl LumaSettings {
         };
     }
 
+    /// Whether a training is possible with it.
+    ///
+    /// # Errors
+    /// What is out of its range.
+    pub fn check(&self) -> Result<(), String> {
+        let ranges = [
+            ("iterations", self.iterations >= 1, "1 or more"),
+            ("max_splats", self.max_splats >= 1, "1 or more"),
+            ("sh_degree", self.sh_degree <= 3, "0 to 3"),
+            ("coarse", (0.0..=1.0).contains(&self.coarse), "0 to 1"),
+        ];
+        match ranges.iter().find(|(_, holds, _)| !holds) {
+            Some((name, _, range)) => Err(format!("{name}: must be {range}")),
+            None => Ok(()),
+        }
+    }
+
     /// How the scene is drawn.
     pub fn raster_options(&self) -> RasterOptions {
         RasterOptions {
@@ -189,6 +206,9 @@ mod tests {
             serde_json::from_str::<LumaSettings>(&text).unwrap(),
             settings
         );
+        assert_eq!(settings.check(), Ok(()));
+        settings.sh_degree = 4;
+        assert!(settings.check().unwrap_err().contains("sh_degree"));
         let unknown = text.replacen("\"seed\"", "\"sede\"", 1);
         let error = serde_json::from_str::<LumaSettings>(&unknown).unwrap_err();
         assert!(error.to_string().contains("sede"), "{error}");

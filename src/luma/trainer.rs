@@ -15,7 +15,7 @@ mod watch;
 
 pub use watch::Look;
 
-use std::{sync::Arc, time::Instant};
+use std::{ops::ControlFlow, sync::Arc, time::Instant};
 
 use watch::Watch;
 
@@ -189,6 +189,20 @@ impl LumaTrainer {
     /// # Errors
     /// [`GpuError`] when the device runs out of room or is lost.
     pub fn train(&mut self, observe: &mut dyn FnMut(LumaProgress)) -> Result<(), LumaError> {
+        self.train_while(&mut |progress| {
+            observe(progress);
+            ControlFlow::Continue(())
+        })
+    }
+
+    /// [`Self::train`], unless `observe` says that it is enough: what is trained by then stays.
+    ///
+    /// # Errors
+    /// As there, and [`LumaError::Cancelled`].
+    pub fn train_while(
+        &mut self,
+        observe: &mut dyn FnMut(LumaProgress) -> ControlFlow<()>,
+    ) -> Result<(), LumaError> {
         let begun = Instant::now();
         self.pace = Pace::default();
         let mut iteration = 0;
@@ -238,6 +252,7 @@ impl LumaTrainer {
             if looks {
                 let seconds = begun.elapsed().as_secs_f64() - self.watch.seconds;
                 self.look(iteration, seconds)?;
+                self.settle_when_reached(iteration);
                 if let Some(best) = self.stop_when_flat(iteration)? {
                     iteration = best;
                     self.pace.back_to(best, begun.elapsed().as_secs_f64());
@@ -422,8 +437,8 @@ impl LumaTrainer {
         &mut self,
         report: Report,
         begun: &Instant,
-        observe: &mut dyn FnMut(LumaProgress),
-    ) -> Result<Option<usize>, GpuError> {
+        observe: &mut dyn FnMut(LumaProgress) -> ControlFlow<()>,
+    ) -> Result<Option<usize>, LumaError> {
         let status = report.status.wait(&self.gpu)?;
         if let Some(needed) = status.overflow {
             let done = self.base + status.steps;
@@ -443,7 +458,7 @@ impl LumaTrainer {
         }
         let since = (report.iteration - 1) / SYNC_EVERY * SYNC_EVERY;
         let recent = &losses[..report.iteration - since];
-        observe(LumaProgress {
+        let told = observe(LumaProgress {
             iteration: report.iteration,
             end: self.schedule.end,
             loss: recent.iter().map(|&loss| f64::from(loss)).sum::<f64>() / recent.len() as f64,
@@ -453,6 +468,9 @@ impl LumaTrainer {
             seconds: all_seconds - self.watch.seconds,
             looked: self.watch.last(),
         });
-        Ok(None)
+        match told {
+            ControlFlow::Continue(()) => Ok(None),
+            ControlFlow::Break(()) => Err(LumaError::Cancelled),
+        }
     }
 }

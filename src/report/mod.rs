@@ -24,7 +24,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::{
     capture::{Exposure, LoadOptions},
-    luma::{CurvePoint, LumaSettings, Preset},
+    luma::{CurvePoint, Goal, LumaSettings, Preset},
     measure::DeltaE,
 };
 
@@ -115,8 +115,8 @@ pub struct LumaReport {
     /// Loss at the end.
     #[serde(deserialize_with = "number_or_nan")]
     pub loss: f64,
-    /// What the amount of work followed from, besides the preset.
-    pub goal: GoalReport,
+    /// What was to end the run; its seconds are those of all of it.
+    pub goal: Goal,
     /// Wall seconds.
     pub seconds: LumaSeconds,
     /// Largest resident memory of the process in bytes, where the system tells.
@@ -130,8 +130,8 @@ pub struct LumaReport {
     pub exposures: Vec<ViewExposure>,
     /// What the training gained with time.
     pub curve: Vec<CurvePoint>,
-    /// Views of which up to three were looked at for it: `test`, or `train` without
-    /// held-out ones.
+    /// Views of which up to three were looked at for it, or all held-out ones where these have
+    /// a PSNR to reach: `test`, or `train` without held-out ones.
     pub curve_on: String,
     /// Longer side at which held-out views were measured, where it is not that of training.
     pub measured_side: Option<u32>,
@@ -155,19 +155,8 @@ pub struct LumaSeconds {
     pub curve: f64,
     /// Measuring on held-out views.
     pub measure: f64,
-    /// The whole run but for writing its files, with attempts that were given up.
+    /// The whole run but for writing its files.
     pub all: f64,
-}
-
-/// What the amount of work of stage 1 followed from, besides the preset.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct GoalReport {
-    /// Seconds that the whole run was allowed.
-    pub time_limit: Option<f64>,
-    /// PSNR in dB that was to be reached.
-    pub target_psnr: Option<f64>,
-    /// Trainings from the start, each with more work; the last or the best one counts.
-    pub attempts: usize,
 }
 
 /// Quality of gray pictures.

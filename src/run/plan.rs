@@ -1,15 +1,16 @@
 //! `plan`: which effects a capture calls for.
 
-use std::{path::PathBuf, sync::Arc};
+use std::{ops::ControlFlow, path::PathBuf, sync::Arc};
 
 use super::{
     Observer, Preset, RunError,
-    fit::{open_gpu, planned},
-    scene::{examine, open},
+    fit::open_gpu,
+    scene::{examine, open, tell_trial},
 };
 use crate::{
     capture::LoadOptions,
     effects::{Overrules, Plan},
+    luma::planned,
     raster::Raster,
 };
 
@@ -45,6 +46,9 @@ pub fn plan(options: &PlanOptions, observe: &mut Observer<'_>) -> Result<Plan, R
         preset.work().room(),
         &options.overrules,
         raster,
-        observe,
+        &mut |progress| {
+            tell_trial(&progress, observe);
+            ControlFlow::Continue(())
+        },
     )
 }

@@ -10,6 +10,7 @@ use crate::{
     capture::{Camera, CaptureError, Dataset, LoadOptions, Notice, Photo, Rejected},
     effects::{Evidence, Survey},
     gpu::GpuError,
+    luma::TrialProgress,
     raster::{Field, Geometry, Raster, RasterOptions, Renderer, constants::NEAR_SHARE},
     splats::{ShField, Splats, ply},
 };
@@ -95,6 +96,21 @@ pub(super) fn examine(dataset: &Dataset, observe: &mut Observer<'_>) -> Result<E
     })?;
     tell_not_finite(dataset, observe);
     Ok(survey.finish())
+}
+
+/// Tells how far a trial is.
+pub(super) fn tell_trial(progress: &TrialProgress, observe: &mut Observer<'_>) {
+    let message = if progress.exposed {
+        "with exposures"
+    } else {
+        "without"
+    };
+    observe(Event::Progress {
+        stage: Stage::Trial,
+        done: progress.done,
+        total: progress.total,
+        message: message.to_owned(),
+    });
 }
 
 fn tell_not_finite(dataset: &Dataset, observe: &mut Observer<'_>) {

@@ -4,10 +4,25 @@ use super::{
     report::{PointStage, Setting},
     space::Value,
 };
-use crate::{chroma::ChromaSettings, report::Report, run::Work};
+use crate::{
+    chroma::ChromaSettings,
+    luma::{Densification, LumaSettings},
+    report::Report,
+    run::{Preset, Work},
+};
 
 /// An option of `fit` or `colorize` and its value.
-pub(super) type Turn = (&'static str, String);
+pub(super) type Given = (&'static str, Option<String>);
+
+/// What turning a knob to a value changes.
+enum Turn {
+    /// The settings of luma.
+    Luma(fn(&mut LumaSettings, &str)),
+    /// What one option says of `fit` or `colorize`.
+    Option(&'static str),
+    /// What several options say.
+    Options(fn(&str) -> Vec<Given>),
+}
 
 /// Something that trades quality for time.
 pub(super) struct Knob {
@@ -17,8 +32,8 @@ pub(super) struct Knob {
     pub stage: PointStage,
     /// Values to try, nearest to the base first.
     values: fn(&Around) -> Vec<String>,
-    /// The options that a value stands for.
-    turn: fn(&str) -> Vec<Turn>,
+    /// What a value stands for.
+    turn: Turn,
     /// The stage's time at a value over the base's, as long as nothing was measured.
     time: fn(&Around, &str) -> f64,
     /// Knobs that cannot be turned with it.
@@ -34,12 +49,10 @@ pub(super) struct Around {
     pub side: u32,
     /// Longer side of the largest photo, in pixels.
     pub largest_side: u32,
-    /// Cap on Gaussians.
-    pub max_splats: usize,
+    /// The settings of luma.
+    pub luma: LumaSettings,
     /// Gaussians that there were at the end.
     pub splats: usize,
-    /// Degree of the luma harmonics.
-    pub sh_degree: u32,
     /// Iterations that Adam takes for chroma.
     pub adam: usize,
     /// The names of the other presets, and the work of each over the base's.
@@ -69,9 +82,8 @@ impl Around {
             iterations: base.luma.iterations,
             side: cap.min(largest_side),
             largest_side,
-            max_splats: base.luma.settings.max_splats,
+            luma: base.luma.settings.clone(),
             splats: base.luma.splats,
-            sh_degree: base.luma.settings.sh_degree,
             adam,
             presets: Vec::new(),
             color: None,
@@ -102,7 +114,7 @@ impl Around {
 
     /// Whether its cap kept the base from having more Gaussians.
     fn reaches_cap(&self) -> bool {
-        self.splats as f64 > 0.9 * self.max_splats as f64
+        self.splats as f64 > 0.9 * self.luma.max_splats as f64
     }
 
     /// With what the coloured base's report says.
@@ -131,7 +143,11 @@ const KNOBS: &[Knob] = &[
         name: YARDSTICK_OF_LUMA,
         stage: PointStage::Luma,
         values: |around| scaled(around.iterations, &[0.5, 2.0, 0.25]),
-        turn: |value| vec![("--iterations", value.to_owned())],
+        turn: Turn::Luma(|settings, value| {
+            settings.iterations = number(value) as usize;
+            // All of them.
+            settings.stop_when_flat = None;
+        }),
         time: |around, value| number(value) / around.iterations as f64,
         conflicts: &[],
     },
@@ -145,7 +161,7 @@ const KNOBS: &[Knob] = &[
                 .map(|(name, _)| (*name).to_owned())
                 .collect()
         },
-        turn: |value| vec![("--preset", value.to_owned())],
+        turn: Turn::Option("--preset"),
         time: |around, value| {
             let known = around.presets.iter().find(|(name, _)| *name == value);
             known.map_or(1.0, |(_, work)| *work)
@@ -161,7 +177,7 @@ const KNOBS: &[Knob] = &[
             let readable = |side: &String| number(side) >= f64::from(LEAST_SIDE);
             sides.into_iter().filter(fits).filter(readable).collect()
         },
-        turn: |value| vec![("--max-side", value.to_owned())],
+        turn: Turn::Option("--max-side"),
         time: |around, value| {
             let side = number(value) / f64::from(around.side);
             1.0 - PIXELS_SHARE + PIXELS_SHARE * side.powi(2)
@@ -172,14 +188,15 @@ const KNOBS: &[Knob] = &[
         name: "max-splats",
         stage: PointStage::Luma,
         values: |around| {
-            let mut values = scaled(around.splats.min(around.max_splats), &[0.5, 0.25]);
+            let cap = around.luma.max_splats;
+            let mut values = scaled(around.splats.min(cap), &[0.5, 0.25]);
             // A cap that is not reached does nothing when it is raised.
             if around.reaches_cap() {
-                values.extend(scaled(around.max_splats, &[2.0]));
+                values.extend(scaled(cap, &[2.0]));
             }
             values
         },
-        turn: |value| vec![("--max-splats", value.to_owned())],
+        turn: Turn::Luma(|settings, value| settings.max_splats = number(value) as usize),
         time: |around, value| {
             let splats = number(value) / around.splats.max(1) as f64;
             PIXELS_SHARE + (1.0 - PIXELS_SHARE) * splats
@@ -189,11 +206,11 @@ const KNOBS: &[Knob] = &[
     Knob {
         name: "sh-degree",
         stage: PointStage::Luma,
-        values: |around| others(&["0", "1", "2", "3"], &around.sh_degree.to_string()),
-        turn: |value| vec![("--sh-degree", value.to_owned())],
+        values: |around| others(&["0", "1", "2", "3"], &around.luma.sh_degree.to_string()),
+        turn: Turn::Option("--sh-degree"),
         time: |around, value| {
             let cost = |degree: f64| 1.0 + 0.05 * (degree + 1.0).powi(2);
-            cost(number(value)) / cost(f64::from(around.sh_degree))
+            cost(number(value)) / cost(f64::from(around.luma.sh_degree))
         },
         conflicts: &[],
     },
@@ -201,7 +218,7 @@ const KNOBS: &[Knob] = &[
         name: "coarse",
         stage: PointStage::Luma,
         values: |_| owned(&["0.25", "0.5"]),
-        turn: |value| vec![("--coarse", value.to_owned())],
+        turn: Turn::Luma(|settings, value| settings.coarse = number(value)),
         time: |_, value| 1.0 - 0.4 * number(value),
         conflicts: &[],
     },
@@ -209,7 +226,7 @@ const KNOBS: &[Knob] = &[
         name: "densify",
         stage: PointStage::Luma,
         values: |_| owned(&["relocate"]),
-        turn: |value| vec![("--densify", value.to_owned())],
+        turn: Turn::Luma(|settings, _| settings.densify_by(Densification::Relocate)),
         time: |_, _| 1.0,
         conflicts: &[],
     },
@@ -217,7 +234,7 @@ const KNOBS: &[Knob] = &[
         name: "solver",
         stage: PointStage::Color,
         values: |around| around.of_color(|_| owned(&["adam"])),
-        turn: |value| vec![("--solver", value.to_owned())],
+        turn: Turn::Option("--solver"),
         time: |_, _| 1.0,
         conflicts: &["rounds", "coarse-rounds", "until", "correct-views"],
     },
@@ -225,7 +242,7 @@ const KNOBS: &[Knob] = &[
         name: YARDSTICK_OF_COLOR,
         stage: PointStage::Color,
         values: |around| around.of_color(|color| scaled(color.rounds, &[0.5, 2.0, 0.25])),
-        turn: |value| vec![("--rounds", value.to_owned())],
+        turn: Turn::Option("--rounds"),
         time: |around, value| {
             let rounds = around.color.as_ref().map_or(1, |color| color.rounds);
             (1.0 + number(value) / rounds.max(1) as f64) / 2.0
@@ -236,7 +253,7 @@ const KNOBS: &[Knob] = &[
         name: "coarse-rounds",
         stage: PointStage::Color,
         values: |around| around.of_color(|color| scaled(color.coarse_rounds, &[0.5, 0.25, 2.0])),
-        turn: |value| vec![("--coarse-rounds", value.to_owned())],
+        turn: Turn::Option("--coarse-rounds"),
         // They take about half of the time, those at full size the rest: there are as many
         // Gaussians at every scale (docs/performance.md).
         time: |around, value| {
@@ -256,10 +273,10 @@ const KNOBS: &[Knob] = &[
             })
         },
         // Only Adam counts iterations.
-        turn: |value| {
-            let solver = ("--solver", "adam".to_owned());
-            vec![solver, ("--until", value.to_owned())]
-        },
+        turn: Turn::Options(|value| {
+            let given = |option, value: &str| (option, Some(value.to_owned()));
+            vec![given("--solver", "adam"), given("--until", value)]
+        }),
         time: |around, value| {
             (number(value) - around.iterations as f64) / around.adam.max(1) as f64
         },
@@ -269,7 +286,7 @@ const KNOBS: &[Knob] = &[
         name: "scales",
         stage: PointStage::Color,
         values: |around| around.of_color(|_| owned(&["1", "2"])),
-        turn: |value| vec![("--scales", value.to_owned())],
+        turn: Turn::Option("--scales"),
         time: |_, value| 1.0 + 0.25 * number(value),
         conflicts: &[],
     },
@@ -277,7 +294,7 @@ const KNOBS: &[Knob] = &[
         name: "chroma-degree",
         stage: PointStage::Color,
         values: |around| around.of_color(|_| owned(&["1", "2"])),
-        turn: |value| vec![("--sh-degree", value.to_owned())],
+        turn: Turn::Option("--sh-degree"),
         time: |_, value| 1.0 + 0.1 * number(value),
         conflicts: &[],
     },
@@ -290,7 +307,7 @@ const KNOBS: &[Knob] = &[
                 size.map_or(Vec::new(), |size| scaled(size, &[0.5, 1.5]))
             })
         },
-        turn: |value| vec![("--teacher-size", value.to_owned())],
+        turn: Turn::Option("--teacher-size"),
         time: |_, _| 1.0,
         conflicts: &[],
     },
@@ -300,20 +317,19 @@ const KNOBS: &[Knob] = &[
         values: |around| {
             around.of_color(|color| owned(&[if color.corrects_views { "off" } else { "on" }]))
         },
-        turn: |value| vec![("--correct-views", value.to_owned())],
+        turn: Turn::Option("--correct-views"),
         time: |_, _| 1.0,
         conflicts: &["solver", "until"],
     },
 ];
 
-/// Knobs of the arithmetic of luma, all of which turn one option of `fit`: what several
-/// of them say is joined by commas (see [`merged`]).
+/// Knobs of the arithmetic of luma.
 const NUMERIC_KNOBS: &[Knob] = &[
     Knob {
         name: "alpha-min",
         stage: PointStage::Luma,
         values: |_| owned(&["0.008", "0.016"]),
-        turn: |value| vec![(NUMERICS, format!("alpha-min={value}"))],
+        turn: Turn::Luma(|settings, value| numeric(settings, "alpha-min", value)),
         time: |_, _| 0.9,
         conflicts: &[],
     },
@@ -321,7 +337,7 @@ const NUMERIC_KNOBS: &[Knob] = &[
         name: "transmittance-min",
         stage: PointStage::Luma,
         values: |_| owned(&["0.001", "0.01"]),
-        turn: |value| vec![(NUMERICS, format!("transmittance-min={value}"))],
+        turn: Turn::Luma(|settings, value| numeric(settings, "transmittance-min", value)),
         time: |_, _| 0.95,
         conflicts: &[],
     },
@@ -329,7 +345,7 @@ const NUMERIC_KNOBS: &[Knob] = &[
         name: "depth-bits",
         stage: PointStage::Luma,
         values: |_| owned(&["24", "16"]),
-        turn: |value| vec![(NUMERICS, format!("depth-bits={value}"))],
+        turn: Turn::Luma(|settings, value| numeric(settings, "depth-bits", value)),
         time: |_, _| 0.95,
         conflicts: &[],
     },
@@ -337,7 +353,7 @@ const NUMERIC_KNOBS: &[Knob] = &[
         name: "storage",
         stage: PointStage::Luma,
         values: |_| owned(&["half"]),
-        turn: |value| vec![(NUMERICS, format!("storage={value}"))],
+        turn: Turn::Luma(|settings, value| numeric(settings, "storage", value)),
         time: |_, _| 1.0,
         conflicts: &[],
     },
@@ -345,7 +361,7 @@ const NUMERIC_KNOBS: &[Knob] = &[
         name: "ssim-window",
         stage: PointStage::Luma,
         values: |_| owned(&["7"]),
-        turn: |value| vec![(NUMERICS, format!("ssim-window={value}"))],
+        turn: Turn::Luma(|settings, value| numeric(settings, "ssim-window", value)),
         time: |_, _| 0.95,
         conflicts: &[],
     },
@@ -353,14 +369,11 @@ const NUMERIC_KNOBS: &[Knob] = &[
         name: "adam",
         stage: PointStage::Luma,
         values: |_| owned(&["lazy"]),
-        turn: |value| vec![(NUMERICS, format!("adam={value}"))],
+        turn: Turn::Luma(|settings, value| numeric(settings, "adam", value)),
         time: |_, _| 0.95,
         conflicts: &[],
     },
 ];
-
-/// The option that they turn.
-const NUMERICS: &str = "--numerics";
 
 /// Less than this `fit` refuses.
 const LEAST_SIDE: u32 = 16;
@@ -405,24 +418,40 @@ pub(super) fn values(around: &Around, wanted: &[String]) -> Vec<Value> {
         .collect()
 }
 
-/// The options that settings stand for, each once. Where two settings turn one option,
-/// their values are joined by a comma.
-pub(super) fn merged(settings: &[Setting]) -> Vec<Turn> {
-    joined(settings.iter().flat_map(|setting| {
-        let knob = knobs().find(|knob| knob.name == setting.knob);
-        knob.map_or(Vec::new(), |knob| (knob.turn)(&setting.value))
-    }))
+/// The knobs that settings turn, each with its value, in the order of the table: how many
+/// iterations there are comes before what depends on it.
+fn turned(settings: &[Setting]) -> impl Iterator<Item = (&'static Knob, &str)> {
+    knobs().filter_map(|knob| {
+        let setting = settings.iter().find(|setting| setting.knob == knob.name)?;
+        Some((knob, setting.value.as_str()))
+    })
 }
 
-fn joined(turns: impl Iterator<Item = Turn>) -> Vec<Turn> {
-    let mut merged: Vec<Turn> = Vec::new();
-    for (option, value) in turns {
-        match merged.iter_mut().find(|(known, _)| *known == option) {
-            Some((_, values)) => *values = format!("{values},{value}"),
-            None => merged.push((option, value)),
+/// The options that settings stand for.
+pub(super) fn options(settings: &[Setting]) -> Vec<Given> {
+    turned(settings)
+        .flat_map(|(knob, value)| match &knob.turn {
+            Turn::Luma(_) => Vec::new(),
+            Turn::Option(option) => vec![(*option, Some(value.to_owned()))],
+            Turn::Options(of) => of(value),
+        })
+        .collect()
+}
+
+/// Changes the settings of luma as settings of knobs say.
+pub(super) fn turn(luma: &mut LumaSettings, settings: &[Setting]) {
+    for (knob, value) in turned(settings) {
+        if let Turn::Luma(turn) = &knob.turn {
+            turn(luma, value);
         }
     }
-    merged
+}
+
+/// The preset that is a setting, if one is.
+pub(super) fn preset(settings: &[Setting]) -> Option<Preset> {
+    let (_, value) = turned(settings).find(|(knob, _)| knob.name == PRESET)?;
+    let mut presets = Preset::ALL.into_iter();
+    presets.find(|preset| preset.name() == value)
 }
 
 /// These multiples of a count, rounded, without the count itself and without repeats.
@@ -446,6 +475,12 @@ fn others(values: &[&str], base: &str) -> Vec<String> {
     let mut values = owned(values);
     values.retain(|value| value != base);
     values
+}
+
+/// Changes one of the numerics; the values of this table are such.
+fn numeric(settings: &mut LumaSettings, key: &str, value: &str) {
+    let changed = settings.numerics.with(&format!("{key}={value}"));
+    settings.numerics = changed.unwrap_or(settings.numerics);
 }
 
 /// The values of this table are numbers wherever one is needed.

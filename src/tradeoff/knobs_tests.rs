@@ -8,9 +8,8 @@ fn around() -> Around {
         iterations: 700,
         side: 400,
         largest_side: 500,
-        max_splats: 12_000,
+        luma: Preset::Draft.settings(),
         splats: 8_000,
-        sh_degree: 0,
         adam: 150,
         presets: vec![("balanced", 2.5), ("paper", 4.0)],
         color: None,
@@ -105,28 +104,57 @@ fn another_preset_is_as_much_work_as_its_amounts_say() {
     assert_eq!(times, [("balanced", 2.5), ("paper", 4.0)]);
 }
 
-#[test]
-fn an_option_is_given_once() {
-    let setting = |knob: &str, value: &str| Setting {
+fn setting(knob: &str, value: &str) -> Setting {
+    Setting {
         knob: knob.to_owned(),
         value: value.to_owned(),
-    };
+    }
+}
+
+#[test]
+fn a_setting_is_an_option_or_a_setting_of_luma() {
+    let settings = [setting("until", "775"), setting("scales", "1")];
+    let given = |option, value: &str| (option, Some(value.to_owned()));
     assert_eq!(
-        merged(&[setting("until", "775"), setting("scales", "1")]),
+        options(&settings),
         [
-            ("--solver", "adam".to_owned()),
-            ("--until", "775".to_owned()),
-            ("--scales", "1".to_owned())
+            given("--solver", "adam"),
+            given("--until", "775"),
+            given("--scales", "1")
         ]
     );
-    let two = [
-        ("--numbers", "a=1".to_owned()),
-        ("--numbers", "b=2".to_owned()),
+    let settings = [
+        setting("storage", "half"),
+        setting("densify", "relocate"),
+        setting("iterations", "4000"),
+        setting("alpha-min", "0.008"),
     ];
-    assert_eq!(
-        joined(two.into_iter()),
-        [("--numbers", "a=1,b=2".to_owned())]
-    );
+    assert!(options(&settings).is_empty());
+    let mut luma = Preset::Balanced.settings();
+    turn(&mut luma, &settings);
+    let mut wanted = LumaSettings {
+        iterations: 4_000,
+        stop_when_flat: None,
+        numerics: "alpha-min=0.008,storage=half".parse().expect("numerics"),
+        ..Preset::Balanced.settings()
+    };
+    wanted.densify_by(Densification::Relocate);
+    assert_eq!(luma, wanted);
+    assert_eq!(wanted.growth, 0.05, "as goes with 4,000 iterations");
+}
+
+#[test]
+fn every_value_of_luma_changes_something() {
+    let around = around();
+    for value in values(&around, &[]) {
+        let settings = [value.setting()];
+        let mut luma = around.luma.clone();
+        turn(&mut luma, &settings);
+        let changed = luma != around.luma || !options(&settings).is_empty();
+        assert!(changed, "{} {}", value.knob, value.value);
+    }
+    assert_eq!(preset(&[setting("preset", "paper")]), Some(Preset::Paper));
+    assert_eq!(preset(&[setting("scales", "1")]), None);
 }
 
 #[test]

@@ -20,8 +20,7 @@ pub use report::{PointStage, Tradeoff, front_table};
 use crate::{
     capture::{Capture, LoadOptions, split},
     effects::Overrules,
-    luma::LumaSettings,
-    run::{Event, Observer, Preset, RunError, RunFolder, Stage, Work, files, open_gpu},
+    run::{Event, Observer, Overlay, Preset, RunError, RunFolder, Stage, Work, files, open_gpu},
 };
 use knobs::Around;
 use pictures::Album;
@@ -31,7 +30,6 @@ use space::{Space, Task, base_name, find};
 use state::State;
 
 /// What `tradeoff` is asked to do; `None` leaves it to the preset.
-#[derive(Clone, Debug)]
 pub struct TradeoffOptions {
     /// The COLMAP folder.
     pub colmap_dir: PathBuf,
@@ -39,10 +37,8 @@ pub struct TradeoffOptions {
     pub output: Option<PathBuf>,
     /// The base; `paper` on a GPU and `draft` on a software adapter by default.
     pub preset: Option<Preset>,
-    /// Iterations of the base.
-    pub iterations: Option<usize>,
-    /// Cap on Gaussians of the base.
-    pub max_splats: Option<usize>,
+    /// What is asked of the base instead of its preset's settings.
+    pub settings: Overlay,
     /// How photos are loaded; some have to be held out.
     pub load: LoadOptions,
     /// Effects that are on or off in every point.
@@ -143,7 +139,7 @@ fn default_folder(colmap_dir: &Path) -> PathBuf {
 /// The next point: what there is to try follows from the bases' reports.
 fn next(
     options: &TradeoffOptions,
-    bench: &Bench,
+    bench: &Bench<'_>,
     sweep: &Tradeoff,
     preset: Preset,
     largest_side: u32,
@@ -157,16 +153,7 @@ fn next(
     if done(PointStage::Luma) {
         let adam = preset.adam_iterations();
         let mut around = Around::new(&report(PointStage::Luma)?, largest_side, adam);
-        let asked = |preset: Preset| {
-            let overlay = |settings: &mut LumaSettings| {
-                if let Some(iterations) = options.iterations {
-                    settings.iterations = iterations;
-                    settings.stop_when_flat = None;
-                }
-                settings.max_splats = options.max_splats.unwrap_or(settings.max_splats);
-            };
-            Work::asked(preset, &overlay, options.load.max_side)
-        };
+        let asked = |preset: Preset| Work::asked(preset, &options.settings, options.load.max_side);
         let others = Preset::ALL.into_iter().filter(|&other| other != preset);
         around.presets = others
             .map(|other| (other.name(), around.work(&asked(other), &asked(preset))))
@@ -182,7 +169,7 @@ fn next(
 
 /// Runs a point, and tells how far the budget is spent.
 fn run(
-    bench: &Bench,
+    bench: &Bench<'_>,
     task: &Task,
     sweep: &Tradeoff,
     observe: &mut Observer<'_>,

@@ -10,15 +10,16 @@ use clap::ValueEnum;
 
 use super::{
     TradeoffError, TradeoffOptions, child,
-    knobs::merged,
-    report::{Outcome, Point, PointStage, Seconds, Subject},
+    knobs::{self, Given},
+    report::{Outcome, Point, PointStage, Seconds, Setting, Subject},
     space::{Task, base_name, find},
 };
 use crate::{
     capture::{LoadOptions, MaskSource, Normalize},
     effects::Overrules,
+    luma::LumaSettings,
     report::{Evaluation, Method},
-    run::{Preset, RunError, RunFolder, files},
+    run::{Overlay, Preset, RunError, RunFolder, files},
 };
 
 /// The option of `fit` for the longer side at which held-out views are measured: only
@@ -28,11 +29,11 @@ const MEASURE_SIDE: &str = "--measure-side";
 /// Frames of `eval`'s path, of which nothing is used: as few as it takes.
 const FRAMES: &str = "2";
 
-/// An option and its value, if it takes one.
-type Given = (&'static str, Option<String>);
+/// The settings of luma of a point, in its folder.
+const SETTINGS: &str = "settings.json";
 
 /// Where points run.
-pub(super) struct Bench {
+pub(super) struct Bench<'a> {
     /// `points/` of the sweep, absolute.
     points: PathBuf,
     /// The COLMAP folder, absolute.
@@ -40,19 +41,21 @@ pub(super) struct Bench {
     /// The teacher, absolute.
     teacher: Option<PathBuf>,
     preset: Preset,
+    /// What the base has of luma's settings instead of its preset's.
+    overlay: &'a Overlay,
     /// Options of every `fit` but for what a setting overrules.
     options: Vec<Given>,
     /// Longer side at which the base sees photos.
     side: u32,
 }
 
-impl Bench {
+impl<'a> Bench<'a> {
     /// The bench of a sweep in `folder`.
     ///
     /// # Errors
     /// [`RunError::File`] when a file is missing.
     pub fn new(
-        options: &TradeoffOptions,
+        options: &'a TradeoffOptions,
         folder: &Path,
         preset: Preset,
         largest_side: u32,
@@ -64,10 +67,9 @@ impl Bench {
             scene: absolute(&options.colmap_dir)?,
             teacher: options.teacher.as_deref().map(absolute).transpose()?,
             preset,
+            overlay: &options.settings,
             options: [
                 vec![("--preset", Some(preset.name().to_owned()))],
-                given(options.iterations, "--iterations"),
-                given(options.max_splats, "--max-splats"),
                 load_options(&options.load)?,
                 overruled(&options.overrules),
             ]
@@ -84,8 +86,18 @@ impl Bench {
             scene: text(&self.scene)?,
             preset: self.preset.name().to_owned(),
             teacher: self.teacher.as_deref().map(text).transpose()?,
+            luma: self.luma(&[]),
             options: spelled(&self.options),
         })
+    }
+
+    /// The settings of luma of a point.
+    fn luma(&self, settings: &[Setting]) -> LumaSettings {
+        let preset = knobs::preset(settings).unwrap_or(self.preset);
+        let mut luma = preset.settings();
+        (self.overlay)(&mut luma);
+        knobs::turn(&mut luma, settings);
+        luma
     }
 
     /// A point's run folder.
@@ -118,8 +130,13 @@ impl Bench {
             fs::remove_dir_all(folder.path()).map_err(files::at(folder.path()))?;
         }
         files::make_folder(folder.path())?;
-        if task.stage == PointStage::Color {
-            self.begin_from_base(&task.name)?;
+        match task.stage {
+            PointStage::Color => self.begin_from_base(&task.name)?,
+            PointStage::Luma => {
+                let luma = serde_json::to_vec_pretty(&self.luma(&task.settings));
+                // Plain structs with string keys: serializing them cannot fail.
+                files::write(&folder.path().join(SETTINGS), &luma.unwrap_or_default())?;
+            }
         }
         let commands = self.commands(task)?;
         let log = folder.path().join("stderr.txt");
@@ -164,9 +181,7 @@ impl Bench {
     fn commands(&self, task: &Task) -> Result<Vec<Vec<String>>, RunError> {
         let folder = text(self.folder(&task.name).path())?;
         let owned = |words: &[&str]| words.iter().map(|&w| w.to_owned()).collect::<Vec<_>>();
-        let turned: Vec<Given> = (merged(&task.settings).into_iter())
-            .map(|(option, value)| (option, Some(value)))
-            .collect();
+        let turned = knobs::options(&task.settings);
         let pictures = text(&self.pictures(&task.name))?;
         let render = owned(&["render", &folder, "-o", &pictures]);
         Ok(match (task.stage, &self.teacher) {
@@ -181,7 +196,9 @@ impl Bench {
                 options.retain(|(option, _)| !overruled(option));
                 options.extend(turned.clone());
                 options.push((MEASURE_SIDE, Some(self.side.to_string())));
-                let fit = owned(&["fit", &text(&self.scene)?, "-o", &folder]);
+                let settings = text(&self.folder(&task.name).path().join(SETTINGS))?;
+                let scene = text(&self.scene)?;
+                let fit = owned(&["fit", &scene, "-o", &folder, "--settings", &settings]);
                 vec![[fit, spelled(&options)].concat(), render]
             }
         })
@@ -333,13 +350,9 @@ fn link(from: &Path, to: &Path) -> Result<(), RunError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{
-        capture::Channel,
-        effects::Effect,
-        tradeoff::report::{Phase, Setting},
-    };
+    use crate::{capture::Channel, effects::Effect, tradeoff::report::Phase};
 
-    fn bench() -> Bench {
+    fn bench(overlay: &Overlay) -> Bench<'_> {
         let load = LoadOptions {
             max_side: Some(64),
             channel: Channel::R,
@@ -355,6 +368,7 @@ mod tests {
             scene: PathBuf::from("/my scene"),
             teacher: Some(PathBuf::from("/t.onnx")),
             preset: Preset::Draft,
+            overlay,
             options: [load_options(&load).expect("paths"), overruled(&overrules)].concat(),
             side: 64,
         }
@@ -375,11 +389,12 @@ mod tests {
 
     #[test]
     fn a_setting_takes_the_place_of_the_bases_option() {
-        let commands = bench().commands(&task(PointStage::Luma, "max-side", "48"));
+        let overlay: Overlay = Box::new(|_| {});
+        let commands = bench(&overlay).commands(&task(PointStage::Luma, "max-side", "48"));
         let commands = commands.expect("paths");
         assert_eq!(
             commands[0].join(" "),
-            "fit /my scene -o /out/points/here --channel r --normalize=-1,2 \
+            "fit /my scene -o /out/points/here --settings /out/points/here/settings.json --channel r --normalize=-1,2 \
              --without background --max-side 48 --measure-side 64"
         );
         assert_eq!(commands[1][0], "render");
@@ -387,8 +402,20 @@ mod tests {
     }
 
     #[test]
+    fn luma_is_the_presets_overlaid_and_turned() {
+        let overlay: Overlay = Box::new(|settings| settings.max_splats = 70);
+        let bench = bench(&overlay);
+        let turned = task(PointStage::Luma, "iterations", "9").settings;
+        let luma = bench.luma(&turned);
+        assert_eq!((luma.iterations, luma.max_splats), (9, 70));
+        let paper = bench.luma(&task(PointStage::Luma, "preset", "paper").settings);
+        assert_eq!((paper.sh_degree, paper.max_splats), (3, 70));
+    }
+
+    #[test]
     fn a_point_in_colour_is_coloured_and_measured() {
-        let commands = bench().commands(&task(PointStage::Color, "until", "900"));
+        let overlay: Overlay = Box::new(|_| {});
+        let commands = bench(&overlay).commands(&task(PointStage::Color, "until", "900"));
         let commands = commands.expect("paths");
         assert_eq!(
             commands[0].join(" "),

@@ -94,6 +94,7 @@ fn read(text: &str, subject: &Subject) -> Result<Tradeoff, String> {
         ("scene", there.scene != subject.scene),
         ("preset", there.preset != subject.preset),
         ("teacher", there.teacher != subject.teacher),
+        ("settings of luma", there.luma != subject.luma),
         ("set of options of fit", there.options != subject.options),
     ];
     match differs.iter().find(|(_, differs)| *differs) {
@@ -109,13 +110,14 @@ fn read(text: &str, subject: &Subject) -> Result<Tradeoff, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tradeoff::report::PointStage;
+    use crate::{luma::LumaSettings, tradeoff::report::PointStage};
 
     fn subject() -> Subject {
         Subject {
             scene: "/garden".to_owned(),
             preset: "draft".to_owned(),
             teacher: None,
+            luma: LumaSettings::new(9),
             options: vec!["--channel".to_owned(), "r".to_owned()],
         }
     }
@@ -172,10 +174,11 @@ mod tests {
             .and_then(|state| state.write())
             .expect("written");
         type Change = (&'static str, fn(&mut Subject));
-        let changes: [Change; 4] = [
+        let changes: [Change; 5] = [
             ("scene", |s| s.scene.push('2')),
             ("preset", |s| s.preset = "paper".to_owned()),
             ("teacher", |s| s.teacher = Some("/t".to_owned())),
+            ("settings", |s| s.luma.iterations += 1),
             ("options", |s| s.options.clear()),
         ];
         for (what, change) in changes {

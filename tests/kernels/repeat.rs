@@ -375,6 +375,43 @@ fn losses_outlive_a_change_of_the_set() {
     assert!(at_50(&same) > 0.01 && at_50(&changed) == at_50(&same));
 }
 
+/// A training settles and ends where its views are as good as was asked for; what asks for
+/// more than there is changes nothing.
+#[test]
+fn a_target_ends_a_training() {
+    let [start, target] = start_and_target();
+    let run = |psnr: Option<f64>| {
+        let settings = LumaSettings {
+            iterations: 200,
+            max_splats: start.len(),
+            ..settings(&start)
+        };
+        let schedule = Schedule::of(&settings);
+        let mut trainer = trainer_by(settings, schedule, 4.0, &start, photos(&target));
+        if let Some(psnr) = psnr {
+            trainer.aim(Goal::Reach { psnr, within: None });
+        }
+        trainer.watch(photos(&target)).unwrap();
+        trainer.train(&mut |_| {}).unwrap();
+        trainer
+    };
+    let [fixed, too_much] = [None, Some(90.0)].map(run);
+    assert!(same(&fixed.splats().unwrap(), &too_much.splats().unwrap()));
+    let looks = |trainer: &LumaTrainer| -> Vec<(usize, f64)> {
+        let looks = trainer.curve().iter();
+        looks.map(|look| (look.iteration, look.psnr)).collect()
+    };
+    let wanted = looks(&fixed)[2].1;
+    let reached = run(Some(wanted));
+    let looks = looks(&reached);
+    // Seen after 75 iterations, or where an earlier look was no worse.
+    let (at, _) = *looks.iter().find(|look| look.1 >= wanted).unwrap();
+    assert!(at <= 75, "{looks:?}");
+    assert_eq!(reached.schedule().end, at + at.div_ceil(5));
+    assert_eq!(reached.schedule().settle_from, at);
+    assert!(looks.last().unwrap().1 >= wanted, "{looks:?}");
+}
+
 /// A time limit moves the end either way, and what is flat ends whatever time is left.
 #[test]
 fn a_time_limit_moves_the_end() {

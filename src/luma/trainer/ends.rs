@@ -38,6 +38,27 @@ impl LumaTrainer {
         }
     }
 
+    /// Lets the run settle where the watched views are as good as the goal asks.
+    pub(super) fn settle_when_reached(&mut self, iteration: usize) {
+        let wanted = self.goal.psnr().unwrap_or(f64::INFINITY);
+        let reached = self.watch.last().is_some_and(|look| look.psnr >= wanted);
+        // What ends while photos are small would have seen nothing else.
+        if reached && iteration > self.schedule.coarse_until {
+            self.schedule.settle_at(iteration);
+            self.longest = self.schedule.end;
+        }
+    }
+
+    /// Whether the goal's PSNR will be reached by the end of the schedule, where every doubling
+    /// of the iterations brings `gain` dB.
+    fn will_reach(&self, iteration: usize, gain: f64) -> bool {
+        let doublings = (self.schedule.end as f64 / iteration as f64).log2();
+        let expected = self.watch.last().map(|look| look.psnr + gain * doublings);
+        self.goal
+            .psnr()
+            .is_some_and(|wanted| expected >= Some(wanted))
+    }
+
     /// Lets the run settle where little is left to gain, from where it was best: when it has
     /// gone back there, the iteration that it goes on from.
     pub(super) fn stop_when_flat(&mut self, iteration: usize) -> Result<Option<usize>, GpuError> {
@@ -58,7 +79,8 @@ impl LumaTrainer {
         // Nothing would be gained while photos are small, and much by the first look after it;
         // harmonics that are yet to come only make a curve steeper.
         let counts = curve.partition_point(|look| look.iteration <= schedule.coarse_until);
-        let flat = gain_of_doubling(&curve[counts..]).is_some_and(|gain| gain < threshold);
+        let flat = gain_of_doubling(&curve[counts..])
+            .is_some_and(|gain| gain < threshold && !self.will_reach(iteration, gain));
         if !flat || (iteration as f64) < early {
             return Ok(None);
         }

@@ -1,36 +1,31 @@
 //! `fit`: photos to geometry and luma.
 
 mod ahead;
-mod attempt;
-mod goal;
+mod budget;
 mod quality;
-mod start;
-mod target;
-mod told;
-mod trial;
+mod report;
+mod training;
 
 use std::{path::PathBuf, sync::Arc, time::Instant};
 
 use super::{
-    Event, Observer, Preset, RunError, RunFolder, files,
-    preset::Work,
+    Observer, Preset, RunError, RunFolder, files,
     scene::{examine, open},
 };
 use crate::{
     capture::LoadOptions,
     effects::{Effect, Overrules},
     gpu::Gpu,
-    luma::LumaSettings,
+    luma::{Goal, LumaSettings},
     raster::{Raster, RasterOptions},
     report::Report,
     splats::ply,
 };
 use ahead::Ahead;
 pub use ahead::AheadOptions;
-use attempt::Job;
-use goal::{Family, SURELY, level_of, preset_below};
-pub(super) use told::capture_report;
-pub(super) use trial::planned;
+use budget::Budget;
+pub(super) use report::capture_report;
+use training::{Job, Trained};
 
 /// Changes settings: what is asked for over what a preset or a time limit has chosen.
 pub type Overlay = Box<dyn Fn(&mut LumaSettings)>;
@@ -42,7 +37,7 @@ pub struct FitOptions {
     /// The run folder; `runs/<folder name>` by default.
     pub output: Option<PathBuf>,
     /// Amount of work; `paper` on a GPU and `draft` on a software adapter by default.
-    /// With a time limit or a target, the most that is tried, `paper` by default.
+    /// With another goal than a fixed one, the most that is tried, `paper` by default.
     pub preset: Option<Preset>,
     /// What is asked for instead of the preset's settings. Not the iterations together with a
     /// time limit or a target, nor what the plan of effects decides.
@@ -55,11 +50,9 @@ pub struct FitOptions {
     pub overrules: Overrules,
     /// Gaussians to start from.
     pub init: Option<PathBuf>,
-    /// Seconds that the whole run may take.
-    pub time_limit: Option<f64>,
-    /// PSNR of the held-out views, in dB, that is to be reached with as little work as it
-    /// takes.
-    pub target_psnr: Option<f64>,
+    /// What is to end the run; seconds are those of all of it. A PSNR is that of the held-out
+    /// views, or of some training views where none is held out.
+    pub goal: Goal,
     /// Whether the report says where the device's time went.
     pub timings: bool,
     /// Who is to colour the photos meanwhile.
@@ -78,8 +71,7 @@ impl FitOptions {
             measure_side: None,
             overrules: Overrules::default(),
             init: None,
-            time_limit: None,
-            target_psnr: None,
+            goal: Goal::Fixed,
             timings: false,
             ahead: AheadOptions::default(),
         }
@@ -97,7 +89,6 @@ pub fn fit(
 ) -> Result<(RunFolder, Report), RunError> {
     let begun = Instant::now();
     let gpu = open_gpu(options.timings)?;
-    let preset = choose_preset(options, &gpu, observe);
     let raster = Arc::new(Raster::new(&gpu));
     let folder = match &options.output {
         Some(path) => RunFolder::at(path),
@@ -105,25 +96,9 @@ pub fn fit(
     };
     files::make_folder(folder.path())?;
     let ahead = Ahead::open(&options.ahead, &folder)?;
-    let asked = Work::asked(preset, &options.settings, options.load.max_side);
-    let family = match options.time_limit.or(options.target_psnr) {
-        Some(_) => Some(Family::of(options, asked.max_side)?),
-        None => None,
-    };
-    let (mut level, mut each) = (level_of(preset), 0.0);
-    let mut work = asked.clone();
-    if let (Some(family), Some(limit), None) = (&family, options.time_limit, options.target_psnr) {
-        let seconds = SURELY * limit - begun.elapsed().as_secs_f64();
-        (level, each) = family.level_for(seconds, &raster, observe)?;
-        work = family.work(level);
-    }
-    if options.timings {
-        // What was rehearsed is no part of the run.
-        gpu.timings()?;
-    }
-
+    let budget = Budget::of(options, &raster, begun, observe)?;
     let load = LoadOptions {
-        max_side: work.max_side,
+        max_side: budget.work.max_side,
         lens: options.overrules.choice(Effect::Lens),
         ..options.load.clone()
     };
@@ -148,43 +123,29 @@ pub fn fit(
         evidence: &evidence,
         judge: judge.as_ref().unwrap_or(&*dataset),
         begun,
+        loading: begun.elapsed().as_secs_f64(),
     };
-    let loading = begun.elapsed().as_secs_f64();
-    let (attempt, attempts) = ahead.meanwhile(&dataset, observe, |observe| {
-        match (&family, options.target_psnr) {
-            (Some(family), Some(target)) => {
-                let reached = job.reach(target, family, observe)?;
-                level = reached.level;
-                Ok((reached.attempt, reached.attempts))
-            }
-            _ => {
-                let limit = job.time_for_training(each)?;
-                Ok((job.attempt(&work, limit, observe)?, 1))
-            }
-        }
-    })?;
-    let preset = match &family {
-        Some(_) => preset_below(level),
-        None => preset,
-    };
-    let missed = options
-        .target_psnr
-        .and_then(|target| attempt.misses(target));
-    let report = job.report(preset, loading, attempts, &attempt);
-    // The old colours do not belong to the new geometry.
+    let trained = ahead.meanwhile(&dataset, observe, |observe| job.train(&budget, observe))?;
+    let report = job.report(budget.preset, &trained);
+    write(&folder, &trained, &report)?;
+    match options.goal.psnr().and_then(|psnr| trained.misses(psnr)) {
+        Some(error) => Err(error),
+        None => Ok((folder, report)),
+    }
+}
+
+/// Writes the run's files in the place of those of an earlier one.
+fn write(folder: &RunFolder, trained: &Trained, report: &Report) -> Result<(), RunError> {
+    // The old colors do not belong to the new geometry.
     for stale in [folder.color(), folder.chroma(), folder.contact_sheet()] {
         files::remove(&stale)?;
     }
     folder.forget_evaluation()?;
-    let comments = comments(attempt.settings.raster_options());
+    let comments = comments(trained.scene.settings.raster_options());
     let origin = glam::DVec3::ZERO;
-    ply::write_ply(&folder.luma(), &attempt.splats, origin, &comments)?;
-    files::write(&folder.log(), attempt.log.as_bytes())?;
-    folder.write_report(&report)?;
-    match missed {
-        Some(error) => Err(error),
-        None => Ok((folder, report)),
-    }
+    ply::write_ply(&folder.luma(), &trained.scene.splats, origin, &comments)?;
+    files::write(&folder.log(), trained.log.as_bytes())?;
+    folder.write_report(report)
 }
 
 /// The device; with `timed`, its dispatches are.
@@ -198,17 +159,4 @@ pub(super) fn comments(options: RasterOptions) -> Vec<String> {
     let program = format!("gs-chroma {}", env!("CARGO_PKG_VERSION"));
     let mode = options.antialiased.then(|| ply::ANTIALIASED.to_owned());
     std::iter::once(program).chain(mode).collect()
-}
-
-fn choose_preset(options: &FitOptions, gpu: &Gpu, observe: &mut Observer<'_>) -> Preset {
-    options.preset.unwrap_or_else(|| {
-        let goal = options.time_limit.or(options.target_psnr);
-        if gpu.is_software() && goal.is_none() {
-            observe(Event::Note(format!(
-                "{} has no GPU behind it: preset draft (--preset paper overrules)",
-                gpu.info().name
-            )));
-        }
-        Preset::for_device(gpu)
-    })
 }

@@ -17,8 +17,10 @@ pub use tables::front_table;
 
 use serde::{Deserialize, Serialize};
 
+use crate::luma::LumaSettings;
+
 /// Version of the file's layout; raised when a key changes its meaning.
-pub const TRADEOFF_VERSION: u32 = 1;
+pub const TRADEOFF_VERSION: u32 = 2;
 
 /// `tradeoff.json`: a sweep, finished or not.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -46,6 +48,8 @@ pub struct Subject {
     pub preset: String,
     /// The teacher's file or folder, absolute.
     pub teacher: Option<String>,
+    /// The settings of luma of the base.
+    pub luma: LumaSettings,
     /// Options that every `fit` is given besides.
     pub options: Vec<String>,
 }
@@ -354,6 +358,7 @@ mod tests {
                 scene: "/photos/<garden>".to_owned(),
                 preset: "draft".to_owned(),
                 teacher: None,
+                luma: LumaSettings::default(),
                 options: Vec::new(),
             },
             device: None,

@@ -1,13 +1,13 @@
 //! Short trainings that tell what the photos alone do not.
 
-use std::sync::Arc;
+use std::{ops::ControlFlow, sync::Arc};
 
-use super::super::{Event, Observer, RunError, Stage};
-use super::start::placed_splats;
+use super::{
+    LumaError, LumaSettings, LumaTrainer, PlannedViews, TrainingView, start::placed_splats,
+};
 use crate::{
     capture::{Dataset, Exposure},
     effects::{Evidence, Overrules, Plan, Room},
-    luma::{LumaSettings, LumaTrainer, PlannedViews, TrainingView},
     raster::Raster,
 };
 
@@ -20,22 +20,29 @@ const MAX_SPLATS: usize = 3_000;
 const MAX_SIDE: u32 = 160;
 const MAX_VIEWS: usize = 32;
 
-/// Runs that may take no longer, in seconds, do without: on a slow device a trial would take a
-/// good part of it.
-pub(super) const TRIAL_FROM: f64 = 300.0;
+/// How far a trial is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TrialProgress {
+    /// Iterations done, of both trainings.
+    pub done: usize,
+    /// Iterations in all.
+    pub total: usize,
+    /// Whether the present training knows the exposures.
+    pub exposed: bool,
+}
 
-/// The plan of a scene, after a trial on the device that `raster` gives where it needs one.
+/// The plan of a capture, after a trial on the device that `raster` gives where it needs one.
 ///
 /// # Errors
-/// [`RunError`] of the device.
-pub(in crate::run) fn planned(
+/// Those of `raster`, and [`LumaError`] of a photo or of the device.
+pub fn planned<E: From<LumaError>>(
     dataset: &Arc<Dataset>,
     evidence: &Evidence,
     room: Room,
     overrules: &Overrules,
-    raster: impl FnOnce() -> Result<Arc<Raster>, RunError>,
-    observe: &mut Observer<'_>,
-) -> Result<Plan, RunError> {
+    raster: impl FnOnce() -> Result<Arc<Raster>, E>,
+    observe: &mut dyn FnMut(TrialProgress) -> ControlFlow<()>,
+) -> Result<Plan, E> {
     let plan = evidence.decide(room, overrules, None);
     if !plan.needs_trial() {
         return Ok(plan);
@@ -51,8 +58,8 @@ fn exposure_gain(
     evidence: &Evidence,
     raster: &Arc<Raster>,
     plan: &Plan,
-    observe: &mut Observer<'_>,
-) -> Result<f64, RunError> {
+    observe: &mut dyn FnMut(TrialProgress) -> ControlFlow<()>,
+) -> Result<f64, LumaError> {
     let views = PlannedViews::new(dataset.clone(), evidence, plan);
     let train = &dataset.split.train;
     let count = train.len().min(MAX_VIEWS);
@@ -76,15 +83,14 @@ fn exposure_gain(
         .enumerate()
     {
         let (raster, settings) = (raster.clone(), settings.clone());
-        LumaTrainer::new(raster, settings, dataset.extent, &start, views)?.train(
+        LumaTrainer::new(raster, settings, dataset.extent, &start, views)?.train_while(
             &mut |progress| {
                 *loss = progress.loss;
-                observe(Event::Progress {
-                    stage: Stage::Trial,
+                observe(TrialProgress {
                     done: which * ITERATIONS + progress.iteration,
                     total: 2 * ITERATIONS,
-                    message: ["with exposures", "without"][which].to_owned(),
-                });
+                    exposed: which == 0,
+                })
             },
         )?;
     }

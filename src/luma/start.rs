@@ -1,53 +1,30 @@
 //! The Gaussians that a training starts from.
 
-use super::super::{Event, Observer, RunError, scene::read_splats};
-use super::FitOptions;
+use super::{
+    LumaSettings,
+    carve::{carved, chosen},
+};
 use crate::{
     capture::{CaptureError, Dataset},
     color::gray_from_rgb,
     effects::Evidence,
-    luma::{
-        LumaSettings,
-        carve::{self, carved},
-    },
     splats::{ShField, Splats, init::initial_splats, sh},
 };
 
-/// Those of `--init`, or one at each of COLMAP's points and a dome behind them.
-pub(super) fn first_splats(
-    options: &FitOptions,
-    dataset: &Dataset,
-    evidence: &Evidence,
-    settings: &LumaSettings,
-    observe: &mut Observer<'_>,
-) -> Result<Splats, RunError> {
-    let Some(path) = &options.init else {
-        return Ok(placed_splats(dataset, evidence, settings)?);
-    };
-    let (splats, options) = read_splats(path, dataset.capture.offset, observe)?;
-    if options != settings.raster_options() {
-        let [is, is_not] = ["antialiased", "not antialiased"];
-        let (file, run) = if options.antialiased {
-            (is, is_not)
-        } else {
-            (is_not, is)
-        };
-        observe(Event::Note(format!(
-            "{} was trained {file}, this run is {run}: small Gaussians will have to adapt",
-            path.display()
-        )));
-    }
+/// What a training can start from that is there: luma of the settings' degree, and no more
+/// Gaussians than they allow.
+pub fn started(splats: &Splats, settings: &LumaSettings) -> Splats {
     let mut splats = splats.to_luma();
     splats.sh = at_degree(&splats.sh, splats.means.len(), settings.sh_degree);
     truncate(&mut splats, settings.max_splats);
-    Ok(splats)
+    splats
 }
 
 /// One at each of COLMAP's points, and a dome behind them.
 ///
 /// # Errors
 /// [`CaptureError`] of a photo.
-pub(super) fn placed_splats(
+pub fn placed_splats(
     dataset: &Dataset,
     evidence: &Evidence,
     settings: &LumaSettings,
@@ -107,7 +84,7 @@ fn truncate(splats: &mut Splats, max: usize) {
         return;
     }
     let kept: Vec<usize> = (0..max).map(|k| k * count / max).collect();
-    *splats = carve::chosen(splats, &kept);
+    *splats = chosen(splats, &kept);
 }
 
 #[cfg(test)]

@@ -1,30 +1,23 @@
-//! What `fit` tells about itself.
+//! The report of `fit`.
 
 use std::path::Path;
 
 use super::super::{Preset, files};
-use super::attempt::{Attempt, Job};
+use super::training::{Job, Trained};
 use crate::{
     capture::Dataset,
     effects::{Effect, Plan},
     report::{
-        CaptureReport, DeviceReport, EffectReport, GoalReport, LumaReport, LumaSeconds,
-        REPORT_VERSION, Report, ViewExposure,
+        CaptureReport, DeviceReport, EffectReport, LumaReport, LumaSeconds, REPORT_VERSION, Report,
+        ViewExposure,
     },
 };
 
 impl Job<'_> {
-    /// The report of the last of so many attempts; `loading` are the seconds until the
-    /// first began.
-    pub fn report(
-        &self,
-        preset: Preset,
-        loading: f64,
-        attempts: usize,
-        attempt: &Attempt,
-    ) -> Report {
-        let (options, last) = (self.options, &attempt.last);
-        let [train, curve, measure] = attempt.seconds;
+    /// The report of a training by a preset.
+    pub fn report(&self, preset: Preset, trained: &Trained) -> Report {
+        let (options, scene) = (self.options, &trained.scene);
+        let (last, [preparing, train, curve]) = (scene.last, scene.seconds);
         Report {
             version: REPORT_VERSION,
             program: env!("CARGO_PKG_VERSION").to_owned(),
@@ -35,37 +28,33 @@ impl Job<'_> {
                 software: self.gpu.is_software(),
             },
             preset,
-            effects: EffectReport::of(&attempt.plan.decisions),
+            effects: EffectReport::of(&scene.plan.decisions),
             luma: LumaReport {
-                settings: attempt.settings.clone(),
-                iterations: attempt.iterations,
-                given_up: attempt.given_up,
-                splats: attempt.splats.len(),
+                settings: scene.settings.clone(),
+                iterations: scene.iterations,
+                given_up: scene.given_up,
+                splats: scene.splats.len(),
                 poisoned: last.map_or(0, |progress| progress.poisoned),
                 refused: last.map_or(0, |progress| progress.refused),
                 loss: last.map_or(0.0, |progress| progress.loss),
-                goal: GoalReport {
-                    time_limit: options.time_limit,
-                    target_psnr: options.target_psnr,
-                    attempts,
-                },
+                goal: options.goal,
                 seconds: LumaSeconds {
-                    load: loading + attempt.preparing,
+                    load: self.loading + preparing,
                     train,
                     curve,
-                    measure,
+                    measure: trained.measuring,
                     all: self.begun.elapsed().as_secs_f64(),
                 },
                 peak_host_memory: files::peak_host_memory(),
-                peak_device_memory: attempt.peak_device_memory,
-                estimated_device_memory: attempt.estimated_device_memory,
-                exposures: exposures(self.dataset, &attempt.plan),
-                curve: attempt.curve.clone(),
+                peak_device_memory: scene.peak_device_memory,
+                estimated_device_memory: scene.estimated_device_memory,
+                exposures: exposures(self.dataset, &scene.plan),
+                curve: scene.curve.clone(),
                 curve_on: self.dataset.measured().0.to_owned(),
                 measured_side: options.measure_side,
-                held_out: attempt.held_out(),
-                held_out_views: attempt.held_out_views.clone(),
-                timings: attempt.timings.clone(),
+                held_out: trained.held_out(),
+                held_out_views: trained.held_out_views.clone(),
+                timings: trained.timings.clone(),
             },
             chroma: None,
         }

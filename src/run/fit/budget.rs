@@ -4,14 +4,14 @@
 //! (1) to `paper` (2) iterations, Gaussians and pixels grow together, between two of these
 //! each by the same factor for equal steps.
 
-use std::sync::Arc;
+use std::{sync::Arc, time::Instant};
 
 use super::super::{Event, Observer, Preset, RunError, preset::Work};
 use super::{FitOptions, Overlay};
 use crate::{
     capture::{Capture, CaptureOptions},
     gpu::GpuError,
-    luma::{LumaError, LumaSettings, Schedule, rehearse},
+    luma::{Goal, LumaError, LumaSettings, Schedule, rehearse},
     raster::Raster,
 };
 
@@ -29,7 +29,7 @@ pub(super) const WRITING: f64 = 0.01;
 
 /// Share of a time limit that is taken to be for training as long as nobody knows how long
 /// photos take to read.
-pub(super) const SURELY: f64 = 0.9;
+const SURELY: f64 = 0.9;
 
 /// The least work that makes a scene. With fewer iterations there is none yet, so time
 /// is saved on Gaussians and pixels (docs/accuracy-and-time.md).
@@ -45,12 +45,12 @@ fn sketch() -> Work {
 }
 
 /// A preset's level.
-pub(super) fn level_of(preset: Preset) -> f64 {
+fn level_of(preset: Preset) -> f64 {
     f64::from(preset as u8)
 }
 
 /// The greatest preset that is no more work than a level.
-pub(super) fn preset_below(level: f64) -> Preset {
+fn preset_below(level: f64) -> Preset {
     Preset::ALL[(level.max(0.0) as usize).min(2)]
 }
 
@@ -82,8 +82,69 @@ fn at_level(level: f64, longest: u32) -> Work {
     }
 }
 
+/// The work that a run is to do.
+pub(super) struct Budget {
+    /// The preset that comes nearest, and no higher than that asked for.
+    pub preset: Preset,
+    pub work: Work,
+    /// Seconds that an iteration is expected to take; 0 where time does not matter.
+    pub each: f64,
+}
+
+impl Budget {
+    /// What the options ask for, where they leave it open on this device: all of a preset, or
+    /// as much as there is time for. `begun` is when the time began to run.
+    ///
+    /// # Errors
+    /// [`RunError::Capture`], and [`GpuError::Lost`] of a rehearsal.
+    pub fn of(
+        options: &FitOptions,
+        raster: &Arc<Raster>,
+        begun: Instant,
+        observe: &mut Observer<'_>,
+    ) -> Result<Self, RunError> {
+        let usual = Preset::for_device(&raster.gpu);
+        let preset = options.preset.unwrap_or(match options.goal {
+            Goal::Fixed => usual,
+            // The most that is tried.
+            Goal::Within { .. } | Goal::Reach { .. } => Preset::Paper,
+        });
+        let mut max_side = options.load.max_side;
+        if options.goal.psnr().is_some() {
+            // PSNR at different sizes cannot be compared: whatever there is time for, photos
+            // are as large as they would be without a target.
+            max_side = max_side.or(options.preset.unwrap_or(usual).max_side());
+        }
+        let Some(limit) = options.goal.seconds() else {
+            if options.preset.is_none() && options.goal == Goal::Fixed && raster.gpu.is_software() {
+                observe(Event::Note(format!(
+                    "{} has no GPU behind it: preset draft (--preset paper overrules)",
+                    raster.gpu.info().name
+                )));
+            }
+            return Ok(Self {
+                preset,
+                work: Work::asked(preset, &options.settings, max_side),
+                each: 0.0,
+            });
+        };
+        let family = Family::of(options, max_side)?;
+        let seconds = SURELY * limit - begun.elapsed().as_secs_f64();
+        let (level, each) = family.level_for(seconds, raster, observe)?;
+        if options.timings {
+            // What was rehearsed is no part of the run.
+            raster.gpu.timings()?;
+        }
+        Ok(Self {
+            preset: preset_below(level),
+            work: family.work(level),
+            each,
+        })
+    }
+}
+
 /// What a run may do, and on what.
-pub(super) struct Family<'a> {
+struct Family<'a> {
     /// The highest level, that of the preset asked for.
     pub highest: f64,
     /// Holds at every level.
@@ -99,12 +160,11 @@ pub(super) struct Family<'a> {
 }
 
 impl<'a> Family<'a> {
-    /// What there is for the capture and the options; `max_side` holds at every level where
-    /// there is a target, for PSNR at different sizes cannot be compared.
+    /// What there is for the capture and the options; `max_side` holds at every level.
     ///
     /// # Errors
     /// [`RunError::Capture`].
-    pub fn of(options: &'a FitOptions, max_side: Option<u32>) -> Result<Self, RunError> {
+    fn of(options: &'a FitOptions, max_side: Option<u32>) -> Result<Self, RunError> {
         let capture = Capture::load_with(&options.colmap_dir, &CaptureOptions::default())?;
         let sizes = || capture.views.iter().map(|view| view.photo_size());
         let [width, height] = sizes().next().unwrap_or([1, 1]).map(f64::from);
@@ -112,17 +172,14 @@ impl<'a> Family<'a> {
             highest: level_of(options.preset.unwrap_or(Preset::Paper)),
             overlay: &options.settings,
             longest_side: sizes().flatten().max().unwrap_or(1),
-            max_side: match options.target_psnr {
-                Some(_) => max_side,
-                None => options.load.max_side,
-            },
+            max_side,
             aspect: height / width,
             points: capture.points.len(),
         })
     }
 
     /// The work at a level.
-    pub fn work(&self, level: f64) -> Work {
+    fn work(&self, level: f64) -> Work {
         let mut work = at_level(level.clamp(LOWEST, self.highest), self.longest_side);
         (self.overlay)(&mut work.settings);
         work.max_side = self.max_side.or(work.max_side);
@@ -157,7 +214,7 @@ impl<'a> Family<'a> {
     ///
     /// # Errors
     /// [`GpuError::Lost`].
-    pub fn level_for(
+    fn level_for(
         &self,
         seconds: f64,
         raster: &Arc<Raster>,

@@ -1,0 +1,295 @@
+//! Stage 1 as a whole: photos in, a gray scene out.
+
+use std::{ops::ControlFlow, sync::Arc, time::Instant};
+
+use super::{
+    CurvePoint, Demand, Goal, LumaError, LumaProgress, LumaSettings, LumaTrainer, PlannedViews,
+    TrainingView, TrialProgress,
+    carve::carved,
+    planned,
+    start::{placed_splats, started},
+};
+use crate::{
+    capture::{Dataset, Exposure},
+    effects::{Effect, Evidence, Overrules, Plan, Room, Survey},
+    gpu::{Gpu, GpuError},
+    raster::{Load, Raster},
+    splats::Splats,
+};
+
+/// Views that are looked at while training goes on, at most.
+const WATCHED: usize = 3;
+
+/// A trained gray scene.
+#[derive(Clone, Debug)]
+pub struct LumaScene {
+    /// Its Gaussians, one channel.
+    pub splats: Splats,
+    /// What it was trained with: what the plan and the memory decided included.
+    pub settings: LumaSettings,
+    /// Which effects were simulated, and why; exposures of all views.
+    pub plan: Plan,
+    /// The scene's extent in world units.
+    pub extent: f64,
+    /// Iterations that led to the Gaussians.
+    pub iterations: usize,
+    /// What the looks at the watched views showed.
+    pub curve: Vec<CurvePoint>,
+    /// The iteration at which the training gave up what had brought no gain.
+    pub given_up: Option<usize>,
+    /// The last report.
+    pub last: Option<LumaProgress>,
+    /// What an iteration worked on, the mean over the reports.
+    pub load: Load,
+    /// Bytes that it was estimated to take on the device at most.
+    pub estimated_device_memory: u64,
+    /// Bytes that it took there at most, where the backend tells.
+    pub peak_device_memory: Option<u64>,
+    /// Seconds of deciding and placing, of training and of looking at watched views.
+    pub seconds: [f64; 3],
+}
+
+impl LumaScene {
+    /// How bright the photos of all views show the scene.
+    pub fn exposures(&self) -> &[Exposure] {
+        &self.plan.exposures
+    }
+}
+
+/// What is worth telling while a scene is trained.
+#[derive(Clone, Copy, Debug)]
+pub enum LumaEvent<'a> {
+    /// So many photos have been examined.
+    Examined {
+        /// The view whose photo comes next.
+        view: usize,
+        /// Views in all.
+        total: usize,
+    },
+    /// A short training that tells whether exposures differ.
+    Trial(TrialProgress),
+    /// The effects that are simulated.
+    Plan(&'a Plan),
+    /// There is room for so many Gaussians only, within the settings' memory limit or, where
+    /// there is none, the adapter's bindings.
+    Capped(usize),
+    /// The training.
+    Training(LumaProgress),
+}
+
+/// Who is told; a [`ControlFlow::Break`] ends the training with [`LumaError::Cancelled`].
+pub type LumaObserver<'a> = dyn FnMut(LumaEvent<'_>) -> ControlFlow<()> + 'a;
+
+/// Trains a gray scene on a dataset, with the effects that its photos call for.
+///
+/// `dataset` holds photos at the size that is trained on.
+///
+/// # Errors
+/// [`LumaError`] of a photo or of the device, or [`LumaError::Cancelled`].
+pub fn fit(
+    gpu: &Gpu,
+    dataset: &Arc<Dataset>,
+    settings: &LumaSettings,
+    observe: &mut LumaObserver<'_>,
+) -> Result<LumaScene, LumaError> {
+    let mut survey = Survey::new(&dataset.capture, &dataset.cameras, &dataset.split);
+    let views: Vec<usize> = (0..dataset.cameras.len()).collect();
+    dataset.visit(&views, |view, photo| {
+        survey.look(view, photo);
+        let total = views.len();
+        go_on(observe(LumaEvent::Examined { view, total }))
+    })?;
+    let evidence = survey.finish();
+    Fit {
+        raster: &Arc::new(Raster::new(gpu)),
+        dataset,
+        evidence: &evidence,
+        overrules: &Overrules::default(),
+        goal: Goal::Fixed,
+        tries: true,
+        start: None,
+        watched: None,
+    }
+    .run(settings, observe)
+}
+
+/// A training of which more is said than [`fit`] asks for.
+pub struct Fit<'a> {
+    /// Where it is trained.
+    pub raster: &'a Arc<Raster>,
+    /// Photos at the size that is trained on.
+    pub dataset: &'a Arc<Dataset>,
+    /// What they say.
+    pub evidence: &'a Evidence,
+    /// Effects that are on or off whatever they say.
+    pub overrules: &'a Overrules,
+    /// What ends it; seconds count from [`Fit::run`] on.
+    pub goal: Goal,
+    /// Whether a short training may decide what the photos leave open.
+    pub tries: bool,
+    /// Gaussians to start from instead of COLMAP's points.
+    pub start: Option<&'a Splats>,
+    /// Views that are looked at on the way; a few of the held-out ones by default.
+    pub watched: Option<(&'a Dataset, Vec<usize>)>,
+}
+
+impl Fit<'_> {
+    /// Trains.
+    ///
+    /// # Errors
+    /// As [`fit`].
+    pub fn run(
+        &self,
+        settings: &LumaSettings,
+        observe: &mut LumaObserver<'_>,
+    ) -> Result<LumaScene, LumaError> {
+        let begun = Instant::now();
+        let dataset = self.dataset;
+        let plan = self.plan(settings, observe)?;
+        go_on(observe(LumaEvent::Plan(&plan)))?;
+        let mut settings = LumaSettings {
+            sh_degree: plan.sh_degree,
+            robust: plan.has(Effect::Robust),
+            antialiased: plan.has(Effect::Antialias),
+            background: plan.has(Effect::Background),
+            ..settings.clone()
+        };
+        let demand = self.fit_memory(&mut settings, &plan, observe)?;
+        let start = match self.start {
+            Some(splats) => started(splats, &settings),
+            None => placed_splats(dataset, self.evidence, &settings)?,
+        };
+        let preparing = begun.elapsed().as_secs_f64();
+
+        let begun = Instant::now();
+        let views = PlannedViews::new(dataset.clone(), self.evidence, &plan);
+        let raster = self.raster.clone();
+        let gpu = raster.gpu.clone();
+        let mut trainer = LumaTrainer::new(raster, settings, dataset.extent, &start, views)?;
+        trainer.aim(match self.goal.seconds() {
+            Some(limit) => self.goal.with_seconds(limit - preparing),
+            None => self.goal,
+        });
+        trainer.watch(self.watched_views(&plan)?)?;
+        let (mut last, mut peak_device_memory) = (None, None);
+        trainer.train_while(&mut |progress| {
+            last = Some(progress);
+            peak_device_memory = peak_device_memory.max(gpu.allocated_bytes());
+            observe(LumaEvent::Training(progress))
+        })?;
+        let mut splats = trainer.splats()?;
+        if dataset.removes_masked() {
+            splats = carved(dataset, &splats)?;
+        }
+        let watching = trainer.watched_seconds();
+        let training = begun.elapsed().as_secs_f64() - watching;
+        Ok(LumaScene {
+            settings: trainer.settings().clone(),
+            extent: dataset.extent,
+            iterations: trainer.schedule().end,
+            curve: trainer.curve().to_vec(),
+            given_up: trainer.given_up(),
+            last,
+            load: trainer.load(),
+            estimated_device_memory: demand.peak_bytes(splats.len()),
+            peak_device_memory,
+            seconds: [preparing, training, watching],
+            plan,
+            splats,
+        })
+    }
+
+    fn plan(
+        &self,
+        settings: &LumaSettings,
+        observe: &mut LumaObserver<'_>,
+    ) -> Result<Plan, LumaError> {
+        let room = Room {
+            iterations: settings.iterations,
+            sh_degree: settings.sh_degree,
+        };
+        if !self.tries {
+            return Ok(self.evidence.decide(room, self.overrules, None));
+        }
+        let mut asked = ControlFlow::Continue(());
+        let plan = planned(
+            self.dataset,
+            self.evidence,
+            room,
+            self.overrules,
+            || Ok::<_, LumaError>(self.raster.clone()),
+            &mut |progress| {
+                if asked.is_continue() {
+                    asked = observe(LumaEvent::Trial(progress));
+                }
+                asked
+            },
+        )?;
+        // A trial is no part of the training.
+        self.raster.gpu.timings()?;
+        Ok(plan)
+    }
+
+    /// Lowers the cap on Gaussians to what there is memory for.
+    fn fit_memory(
+        &self,
+        settings: &mut LumaSettings,
+        plan: &Plan,
+        observe: &mut LumaObserver<'_>,
+    ) -> Result<Demand, LumaError> {
+        let (dataset, limit) = (self.dataset, settings.memory_limit);
+        let ignores = plan.has(Effect::Masks) || plan.has(Effect::Robust);
+        let cameras = dataset.split.train.iter().map(|&i| &dataset.cameras[i]);
+        let (photographed, watched) = self.watched();
+        let demand = Demand::of(cameras, ignores, settings.sh_degree, limit)
+            .watching(watched.iter().map(|&i| &photographed.cameras[i]));
+        let binding = self.raster.gpu.binding_limit();
+        let fits = demand.largest_set(limit, binding);
+        if fits == 0 {
+            return Err(LumaError::Gpu(GpuError::OverLimit {
+                splats: 1,
+                needed: demand.peak_bytes(1),
+                limit: limit.unwrap_or(binding),
+            }));
+        }
+        if fits < settings.max_splats {
+            go_on(observe(LumaEvent::Capped(fits)))?;
+            settings.max_splats = fits;
+        }
+        Ok(demand)
+    }
+
+    /// The views that are looked at, by default a few of those that are measured, evenly
+    /// spread.
+    fn watched(&self) -> (&Dataset, Vec<usize>) {
+        if let Some((dataset, views)) = &self.watched {
+            return (dataset, views.clone());
+        }
+        let measured = self.dataset.measured().1;
+        let count = measured.len().min(WATCHED);
+        let spread = (0..count).map(|k| measured[k * measured.len() / count]);
+        (self.dataset, spread.collect())
+    }
+
+    fn watched_views(&self, plan: &Plan) -> Result<Vec<TrainingView>, LumaError> {
+        let (dataset, watched) = self.watched();
+        let view = |i: usize| {
+            let photo = dataset.photo(i)?;
+            Ok(TrainingView {
+                camera: dataset.cameras[i].clone(),
+                gray: photo.gray.clone(),
+                mask: photo.mask.clone(),
+                exposure: plan.exposures[i],
+            })
+        };
+        watched.into_iter().map(view).collect()
+    }
+}
+
+/// An error, if it is not to go on.
+fn go_on(flow: ControlFlow<()>) -> Result<(), LumaError> {
+    match flow {
+        ControlFlow::Continue(()) => Ok(()),
+        ControlFlow::Break(()) => Err(LumaError::Cancelled),
+    }
+}

@@ -1,0 +1,221 @@
+//! One training, from settings to measured splats.
+
+use std::{fmt::Write, ops::ControlFlow, sync::Arc, time::Instant};
+
+use super::super::{
+    Event, Observer, RunError, Stage,
+    scene::{read_splats, tell_trial},
+    yardstick::Yardstick,
+};
+use super::{
+    FitOptions,
+    budget::{Budget, ITERATIONS_MIN, WRITING},
+    quality::{mean_quality, measure_luma},
+};
+use crate::{
+    capture::{CaptureError, Dataset, Exposure},
+    effects::{Effect, Evidence},
+    gpu::Gpu,
+    luma::{Fit, LumaEvent, LumaProgress, LumaScene},
+    raster::Raster,
+    report::{KernelReport, LumaQuality, LumaView, kernel_reports},
+};
+
+/// Runs that may take no longer, in seconds, do without a trial: on a slow device it would
+/// take a good part of it.
+const TRIAL_FROM: f64 = 300.0;
+
+/// What a training needs.
+pub(super) struct Job<'a> {
+    pub options: &'a FitOptions,
+    pub gpu: &'a Gpu,
+    pub raster: &'a Arc<Raster>,
+    /// Photos at the size that is trained on.
+    pub dataset: &'a Arc<Dataset>,
+    /// What they say.
+    pub evidence: &'a Evidence,
+    /// Photos at the size that is measured at.
+    pub judge: &'a Dataset,
+    /// When the run began.
+    pub begun: Instant,
+    /// Seconds until it had its photos.
+    pub loading: f64,
+}
+
+/// What came of it.
+pub(super) struct Trained {
+    pub scene: LumaScene,
+    /// `train.csv`.
+    pub log: String,
+    pub held_out_views: Vec<LumaView>,
+    pub timings: Option<Vec<KernelReport>>,
+    /// Seconds of measuring.
+    pub measuring: f64,
+}
+
+impl Trained {
+    /// Mean over the held-out views, if any.
+    pub fn held_out(&self) -> Option<LumaQuality> {
+        mean_quality(&self.held_out_views)
+    }
+
+    /// PSNR of the held-out views; of some training views where none is held out.
+    pub fn psnr(&self) -> Option<f64> {
+        let watched = || self.scene.curve.last().map(|point| point.psnr);
+        self.held_out().map(|quality| quality.psnr).or_else(watched)
+    }
+
+    /// The error, if it does not reach so many dB.
+    pub fn misses(&self, target: f64) -> Option<RunError> {
+        let reached = self.psnr().unwrap_or(f64::NEG_INFINITY);
+        (reached < target).then_some(RunError::TargetMissed { target, reached })
+    }
+}
+
+impl Job<'_> {
+    /// Seconds for training within the time limit, measuring and writing taken off; an
+    /// iteration takes about `each`.
+    ///
+    /// # Errors
+    /// [`RunError::TimeTooShort`].
+    fn time_for_training(&self, each: f64) -> Result<Option<f64>, RunError> {
+        let Some(limit) = self.options.goal.seconds() else {
+            return Ok(None);
+        };
+        let before = self.begun.elapsed().as_secs_f64();
+        let left = (1.0 - WRITING) * limit - before - self.measuring(each)?;
+        let least = ITERATIONS_MIN as f64 * each;
+        if left < least {
+            return Err(RunError::TimeTooShort {
+                limit,
+                iterations: ITERATIONS_MIN,
+                needed: limit - left + least,
+            });
+        }
+        Ok(Some(left))
+    }
+
+    /// Seconds that measuring will take, where an iteration takes about `each`.
+    fn measuring(&self, each: f64) -> Result<f64, CaptureError> {
+        let views = &self.judge.split.test;
+        let Some(&first) = views.first() else {
+            return Ok(0.0);
+        };
+        let photo = self.judge.photo(first)?;
+        let yardstick = Yardstick {
+            photo: &photo,
+            exposure: Exposure::NONE,
+        };
+        let gray = yardstick.gray();
+        let begun = Instant::now();
+        // Of the photo against itself: it is only about the time.
+        std::hint::black_box(yardstick.luma_quality(&gray));
+        let pixels = |dataset: &Dataset| {
+            let camera = &dataset.cameras[first];
+            f64::from(camera.width) * f64::from(camera.height)
+        };
+        let drawing = each * pixels(self.judge) / pixels(self.dataset).max(1.0);
+        Ok(views.len() as f64 * (begun.elapsed().as_secs_f64() + drawing))
+    }
+
+    /// Trains towards the goal and measures.
+    ///
+    /// # Errors
+    /// [`RunError`].
+    pub fn train(&self, budget: &Budget, observe: &mut Observer<'_>) -> Result<Trained, RunError> {
+        let (options, dataset) = (self.options, self.dataset);
+        let limit = self.time_for_training(budget.each)?;
+        let settings = &budget.work.settings;
+        let init = options.init.as_ref();
+        let init = init.map(|path| read_splats(path, dataset.capture.offset, observe));
+        let init = init.transpose()?;
+        let seconds = options.goal.seconds();
+        // Held-out views have to be seen as they are measured, where they are to be reached.
+        let reaches = options.goal.psnr().is_some() && !self.judge.split.test.is_empty();
+        let fit = Fit {
+            raster: self.raster,
+            dataset,
+            evidence: self.evidence,
+            overrules: &options.overrules,
+            goal: limit.map_or(options.goal, |limit| options.goal.with_seconds(limit)),
+            tries: seconds.is_none_or(|limit| limit >= TRIAL_FROM),
+            start: init.as_ref().map(|(splats, _)| splats),
+            watched: reaches.then(|| (self.judge, self.judge.split.test.clone())),
+        };
+        let mut log = String::from("iteration,loss,splats,seconds,poisoned\n");
+        let scene = fit.run(settings, &mut |event| {
+            match event {
+                // Not asked for: the evidence is there.
+                LumaEvent::Examined { .. } => {}
+                LumaEvent::Trial(progress) => tell_trial(&progress, observe),
+                LumaEvent::Plan(plan) => {
+                    observe(Event::Note(plan.to_string()));
+                    if let (Some(path), Some((_, drawn))) = (&options.init, init.as_ref()) {
+                        let antialiased = plan.has(Effect::Antialias);
+                        if drawn.antialiased != antialiased {
+                            let [is, is_not] = ["antialiased", "not antialiased"];
+                            let named = |is_so| if is_so { is } else { is_not };
+                            observe(Event::Note(format!(
+                                "{} was trained {}, this run is {}: small Gaussians will have to adapt",
+                                path.display(),
+                                named(drawn.antialiased),
+                                named(antialiased),
+                            )));
+                        }
+                    }
+                }
+                LumaEvent::Capped(fits) => observe(Event::Note(match settings.memory_limit {
+                    Some(limit) => format!("at most {fits} Gaussians fit into {} MiB", limit >> 20),
+                    None => format!("at most {fits} Gaussians fit into the adapter's bindings"),
+                })),
+                LumaEvent::Training(progress) => {
+                    // Writing to a string cannot fail.
+                    let _ = writeln!(
+                        log,
+                        "{},{:.6},{},{:.3},{}",
+                        progress.iteration,
+                        progress.loss,
+                        progress.splats,
+                        progress.seconds,
+                        progress.poisoned
+                    );
+                    observe(Event::Progress {
+                        stage: Stage::Luma,
+                        done: progress.iteration,
+                        total: progress.end,
+                        message: in_words(&progress),
+                    });
+                }
+            }
+            ControlFlow::Continue(())
+        })?;
+        let timings = (options.timings)
+            .then(|| Ok::<_, RunError>(kernel_reports(&self.gpu.timings()?, &scene.load)))
+            .transpose()?;
+
+        let begun = Instant::now();
+        let drawn = self.raster.drawing(scene.settings.raster_options());
+        let held_out_views = measure_luma(&drawn, self.judge, &scene.splats, scene.exposures())?;
+        Ok(Trained {
+            scene,
+            log,
+            held_out_views,
+            timings,
+            measuring: begun.elapsed().as_secs_f64(),
+        })
+    }
+}
+
+/// The figures beside a progress bar.
+fn in_words(progress: &LumaProgress) -> String {
+    let looked = progress.looked.map_or(String::new(), |look| {
+        let rise = look
+            .per_minute
+            .map_or(String::new(), |rise| format!(" ({rise:+.1}/min)"));
+        format!(", {:.2} dB{rise}", look.psnr)
+    });
+    format!(
+        "loss {:.4}, {} splats{looked}",
+        progress.loss, progress.splats
+    )
+}
