@@ -14,6 +14,7 @@ const PLAIN: &[&str] = &[
     "lbfgs",
     "project",
     "relocation",
+    "rgb_loss",
     "scan",
     "sort",
     "sum_loss",
@@ -24,9 +25,6 @@ const PLAIN: &[&str] = &[
 
 /// Kernels compiled once for each kind of colour.
 const COLORED: &[&str] = &["blend", "shade"];
-
-/// Their adjoints: luma trains the geometry too, chroma does not.
-const ADJOINT: &[&str] = &["blend_backward", "shade_backward", "sum_instances"];
 
 /// Effects of the photos that the luma loss may reckon with.
 const LOSS_EFFECTS: &[&str] = &["exposed", "masked"];
@@ -49,10 +47,15 @@ fn main() {
             compile(&out, kernel, &format!("_{color}"), &[color]);
         }
     }
-    for kernel in ADJOINT {
+    // Luma trains the geometry too; on frozen geometry the gradient of a/b or RGB and its
+    // curvature come back as four figures.
+    for kernel in ["blend_backward", "sum_instances"] {
         compile(&out, kernel, "_luma", &["luma", "geometry"]);
-        compile(&out, kernel, "_chroma", &["chroma"]);
+        compile(&out, kernel, "_figures", &["figures"]);
     }
+    compile(&out, "shade_backward", "_luma", &["luma", "geometry"]);
+    compile(&out, "shade_backward", "_chroma", &["chroma"]);
+    compile(&out, "shade_backward", "_rgb", &["rgb"]);
     compile(&out, "project_backward", "", &["luma", "geometry"]);
     // In training the two that reach the parameters take Adam's step at once.
     for kernel in ["project_backward", "shade_backward"] {
@@ -84,30 +87,14 @@ fn main() {
     compile(&out, "project", "_mip", &mip[2..3]);
     compile(&out, "project_backward", "_mip", &mip[..3]);
     compile(&out, "project_backward", "_mip_step", &mip);
-    // The solver sums over the views, and needs the loss's curvature.
-    compile(&out, "shade_backward", "_chroma_add", &["chroma", "add"]);
-    compile(&out, "chroma_loss", "_curvature", &["curvature"]);
 }
 
 fn compile(out: &str, kernel: &str, suffix: &str, features: &[&str]) {
     let mut compiler = Wesl::new("shaders");
     compiler.keep_all_entrypoints();
     for feature in [
-        "luma",
-        "chroma",
-        "rgb",
-        "geometry",
-        "step",
-        "add",
-        "curvature",
-        "exposed",
-        "masked",
-        "mip",
-        "lazy",
-        "half",
-        "window11",
-        "window7",
-        "window5",
+        "luma", "chroma", "rgb", "figures", "geometry", "step", "exposed", "masked", "mip", "lazy",
+        "half", "window11", "window7", "window5",
     ] {
         compiler.set_feature(feature, features.contains(&feature));
     }

@@ -18,12 +18,12 @@ use std::{
 use gs_chroma::{
     capture::{Capture, LoadOptions, Loader, split},
     chroma::{
-        ChromaSettings, ChromaView, Distiller, Solver,
+        AdamSolver, ChromaSettings, FrozenViews, IrlsSolver, Room, Targets, Task,
         teacher::{GrayImage, Teacher, TeacherSettings},
     },
     gpu::Gpu,
     raster::Raster,
-    splats::{Splats, ply},
+    splats::ply,
 };
 
 type Fallible<T> = Result<T, Box<dyn std::error::Error>>;
@@ -38,11 +38,13 @@ struct Point {
 }
 
 struct Problem {
-    raster: Arc<Raster>,
-    luma: Splats,
-    extent: f64,
-    views: Vec<ChromaView>,
+    frozen: FrozenViews,
+    targets: Targets,
+    tasks: Vec<Task>,
 }
+
+/// Scales that Adam may be asked for.
+const SCALES: usize = 5;
 
 fn load(run: &Path, teacher: &Path) -> Fallible<Problem> {
     let report: serde_json::Value = serde_json::from_slice(&fs::read(run.join("report.json"))?)?;
@@ -57,7 +59,8 @@ fn load(run: &Path, teacher: &Path) -> Fallible<Problem> {
     )?;
     let split = split(&capture.views, options.holdout);
     let loader = Loader::open(&capture, &options)?;
-    let mut views = Vec::new();
+    let (mut targets, mut tasks) = (Targets::new(SCALES), Vec::new());
+    let mut cameras = Vec::new();
     for &i in &split.train {
         let (photo, camera) = loader.load(&capture.views[i])?;
         let gray = GrayImage {
@@ -66,18 +69,20 @@ fn load(run: &Path, teacher: &Path) -> Fallible<Problem> {
             pixels: &photo.gray,
         };
         if let Some(wanted) = teacher.colorize(capture.views[i].name.as_str(), gray, None)? {
-            views.push(ChromaView {
-                camera,
-                wanted,
-                weights: None,
+            tasks.push(Task {
+                view: cameras.len(),
+                target: targets.push_ab(&wanted, None)?,
             });
+            cameras.push(camera);
         }
     }
+    let raster = Arc::new(Raster::new(&Gpu::open()?));
+    let luma = ply::read_ply(&run.join("luma.ply"))?.splats.to_luma();
+    let (extent, room) = (capture.extent(), Room::default());
     Ok(Problem {
-        raster: Arc::new(Raster::new(&Gpu::open()?)),
-        luma: ply::read_ply(&run.join("luma.ply"))?.splats.to_luma(),
-        extent: capture.extent(),
-        views,
+        frozen: FrozenViews::new(&raster, &luma, extent, &cameras, SCALES, room)?,
+        targets,
+        tasks,
     })
 }
 
@@ -106,16 +111,15 @@ fn compare(problem: &Problem, paper: ChromaSettings) -> Fallible<Vec<Point>> {
         ..ChromaSettings::exact()
     };
     let Problem {
-        raster,
-        luma,
-        extent,
-        views,
+        frozen,
+        targets,
+        tasks,
     } = problem;
     // Measures only; it never solves.
-    let mut judge = Solver::new(raster.clone(), &settings, *extent, luma, views)?;
+    let mut judge = IrlsSolver::new(frozen, &settings, targets, tasks.clone())?;
 
     let begun = Instant::now();
-    let mut solver = Solver::new(raster.clone(), &settings, *extent, luma, views)?;
+    let mut solver = IrlsSolver::new(frozen, &settings, targets, tasks.clone())?;
     let mut spent = begun.elapsed().as_secs_f64();
     for round in 0..solver.round_count() {
         let begun = Instant::now();
@@ -135,7 +139,7 @@ fn compare(problem: &Problem, paper: ChromaSettings) -> Fallible<Vec<Point>> {
     drop(solver);
 
     let begun = Instant::now();
-    let mut adam = Distiller::new(raster.clone(), paper, *extent, luma, views.clone())?;
+    let mut adam = AdamSolver::new(frozen, paper, targets, tasks.clone())?;
     let mut spent = begun.elapsed().as_secs_f64();
     for stop in stops(iterations) {
         let begun = Instant::now();
@@ -189,7 +193,7 @@ fn main() -> ExitCode {
         match argument.as_str() {
             "--csv" => csv = arguments.next(),
             "--iterations" => paper.iterations = number(arguments.next(), paper.iterations),
-            "--scales" => paper.coarser_scales = number(arguments.next(), paper.coarser_scales),
+            "--scales" => paper.scales = number(arguments.next(), paper.scales),
             _ => places.push(PathBuf::from(argument)),
         }
     }

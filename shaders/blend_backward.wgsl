@@ -1,5 +1,5 @@
 // The adjoint of `blend`: for each instance, the gradient with respect to its
-// colour and, where the geometry is trained, its centre, conic and opacity.
+// color and, where the geometry is trained, its center, conic and opacity.
 //
 // A workgroup takes a tile, a thread eight pixels of a column, as two quads. The
 // Gaussians of the tile's list come in batches: threads fetch them and note which
@@ -10,15 +10,20 @@
 //
 // Transmittance is recomputed front to back as `blend` computed it; nothing is
 // recovered by dividing by 1 - alpha.
-import package::common::color::{Color, color_dot};
+import package::common::color::Color;
+@if(geometry) import package::common::color::color_dot;
 import package::common::constants::{ALPHA_MAX, ALPHA_MIN, TILE_SIDE};
 import package::common::numeric::linear_group;
-import package::common::partials::{PARTIAL_COLOR, PARTIAL_STRIDE, PARTIAL_WORDS, PartialWord};
+import package::common::partials::{PARTIAL_STRIDE, PARTIAL_WORDS, PartialWord};
 @if(half) import package::common::partials::packed;
-@if(geometry) import package::common::partials::PARTIAL_PULL;
+@if(geometry) import package::common::partials::{PARTIAL_COLOR, PARTIAL_PULL};
 import package::common::projected::{Projected, power_cutoff, touches};
-import package::common::quad::{Quad, contributes, powers, quad_alpha};
+import package::common::quad::{contributes, powers, quad_alpha};
+@if(geometry) import package::common::quad::Quad;
 import package::common::view::View;
+
+// Four figures of four pixels, a column a pixel.
+@if(figures) alias Quad = mat4x4f;
 
 const THREADS: u32 = 32u;
 const BATCH: u32 = 16u;
@@ -35,7 +40,7 @@ const SHARE: u32 = PARTIAL_STRIDE | 1u;
 @group(0) @binding(3) var<storage, read> instance_splats: array<u32>;
 @group(0) @binding(4) var<storage, read> projected: array<Projected>;
 @group(0) @binding(5) var<storage, read> lasts: array<u32>;
-// Gradient of the loss with respect to each pixel.
+// Gradient of the loss with respect to each pixel, on frozen geometry its curvature too.
 @group(0) @binding(6) var<storage, read> image_gradient: array<Color>;
 // `[instances, PARTIAL_WORDS]` by emission slot.
 @group(0) @binding(7) var<storage, read_write> partials: array<PartialWord>;
@@ -79,12 +84,9 @@ struct Pixels {
 
 // The gradient of four pixels, weighted and added up.
 @if(luma) fn gathered(weight: vec4f, quad: Quad) -> Color { return dot(weight, quad); }
-@if(chroma) fn gathered(weight: vec4f, quad: Quad) -> Color { return vec2f(dot(weight, quad[0]), dot(weight, quad[1])); }
+@if(figures) fn gathered(weight: vec4f, quad: Quad) -> Color { return quad * weight; }
 @if(luma) fn insert(quad: Quad, k: u32, color: Color) -> Quad { var q = quad; q[k] = color; return q; }
-@if(chroma) fn insert(quad: Quad, k: u32, color: Color) -> Quad { var q = quad; q[0][k] = color.x; q[1][k] = color.y; return q; }
-// The gradient of each pixel times one colour.
-@if(luma) fn shown(quad: Quad, color: Color) -> vec4f { return quad * color; }
-@if(chroma) fn shown(quad: Quad, color: Color) -> vec4f { return quad[0] * color.x + quad[1] * color.y; }
+@if(figures) fn insert(quad: Quad, k: u32, color: Color) -> Quad { var q = quad; q[k] = color; return q; }
 
 fn load(first: vec2u) -> Pixels {
     var pixels = Pixels();
@@ -120,7 +122,7 @@ fn accumulate(
     (*share).color += gathered(weight, (*pixels).gradient);
     (*pixels).transmittance = select(before, before * (1.0 - alpha), hit);
     @if(geometry) {
-        let contribution = shown((*pixels).gradient, color);
+        let contribution = (*pixels).gradient * color;
         let behind = (*pixels).remaining - weight * contribution;
         (*pixels).remaining = behind;
         let v_alpha = before * contribution - behind / (1.0 - alpha);
@@ -236,9 +238,11 @@ fn blend_backward(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) 
                 shares[at + PARTIAL_PULL] = share.pull;
             }
             @if(luma) { shares[at + PARTIAL_COLOR] = share.color; }
-            @if(chroma) {
-                shares[at + PARTIAL_COLOR] = share.color.x;
-                shares[at + PARTIAL_COLOR + 1u] = share.color.y;
+            @if(figures) {
+                shares[at] = share.color.x;
+                shares[at + 1u] = share.color.y;
+                shares[at + 2u] = share.color.z;
+                shares[at + 3u] = share.color.w;
             }
         }
         workgroupBarrier();

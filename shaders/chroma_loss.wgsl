@@ -1,30 +1,27 @@
 // Smoothed L1 between rendered and wanted a/b, value and gradient: of each channel, or
 // of their distance in the a, b plane. It may decline to a constant for large
-// residuals, so that a teacher who is plainly wrong does not count. For the solver
-// (`curvature`), the slope over the residual as well: the weight of the pixel in the
-// quadratic that touches the loss from above.
+// residuals, so that a teacher who is plainly wrong does not count. With the gradient goes
+// the curvature, the slope over the residual: the weight of the pixel in the quadratic
+// that touches the loss from above.
 import package::common::correction::{Correction, corrected};
 import package::common::numeric::linear_group;
 import package::common::view::View;
-
-// Where |r| turns from a parabola into a line, in CIELAB units: far below a
-// visible difference, wide enough that the gradient has no jump at zero.
-const SMOOTHING: f32 = 0.5;
+import package::common::wanted::{SMOOTHING, wanted_ab};
 
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var<storage, read> image: array<vec2f>;
-@group(0) @binding(2) var<storage, read> wanted: array<vec2f>;
+@group(0) @binding(2) var<storage, read> wanted: array<u32>;
 // The a/b rendered at the next coarser scale; weight 0 where there is none.
 @group(0) @binding(3) var<storage, read> coarser: array<vec2f>;
 @group(0) @binding(4) var<uniform> weights: ChromaLossWeights;
 @group(0) @binding(5) var<storage, read_write> block_losses: array<f32>;
-@group(0) @binding(6) var<storage, read_write> image_gradient: array<vec2f>;
+// Gradient, then curvature.
+@group(0) @binding(6) var<storage, read_write> image_gradient: array<vec4f>;
 // How much each wanted pixel counts: 0 not at all, 1 as an ordinary one, more where
 // somebody painted it by hand.
 @group(0) @binding(7) var<storage, read> pixel_weights: array<f32>;
 // `[views]`
 @group(0) @binding(8) var<storage, read> corrections: array<Correction>;
-@if(curvature) @group(0) @binding(9) var<storage, read_write> curvatures: array<vec2f>;
 
 struct ChromaLossWeights {
     coarser_size: vec2u,
@@ -89,7 +86,7 @@ fn chroma_loss(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) gro
         }
         // What somebody painted is neither corrected nor doubted.
         let painted = weight > 1.0;
-        var target_ab = wanted[p];
+        var target_ab = wanted_ab(wanted[p]);
         if !painted {
             target_ab = corrected(corrections[weights.view_index], target_ab);
         }
@@ -107,8 +104,7 @@ fn chroma_loss(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) gro
             gradient += weights.agreement * agreed.curvature * drift;
         }
         losses[local] = 0.5 * (loss.x + loss.y);
-        image_gradient[p] = scale * gradient;
-        @if(curvature) { curvatures[p] = scale * curvature; }
+        image_gradient[p] = scale * vec4f(gradient, curvature);
     }
     workgroupBarrier();
     for (var half = 128u; half > 0u; half /= 2u) {

@@ -13,6 +13,8 @@ struct LbfgsParameters {
     // Unknowns: `planes` times Gaussians.
     length: u32,
     splats: u32,
+    // Planes of `diagonal`.
+    diagonals: u32,
     blocks: u32,
     // Added to the matrix's diagonal: decides where the pictures do not.
     ridge: f32,
@@ -53,7 +55,7 @@ const LEAST_SCALE: f32 = 1e-3;
 @group(0) @binding(1) var<uniform> pair: u32;
 @group(0) @binding(2) var<storage, read_write> unknowns: array<f32>;
 @group(0) @binding(3) var<storage, read_write> gradient: array<f32>;
-// Sums of weights, planes of the constant harmonic: the first two `[2, N]`.
+// Sums of weights, `[diagonals, N]`: a plane for each channel, or one for all.
 @group(0) @binding(4) var<storage, read> diagonal: array<f32>;
 // The least that each unknown may be.
 @group(0) @binding(5) var<storage, read> floors: array<f32>;
@@ -74,6 +76,8 @@ const LEAST_SCALE: f32 = 1e-3;
 // Any of the arrays above.
 @group(0) @binding(15) var<storage, read> left: array<f32>;
 @group(0) @binding(16) var<storage, read> right: array<f32>;
+// What the ridge draws the unknowns to.
+@group(0) @binding(17) var<storage, read> origin: array<f32>;
 
 var<workgroup> sums: array<f32, 256>;
 
@@ -111,7 +115,7 @@ fn total(local: u32) -> f32 {
 // of a Gaussian's weights bounds its row.
 fn inverse_diagonal(k: u32) -> f32 {
     let n = parameters.splats;
-    let of_channel = (k / n) % 2u * n + k % n;
+    let of_channel = (k / n) % parameters.diagonals * n + k % n;
     return 1.0 / (parameters.diagonal_scale * diagonal[of_channel] + parameters.ridge);
 }
 
@@ -122,8 +126,9 @@ fn lbfgs_ridge(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) gro
     let k = block * 256u + local;
     var own = 0.0;
     if k < parameters.length {
-        gradient[k] += parameters.ridge * unknowns[k];
-        own = 0.5 * parameters.ridge * unknowns[k] * unknowns[k];
+        let off = unknowns[k] - origin[k];
+        gradient[k] += parameters.ridge * off;
+        own = 0.5 * parameters.ridge * off * off;
     }
     leave_sum(block, local, own);
 }

@@ -1,14 +1,18 @@
 // The adjoint of `shade`: gradients of the spherical harmonics and, through the
 // direction of view, of the means. In training (`step`) Adam moves the harmonics at
-// once, and their gradient is never stored; `lazy` as in `project_backward`.
+// once, and their gradient is never stored; `lazy` as in `project_backward`. On frozen
+// geometry gradients are added to what is there, and so are the curvatures' sums.
 @if(step) import package::common::adam::{AdamParameters, GRADIENT_MAX, adam_step};
-import package::common::color::{CHANNELS, Color, color_dot, color_gradient};
+import package::common::color::{CHANNELS, Color, color_gradient};
+@if(geometry) import package::common::color::color_dot;
 import package::common::constants::{INVISIBLE, PLANE_MEAN};
 @if(step) import package::common::constants::{STATUS_OVERFLOW, STATUS_REFUSED};
 import package::common::numeric::linear_group;
 @if(step) import package::common::numeric::is_within;
-import package::common::partials::{PARTIAL_COLOR, PARTIAL_STRIDE};
+import package::common::partials::PARTIAL_STRIDE;
+@if(geometry) import package::common::partials::PARTIAL_COLOR;
 import package::common::sh::sh_term;
+@if(!geometry) import package::common::sh::SH_C0;
 import package::common::view::View;
 
 @group(0) @binding(0) var<uniform> view: View;
@@ -16,10 +20,13 @@ import package::common::view::View;
 @group(0) @binding(2) var<storage, read> ranks: array<u32>;
 @group(0) @binding(3) var<storage, read> colors: array<Color>;
 @group(0) @binding(4) var<storage, read> gradients: array<f32>;
-// Planes `[(degree + 1)², CHANNELS, N]`: all of them written, or (`add`) added to.
+// Planes `[harmonics, CHANNELS, N]`: all of them written, or on frozen geometry added to.
 @if(!step) @group(0) @binding(5) var<storage, read_write> sh_gradient: array<f32>;
 @if(geometry && !step) @group(0) @binding(6) var<storage, read> sh: array<f32>;
 @if(step) @group(0) @binding(6) var<storage, read_write> sh: array<f32>;
+// Planes `[2, N]` of a and b, `[1, N]` of RGB: the constant harmonic times the curvatures
+// of the pixels, each weighed as it is drawn.
+@if(!geometry) @group(0) @binding(6) var<storage, read_write> diagonal: array<f32>;
 // Planes `[3, N]`, what the means' gradient owes to the direction of view.
 @if(geometry) @group(0) @binding(7) var<storage, read_write> mean_gradient: array<f32>;
 @if(step) @group(0) @binding(8) var<uniform> parameters: AdamParameters;
@@ -50,31 +57,34 @@ fn plane_index(k: u32, i: u32) -> u32 {
 
 @if(step) fn store(k: u32, i: u32, value: Color) { descend(k, i, value); }
 
-@if(add) fn store(k: u32, i: u32, value: Color) {
+@if(geometry && !step) fn store(k: u32, i: u32, value: Color) { sh_gradient[plane_index(k, i)] = value; }
+
+@if(chroma) fn store(k: u32, i: u32, value: Color) {
     let at = plane_index(k, i);
     sh_gradient[at] += value.x;
     sh_gradient[at + view.splat_count] += value.y;
 }
-
-@if(!step && !add) fn store(k: u32, i: u32, value: Color) {
+@if(rgb) fn store(k: u32, i: u32, value: Color) {
     let at = plane_index(k, i);
-    @if(luma) { sh_gradient[at] = value; }
-    @if(chroma) { sh_gradient[at] = value.x; sh_gradient[at + view.splat_count] = value.y; }
-    @if(rgb) { sh_gradient[at] = value.x; sh_gradient[at + view.splat_count] = value.y; sh_gradient[at + 2u * view.splat_count] = value.z; }
+    sh_gradient[at] += value.x;
+    sh_gradient[at + view.splat_count] += value.y;
+    sh_gradient[at + 2u * view.splat_count] += value.z;
 }
 
-@if(geometry) fn coefficient(k: u32, i: u32) -> Color {
-    let at = plane_index(k, i);
-    @if(luma) return sh[at];
-    @if(chroma) return vec2f(sh[at], sh[at + view.splat_count]);
-    @if(rgb) return vec3f(sh[at], sh[at + view.splat_count], sh[at + 2u * view.splat_count]);
+@if(luma) fn gradient_of(i: u32) -> Color { return gradients[i * PARTIAL_STRIDE + PARTIAL_COLOR]; }
+@if(chroma) fn gradient_of(i: u32) -> Color {
+    let at = i * PARTIAL_STRIDE;
+    return vec2f(gradients[at], gradients[at + 1u]);
+}
+@if(rgb) fn gradient_of(i: u32) -> Color {
+    let at = i * PARTIAL_STRIDE;
+    return vec3f(gradients[at], gradients[at + 1u], gradients[at + 2u]);
 }
 
-fn gradient_of(i: u32) -> Color {
-    let at = i * PARTIAL_STRIDE + PARTIAL_COLOR;
-    @if(luma) return gradients[at];
-    @if(chroma) return vec2f(gradients[at], gradients[at + 1u]);
-    @if(rgb) return vec3f(gradients[at], gradients[at + 1u], gradients[at + 2u]);
+@if(!geometry) fn add_curvatures(i: u32) {
+    for (var figure = CHANNELS; figure < PARTIAL_STRIDE; figure++) {
+        diagonal[(figure - CHANNELS) * view.splat_count + i] += SH_C0 * gradients[i * PARTIAL_STRIDE + figure];
+    }
 }
 
 @compute @workgroup_size(256)
@@ -87,10 +97,12 @@ fn shade_backward(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) 
     // After an overflow nothing moves until the host has grown the buffers and
     // repeats the iteration.
     @if(step) { if atomicLoad(&status[STATUS_OVERFLOW]) != 0u { return; } }
-    let count = (view.sh_degree + 1u) * (view.sh_degree + 1u);
+    @if(geometry) let count = (view.sh_degree + 1u) * (view.sh_degree + 1u);
+    // As many harmonics as the gradient has planes for; the picture may have more.
+    @if(!geometry) let count = arrayLength(&sh_gradient) / (CHANNELS * n);
     @if(lazy) { if ranks[i] == INVISIBLE { return; } }
     @if(!lazy) if ranks[i] == INVISIBLE {
-        @if(!add) for (var k = 0u; k < count; k++) {
+        @if(geometry) for (var k = 0u; k < count; k++) {
             store(k, i, Color());
         }
         @if(geometry) {
@@ -108,9 +120,10 @@ fn shade_backward(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) 
     @if(geometry) var v_direction = vec3f();
     for (var k = 0u; k < count; k++) {
         let term = sh_term(k, direction);
-        @if(geometry) { v_direction += term.slope * color_dot(coefficient(k, i), v_color); }
+        @if(geometry) { v_direction += term.slope * color_dot(sh[plane_index(k, i)], v_color); }
         store(k, i, term.value * v_color);
     }
+    @if(!geometry) { add_curvatures(i); }
     @if(geometry) {
         let v_mean = (v_direction - direction * dot(direction, v_direction)) / distance;
         mean_gradient[i] = v_mean.x;

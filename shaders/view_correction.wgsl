@@ -5,6 +5,7 @@
 import package::common::correction::Correction;
 import package::common::numeric::linear_group;
 import package::common::view::View;
+import package::common::wanted::wanted_ab;
 
 // Workgroups that sum one view.
 const SUM_GROUPS: u32 = 64u;
@@ -26,8 +27,9 @@ struct CorrectionParameters {
 
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var<storage, read> image: array<vec2f>;
-@group(0) @binding(2) var<storage, read> wanted: array<vec2f>;
-@group(0) @binding(3) var<storage, read> curvatures: array<vec2f>;
+@group(0) @binding(2) var<storage, read> wanted: array<u32>;
+// What `chroma_loss` left: gradient, then curvature.
+@group(0) @binding(3) var<storage, read> image_gradient: array<vec4f>;
 @group(0) @binding(4) var<uniform> parameters: CorrectionParameters;
 // `[views, SUM_GROUPS, SUMS]`
 @group(0) @binding(5) var<storage, read_write> view_sums: array<f32>;
@@ -43,7 +45,7 @@ fn view_correction_sums(@builtin(workgroup_id) group: vec3u, @builtin(local_invo
         // One weight for both channels. Painted pixels are not the teacher's; of unknown
         // ones the curvature may be that of the agreement between scales; where nothing
         // is drawn, there is nothing to compare with.
-        var weight = 0.5 * (curvatures[p].x + curvatures[p].y);
+        var weight = 0.5 * (image_gradient[p].z + image_gradient[p].w);
         if parameters.weighted != 0u && (pixel_weights[p] > 1.0 || pixel_weights[p] <= 0.0) {
             weight = 0.0;
         }
@@ -51,7 +53,7 @@ fn view_correction_sums(@builtin(workgroup_id) group: vec3u, @builtin(local_invo
         if all(x == vec2f()) {
             weight = 0.0;
         }
-        let t = wanted[p];
+        let t = wanted_ab(wanted[p]);
         own[0] += weight;
         own[1] += weight * x.x;
         own[2] += weight * x.y;

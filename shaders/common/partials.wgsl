@@ -1,6 +1,7 @@
 // The gradient record of one Gaussian on the image plane: six figures for mean,
-// conic and opacity and the pull where the geometry is trained, then the colour.
-import package::common::color::CHANNELS;
+// conic and opacity and the pull where the geometry is trained, then the color. On frozen
+// geometry four figures: the color's gradient (a, b or R, G, B), then its curvature.
+@if(geometry) import package::common::color::CHANNELS;
 @if(half) import package::common::numeric::is_finite;
 
 // What densification asks: the sum over pixels of the length of each pixel's
@@ -8,8 +9,8 @@ import package::common::color::CHANNELS;
 // do not cancel where pixels pull apart, as they do within one large Gaussian.
 @if(geometry) const PARTIAL_PULL: u32 = 6u;
 @if(geometry) const PARTIAL_COLOR: u32 = 7u;
-@if(!geometry) const PARTIAL_COLOR: u32 = 0u;
-const PARTIAL_STRIDE: u32 = PARTIAL_COLOR + CHANNELS;
+@if(geometry) const PARTIAL_STRIDE: u32 = PARTIAL_COLOR + CHANNELS;
+@if(!geometry) const PARTIAL_STRIDE: u32 = 4u;
 
 // How a list entry's record waits for its sum: a word a figure, or (`half`) a word for
 // two, each the upper half of an f32. The range must stay that of f32: a figure is one

@@ -26,14 +26,29 @@ pub struct CorrectionParameters {
     pub padding: u32,
 }
 
+/// The kernels.
+pub struct CorrectionKernels {
+    sums: Kernel,
+    solve: Kernel,
+}
+
+impl CorrectionKernels {
+    /// Compiles them.
+    pub fn new(gpu: &Gpu) -> Self {
+        let kernel = |name| Kernel::new(gpu, name, shaders::VIEW_CORRECTION);
+        Self {
+            sums: kernel("view_correction_sums"),
+            solve: kernel("view_correction"),
+        }
+    }
+}
+
 /// Finds the corrections of all views.
 pub struct Corrections {
     /// One for each view; they change nothing until the first are found.
     pub corrections: Buffer<Correction>,
     view_sums: Buffer<f32>,
-    sums: Kernel,
-    solve: Kernel,
-    solve_bindings: Bindings,
+    solve: Bindings,
     views: usize,
 }
 
@@ -42,14 +57,13 @@ impl Corrections {
     ///
     /// # Errors
     /// [`GpuError::TooLarge`].
-    pub fn new(gpu: &Gpu, views: usize) -> Result<Self, GpuError> {
+    pub fn new(gpu: &Gpu, kernels: &CorrectionKernels, views: usize) -> Result<Self, GpuError> {
         let corrections =
             Buffer::from_slice(gpu, "view corrections", &vec![Correction::NONE; views])?;
         let view_sums = Buffer::zeros(gpu, "view sums", views * SUM_GROUPS * SUMS)?;
-        let kernel = |name| Kernel::new(gpu, name, shaders::VIEW_CORRECTION);
-        let [sums, solve] = [kernel("view_correction_sums"), kernel("view_correction")];
-        let parameters = Self::parameters(gpu, views, 0, false)?;
-        let solve_bindings = solve.bind_at(
+        let parameters = CorrectionParameters::of(views, 0, false);
+        let parameters = Buffer::uniform(gpu, "correction parameters", &parameters)?;
+        let solve = kernels.solve.bind_at(
             gpu,
             &[
                 (4, parameters.raw()),
@@ -60,65 +74,82 @@ impl Corrections {
         Ok(Self {
             corrections,
             view_sums,
-            sums,
             solve,
-            solve_bindings,
             views,
         })
     }
 
-    fn parameters(
-        gpu: &Gpu,
-        views: usize,
-        view_index: usize,
-        weighted: bool,
-    ) -> Result<Buffer<CorrectionParameters>, GpuError> {
-        Buffer::uniform(
-            gpu,
-            "correction parameters",
-            &CorrectionParameters {
-                views: views as u32,
-                view_index: view_index as u32,
-                weighted: u32::from(weighted),
-                padding: 0,
-            },
-        )
-    }
-
-    /// Ties one view's picture, wanted a/b, curvature and, where there are any, weights
-    /// of the pixels.
+    /// What tells [`Corrections::sum`] which view it is about.
     ///
     /// # Errors
     /// [`GpuError::TooLarge`].
-    pub fn bind(
+    pub fn parameters(
         &self,
         gpu: &Gpu,
         view_index: usize,
-        [view, image, wanted, curvatures]: [&wgpu::Buffer; 4],
-        weights: (&Buffer<f32>, bool),
-    ) -> Result<Bindings, GpuError> {
-        let parameters = Self::parameters(gpu, self.views, view_index, weights.1)?;
-        Ok(self.sums.bind_at(
+        weighted: bool,
+    ) -> Result<Buffer<CorrectionParameters>, GpuError> {
+        let parameters = CorrectionParameters::of(self.views, view_index, weighted);
+        Buffer::uniform(gpu, "correction parameters", &parameters)
+    }
+
+    /// Chooses another view for what is submitted next.
+    pub fn choose(
+        &self,
+        gpu: &Gpu,
+        parameters: &Buffer<CorrectionParameters>,
+        view_index: usize,
+        weighted: bool,
+    ) {
+        let chosen = CorrectionParameters::of(self.views, view_index, weighted);
+        parameters.write(gpu, &[chosen]);
+    }
+
+    /// Ties view, picture and wanted a/b, what `chroma_loss` left, and the weights of the
+    /// pixels.
+    pub fn bind(
+        &self,
+        gpu: &Gpu,
+        kernels: &CorrectionKernels,
+        parameters: &Buffer<CorrectionParameters>,
+        ([view, image, wanted], image_gradient, weights): (
+            [&wgpu::Buffer; 3],
+            &Buffer<f32>,
+            &Buffer<f32>,
+        ),
+    ) -> Bindings {
+        kernels.sums.bind_at(
             gpu,
             &[
                 (0, view),
                 (1, image),
                 (2, wanted),
-                (3, curvatures),
+                (3, image_gradient.raw()),
                 (4, parameters.raw()),
                 (5, self.view_sums.raw()),
-                (7, weights.0.raw()),
+                (7, weights.raw()),
             ],
-        ))
+        )
     }
 
     /// Records one view's sums.
-    pub fn sum(&self, bindings: &Bindings, recorder: &mut Recorder) {
-        recorder.dispatch(&self.sums, bindings, SUM_GROUPS as u32);
+    pub fn sum(&self, kernels: &CorrectionKernels, bindings: &Bindings, recorder: &mut Recorder) {
+        recorder.dispatch(&kernels.sums, bindings, SUM_GROUPS as u32);
     }
 
     /// Records the corrections that follow from all views' sums.
-    pub fn solve(&self, recorder: &mut Recorder) {
-        recorder.dispatch(&self.solve, &self.solve_bindings, 1);
+    pub fn solve(&self, kernels: &CorrectionKernels, recorder: &mut Recorder) {
+        recorder.dispatch(&kernels.solve, &self.solve, 1);
+    }
+}
+
+impl CorrectionParameters {
+    fn of(views: usize, view_index: usize, weighted: bool) -> Self {
+        Self {
+            views: views as u32,
+            view_index: view_index as u32,
+            weighted: u32::from(weighted),
+            padding: 0,
+        }
     }
 }

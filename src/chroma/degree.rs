@@ -1,13 +1,7 @@
 //! Which degree of the chroma harmonics the views prove useful.
 
-use std::sync::Arc;
-
-use super::{ChromaSettings, ChromaView, Solver, distil};
-use crate::{
-    gpu::GpuError,
-    raster::Raster,
-    splats::{Splats, sh},
-};
+use super::{ChromaError, ChromaSettings, FrozenViews, IrlsSolver, Targets, Task, solve};
+use crate::splats::{Splats, sh};
 
 /// Every so many views are held back to judge by.
 const HELD_BACK: usize = 5;
@@ -25,26 +19,26 @@ pub struct ChosenDegree {
     pub losses: Vec<f64>,
 }
 
-/// Distils most of `views` at degree 0, 1 and so on, as long as those held back gain.
-/// Fewer than two views prove nothing: degree 0.
+/// Distills most of `tasks` at degree 0, 1 and so on, as long as those held back gain.
+/// Fewer than two tasks prove nothing: degree 0.
 ///
 /// # Errors
-/// [`GpuError`] when it does not fit or the device is lost.
+/// As [`solve`].
 pub fn choose_degree(
-    raster: &Arc<Raster>,
+    frozen: &FrozenViews,
     settings: &ChromaSettings,
-    extent: f64,
-    splats: &Splats,
-    views: &[ChromaView],
-) -> Result<ChosenDegree, GpuError> {
+    targets: &Targets,
+    tasks: &[Task],
+    luma: &Splats,
+) -> Result<ChosenDegree, ChromaError> {
     let (mut kept, mut held_back) = (Vec::new(), Vec::new());
-    for (i, view) in views.iter().enumerate() {
+    for (i, &task) in tasks.iter().enumerate() {
         let to = if i % HELD_BACK == HELD_BACK / 2 {
             &mut held_back
         } else {
             &mut kept
         };
-        to.push(view.clone());
+        to.push(task);
     }
     let mut losses: Vec<f64> = Vec::new();
     if kept.is_empty() || held_back.is_empty() {
@@ -56,8 +50,8 @@ pub fn choose_degree(
             ..settings.clone()
         };
         let ignore = &mut |_| ();
-        let found = distil(raster, &settings, extent, splats, kept.clone(), ignore)?;
-        let mut judge = Solver::new(raster.clone(), &settings, extent, splats, &held_back)?;
+        let found = solve(frozen, &settings, targets, kept.clone(), luma, ignore)?;
+        let mut judge = IrlsSolver::new(frozen, &settings, targets, held_back.clone())?;
         let loss = judge.objective(&found.chroma)?;
         let gains = (losses.last()).is_none_or(|before| loss < before * (1.0 - LEAST_GAIN));
         losses.push(loss);

@@ -15,6 +15,8 @@ pub struct LbfgsParameters {
     pub length: u32,
     /// Gaussians; there are as many unknowns in a plane.
     pub splats: u32,
+    /// Planes of the diagonal.
+    pub diagonals: u32,
     /// Workgroups that leave a partial sum.
     pub blocks: u32,
     /// Added to the matrix's diagonal.
@@ -32,16 +34,18 @@ const SHARED_SCALARS: usize = 6;
 /// The loss before the first point is accepted, as the first scalar.
 const UNKNOWN: f32 = f32::MAX;
 
-/// What is minimised over, planes `[planes, N]`, and what the caller leaves before
-/// [`Lbfgs::step`].
+/// What is minimised over, planes `[harmonics, channels, N]`, and what the caller leaves
+/// before [`Lbfgs::step`].
 pub struct System {
-    /// What is solved for.
+    /// What is solved for: the first planes of this, as many as the gradient has.
     pub unknowns: Buffer<f32>,
     /// The loss's gradient.
     pub gradient: Buffer<f32>,
-    /// The adjoint of the weights themselves, of which the planes of the constant
-    /// harmonic count.
+    /// Sums of the pixels' curvatures, weighed as Gaussians are drawn there: a plane for
+    /// each channel, or one for all.
     pub diagonal: Buffer<f32>,
+    /// What the ridge draws the unknowns to.
+    pub origin: Buffer<f32>,
     /// The least that each unknown may be; [`UNBOUNDED`] where nothing bounds it.
     pub floors: Buffer<f32>,
     /// The losses whose sum is minimised.
@@ -50,6 +54,56 @@ pub struct System {
 
 /// The floor of an unknown that has none.
 pub const UNBOUNDED: f32 = f32::MIN;
+
+/// Planes of floats that a system and its solver take for each plane of unknowns, beside
+/// these: gradient, origin, floors, the accepted point and its gradient, preconditioner,
+/// direction, and the pairs.
+const PLANES: usize = 7 + 2 * MEMORY;
+
+/// Bytes of a system of `planes` planes of unknowns, and of its solver.
+pub(super) fn bytes(splats: usize, planes: usize) -> u64 {
+    // And the diagonal's, two at most.
+    4 * splats as u64 * ((1 + PLANES) * planes + 2) as u64
+}
+
+/// The compiled kernels.
+pub struct LbfgsKernels {
+    ridge: Kernel,
+    judge: Kernel,
+    keep: Kernel,
+    begin: Kernel,
+    dot: Kernel,
+    curvature: Kernel,
+    spread: Kernel,
+    scale: Kernel,
+    alpha: Kernel,
+    add: Kernel,
+    precondition: Kernel,
+    beta: Kernel,
+    step: Kernel,
+}
+
+impl LbfgsKernels {
+    /// Compiles them.
+    pub fn new(gpu: &Gpu) -> Self {
+        let kernel = |name| Kernel::new(gpu, name, shaders::LBFGS);
+        Self {
+            ridge: kernel("lbfgs_ridge"),
+            judge: kernel("lbfgs_judge"),
+            keep: kernel("lbfgs_pair"),
+            begin: kernel("lbfgs_begin"),
+            dot: kernel("lbfgs_dot"),
+            curvature: kernel("lbfgs_curvature"),
+            spread: kernel("lbfgs_spread"),
+            scale: kernel("lbfgs_scale"),
+            alpha: kernel("lbfgs_alpha"),
+            add: kernel("lbfgs_add"),
+            precondition: kernel("lbfgs_precondition"),
+            beta: kernel("lbfgs_beta"),
+            step: kernel("lbfgs_step"),
+        }
+    }
+}
 
 /// An entry point and what it works on.
 struct Bound(Kernel, Bindings);
@@ -81,15 +135,21 @@ pub struct Lbfgs {
 }
 
 impl Lbfgs {
-    /// Compiles the kernels for `system` of `splats` Gaussians.
+    /// Ties the kernels to `system` of `splats` Gaussians with so many channels.
     ///
     /// # Errors
     /// [`GpuError::TooLarge`].
-    pub fn new(gpu: &Gpu, system: &System, splats: usize, ridge: f32) -> Result<Self, GpuError> {
-        let length = system.unknowns.len();
+    pub fn new(
+        gpu: &Gpu,
+        kernels: &LbfgsKernels,
+        system: &System,
+        [splats, channels]: [usize; 2],
+        ridge: f32,
+    ) -> Result<Self, GpuError> {
+        let length = system.gradient.len();
         // The adjoint multiplies by the constant harmonic once, the matrix by all harmonics
         // twice, and the squares of those sum to as many of its own square (Unsöld 1927).
-        let harmonics = length / (2 * splats).max(1);
+        let harmonics = length / (channels * splats).max(1);
         let blocks = groups_for(length);
         let parameters = Buffer::uniform(
             gpu,
@@ -97,6 +157,7 @@ impl Lbfgs {
             &LbfgsParameters {
                 length: length as u32,
                 splats: splats as u32,
+                diagonals: (system.diagonal.len() / splats.max(1)).max(1) as u32,
                 blocks,
                 ridge,
                 diagonal_scale: (sh::C0 * harmonics as f64) as f32,
@@ -107,7 +168,6 @@ impl Lbfgs {
         let (preconditioner, direction) = (zeros("preconditioner")?, zeros("direction")?);
         let block_sums = Buffer::<f32>::zeros(gpu, "lbfgs sums", blocks as usize)?;
         let scalars = Buffer::<f32>::zeros(gpu, "scalars", SHARED_SCALARS + 2 * MEMORY)?;
-        let kernel = |name| Kernel::new(gpu, name, shaders::LBFGS);
         let bind = |kernel: &Kernel, used: &[(u32, &wgpu::Buffer)]| {
             Bound(kernel.clone(), kernel.bind_at(gpu, used))
         };
@@ -117,10 +177,6 @@ impl Lbfgs {
         let sums = (13, block_sums.raw());
         let (of_direction, of_scalars) = ((10, direction.raw()), (14, scalars.raw()));
 
-        let [keep, dot, add] = ["lbfgs_pair", "lbfgs_dot", "lbfgs_add"].map(kernel);
-        let [curvature, spread, scale] =
-            ["lbfgs_curvature", "lbfgs_spread", "lbfgs_scale"].map(kernel);
-        let [alpha, beta] = ["lbfgs_alpha", "lbfgs_beta"].map(kernel);
         let pairs = (0..MEMORY)
             .map(|index| {
                 let displacement = zeros("displacement")?;
@@ -129,20 +185,20 @@ impl Lbfgs {
                 let index = (1, index.raw());
                 let product = |left: &Buffer<f32>, right: &Buffer<f32>| {
                     bind(
-                        &dot,
+                        &kernels.dot,
                         &[parameters, sums, (15, left.raw()), (16, right.raw())],
                     )
                 };
                 let sum = |kernel: &Kernel| bind(kernel, &[parameters, index, sums, of_scalars]);
                 let add = |left: &Buffer<f32>| {
                     bind(
-                        &add,
+                        &kernels.add,
                         &[parameters, of_direction, of_scalars, (15, left.raw())],
                     )
                 };
                 Ok(OfPair {
                     keep: bind(
-                        &keep,
+                        &kernels.keep,
                         &[
                             parameters,
                             unknowns,
@@ -156,32 +212,41 @@ impl Lbfgs {
                     ),
                     curvature: [
                         product(&displacement, &change),
-                        bind(&curvature, &[parameters, sums, of_scalars]),
+                        bind(&kernels.curvature, &[parameters, sums, of_scalars]),
                     ],
                     spread: [
-                        bind(&spread, &[parameters, inverse, (12, change.raw()), sums]),
-                        sum(&scale),
+                        bind(
+                            &kernels.spread,
+                            &[parameters, inverse, (12, change.raw()), sums],
+                        ),
+                        sum(&kernels.scale),
                     ],
                     along_displacement: product(&displacement, &direction),
-                    alpha: sum(&alpha),
+                    alpha: sum(&kernels.alpha),
                     add_change: add(&change),
                     along_change: product(&change, &direction),
-                    beta: sum(&beta),
+                    beta: sum(&kernels.beta),
                     add_displacement: add(&displacement),
                 })
             })
             .collect::<Result<_, GpuError>>()?;
         let lbfgs = Self {
             ridge: bind(
-                &kernel("lbfgs_ridge"),
-                &[parameters, unknowns, gradient, sums],
+                &kernels.ridge,
+                &[
+                    parameters,
+                    unknowns,
+                    gradient,
+                    sums,
+                    (17, system.origin.raw()),
+                ],
             ),
             judge: bind(
-                &kernel("lbfgs_judge"),
+                &kernels.judge,
                 &[parameters, (6, system.losses.raw()), sums, of_scalars],
             ),
             begin: bind(
-                &kernel("lbfgs_begin"),
+                &kernels.begin,
                 &[
                     parameters,
                     unknowns,
@@ -194,11 +259,11 @@ impl Lbfgs {
                 ],
             ),
             precondition: bind(
-                &kernel("lbfgs_precondition"),
+                &kernels.precondition,
                 &[parameters, inverse, of_direction, of_scalars],
             ),
             step: bind(
-                &kernel("lbfgs_step"),
+                &kernels.step,
                 &[parameters, unknowns, floors, inverse, of_direction],
             ),
             pairs,

@@ -1,8 +1,6 @@
-//! The chroma loss (`shaders/chroma_loss.wgsl`).
+//! The losses of stage 2 (`shaders/chroma_loss.wgsl`, `shaders/rgb_loss.wgsl`).
 
 use bytemuck::{Pod, Zeroable};
-
-use crate::gpu::{Gpu, Kernel, shaders};
 
 /// Pixels that a workgroup of the loss takes.
 pub(super) const LOSS_BLOCK: usize = 256;
@@ -63,12 +61,10 @@ impl Correction {
     };
 }
 
-/// Compiles the kernel.
-pub(super) fn kernel(gpu: &Gpu) -> Kernel {
-    Kernel::new(gpu, "chroma_loss", shaders::CHROMA_LOSS)
-}
-
-/// Compiles the kernel that gives the curvature too.
-pub(super) fn curvature_kernel(gpu: &Gpu) -> Kernel {
-    Kernel::new(gpu, "chroma_loss", shaders::CHROMA_LOSS_CURVATURE)
+/// Twin of `struct RgbLossParameters`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct RgbLossParameters {
+    /// 1 where each pixel has a weight.
+    pub weighted: u32,
 }

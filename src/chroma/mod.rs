@@ -1,34 +1,42 @@
-//! Stage 2: colour, distilled from a teacher into frozen geometry.
+//! Stage 2: color, distilled from a teacher into frozen geometry.
+//!
+//! [`Targets`] hold what the teacher wants, [`FrozenViews`] what the cameras see of the
+//! geometry; [`IrlsSolver`] or [`AdamSolver`] solve for a/b, and [`bake`] brings them into
+//! the RGB that splat files have.
 
-mod bake_rgb;
+mod adam;
+mod bake;
 mod correction;
 mod degree;
-mod distil;
-mod distill;
+mod error;
 mod fill;
+mod frozen;
 mod irls;
+mod kernels;
 mod lbfgs;
 mod loss;
-mod pass;
+mod passes;
 mod picture;
-mod rgb;
 mod roofline;
-mod rows;
 mod settings;
+mod solve;
+mod targets;
 pub mod teacher;
-mod view;
 
-pub use bake_rgb::bake_rgb;
-pub use correction::{CorrectionParameters, Corrections, SUM_GROUPS, SUMS};
+pub use adam::AdamSolver;
+pub use bake::{bake, bake_rgb, fit_rgb};
+pub use correction::{CorrectionKernels, CorrectionParameters, Corrections, SUM_GROUPS, SUMS};
 pub use degree::{ChosenDegree, LEAST_GAIN, choose_degree};
-pub use distil::{Distilled, SolverKind, distil};
-pub use distill::{ChromaProgress, Distiller};
+pub use error::ChromaError;
 pub use fill::fill_unseen;
-pub use irls::Solver;
-pub use lbfgs::{Lbfgs, LbfgsParameters, System, UNBOUNDED};
-pub use loss::{ChromaLossWeights, Correction};
+pub use frozen::{FrozenViews, Room};
+pub use irls::IrlsSolver;
+pub use kernels::ChromaKernels;
+pub use lbfgs::{Lbfgs, LbfgsKernels, LbfgsParameters, System, UNBOUNDED};
+pub use loss::{ChromaLossWeights, Correction, RgbLossParameters};
+pub use passes::Task;
 pub use picture::native_rgb;
-pub use rgb::{RgbView, bake, fit_rgb};
 pub use roofline::minimum_words;
 pub use settings::ChromaSettings;
-pub use view::ChromaView;
+pub use solve::{ChromaProgress, Solved, SolverKind, solve};
+pub use targets::{Target, Targets, pack_ab, pack_rgb};

@@ -8,19 +8,22 @@ pub fn minimum_words(kernel: &str, load: &Load) -> Option<f64> {
     let Load {
         splats,
         pixels,
-        channels,
         sh_planes,
         ..
     } = *load;
     // Unknowns of the solver.
     let planes = sh_planes * splats;
     Some(match kernel {
-        "chroma_loss" => 3.25 * channels * pixels,
+        // Picture, wanted a/b, gradient and curvature.
+        "chroma_loss" => 7.0 * pixels,
+        // Picture, wanted RGB, gradient and curvature.
+        "rgb_loss" => 9.0 * pixels,
         // Picture, wanted a/b and curvature.
-        "view_correction_sums" => 3.0 * channels * pixels,
+        "view_correction_sums" => 5.0 * pixels,
         // A few sums of each view.
         "view_correction" => 0.0,
-        "lbfgs_ridge" | "lbfgs_add" | "lbfgs_precondition" => 3.0 * planes,
+        "lbfgs_ridge" => 4.0 * planes,
+        "lbfgs_add" | "lbfgs_precondition" => 3.0 * planes,
         "lbfgs_pair" => 8.0 * planes,
         "lbfgs_begin" => 5.0 * planes + 2.0 * splats,
         "lbfgs_dot" | "lbfgs_spread" => 2.0 * planes,

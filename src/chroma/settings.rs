@@ -1,19 +1,21 @@
 //! What stage 2 can be told.
 
+use serde::{Deserialize, Serialize};
+
 use super::SolverKind;
 
 /// Settings of one distillation.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ChromaSettings {
     /// Who solves.
     pub solver: SolverKind,
     /// Degree of the chroma harmonics, 0 to 3. Degree 0 cannot memorise that a
     /// teacher colours the views differently.
     pub sh_degree: u32,
-    /// Scales beside the full one that count: the coarsest is 2^this times smaller. The
-    /// paper leaves it open; see docs/decisions.md for the ablation.
-    pub coarser_scales: u32,
-    /// Weight of the agreement with the next coarser scale, the teacher's being 1.
+    /// Coarser scales that count for Adam beside the full one, each half as large as the
+    /// last. The paper leaves it open; see docs/decisions.md for the ablation.
+    pub scales: u32,
+    /// Adam's weight of the agreement with the next coarser scale, the teacher's being 1.
     pub agreement: f32,
     /// Residual in CIELAB units at which the loss has all but levelled off, so that
     /// what is plainly wrong in one view does not count; `None`: plain L1.
@@ -29,22 +31,22 @@ pub struct ChromaSettings {
     /// Seeds the order of Adam's views.
     pub seed: u64,
     /// Whether least squares brings each view's teacher into line with the others.
-    pub corrects_views: bool,
+    pub correct_views: bool,
     /// Coarser scales that least squares passes through on its way.
-    pub warm_scales: u32,
+    pub coarse_scales: u32,
     /// Rounds on each of them: in each all views are drawn, reweighted, and a step taken.
-    pub warm_rounds: usize,
+    pub coarse_rounds: usize,
     /// Rounds at full size.
     pub rounds: usize,
     /// How strongly least squares draws every Gaussian towards gray, in pixels that show it:
     /// what depends on less stays where the others leave it.
     pub ridge: f64,
+    /// Bytes of the device that solving and baking may take; views that do not fit are brought
+    /// one at a time. `None`: all that is worth keeping, up to 2 GiB.
+    pub memory_limit: Option<u64>,
     /// Whether Gaussians that no view sees well take their neighbours' colour after
     /// least squares.
-    pub fills: bool,
-    /// Tile lists are kept while they take no more than this many bytes on the device;
-    /// those of the other views are made anew whenever they come up.
-    pub cache_bytes: usize,
+    pub fill: bool,
 }
 
 /// In pixels. Less than it says, for the loss of a residual does not grow with its square as
@@ -52,19 +54,16 @@ pub struct ChromaSettings {
 /// hundredth of it fits the teacher better and held-out photos worse (docs/decisions.md).
 const RIDGE: f64 = 0.01;
 
-/// Leaves room for the rest on devices of 4 GiB.
-const CACHE_BYTES: usize = 2 << 30;
-
 impl ChromaSettings {
     /// The paper's distillation: Adam for so many iterations, three scales.
     pub fn adam(iterations: usize) -> Self {
         Self {
             solver: SolverKind::Adam,
-            coarser_scales: 2,
+            scales: 2,
             iterations,
             robust: None,
-            corrects_views: false,
-            fills: false,
+            correct_views: false,
+            fill: false,
             ..Self::irls()
         }
     }
@@ -74,20 +73,20 @@ impl ChromaSettings {
         Self {
             solver: SolverKind::Irls,
             sh_degree: 0,
-            coarser_scales: 0,
+            scales: 0,
             agreement: 1.0,
             robust: Some(10.0),
             iterations: 0,
             rates: [2.0, 0.1],
             rest_share: 1.0 / 20.0,
             seed: 0,
-            corrects_views: true,
-            warm_scales: 2,
-            warm_rounds: 10,
+            correct_views: true,
+            coarse_scales: 2,
+            coarse_rounds: 10,
             rounds: 10,
             ridge: RIDGE,
-            fills: true,
-            cache_bytes: CACHE_BYTES,
+            memory_limit: None,
+            fill: true,
         }
     }
 
@@ -96,18 +95,26 @@ impl ChromaSettings {
     pub fn exact() -> Self {
         Self {
             robust: None,
-            corrects_views: false,
-            warm_rounds: 4,
-            fills: false,
+            correct_views: false,
+            coarse_rounds: 4,
+            fill: false,
             ..Self::irls()
         }
+    }
+
+    /// Scales that targets are needed at, the full one included.
+    pub fn target_scales(&self) -> usize {
+        1 + match self.solver {
+            SolverKind::Adam => self.scales,
+            SolverKind::Irls => self.coarse_scales,
+        } as usize
     }
 
     /// Iterations of Adam, or rounds of least squares on all scales.
     pub fn steps_to_report(&self) -> usize {
         match self.solver {
             SolverKind::Adam => self.iterations,
-            SolverKind::Irls => self.warm_scales as usize * self.warm_rounds + self.rounds,
+            SolverKind::Irls => self.coarse_scales as usize * self.coarse_rounds + self.rounds,
         }
     }
 

@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use clap::{Args, CommandFactory, ValueEnum, error::ErrorKind};
 
 use super::{Cli, CliError, print, progress::Progress};
-use crate::chroma::{SolverKind, teacher};
+use crate::chroma::{ChromaSettings, SolverKind, teacher};
 use crate::report::timings_table;
-use crate::run::{ChromaOptions, ColorizeOptions, Degree, TeachOptions, colorize};
+use crate::run::{ColorizeOptions, Degree, TeachOptions, colorize};
 
 /// How a teacher's small picture becomes as large as the photo.
 #[derive(Clone, Copy, ValueEnum)]
@@ -73,7 +73,7 @@ pub struct Colorize {
     /// Give Gaussians that no view sees well their neighbours' colour [default: on with irls].
     #[arg(long, value_enum, value_name = "on|off")]
     fill: Option<Switch>,
-    /// Coarser scales that count beside the full one [default: 0 with irls, 2 with adam].
+    /// Coarser scales that count for Adam beside the full one [default: 2].
     #[arg(long, value_name = "0..4", value_parser = clap::value_parser!(u32).range(0..=4))]
     scales: Option<u32>,
     /// Degree of the chroma's dependence on the direction of view, or `auto`: what training views
@@ -83,6 +83,10 @@ pub struct Colorize {
     /// COLMAP folder with the photos, when it is not where `fit` found it.
     #[arg(long, value_name = "COLMAP_DIR")]
     colmap: Option<PathBuf>,
+    /// Device memory in MiB for solving and baking: what does not fit is brought from the host
+    /// view by view.
+    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u32).range(1..))]
+    memory_limit: Option<u32>,
     /// Time every kernel, and print a table of it.
     #[arg(long)]
     timings: bool,
@@ -158,6 +162,27 @@ impl Colorize {
         teachers.iter().cloned().zip(weights).collect()
     }
 
+    /// The solver's settings with what was said of them.
+    fn settings(&self) -> ChromaSettings {
+        let mut settings = match self.solver {
+            SolverKind::Irls => ChromaSettings::irls(),
+            // As many iterations as the run says.
+            SolverKind::Adam => ChromaSettings::adam(0),
+        };
+        let count = |said: Option<u32>, default: usize| said.map_or(default, |n| n as usize);
+        settings.scales = self.scales.unwrap_or(settings.scales);
+        settings.rounds = count(self.rounds, settings.rounds);
+        settings.coarse_rounds = count(self.coarse_rounds, settings.coarse_rounds);
+        if let Some(residual) = self.robust {
+            settings.robust = Some(residual).filter(|residual| residual.is_finite());
+        }
+        if let Some(switch) = self.fill {
+            settings.fill = switch == Switch::On;
+        }
+        settings.memory_limit = self.memory_limit.map(|mib| u64::from(mib) << 20);
+        settings
+    }
+
     /// Ends the program where an option belongs to the other solver.
     fn check_solver(&self) {
         let of_irls = [
@@ -166,9 +191,13 @@ impl Colorize {
             ("--correct-views", self.correct_views == Some(Switch::On)),
             ("--fill", self.fill == Some(Switch::On)),
         ];
+        let of_adam = [
+            ("--until", self.until.is_some()),
+            ("--scales", self.scales.is_some()),
+        ];
         let (options, other) = match self.solver {
             SolverKind::Adam => (&of_irls[..], SolverKind::Irls),
-            SolverKind::Irls => (&[("--until", self.until.is_some())][..], SolverKind::Adam),
+            SolverKind::Irls => (&of_adam[..], SolverKind::Adam),
         };
         if let Some((option, _)) = options.iter().find(|(_, given)| *given) {
             let message = format!("{option} needs --solver {}", other.name());
@@ -180,6 +209,7 @@ impl Colorize {
 
     pub(super) fn run(self) -> Result<(), CliError> {
         self.check_solver();
+        let settings = self.settings();
         let mut progress = Progress::default();
         let options = ColorizeOptions {
             teach: TeachOptions {
@@ -198,16 +228,9 @@ impl Colorize {
             run: self.run,
             output: self.output,
             until: self.until.map(|n| n as usize),
-            chroma: ChromaOptions {
-                solver: self.solver,
-                sh_degree: self.sh_degree,
-                scales: self.scales,
-                rounds: self.rounds.map(|n| n as usize),
-                coarse_rounds: self.coarse_rounds.map(|n| n as usize),
-                robust: self.robust,
-                correct_views: self.correct_views.map(|switch| switch == Switch::On),
-                fill: self.fill.map(|switch| switch == Switch::On),
-            },
+            settings,
+            sh_degree: self.sh_degree,
+            correct_views: self.correct_views.map(|switch| switch == Switch::On),
             colmap: self.colmap,
             timings: self.timings,
         };

@@ -26,6 +26,9 @@ pub struct Eval {
     /// and the teacher on each drawn gray frame.
     #[arg(long, requires = "teacher")]
     baselines: bool,
+    /// Device memory in MiB for fitting these RGB splats.
+    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u32).range(1..), requires = "baselines")]
+    memory_limit: Option<u32>,
     /// Frames of the rendered path.
     #[arg(long, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u32).range(2..=9999))]
     frames: u32,
@@ -58,6 +61,7 @@ impl Eval {
             colmap: self.colmap,
             frames: self.frames as usize,
             baselines: self.baselines,
+            memory_limit: self.memory_limit.map(|mib| u64::from(mib) << 20),
             flow: self.flow,
             lpips: self.lpips,
         };

@@ -12,8 +12,9 @@ use crate::{
         scene::{Scene, View},
     },
     raster::{
-        Field, Geometry, Layer, LayerAdjoint, Lists, Outcome, Projected, Raster, RasterNumerics,
-        RasterOptions, Status, ViewUniform, constants::*,
+        AdjointScratch, COLOR_FIGURES, ChromaAdjoint, ChromaSums, ColorKind, Field, Geometry,
+        Layer, Lists, LumaAdjoint, Outcome, Projected, Raster, RasterNumerics, RasterOptions,
+        Status, ViewUniform, constants::*,
     },
     splats::{ShField, Splats},
 };
@@ -70,7 +71,18 @@ pub struct Stage {
     pub layer: Layer,
     raster: Arc<Raster>,
     count: usize,
-    adjoint: Option<(LayerAdjoint, Buffer<f32>)>,
+    adjoint: Adjoint,
+}
+
+enum Adjoint {
+    /// With the field's gradient.
+    Luma(LumaAdjoint, Buffer<f32>),
+    Color {
+        adjoint: ChromaAdjoint,
+        image_gradient: Buffer<f32>,
+        gradient: Buffer<f32>,
+        diagonal: Buffer<f32>,
+    },
 }
 
 impl Stage {
@@ -107,15 +119,34 @@ impl Stage {
         let field = Field::upload(gpu, &splats.sh)?;
         let lists = Lists::new(&raster, &geometry, tiles, capacity)?;
         let layer = Layer::new(&raster, &geometry, &lists, &field, pixels, tiles)?;
-        let trained = field.kind.channels() < 3;
-        let adjoint = trained
-            .then(|| {
-                let gradient = Buffer::zeros(gpu, "field gradient", field.planes.len())?;
+        let gradient = Buffer::zeros(gpu, "field gradient", field.planes.len())?;
+        let adjoint = match field.kind {
+            ColorKind::Luma => {
                 let outcome = Outcome::Gradient(&gradient);
-                LayerAdjoint::new(&raster, &geometry, &lists, &field, &layer, &outcome)
-                    .map(|adjoint| (adjoint, gradient))
-            })
-            .transpose()?;
+                let adjoint =
+                    LumaAdjoint::new(&raster, &geometry, &lists, &field, &layer, &outcome)?;
+                Adjoint::Luma(adjoint, gradient)
+            }
+            ColorKind::Chroma | ColorKind::Rgb => {
+                let image_gradient = Buffer::zeros(gpu, "image gradient", COLOR_FIGURES * pixels)?;
+                let scratch = AdjointScratch::color(gpu, splats.len(), capacity)?;
+                let planes = COLOR_FIGURES - field.kind.channels();
+                let diagonal = Buffer::zeros(gpu, "diagonal", planes * splats.len())?;
+                let sums = ChromaSums {
+                    gradient: &gradient,
+                    diagonal: &diagonal,
+                };
+                let image = &image_gradient;
+                let adjoint =
+                    ChromaAdjoint::new(&raster, &geometry, &lists, &layer, image, scratch, sums);
+                Adjoint::Color {
+                    adjoint,
+                    image_gradient,
+                    gradient,
+                    diagonal,
+                }
+            }
+        };
         Ok(Self {
             view,
             lists,
@@ -145,30 +176,59 @@ impl Stage {
     }
 
     /// Draws, and differentiates `Σ upstream · picture`; `upstream` is
-    /// `[pixels, channels]`.
+    /// `[pixels, channels]`. Of a/b and RGB its first channels stand for the curvatures too.
     ///
     /// # Errors
     /// [`GpuError::Lost`].
-    ///
-    /// # Panics
-    /// For RGB, which is shown but never trained.
     pub fn backward(&self, upstream: &[f64]) -> Result<Gradient, GpuError> {
+        self.backward_onto(upstream, &[])
+    }
+
+    /// The same, of a/b and RGB added to these values of the field's gradient.
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`].
+    pub fn backward_onto(&self, upstream: &[f64], before: &[f32]) -> Result<Gradient, GpuError> {
         let gpu = &self.raster.gpu;
-        let (adjoint, field_gradient) = self.adjoint.as_ref().expect("RGB is not trained");
-        let narrow: Vec<f32> = upstream.iter().map(|&v| v as f32).collect();
-        adjoint.image_gradient.write(gpu, &narrow);
+        let narrow = |values: &[f64]| values.iter().map(|&v| v as f32).collect::<Vec<_>>();
         let mut recorder = self.record();
-        adjoint.record(&self.raster, &mut recorder);
-        recorder.submit();
-        let (geometry, statistics) = match &adjoint.geometry {
-            Some(geometry) => (geometry.gradient.read(gpu)?, geometry.statistics.read(gpu)?),
-            None => (Vec::new(), Vec::new()),
-        };
-        Ok(Gradient {
-            count: self.count,
-            geometry,
-            statistics,
-            field: field_gradient.read(gpu)?,
+        Ok(match &self.adjoint {
+            Adjoint::Luma(adjoint, gradient) => {
+                adjoint.image_gradient.write(gpu, &narrow(upstream));
+                adjoint.record(&self.raster, &mut recorder);
+                recorder.submit();
+                Gradient {
+                    count: self.count,
+                    geometry: adjoint.geometry_gradient.read(gpu)?,
+                    statistics: adjoint.statistics.read(gpu)?,
+                    field: gradient.read(gpu)?,
+                    diagonal: Vec::new(),
+                }
+            }
+            Adjoint::Color {
+                adjoint,
+                image_gradient,
+                gradient,
+                diagonal,
+            } => {
+                let channels = self.layer.kind.channels();
+                let figures = (upstream.chunks_exact(channels))
+                    .flat_map(|of_pixel| of_pixel.iter().chain(of_pixel).take(COLOR_FIGURES));
+                let figures: Vec<f64> = figures.copied().collect();
+                image_gradient.write(gpu, &narrow(&figures));
+                gradient.write(gpu, &vec![0.0; gradient.len()]);
+                gradient.write(gpu, before);
+                diagonal.write(gpu, &vec![0.0; diagonal.len()]);
+                adjoint.record(&self.raster, &mut recorder);
+                recorder.submit();
+                Gradient {
+                    count: self.count,
+                    geometry: Vec::new(),
+                    statistics: Vec::new(),
+                    field: gradient.read(gpu)?,
+                    diagonal: diagonal.read(gpu)?,
+                }
+            }
         })
     }
 
@@ -221,17 +281,19 @@ impl Stage {
 #[derive(PartialEq)]
 pub struct Gradient {
     count: usize,
-    /// `[11, N]`; empty for chroma.
+    /// `[11, N]`; empty for a/b and RGB.
     pub geometry: Vec<f32>,
-    /// `[2, N]`; empty for chroma.
+    /// `[2, N]`; empty for a/b and RGB.
     pub statistics: Vec<f32>,
     /// `[(degree + 1)², channels, N]`.
     pub field: Vec<f32>,
+    /// Sums of curvatures, `[4 - channels, N]`; empty for luma.
+    pub diagonal: Vec<f32>,
 }
 
 impl Gradient {
     /// The groups of parameters with their names, each `[N, …]` as the oracle
-    /// has it; chroma has the last one only.
+    /// has it; a/b and RGB have the last one only.
     pub fn groups(&self) -> Vec<(&'static str, Vec<f64>)> {
         let field_planes = self.field.len() / self.count;
         let mut groups = Vec::new();
@@ -258,7 +320,12 @@ impl Gradient {
 
     /// All planes without those of Gaussian `index`, as bits.
     pub fn bits_without(&self, index: Option<usize>) -> Vec<u32> {
-        let planes = [&self.geometry, &self.statistics, &self.field];
+        let planes = [
+            &self.geometry,
+            &self.statistics,
+            &self.field,
+            &self.diagonal,
+        ];
         (planes
             .into_iter()
             .flat_map(|planes| planes.iter().enumerate()))

@@ -22,5 +22,5 @@ pub use evidence::{Evidence, Survey};
 pub use exposure::{Exposures, find_exposures, find_photo_exposures};
 pub use plan::{Decider, Decision, Effect, Overrules, Plan, Room, table};
 pub use sampling::sampling_spread;
-pub use teacher::{TeacherSpread, teacher_spread};
+pub use teacher::{TeacherSamples, TeacherSpread};
 pub use tracks::Sample;

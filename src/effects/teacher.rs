@@ -18,53 +18,81 @@ pub struct TeacherSpread {
     pub noise: f64,
 }
 
-/// Compares the answers at COLMAP's points. `answers` are a/b `[height, width]` of the
-/// capture's views in the size of `cameras`, where the teacher has one.
-///
-/// `None` where no point is seen in two of them.
-pub fn teacher_spread(
-    capture: &Capture,
-    cameras: &[&Camera],
-    answers: &[Option<&[[f32; 2]]>],
-) -> Option<TeacherSpread> {
-    let taught: Vec<usize> = (0..answers.len())
-        .filter(|&v| answers[v].is_some())
-        .collect();
-    let (mut spread, mut noise) = (0.0, 0.0);
-    for channel in 0..2 {
-        let tracks: Vec<Vec<Sample>> = (capture.points.iter())
-            .map(|point| {
-                (point.track.iter())
-                    .filter_map(|seen| {
-                        let camera = cameras[seen.view];
-                        let [x, y] = place_in(camera, &capture.views[seen.view].camera, seen.pixel);
-                        let inside = x >= 0.0
-                            && y >= 0.0
-                            && x < f64::from(camera.width)
-                            && y < f64::from(camera.height);
-                        let pixel = y as usize * camera.width as usize + x as usize;
-                        let ab = answers[seen.view].filter(|_| inside)?[pixel];
-                        Some(Sample {
-                            view: seen.view,
-                            value: 0.5 + f64::from(ab[channel]) / UNITS,
-                            direction: (point.position - camera.center()).normalize_or_zero(),
-                        })
-                    })
-                    .collect::<Vec<Sample>>()
-            })
-            .filter(|samples| samples.len() >= 2)
-            .collect();
-        if tracks.is_empty() {
-            return None;
+/// What a teacher says at COLMAP's points, taken view by view.
+pub struct TeacherSamples {
+    /// For each view the points it shows, and their places in the points' tracks.
+    seen: Vec<Vec<(usize, usize)>>,
+    /// `[points][track]`: a/b of each observation, where it is known.
+    ab: Vec<Vec<Option<[f32; 2]>>>,
+    /// Cameras of the views that were taken.
+    cameras: Vec<Option<Camera>>,
+}
+
+impl TeacherSamples {
+    /// None yet.
+    pub fn new(capture: &Capture) -> Self {
+        let mut seen = vec![Vec::new(); capture.views.len()];
+        for (index, point) in capture.points.iter().enumerate() {
+            for (place, observation) in point.track.iter().enumerate() {
+                seen[observation.view].push((index, place));
+            }
         }
-        let found = find_exposures(&tracks, answers.len(), &taught);
-        spread += found.spread * found.spread;
-        noise += found.noise * found.noise;
+        Self {
+            seen,
+            ab: (capture.points.iter())
+                .map(|point| vec![None; point.track.len()])
+                .collect(),
+            cameras: vec![None; capture.views.len()],
+        }
     }
-    Some(TeacherSpread {
-        spread: UNITS * spread.sqrt(),
-        noise: UNITS * noise.sqrt(),
-    })
+
+    /// Takes a view's a/b, `[height, width]` in the size of `camera`.
+    pub fn take(&mut self, capture: &Capture, view: usize, camera: &Camera, ab: &[[f32; 2]]) {
+        for &(point, place) in &self.seen[view] {
+            let pixel = capture.points[point].track[place].pixel;
+            let [x, y] = place_in(camera, &capture.views[view].camera, pixel);
+            let inside =
+                x >= 0.0 && y >= 0.0 && x < f64::from(camera.width) && y < f64::from(camera.height);
+            let at = y as usize * camera.width as usize + x as usize;
+            self.ab[point][place] = ab.get(at).copied().filter(|_| inside);
+        }
+        self.cameras[view] = Some(camera.clone());
+    }
+
+    /// Compares the views. `None` where no point is seen in two of them.
+    pub fn spread(&self, capture: &Capture) -> Option<TeacherSpread> {
+        let views = self.cameras.len();
+        let taught: Vec<usize> = (0..views).filter(|&v| self.cameras[v].is_some()).collect();
+        let (mut spread, mut noise) = (0.0, 0.0);
+        for channel in 0..2 {
+            let tracks: Vec<Vec<Sample>> = (capture.points.iter().zip(&self.ab))
+                .map(|(point, ab)| {
+                    (point.track.iter().zip(ab))
+                        .filter_map(|(seen, ab)| {
+                            let camera = self.cameras[seen.view].as_ref()?;
+                            let value = f64::from((*ab)?[channel]);
+                            Some(Sample {
+                                view: seen.view,
+                                value: 0.5 + value / UNITS,
+                                direction: (point.position - camera.center()).normalize_or_zero(),
+                            })
+                        })
+                        .collect::<Vec<Sample>>()
+                })
+                .filter(|samples| samples.len() >= 2)
+                .collect();
+            if tracks.is_empty() {
+                return None;
+            }
+            let found = find_exposures(&tracks, views, &taught);
+            spread += found.spread * found.spread;
+            noise += found.noise * found.noise;
+        }
+        Some(TeacherSpread {
+            spread: UNITS * spread.sqrt(),
+            noise: UNITS * noise.sqrt(),
+        })
+    }
 }
 
 #[cfg(test)]
@@ -107,9 +135,11 @@ mod tests {
                     .collect()
             })
             .collect();
-        let cameras: Vec<&Camera> = photos.iter().map(|(_, camera)| camera).collect();
-        let answers: Vec<Option<&[[f32; 2]]>> = answers.iter().map(|a| Some(&a[..])).collect();
-        teacher_spread(&capture, &cameras, &answers)
+        let mut samples = TeacherSamples::new(&capture);
+        for (view, ((_, camera), ab)) in photos.iter().zip(&answers).enumerate() {
+            samples.take(&capture, view, camera, ab);
+        }
+        samples.spread(&capture)
     }
 
     #[test]

@@ -197,6 +197,13 @@ impl Recorder {
             .copy_buffer_to_buffer(from, 0, to, 0, from.size());
     }
 
+    /// Copies the front of a buffer onto one that is no longer.
+    pub fn copy_front(&mut self, from: &wgpu::Buffer, to: &wgpu::Buffer) {
+        self.pass = None;
+        self.encoder
+            .copy_buffer_to_buffer(from, 0, to, 0, to.size());
+    }
+
     /// Fills a buffer with zeros.
     pub fn clear(&mut self, buffer: &wgpu::Buffer) {
         self.pass = None;

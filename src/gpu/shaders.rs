@@ -14,8 +14,6 @@ shaders! {
     ADAM = "adam";
     /// Chroma loss.
     CHROMA_LOSS = "chroma_loss";
-    /// Chroma loss with its curvature.
-    CHROMA_LOSS_CURVATURE = "chroma_loss_curvature";
     /// Keys of the depth sort.
     COMPACT = "compact";
     /// Copies along a densification plan.
@@ -64,6 +62,8 @@ shaders! {
     PROJECT_BACKWARD_MIP_STEP_LAZY = "project_backward_mip_step_lazy";
     /// What densification by relocation adds to a step.
     RELOCATION = "relocation";
+    /// RGB loss.
+    RGB_LOSS = "rgb_loss";
     /// Prefix sum.
     SCAN = "scan";
     /// Radix sort.
@@ -92,22 +92,22 @@ shaders! {
     BLEND_BACKWARD_LUMA = "blend_backward_luma";
     /// Adjoint of blending, luma and geometry, its records at half the size.
     BLEND_BACKWARD_LUMA_HALF = "blend_backward_luma_half";
-    /// Adjoint of blending, chroma alone.
-    BLEND_BACKWARD_CHROMA = "blend_backward_chroma";
+    /// Adjoint of blending, gradient and curvature of color alone.
+    BLEND_BACKWARD_FIGURES = "blend_backward_figures";
     /// Adjoint of shading, luma and means.
     SHADE_BACKWARD_LUMA = "shade_backward_luma";
     /// Adjoint of shading, luma and means, with Adam's step.
     SHADE_BACKWARD_STEP = "shade_backward_step";
     /// Adjoint of shading, luma and means, with Adam's step for what the view shows.
     SHADE_BACKWARD_STEP_LAZY = "shade_backward_step_lazy";
-    /// Adjoint of shading, chroma alone.
-    SHADE_BACKWARD_CHROMA = "shade_backward_chroma";
     /// Adjoint of shading, chroma alone, added to what is there.
-    SHADE_BACKWARD_CHROMA_ADD = "shade_backward_chroma_add";
+    SHADE_BACKWARD_CHROMA = "shade_backward_chroma";
+    /// Adjoint of shading, RGB alone, added to what is there.
+    SHADE_BACKWARD_RGB = "shade_backward_rgb";
     /// Sum of the instances' gradients, luma and geometry.
     SUM_INSTANCES_LUMA = "sum_instances_luma";
     /// Sum of the instances' gradients, luma and geometry, of records at half the size.
     SUM_INSTANCES_LUMA_HALF = "sum_instances_luma_half";
-    /// Sum of the instances' gradients, chroma alone.
-    SUM_INSTANCES_CHROMA = "sum_instances_chroma";
+    /// Sum of the instances' gradients and curvatures, color alone.
+    SUM_INSTANCES_FIGURES = "sum_instances_figures";
 }

@@ -8,7 +8,7 @@ use super::{LumaError, SsimWindow, TrainingViews, photos::Photos};
 use crate::{
     capture::Exposure,
     gpu::{Bindings, Buffer, Gpu, Kernel, Recorder, shaders},
-    raster::{Layer, LayerAdjoint, Lists, LossLog, ViewUniform},
+    raster::{Layer, Lists, LossLog, LumaAdjoint, ViewUniform},
 };
 
 /// Pixels on the side of a workgroup's block.
@@ -156,7 +156,7 @@ impl Loss {
         kernels: &LossKernels,
         lists: &Lists,
         layer: &Layer,
-        adjoint: &LayerAdjoint,
+        adjoint: &LumaAdjoint,
         log: &LossLog,
         targets: &Targets,
     ) -> Vec<Self> {

@@ -12,7 +12,10 @@ use super::{LumaError, TrainingViews, view};
 use crate::{
     capture::{Camera, Exposure},
     gpu::{Buffer, GpuError, Recorder},
-    raster::{Field, Geometry, Layer, LayerAdjoint, Lists, Outcome, Raster, ViewUniform},
+    raster::{
+        AdjointScratch, COLOR_FIGURES, ChromaAdjoint, ChromaSums, Field, Geometry, Layer, Lists,
+        Raster, ViewUniform,
+    },
     splats::{ShField, sh},
 };
 
@@ -110,11 +113,14 @@ struct Drawing {
     luma: Layer,
     pair: Layer,
     pair_field: Field,
-    /// Adds to `sums`, the other replaces `of_one`.
-    adding: LayerAdjoint,
-    replacing: LayerAdjoint,
+    /// What the adjoints bring back, `[pixels, 4]`; the last two are not used.
+    image_gradient: Buffer<f32>,
+    /// Of all views, `[2, N]`.
     sums: Buffer<f32>,
+    to_sums: ChromaAdjoint,
+    /// Of one view.
     of_one: Buffer<f32>,
+    to_one: ChromaAdjoint,
 }
 
 impl Drawing {
@@ -130,19 +136,28 @@ impl Drawing {
         let pair = Layer::new(raster, geometry, &lists, &pair_field, pixels, tiles)?;
         let sums = Buffer::zeros(gpu, "sums of residuals", pair_field.planes.len())?;
         let of_one = Buffer::zeros(gpu, "sums of one view's residuals", sums.len())?;
-        let adjoint =
-            |outcome| LayerAdjoint::new(raster, geometry, &lists, &pair_field, &pair, &outcome);
-        let adding = adjoint(Outcome::Sum(&sums))?;
-        let replacing = adjoint(Outcome::Gradient(&of_one))?;
+        let image_gradient = Buffer::zeros(gpu, "residuals", COLOR_FIGURES * pixels)?;
+        let scratch = AdjointScratch::color(gpu, geometry.count, capacity)?;
+        let unused = Buffer::zeros(gpu, "sums of curvatures", sums.len())?;
+        let adjoint = |gradient| {
+            let sums = ChromaSums {
+                gradient,
+                diagonal: &unused,
+            };
+            let (image, scratch) = (&image_gradient, scratch.clone());
+            ChromaAdjoint::new(raster, geometry, &lists, &pair, image, scratch, sums)
+        };
+        let [to_sums, to_one] = [adjoint(&sums), adjoint(&of_one)];
         Ok(Self {
             lists,
             luma,
             pair,
             pair_field,
-            adding,
-            replacing,
+            image_gradient,
             sums,
+            to_sums,
             of_one,
+            to_one,
         })
     }
 
@@ -156,21 +171,21 @@ impl Drawing {
             if let Some(needed) = self.lists.status(gpu)?.overflow {
                 return Ok(Some(needed));
             }
-            self.pull_back(scene, &photo, &residuals(&photo, &luma), &self.adding);
+            self.pull_back(scene, &photo, &residuals(&photo, &luma), &self.to_sums);
         }
         Ok(None)
     }
 
     /// Brings a photo's residuals, and what counts of it, to the Gaussians.
-    fn pull_back(&self, scene: &Scene, photo: &Photo, residuals: &[f32], adjoint: &LayerAdjoint) {
+    fn pull_back(&self, scene: &Scene, photo: &Photo, residuals: &[f32], adjoint: &ChromaAdjoint) {
         let gpu = &scene.raster.gpu;
-        let pairs: Vec<f32> = (residuals.iter().zip(&photo.mask))
+        let figures: Vec<f32> = (residuals.iter().zip(&photo.mask))
             .flat_map(|(residual, &count)| {
                 let count = f32::from(count) / 255.0;
-                [count * residual, count]
+                [count * residual, count, 0.0, 0.0]
             })
             .collect();
-        adjoint.image_gradient.write_at(gpu, 0, &pairs);
+        self.image_gradient.write(gpu, &figures);
         let mut recorder = Recorder::new(gpu);
         adjoint.record(scene.raster, &mut recorder);
         recorder.submit();
@@ -186,7 +201,10 @@ impl Drawing {
         all: &[f32],
     ) -> Result<Vec<f32>, GpuError> {
         let gpu = &scene.raster.gpu;
-        self.pull_back(scene, photo, residuals, &self.replacing);
+        let mut recorder = Recorder::new(gpu);
+        recorder.clear(self.of_one.raw());
+        recorder.submit();
+        self.pull_back(scene, photo, residuals, &self.to_one);
         let own = self.of_one.read(gpu)?;
         let count = all.len() / 2;
         let of_others = |k: usize| (all[k] - own[k]).max(0.0);

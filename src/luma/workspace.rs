@@ -11,7 +11,7 @@ use super::{
 use crate::{
     gpu::{Buffer, Gpu, GpuError},
     raster::{
-        AdamStep, Layer, LayerAdjoint, Lists, LossLog, Model, Outcome, Raster, SumLossKernel,
+        AdamStep, Layer, Lists, LossLog, LumaAdjoint, Model, Outcome, Raster, SumLossKernel,
         constants::GEOMETRY_PLANES,
     },
     splats::sh,
@@ -41,7 +41,7 @@ impl Kernels {
 pub struct Workspace {
     pub lists: Lists,
     pub layer: Layer,
-    pub adjoint: LayerAdjoint,
+    pub adjoint: LumaAdjoint,
     /// Rates of the geometry.
     pub geometry_step: AdamStep,
     /// Rates of the harmonics.
@@ -78,7 +78,7 @@ impl Workspace {
             geometry: geometry_step.of(&model.geometry_moments),
             field: field_step.of(&model.field_moments),
         };
-        let adjoint = LayerAdjoint::new(raster, geometry, &lists, field, &layer, &outcome)?;
+        let adjoint = LumaAdjoint::new(raster, geometry, &lists, field, &layer, &outcome)?;
         let log = LossLog::new(gpu, &kernels.sum_loss, &lists.status, max_tiles, SYNC_EVERY)?;
         let losses = Loss::all(gpu, &kernels.loss, &lists, &layer, &adjoint, &log, targets);
         let relocation = (settings.densify == Densification::Relocate)
@@ -101,11 +101,6 @@ impl Workspace {
 
     /// Densification statistics since the set last changed.
     pub fn statistics(&self) -> &Buffer<f32> {
-        &self
-            .adjoint
-            .geometry
-            .as_ref()
-            .expect("luma trains geometry")
-            .statistics
+        &self.adjoint.statistics
     }
 }

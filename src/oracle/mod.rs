@@ -27,6 +27,7 @@ mod project_tests;
 pub mod random;
 pub mod relocation;
 pub mod render;
+pub mod rgb_loss;
 pub mod scene;
 pub mod shade;
 pub mod tiles;

@@ -24,49 +24,61 @@ impl LayerKernels {
     }
 }
 
+/// `blend_backward` and `sum_instances`.
 #[derive(Clone)]
-pub(super) struct AdjointKernels {
-    pub blend: Kernel,
-    pub sum: Kernel,
-    pub shade: Kernel,
-    /// Adds to the gradient instead of replacing it; chroma only.
-    pub shade_add: Option<Kernel>,
+pub(super) struct BlendBackwardKernels {
+    luma: [Kernel; 2],
+    color: [Kernel; 2],
 }
 
-impl AdjointKernels {
-    /// # Panics
-    /// For RGB, which is shown but never trained.
-    pub fn new(gpu: &Gpu, kind: ColorKind, numerics: &RasterNumerics) -> Self {
-        let (blend, sum, shade) = match kind {
-            ColorKind::Luma => {
-                let (blend, sum) = match numerics.storage {
-                    Storage::Full => (shaders::BLEND_BACKWARD_LUMA, shaders::SUM_INSTANCES_LUMA),
-                    Storage::Half => (
-                        shaders::BLEND_BACKWARD_LUMA_HALF,
-                        shaders::SUM_INSTANCES_LUMA_HALF,
-                    ),
-                };
-                (blend, sum, shaders::SHADE_BACKWARD_LUMA)
-            }
-            ColorKind::Chroma => (
-                shaders::BLEND_BACKWARD_CHROMA,
-                shaders::SUM_INSTANCES_CHROMA,
-                shaders::SHADE_BACKWARD_CHROMA,
-            ),
-            ColorKind::Rgb => panic!("RGB has no adjoint"),
+impl BlendBackwardKernels {
+    pub fn new(gpu: &Gpu, numerics: &RasterNumerics) -> Self {
+        let [blend, sum] = match numerics.storage {
+            Storage::Full => [shaders::BLEND_BACKWARD_LUMA, shaders::SUM_INSTANCES_LUMA],
+            Storage::Half => [
+                shaders::BLEND_BACKWARD_LUMA_HALF,
+                shaders::SUM_INSTANCES_LUMA_HALF,
+            ],
         };
+        let cutoff = numerics.alpha_cutoff();
+        let of_blend = |source| Kernel::with(gpu, "blend_backward", source, &cutoff);
         Self {
-            blend: Kernel::with(gpu, "blend_backward", blend, &numerics.alpha_cutoff()),
-            sum: match kind {
-                // Chroma's sums need no division by the opacity.
-                ColorKind::Chroma | ColorKind::Rgb => Kernel::new(gpu, "sum_instances", sum),
-                ColorKind::Luma => {
-                    Kernel::with(gpu, "sum_instances", sum, &numerics.alpha_cutoff())
-                }
-            },
-            shade: Kernel::new(gpu, "shade_backward", shade),
-            shade_add: (kind == ColorKind::Chroma)
-                .then(|| Kernel::new(gpu, "shade_backward", shaders::SHADE_BACKWARD_CHROMA_ADD)),
+            luma: [
+                of_blend(blend),
+                Kernel::with(gpu, "sum_instances", sum, &cutoff),
+            ],
+            color: [
+                of_blend(shaders::BLEND_BACKWARD_FIGURES),
+                // Nothing is divided by the opacity here.
+                Kernel::new(gpu, "sum_instances", shaders::SUM_INSTANCES_FIGURES),
+            ],
+        }
+    }
+
+    pub fn luma(&self) -> [&Kernel; 2] {
+        self.luma.each_ref()
+    }
+
+    pub fn color(&self) -> [&Kernel; 2] {
+        self.color.each_ref()
+    }
+}
+
+/// `shade_backward`.
+#[derive(Clone)]
+pub(super) struct ShadeBackwardKernels {
+    pub luma: Kernel,
+    pub chroma: Kernel,
+    pub rgb: Kernel,
+}
+
+impl ShadeBackwardKernels {
+    pub fn new(gpu: &Gpu) -> Self {
+        let kernel = |source| Kernel::new(gpu, "shade_backward", source);
+        Self {
+            luma: kernel(shaders::SHADE_BACKWARD_LUMA),
+            chroma: kernel(shaders::SHADE_BACKWARD_CHROMA),
+            rgb: kernel(shaders::SHADE_BACKWARD_RGB),
         }
     }
 }

@@ -130,6 +130,15 @@ pub struct Lists {
 }
 
 impl Lists {
+    /// Bytes of lists for so many Gaussians, tiles and entries.
+    pub fn bytes(splats: usize, max_tiles: usize, capacity: usize) -> u64 {
+        // Visible, depth, rank and offset of each Gaussian; an entry's; a tile's.
+        let words = 4 * splats + capacity + max_tiles + 1;
+        (size_of::<Projected>() * splats + 4 * words) as u64
+            + Sort::bytes(splats)
+            + Sort::bytes(capacity)
+    }
+
     /// Lists for views of at most `max_tiles` tiles and `capacity` entries.
     ///
     /// # Errors

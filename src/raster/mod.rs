@@ -3,9 +3,10 @@
 //! project → depth sort → tile lists → tile sort → blend, then back. Every step
 //! is a kernel in `shaders/`; [`Lists`] records those that depend on the
 //! geometry alone, [`Layer`] those that draw one field of colour over it,
-//! [`LayerAdjoint`] their adjoints.
+//! [`LumaAdjoint`] and [`ChromaAdjoint`] their adjoints.
 
 mod adam;
+mod adjoint;
 pub mod constants;
 mod kernels;
 mod layer;
@@ -21,7 +22,8 @@ mod sum_loss;
 mod view;
 
 pub use adam::{Adam, AdamKernel, AdamMoments, AdamParameters, AdamStep, StepBuffers};
-pub use layer::{AdjointScratch, Canvas, GeometryAdjoint, Layer, LayerAdjoint, Outcome};
+pub use adjoint::{AdjointScratch, COLOR_FIGURES, ChromaAdjoint, ChromaSums, LumaAdjoint, Outcome};
+pub use layer::{Canvas, Layer};
 pub use lists::{Lists, Projected, Status, StatusReadback, TileListsMode};
 pub use model::{Model, Snapshot};
 pub use numerics::{AdamSteps, RasterNumerics, Storage};
@@ -34,7 +36,9 @@ pub use view::ViewUniform;
 use std::sync::Arc;
 
 use crate::gpu::{Gpu, Kernel};
-use kernels::{AdjointKernels, LayerKernels, ProjectionKernels, shade_step};
+use kernels::{
+    BlendBackwardKernels, LayerKernels, ProjectionKernels, ShadeBackwardKernels, shade_step,
+};
 use lists::ListKernels;
 use scan::ScanKernels;
 use sort::SortKernels;
@@ -104,7 +108,8 @@ pub struct Raster {
     sort: SortKernels,
     lists: ListKernels,
     layers: [LayerKernels; 3],
-    adjoints: [AdjointKernels; 2],
+    blend_backward: BlendBackwardKernels,
+    shade_backward: ShadeBackwardKernels,
     projection: ProjectionKernels,
     shade_step: Kernel,
 }
@@ -126,7 +131,8 @@ impl Raster {
             sort: SortKernels::new(gpu),
             lists: ListKernels::new(gpu, &numerics),
             layers: layers(gpu, &numerics),
-            adjoints: adjoints(gpu, &numerics),
+            blend_backward: BlendBackwardKernels::new(gpu, &numerics),
+            shade_backward: ShadeBackwardKernels::new(gpu),
             projection: ProjectionKernels::new(gpu, options, &numerics),
             shade_step: shade_step(gpu, &numerics),
         }
@@ -156,7 +162,7 @@ impl Raster {
             numerics,
             lists: ListKernels::new(gpu, &numerics),
             layers: layers(gpu, &numerics),
-            adjoints: adjoints(gpu, &numerics),
+            blend_backward: BlendBackwardKernels::new(gpu, &numerics),
             projection: ProjectionKernels::new(gpu, self.options, &numerics),
             shade_step: shade_step(gpu, &numerics),
             ..Self::clone(self)
@@ -186,17 +192,9 @@ impl Raster {
     fn layer(&self, kind: ColorKind) -> &LayerKernels {
         &self.layers[kind.channels() - 1]
     }
-
-    fn adjoint(&self, kind: ColorKind) -> &AdjointKernels {
-        &self.adjoints[kind.channels() - 1]
-    }
 }
 
 fn layers(gpu: &Gpu, numerics: &RasterNumerics) -> [LayerKernels; 3] {
     [ColorKind::Luma, ColorKind::Chroma, ColorKind::Rgb]
         .map(|kind| LayerKernels::new(gpu, kind, numerics))
-}
-
-fn adjoints(gpu: &Gpu, numerics: &RasterNumerics) -> [AdjointKernels; 2] {
-    [ColorKind::Luma, ColorKind::Chroma].map(|kind| AdjointKernels::new(gpu, kind, numerics))
 }

@@ -54,8 +54,9 @@ pub fn minimum_words(kernel: &str, load: &Load) -> Option<f64> {
     let trained = f64::from(u8::from(trains_geometry));
     // With the geometry, Adam's step is taken at once: value and moments in and out.
     let sh_step = if trains_geometry { 6.0 } else { 1.0 } * sh_planes;
-    // What an instance's gradient takes: seven figures for the geometry, the color.
-    let partial = channels + 7.0 * trained;
+    // What an instance's gradient takes: seven figures for the geometry, the color; on
+    // frozen geometry four, gradient and curvature.
+    let partial = if trains_geometry { channels + 7.0 } else { 4.0 };
     // And as it waits for its sum.
     let halved = trains_geometry && numerics.storage == Storage::Half;
     let stored = if halved { 0.5 } else { 1.0 } * partial;
@@ -86,7 +87,12 @@ pub fn minimum_words(kernel: &str, load: &Load) -> Option<f64> {
         "blend" => (LISTED + channels) * instances + (channels + 1.0) * pixels,
         "sum_loss" => tiles,
         "blend_backward" => {
-            (LISTED + channels + stored) * instances + (2.0 * channels + 1.0) * pixels
+            let of_pixel = if trains_geometry {
+                2.0 * channels
+            } else {
+                partial
+            } + 1.0;
+            (LISTED + channels * trained + stored) * instances + of_pixel * pixels
         }
         "sum_instances" => stored * instances + (partial + 2.0) * visible,
         "shade_backward" => {

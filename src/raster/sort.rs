@@ -58,6 +58,11 @@ pub struct Sort {
 }
 
 impl Sort {
+    /// Bytes of a sort of so many keys: twice keys and values, and the histograms.
+    pub fn bytes(capacity: usize) -> u64 {
+        4 * (4 * capacity + 256 * capacity.div_ceil(BLOCK).max(1)) as u64
+    }
+
     /// A sort of at most `capacity` keys by these `bits` of theirs, 0 the lowest; how many
     /// there are stands in `count_word` of `status`.
     ///

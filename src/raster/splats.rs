@@ -15,6 +15,11 @@ pub struct Geometry {
 }
 
 impl Geometry {
+    /// Bytes of so many Gaussians.
+    pub fn bytes(count: usize) -> u64 {
+        4 * (GEOMETRY_PLANES * count) as u64
+    }
+
     /// Uploads the geometry of `splats`.
     ///
     /// # Errors

@@ -5,20 +5,17 @@ use image::{Rgb, RgbImage, imageops};
 /// Pixels between pictures.
 const GAP: u32 = 4;
 
-/// One view's pictures, `[height, width]` of RGB in [0, 1]; a missing one stays blank.
+/// One view's pictures, all of one size; a missing one stays blank.
 pub struct Row {
     /// Width in pixels.
     pub width: u32,
     /// Height in pixels.
     pub height: u32,
     /// Left to right.
-    pub pictures: Vec<Option<Vec<[f32; 3]>>>,
+    pub pictures: Vec<Option<RgbImage>>,
 }
 
 /// Lays rows out on white.
-///
-/// # Panics
-/// When a picture has not its row's size.
 pub fn contact_sheet(rows: &[Row]) -> RgbImage {
     let width = rows
         .iter()
@@ -30,10 +27,9 @@ pub fn contact_sheet(rows: &[Row]) -> RgbImage {
     let mut y = GAP;
     for row in rows {
         for (column, picture) in row.pictures.iter().enumerate() {
-            if let Some(pixels) = picture {
+            if let Some(image) = picture {
                 let x = GAP + column as u32 * (row.width + GAP);
-                let image = to_image(row.width, row.height, pixels);
-                imageops::replace(&mut sheet, &image, i64::from(x), i64::from(y));
+                imageops::replace(&mut sheet, image, i64::from(x), i64::from(y));
             }
         }
         y += row.height + GAP;
@@ -60,7 +56,7 @@ mod tests {
 
     #[test]
     fn pictures_stand_in_their_cells() {
-        let red = vec![[1.0, 0.0, 0.0]; 6];
+        let red = to_image(3, 2, &[[1.0, 0.0, 0.0]; 6]);
         let sheet = contact_sheet(&[Row {
             width: 3,
             height: 2,

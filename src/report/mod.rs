@@ -24,6 +24,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::{
     capture::{Exposure, LoadOptions},
+    chroma::ChromaSettings,
     luma::{CurvePoint, Goal, LumaSettings, Preset},
     measure::DeltaE,
 };
@@ -207,9 +208,8 @@ pub struct ChromaReport {
     pub hints: usize,
     /// Training views that a teacher coloured or that have hints.
     pub colored_views: usize,
-    /// Who solved: `irls` or `adam`.
-    #[serde(default = "adam")]
-    pub solver: String,
+    /// How chroma was solved for.
+    pub settings: ChromaSettings,
     /// Iterations of Adam, or rounds of least squares on all scales.
     pub iterations: usize,
     /// The last of them, counted from the start of stage 1.
@@ -218,23 +218,9 @@ pub struct ChromaReport {
     /// the pixels.
     #[serde(default)]
     pub passes: f64,
-    /// Degree of the chroma harmonics.
-    pub sh_degree: u32,
-    /// Coarser scales that counted.
-    #[serde(default)]
-    pub coarser_scales: u32,
-    /// Residual, in CIELAB units, at which the loss levels off; `None`: plain L1.
-    #[serde(default)]
-    pub robust: Option<f32>,
     /// What was decided about each effect of stage 2.
     #[serde(default)]
     pub effects: Vec<EffectReport>,
-    /// Whether each view's teacher was brought into line with the others.
-    #[serde(default)]
-    pub corrects_views: bool,
-    /// Whether Gaussians that no view sees well took their neighbours' colour.
-    #[serde(default)]
-    pub fills: bool,
     /// Loss at the end, in CIELAB units.
     #[serde(deserialize_with = "number_or_nan")]
     pub loss: f64,
@@ -244,6 +230,12 @@ pub struct ChromaReport {
     pub peak_host_memory: Option<u64>,
     /// Largest memory of the device's buffers in bytes, where the backend tells.
     pub peak_device_memory: Option<u64>,
+    /// Bytes of the device that solving and baking were expected to take at most.
+    #[serde(default)]
+    pub estimated_device_memory: u64,
+    /// Training views whose tile lists and wanted colors stayed on the device.
+    #[serde(default)]
+    pub pinned_views: usize,
     /// ΔE00 between the native picture and the exported file's.
     pub bake: ColorError,
     /// Views that the bake was measured on: `test`, or `train` without held-out ones.
@@ -273,11 +265,6 @@ pub struct TeacherReport {
     pub weight: f32,
 }
 
-/// The solver of reports that do not name one.
-fn adam() -> String {
-    "adam".to_owned()
-}
-
 /// What a weight or strength is where nothing else is said.
 fn whole() -> f32 {
     1.0
@@ -290,8 +277,17 @@ pub struct ChromaSeconds {
     pub teacher: f64,
     /// Distilling.
     pub distill: f64,
-    /// Baking, writing and measuring.
+    /// Baking to RGB.
+    pub bake: f64,
+    /// Measuring, and drawing the contact sheet.
     pub measure: f64,
+}
+
+impl ChromaSeconds {
+    /// All of them.
+    pub fn total(&self) -> f64 {
+        self.teacher + self.distill + self.bake + self.measure
+    }
 }
 
 /// A colour difference.
@@ -402,7 +398,7 @@ impl Report {
         format!(
             "coloured from {} views in {:.0} s{truth}, export off by ΔE00 {:.2}",
             chroma.colored_views,
-            chroma.seconds.teacher + chroma.seconds.distill,
+            chroma.seconds.total(),
             chroma.bake.mean
         )
     }

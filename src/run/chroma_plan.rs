@@ -1,15 +1,18 @@
 //! Which effects of teachers stage 2 reckons with.
 
-use super::{
-    chroma_options::{ChromaOptions, Degree},
-    scene::Scene,
-    teach::Taught,
-};
 use crate::{
-    capture::Camera,
     chroma::{ChosenDegree, SolverKind},
-    effects::{Decider, Decision, Effect, teacher_spread},
+    effects::{Decider, Decision, Effect, TeacherSpread},
 };
+
+/// Degree of the chroma harmonics.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Degree {
+    /// This one.
+    Fixed(u32),
+    /// As high as training views that are held back prove useful.
+    Auto,
+}
 
 /// Views that differ by less, root mean square in CIELAB units, look alike.
 const SPREAD: f64 = 1.0;
@@ -18,25 +21,16 @@ const SPREAD: f64 = 1.0;
 const SPREAD_OVER_NOISE: f64 = 3.0;
 
 /// Whether the views' teachers are brought into line: where they disagree about the same
-/// points in saturation or tint, unless the options say. Adam cannot.
+/// points in saturation or tint, unless the user has a `wish`. Adam cannot.
 pub(super) fn correction(
-    scene: &Scene,
-    taught: &[Option<Taught>],
-    options: &ChromaOptions,
+    found: Option<TeacherSpread>,
+    solver: SolverKind,
+    wish: Option<bool>,
 ) -> Decision {
-    let cameras: Vec<&Camera> = scene.photos.iter().map(|(_, camera)| camera).collect();
-    let answers: Vec<Option<&[[f32; 2]]>> = (taught.iter().enumerate())
-        .map(|(view, taught)| {
-            let trained = scene.split.train.contains(&view);
-            let taught = taught.as_ref().filter(|_| trained)?;
-            Some(&taught.answer.ab[..])
-        })
-        .collect();
-    let found = teacher_spread(&scene.capture, &cameras, &answers);
     let noise = found.map_or(0.0, |found| SPREAD_OVER_NOISE * found.noise);
     let evidence = found.map(|found| found.spread);
     let decision = Decision::new(Effect::TeacherCorrection, evidence, SPREAD.max(noise));
-    match (options.solver, options.correct_views) {
+    match (solver, wish) {
         (SolverKind::Adam, _) => Decision {
             on: false,
             decided_by: Decider::Preset,
@@ -59,7 +53,7 @@ pub(super) fn correction(
 
 /// Whether chroma depends on the direction of view: as the views that were held back
 /// say, in percent of their loss, where they were asked.
-pub(super) fn degree(options: &ChromaOptions, chosen: Option<&ChosenDegree>) -> Decision {
+pub(super) fn degree(asked: Degree, chosen: Option<&ChosenDegree>) -> Decision {
     let gain = chosen.and_then(|chosen| {
         let first = *chosen.losses.first()?;
         let best = chosen.losses.iter().copied().fold(first, f64::min);
@@ -67,7 +61,7 @@ pub(super) fn degree(options: &ChromaOptions, chosen: Option<&ChosenDegree>) -> 
     });
     let threshold = 100.0 * crate::chroma::LEAST_GAIN;
     let decision = Decision::new(Effect::ChromaDegree, gain, threshold);
-    match (options.sh_degree, chosen) {
+    match (asked, chosen) {
         (_, Some(chosen)) => Decision {
             on: chosen.degree > 0,
             ..decision

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::{
     RunError,
     scene::{Scene, gray_to_rgb, renderer, rgb_pixels, shown_rgb},
-    teach::Taught,
+    teach::Lesson,
     yardstick::Yardstick,
 };
 use crate::{
@@ -13,7 +13,7 @@ use crate::{
     chroma::{native_rgb, teacher::AbImage},
     measure,
     raster::{Picture, Raster},
-    report::{ColorError, ColorQuality, ColorView, Row},
+    report::{ColorError, ColorQuality, ColorView, Row, to_image},
     splats::{ShField, Splats},
 };
 
@@ -39,7 +39,7 @@ impl Measured {
         exposures: &[Exposure],
         [luma, baked]: [&Splats; 2],
         chroma: &ShField,
-        taught: &[Option<Taught>],
+        lesson: &Lesson,
     ) -> Result<Self, RunError> {
         let mut renderer = renderer(scene, raster, luma, &[&luma.sh, chroma, &baked.sh])?;
         let (mut errors, mut views, mut rows) = (Vec::new(), Vec::new(), Vec::new());
@@ -50,9 +50,10 @@ impl Measured {
             let native = native_rgb(&pictures[0], &pictures[1]);
             let exported = shown_rgb(&pictures[2].pixels);
             errors.push(ColorError::from(measure::mean_delta_e(&native, &exported)));
-            let taught = taught[i]
-                .as_ref()
-                .map(|taught| teacher_picture(&photo.gray, &taught.answer));
+            let taught = (lesson.of_view[i])
+                .map(|target| lesson.targets.read(target, 0))
+                .transpose()?
+                .map(|target| teacher_picture(&photo.gray, &target.ab()));
             if yardstick.measures() {
                 let shown = yardstick.shown(&exported);
                 let colorful = |rgb: &Vec<[f32; 3]>| yardstick.colorfulness(rgb);
@@ -67,14 +68,16 @@ impl Measured {
                 });
             }
             if rows.len() < SHEET_ROWS {
+                let (width, height) = (camera.width, camera.height);
+                let bytes = |pixels: &Vec<[f32; 3]>| to_image(width, height, pixels);
                 rows.push(Row {
-                    width: camera.width,
-                    height: camera.height,
+                    width,
+                    height,
                     pictures: vec![
-                        Some(rgb_pixels(photo)),
-                        Some(gray_to_rgb(&pictures[0].pixels)),
-                        taught,
-                        Some(exported),
+                        Some(bytes(&rgb_pixels(photo))),
+                        Some(bytes(&gray_to_rgb(&pictures[0].pixels))),
+                        taught.as_ref().map(bytes),
+                        Some(bytes(&exported)),
                     ],
                 });
             }

@@ -9,19 +9,19 @@ use std::{
 
 use super::{
     Event, Observer, Preset, RunError, RunFolder, Stage,
-    chroma_options::{ChromaOptions, Degree},
-    chroma_plan,
+    chroma_plan::{self, Degree},
     color_quality::Measured,
     files,
     fit::{capture_report, comments, open_gpu},
-    scene::{Scene, masked_weights, read_splats},
+    scene::{Scene, read_splats},
     teach::{TeachOptions, Teachers},
     yardstick,
 };
 use crate::{
     capture::{Camera, LoadOptions},
     chroma::{
-        ChosenDegree, ChromaProgress, ChromaView, bake, choose_degree, distil, teacher::Upsample,
+        ChosenDegree, ChromaProgress, ChromaSettings, FrozenViews, Room, Task, bake, choose_degree,
+        solve, teacher::Upsample,
     },
     effects::{Overrules, table},
     gpu::Gpu,
@@ -30,7 +30,7 @@ use crate::{
         CaptureReport, ChromaReport, ChromaSeconds, DeviceReport, EffectReport, LumaReport,
         REPORT_VERSION, Report, contact_sheet, kernel_reports,
     },
-    splats::ply,
+    splats::{ply, sh},
 };
 
 /// What `colorize` is asked to do.
@@ -44,8 +44,14 @@ pub struct ColorizeOptions {
     pub output: Option<PathBuf>,
     /// Last iteration, counted from the start of stage 1; the preset's by default.
     pub until: Option<usize>,
-    /// How chroma is solved for.
-    pub chroma: ChromaOptions,
+    /// How chroma is solved for. Seed and iterations are those of the run, the degree follows
+    /// from `sh_degree`, and whether views are corrected from `correct_views`.
+    pub settings: ChromaSettings,
+    /// Degree of the chroma harmonics.
+    pub sh_degree: Degree,
+    /// Whether each view's teacher is brought into line with the others; by default where
+    /// they disagree.
+    pub correct_views: Option<bool>,
     /// COLMAP folder, where it is not the one that `fit` noted.
     pub colmap: Option<PathBuf>,
     /// Whether the report says where the device's time went.
@@ -101,47 +107,54 @@ pub fn colorize(
     files::make_folder_of(&output.ply)?;
 
     let begun = Instant::now();
-    let lesson = teachers.ask(&scene, observe)?;
+    let mut settings = ChromaSettings {
+        iterations,
+        seed: report.luma.settings.seed,
+        ..options.settings.clone()
+    };
+    let scales = settings.target_scales();
+    let lesson = teachers.ask(&scene, scales, observe)?;
     let seconds_teacher = begun.elapsed().as_secs_f64();
 
     let begun = Instant::now();
     let raster = Arc::new(Raster::with(&gpu, drawn));
-    let views: Vec<ChromaView> = scene
-        .split
-        .train
-        .iter()
-        .filter_map(|&i| {
-            let taught = lesson.views[i].clone()?;
-            let (photo, camera) = &scene.photos[i];
-            Some(ChromaView {
-                camera: camera.clone(),
-                wanted: taught.answer,
-                weights: masked_weights(taught.weights, photo),
-            })
+    let cameras: Vec<Camera> = (scene.split.train.iter())
+        .map(|&i| scene.photos[i].1.clone())
+        .collect();
+    let tasks: Vec<Task> = (scene.split.train.iter().enumerate())
+        .filter_map(|(view, &i)| {
+            let target = lesson.of_view[i]?;
+            Some(Task { view, target })
         })
         .collect();
-    let colored_views = views.len();
-    let correction = chroma_plan::correction(&scene, &lesson.views, &options.chroma);
-    let asked = ChromaOptions {
-        correct_views: Some(correction.on),
-        ..options.chroma.clone()
+    let colored_views = tasks.len();
+    let room = Room {
+        limit: settings.memory_limit,
+        sh_degree: match options.sh_degree {
+            Degree::Fixed(degree) => degree,
+            Degree::Auto => sh::MAX_DEGREE,
+        },
+        weighted: lesson.targets.weighted(),
     };
-    let chosen = match asked.sh_degree {
-        Degree::Fixed(_) => None,
+    // The bake passes through half the size.
+    let scales = scales.max(2);
+    let frozen = FrozenViews::new(&raster, &luma, scene.extent, &cameras, scales, room)?;
+    let correction = chroma_plan::correction(lesson.spread, settings.solver, options.correct_views);
+    settings.correct_views = correction.on;
+    let mut chosen = None;
+    settings.sh_degree = match options.sh_degree {
+        Degree::Fixed(degree) => degree,
         Degree::Auto => {
-            let settings = asked.settings(iterations, 0, report.luma.settings.seed);
-            let chosen = choose_degree(&raster, &settings, scene.extent, &luma, &views)?;
-            observe(Event::Note(describe(&chosen)));
-            Some(chosen)
+            let found = choose_degree(&frozen, &settings, &lesson.targets, &tasks, &luma)?;
+            observe(Event::Note(describe(&found)));
+            chosen.insert(found).degree
         }
     };
-    let degree = match (asked.sh_degree, &chosen) {
-        (Degree::Fixed(degree), _) => degree,
-        (Degree::Auto, chosen) => chosen.as_ref().map_or(0, |chosen| chosen.degree),
-    };
-    let effects = [correction, chroma_plan::degree(&asked, chosen.as_ref())];
+    let effects = [
+        correction,
+        chroma_plan::degree(options.sh_degree, chosen.as_ref()),
+    ];
     observe(Event::Note(table(&effects)));
-    let settings = asked.settings(iterations, degree, report.luma.settings.seed);
     let (mut log, mut last, mut peak_device_memory) = (String::new(), None, None);
     let total = settings.steps_to_report();
     let told = &mut |progress: ChromaProgress| {
@@ -163,7 +176,7 @@ pub fn colorize(
         last = Some(progress);
         peak_device_memory = peak_device_memory.max(gpu.allocated_bytes());
     };
-    let found = distil(&raster, &settings, scene.extent, &luma, views, told)?;
+    let found = solve(&frozen, &settings, &lesson.targets, tasks, &luma, told)?;
     let chroma = found.chroma;
     let timings = (options.timings)
         .then(|| Ok::<_, RunError>(kernel_reports(&gpu.timings()?, &found.load)))
@@ -171,10 +184,13 @@ pub fn colorize(
     let seconds_distill = begun.elapsed().as_secs_f64();
 
     let begun = Instant::now();
-    let cameras: Vec<Camera> = (scene.split.train.iter())
-        .map(|&i| scene.photos[i].1.clone())
-        .collect();
-    let baked = bake(&raster, scene.extent, &luma, &chroma, &cameras)?;
+    let baked = bake(&frozen, &luma, &chroma)?;
+    let seconds_bake = begun.elapsed().as_secs_f64();
+    peak_device_memory = peak_device_memory.max(gpu.allocated_bytes());
+    let (estimated_device_memory, pinned_views) = (frozen.demand(), frozen.pinned());
+    drop(frozen);
+
+    let begun = Instant::now();
     let exposures = yardstick::exposures(&scene, &report.luma.exposures);
     let measured = Measured::of(
         &raster,
@@ -182,7 +198,7 @@ pub fn colorize(
         &exposures,
         [&luma, &baked],
         &chroma,
-        &lesson.views,
+        &lesson,
     )?;
     report.chroma = Some(ChromaReport {
         teacher: match &teachers.describe()[..] {
@@ -196,31 +212,24 @@ pub fn colorize(
             Upsample::Bilinear => "bilinear",
         }
         .to_owned(),
-        hints: scene
-            .split
-            .train
-            .iter()
-            .filter(|&&i| lesson.hinted[i])
-            .count(),
+        hints: lesson.hinted,
         colored_views,
-        solver: settings.solver.name().to_owned(),
         iterations: total,
+        settings,
         until: report.luma.iterations + total,
         passes: last.map_or(0.0, |progress| progress.passes),
-        sh_degree: degree,
-        coarser_scales: settings.coarser_scales,
-        robust: settings.robust,
         effects: EffectReport::of(&effects),
-        corrects_views: settings.corrects_views,
-        fills: settings.fills,
         loss: last.map_or(0.0, |progress| progress.loss),
         seconds: ChromaSeconds {
             teacher: seconds_teacher,
             distill: seconds_distill,
+            bake: seconds_bake,
             measure: begun.elapsed().as_secs_f64(),
         },
         peak_host_memory: files::peak_host_memory(),
         peak_device_memory,
+        estimated_device_memory,
+        pinned_views,
         bake: measured.bake,
         measured_on: scene.measured().0.to_owned(),
         pictures: measured.mean(),

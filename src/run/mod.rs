@@ -1,6 +1,5 @@
 //! Whole runs: what a command does from its options to its files.
 
-mod chroma_options;
 mod chroma_plan;
 mod color_quality;
 mod colorize;
@@ -18,7 +17,7 @@ mod yardstick;
 
 use std::{fmt, path::PathBuf};
 
-pub use chroma_options::{ChromaOptions, Degree};
+pub use chroma_plan::Degree;
 pub use colorize::{ColorizeOptions, Output, colorize};
 pub use eval::{EvalOptions, eval};
 pub use fit::{AheadOptions, FitOptions, Overlay, fit};
@@ -26,11 +25,14 @@ pub use folder::RunFolder;
 pub use info::{export, info};
 pub use plan::{PlanOptions, plan};
 pub use render::{RenderOptions, Views, render};
-pub use teach::{HINT_WEIGHT, Taught, TeachOptions};
+pub use teach::{HINT_WEIGHT, TeachOptions};
 
 pub use crate::luma::Preset;
 use crate::{
-    capture::CaptureError, chroma::teacher::TeacherError, gpu::GpuError, luma::LumaError,
+    capture::CaptureError,
+    chroma::{ChromaError, teacher::TeacherError},
+    gpu::GpuError,
+    luma::LumaError,
     splats::ply::PlyError,
 };
 pub(crate) use fit::open_gpu;
@@ -45,6 +47,9 @@ pub enum RunError {
     /// The device.
     #[error(transparent)]
     Gpu(#[from] GpuError),
+    /// Stage 2.
+    #[error(transparent)]
+    Chroma(#[from] ChromaError),
     /// A splat file.
     #[error(transparent)]
     Ply(#[from] PlyError),

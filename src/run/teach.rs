@@ -3,11 +3,18 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{Event, Observer, RunError, Stage, scene::Scene};
+use super::{
+    Event, Observer, RunError, Stage,
+    scene::{Scene, masked_weights},
+};
 use crate::{
-    chroma::teacher::{
-        AbImage, Asked, GrayImage, HintFolder, HintImage, Teacher, TeacherInfo, TeacherSettings,
+    chroma::{
+        Targets,
+        teacher::{
+            AbImage, Asked, GrayImage, HintFolder, HintImage, Teacher, TeacherInfo, TeacherSettings,
+        },
     },
+    effects::{TeacherSamples, TeacherSpread},
     report::TeacherReport,
 };
 
@@ -40,15 +47,15 @@ impl Default for TeachOptions {
     }
 }
 
-/// What is known of a view's colours.
+/// What is known of a view's colors.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Taught {
+struct Taught {
     /// CIELAB a, b at the photo's size; 0 where nothing is known.
-    pub answer: AbImage,
-    /// How much each pixel counts, `[height, width]`: 1 where a teacher coloured
+    answer: AbImage,
+    /// How much each pixel counts, `[height, width]`: 1 where a teacher colored
     /// it, 0 where nothing is known, up to [`HINT_WEIGHT`] where it is painted.
     /// `None` stands for 1 everywhere.
-    pub weights: Option<Vec<f32>>,
+    weights: Option<Vec<f32>>,
 }
 
 /// The teachers and hints of a command, opened.
@@ -68,10 +75,14 @@ struct Member {
 
 /// What all views were taught.
 pub(super) struct Lesson {
-    /// What is known of each view; `None` where nothing is.
-    pub views: Vec<Option<Taught>>,
-    /// Which views have hints.
-    pub hinted: Vec<bool>,
+    /// What is known of the views, and how much of it counts.
+    pub targets: Targets,
+    /// Each view's place among these; `None` where nothing is known.
+    pub of_view: Vec<Option<usize>>,
+    /// Training views that have hints.
+    pub hinted: usize,
+    /// How far the training views disagree about COLMAP's points.
+    pub spread: Option<TeacherSpread>,
 }
 
 impl Teachers {
@@ -131,14 +142,19 @@ impl Teachers {
         self.teachers.iter().map(describe).collect()
     }
 
-    /// Asks about every view. Held-out views are asked about too: for the
-    /// contact sheet, never for training.
+    /// Asks about every view, and keeps what is wanted at so many scales. Held-out views
+    /// are asked about too: for the contact sheet, never for training.
     ///
     /// # Errors
     /// [`RunError::Teacher`], [`RunError::TeacherCoversNothing`] where a teacher
     /// or the hints have no image for any training view, and
     /// [`RunError::NothingPainted`] where there are but hints, all of them empty.
-    pub fn ask(&mut self, scene: &Scene, observe: &mut Observer<'_>) -> Result<Lesson, RunError> {
+    pub fn ask(
+        &mut self,
+        scene: &Scene,
+        scales: usize,
+        observe: &mut Observer<'_>,
+    ) -> Result<Lesson, RunError> {
         if self.asks_no_network() {
             observe(Event::Note(
                 "--teacher-profile and --teacher-size change nothing: no teacher is a network"
@@ -146,9 +162,12 @@ impl Teachers {
             ));
         }
         let total = scene.photos.len();
+        let mut samples = TeacherSamples::new(&scene.capture);
         let mut lesson = Lesson {
-            views: Vec::with_capacity(total),
-            hinted: Vec::with_capacity(total),
+            targets: Targets::new(scales),
+            of_view: Vec::with_capacity(total),
+            hinted: 0,
+            spread: None,
         };
         // Which teachers have an answer for a training view, and whether there
         // is a hint for one.
@@ -188,17 +207,28 @@ impl Teachers {
                 }
             }
             let answer = mean(answers).map(|answer| scaled(answer, self.strength));
-            lesson.hinted.push(hints.is_some());
-            lesson.views.push(match hints {
+            lesson.hinted += usize::from(trained && hints.is_some());
+            let taught = match hints {
                 Some(hints) => Some(with_hints(answer, &hints.resized(gray.width, gray.height))),
                 None => answer.map(|answer| Taught {
                     answer,
                     weights: None,
                 }),
-            });
+            };
+            let Some(Taught { answer, weights }) = taught else {
+                lesson.of_view.push(None);
+                continue;
+            };
+            if trained {
+                samples.take(&scene.capture, i, camera, &answer.ab);
+            }
+            let weights = masked_weights(weights, photo);
+            let target = lesson.targets.push_ab(&answer, weights.as_deref())?;
+            lesson.of_view.push(Some(target));
         }
         covers.push(hints_cover);
         self.check(&covers, scene, &lesson)?;
+        lesson.spread = samples.spread(&scene.capture);
         Ok(lesson)
     }
 
@@ -215,7 +245,13 @@ impl Teachers {
             });
         }
         match hints {
-            Some(path) if scene.split.train.iter().all(|&i| lesson.views[i].is_none()) => {
+            Some(path)
+                if scene
+                    .split
+                    .train
+                    .iter()
+                    .all(|&i| lesson.of_view[i].is_none()) =>
+            {
                 Err(RunError::NothingPainted(path.clone()))
             }
             _ => Ok(()),

@@ -122,8 +122,8 @@ impl Around {
         self.color = base.chroma.as_ref().map(|chroma| ColorAround {
             // The base is coloured by the default solver.
             rounds: ChromaSettings::irls().rounds,
-            coarse_rounds: ChromaSettings::irls().warm_rounds,
-            corrects_views: chroma.corrects_views,
+            coarse_rounds: ChromaSettings::irls().coarse_rounds,
+            corrects_views: chroma.settings.correct_views,
             teacher_size: (chroma.teacher.as_ref())
                 .and_then(|teacher| teacher.input_size)
                 .map(|[width, height]| width.min(height)),
@@ -286,9 +286,13 @@ const KNOBS: &[Knob] = &[
         name: "scales",
         stage: PointStage::Color,
         values: |around| around.of_color(|_| owned(&["1", "2"])),
-        turn: Turn::Option("--scales"),
+        // Only Adam agrees between scales.
+        turn: Turn::Options(|value| {
+            let solver = ("--solver", Some("adam".to_owned()));
+            vec![solver, ("--scales", Some(value.to_owned()))]
+        }),
         time: |_, value| 1.0 + 0.25 * number(value),
-        conflicts: &[],
+        conflicts: &["solver", "rounds", "coarse-rounds", "correct-views"],
     },
     Knob {
         name: "chroma-degree",

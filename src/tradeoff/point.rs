@@ -236,7 +236,7 @@ impl<'a> Bench<'a> {
             let own = chroma.seconds.teacher;
             outcome.seconds.teacher = asked_elsewhere(task, points).unwrap_or(own);
             outcome.seconds.distill = chroma.seconds.distill;
-            outcome.seconds.bake = chroma.seconds.measure;
+            outcome.seconds.bake = chroma.seconds.bake + chroma.seconds.measure;
             outcome.delta_e = chroma.pictures.delta_e.map(|error| error.mean);
             outcome.consistency = consistency(&folder)?;
             outcome.colorfulness = Some(chroma.pictures.colorfulness);

@@ -18,26 +18,32 @@ fn the_default_solver_says_what_it_did() {
     let place = place_with_run();
     let teacher = onnx("ddcolor_tiny.onnx");
     let chroma = &place.json(&[&QUICK[..], &[&teacher]].concat())["chroma"];
-    assert_eq!(chroma["solver"], "irls");
+    assert_eq!(chroma["settings"]["solver"], "irls");
     assert_eq!(chroma["iterations"], WARM + 2);
     assert_eq!(chroma["until"], LUMA + WARM + 2);
-    assert_eq!(chroma["robust"], 10.0);
-    assert_eq!(chroma["corrects_views"], true);
-    assert_eq!(chroma["fills"], true);
-    assert_eq!(chroma["coarser_scales"], 0);
+    assert_eq!(chroma["settings"]["robust"], 10.0);
+    assert_eq!(chroma["settings"]["correct_views"], true);
+    assert_eq!(chroma["settings"]["fill"], true);
+    assert_eq!(chroma["pinned_views"], 8);
+    let (estimated, taken) = (
+        &chroma["estimated_device_memory"],
+        &chroma["peak_device_memory"],
+    );
+    assert!(estimated.as_u64() > Some(0), "{estimated}");
+    assert!(taken.is_null() || taken.as_u64() > Some(0), "{taken}");
     // Eight views a round: all at full size, 1/4 and 1/16 before; in the end half a pass.
     let passes = 8.0 * (2.5 + 10.0 / 4.0 + 10.0 / 16.0);
     assert_eq!(chroma["passes"], passes);
 
     let plain = ["--robust", "off", "--correct-views", "off", "--fill", "off"];
-    let choices = ["--scales", "1", "--sh-degree", "1"];
+    let choices = ["--coarse-rounds", "3", "--sh-degree", "1"];
     let arguments = [&QUICK[..], &[&teacher], &plain, &choices].concat();
     let chroma = &place.json(&arguments)["chroma"];
-    assert_eq!(chroma["robust"], serde_json::Value::Null);
-    assert_eq!(chroma["corrects_views"], false);
-    assert_eq!(chroma["fills"], false);
-    assert_eq!(chroma["coarser_scales"], 1);
-    assert_eq!(chroma["sh_degree"], 1);
+    assert_eq!(chroma["settings"]["robust"], serde_json::Value::Null);
+    assert_eq!(chroma["settings"]["correct_views"], false);
+    assert_eq!(chroma["settings"]["fill"], false);
+    assert_eq!(chroma["iterations"], 2 * 3 + 2);
+    assert_eq!(chroma["settings"]["sh_degree"], 1);
 }
 
 #[test]
@@ -50,13 +56,34 @@ fn solving_again_gives_the_same_bytes() {
     assert!(place.read("first.ply") == place.read("second.ply"));
 }
 
+/// The least that there may be, as the error says, gives the same file.
+#[test]
+fn a_memory_limit_changes_no_byte() {
+    let place = place_with_run();
+    let teacher = onnx("ddcolor_tiny.onnx");
+    let with = |rest: &[&'static str]| [&QUICK[..], &[&teacher], rest].concat();
+    place.succeed(&with(&["-o", "all.ply"]));
+    let report = place.json(&with(&["--memory-limit", "3", "-o", "few.ply"]));
+    let pinned = report["chroma"]["pinned_views"].as_u64();
+    assert!(pinned < Some(8), "{pinned:?}");
+    assert!(place.read("all.ply") == place.read("few.ply"));
+    let done = place.run(&with(&["--memory-limit", "1"]));
+    assert_eq!(done.code, Some(1));
+    assert!(
+        done.stderr.contains("raise --memory-limit"),
+        "{}",
+        done.stderr
+    );
+}
+
 #[test]
 fn options_of_the_other_solver_are_refused() {
     let place = place_with_run();
     let teacher = onnx("ddcolor_tiny.onnx");
     let adam = ["--solver", "adam"];
-    let cases: [(&[&str], &str); 5] = [
+    let cases: [(&[&str], &str); 6] = [
         (&["--until", "62"], "--until needs --solver adam"),
+        (&["--scales", "1"], "--scales needs --solver adam"),
         (
             &[&adam[..], &["--rounds", "2"]].concat(),
             "--rounds needs --solver irls",

@@ -56,7 +56,7 @@ fn the_files_of_a_coloured_run() {
     let chroma = &report["chroma"];
     assert_eq!(chroma["until"], UNTIL);
     assert_eq!(chroma["iterations"], UNTIL - LUMA);
-    assert_eq!(chroma["sh_degree"], 1);
+    assert_eq!(chroma["settings"]["sh_degree"], 1);
     assert_eq!(chroma["colored_views"], scene::VIEWS - scene::HELD_OUT);
     assert_eq!(chroma["teacher"]["kind"], "DDColor");
     assert_eq!(chroma["teacher"]["name"], "ddcolor_tiny.onnx");

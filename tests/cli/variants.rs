@@ -90,6 +90,9 @@ fn a_teacher_is_corrected_where_its_views_disagree() {
         let effects = &place.report("run")["chroma"]["effects"];
         assert_eq!(effects[0]["name"], "teacher-correction");
         assert_eq!(effects[0]["on"], on, "{name}: {}", effects[0]);
-        assert_eq!(place.report("run")["chroma"]["corrects_views"], on);
+        assert_eq!(
+            place.report("run")["chroma"]["settings"]["correct_views"],
+            on
+        );
     }
 }

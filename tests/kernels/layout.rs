@@ -4,7 +4,8 @@ use std::{collections::BTreeMap, mem::offset_of};
 
 use gs_chroma::{
     chroma::{
-        ChromaLossWeights, Correction, CorrectionParameters, LbfgsParameters, SUM_GROUPS, SUMS,
+        ChromaLossWeights, Correction, CorrectionParameters, LbfgsParameters, RgbLossParameters,
+        SUM_GROUPS, SUMS,
     },
     gpu::{STORAGE_BUFFERS, shaders},
     luma::{
@@ -149,6 +150,7 @@ fn twins() -> Vec<Twin> {
                 joint
             }
         ),
+        twin!("RgbLossParameters" = RgbLossParameters { weighted }),
         twin!(
             "Correction" = Correction {
                 gain,
@@ -168,6 +170,7 @@ fn twins() -> Vec<Twin> {
             "LbfgsParameters" = LbfgsParameters {
                 length,
                 splats,
+                diagonals,
                 blocks,
                 ridge,
                 diagonal_scale
@@ -301,6 +304,7 @@ fn constants_are_those_of_the_oracle() {
         ("luma_loss_window7", shaders::LUMA_LOSS_WINDOW7),
         ("luma_loss_window5", shaders::LUMA_LOSS_WINDOW5),
         ("chroma_loss", shaders::CHROMA_LOSS),
+        ("rgb_loss", shaders::RGB_LOSS),
         ("view_correction", shaders::VIEW_CORRECTION),
         ("adam", shaders::ADAM),
     ];
@@ -345,6 +349,7 @@ fn constants_are_those_of_the_oracle() {
         ("luma_loss", "SSIM_WEIGHT", vec![oracle::SSIM_WEIGHT]),
         ("luma_loss", "L1_WEIGHT", vec![1.0 - oracle::SSIM_WEIGHT]),
         ("chroma_loss", "SMOOTHING", vec![oracle::CHROMA_EPSILON]),
+        ("rgb_loss", "SMOOTHING", vec![oracle::CHROMA_EPSILON]),
         (
             "view_correction",
             "PRIOR_VARIANCE",

@@ -1,12 +1,12 @@
 //! The solver's end against the least loss that there is, found by elimination in f64.
 
 use gs_chroma::{
-    chroma::{ChromaSettings, ChromaView, Solver},
+    chroma::ChromaSettings,
     splats::{ShField, Splats},
 };
 
 use crate::{
-    harness::{camera, raster, splats},
+    harness::{camera, splats},
     oracle::{
         chroma_loss::{curvature, smooth_l1},
         constants::SH_C0,
@@ -16,7 +16,7 @@ use crate::{
         scene::{Scene, View},
         shade::Shading,
     },
-    solver::{HEIGHT, PIXELS, WIDTH, chroma_view},
+    solver::{self, ChromaView, HEIGHT, PIXELS, WIDTH, chroma_view},
 };
 
 /// Two views of a random scene.
@@ -54,7 +54,13 @@ impl Problem {
                     3.0
                 };
                 let noise: [f64; 2] = random.array(-spread, spread);
-                [0, 1].map(|c| f64::from((ab[c] + noise[c]) as f32))
+                // As wanted colors are kept.
+                [0, 1].map(|c| {
+                    ((ab[c] + noise[c]) * 256.0)
+                        .round()
+                        .clamp(-32768.0, 32767.0)
+                        / 256.0
+                })
             });
             wanted.push(noisy.collect());
             // Where f32 may decide otherwise nothing is known.
@@ -170,12 +176,12 @@ fn the_least_loss_is_reached() {
         for (rounds, near) in [(24, 1e-3), (150, 1e-7)] {
             let settings = ChromaSettings {
                 sh_degree: degree as u32,
-                warm_scales: 0,
+                coarse_scales: 0,
                 rounds,
                 ..ChromaSettings::exact()
             };
-            let mut solver =
-                Solver::new(raster(), &settings, 1.0, &problem.luma(), &views).unwrap();
+            let on_device = solver::Problem::new(&problem.luma(), &views);
+            let mut solver = on_device.solver(&settings);
             solver.run(&mut |_| {}).unwrap();
             let chroma = solver.chroma().unwrap();
             let x: Vec<[f64; 2]> = (chroma.coefficients.chunks_exact(2))

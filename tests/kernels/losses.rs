@@ -32,7 +32,7 @@ fn chroma_slopes_at_rest_and_far_away() {
     for (away, slope) in [(0.0, 0.0), (300.0, 1.0), (-1e6, -1.0)] {
         let image = [[12.5 + away, -30.0]; 45];
         let plain = input(&image, ChromaLossWeights::default());
-        let output = plain.run(gpu(), false).unwrap();
+        let output = plain.run(gpu()).unwrap();
         let loss = output.loss;
         assert!(
             (loss - chroma_loss(&image, &WANTED)).abs() <= 1e-6 * loss,
@@ -44,7 +44,7 @@ fn chroma_slopes_at_rest_and_far_away() {
             assert_eq!(pair[1], 0.0);
         }
         // The variant with the curvature gives the same bits.
-        let curved = plain.run(gpu(), true).unwrap();
+        let curved = plain.run(gpu()).unwrap();
         assert_eq!(curved.loss.to_bits(), loss.to_bits());
         assert_eq!(curved.gradient, output.gradient);
     }
@@ -58,7 +58,7 @@ fn what_is_plainly_wrong_has_no_slope() {
         decline: 0.1,
         ..ChromaLossWeights::default()
     };
-    let output = input(&image, declining).run(gpu(), true).unwrap();
+    let output = input(&image, declining).run(gpu()).unwrap();
     // One channel of two at the level of 1 / 0.1.
     assert!((output.loss - 5.0).abs() < 1e-5, "{}", output.loss);
     assert!(output.gradient.iter().all(|&slope| slope == 0.0));
@@ -71,7 +71,7 @@ fn what_is_plainly_wrong_has_no_slope() {
         joint: 1,
         ..declining
     };
-    let output = input(&image, joint).run(gpu(), true).unwrap();
+    let output = input(&image, joint).run(gpu()).unwrap();
     assert!((output.loss - 5.0).abs() < 1e-5, "{}", output.loss);
     assert!(output.curvatures.iter().all(|&curvature| curvature == 0.0));
     let painted = ChromaInput {
@@ -84,7 +84,7 @@ fn what_is_plainly_wrong_has_no_slope() {
             },
         )
     };
-    let output = painted.run(gpu(), true).unwrap();
+    let output = painted.run(gpu()).unwrap();
     for pair in output.gradient.chunks_exact(2) {
         assert!((f64::from(pair[0]) * 90.0 - 50.0).abs() < 1e-3, "{pair:?}");
     }

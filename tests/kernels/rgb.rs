@@ -2,7 +2,9 @@
 //! Gaussian gets.
 
 use gs_chroma::{
-    chroma::{ChromaSettings, RgbView, bake, bake_rgb, fit_rgb, native_rgb},
+    chroma::{
+        ChromaSettings, FrozenViews, Room, Targets, Task, bake, bake_rgb, fit_rgb, native_rgb,
+    },
     raster::{Field, Geometry, Picture, Renderer, constants::NEAR_SHARE},
     splats::{ShField, Splats, sh},
 };
@@ -54,11 +56,15 @@ fn colourful() -> Splats {
     splats
 }
 
+fn frozen(splats: &Splats) -> FrozenViews {
+    FrozenViews::new(&raster(), splats, EXTENT, &cameras(), 3, Room::default()).unwrap()
+}
+
 fn settings() -> ChromaSettings {
     ChromaSettings {
-        corrects_views: false,
+        correct_views: false,
         robust: None,
-        fills: false,
+        fill: false,
         ..ChromaSettings::irls()
     }
 }
@@ -68,28 +74,28 @@ fn rgb_harmonics_are_fitted_to_what_is_shown() {
     let truth = colourful();
     let pictures = shown(&truth);
     let fitted = |spoilt: f32| {
-        let views: Vec<RgbView> = (cameras().into_iter().zip(&pictures))
-            .map(|(camera, wanted)| {
-                let mut wanted = wanted.clone();
-                let mut weights = vec![1.0; wanted.len()];
-                for pixel in 0..wanted.len() / 10 {
-                    wanted[pixel] = [spoilt; 3];
-                    weights[pixel] = 0.0;
-                }
-                RgbView {
-                    camera,
-                    wanted,
-                    weights: Some(weights),
-                }
-            })
-            .collect();
         // Degree 3 settles slowly: an error of 0.011 with ten rounds.
         let settings = ChromaSettings {
-            warm_rounds: 30,
+            coarse_rounds: 30,
             rounds: 30,
             ..settings()
         };
-        fit_rgb(&raster(), &settings, EXTENT, &truth, &views).unwrap()
+        let mut targets = Targets::new(settings.target_scales());
+        let tasks = (0..).zip(&pictures).map(|(view, wanted)| {
+            let mut wanted = wanted.clone();
+            let mut weights = vec![1.0; wanted.len()];
+            for pixel in 0..wanted.len() / 10 {
+                wanted[pixel] = [spoilt; 3];
+                weights[pixel] = 0.0;
+            }
+            let camera = &cameras()[view];
+            let size = [camera.width, camera.height];
+            let target = targets.push_rgb(size, &wanted, Some(&weights)).unwrap();
+            Task { view, target }
+        });
+        let tasks = tasks.collect();
+        let frozen = frozen(&truth);
+        fit_rgb(&frozen, &settings, &targets, tasks).unwrap()
     };
     let sh = fitted(0.0);
     let error = distance(
@@ -116,7 +122,7 @@ fn the_bake_comes_closer_than_each_gaussian_by_itself() {
         .map(|pictures| native_rgb(&pictures[0], &pictures[1]))
         .collect();
     let alone = distance(&shown(&bake_rgb(&luma, &chroma)), &native);
-    let baked = bake(&raster(), EXTENT, &luma, &chroma, &cameras()).unwrap();
+    let baked = bake(&frozen(&luma), &luma, &chroma).unwrap();
     let together = distance(&shown(&baked), &native);
     assert!(together < 0.8 * alone, "{together} {alone}");
     // Nothing but colours has moved.
@@ -138,7 +144,7 @@ fn the_bake_knows_that_nothing_gets_darker_than_black() {
     let native: Vec<Vec<[f32; 3]>> = (drawn(&luma, &[&luma.sh, &chroma]).iter())
         .map(|pictures| native_rgb(&pictures[0], &pictures[1]))
         .collect();
-    let baked = bake(&raster(), EXTENT, &luma, &chroma, &cameras()).unwrap();
+    let baked = bake(&frozen(&luma), &luma, &chroma).unwrap();
     let error = distance(&shown(&baked), &native);
     // 0.0058; 0.0102 without floors, 0.0121 each Gaussian by itself.
     assert!(error < 0.007, "{error}");

@@ -3,7 +3,10 @@
 use glam::{DMat3, DVec3};
 use gs_chroma::{
     capture::Camera,
-    chroma::{ChromaSettings, ChromaView, Solver, distil, teacher::AbImage},
+    chroma::{
+        ChromaError, ChromaSettings, FrozenViews, IrlsSolver, Room, Targets, Task, bake, solve,
+        teacher::AbImage,
+    },
     raster::{Field, Geometry, Renderer},
     splats::{ShField, Splats, sh},
 };
@@ -13,6 +16,67 @@ use crate::harness::{bits, gpu, raster};
 pub const WIDTH: usize = 32;
 pub const HEIGHT: usize = 24;
 pub const PIXELS: usize = WIDTH * HEIGHT;
+
+/// A camera and what is wanted in its picture.
+#[derive(Clone)]
+pub struct ChromaView {
+    pub camera: Camera,
+    pub wanted: AbImage,
+    pub weights: Option<Vec<f32>>,
+}
+
+/// Frozen views, what is wanted in them, and all of it to do.
+pub struct Problem {
+    pub frozen: FrozenViews,
+    pub targets: Targets,
+    pub tasks: Vec<Task>,
+}
+
+impl Problem {
+    pub fn new(luma: &Splats, views: &[ChromaView]) -> Self {
+        Self::within(None, usize::MAX, luma, views).unwrap()
+    }
+
+    /// Within so many bytes of the device and of the host.
+    pub fn within(
+        limit: Option<u64>,
+        host: usize,
+        luma: &Splats,
+        views: &[ChromaView],
+    ) -> Result<Self, ChromaError> {
+        let mut targets = Targets::within(3, host);
+        let tasks = (0..)
+            .zip(views)
+            .map(
+                |(
+                    view,
+                    ChromaView {
+                        wanted, weights, ..
+                    },
+                )| {
+                    let target = targets.push_ab(wanted, weights.as_deref())?;
+                    Ok(Task { view, target })
+                },
+            )
+            .collect::<Result<_, ChromaError>>()?;
+        let cameras: Vec<Camera> = views.iter().map(|view| view.camera.clone()).collect();
+        let room = Room {
+            limit,
+            sh_degree: 1,
+            weighted: targets.weighted(),
+        };
+        let frozen = FrozenViews::new(&raster(), luma, 1.0, &cameras, 3, room)?;
+        Ok(Self {
+            frozen,
+            targets,
+            tasks,
+        })
+    }
+
+    pub fn solver(&self, settings: &ChromaSettings) -> IrlsSolver<'_> {
+        IrlsSolver::new(&self.frozen, settings, &self.targets, self.tasks.clone()).unwrap()
+    }
+}
 
 pub fn chroma_view(camera: Camera, ab: Vec<[f64; 2]>) -> ChromaView {
     let wanted = AbImage {
@@ -28,7 +92,8 @@ pub fn chroma_view(camera: Camera, ab: Vec<[f64; 2]>) -> ChromaView {
 }
 
 fn solved(settings: &ChromaSettings, luma: &Splats, views: &[ChromaView]) -> ShField {
-    let mut solver = Solver::new(raster(), settings, 1.0, luma, views).unwrap();
+    let problem = Problem::new(luma, views);
+    let mut solver = problem.solver(settings);
     solver.run(&mut |_| {}).unwrap();
     solver.chroma().unwrap()
 }
@@ -133,30 +198,68 @@ fn farthest(a: &[[f64; 2]], b: &[[f64; 2]]) -> f64 {
 
 fn settings() -> ChromaSettings {
     ChromaSettings {
-        corrects_views: false,
+        correct_views: false,
         ..ChromaSettings::irls()
     }
 }
 
+/// Six views of the wall, every other one with weights.
+fn six_views() -> Vec<ChromaView> {
+    (cameras(6).into_iter().enumerate())
+        .map(|(k, camera)| {
+            let mut view = chroma_view(camera.clone(), pictured(&camera));
+            let weights = (0..PIXELS).map(|p| [1.0, 0.5, 50.0][p % 3]);
+            view.weights = (k % 2 == 0).then(|| weights.collect());
+            view
+        })
+        .collect()
+}
+
+/// Whether all views stay on the device, some, or none, and whether what is wanted waits
+/// in memory or in a file.
 #[test]
-fn the_same_bytes_with_lists_of_their_own_and_shared() {
-    let views: Vec<ChromaView> = (cameras(3).into_iter())
-        .map(|camera| chroma_view(camera.clone(), pictured(&camera)))
-        .collect();
-    let of = |cache_bytes| {
-        let settings = ChromaSettings {
-            cache_bytes,
-            coarser_scales: 1,
-            rounds: 2,
-            ..ChromaSettings::irls()
-        };
-        bits(&solved(&settings, &wall(), &views).coefficients)
+fn results_do_not_depend_on_the_budget() {
+    let (luma, views) = (wall(), six_views());
+    let within = |limit, host| {
+        let problem = Problem::within(limit, host, &luma, &views).unwrap();
+        let (frozen, targets) = (&problem.frozen, &problem.targets);
+        let mut found = Vec::new();
+        for settings in [
+            ChromaSettings::irls(),
+            ChromaSettings {
+                sh_degree: 1,
+                rounds: 3,
+                ..ChromaSettings::irls()
+            },
+            ChromaSettings::adam(12),
+        ] {
+            let (tasks, quiet) = (problem.tasks.clone(), &mut |_| {});
+            let solved = solve(frozen, &settings, targets, tasks, &luma, quiet).unwrap();
+            found.extend(bits(&solved.chroma.coefficients));
+            if settings.sh_degree == 0 {
+                let baked = bake(frozen, &luma, &solved.chroma).unwrap();
+                found.extend(bits(&baked.sh.coefficients));
+            }
+        }
+        (found, frozen.pinned(), frozen.demand())
     };
-    let own = of(usize::MAX);
-    assert!(own == of(usize::MAX), "two runs differ");
-    assert!(own == of(0), "all views share one set of lists");
-    // Room for some of them.
-    assert!(own == of(12_000), "some views share one set of lists");
+    let (all, pinned, demand) = within(None, usize::MAX);
+    assert_eq!(pinned, views.len());
+    assert!(all == within(None, usize::MAX).0, "two runs differ");
+    assert!(all == within(None, 0).0, "targets wait in a file");
+    // The least that there is, as the error tells.
+    let Err(ChromaError::OverLimit { needed, .. }) =
+        Problem::within(Some(1), 0, &luma, &views).map(|_| ())
+    else {
+        panic!("a byte is enough");
+    };
+    assert!(needed < demand, "{needed} {demand}");
+    let (one, pinned, _) = within(Some(needed), 0);
+    assert_eq!(pinned, 0);
+    assert!(all == one, "one view at a time differs");
+    let (some, pinned, _) = within(Some((needed + demand) / 2), 5_000);
+    assert!((1..views.len()).contains(&pinned), "{pinned} stay");
+    assert!(all == some, "some views at a time differ");
 }
 
 #[test]
@@ -185,13 +288,15 @@ fn what_no_view_sees_takes_its_neighbours_colour() {
     }
     luma.sh = ShField::zeros(luma.len(), 0, 1);
     let views = constant_views(&[ab; 3]);
-    let mut solver = Solver::new(raster(), &settings(), 1.0, &luma, &views).unwrap();
+    let problem = Problem::new(&luma, &views);
+    let mut solver = problem.solver(&settings());
     solver.run(&mut |_| {}).unwrap();
     let (chroma, seen) = (solver.chroma().unwrap(), solver.seen().unwrap());
     for i in hidden.clone() {
         assert_eq!((chroma.of(i), seen[i]), (&[0.0; 2][..], 0.0), "{i}");
     }
-    let filled = distil(&raster(), &settings(), 1.0, &luma, views, &mut |_| {}).unwrap();
+    let (frozen, targets, tasks) = (&problem.frozen, &problem.targets, problem.tasks.clone());
+    let filled = solve(frozen, &settings(), targets, tasks, &luma, &mut |_| {}).unwrap();
     let away = farthest(&colors(&filled.chroma)[hidden], &[ab; 6]);
     assert!(away < 1.0, "{away}");
 }
@@ -208,9 +313,9 @@ fn a_hint_wins_over_ten_views() {
     for p in (0..PIXELS).filter(|&p| brush(p)) {
         view.wanted.ab[p] = painted.map(|v| v as f32);
     }
-    for corrects_views in [false, true] {
+    for correct_views in [false, true] {
         let settings = ChromaSettings {
-            corrects_views,
+            correct_views,
             ..settings()
         };
         let chroma = solved(&settings, &wall(), &views);
@@ -223,7 +328,7 @@ fn a_hint_wins_over_ten_views() {
             there[HEIGHT / 2 * WIDTH + 26],
         );
         let away = [farthest(&[right], &[painted]), farthest(&[left], &[said])];
-        println!("corrects {corrects_views}: {right:?} where it was painted, {left:?} elsewhere");
+        println!("corrects {correct_views}: {right:?} where it was painted, {left:?} elsewhere");
         assert!(away[0] < 2.0 && away[1] < 2.0, "{away:?}");
     }
 }
@@ -284,13 +389,14 @@ fn views_with_gains_and_tints_agree_on_their_mean() {
     let steady: Vec<ChromaView> = (cameras(gains.len()).into_iter())
         .map(|camera| chroma_view(camera.clone(), pictured(&camera)))
         .collect();
-    let of = |corrects_views, views: &[ChromaView]| {
+    let of = |correct_views, views: &[ChromaView]| {
         let settings = ChromaSettings {
-            corrects_views,
+            correct_views,
             ..ChromaSettings::irls()
         };
         let mut last = 0.0;
-        let mut solver = Solver::new(raster(), &settings, 1.0, &wall(), views).unwrap();
+        let problem = Problem::new(&wall(), views);
+        let mut solver = problem.solver(&settings);
         solver.run(&mut |progress| last = progress.loss).unwrap();
         (inner(&solver.chroma().unwrap()), last)
     };

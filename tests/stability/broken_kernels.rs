@@ -140,8 +140,8 @@ fn broken_losses_and_steps_are_noticed() {
         (
             "chroma loss",
             "chroma_loss",
-            "curvatures[p] = scale * curvature",
-            "curvatures[p] = -scale * curvature",
+            "scale * vec4f(gradient, curvature)",
+            "scale * vec4f(gradient, -curvature)",
         ),
         (
             "chroma loss",
@@ -150,10 +150,34 @@ fn broken_losses_and_steps_are_noticed() {
             "let painted = weight > 100.0",
         ),
         (
+            "rgb loss",
+            "rgb_loss",
+            "min(difference, vec3f(0.0))",
+            "difference",
+        ),
+        (
+            "rgb loss",
+            "rgb_loss",
+            "vec4f(residual, UNITS)",
+            "vec4f(residual, 1.0)",
+        ),
+        (
             "lbfgs",
             "lbfgs_ridge",
-            "parameters.ridge * unknowns[k];",
-            "-parameters.ridge * unknowns[k];",
+            "unknowns[k] - origin[k]",
+            "unknowns[k]",
+        ),
+        (
+            "adjoint",
+            "shade_backward",
+            "SH_C0 * gradients",
+            "gradients",
+        ),
+        (
+            "lbfgs",
+            "lbfgs_ridge",
+            "gradient[k] += parameters.ridge * off",
+            "gradient[k] -= parameters.ridge * off",
         ),
         (
             "lbfgs",

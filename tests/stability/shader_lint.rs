@@ -213,6 +213,23 @@ const REASONS: &[(&str, &str, &str)] = &[
         "the divisor is at least ALPHA_MIN",
     ),
     (
+        "rgb_loss",
+        "0.5 / f32(pixels)",
+        "the kernel runs for images of at least one pixel",
+    ),
+    ("rgb_loss", "sqrt", "SMOOTHING² is added to a square"),
+    (
+        "rgb_loss",
+        "weight / length",
+        "a length is at least SMOOTHING",
+    ),
+    ("wanted_ab", "vec2f(halves) / 256.0", "a constant divisor"),
+    (
+        "wanted_rgb",
+        "vec3f((vec3u(word) >> vec3u(0u, 10u, 20u)) & vec3u(1023u)) / 1023.0",
+        "a constant divisor",
+    ),
+    (
         "sum_loss",
         "sums[0] / f32(parameters.pixels)",
         "the host sets a count of at least one pixel",

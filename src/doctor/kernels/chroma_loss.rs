@@ -1,10 +1,10 @@
-//! `chroma_loss`, with and without the curvature, and `sum_loss` of many blocks.
+//! `chroma_loss`, and `sum_loss` of many blocks.
 
 use std::sync::Arc;
 
 use super::losses::{SIZES, logged, view};
 use crate::{
-    chroma::{ChromaLossWeights, Correction},
+    chroma::{ChromaLossWeights, Correction, pack_ab},
     compare::widen,
     doctor::measured::{Allowance, Row, Sample},
     gpu::{Buffer, Gpu, GpuError, Kernel, groups_for, shaders},
@@ -27,7 +27,7 @@ pub struct ChromaInput<'a> {
     pub size: [usize; 2],
     /// Rendered a/b, `[pixels][2]`.
     pub image: &'a [[f64; 2]],
-    /// Wanted a/b, `[pixels][2]`.
+    /// Wanted a/b, `[pixels][2]`, in 256ths of a unit.
     pub wanted: &'a [[f64; 2]],
     /// The coarser scale's picture, of the size in `weights`.
     pub coarser: &'a [[f64; 2]],
@@ -45,7 +45,7 @@ pub struct ChromaOutput {
     pub loss: f64,
     /// With respect to the image, `[pixels, 2]`.
     pub gradient: Vec<f32>,
-    /// Slope over residual, `[pixels, 2]`; empty unless asked for.
+    /// Slope over residual, `[pixels, 2]`.
     pub curvatures: Vec<f32>,
 }
 
@@ -55,58 +55,55 @@ fn pixels(gpu: &Gpu, values: &[[f64; 2]]) -> Result<Buffer<f32>, GpuError> {
 }
 
 impl ChromaInput<'_> {
-    /// Runs the kernel, or (`curved`) the one that gives the curvature too.
+    /// Runs the kernel.
     ///
     /// # Errors
     /// [`GpuError`].
-    pub fn run(&self, gpu: &Gpu, curved: bool) -> Result<ChromaOutput, GpuError> {
-        let source = if curved {
-            shaders::CHROMA_LOSS_CURVATURE
-        } else {
-            shaders::CHROMA_LOSS
-        };
-        let kernel = Kernel::new(gpu, "chroma_loss", source);
+    pub fn run(&self, gpu: &Gpu) -> Result<ChromaOutput, GpuError> {
+        let kernel = Kernel::new(gpu, "chroma_loss", shaders::CHROMA_LOSS);
         let view = view(gpu, self.size)?;
         let weights = Buffer::uniform(gpu, "weights", &self.weights)?;
-        let [image, wanted, coarser] = [self.image, self.wanted, self.coarser];
-        let (image, wanted, coarser) = (
-            pixels(gpu, image)?,
-            pixels(gpu, wanted)?,
-            pixels(gpu, coarser)?,
-        );
+        let (image, coarser) = (pixels(gpu, self.image)?, pixels(gpu, self.coarser)?);
+        let wanted: Vec<u32> = (self.wanted.iter())
+            .map(|ab| pack_ab(ab.map(|v| v as f32)))
+            .collect();
+        let wanted = Buffer::from_slice(gpu, "wanted", &wanted)?;
         let narrow: Vec<f32> = self.pixel_weights.iter().map(|&w| w as f32).collect();
         let pixel_weights = Buffer::from_slice(gpu, "pixel weights", &narrow)?;
         let corrections = Buffer::from_slice(gpu, "corrections", self.corrections)?;
-        let gradient = Buffer::<f32>::zeros(gpu, "gradient", image.len())?;
-        let curvatures = Buffer::<f32>::zeros(gpu, "curvatures", image.len())?;
+        let figures = Buffer::<f32>::zeros(gpu, "figures", 2 * image.len())?;
         let groups = groups_for(self.size[0] * self.size[1]);
         let loss = logged(gpu, self.size, groups as usize, |recorder, block_losses| {
-            let mut buffers = vec![
+            let buffers = [
                 view.raw(),
                 image.raw(),
                 wanted.raw(),
                 coarser.raw(),
                 weights.raw(),
                 block_losses.raw(),
-                gradient.raw(),
+                figures.raw(),
                 pixel_weights.raw(),
                 corrections.raw(),
             ];
-            if curved {
-                buffers.push(curvatures.raw());
-            }
             recorder.dispatch(&kernel, &kernel.bind(gpu, &buffers), groups);
         })?;
+        let figures = figures.read(gpu)?;
+        let half = |first: usize| {
+            let of_pixels = figures.chunks_exact(4);
+            let of_pixels = of_pixels.flat_map(|figures| &figures[first..first + 2]);
+            of_pixels.copied().collect()
+        };
         Ok(ChromaOutput {
             loss,
-            gradient: gradient.read(gpu)?,
-            curvatures: if curved {
-                curvatures.read(gpu)?
-            } else {
-                Vec::new()
-            },
+            gradient: half(0),
+            curvatures: half(2),
         })
     }
+}
+
+/// Rounded to what wanted a/b can be.
+pub(super) fn in_steps(value: f64) -> f64 {
+    (256.0 * value).round() / 256.0
 }
 
 /// Bilinear sample with half-pixel centres, as images are resized everywhere.
@@ -141,7 +138,6 @@ struct Terms {
     decline: f64,
     /// Whether pixels have weights and the teacher is corrected.
     weighed: bool,
-    curved: bool,
     /// Whether a and b are judged together.
     joint: bool,
 }
@@ -150,7 +146,6 @@ const PLAIN: Terms = Terms {
     agreement: 0.0,
     decline: 0.0,
     weighed: false,
-    curved: false,
     joint: false,
 };
 
@@ -185,6 +180,8 @@ fn measure(gpu: &Gpu, terms: Terms) -> Result<[Vec<Sample>; 3], GpuError> {
                 .collect()
         };
         let (wanted, coarser) = (pixels(size, 60.0), pixels(half, 60.0));
+        // As they wait for the kernel.
+        let wanted = wanted.into_iter().map(|ab| ab.map(in_steps)).collect();
         let noise = pixels(size, 3.0);
         let count = size[0] * size[1];
         let mut teaching = Teaching {
@@ -229,7 +226,7 @@ fn measure(gpu: &Gpu, terms: Terms) -> Result<[Vec<Sample>; 3], GpuError> {
                 joint: u32::from(terms.joint),
             },
         };
-        let output = input.run(gpu, terms.curved)?;
+        let output = input.run(gpu)?;
 
         let smooth = upsample(&coarser, half, size);
         let [slopes, curves] = teaching.slopes(&image);
@@ -248,10 +245,8 @@ fn measure(gpu: &Gpu, terms: Terms) -> Result<[Vec<Sample>; 3], GpuError> {
         let scaled = |values: &[f32]| widen(values).into_iter().map(|v| v * scale).collect();
         samples[0].push(Sample::new(vec![output.loss], vec![loss]));
         samples[1].push(Sample::new(scaled(&output.gradient), sum(&slopes, &drift)));
-        if terms.curved {
-            let expected = sum(&curves, &by_drift);
-            samples[2].push(Sample::new(scaled(&output.curvatures), expected));
-        }
+        let expected = sum(&curves, &by_drift);
+        samples[2].push(Sample::new(scaled(&output.curvatures), expected));
     }
     Ok(samples)
 }
@@ -275,7 +270,6 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
     let solver = Terms {
         decline: 0.1,
         weighed: true,
-        curved: true,
         ..PLAIN
     };
     let [weighed_values, weighed_gradients, weighed_curvatures] = measure(gpu, solver)?;

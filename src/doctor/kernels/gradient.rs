@@ -10,15 +10,15 @@ use crate::{
         measured::{Allowance, Row, Sample},
         stage::{Stage, splats},
     },
-    gpu::{Buffer, GpuError, Recorder},
+    gpu::GpuError,
     oracle::{
         gradient::{gradient, pulls},
         random::{Random, opaque_stack, random_scene_before, random_view},
         render::decision_margin,
         scene::{Scene, View},
-        shade::Shading,
+        shade::{Shading, unclamped},
     },
-    raster::{Field, Geometry, LayerAdjoint, Outcome, Raster},
+    raster::Raster,
 };
 
 /// The gradient of a picture: one random number a value, none where a pixel
@@ -45,19 +45,25 @@ fn oracle_groups<const C: usize>(gradient: &Scene<f64, C>) -> Vec<Vec<f64>> {
         gradient.opacity_logits.clone(),
     ];
     let sh = gradient.sh.as_flattened().to_vec();
-    let geometry = geometry.into_iter().filter(|_| C != 2);
+    let geometry = geometry.into_iter().filter(|_| C == 1);
     geometry.chain([sh]).collect()
 }
 
-/// Samples by group of parameters.
+/// The gradient of a luma picture.
+pub(super) fn of_luma(scene: &Scene<f64, 1>, view: &View, upstream: &[[f64; 1]]) -> Scene<f64, 1> {
+    gradient(scene, view, Shading::Offset, upstream)
+}
+
+/// Samples by group of parameters; `expect` gives the gradient of a picture.
 pub(super) fn measure<const C: usize>(
     raster: &Arc<Raster>,
     scenes: &[(Scene<f64, C>, View)],
+    expect: impl Fn(&Scene<f64, C>, &View, &[[f64; C]]) -> Scene<f64, C>,
 ) -> Result<Vec<(&'static str, Vec<Sample>)>, GpuError> {
     let mut groups: Vec<(&'static str, Vec<Sample>)> = Vec::new();
     for (seed, (scene, view)) in scenes.iter().enumerate() {
         let upstream = upstream(seed as u64, scene, view);
-        let expected = gradient(scene, view, Shading::of_channels(C), &upstream);
+        let expected = expect(scene, view, &upstream);
         let stage = Stage::new(raster, &splats(scene), view)?;
         let actual = stage.backward(upstream.as_flattened())?;
         let mut rows = actual.groups();
@@ -77,34 +83,55 @@ pub(super) fn measure<const C: usize>(
     Ok(groups)
 }
 
-/// The adjoint that adds, against the plain one and what was there.
-fn added(raster: &Arc<Raster>, scenes: &[(Scene<f64, 2>, View)]) -> Result<Vec<Sample>, GpuError> {
-    let gpu = &raster.gpu;
-    (scenes.iter().enumerate())
-        .map(|(seed, (scene, view))| {
-            let (splats, upstream) = (splats(scene), upstream(seed as u64, scene, view));
-            let stage = Stage::new(raster, &splats, view)?;
-            let once = stage.backward(upstream.as_flattened())?.field;
-            // Not the gradient itself: what nobody sees keeps what was there.
-            let before: Vec<f32> = once.iter().map(|slope| 3.0 - 0.5 * slope).collect();
-            let geometry = Geometry::upload(gpu, &splats)?;
-            let field = Field::upload(gpu, &splats.sh)?;
-            let sum = Buffer::from_slice(gpu, "sum", &before)?;
-            let outcome = Outcome::Sum(&sum);
-            let Stage { lists, layer, .. } = &stage;
-            let adjoint = LayerAdjoint::new(raster, &geometry, lists, &field, layer, &outcome)?;
-            let upstream: Vec<f32> = (upstream.as_flattened().iter())
-                .map(|&v| v as f32)
-                .collect();
-            adjoint.image_gradient.write(gpu, &upstream);
-            let mut recorder = Recorder::new(gpu);
-            adjoint.record(raster, &mut recorder);
-            recorder.submit();
-            let pairs = before.iter().zip(&once);
-            let expected = pairs.map(|(&b, &o)| f64::from(b) + f64::from(o)).collect();
-            Ok(Sample::new(widen(&sum.read(gpu)?), expected))
-        })
-        .collect()
+/// The adjoint on frozen geometry: the sums of the curvatures against the oracle, the
+/// gradient added to what was there against the plain one.
+fn frozen<const C: usize>(
+    raster: &Arc<Raster>,
+    scenes: &[(Scene<f64, C>, View)],
+) -> Result<[Vec<Sample>; 2], GpuError> {
+    let (mut diagonals, mut added) = (Vec::new(), Vec::new());
+    for (seed, (scene, view)) in scenes.iter().enumerate() {
+        let upstream = upstream(seed as u64, scene, view);
+        let stage = Stage::new(raster, &splats(scene), view)?;
+        let once = stage.backward(upstream.as_flattened())?;
+        // Curvatures pass black and white alike.
+        let plain = gradient(scene, view, Shading::Plain, &upstream);
+        let harmonics = scene.sh.len() / scene.len();
+        let expected = (0..4 - C).flat_map(|c| (0..scene.len()).map(move |i| (c, i)));
+        let expected = expected.map(|(c, i)| plain.sh[i * harmonics][c]).collect();
+        diagonals.push(Sample::new(widen(&once.diagonal), expected));
+        // Not the gradient itself: what nobody sees keeps what was there.
+        let before: Vec<f32> = once.field.iter().map(|slope| 3.0 - 0.5 * slope).collect();
+        let sum = stage.backward_onto(upstream.as_flattened(), &before)?.field;
+        let pairs = before.iter().zip(&once.field);
+        let expected = pairs.map(|(&b, &o)| f64::from(b) + f64::from(o)).collect();
+        added.push(Sample::new(widen(&sum), expected));
+    }
+    Ok([diagonals, added])
+}
+
+/// What the RGB adjoint gives: the plain gradient, but for channels that are black and
+/// would become darker.
+fn brightening(scene: &Scene<f64, 3>, view: &View, plain: Scene<f64, 3>) -> Scene<f64, 3> {
+    let mut gradient = plain;
+    let harmonics = scene.sh.len() / scene.len();
+    for i in 0..scene.len() {
+        let own = i * harmonics..(i + 1) * harmonics;
+        let shown = unclamped(
+            &scene.means[i],
+            &scene.sh[own.clone()],
+            view,
+            Shading::Offset,
+        );
+        for c in 0..3 {
+            if shown[c] <= 0.0 && gradient.sh[own.start][c] >= 0.0 {
+                gradient.sh[own.clone()]
+                    .iter_mut()
+                    .for_each(|sh| sh[c] = 0.0);
+            }
+        }
+    }
+    gradient
 }
 
 /// Scenes of every degree before views of odd sizes, and opaque stacks.
@@ -148,19 +175,40 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
         ("luma adjoint", false, 2.02e-6),
         ("luma adjoint, antialiased", true, 3.21e-6),
     ] {
-        let groups = measure::<1>(raster, &scenes(antialiased))?;
+        let groups = measure(raster, &scenes(antialiased), of_luma)?;
         for ((name, samples), bounds) in groups.into_iter().zip(bounds(opacity)) {
             rows.push(Row::gradient(kernel, name, bounds, &samples));
         }
     }
-    for (name, samples) in measure::<2>(raster, &scenes(false))? {
-        rows.push(Row::gradient("chroma adjoint", name, chroma, &samples));
+    let of_chroma = measure::<2>(raster, &scenes(false), |scene, view, upstream| {
+        gradient(scene, view, Shading::Plain, upstream)
+    })?;
+    let of_rgb = measure::<3>(raster, &scenes(false), |scene, view, upstream| {
+        brightening(scene, view, gradient(scene, view, Shading::Plain, upstream))
+    })?;
+    for (kernel, groups, [diagonals, added]) in [
+        (
+            "chroma adjoint",
+            of_chroma,
+            frozen::<2>(raster, &scenes(false))?,
+        ),
+        ("rgb adjoint", of_rgb, frozen::<3>(raster, &scenes(false))?),
+    ] {
+        for (name, samples) in groups {
+            rows.push(Row::gradient(kernel, name, chroma, &samples));
+        }
+        rows.push(Row::gradient(
+            kernel,
+            "sums of curvatures",
+            chroma,
+            &diagonals,
+        ));
+        rows.push(Row::elementwise(
+            kernel,
+            "sh, added to what is there",
+            allowed.relative(4.36e-8, 1.0),
+            &added,
+        ));
     }
-    rows.push(Row::elementwise(
-        "chroma adjoint",
-        "sh, added to what is there",
-        allowed.relative(4.36e-8, 1.0),
-        &added(raster, &scenes(false))?,
-    ));
     Ok(rows)
 }

@@ -11,6 +11,7 @@ mod losses;
 pub mod numerics;
 mod project;
 mod relocation;
+mod rgb_loss;
 mod scan;
 mod sort;
 mod step;
@@ -29,13 +30,14 @@ use crate::{gpu::GpuError, raster::Raster};
 type Measure = fn(&Arc<Raster>) -> Result<Vec<Row>, GpuError>;
 
 /// The topics in the order in which an iteration meets them.
-pub const TOPICS: [(&str, Measure); 14] = [
+pub const TOPICS: [(&str, Measure); 15] = [
     ("project", project::rows),
     ("scan", scan::rows),
     ("sort", sort::rows),
     ("blend", blend::rows),
     ("losses", losses::rows),
     ("chroma loss", chroma_loss::rows),
+    ("rgb loss", rgb_loss::rows),
     ("adjoint", gradient::rows),
     ("numerics", numerics::rows),
     ("step", step::rows),

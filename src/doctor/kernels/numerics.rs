@@ -17,8 +17,7 @@ use crate::{
         scene::{Scene, View},
     },
     raster::{
-        AdjointScratch, Field, Geometry, Layer, LayerAdjoint, Lists, Outcome, Raster,
-        RasterNumerics, Storage,
+        Field, Geometry, Layer, Lists, LumaAdjoint, Outcome, Raster, RasterNumerics, Storage,
     },
 };
 
@@ -104,7 +103,11 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
     let mut groups: Vec<(&'static str, Vec<Sample>)> = Vec::new();
     for numerics in CUTS {
         let raster = &cutting(raster, &numerics);
-        let measured = gradient::measure::<1>(raster, &cut(gradient::scenes(false), numerics))?;
+        let measured = gradient::measure(
+            raster,
+            &cut(gradient::scenes(false), numerics),
+            gradient::of_luma,
+        )?;
         for (k, (name, samples)) in measured.into_iter().enumerate() {
             if groups.len() <= k {
                 groups.push((name, Vec::new()));
@@ -121,7 +124,7 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
         storage: Storage::Half,
         ..raster.numerics()
     });
-    let groups = gradient::measure::<1>(&half, &gradient::scenes(false))?;
+    let groups = gradient::measure(&half, &gradient::scenes(false), gradient::of_luma)?;
     for ((name, samples), (l2, worst)) in groups.into_iter().zip(HALF_SEEN) {
         let kernel = "luma adjoint, half storage";
         rows.push(Row::gradient(kernel, name, bounds(l2, worst), &samples));
@@ -162,19 +165,10 @@ fn left(
     let (pixels, tiles) = (stage.view.pixel_count(), stage.view.tile_count());
     let lists = Lists::new(raster, &geometry, tiles, stage.lists.capacity)?;
     let layer = Layer::new(raster, &geometry, &lists, &field, pixels, tiles)?;
-    let storage = raster.numerics().storage;
-    let scratch = AdjointScratch::new(gpu, field.kind, storage, scene.len(), lists.capacity)?;
     let field_gradient = Buffer::zeros(gpu, "field gradient", field.planes.len())?;
-    let adjoint = LayerAdjoint::on(
-        raster,
-        &geometry,
-        &lists,
-        &field,
-        &layer,
-        Buffer::from_slice(gpu, "upstream", upstream)?,
-        scratch.clone(),
-        &Outcome::Gradient(&field_gradient),
-    )?;
+    let outcome = Outcome::Gradient(&field_gradient);
+    let adjoint = LumaAdjoint::new(raster, &geometry, &lists, &field, &layer, &outcome)?;
+    adjoint.image_gradient.write(gpu, upstream);
     let mut recorder = Recorder::new(gpu);
     lists.set_view(gpu, &stage.view);
     lists.record(raster, &mut recorder);
@@ -182,8 +176,8 @@ fn left(
     adjoint.record(raster, &mut recorder);
     recorder.submit();
     Ok(Left {
-        records: scratch.partials.read(gpu)?,
-        gradients: scratch.gradients.read(gpu)?,
+        records: adjoint.scratch().partials.read(gpu)?,
+        gradients: adjoint.scratch().gradients.read(gpu)?,
     })
 }
 

@@ -17,7 +17,7 @@ use crate::{
         scene::View,
     },
     raster::{
-        AdamMoments, AdamStep, AdamSteps, Field, Geometry, Layer, LayerAdjoint, Lists, Model,
+        AdamMoments, AdamStep, AdamSteps, Field, Geometry, Layer, Lists, LumaAdjoint, Model,
         Outcome, Raster, RasterNumerics, RasterOptions, constants::*,
     },
     splats::Splats,
@@ -66,7 +66,7 @@ fn stepped(
         geometry: geometry_step.of(&model.geometry_moments),
         field: field_step.of(&model.field_moments),
     };
-    let adjoint = LayerAdjoint::new(raster, geometry, &lists, field, &layer, &outcome)?;
+    let adjoint = LumaAdjoint::new(raster, geometry, &lists, field, &layer, &outcome)?;
     adjoint.image_gradient.write(gpu, upstream);
     let mut recorder = Recorder::new(gpu);
     lists.set_view(gpu, &stage.view);

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use super::losses::view;
+use super::{chroma_loss::in_steps, losses::view};
 use crate::{
-    chroma::{Correction, Corrections},
+    chroma::{Correction, CorrectionKernels, Corrections, pack_ab},
     doctor::measured::{Allowance, Row, Sample},
     gpu::{Buffer, Gpu, GpuError, Recorder},
     oracle::{
@@ -37,8 +37,8 @@ impl Taught {
                 let drawn = f64::from(u8::from(k % 11 != 3));
                 let x = [0, 1].map(|c| drawn * round(x[c] + centre[c]));
                 let noise: [f64; 2] = random.array(-4.0, 4.0);
-                let t =
-                    [0, 1].map(|c| round(gain[c] * x[c] + turn * x[1 - c] + offset[c] + noise[c]));
+                let t = [0, 1]
+                    .map(|c| in_steps(gain[c] * x[c] + turn * x[1 - c] + offset[c] + noise[c]));
                 (random.range(1e-5, 1e-3), x, t)
             })
             .collect();
@@ -72,7 +72,8 @@ impl Taught {
 }
 
 fn on_device(gpu: &Gpu, views: &[Taught]) -> Result<Vec<Correction>, GpuError> {
-    let corrections = Corrections::new(gpu, views.len())?;
+    let kernels = CorrectionKernels::new(gpu);
+    let corrections = Corrections::new(gpu, &kernels, views.len())?;
     let narrow = |values: Vec<[f64; 2]>| {
         let values: Vec<f32> = values.as_flattened().iter().map(|&v| v as f32).collect();
         Buffer::from_slice(gpu, "pixels", &values)
@@ -81,25 +82,24 @@ fn on_device(gpu: &Gpu, views: &[Taught]) -> Result<Vec<Correction>, GpuError> {
         let view = view(gpu, taught.size)?;
         let pixels = || taught.pixels.iter();
         // The channels differ; their mean is the weight.
-        let curvatures = narrow(pixels().map(|p| [1.5 * p.0, 0.5 * p.0]).collect())?;
+        let curvatures = pixels().flat_map(|p| [[7.0, -7.0], [1.5 * p.0, 0.5 * p.0]]);
+        let left = narrow(curvatures.collect())?;
         let image = narrow(pixels().map(|p| p.1).collect())?;
-        let wanted = narrow(pixels().map(|p| p.2).collect())?;
+        let wanted: Vec<u32> = pixels().map(|p| pack_ab(p.2.map(|v| v as f32))).collect();
+        let wanted = Buffer::from_slice(gpu, "wanted", &wanted)?;
         let weights: Vec<f32> = (taught.weights.as_deref().unwrap_or(&[0.0]).iter())
             .map(|&w| w as f32)
             .collect();
         let weights = Buffer::from_slice(gpu, "pixel weights", &weights)?;
-        let bindings = corrections.bind(
-            gpu,
-            index,
-            [view.raw(), image.raw(), wanted.raw(), curvatures.raw()],
-            (&weights, taught.weights.is_some()),
-        )?;
+        let parameters = corrections.parameters(gpu, index, taught.weights.is_some())?;
+        let inputs = [view.raw(), image.raw(), wanted.raw()];
+        let bindings = corrections.bind(gpu, &kernels, &parameters, (inputs, &left, &weights));
         let mut recorder = Recorder::new(gpu);
-        corrections.sum(&bindings, &mut recorder);
+        corrections.sum(&kernels, &bindings, &mut recorder);
         recorder.submit();
     }
     let mut recorder = Recorder::new(gpu);
-    corrections.solve(&mut recorder);
+    corrections.solve(&kernels, &mut recorder);
     recorder.submit();
     corrections.corrections.read(gpu)
 }

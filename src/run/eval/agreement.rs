@@ -183,7 +183,7 @@ pub(super) fn between_views(
     let views = &subject.scene.photos;
     let taught = painter.teacher().is_some();
     let candidates: Vec<usize> = (0..views.len())
-        .filter(|&i| !taught || painter.answer(i).is_some())
+        .filter(|&i| !taught || painter.answers(i))
         .collect();
     let in_color = views.iter().all(|(photo, _)| photo.rgb.is_some());
     let count = candidates.len().min(MAX_VIEWS);
@@ -199,7 +199,7 @@ pub(super) fn between_views(
         });
         let camera = small(&views[i].1);
         let mut drawing = painter.draw(&camera, name)?;
-        if let Some(answer) = painter.answer(i) {
+        if let Some(answer) = painter.answer(i)? {
             let answer = answer.resized(camera.width, camera.height);
             let layer = Layer::Ab(to_picture(&answer));
             drawing.layers.push((Method::Teacher, layer));

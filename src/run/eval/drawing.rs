@@ -105,8 +105,16 @@ impl<'a> Painter<'a> {
     }
 
     /// The teacher's answer for a photo.
-    pub fn answer(&self, view: usize) -> Option<&AbImage> {
-        self.teacher.as_ref()?.answers[view].as_ref()
+    pub fn answer(&self, view: usize) -> Result<Option<AbImage>, RunError> {
+        match &self.teacher {
+            Some(teacher) => teacher.answer(view),
+            None => Ok(None),
+        }
+    }
+
+    /// Whether the teacher has an answer for a photo.
+    pub fn answers(&self, view: usize) -> bool {
+        (self.teacher.as_ref()).is_some_and(|teacher| teacher.answers(view))
     }
 
     /// Name, kind and identity of the teacher.

@@ -48,6 +48,8 @@ pub struct EvalOptions {
     pub frames: usize,
     /// Whether other ways to colour a scene are measured beside it.
     pub baselines: bool,
+    /// Bytes of the device that fitting RGB splats may take.
+    pub memory_limit: Option<u64>,
     /// Folder of `.flo` files between the path's frames; geometric flow by default.
     pub flow: Option<PathBuf>,
     /// A network that tells how far two pictures are apart.
@@ -84,7 +86,9 @@ pub fn eval(
     let drawn = subject.report.luma.settings.raster_options();
     let raster = Arc::new(Raster::with(&open_gpu(false)?, drawn));
     let splats = match &teacher {
-        Some(teacher) if options.baselines => Some(teacher.rgb_splats(&raster, &subject, observe)?),
+        Some(teacher) if options.baselines => {
+            Some(teacher.rgb_splats(&raster, &subject, options.memory_limit, observe)?)
+        }
         _ => None,
     };
     let mut rgb = vec![(Method::Exported, &subject.exported)];
@@ -107,7 +111,8 @@ pub fn eval(
             continue;
         }
         let drawing = painter.draw(&subject.scene.photos[i].1, name)?;
-        let scored = Scored::of(name, yardstick, &drawing, painter.answer(i), lpips.as_mut())?;
+        let answer = painter.answer(i)?;
+        let scored = Scored::of(name, yardstick, &drawing, answer.as_ref(), lpips.as_mut())?;
         if rows.len() < MAX_ROWS {
             rows.push(page_row(made.path(), rows.len(), &scored)?);
         }
@@ -135,7 +140,7 @@ pub fn eval(
         program: env!("CARGO_PKG_VERSION").to_owned(),
         scene: subject.name(),
         teacher: painter.teacher(),
-        teacher_colorfulness: score::teacher_colorfulness(&painter, &subject),
+        teacher_colorfulness: score::teacher_colorfulness(&painter, &subject)?,
         measured_on: measured_on.to_owned(),
         luma: score::mean_luma(&views),
         bake: score::mean_bake(&views),

@@ -215,13 +215,21 @@ pub(super) fn mean_luma(views: &[Scored]) -> LumaScore {
 }
 
 /// Mean colourfulness of the teacher's pictures of all photos.
-pub(super) fn teacher_colorfulness(painter: &Painter<'_>, subject: &Subject) -> Option<f64> {
-    let photos = subject.scene.photos.iter().enumerate();
-    mean(photos.map(|(i, (photo, _))| {
-        let layer = Layer::Ab(to_picture(painter.answer(i)?));
+pub(super) fn teacher_colorfulness(
+    painter: &Painter<'_>,
+    subject: &Subject,
+) -> Result<Option<f64>, RunError> {
+    let mut values = Vec::new();
+    for (i, (photo, _)) in subject.scene.photos.iter().enumerate() {
+        let Some(answer) = painter.answer(i)? else {
+            continue;
+        };
+        let layer = Layer::Ab(to_picture(&answer));
         let yardstick = subject.yardstick(i);
-        (yardstick.measures()).then(|| yardstick.colorfulness(&layer.rgb(&gray_picture(photo))))
-    }))
+        let measures = yardstick.measures();
+        values.push(measures.then(|| yardstick.colorfulness(&layer.rgb(&gray_picture(photo)))));
+    }
+    Ok(mean(values.into_iter()))
 }
 
 /// Mean over the views of what the export costs.

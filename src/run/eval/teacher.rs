@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     chroma::{
-        ChromaSettings, RgbView, fit_rgb, native_rgb,
+        ChromaSettings, FrozenViews, Room, Targets, Task, fit_rgb, native_rgb,
         teacher::{AbImage, Asked, GrayImage, Teacher, TeacherSettings},
     },
     raster::{Picture, Raster},
@@ -29,8 +29,9 @@ pub(super) struct EvalTeacher {
     path: PathBuf,
     /// Name, kind and identity.
     pub info: serde_json::Value,
-    /// The answer for each view, `None` where there is none.
-    pub answers: Vec<Option<AbImage>>,
+    /// The answers, and each view's place among them, `None` where there is none.
+    answers: Targets,
+    of_view: Vec<Option<usize>>,
     /// Asked for drawn pictures; keeps no answers, since every colouring draws others.
     frames: Option<Teacher>,
 }
@@ -56,7 +57,7 @@ impl EvalTeacher {
             ));
         }
         let scene = &subject.scene;
-        let mut answers = Vec::with_capacity(scene.photos.len());
+        let (mut answers, mut of_view) = (Targets::new(1), Vec::new());
         let views = scene.photos.iter().zip(&scene.capture.views);
         for (done, ((photo, camera), view)) in views.enumerate() {
             observe(Event::Progress {
@@ -70,9 +71,11 @@ impl EvalTeacher {
                 height: photo.height,
                 pixels: &photo.gray,
             };
-            answers.push(teacher.colorize(Asked::view(view, camera), gray, None)?);
+            let answer = teacher.colorize(Asked::view(view, camera), gray, None)?;
+            let kept = answer.map(|answer| answers.push_ab(&answer, None));
+            of_view.push(kept.transpose()?);
         }
-        if answers.iter().all(Option::is_none) {
+        if answers.is_empty() {
             return Err(RunError::TeacherCoversNothing {
                 teacher: path.to_owned(),
                 example: scene.capture.views[0].name.clone(),
@@ -93,8 +96,20 @@ impl EvalTeacher {
             path: path.to_owned(),
             info: serde_json::to_value(info).unwrap_or_default(),
             answers,
+            of_view,
             frames,
         })
+    }
+
+    /// Whether there is an answer for a view.
+    pub fn answers(&self, view: usize) -> bool {
+        self.of_view[view].is_some()
+    }
+
+    /// The answer for a view, where there is one.
+    pub fn answer(&self, view: usize) -> Result<Option<AbImage>, RunError> {
+        let kept = self.of_view[view].map(|index| self.answers.read(index, 0));
+        Ok(kept.transpose()?.map(|target| target.ab()))
     }
 
     /// RGB splats on the run's geometry, fitted to the teacher's pictures of the training
@@ -104,6 +119,7 @@ impl EvalTeacher {
         &self,
         raster: &Arc<Raster>,
         subject: &Subject,
+        memory_limit: Option<u64>,
         observe: &mut Observer<'_>,
     ) -> Result<ShField, RunError> {
         let scene = &subject.scene;
@@ -115,40 +131,46 @@ impl EvalTeacher {
             total,
             message,
         });
-        let views: Vec<RgbView> = (scene.split.train.iter())
-            .filter_map(|&i| {
-                let (photo, camera) = &scene.photos[i];
-                let answer = to_picture(self.answers[i].as_ref()?);
-                let colored = native_rgb(&gray_picture(photo), &answer);
-                Some(RgbView {
-                    camera: camera.clone(),
-                    wanted: subject.yardstick(i).unexposed(&colored),
-                    weights: masked_weights(None, photo),
-                })
-            })
-            .collect();
-        if views.is_empty() {
+        let ours = ChromaSettings::irls();
+        let settings = ChromaSettings {
+            sh_degree: sh::MAX_DEGREE,
+            robust: None,
+            correct_views: false,
+            coarse_rounds: RGB_ROUNDS * ours.coarse_rounds,
+            rounds: RGB_ROUNDS * ours.rounds,
+            ..ours
+        };
+        let mut targets = Targets::new(settings.target_scales());
+        let (mut tasks, mut cameras) = (Vec::new(), Vec::new());
+        for &i in &scene.split.train {
+            let (photo, camera) = &scene.photos[i];
+            let Some(answer) = self.answer(i)? else {
+                continue;
+            };
+            let colored = native_rgb(&gray_picture(photo), &to_picture(&answer));
+            let wanted = subject.yardstick(i).unexposed(&colored);
+            let weights = masked_weights(None, photo);
+            let size = [photo.width, photo.height];
+            tasks.push(Task {
+                view: cameras.len(),
+                target: targets.push_rgb(size, &wanted, weights.as_deref())?,
+            });
+            cameras.push(camera.clone());
+        }
+        if tasks.is_empty() {
             return Err(RunError::TeacherCoversNothing {
                 teacher: self.path.clone(),
                 example: scene.capture.views[scene.split.train[0]].name.clone(),
             });
         }
-        let ours = ChromaSettings::irls();
-        let settings = ChromaSettings {
+        let room = Room {
+            limit: memory_limit,
             sh_degree: sh::MAX_DEGREE,
-            robust: None,
-            corrects_views: false,
-            warm_rounds: RGB_ROUNDS * ours.warm_rounds,
-            rounds: RGB_ROUNDS * ours.rounds,
-            ..ours
+            weighted: targets.weighted(),
         };
-        Ok(fit_rgb(
-            raster,
-            &settings,
-            scene.extent,
-            &subject.luma,
-            &views,
-        )?)
+        let (luma, extent, scales) = (&subject.luma, scene.extent, targets.scales());
+        let frozen = FrozenViews::new(raster, luma, extent, &cameras, scales, room)?;
+        Ok(fit_rgb(&frozen, &settings, &targets, tasks)?)
     }
 
     /// What the teacher makes of a drawn gray picture; `None` without that baseline.

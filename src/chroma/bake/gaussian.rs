@@ -1,4 +1,4 @@
-//! From luma and chroma to the RGB harmonics that viewers blend.
+//! Each Gaussian by itself, from luma and chroma to RGB.
 //!
 //! Viewers blend sRGB values; the native picture blends gray and a/b and
 //! converts afterwards. Gaussian by Gaussian, the colour at the mean gray is

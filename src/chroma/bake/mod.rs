@@ -1,0 +1,7 @@
+//! From luma and chroma to the RGB harmonics that viewers blend.
+
+mod fit;
+mod gaussian;
+
+pub use fit::{bake, fit_rgb};
+pub use gaussian::bake_rgb;

@@ -1,0 +1,41 @@
+//! What can go wrong in stage 2.
+
+use crate::gpu::GpuError;
+
+/// Stage 2 cannot go on.
+#[derive(Debug, thiserror::Error)]
+pub enum ChromaError {
+    /// The device.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+    /// The temporary file that wanted colors wait in.
+    #[error(
+        "wanted colors do not fit into a temporary file ({0}): make room, or set TMPDIR to a folder with more"
+    )]
+    Spill(#[from] std::io::Error),
+    /// There is nothing to distill.
+    #[error("no view has a color: a teacher must color at least one training view")]
+    NoViews,
+    /// A picture has not its camera's size.
+    #[error("a wanted picture of {found:?} pixels for a camera of {expected:?}")]
+    WrongSize {
+        /// Width and height of the picture.
+        found: [u32; 2],
+        /// Of the camera.
+        expected: [u32; 2],
+    },
+    /// The memory limit does not hold what one view needs.
+    #[error(
+        "{splats} Gaussians and one view at a time need {} MiB of the device but the memory limit is {}: \
+         raise --memory-limit, or train with fewer Gaussians or smaller photos",
+        needed >> 20, limit >> 20
+    )]
+    OverLimit {
+        /// Gaussians.
+        splats: usize,
+        /// Bytes needed.
+        needed: u64,
+        /// Bytes allowed.
+        limit: u64,
+    },
+}

@@ -1,0 +1,374 @@
+//! Views drawn, judged and brought back: for each the picture, its loss, and the adjoint
+//! that adds to gradient and curvature. Drawing is the matrix A of a linear problem, the
+//! adjoint Aᵀ.
+
+use super::{
+    ChromaError, FrozenViews, Targets,
+    correction::{CorrectionParameters, Corrections},
+    loss::{ChromaLossWeights, LOSS_BLOCK, RgbLossParameters},
+};
+use crate::{
+    gpu::{Bindings, Buffer, Recorder},
+    raster::{
+        AdjointScratch, COLOR_FIGURES, Canvas, ChromaAdjoint, ChromaSums, ColorKind, Field, Layer,
+        Load, LossLog, constants::STATUS_WORDS,
+    },
+};
+
+/// A view and what is wanted there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Task {
+    /// Index into [`FrozenViews`].
+    pub view: usize,
+    /// Index into [`Targets`].
+    pub target: usize,
+}
+
+/// How a view is judged.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Judging {
+    /// Weight of the agreement with the next coarser scale, drawn just before.
+    pub agreement: f32,
+    /// Residual at which the loss of a and b together levels off; without one, each has
+    /// its own.
+    pub robust: Option<f32>,
+}
+
+/// What follows on the loss.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Ending {
+    /// Nothing.
+    Loss,
+    /// The adjoint.
+    Gradient,
+    /// The adjoint, and the sums for the view's correction.
+    GradientAndSums,
+}
+
+/// A loss tied to what it judges.
+enum Judge {
+    Chroma {
+        weights: Buffer<ChromaLossWeights>,
+        loss: Bindings,
+        parameters: Buffer<CorrectionParameters>,
+        sums: Bindings,
+    },
+    Rgb {
+        parameters: Buffer<RgbLossParameters>,
+        loss: Bindings,
+    },
+}
+
+/// Where one view at one scale is drawn and judged.
+struct Seat {
+    layer: Layer,
+    adjoint: ChromaAdjoint,
+    judge: Judge,
+    wanted: Buffer<u32>,
+    weights: Buffer<f32>,
+}
+
+/// All passes of one solve.
+pub(super) struct Passes<'a> {
+    pub frozen: &'a FrozenViews,
+    targets: &'a Targets,
+    pub tasks: Vec<Task>,
+    pub field: Field,
+    /// Of the field's first planes: those that are solved for.
+    pub gradient: Buffer<f32>,
+    /// See [`ChromaSums::diagonal`].
+    pub diagonal: Buffer<f32>,
+    pub log: LossLog,
+    pub status: Buffer<u32>,
+    pub corrections: Corrections,
+    /// A seat for each scale of each pinned task, then one for each scale that all
+    /// others take turns in.
+    seats: Vec<Seat>,
+    scales: usize,
+    kept: usize,
+}
+
+impl<'a> Passes<'a> {
+    /// Passes of `field` over `tasks` at so many scales; its first `planes` planes are
+    /// solved for. The log has room for `entries` losses.
+    pub fn new(
+        frozen: &'a FrozenViews,
+        targets: &'a Targets,
+        mut tasks: Vec<Task>,
+        field: Field,
+        planes: usize,
+        [scales, entries]: [usize; 2],
+    ) -> Result<Self, ChromaError> {
+        let raster = &frozen.raster;
+        let gpu = &raster.gpu;
+        if tasks.is_empty() {
+            return Err(ChromaError::NoViews);
+        }
+        for task in &tasks {
+            let (found, expected) = (targets.size(task.target), frozen.uniform(task.view, 0).size);
+            if found != expected {
+                return Err(ChromaError::WrongSize { found, expected });
+            }
+        }
+        // Those that stay come first.
+        tasks.sort_by_key(|task| task.view);
+        let kept = tasks
+            .iter()
+            .filter(|task| frozen.is_pinned(task.view))
+            .count();
+        let splats = frozen.geometry.count;
+        let pixels: Vec<usize> = (0..scales)
+            .map(|scale| {
+                let views = tasks.iter().map(|task| frozen.uniform(task.view, scale));
+                views.map(|view| view.pixel_count()).max().unwrap_or(0)
+            })
+            .collect();
+        let gradient = Buffer::zeros(gpu, "gradient", planes * splats)?;
+        let diagonals = COLOR_FIGURES - field.kind.channels();
+        let diagonal = Buffer::zeros(gpu, "diagonal", diagonals * splats)?;
+        // Frozen lists never overflow: this status stays zero.
+        let status = Buffer::zeros(gpu, "status", STATUS_WORDS)?;
+        let blocks = pixels[0].div_ceil(LOSS_BLOCK);
+        let log = LossLog::new(gpu, &frozen.kernels.sum_loss, &status, blocks, entries)?;
+        let corrections = Corrections::new(gpu, &frozen.kernels.correction, tasks.len())?;
+        let canvases = (pixels.iter())
+            .map(|&pixels| Canvas::new(gpu, field.kind, splats, pixels))
+            .collect::<Result<Vec<_>, _>>()?;
+        let capacity = frozen.capacity(tasks.iter().map(|task| task.view));
+        let scratch = AdjointScratch::color(gpu, splats, capacity)?;
+        let image_gradient = Buffer::zeros(gpu, "image gradient", COLOR_FIGURES * pixels[0])?;
+        let mut passes = Self {
+            frozen,
+            targets,
+            tasks,
+            field,
+            gradient,
+            diagonal,
+            log,
+            status,
+            corrections,
+            seats: Vec::new(),
+            scales,
+            kept,
+        };
+        let weighted = targets.weighted();
+        for task in 0..kept {
+            for (scale, canvas) in canvases.iter().enumerate() {
+                let Task { view, target } = passes.tasks[task];
+                let target = targets.read(target, scale)?;
+                let wanted = Buffer::from_slice(gpu, "wanted", &target.pixels)?;
+                let weights = target.weights.as_deref().unwrap_or(&[0.0]);
+                let weights = Buffer::from_slice(gpu, "pixel weights", weights)?;
+                let coarser = canvases.get(scale + 1).unwrap_or(canvas);
+                let made = [canvas, coarser];
+                let shared = (&image_gradient, &scratch);
+                let seat = passes.seat(view, scale, made, shared, wanted, weights)?;
+                passes.seats.push(seat);
+            }
+            // What is written waits on the host until it is there.
+            gpu.queue().submit([]);
+            gpu.wait()?;
+        }
+        if let Some(&Task { view, .. }) = passes.tasks.get(kept) {
+            let wanted: Buffer<u32> = Buffer::zeros(gpu, "wanted", pixels[0])?;
+            let count = if weighted { pixels[0] } else { 1 };
+            let weights: Buffer<f32> = Buffer::zeros(gpu, "pixel weights", count)?;
+            for (scale, canvas) in canvases.iter().enumerate() {
+                let coarser = canvases.get(scale + 1).unwrap_or(canvas);
+                let made = [canvas, coarser];
+                let shared = (&image_gradient, &scratch);
+                let (wanted, weights) = (wanted.clone(), weights.clone());
+                let seat = passes.seat(view, scale, made, shared, wanted, weights)?;
+                passes.seats.push(seat);
+            }
+        }
+        Ok(passes)
+    }
+
+    fn seat(
+        &self,
+        view: usize,
+        scale: usize,
+        [canvas, coarser]: [&Canvas; 2],
+        (image_gradient, scratch): (&Buffer<f32>, &AdjointScratch),
+        wanted: Buffer<u32>,
+        weights: Buffer<f32>,
+    ) -> Result<Seat, ChromaError> {
+        let Self { frozen, field, .. } = self;
+        let (raster, geometry, kernels) = (&frozen.raster, &frozen.geometry, &frozen.kernels);
+        let gpu = &raster.gpu;
+        let lists = frozen.lists(view, scale).ok_or(ChromaError::NoViews)?;
+        let layer = Layer::on(
+            raster,
+            geometry,
+            lists,
+            field,
+            canvas.clone(),
+            lists.max_tiles(),
+        );
+        let sums = ChromaSums {
+            gradient: &self.gradient,
+            diagonal: &self.diagonal,
+        };
+        let scratch = scratch.clone();
+        let adjoint = ChromaAdjoint::new(
+            raster,
+            geometry,
+            lists,
+            &layer,
+            image_gradient,
+            scratch,
+            sums,
+        );
+        let block_losses = self.log.block_losses.raw();
+        let judge = match field.kind {
+            ColorKind::Rgb => {
+                let parameters =
+                    Buffer::uniform(gpu, "rgb loss parameters", &RgbLossParameters::default())?;
+                let loss = kernels.rgb_loss.bind(
+                    gpu,
+                    &[
+                        lists.view.raw(),
+                        layer.image.raw(),
+                        wanted.raw(),
+                        parameters.raw(),
+                        block_losses,
+                        image_gradient.raw(),
+                        weights.raw(),
+                    ],
+                );
+                Judge::Rgb { parameters, loss }
+            }
+            ColorKind::Chroma | ColorKind::Luma => {
+                let of_loss =
+                    Buffer::uniform(gpu, "chroma loss weights", &ChromaLossWeights::default())?;
+                let loss = kernels.chroma_loss.bind(
+                    gpu,
+                    &[
+                        lists.view.raw(),
+                        layer.image.raw(),
+                        wanted.raw(),
+                        coarser.image().raw(),
+                        of_loss.raw(),
+                        block_losses,
+                        image_gradient.raw(),
+                        weights.raw(),
+                        self.corrections.corrections.raw(),
+                    ],
+                );
+                let parameters = self.corrections.parameters(gpu, 0, false)?;
+                let inputs = [lists.view.raw(), layer.image.raw(), wanted.raw()];
+                let inputs = (inputs, image_gradient, &weights);
+                let sums = (self.corrections).bind(gpu, &kernels.correction, &parameters, inputs);
+                Judge::Chroma {
+                    weights: of_loss,
+                    loss,
+                    parameters,
+                    sums,
+                }
+            }
+        };
+        Ok(Seat {
+            layer,
+            adjoint,
+            judge,
+            wanted,
+            weights,
+        })
+    }
+
+    /// What a dispatch works on, the mean over the tasks at so many scales.
+    pub fn load(&self, scales: usize) -> Load {
+        let views = self.tasks.iter().map(|task| task.view);
+        let channels = self.field.kind.channels() as f64;
+        let of_splat = self.field.planes.len() as f64 / self.frozen.geometry.count as f64;
+        Load {
+            channels,
+            sh_planes: of_splat,
+            ..self.frozen.load(views, scales)
+        }
+    }
+
+    /// Forgets gradient, curvature and losses.
+    pub fn clear(&self) {
+        let mut recorder = Recorder::new(&self.frozen.raster.gpu);
+        recorder.clear(self.log.losses.raw());
+        recorder.clear(self.gradient.raw());
+        recorder.clear(self.diagonal.raw());
+        recorder.submit();
+    }
+
+    /// Draws a task's view at a scale, files its loss under `entry`, and adds its gradient
+    /// as `ending` says.
+    pub fn draw(
+        &self,
+        index: usize,
+        scale: usize,
+        judging: Judging,
+        entry: usize,
+        ending: Ending,
+    ) -> Result<(), ChromaError> {
+        let (frozen, raster) = (self.frozen, &self.frozen.raster);
+        let gpu = &raster.gpu;
+        let Task { view, target } = self.tasks[index];
+        let stays = index < self.kept;
+        let seat = &self.seats[if stays { index } else { self.kept } * self.scales + scale];
+        let weighted = if stays {
+            seat.weights.len() > 1
+        } else {
+            // What the view before this one reads must be read, and what waits on the
+            // host must be gone.
+            gpu.wait()?;
+            let target = self.targets.read(target, scale)?;
+            seat.wanted.write(gpu, &target.pixels);
+            if let Some(weights) = &target.weights {
+                seat.weights.write(gpu, weights);
+            }
+            target.weights.is_some()
+        };
+        let pixels = frozen.uniform(view, scale).pixel_count();
+        let blocks = pixels.div_ceil(LOSS_BLOCK) as u32;
+        let mut recorder = Recorder::new(gpu);
+        frozen.list(view, scale, self.field.degree, &mut recorder);
+        seat.layer.record(raster, &mut recorder);
+        match &seat.judge {
+            Judge::Rgb { parameters, loss } => {
+                let weighted = u32::from(weighted);
+                parameters.write(gpu, &[RgbLossParameters { weighted }]);
+                recorder.dispatch(&frozen.kernels.rgb_loss, loss, blocks);
+            }
+            Judge::Chroma {
+                weights,
+                loss,
+                parameters,
+                sums,
+            } => {
+                let agrees = judging.agreement > 0.0;
+                let coarser = if agrees { scale + 1 } else { scale };
+                weights.write(
+                    gpu,
+                    &[ChromaLossWeights {
+                        coarser_size: frozen.uniform(view, coarser).size,
+                        agreement: judging.agreement,
+                        view_index: index as u32,
+                        weighted: u32::from(weighted),
+                        ..ChromaLossWeights::robust(judging.robust)
+                    }],
+                );
+                recorder.dispatch(&frozen.kernels.chroma_loss, loss, blocks);
+                if ending == Ending::GradientAndSums {
+                    self.corrections.choose(gpu, parameters, index, weighted);
+                    (self.corrections).sum(&frozen.kernels.correction, sums, &mut recorder);
+                }
+            }
+        }
+        let sum_loss = &frozen.kernels.sum_loss;
+        self.log
+            .record(gpu, sum_loss, &mut recorder, blocks, pixels, entry);
+        if ending != Ending::Loss {
+            seat.adjoint.record(raster, &mut recorder);
+        }
+        recorder.submit();
+        Ok(())
+    }
+}
