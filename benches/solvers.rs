@@ -11,8 +11,8 @@
 //! scales, two as in the paper, least squares alone. `tools/plot_solvers.py` draws the CSV.
 
 use std::{
-    fmt::Write, fs, path::Path, path::PathBuf, process::ExitCode, str::FromStr, sync::Arc,
-    time::Instant,
+    fmt::Write, fs, ops::ControlFlow, path::Path, path::PathBuf, process::ExitCode, str::FromStr,
+    sync::Arc, time::Instant,
 };
 
 use gs_chroma::{
@@ -124,7 +124,10 @@ fn compare(problem: &Problem, paper: ChromaSettings) -> Fallible<Vec<Point>> {
     for round in 0..solver.round_count() {
         let begun = Instant::now();
         let mut passes = 0.0;
-        solver.run_to(round + 1, &mut |progress| passes = progress.passes)?;
+        solver.run_to(round + 1, &mut |progress| {
+            passes = progress.passes;
+            ControlFlow::Continue(())
+        })?;
         let chroma = solver.chroma()?;
         spent += begun.elapsed().as_secs_f64();
         points.push(Point {
@@ -144,7 +147,10 @@ fn compare(problem: &Problem, paper: ChromaSettings) -> Fallible<Vec<Point>> {
     for stop in stops(iterations) {
         let begun = Instant::now();
         let mut passes = 0.0;
-        adam.run_to(stop, &mut |progress| passes = progress.passes)?;
+        adam.run_to(stop, &mut |progress| {
+            passes = progress.passes;
+            ControlFlow::Continue(())
+        })?;
         let chroma = adam.chroma()?;
         spent += begun.elapsed().as_secs_f64();
         points.push(Point {

@@ -4,7 +4,7 @@
 use std::time::Instant;
 
 use super::{
-    ChromaError, ChromaProgress, ChromaSettings, FrozenViews, Targets, Task, irls,
+    ChromaError, ChromaObserver, ChromaProgress, ChromaSettings, FrozenViews, Targets, Task, irls,
     passes::{Ending, Judging, Passes},
 };
 use crate::{
@@ -67,7 +67,7 @@ impl<'a> AdamSolver<'a> {
     ///
     /// # Errors
     /// [`ChromaError`] when the device is lost or targets cannot be read.
-    pub fn run(&mut self, observe: &mut dyn FnMut(ChromaProgress)) -> Result<(), ChromaError> {
+    pub fn run(&mut self, observe: &mut ChromaObserver<'_>) -> Result<(), ChromaError> {
         self.run_to(self.settings.iterations, observe)
     }
 
@@ -78,7 +78,7 @@ impl<'a> AdamSolver<'a> {
     pub fn run_to(
         &mut self,
         until: usize,
-        observe: &mut dyn FnMut(ChromaProgress),
+        observe: &mut ChromaObserver<'_>,
     ) -> Result<(), ChromaError> {
         let begun = Instant::now();
         let mut pending = None;
@@ -96,7 +96,7 @@ impl<'a> AdamSolver<'a> {
             for (done, losses) in due.into_iter().chain(last) {
                 let losses = losses.wait(self.gpu())?;
                 let recent = &losses[..done - (done - 1) / REPORT_EVERY * REPORT_EVERY];
-                observe(ChromaProgress {
+                let told = observe(ChromaProgress {
                     iteration: done,
                     loss: recent.iter().map(|&loss| f64::from(loss)).sum::<f64>()
                         / recent.len() as f64,
@@ -106,6 +106,9 @@ impl<'a> AdamSolver<'a> {
                             .sum::<f64>(),
                     seconds: begun.elapsed().as_secs_f64(),
                 });
+                if told.is_break() {
+                    return Err(ChromaError::Cancelled);
+                }
             }
         }
         Ok(())

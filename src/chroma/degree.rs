@@ -1,5 +1,7 @@
 //! Which degree of the chroma harmonics the views prove useful.
 
+use std::ops::ControlFlow;
+
 use super::{ChromaError, ChromaSettings, FrozenViews, IrlsSolver, Targets, Task, solve};
 use crate::splats::{Splats, sh};
 
@@ -49,7 +51,7 @@ pub fn choose_degree(
             sh_degree: degree,
             ..settings.clone()
         };
-        let ignore = &mut |_| ();
+        let ignore = &mut |_| ControlFlow::Continue(());
         let found = solve(frozen, &settings, targets, kept.clone(), luma, ignore)?;
         let mut judge = IrlsSolver::new(frozen, &settings, targets, held_back.clone())?;
         let loss = judge.objective(&found.chroma)?;

@@ -1,6 +1,7 @@
 //! What can go wrong in stage 2.
 
-use crate::gpu::GpuError;
+use super::ColorizerError;
+use crate::{capture::CaptureError, gpu::GpuError};
 
 /// Stage 2 cannot go on.
 #[derive(Debug, thiserror::Error)]
@@ -13,6 +14,15 @@ pub enum ChromaError {
         "wanted colors do not fit into a temporary file ({0}): make room, or set TMPDIR to a folder with more"
     )]
     Spill(#[from] std::io::Error),
+    /// A photo.
+    #[error(transparent)]
+    Capture(#[from] CaptureError),
+    /// Whoever colors the photos.
+    #[error(transparent)]
+    Colorizer(ColorizerError),
+    /// Whoever was told of the progress wanted it to end.
+    #[error("cancelled")]
+    Cancelled,
     /// There is nothing to distill.
     #[error("no view has a color: a teacher must color at least one training view")]
     NoViews,

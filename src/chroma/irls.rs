@@ -6,7 +6,7 @@
 use std::time::Instant;
 
 use super::{
-    ChromaError, ChromaProgress, ChromaSettings, FrozenViews, Targets, Task,
+    ChromaError, ChromaObserver, ChromaProgress, ChromaSettings, FrozenViews, Targets, Task,
     lbfgs::{Lbfgs, System, UNBOUNDED},
     passes::{Ending, Judging, Passes},
 };
@@ -156,7 +156,7 @@ impl<'a> IrlsSolver<'a> {
     ///
     /// # Errors
     /// [`ChromaError`] when the device is lost or targets cannot be read.
-    pub fn run(&mut self, observe: &mut dyn FnMut(ChromaProgress)) -> Result<(), ChromaError> {
+    pub fn run(&mut self, observe: &mut ChromaObserver<'_>) -> Result<(), ChromaError> {
         self.run_to(self.rounds.len(), observe)
     }
 
@@ -167,7 +167,7 @@ impl<'a> IrlsSolver<'a> {
     pub fn run_to(
         &mut self,
         until: usize,
-        observe: &mut dyn FnMut(ChromaProgress),
+        observe: &mut ChromaObserver<'_>,
     ) -> Result<(), ChromaError> {
         let begun = Instant::now();
         let gpu = self.gpu();
@@ -202,12 +202,15 @@ impl<'a> IrlsSolver<'a> {
                 None
             };
             for (index, passes, losses) in due.into_iter().chain(last) {
-                observe(ChromaProgress {
+                let told = observe(ChromaProgress {
                     iteration: index + 1,
                     loss: mean(&losses.wait(gpu)?),
                     passes,
                     seconds: begun.elapsed().as_secs_f64(),
                 });
+                if told.is_break() {
+                    return Err(ChromaError::Cancelled);
+                }
             }
         }
         Ok(())

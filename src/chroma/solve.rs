@@ -1,5 +1,7 @@
 //! Stage 2 as a whole: one of the solvers, and color for what no view shows.
 
+use std::ops::ControlFlow;
+
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -45,6 +47,9 @@ pub struct ChromaProgress {
     pub seconds: f64,
 }
 
+/// Who is told; a [`ControlFlow::Break`] ends it with [`ChromaError::Cancelled`].
+pub type ChromaObserver<'a> = dyn FnMut(ChromaProgress) -> ControlFlow<()> + 'a;
+
 /// What a distillation found.
 pub struct Solved {
     /// The chroma of each Gaussian.
@@ -65,7 +70,7 @@ pub fn solve(
     targets: &Targets,
     tasks: Vec<Task>,
     luma: &Splats,
-    observe: &mut dyn FnMut(ChromaProgress),
+    observe: &mut ChromaObserver<'_>,
 ) -> Result<Solved, ChromaError> {
     match settings.solver {
         SolverKind::Adam => {

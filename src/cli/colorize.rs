@@ -5,9 +5,10 @@ use std::path::PathBuf;
 use clap::{Args, CommandFactory, ValueEnum, error::ErrorKind};
 
 use super::{Cli, CliError, print, progress::Progress};
+use crate::chroma::Degree;
 use crate::chroma::{ChromaSettings, SolverKind, teacher};
 use crate::report::timings_table;
-use crate::run::{ColorizeOptions, Degree, TeachOptions, colorize};
+use crate::run::{ColorizeOptions, TeachOptions, colorize};
 
 /// How a teacher's small picture becomes as large as the photo.
 #[derive(Clone, Copy, ValueEnum)]

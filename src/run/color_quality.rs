@@ -4,13 +4,12 @@ use std::sync::Arc;
 
 use super::{
     RunError,
-    scene::{Scene, gray_to_rgb, renderer, rgb_pixels, shown_rgb},
-    teach::Lesson,
+    scene::{gray_to_rgb, renderer, rgb_pixels, shown_rgb},
     yardstick::Yardstick,
 };
 use crate::{
-    capture::Exposure,
-    chroma::{native_rgb, teacher::AbImage},
+    capture::{Dataset, Exposure},
+    chroma::{Lesson, native_rgb, teacher::AbImage},
     measure,
     raster::{Picture, Raster},
     report::{ColorError, ColorQuality, ColorView, Row, to_image},
@@ -35,17 +34,18 @@ impl Measured {
     /// against `baked`, and that against the photos.
     pub fn of(
         raster: &Arc<Raster>,
-        scene: &Scene,
+        dataset: &Dataset,
         exposures: &[Exposure],
         [luma, baked]: [&Splats; 2],
         chroma: &ShField,
         lesson: &Lesson,
     ) -> Result<Self, RunError> {
-        let mut renderer = renderer(scene, raster, luma, &[&luma.sh, chroma, &baked.sh])?;
+        let mut renderer = renderer(dataset, raster, luma, &[&luma.sh, chroma, &baked.sh])?;
         let (mut errors, mut views, mut rows) = (Vec::new(), Vec::new(), Vec::new());
-        for &i in scene.measured().1 {
-            let (photo, camera) = &scene.photos[i];
-            let yardstick = Yardstick::of(scene, exposures, i);
+        dataset.visit_colors(dataset.measured().1, |i, photo| {
+            let (photo, camera) = (&photo, &dataset.cameras[i]);
+            let exposure = exposures[i];
+            let yardstick = Yardstick { photo, exposure };
             let pictures = renderer.render(camera)?;
             let native = native_rgb(&pictures[0], &pictures[1]);
             let exported = shown_rgb(&pictures[2].pixels);
@@ -58,7 +58,7 @@ impl Measured {
                 let shown = yardstick.shown(&exported);
                 let colorful = |rgb: &Vec<[f32; 3]>| yardstick.colorfulness(rgb);
                 views.push(ColorView {
-                    name: scene.capture.views[i].name.clone(),
+                    name: dataset.capture.views[i].name.clone(),
                     quality: ColorQuality {
                         delta_e: (yardstick.rgb())
                             .map(|truth| yardstick.color_error(&shown, &truth)),
@@ -81,7 +81,8 @@ impl Measured {
                     ],
                 });
             }
-        }
+            Ok::<_, RunError>(())
+        })?;
         Ok(Self {
             bake: mean_error(&errors),
             views,

@@ -2,6 +2,7 @@
 
 use std::{
     fmt::Write,
+    ops::ControlFlow,
     path::{Path, PathBuf},
     sync::Arc,
     time::Instant,
@@ -9,20 +10,16 @@ use std::{
 
 use super::{
     Event, Observer, Preset, RunError, RunFolder, Stage,
-    chroma_plan::{self, Degree},
     color_quality::Measured,
     files,
     fit::{capture_report, comments, open_gpu},
-    scene::{Scene, read_splats},
+    scene::{open, read_splats, tell_not_finite},
     teach::{TeachOptions, Teachers},
     yardstick,
 };
 use crate::{
-    capture::{Camera, LoadOptions},
-    chroma::{
-        ChosenDegree, ChromaProgress, ChromaSettings, FrozenViews, Room, Task, bake, choose_degree,
-        solve, teacher::Upsample,
-    },
+    capture::LoadOptions,
+    chroma::{ChosenDegree, ChromaSettings, ColorizeEvent, Degree, Distill, teacher::Upsample},
     effects::{Overrules, table},
     gpu::Gpu,
     raster::Raster,
@@ -30,7 +27,7 @@ use crate::{
         CaptureReport, ChromaReport, ChromaSeconds, DeviceReport, EffectReport, LumaReport,
         REPORT_VERSION, Report, contact_sheet, kernel_reports,
     },
-    splats::{ply, sh},
+    splats::ply,
 };
 
 /// What `colorize` is asked to do.
@@ -81,21 +78,14 @@ pub fn colorize(
     let gpu = open_gpu(options.timings)?;
     let mut report = source.report(&gpu);
     let colmap_dir = source.colmap_dir(options, &report.capture)?;
-    let scene = Scene::load(&colmap_dir, &report.capture.load, observe)?;
+    let dataset = open(&colmap_dir, &report.capture.load, observe)?;
     // A run's own files are moved already; others lie where COLMAP has the cameras.
     let offset = match source.folder {
         Some(_) => glam::DVec3::ZERO,
-        None => scene.capture.offset,
+        None => dataset.capture.offset,
     };
     let (luma, drawn) = read_splats(&source.splats, offset, observe)?;
     let luma = luma.to_luma();
-    if source.report.is_none() {
-        report.capture = capture_report(&colmap_dir, &scene);
-        report.luma.splats = luma.len();
-        report.luma.settings.sh_degree = luma.sh.degree;
-        report.luma.settings.antialiased = drawn.antialiased;
-    }
-    let drawn = report.luma.settings.raster_options();
     let iterations = adam_iterations(options, report.preset, report.luma.iterations)?;
     let output = Output {
         ply: options
@@ -107,99 +97,72 @@ pub fn colorize(
     files::make_folder_of(&output.ply)?;
 
     let begun = Instant::now();
-    let mut settings = ChromaSettings {
+    let settings = ChromaSettings {
         iterations,
         seed: report.luma.settings.seed,
         ..options.settings.clone()
     };
-    let scales = settings.target_scales();
-    let lesson = teachers.ask(&scene, scales, observe)?;
+    let (lesson, hinted) = teachers.ask(&dataset, settings.target_scales(), observe)?;
     let seconds_teacher = begun.elapsed().as_secs_f64();
-
-    let begun = Instant::now();
+    tell_not_finite(&dataset, observe);
+    if source.report.is_none() {
+        report.capture = capture_report(&colmap_dir, &dataset);
+        report.luma.splats = luma.len();
+        report.luma.settings.sh_degree = luma.sh.degree;
+        report.luma.settings.antialiased = drawn.antialiased;
+    }
+    let drawn = report.luma.settings.raster_options();
     let raster = Arc::new(Raster::with(&gpu, drawn));
-    let cameras: Vec<Camera> = (scene.split.train.iter())
-        .map(|&i| scene.photos[i].1.clone())
-        .collect();
-    let tasks: Vec<Task> = (scene.split.train.iter().enumerate())
-        .filter_map(|(view, &i)| {
-            let target = lesson.of_view[i]?;
-            Some(Task { view, target })
-        })
-        .collect();
-    let colored_views = tasks.len();
-    let room = Room {
-        limit: settings.memory_limit,
-        sh_degree: match options.sh_degree {
-            Degree::Fixed(degree) => degree,
-            Degree::Auto => sh::MAX_DEGREE,
-        },
-        weighted: lesson.targets.weighted(),
+    let distill = Distill {
+        raster: &raster,
+        dataset: &dataset,
+        luma: &luma,
+        lesson: &lesson,
+        sh_degree: options.sh_degree,
+        correct_views: options.correct_views,
     };
-    // The bake passes through half the size.
-    let scales = scales.max(2);
-    let frozen = FrozenViews::new(&raster, &luma, scene.extent, &cameras, scales, room)?;
-    let correction = chroma_plan::correction(lesson.spread, settings.solver, options.correct_views);
-    settings.correct_views = correction.on;
-    let mut chosen = None;
-    settings.sh_degree = match options.sh_degree {
-        Degree::Fixed(degree) => degree,
-        Degree::Auto => {
-            let found = choose_degree(&frozen, &settings, &lesson.targets, &tasks, &luma)?;
-            observe(Event::Note(describe(&found)));
-            chosen.insert(found).degree
+    let (mut log, total) = (String::new(), settings.steps_to_report());
+    let colored = distill.run(&settings, &mut |event| {
+        match event {
+            // It has been asked already.
+            ColorizeEvent::Asked { .. } => {}
+            ColorizeEvent::Chosen(chosen) => observe(Event::Note(describe(chosen))),
+            ColorizeEvent::Plan(effects) => observe(Event::Note(table(effects))),
+            ColorizeEvent::Solving(progress) => {
+                // Writing to a string cannot fail.
+                let _ = writeln!(
+                    log,
+                    "{},{:.6},{},{:.3},",
+                    report.luma.iterations + progress.iteration,
+                    progress.loss,
+                    luma.len(),
+                    progress.seconds
+                );
+                observe(Event::Progress {
+                    stage: Stage::Chroma,
+                    done: progress.iteration,
+                    total,
+                    message: format!("loss {:.3}", progress.loss),
+                });
+            }
         }
-    };
-    let effects = [
-        correction,
-        chroma_plan::degree(options.sh_degree, chosen.as_ref()),
-    ];
-    observe(Event::Note(table(&effects)));
-    let (mut log, mut last, mut peak_device_memory) = (String::new(), None, None);
-    let total = settings.steps_to_report();
-    let told = &mut |progress: ChromaProgress| {
-        // Writing to a string cannot fail.
-        let _ = writeln!(
-            log,
-            "{},{:.6},{},{:.3},",
-            report.luma.iterations + progress.iteration,
-            progress.loss,
-            luma.len(),
-            progress.seconds
-        );
-        observe(Event::Progress {
-            stage: Stage::Chroma,
-            done: progress.iteration,
-            total,
-            message: format!("loss {:.3}", progress.loss),
-        });
-        last = Some(progress);
-        peak_device_memory = peak_device_memory.max(gpu.allocated_bytes());
-    };
-    let found = solve(&frozen, &settings, &lesson.targets, tasks, &luma, told)?;
-    let chroma = found.chroma;
+        ControlFlow::Continue(())
+    })?;
     let timings = (options.timings)
-        .then(|| Ok::<_, RunError>(kernel_reports(&gpu.timings()?, &found.load)))
+        .then(|| Ok::<_, RunError>(kernel_reports(&gpu.timings()?, &colored.load)))
         .transpose()?;
-    let seconds_distill = begun.elapsed().as_secs_f64();
 
     let begun = Instant::now();
-    let baked = bake(&frozen, &luma, &chroma)?;
-    let seconds_bake = begun.elapsed().as_secs_f64();
-    peak_device_memory = peak_device_memory.max(gpu.allocated_bytes());
-    let (estimated_device_memory, pinned_views) = (frozen.demand(), frozen.pinned());
-    drop(frozen);
-
-    let begun = Instant::now();
-    let exposures = yardstick::exposures(&scene, &report.luma.exposures);
+    let exposures = yardstick::exposures(&dataset, &report.luma.exposures);
     let measured = Measured::of(
         &raster,
-        &scene,
+        &dataset,
         &exposures,
-        [&luma, &baked],
-        &chroma,
+        [&luma, &colored.splats],
+        &colored.chroma,
         &lesson,
     )?;
+    let [distilling, baking] = colored.seconds;
     report.chroma = Some(ChromaReport {
         teacher: match &teachers.describe()[..] {
             [only] => Some(only.clone()),
@@ -212,34 +175,34 @@ pub fn colorize(
             Upsample::Bilinear => "bilinear",
         }
         .to_owned(),
-        hints: lesson.hinted,
-        colored_views,
+        hints: hinted,
+        colored_views: colored.colored_views,
         iterations: total,
-        settings,
         until: report.luma.iterations + total,
-        passes: last.map_or(0.0, |progress| progress.passes),
-        effects: EffectReport::of(&effects),
-        loss: last.map_or(0.0, |progress| progress.loss),
+        passes: colored.last.map_or(0.0, |progress| progress.passes),
+        effects: EffectReport::of(&colored.effects),
+        loss: colored.last.map_or(0.0, |progress| progress.loss),
         seconds: ChromaSeconds {
             teacher: seconds_teacher,
-            distill: seconds_distill,
-            bake: seconds_bake,
+            distill: distilling,
+            bake: baking,
             measure: begun.elapsed().as_secs_f64(),
         },
         peak_host_memory: files::peak_host_memory(),
-        peak_device_memory,
-        estimated_device_memory,
-        pinned_views,
+        peak_device_memory: colored.peak_device_memory,
+        estimated_device_memory: colored.estimated_device_memory,
+        pinned_views: colored.pinned_views,
+        settings: colored.settings,
         bake: measured.bake,
-        measured_on: scene.measured().0.to_owned(),
+        measured_on: dataset.measured().0.to_owned(),
         pictures: measured.mean(),
         views: measured.views,
         timings,
     });
-    ply::write_ply(&output.ply, &baked, offset, &comments(drawn))?;
+    ply::write_ply(&output.ply, &colored.splats, offset, &comments(drawn))?;
     if let Some(folder) = &source.folder {
         if output.ply == folder.color() {
-            folder.write_chroma(&chroma)?;
+            folder.write_chroma(&colored.chroma)?;
         }
         append_log(folder, report.luma.iterations, &log)?;
         files::write_png(&folder.contact_sheet(), &contact_sheet(&measured.rows))?;

@@ -1,6 +1,5 @@
 //! Whole runs: what a command does from its options to its files.
 
-mod chroma_plan;
 mod color_quality;
 mod colorize;
 mod eval;
@@ -17,7 +16,6 @@ mod yardstick;
 
 use std::{fmt, path::PathBuf};
 
-pub use chroma_plan::Degree;
 pub use colorize::{ColorizeOptions, Output, colorize};
 pub use eval::{EvalOptions, eval};
 pub use fit::{AheadOptions, FitOptions, Overlay, fit};
@@ -49,7 +47,7 @@ pub enum RunError {
     Gpu(#[from] GpuError),
     /// Stage 2.
     #[error(transparent)]
-    Chroma(#[from] ChromaError),
+    Chroma(ChromaError),
     /// A splat file.
     #[error(transparent)]
     Ply(#[from] PlyError),
@@ -121,6 +119,20 @@ pub enum RunError {
         /// What was reached, in dB.
         reached: f64,
     },
+}
+
+impl From<ChromaError> for RunError {
+    fn from(error: ChromaError) -> Self {
+        match error {
+            ChromaError::Gpu(error) => error.into(),
+            ChromaError::Capture(error) => error.into(),
+            ChromaError::Colorizer(error) => match error.downcast::<TeacherError>() {
+                Ok(error) => Self::Teacher(*error),
+                Err(error) => Self::Chroma(ChromaError::Colorizer(error)),
+            },
+            other => Self::Chroma(other),
+        }
+    }
 }
 
 impl From<LumaError> for RunError {

@@ -113,7 +113,7 @@ pub(super) fn tell_trial(progress: &TrialProgress, observe: &mut Observer<'_>) {
     });
 }
 
-fn tell_not_finite(dataset: &Dataset, observe: &mut Observer<'_>) {
+pub(super) fn tell_not_finite(dataset: &Dataset, observe: &mut Observer<'_>) {
     let count = dataset.not_finite();
     if count > 0 {
         observe(Event::Note(format!(
@@ -176,17 +176,6 @@ pub(super) fn read_splats(
 /// Whether a pixel counts at least half.
 pub(super) fn counts(photo: &Photo, pixel: usize) -> bool {
     photo.counts(pixel)
-}
-
-/// Weights of the pixels that the photo's mask lets count.
-pub(super) fn masked_weights(weights: Option<Vec<f32>>, photo: &Photo) -> Option<Vec<f32>> {
-    let Some(mask) = &photo.mask else {
-        return weights;
-    };
-    let weights = weights.unwrap_or_else(|| vec![1.0; mask.len()]);
-    let counted =
-        (weights.iter().zip(mask)).map(|(weight, &count)| weight * f32::from(count) / 255.0);
-    Some(counted.collect())
 }
 
 /// Gray pixels as floats in [0, 1].

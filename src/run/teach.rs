@@ -1,20 +1,20 @@
 //! Asking the teachers: what each view's colours are to be, and how much each
 //! pixel of that counts.
 
-use std::path::{Path, PathBuf};
-
-use super::{
-    Event, Observer, RunError, Stage,
-    scene::{Scene, masked_weights},
+use std::{
+    ops::ControlFlow,
+    path::{Path, PathBuf},
 };
+
+use super::{Event, Observer, RunError, Stage};
 use crate::{
+    capture::Dataset,
     chroma::{
-        Targets,
+        Colorizer, ColorizerError, Lesson, Wanted, teach,
         teacher::{
             AbImage, Asked, GrayImage, HintFolder, HintImage, Teacher, TeacherInfo, TeacherSettings,
         },
     },
-    effects::{TeacherSamples, TeacherSpread},
     report::TeacherReport,
 };
 
@@ -47,17 +47,6 @@ impl Default for TeachOptions {
     }
 }
 
-/// What is known of a view's colors.
-#[derive(Clone, Debug, PartialEq)]
-struct Taught {
-    /// CIELAB a, b at the photo's size; 0 where nothing is known.
-    answer: AbImage,
-    /// How much each pixel counts, `[height, width]`: 1 where a teacher colored
-    /// it, 0 where nothing is known, up to [`HINT_WEIGHT`] where it is painted.
-    /// `None` stands for 1 everywhere.
-    weights: Option<Vec<f32>>,
-}
-
 /// The teachers and hints of a command, opened.
 pub(super) struct Teachers {
     teachers: Vec<Member>,
@@ -73,16 +62,62 @@ struct Member {
     weight: f32,
 }
 
-/// What all views were taught.
-pub(super) struct Lesson {
-    /// What is known of the views, and how much of it counts.
-    pub targets: Targets,
-    /// Each view's place among these; `None` where nothing is known.
-    pub of_view: Vec<Option<usize>>,
+/// Teachers while they are asked about the views of a dataset, in order.
+struct Asking<'a, 'o> {
+    teachers: &'a mut Teachers,
+    dataset: &'a Dataset,
+    observe: &'a mut Observer<'o>,
+    /// The view that comes next.
+    view: usize,
+    /// Which teachers have an answer for a training view.
+    covers: Vec<bool>,
+    /// Whether there is a hint for one.
+    hints_cover: bool,
     /// Training views that have hints.
-    pub hinted: usize,
-    /// How far the training views disagree about COLMAP's points.
-    pub spread: Option<TeacherSpread>,
+    hinted: usize,
+}
+
+impl Colorizer for Asking<'_, '_> {
+    fn colorize(
+        &mut self,
+        asked: Asked<'_>,
+        gray: GrayImage<'_>,
+    ) -> Result<Option<Wanted>, ColorizerError> {
+        let (view, capture) = (self.view, &self.dataset.capture);
+        self.view += 1;
+        (self.observe)(Event::Progress {
+            stage: Stage::Teacher,
+            done: view,
+            total: capture.views.len(),
+            message: asked.name.to_owned(),
+        });
+        let trained = self.dataset.split.train.contains(&view);
+        let folder = self.teachers.hints.as_ref();
+        let folder = folder.map(|(_, folder)| folder.load(asked, gray));
+        let mut hints = folder.transpose()?.flatten();
+        self.hints_cover |= trained && hints.is_some();
+        if hints.as_ref().is_some_and(HintImage::is_empty) {
+            (self.observe)(Event::Note(format!(
+                "left out the hints for {}: nothing is painted there",
+                asked.name
+            )));
+            hints = None;
+        }
+        let mut answers = Vec::new();
+        for (member, covers) in self.teachers.teachers.iter_mut().zip(&mut self.covers) {
+            if let Some(answer) = member.teacher.colorize(asked, gray, hints.as_ref())? {
+                answers.push((answer, member.weight));
+                *covers |= trained;
+            }
+        }
+        let strength = self.teachers.strength;
+        let answer = mean(answers).map(|answer| scaled(answer, strength));
+        self.hinted += usize::from(trained && hints.is_some());
+        Ok(match hints {
+            Some(hints) => Some(with_hints(answer, &hints.resized(gray.width, gray.height))),
+            None => answer.map(|ab| Wanted { ab, weights: None }),
+        })
+    }
 }
 
 impl Teachers {
@@ -142,8 +177,8 @@ impl Teachers {
         self.teachers.iter().map(describe).collect()
     }
 
-    /// Asks about every view, and keeps what is wanted at so many scales. Held-out views
-    /// are asked about too: for the contact sheet, never for training.
+    /// Asks about every view, and keeps what is wanted at so many scales; also gives how many
+    /// training views have hints.
     ///
     /// # Errors
     /// [`RunError::Teacher`], [`RunError::TeacherCoversNothing`] where a teacher
@@ -151,102 +186,48 @@ impl Teachers {
     /// [`RunError::NothingPainted`] where there are but hints, all of them empty.
     pub fn ask(
         &mut self,
-        scene: &Scene,
+        dataset: &Dataset,
         scales: usize,
         observe: &mut Observer<'_>,
-    ) -> Result<Lesson, RunError> {
+    ) -> Result<(Lesson, usize), RunError> {
         if self.asks_no_network() {
             observe(Event::Note(
                 "--teacher-profile and --teacher-size change nothing: no teacher is a network"
                     .into(),
             ));
         }
-        let total = scene.photos.len();
-        let mut samples = TeacherSamples::new(&scene.capture);
-        let mut lesson = Lesson {
-            targets: Targets::new(scales),
-            of_view: Vec::with_capacity(total),
+        let mut asking = Asking {
+            covers: vec![false; self.teachers.len()],
+            hints_cover: false,
             hinted: 0,
-            spread: None,
+            view: 0,
+            dataset,
+            observe,
+            teachers: self,
         };
-        // Which teachers have an answer for a training view, and whether there
-        // is a hint for one.
-        let (mut covers, mut hints_cover) = (vec![false; self.teachers.len()], false);
-        for (i, (photo, camera)) in scene.photos.iter().enumerate() {
-            let view = &scene.capture.views[i];
-            let (name, asked) = (&view.name, Asked::view(view, camera));
-            observe(Event::Progress {
-                stage: Stage::Teacher,
-                done: i,
-                total,
-                message: name.clone(),
-            });
-            let gray = GrayImage {
-                width: photo.width,
-                height: photo.height,
-                pixels: &photo.gray,
-            };
-            let trained = scene.split.train.contains(&i);
-            let folder = self
-                .hints
-                .as_ref()
-                .map(|(_, folder)| folder.load(asked, gray));
-            let mut hints = folder.transpose()?.flatten();
-            hints_cover |= trained && hints.is_some();
-            if hints.as_ref().is_some_and(HintImage::is_empty) {
-                observe(Event::Note(format!(
-                    "left out the hints for {name}: nothing is painted there"
-                )));
-                hints = None;
-            }
-            let mut answers = Vec::new();
-            for (member, covers) in self.teachers.iter_mut().zip(&mut covers) {
-                if let Some(answer) = member.teacher.colorize(asked, gray, hints.as_ref())? {
-                    answers.push((answer, member.weight));
-                    *covers |= trained;
-                }
-            }
-            let answer = mean(answers).map(|answer| scaled(answer, self.strength));
-            lesson.hinted += usize::from(trained && hints.is_some());
-            let taught = match hints {
-                Some(hints) => Some(with_hints(answer, &hints.resized(gray.width, gray.height))),
-                None => answer.map(|answer| Taught {
-                    answer,
-                    weights: None,
-                }),
-            };
-            let Some(Taught { answer, weights }) = taught else {
-                lesson.of_view.push(None);
-                continue;
-            };
-            if trained {
-                samples.take(&scene.capture, i, camera, &answer.ab);
-            }
-            let weights = masked_weights(weights, photo);
-            let target = lesson.targets.push_ab(&answer, weights.as_deref())?;
-            lesson.of_view.push(Some(target));
-        }
-        covers.push(hints_cover);
-        self.check(&covers, scene, &lesson)?;
-        lesson.spread = samples.spread(&scene.capture);
-        Ok(lesson)
+        let told = &mut |_| ControlFlow::Continue(());
+        let lesson = teach(dataset, &mut asking, scales, told)?;
+        let (mut covers, hinted) = (asking.covers, asking.hinted);
+        covers.push(asking.hints_cover);
+        self.check(&covers, dataset, &lesson)?;
+        Ok((lesson, hinted))
     }
 
     /// Whether every source has something for a training view; `covers` says so
     /// of each teacher and then of the hints.
-    fn check(&self, covers: &[bool], scene: &Scene, lesson: &Lesson) -> Result<(), RunError> {
+    fn check(&self, covers: &[bool], dataset: &Dataset, lesson: &Lesson) -> Result<(), RunError> {
         let teachers = self.teachers.iter().map(|member| &member.path);
         let hints = self.hints.as_ref().map(|(path, _)| path);
         let mut sources = teachers.chain(hints).zip(covers);
         if let Some((path, _)) = sources.find(|(_, covers)| !**covers) {
             return Err(RunError::TeacherCoversNothing {
                 teacher: path.clone(),
-                example: scene.capture.views[scene.split.train[0]].name.clone(),
+                example: dataset.capture.views[dataset.split.train[0]].name.clone(),
             });
         }
         match hints {
             Some(path)
-                if scene
+                if dataset
                     .split
                     .train
                     .iter()
@@ -285,7 +266,7 @@ fn scaled(mut answer: AbImage, strength: f32) -> AbImage {
 /// Lays paint of the photo's size over an answer. Each pixel is the mean of the
 /// teachers' answer, of weight 1 − α (0 without one), and the paint, of weight
 /// α · [`HINT_WEIGHT`]; it counts as much as both.
-fn with_hints(answer: Option<AbImage>, hints: &HintImage) -> Taught {
+fn with_hints(answer: Option<AbImage>, hints: &HintImage) -> Wanted {
     let known = f32::from(answer.is_some());
     let mut answer = answer.unwrap_or_else(|| AbImage {
         width: hints.width,
@@ -302,8 +283,8 @@ fn with_hints(answer: Option<AbImage>, hints: &HintImage) -> Taught {
         }
         weights.push(weight);
     }
-    Taught {
-        answer,
+    Wanted {
+        ab: answer,
         weights: Some(weights),
     }
 }
@@ -357,9 +338,9 @@ mod tests {
     fn paint_outweighs_the_teacher_where_it_is_opaque() {
         let answer = image(&[[8.0, 8.0]; 3]);
         let taught = with_hints(Some(answer), &paint(&[0.0, 1.0, 0.5]));
-        assert_eq!(taught.answer.ab[..2], [[8.0, 8.0], [40.0, -10.0]]);
+        assert_eq!(taught.ab.ab[..2], [[8.0, 8.0], [40.0, -10.0]]);
         // (0.5 · 8 + 25 · 40) / 25.5
-        assert!((taught.answer.ab[2][0] - 39.372_55).abs() < 1e-4);
+        assert!((taught.ab.ab[2][0] - 39.372_55).abs() < 1e-4);
         assert_eq!(taught.weights, Some(vec![1.0, 50.0, 25.5]));
     }
 
@@ -367,8 +348,8 @@ mod tests {
     fn without_a_teacher_only_paint_counts() {
         let taught = with_hints(None, &paint(&[0.0, 1.0, 0.5]));
         assert_eq!(taught.weights, Some(vec![0.0, 50.0, 25.0]));
-        assert_eq!(taught.answer.ab[0], [0.0; 2]);
-        assert_eq!(taught.answer.ab[1], [40.0, -10.0]);
-        assert!((taught.answer.ab[2][0] - 40.0).abs() < 1e-4);
+        assert_eq!(taught.ab.ab[0], [0.0; 2]);
+        assert_eq!(taught.ab.ab[1], [40.0, -10.0]);
+        assert!((taught.ab.ab[2][0] - 40.0).abs() < 1e-4);
     }
 }

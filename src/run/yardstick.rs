@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use super::scene::{Scene, counts, gray_pixels, rgb_pixels};
 use crate::{
-    capture::{Exposure, Photo},
+    capture::{Dataset, Exposure, Photo},
     measure,
     report::{ColorError, LumaQuality, ViewExposure},
 };
@@ -19,13 +19,13 @@ pub(super) struct Yardstick<'a> {
     pub exposure: Exposure,
 }
 
-/// By view of `scene`, the exposures that a report tells; none where it tells none.
-pub(super) fn exposures(scene: &Scene, told: &[ViewExposure]) -> Vec<Exposure> {
+/// By view of `dataset`, the exposures that a report tells; none where it tells none.
+pub(super) fn exposures(dataset: &Dataset, told: &[ViewExposure]) -> Vec<Exposure> {
     let by_name: HashMap<&str, Exposure> = (told.iter())
         .map(|view| (view.name.as_str(), view.exposure))
         .collect();
     let of = |name: &str| by_name.get(name).copied().unwrap_or(Exposure::NONE);
-    (scene.capture.views.iter())
+    (dataset.capture.views.iter())
         .map(|view| of(&view.name))
         .collect()
 }

@@ -1,5 +1,7 @@
 //! The solver's end against the least loss that there is, found by elimination in f64.
 
+use std::ops::ControlFlow;
+
 use gs_chroma::{
     chroma::ChromaSettings,
     splats::{ShField, Splats},
@@ -182,7 +184,7 @@ fn the_least_loss_is_reached() {
             };
             let on_device = solver::Problem::new(&problem.luma(), &views);
             let mut solver = on_device.solver(&settings);
-            solver.run(&mut |_| {}).unwrap();
+            solver.run(&mut |_| ControlFlow::Continue(())).unwrap();
             let chroma = solver.chroma().unwrap();
             let x: Vec<[f64; 2]> = (chroma.coefficients.chunks_exact(2))
                 .map(|ab| [f64::from(ab[0]), f64::from(ab[1])])

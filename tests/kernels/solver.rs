@@ -1,5 +1,7 @@
 //! The least-squares solver of stage 2 as a whole, on scenes whose colours are known.
 
+use std::ops::ControlFlow;
+
 use glam::{DMat3, DVec3};
 use gs_chroma::{
     capture::Camera,
@@ -94,7 +96,7 @@ pub fn chroma_view(camera: Camera, ab: Vec<[f64; 2]>) -> ChromaView {
 fn solved(settings: &ChromaSettings, luma: &Splats, views: &[ChromaView]) -> ShField {
     let problem = Problem::new(luma, views);
     let mut solver = problem.solver(settings);
-    solver.run(&mut |_| {}).unwrap();
+    solver.run(&mut |_| ControlFlow::Continue(())).unwrap();
     solver.chroma().unwrap()
 }
 
@@ -233,7 +235,7 @@ fn results_do_not_depend_on_the_budget() {
             },
             ChromaSettings::adam(12),
         ] {
-            let (tasks, quiet) = (problem.tasks.clone(), &mut |_| {});
+            let (tasks, quiet) = (problem.tasks.clone(), &mut |_| ControlFlow::Continue(()));
             let solved = solve(frozen, &settings, targets, tasks, &luma, quiet).unwrap();
             found.extend(bits(&solved.chroma.coefficients));
             if settings.sh_degree == 0 {
@@ -290,13 +292,16 @@ fn what_no_view_sees_takes_its_neighbours_colour() {
     let views = constant_views(&[ab; 3]);
     let problem = Problem::new(&luma, &views);
     let mut solver = problem.solver(&settings());
-    solver.run(&mut |_| {}).unwrap();
+    solver.run(&mut |_| ControlFlow::Continue(())).unwrap();
     let (chroma, seen) = (solver.chroma().unwrap(), solver.seen().unwrap());
     for i in hidden.clone() {
         assert_eq!((chroma.of(i), seen[i]), (&[0.0; 2][..], 0.0), "{i}");
     }
     let (frozen, targets, tasks) = (&problem.frozen, &problem.targets, problem.tasks.clone());
-    let filled = solve(frozen, &settings(), targets, tasks, &luma, &mut |_| {}).unwrap();
+    let filled = solve(frozen, &settings(), targets, tasks, &luma, &mut |_| {
+        ControlFlow::Continue(())
+    })
+    .unwrap();
     let away = farthest(&colors(&filled.chroma)[hidden], &[ab; 6]);
     assert!(away < 1.0, "{away}");
 }
@@ -397,7 +402,12 @@ fn views_with_gains_and_tints_agree_on_their_mean() {
         let mut last = 0.0;
         let problem = Problem::new(&wall(), views);
         let mut solver = problem.solver(&settings);
-        solver.run(&mut |progress| last = progress.loss).unwrap();
+        solver
+            .run(&mut |progress| {
+                last = progress.loss;
+                ControlFlow::Continue(())
+            })
+            .unwrap();
         (inner(&solver.chroma().unwrap()), last)
     };
     let (one, floor) = of(false, &steady);

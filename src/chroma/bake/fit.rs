@@ -1,6 +1,8 @@
 //! RGB harmonics fitted to pictures: the RGB of the drawing is that of viewers, no
 //! Gaussian gets darker than black, and no pixel brighter than white.
 
+use std::ops::ControlFlow;
+
 use super::gaussian::{bake_rgb, darkest};
 use crate::{
     chroma::{
@@ -31,7 +33,7 @@ pub fn fit_rgb(
     // Mid-gray.
     let start = ShField::zeros(frozen.splat_count(), settings.sh_degree, 3);
     let mut solver = IrlsSolver::starting_at(frozen, settings, targets, tasks, &start)?;
-    solver.run(&mut |_| ())?;
+    solver.run(&mut |_| ControlFlow::Continue(()))?;
     solver.chroma()
 }
 
@@ -68,7 +70,7 @@ pub fn bake(frozen: &FrozenViews, luma: &Splats, chroma: &ShField) -> Result<Spl
     let start = &baked.sh;
     let mut solver = IrlsSolver::starting_at(frozen, &settings, &targets, tasks, start)?;
     solver.set_floors(&floors);
-    solver.run(&mut |_| ())?;
+    solver.run(&mut |_| ControlFlow::Continue(()))?;
     baked.sh = solver.chroma()?;
     Ok(baked)
 }

@@ -12,11 +12,11 @@ use super::{
 };
 use crate::{
     chroma::{
-        ChromaSettings, FrozenViews, Room, Targets, Task, fit_rgb, native_rgb,
+        ChromaSettings, FrozenViews, Room, Targets, Task, fit_rgb, masked_weights, native_rgb,
         teacher::{AbImage, Asked, GrayImage, Teacher, TeacherSettings},
     },
     raster::{Picture, Raster},
-    run::{Event, Observer, RunError, Stage, scene::masked_weights},
+    run::{Event, Observer, RunError, Stage},
     splats::{ShField, sh},
 };
 

@@ -1,9 +1,7 @@
 //! Which effects of teachers stage 2 reckons with.
 
-use crate::{
-    chroma::{ChosenDegree, SolverKind},
-    effects::{Decider, Decision, Effect, TeacherSpread},
-};
+use super::{ChosenDegree, LEAST_GAIN, SolverKind};
+use crate::effects::{Decider, Decision, Effect, TeacherSpread};
 
 /// Degree of the chroma harmonics.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,7 +57,7 @@ pub(super) fn degree(asked: Degree, chosen: Option<&ChosenDegree>) -> Decision {
         let best = chosen.losses.iter().copied().fold(first, f64::min);
         Some(100.0 * (1.0 - best / first))
     });
-    let threshold = 100.0 * crate::chroma::LEAST_GAIN;
+    let threshold = 100.0 * LEAST_GAIN;
     let decision = Decision::new(Effect::ChromaDegree, gain, threshold);
     match (asked, chosen) {
         (_, Some(chosen)) => Decision {

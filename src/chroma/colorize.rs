@@ -1,0 +1,200 @@
+//! Stage 2 as a whole: a gray scene and someone who colors photos in, a colored scene out.
+
+use std::{ops::ControlFlow, sync::Arc, time::Instant};
+
+use super::{
+    ChosenDegree, ChromaError, ChromaProgress, ChromaSettings, Colorizer, Degree, FrozenViews,
+    Lesson, Room, Task, bake, choose_degree, plan, solve, teach,
+};
+use crate::{
+    capture::{Camera, Dataset},
+    effects::Decision,
+    raster::{Load, Raster},
+    splats::{ShField, Splats, sh},
+};
+
+/// A colored scene.
+#[derive(Clone, Debug)]
+pub struct Colored {
+    /// The Gaussians with RGB harmonics, as splat files have them.
+    pub splats: Splats,
+    /// The a/b harmonics from which they are made.
+    pub chroma: ShField,
+    /// What was solved with: what the plan decided included.
+    pub settings: ChromaSettings,
+    /// Which effects were reckoned with, and why.
+    pub effects: [Decision; 2],
+    /// Training views with colors.
+    pub colored_views: usize,
+    /// The last report of the solver.
+    pub last: Option<ChromaProgress>,
+    /// What a dispatch of the solver worked on, the mean over the passes.
+    pub load: Load,
+    /// Bytes that it was estimated to take on the device at most.
+    pub estimated_device_memory: u64,
+    /// Bytes that it took there at most, where the backend tells.
+    pub peak_device_memory: Option<u64>,
+    /// Views whose lists and targets stayed on the device.
+    pub pinned_views: usize,
+    /// Seconds of solving and of the bake.
+    pub seconds: [f64; 2],
+}
+
+/// What is worth telling while a scene is colored.
+#[derive(Clone, Copy, Debug)]
+pub enum ColorizeEvent<'a> {
+    /// This view is asked about next.
+    Asked {
+        /// The view.
+        view: usize,
+        /// Views in all.
+        total: usize,
+    },
+    /// The degree that held-back views prove useful.
+    Chosen(&'a ChosenDegree),
+    /// Which effects are reckoned with.
+    Plan(&'a [Decision; 2]),
+    /// The solver.
+    Solving(ChromaProgress),
+}
+
+/// Who is told; a [`ControlFlow::Break`] ends it with [`ChromaError::Cancelled`].
+pub type ColorizeObserver<'a> = dyn FnMut(ColorizeEvent<'_>) -> ControlFlow<()> + 'a;
+
+/// Colors the gray scene `luma`, which was trained on `dataset` and is drawn by `raster`.
+///
+/// # Errors
+/// [`ChromaError`] of a photo, of the colorizer or of the device;
+/// [`ChromaError::NoViews`] where no training view gets a color.
+pub fn colorize(
+    raster: &Arc<Raster>,
+    dataset: &Dataset,
+    luma: &Splats,
+    colorizer: &mut dyn Colorizer,
+    settings: &ChromaSettings,
+    observe: &mut ColorizeObserver<'_>,
+) -> Result<Colored, ChromaError> {
+    let total = dataset.cameras.len();
+    let lesson = teach(dataset, colorizer, settings.target_scales(), &mut |view| {
+        observe(ColorizeEvent::Asked { view, total })
+    })?;
+    Distill {
+        raster,
+        dataset,
+        luma,
+        lesson: &lesson,
+        sh_degree: Degree::Fixed(settings.sh_degree),
+        correct_views: None,
+    }
+    .run(settings, observe)
+}
+
+/// A distillation of which more is said than [`colorize`] asks for.
+pub struct Distill<'a> {
+    /// How the scene is drawn.
+    pub raster: &'a Arc<Raster>,
+    /// What it was trained on.
+    pub dataset: &'a Dataset,
+    /// The scene, one channel.
+    pub luma: &'a Splats,
+    /// What its views' colors are to be.
+    pub lesson: &'a Lesson,
+    /// Degree of the chroma harmonics.
+    pub sh_degree: Degree,
+    /// Whether each view's teacher is brought into line with the others; by default where
+    /// they disagree.
+    pub correct_views: Option<bool>,
+}
+
+impl Distill<'_> {
+    /// Solves and bakes.
+    ///
+    /// # Errors
+    /// As [`colorize`].
+    pub fn run(
+        &self,
+        settings: &ChromaSettings,
+        observe: &mut ColorizeObserver<'_>,
+    ) -> Result<Colored, ChromaError> {
+        let begun = Instant::now();
+        let (dataset, lesson, gpu) = (self.dataset, self.lesson, &self.raster.gpu);
+        let train = &dataset.split.train;
+        let cameras: Vec<Camera> = train.iter().map(|&i| dataset.cameras[i].clone()).collect();
+        let tasks: Vec<Task> = (train.iter().enumerate())
+            .filter_map(|(view, &i)| {
+                let target = lesson.of_view[i]?;
+                Some(Task { view, target })
+            })
+            .collect();
+        let colored_views = tasks.len();
+        let mut settings = settings.clone();
+        let room = Room {
+            limit: settings.memory_limit,
+            sh_degree: match self.sh_degree {
+                Degree::Fixed(degree) => degree,
+                Degree::Auto => sh::MAX_DEGREE,
+            },
+            weighted: lesson.targets.weighted(),
+        };
+        // The bake passes through half the size.
+        let scales = settings.target_scales().max(2);
+        let frozen = FrozenViews::new(
+            self.raster,
+            self.luma,
+            dataset.extent,
+            &cameras,
+            scales,
+            room,
+        )?;
+        let correction = plan::correction(lesson.spread, settings.solver, self.correct_views);
+        settings.correct_views = correction.on;
+        let mut chosen = None;
+        settings.sh_degree = match self.sh_degree {
+            Degree::Fixed(degree) => degree,
+            Degree::Auto => {
+                let found = choose_degree(&frozen, &settings, &lesson.targets, &tasks, self.luma)?;
+                go_on(observe(ColorizeEvent::Chosen(&found)))?;
+                chosen.insert(found).degree
+            }
+        };
+        let effects = [correction, plan::degree(self.sh_degree, chosen.as_ref())];
+        go_on(observe(ColorizeEvent::Plan(&effects)))?;
+        let (mut last, mut peak) = (None, None);
+        let solved = solve(
+            &frozen,
+            &settings,
+            &lesson.targets,
+            tasks,
+            self.luma,
+            &mut |progress| {
+                last = Some(progress);
+                peak = peak.max(gpu.allocated_bytes());
+                observe(ColorizeEvent::Solving(progress))
+            },
+        )?;
+        let solving = begun.elapsed().as_secs_f64();
+        let begun = Instant::now();
+        let splats = bake(&frozen, self.luma, &solved.chroma)?;
+        Ok(Colored {
+            splats,
+            chroma: solved.chroma,
+            effects,
+            colored_views,
+            last,
+            load: solved.load,
+            estimated_device_memory: frozen.demand(),
+            peak_device_memory: peak.max(gpu.allocated_bytes()),
+            pinned_views: frozen.pinned(),
+            seconds: [solving, begun.elapsed().as_secs_f64()],
+            settings,
+        })
+    }
+}
+
+/// An error, if it is not to go on.
+fn go_on(flow: ControlFlow<()>) -> Result<(), ChromaError> {
+    match flow {
+        ControlFlow::Continue(()) => Ok(()),
+        ControlFlow::Break(()) => Err(ChromaError::Cancelled),
+    }
+}
