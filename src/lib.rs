@@ -7,6 +7,7 @@
 mod beside;
 pub mod capture;
 pub mod chroma;
+#[cfg(feature = "cli")]
 pub mod cli;
 pub mod color;
 pub mod compare;
@@ -20,4 +21,5 @@ pub mod raster;
 pub mod report;
 pub mod run;
 pub mod splats;
+#[cfg(feature = "cli")]
 pub mod tradeoff;

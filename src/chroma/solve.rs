@@ -13,7 +13,7 @@ use crate::{
 };
 
 /// How chroma is solved for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum SolverKind {
     /// Reweighted least squares over all views, sped up by L-BFGS.

@@ -4,20 +4,35 @@ use std::path::PathBuf;
 
 use clap::{Args, CommandFactory, ValueEnum, error::ErrorKind};
 
-use super::{Cli, CliError, print, progress::Progress};
-use crate::chroma::Degree;
-use crate::chroma::{ChromaSettings, SolverKind, teacher};
+use super::{
+    Cli, CliError, print,
+    progress::Progress,
+    values::{one_of, positive, share},
+};
+use crate::chroma::{
+    ChromaSettings, Degree, SolverKind,
+    teacher::{TeacherSettings, Upsample},
+};
 use crate::report::timings_table;
 use crate::run::{ColorizeOptions, TeachOptions, colorize};
 
 /// How a teacher's small picture becomes as large as the photo.
-#[derive(Clone, Copy, ValueEnum)]
-enum Upsample {
-    /// Along the photo's edges.
-    Guided,
-    /// Evenly: colours spill over edges.
-    Bilinear,
-}
+const UPSAMPLE: &[(Upsample, &str)] = &[
+    (Upsample::Guided, "Along the photo's edges"),
+    (Upsample::Bilinear, "Evenly: colours spill over edges"),
+];
+
+/// How chroma is solved for.
+const SOLVERS: &[(SolverKind, &str)] = &[
+    (
+        SolverKind::Irls,
+        "Reweighted least squares over all views, sped up by L-BFGS",
+    ),
+    (
+        SolverKind::Adam,
+        "The paper's: stochastic steps of Adam, coarse to fine",
+    ),
+];
 
 /// Colour a trained run with a colorization network or a folder of coloured photos.
 #[derive(Args)]
@@ -29,7 +44,7 @@ pub struct Colorize {
     #[arg(long, value_name = "FILE.onnx|DIR", required_unless_present = "hints")]
     teacher: Vec<PathBuf>,
     /// What each teacher counts, in their order [default: all the same].
-    #[arg(long, value_name = "N,N,…", value_delimiter = ',', value_parser = weight, requires = "teacher")]
+    #[arg(long, value_name = "N,N,…", value_delimiter = ',', value_parser = positive::<f32>, requires = "teacher")]
     weights: Vec<f32>,
     /// What the network takes and gives: a profile (ddcolor, siggraph17, siggraph17-full, eccv16,
     /// caffe-v2, bigcolor, deoldify, deoldify-browser) or a manifest [default: FILE.toml beside
@@ -40,10 +55,10 @@ pub struct Colorize {
     #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(1..=8192), requires = "teacher")]
     teacher_size: Option<u32>,
     /// How a teacher's small picture becomes as large as the photo.
-    #[arg(long, value_enum, default_value_t = Upsample::Guided)]
+    #[arg(long, value_parser = one_of(UPSAMPLE), default_value = "guided")]
     upsample: Upsample,
     /// How strong the teachers' colours become; hints stay as painted.
-    #[arg(long, value_name = "0..1", default_value_t = 1.0, value_parser = strength)]
+    #[arg(long, value_name = "0..1", default_value_t = 1.0, value_parser = share::<f32>)]
     strength: f32,
     /// A folder of hints: PNG images named like the photos, colour painted on transparency.
     #[arg(long, value_name = "DIR")]
@@ -52,7 +67,7 @@ pub struct Colorize {
     #[arg(short, long, value_name = "FILE.ply")]
     output: Option<PathBuf>,
     /// How chroma is solved for.
-    #[arg(long, value_enum, default_value_t = SolverKind::Irls)]
+    #[arg(long, value_parser = one_of(SOLVERS), default_value = "irls")]
     solver: SolverKind,
     /// Adam's last iteration, counted from the start of `fit` [default: the preset's].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
@@ -105,14 +120,10 @@ enum Switch {
 
 /// A residual; `off` is one that is never reached.
 fn robust(text: &str) -> Result<f32, String> {
-    let residual = match text {
-        "off" => Some(f32::INFINITY),
-        _ => text
-            .parse()
-            .ok()
-            .filter(|r: &f32| *r > 0.0 && r.is_finite()),
-    };
-    residual.ok_or_else(|| "must be a number above 0, or off".to_owned())
+    match text {
+        "off" => Ok(f32::INFINITY),
+        _ => positive(text).map_err(|reason| reason + ", or off"),
+    }
 }
 
 /// A degree of harmonics.
@@ -124,24 +135,6 @@ fn degree(text: &str) -> Result<Degree, String> {
             _ => Err("must be 0, 1, 2, 3 or auto".to_owned()),
         },
     }
-}
-
-/// A teacher's weight.
-fn weight(text: &str) -> Result<f32, String> {
-    let weight = text
-        .parse()
-        .ok()
-        .filter(|&w: &f32| w > 0.0 && w.is_finite());
-    weight.ok_or_else(|| "must be a number above 0".to_owned())
-}
-
-/// A share.
-fn strength(text: &str) -> Result<f32, String> {
-    let share = text
-        .parse()
-        .ok()
-        .filter(|share| (0.0..=1.0).contains(share));
-    share.ok_or_else(|| "must be a number from 0 to 1".to_owned())
 }
 
 impl Colorize {
@@ -215,13 +208,10 @@ impl Colorize {
         let options = ColorizeOptions {
             teach: TeachOptions {
                 teachers: self.teachers(),
-                settings: teacher::TeacherSettings {
+                settings: TeacherSettings {
                     profile: self.teacher_profile,
                     size: self.teacher_size,
-                    upsample: match self.upsample {
-                        Upsample::Guided => teacher::Upsample::Guided,
-                        Upsample::Bilinear => teacher::Upsample::Bilinear,
-                    },
+                    upsample: self.upsample,
                 },
                 strength: self.strength,
                 hints: self.hints,

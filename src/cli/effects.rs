@@ -5,17 +5,34 @@ use clap::{
     error::{ContextKind, ContextValue, ErrorKind},
 };
 
-use super::Cli;
+use super::{Cli, values::one_of};
 use crate::effects::{Effect, Overrules};
+
+/// Those of stage 1.
+const EFFECTS: &[(Effect, &str)] = &[
+    (Effect::Lens, "The lens bends straight lines"),
+    (Effect::Masks, "Some pixels of the photos do not count"),
+    (Effect::Exposure, "Photos differ in exposure, or flicker"),
+    (Effect::Robust, "Photos show dust, scratches or passers-by"),
+    (
+        Effect::Antialias,
+        "Views show the same places from near and from far",
+    ),
+    (
+        Effect::Background,
+        "Photos show what no point explains, such as the sky",
+    ),
+    (Effect::LumaDegree, "Luma depends on the direction of view"),
+];
 
 /// What the user wants regardless of evidence.
 #[derive(Args)]
 pub struct EffectArguments {
     /// Simulate an effect whatever the evidence; may be given several times.
-    #[arg(long, value_name = "EFFECT", value_enum)]
+    #[arg(long, value_name = "EFFECT", value_parser = one_of(EFFECTS))]
     with: Vec<Effect>,
     /// Leave an effect out whatever the evidence; may be given several times.
-    #[arg(long, value_name = "EFFECT", value_enum)]
+    #[arg(long, value_name = "EFFECT", value_parser = one_of(EFFECTS))]
     without: Vec<Effect>,
     /// Degree of the luminance's dependence on the direction of view, at most [default: as
     /// the evidence says, within the preset].

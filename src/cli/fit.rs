@@ -7,10 +7,11 @@ use clap::Args;
 use super::{
     CliError,
     effects::EffectArguments,
-    luma::{LumaArguments, decibels, positive},
+    luma::LumaArguments,
     photos::Photos,
     print,
     progress::Progress,
+    values::{PRESETS, one_of, positive},
 };
 use crate::chroma::teacher::TeacherSettings;
 use crate::luma::Goal;
@@ -29,7 +30,7 @@ pub struct Fit {
     #[arg(short, long, value_name = "RUN")]
     output: Option<PathBuf>,
     /// How much work to put in [default: paper on a GPU, draft without one].
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = one_of(PRESETS))]
     preset: Option<Preset>,
     #[command(flatten)]
     photos: Photos,
@@ -37,11 +38,11 @@ pub struct Fit {
     luma: LumaArguments,
     /// Choose iterations, Gaussians and photo size so that all is done in so many minutes; with
     /// --preset, no more work than that.
-    #[arg(long, value_name = "MIN", value_parser = minutes, conflicts_with = "iterations")]
+    #[arg(long, value_name = "MIN", value_parser = positive::<f64>, conflicts_with = "iterations")]
     time_limit: Option<f64>,
     /// End once held-out views have this PSNR in dB, and have settled; at most with the work of
     /// --preset [default: paper].
-    #[arg(long, value_name = "DB", value_parser = decibels, conflicts_with = "iterations")]
+    #[arg(long, value_name = "DB", value_parser = positive::<f64>, conflicts_with = "iterations")]
     target_psnr: Option<f64>,
     /// Measure held-out views at this longer side instead of the one that is trained on.
     #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(16..))]
@@ -114,8 +115,4 @@ impl Fit {
         }
         Ok(())
     }
-}
-
-fn minutes(text: &str) -> Result<f64, String> {
-    positive(text).ok_or_else(|| "not a number of minutes above 0".to_owned())
 }

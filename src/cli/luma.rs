@@ -5,10 +5,20 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 
+use super::values::{one_of, positive, share};
 use crate::luma::{Densification, FLAT, LumaSettings, Numerics};
 use crate::run::{Overlay, RunError};
+
+/// Ways in which Gaussians come and go.
+const DENSIFY: &[(Densification, &str)] = &[
+    (Densification::Split, "3D Gaussian Splatting's way"),
+    (
+        Densification::Relocate,
+        "The way of 3DGS as Markov chain Monte Carlo",
+    ),
+];
 
 /// What is asked for instead of the preset's settings.
 #[derive(Args)]
@@ -21,10 +31,10 @@ pub(super) struct LumaArguments {
     max_splats: Option<u32>,
     /// How Gaussians come and go: split where the loss pulls, or put faint ones where others are
     /// [default: split].
-    #[arg(long, value_enum)]
-    densify: Option<Densify>,
+    #[arg(long, value_parser = one_of(DENSIFY))]
+    densify: Option<Densification>,
     /// Share of the iterations, from the first on, that see photos at half their size [default: 0].
-    #[arg(long, value_name = "0..1", value_parser = share)]
+    #[arg(long, value_name = "0..1", value_parser = share::<f64>)]
     coarse: Option<f64>,
     /// Take no more of the device's memory than this; fewer Gaussians if need be.
     #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u32).range(1..))]
@@ -33,7 +43,7 @@ pub(super) struct LumaArguments {
     /// (0.1 if no number follows), with what was best on the way [default: 0.3 in the preset
     /// balanced, 0.1 in paper, unless --iterations or --time-limit says how much is to be done;
     /// else never]. With --target-psnr only where that will not be reached.
-    #[arg(long, value_name = "DB", num_args = 0..=1, require_equals = true, value_parser = decibels)]
+    #[arg(long, value_name = "DB", num_args = 0..=1, require_equals = true, value_parser = positive::<f64>)]
     stop_when_flat: Option<Option<f64>>,
     /// How accurately training computes: alpha-min=0.00001..0.1, transmittance-min=0..0.5,
     /// depth-bits=32|24|16, storage=full|half, ssim-window=11|7|5, adam=exact|lazy. What is
@@ -74,10 +84,7 @@ impl LumaArguments {
             settings.max_splats = max_splats as usize;
         }
         if let Some(densify) = self.densify {
-            settings.densify_by(match densify {
-                Densify::Split => Densification::Split,
-                Densify::Relocate => Densification::Relocate,
-            });
+            settings.densify_by(densify);
         }
         if let Some(coarse) = self.coarse {
             settings.coarse = coarse;
@@ -108,33 +115,6 @@ fn read(path: &Path) -> Result<LumaSettings, RunError> {
         .map_err(|error| file(format!("no settings of luma: {error}")))?;
     settings.check().map_err(file)?;
     Ok(settings)
-}
-
-/// Ways in which Gaussians come and go.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum Densify {
-    /// 3D Gaussian Splatting's way.
-    Split,
-    /// The way of 3DGS as Markov chain Monte Carlo.
-    Relocate,
-}
-
-fn share(text: &str) -> Result<f64, String> {
-    match text.parse() {
-        Ok(share) if (0.0..=1.0).contains(&share) => Ok(share),
-        _ => Err("not a number from 0 to 1".to_owned()),
-    }
-}
-
-/// A number of dB above 0.
-pub(super) fn decibels(text: &str) -> Result<f64, String> {
-    positive(text).ok_or_else(|| "not a number of dB above 0".to_owned())
-}
-
-/// A finite number above 0.
-pub(super) fn positive(text: &str) -> Option<f64> {
-    let number: f64 = text.parse().ok()?;
-    (number > 0.0 && number.is_finite()).then_some(number)
 }
 
 #[cfg(test)]

@@ -14,6 +14,7 @@ mod plan;
 mod progress;
 mod render;
 mod tradeoff;
+mod values;
 
 use std::{
     fmt::Display,

@@ -2,7 +2,38 @@
 
 use clap::Args;
 
+use super::values::one_of;
 use crate::capture::{Channel, Encoding, LoadOptions, MaskSource, MaskUse, Normalize};
+
+const CHANNELS: &[(Channel, &str)] = &[
+    (Channel::Luma, "The gray with the same `L*`"),
+    (
+        Channel::R,
+        "Red. Infra-red cameras with a filter leave their signal in one channel",
+    ),
+    (Channel::G, "Green"),
+    (Channel::B, "Blue"),
+];
+
+const ENCODINGS: &[(Encoding, &str)] = &[
+    (
+        Encoding::Auto,
+        "Linear light in files of floats, sRGB in all others",
+    ),
+    (Encoding::Srgb, "Encoded for display"),
+    (
+        Encoding::Linear,
+        "In proportion to the light, as a sensor counts it",
+    ),
+];
+
+const MASK_USES: &[(MaskUse, &str)] = &[
+    (MaskUse::Ignore, "Anything: the photo does not say"),
+    (
+        MaskUse::Remove,
+        "Nothing: what the mask leaves stands before black",
+    ),
+];
 
 /// How photos are loaded.
 #[derive(Args)]
@@ -14,10 +45,10 @@ pub(super) struct Photos {
     #[arg(long)]
     no_holdout: bool,
     /// What of a colour photo becomes gray: an infra-red camera may have its signal in one channel.
-    #[arg(long, value_enum, default_value_t = Channel::Luma)]
+    #[arg(long, value_parser = one_of(CHANNELS), default_value = "luma")]
     channel: Channel,
     /// What the files' values are; auto: linear light in floats, sRGB in all others.
-    #[arg(long, value_enum, default_value_t = Encoding::Auto)]
+    #[arg(long, value_parser = one_of(ENCODINGS), default_value = "auto")]
     encoding: Encoding,
     /// Which of the files' values become black and white, of all photos alike; auto: of more than
     /// 8 bits, where the range is not used, the 0.5th and 99.5th percentile of all photos.
@@ -33,7 +64,7 @@ pub(super) struct Photos {
     #[arg(long, value_name = "DIR|off")]
     masks: Option<String>,
     /// What is where a mask is black: anything, or nothing.
-    #[arg(long, value_enum, default_value_t = MaskUse::Ignore)]
+    #[arg(long, value_parser = one_of(MASK_USES), default_value = "ignore")]
     masked: MaskUse,
 }
 

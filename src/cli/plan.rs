@@ -4,7 +4,14 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{CliError, effects::EffectArguments, photos::Photos, print, progress::Progress};
+use super::{
+    CliError,
+    effects::EffectArguments,
+    photos::Photos,
+    print,
+    progress::Progress,
+    values::{PRESETS, one_of},
+};
 use crate::run::{PlanOptions, Preset, plan};
 
 /// Say which effects a capture calls for, and why, without fitting it.
@@ -13,7 +20,7 @@ pub struct Plan {
     /// Folder with images/ and a COLMAP model (sparse/0, sparse or the folder itself).
     colmap_dir: PathBuf,
     /// How much work `fit` would put in [default: paper on a GPU, draft without one].
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = one_of(PRESETS))]
     preset: Option<Preset>,
     #[command(flatten)]
     photos: Photos,

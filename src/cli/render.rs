@@ -4,8 +4,14 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{CliError, print, progress::Progress};
+use super::{CliError, print, progress::Progress, values::one_of};
 use crate::run::{RenderOptions, Views, render};
+
+const VIEWS: &[(Views, &str)] = &[
+    (Views::Train, "Those trained on"),
+    (Views::Test, "Those held out"),
+    (Views::All, "All"),
+];
 
 /// Draw a scene from the photographed viewpoints, one PNG a view.
 #[derive(Args)]
@@ -16,7 +22,7 @@ pub struct Render {
     #[arg(long, value_name = "COLMAP_DIR")]
     colmap: Option<PathBuf>,
     /// Which views [default: those held out, or all where none is].
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = one_of(VIEWS))]
     views: Option<Views>,
     /// Draw luma.ply although color.ply is there.
     #[arg(long)]

@@ -5,8 +5,13 @@ use std::path::PathBuf;
 use clap::{Args, builder::PossibleValuesParser};
 
 use super::{
-    CliError, effects::EffectArguments, luma::LumaArguments, photos::Photos, print,
+    CliError,
+    effects::EffectArguments,
+    luma::LumaArguments,
+    photos::Photos,
+    print,
     progress::Progress,
+    values::{PRESETS, one_of, positive},
 };
 use crate::run::Preset;
 use crate::tradeoff::{FILES, PointStage, TradeoffOptions, front_table, knob_names, tradeoff};
@@ -25,13 +30,13 @@ pub struct Tradeoff {
     #[arg(long, value_name = "FILE.onnx|DIR")]
     teacher: Option<PathBuf>,
     /// What knobs are turned around [default: paper on a GPU, draft without one].
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = one_of(PRESETS))]
     preset: Option<Preset>,
     #[command(flatten)]
     luma: LumaArguments,
     /// Minutes that all points may take together, earlier starts included; the base runs
     /// anyway.
-    #[arg(long, value_name = "MINUTES", default_value_t = 30.0, value_parser = minutes)]
+    #[arg(long, value_name = "MINUTES", default_value_t = 30.0, value_parser = positive::<f64>)]
     budget: f64,
     /// Knobs to turn [default: all].
     #[arg(long, value_name = "A,B,…", value_delimiter = ',', value_parser = PossibleValuesParser::new(knob_names()))]
@@ -74,11 +79,4 @@ impl Tradeoff {
         }
         Ok(())
     }
-}
-
-/// A budget.
-fn minutes(text: &str) -> Result<f64, String> {
-    let minutes = text.parse().ok();
-    let minutes = minutes.filter(|minutes: &f64| *minutes > 0.0 && minutes.is_finite());
-    minutes.ok_or_else(|| "must be a number above 0".to_owned())
 }

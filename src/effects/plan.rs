@@ -2,7 +2,6 @@
 
 use std::fmt;
 
-use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 
 use super::{direction, evidence::Evidence, tracks};
@@ -46,28 +45,26 @@ const DIRECTION_LEVELS: f64 = 5.0;
 const DEGREE_LEVELS: f64 = 1.0;
 
 /// An effect of image formation.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ValueEnum, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Effect {
-    /// The lens bends straight lines
+    /// The lens bends straight lines.
     Lens,
-    /// Some pixels of the photos do not count
+    /// Some pixels of the photos do not count.
     Masks,
-    /// Photos differ in exposure, or flicker
+    /// Photos differ in exposure, or flicker.
     Exposure,
-    /// Photos show dust, scratches or passers-by
+    /// Photos show dust, scratches or passers-by.
     Robust,
-    /// Views show the same places from near and from far
+    /// Views show the same places from near and from far.
     Antialias,
-    /// Photos show what no point explains, such as the sky
+    /// Photos show what no point explains, such as the sky.
     Background,
-    /// Luma depends on the direction of view
+    /// Luma depends on the direction of view.
     LumaDegree,
-    /// The teacher's views differ in saturation and tint
-    #[value(skip)]
+    /// The teacher's views differ in saturation and tint.
     TeacherCorrection,
-    /// Chroma depends on the direction of view
-    #[value(skip)]
+    /// Chroma depends on the direction of view.
     ChromaDegree,
 }
 

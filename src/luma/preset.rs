@@ -1,12 +1,11 @@
 //! Named settings.
 
-use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 
 use super::{LumaSettings, PAPER_ITERATIONS};
 
 /// How much work to put into a scene.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Preset {
     /// Small photos, few Gaussians: the bundled garden in 30 s on two processor cores, 23.6 dB of

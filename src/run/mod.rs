@@ -22,6 +22,7 @@ pub use fit::{AheadOptions, FitOptions, Overlay, fit};
 pub use folder::RunFolder;
 pub use info::{export, info};
 pub use plan::{PlanOptions, plan};
+pub use preset::Work;
 pub use render::{RenderOptions, Views, render};
 pub use teach::{HINT_WEIGHT, TeachOptions};
 
@@ -33,8 +34,6 @@ use crate::{
     luma::LumaError,
     splats::ply::PlyError,
 };
-pub(crate) use fit::open_gpu;
-pub(crate) use preset::Work;
 
 /// What can stop a run.
 #[derive(Debug, thiserror::Error)]

@@ -9,7 +9,7 @@ use crate::{
 
 /// An amount of work.
 #[derive(Clone, Debug)]
-pub(crate) struct Work {
+pub struct Work {
     /// How luma is trained.
     pub settings: LumaSettings,
     /// Longer side of the photos.

@@ -5,7 +5,6 @@ use std::{
     sync::Arc,
 };
 
-use clap::ValueEnum;
 use glam::DVec3;
 
 use super::{
@@ -20,7 +19,8 @@ use crate::{
 };
 
 /// Which of a capture's views.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Views {
     /// Those trained on.
     Train,

@@ -20,7 +20,8 @@ pub use report::{PointStage, Tradeoff, front_table};
 use crate::{
     capture::{Capture, LoadOptions, split},
     effects::Overrules,
-    run::{Event, Observer, Overlay, Preset, RunError, RunFolder, Stage, Work, files, open_gpu},
+    gpu::Gpu,
+    run::{Event, Observer, Overlay, Preset, RunError, RunFolder, Stage, Work, files},
 };
 use knobs::Around;
 use pictures::Album;
@@ -85,7 +86,7 @@ pub fn tradeoff(
 ) -> Result<(PathBuf, Tradeoff), TradeoffError> {
     let preset = match options.preset {
         Some(preset) => preset,
-        None => Preset::for_device(&open_gpu(false)?),
+        None => Preset::for_device(&Gpu::open().map_err(RunError::from)?),
     };
     let folder = options
         .output

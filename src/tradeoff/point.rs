@@ -6,7 +6,7 @@ use std::{
     time::Instant,
 };
 
-use clap::ValueEnum;
+use serde::Serialize;
 
 use super::{
     TradeoffError, TradeoffOptions, child,
@@ -314,8 +314,8 @@ fn given(value: Option<impl ToString>, option: &'static str) -> Vec<Given> {
 }
 
 /// The name of a choice, unless it is the default.
-fn chosen<T: ValueEnum + PartialEq>(choice: T, default: T) -> Option<String> {
-    let name = choice.to_possible_value()?.get_name().to_owned();
+fn chosen<T: Serialize + PartialEq>(choice: T, default: T) -> Option<String> {
+    let name = serde_json::to_value(&choice).ok()?.as_str()?.to_owned();
     (choice != default).then_some(name)
 }
 

@@ -4,7 +4,8 @@ use super::images::{Filter, resample};
 use super::{AbImage, GrayImage};
 
 /// How an answer smaller than its photo is enlarged.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Upsample {
     /// Along the photo's edges: joint bilateral upsampling.
     #[default]

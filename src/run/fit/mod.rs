@@ -149,7 +149,7 @@ fn write(folder: &RunFolder, trained: &Trained, report: &Report) -> Result<(), R
 }
 
 /// The device; with `timed`, its dispatches are.
-pub(crate) fn open_gpu(timed: bool) -> Result<Gpu, RunError> {
+pub(super) fn open_gpu(timed: bool) -> Result<Gpu, RunError> {
     let gpu = Gpu::open()?;
     Ok(if timed { gpu.timed()? } else { gpu })
 }
