@@ -344,7 +344,7 @@ fn one_range_cannot_serve_two_kinds() {
     let error = Loader::open(&capture, &LoadOptions::default())
         .unwrap_err()
         .to_string();
-    for words in ["b.png", "16 bits", "a.png", "8 bits", "--normalize off"] {
+    for words in ["b.png", "16 bits", "a.png", "8 bits", "convert one"] {
         assert!(error.contains(words), "{error}");
     }
     let options = LoadOptions {

@@ -172,7 +172,7 @@ pub enum CaptureError {
     },
     /// One range was to serve photos whose values mean different things.
     #[error(
-        "{path}: has {depth} a channel but {other} has {other_depth}: one range cannot normalise both; convert one of them, or give --normalize off"
+        "{path}: has {depth} a channel but {other} has {other_depth}: one range cannot normalise both; convert one of them"
     )]
     MixedDepths {
         /// A photo.
@@ -185,15 +185,13 @@ pub enum CaptureError {
         other_depth: String,
     },
     /// The folder of masks is not there.
-    #[error("{dir}: no such folder of masks; name another with --masks, or leave it out")]
+    #[error("{dir}: no such folder of masks")]
     NoMaskFolder {
         /// The folder.
         dir: PathBuf,
     },
     /// No mask has the name of a photo.
-    #[error(
-        "{dir}: holds no mask for any photo, such as {example}; name masks like COLMAP does, or give --masks off"
-    )]
+    #[error("{dir}: holds no mask for any photo, such as {example}; name masks like COLMAP does")]
     NoMasks {
         /// The folder of masks.
         dir: PathBuf,

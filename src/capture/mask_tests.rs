@@ -100,14 +100,10 @@ fn another_folder_may_be_named() {
     assert_fails(
         &capture,
         options.masks,
-        &["elsewhere", "a.png.png", "--masks off"],
+        &["elsewhere", "a.png.png", "like COLMAP does"],
     );
     let none = MaskSource::Folder(dir.path().join("none"));
-    assert_fails(
-        &capture,
-        none,
-        &["none", "no such folder of masks", "--masks"],
-    );
+    assert_fails(&capture, none, &["none", "no such folder of masks"]);
     let photos = MaskSource::Folder(dir.path().join("images"));
     assert_fails(&capture, photos, &["images", "no mask for any photo"]);
 }

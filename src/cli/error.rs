@@ -1,15 +1,16 @@
 //! What can stop the program.
 
+use super::remedy;
 use crate::{run::RunError, tradeoff::TradeoffError};
 
 /// What stopped a command; one line that names the file and the remedy.
 #[derive(Debug, thiserror::Error)]
 pub enum CliError {
     /// A run.
-    #[error(transparent)]
+    #[error("{}", remedy::of_run(.0))]
     Run(#[from] RunError),
     /// A sweep.
-    #[error(transparent)]
+    #[error("{}", remedy::of_sweep(.0))]
     Tradeoff(#[from] TradeoffError),
     /// The device computes something else than the reference.
     #[error(

@@ -12,6 +12,7 @@ mod luma;
 mod photos;
 mod plan;
 mod progress;
+mod remedy;
 mod render;
 mod tradeoff;
 mod values;

@@ -34,9 +34,7 @@ pub enum GpuError {
         reason: String,
     },
     /// A buffer is larger than the adapter can bind.
-    #[error(
-        "buffer `{label}` needs {needed} bytes but the adapter binds at most {limit}: lower --max-splats or --max-side"
-    )]
+    #[error("buffer `{label}` needs {needed} bytes but the adapter binds at most {limit}")]
     TooLarge {
         /// What the buffer holds.
         label: String,
@@ -47,8 +45,7 @@ pub enum GpuError {
     },
     /// A set of Gaussians needs a buffer that the adapter cannot bind.
     #[error(
-        "{splats} Gaussians: buffer `{label}` exceeds the {limit} bytes that the adapter binds; about {fits} would fit: \
-         set --max-splats {fits}, or lower --max-side"
+        "{splats} Gaussians: buffer `{label}` exceeds the {limit} bytes that the adapter binds; about {fits} would fit"
     )]
     TooManySplats {
         /// Gaussians.
@@ -62,8 +59,7 @@ pub enum GpuError {
     },
     /// A training needs more than it was allowed.
     #[error(
-        "{splats} Gaussians and their tile lists need {} MiB of the device but --memory-limit allows {}: \
-         raise it, or lower --max-splats or --max-side", needed.div_ceil(1 << 20), limit >> 20
+        "{splats} Gaussians and their tile lists need {} MiB of the device but may take {}", needed.div_ceil(1 << 20), limit >> 20
     )]
     OverLimit {
         /// Gaussians.

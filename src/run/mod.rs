@@ -65,16 +65,16 @@ pub enum RunError {
     #[error(transparent)]
     Luma(LumaError),
     /// There is no run to go on with.
-    #[error("no run under runs/: train one with `gs-chroma fit COLMAP_DIR`, or name a run folder")]
+    #[error("no run under runs/")]
     NoRun,
     /// A splat file without cameras.
-    #[error("{}: a splat file has no cameras: name the COLMAP folder with --colmap", .0.display())]
+    #[error("{}: a splat file has no cameras", .0.display())]
     NoCameras(PathBuf),
     /// A splat file without Gaussians.
-    #[error("{}: holds no Gaussians: name another file, or train again with `gs-chroma fit`", .0.display())]
+    #[error("{}: holds no Gaussians", .0.display())]
     NoSplats(PathBuf),
     /// All views were trained on.
-    #[error("no view is held out: choose --views train or --views all")]
+    #[error("no view is held out")]
     NoHeldOut,
     /// The teacher has no picture for any training view.
     #[error("{}: no image of it has the name of a training photo (such as {example}): name its images like the photos", teacher.display())]
@@ -85,10 +85,10 @@ pub enum RunError {
         example: String,
     },
     /// There are hints for training views, but no paint.
-    #[error("{}: nothing is painted on any training photo: paint on one, or give a --teacher as well", .0.display())]
+    #[error("{}: nothing is painted on any training photo: paint on one", .0.display())]
     NothingPainted(PathBuf),
     /// Nothing is left for stage 2.
-    #[error("--until {until}: stage 1 already took {luma} iterations: choose a larger number")]
+    #[error("stage 1 already took {luma} iterations: choose a larger number")]
     NothingUntil {
         /// What was asked.
         until: usize,
@@ -97,8 +97,8 @@ pub enum RunError {
     },
     /// A time limit within which nothing can be trained.
     #[error(
-        "--time-limit {:.2}: reading, measuring and {} iterations take longer: give at least {:.2} minutes, or lower --max-side",
-        limit / 60.0, iterations, needed / 60.0
+        "reading, measuring and {} iterations take longer: give at least {:.2} minutes",
+        iterations, needed / 60.0
     )]
     TimeTooShort {
         /// Seconds allowed.
@@ -109,9 +109,7 @@ pub enum RunError {
         needed: f64,
     },
     /// A PSNR that was not reached; the best that was is written.
-    #[error(
-        "--target-psnr {target}: {reached:.2} dB is what could be reached, and is written: give more time, a higher --preset or a larger --max-splats if there is one"
-    )]
+    #[error("{reached:.2} dB is what could be reached, and is written")]
     TargetMissed {
         /// What was asked for, in dB.
         target: f64,

@@ -62,7 +62,7 @@ pub enum TeacherError {
     /// More than one kind of network has such inputs and outputs.
     #[error(
         "{}: several kinds of networks have its inputs and outputs, and only you can know which \
-         it is: give --teacher-profile {profiles}", path.display()
+         it is: {profiles}", path.display()
     )]
     SeveralProfiles {
         /// The `.onnx` file.
@@ -71,9 +71,7 @@ pub enum TeacherError {
         profiles: String,
     },
     /// No built-in profile has this name.
-    #[error(
-        "--teacher-profile {name}: no such profile; there are {known}, or name a .toml manifest"
-    )]
+    #[error("{name}: no such profile; there are {known}, or name a .toml manifest")]
     UnknownProfile {
         /// What was asked for.
         name: String,
@@ -89,7 +87,7 @@ pub enum TeacherError {
         reason: String,
     },
     /// The model does not take the size that was asked for.
-    #[error("{}: --teacher-size {size}: {reason}", path.display())]
+    #[error("{}: size {size}: {reason}", path.display())]
     BadSize {
         /// The `.onnx` file.
         path: PathBuf,

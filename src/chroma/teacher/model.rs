@@ -365,7 +365,7 @@ mod tests {
             ),
         ] {
             let message = chosen(&[inputs], output).unwrap_err();
-            for part in ["m.onnx", "--teacher-profile", expected] {
+            for part in ["m.onnx", "only you can know", expected] {
                 assert!(message.contains(part), "{message}");
             }
         }

@@ -45,7 +45,7 @@ pub(super) const CASES: &[Case] = &[
     usage(
         "no time",
         "fit scene --time-limit 0",
-        &["--time-limit", "minutes above 0"],
+        &["--time-limit", "a number above 0"],
     ),
     usage(
         "a time limit and iterations",
@@ -55,7 +55,7 @@ pub(super) const CASES: &[Case] = &[
     usage(
         "a target that is no number",
         "fit scene --target-psnr high",
-        &["high", "--target-psnr", "dB above 0"],
+        &["high", "--target-psnr", "above 0"],
     ),
     usage(
         "numerics of no kind",

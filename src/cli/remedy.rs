@@ -1,0 +1,81 @@
+//! What the program can do about an error: the library knows none of its options.
+
+use crate::{
+    capture::CaptureError, chroma::teacher::TeacherError, gpu::GpuError, run::RunError,
+    tradeoff::TradeoffError,
+};
+
+/// What the user reads of an error of a run.
+pub(super) fn of_run(error: &RunError) -> String {
+    match error {
+        RunError::Capture(error) => of_capture(error),
+        RunError::Gpu(error) => of_gpu(error),
+        RunError::Teacher(error) => of_teacher(error),
+        RunError::NoRun => {
+            format!("{error}: train one with `gs-chroma fit COLMAP_DIR`, or name a run folder")
+        }
+        RunError::NoCameras(_) => format!("{error}: name the COLMAP folder with --colmap"),
+        RunError::NoSplats(_) => {
+            format!("{error}: name another file, or train again with `gs-chroma fit`")
+        }
+        RunError::NoHeldOut => format!("{error}: choose --views train or --views all"),
+        RunError::NothingPainted(_) => format!("{error}, or give a --teacher as well"),
+        RunError::NothingUntil { until, .. } => format!("--until {until}: {error}"),
+        RunError::TimeTooShort { limit, .. } => {
+            format!(
+                "--time-limit {:.2}: {error}, or lower --max-side",
+                limit / 60.0
+            )
+        }
+        RunError::TargetMissed { target, .. } => format!(
+            "--target-psnr {target}: {error}: give more time, a higher --preset or a larger --max-splats if there is one"
+        ),
+        _ => error.to_string(),
+    }
+}
+
+/// What the user reads of an error of a sweep.
+pub(super) fn of_sweep(error: &TradeoffError) -> String {
+    match error {
+        TradeoffError::Run(error) => of_run(error),
+        _ => error.to_string(),
+    }
+}
+
+fn of_gpu(error: &GpuError) -> String {
+    match error {
+        GpuError::TooLarge { .. } => format!("{error}: lower --max-splats or --max-side"),
+        GpuError::TooManySplats { fits, .. } => {
+            format!("{error}: set --max-splats {fits}, or lower --max-side")
+        }
+        GpuError::OverLimit { .. } => {
+            format!("{error}: raise --memory-limit, or lower --max-splats or --max-side")
+        }
+        _ => error.to_string(),
+    }
+}
+
+fn of_capture(error: &CaptureError) -> String {
+    match error {
+        CaptureError::MixedDepths { .. } => format!("{error}, or give --normalize off"),
+        CaptureError::NoMaskFolder { .. } => {
+            format!("{error}; name another with --masks, or leave it out")
+        }
+        CaptureError::NoMasks { .. } => format!("{error}, or give --masks off"),
+        _ => error.to_string(),
+    }
+}
+
+fn of_teacher(error: &TeacherError) -> String {
+    match error {
+        TeacherError::SeveralProfiles { path, profiles } => format!(
+            "{}: several kinds of networks have its inputs and outputs, and only you can know which it is: give --teacher-profile {profiles}",
+            path.display()
+        ),
+        TeacherError::UnknownProfile { .. } => format!("--teacher-profile {error}"),
+        TeacherError::BadSize { path, size, reason } => {
+            format!("{}: --teacher-size {size}: {reason}", path.display())
+        }
+        _ => error.to_string(),
+    }
+}
