@@ -1,8 +1,14 @@
 //! gs-chroma: coloured 3D Gaussian scenes from grayscale photographs.
 //!
-//! Imports go down only: `cli` → `tradeoff` → `run`, `report` → `luma`, `chroma`, `measure` →
-//! `raster` → `gpu` → `splats`, `capture`, `color`. [`doctor`] compares the kernels
-//! of `raster` with the [`oracle`], which uses nothing else of the crate.
+//! Imports go down only:
+//!
+//! ```text
+//! cli → tradeoff → run → report, doctor → luma, chroma → effects, measure → raster → capture, splats
+//! → gpu, color, beside, oracle, compare
+//! ```
+//!
+//! [`doctor`] compares the kernels of [`raster`], [`luma`] and [`chroma`] with the [`oracle`],
+//! which uses nothing else of the crate. The feature `cli` adds the program.
 
 mod beside;
 pub mod capture;

@@ -4,6 +4,7 @@
 //! `WRITE_DOCS=1 cargo test --release --test stability` makes docs/hard-cases.md
 //! from what it measures.
 
+mod architecture;
 mod broken_kernels;
 mod cases;
 mod poison;
