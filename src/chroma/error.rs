@@ -36,8 +36,7 @@ pub enum ChromaError {
     },
     /// The memory limit does not hold what one view needs.
     #[error(
-        "{splats} Gaussians and one view at a time need {} MiB of the device but the memory limit is {}: \
-         raise --memory-limit, or train with fewer Gaussians or smaller photos",
+        "{splats} Gaussians and one view at a time need {} MiB of the device but the memory limit is {}",
         needed >> 20, limit >> 20
     )]
     OverLimit {

@@ -1,7 +1,10 @@
 //! What the program can do about an error: the library knows none of its options.
 
 use crate::{
-    capture::CaptureError, chroma::teacher::TeacherError, gpu::GpuError, run::RunError,
+    capture::CaptureError,
+    chroma::{ChromaError, teacher::TeacherError},
+    gpu::GpuError,
+    run::RunError,
     tradeoff::TradeoffError,
 };
 
@@ -11,6 +14,9 @@ pub(super) fn of_run(error: &RunError) -> String {
         RunError::Capture(error) => of_capture(error),
         RunError::Gpu(error) => of_gpu(error),
         RunError::Teacher(error) => of_teacher(error),
+        RunError::Chroma(ChromaError::OverLimit { .. }) => format!(
+            "{error}: raise --memory-limit, or train with fewer Gaussians or smaller photos"
+        ),
         RunError::NoRun => {
             format!("{error}: train one with `gs-chroma fit COLMAP_DIR`, or name a run folder")
         }
