@@ -1,76 +1,23 @@
 //! Photo files as numbers.
 
-use std::fmt;
 use std::fs::File;
-use std::io::{BufRead, BufReader, Cursor, Read, Seek};
+use std::io::{BufReader, Cursor, Read};
 use std::path::Path;
 
 use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 
 use super::error::CaptureError;
+use super::sample::{Bytes, Depth, Header, LARGEST_FILE, Samples};
 use super::{jpeg, tiff};
-
-/// The most a decoded file may take, in bytes: 178 million 8-bit RGB pixels, more
-/// than any camera's, and little enough to fail with words instead of by force.
-pub(super) const LARGEST_FILE: u64 = 512 << 20;
 
 /// The longest of the formats' magic numbers, in bytes.
 const MAGIC: u64 = 16;
-
-/// How exactly a file tells the brightness of a pixel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Depth {
-    /// Whole numbers from 0 to 255.
-    Eight,
-    /// Whole numbers from 0 to 65,535.
-    Sixteen,
-    /// Floats.
-    Float,
-}
-
-impl Depth {
-    /// The value of white where nobody says another.
-    pub fn white(self) -> f64 {
-        match self {
-            Self::Eight => f64::from(u8::MAX),
-            Self::Sixteen => f64::from(u16::MAX),
-            Self::Float => 1.0,
-        }
-    }
-}
-
-impl fmt::Display for Depth {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Eight => "8 bits",
-            Self::Sixteen => "16 bits",
-            Self::Float => "floats",
-        })
-    }
-}
-
-/// What a file announces.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Header {
-    /// Width and height in pixels.
-    pub size: [u32; 2],
-    pub depth: Depth,
-    /// 1 gray, 2 gray and alpha, 3 RGB, 4 RGB and alpha.
-    pub channels: usize,
-}
 
 /// A decoded file.
 pub(super) struct Picture {
     pub header: Header,
     /// `[height, width, channels]`.
     pub samples: Samples,
-}
-
-/// Values as they stand in the file.
-pub(super) enum Samples {
-    Eight(Vec<u8>),
-    Sixteen(Vec<u16>),
-    Float(Vec<f32>),
 }
 
 /// Reads what a file announces, and of TIFF and PNG files nothing else.
@@ -117,10 +64,6 @@ pub(super) fn decode(
         samples: samples.map_err(failure(path))?,
     })
 }
-
-/// Where a file's bytes come from.
-pub(super) trait Bytes: BufRead + Seek {}
-impl<T: BufRead + Seek> Bytes for T {}
 
 /// A file whose header has been read.
 enum Source {

@@ -4,11 +4,12 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use super::decode::{self, Depth};
+use super::decode;
 use super::error::CaptureError;
 use super::mask::{self, MaskFolder};
 use super::options::{LoadOptions, MaskSource, Normalize};
 use super::photo::{Photo, check_size, working_size};
+use super::sample::Depth;
 use super::tone;
 use super::{Camera, Capture, View};
 

@@ -2,11 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use super::decode::{self, Depth, Picture, Samples};
+use super::decode::{self, Picture};
 use super::error::CaptureError;
 use super::options::MaskSource;
 use super::photo::same_shape;
 use super::resample::downscale;
+use super::sample::{Depth, Samples};
 use super::{Capture, View};
 
 /// Where masks lie unless told otherwise.

@@ -16,6 +16,7 @@ mod options;
 mod order;
 mod photo;
 mod resample;
+mod sample;
 mod split;
 mod tiff;
 mod tone;

@@ -4,7 +4,7 @@ use tiff::ColorType;
 use tiff::decoder::{DecodingResult, DecodingSampleType, Limits};
 use tiff::tags::Tag;
 
-use super::decode::{Bytes, Depth, Header, LARGEST_FILE, Samples};
+use super::sample::{Bytes, Depth, Header, LARGEST_FILE, Samples};
 
 /// A TIFF file whose header has been read.
 pub(super) type Decoder = Box<tiff::decoder::Decoder<Box<dyn Bytes>>>;

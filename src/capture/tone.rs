@@ -1,8 +1,9 @@
 //! From a file's values to 8-bit pixels.
 
-use super::decode::{Depth, Header, Picture, Samples};
+use super::decode::Picture;
 use super::options::{Channel, Encoding, LoadOptions, Normalize};
 use super::photo::{Pixels, Values};
+use super::sample::{Depth, Header, Samples};
 use crate::color::linear_to_srgb;
 
 /// A photo's pixels, encoded sRGB of 8 bits. Those with a value that is not finite

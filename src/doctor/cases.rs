@@ -8,7 +8,8 @@ use crate::oracle::{
     random::{
         Random, oblique_view, opaque_stack, random_scene, random_scene_before, random_view, round,
     },
-    scene::{Gaussian, Scene, View},
+    scene::{Gaussian, Scene},
+    view::View,
 };
 
 /// The troublesome Gaussian of most cases.

@@ -201,7 +201,7 @@ pub fn examine_with(
     let actual = widen(&stage.forward()?);
     let poisoned = stage.status()?.poisoned;
     let pixels = render_pixels(&wanted, &hard.view, Shading::Offset);
-    let expected: Vec<f64> = pixels.iter().flat_map(|pixel| pixel.colour).collect();
+    let expected: Vec<f64> = pixels.iter().flat_map(|pixel| pixel.color).collect();
     let may_flip: Vec<bool> = pixels.iter().map(|pixel| pixel.margin < MARGIN).collect();
     let brightest = expected
         .iter()

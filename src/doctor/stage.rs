@@ -7,10 +7,7 @@ use glam::{DMat3, DVec3};
 use crate::{
     capture::Camera,
     gpu::{Buffer, GpuError, Recorder},
-    oracle::{
-        numerics::Numerics,
-        scene::{Scene, View},
-    },
+    oracle::{numerics::Numerics, scene::Scene, view::View},
     raster::{
         AdjointScratch, COLOR_FIGURES, ChromaAdjoint, ChromaSums, ColorKind, Field, Geometry,
         Layer, Lists, LumaAdjoint, Outcome, Projected, Raster, RasterNumerics, RasterOptions,

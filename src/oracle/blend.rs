@@ -7,21 +7,21 @@ use super::{Number, relative_distance};
 /// What blending needs to know of a Gaussian.
 #[derive(Clone, Copy, Debug)]
 pub struct ScreenSplat<T, const C: usize> {
-    /// Centre in pixels.
+    /// Center in pixels.
     pub mean2d: [T; 2],
     /// Inverse covariance `xx, xy, yy`.
     pub conic: [T; 3],
-    /// Opacity at the centre.
+    /// Opacity at the center.
     pub opacity: T,
-    /// Colour.
-    pub colour: [T; C],
+    /// Color.
+    pub color: [T; C],
 }
 
 /// What blending leaves at a pixel.
 #[derive(Clone, Debug)]
 pub struct Pixel<T, const C: usize> {
-    /// Blended colour over a background of zero.
-    pub colour: [T; C],
+    /// Blended color over a background of zero.
+    pub color: [T; C],
     /// Share of the background that still shows.
     pub transmittance: T,
     /// Positions, in the blended list, of the splats that were added.
@@ -39,7 +39,7 @@ pub fn blend_pixel<'a, T: Number, const C: usize>(
     y: f64,
 ) -> Pixel<T, C> {
     let mut pixel = Pixel {
-        colour: [T::zero(); C],
+        color: [T::zero(); C],
         transmittance: T::one(),
         contributors: Vec::new(),
         margin: f64::INFINITY,
@@ -78,8 +78,8 @@ pub fn blend_pixel<'a, T: Number, const C: usize>(
         if next.re() < numerics.transmittance_min {
             break;
         }
-        for (sum, &colour) in pixel.colour.iter_mut().zip(&splat.colour) {
-            *sum += colour * alpha * pixel.transmittance;
+        for (sum, &color) in pixel.color.iter_mut().zip(&splat.color) {
+            *sum += color * alpha * pixel.transmittance;
         }
         pixel.transmittance = next;
         pixel.contributors.push(position);
@@ -87,8 +87,8 @@ pub fn blend_pixel<'a, T: Number, const C: usize>(
     pixel
 }
 
-/// The centre of pixel `index` of an image `width` pixels wide.
-pub fn pixel_centre(index: usize, width: usize) -> [f64; 2] {
+/// The center of pixel `index` of an image `width` pixels wide.
+pub fn pixel_center(index: usize, width: usize) -> [f64; 2] {
     [(index % width) as f64 + 0.5, (index / width) as f64 + 0.5]
 }
 
@@ -101,7 +101,7 @@ pub fn blend<T: Number, const C: usize>(
 ) -> Vec<Pixel<T, C>> {
     (0..width * height)
         .map(|index| {
-            let [x, y] = pixel_centre(index, width);
+            let [x, y] = pixel_center(index, width);
             blend_pixel(splats, numerics, x, y)
         })
         .collect()
@@ -112,12 +112,12 @@ mod tests {
     use super::super::{lift, seed};
     use super::*;
 
-    fn splat(opacity: f64, colour: f64) -> ScreenSplat<f64, 1> {
+    fn splat(opacity: f64, color: f64) -> ScreenSplat<f64, 1> {
         ScreenSplat {
             mean2d: [3.0, 2.0],
             conic: [0.5, 0.1, 0.25],
             opacity,
-            colour: [colour],
+            color: [color],
         }
     }
 
@@ -126,7 +126,7 @@ mod tests {
         let pixel = blend_pixel(&[splat(0.8, 0.7)], &Numerics::DEFAULT, 4.0, 0.0);
         // d = (1, -2): ½·0.5·1 + ½·0.25·4 + 0.1·(-2) = 0.55
         let alpha = 0.8 * (-0.55_f64).exp();
-        assert!((pixel.colour[0] - 0.7 * alpha).abs() < 1e-15);
+        assert!((pixel.color[0] - 0.7 * alpha).abs() < 1e-15);
         assert!((pixel.transmittance - (1.0 - alpha)).abs() < 1e-15);
     }
 
@@ -138,7 +138,7 @@ mod tests {
             3.0,
             2.0,
         );
-        assert_eq!(pixel.colour[0], 0.5 + 8.0 * 0.25 * 0.5);
+        assert_eq!(pixel.color[0], 0.5 + 8.0 * 0.25 * 0.5);
         assert_eq!(pixel.transmittance, 0.375);
         assert_eq!(pixel.contributors, [0, 1]);
     }
@@ -160,12 +160,12 @@ mod tests {
             mean2d: [3.0, 2.0].map(lift),
             conic: [0.5, 0.1, 0.25].map(lift),
             opacity: seed(0.995),
-            colour: [lift(1.0)],
+            color: [lift(1.0)],
         };
         let pixel = blend_pixel(&[bright], &Numerics::DEFAULT, 3.0, 2.0);
-        assert_eq!((pixel.colour[0].re, pixel.colour[0].eps), (0.99, 0.0));
+        assert_eq!((pixel.color[0].re, pixel.color[0].eps), (0.99, 0.0));
         let faint = blend_pixel(&[splat(0.0039, 1.0)], &Numerics::DEFAULT, 3.0, 2.0);
-        assert_eq!(faint.colour[0], 0.0);
+        assert_eq!(faint.color[0], 0.0);
         assert_eq!(faint.transmittance, 1.0);
         assert!(faint.margin < 0.01);
     }
@@ -176,6 +176,6 @@ mod tests {
         broken.conic[0] = f64::NAN;
         let pixel = blend_pixel(&[broken, splat(0.5, 1.0)], &Numerics::DEFAULT, 4.0, 2.0);
         assert_eq!(pixel.contributors, [1]);
-        assert!(pixel.colour[0].is_finite());
+        assert!(pixel.color[0].is_finite());
     }
 }

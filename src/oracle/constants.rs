@@ -13,7 +13,7 @@ pub const ALPHA_MIN: f64 = 1.0 / 255.0;
 /// A pixel stops before its transmittance would fall below this.
 pub const TRANSMITTANCE_MIN: f64 = 1e-4;
 
-/// Gaussians with a colour of larger magnitude are not drawn.
+/// Gaussians with a color of larger magnitude are not drawn.
 pub const COLOR_MAX: f64 = 1e4;
 
 /// Quaternions with a squared norm up to this have no direction worth trusting.

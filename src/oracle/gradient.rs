@@ -7,10 +7,11 @@
 //!
 //! To leave out pixels near a discontinuity, set their `v` to zero.
 
-use super::blend::{ScreenSplat, blend_pixel, pixel_centre};
+use super::blend::{ScreenSplat, blend_pixel, pixel_center};
 use super::render::{to_screen, visible};
-use super::scene::{Scene, View};
+use super::scene::Scene;
 use super::shade::Shading;
+use super::view::View;
 use super::{lift, seed};
 use num_dual::Dual64;
 
@@ -44,7 +45,7 @@ impl<'a, const C: usize> Tape<'a, C> {
         let mut contributors = Vec::new();
         let mut pixels = vec![Vec::new(); list.len()];
         for index in 0..upstream.len() {
-            let [x, y] = pixel_centre(index, view.width);
+            let [x, y] = pixel_center(index, view.width);
             let pixel = blend_pixel(list.iter().map(|v| &v.splat), &view.numerics, x, y);
             for &position in &pixel.contributors {
                 pixels[position].push(index);
@@ -73,7 +74,7 @@ impl<'a, const C: usize> Tape<'a, C> {
         varied: &ScreenSplat<Dual64, C>,
     ) -> impl Iterator<Item = f64> {
         self.pixels[position].iter().map(move |&index| {
-            let [x, y] = pixel_centre(index, self.view.width);
+            let [x, y] = pixel_center(index, self.view.width);
             let splats = self.contributors[index].iter().map(|&other| {
                 if other == position {
                     varied
@@ -82,7 +83,7 @@ impl<'a, const C: usize> Tape<'a, C> {
                 }
             });
             let pixel = blend_pixel(splats, &self.view.numerics, x, y);
-            let shares = self.upstream[index].iter().zip(pixel.colour);
+            let shares = self.upstream[index].iter().zip(pixel.color);
             shares.map(|(v, out)| v * out.eps).sum()
         })
     }
@@ -93,7 +94,7 @@ fn lift_splat<const C: usize>(splat: &ScreenSplat<f64, C>) -> ScreenSplat<Dual64
         mean2d: splat.mean2d.map(lift),
         conic: splat.conic.map(lift),
         opacity: lift(splat.opacity),
-        colour: splat.colour.map(lift),
+        color: splat.color.map(lift),
     }
 }
 
@@ -102,7 +103,7 @@ fn zero_splat<const C: usize>() -> ScreenGradient<C> {
         mean2d: [0.0; 2],
         conic: [0.0; 3],
         opacity: 0.0,
-        colour: [0.0; C],
+        color: [0.0; C],
     }
 }
 
@@ -110,7 +111,7 @@ fn splat_fields<T, const C: usize>(splat: &mut ScreenSplat<T, C>) -> impl Iterat
     (splat.mean2d.iter_mut())
         .chain(&mut splat.conic)
         .chain(std::iter::once(&mut splat.opacity))
-        .chain(&mut splat.colour)
+        .chain(&mut splat.color)
 }
 
 /// The gradient with respect to every parameter, in the shape of the scene;
@@ -182,7 +183,7 @@ pub fn screen_gradient<const C: usize>(
 }
 
 /// The pull on each Gaussian, `[N]`: the sum over pixels of the length of the
-/// gradient with respect to its centre in normalised device coordinates.
+/// gradient with respect to its center in normalised device coordinates.
 pub fn pulls<const C: usize>(
     scene: &Scene<f64, C>,
     view: &View,

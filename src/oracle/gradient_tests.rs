@@ -4,9 +4,10 @@
 use super::gradient::{gradient, screen_gradient};
 use super::random::{Random, opaque_stack, random_scene};
 use super::render::{decision_margin, render, to_screen};
-use super::scene::{Scene, View};
+use super::scene::Scene;
 use super::seed;
 use super::shade::Shading;
+use super::view::View;
 
 /// Random v, zero where a pixel is within `margin` of a decision.
 fn upstream<const C: usize>(scene: &Scene<f64, C>, view: &View, margin: f64) -> Vec<[f64; C]> {
@@ -130,11 +131,11 @@ fn screen_gradient_and_projection_make_the_whole_by_the_chain_rule() {
                 let inner = (splat.mean2d.iter())
                     .chain(&splat.conic)
                     .chain(std::iter::once(&splat.opacity))
-                    .chain(&splat.colour);
+                    .chain(&splat.color);
                 let outer = (s.mean2d.iter())
                     .chain(&s.conic)
                     .chain(std::iter::once(&s.opacity))
-                    .chain(&s.colour);
+                    .chain(&s.color);
                 chained = inner.zip(outer).map(|(i, o)| i.eps * o).sum();
             }
             let mut row = whole.gaussian(index);

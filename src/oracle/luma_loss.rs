@@ -18,10 +18,10 @@ pub fn window(side: usize) -> Vec<f64> {
     raw.into_iter().map(|w| w / sum).collect()
 }
 
-/// The pixels of a window of `side` taps around `centre` that lie in `0..size`.
-fn reach(centre: usize, side: usize, size: usize) -> std::ops::Range<usize> {
+/// The pixels of a window of `side` taps around `center` that lie in `0..size`.
+fn reach(center: usize, side: usize, size: usize) -> std::ops::Range<usize> {
     let radius = side / 2;
-    centre.saturating_sub(radius)..(centre + radius + 1).min(size)
+    center.saturating_sub(radius)..(center + radius + 1).min(size)
 }
 
 /// SSIM at one pixel. `x` and `y` are `[height · width]`.

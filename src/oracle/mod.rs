@@ -31,6 +31,7 @@ pub mod rgb_loss;
 pub mod scene;
 pub mod shade;
 pub mod tiles;
+pub mod view;
 pub mod view_correction;
 
 use num_dual::{Dual64, DualNum};

@@ -7,18 +7,18 @@
 use super::Number;
 use super::constants::{BLUR, FRUSTUM_MARGIN, QUAT_NORM_MIN_SQ};
 use super::linear::{apply, dot, rotation};
-use super::scene::View;
+use super::view::View;
 
-/// One Gaussian on the screen. Pixels; the centre of the first one is (0.5, 0.5).
+/// One Gaussian on the screen. Pixels; the center of the first one is (0.5, 0.5).
 #[derive(Clone, Copy, Debug)]
 pub struct Projected<T> {
-    /// Centre.
+    /// Center.
     pub mean2d: [T; 2],
     /// Covariance `xx, xy, yy` with the blur, px².
     pub cov2d: [T; 3],
     /// Inverse of the covariance, `xx, xy, yy`.
     pub conic: [T; 3],
-    /// Opacity at the centre, from the least that is blended to 1; antialiased, the one
+    /// Opacity at the center, from the least that is blended to 1; antialiased, the one
     /// stored times what the blur leaves of it.
     pub opacity: T,
     /// z in camera space; what splats are sorted by.
@@ -44,8 +44,8 @@ pub enum Cull {
     Opacity,
     /// The box around the visible ellipse misses the image.
     Outside,
-    /// The colour exceeds [`COLOR_MAX`](super::constants::COLOR_MAX).
-    Colour,
+    /// The color exceeds [`COLOR_MAX`](super::constants::COLOR_MAX).
+    Color,
 }
 
 /// Where the Jacobian stops following x/z, y/z: `[[low, high]; 2]`.
@@ -159,8 +159,8 @@ pub fn project<T: Number>(
     let mean2d = [x / z * view.fx + view.cx, y / z * view.fy + view.cy];
     let size = [view.width, view.height];
     let touches = (0..2).all(|i| {
-        let (centre, half) = (mean2d[i].re(), half_extent[i]);
-        centre + half >= 0.0 && centre - half <= size[i] as f64
+        let (center, half) = (mean2d[i].re(), half_extent[i]);
+        center + half >= 0.0 && center - half <= size[i] as f64
     });
     if !touches {
         return Err(Cull::Outside);

@@ -7,7 +7,7 @@ use super::linear::{apply, dot, rotation, transpose};
 use super::numerics::Numerics;
 use super::project::{Cull, jacobian_limits, project};
 use super::random::oblique_view;
-use super::scene::View;
+use super::view::View;
 
 fn view() -> View {
     View {
@@ -57,9 +57,9 @@ fn quaternion_turns_the_long_axis_from_x_to_y() {
 fn covariance_is_that_of_the_linearised_projection() {
     let view = oblique_view();
     let (quat, log_scale) = ([0.7, -0.2, 0.5, 0.9], [-2.0, -3.5, -2.6_f64]);
-    let centre = view.centre();
+    let center = view.center();
     let offset = apply(&transpose(view.rotation), &[0.4, -0.3, 2.0]);
-    let mean = [0, 1, 2].map(|k| centre[k] + offset[k]);
+    let mean = [0, 1, 2].map(|k| center[k] + offset[k]);
     let p = project(&mean, &quat, &log_scale, 0.0, &view).unwrap();
 
     let axes = rotation(quat.map(|q| q / dot(&quat, &quat).sqrt()));

@@ -4,8 +4,9 @@
 use super::constants::SH_C0;
 use super::linear::{apply, rotation, transpose};
 use super::numerics::Numerics;
-use super::scene::{Gaussian, Scene, View};
+use super::scene::{Gaussian, Scene};
 use super::shade::Shading;
+use super::view::View;
 
 /// SplitMix64 (Steele, Lea, Flood 2014).
 pub struct Random(u64);
@@ -42,7 +43,7 @@ pub fn round(value: f64) -> f64 {
     f64::from(value as f32)
 }
 
-/// A view of 48×40 pixels that is turned, shifted and off-centre.
+/// A view of 48×40 pixels that is turned, shifted and off-center.
 pub fn oblique_view() -> View {
     let quat = [0.9, 0.2, -0.3, 0.1_f64];
     let norm = quat.iter().map(|q| q * q).sum::<f64>().sqrt();
@@ -66,11 +67,11 @@ pub fn oblique_view() -> View {
 ///
 /// Footprints have half extents of about 1 to 17 px and aspect ratios up to
 /// 7, opacities lie in 0.02..0.98, depths in 1.5..6 at least 1e-4 (relative)
-/// apart; some centres lie outside the image, a few beyond the reach of the
+/// apart; some centers lie outside the image, a few beyond the reach of the
 /// Jacobian. No Gaussian is within 1e-3 of a decision of its own
 /// ([`Gaussian::margin`]); for those of the pixels see
 /// [`decision_margin`](super::render::decision_margin). Harmonics suit
-/// [`Shading::of_channels`]: colours about 0..1, or ±40 Lab units for C = 2.
+/// [`Shading::of_channels`]: colors about 0..1, or ±40 Lab units for C = 2.
 pub fn random_scene<const C: usize>(
     seed: u64,
     count: usize,
@@ -180,10 +181,10 @@ pub fn opaque_stack<const C: usize>(
     degree: usize,
 ) -> (Scene<f64, C>, View) {
     let (mut scene, view) = random_scene::<C>(seed, count, degree);
-    let centre = view.centre();
+    let center = view.center();
     for i in 0..count {
         let depth = 1.5 + 4.5 * i as f64 / count as f64;
-        scene.means[i] = std::array::from_fn(|k| round(centre[k] + depth * view.rotation[2][k]));
+        scene.means[i] = std::array::from_fn(|k| round(center[k] + depth * view.rotation[2][k]));
         scene.opacity_logits[i] = round(3.0 + 4.0 * (i % 3) as f64);
     }
     (scene, view)
@@ -236,7 +237,7 @@ mod tests {
             .fold((0, 0), |(dark, all), c| {
                 (dark + usize::from(c == 0.0), all + 1)
             });
-        assert!(dark > 0, "the clamp of the colour must be met");
+        assert!(dark > 0, "the clamp of the color must be met");
     }
 
     #[test]

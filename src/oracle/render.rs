@@ -4,8 +4,9 @@ use super::Number;
 use super::blend::{Pixel, ScreenSplat, blend};
 use super::constants::COLOR_MAX;
 use super::project::{Cull, Projected};
-use super::scene::{Gaussian, Scene, View};
+use super::scene::{Gaussian, Scene};
 use super::shade::{Shading, shade};
+use super::view::View;
 
 /// A visible Gaussian: its index in the scene and its two faces.
 #[derive(Clone, Debug)]
@@ -28,15 +29,15 @@ pub fn to_screen<T: Number, const C: usize>(
     shading: Shading,
 ) -> Result<(Projected<T>, ScreenSplat<T, C>), Cull> {
     let projected = gaussian.project(view)?;
-    let colour = shade(&gaussian.mean, &gaussian.sh, view, shading);
-    if colour.iter().any(|c| c.re().abs() > COLOR_MAX) {
-        return Err(Cull::Colour);
+    let color = shade(&gaussian.mean, &gaussian.sh, view, shading);
+    if color.iter().any(|c| c.re().abs() > COLOR_MAX) {
+        return Err(Cull::Color);
     }
     let splat = ScreenSplat {
         mean2d: projected.mean2d,
         conic: projected.conic,
         opacity: projected.opacity,
-        colour,
+        color,
     };
     Ok((projected, splat))
 }
@@ -84,7 +85,7 @@ pub fn render<T: Number, const C: usize>(
 ) -> Vec<[T; C]> {
     render_pixels(scene, view, shading)
         .into_iter()
-        .map(|p| p.colour)
+        .map(|p| p.color)
         .collect()
 }
 
@@ -109,9 +110,9 @@ mod tests {
         let mut view = oblique_view();
         (view.cx, view.cy) = (24.5, 20.5);
         view.fy = view.fx;
-        let centre = view.centre();
+        let center = view.center();
         let sigma = 0.1_f64;
-        let mean = std::array::from_fn(|k| centre[k] + 2.0 * view.rotation[2][k]);
+        let mean = std::array::from_fn(|k| center[k] + 2.0 * view.rotation[2][k]);
         let gaussian = Gaussian {
             mean,
             quat: [0.3, -0.5, 0.2, 0.9],

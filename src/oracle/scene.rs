@@ -1,53 +1,15 @@
-//! Scenes and views as plain arrays, and random ones to test with.
+//! Scenes as plain arrays, and random ones to test with.
 
-use super::numerics::Numerics;
 use super::project::{Cull, Projected, jacobian_limits, project};
 use super::shade::{Shading, unclamped};
+use super::view::View;
 use super::{Number, lift, relative_distance};
 use num_dual::Dual64;
-
-/// A pinhole view; axes x right, y down, z forward.
-#[derive(Clone, Debug)]
-pub struct View {
-    /// World-to-camera rotation, rows.
-    pub rotation: [[f64; 3]; 3],
-    /// World-to-camera translation.
-    pub translation: [f64; 3],
-    /// Focal lengths in pixels.
-    pub fx: f64,
-    /// Focal lengths in pixels.
-    pub fy: f64,
-    /// Principal point in pixels.
-    pub cx: f64,
-    /// Principal point in pixels.
-    pub cy: f64,
-    /// Image width in pixels.
-    pub width: usize,
-    /// Image height in pixels.
-    pub height: usize,
-    /// Gaussians are drawn beyond this depth only, in world units; 0 or more.
-    pub near: f64,
-    /// Whether a Gaussian's opacity falls by what the blur spreads it.
-    pub antialiased: bool,
-    /// What is left out.
-    pub numerics: Numerics,
-}
-
-impl View {
-    /// The camera's centre in world space, `-Rᵀt`.
-    pub fn centre(&self) -> [f64; 3] {
-        std::array::from_fn(|column| {
-            -(0..3)
-                .map(|row| self.rotation[row][column] * self.translation[row])
-                .sum::<f64>()
-        })
-    }
-}
 
 /// One Gaussian with all its parameters.
 #[derive(Clone, Debug)]
 pub struct Gaussian<T, const C: usize> {
-    /// Centre in world units.
+    /// Center in world units.
     pub mean: [T; 3],
     /// Rotation `w x y z`, of any length.
     pub quat: [T; 4],
@@ -100,7 +62,7 @@ impl<const C: usize> Gaussian<f64, C> {
     }
 
     /// The smallest relative distance of this Gaussian's decisions (near
-    /// plane, frustum clamp, opacity floor, image box, colour at zero) from
+    /// plane, frustum clamp, opacity floor, image box, color at zero) from
     /// falling the other way.
     pub fn margin(&self, view: &View, shading: Shading) -> f64 {
         let depth = (0..3)

@@ -1,9 +1,9 @@
-//! View-dependent colour from spherical harmonics, as splat files define them.
+//! View-dependent color from spherical harmonics, as splat files define them.
 
 use super::Number;
 use super::constants::{SH_C0, SH_C1, SH_C2, SH_C3};
 use super::linear::dot;
-use super::scene::View;
+use super::view::View;
 
 /// What the sum of harmonics means.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,10 +25,10 @@ impl Shading {
     }
 }
 
-/// The unit vector from the camera's centre `-Rᵀt` to `mean`, in world space.
+/// The unit vector from the camera's center `-Rᵀt` to `mean`, in world space.
 pub fn direction<T: Number>(mean: &[T; 3], view: &View) -> [T; 3] {
-    let centre = view.centre();
-    let offset: [T; 3] = std::array::from_fn(|i| mean[i] - centre[i]);
+    let center = view.center();
+    let offset: [T; 3] = std::array::from_fn(|i| mean[i] - center[i]);
     let length = dot(&offset, &offset).sqrt();
     offset.map(|v| v / length)
 }
@@ -68,27 +68,27 @@ pub fn unclamped<T: Number, const C: usize>(
         Shading::Offset => 0.5,
         Shading::Plain => 0.0,
     };
-    let mut colour = [T::from(start); C];
+    let mut color = [T::from(start); C];
     for (coefficients, harmonic) in sh.iter().zip(harmonics) {
-        for (channel, &coefficient) in colour.iter_mut().zip(coefficients) {
+        for (channel, &coefficient) in color.iter_mut().zip(coefficients) {
             *channel += harmonic * coefficient;
         }
     }
-    colour
+    color
 }
 
-/// Colour of one Gaussian seen from `view`; `sh` is `[K][C]`, K = 1, 4, 9 or 16.
+/// Color of one Gaussian seen from `view`; `sh` is `[K][C]`, K = 1, 4, 9 or 16.
 pub fn shade<T: Number, const C: usize>(
     mean: &[T; 3],
     sh: &[[T; C]],
     view: &View,
     shading: Shading,
 ) -> [T; C] {
-    let colour = unclamped(mean, sh, view, shading);
+    let color = unclamped(mean, sh, view, shading);
     match shading {
-        Shading::Plain => colour,
+        Shading::Plain => color,
         // At and below zero the derivative is zero; NaN stays visible.
-        Shading::Offset => colour.map(|c| if c.re() <= 0.0 { T::zero() } else { c }),
+        Shading::Offset => color.map(|c| if c.re() <= 0.0 { T::zero() } else { c }),
     }
 }
 

@@ -1,5 +1,5 @@
 //! Which tiles a Gaussian touches: its visible ellipse against the rectangle
-//! of each tile's pixel centres, exactly.
+//! of each tile's pixel centers, exactly.
 
 use super::project::Projected;
 
@@ -25,9 +25,9 @@ impl TileGrid {
         self.height.div_ceil(self.tile)
     }
 
-    /// First and last pixel centres of a tile, `[[left, right], [top, bottom]]`.
+    /// First and last pixel centers of a tile, `[[left, right], [top, bottom]]`.
     /// Tiles at the border end with the image.
-    pub fn centres(&self, column: usize, row: usize) -> [[f64; 2]; 2] {
+    pub fn centers(&self, column: usize, row: usize) -> [[f64; 2]; 2] {
         let span = |index: usize, size: usize| {
             let last = ((index + 1) * self.tile).min(size);
             [(index * self.tile) as f64 + 0.5, last as f64 - 0.5]
@@ -62,7 +62,7 @@ pub fn min_power(projected: &Projected<f64>, rectangle: [[f64; 2]; 2]) -> f64 {
 
 /// Whether a Gaussian touches a tile.
 pub fn touches(projected: &Projected<f64>, grid: &TileGrid, column: usize, row: usize) -> bool {
-    min_power(projected, grid.centres(column, row)) <= projected.cutoff
+    min_power(projected, grid.centers(column, row)) <= projected.cutoff
 }
 
 /// Per tile, in row order, the positions in `projected` that touch it. Given
@@ -102,8 +102,8 @@ mod tests {
     #[test]
     fn grid_covers_the_image() {
         assert_eq!((GRID.columns(), GRID.rows()), (3, 3));
-        assert_eq!(GRID.centres(0, 0), [[0.5, 15.5], [0.5, 15.5]]);
-        assert_eq!(GRID.centres(2, 2), [[32.5, 47.5], [32.5, 39.5]]);
+        assert_eq!(GRID.centers(0, 0), [[0.5, 15.5], [0.5, 15.5]]);
+        assert_eq!(GRID.centers(2, 2), [[32.5, 47.5], [32.5, 39.5]]);
     }
 
     #[test]
@@ -111,7 +111,7 @@ mod tests {
         for visible in scene(21) {
             let p = &visible.projected;
             for tile in 0..9 {
-                let [[left, right], [top, bottom]] = GRID.centres(tile % 3, tile / 3);
+                let [[left, right], [top, bottom]] = GRID.centers(tile % 3, tile / 3);
                 let mut least = f64::INFINITY;
                 for i in 0..=300 {
                     for j in 0..=300 {
@@ -147,7 +147,7 @@ mod tests {
                     i as f64 + 0.5,
                     j as f64 + 0.5,
                 );
-                assert_eq!(tiled.colour, expected.colour);
+                assert_eq!(tiled.color, expected.color);
                 assert_eq!(tiled.transmittance, expected.transmittance);
             }
         }
@@ -162,7 +162,7 @@ mod tests {
         let mut boxes = 0;
         for p in &projected {
             for tile in 0..grid.columns() * grid.rows() {
-                let spans = grid.centres(tile % grid.columns(), tile / grid.columns());
+                let spans = grid.centers(tile % grid.columns(), tile / grid.columns());
                 boxes += usize::from((0..2).all(|i| {
                     p.mean2d[i] + p.half_extent[i] >= spans[i][0]
                         && p.mean2d[i] - p.half_extent[i] <= spans[i][1]

@@ -54,7 +54,7 @@ pub fn teacher_of(pixels: &[Pixel]) -> Affine {
     let x = [0, 1].map(|c| mean(&|pixel| pixel.1[c]));
     let t = [0, 1].map(|c| mean(&|pixel| pixel.2[c]));
     let prior = |i: usize, j: usize| if i == j { CORRECTION_PRIOR } else { 0.0 };
-    // Centred before it is squared: nothing cancels.
+    // Centerd before it is squared: nothing cancels.
     let within =
         [0, 1].map(|i| [0, 1].map(|j| mean(&|p| (p.1[i] - x[i]) * (p.1[j] - x[j])) + prior(i, j)));
     let across =
@@ -138,7 +138,7 @@ mod tests {
         }
     }
 
-    /// What all teachers share is the scene's colour, which must not drift.
+    /// What all teachers share is the scene's color, which must not drift.
     #[test]
     fn what_all_share_stays() {
         let mut random = Random::new(3);
@@ -158,7 +158,7 @@ mod tests {
         assert_eq!(teacher_of(&[]), Affine::IDENTITY);
         // The sky, where no Gaussian is.
         assert_eq!(teacher_of(&[(1.0, [0.0; 2], [50.0; 2])]), Affine::IDENTITY);
-        // A teacher that knows no colour at all cannot be undone.
+        // A teacher that knows no color at all cannot be undone.
         let mut random = Random::new(4);
         let gray = Affine {
             gain: [[0.0; 2]; 2],

@@ -73,7 +73,7 @@ fn a_file_that_was_trained_antialiased_is_drawn_so() {
         place.succeed(&[&render[..], &["-o", name]].concat());
     }
     let splats = SplatFile::read(&place, "mip.ply").to_oracle();
-    let view = super::oracle::scene::View {
+    let view = super::oracle::view::View {
         antialiased: true,
         ..scene::view(4, [0.0; 3])
     };

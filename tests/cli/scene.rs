@@ -5,7 +5,7 @@ use std::path::Path;
 
 use image::{Rgb, RgbImage};
 
-use super::oracle::{numerics::Numerics, scene::View};
+use super::oracle::{numerics::Numerics, view::View};
 
 /// Width and height of every photo.
 pub const SIZE: [u32; 2] = [64, 48];

@@ -5,7 +5,7 @@ use crate::{
     harness::{Stage, splats},
     oracle::{
         random::{oblique_view, random_scene_before},
-        scene::View,
+        view::View,
     },
 };
 

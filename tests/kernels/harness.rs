@@ -14,7 +14,7 @@ pub use gs_chroma::doctor::stage::{Gradient, camera, splats};
 
 use crate::oracle::{
     random::{oblique_view, random_scene},
-    scene::View,
+    view::View,
 };
 
 static RASTER: LazyLock<Arc<Raster>> = LazyLock::new(|| {

@@ -15,8 +15,9 @@ use crate::{
         lbfgs::{Matrix, solve},
         random::{Random, oblique_view, random_scene_before},
         render::{decision_margin, render},
-        scene::{Scene, View},
+        scene::Scene,
         shade::Shading,
+        view::View,
     },
     solver::{self, ChromaView, HEIGHT, PIXELS, WIDTH, chroma_view},
 };

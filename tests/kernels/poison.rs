@@ -7,7 +7,8 @@ use crate::{
     harness::{Gradient, Stage, bits, splats},
     oracle::{
         random::{Random, oblique_view, random_scene},
-        scene::{Scene, View},
+        scene::Scene,
+        view::View,
     },
 };
 
@@ -74,7 +75,7 @@ fn scenes() -> (Splats, View, Splats) {
     let (mut scene, _) = random_scene::<1>(7, COUNT, 1);
     let view = oblique_view();
     // In front, in the middle: what is wrong with it would be seen everywhere.
-    let centre = view.centre();
+    let centre = view.center();
     scene.means[AT] = std::array::from_fn(|k| f64::from((centre[k] + view.rotation[2][k]) as f32));
     let others = (0..COUNT).filter(|&i| i != AT).map(|i| scene.gaussian(i));
     (splats(&scene), view.clone(), splats(&Scene::of(1, others)))

@@ -6,7 +6,7 @@ use crate::{
     harness::{Stage, bits, camera, gpu, raster, splats},
     oracle::{
         random::{oblique_view, random_scene},
-        scene::View,
+        view::View,
     },
 };
 

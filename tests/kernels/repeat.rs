@@ -14,7 +14,7 @@ use crate::{
     harness::{Stage, bits, camera, gpu, raster, splats},
     oracle::{
         random::{Random, oblique_view, random_scene},
-        scene::View,
+        view::View,
     },
 };
 
@@ -454,7 +454,7 @@ fn overflow_changes_nothing() {
     assert_eq!(view_at(FAR_FIRST, entries.len(), 0), 0);
     let bystanders = 500;
     assert!(entries.iter().all(|&needed| 2 * needed < bystanders * ROOM));
-    let [centre, forward] = [oblique_view().centre(), oblique_view().rotation[2]];
+    let [centre, forward] = [oblique_view().center(), oblique_view().rotation[2]];
     let mut roomy = start.clone();
     for _ in 0..bystanders {
         let behind = std::array::from_fn(|k| (centre[k] - 50.0 * forward[k]) as f32);

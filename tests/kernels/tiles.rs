@@ -7,9 +7,10 @@ use crate::{
         constants::TILE,
         random::{oblique_view, random_scene, random_scene_before, random_view},
         render::visible,
-        scene::{Scene, View},
+        scene::Scene,
         shade::Shading,
         tiles::{TileGrid, min_power},
+        view::View,
     },
 };
 
@@ -33,7 +34,7 @@ fn check(scene: &Scene<f64, 1>, view: &View) -> usize {
     assert_eq!(stage.status().overflow, None);
     let mut surplus = 0;
     for (tile, list) in lists.iter().enumerate() {
-        let clipped = grid.centres(tile % grid.columns(), tile / grid.columns());
+        let clipped = grid.centers(tile % grid.columns(), tile / grid.columns());
         // At the border the kernel goes on to the tile's own end.
         let whole = clipped.map(|[first, _]| [first, first + TILE as f64 - 1.0]);
         let mut wanted = Vec::new();

@@ -13,8 +13,9 @@ use gs_chroma::{
     oracle::{
         random::random_scene,
         render::{render_pixels, visible},
-        scene::{Scene, View},
+        scene::Scene,
         shade::Shading,
+        view::View,
     },
     raster::Raster,
     splats::Splats,
@@ -95,7 +96,7 @@ fn as_the_oracle_says(picture: &[f32], changed: &Splats) -> bool {
         .iter()
         .zip(picture))
     .all(|(pixel, &actual)| {
-        let [expected] = pixel.colour;
+        let [expected] = pixel.color;
         pixel.margin < MARGIN
             || (f64::from(actual) - expected).abs() <= 1e-4 * expected.abs().max(1.0)
     })

@@ -166,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn enlarging_interpolates_between_half_pixel_centres() {
+    fn enlarging_interpolates_between_half_pixel_centers() {
         let expected = [0.0, 1.0, 3.0, 4.0];
         assert_near(&row(&[0.0, 4.0]).resized(4, 1), &expected);
         let column = AbImage {

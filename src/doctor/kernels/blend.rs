@@ -14,8 +14,9 @@ use crate::{
         constants::ALPHA_MIN,
         random::{opaque_stack, random_scene_before, random_view},
         render::render_pixels,
-        scene::{Scene, View},
+        scene::Scene,
         shade::Shading,
+        view::View,
     },
     raster::Raster,
 };
@@ -41,7 +42,7 @@ pub(super) fn pictures<const C: usize>(
         let pixels = render_pixels(&scene, &view, Shading::of_channels(C));
         Ok(Sample {
             actual: widen(&actual),
-            expected: pixels.iter().flat_map(|p| p.colour).collect(),
+            expected: pixels.iter().flat_map(|p| p.color).collect(),
             may_flip: (pixels.iter())
                 .flat_map(|p| [p.margin < MARGIN; C])
                 .collect(),

@@ -15,8 +15,9 @@ use crate::{
         gradient::{gradient, pulls},
         random::{Random, opaque_stack, random_scene_before, random_view},
         render::decision_margin,
-        scene::{Scene, View},
+        scene::Scene,
         shade::{Shading, unclamped},
+        view::View,
     },
     raster::Raster,
 };

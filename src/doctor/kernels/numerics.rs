@@ -14,7 +14,8 @@ use crate::{
     oracle::{
         constants::ALPHA_MAX,
         numerics::{Numerics, upper_half},
-        scene::{Scene, View},
+        scene::Scene,
+        view::View,
     },
     raster::{
         Field, Geometry, Layer, Lists, LumaAdjoint, Outcome, Raster, RasterNumerics, Storage,

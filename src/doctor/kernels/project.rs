@@ -11,7 +11,7 @@ use crate::{
     gpu::GpuError,
     oracle::{
         random::{oblique_view, random_scene_before, random_view},
-        scene::View,
+        view::View,
     },
     raster::Raster,
 };

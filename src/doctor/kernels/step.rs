@@ -14,7 +14,7 @@ use crate::{
         adam::{Moments, adam},
         random::{Random, random_scene_before, random_view},
         relocation::relocation_pull,
-        scene::View,
+        view::View,
     },
     raster::{
         AdamMoments, AdamStep, AdamSteps, Field, Geometry, Layer, Lists, LumaAdjoint, Model,

@@ -1,0 +1,61 @@
+//! The values in a file of a photo or a mask, and what the file announces of them.
+
+use std::fmt;
+use std::io::{BufRead, Seek};
+
+/// The most a decoded file may take, in bytes: 178 million 8-bit RGB pixels, more
+/// than any camera's, and little enough to fail with words instead of by force.
+pub(super) const LARGEST_FILE: u64 = 512 << 20;
+
+/// How exactly a file tells the brightness of a pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Depth {
+    /// Whole numbers from 0 to 255.
+    Eight,
+    /// Whole numbers from 0 to 65,535.
+    Sixteen,
+    /// Floats.
+    Float,
+}
+
+impl Depth {
+    /// The value of white where nobody says another.
+    pub fn white(self) -> f64 {
+        match self {
+            Self::Eight => f64::from(u8::MAX),
+            Self::Sixteen => f64::from(u16::MAX),
+            Self::Float => 1.0,
+        }
+    }
+}
+
+impl fmt::Display for Depth {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Eight => "8 bits",
+            Self::Sixteen => "16 bits",
+            Self::Float => "floats",
+        })
+    }
+}
+
+/// What a file announces.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Header {
+    /// Width and height in pixels.
+    pub size: [u32; 2],
+    pub depth: Depth,
+    /// 1 gray, 2 gray and alpha, 3 RGB, 4 RGB and alpha.
+    pub channels: usize,
+}
+
+/// Values as they stand in the file.
+pub(super) enum Samples {
+    Eight(Vec<u8>),
+    Sixteen(Vec<u16>),
+    Float(Vec<f32>),
+}
+
+/// Where a file's bytes come from.
+pub(super) trait Bytes: BufRead + Seek {}
+impl<T: BufRead + Seek> Bytes for T {}
