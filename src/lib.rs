@@ -1,4 +1,4 @@
-//! gs-chroma: coloured 3D Gaussian scenes from grayscale photographs.
+//! gs-chroma: colored 3D Gaussian scenes from grayscale photographs.
 //!
 //! Imports go down only:
 //!
@@ -9,6 +9,40 @@
 //!
 //! [`doctor`] compares the kernels of [`raster`], [`luma`] and [`chroma`] with the [`oracle`],
 //! which uses nothing else of the crate. The feature `cli` adds the program.
+//!
+//! # A whole job
+//!
+//! Photos with poses in, a colored scene out. Anyone who implements
+//! [`chroma::Colorizer`] can color the photos; networks and folders of colored images do
+//! ([`chroma::teacher::Teacher`]).
+//!
+//! ```
+//! use std::{error::Error, ops::ControlFlow, path::Path, sync::Arc};
+//!
+//! use gs_chroma::{
+//!     capture::{Dataset, LoadOptions},
+//!     chroma::{self, ChromaSettings, teacher::{Teacher, TeacherSettings}},
+//!     gpu::Gpu,
+//!     luma::{self, LumaSettings},
+//!     raster::Raster,
+//! };
+//!
+//! # fn main() -> Result<(), Box<dyn Error>> {
+//! let options = LoadOptions { max_side: Some(48), ..LoadOptions::default() };
+//! let dataset = Arc::new(Dataset::open(Path::new("assets/demo"), &options, &mut |_| {})?);
+//! let gpu = Gpu::open()?;
+//! let scene = luma::fit(&gpu, &dataset, &LumaSettings::new(20), &mut |_| ControlFlow::Continue(()))?;
+//!
+//! let raster = Arc::new(Raster::with(&gpu, scene.settings.raster_options()));
+//! let mut teacher = Teacher::open(Path::new("assets/demo/images"), None, &TeacherSettings::default())?;
+//! let settings = ChromaSettings { rounds: 1, coarse_rounds: 1, ..ChromaSettings::irls() };
+//! let colored = chroma::colorize(
+//!     &raster, &dataset, &scene.splats, &mut teacher, &settings, &mut |_| ControlFlow::Continue(()),
+//! )?;
+//! assert_eq!(colored.splats.sh.channels, 3);
+//! # Ok(())
+//! # }
+//! ```
 
 mod beside;
 pub mod capture;
