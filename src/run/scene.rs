@@ -1,60 +1,19 @@
 //! What several commands need of a capture: its photos at working size, a
 //! renderer for its splats.
 
-use std::{ops::Deref, path::Path, sync::Arc};
+use std::{path::Path, sync::Arc};
 
 use glam::DVec3;
 
 use super::{Event, Observer, RunError, Stage};
 use crate::{
-    capture::{Camera, CaptureError, Dataset, LoadOptions, Notice, Photo, Rejected},
+    capture::{CaptureError, Dataset, LoadOptions, Notice, Photo, Rejected},
     effects::{Evidence, Survey},
     gpu::GpuError,
     luma::TrialProgress,
     raster::{Field, Geometry, Raster, RasterOptions, Renderer, constants::NEAR_SHARE},
     splats::{ShField, Splats, ply},
 };
-
-/// A capture with all its photos decoded, colors and all.
-pub(super) struct Scene {
-    pub dataset: Dataset,
-    /// Photo and camera of each view, at working size.
-    pub photos: Vec<(Photo, Camera)>,
-}
-
-impl Deref for Scene {
-    type Target = Dataset;
-
-    fn deref(&self) -> &Dataset {
-        &self.dataset
-    }
-}
-
-impl Scene {
-    /// Reads a COLMAP folder and decodes its photos.
-    pub fn load(
-        colmap_dir: &Path,
-        options: &LoadOptions,
-        observe: &mut Observer<'_>,
-    ) -> Result<Self, RunError> {
-        let dataset = open(colmap_dir, options, observe)?;
-        let total = dataset.cameras.len();
-        let mut photos = Vec::with_capacity(total);
-        let all: Vec<usize> = (0..total).collect();
-        dataset.visit_colors(&all, |view, photo| {
-            photos.push((photo, dataset.cameras[view].clone()));
-            observe(Event::Progress {
-                stage: Stage::Photos,
-                done: view,
-                total,
-                message: dataset.capture.views[view].name.clone(),
-            });
-            Ok::<_, CaptureError>(())
-        })?;
-        tell_not_finite(&dataset, observe);
-        Ok(Self { dataset, photos })
-    }
-}
 
 /// Opens a COLMAP folder; nothing is decoded but what [`Dataset::open`] has to.
 pub(super) fn open(

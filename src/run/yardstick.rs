@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::scene::{Scene, counts, gray_pixels, rgb_pixels};
+use super::scene::{counts, gray_pixels, rgb_pixels};
 use crate::{
     capture::{Dataset, Exposure, Photo},
     measure,
@@ -31,14 +31,6 @@ pub(super) fn exposures(dataset: &Dataset, told: &[ViewExposure]) -> Vec<Exposur
 }
 
 impl<'a> Yardstick<'a> {
-    /// The photo of a view, where `exposures` are those of all views.
-    pub fn of(scene: &'a Scene, exposures: &[Exposure], view: usize) -> Self {
-        Self {
-            photo: &scene.photos[view].0,
-            exposure: exposures[view],
-        }
-    }
-
     /// Whether any pixel counts; a photo of which none does measures nothing.
     pub fn measures(&self) -> bool {
         (0..self.photo.gray.len()).any(|pixel| counts(self.photo, pixel))

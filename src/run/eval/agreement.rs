@@ -106,11 +106,11 @@ pub(super) fn along_path(
     observe: &mut Observer<'_>,
     keep: &mut dyn FnMut(usize, RgbImage) -> Result<(), RunError>,
 ) -> Result<PathScore, RunError> {
-    let scene = &subject.scene;
-    let train = &scene.split.train;
-    let cameras: Vec<Camera> = train.iter().map(|&i| small(&scene.photos[i].1)).collect();
+    let dataset = &subject.dataset;
+    let train = &dataset.split.train;
+    let cameras: Vec<Camera> = train.iter().map(|&i| small(&dataset.cameras[i])).collect();
     let cameras: Vec<&Camera> = cameras.iter().collect();
-    let path = camera_path(&cameras, scene.extent, options.frames);
+    let path = camera_path(&cameras, dataset.extent, options.frames);
     let mut sums: Vec<(usize, Sums)> = DELTAS.map(|delta| (delta, Sums::default())).into();
     let mut recent: VecDeque<Frame> = VecDeque::new();
     for (index, camera) in path.iter().enumerate() {
@@ -180,24 +180,30 @@ pub(super) fn between_views(
     subject: &Subject,
     observe: &mut Observer<'_>,
 ) -> Result<BetweenScore, RunError> {
-    let views = &subject.scene.photos;
+    let dataset = &subject.dataset;
     let taught = painter.teacher().is_some();
-    let candidates: Vec<usize> = (0..views.len())
+    let candidates: Vec<usize> = (0..dataset.cameras.len())
         .filter(|&i| !taught || painter.answers(i))
         .collect();
-    let in_color = views.iter().all(|(photo, _)| photo.rgb.is_some());
     let count = candidates.len().min(MAX_VIEWS);
+    let chosen: Vec<usize> = (0..count)
+        .map(|k| candidates[k * candidates.len() / count])
+        .collect();
+    let mut in_color = true;
+    for &view in &chosen {
+        in_color = in_color && dataset.color(view)?.rgb.is_some();
+    }
     let mut frames = Vec::with_capacity(count);
-    for k in 0..count {
-        let i = candidates[k * candidates.len() / count];
-        let name = &subject.scene.capture.views[i].name;
+    for (k, &i) in chosen.iter().enumerate() {
+        let name = &dataset.capture.views[i].name;
         observe(Event::Progress {
             stage: Stage::Pairs,
             done: k,
             total: count,
             message: name.clone(),
         });
-        let camera = small(&views[i].1);
+        let camera = small(&dataset.cameras[i]);
+        let photo = dataset.color(i)?;
         let mut drawing = painter.draw(&camera, name)?;
         if let Some(answer) = painter.answer(i)? {
             let answer = answer.resized(camera.width, camera.height);
@@ -205,20 +211,19 @@ pub(super) fn between_views(
             drawing.layers.push((Method::Teacher, layer));
         }
         if in_color {
-            let photo = &views[i].0;
             let truth = AbImage {
                 width: photo.width,
                 height: photo.height,
-                ab: ab_of(&rgb_pixels(photo)),
+                ab: ab_of(&rgb_pixels(&photo)),
             };
             let truth = to_picture(&truth.resized(camera.width, camera.height));
             drawing.layers.push((Method::Photo, Layer::Ab(truth)));
         }
         let mut depth = painter.depth(&camera)?;
-        hide_masked(&views[i].0, &camera, &mut depth);
+        hide_masked(&photo, &camera, &mut depth);
         frames.push(Frame::of(drawing, depth));
     }
-    let points = &subject.scene.capture.points;
+    let points = &dataset.capture.points;
     let every = points.len().div_ceil(MAX_POINTS);
     let mut misses = Vec::new();
     let mut sums = Sums::default();

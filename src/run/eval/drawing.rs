@@ -53,14 +53,14 @@ impl<'a> Painter<'a> {
         rgb: &[(Method, &ShField)],
         teacher: Option<&'a mut EvalTeacher>,
     ) -> Result<Self, RunError> {
-        let scene = &subject.scene;
+        let dataset = &subject.dataset;
         let mut fields = vec![&subject.luma.sh];
         fields.extend(rgb.iter().map(|(_, field)| field));
         fields.extend(&subject.chroma);
         Ok(Self {
             raster: raster.clone(),
             subject,
-            renderer: renderer(scene, raster, &subject.luma, &fields)?,
+            renderer: renderer(dataset, raster, &subject.luma, &fields)?,
             has_native: subject.chroma.is_some(),
             rgb: rgb.iter().map(|(method, _)| *method).collect(),
             teacher,
@@ -97,7 +97,7 @@ impl<'a> Painter<'a> {
         let steps = DepthSteps::new(&self.subject.luma, camera);
         let fields: Vec<&ShField> = steps.fields.iter().collect();
         let luma = &self.subject.luma;
-        let renderer = renderer(&self.subject.scene, &self.raster, luma, &fields)?;
+        let renderer = renderer(&self.subject.dataset, &self.raster, luma, &fields)?;
         // Zeros and ones can be drawn.
         let mut renderer = renderer.with_one_list();
         let pixels = camera.width as usize * camera.height as usize;

@@ -97,27 +97,31 @@ pub fn eval(
 
     let mut views = Vec::new();
     let mut rows = Vec::new();
-    let (measured_on, measured) = subject.scene.measured();
-    for (done, &i) in measured.iter().enumerate() {
-        let name = &subject.scene.capture.views[i].name;
+    let dataset = &subject.dataset;
+    let (measured_on, measured) = dataset.measured();
+    let mut done = 0;
+    dataset.visit_colors(measured, |i, photo| {
+        let name = &dataset.capture.views[i].name;
         observe(Event::Progress {
             stage: Stage::Measure,
             done,
             total: measured.len(),
             message: name.clone(),
         });
-        let yardstick = subject.yardstick(i);
+        done += 1;
+        let yardstick = subject.yardstick(i, &photo);
         if !yardstick.measures() {
-            continue;
+            return Ok(());
         }
-        let drawing = painter.draw(&subject.scene.photos[i].1, name)?;
+        let drawing = painter.draw(&dataset.cameras[i], name)?;
         let answer = painter.answer(i)?;
         let scored = Scored::of(name, yardstick, &drawing, answer.as_ref(), lpips.as_mut())?;
         if rows.len() < MAX_ROWS {
             rows.push(page_row(made.path(), rows.len(), &scored)?);
         }
         views.push(scored);
-    }
+        Ok::<_, RunError>(())
+    })?;
     let mut strip = Vec::new();
     let every = options.frames.div_ceil(STRIP_FRAMES);
     let path = agreement::along_path(

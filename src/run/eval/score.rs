@@ -220,15 +220,18 @@ pub(super) fn teacher_colorfulness(
     subject: &Subject,
 ) -> Result<Option<f64>, RunError> {
     let mut values = Vec::new();
-    for (i, (photo, _)) in subject.scene.photos.iter().enumerate() {
-        let Some(answer) = painter.answer(i)? else {
-            continue;
-        };
-        let layer = Layer::Ab(to_picture(&answer));
-        let yardstick = subject.yardstick(i);
-        let measures = yardstick.measures();
-        values.push(measures.then(|| yardstick.colorfulness(&layer.rgb(&gray_picture(photo)))));
-    }
+    let views: Vec<usize> = (0..subject.dataset.cameras.len())
+        .filter(|&view| painter.answers(view))
+        .collect();
+    subject.dataset.visit(&views, |view, photo| {
+        if let Some(answer) = painter.answer(view)? {
+            let layer = Layer::Ab(to_picture(&answer));
+            let yardstick = subject.yardstick(view, photo);
+            let measures = yardstick.measures();
+            values.push(measures.then(|| yardstick.colorfulness(&layer.rgb(&gray_picture(photo)))));
+        }
+        Ok::<_, RunError>(())
+    })?;
     Ok(mean(values.into_iter()))
 }
 

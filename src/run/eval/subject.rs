@@ -4,11 +4,11 @@ use std::path::PathBuf;
 
 use super::EvalOptions;
 use crate::{
-    capture::Exposure,
+    capture::{Dataset, Exposure, Photo},
     report::Report,
     run::{
         Event, Observer, RunError, RunFolder,
-        scene::{Scene, read_splats},
+        scene::{open, read_splats},
         yardstick::{Yardstick, exposures},
     },
     splats::{ShField, Splats},
@@ -18,7 +18,7 @@ use crate::{
 pub(super) struct Subject {
     pub folder: RunFolder,
     pub report: Report,
-    pub scene: Scene,
+    pub dataset: Dataset,
     /// How bright each view's photo shows the scene.
     pub exposures: Vec<Exposure>,
     /// Geometry and luma.
@@ -62,26 +62,29 @@ impl Subject {
             Some(path) => path.clone(),
             None => PathBuf::from(&report.capture.path),
         };
-        let scene = Scene::load(&colmap, &report.capture.load, observe)?;
+        let dataset = open(&colmap, &report.capture.load, observe)?;
         Ok(Self {
-            exposures: exposures(&scene, &report.luma.exposures),
+            exposures: exposures(&dataset, &report.luma.exposures),
             folder,
             report,
-            scene,
+            dataset,
             luma,
             chroma,
             exported: exported.sh,
         })
     }
 
-    /// A view's photo.
-    pub fn yardstick(&self, view: usize) -> Yardstick<'_> {
-        Yardstick::of(&self.scene, &self.exposures, view)
+    /// The photo of a view, to hold pictures of it against.
+    pub fn yardstick<'a>(&self, view: usize, photo: &'a Photo) -> Yardstick<'a> {
+        Yardstick {
+            photo,
+            exposure: self.exposures[view],
+        }
     }
 
     /// The name of the photos' folder.
     pub fn name(&self) -> String {
-        let root = &self.scene.capture.root;
+        let root = &self.dataset.capture.root;
         let name = root.canonicalize().ok();
         let name = name.as_ref().unwrap_or(root).file_name();
         name.map_or("scene".into(), |n| n.to_string_lossy())

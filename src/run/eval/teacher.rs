@@ -56,14 +56,15 @@ impl EvalTeacher {
                     .to_owned(),
             ));
         }
-        let scene = &subject.scene;
+        let dataset = &subject.dataset;
         let (mut answers, mut of_view) = (Targets::new(1), Vec::new());
-        let views = scene.photos.iter().zip(&scene.capture.views);
-        for (done, ((photo, camera), view)) in views.enumerate() {
+        let views: Vec<usize> = (0..dataset.cameras.len()).collect();
+        dataset.visit(&views, |index, photo| {
+            let view = &dataset.capture.views[index];
             observe(Event::Progress {
                 stage: Stage::Teacher,
-                done,
-                total: scene.photos.len(),
+                done: index,
+                total: views.len(),
                 message: view.name.clone(),
             });
             let gray = GrayImage {
@@ -71,14 +72,16 @@ impl EvalTeacher {
                 height: photo.height,
                 pixels: &photo.gray,
             };
-            let answer = teacher.colorize(Asked::view(view, camera), gray, None)?;
+            let asked = Asked::view(view, &dataset.cameras[index]);
+            let answer = teacher.colorize(asked, gray, None)?;
             let kept = answer.map(|answer| answers.push_ab(&answer, None));
             of_view.push(kept.transpose()?);
-        }
+            Ok::<_, RunError>(())
+        })?;
         if answers.is_empty() {
             return Err(RunError::TeacherCoversNothing {
                 teacher: path.to_owned(),
-                example: scene.capture.views[0].name.clone(),
+                example: dataset.capture.views[0].name.clone(),
             });
         }
         let frames = if baselines && teacher.is_network() {
@@ -122,7 +125,7 @@ impl EvalTeacher {
         memory_limit: Option<u64>,
         observe: &mut Observer<'_>,
     ) -> Result<ShField, RunError> {
-        let scene = &subject.scene;
+        let dataset = &subject.dataset;
         let (done, total) = (0, 1);
         let message = "RGB splats to compare with".to_owned();
         observe(Event::Progress {
@@ -142,25 +145,25 @@ impl EvalTeacher {
         };
         let mut targets = Targets::new(settings.target_scales());
         let (mut tasks, mut cameras) = (Vec::new(), Vec::new());
-        for &i in &scene.split.train {
-            let (photo, camera) = &scene.photos[i];
-            let Some(answer) = self.answer(i)? else {
-                continue;
+        dataset.visit(&dataset.split.train, |view, photo| {
+            let Some(answer) = self.answer(view)? else {
+                return Ok(());
             };
             let colored = native_rgb(&gray_picture(photo), &to_picture(&answer));
-            let wanted = subject.yardstick(i).unexposed(&colored);
+            let wanted = subject.yardstick(view, photo).unexposed(&colored);
             let weights = masked_weights(None, photo);
             let size = [photo.width, photo.height];
             tasks.push(Task {
                 view: cameras.len(),
                 target: targets.push_rgb(size, &wanted, weights.as_deref())?,
             });
-            cameras.push(camera.clone());
-        }
+            cameras.push(dataset.cameras[view].clone());
+            Ok::<_, RunError>(())
+        })?;
         if tasks.is_empty() {
             return Err(RunError::TeacherCoversNothing {
                 teacher: self.path.clone(),
-                example: scene.capture.views[scene.split.train[0]].name.clone(),
+                example: dataset.capture.views[dataset.split.train[0]].name.clone(),
             });
         }
         let room = Room {
@@ -168,7 +171,7 @@ impl EvalTeacher {
             sh_degree: sh::MAX_DEGREE,
             weighted: targets.weighted(),
         };
-        let (luma, extent, scales) = (&subject.luma, scene.extent, targets.scales());
+        let (luma, extent, scales) = (&subject.luma, dataset.extent, targets.scales());
         let frozen = FrozenViews::new(raster, luma, extent, &cameras, scales, room)?;
         Ok(fit_rgb(&frozen, &settings, &targets, tasks)?)
     }
