@@ -236,7 +236,13 @@ const KNOBS: &[Knob] = &[
         values: |around| around.of_color(|_| owned(&["adam"])),
         turn: Turn::Option("--solver"),
         time: |_, _| 1.0,
-        conflicts: &["rounds", "coarse-rounds", "until", "correct-views"],
+        conflicts: &[
+            "rounds",
+            "coarse-rounds",
+            "until",
+            "scales",
+            "correct-views",
+        ],
     },
     Knob {
         name: YARDSTICK_OF_COLOR,
@@ -247,7 +253,7 @@ const KNOBS: &[Knob] = &[
             let rounds = around.color.as_ref().map_or(1, |color| color.rounds);
             (1.0 + number(value) / rounds.max(1) as f64) / 2.0
         },
-        conflicts: &["solver", "until"],
+        conflicts: &["solver", "until", "scales"],
     },
     Knob {
         name: "coarse-rounds",
@@ -260,7 +266,7 @@ const KNOBS: &[Knob] = &[
             let rounds = around.color.as_ref().map_or(1, |color| color.coarse_rounds);
             (1.0 + number(value) / rounds.max(1) as f64) / 2.0
         },
-        conflicts: &["solver", "until"],
+        conflicts: &["solver", "until", "scales"],
     },
     Knob {
         name: "until",
@@ -323,7 +329,7 @@ const KNOBS: &[Knob] = &[
         },
         turn: Turn::Option("--correct-views"),
         time: |_, _| 1.0,
-        conflicts: &["solver", "until"],
+        conflicts: &["solver", "until", "scales"],
     },
 ];
 
@@ -431,15 +437,22 @@ fn turned(settings: &[Setting]) -> impl Iterator<Item = (&'static Knob, &str)> {
     })
 }
 
-/// The options that settings stand for.
+/// The options that settings stand for, each once.
 pub(super) fn options(settings: &[Setting]) -> Vec<Given> {
-    turned(settings)
-        .flat_map(|(knob, value)| match &knob.turn {
+    let mut options = Vec::new();
+    for (knob, value) in turned(settings) {
+        let given = match &knob.turn {
             Turn::Luma(_) => Vec::new(),
             Turn::Option(option) => vec![(*option, Some(value.to_owned()))],
             Turn::Options(of) => of(value),
-        })
-        .collect()
+        };
+        for option in given {
+            if !options.contains(&option) {
+                options.push(option);
+            }
+        }
+    }
+    options
 }
 
 /// Changes the settings of luma as settings of knobs say.
