@@ -274,7 +274,7 @@ impl<'a> IrlsSolver<'a> {
     /// Draws every view for its loss, and with `adjoint` finds the gradient and the sums
     /// of the corrections.
     fn draw(&mut self, round: &Round, adjoint: bool) -> Result<(), ChromaError> {
-        self.passes.clear();
+        self.passes.clear(adjoint);
         let judging = Judging {
             agreement: 0.0,
             robust: round.robust,

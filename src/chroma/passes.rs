@@ -289,12 +289,15 @@ impl<'a> Passes<'a> {
         }
     }
 
-    /// Forgets gradient, curvature and losses.
-    pub fn clear(&self) {
+    /// Forgets losses and, with `sums`, gradient and curvature, which is asked for after the
+    /// last pass ([`IrlsSolver::seen`](super::IrlsSolver::seen)).
+    pub fn clear(&self, sums: bool) {
         let mut recorder = Recorder::new(&self.frozen.raster.gpu);
         recorder.clear(self.log.losses.raw());
-        recorder.clear(self.gradient.raw());
-        recorder.clear(self.diagonal.raw());
+        if sums {
+            recorder.clear(self.gradient.raw());
+            recorder.clear(self.diagonal.raw());
+        }
         recorder.submit();
     }
 

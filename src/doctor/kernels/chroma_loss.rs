@@ -295,7 +295,7 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
         ),
         value(
             "value, weighed, corrected, declining",
-            1.40e-7,
+            6.61e-7,
             &weighed_values,
         ),
         gradient(
@@ -310,7 +310,7 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
             2.62e-6,
             &weighed_curvatures,
         ),
-        value("value, a and b together", 7.92e-8, &joint_values),
+        value("value, a and b together", 1.12e-7, &joint_values),
         gradient(
             "gradient × pixels, a and b together",
             2.17e-7,
@@ -323,10 +323,10 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
             1.86e-6,
             &joint_curvatures,
         ),
-        value("value, all terms", 6.70e-8, &all_values),
+        value("value, all terms", 8.48e-8, &all_values),
         gradient(
             "gradient × pixels, all terms",
-            7.90e-8,
+            8.84e-8,
             3.80e-6,
             &all_gradients,
         ),
