@@ -199,6 +199,13 @@ impl Dataset {
         self.decoded.load(Ordering::Relaxed)
     }
 
+    /// Empties the cache: for whoever needs the room more than the photos.
+    pub fn release(&self) {
+        let mut cache = self.cache();
+        let most = cache.most;
+        *cache = Cache::of(most);
+    }
+
     /// Bytes that the cache holds.
     pub fn cached_bytes(&self) -> usize {
         self.cache().bytes
@@ -312,6 +319,8 @@ mod tests {
         assert_eq!(dataset.decoded(), before);
         assert_eq!(dataset.photo(0).expect("photo"), first);
         assert_eq!(dataset.decoded(), before + 1);
+        dataset.release();
+        assert_eq!(dataset.cached_bytes(), 0);
         // Nothing is kept, and all is there.
         let nothing = demo().caching(0);
         assert_eq!(nothing.photo(0).expect("photo"), first);

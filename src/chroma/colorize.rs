@@ -117,6 +117,8 @@ impl Distill<'_> {
         observe: &mut ColorizeObserver<'_>,
     ) -> Result<Colored, ChromaError> {
         let begun = Instant::now();
+        // No photo is looked at any more.
+        self.dataset.release();
         let (dataset, lesson, gpu) = (self.dataset, self.lesson, &self.raster.gpu);
         let train = &dataset.split.train;
         let cameras: Vec<Camera> = train.iter().map(|&i| dataset.cameras[i].clone()).collect();

@@ -1,5 +1,7 @@
 //! What can be turned, and how far around the preset.
 
+use std::collections::HashSet;
+
 use super::{
     report::{PointStage, Setting},
     space::Value,
@@ -439,20 +441,13 @@ fn turned(settings: &[Setting]) -> impl Iterator<Item = (&'static Knob, &str)> {
 
 /// The options that settings stand for, each once.
 pub(super) fn options(settings: &[Setting]) -> Vec<Given> {
-    let mut options = Vec::new();
-    for (knob, value) in turned(settings) {
-        let given = match &knob.turn {
-            Turn::Luma(_) => Vec::new(),
-            Turn::Option(option) => vec![(*option, Some(value.to_owned()))],
-            Turn::Options(of) => of(value),
-        };
-        for option in given {
-            if !options.contains(&option) {
-                options.push(option);
-            }
-        }
-    }
-    options
+    let given = turned(settings).flat_map(|(knob, value)| match &knob.turn {
+        Turn::Luma(_) => Vec::new(),
+        Turn::Option(option) => vec![(*option, Some(value.to_owned()))],
+        Turn::Options(of) => of(value),
+    });
+    let mut seen = HashSet::new();
+    given.filter(|option| seen.insert(option.clone())).collect()
 }
 
 /// Changes the settings of luma as settings of knobs say.
@@ -467,18 +462,20 @@ pub(super) fn turn(luma: &mut LumaSettings, settings: &[Setting]) {
 /// The preset that is a setting, if one is.
 pub(super) fn preset(settings: &[Setting]) -> Option<Preset> {
     let (_, value) = turned(settings).find(|(knob, _)| knob.name == PRESET)?;
-    let mut presets = Preset::ALL.into_iter();
-    presets.find(|preset| preset.name() == value)
+    Preset::ALL
+        .into_iter()
+        .find(|preset| preset.name() == value)
 }
 
 /// These multiples of a count, rounded, without the count itself and without repeats.
 fn scaled(count: usize, factors: &[f64]) -> Vec<String> {
     let mut values: Vec<String> = Vec::new();
     for factor in factors {
-        let value = ((count as f64 * factor).round() as usize).max(1);
-        let text = value.to_string();
-        if value != count && !values.contains(&text) {
-            values.push(text);
+        let value = ((count as f64 * factor).round() as usize)
+            .max(1)
+            .to_string();
+        if value != count.to_string() && !values.contains(&value) {
+            values.push(value);
         }
     }
     values
@@ -489,9 +486,10 @@ fn owned(values: &[&str]) -> Vec<String> {
 }
 
 fn others(values: &[&str], base: &str) -> Vec<String> {
-    let mut values = owned(values);
-    values.retain(|value| value != base);
-    values
+    owned(values)
+        .into_iter()
+        .filter(|value| value != base)
+        .collect()
 }
 
 /// Changes one of the numerics; the values of this table are such.

@@ -165,7 +165,7 @@ fn broken_losses_and_steps_are_noticed() {
             "lbfgs",
             "lbfgs_ridge",
             "unknowns[k] - origin[k]",
-            "unknowns[k]",
+            "unknowns[k] + origin[k]",
         ),
         (
             "adjoint",

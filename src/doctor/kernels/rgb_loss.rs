@@ -132,7 +132,7 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
         let value = allowed.relative(5.19e-7, 0.0);
         rows.push(Row::elementwise("rgb_loss", what[0], value, &values));
         for (what, samples) in [(what[1], &gradients), (what[2], &curvatures)] {
-            let bounds = allowed.gradient(4.67e-7, allowed.relative(1.71e-6, 100.0));
+            let bounds = allowed.gradient(1.32e-6, allowed.relative(1.71e-6, 100.0));
             rows.push(Row::gradient("rgb_loss", what, bounds, samples));
         }
     }
