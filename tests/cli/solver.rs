@@ -62,23 +62,15 @@ fn a_memory_limit_changes_no_byte() {
     let place = place_with_run();
     let teacher = onnx("ddcolor_tiny.onnx");
     let with = |rest: &[&'static str]| [&QUICK[..], &[&teacher], rest].concat();
-    let report = place.json(&with(&["-o", "all.ply"]));
-    let all = report["chroma"]["estimated_device_memory"]
-        .as_u64()
-        .unwrap();
-    let few = ((all - 1) >> 20).to_string();
-    let few: &'static str = few.leak();
-    let report = place.json(&with(&["--memory-limit", few, "-o", "few.ply"]));
-    let pinned = report["chroma"]["pinned_views"].as_u64();
-    assert!(pinned < Some(8), "{pinned:?}");
-    assert!(place.read("all.ply") == place.read("few.ply"));
-    let done = place.run(&with(&["--memory-limit", "1"]));
-    assert_eq!(done.code, Some(1));
+    place.succeed(&with(&["-o", "all.ply"]));
+    // Budgets that hold some views or one are tests/kernels': this scene is too small for them.
+    let report = place.json(&with(&["--memory-limit", "1", "-o", "few.ply"]));
+    let estimated = report["chroma"]["estimated_device_memory"].as_u64();
     assert!(
-        done.stderr.contains("raise --memory-limit"),
-        "{}",
-        done.stderr
+        estimated.is_some_and(|bytes| bytes <= 1 << 20),
+        "{estimated:?}"
     );
+    assert!(place.read("all.ply") == place.read("few.ply"));
 }
 
 #[test]
