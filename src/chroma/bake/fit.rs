@@ -17,7 +17,7 @@ const BAKE_VIEWS: usize = 16;
 
 /// Rounds of the bake at half the size, and at full size; more make views worse that are
 /// not fitted to (docs/decisions.md).
-const BAKE_ROUNDS: [usize; 2] = [8, 10];
+const BAKE_ROUNDS: [usize; 2] = [6, 6];
 
 /// Fits RGB harmonics, up to the degree of `settings`, to the colored pictures of `tasks`:
 /// what training RGB splats on a teacher's pictures would give on this geometry.
