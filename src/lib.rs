@@ -3,8 +3,8 @@
 //! Imports go down only:
 //!
 //! ```text
-//! cli → tradeoff → run → report, doctor → luma, chroma → effects, measure → raster → capture, splats
-//! → gpu, color, beside, oracle, compare
+//! cli → tradeoff → run → eval → report, doctor → luma, chroma → effects, measure → raster
+//! → capture, splats → gpu, color, beside, npy, oracle, compare
 //! ```
 //!
 //! [`doctor`] compares the kernels of [`raster`], [`luma`] and [`chroma`] with the [`oracle`],
@@ -53,9 +53,11 @@ pub mod color;
 pub mod compare;
 pub mod doctor;
 pub mod effects;
+pub mod eval;
 pub mod gpu;
 pub mod luma;
 pub mod measure;
+mod npy;
 pub mod oracle;
 pub mod raster;
 pub mod report;

@@ -35,6 +35,21 @@ impl Photo {
     pub fn counts(&self, pixel: usize) -> bool {
         self.mask.as_ref().is_none_or(|mask| mask[pixel] >= 128)
     }
+
+    /// Gray in [0, 1], `[height · width]`.
+    pub fn gray_values(&self) -> Vec<f32> {
+        self.gray.iter().map(|&v| f32::from(v) / 255.0).collect()
+    }
+
+    /// RGB in [0, 1], `[height · width]`; gray where the photo has no colors.
+    pub fn rgb_values(&self) -> Vec<[f32; 3]> {
+        match &self.rgb {
+            Some(rgb) => (rgb.iter())
+                .map(|color| color.map(|v| f32::from(v) / 255.0))
+                .collect(),
+            None => self.gray_values().into_iter().map(|v| [v; 3]).collect(),
+        }
+    }
 }
 
 /// A decoded file, encoded for display.

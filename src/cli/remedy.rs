@@ -3,6 +3,7 @@
 use crate::{
     capture::CaptureError,
     chroma::{ChromaError, teacher::TeacherError},
+    eval::EvalError,
     gpu::GpuError,
     run::RunError,
     tradeoff::TradeoffError,
@@ -17,6 +18,12 @@ pub(super) fn of_run(error: &RunError) -> String {
         RunError::Chroma(ChromaError::OverLimit { .. }) => format!(
             "{error}: raise --memory-limit, or train with fewer Gaussians or smaller photos"
         ),
+        RunError::Eval(EvalError::NoFlow { .. }) => {
+            format!("{error}: --flow needs one file for each pair of frames and direction")
+        }
+        RunError::Eval(EvalError::Flow { .. }) => {
+            format!("{error}: make it from the frames that `eval` writes, with as many --frames")
+        }
         RunError::NoRun => {
             format!("{error}: train one with `gs-chroma fit COLMAP_DIR`, or name a run folder")
         }

@@ -33,6 +33,9 @@ pub enum GpuError {
         /// What the driver said.
         reason: String,
     },
+    /// A field that no kernel shades.
+    #[error("no color has {0} channels: gray has 1, a/b 2, RGB 3")]
+    NoColor(usize),
     /// A buffer is larger than the adapter can bind.
     #[error("buffer `{label}` needs {needed} bytes but the adapter binds at most {limit}")]
     TooLarge {

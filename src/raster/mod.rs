@@ -55,16 +55,13 @@ pub enum ColorKind {
 }
 
 impl ColorKind {
-    /// The kind with so many channels.
-    ///
-    /// # Panics
-    /// For other counts than 1, 2 and 3: [`crate::splats::ShField`] has no others.
-    pub fn of_channels(channels: usize) -> Self {
+    /// The kind with so many channels, if there is one.
+    pub fn of_channels(channels: usize) -> Option<Self> {
         match channels {
-            1 => Self::Luma,
-            2 => Self::Chroma,
-            3 => Self::Rgb,
-            other => panic!("no colour has {other} channels"),
+            1 => Some(Self::Luma),
+            2 => Some(Self::Chroma),
+            3 => Some(Self::Rgb),
+            _ => None,
         }
     }
 

@@ -2,10 +2,11 @@
 
 use std::sync::Arc;
 
-use super::{Field, Geometry, Layer, Lists, Raster, ViewUniform};
+use super::{Field, Geometry, Layer, Lists, Raster, ViewUniform, constants::NEAR_SHARE};
 use crate::{
     capture::Camera,
     gpu::{GpuError, Recorder},
+    splats::{ShField, Splats},
 };
 
 /// Tile-list entries to begin with, for each Gaussian; grows on demand.
@@ -37,7 +38,36 @@ pub struct Renderer {
     max_tiles: usize,
 }
 
+impl Picture {
+    /// The picture as viewers show it, sRGB in [0, 1], `[height, width]`: of one channel
+    /// gray, of three RGB.
+    pub fn shown(&self) -> Vec<[f32; 3]> {
+        let pixels = self.pixels.chunks_exact(self.channels.max(1));
+        pixels
+            .map(|pixel| [0, 1, 2].map(|c| pixel[c.min(pixel.len() - 1)].clamp(0.0, 1.0)))
+            .collect()
+    }
+}
+
 impl Renderer {
+    /// A renderer of `fields` over the geometry of `splats` that shows nothing nearer to a
+    /// camera than [`NEAR_SHARE`] of the capture's `extent`, in world units.
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`].
+    pub fn of(
+        raster: &Arc<Raster>,
+        splats: &Splats,
+        fields: &[&ShField],
+        extent: f64,
+    ) -> Result<Self, GpuError> {
+        let gpu = &raster.gpu;
+        let fields = fields.iter().map(|field| Field::upload(gpu, field));
+        let fields = fields.collect::<Result<_, _>>()?;
+        let geometry = Geometry::upload(gpu, splats)?;
+        Self::new(raster.clone(), geometry, fields, NEAR_SHARE * extent)
+    }
+
     /// A renderer of `fields` over `geometry` that shows nothing nearer to a
     /// camera than `near` world units.
     ///

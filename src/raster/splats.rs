@@ -81,8 +81,10 @@ impl Field {
     /// Uploads a field.
     ///
     /// # Errors
-    /// [`GpuError::TooLarge`].
+    /// [`GpuError::TooLarge`], [`GpuError::NoColor`].
     pub fn upload(gpu: &Gpu, field: &ShField) -> Result<Self, GpuError> {
+        let kind = ColorKind::of_channels(field.channels);
+        let kind = kind.ok_or(GpuError::NoColor(field.channels))?;
         let stride = sh::coefficient_count(field.degree) * field.channels;
         let n = field.coefficients.len() / stride;
         let mut planes = vec![0.0; field.coefficients.len()];
@@ -92,7 +94,7 @@ impl Field {
             }
         }
         Ok(Self {
-            kind: ColorKind::of_channels(field.channels),
+            kind,
             degree: field.degree,
             planes: Buffer::from_slice(gpu, "spherical harmonics", &planes)?,
         })

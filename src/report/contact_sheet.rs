@@ -42,12 +42,10 @@ pub fn contact_sheet(rows: &[Row]) -> RgbImage {
 /// # Panics
 /// When there are not `width · height` pixels.
 pub fn to_image(width: u32, height: u32, pixels: &[[f32; 3]]) -> RgbImage {
-    let bytes = pixels
-        .iter()
-        .flatten()
-        .map(|v| (v.clamp(0.0, 1.0) * 255.0).round() as u8)
-        .collect();
-    RgbImage::from_raw(width, height, bytes).expect("as many pixels as the size says")
+    RgbImage::from_fn(width, height, |x, y| {
+        let pixel = pixels[y as usize * width as usize + x as usize];
+        image::Rgb(pixel.map(|v| (v.clamp(0.0, 1.0) * 255.0).round() as u8))
+    })
 }
 
 #[cfg(test)]

@@ -9,18 +9,16 @@ use std::{
 };
 
 use super::{
-    Event, Observer, Preset, RunError, RunFolder, Stage,
-    color_quality::Measured,
-    files,
+    Event, Observer, Preset, RunError, RunFolder, Stage, files,
     fit::{capture_report, comments, open_gpu},
     scene::{open, read_splats, tell_not_finite},
     teach::{TeachOptions, Teachers},
-    yardstick,
 };
 use crate::{
     capture::LoadOptions,
     chroma::{ChosenDegree, ChromaSettings, ColorizeEvent, Degree, Distill, teacher::Upsample},
     effects::{Overrules, table},
+    eval::{Measured, exposures},
     gpu::Gpu,
     raster::Raster,
     report::{
@@ -153,7 +151,7 @@ pub fn colorize(
         .transpose()?;
 
     let begun = Instant::now();
-    let exposures = yardstick::exposures(&dataset, &report.luma.exposures);
+    let exposures = exposures(&dataset, &report.luma.exposures);
     let measured = Measured::of(
         &raster,
         &dataset,

@@ -136,9 +136,8 @@ impl RunFolder {
     /// Writes the native chroma; what was measured of an earlier one goes.
     pub(super) fn write_chroma(&self, chroma: &ShField) -> Result<(), RunError> {
         let path = self.chroma();
-        let bytes = npy::encode(chroma).map_err(files::at(&path))?;
         self.forget_evaluation()?;
-        files::write(&path, &bytes)
+        files::write(&path, &npy::encode(chroma))
     }
 
     /// Removes what `eval` wrote.

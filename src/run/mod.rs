@@ -1,6 +1,5 @@
 //! Whole runs: what a command does from its options to its files.
 
-mod color_quality;
 mod colorize;
 mod eval;
 pub(crate) mod files;
@@ -12,7 +11,6 @@ mod preset;
 mod render;
 mod scene;
 mod teach;
-mod yardstick;
 
 use std::{fmt, path::PathBuf};
 
@@ -30,6 +28,7 @@ pub use crate::luma::Preset;
 use crate::{
     capture::CaptureError,
     chroma::{ChromaError, teacher::TeacherError},
+    eval::EvalError,
     gpu::GpuError,
     luma::LumaError,
     splats::ply::PlyError,
@@ -64,6 +63,9 @@ pub enum RunError {
     /// Training.
     #[error(transparent)]
     Luma(LumaError),
+    /// Measuring.
+    #[error(transparent)]
+    Eval(EvalError),
     /// There is no run to go on with.
     #[error("no run under runs/")]
     NoRun,
@@ -128,6 +130,18 @@ impl From<ChromaError> for RunError {
                 Err(error) => Self::Chroma(ChromaError::Colorizer(error)),
             },
             other => Self::Chroma(other),
+        }
+    }
+}
+
+impl From<EvalError> for RunError {
+    fn from(error: EvalError) -> Self {
+        match error {
+            EvalError::Capture(error) => error.into(),
+            EvalError::Gpu(error) => error.into(),
+            EvalError::Chroma(error) => error.into(),
+            EvalError::Teacher(error) => error.into(),
+            other => Self::Eval(other),
         }
     }
 }

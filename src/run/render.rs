@@ -7,14 +7,11 @@ use std::{
 
 use glam::DVec3;
 
-use super::{
-    Event, Observer, RunError, RunFolder, Stage, files,
-    scene::{gray_to_rgb, read_splats, shown_rgb},
-};
+use super::{Event, Observer, RunError, RunFolder, Stage, files, scene::read_splats};
 use crate::{
     capture::{Capture, LoadOptions, Loader, split},
     gpu::Gpu,
-    raster::{Field, Geometry, Raster, Renderer, constants::NEAR_SHARE},
+    raster::{Raster, Renderer},
     report::to_image,
 };
 
@@ -103,12 +100,7 @@ pub fn render(options: &RenderOptions, observe: &mut Observer<'_>) -> Result<usi
     files::make_folder(&options.output)?;
     let gpu = Gpu::open()?;
     let raster = Arc::new(Raster::with(&gpu, run.unwrap_or(drawn)));
-    let mut renderer = Renderer::new(
-        raster,
-        Geometry::upload(&gpu, &splats)?,
-        vec![Field::upload(&gpu, &splats.sh)?],
-        NEAR_SHARE * capture.extent(),
-    )?;
+    let mut renderer = Renderer::of(&raster, &splats, &[&splats.sh], capture.extent())?;
     for (done, &i) in chosen.iter().enumerate() {
         let view = &capture.views[i];
         observe(Event::Progress {
@@ -120,15 +112,14 @@ pub fn render(options: &RenderOptions, observe: &mut Observer<'_>) -> Result<usi
         // The photo decides the size, which the model's camera may miss by a pixel.
         let camera = loader.camera(view)?;
         let picture = renderer.render(&camera)?.remove(0);
-        let pixels = match picture.channels {
-            1 => gray_to_rgb(&picture.pixels),
-            _ => shown_rgb(&picture.pixels),
-        };
         let path = options.output.join(&view.name).with_extension("png");
         if let Some(folder) = path.parent() {
             files::make_folder(folder)?;
         }
-        files::write_png(&path, &to_image(picture.width, picture.height, &pixels))?;
+        files::write_png(
+            &path,
+            &to_image(picture.width, picture.height, &picture.shown()),
+        )?;
     }
     Ok(chosen.len())
 }

@@ -1,18 +1,16 @@
-//! What several commands need of a capture: its photos at working size, a
-//! renderer for its splats.
+//! What several commands need of a capture: its photos, and splats to go on from.
 
-use std::{path::Path, sync::Arc};
+use std::path::Path;
 
 use glam::DVec3;
 
 use super::{Event, Observer, RunError, Stage};
 use crate::{
-    capture::{CaptureError, Dataset, LoadOptions, Notice, Photo, Rejected},
+    capture::{CaptureError, Dataset, LoadOptions, Notice, Rejected},
     effects::{Evidence, Survey},
-    gpu::GpuError,
     luma::TrialProgress,
-    raster::{Field, Geometry, Raster, RasterOptions, Renderer, constants::NEAR_SHARE},
-    splats::{ShField, Splats, ply},
+    raster::RasterOptions,
+    splats::{Splats, ply},
 };
 
 /// Opens a COLMAP folder; nothing is decoded but what [`Dataset::open`] has to.
@@ -81,27 +79,6 @@ pub(super) fn tell_not_finite(dataset: &Dataset, observe: &mut Observer<'_>) {
     }
 }
 
-/// A renderer of several fields over the geometry of `splats`.
-pub(super) fn renderer(
-    dataset: &Dataset,
-    raster: &Arc<Raster>,
-    splats: &Splats,
-    fields: &[&ShField],
-) -> Result<Renderer, GpuError> {
-    let gpu = &raster.gpu;
-    let fields = fields
-        .iter()
-        .map(|field| Field::upload(gpu, field))
-        .collect::<Result<_, _>>()?;
-    let geometry = Geometry::upload(gpu, splats)?;
-    Renderer::new(
-        raster.clone(),
-        geometry,
-        fields,
-        NEAR_SHARE * dataset.extent,
-    )
-}
-
 /// Reads a splat file that has at least one Gaussian and subtracts `offset`, in
 /// world units, from its centres; also gives how the file wants to be drawn.
 pub(super) fn read_splats(
@@ -130,38 +107,4 @@ pub(super) fn read_splats(
         antialiased: read.antialiased,
     };
     Ok((splats, options))
-}
-
-/// Whether a pixel counts at least half.
-pub(super) fn counts(photo: &Photo, pixel: usize) -> bool {
-    photo.counts(pixel)
-}
-
-/// Gray pixels as floats in [0, 1].
-pub(super) fn gray_pixels(photo: &Photo) -> Vec<f32> {
-    photo.gray.iter().map(|&v| f32::from(v) / 255.0).collect()
-}
-
-/// The photo as RGB in [0, 1], gray where it has no colours.
-pub(super) fn rgb_pixels(photo: &Photo) -> Vec<[f32; 3]> {
-    match &photo.rgb {
-        Some(rgb) => rgb
-            .iter()
-            .map(|c| c.map(|v| f32::from(v) / 255.0))
-            .collect(),
-        None => gray_pixels(photo).into_iter().map(|v| [v; 3]).collect(),
-    }
-}
-
-/// A one-channel picture as RGB.
-pub(super) fn gray_to_rgb(pixels: &[f32]) -> Vec<[f32; 3]> {
-    pixels.iter().map(|&v| [v.clamp(0.0, 1.0); 3]).collect()
-}
-
-/// A three-channel picture as RGB in [0, 1].
-pub(super) fn shown_rgb(pixels: &[f32]) -> Vec<[f32; 3]> {
-    pixels
-        .chunks_exact(3)
-        .map(|c| [c[0], c[1], c[2]].map(|v| v.clamp(0.0, 1.0)))
-        .collect()
 }

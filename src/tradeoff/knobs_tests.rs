@@ -1,7 +1,7 @@
 //! What is tried around a base.
 
 use super::*;
-use crate::luma::LumaSettings;
+use crate::{luma::LumaSettings, run::Work, tradeoff::around::ColorAround};
 
 fn around() -> Around {
     Around {

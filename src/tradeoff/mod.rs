@@ -1,5 +1,6 @@
 //! `tradeoff`: what quality costs in time, on the user's scene and device.
 
+mod around;
 mod child;
 mod knobs;
 mod pictures;
@@ -23,7 +24,7 @@ use crate::{
     gpu::Gpu,
     run::{Event, Observer, Overlay, Preset, RunError, RunFolder, Stage, Work, files},
 };
-use knobs::Around;
+use around::Around;
 use pictures::Album;
 use point::Bench;
 use report::{Measure, Phase, Point, csv, page};

@@ -6,7 +6,7 @@
 
 use super::report::{Measure, Phase, Point, PointStage, Setting};
 use super::{
-    knobs::{PRESET, YARDSTICK_OF_COLOR, YARDSTICK_OF_LUMA},
+    knobs::{BASELINE_OF_COLOR, BASELINE_OF_LUMA, PRESET},
     space::{Space, Task, Value, base_name, expected, find, name},
 };
 
@@ -91,7 +91,7 @@ fn halving(space: &Space, points: &[Point], fits: &dyn Fn(&Task) -> bool) -> Opt
         let at_rung = |settings: &[Setting]| -> Vec<Setting> {
             let mut settings = settings.to_vec();
             if iterations != space.iterations {
-                let knob = YARDSTICK_OF_LUMA.to_owned();
+                let knob = BASELINE_OF_LUMA.to_owned();
                 let value = iterations.to_string();
                 settings.push(Setting { knob, value });
             }
@@ -125,7 +125,7 @@ fn combinations(
     at_least: usize,
 ) -> Vec<Vec<Setting>> {
     let mut proven: Vec<(f64, &Value)> = (space.values.iter())
-        .filter(|value| value.stage == stage && ![yardstick(stage), PRESET].contains(&value.knob))
+        .filter(|value| value.stage == stage && ![baseline(stage), PRESET].contains(&value.knob))
         .filter_map(|value| {
             let point = find(points, &name(stage, &[value.setting()]))?;
             let gain = gain(points, point)?;
@@ -158,12 +158,12 @@ fn combinations(
 }
 
 /// How much better a point is than what the same seconds buy by turning the stage's
-/// yardstick alone, in dB of PSNR or in ΔE00.
+/// baseline alone, in dB of PSNR or in ΔE00.
 fn gain(points: &[Point], point: &Point) -> Option<f64> {
     let measure = decisive(point.stage);
     let mut curve: Vec<[f64; 2]> = (points.iter())
         .filter(|p| p.stage == point.stage)
-        .filter(|p| p.settings.iter().all(|s| s.knob == yardstick(p.stage)))
+        .filter(|p| p.settings.iter().all(|s| s.knob == baseline(p.stage)))
         .filter_map(|p| Some([p.seconds()?.ln(), p.merit(measure)?]))
         .collect();
     curve.sort_by(|a, b| a[0].total_cmp(&b[0]));
@@ -187,14 +187,14 @@ fn decisive(stage: PointStage) -> Measure {
     Measure::of(stage)[0]
 }
 
-fn yardstick(stage: PointStage) -> &'static str {
+fn baseline(stage: PointStage) -> &'static str {
     match stage {
-        PointStage::Luma => YARDSTICK_OF_LUMA,
-        PointStage::Color => YARDSTICK_OF_COLOR,
+        PointStage::Luma => BASELINE_OF_LUMA,
+        PointStage::Color => BASELINE_OF_COLOR,
     }
 }
 
-/// A value that lies so little below the yardstick's curve may still help others: below
+/// A value that lies so little below the baseline's curve may still help others: below
 /// what anybody sees, in dB and in ΔE00.
 fn near(stage: PointStage) -> f64 {
     match stage {

@@ -4,16 +4,17 @@ use std::{collections::BTreeSet, fs, path::Path};
 
 /// The folders and files right below `src`, from top to bottom. What stands on one floor
 /// does not know each other.
-const FLOORS: [&[&str]; 9] = [
+const FLOORS: [&[&str]; 10] = [
     &["cli"],
     &["tradeoff"],
     &["run"],
+    &["eval"],
     &["report", "doctor"],
     &["luma", "chroma"],
     &["effects", "measure"],
     &["raster"],
     &["capture", "splats"],
-    &["gpu", "color", "beside", "oracle", "compare"],
+    &["gpu", "color", "beside", "npy", "oracle", "compare"],
 ];
 
 fn floor(name: &str) -> Option<usize> {

@@ -68,11 +68,7 @@ impl ModelName {
     /// coefficient is out of the range in which its formula means a lens.
     pub fn lens(self, width: u32, height: u32, parameters: &[f64]) -> Result<Lens, String> {
         if parameters.len() != self.parameters {
-            return Err(format!(
-                "{} parameters do not make a {}",
-                parameters.len(),
-                self.name
-            ));
+            return Err(self.wrong_count(parameters));
         }
         if let Some(strange) = parameters.iter().find(|value| !value.is_finite()) {
             return Err(format!("the parameter {strange} is not finite"));
@@ -83,7 +79,7 @@ impl ModelName {
             (&[fx, fy], &[x, y, ref rest @ ..]) => (DVec2::new(fx, fy), DVec2::new(x, y), rest),
             // The sphere's width is a turn, its height half of one.
             (&[], &[w, h]) => (DVec2::new(w / TAU, h / PI), DVec2::new(w, h) / 2.0, &[][..]),
-            _ => unreachable!("every model has one of these shapes"),
+            _ => return Err(self.wrong_count(parameters)),
         };
         if focal.min_element() <= 0.0 {
             return Err(format!(
@@ -102,6 +98,14 @@ impl ModelName {
             projection,
             distortion,
         })
+    }
+
+    fn wrong_count(self, parameters: &[f64]) -> String {
+        format!(
+            "{} parameters do not make a {}",
+            parameters.len(),
+            self.name
+        )
     }
 
     /// What the parameters after the principal point mean.
@@ -158,7 +162,7 @@ impl ModelName {
                 ));
             }
             ("EUCM", &[alpha, beta]) => perspective(Distortion::EnhancedUnified { alpha, beta }),
-            _ => unreachable!("the number of parameters is checked"),
+            _ => return Err(self.wrong_count(coefficients)),
         };
         Ok(distortion)
     }

@@ -116,12 +116,13 @@ impl Ports {
     /// [`TeacherError::NoProfile`] where none does,
     /// [`TeacherError::SeveralProfiles`] where more than one might.
     pub fn choose(&self, path: &Path) -> Result<(Profile, Fit), TeacherError> {
-        let fit = |built_in: &'static BuiltIn| {
-            let profile = built_in.profile();
-            let fit = self.fit(&profile)?;
-            Some((built_in, profile, fit))
-        };
-        let mut fitting: Vec<_> = BUILT_IN.iter().filter_map(fit).collect();
+        let mut fitting = Vec::new();
+        for built_in in BUILT_IN {
+            let profile = built_in.profile()?;
+            if let Some(fit) = self.fit(&profile) {
+                fitting.push((built_in, profile, fit));
+            }
+        }
         // Sides tell more than names, which an exporter may have made up.
         keep_if_any(&mut fitting, |(kind, profile, fit)| {
             self.has_stride(fit, profile, kind.stride)
@@ -135,7 +136,7 @@ impl Ports {
             });
         }
         let chosen = fitting.pop().map(|(_, profile, fit)| (profile, fit));
-        chosen.ok_or_else(|| self.no_profile(path, BUILT_IN.iter().map(BuiltIn::profile)))
+        chosen.ok_or_else(|| self.no_profile(path, BUILT_IN.iter().flat_map(BuiltIn::profile)))
     }
 
     /// How the profile that was asked for fits.

@@ -300,9 +300,15 @@ pub(super) static BUILT_IN: &[BuiltIn] = &[
 ];
 
 impl BuiltIn {
-    pub fn profile(&self) -> Profile {
-        // A test reads them all.
-        Profile::parse(self.text).expect("built-in profiles are sound")
+    /// Its contract; a test reads them all.
+    ///
+    /// # Errors
+    /// [`TeacherError::BadManifest`].
+    pub fn profile(&self) -> Result<Profile, TeacherError> {
+        Profile::parse(self.text).map_err(|reason| TeacherError::BadManifest {
+            path: self.names[0].into(),
+            reason,
+        })
     }
 }
 
@@ -316,10 +322,9 @@ pub(super) fn named(name: &str) -> Result<Profile, TeacherError> {
         return Profile::read(path);
     }
     let is_it = |built_in: &&BuiltIn| built_in.names.iter().any(|n| n.eq_ignore_ascii_case(name));
-    let found = BUILT_IN.iter().find(is_it);
-    found
-        .map(BuiltIn::profile)
-        .ok_or_else(|| TeacherError::UnknownProfile {
+    match BUILT_IN.iter().find(is_it) {
+        Some(found) => found.profile(),
+        None => Err(TeacherError::UnknownProfile {
             name: name.to_owned(),
             known: BUILT_IN
                 .iter()
@@ -327,7 +332,8 @@ pub(super) fn named(name: &str) -> Result<Profile, TeacherError> {
                 .copied()
                 .collect::<Vec<_>>()
                 .join(", "),
-        })
+        }),
+    }
 }
 
 #[cfg(test)]
@@ -341,7 +347,7 @@ mod tests {
     #[test]
     fn built_in_profiles_are_sound_and_have_their_names() {
         for built_in in BUILT_IN {
-            let profile = built_in.profile();
+            let profile = built_in.profile().unwrap();
             for name in built_in.names {
                 assert_eq!(named(&name.to_uppercase()).unwrap(), profile);
             }

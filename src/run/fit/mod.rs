@@ -2,7 +2,6 @@
 
 mod ahead;
 mod budget;
-mod quality;
 mod report;
 mod training;
 

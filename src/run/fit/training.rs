@@ -5,16 +5,15 @@ use std::{fmt::Write, ops::ControlFlow, sync::Arc, time::Instant};
 use super::super::{
     Event, Observer, RunError, Stage,
     scene::{read_splats, tell_trial},
-    yardstick::Yardstick,
 };
 use super::{
     FitOptions,
     budget::{Budget, ITERATIONS_MIN, WRITING},
-    quality::{mean_quality, measure_luma},
 };
 use crate::{
     capture::{CaptureError, Dataset, Exposure},
     effects::{Effect, Evidence},
+    eval::{Reference, mean_quality, measure_luma},
     gpu::Gpu,
     luma::{Fit, LumaEvent, LumaProgress, LumaScene},
     raster::Raster,
@@ -102,14 +101,14 @@ impl Job<'_> {
             return Ok(0.0);
         };
         let photo = self.judge.photo(first)?;
-        let yardstick = Yardstick {
+        let reference = Reference {
             photo: &photo,
             exposure: Exposure::NONE,
         };
-        let gray = yardstick.gray();
+        let gray = reference.gray();
         let begun = Instant::now();
         // Of the photo against itself: it is only about the time.
-        std::hint::black_box(yardstick.luma_quality(&gray));
+        std::hint::black_box(reference.luma_quality(&gray));
         let pixels = |dataset: &Dataset| {
             let camera = &dataset.cameras[first];
             f64::from(camera.width) * f64::from(camera.height)

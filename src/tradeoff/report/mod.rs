@@ -1,7 +1,6 @@
 //! What a sweep found: `tradeoff.json`, `tradeoff.csv` and `tradeoff.html`.
 //! docs/tradeoff.md describes every key and column.
 
-mod base64;
 mod csv;
 mod front;
 mod page;

@@ -1,10 +1,11 @@
 //! `tradeoff.html`: one file that needs nothing else.
 
+use base64::prelude::{BASE64_STANDARD, Engine as _};
+
 use std::{collections::BTreeMap, fmt::Write};
 
 use super::{
     Measure, Point, PointStage, Tradeoff,
-    base64::base64,
     plots::{groups, plot},
     shell_line,
     tables::{cost_table, figure, front_table, measures, memory},
@@ -171,7 +172,7 @@ fn push_figure(html: &mut String, class: &str, jpeg: &[u8], caption: &str) {
 }
 
 fn source(jpeg: &[u8]) -> String {
-    format!("data:image/jpeg;base64,{}", base64(jpeg))
+    format!("data:image/jpeg;base64,{}", BASE64_STANDARD.encode(jpeg))
 }
 
 /// Every point of a stage, with what reproduces it.

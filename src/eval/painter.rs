@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{subject::Subject, teacher::EvalTeacher};
+use super::{ColoredScene, EvalError, MeasuredTeacher};
 use crate::{
     capture::{Camera, Photo},
     chroma::{native_rgb, teacher::AbImage},
@@ -10,26 +10,22 @@ use crate::{
     measure::DepthSteps,
     raster::{Picture, Raster, Renderer},
     report::Method,
-    run::{
-        RunError,
-        scene::{gray_pixels, renderer, shown_rgb},
-    },
     splats::ShField,
 };
 
 /// Draws every method's picture.
-pub(super) struct Painter<'a> {
+pub struct Painter<'a> {
     raster: Arc<Raster>,
-    subject: &'a Subject,
+    scene: &'a ColoredScene,
     renderer: Renderer,
     has_native: bool,
     /// Methods that are RGB splats, in the order of their fields.
     rgb: Vec<Method>,
-    teacher: Option<&'a mut EvalTeacher>,
+    teacher: Option<&'a mut MeasuredTeacher>,
 }
 
-/// A coloured picture as a method makes it.
-pub(super) enum Layer {
+/// A colored picture as a method makes it.
+pub enum Layer {
     /// a and b, to be shown with the gray picture's lightness.
     Ab(Picture),
     /// RGB in [0, 1], `[height, width]`.
@@ -37,47 +33,49 @@ pub(super) enum Layer {
 }
 
 /// A viewpoint.
-pub(super) struct Drawing {
+pub struct Drawing {
+    /// Where from.
     pub camera: Camera,
     /// One channel, encoded sRGB.
     pub gray: Picture,
+    /// Each method's picture.
     pub layers: Vec<(Method, Layer)>,
 }
 
 impl<'a> Painter<'a> {
-    /// A painter of the subject's own pictures, of RGB splats on its geometry, and of
+    /// A painter of the scene's own pictures, of RGB splats on its geometry, and of
     /// what a teacher makes of the gray pictures.
     pub fn new(
         raster: &Arc<Raster>,
-        subject: &'a Subject,
+        scene: &'a ColoredScene,
         rgb: &[(Method, &ShField)],
-        teacher: Option<&'a mut EvalTeacher>,
-    ) -> Result<Self, RunError> {
-        let dataset = &subject.dataset;
-        let mut fields = vec![&subject.luma.sh];
+        teacher: Option<&'a mut MeasuredTeacher>,
+    ) -> Result<Self, EvalError> {
+        let dataset = &scene.dataset;
+        let mut fields = vec![&scene.luma.sh];
         fields.extend(rgb.iter().map(|(_, field)| field));
-        fields.extend(&subject.chroma);
+        fields.extend(&scene.chroma);
         Ok(Self {
             raster: raster.clone(),
-            subject,
-            renderer: renderer(dataset, raster, &subject.luma, &fields)?,
-            has_native: subject.chroma.is_some(),
+            scene,
+            renderer: Renderer::of(raster, &scene.luma, &fields, dataset.extent)?,
+            has_native: scene.chroma.is_some(),
             rgb: rgb.iter().map(|(method, _)| *method).collect(),
             teacher,
         })
     }
 
     /// Draws what `camera` sees; `name` is for the teacher's errors.
-    pub fn draw(&mut self, camera: &Camera, name: &str) -> Result<Drawing, RunError> {
-        let mut pictures = self.renderer.render(camera)?.into_iter();
-        let mut next = || pictures.next().expect("a picture for every field");
-        let gray = next();
+    pub fn draw(&mut self, camera: &Camera, name: &str) -> Result<Drawing, EvalError> {
+        let mut pictures = self.renderer.render(camera)?;
+        // One picture a field: gray, RGB, and a/b last.
+        let gray = pictures.remove(0);
         let mut layers = Vec::new();
-        for &method in &self.rgb {
-            layers.push((method, Layer::Rgb(shown_rgb(&next().pixels))));
-        }
         if self.has_native {
-            layers.insert(0, (Method::Native, Layer::Ab(next())));
+            layers.extend(pictures.pop().map(|ab| (Method::Native, Layer::Ab(ab))));
+        }
+        for (&method, picture) in self.rgb.iter().zip(&pictures) {
+            layers.push((method, Layer::Rgb(picture.shown())));
         }
         if let Some(teacher) = &mut self.teacher
             && let Some(answer) = teacher.color_frame(name, &gray)?
@@ -93,11 +91,12 @@ impl<'a> Painter<'a> {
 
     /// The scene's median depth along the camera's z axis in world units, `[height,
     /// width]`; NaN where it is not opaque enough to have one.
-    pub fn depth(&self, camera: &Camera) -> Result<Vec<f32>, RunError> {
-        let steps = DepthSteps::new(&self.subject.luma, camera);
+    pub fn depth(&self, camera: &Camera) -> Result<Vec<f32>, EvalError> {
+        let steps = DepthSteps::new(&self.scene.luma, camera);
         let fields: Vec<&ShField> = steps.fields.iter().collect();
-        let luma = &self.subject.luma;
-        let renderer = renderer(&self.subject.dataset, &self.raster, luma, &fields)?;
+        let luma = &self.scene.luma;
+        let extent = self.scene.dataset.extent;
+        let renderer = Renderer::of(&self.raster, luma, &fields, extent)?;
         // Zeros and ones can be drawn.
         let mut renderer = renderer.with_one_list();
         let pixels = camera.width as usize * camera.height as usize;
@@ -105,7 +104,7 @@ impl<'a> Painter<'a> {
     }
 
     /// The teacher's answer for a photo.
-    pub fn answer(&self, view: usize) -> Result<Option<AbImage>, RunError> {
+    pub fn answer(&self, view: usize) -> Result<Option<AbImage>, EvalError> {
         match &self.teacher {
             Some(teacher) => teacher.answer(view),
             None => Ok(None),
@@ -150,7 +149,7 @@ impl Layer {
 }
 
 /// CIELAB a and b of RGB in [0, 1].
-pub(super) fn ab_of(rgb: &[[f32; 3]]) -> Vec<[f32; 2]> {
+pub fn ab_of(rgb: &[[f32; 3]]) -> Vec<[f32; 2]> {
     let ab = |rgb: &[f32; 3]| {
         let [_, a, b] = srgb_to_lab(rgb.map(f64::from));
         [a as f32, b as f32]
@@ -159,17 +158,17 @@ pub(super) fn ab_of(rgb: &[[f32; 3]]) -> Vec<[f32; 2]> {
 }
 
 /// A photo's gray as a picture of one channel.
-pub(super) fn gray_picture(photo: &Photo) -> Picture {
+pub fn gray_picture(photo: &Photo) -> Picture {
     Picture {
         width: photo.width,
         height: photo.height,
         channels: 1,
-        pixels: gray_pixels(photo),
+        pixels: photo.gray_values(),
     }
 }
 
 /// A teacher's answer as a picture of two channels.
-pub(super) fn to_picture(answer: &AbImage) -> Picture {
+pub fn to_picture(answer: &AbImage) -> Picture {
     Picture {
         width: answer.width,
         height: answer.height,

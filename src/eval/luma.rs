@@ -2,43 +2,46 @@
 
 use std::sync::Arc;
 
-use super::super::{RunError, scene::renderer, yardstick::Yardstick};
+use super::{EvalError, Reference};
 use crate::{
     capture::{Dataset, Exposure},
-    raster::Raster,
+    raster::{Raster, Renderer},
     report::{LumaQuality, LumaView},
     splats::Splats,
 };
 
-/// Each held-out view of `dataset`.
-pub(super) fn measure_luma(
+/// Gray pictures of each held-out view of `dataset` against its photo, as that was exposed.
+///
+/// # Errors
+/// [`EvalError`] of a photo or the device.
+pub fn measure_luma(
     raster: &Arc<Raster>,
     dataset: &Dataset,
     splats: &Splats,
     exposures: &[Exposure],
-) -> Result<Vec<LumaView>, RunError> {
-    let mut renderer = renderer(dataset, raster, splats, &[&splats.sh])?;
+) -> Result<Vec<LumaView>, EvalError> {
+    let mut renderer = Renderer::of(raster, splats, &[&splats.sh], dataset.extent)?;
     let mut views = Vec::new();
     dataset.visit(&dataset.split.test, |view, photo| {
-        let yardstick = Yardstick {
+        let reference = Reference {
             photo,
             exposure: exposures[view],
         };
-        if yardstick.measures() {
+        if reference.measures() {
             let picture = renderer.render(&dataset.cameras[view])?.remove(0);
-            let shown = yardstick.luma_shown(&picture.pixels);
+            let shown = reference.luma_shown(&picture.pixels);
             views.push(LumaView {
                 name: dataset.capture.views[view].name.clone(),
-                quality: yardstick.luma_quality(&shown),
+                quality: reference.luma_quality(&shown),
             });
         }
-        Ok::<_, RunError>(())
+        Ok::<_, EvalError>(())
     })?;
     Ok(views)
 }
 
 /// Their mean, if there are any.
-pub(super) fn mean_quality(views: &[LumaView]) -> Option<LumaQuality> {
+pub fn mean_quality(views: &[LumaView]) -> Option<LumaQuality> {
     let mean = |value: fn(&LumaQuality) -> f64| {
         views.iter().map(|view| value(&view.quality)).sum::<f64>() / views.len() as f64
     };

@@ -1,17 +1,13 @@
-//! How good a coloured scene is, as far as `colorize` itself says.
+//! How good a colored scene is, as far as `colorize` itself says.
 
 use std::sync::Arc;
 
-use super::{
-    RunError,
-    scene::{gray_to_rgb, renderer, rgb_pixels, shown_rgb},
-    yardstick::Yardstick,
-};
+use super::{EvalError, Reference};
 use crate::{
     capture::{Dataset, Exposure},
     chroma::{Lesson, native_rgb, teacher::AbImage},
     measure,
-    raster::{Picture, Raster},
+    raster::{Picture, Raster, Renderer},
     report::{ColorError, ColorQuality, ColorView, Row, to_image},
     splats::{ShField, Splats},
 };
@@ -20,7 +16,7 @@ use crate::{
 const SHEET_ROWS: usize = 4;
 
 /// Pictures of the measured views and what they amount to.
-pub(super) struct Measured {
+pub struct Measured {
     /// The exported file against the native pictures, mean over the views.
     pub bake: ColorError,
     /// Each view.
@@ -39,29 +35,30 @@ impl Measured {
         [luma, baked]: [&Splats; 2],
         chroma: &ShField,
         lesson: &Lesson,
-    ) -> Result<Self, RunError> {
-        let mut renderer = renderer(dataset, raster, luma, &[&luma.sh, chroma, &baked.sh])?;
+    ) -> Result<Self, EvalError> {
+        let mut renderer =
+            Renderer::of(raster, luma, &[&luma.sh, chroma, &baked.sh], dataset.extent)?;
         let (mut errors, mut views, mut rows) = (Vec::new(), Vec::new(), Vec::new());
         dataset.visit_colors(dataset.measured().1, |i, photo| {
             let (photo, camera) = (&photo, &dataset.cameras[i]);
             let exposure = exposures[i];
-            let yardstick = Yardstick { photo, exposure };
+            let reference = Reference { photo, exposure };
             let pictures = renderer.render(camera)?;
             let native = native_rgb(&pictures[0], &pictures[1]);
-            let exported = shown_rgb(&pictures[2].pixels);
+            let exported = pictures[2].shown();
             errors.push(ColorError::from(measure::mean_delta_e(&native, &exported)));
             let taught = (lesson.of_view[i])
                 .map(|target| lesson.targets.read(target, 0))
                 .transpose()?
                 .map(|target| teacher_picture(&photo.gray, &target.ab()));
-            if yardstick.measures() {
-                let shown = yardstick.shown(&exported);
-                let colorful = |rgb: &Vec<[f32; 3]>| yardstick.colorfulness(rgb);
+            if reference.measures() {
+                let shown = reference.shown(&exported);
+                let colorful = |rgb: &Vec<[f32; 3]>| reference.colorfulness(rgb);
                 views.push(ColorView {
                     name: dataset.capture.views[i].name.clone(),
                     quality: ColorQuality {
-                        delta_e: (yardstick.rgb())
-                            .map(|truth| yardstick.color_error(&shown, &truth)),
+                        delta_e: (reference.rgb())
+                            .map(|truth| reference.color_error(&shown, &truth)),
                         colorfulness: colorful(&shown),
                         teacher_colorfulness: taught.as_ref().map(colorful),
                     },
@@ -74,14 +71,14 @@ impl Measured {
                     width,
                     height,
                     pictures: vec![
-                        Some(bytes(&rgb_pixels(photo))),
-                        Some(bytes(&gray_to_rgb(&pictures[0].pixels))),
+                        Some(bytes(&photo.rgb_values())),
+                        Some(bytes(&pictures[0].shown())),
                         taught.as_ref().map(bytes),
                         Some(bytes(&exported)),
                     ],
                 });
             }
-            Ok::<_, RunError>(())
+            Ok::<_, EvalError>(())
         })?;
         Ok(Self {
             bake: mean_error(&errors),

@@ -1,71 +1,58 @@
 //! The teacher as one to be measured: its own pictures, and what it makes of the gray
 //! scene frame by frame.
 
-use std::{
-    path::{Path, PathBuf},
-    sync::Arc,
-};
+use std::sync::Arc;
 
 use super::{
-    drawing::{gray_picture, to_picture},
-    subject::Subject,
+    ColoredScene, EvalError, Observer, Progress, Task as Step,
+    painter::{gray_picture, to_picture},
 };
 use crate::{
+    capture::Dataset,
     chroma::{
         ChromaSettings, FrozenViews, Room, Targets, Task, fit_rgb, masked_weights, native_rgb,
-        teacher::{AbImage, Asked, GrayImage, Teacher, TeacherSettings},
+        teacher::{AbImage, Asked, GrayImage, Teacher},
     },
     raster::{Picture, Raster},
-    run::{Event, Observer, RunError, Stage},
     splats::{ShField, sh},
 };
 
-/// RGB splats get so many times the rounds of `colorize`: harmonics of degree 3 settle more
+/// RGB splats get so many times the chroma solver's rounds: harmonics of degree 3 settle more
 /// slowly than a color for each Gaussian.
 const RGB_ROUNDS: usize = 3;
 
 /// A teacher and its answers for the photos.
-pub(super) struct EvalTeacher {
-    path: PathBuf,
+pub struct MeasuredTeacher {
     /// Name, kind and identity.
     pub info: serde_json::Value,
     /// The answers, and each view's place among them, `None` where there is none.
     answers: Targets,
     of_view: Vec<Option<usize>>,
-    /// Asked for drawn pictures; keeps no answers, since every colouring draws others.
+    /// Asked for drawn pictures; keeps no answers, since every coloring draws others.
     frames: Option<Teacher>,
 }
 
-impl EvalTeacher {
-    /// Asks for all photos, through the run's cache; opens the teacher for frames too
-    /// where `baselines` are wanted and it is a network.
+impl MeasuredTeacher {
+    /// Asks `teacher` for all photos; `frames`, where given, is asked for drawn pictures.
+    ///
+    /// # Errors
+    /// [`EvalError`] of a photo or the teacher, [`EvalError::NothingTaught`].
     pub fn ask(
-        path: &Path,
-        settings: &TeacherSettings,
-        subject: &Subject,
-        baselines: bool,
+        mut teacher: Teacher,
+        frames: Option<Teacher>,
+        dataset: &Dataset,
         observe: &mut Observer<'_>,
-    ) -> Result<Self, RunError> {
-        let mut teacher = Teacher::open(path, Some(&subject.folder.teacher()), settings)?;
+    ) -> Result<Self, EvalError> {
         let info = teacher.describe();
-        if let Some(chroma) = &subject.report.chroma
-            && !(chroma.teachers.iter()).any(|t| (&t.name, &t.sha256) == (&info.name, &info.sha256))
-        {
-            observe(Event::Note(
-                "the run was coloured by another teacher than the one it is measured against"
-                    .to_owned(),
-            ));
-        }
-        let dataset = &subject.dataset;
         let (mut answers, mut of_view) = (Targets::new(1), Vec::new());
         let views: Vec<usize> = (0..dataset.cameras.len()).collect();
         dataset.visit(&views, |index, photo| {
             let view = &dataset.capture.views[index];
-            observe(Event::Progress {
-                stage: Stage::Teacher,
+            observe(Progress {
+                task: Step::Teacher,
                 done: index,
                 total: views.len(),
-                message: view.name.clone(),
+                name: &view.name,
             });
             let gray = GrayImage {
                 width: photo.width,
@@ -76,27 +63,12 @@ impl EvalTeacher {
             let answer = teacher.colorize(asked, gray, None)?;
             let kept = answer.map(|answer| answers.push_ab(&answer, None));
             of_view.push(kept.transpose()?);
-            Ok::<_, RunError>(())
+            Ok::<_, EvalError>(())
         })?;
         if answers.is_empty() {
-            return Err(RunError::TeacherCoversNothing {
-                teacher: path.to_owned(),
-                example: dataset.capture.views[0].name.clone(),
-            });
+            return Err(EvalError::NothingTaught);
         }
-        let frames = if baselines && teacher.is_network() {
-            Some(Teacher::open(path, None, settings)?)
-        } else {
-            if baselines {
-                observe(Event::Note(
-                    "a folder of images cannot colour frames: no baseline of luma, then teacher"
-                        .to_owned(),
-                ));
-            }
-            None
-        };
         Ok(Self {
-            path: path.to_owned(),
             info: serde_json::to_value(info).unwrap_or_default(),
             answers,
             of_view,
@@ -110,29 +82,30 @@ impl EvalTeacher {
     }
 
     /// The answer for a view, where there is one.
-    pub fn answer(&self, view: usize) -> Result<Option<AbImage>, RunError> {
+    pub fn answer(&self, view: usize) -> Result<Option<AbImage>, EvalError> {
         let kept = self.of_view[view].map(|index| self.answers.read(index, 0));
         Ok(kept.transpose()?.map(|target| target.ab()))
     }
 
     /// RGB splats on the run's geometry, fitted to the teacher's pictures of the training
     /// views: harmonics of degree 3 as splat trainers have, in [`RGB_ROUNDS`] times the
-    /// rounds that `colorize` takes by default. They are told what `fit` knew: exposures, masks.
+    /// default rounds of the chroma solver. They are told what the training knew: exposures, masks.
+    ///
+    /// # Errors
+    /// [`EvalError`] of a photo or the solver, [`EvalError::NothingTaught`].
     pub fn rgb_splats(
         &self,
         raster: &Arc<Raster>,
-        subject: &Subject,
+        scene: &ColoredScene,
         memory_limit: Option<u64>,
         observe: &mut Observer<'_>,
-    ) -> Result<ShField, RunError> {
-        let dataset = &subject.dataset;
-        let (done, total) = (0, 1);
-        let message = "RGB splats to compare with".to_owned();
-        observe(Event::Progress {
-            stage: Stage::Chroma,
-            done,
-            total,
-            message,
+    ) -> Result<ShField, EvalError> {
+        let dataset = &scene.dataset;
+        observe(Progress {
+            task: Step::RgbSplats,
+            done: 0,
+            total: 1,
+            name: "",
         });
         let ours = ChromaSettings::irls();
         let settings = ChromaSettings {
@@ -150,7 +123,7 @@ impl EvalTeacher {
                 return Ok(());
             };
             let colored = native_rgb(&gray_picture(photo), &to_picture(&answer));
-            let wanted = subject.yardstick(view, photo).unexposed(&colored);
+            let wanted = scene.reference(view, photo).unexposed(&colored);
             let weights = masked_weights(None, photo);
             let size = [photo.width, photo.height];
             tasks.push(Task {
@@ -158,26 +131,27 @@ impl EvalTeacher {
                 target: targets.push_rgb(size, &wanted, weights.as_deref())?,
             });
             cameras.push(dataset.cameras[view].clone());
-            Ok::<_, RunError>(())
+            Ok::<_, EvalError>(())
         })?;
         if tasks.is_empty() {
-            return Err(RunError::TeacherCoversNothing {
-                teacher: self.path.clone(),
-                example: dataset.capture.views[dataset.split.train[0]].name.clone(),
-            });
+            return Err(EvalError::NothingTaught);
         }
         let room = Room {
             limit: memory_limit,
             sh_degree: sh::MAX_DEGREE,
             weighted: targets.weighted(),
         };
-        let (luma, extent, scales) = (&subject.luma, dataset.extent, targets.scales());
+        let (luma, extent, scales) = (&scene.luma, dataset.extent, targets.scales());
         let frozen = FrozenViews::new(raster, luma, extent, &cameras, scales, room)?;
         Ok(fit_rgb(&frozen, &settings, &targets, tasks)?)
     }
 
     /// What the teacher makes of a drawn gray picture; `None` without that baseline.
-    pub fn color_frame(&mut self, name: &str, gray: &Picture) -> Result<Option<AbImage>, RunError> {
+    pub fn color_frame(
+        &mut self,
+        name: &str,
+        gray: &Picture,
+    ) -> Result<Option<AbImage>, EvalError> {
         let Some(teacher) = &mut self.frames else {
             return Ok(None);
         };

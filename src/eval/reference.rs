@@ -1,8 +1,7 @@
-//! A photo as what pictures of the scene are held against.
+//! A photo as the reference that pictures of the scene are compared with.
 
 use std::collections::HashMap;
 
-use super::scene::{counts, gray_pixels, rgb_pixels};
 use crate::{
     capture::{Dataset, Exposure, Photo},
     measure,
@@ -11,16 +10,18 @@ use crate::{
 
 /// A photo, how bright it shows the scene, and which of its pixels count.
 ///
-/// Pictures that are measured are those that the photo would show ([`Yardstick::luma_shown`],
-/// [`Yardstick::shown`]), for how bright a photo became is no matter of the scene.
+/// Pictures that are measured are those that the photo would show ([`Reference::luma_shown`],
+/// [`Reference::shown`]), for how bright a photo became is no matter of the scene.
 #[derive(Clone, Copy)]
-pub(super) struct Yardstick<'a> {
+pub struct Reference<'a> {
+    /// The photo.
     pub photo: &'a Photo,
+    /// How bright it shows the scene.
     pub exposure: Exposure,
 }
 
 /// By view of `dataset`, the exposures that a report tells; none where it tells none.
-pub(super) fn exposures(dataset: &Dataset, told: &[ViewExposure]) -> Vec<Exposure> {
+pub fn exposures(dataset: &Dataset, told: &[ViewExposure]) -> Vec<Exposure> {
     let by_name: HashMap<&str, Exposure> = (told.iter())
         .map(|view| (view.name.as_str(), view.exposure))
         .collect();
@@ -30,20 +31,20 @@ pub(super) fn exposures(dataset: &Dataset, told: &[ViewExposure]) -> Vec<Exposur
         .collect()
 }
 
-impl<'a> Yardstick<'a> {
+impl<'a> Reference<'a> {
     /// Whether any pixel counts; a photo of which none does measures nothing.
     pub fn measures(&self) -> bool {
-        (0..self.photo.gray.len()).any(|pixel| counts(self.photo, pixel))
+        (0..self.photo.gray.len()).any(|pixel| self.photo.counts(pixel))
     }
 
     /// Gray in [0, 1], `[height, width]`.
     pub fn gray(&self) -> Vec<f32> {
-        gray_pixels(self.photo)
+        self.photo.gray_values()
     }
 
     /// RGB in [0, 1], `[height, width]`, where the photo has colours.
     pub fn rgb(&self) -> Option<Vec<[f32; 3]>> {
-        self.photo.rgb.as_ref().map(|_| rgb_pixels(self.photo))
+        self.photo.rgb.as_ref().map(|_| self.photo.rgb_values())
     }
 
     /// What the photo would show of a gray picture, in [0, 1].
@@ -73,7 +74,7 @@ impl<'a> Yardstick<'a> {
     /// The values of the pixels that count.
     pub fn counted<T: Copy>(&self, values: &[T]) -> Vec<T> {
         (values.iter().enumerate())
-            .filter(|&(pixel, _)| counts(self.photo, pixel))
+            .filter(|&(pixel, _)| self.photo.counts(pixel))
             .map(|(_, &value)| value)
             .collect()
     }
@@ -82,7 +83,7 @@ impl<'a> Yardstick<'a> {
     pub fn patched<T: Copy>(&self, picture: &[T], truth: &[T]) -> Vec<T> {
         (picture.iter().zip(truth).enumerate())
             .map(|(pixel, (&ours, &right))| {
-                if counts(self.photo, pixel) {
+                if self.photo.counts(pixel) {
                     ours
                 } else {
                     right
@@ -137,31 +138,31 @@ mod tests {
     #[test]
     fn what_does_not_count_changes_nothing() {
         let photo = photo();
-        let yardstick = Yardstick {
+        let reference = Reference {
             photo: &photo,
             exposure: Exposure::NONE,
         };
-        let truth = yardstick.rgb().expect("colours");
+        let truth = reference.rgb().expect("colours");
         let mut other = truth.clone();
         other[1] = [0.0, 1.0, 0.0];
-        assert_eq!(yardstick.color_error(&other, &truth).mean, 0.0);
+        assert_eq!(reference.color_error(&other, &truth).mean, 0.0);
         assert_eq!(
-            yardstick.colorfulness(&other),
-            yardstick.colorfulness(&truth)
+            reference.colorfulness(&other),
+            reference.colorfulness(&truth)
         );
-        let gray = yardstick.gray();
-        let quality = yardstick.luma_quality(&[gray[0], 0.0]);
+        let gray = reference.gray();
+        let quality = reference.luma_quality(&[gray[0], 0.0]);
         assert_eq!((quality.psnr, quality.ssim), (measure::IDENTICAL_PSNR, 1.0));
         // What counts does.
         other[0][0] += 0.1;
-        assert!(yardstick.color_error(&other, &truth).mean > 1.0);
-        assert!(yardstick.luma_quality(&[gray[0] + 0.1, gray[1]]).psnr < 21.0);
+        assert!(reference.color_error(&other, &truth).mean > 1.0);
+        assert!(reference.luma_quality(&[gray[0] + 0.1, gray[1]]).psnr < 21.0);
     }
 
     #[test]
     fn a_photo_shows_the_scene_as_bright_as_it_was_exposed() {
         let photo = photo();
-        let yardstick = Yardstick {
+        let reference = Reference {
             photo: &photo,
             exposure: Exposure {
                 gain: 1.25,
@@ -169,16 +170,16 @@ mod tests {
             },
         };
         let scene = [[0.4, 0.2, 0.02], [0.9, 0.6, 0.5]];
-        let shown = yardstick.shown(&scene);
+        let shown = reference.shown(&scene);
         for (shown, want) in (shown.as_flattened().iter()).zip([0.45, 0.2, 0.0, 1.0, 0.7, 0.575]) {
             assert!((shown - want).abs() < 1e-6, "{shown} {want}");
         }
         assert_eq!(
-            yardstick.luma_shown(&[0.4, 0.02]),
+            reference.luma_shown(&[0.4, 0.02]),
             [shown[0][0], shown[0][2]]
         );
         // And back, where black and white did not cut.
-        let back = yardstick.unexposed(&shown);
+        let back = reference.unexposed(&shown);
         for (pixel, channel) in [(0, 0), (0, 1), (1, 1), (1, 2)] {
             let (back, want) = (back[pixel][channel], scene[pixel][channel]);
             assert!((back - want).abs() < 1e-6, "{back} {want}");

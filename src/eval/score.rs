@@ -1,23 +1,18 @@
 //! Pictures of a view against its photo.
 
 use super::{
-    drawing::{Drawing, Layer, Painter, ab_of, gray_picture, to_picture},
-    lpips::Lpips,
-    subject::Subject,
+    ColoredScene, Drawing, EvalError, Layer, Lpips, Painter, Reference,
+    painter::{ab_of, gray_picture, to_picture},
 };
 use crate::{
     chroma::teacher::AbImage,
     measure,
     report::{ColorError, LumaScore, Method, PictureScore, ViewScore, error_map},
-    run::{
-        RunError,
-        scene::{gray_to_rgb, rgb_pixels},
-        yardstick::Yardstick,
-    },
 };
 
 /// A measured view.
-pub(super) struct Scored {
+pub struct Scored {
+    /// The figures.
     pub score: ViewScore,
     /// ΔE00 between the native and the exported picture.
     bake: Option<ColorError>,
@@ -28,7 +23,7 @@ pub(super) struct Scored {
 }
 
 /// A picture for the page.
-pub(super) struct Shot {
+pub struct Shot {
     /// Part of its file's name.
     pub file: &'static str,
     /// What it shows.
@@ -51,16 +46,16 @@ impl Scored {
     /// as the photo would show it.
     pub fn of(
         name: &str,
-        yardstick: Yardstick<'_>,
+        reference: Reference<'_>,
         drawing: &Drawing,
         answer: Option<&AbImage>,
         mut lpips: Option<&mut Lpips>,
-    ) -> Result<Self, RunError> {
-        let photo = yardstick.photo;
+    ) -> Result<Self, EvalError> {
+        let photo = reference.photo;
         let size = [photo.width, photo.height];
-        let shown = rgb_pixels(photo);
-        let luma_shown = yardstick.luma_shown(&drawing.gray.pixels);
-        let drawn_gray = gray_to_rgb(&luma_shown);
+        let shown = photo.rgb_values();
+        let luma_shown = reference.luma_shown(&drawing.gray.pixels);
+        let drawn_gray = rgb_of(&luma_shown);
         let mut shots = Vec::new();
         let mut show = |file, caption, pixels| {
             shots.push(Shot {
@@ -71,47 +66,47 @@ impl Scored {
         };
         show("photo", "photo", shown.clone());
         show("luma", "luma", drawn_gray.clone());
-        let quality = yardstick.luma_quality(&luma_shown);
+        let quality = reference.luma_quality(&luma_shown);
         let luma = LumaScore {
             psnr: quality.psnr,
             ssim: quality.ssim,
             lpips: match &mut lpips {
                 Some(lpips) => {
-                    let gray = gray_to_rgb(&yardstick.gray());
-                    Some(lpips.distance(&yardstick.patched(&drawn_gray, &gray), &gray, size)?)
+                    let gray = rgb_of(&reference.gray());
+                    Some(lpips.distance(&reference.patched(&drawn_gray, &gray), &gray, size)?)
                 }
                 None => None,
             },
         };
-        // Fidelity to a gray photo's colours is no figure.
-        let truth = yardstick.rgb();
+        // Fidelity to a gray photo's colors is no figure.
+        let truth = reference.rgb();
         let truth = truth.as_deref();
         let mut scores = Vec::new();
         let mut rendered = Vec::new();
         let mut score = |method: Method, rgb: Vec<[f32; 3]>, ab: &[[f32; 2]]| {
-            let counted = yardstick.counted(&rgb);
-            let wanted = truth.map(|truth| yardstick.counted(truth));
+            let counted = reference.counted(&rgb);
+            let wanted = truth.map(|truth| reference.counted(truth));
             let wanted = wanted.as_deref();
             scores.push(PictureScore {
                 method,
                 psnr: wanted
                     .map(|t| measure::reported_psnr(counted.as_flattened(), t.as_flattened())),
-                ssim: truth.map(|t| rgb_ssim(yardstick, &rgb, t)),
-                delta_e: truth.map(|t| yardstick.color_error(&rgb, t)),
-                ab_error: wanted.map(|t| measure::ab_error(&yardstick.counted(ab), &ab_of(t))),
+                ssim: truth.map(|t| rgb_ssim(reference, &rgb, t)),
+                delta_e: truth.map(|t| reference.color_error(&rgb, t)),
+                ab_error: wanted.map(|t| measure::ab_error(&reference.counted(ab), &ab_of(t))),
                 colorfulness: measure::colorfulness(&counted),
                 lpips: match (&mut lpips, truth) {
                     (Some(lpips), Some(t)) => {
-                        Some(lpips.distance(&yardstick.patched(&rgb, t), t, size)?)
+                        Some(lpips.distance(&reference.patched(&rgb, t), t, size)?)
                     }
                     _ => None,
                 },
             });
             rendered.push((method, rgb));
-            Ok::<_, RunError>(())
+            Ok::<_, EvalError>(())
         };
         for (method, layer) in &drawing.layers {
-            let rgb = yardstick.shown(&layer.rgb(&drawing.gray));
+            let rgb = reference.shown(&layer.rgb(&drawing.gray));
             score(*method, rgb, &layer.ab())?;
         }
         if let Some(answer) = answer {
@@ -137,7 +132,7 @@ impl Scored {
                 show(
                     file,
                     caption,
-                    error_map(&yardstick.patched(errors, &nothing)),
+                    error_map(&reference.patched(errors, &nothing)),
                 );
             };
             map("delta-e", "ΔE00, ours", &measure::delta_e(exported, truth));
@@ -156,7 +151,7 @@ impl Scored {
             ssim: None,
             delta_e: None,
             ab_error: None,
-            colorfulness: yardstick.colorfulness(&shown),
+            colorfulness: reference.colorfulness(&shown),
             lpips: None,
         });
         Ok(Self {
@@ -172,6 +167,11 @@ impl Scored {
     }
 }
 
+/// Gray as RGB.
+fn rgb_of(gray: &[f32]) -> Vec<[f32; 3]> {
+    gray.iter().map(|&v| [v; 3]).collect()
+}
+
 /// What the export costs, of the scene as it is.
 fn bake(drawing: &Drawing) -> Option<ColorError> {
     let of = |method| Some(drawing.layer(method)?.rgb(&drawing.gray));
@@ -179,15 +179,15 @@ fn bake(drawing: &Drawing) -> Option<ColorError> {
     Some(measure::mean_delta_e(&native, &exported).into())
 }
 
-/// Distance of each pixel's colours in the a, b plane.
+/// Distance of each pixel's colors in the a, b plane.
 fn distances(ab: &[[f32; 2]], wanted: &[[f32; 2]]) -> Vec<f64> {
     let apart = |(p, q): (&[f32; 2], &[f32; 2])| f64::from((p[0] - q[0]).hypot(p[1] - q[1]));
     ab.iter().zip(wanted).map(apart).collect()
 }
 
-fn rgb_ssim(yardstick: Yardstick<'_>, shown: &[[f32; 3]], truth: &[[f32; 3]]) -> f64 {
+fn rgb_ssim(reference: Reference<'_>, shown: &[[f32; 3]], truth: &[[f32; 3]]) -> f64 {
     let channel = |pixels: &[[f32; 3]], c: usize| pixels.iter().map(|p| p[c]).collect::<Vec<_>>();
-    let of = |c| yardstick.ssim(&channel(shown, c), &channel(truth, c));
+    let of = |c| reference.ssim(&channel(shown, c), &channel(truth, c));
     (of(0) + of(1) + of(2)) / 3.0
 }
 
@@ -205,7 +205,7 @@ fn mean_error(errors: impl Iterator<Item = Option<ColorError>> + Clone) -> Optio
 }
 
 /// Mean over the views; at least one is measured.
-pub(super) fn mean_luma(views: &[Scored]) -> LumaScore {
+pub fn mean_luma(views: &[Scored]) -> LumaScore {
     let lumas = || views.iter().map(|view| &view.score.luma);
     LumaScore {
         psnr: mean(lumas().map(|l| Some(l.psnr))).unwrap_or(f64::NAN),
@@ -214,34 +214,34 @@ pub(super) fn mean_luma(views: &[Scored]) -> LumaScore {
     }
 }
 
-/// Mean colourfulness of the teacher's pictures of all photos.
-pub(super) fn teacher_colorfulness(
+/// Mean colorfulness of the teacher's pictures of all photos.
+pub fn teacher_colorfulness(
     painter: &Painter<'_>,
-    subject: &Subject,
-) -> Result<Option<f64>, RunError> {
+    scene: &ColoredScene,
+) -> Result<Option<f64>, EvalError> {
     let mut values = Vec::new();
-    let views: Vec<usize> = (0..subject.dataset.cameras.len())
+    let views: Vec<usize> = (0..scene.dataset.cameras.len())
         .filter(|&view| painter.answers(view))
         .collect();
-    subject.dataset.visit(&views, |view, photo| {
+    scene.dataset.visit(&views, |view, photo| {
         if let Some(answer) = painter.answer(view)? {
             let layer = Layer::Ab(to_picture(&answer));
-            let yardstick = subject.yardstick(view, photo);
-            let measures = yardstick.measures();
-            values.push(measures.then(|| yardstick.colorfulness(&layer.rgb(&gray_picture(photo)))));
+            let reference = scene.reference(view, photo);
+            let measures = reference.measures();
+            values.push(measures.then(|| reference.colorfulness(&layer.rgb(&gray_picture(photo)))));
         }
-        Ok::<_, RunError>(())
+        Ok::<_, EvalError>(())
     })?;
     Ok(mean(values.into_iter()))
 }
 
 /// Mean over the views of what the export costs.
-pub(super) fn mean_bake(views: &[Scored]) -> Option<ColorError> {
+pub fn mean_bake(views: &[Scored]) -> Option<ColorError> {
     mean_error(views.iter().map(|view| view.bake))
 }
 
 /// Each method's mean over the views that have it.
-pub(super) fn mean_pictures(views: &[Scored]) -> Vec<PictureScore> {
+pub fn mean_pictures(views: &[Scored]) -> Vec<PictureScore> {
     let all = || views.iter().flat_map(|view| &view.score.pictures);
     let mut methods: Vec<Method> = all().map(|score| score.method).collect();
     methods.sort();

@@ -6,19 +6,14 @@ use std::{collections::VecDeque, path::Path};
 use image::RgbImage;
 
 use super::{
-    EvalOptions,
-    drawing::{Drawing, Layer, Painter, ab_of, to_picture},
-    subject::Subject,
+    ColoredScene, Drawing, EvalError, Layer, Observer, Painter, Progress, Task,
+    painter::{ab_of, to_picture},
 };
 use crate::{
     capture::{Camera, Photo},
     chroma::teacher::AbImage,
     measure::{Consistency, Flow, camera_path, decode_flo, visible},
     report::{BetweenScore, ConsistencyScore, Method, PathConsistency, PathScore, to_image},
-    run::{
-        Event, Observer, RunError, Stage,
-        scene::{counts, rgb_pixels},
-    },
 };
 
 /// Distances in frames: short range as in the literature, with 1 beside 10, and long
@@ -98,27 +93,33 @@ impl Sums {
     }
 }
 
-/// Draws the path, gives each frame's exported picture to `keep`, and compares frames.
-pub(super) fn along_path(
+/// Draws a path of so many frames, gives each one's exported picture to `keep`, and compares
+/// frames by the scene's own geometry or by optical flow in `flow_files`, named
+/// `0000-0007.flo`.
+///
+/// # Errors
+/// [`EvalError`] of the device, the teacher or the flow, and whatever `keep` fails with.
+pub fn along_path<E: From<EvalError>>(
     painter: &mut Painter<'_>,
-    subject: &Subject,
-    options: &EvalOptions,
+    scene: &ColoredScene,
+    frames: usize,
+    flow_files: Option<&Path>,
     observe: &mut Observer<'_>,
-    keep: &mut dyn FnMut(usize, RgbImage) -> Result<(), RunError>,
-) -> Result<PathScore, RunError> {
-    let dataset = &subject.dataset;
+    keep: &mut dyn FnMut(usize, RgbImage) -> Result<(), E>,
+) -> Result<PathScore, E> {
+    let dataset = &scene.dataset;
     let train = &dataset.split.train;
     let cameras: Vec<Camera> = train.iter().map(|&i| small(&dataset.cameras[i])).collect();
     let cameras: Vec<&Camera> = cameras.iter().collect();
-    let path = camera_path(&cameras, dataset.extent, options.frames);
+    let path = camera_path(&cameras, dataset.extent, frames);
     let mut sums: Vec<(usize, Sums)> = DELTAS.map(|delta| (delta, Sums::default())).into();
     let mut recent: VecDeque<Frame> = VecDeque::new();
     for (index, camera) in path.iter().enumerate() {
-        observe(Event::Progress {
-            stage: Stage::Path,
+        observe(Progress {
+            task: Task::Path,
             done: index,
             total: path.len(),
-            message: String::new(),
+            name: "",
         });
         let drawing = painter.draw(camera, &format!("frame {index}"))?;
         if let Some(layer) = drawing.layer(Method::Exported) {
@@ -131,9 +132,9 @@ pub(super) fn along_path(
             let Some(first) = recent.len().checked_sub(*delta).map(|at| &recent[at]) else {
                 continue;
             };
-            let flow = |from: &Frame, to: &Frame, names: [usize; 2]| match &options.flow {
+            let flow = |from: &Frame, to: &Frame, names: [usize; 2]| match flow_files {
                 Some(folder) => Ok(from.masked(read_flow(folder, names, from.size())?)),
-                None => Ok::<_, RunError>(from.flow_to(to)),
+                None => Ok::<_, EvalError>(from.flow_to(to)),
             };
             let forward = flow(first, &frame, [index - *delta, index])?;
             let backward = flow(&frame, first, [index, index - *delta])?;
@@ -145,13 +146,7 @@ pub(super) fn along_path(
         }
     }
     let skipped: Vec<usize> = DELTAS.into_iter().filter(|&d| d >= path.len()).collect();
-    if !skipped.is_empty() {
-        observe(Event::Note(format!(
-            "a path of {} frames is too short for Δ = {skipped:?}: choose more --frames",
-            path.len()
-        )));
-    }
-    let flow = if options.flow.is_some() {
+    let flow = if flow_files.is_some() {
         "files"
     } else {
         "geometric"
@@ -173,14 +168,17 @@ pub(super) fn along_path(
 }
 
 /// Compares the photographed views in pairs; where there is a teacher, those that it
-/// coloured. What photos in colour differ by among themselves tells how much is due to
+/// colored. What photos in color differ by among themselves tells how much is due to
 /// light, noise and the flow.
-pub(super) fn between_views(
+///
+/// # Errors
+/// [`EvalError`] of a photo, the device or the teacher.
+pub fn between_views(
     painter: &mut Painter<'_>,
-    subject: &Subject,
+    scene: &ColoredScene,
     observe: &mut Observer<'_>,
-) -> Result<BetweenScore, RunError> {
-    let dataset = &subject.dataset;
+) -> Result<BetweenScore, EvalError> {
+    let dataset = &scene.dataset;
     let taught = painter.teacher().is_some();
     let candidates: Vec<usize> = (0..dataset.cameras.len())
         .filter(|&i| !taught || painter.answers(i))
@@ -196,11 +194,11 @@ pub(super) fn between_views(
     let mut frames = Vec::with_capacity(count);
     for (k, &i) in chosen.iter().enumerate() {
         let name = &dataset.capture.views[i].name;
-        observe(Event::Progress {
-            stage: Stage::Pairs,
+        observe(Progress {
+            task: Task::Pairs,
             done: k,
             total: count,
-            message: name.clone(),
+            name,
         });
         let camera = small(&dataset.cameras[i]);
         let photo = dataset.color(i)?;
@@ -214,7 +212,7 @@ pub(super) fn between_views(
             let truth = AbImage {
                 width: photo.width,
                 height: photo.height,
-                ab: ab_of(&rgb_pixels(&photo)),
+                ab: ab_of(&photo.rgb_values()),
             };
             let truth = to_picture(&truth.resized(camera.width, camera.height));
             drawing.layers.push((Method::Photo, Layer::Ab(truth)));
@@ -268,7 +266,7 @@ fn hide_masked(photo: &Photo, camera: &Camera, depth: &mut [f32]) {
     for (pixel, depth) in depth.iter_mut().enumerate() {
         let column = across(pixel % width, width, photo.width);
         let row = across(pixel / width, height, photo.height);
-        if !counts(photo, row * photo.width as usize + column) {
+        if !photo.counts(row * photo.width as usize + column) {
             *depth = f32::NAN;
         }
     }
@@ -288,20 +286,11 @@ fn small(camera: &Camera) -> Camera {
 }
 
 /// The flow from one frame to another: `0000-0007.flo`.
-fn read_flow(folder: &Path, [from, to]: [usize; 2], size: [usize; 2]) -> Result<Flow, RunError> {
+fn read_flow(folder: &Path, [from, to]: [usize; 2], size: [usize; 2]) -> Result<Flow, EvalError> {
     let path = folder.join(format!("{from:04}-{to:04}.flo"));
-    let failure = |reason: String| RunError::File {
+    let bytes = std::fs::read(&path).map_err(|error| EvalError::NoFlow {
         path: path.clone(),
-        reason,
-    };
-    let bytes = std::fs::read(&path).map_err(|error| {
-        failure(format!(
-            "{error}: --flow needs one file for each pair of frames and direction"
-        ))
+        error,
     })?;
-    decode_flo(&bytes, size[0], size[1]).map_err(|reason| {
-        failure(format!(
-            "{reason}: make it from the frames that `eval` writes, with as many --frames"
-        ))
-    })
+    decode_flo(&bytes, size[0], size[1]).map_err(|reason| EvalError::Flow { path, reason })
 }

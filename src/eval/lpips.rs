@@ -11,10 +11,11 @@ use ort::{
     value::{Outlet, Tensor, TensorElementType, ValueType},
 };
 
-use crate::{chroma::teacher::runtime, run::RunError};
+use super::EvalError;
+use crate::chroma::teacher::runtime;
 
 /// A network with two pictures in and one number out.
-pub(super) struct Lpips {
+pub struct Lpips {
     path: PathBuf,
     session: Session,
     /// Width and height of its inputs, where the model fixes them.
@@ -23,15 +24,13 @@ pub(super) struct Lpips {
 
 impl Lpips {
     /// Opens a model: two inputs `[1, 3, H, W]` of f32 in [-1, 1], one number out.
-    pub fn open(path: &Path) -> Result<Self, RunError> {
-        let failure = |reason: String| RunError::File {
+    pub fn open(path: &Path) -> Result<Self, EvalError> {
+        let failure = |reason: String| EvalError::Network {
             path: path.to_owned(),
             reason,
         };
         if !path.is_file() {
-            return Err(failure(
-                "no such file: --lpips takes an .onnx file".to_owned(),
-            ));
+            return Err(failure("no such file; an ONNX model is needed".to_owned()));
         }
         let environment = runtime::environment()?;
         let load = || -> ort::Result<Session> {
@@ -66,7 +65,7 @@ impl Lpips {
         a: &[[f32; 3]],
         b: &[[f32; 3]],
         size: [u32; 2],
-    ) -> Result<f64, RunError> {
+    ) -> Result<f64, EvalError> {
         let wanted = self.size.unwrap_or(size);
         let run = |session: &mut Session| -> ort::Result<Vec<f32>> {
             let outputs = session.run(ort::inputs![
@@ -75,7 +74,7 @@ impl Lpips {
             ])?;
             Ok(outputs[0].try_extract_tensor::<f32>()?.1.to_vec())
         };
-        let failure = |reason: String| RunError::File {
+        let failure = |reason: String| EvalError::Network {
             path: self.path.clone(),
             reason,
         };
@@ -115,9 +114,9 @@ fn tensor(pixels: &[[f32; 3]], size: [u32; 2], wanted: [u32; 2]) -> ort::Result<
         planes(pixels.as_flattened())
     } else {
         let [width, height] = size;
-        let image =
-            ImageBuffer::<Rgb<f32>, _>::from_raw(width, height, pixels.as_flattened().to_vec())
-                .expect("as many pixels as the size says");
+        let image = ImageBuffer::from_fn(width, height, |x, y| {
+            Rgb(pixels[y as usize * width as usize + x as usize])
+        });
         let filter = imageops::FilterType::Triangle;
         planes(&imageops::resize(&image, wanted[0], wanted[1], filter))
     };

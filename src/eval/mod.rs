@@ -1,0 +1,102 @@
+//! How good a scene is: its pictures against photos, and against each other.
+
+mod agreement;
+mod colored;
+mod lpips;
+mod luma;
+mod painter;
+mod reference;
+mod scene;
+mod score;
+mod teacher;
+
+use std::path::PathBuf;
+
+pub use agreement::{along_path, between_views};
+pub use colored::Measured;
+pub use lpips::Lpips;
+pub use luma::{mean_quality, measure_luma};
+pub use painter::{Drawing, Layer, Painter};
+pub use reference::{Reference, exposures};
+pub use scene::ColoredScene;
+pub use score::{Scored, Shot, mean_bake, mean_luma, mean_pictures, teacher_colorfulness};
+pub use teacher::MeasuredTeacher;
+
+use crate::{
+    capture::CaptureError,
+    chroma::{ChromaError, teacher::TeacherError},
+    gpu::GpuError,
+};
+
+/// What can end an evaluation.
+#[derive(Debug, thiserror::Error)]
+pub enum EvalError {
+    /// The photos or their poses.
+    #[error(transparent)]
+    Capture(#[from] CaptureError),
+    /// The device.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+    /// RGB splats to compare with, or answers that were kept.
+    #[error(transparent)]
+    Chroma(#[from] ChromaError),
+    /// The teacher.
+    #[error(transparent)]
+    Teacher(#[from] TeacherError),
+    /// The teacher has no colors for any view that it is asked about.
+    #[error("the teacher has no colors for these views")]
+    NothingTaught,
+    /// A network that should tell how far two pictures are apart.
+    #[error("{}: {reason}", path.display())]
+    Network {
+        /// The model.
+        path: PathBuf,
+        /// What is wrong with it and what to do.
+        reason: String,
+    },
+    /// A file of optical flow is not there.
+    #[error("{}: {error}", path.display())]
+    NoFlow {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        error: std::io::Error,
+    },
+    /// A file of optical flow is no use.
+    #[error("{}: {reason}", path.display())]
+    Flow {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
+}
+
+/// What an evaluation is doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Task {
+    /// Asking the teacher.
+    Teacher,
+    /// Fitting RGB splats to compare with.
+    RgbSplats,
+    /// Drawing and comparing the frames of a path.
+    Path,
+    /// Drawing and comparing photographed views.
+    Pairs,
+}
+
+/// How far it is.
+#[derive(Clone, Copy, Debug)]
+pub struct Progress<'a> {
+    /// What is being done.
+    pub task: Task,
+    /// Steps done.
+    pub done: usize,
+    /// Steps in all.
+    pub total: usize,
+    /// The view at hand, if it has a name.
+    pub name: &'a str,
+}
+
+/// Who is told.
+pub type Observer<'a> = dyn FnMut(Progress<'_>) + 'a;

@@ -1,0 +1,294 @@
+//! `eval`: how good a coloured run is.
+
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+    time::Instant,
+};
+
+use super::{
+    Event, Observer, RunError, RunFolder, Stage, files,
+    fit::open_gpu,
+    scene::{open, read_splats},
+};
+use crate::{
+    capture::Dataset,
+    chroma::teacher::{Teacher, TeacherSettings},
+    eval::{
+        ColoredScene, EvalError, Lpips, MeasuredTeacher, Painter, Progress, Scored, Task,
+        along_path, between_views, exposures, mean_bake, mean_luma, mean_pictures,
+        teacher_colorfulness,
+    },
+    raster::Raster,
+    report::{
+        EVALUATION_VERSION, Evaluation, Figure, Method, PageRow, Report, Rules, TeacherReport,
+        evaluation_page, to_image,
+    },
+};
+
+/// Views on the page: a browser should not have to load a thousand pictures.
+const MAX_ROWS: usize = 24;
+
+/// Frames in the page's strip.
+const STRIP_FRAMES: usize = 12;
+
+/// What `eval` is asked to do.
+#[derive(Clone, Debug)]
+pub struct EvalOptions {
+    /// Run folder; the newest run by default.
+    pub run: Option<PathBuf>,
+    /// The teacher, to be measured beside the scene.
+    pub teacher: Option<PathBuf>,
+    /// How it is asked.
+    pub teacher_settings: TeacherSettings,
+    /// COLMAP folder, where it is not the one that `fit` noted.
+    pub colmap: Option<PathBuf>,
+    /// Frames of the path, at least 2.
+    pub frames: usize,
+    /// Whether other ways to colour a scene are measured beside it.
+    pub baselines: bool,
+    /// Bytes of the device that fitting RGB splats may take.
+    pub memory_limit: Option<u64>,
+    /// Folder of `.flo` files between the path's frames; geometric flow by default.
+    pub flow: Option<PathBuf>,
+    /// A network that tells how far two pictures are apart.
+    pub lpips: Option<PathBuf>,
+}
+
+/// Measures a run and writes `eval.json` and the page into its folder.
+///
+/// # Errors
+/// [`RunError`]; the files of an earlier evaluation stay until all is measured.
+pub fn eval(
+    options: &EvalOptions,
+    observe: &mut Observer<'_>,
+) -> Result<(RunFolder, Evaluation), RunError> {
+    let begun = Instant::now();
+    let (folder, report, scene) = load(options, observe)?;
+    let made = tempfile::Builder::new()
+        .prefix(".eval-")
+        .tempdir_in(folder.path())
+        .map_err(files::at(folder.path()))?;
+    files::check_page(&folder.evaluation_page())?;
+    let mut lpips = options.lpips.as_deref().map(Lpips::open).transpose()?;
+    let mut teacher = match &options.teacher {
+        Some(path) => Some(ask(path, options, &folder, &report, &scene, observe)?),
+        None => None,
+    };
+    let drawn = report.luma.settings.raster_options();
+    let raster = Arc::new(Raster::with(&open_gpu(false)?, drawn));
+    let splats = match (&teacher, &options.teacher) {
+        (Some(teacher), Some(path)) if options.baselines => {
+            let limit = options.memory_limit;
+            let mut told = |progress: Progress<'_>| observe(event(progress));
+            let splats = teacher.rgb_splats(&raster, &scene, limit, &mut told);
+            Some(splats.map_err(covers_nothing(path, &scene.dataset))?)
+        }
+        _ => None,
+    };
+    let mut rgb = vec![(Method::Exported, &scene.exported)];
+    rgb.extend(splats.as_ref().map(|field| (Method::RgbSplats, field)));
+    let mut painter = Painter::new(&raster, &scene, &rgb, teacher.as_mut())?;
+
+    let mut views = Vec::new();
+    let mut rows = Vec::new();
+    let dataset = &scene.dataset;
+    let (measured_on, measured) = dataset.measured();
+    let mut done = 0;
+    dataset.visit_colors(measured, |i, photo| {
+        let name = &dataset.capture.views[i].name;
+        observe(Event::Progress {
+            stage: Stage::Measure,
+            done,
+            total: measured.len(),
+            message: name.clone(),
+        });
+        done += 1;
+        let reference = scene.reference(i, &photo);
+        if !reference.measures() {
+            return Ok(());
+        }
+        let drawing = painter.draw(&dataset.cameras[i], name)?;
+        let answer = painter.answer(i)?;
+        let scored = Scored::of(name, reference, &drawing, answer.as_ref(), lpips.as_mut())?;
+        if rows.len() < MAX_ROWS {
+            rows.push(page_row(made.path(), rows.len(), &scored)?);
+        }
+        views.push(scored);
+        Ok::<_, RunError>(())
+    })?;
+    let mut strip = Vec::new();
+    let every = options.frames.div_ceil(STRIP_FRAMES);
+    let flow = options.flow.as_deref();
+    let mut keep = |frame, image| {
+        let file = format!("frame-{frame:04}.png");
+        files::write_png(&made.path().join(&file), &image)?;
+        if frame % every == 0 {
+            strip.push(file);
+        }
+        Ok::<_, RunError>(())
+    };
+    let mut told = |progress: Progress<'_>| observe(event(progress));
+    let frames = options.frames;
+    let path = along_path(&mut painter, &scene, frames, flow, &mut told, &mut keep)?;
+    let between = between_views(&mut painter, &scene, &mut told)?;
+    if !path.skipped.is_empty() {
+        observe(Event::Note(format!(
+            "a path of {} frames is too short for Δ = {:?}: choose more --frames",
+            path.frames, path.skipped
+        )));
+    }
+    let evaluation = Evaluation {
+        version: EVALUATION_VERSION,
+        program: env!("CARGO_PKG_VERSION").to_owned(),
+        scene: scene.name(),
+        teacher: painter.teacher(),
+        teacher_colorfulness: teacher_colorfulness(&painter, &scene)?,
+        measured_on: measured_on.to_owned(),
+        luma: mean_luma(&views),
+        bake: mean_bake(&views),
+        pictures: mean_pictures(&views),
+        views: views.into_iter().map(|scored| scored.score).collect(),
+        rules: Rules::default(),
+        path,
+        between,
+        seconds: begun.elapsed().as_secs_f64(),
+    };
+    let html = evaluation_page(&evaluation, &rows, &strip);
+    files::write(&made.path().join(files::PAGE), html.as_bytes())?;
+    files::replace_page(made, &folder.evaluation_page())?;
+    let json = evaluation.to_json() + "\n";
+    files::write(&folder.evaluation(), json.as_bytes())?;
+    Ok((folder, evaluation))
+}
+
+/// Opens the run that is to be measured.
+fn load(
+    options: &EvalOptions,
+    observe: &mut Observer<'_>,
+) -> Result<(RunFolder, Report, ColoredScene), RunError> {
+    let folder = match &options.run {
+        Some(path) => RunFolder::at(path),
+        None => RunFolder::newest()?,
+    };
+    let report = folder.read_report()?;
+    let refused = |path: PathBuf, reason: &str| RunError::File {
+        path,
+        reason: format!("{reason}: run `gs-chroma colorize` first"),
+    };
+    let color = folder.color();
+    if !color.exists() {
+        return Err(refused(color, "the run is not coloured yet"));
+    }
+    // A run's own files are moved already.
+    let offset = glam::DVec3::ZERO;
+    let luma = read_splats(&folder.luma(), offset, observe)?.0.to_luma();
+    let exported = read_splats(&color, offset, observe)?.0;
+    if exported.means != luma.means || exported.sh.channels != 3 {
+        return Err(refused(color, "its Gaussians are not those of luma.ply"));
+    }
+    let chroma = folder.read_chroma(luma.len())?;
+    if chroma.is_none() {
+        observe(Event::Note(format!(
+            "{} is missing: the native picture is not measured; `gs-chroma colorize` writes it",
+            folder.chroma().display()
+        )));
+    }
+    let colmap = match &options.colmap {
+        Some(path) => path.clone(),
+        None => PathBuf::from(&report.capture.path),
+    };
+    let dataset = open(&colmap, &report.capture.load, observe)?;
+    let scene = ColoredScene {
+        exposures: exposures(&dataset, &report.luma.exposures),
+        dataset,
+        luma,
+        chroma,
+        exported: exported.sh,
+    };
+    Ok((folder, report, scene))
+}
+
+/// Asks the teacher for all photos, through the run's cache; for frames too where baselines
+/// are wanted and it is a network.
+fn ask(
+    path: &Path,
+    options: &EvalOptions,
+    folder: &RunFolder,
+    report: &Report,
+    scene: &ColoredScene,
+    observe: &mut Observer<'_>,
+) -> Result<MeasuredTeacher, RunError> {
+    let settings = &options.teacher_settings;
+    let teacher = Teacher::open(path, Some(&folder.teacher()), settings)?;
+    let info = teacher.describe();
+    let is_same = |t: &TeacherReport| (&t.name, &t.sha256) == (&info.name, &info.sha256);
+    if let Some(chroma) = &report.chroma
+        && !chroma.teachers.iter().any(is_same)
+    {
+        observe(Event::Note(
+            "the run was coloured by another teacher than the one it is measured against"
+                .to_owned(),
+        ));
+    }
+    let frames = if options.baselines && teacher.is_network() {
+        Some(Teacher::open(path, None, settings)?)
+    } else {
+        None
+    };
+    if options.baselines && frames.is_none() {
+        observe(Event::Note(
+            "a folder of images cannot colour frames: no baseline of luma, then teacher".to_owned(),
+        ));
+    }
+    let mut told = |progress: Progress<'_>| observe(event(progress));
+    let asked = MeasuredTeacher::ask(teacher, frames, &scene.dataset, &mut told);
+    asked.map_err(covers_nothing(path, &scene.dataset))
+}
+
+/// Names the teacher that has nothing to say.
+fn covers_nothing(path: &Path, dataset: &Dataset) -> impl FnOnce(EvalError) -> RunError {
+    move |error| match error {
+        EvalError::NothingTaught => RunError::TeacherCoversNothing {
+            teacher: path.to_owned(),
+            example: dataset.capture.views[dataset.split.train[0]].name.clone(),
+        },
+        other => other.into(),
+    }
+}
+
+fn event(progress: Progress<'_>) -> Event {
+    Event::Progress {
+        stage: match progress.task {
+            Task::Teacher => Stage::Teacher,
+            Task::RgbSplats => Stage::Chroma,
+            Task::Path => Stage::Path,
+            Task::Pairs => Stage::Pairs,
+        },
+        done: progress.done,
+        total: progress.total,
+        message: match progress.task {
+            Task::RgbSplats => "RGB splats to compare with".to_owned(),
+            _ => progress.name.to_owned(),
+        },
+    }
+}
+
+/// Writes a view's pictures beside the page.
+fn page_row(folder: &Path, index: usize, scored: &Scored) -> Result<PageRow, RunError> {
+    let [width, height] = scored.size;
+    let mut figures = Vec::new();
+    for shot in &scored.shots {
+        let file = format!("view-{index:02}-{}.png", shot.file);
+        let image = to_image(width, height, &shot.pixels);
+        files::write_png(&folder.join(&file), &image)?;
+        figures.push(Figure {
+            caption: shot.caption.to_owned(),
+            file,
+        });
+    }
+    Ok(PageRow {
+        name: scored.score.name.clone(),
+        figures,
+    })
+}
