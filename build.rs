@@ -47,6 +47,7 @@ fn main() {
             compile(&out, kernel, &format!("_{color}"), &[color]);
         }
     }
+    compile(&out, "chroma_loss", "_agreeing", &["agreeing"]);
     // Luma trains the geometry too; on frozen geometry the gradient of a/b or RGB and its
     // curvature come back as four figures.
     for kernel in ["blend_backward", "sum_instances"] {
@@ -93,8 +94,8 @@ fn compile(out: &str, kernel: &str, suffix: &str, features: &[&str]) {
     let mut compiler = Wesl::new("shaders");
     compiler.keep_all_entrypoints();
     for feature in [
-        "luma", "chroma", "rgb", "figures", "geometry", "step", "exposed", "masked", "mip", "lazy",
-        "half", "window11", "window7", "window5",
+        "luma", "chroma", "rgb", "agreeing", "figures", "geometry", "step", "exposed", "masked",
+        "mip", "lazy", "half", "window11", "window7", "window5",
     ] {
         compiler.set_feature(feature, features.contains(&feature));
     }

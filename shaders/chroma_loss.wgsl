@@ -2,7 +2,8 @@
 // of their distance in the a, b plane. It may decline to a constant for large
 // residuals, so that a teacher who is plainly wrong does not count. With the gradient goes
 // the curvature, the slope over the residual: the weight of the pixel in the quadratic
-// that touches the loss from above.
+// that touches the loss from above. `agreeing`: the picture shall agree with that of the next
+// coarser scale as well.
 import package::common::correction::{Correction, corrected};
 import package::common::numeric::linear_group;
 import package::common::view::View;
@@ -11,17 +12,17 @@ import package::common::wanted::{SMOOTHING, wanted_ab};
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var<storage, read> image: array<vec2f>;
 @group(0) @binding(2) var<storage, read> wanted: array<u32>;
-// The a/b rendered at the next coarser scale; weight 0 where there is none.
-@group(0) @binding(3) var<storage, read> coarser: array<vec2f>;
-@group(0) @binding(4) var<uniform> weights: ChromaLossWeights;
-@group(0) @binding(5) var<storage, read_write> block_losses: array<f32>;
+@group(0) @binding(3) var<uniform> weights: ChromaLossWeights;
+@group(0) @binding(4) var<storage, read_write> block_losses: array<f32>;
 // Gradient, then curvature.
-@group(0) @binding(6) var<storage, read_write> image_gradient: array<vec4f>;
+@group(0) @binding(5) var<storage, read_write> image_gradient: array<vec4f>;
 // How much each wanted pixel counts: 0 not at all, 1 as an ordinary one, more where
 // somebody painted it by hand.
-@group(0) @binding(7) var<storage, read> pixel_weights: array<f32>;
+@group(0) @binding(6) var<storage, read> pixel_weights: array<f32>;
 // `[views]`
-@group(0) @binding(8) var<storage, read> corrections: array<Correction>;
+@group(0) @binding(7) var<storage, read> corrections: array<Correction>;
+// The a/b rendered at the next coarser scale.
+@if(agreeing) @group(0) @binding(8) var<storage, read> coarser: array<vec2f>;
 
 struct ChromaLossWeights {
     coarser_size: vec2u,
@@ -61,7 +62,7 @@ fn penalty(residual: vec2f, decline: f32, joint: bool) -> Penalty {
 // Bilinear sample of the coarser image at this pixel, half-pixel centres.
 // The position is counted in halves of a fine pixel: integers are exact where a
 // quotient in f32 would lose the fraction.
-fn upsampled(pixel: vec2u) -> vec2f {
+@if(agreeing) fn upsampled(pixel: vec2u) -> vec2f {
     let at = max((2u * pixel + 1u) * weights.coarser_size, view.size) - view.size;
     let low = at / (2u * view.size);
     let high = min(low + 1u, weights.coarser_size - 1u);
@@ -96,7 +97,7 @@ fn chroma_loss(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) gro
         var loss = weight * taught.value;
         var curvature = weight * taught.curvature;
         var gradient = curvature * residual;
-        if weights.agreement > 0.0 {
+        @if(agreeing) {
             let drift = image[p] - upsampled(vec2u(p % view.size.x, p / view.size.x));
             let agreed = penalty(drift, 0.0, false);
             loss += weights.agreement * agreed.value;

@@ -9,6 +9,8 @@ use crate::{
 /// The compiled kernels.
 pub struct ChromaKernels {
     pub(super) chroma_loss: Kernel,
+    /// With the agreement with a coarser scale.
+    pub(super) agreeing_loss: Kernel,
     pub(super) rgb_loss: Kernel,
     pub(super) sum_loss: SumLossKernel,
     pub(super) correction: CorrectionKernels,
@@ -21,6 +23,7 @@ impl ChromaKernels {
     pub fn new(gpu: &Gpu) -> Self {
         Self {
             chroma_loss: Kernel::new(gpu, "chroma_loss", shaders::CHROMA_LOSS),
+            agreeing_loss: Kernel::new(gpu, "chroma_loss", shaders::CHROMA_LOSS_AGREEING),
             rgb_loss: Kernel::new(gpu, "rgb_loss", shaders::RGB_LOSS),
             sum_loss: SumLossKernel::new(gpu),
             correction: CorrectionKernels::new(gpu),

@@ -50,6 +50,8 @@ enum Judge {
     Chroma {
         weights: Buffer<ChromaLossWeights>,
         loss: Bindings,
+        /// Where there is a coarser scale.
+        agreeing: Option<Bindings>,
         parameters: Buffer<CorrectionParameters>,
         sums: Bindings,
     },
@@ -159,8 +161,7 @@ impl<'a> Passes<'a> {
                 let wanted = Buffer::from_slice(gpu, "wanted", &target.pixels)?;
                 let weights = target.weights.as_deref().unwrap_or(&[0.0]);
                 let weights = Buffer::from_slice(gpu, "pixel weights", weights)?;
-                let coarser = canvases.get(scale + 1).unwrap_or(canvas);
-                let made = [canvas, coarser];
+                let made = (canvas, canvases.get(scale + 1));
                 let shared = (&image_gradient, &scratch);
                 let seat = passes.seat(view, scale, made, shared, wanted, weights)?;
                 passes.seats.push(seat);
@@ -174,8 +175,7 @@ impl<'a> Passes<'a> {
             let count = if weighted { pixels[0] } else { 1 };
             let weights: Buffer<f32> = Buffer::zeros(gpu, "pixel weights", count)?;
             for (scale, canvas) in canvases.iter().enumerate() {
-                let coarser = canvases.get(scale + 1).unwrap_or(canvas);
-                let made = [canvas, coarser];
+                let made = (canvas, canvases.get(scale + 1));
                 let shared = (&image_gradient, &scratch);
                 let (wanted, weights) = (wanted.clone(), weights.clone());
                 let seat = passes.seat(view, scale, made, shared, wanted, weights)?;
@@ -189,7 +189,7 @@ impl<'a> Passes<'a> {
         &self,
         view: usize,
         scale: usize,
-        [canvas, coarser]: [&Canvas; 2],
+        (canvas, coarser): (&Canvas, Option<&Canvas>),
         (image_gradient, scratch): (&Buffer<f32>, &AdjointScratch),
         wanted: Buffer<u32>,
         weights: Buffer<f32>,
@@ -242,20 +242,21 @@ impl<'a> Passes<'a> {
             ColorKind::Chroma | ColorKind::Luma => {
                 let of_loss =
                     Buffer::uniform(gpu, "chroma loss weights", &ChromaLossWeights::default())?;
-                let loss = kernels.chroma_loss.bind(
-                    gpu,
-                    &[
-                        lists.view.raw(),
-                        layer.image.raw(),
-                        wanted.raw(),
-                        coarser.image().raw(),
-                        of_loss.raw(),
-                        block_losses,
-                        image_gradient.raw(),
-                        weights.raw(),
-                        self.corrections.corrections.raw(),
-                    ],
-                );
+                let mut buffers = vec![
+                    lists.view.raw(),
+                    layer.image.raw(),
+                    wanted.raw(),
+                    of_loss.raw(),
+                    block_losses,
+                    image_gradient.raw(),
+                    weights.raw(),
+                    self.corrections.corrections.raw(),
+                ];
+                let loss = kernels.chroma_loss.bind(gpu, &buffers);
+                let agreeing = coarser.map(|coarser| {
+                    buffers.push(coarser.image().raw());
+                    kernels.agreeing_loss.bind(gpu, &buffers)
+                });
                 let parameters = self.corrections.parameters(gpu, 0, false)?;
                 let inputs = [lists.view.raw(), layer.image.raw(), wanted.raw()];
                 let inputs = (inputs, image_gradient, &weights);
@@ -263,6 +264,7 @@ impl<'a> Passes<'a> {
                 Judge::Chroma {
                     weights: of_loss,
                     loss,
+                    agreeing,
                     parameters,
                     sums,
                 }
@@ -343,11 +345,12 @@ impl<'a> Passes<'a> {
             Judge::Chroma {
                 weights,
                 loss,
+                agreeing,
                 parameters,
                 sums,
             } => {
-                let agrees = judging.agreement > 0.0;
-                let coarser = if agrees { scale + 1 } else { scale };
+                let agreeing = agreeing.as_ref().filter(|_| judging.agreement > 0.0);
+                let coarser = scale + usize::from(agreeing.is_some());
                 weights.write(
                     gpu,
                     &[ChromaLossWeights {
@@ -358,7 +361,10 @@ impl<'a> Passes<'a> {
                         ..ChromaLossWeights::robust(judging.robust)
                     }],
                 );
-                recorder.dispatch(&frozen.kernels.chroma_loss, loss, blocks);
+                match agreeing {
+                    Some(loss) => recorder.dispatch(&frozen.kernels.agreeing_loss, loss, blocks),
+                    None => recorder.dispatch(&frozen.kernels.chroma_loss, loss, blocks),
+                }
                 if ending == Ending::GradientAndSums {
                     self.corrections.choose(gpu, parameters, index, weighted);
                     (self.corrections).sum(&frozen.kernels.correction, sums, &mut recorder);

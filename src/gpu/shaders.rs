@@ -14,6 +14,8 @@ shaders! {
     ADAM = "adam";
     /// Chroma loss.
     CHROMA_LOSS = "chroma_loss";
+    /// Chroma loss with the agreement with a coarser scale.
+    CHROMA_LOSS_AGREEING = "chroma_loss_agreeing";
     /// Keys of the depth sort.
     COMPACT = "compact";
     /// Copies along a densification plan.

@@ -1,4 +1,4 @@
-//! RGB harmonics fitted to pictures: the RGB of the drawing is that of viewers, no
+//! RGB harmonics fitted to pictures, as viewers draw them: no
 //! Gaussian gets darker than black, and no pixel brighter than white.
 
 use std::ops::ControlFlow;
@@ -15,9 +15,9 @@ use crate::{
 /// Views that the bake is fitted to at most; more of one scene say little new.
 const BAKE_VIEWS: usize = 16;
 
-/// Rounds of the bake at half the size, and at full size; more make views worse that are
-/// not fitted to (docs/decisions.md).
-const BAKE_ROUNDS: [usize; 2] = [6, 6];
+/// Rounds of the bake, all at full size: pictures of half the size are blurred otherwise, and
+/// what is right for them is wrong for these (docs/decisions.md).
+const BAKE_ROUNDS: usize = 16;
 
 /// Fits RGB harmonics, up to the degree of `settings`, to the colored pictures of `tasks`:
 /// what training RGB splats on a teacher's pictures would give on this geometry.
@@ -45,51 +45,76 @@ pub fn fit_rgb(
 /// As [`solve`](crate::chroma::solve).
 pub fn bake(frozen: &FrozenViews, luma: &Splats, chroma: &ShField) -> Result<Splats, ChromaError> {
     let settings = ChromaSettings {
-        coarse_scales: 1,
-        coarse_rounds: BAKE_ROUNDS[0],
-        rounds: BAKE_ROUNDS[1],
+        coarse_scales: 0,
+        rounds: BAKE_ROUNDS,
         ..ChromaSettings::exact()
     };
-    let gpu = frozen.gpu();
-    let fields = [Field::upload(gpu, &luma.sh)?, Field::upload(gpu, chroma)?];
-    let mut targets = Targets::new(settings.target_scales());
+    let mut baked = bake_rgb(luma, chroma);
+    let room = raise_to_black(&mut baked);
+    // What is missing is linear in what the Gaussians are moved by: these are Gaussians
+    // around mid-gray, of which none is black.
+    let unmoved = ShField::zeros(frozen.splat_count(), 0, 3);
+    let (targets, tasks) = missing(frozen, [&luma.sh, chroma, &baked.sh, &unmoved])?;
+    let mut solver = IrlsSolver::starting_at(frozen, &settings, &targets, tasks, &unmoved)?;
+    solver.set_floors(&room);
+    solver.run(&mut |_| ControlFlow::Continue(()))?;
+    let moved = solver.chroma()?;
+    let stride = 3 * sh::coefficient_count(baked.sh.degree);
+    let of_splats = baked.sh.coefficients.chunks_exact_mut(stride);
+    for (of_splat, by) in of_splats.zip(moved.coefficients.chunks_exact(3)) {
+        for (constant, by) in of_splat.iter_mut().zip(by) {
+            *constant += by;
+        }
+    }
+    Ok(baked)
+}
+
+/// What `exported` lacks of the native pictures, on top of the picture of `unmoved`.
+fn missing(
+    frozen: &FrozenViews,
+    [luma, chroma, exported, unmoved]: [&ShField; 4],
+) -> Result<(Targets, Vec<Task>), ChromaError> {
+    let upload = |field| Field::upload(frozen.gpu(), field);
+    let (luma, chroma) = (upload(luma)?, upload(chroma)?);
+    let (exported, unmoved) = (upload(exported)?, upload(unmoved)?);
+    let mut targets = Targets::new(1);
     let step = frozen.len().div_ceil(BAKE_VIEWS).max(1);
     let tasks = (0..frozen.len())
         .step_by(step)
         .map(|view| {
-            let pictures = frozen.draw(view, &fields.each_ref())?;
-            let size = [pictures[0].width, pictures[0].height];
+            let pictures = frozen.draw(view, &[&luma, &chroma, &exported, &unmoved])?;
             let native = native_rgb(&pictures[0], &pictures[1]);
-            let target = targets.push_rgb(size, &native, None)?;
+            // Viewers clip: nothing is missing beyond white.
+            let shown = pictures[2].shown();
+            let around = pictures[3].pixels.as_chunks::<3>().0;
+            let wanted: Vec<[f32; 3]> = (native.iter().zip(&shown).zip(around))
+                .map(|((native, shown), around)| {
+                    [0, 1, 2].map(|c| around[c] + native[c] - shown[c])
+                })
+                .collect();
+            let size = [pictures[0].width, pictures[0].height];
+            let target = targets.push_rgb(size, &wanted, None)?;
             Ok(Task { view, target })
         })
-        .collect::<Result<Vec<_>, ChromaError>>()?;
-    drop(fields);
-    let mut baked = bake_rgb(luma, chroma);
-    let floors = raise_to_black(&mut baked);
-    let start = &baked.sh;
-    let mut solver = IrlsSolver::starting_at(frozen, &settings, &targets, tasks, start)?;
-    solver.set_floors(&floors);
-    solver.run(&mut |_| ControlFlow::Continue(()))?;
-    baked.sh = solver.chroma()?;
-    Ok(baked)
+        .collect::<Result<_, ChromaError>>()?;
+    Ok((targets, tasks))
 }
 
 /// Raises constant harmonics to the least with which a Gaussian shows from somewhere:
 /// viewers draw no channel darker than black, so below these nothing changes any more.
-/// Gives them as planes `[3, N]`.
+/// Gives how far each may still fall, 0 or less, as planes `[3, N]`.
 fn raise_to_black(splats: &mut Splats) -> Vec<f32> {
     let count = splats.len();
     let stride = 3 * sh::coefficient_count(splats.sh.degree);
-    let mut floors = vec![UNBOUNDED; 3 * count];
+    let mut room = vec![UNBOUNDED; 3 * count];
     let of_splats = splats.sh.coefficients.chunks_exact_mut(stride);
     for (i, of_splat) in of_splats.enumerate() {
         for channel in 0..3 {
             let mut rest = of_splat[3..].iter().skip(channel).step_by(3).copied();
             let least = ((darkest(&mut rest) - 0.5) / sh::C0) as f32;
-            floors[channel * count + i] = least;
             of_splat[channel] = of_splat[channel].max(least);
+            room[channel * count + i] = least - of_splat[channel];
         }
     }
-    floors
+    room
 }

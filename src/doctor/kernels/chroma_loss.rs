@@ -29,7 +29,7 @@ pub struct ChromaInput<'a> {
     pub image: &'a [[f64; 2]],
     /// Wanted a/b, `[pixels][2]`, in 256ths of a unit.
     pub wanted: &'a [[f64; 2]],
-    /// The coarser scale's picture, of the size in `weights`.
+    /// The coarser scale's picture, of the size in `weights`; read where `weights` say so.
     pub coarser: &'a [[f64; 2]],
     /// How much each pixel counts; read where `weights` say so.
     pub pixel_weights: &'a [f64],
@@ -60,7 +60,13 @@ impl ChromaInput<'_> {
     /// # Errors
     /// [`GpuError`].
     pub fn run(&self, gpu: &Gpu) -> Result<ChromaOutput, GpuError> {
-        let kernel = Kernel::new(gpu, "chroma_loss", shaders::CHROMA_LOSS);
+        let agrees = self.weights.agreement > 0.0;
+        let shader = if agrees {
+            shaders::CHROMA_LOSS_AGREEING
+        } else {
+            shaders::CHROMA_LOSS
+        };
+        let kernel = Kernel::new(gpu, "chroma_loss", shader);
         let view = view(gpu, self.size)?;
         let weights = Buffer::uniform(gpu, "weights", &self.weights)?;
         let (image, coarser) = (pixels(gpu, self.image)?, pixels(gpu, self.coarser)?);
@@ -74,17 +80,19 @@ impl ChromaInput<'_> {
         let figures = Buffer::<f32>::zeros(gpu, "figures", 2 * image.len())?;
         let groups = groups_for(self.size[0] * self.size[1]);
         let loss = logged(gpu, self.size, groups as usize, |recorder, block_losses| {
-            let buffers = [
+            let mut buffers = vec![
                 view.raw(),
                 image.raw(),
                 wanted.raw(),
-                coarser.raw(),
                 weights.raw(),
                 block_losses.raw(),
                 figures.raw(),
                 pixel_weights.raw(),
                 corrections.raw(),
             ];
+            if agrees {
+                buffers.push(coarser.raw());
+            }
             recorder.dispatch(&kernel, &kernel.bind(gpu, &buffers), groups);
         })?;
         let figures = figures.read(gpu)?;
