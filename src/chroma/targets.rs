@@ -12,7 +12,7 @@ use super::{
 };
 
 /// Bytes of wanted pictures that stay in memory by default.
-const MEMORY: usize = 192 << 20;
+const MEMORY: usize = 96 << 20;
 
 /// Steps of a CIELAB unit that wanted a/b are rounded to.
 const AB_STEPS: f32 = 256.0;
