@@ -51,7 +51,8 @@ def measured(photos: int, arguments: argparse.Namespace) -> Peaks:
     """Peaks in MiB by stage and kind."""
     with tempfile.TemporaryDirectory() as folder:
         for command in commands(photos, arguments, Path(folder)):
-            subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+            quiet = subprocess.DEVNULL
+            subprocess.run(command, check=True, stdout=quiet, stderr=quiet)
         report = json.loads((Path(folder) / "run/report.json").read_text(encoding="utf-8"))
     return {(stage, kind): report[stage][kind] / 2**20 for stage in STAGES for kind in KINDS}
 
