@@ -13,7 +13,7 @@ const BLUR: f32 = 0.3;
 // Alpha is capped so that 1/(1 - alpha) in the adjoint stays below 100.
 const ALPHA_MAX: f32 = 0.99;
 
-// Below half an 8-bit step a contribution cannot be seen.
+// The smallest opacity that is blended: one step of an 8-bit image.
 override ALPHA_MIN: f32 = 0.00392156862745098;
 
 // A pixel is finished when less than this passes through.

@@ -13,7 +13,7 @@ struct View {
     size: vec2u,
     tiles: vec2u,
     splat_count: u32,
-    // Degree of the spherical harmonics in use and the degree they are stored with.
+    // Degree of the spherical harmonics in use.
     sh_degree: u32,
     instance_capacity: u32,
     padding: u32,
