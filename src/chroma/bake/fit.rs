@@ -1,13 +1,11 @@
-//! RGB harmonics fitted to pictures, as viewers draw them: no
-//! Gaussian gets darker than black, and no pixel brighter than white.
+//! RGB harmonics fitted to pictures, as viewers draw them: no Gaussian gets darker than
+//! black, and no pixel brighter than white.
 
 use std::ops::ControlFlow;
 
 use super::gaussian::{bake_rgb, darkest};
 use crate::{
-    chroma::{
-        ChromaError, ChromaSettings, FrozenViews, IrlsSolver, Targets, Task, UNBOUNDED, native_rgb,
-    },
+    chroma::{ChromaError, ChromaSettings, FrozenViews, IrlsSolver, Targets, Task, native_rgb},
     raster::Field,
     splats::{ShField, Splats, sh},
 };
@@ -69,7 +67,8 @@ pub fn bake(frozen: &FrozenViews, luma: &Splats, chroma: &ShField) -> Result<Spl
     Ok(baked)
 }
 
-/// What `exported` lacks of the native pictures, on top of the picture of `unmoved`.
+/// What `exported` lacks of the native pictures, on top of the picture of `unmoved`. Wanted
+/// pictures hold 0 to 1: what lacks more than half of that is asked for in part.
 fn missing(
     frozen: &FrozenViews,
     [luma, chroma, exported, unmoved]: [&ShField; 4],
@@ -106,7 +105,7 @@ fn missing(
 fn raise_to_black(splats: &mut Splats) -> Vec<f32> {
     let count = splats.len();
     let stride = 3 * sh::coefficient_count(splats.sh.degree);
-    let mut room = vec![UNBOUNDED; 3 * count];
+    let mut room = vec![0.0; 3 * count];
     let of_splats = splats.sh.coefficients.chunks_exact_mut(stride);
     for (i, of_splat) in of_splats.enumerate() {
         for channel in 0..3 {

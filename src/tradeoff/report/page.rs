@@ -1,8 +1,8 @@
 //! `tradeoff.html`: one file that needs nothing else.
 
-use base64::prelude::{BASE64_STANDARD, Engine as _};
-
 use std::{collections::BTreeMap, fmt::Write};
+
+use base64::prelude::{BASE64_STANDARD, Engine as _};
 
 use super::{
     Measure, Point, PointStage, Tradeoff,
