@@ -28,6 +28,9 @@ pub struct Measured {
 impl Measured {
     /// Draws and measures the held-out views, or all where none is: `luma` with `chroma`
     /// against `baked`, and that against the photos.
+    ///
+    /// # Errors
+    /// [`EvalError`] of a photo or the device, or when wanted colors cannot be read.
     pub fn of(
         raster: &Arc<Raster>,
         dataset: &Dataset,

@@ -24,6 +24,9 @@ pub struct Lpips {
 
 impl Lpips {
     /// Opens a model: two inputs `[1, 3, H, W]` of f32 in [-1, 1], one number out.
+    ///
+    /// # Errors
+    /// [`EvalError::Network`]; [`EvalError::Teacher`] without ONNX Runtime.
     pub fn open(path: &Path) -> Result<Self, EvalError> {
         let failure = |reason: String| EvalError::Network {
             path: path.to_owned(),
@@ -60,6 +63,9 @@ impl Lpips {
     }
 
     /// The distance of two pictures, RGB in [0, 1] of one width and height.
+    ///
+    /// # Errors
+    /// [`EvalError::Network`].
     pub fn distance(
         &mut self,
         a: &[[f32; 3]],

@@ -45,6 +45,9 @@ pub struct Drawing {
 impl<'a> Painter<'a> {
     /// A painter of the scene's own pictures, of RGB splats on its geometry, and of
     /// what a teacher makes of the gray pictures.
+    ///
+    /// # Errors
+    /// [`EvalError::Gpu`].
     pub fn new(
         raster: &Arc<Raster>,
         scene: &'a ColoredScene,
@@ -66,6 +69,9 @@ impl<'a> Painter<'a> {
     }
 
     /// Draws what `camera` sees; `name` is for the teacher's errors.
+    ///
+    /// # Errors
+    /// [`EvalError`] of the device or the teacher.
     pub fn draw(&mut self, camera: &Camera, name: &str) -> Result<Drawing, EvalError> {
         let mut pictures = self.renderer.render(camera)?;
         // One picture a field: gray, RGB, and a/b last.
@@ -91,6 +97,9 @@ impl<'a> Painter<'a> {
 
     /// The scene's median depth along the camera's z axis in world units, `[height,
     /// width]`; NaN where it is not opaque enough to have one.
+    ///
+    /// # Errors
+    /// [`EvalError::Gpu`].
     pub fn depth(&self, camera: &Camera) -> Result<Vec<f32>, EvalError> {
         let steps = DepthSteps::new(&self.scene.luma, camera);
         let fields: Vec<&ShField> = steps.fields.iter().collect();
@@ -104,6 +113,9 @@ impl<'a> Painter<'a> {
     }
 
     /// The teacher's answer for a photo.
+    ///
+    /// # Errors
+    /// [`EvalError::Chroma`] when kept answers cannot be read.
     pub fn answer(&self, view: usize) -> Result<Option<AbImage>, EvalError> {
         match &self.teacher {
             Some(teacher) => teacher.answer(view),

@@ -44,6 +44,9 @@ const SHOWN: [(Method, &str, &str); 4] = [
 impl Scored {
     /// Measures what was drawn, and the teacher's answer, against a photo: what was drawn
     /// as the photo would show it.
+    ///
+    /// # Errors
+    /// [`EvalError::Network`] of `lpips`.
     pub fn of(
         name: &str,
         reference: Reference<'_>,
@@ -215,6 +218,9 @@ pub fn mean_luma(views: &[Scored]) -> LumaScore {
 }
 
 /// Mean colorfulness of the teacher's pictures of all photos.
+///
+/// # Errors
+/// [`EvalError`] of a photo, or when kept answers cannot be read.
 pub fn teacher_colorfulness(
     painter: &Painter<'_>,
     scene: &ColoredScene,

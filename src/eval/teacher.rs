@@ -82,6 +82,9 @@ impl MeasuredTeacher {
     }
 
     /// The answer for a view, where there is one.
+    ///
+    /// # Errors
+    /// [`EvalError::Chroma`] when kept answers cannot be read.
     pub fn answer(&self, view: usize) -> Result<Option<AbImage>, EvalError> {
         let kept = self.of_view[view].map(|index| self.answers.read(index, 0));
         Ok(kept.transpose()?.map(|target| target.ab()))
@@ -147,6 +150,9 @@ impl MeasuredTeacher {
     }
 
     /// What the teacher makes of a drawn gray picture; `None` without that baseline.
+    ///
+    /// # Errors
+    /// [`EvalError::Teacher`].
     pub fn color_frame(
         &mut self,
         name: &str,
