@@ -8,7 +8,7 @@ use gs_chroma::{
     capture::{Dataset, LoadOptions},
     chroma::{
         self, ChromaSettings, Colorizer, ColorizerError, Wanted,
-        teacher::{AbImage, Asked, GrayImage},
+        teacher::{AbImage, GrayImage, Query},
     },
     gpu::Gpu,
     luma::{self, LumaEvent, LumaSettings},
@@ -22,7 +22,7 @@ struct Sepia;
 impl Colorizer for Sepia {
     fn colorize(
         &mut self,
-        _: Asked<'_>,
+        _: Query<'_>,
         photo: GrayImage<'_>,
     ) -> Result<Option<Wanted>, ColorizerError> {
         let (width, height) = (photo.width, photo.height);

@@ -4,7 +4,7 @@
 //!
 //! ```text
 //! cli → tradeoff → run → eval → report, doctor → luma, chroma → effects, measure → raster
-//! → capture, splats → gpu, color, beside, npy, oracle, compare
+//! → capture, splats → gpu, color, atomic_file, npy, oracle, compare
 //! ```
 //!
 //! [`doctor`] compares the kernels of [`raster`], [`luma`] and [`chroma`] with the [`oracle`],
@@ -44,7 +44,7 @@
 //! # }
 //! ```
 
-mod beside;
+mod atomic_file;
 pub mod capture;
 pub mod chroma;
 #[cfg(feature = "cli")]

@@ -17,22 +17,16 @@ pub struct LoadOptions {
     /// Whether every 8th view is held out.
     pub holdout: bool,
     /// Whether the lens's distortion is taken out.
-    #[serde(default)]
     pub lens: Choice,
     /// What of a colour photo becomes gray.
-    #[serde(default)]
     pub channel: Channel,
     /// What the files' values are.
-    #[serde(default)]
     pub encoding: Encoding,
     /// Which of the files' values become black and white.
-    #[serde(default = "Normalize::off")]
     pub normalize: Normalize,
     /// Where masks are.
-    #[serde(default = "MaskSource::off")]
     pub masks: MaskSource,
     /// What is where a mask is black.
-    #[serde(default)]
     pub masked: MaskUse,
 }
 
@@ -119,12 +113,6 @@ pub enum Normalize {
     Range([f64; 2]),
 }
 
-impl Normalize {
-    fn off() -> Self {
-        Self::Off
-    }
-}
-
 impl From<Normalize> for Option<[f64; 2]> {
     fn from(normalize: Normalize) -> Self {
         match normalize {
@@ -170,12 +158,6 @@ pub enum MaskSource {
     Off,
     /// In this folder.
     Folder(PathBuf),
-}
-
-impl MaskSource {
-    fn off() -> Self {
-        Self::Off
-    }
 }
 
 impl fmt::Display for MaskSource {

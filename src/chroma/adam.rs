@@ -4,8 +4,9 @@
 use std::time::Instant;
 
 use super::{
-    ChromaError, ChromaObserver, ChromaProgress, ChromaSettings, FrozenViews, Targets, Task, irls,
+    ChromaError, ChromaObserver, ChromaProgress, ChromaSettings, FrozenViews, Targets, Task,
     passes::{Ending, Judging, Passes},
+    progress::share,
 };
 use crate::{
     capture::view_at,
@@ -101,9 +102,7 @@ impl<'a> AdamSolver<'a> {
                     loss: recent.iter().map(|&loss| f64::from(loss)).sum::<f64>()
                         / recent.len() as f64,
                     passes: done as f64
-                        * (0..=self.settings.scales as usize)
-                            .map(irls::share)
-                            .sum::<f64>(),
+                        * (0..=self.settings.scales as usize).map(share).sum::<f64>(),
                     seconds: begun.elapsed().as_secs_f64(),
                 });
                 if told.is_break() {

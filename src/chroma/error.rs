@@ -1,7 +1,11 @@
 //! What can go wrong in stage 2.
 
-use super::ColorizerError;
+use std::error::Error;
+
 use crate::{capture::CaptureError, gpu::GpuError};
+
+/// What is wrong with a colorizer.
+pub type ColorizerError = Box<dyn Error + Send + Sync>;
 
 /// Stage 2 cannot go on.
 #[derive(Debug, thiserror::Error)]

@@ -9,6 +9,7 @@ use super::{
     ChromaError, ChromaObserver, ChromaProgress, ChromaSettings, FrozenViews, Targets, Task,
     lbfgs::{Lbfgs, System, UNBOUNDED},
     passes::{Ending, Judging, Passes},
+    progress::share,
 };
 use crate::{
     gpu::{Buffer, Gpu, Readback, Recorder},
@@ -299,8 +300,3 @@ fn mean(losses: &[f32]) -> f64 {
 
 /// What drawing a view is of a pass over it, its adjoint included.
 const DRAWING: f64 = 0.5;
-
-/// What a pass over one scale is of a pass at full size.
-pub(super) fn share(scale: usize) -> f64 {
-    0.25_f64.powi(scale as i32)
-}

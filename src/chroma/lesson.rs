@@ -1,18 +1,15 @@
 //! What the colors of a dataset's views are to be, asked for view by view.
 
-use std::{error::Error, ops::ControlFlow};
+use std::ops::ControlFlow;
 
 use super::{
-    ChromaError, Targets,
-    teacher::{AbImage, Asked, GrayImage, Teacher},
+    ChromaError, ColorizerError, Targets,
+    teacher::{AbImage, GrayImage, Query, Teacher},
 };
 use crate::{
     capture::{Dataset, Photo},
     effects::{TeacherSamples, TeacherSpread},
 };
-
-/// What is wrong with a colorizer.
-pub type ColorizerError = Box<dyn Error + Send + Sync>;
 
 /// What a photo's colors are to be.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,7 +29,7 @@ pub trait Colorizer {
     /// Whatever ends the whole.
     fn colorize(
         &mut self,
-        asked: Asked<'_>,
+        query: Query<'_>,
         photo: GrayImage<'_>,
     ) -> Result<Option<Wanted>, ColorizerError>;
 }
@@ -40,10 +37,10 @@ pub trait Colorizer {
 impl Colorizer for Teacher {
     fn colorize(
         &mut self,
-        asked: Asked<'_>,
+        query: Query<'_>,
         photo: GrayImage<'_>,
     ) -> Result<Option<Wanted>, ColorizerError> {
-        let answer = Self::colorize(self, asked, photo, None)?;
+        let answer = Self::colorize(self, query, photo, None)?;
         Ok(answer.map(|ab| Wanted { ab, weights: None }))
     }
 }
@@ -85,8 +82,8 @@ pub fn teach(
             height: photo.height,
             pixels: &photo.gray,
         };
-        let asked = Asked::view(&capture.views[view], camera);
-        let wanted = colorizer.colorize(asked, gray);
+        let query = Query::view(&capture.views[view], camera);
+        let wanted = colorizer.colorize(query, gray);
         let Some(Wanted { ab, weights }) = wanted.map_err(ChromaError::Colorizer)? else {
             of_view.push(None);
             return Ok(());

@@ -2,7 +2,25 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::SolverKind;
+/// How chroma is solved for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SolverKind {
+    /// Reweighted least squares over all views, sped up by L-BFGS.
+    Irls,
+    /// The paper's: stochastic steps of Adam, coarse to fine.
+    Adam,
+}
+
+impl SolverKind {
+    /// Its name in reports and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Irls => "irls",
+            Self::Adam => "adam",
+        }
+    }
+}
 
 /// Settings of one distillation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -7,7 +7,7 @@ use image::RgbImage;
 
 use super::{
     ColoredScene, Drawing, EvalError, Layer, Observer, Painter, Progress, Task,
-    painter::{ab_of, to_picture},
+    picture::{ab_of, to_picture},
 };
 use crate::{
     capture::{Camera, Photo},

@@ -5,6 +5,7 @@ mod colored;
 mod lpips;
 mod luma;
 mod painter;
+mod picture;
 mod reference;
 mod scene;
 mod score;

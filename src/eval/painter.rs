@@ -2,11 +2,13 @@
 
 use std::sync::Arc;
 
-use super::{ColoredScene, EvalError, MeasuredTeacher};
+use super::{
+    ColoredScene, EvalError, MeasuredTeacher,
+    picture::{ab_of, to_picture},
+};
 use crate::{
-    capture::{Camera, Photo},
+    capture::Camera,
     chroma::{native_rgb, teacher::AbImage},
-    color::srgb_to_lab,
     measure::DepthSteps,
     raster::{Picture, Raster, Renderer},
     report::Method,
@@ -157,34 +159,5 @@ impl Layer {
             Self::Ab(picture) => native_rgb(gray, picture),
             Self::Rgb(rgb) => rgb.clone(),
         }
-    }
-}
-
-/// CIELAB a and b of RGB in [0, 1].
-pub fn ab_of(rgb: &[[f32; 3]]) -> Vec<[f32; 2]> {
-    let ab = |rgb: &[f32; 3]| {
-        let [_, a, b] = srgb_to_lab(rgb.map(f64::from));
-        [a as f32, b as f32]
-    };
-    rgb.iter().map(ab).collect()
-}
-
-/// A photo's gray as a picture of one channel.
-pub fn gray_picture(photo: &Photo) -> Picture {
-    Picture {
-        width: photo.width,
-        height: photo.height,
-        channels: 1,
-        pixels: photo.gray_values(),
-    }
-}
-
-/// A teacher's answer as a picture of two channels.
-pub fn to_picture(answer: &AbImage) -> Picture {
-    Picture {
-        width: answer.width,
-        height: answer.height,
-        channels: 2,
-        pixels: answer.ab.as_flattened().to_vec(),
     }
 }

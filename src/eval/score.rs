@@ -2,7 +2,7 @@
 
 use super::{
     ColoredScene, Drawing, EvalError, Layer, Lpips, Painter, Reference,
-    painter::{ab_of, gray_picture, to_picture},
+    picture::{ab_of, gray_picture, to_picture},
 };
 use crate::{
     chroma::teacher::AbImage,

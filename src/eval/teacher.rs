@@ -5,13 +5,13 @@ use std::sync::Arc;
 
 use super::{
     ColoredScene, EvalError, Observer, Progress, Task as Step,
-    painter::{gray_picture, to_picture},
+    picture::{gray_picture, to_picture},
 };
 use crate::{
     capture::Dataset,
     chroma::{
         ChromaSettings, FrozenViews, Room, Targets, Task, fit_rgb, masked_weights, native_rgb,
-        teacher::{AbImage, Asked, GrayImage, Teacher},
+        teacher::{AbImage, GrayImage, Query, Teacher},
     },
     raster::{Picture, Raster},
     splats::{ShField, sh},
@@ -59,8 +59,8 @@ impl MeasuredTeacher {
                 height: photo.height,
                 pixels: &photo.gray,
             };
-            let asked = Asked::view(view, &dataset.cameras[index]);
-            let answer = teacher.colorize(asked, gray, None)?;
+            let query = Query::view(view, &dataset.cameras[index]);
+            let answer = teacher.colorize(query, gray, None)?;
             let kept = answer.map(|answer| answers.push_ab(&answer, None));
             of_view.push(kept.transpose()?);
             Ok::<_, EvalError>(())

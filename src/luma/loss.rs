@@ -189,14 +189,3 @@ impl Loss {
         recorder.dispatch_grid(&kernels.backward, &self.backward, x, y);
     }
 }
-
-/// Packs 8-bit pixels four to a word, the first in the lowest byte.
-pub fn pack(gray: &[u8]) -> Vec<u32> {
-    gray.chunks(4)
-        .map(|bytes| {
-            let mut word = [0; 4];
-            word[..bytes.len()].copy_from_slice(bytes);
-            u32::from_le_bytes(word)
-        })
-        .collect()
-}

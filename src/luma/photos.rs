@@ -3,7 +3,7 @@
 use std::{collections::HashMap, sync::Arc};
 
 use super::{
-    LumaError, TrainingView, TrainingViews, loss,
+    LumaError, TrainingView, TrainingViews,
     prefetch::Prefetch,
     view::{self, halved},
 };
@@ -102,7 +102,7 @@ impl Photos {
         match &mut self.stream {
             None => {
                 if let Some(buffer) = &self.pictures[photo].mask {
-                    buffer.write(gpu, &loss::pack(mask));
+                    buffer.write(gpu, &pack(mask));
                 }
             }
             Some(stream) => {
@@ -154,9 +154,20 @@ impl Picture {
     }
 
     fn write(&self, gpu: &Gpu, mut view: TrainingView) {
-        self.gray.write(gpu, &loss::pack(&view.gray));
+        self.gray.write(gpu, &pack(&view.gray));
         if let Some(mask) = &self.mask {
-            mask.write(gpu, &loss::pack(&view.counts()));
+            mask.write(gpu, &pack(&view.counts()));
         }
     }
+}
+
+/// Packs 8-bit pixels four to a word, the first in the lowest byte.
+fn pack(gray: &[u8]) -> Vec<u32> {
+    gray.chunks(4)
+        .map(|bytes| {
+            let mut word = [0; 4];
+            word[..bytes.len()].copy_from_slice(bytes);
+            u32::from_le_bytes(word)
+        })
+        .collect()
 }

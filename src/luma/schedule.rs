@@ -1,6 +1,6 @@
 //! When things happen in a training, which follows from its settings.
 
-use super::{Densification, LumaSettings};
+use super::{Densification, LumaSettings, PAPER_ITERATIONS, settings::SHORT_RUN};
 
 /// When things happen in a training, in iterations.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -119,9 +119,6 @@ impl Schedule {
     }
 }
 
-/// In a run with fewer iterations the set of Gaussians changes at a pace of its own.
-pub const SHORT_RUN: usize = 3_000;
-
 /// The next degree of harmonics waits no longer than this: a run whose curve is soon flat
 /// ends with what it has learnt by then.
 const RAISED_BY: usize = 250;
@@ -137,9 +134,6 @@ pub const SETTLING_SHARE: f64 = 0.2;
 /// Shares of the iterations after which outliers are looked for: once the scene is
 /// there, and again when it is sharper.
 pub const OUTLIERS_AT: [f64; 2] = [0.4, 0.65];
-
-/// Luma iterations of ChromaDistill (WACV 2025, supplement).
-pub const PAPER_ITERATIONS: usize = 15_000;
 
 #[cfg(test)]
 mod tests {

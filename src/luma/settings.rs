@@ -3,11 +3,14 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{
-    Numerics,
-    schedule::{PAPER_ITERATIONS, SHORT_RUN},
-};
+use super::Numerics;
 use crate::raster::RasterOptions;
+
+/// Luma iterations of ChromaDistill (WACV 2025, supplement).
+pub const PAPER_ITERATIONS: usize = 15_000;
+
+/// In a run with fewer iterations the set of Gaussians changes at a pace of its own.
+pub(super) const SHORT_RUN: usize = 3_000;
 
 /// Iterations between two looks at the device.
 pub(super) const SYNC_EVERY: usize = 25;

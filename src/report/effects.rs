@@ -21,7 +21,6 @@ pub struct EffectReport {
     pub decided_by: Decider,
     /// Per cent by which a short training fitted the photos better with it than without, where
     /// that was tried.
-    #[serde(default)]
     pub trial: Option<f64>,
     /// What it costs while it is on.
     pub cost: String,

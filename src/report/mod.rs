@@ -24,7 +24,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::{
     capture::{Exposure, LoadOptions},
-    chroma::ChromaSettings,
+    chroma::{ChromaSettings, teacher::Upsample},
     luma::{CurvePoint, Goal, LumaSettings, Preset},
     measure::DeltaE,
 };
@@ -192,19 +192,13 @@ pub struct LumaView {
 /// Stage 2.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ChromaReport {
-    /// Who coloured the photos, where there is exactly one teacher.
-    pub teacher: Option<TeacherReport>,
     /// All teachers, in the order of the command line.
-    #[serde(default)]
     pub teachers: Vec<TeacherReport>,
     /// What the teachers' a and b were multiplied by.
-    #[serde(default = "whole")]
     pub strength: f32,
-    /// How answers smaller than the photo were enlarged: `guided` or `bilinear`.
-    #[serde(default)]
-    pub upsample: String,
+    /// How answers smaller than the photo were enlarged.
+    pub upsample: Upsample,
     /// Training views with painted hints.
-    #[serde(default)]
     pub hints: usize,
     /// Training views that a teacher coloured or that have hints.
     pub colored_views: usize,
@@ -216,10 +210,8 @@ pub struct ChromaReport {
     pub until: usize,
     /// Drawings of a view with their adjoints, those of coarser scales by their share of
     /// the pixels.
-    #[serde(default)]
     pub passes: f64,
     /// What was decided about each effect of stage 2.
-    #[serde(default)]
     pub effects: Vec<EffectReport>,
     /// Loss at the end, in CIELAB units.
     #[serde(deserialize_with = "number_or_nan")]
@@ -231,10 +223,8 @@ pub struct ChromaReport {
     /// Largest memory of the device's buffers in bytes, where the backend tells.
     pub peak_device_memory: Option<u64>,
     /// Bytes of the device that solving and baking were expected to take at most.
-    #[serde(default)]
     pub estimated_device_memory: u64,
     /// Training views whose tile lists and wanted colors stayed on the device.
-    #[serde(default)]
     pub pinned_views: usize,
     /// ΔE00 between the native picture and the exported file's.
     pub bake: ColorError,
@@ -261,13 +251,7 @@ pub struct TeacherReport {
     /// Width and height at which the network sees photos.
     pub input_size: Option<[u32; 2]>,
     /// What its answers count beside the other teachers'.
-    #[serde(default = "whole")]
     pub weight: f32,
-}
-
-/// What a weight or strength is where nothing else is said.
-fn whole() -> f32 {
-    1.0
 }
 
 /// Wall seconds of stage 2.

@@ -16,7 +16,7 @@ use super::{
 };
 use crate::{
     capture::LoadOptions,
-    chroma::{ChosenDegree, ChromaSettings, ColorizeEvent, Degree, Distill, teacher::Upsample},
+    chroma::{ChosenDegree, ChromaSettings, ColorizeEvent, Degree, Distill},
     effects::{Overrules, table},
     eval::{Measured, exposures},
     gpu::Gpu,
@@ -162,17 +162,9 @@ pub fn colorize(
     )?;
     let [distilling, baking] = colored.seconds;
     report.chroma = Some(ChromaReport {
-        teacher: match &teachers.describe()[..] {
-            [only] => Some(only.clone()),
-            _ => None,
-        },
         teachers: teachers.describe(),
         strength: options.teach.strength,
-        upsample: match options.teach.settings.upsample {
-            Upsample::Guided => "guided",
-            Upsample::Bilinear => "bilinear",
-        }
-        .to_owned(),
+        upsample: options.teach.settings.upsample,
         hints: hinted,
         colored_views: colored.colored_views,
         iterations: total,

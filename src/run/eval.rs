@@ -134,7 +134,7 @@ pub fn eval(
     let between = between_views(&mut painter, &scene, &mut told)?;
     if !path.skipped.is_empty() {
         observe(Event::Note(format!(
-            "a path of {} frames is too short for Δ = {:?}: choose more --frames",
+            "a path of {} frames is too short for Δ = {:?}: choose more",
             path.frames, path.skipped
         )));
     }

@@ -9,7 +9,7 @@ use std::{
 use image::RgbImage;
 
 use super::RunError;
-use crate::beside::{beside, folder_of};
+use crate::atomic_file::{self, folder_of};
 
 /// Turns a system error into one that names the path.
 pub(crate) fn at(path: &Path) -> impl FnOnce(std::io::Error) -> RunError {
@@ -22,7 +22,7 @@ pub(crate) fn at(path: &Path) -> impl FnOnce(std::io::Error) -> RunError {
 
 /// Writes beside and renames.
 pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), RunError> {
-    let mut file = beside(path).map_err(at(path))?;
+    let mut file = atomic_file::create(path).map_err(at(path))?;
     file.write_all(bytes).map_err(at(path))?;
     file.persist(path).map_err(|error| at(path)(error.error))?;
     Ok(())

@@ -12,7 +12,7 @@ use crate::{
     chroma::{
         Colorizer, ColorizerError, Lesson, Wanted, teach,
         teacher::{
-            AbImage, Asked, GrayImage, HintFolder, HintImage, Teacher, TeacherInfo, TeacherSettings,
+            AbImage, GrayImage, HintFolder, HintImage, Query, Teacher, TeacherInfo, TeacherSettings,
         },
     },
     report::TeacherReport,
@@ -80,7 +80,7 @@ struct Asking<'a, 'o> {
 impl Colorizer for Asking<'_, '_> {
     fn colorize(
         &mut self,
-        asked: Asked<'_>,
+        query: Query<'_>,
         gray: GrayImage<'_>,
     ) -> Result<Option<Wanted>, ColorizerError> {
         let (view, capture) = (self.view, &self.dataset.capture);
@@ -89,23 +89,23 @@ impl Colorizer for Asking<'_, '_> {
             stage: Stage::Teacher,
             done: view,
             total: capture.views.len(),
-            message: asked.name.to_owned(),
+            message: query.name.to_owned(),
         });
         let trained = self.dataset.split.train.contains(&view);
         let folder = self.teachers.hints.as_ref();
-        let folder = folder.map(|(_, folder)| folder.load(asked, gray));
+        let folder = folder.map(|(_, folder)| folder.load(query, gray));
         let mut hints = folder.transpose()?.flatten();
         self.hints_cover |= trained && hints.is_some();
         if hints.as_ref().is_some_and(HintImage::is_empty) {
             (self.observe)(Event::Note(format!(
                 "left out the hints for {}: nothing is painted there",
-                asked.name
+                query.name
             )));
             hints = None;
         }
         let mut answers = Vec::new();
         for (member, covers) in self.teachers.teachers.iter_mut().zip(&mut self.covers) {
-            if let Some(answer) = member.teacher.colorize(asked, gray, hints.as_ref())? {
+            if let Some(answer) = member.teacher.colorize(query, gray, hints.as_ref())? {
                 answers.push((answer, member.weight));
                 *covers |= trained;
             }
@@ -192,8 +192,7 @@ impl Teachers {
     ) -> Result<(Lesson, usize), RunError> {
         if self.asks_no_network() {
             observe(Event::Note(
-                "--teacher-profile and --teacher-size change nothing: no teacher is a network"
-                    .into(),
+                "profile and size change nothing: no teacher is a network".into(),
             ));
         }
         let mut asking = Asking {

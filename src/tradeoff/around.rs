@@ -89,7 +89,7 @@ impl Around {
             rounds: ChromaSettings::irls().rounds,
             coarse_rounds: ChromaSettings::irls().coarse_rounds,
             corrects_views: chroma.settings.correct_views,
-            teacher_size: (chroma.teacher.as_ref())
+            teacher_size: (chroma.teachers.first())
                 .and_then(|teacher| teacher.input_size)
                 .map(|[width, height]| width.min(height)),
         });

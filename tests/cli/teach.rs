@@ -58,8 +58,8 @@ fn the_files_of_a_coloured_run() {
     assert_eq!(chroma["iterations"], UNTIL - LUMA);
     assert_eq!(chroma["settings"]["sh_degree"], 1);
     assert_eq!(chroma["colored_views"], scene::VIEWS - scene::HELD_OUT);
-    assert_eq!(chroma["teacher"]["kind"], "DDColor");
-    assert_eq!(chroma["teacher"]["name"], "ddcolor_tiny.onnx");
+    assert_eq!(chroma["teachers"][0]["kind"], "DDColor");
+    assert_eq!(chroma["teachers"][0]["name"], "ddcolor_tiny.onnx");
     assert_eq!(chroma["measured_on"], "test");
 }
 
@@ -225,8 +225,8 @@ fn a_folder_teaches_some_views_at_its_own_sizes() {
     let report = with_painted(&place);
     let chroma = &report["chroma"];
     assert_eq!(chroma["colored_views"], 3);
-    assert_eq!(chroma["teacher"]["kind"], "folder");
-    assert_eq!(chroma["teacher"]["name"], "painted");
+    assert_eq!(chroma["teachers"][0]["kind"], "folder");
+    assert_eq!(chroma["teachers"][0]["name"], "painted");
     // Of the held-out views 0 and 8 the teacher knows one.
     assert!(chroma["views"][0]["teacher_colorfulness"].is_f64());
     assert!(chroma["views"][1]["teacher_colorfulness"].is_null());

@@ -64,7 +64,6 @@ fn two_teachers_are_averaged_by_weight() {
     let both = ["--teacher", "red", "--teacher", "blue"];
     let chroma = colorize(&place, &[&both[..], &["--weights", "1,9"]].concat());
     assert_eq!(chroma["colored_views"], scene::VIEWS - scene::HELD_OUT);
-    assert!(chroma["teacher"].is_null(), "{}", chroma["teacher"]);
     let teachers = chroma["teachers"].as_array().expect("a list");
     assert_eq!(teachers.len(), 2);
     for (teacher, (name, weight)) in teachers.iter().zip([("red", 1.0), ("blue", 9.0)]) {
@@ -112,7 +111,7 @@ fn hints_outweigh_the_teacher_where_they_are() {
     paint(&place, "red", RED, &all());
     let chroma = colorize(&place, &["--teacher", "red"]);
     assert_eq!(
-        (&chroma["hints"], chroma["teacher"]["name"].as_str()),
+        (&chroma["hints"], chroma["teachers"][0]["name"].as_str()),
         (&0.into(), Some("red"))
     );
     assert!(redder(&place) > 0.9, "{}", redder(&place));
@@ -148,7 +147,6 @@ fn hints_do_without_a_teacher() {
         (&chroma["hints"], &chroma["colored_views"]),
         (&3.into(), &3.into())
     );
-    assert!(chroma["teacher"].is_null());
     assert_eq!(chroma["teachers"].as_array().map(Vec::len), Some(0));
     assert!(redder(&place) < 0.2, "{}", redder(&place));
 }
@@ -158,7 +156,7 @@ fn a_network_with_hint_inputs_is_told_of_them() {
     let place = place_with_run();
     let network = onnx("siggraph17_full_tiny.onnx");
     let plain = colorize(&place, &["--teacher", &network]);
-    assert_eq!(plain["teacher"]["kind"], "SIGGRAPH17 with hints");
+    assert_eq!(plain["teachers"][0]["kind"], "SIGGRAPH17 with hints");
     let answers = place.files("runs/scene/teacher").len();
     hint(&place, BLUE, &[1, 2], scene::SIZE[0] / 2);
     colorize(&place, &["--teacher", &network, "--hints", "hints"]);
@@ -196,8 +194,11 @@ fn profile_size_and_upsampling_are_asked_for() {
     let network = onnx("deoldify_tiny.onnx");
     let asked = ["--teacher", &network, "--teacher-profile", "deoldify"];
     let chroma = colorize(&place, &[&asked[..], &["--teacher-size", "64"]].concat());
-    assert_eq!(chroma["teacher"]["kind"], "DeOldify");
-    assert_eq!(chroma["teacher"]["input_size"], serde_json::json!([64, 64]));
+    assert_eq!(chroma["teachers"][0]["kind"], "DeOldify");
+    assert_eq!(
+        chroma["teachers"][0]["input_size"],
+        serde_json::json!([64, 64])
+    );
     assert_eq!(chroma["upsample"], "guided");
     let answers = place.files("runs/scene/teacher").len();
     // Another size is another question.
@@ -248,5 +249,5 @@ fn the_guides_manifest_is_taken() {
     place.write("mine.onnx", network);
     place.write("mine.toml", manifest);
     let chroma = colorize(&place, &["--teacher", "mine.onnx"]);
-    assert_eq!(chroma["teacher"]["kind"], "Mine");
+    assert_eq!(chroma["teachers"][0]["kind"], "Mine");
 }

@@ -14,7 +14,7 @@ const FLOORS: [&[&str]; 10] = [
     &["effects", "measure"],
     &["raster"],
     &["capture", "splats"],
-    &["gpu", "color", "beside", "npy", "oracle", "compare"],
+    &["gpu", "color", "atomic_file", "npy", "oracle", "compare"],
 ];
 
 fn floor(name: &str) -> Option<usize> {

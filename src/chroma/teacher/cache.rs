@@ -1,7 +1,7 @@
 //! Answers of a network on disk, so that each photo is coloured once.
 
 use super::{AbImage, GrayImage, TeacherError};
-use crate::{beside::beside, npy};
+use crate::{atomic_file, npy};
 use sha2::{Digest, Sha256};
 use std::fs::{self, File};
 use std::io::{self, Read, Write};
@@ -38,7 +38,7 @@ impl Cache {
     pub fn store(&self, key: &str, image: &AbImage) -> Result<(), TeacherError> {
         let path = self.path(key);
         let stored = || -> io::Result<()> {
-            let mut file = beside(&path)?;
+            let mut file = atomic_file::create(&path)?;
             file.write_all(&encode(image))?;
             file.persist(&path)?;
             Ok(())

@@ -1,7 +1,7 @@
 //! A folder of coloured images as a teacher.
 
 use super::named_images::NamedImages;
-use super::{AbImage, Asked, GrayImage, TeacherError, TeacherInfo, file_name};
+use super::{AbImage, GrayImage, Query, TeacherError, TeacherInfo, file_name};
 use crate::color::srgb_to_lab;
 use std::path::{Path, PathBuf};
 
@@ -48,10 +48,10 @@ impl FolderTeacher {
     /// image.
     pub(super) fn colorize<'a>(
         &self,
-        asked: impl Into<Asked<'a>>,
+        query: impl Into<Query<'a>>,
         photo: GrayImage<'_>,
     ) -> Result<Option<AbImage>, TeacherError> {
-        let Some(found) = self.images.load(asked.into(), photo)? else {
+        let Some(found) = self.images.load(query.into(), photo)? else {
             return Ok(None);
         };
         let size = [found.image.width(), found.image.height()];
@@ -241,8 +241,8 @@ mod tests {
             height,
             pixels: &pixels,
         };
-        let asked = || Asked::view(&view, &view.camera);
-        let answer = teacher.colorize(asked(), gray).unwrap().unwrap();
+        let query = || Query::view(&view, &view.camera);
+        let answer = teacher.colorize(query(), gray).unwrap().unwrap();
         assert_eq!((answer.width, answer.height), (width, height));
         let row = &answer.ab[(height / 2 * width) as usize..][..width as usize];
         let middle = width as usize / 2;
@@ -258,13 +258,13 @@ mod tests {
         // Its own image goes before the photo's.
         save(&folder, "a/b@front.png", width, height, [0, 255, 0]);
         let teacher = FolderTeacher::open(folder.path()).unwrap();
-        let answer = teacher.colorize(asked(), gray).unwrap().unwrap();
+        let answer = teacher.colorize(query(), gray).unwrap().unwrap();
         assert!(answer.ab.iter().all(|ab| ab[0] < -80.0));
         // An image of another cut of the photo is still refused.
         save(&folder, "a/b.png", 60, 60, [0, 255, 0]);
         fs::remove_file(folder.path().join("a/b@front.png")).unwrap();
         let teacher = FolderTeacher::open(folder.path()).unwrap();
-        let error = teacher.colorize(asked(), gray).unwrap_err().to_string();
+        let error = teacher.colorize(query(), gray).unwrap_err().to_string();
         assert!(
             error.contains("a/b.jpg") && error.contains("40 x 30"),
             "{error}"

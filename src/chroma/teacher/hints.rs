@@ -2,7 +2,7 @@
 
 use super::images::{Filter, resample};
 use super::named_images::NamedImages;
-use super::{Asked, GrayImage, TeacherError};
+use super::{GrayImage, Query, TeacherError};
 use crate::color::srgb_to_lab;
 use std::path::Path;
 
@@ -43,12 +43,12 @@ impl HintFolder {
     /// otherwise as for a folder teacher's image.
     pub fn load<'a>(
         &self,
-        asked: impl Into<Asked<'a>>,
+        query: impl Into<Query<'a>>,
         photo: GrayImage<'_>,
     ) -> Result<Option<HintImage>, TeacherError> {
-        let asked = asked.into();
-        photo.check(asked.name)?;
-        let Some(found) = self.images.load(asked, photo)? else {
+        let query = query.into();
+        photo.check(query.name)?;
+        let Some(found) = self.images.load(query, photo)? else {
             return Ok(None);
         };
         if !found.image.color().has_alpha() {

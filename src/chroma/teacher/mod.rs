@@ -4,7 +4,6 @@
 //! that somebody or something else has coloured. Both answer with CIELAB a, b
 //! for a whole photo; lightness always stays the photo's.
 
-mod asked;
 mod cache;
 mod error;
 mod folder;
@@ -14,16 +13,17 @@ mod model;
 mod named_images;
 mod network;
 mod profile;
+mod query;
 pub(crate) mod runtime;
 mod upsample;
 
-pub use asked::Asked;
 pub use error::TeacherError;
 pub use folder::FolderTeacher;
 pub use hints::{HintFolder, HintImage};
 pub use images::{AbImage, GrayImage};
 pub(super) use images::{Filter, resample};
 pub use network::NetworkTeacher;
+pub use query::Query;
 pub use upsample::Upsample;
 
 use serde::Serialize;
@@ -130,15 +130,15 @@ impl Teacher {
     /// damaged or has another aspect than the photo.
     pub fn colorize<'a>(
         &mut self,
-        asked: impl Into<Asked<'a>>,
+        query: impl Into<Query<'a>>,
         photo: GrayImage<'_>,
         hints: Option<&HintImage>,
     ) -> Result<Option<AbImage>, TeacherError> {
-        let asked = asked.into();
-        photo.check(asked.name)?;
+        let query = query.into();
+        photo.check(query.name)?;
         let answer = match &mut self.source {
-            Source::Network(network) => Some(network.colorize(asked.name, photo, hints)?),
-            Source::Folder(folder) => folder.colorize(asked, photo)?,
+            Source::Network(network) => Some(network.colorize(query.name, photo, hints)?),
+            Source::Folder(folder) => folder.colorize(query, photo)?,
         };
         Ok(answer.map(|answer| answer.upsampled(photo, self.upsample)))
     }

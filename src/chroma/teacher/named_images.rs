@@ -1,8 +1,8 @@
 //! A folder of images that belong to photos by name.
 
-use super::asked::Original;
 use super::error::first_line;
-use super::{Asked, GrayImage, TeacherError};
+use super::query::Original;
+use super::{GrayImage, Query, TeacherError};
 use image::DynamicImage;
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
@@ -86,18 +86,18 @@ impl NamedImages {
     /// where it shows another cut of the photo, [`TeacherError::Io`].
     pub fn load<'a>(
         &'a self,
-        asked: Asked<'a>,
+        query: Query<'a>,
         photo: GrayImage<'_>,
     ) -> Result<Option<Found<'a>>, TeacherError> {
         let find = |name: &str| self.images.get(&key(Path::new(name)));
         let whole = || {
-            let original = asked.original?;
+            let original = query.original?;
             Some((original.name, find(original.name)?, Some(original)))
         };
         // A view with its photo's name has no image of its own, but its photo's.
-        let own = match asked.original {
-            Some(original) if original.name == asked.name => None,
-            _ => find(asked.name).map(|path| (asked.name, path, None)),
+        let own = match query.original {
+            Some(original) if original.name == query.name => None,
+            _ => find(query.name).map(|path| (query.name, path, None)),
         };
         let Some((name, path, original)) = own.or_else(whole) else {
             return Ok(None);

@@ -17,7 +17,7 @@ pub(crate) fn folder_of(path: &Path) -> &Path {
 ///
 /// # Errors
 /// The system's, when the folder is missing or cannot be written to.
-pub(crate) fn beside(path: &Path) -> io::Result<NamedTempFile> {
+pub(crate) fn create(path: &Path) -> io::Result<NamedTempFile> {
     let mut builder = Builder::new();
     #[cfg(unix)]
     {
@@ -39,14 +39,14 @@ mod tests {
     fn a_file_appears_when_it_is_complete() {
         let place = tempfile::tempdir().unwrap();
         let path = place.path().join("out");
-        let mut file = beside(&path).unwrap();
+        let mut file = create(&path).unwrap();
         file.write_all(b"whole").unwrap();
         assert!(!path.exists());
         file.persist(&path).unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"whole");
-        drop(beside(&path).unwrap());
+        drop(create(&path).unwrap());
         assert_eq!(fs::read_dir(place.path()).unwrap().count(), 1);
-        assert!(beside(&place.path().join("no folder/out")).is_err());
+        assert!(create(&place.path().join("no folder/out")).is_err());
     }
 
     #[cfg(unix)]
@@ -55,7 +55,7 @@ mod tests {
         use std::os::unix::fs::PermissionsExt;
         let place = tempfile::tempdir().unwrap();
         let [ours, plain] = ["ours", "plain"].map(|name| place.path().join(name));
-        beside(&ours).unwrap().persist(&ours).unwrap();
+        create(&ours).unwrap().persist(&ours).unwrap();
         fs::write(&plain, []).unwrap();
         let [ours, plain] = [ours, plain].map(|path| fs::metadata(path).unwrap().permissions());
         assert_eq!(ours.mode(), plain.mode());

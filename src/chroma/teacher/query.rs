@@ -8,7 +8,7 @@ use crate::capture::{Camera, View, lens::Undistortion};
 /// A network only sees pixels. A folder holds images of photos as the camera took
 /// them; `original` says how the one asked about was made of such a photo.
 #[derive(Clone, Copy)]
-pub struct Asked<'a> {
+pub struct Query<'a> {
     /// The view's name: a path below the photo folder.
     pub name: &'a str,
     pub(super) original: Option<Original<'a>>,
@@ -24,7 +24,7 @@ pub(super) struct Original<'a> {
     camera: &'a Camera,
 }
 
-impl<'a> From<&'a str> for Asked<'a> {
+impl<'a> From<&'a str> for Query<'a> {
     fn from(name: &'a str) -> Self {
         Self {
             name,
@@ -33,7 +33,7 @@ impl<'a> From<&'a str> for Asked<'a> {
     }
 }
 
-impl<'a> Asked<'a> {
+impl<'a> Query<'a> {
     /// A view as `camera` shows it, which is the view's at working size.
     pub fn view(view: &'a View, camera: &'a Camera) -> Self {
         let original = view.undistortion.as_ref().map(|undistortion| Original {

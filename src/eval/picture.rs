@@ -1,0 +1,32 @@
+//! Photos and answers as pictures.
+
+use crate::{capture::Photo, chroma::teacher::AbImage, color::srgb_to_lab, raster::Picture};
+
+/// CIELAB a and b of RGB in [0, 1].
+pub fn ab_of(rgb: &[[f32; 3]]) -> Vec<[f32; 2]> {
+    let ab = |rgb: &[f32; 3]| {
+        let [_, a, b] = srgb_to_lab(rgb.map(f64::from));
+        [a as f32, b as f32]
+    };
+    rgb.iter().map(ab).collect()
+}
+
+/// A photo's gray as a picture of one channel.
+pub fn gray_picture(photo: &Photo) -> Picture {
+    Picture {
+        width: photo.width,
+        height: photo.height,
+        channels: 1,
+        pixels: photo.gray_values(),
+    }
+}
+
+/// A teacher's answer as a picture of two channels.
+pub fn to_picture(answer: &AbImage) -> Picture {
+    Picture {
+        width: answer.width,
+        height: answer.height,
+        channels: 2,
+        pixels: answer.ab.as_flattened().to_vec(),
+    }
+}
