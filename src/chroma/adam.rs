@@ -99,6 +99,7 @@ impl<'a> AdamSolver<'a> {
                 let recent = &losses[..done - (done - 1) / REPORT_EVERY * REPORT_EVERY];
                 let told = observe(ChromaProgress {
                     iteration: done,
+                    total: self.settings.iterations,
                     loss: recent.iter().map(|&loss| f64::from(loss)).sum::<f64>()
                         / recent.len() as f64,
                     passes: done as f64

@@ -50,12 +50,21 @@ pub enum ColorizeEvent<'a> {
         /// Views in all.
         total: usize,
     },
+    /// The solver, at a degree that is tried.
+    Trying {
+        /// Degree of the chroma harmonics.
+        degree: u32,
+        /// How far it is.
+        progress: ChromaProgress,
+    },
     /// The degree that held-back views prove useful.
     Chosen(&'a ChosenDegree),
     /// Which effects are reckoned with.
     Plan(&'a [Decision; 2]),
     /// The solver.
     Solving(ChromaProgress),
+    /// The bake; its loss is in hundredths of the way from black to white.
+    Baking(ChromaProgress),
 }
 
 /// Who is told; a [`ControlFlow::Break`] ends it with [`ChromaError::Cancelled`].
@@ -138,8 +147,7 @@ impl Distill<'_> {
             },
             weighted: lesson.targets.weighted(),
         };
-        // The bake passes through half the size.
-        let scales = settings.target_scales().max(2);
+        let scales = settings.target_scales();
         let frozen = FrozenViews::new(
             self.raster,
             self.luma,
@@ -150,18 +158,28 @@ impl Distill<'_> {
         )?;
         let correction = plan::correction(lesson.spread, settings.solver, self.correct_views);
         settings.correct_views = correction.on;
+        let (mut last, mut peak) = (None, None);
         let mut chosen = None;
         settings.sh_degree = match self.sh_degree {
             Degree::Fixed(degree) => degree,
             Degree::Auto => {
-                let found = choose_degree(&frozen, &settings, &lesson.targets, &tasks, self.luma)?;
+                let found = choose_degree(
+                    &frozen,
+                    &settings,
+                    &lesson.targets,
+                    &tasks,
+                    self.luma,
+                    &mut |degree, progress| {
+                        peak = peak.max(gpu.allocated_bytes());
+                        observe(ColorizeEvent::Trying { degree, progress })
+                    },
+                )?;
                 go_on(observe(ColorizeEvent::Chosen(&found)))?;
                 chosen.insert(found).degree
             }
         };
         let effects = [correction, plan::degree(self.sh_degree, chosen.as_ref())];
         go_on(observe(ColorizeEvent::Plan(&effects)))?;
-        let (mut last, mut peak) = (None, None);
         let solved = solve(
             &frozen,
             &settings,
@@ -176,7 +194,10 @@ impl Distill<'_> {
         )?;
         let solving = begun.elapsed().as_secs_f64();
         let begun = Instant::now();
-        let splats = bake(&frozen, self.luma, &solved.chroma)?;
+        let splats = bake(&frozen, self.luma, &solved.chroma, &mut |progress| {
+            peak = peak.max(gpu.allocated_bytes());
+            observe(ColorizeEvent::Baking(progress))
+        })?;
         Ok(Colored {
             splats,
             chroma: solved.chroma,
@@ -185,7 +206,7 @@ impl Distill<'_> {
             last,
             load: solved.load,
             estimated_device_memory: frozen.demand(),
-            peak_device_memory: peak.max(gpu.allocated_bytes()),
+            peak_device_memory: peak,
             pinned_views: frozen.pinned(),
             seconds: [solving, begun.elapsed().as_secs_f64()],
             settings,

@@ -2,7 +2,9 @@
 
 use std::ops::ControlFlow;
 
-use super::{ChromaError, ChromaSettings, FrozenViews, IrlsSolver, Targets, Task, solve};
+use super::{
+    ChromaError, ChromaProgress, ChromaSettings, FrozenViews, IrlsSolver, Targets, Task, solve,
+};
 use crate::splats::{Splats, sh};
 
 /// Every so many views are held back to judge by.
@@ -22,7 +24,7 @@ pub struct ChosenDegree {
 }
 
 /// Distills most of `tasks` at degree 0, 1 and so on, as long as those held back gain.
-/// Fewer than two tasks prove nothing: degree 0.
+/// Fewer than two tasks prove nothing: degree 0. `observe` is told of the degree as well.
 ///
 /// # Errors
 /// As [`solve`].
@@ -32,6 +34,7 @@ pub fn choose_degree(
     targets: &Targets,
     tasks: &[Task],
     luma: &Splats,
+    observe: &mut dyn FnMut(u32, ChromaProgress) -> ControlFlow<()>,
 ) -> Result<ChosenDegree, ChromaError> {
     let (mut kept, mut held_back) = (Vec::new(), Vec::new());
     for (i, &task) in tasks.iter().enumerate() {
@@ -51,8 +54,8 @@ pub fn choose_degree(
             sh_degree: degree,
             ..settings.clone()
         };
-        let ignore = &mut |_| ControlFlow::Continue(());
-        let found = solve(frozen, &settings, targets, kept.clone(), luma, ignore)?;
+        let observe = &mut |progress| observe(degree, progress);
+        let found = solve(frozen, &settings, targets, kept.clone(), luma, observe)?;
         let mut judge = IrlsSolver::new(frozen, &settings, targets, held_back.clone())?;
         let loss = judge.objective(&found.chroma)?;
         let gains = (losses.last()).is_none_or(|before| loss < before * (1.0 - LEAST_GAIN));

@@ -98,7 +98,7 @@ impl FrozenViews {
             .collect();
         drop(frozen);
 
-        let demand = Demand::of(geometry.count, &views, room);
+        let demand = Demand::of(geometry.count, splats.sh.degree, &views, room);
         let pinned = demand.pinned(&views, room.limit)?;
         for view in views[..pinned].iter_mut().flatten() {
             let lists = Lists::new(raster, &geometry, view.uniform.tile_count(), view.entries)?;
@@ -285,7 +285,7 @@ struct Demand {
 }
 
 impl Demand {
-    fn of(splats: usize, views: &[Vec<Frozen>], room: Room) -> Self {
+    fn of(splats: usize, luma_degree: u32, views: &[Vec<Frozen>], room: Room) -> Self {
         let all = || views.iter().flatten();
         let most = |of: &dyn Fn(&Frozen) -> usize| all().map(of).max().unwrap_or(0);
         let tiles = most(&|frozen| frozen.uniform.tile_count());
@@ -296,29 +296,29 @@ impl Demand {
                 sizes.max().unwrap_or(0)
             })
             .collect();
-        // RGB's are the widest.
-        let canvases: u64 = (pixels.iter())
-            .map(|&pixels| Canvas::bytes(ColorKind::Rgb, splats, pixels))
-            .sum();
-        let chroma = 2 * sh::coefficient_count(room.sh_degree);
-        // The bake solves for the constant harmonic of RGB, but draws all.
-        let solved = super::lbfgs::bytes(splats, chroma.max(3));
-        let drawn = (3 * sh::coefficient_count(sh::MAX_DEGREE) * splats * 4) as u64;
-        let image_gradient = 4 * (COLOR_FIGURES * pixels[0]) as u64;
+        let [luma, chroma] = [luma_degree, room.sh_degree].map(sh::coefficient_count);
+        let field = |planes: usize| 4 * (planes * splats) as u64;
+        let canvas = |kind, pixels| Canvas::bytes(kind, splats, pixels);
+        let judged =
+            4 * (COLOR_FIGURES * pixels[0]) as u64 + AdjointScratch::color_bytes(splats, entries);
+        let chroma_canvases = pixels
+            .iter()
+            .map(|&pixels| canvas(ColorKind::Chroma, pixels));
+        // One after the other: a/b are solved for, then pictures are drawn for the bake to
+        // meet, then RGB's constant harmonics are solved for.
+        let solving =
+            super::lbfgs::bytes(splats, 2 * chroma) + chroma_canvases.sum::<u64>() + judged;
+        let rgb = canvas(ColorKind::Rgb, pixels[0]);
+        let drawing = field(luma + 2 * chroma + 3 * luma.max(chroma) + 3) + rgb;
+        let baking = super::lbfgs::bytes(splats, 3) + rgb + judged;
         let of_pixel = 4 * (1 + u64::from(room.weighted));
         Self {
             splats,
             tiles,
             entries,
-            fixed: Geometry::bytes(splats)
-                + canvases
-                + solved
-                + drawn
-                + image_gradient
-                + AdjointScratch::color_bytes(splats, entries),
+            fixed: Geometry::bytes(splats) + solving.max(drawing).max(baking),
             of_pixel,
-            turns: Lists::bytes(splats, tiles, entries)
-                + of_pixel * pixels.iter().sum::<usize>() as u64,
+            turns: Lists::bytes(splats, tiles, entries) + of_pixel * pixels[0] as u64,
         }
     }
 

@@ -205,6 +205,7 @@ impl<'a> IrlsSolver<'a> {
             for (index, passes, losses) in due.into_iter().chain(last) {
                 let told = observe(ChromaProgress {
                     iteration: index + 1,
+                    total: self.rounds.len(),
                     loss: mean(&losses.wait(gpu)?),
                     passes,
                     seconds: begun.elapsed().as_secs_f64(),

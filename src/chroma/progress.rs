@@ -7,6 +7,8 @@ use std::ops::ControlFlow;
 pub struct ChromaProgress {
     /// Iterations of Adam, or rounds of reweighting, done.
     pub iteration: usize,
+    /// Of them in all.
+    pub total: usize,
     /// Mean loss of the finest scale in use, in CIELAB units: since the last report, or
     /// at the start of the round.
     pub loss: f64,

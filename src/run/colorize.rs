@@ -16,7 +16,7 @@ use super::{
 };
 use crate::{
     capture::LoadOptions,
-    chroma::{ChosenDegree, ChromaSettings, ColorizeEvent, Degree, Distill},
+    chroma::{ChosenDegree, ChromaProgress, ChromaSettings, ColorizeEvent, Degree, Distill},
     effects::{Overrules, table},
     eval::{Measured, exposures},
     gpu::Gpu,
@@ -120,6 +120,12 @@ pub fn colorize(
         correct_views: options.correct_views,
     };
     let (mut log, total) = (String::new(), settings.steps_to_report());
+    let told = |stage, progress: ChromaProgress, message| Event::Progress {
+        stage,
+        done: progress.iteration,
+        total: progress.total,
+        message,
+    };
     let colored = distill.run(&settings, &mut |event| {
         match event {
             // It has been asked already.
@@ -136,12 +142,16 @@ pub fn colorize(
                     luma.len(),
                     progress.seconds
                 );
-                observe(Event::Progress {
-                    stage: Stage::Chroma,
-                    done: progress.iteration,
-                    total,
-                    message: format!("loss {:.3}", progress.loss),
-                });
+                let message = format!("loss {:.3}", progress.loss);
+                observe(told(Stage::Chroma, progress, message));
+            }
+            ColorizeEvent::Trying { degree, progress } => {
+                let message = format!("SH degree {degree}, loss {:.3}", progress.loss);
+                observe(told(Stage::Degree, progress, message));
+            }
+            ColorizeEvent::Baking(progress) => {
+                let message = format!("loss {:.3}", progress.loss);
+                observe(told(Stage::Bake, progress, message));
             }
         }
         ControlFlow::Continue(())

@@ -169,8 +169,12 @@ pub enum Stage {
     Luma,
     /// Asking the teacher.
     Teacher,
+    /// Solving for chroma harmonics of one degree after the other.
+    Degree,
     /// Stage 2.
     Chroma,
+    /// From a/b to the RGB that splat files have.
+    Bake,
     /// Drawing pictures.
     Render,
     /// Measuring pictures against photos.
@@ -191,7 +195,9 @@ impl fmt::Display for Stage {
             Self::Trial => "trial",
             Self::Luma => "luma",
             Self::Teacher => "teacher",
+            Self::Degree => "degree",
             Self::Chroma => "chroma",
+            Self::Bake => "bake",
             Self::Render => "render",
             Self::Measure => "measure",
             Self::Path => "path",

@@ -1,8 +1,12 @@
-//! What a training takes on the device is what was said before.
+//! What both stages take on the device is what was said before.
 
-use std::sync::Arc;
+use std::{ops::ControlFlow, sync::Arc};
 
 use gs_chroma::{
+    chroma::{
+        ChromaError, ChromaSettings, FrozenViews, Room, Targets, Task, bake, solve,
+        teacher::AbImage,
+    },
     gpu::{Gpu, GpuError},
     luma::{Demand, LumaError, LumaSettings, LumaTrainer, TrainingView},
     raster::Raster,
@@ -10,15 +14,15 @@ use gs_chroma::{
 };
 
 use crate::{
-    harness::camera,
+    harness::{camera, cameras},
     oracle::random::{Random, oblique_view},
 };
 
 const COUNT: usize = 100_000;
 
-fn start(sh_degree: u32) -> Splats {
+fn start(count: usize, sh_degree: u32) -> Splats {
     let mut random = Random::new(4);
-    let points: Vec<_> = (0..COUNT)
+    let points: Vec<_> = (0..count)
         .map(|_| (random.array(-1.0, 1.0).map(|v| v as f32), 0.5))
         .collect();
     initial_splats(&points, 1.0, sh_degree)
@@ -46,7 +50,7 @@ fn a_training_takes_what_was_estimated() {
     for sh_degree in [0, 3] {
         // A device of its own: other tests allocate on the shared one.
         let gpu = Gpu::open().unwrap();
-        let start = start(sh_degree);
+        let start = start(COUNT, sh_degree);
         let before = gpu.allocated_bytes().unwrap();
         let _trainer = trainer(&gpu, &start, None).unwrap();
         // What uploads pass through is free again once they are done.
@@ -63,7 +67,7 @@ fn a_training_takes_what_was_estimated() {
 #[test]
 fn what_is_beyond_the_limit_is_refused_before_it_is_taken() {
     let gpu = Gpu::open().unwrap();
-    let start = start(0);
+    let start = start(COUNT, 0);
     let before = gpu.allocated_bytes().unwrap();
     let refused = trainer(&gpu, &start, Some(30 << 20)).err().unwrap();
     let LumaError::Gpu(GpuError::OverLimit { splats, needed, .. }) = refused else {
@@ -105,4 +109,64 @@ fn streamed_photos_train_alike() {
         trainer.splats().unwrap()
     };
     assert!(trained(Some(limit)) == trained(None));
+}
+
+/// The most that the device holds while stage 2 solves and bakes at a degree, what it was said
+/// to hold, and how many views stayed there.
+fn coloring(sh_degree: u32, limit: Option<u64>) -> Result<(u64, u64, usize), ChromaError> {
+    let gpu = Gpu::open().unwrap();
+    let luma = start(COUNT / 5, 1);
+    let cameras: Vec<_> = cameras().iter().map(|c| c.resized(200, 150)).collect();
+    let mut targets = Targets::new(3);
+    let tasks = (cameras.iter().enumerate()).map(|(view, camera)| {
+        let wanted = AbImage {
+            width: camera.width,
+            height: camera.height,
+            ab: vec![[20.0, -10.0]; (camera.width * camera.height) as usize],
+        };
+        let target = targets.push_ab(&wanted, None)?;
+        Ok::<_, ChromaError>(Task { view, target })
+    });
+    let tasks = tasks.collect::<Result<Vec<_>, _>>()?;
+    let raster = Arc::new(Raster::new(&gpu));
+    let before = gpu.allocated_bytes().unwrap();
+    let room = Room {
+        limit,
+        sh_degree,
+        weighted: false,
+    };
+    let frozen = FrozenViews::new(&raster, &luma, 1.0, &cameras, 3, room)?;
+    let mut peak = 0;
+    let mut look = |_| {
+        peak = peak.max(gpu.allocated_bytes().unwrap() - before);
+        ControlFlow::Continue(())
+    };
+    let settings = ChromaSettings {
+        sh_degree,
+        rounds: 1,
+        coarse_rounds: 1,
+        ..ChromaSettings::irls()
+    };
+    let solved = solve(&frozen, &settings, &targets, tasks, &luma, &mut look)?;
+    bake(&frozen, &luma, &solved.chroma, &mut look)?;
+    Ok((peak, frozen.demand(), frozen.pinned()))
+}
+
+#[test]
+fn coloring_takes_what_was_estimated() {
+    for sh_degree in [0, 3] {
+        let Err(ChromaError::OverLimit { needed, .. }) = coloring(sh_degree, Some(1)) else {
+            panic!("a byte is enough");
+        };
+        let all = coloring(sh_degree, None).unwrap();
+        let half = coloring(sh_degree, Some((needed + all.1) / 2)).unwrap();
+        let one = coloring(sh_degree, Some(needed)).unwrap();
+        assert_eq!((all.2, one.2), (5, 0));
+        assert!((1..5).contains(&half.2), "{}", half.2);
+        for (taken, estimated, views) in [all, half, one] {
+            let ratio = taken as f64 / estimated as f64;
+            let what = format!("degree {sh_degree}, {views} views: {ratio:.3}");
+            assert!((0.97..1.01).contains(&ratio), "{what}");
+        }
+    }
 }

@@ -5,7 +5,10 @@ use std::ops::ControlFlow;
 
 use super::gaussian::{bake_rgb, darkest};
 use crate::{
-    chroma::{ChromaError, ChromaSettings, FrozenViews, IrlsSolver, Targets, Task, native_rgb},
+    chroma::{
+        ChromaError, ChromaObserver, ChromaSettings, FrozenViews, IrlsSolver, Targets, Task,
+        native_rgb,
+    },
     raster::Field,
     splats::{ShField, Splats, sh},
 };
@@ -37,11 +40,17 @@ pub fn fit_rgb(
 
 /// RGB Gaussians that look like `luma` with `chroma`: each Gaussian by itself first
 /// ([`bake_rgb`]), then their constant harmonics moved together so that the exported
-/// pictures come close to the native ones, in an even choice of the frozen views.
+/// pictures come close to the native ones, in an even choice of the frozen views. Losses are
+/// told in hundredths of the way from black to white.
 ///
 /// # Errors
 /// As [`solve`](crate::chroma::solve).
-pub fn bake(frozen: &FrozenViews, luma: &Splats, chroma: &ShField) -> Result<Splats, ChromaError> {
+pub fn bake(
+    frozen: &FrozenViews,
+    luma: &Splats,
+    chroma: &ShField,
+    observe: &mut ChromaObserver<'_>,
+) -> Result<Splats, ChromaError> {
     let settings = ChromaSettings {
         coarse_scales: 0,
         rounds: BAKE_ROUNDS,
@@ -55,7 +64,7 @@ pub fn bake(frozen: &FrozenViews, luma: &Splats, chroma: &ShField) -> Result<Spl
     let (targets, tasks) = missing(frozen, [&luma.sh, chroma, &baked.sh, &unmoved])?;
     let mut solver = IrlsSolver::starting_at(frozen, &settings, &targets, tasks, &unmoved)?;
     solver.set_floors(&room);
-    solver.run(&mut |_| ControlFlow::Continue(()))?;
+    solver.run(observe)?;
     let moved = solver.chroma()?;
     let stride = 3 * sh::coefficient_count(baked.sh.degree);
     let of_splats = baked.sh.coefficients.chunks_exact_mut(stride);
