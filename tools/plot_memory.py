@@ -30,6 +30,7 @@ TOOLS = Path(__file__).parent
 PROGRAM = TOOLS.parent / "target/release/gs-chroma"
 STAGES = {"luma": "fit", "chroma": "colorize"}
 KINDS = {"peak_host_memory": "host", "peak_device_memory": "device"}
+PHOTOS = [25, 50, 100, 200, 400, 800, 1600]
 Peaks = dict[tuple[str, str], float]
 
 
@@ -40,10 +41,10 @@ def commands(photos: int, arguments: argparse.Namespace, folder: Path) -> list[l
     make = [sys.executable, str(TOOLS / "make_large_capture.py"), capture, "--teacher", teacher]
     make += ["--photos", str(photos), "--size", arguments.size]
     fit = [str(PROGRAM), "fit", capture, "-o", run, "--preset", "draft", "--max-side", side]
-    fit += ["--iterations", str(arguments.iterations)]
+    limit = ["--memory-limit", str(arguments.memory_limit)]
+    fit += ["--iterations", str(arguments.iterations), *limit]
     color = [str(PROGRAM), "colorize", run, "--teacher", teacher]
-    color += ["--rounds", "1", "--coarse-rounds", "1"]
-    color += ["--memory-limit", str(arguments.memory_limit)]
+    color += ["--rounds", "1", "--coarse-rounds", "1", *limit]
     return [make, fit, color]
 
 
@@ -60,10 +61,10 @@ def measured(photos: int, arguments: argparse.Namespace) -> Peaks:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("-o", "--output", type=Path, required=True)
-    parser.add_argument("--photos", type=int, nargs="+", default=[25, 50, 100, 200, 400, 800])
+    parser.add_argument("--photos", type=int, nargs="+", default=PHOTOS)
     parser.add_argument("--size", default="800x600")
     parser.add_argument("--iterations", type=int, default=50)
-    parser.add_argument("--memory-limit", type=int, default=384, help="of colorize, in MiB")
+    parser.add_argument("--memory-limit", type=int, default=384, help="in MiB")
     arguments = parser.parse_args()
     names = [f"{command}, {kind}" for command in STAGES.values() for kind in KINDS.values()]
     print(f"| photos | {' | '.join(names)} |\n|--:{'|--:' * len(names)}|", flush=True)

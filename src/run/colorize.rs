@@ -76,7 +76,8 @@ pub fn colorize(
     let gpu = open_gpu(options.timings)?;
     let mut report = source.report(&gpu);
     let colmap_dir = source.colmap_dir(options, &report.capture)?;
-    let dataset = open(&colmap_dir, &report.capture.load, observe)?;
+    // Every photo is looked at once.
+    let dataset = open(&colmap_dir, &report.capture.load, observe)?.caching(0);
     // A run's own files are moved already; others lie where COLMAP has the cameras.
     let offset = match source.folder {
         Some(_) => glam::DVec3::ZERO,
