@@ -4,9 +4,10 @@ use std::{ops::ControlFlow, sync::Arc, time::Instant};
 
 use super::{
     CurvePoint, Demand, Goal, LumaError, LumaProgress, LumaSettings, LumaTrainer, PlannedViews,
-    TrainingView, TrialProgress,
+    TrialProgress,
     carve::carved,
     planned,
+    planned::WatchedViews,
     start::{placed_splats, started},
 };
 use crate::{
@@ -130,7 +131,7 @@ pub struct Fit<'a> {
     /// Gaussians to start from instead of COLMAP's points.
     pub start: Option<&'a Splats>,
     /// Views that are looked at on the way; a few of the held-out ones by default.
-    pub watched: Option<(&'a Dataset, Vec<usize>)>,
+    pub watched: Option<(&'a Arc<Dataset>, Vec<usize>)>,
 }
 
 impl Fit<'_> {
@@ -170,7 +171,12 @@ impl Fit<'_> {
             Some(limit) => self.goal.with_seconds(limit - preparing),
             None => self.goal,
         });
-        trainer.watch(self.watched_views(&plan)?)?;
+        let (photographed, views) = self.watched();
+        trainer.watch(WatchedViews {
+            dataset: photographed.clone(),
+            views,
+            exposures: plan.exposures.clone(),
+        })?;
         let (mut last, mut peak_device_memory) = (None, None);
         trainer.train_while(&mut |progress| {
             last = Some(progress);
@@ -261,7 +267,7 @@ impl Fit<'_> {
 
     /// The views that are looked at, by default a few of those that are measured, evenly
     /// spread.
-    fn watched(&self) -> (&Dataset, Vec<usize>) {
+    fn watched(&self) -> (&Arc<Dataset>, Vec<usize>) {
         if let Some((dataset, views)) = &self.watched {
             return (dataset, views.clone());
         }
@@ -269,20 +275,6 @@ impl Fit<'_> {
         let count = measured.len().min(WATCHED);
         let spread = (0..count).map(|k| measured[k * measured.len() / count]);
         (self.dataset, spread.collect())
-    }
-
-    fn watched_views(&self, plan: &Plan) -> Result<Vec<TrainingView>, LumaError> {
-        let (dataset, watched) = self.watched();
-        let view = |i: usize| {
-            let photo = dataset.photo(i)?;
-            Ok(TrainingView {
-                camera: dataset.cameras[i].clone(),
-                gray: photo.gray.clone(),
-                mask: photo.mask.clone(),
-                exposure: plan.exposures[i],
-            })
-        };
-        watched.into_iter().map(view).collect()
     }
 }
 

@@ -1,4 +1,4 @@
-//! A dataset's training views as its plan has them.
+//! A dataset's views as its plan has them.
 
 use std::sync::Arc;
 
@@ -83,5 +83,43 @@ impl TrainingViews for PlannedViews {
 
     fn load(&self, view: usize) -> Result<TrainingView, CaptureError> {
         self.of(self.dataset.split.train[view])
+    }
+}
+
+/// Views to look at while others are trained on; their photos come from a [`Dataset`].
+#[derive(Clone, Debug)]
+pub(super) struct WatchedViews {
+    pub dataset: Arc<Dataset>,
+    /// Which of its views.
+    pub views: Vec<usize>,
+    /// Of all views of the dataset.
+    pub exposures: Vec<Exposure>,
+}
+
+impl TrainingViews for WatchedViews {
+    fn count(&self) -> usize {
+        self.views.len()
+    }
+
+    fn camera(&self, view: usize) -> &Camera {
+        &self.dataset.cameras[self.views[view]]
+    }
+
+    fn exposure(&self, view: usize) -> Exposure {
+        self.exposures[self.views[view]]
+    }
+
+    fn masked(&self) -> bool {
+        self.dataset.masked_views > 0
+    }
+
+    fn load(&self, view: usize) -> Result<TrainingView, CaptureError> {
+        let photo = self.dataset.photo(self.views[view])?;
+        Ok(TrainingView {
+            camera: self.camera(view).clone(),
+            gray: photo.gray.clone(),
+            mask: photo.mask.clone(),
+            exposure: self.exposure(view),
+        })
     }
 }

@@ -1,11 +1,11 @@
 //! Views that are not trained on, looked at now and then.
 
-use std::time::Instant;
+use std::{sync::Arc, time::Instant};
 
 use super::{LumaTrainer, best::Best};
 use crate::{
     gpu::{GpuError, Recorder},
-    luma::{TrainingView, curve::CurvePoint, settings::SYNC_EVERY},
+    luma::{LumaError, TrainingView, TrainingViews, curve::CurvePoint, settings::SYNC_EVERY, view},
     measure,
     raster::ViewUniform,
 };
@@ -37,7 +37,9 @@ pub struct Look {
 /// What a training is watched by.
 #[derive(Default)]
 pub(super) struct Watch {
-    views: Vec<TrainingView>,
+    views: Option<Arc<dyn TrainingViews>>,
+    /// Those of which something counts.
+    counting: Vec<usize>,
     /// The next look is after this iteration.
     next: usize,
     pub curve: Vec<CurvePoint>,
@@ -52,7 +54,7 @@ pub(super) struct Watch {
 impl Watch {
     /// Whether there is a look after `iteration` (counted from 1) of `end`.
     pub fn is_due(&self, iteration: usize, end: usize) -> bool {
-        !self.views.is_empty() && (iteration == end || iteration == self.next)
+        !self.counting.is_empty() && (iteration == end || iteration == self.next)
     }
 
     /// What the last look showed.
@@ -72,26 +74,35 @@ impl Watch {
 
 impl LumaTrainer {
     /// Looks at these views now and then while it trains, but for those of which nothing
-    /// counts. That changes nothing in what is trained, but takes time.
+    /// counts; their photos are loaded whenever it does. That changes nothing in what is
+    /// trained, but takes time.
     ///
     /// # Errors
-    /// [`GpuError::TooLarge`] or [`GpuError::OverLimit`] when a view is larger than those
-    /// trained on and the adapter or the memory limit cannot hold it.
-    pub fn watch(&mut self, mut views: Vec<TrainingView>) -> Result<(), GpuError> {
-        views.retain(|view| (0..view.gray.len()).any(|pixel| counts(view, pixel)));
+    /// [`LumaError`] of a photo; [`GpuError::TooLarge`] or [`GpuError::OverLimit`] when a view
+    /// is larger than those trained on and the adapter or the memory limit cannot hold it.
+    pub fn watch(&mut self, views: impl TrainingViews + 'static) -> Result<(), LumaError> {
+        let mut counting = Vec::new();
+        for index in 0..views.count() {
+            let view = view::load(&views, index)?;
+            if (0..view.gray.len()).any(|pixel| counts(&view, pixel)) {
+                counting.push(index);
+            }
+        }
+        let cameras = || counting.iter().map(|&index| views.camera(index));
         let before = [self.max_pixels, self.max_tiles];
-        for view in &views {
-            let uniform = ViewUniform::new(&view.camera, self.near, 0, 0);
+        for camera in cameras() {
+            let uniform = ViewUniform::new(camera, self.near, 0, 0);
             self.max_pixels = self.max_pixels.max(uniform.pixel_count());
             self.max_tiles = self.max_tiles.max(uniform.tile_count());
         }
-        self.demand = self.demand.watching(views.iter().map(|view| &view.camera));
+        self.demand = self.demand.watching(cameras());
         if before != [self.max_pixels, self.max_tiles] {
             let capacity = self.workspace()?.lists.capacity;
             self.rebuild(capacity, self.base)?;
         }
         self.watch = Watch {
-            views,
+            views: Some(Arc::new(views)),
+            counting,
             next: next_look(0),
             ..Watch::default()
         };
@@ -115,17 +126,21 @@ impl LumaTrainer {
     }
 
     /// Looks, `seconds` of training after its beginning. Nothing may be on its way.
-    pub(super) fn look(&mut self, iteration: usize, seconds: f64) -> Result<(), GpuError> {
+    pub(super) fn look(&mut self, iteration: usize, seconds: f64) -> Result<(), LumaError> {
+        let Some(views) = self.watch.views.clone() else {
+            return Ok(());
+        };
         let begun = Instant::now();
         let mut sum = 0.0;
-        for index in 0..self.watch.views.len() {
-            sum += self.psnr(index, iteration)?;
+        for place in 0..self.watch.counting.len() {
+            let view = view::load(&*views, self.watch.counting[place])?;
+            sum += self.psnr(&view, iteration)?;
         }
         self.watch.curve.push(CurvePoint {
             iteration,
             seconds,
             splats: self.model.len(),
-            psnr: sum / self.watch.views.len() as f64,
+            psnr: sum / self.watch.counting.len() as f64,
         });
         self.watch.next = next_look(iteration);
         self.watch.seconds += begun.elapsed().as_secs_f64();
@@ -133,11 +148,10 @@ impl LumaTrainer {
     }
 
     /// PSNR of one view, over the pixels that count.
-    fn psnr(&mut self, index: usize, iteration: usize) -> Result<f64, GpuError> {
+    fn psnr(&mut self, watched: &TrainingView, iteration: usize) -> Result<f64, GpuError> {
         let pixels = loop {
-            let camera = &self.watch.views[index].camera;
             let degree = self.degree_at(iteration);
-            let view = ViewUniform::new(camera, self.near, self.model.len(), degree);
+            let view = ViewUniform::new(&watched.camera, self.near, self.model.len(), degree);
             let workspace = self.workspace()?;
             let mut recorder = Recorder::new(&self.gpu);
             workspace.lists.set_view(&self.gpu, &view);
@@ -149,7 +163,6 @@ impl LumaTrainer {
                 Some(needed) => self.make_room(needed, iteration)?,
             }
         };
-        let watched = &self.watch.views[index];
         let (mut shown, mut truth) = (Vec::new(), Vec::new());
         for pixel in (0..watched.gray.len()).filter(|&pixel| counts(watched, pixel)) {
             shown.push(watched.exposure.shown(f64::from(pixels[pixel])) as f32);

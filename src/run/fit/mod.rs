@@ -109,7 +109,7 @@ pub fn fit(
                 ..dataset.options.clone()
             };
             // What is to be said about the photos is said of those that are trained on.
-            Some(open(&options.colmap_dir, &load, &mut |_| {})?)
+            Some(Arc::new(open(&options.colmap_dir, &load, &mut |_| {})?))
         }
         None => None,
     };
@@ -120,7 +120,7 @@ pub fn fit(
         raster: &raster,
         dataset: &dataset,
         evidence: &evidence,
-        judge: judge.as_ref().unwrap_or(&*dataset),
+        judge: judge.as_ref().unwrap_or(&dataset),
         begun,
         loading: begun.elapsed().as_secs_f64(),
     };

@@ -34,7 +34,7 @@ pub(super) struct Job<'a> {
     /// What they say.
     pub evidence: &'a Evidence,
     /// Photos at the size that is measured at.
-    pub judge: &'a Dataset,
+    pub judge: &'a Arc<Dataset>,
     /// When the run began.
     pub begun: Instant,
     /// Seconds until it had its photos.
