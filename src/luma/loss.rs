@@ -100,6 +100,11 @@ pub struct Targets {
 }
 
 impl Targets {
+    /// Bytes besides the photos.
+    pub fn bytes(max_pixels: usize) -> u64 {
+        4 * 3 * max_pixels as u64
+    }
+
     /// The photos of `views`, of at most `max_pixels` pixels, and if it is `coarse` at half
     /// the size as well; where `streamed`, one at a time.
     ///

@@ -1,9 +1,12 @@
 //! How much room a training takes on the device, known before any is taken.
 
+use super::loss::Targets;
 use crate::{
     capture::Camera,
     gpu::GpuError,
-    raster::{ViewUniform, constants::*},
+    raster::{
+        Canvas, ColorKind, Lists, LumaAdjoint, Model, ViewUniform, constants::GEOMETRY_PLANES,
+    },
     splats::sh,
 };
 
@@ -13,20 +16,8 @@ const WORD: u64 = 4;
 /// Tile-list entries that a set is expected to need for each Gaussian, at least.
 pub(super) const ENTRIES_PER_SPLAT: usize = 4;
 
-/// Words that a Gaussian takes besides its parameters: projection 8, four flags and
-/// ranks, keys and places of the depth sort 4, its histogram, colour, gradient on the
-/// image plane 8, of its mean 3, statistics.
-const SCRATCH_WORDS: f64 = 8.0 + 4.0 + 4.0 + 0.125 + 1.0 + 8.0 + 3.0 + STATISTICS_PLANES as f64;
-
 /// Words of a line of the plan that a change of the set follows.
-const PLAN_WORDS: f64 = 12.0;
-
-/// Words of a tile-list entry: keys and places of the tile sort 4, its histogram, the
-/// Gaussian's index, the gradient's eight figures (stored in full; half storage takes less).
-const ENTRY_WORDS: f64 = 4.0 + 0.125 + 1.0 + 8.0;
-
-/// Words of a pixel: picture, last entry, gradient, three slopes of SSIM.
-const PIXEL_WORDS: u64 = 6;
+const PLAN_WORDS: u64 = 12;
 
 /// Photos stay on the device while they take at most one part in so many of a memory
 /// limit: the rest is worth more to Gaussians, and a photo an iteration is little to
@@ -41,7 +32,9 @@ const RESIDENT_MAX: u64 = 1 << 30;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Demand {
     /// Pixels of the largest photo.
-    pub max_pixels: u64,
+    pub max_pixels: usize,
+    /// Tiles of the one that has most.
+    pub max_tiles: usize,
     /// Bytes of the photos and masks on the device: all, or the largest if they are streamed.
     pub photos: u64,
     /// Whether photos are brought to the device one at a time.
@@ -59,23 +52,29 @@ impl Demand {
         sh_degree: u32,
         limit: Option<u64>,
     ) -> Self {
-        let (mut max_pixels, mut photos) = (0, 0);
+        let mut demand = Self {
+            max_pixels: 0,
+            max_tiles: 0,
+            photos: 0,
+            streams: false,
+            sh_degree,
+        };
+        let mut photos = 0;
         for camera in cameras {
-            let pixels = ViewUniform::new(camera, 1.0, 0, 0).pixel_count() as u64;
-            max_pixels = max_pixels.max(pixels);
+            demand.hold(camera);
+            let pixels = u64::from(camera.width) * u64::from(camera.height);
             photos += pixels.next_multiple_of(WORD);
         }
         let pictures = 1 + u64::from(masked);
         photos *= pictures;
         let streams = photos > limit.map_or(RESIDENT_MAX, |limit| limit / PHOTO_SHARE);
         if streams {
-            photos = pictures * max_pixels.next_multiple_of(WORD);
+            photos = pictures * (demand.max_pixels as u64).next_multiple_of(WORD);
         }
         Self {
-            max_pixels,
             photos,
             streams,
-            sh_degree,
+            ..demand
         }
     }
 
@@ -83,28 +82,26 @@ impl Demand {
     /// stay on the host.
     pub fn watching<'a>(mut self, cameras: impl Iterator<Item = &'a Camera>) -> Self {
         for camera in cameras {
-            let pixels = ViewUniform::new(camera, 1.0, 0, 0).pixel_count() as u64;
-            self.max_pixels = self.max_pixels.max(pixels);
+            self.hold(camera);
         }
         self
     }
 
-    fn parameters(&self) -> f64 {
-        (GEOMETRY_PLANES + sh::coefficient_count(self.sh_degree)) as f64
-    }
-
-    /// Bytes for each Gaussian, tile lists not counted: its parameters three times
-    /// (values and both moments of Adam; gradients are never stored) and what a view
-    /// leaves. At most 450 at degree 3.
-    pub fn bytes_per_splat(&self) -> f64 {
-        WORD as f64 * (3.0 * self.parameters() + SCRATCH_WORDS)
+    /// Pictures as large as a camera's.
+    fn hold(&mut self, camera: &Camera) {
+        let view = ViewUniform::new(camera, 1.0, 0, 0);
+        self.max_pixels = self.max_pixels.max(view.pixel_count());
+        self.max_tiles = self.max_tiles.max(view.tile_count());
     }
 
     /// Bytes while `splats` Gaussians with `entries` tile-list entries are trained.
     pub fn bytes(&self, splats: usize, entries: usize) -> u64 {
-        let words = ENTRY_WORDS * entries as f64;
-        let moving = self.bytes_per_splat() * splats as f64 + WORD as f64 * words;
-        moving as u64 + WORD * PIXEL_WORDS * self.max_pixels + self.photos
+        Model::bytes(splats, self.sh_degree)
+            + Lists::bytes(splats, self.max_tiles, entries)
+            + Canvas::bytes(ColorKind::Luma, splats, self.max_pixels)
+            + LumaAdjoint::bytes(splats, entries, self.max_pixels)
+            + Targets::bytes(self.max_pixels)
+            + self.photos
     }
 
     /// Whether `splats` Gaussians with `entries` tile-list entries are within `limit`
@@ -126,8 +123,8 @@ impl Demand {
 
     /// Bytes at most: while the set changes, parameters and moments exist twice.
     pub fn peak_bytes(&self, splats: usize) -> u64 {
-        let twice = WORD as f64 * (3.0 * self.parameters() + PLAN_WORDS) * splats as f64;
-        self.bytes(splats, ENTRIES_PER_SPLAT * splats) + twice as u64
+        let again = Model::bytes(splats, self.sh_degree) + WORD * PLAN_WORDS * splats as u64;
+        self.bytes(splats, ENTRIES_PER_SPLAT * splats) + again
     }
 
     /// The largest number of Gaussians whose [`Self::peak_bytes`] are within `limit`
@@ -141,9 +138,17 @@ impl Demand {
         let Some(limit) = limit else {
             return by_binding;
         };
-        let fixed = self.bytes(0, 0);
-        let each = self.peak_bytes(1_000_000).saturating_sub(fixed) as f64 / 1e6;
-        by_binding.min((limit.saturating_sub(fixed) as f64 / each) as usize)
+        // Between what surely fits and what surely does not.
+        let (mut fits, mut beyond) = (0, by_binding.saturating_add(1));
+        while beyond - fits > 1 {
+            let middle = fits + (beyond - fits) / 2;
+            if self.peak_bytes(middle) <= limit {
+                fits = middle;
+            } else {
+                beyond = middle;
+            }
+        }
+        fits
     }
 }
 
@@ -153,6 +158,7 @@ mod tests {
 
     const DEMAND: Demand = Demand {
         max_pixels: 57_600,
+        max_tiles: 225,
         photos: 576_000,
         streams: false,
         sh_degree: 0,
@@ -161,23 +167,23 @@ mod tests {
     #[test]
     fn the_largest_set_is_within_the_limit_and_the_next_is_not() {
         for limit in [8 << 20, 100 << 20, 4_u64 << 30] {
-            let fits = DEMAND.largest_set(Some(limit), u64::MAX);
+            let fits = DEMAND.largest_set(Some(limit), 1 << 40);
             assert!(DEMAND.peak_bytes(fits) <= limit);
-            assert!(DEMAND.peak_bytes(fits + 2) > limit, "{fits}");
+            assert!(DEMAND.peak_bytes(fits + 1) > limit, "{fits}");
         }
-        assert_eq!(DEMAND.largest_set(Some(1000), u64::MAX), 0);
+        assert_eq!(DEMAND.largest_set(Some(1000), 1 << 40), 0);
     }
 
     #[test]
     fn a_gaussian_takes_at_most_450_bytes() {
         let of = |sh_degree| {
-            Demand {
+            let demand = Demand {
                 sh_degree,
                 ..DEMAND
-            }
-            .bytes_per_splat()
+            };
+            (demand.bytes(1_000_000, 0) - demand.bytes(0, 0)) / 1_000_000
         };
-        assert!(of(3) <= 450.0 && of(0) < 270.0, "{} {}", of(3), of(0));
+        assert!(of(3) <= 450 && of(0) < 270, "{} {}", of(3), of(0));
     }
 
     #[test]

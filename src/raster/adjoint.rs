@@ -157,6 +157,13 @@ pub struct LumaAdjoint {
 }
 
 impl LumaAdjoint {
+    /// Bytes of one that ends in a step, for so many Gaussians, entries of the tile lists
+    /// (stored in full) and pixels.
+    pub fn bytes(splats: usize, capacity: usize, max_pixels: usize) -> u64 {
+        let of_splat = LUMA_FIGURES + 3 + STATISTICS_PLANES;
+        4 * (of_splat * splats + LUMA_FIGURES * capacity + max_pixels) as u64
+    }
+
     /// The adjoint of `layer`, which draws luma.
     ///
     /// # Errors

@@ -1,9 +1,9 @@
 //! What a training changes: planes of parameters and Adam's moments, with one owner.
 
-use super::{AdamMoments, Field, Geometry};
+use super::{AdamMoments, Field, Geometry, constants::GEOMETRY_PLANES};
 use crate::{
     gpu::{Buffer, Gpu, GpuError},
-    splats::Splats,
+    splats::{Splats, sh},
 };
 
 /// Gaussians that are trained.
@@ -12,13 +12,20 @@ pub struct Model {
     pub geometry: Geometry,
     /// Harmonics.
     pub field: Field,
-    /// AdamMoments of the geometry.
+    /// Of the geometry.
     pub geometry_moments: AdamMoments,
-    /// AdamMoments of the harmonics.
+    /// Of the harmonics.
     pub field_moments: AdamMoments,
 }
 
 impl Model {
+    /// Bytes of so many Gaussians with harmonics of `sh_degree`.
+    pub fn bytes(count: usize, sh_degree: u32) -> u64 {
+        let planes = GEOMETRY_PLANES + sh::coefficient_count(sh_degree);
+        // Values and both moments.
+        4 * (3 * planes * count) as u64
+    }
+
     /// Uploads Gaussians; Adam starts from rest.
     ///
     /// # Errors

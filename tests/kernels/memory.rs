@@ -115,7 +115,7 @@ fn streamed_photos_train_alike() {
 /// to hold, and how many views stayed there.
 fn coloring(sh_degree: u32, limit: Option<u64>) -> Result<(u64, u64, usize), ChromaError> {
     let gpu = Gpu::open().unwrap();
-    let luma = start(COUNT / 5, 1);
+    let luma = start(COUNT / 10, 1);
     let cameras: Vec<_> = cameras().iter().map(|c| c.resized(200, 150)).collect();
     let mut targets = Targets::new(3);
     let tasks = (cameras.iter().enumerate()).map(|(view, camera)| {
