@@ -4,7 +4,7 @@ export PATH := $(PATH):$(HOME)/.cargo/bin
 .PHONY: help setup demo test
 
 help:
-	@echo "make demo   install what is missing, then fit and colour the bundled scene"
+	@echo "make demo   install what is missing, then fit and color the bundled scene"
 	@echo "make test   install what is missing, then check format, lints and tests"
 
 setup:
@@ -17,7 +17,7 @@ demo: setup
 	cargo run --release --quiet -- colorize runs/demo --teacher assets/teacher/demo-teacher.onnx
 	@echo
 	@echo "Gray scene:      runs/demo/luma.ply"
-	@echo "Coloured scene:  runs/demo/color.ply"
+	@echo "Colored scene:  runs/demo/color.ply"
 	@echo "Contact sheet:   runs/demo/contact-sheet.png"
 
 test: setup

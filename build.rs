@@ -5,7 +5,7 @@ use std::{env, fs, path::Path};
 
 use wesl::{ModulePath, Wesl};
 
-/// Kernels that know nothing of colour channels.
+/// Kernels that know nothing of color channels.
 const PLAIN: &[&str] = &[
     "adam",
     "chroma_loss",
@@ -23,7 +23,7 @@ const PLAIN: &[&str] = &[
     "view_correction",
 ];
 
-/// Kernels compiled once for each kind of colour.
+/// Kernels compiled once for each kind of color.
 const COLORED: &[&str] = &["blend", "shade"];
 
 /// Effects of the photos that the luma loss may reckon with.

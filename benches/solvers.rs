@@ -7,7 +7,7 @@
 //!
 //! TEACHER is an `.onnx` file or a folder, as for `colorize --teacher`. Both solvers get
 //! the same views and wanted a/b; the loss at full size of each stage on the way is measured
-//! by the same code, its time left out. Adam minimises it together with the losses at N coarser
+//! by the same code, its time left out. Adam minimizes it together with the losses at N coarser
 //! scales, two as in the paper, least squares alone. `tools/plot_solvers.py` draws the CSV.
 
 use std::{

@@ -1,12 +1,12 @@
-//! What a small answer loses by being enlarged: true a/b of colour photos, made 3.1 times
+//! What a small answer loses by being enlarged: true a/b of color photos, made 3.1 times
 //! smaller and enlarged again, evenly and along the photo's edges.
 //!
 //! ```text
 //! cargo bench --bench upsample -- FOLDER
 //! ```
 //!
-//! FOLDER holds colour photos, of any format that the program reads. They are
-//! halved first, for JPEG files hold half of their colours' resolution.
+//! FOLDER holds color photos, of any format that the program reads. They are
+//! halved first, for JPEG files hold half of their colors' resolution.
 
 use std::{path::PathBuf, process::ExitCode, time::Instant};
 
@@ -28,7 +28,7 @@ fn main() -> ExitCode {
     // Cargo adds `--bench`.
     let folder = std::env::args().skip(1).find(|word| !word.starts_with('-'));
     let Some(folder) = folder.map(PathBuf::from) else {
-        eprintln!("usage: cargo bench --bench upsample -- FOLDER, with colour photos");
+        eprintln!("usage: cargo bench --bench upsample -- FOLDER, with color photos");
         return ExitCode::from(2);
     };
     let photos: Vec<RgbImage> = match std::fs::read_dir(&folder) {

@@ -1,7 +1,7 @@
 // Front-to-back blending. A workgroup draws a tile, a thread four pixels of a
 // column. The Gaussians of the tile's list come in batches: each thread fetches
 // one and notes which of the tile's eight parts (8 by 4 pixels, eight
-// neighbouring threads) it touches; then each part draws what touches it.
+// neighboring threads) it touches; then each part draws what touches it.
 import package::common::color::Color;
 import package::common::constants::{TILE_SIDE, TRANSMITTANCE_MIN};
 import package::common::numeric::linear_group;

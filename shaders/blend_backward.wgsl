@@ -3,7 +3,7 @@
 //
 // A workgroup takes a tile, a thread eight pixels of a column, as two quads. The
 // Gaussians of the tile's list come in batches: threads fetch them and note which
-// of the tile's four parts (8 by 8 pixels, eight neighbouring threads) they touch.
+// of the tile's four parts (8 by 8 pixels, eight neighboring threads) they touch.
 // Each thread adds up its own pixels' share of a Gaussian that touches its part and
 // leaves it in workgroup memory; then the threads add up the shares, one figure
 // each, in a fixed order. No float atomics, no subgroups, the same bits every run.
@@ -30,7 +30,7 @@ const BATCH: u32 = 16u;
 const PARTS: u32 = 4u;
 // Threads of a part, and pixels on its side.
 const PART: u32 = 8u;
-// A word more than there are figures, if these are even: neighbouring threads
+// A word more than there are figures, if these are even: neighboring threads
 // write to different banks.
 const SHARE: u32 = PARTIAL_STRIDE | 1u;
 
@@ -68,7 +68,7 @@ struct Share {
     // Sums of dL/dpower times 1, dx, dy, dx² and dx·dy, dy².
     @if(geometry) moments: vec4f,
     @if(geometry) moments_y: vec2f,
-    // Sum of the lengths of the gradients with respect to the centre.
+    // Sum of the lengths of the gradients with respect to the center.
     @if(geometry) pull: f32,
     // Sum of the weighted gradient.
     color: Color,
@@ -76,7 +76,7 @@ struct Share {
 
 struct Pixels {
     transmittance: vec4f,
-    // Gradient times the colour still to come, summed over the channels.
+    // Gradient times the color still to come, summed over the channels.
     @if(geometry) remaining: vec4f,
     gradient: Quad,
     last: vec4u,
@@ -104,7 +104,7 @@ fn load(first: vec2u) -> Pixels {
 }
 
 // Adds one quad's share of an instance and moves the quad behind it. `d` is the
-// first pixel relative to the Gaussian's centre.
+// first pixel relative to the Gaussian's center.
 fn accumulate(
     share: ptr<function, Share>,
     pixels: ptr<function, Pixels>,

@@ -59,7 +59,7 @@ fn penalty(residual: vec2f, decline: f32, joint: bool) -> Penalty {
     return Penalty(share * (length - SMOOTHING), 1.0 / length);
 }
 
-// Bilinear sample of the coarser image at this pixel, half-pixel centres.
+// Bilinear sample of the coarser image at this pixel, half-pixel centers.
 // The position is counted in halves of a fine pixel: integers are exact where a
 // quotient in f32 would lose the fraction.
 @if(agreeing) fn upsampled(pixel: vec2u) -> vec2f {

@@ -2,7 +2,7 @@
 // device: no number is read back between the steps. Sums run in a fixed order.
 //
 // There is no line search. A step that raised the loss is undone, what is remembered is
-// forgotten, and the step of the majoriser is taken instead: the quadratic that touches the
+// forgotten, and the step of the majorizer is taken instead: the quadratic that touches the
 // loss from above, its matrix AᵀWA replaced by row sums, which bound it.
 //
 // Unknowns may have floors. One that stands at its floor, and would go below, is held there;
@@ -32,7 +32,7 @@ const ACCEPTED: u32 = 1u;
 const PAIRED: u32 = 2u;
 // Displacement · change of the newest pair.
 const CURVATURE: u32 = 3u;
-// What the inverse of the majoriser's diagonal is multiplied by.
+// What the inverse of the majorizer's diagonal is multiplied by.
 const SCALE: u32 = 4u;
 // What `lbfgs_add` multiplies by.
 const FACTOR: u32 = 5u;
@@ -47,7 +47,7 @@ const UNKNOWN: f32 = 3.4028235e38;
 const TOLERANCE: f32 = 1e-4;
 
 // The scale is at least 1 where the loss is convex. Steps shorter than this share of the
-// majoriser's come from pairs that say nothing.
+// majorizer's come from pairs that say nothing.
 const LEAST_SCALE: f32 = 1e-3;
 
 @group(0) @binding(0) var<uniform> parameters: LbfgsParameters;
@@ -59,12 +59,12 @@ const LEAST_SCALE: f32 = 1e-3;
 @group(0) @binding(4) var<storage, read> diagonal: array<f32>;
 // The least that each unknown may be.
 @group(0) @binding(5) var<storage, read> floors: array<f32>;
-// The losses whose sum is minimised.
+// The losses whose sum is minimized.
 @group(0) @binding(6) var<storage, read> losses: array<f32>;
 // The accepted point, and the gradient there.
 @group(0) @binding(7) var<storage, read_write> accepted_unknowns: array<f32>;
 @group(0) @binding(8) var<storage, read_write> accepted_gradient: array<f32>;
-// Inverse of the majoriser's diagonal there; 0 for the unknowns that are held.
+// Inverse of the majorizer's diagonal there; 0 for the unknowns that are held.
 @group(0) @binding(9) var<storage, read_write> preconditioner: array<f32>;
 // Becomes the step.
 @group(0) @binding(10) var<storage, read_write> direction: array<f32>;
@@ -111,7 +111,7 @@ fn total(local: u32) -> f32 {
     return sum_of_group(local, own);
 }
 
-// One over the majoriser's diagonal. Blend weights sum to at most one a pixel, so the sum
+// One over the majorizer's diagonal. Blend weights sum to at most one a pixel, so the sum
 // of a Gaussian's weights bounds its row.
 fn inverse_diagonal(k: u32) -> f32 {
     let n = parameters.splats;

@@ -1,4 +1,4 @@
-// Means, quaternions, log-scales and opacity logits to centres, conics and
+// Means, quaternions, log-scales and opacity logits to centers, conics and
 // opacities on the image plane. One thread a Gaussian.
 //
 // With `mip` opacities are what they show, not what is stored: the blur spreads a

@@ -1,4 +1,4 @@
-// The adjoint of `project`: from centres, conics and opacities on the image
+// The adjoint of `project`: from centers, conics and opacities on the image
 // plane to means, quaternions, log-scales and opacity logits. Derivation in
 // docs/architecture.md. In training (`step`) Adam moves the parameters at once, and
 // their gradient is never stored; or (`lazy`) it moves those of the Gaussians that the view

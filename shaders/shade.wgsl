@@ -1,4 +1,4 @@
-// Spherical harmonics to the colour that each visible Gaussian shows this view.
+// Spherical harmonics to the color that each visible Gaussian shows this view.
 import package::common::color::{CHANNELS, Color, color_from_sh};
 import package::common::constants::{COLOR_MAX, INVISIBLE, PLANE_MEAN, STATUS_POISONED};
 import package::common::numeric::{is_within, linear_group};

@@ -1,6 +1,6 @@
 // Sums the gradient records of a Gaussian's instances in emission order, then
-// turns the moments of dL/dpower into the gradients of centre, conic and opacity:
-// power = ½(A dx² + C dy²) + B dx dy with d = pixel - centre, and alpha = opacity·exp(-power).
+// turns the moments of dL/dpower into the gradients of center, conic and opacity:
+// power = ½(A dx² + C dy²) + B dx dy with d = pixel - center, and alpha = opacity·exp(-power).
 import package::common::constants::{ALPHA_MIN, STATUS_INSTANCES, STATUS_VISIBLE};
 import package::common::numeric::linear_group;
 import package::common::partials::{PARTIAL_STRIDE, PARTIAL_WORDS, PartialWord};
@@ -48,7 +48,7 @@ fn sum_instances(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) g
         sum[2] = 0.5 * m[3];
         sum[3] = m[4];
         sum[4] = 0.5 * m[5];
-        // A Gaussian whose colour is not finite has opacity 0 and no moments.
+        // A Gaussian whose color is not finite has opacity 0 and no moments.
         sum[5] = -m[0] / max(q.w, ALPHA_MIN);
     }
     for (var c = 0u; c < PARTIAL_STRIDE; c++) {

@@ -1,5 +1,5 @@
 // Where each tile's instances begin in the sorted list: a binary search a tile
-// needs no clearing and no neighbour's key.
+// needs no clearing and no neighbor's key.
 import package::common::constants::STATUS_INSTANCES;
 import package::common::numeric::linear_group;
 import package::common::view::View;

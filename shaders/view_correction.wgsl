@@ -1,7 +1,7 @@
-// What brings each view's teacher into line with the colours found so far. The
+// What brings each view's teacher into line with the colors found so far. The
 // teacher's a/b are taken to be M · x + m of the rendered x, by weighted least squares;
 // over the views M is made to average to the identity and m to zero, so that the
-// scene's own colour cannot drift; what is wanted becomes M⁻¹(t - m).
+// scene's own color cannot drift; what is wanted becomes M⁻¹(t - m).
 import package::common::correction::Correction;
 import package::common::numeric::linear_group;
 import package::common::view::View;
@@ -12,7 +12,7 @@ const SUM_GROUPS: u32 = 64u;
 // Weight; weighted x, t; xx (3); t xᵀ (4 rows by t).
 const SUMS: u32 = 12u;
 // Variance in squared CIELAB units that is added to both sides: a view with hardly any
-// colour says nothing about the gain, which then stays at the identity.
+// color says nothing about the gain, which then stays at the identity.
 const PRIOR_VARIANCE: f32 = 4.0;
 // A gain that all but loses a direction cannot be undone.
 const DETERMINANT_MIN: f32 = 0.1;

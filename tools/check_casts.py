@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What is to be expected of colours whose teacher gives every photo another cast.
+"""What is to be expected of colors whose teacher gives every photo another cast.
 
     python3 tools/check_casts.py --svg docs/images/casts.svg
 
@@ -28,7 +28,7 @@ from unsteady_teacher import (
     HOLDOUT_STEP,
     PATCHES,
     SHIFT,
-    coloured,
+    colored,
     mean_whim,
     photo_paths,
     read_photo,
@@ -82,8 +82,8 @@ def errors(photos: list[Array], count: int, seed: int, cast: float) -> tuple[flo
     pairs = []
     for k, photo in enumerate(photos):
         chance = np.random.default_rng([seed, k * HOLDOUT_STEP])
-        teacher = coloured(photo, whim(chance, cast), PATCHES, chance)
-        pairs.append((ab_error(teacher, photo), ab_error(coloured(photo, mean, 0, chance), photo)))
+        teacher = colored(photo, whim(chance, cast), PATCHES, chance)
+        pairs.append((ab_error(teacher, photo), ab_error(colored(photo, mean, 0, chance), photo)))
     teacher, least = np.mean(pairs, axis=0)
     return float(teacher), float(least)
 

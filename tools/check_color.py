@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Colours real scenes by three teachers, measures them, and prints Markdown tables with bounds.
+"""Colors real scenes by three teachers, measures them, and prints Markdown tables with bounds.
 
     cargo build --release && python3 tools/check_color.py -o target/color
 
-Each scene is a COLMAP folder of colour photos below DATA (default ../shared/data); scenes that are
+Each scene is a COLMAP folder of color photos below DATA (default ../shared/data); scenes that are
 not there are skipped with a word. A scene is fitted once (and not again while its run is there),
-then coloured and evaluated with each teacher: the photos themselves (oracle), the photos made
+then colored and evaluated with each teacher: the photos themselves (oracle), the photos made
 unsteady by unsteady_teacher.py, and the bundled network. Needs numpy and Pillow.
 
 `--colorize="--sh-degree 1"` hands flags to `gs-chroma colorize`, `--eval="--lpips lpips.onnx"` to `eval`.
@@ -33,7 +33,7 @@ SIDE = 320
 AGREEMENT = 1 / 4
 TO_RGB_SPLATS = 0.6
 TO_TEACHER = 0.4
-COLOURFULNESS = 0.05
+COLORFULNESS = 0.05
 TO_PER_FRAME = 1 / 2
 BAKE = (1.0, 3.0)
 
@@ -66,7 +66,7 @@ HEAD = [
     "held-out a/b error: ours",
     "/ teacher's (≤ 0.4)",
     "/ RGB splats' (≤ 0.6)",
-    "colourfulness / teacher's (± 5 %)",
+    "colorfulness / teacher's (± 5 %)",
     "/ photos'",
     "path Δ = 30 / per frame (≤ 0.5)",
     "held-out ΔE00: ours, RGB splats",
@@ -135,9 +135,9 @@ def row(scene: str, teacher: str, method: str, found: dict, seconds: float) -> l
     cells.append(bounded(to_teacher, TO_TEACHER) if known else judged(to_teacher, True))
     to_rgb = ratio(ours, rgb, "ab_error")
     cells.append(bounded(to_rgb, TO_RGB_SPLATS) if known else judged(to_rgb, True))
-    colourful = ours["colorfulness"] / found["teacher_colorfulness"]
-    cells.append(judged(colourful, abs(colourful - 1) <= COLOURFULNESS))
-    # An unsteady teacher's whims are colourful too: what the scene has is in the photos.
+    colorful = ours["colorfulness"] / found["teacher_colorfulness"]
+    cells.append(judged(colorful, abs(colorful - 1) <= COLORFULNESS))
+    # An unsteady teacher's whims are colorful too: what the scene has is in the photos.
     cells.append(judged(ratio(ours, pictures.get("photo"), "colorfulness"), True))
     cells.append(bounded(ratio(far.get(method), far.get("per_frame"), "error"), TO_PER_FRAME))
     mine = ours["delta_e"]["mean"]
@@ -213,7 +213,7 @@ def main() -> int:
     head = HEAD
     if arguments.ablation:
         head = ["scene", "variant", "views differ by", "held-out a/b error", "ΔE00"]
-        head += ["colourfulness", "view passes", "seconds"]
+        head += ["colorfulness", "view passes", "seconds"]
         arguments.teachers = ["unsteady"]
     line(head)
     line(["---"] * len(head))

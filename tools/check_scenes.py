@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Runs `fit` and `colorize` on real scenes and prints what came out as Markdown.
 
-Each scene is a COLMAP folder of colour photos below DATA (default ../shared/data).
+Each scene is a COLMAP folder of color photos below DATA (default ../shared/data).
 The photos are turned to gray by the program; they serve as the teacher and as
 the truth. Scenes that are not there are skipped with a word.
 
@@ -42,7 +42,7 @@ def main() -> int:
     parser.add_argument("--colorize", default="", help="more flags for colorize, as one word")
     parser.add_argument("--scenes", nargs="*", default=[name for name, _, _ in SCENES])
     arguments = parser.parse_args()
-    print("| scene | side | Gaussians | fit | PSNR | SSIM | colour | ΔE00 | colourfulness / teacher | bake ΔE00 mean, 95 % | memory |")
+    print("| scene | side | Gaussians | fit | PSNR | SSIM | color | ΔE00 | colorfulness / teacher | bake ΔE00 mean, 95 % | memory |")
     print("|---|---|---|---|---|---|---|---|---|---|---|")
     for name, side, cap in SCENES:
         folder = arguments.data / name

@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
 # Tries everything on this machine's GPU in one go: device, doctor, cost of the kernels, tests, a long fit,
-# its colours, and the peers that are named.
+# its colors, and the peers that are named.
 #
 #   tools/device_check.sh [OUTPUT] [--no-tests]     OUTPUT is target/device unless given
 #
 # Environment, with paths from the repository's root:
-#   SCENE                     COLMAP folder of colour photos, ../shared/data/fern-llff unless given
+#   SCENE                     COLMAP folder of color photos, ../shared/data/fern-llff unless given
 #   ITERATIONS, SIDE          of the fit: 15000 and 800
 #   BRUSH, GSPLAT, OPENSPLAT  what tools/bench_peers takes as --brush, --gsplat and --opensplat
 #   PROGRAM, PYTHON           target/release/gs-chroma, which is built first, and python3

@@ -1,4 +1,4 @@
-"""sRGB to CIELAB (D65, 2 degree observer) and the measures of colour that the tools report."""
+"""sRGB to CIELAB (D65, 2 degree observer) and the measures of color that the tools report."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def lightness_to_gray(lightness: Array) -> Array:
     return encode(np.where(f > KNEE, f**3, 3 * KNEE**2 * (f - 4 / 29)))
 
 
-def colourfulness(rgb: Array) -> float:
+def colorfulness(rgb: Array) -> float:
     """Hasler and Suesstrunk (2003), signed opponent channels, of sRGB (..., 3) in [0, 1]."""
     r, g, b = (255 * rgb[..., i] for i in range(3))
     red_green, yellow_blue = r - g, (r + g) / 2 - b

@@ -2,7 +2,7 @@
 
     python tools/make_wide_fisheye.py --out target/variants/wide-fisheye
 
-The lens is OPENCV_FISHEYE without coefficients: a pixel's distance from the centre is
+The lens is OPENCV_FISHEYE without coefficients: a pixel's distance from the center is
 proportional to the angle. Poses are the renderer's; points are where rays meet the garden,
 seen by every view from which nothing hides them. Needs bpy, numpy and Pillow of
 `tools/requirements.txt`.
@@ -57,7 +57,7 @@ def ray(pixel: Array) -> Array:
 
 def pixel_of(camera: Camera, place: Array) -> Array | None:
     """Where a view has a place, if it is in the picture."""
-    x, y, z = camera.rotation @ (place - camera.centre)
+    x, y, z = camera.rotation @ (place - camera.center)
     aside = float(np.hypot(x, y))
     pixel = FOCAL * np.arctan2(aside, z) * np.array([x, y]) / max(aside, 1e-12) + SIDE / 2
     return pixel if (0 < pixel).all() and (pixel < SIDE).all() else None
@@ -76,9 +76,9 @@ def sees(camera: Camera, place: Array) -> Array | None:
     pixel = pixel_of(camera, place)
     if pixel is None:
         return None
-    way = place - camera.centre
+    way = place - camera.center
     distance = float(np.linalg.norm(way))
-    hit = first_hit(camera.centre, way / distance)
+    hit = first_hit(camera.center, way / distance)
     near = hit is not None and np.linalg.norm(hit - place) < SLACK * distance
     return pixel if near else None
 
@@ -89,7 +89,7 @@ def survey(views: list[Camera]) -> list[tuple[Array, dict[int, Array]]]:
     found = []
     for camera in views:
         for pixel in rng.uniform(0, SIDE, (RAYS, 2)):
-            place = first_hit(camera.centre, camera.rotation.T @ ray(pixel))
+            place = first_hit(camera.center, camera.rotation.T @ ray(pixel))
             if place is None:
                 continue
             track = {index: sees(view, place) for index, view in enumerate(views)}
@@ -107,7 +107,7 @@ def quaternion(rotation: Array) -> list[float]:
 
 
 def write_model(views: list[Camera], points: list[tuple[Array, dict[int, Array]]], out: Path) -> None:
-    """Writes cameras.txt, images.txt and points3D.txt; colours are the photos'."""
+    """Writes cameras.txt, images.txt and points3D.txt; colors are the photos'."""
     folder = out / "sparse" / "0"
     folder.mkdir(parents=True, exist_ok=True)
     numbers = [FOCAL, FOCAL, SIDE / 2, SIDE / 2, 0, 0, 0, 0]
@@ -126,7 +126,7 @@ def write_model(views: list[Camera], points: list[tuple[Array, dict[int, Array]]
     (folder / "points3D.txt").write_text("".join(lines))
     lines = []
     for index, view in enumerate(views):
-        shift = -view.rotation @ view.centre
+        shift = -view.rotation @ view.center
         words = [index + 1, *quaternion(view.rotation), *shift, 1, f"{view.name}.png"]
         lines.append(" ".join(map(str, words)) + "\n" + " ".join(seen[index]) + "\n")
     (folder / "images.txt").write_text("".join(lines))

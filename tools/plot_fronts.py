@@ -84,7 +84,7 @@ def main():
             mark = marks.get(knob, "X" if point["phase"] == "base" else "+")
             panel.plot(point["seconds"], point["quality"], mark, color=color, markersize=7, label=knob or {"front": "combinations"}.get(point["phase"], point["phase"]))
             if knob:
-                # Which knob, the colour says.
+                # Which knob, the color says.
                 value = point["settings"].split("=")[1]
                 at = point["seconds"], point["quality"]
                 panel.annotate(value, at, textcoords="offset points", xytext=(6, -10), fontsize=7)

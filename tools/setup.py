@@ -119,7 +119,7 @@ def runtime_is_missing() -> bool:
 
 
 def install_runtime() -> None:
-    """Takes the library and its licence out of the wheel that pip downloads and verifies."""
+    """Takes the library and its license out of the wheel that pip downloads and verifies."""
     by_hand = f"let ORT_DYLIB_PATH name the library of ONNX Runtime {ONNXRUNTIME}"
     wheel = wheel_here()
     if not wheel:

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Makes an unsteady teacher out of colour photos: right on the whole, wrong in each view by itself.
+"""Makes an unsteady teacher out of color photos: right on the whole, wrong in each view by itself.
 
     python3 tools/unsteady_teacher.py scene/images -o target/unsteady
 
 Every photo keeps its L*. Its saturation is multiplied by a number between 0.6 and 1.1, its a and b
 are shifted by normal numbers of standard deviation 8, and three rectangles of 15 to 25 % of a side
-get a wrong colour. Numbers depend on the seed and the photo's place among the names. Needs numpy
+get a wrong color. Numbers depend on the seed and the photo's place among the names. Needs numpy
 and Pillow.
 
 `--mean` makes a teacher that agrees with itself instead: every photo has the saturation and the
@@ -29,7 +29,7 @@ PATCHES = 3
 PATCH_SIDE = (0.15, 0.25)
 # Photos 0, 8, 16, … are held out by `fit`: what is said of them teaches nothing.
 HOLDOUT_STEP = 8
-# A wrong colour is as strong as a real one, and of any hue.
+# A wrong color is as strong as a real one, and of any hue.
 PATCH_CHROMA = (20.0, 60.0)
 
 
@@ -45,8 +45,8 @@ def mean_whim(seed: int, count: int, shift: float) -> Array:
     return np.mean([whim(np.random.default_rng([seed, index]), shift) for index in learned], axis=0)
 
 
-def coloured(rgb: Array, whim: Array, patches: int, chance: np.random.Generator) -> Array:
-    """An sRGB picture (height, width, 3) in [0, 1] with colours as of a whim."""
+def colored(rgb: Array, whim: Array, patches: int, chance: np.random.Generator) -> Array:
+    """An sRGB picture (height, width, 3) in [0, 1] with colors as of a whim."""
     lab = rgb_to_lab(rgb)
     height, width = lab.shape[:2]
     lab[..., 1:] = lab[..., 1:] * whim[0] + whim[1:]
@@ -112,9 +112,9 @@ def main() -> int:
         view = whim(chance, arguments.shift)
         rgb = read_photo(path, arguments.max_side)
         if arguments.mean:
-            picture = coloured(rgb, mean, 0, chance)
+            picture = colored(rgb, mean, 0, chance)
         else:
-            picture = coloured(rgb, view, arguments.patches, chance)
+            picture = colored(rgb, view, arguments.patches, chance)
         out = arguments.output / path.relative_to(arguments.photos).with_suffix(".png")
         out.parent.mkdir(parents=True, exist_ok=True)
         Image.fromarray((picture * 255.0).round().astype(np.uint8)).save(out)

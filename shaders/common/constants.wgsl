@@ -19,14 +19,14 @@ override ALPHA_MIN: f32 = 0.00392156862745098;
 // A pixel is finished when less than this passes through.
 override TRANSMITTANCE_MIN: f32 = 1e-4;
 
-// A larger colour is poison: its gradient times squared pixel distances, squared
+// A larger color is poison: its gradient times squared pixel distances, squared
 // again by Adam, would overflow.
 const COLOR_MAX: f32 = 1e4;
 
 // A quaternion whose squared length is below has no direction in f32.
 const QUAT_NORM_MIN_SQ: f32 = 1e-8;
 
-// The linearised projection is kept inside the image and this share of its half width.
+// The linearized projection is kept inside the image and this share of its half width.
 const FRUSTUM_MARGIN: f32 = 0.3;
 
 // Planes of the geometry array `[11, N]`.

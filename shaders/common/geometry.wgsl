@@ -7,7 +7,7 @@ import package::common::view::View;
 struct Footprint {
     // Position in camera space.
     camera: vec3f,
-    // x/z and y/z inside the slope limits, as the linearisation uses them.
+    // x/z and y/z inside the slope limits, as the linearization uses them.
     slope: vec2f,
     // Rotation · diag(scale), columns.
     axes: mat3x3f,

@@ -5,7 +5,7 @@
 @if(half) import package::common::numeric::is_finite;
 
 // What densification asks: the sum over pixels of the length of each pixel's
-// gradient with respect to the centre, in normalised device coordinates. Lengths
+// gradient with respect to the center, in normalized device coordinates. Lengths
 // do not cancel where pixels pull apart, as they do within one large Gaussian.
 @if(geometry) const PARTIAL_PULL: u32 = 6u;
 @if(geometry) const PARTIAL_COLOR: u32 = 7u;

@@ -2,7 +2,7 @@ import package::common::constants::ALPHA_MIN;
 
 // A Gaussian on the image plane.
 struct Projected {
-    // Centre in pixels.
+    // Center in pixels.
     mean: vec2f,
     // Half width and height of the box outside which alpha is below ALPHA_MIN.
     extent: vec2f,
@@ -20,8 +20,8 @@ fn power_cutoff(opacity: f32) -> f32 {
     return log(opacity / ALPHA_MIN);
 }
 
-// The least power over the rectangle of pixel centres [low, high]: 0 when the
-// centre lies inside, else on one of the two edges that face it, where a
+// The least power over the rectangle of pixel centers [low, high]: 0 when the
+// center lies inside, else on one of the two edges that face it, where a
 // quadratic in one variable is clamped to the edge.
 fn least_power(splat: Projected, low: vec2f, high: vec2f) -> f32 {
     let conic = splat.conic_opacity.xyz;
@@ -36,7 +36,7 @@ fn least_power(splat: Projected, low: vec2f, high: vec2f) -> f32 {
     return min(power_at(conic, on_vertical), power_at(conic, on_horizontal));
 }
 
-// Whether the Gaussian can be seen in the rectangle of pixel centres
+// Whether the Gaussian can be seen in the rectangle of pixel centers
 // [low, high]. Lists, blending and adjoint all ask here.
 fn touches(splat: Projected, cutoff: f32, low: vec2f, high: vec2f) -> bool {
     return least_power(splat, low, high) <= cutoff;

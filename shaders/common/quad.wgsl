@@ -8,12 +8,12 @@ import package::common::view::View;
 @if(chroma) alias Quad = mat2x4f;
 @if(rgb) alias Quad = mat3x4f;
 
-// Weights times one colour.
+// Weights times one color.
 @if(luma) fn weighted(weights: vec4f, color: Color) -> Quad { return weights * color; }
 @if(chroma) fn weighted(weights: vec4f, color: Color) -> Quad { return Quad(weights * color.x, weights * color.y); }
 @if(rgb) fn weighted(weights: vec4f, color: Color) -> Quad { return Quad(weights * color.x, weights * color.y, weights * color.z); }
 
-// Colour of one of the four pixels.
+// Color of one of the four pixels.
 @if(luma) fn pixel_of(quad: Quad, k: u32) -> Color { return quad[k]; }
 @if(chroma) fn pixel_of(quad: Quad, k: u32) -> Color { return vec2f(quad[0][k], quad[1][k]); }
 @if(rgb) fn pixel_of(quad: Quad, k: u32) -> Color { return vec3f(quad[0][k], quad[1][k], quad[2][k]); }

@@ -1,4 +1,4 @@
-// SSIM's window along one axis, and how four neighbouring sums are made with it at once.
+// SSIM's window along one axis, and how four neighboring sums are made with it at once.
 // Wang et al. 2004 take eleven taps of a Gaussian with σ = 1.5; `window7` and `window5`
 // cut it off earlier and weigh the rest so that it sums to one.
 
@@ -16,7 +16,7 @@ const HALO: u32 = 16u + 2u * RADIUS;
 @if(window5) const WINDOW: array<f32, 3> = array<f32, 3>(
     0.12007838424321347, 0.2338807565853503, 0.29208171834287244);
 
-// Neighbours: sixteen, twelve or eight, of which the last two of sixteen and of twelve
+// Neighbors: sixteen, twelve or eight, of which the last two of sixteen and of twelve
 // are not used.
 struct Run {
     a: vec4f,
@@ -25,7 +25,7 @@ struct Run {
     @if(window11) d: vec4f,
 }
 
-// The window over the neighbours from four places on. Four sums share most
+// The window over the neighbors from four places on. Four sums share most
 // of their values; each value is loaded once.
 @if(window11) fn windowed(v: Run) -> vec4f {
     return WINDOW[0] * (v.a + vec4f(v.c.zw, v.d.xy))

@@ -4,11 +4,11 @@ struct View {
     row0: vec4f,
     row1: vec4f,
     row2: vec4f,
-    // Camera centre in world space, near distance in w.
+    // Camera center in world space, near distance in w.
     center_near: vec4f,
     // fx, fy, cx, cy in pixels.
     intrinsics: vec4f,
-    // Lowest x/z, y/z and highest x/z, y/z that the linearised projection uses.
+    // Lowest x/z, y/z and highest x/z, y/z that the linearized projection uses.
     slope_limits: vec4f,
     size: vec2u,
     tiles: vec2u,

@@ -6,7 +6,7 @@ use glam::{DMat3, DVec3};
 ///
 /// Camera axes: x right, y down, z forward. A world point `X` lies at
 /// `x = rotation · X + translation` in camera space and projects to
-/// `u = fx·x/z + cx`, `v = fy·y/z + cy` in pixels. The centre of the top left
+/// `u = fx·x/z + cx`, `v = fy·y/z + cy` in pixels. The center of the top left
 /// pixel is at `(0.5, 0.5)`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Camera {
@@ -29,7 +29,7 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// The camera's centre in world space: `-Rᵀ·t`.
+    /// The camera's center in world space: `-Rᵀ·t`.
     pub fn center(&self) -> DVec3 {
         -(self.rotation.transpose() * self.translation)
     }
@@ -70,7 +70,7 @@ impl Camera {
 
     /// The same view with the world's origin moved to `offset`: a point that
     /// was at `X` is now at `X - offset`.
-    pub fn recentred(&self, offset: DVec3) -> Self {
+    pub fn recentered(&self, offset: DVec3) -> Self {
         Self {
             translation: self.translation + self.rotation * offset,
             ..self.clone()
@@ -127,9 +127,9 @@ mod tests {
     }
 
     #[test]
-    fn recentring_moves_points_and_keeps_pixels() {
+    fn recentering_moves_points_and_keeps_pixels() {
         let (point, offset) = (DVec3::new(0.2, 0.7, 1.0), DVec3::new(10.0, -4.0, 7.0));
-        let moved = camera().recentred(offset);
+        let moved = camera().recentered(offset);
         let [u, v] = project(&camera(), point);
         let [us, vs] = project(&moved, point - offset);
         assert!((us - u).abs() < 1e-10 && (vs - v).abs() < 1e-10);

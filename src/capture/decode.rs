@@ -133,7 +133,7 @@ fn check_jpeg(file: &[u8]) -> Result<(), String> {
             frame.precision
         )),
         Some(frame) if frame.components == 4 => {
-            Err("has CMYK colours; convert it to RGB or gray".into())
+            Err("has CMYK colors; convert it to RGB or gray".into())
         }
         Some(_) => Ok(()),
     }

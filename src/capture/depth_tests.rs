@@ -91,7 +91,7 @@ fn sixteen_bits_are_rounded_to_the_nearest_gray() {
 }
 
 #[test]
-fn sixteen_bits_of_colour_keep_it() {
+fn sixteen_bits_of_color_keep_it() {
     let (_dir, capture) = capture(|_, path| {
         ImageBuffer::<Rgb<u16>, _>::from_fn(SIZE.0, SIZE.1, |x, y| {
             Rgb([257 * 9 * x as u16, 257 * 5 * y as u16, 257 * 200])
@@ -297,7 +297,7 @@ fn photos_that_fill_their_range_stay() {
 }
 
 #[test]
-fn floats_beyond_their_range_are_normalised() {
+fn floats_beyond_their_range_are_normalized() {
     let (_dir, capture) = capture(|i, path| {
         let values: [f32; COUNT] = std::array::from_fn(|k| (48 * i + k) as f32 / 50.0);
         fs::write(path, gray_tiff(&values)).unwrap();

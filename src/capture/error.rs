@@ -172,7 +172,7 @@ pub enum CaptureError {
     },
     /// One range was to serve photos whose values mean different things.
     #[error(
-        "{path}: has {depth} a channel but {other} has {other_depth}: one range cannot normalise both; convert one of them"
+        "{path}: has {depth} a channel but {other} has {other_depth}: one range cannot normalize both; convert one of them"
     )]
     MixedDepths {
         /// A photo.

@@ -15,7 +15,7 @@ pub(super) struct Model {
     pub points: Vec<PointRecord>,
 }
 
-/// Position, colour, track: image by its place in `images`, index of the 2D point.
+/// Position, color, track: image by its place in `images`, index of the 2D point.
 pub(super) type PointRecord = ([f64; 3], [u8; 3], Vec<(u32, u32)>);
 
 #[derive(Clone)]

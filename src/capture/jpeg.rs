@@ -5,7 +5,7 @@
 pub(super) struct Frame {
     /// Bits per component.
     pub precision: u8,
-    /// Colour components: 1 gray, 3 colour, 4 CMYK or YCCK.
+    /// Color components: 1 gray, 3 color, 4 CMYK or YCCK.
     pub components: u8,
 }
 

@@ -21,7 +21,7 @@ const SAMPLED_PIXELS: usize = 4096;
 /// highlights, dead pixels.
 const BEYOND: f64 = 0.005;
 
-/// Photos whose range fills less of the scale than this are normalised: the device
+/// Photos whose range fills less of the scale than this are normalized: the device
 /// keeps 8 bits, and one of them would say nothing.
 const FULL_ENOUGH: f64 = 0.5;
 
@@ -60,7 +60,7 @@ impl Loader {
     ///
     /// # Errors
     /// If the masks that the options name are not there, a photo cannot be read, or
-    /// photos whose values mean different things were to be normalised together.
+    /// photos whose values mean different things were to be normalized together.
     pub fn open(capture: &Capture, options: &LoadOptions) -> Result<Self, CaptureError> {
         let masks = MaskFolder::open(capture, &options.masks)?;
         let mut loader = Self::new(options.clone());
@@ -129,7 +129,7 @@ impl Loader {
     /// the view says so, and resizes its camera to it.
     ///
     /// Reads JPEG, PNG and TIFF: 8 or 16 bits a channel or floats, gray or RGB.
-    /// Transparency, colour profiles and the EXIF orientation are ignored, the last
+    /// Transparency, color profiles and the EXIF orientation are ignored, the last
     /// because COLMAP ignores it. A photo whose longer side exceeds `max_side` is
     /// downscaled to it by area averaging of the encoded values, at its aspect ratio.
     ///
@@ -220,7 +220,7 @@ impl Loader {
     }
 }
 
-/// The first view of each photo; all views of a photo are neighbours.
+/// The first view of each photo; all views of a photo are neighbors.
 pub fn first_views(views: &[View]) -> impl Iterator<Item = &View> {
     views
         .chunk_by(|a, b| a.photo == b.photo)

@@ -74,7 +74,7 @@ fn same_folder(a: &Path, b: &Path) -> bool {
 }
 
 /// Reads the mask of a photo of `size` pixels: what each pixel counts, `[height,
-/// width]`. Of a colour mask the lightest channel counts, alpha never. A mask of
+/// width]`. Of a color mask the lightest channel counts, alpha never. A mask of
 /// nothing but 0 and 1 is one of numbers, not of grays, and 1 counts fully.
 ///
 /// # Errors

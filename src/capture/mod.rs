@@ -56,10 +56,10 @@ const QUATERNION_SLACK: f64 = 1e-3;
 
 /// Coordinates beyond this, in world units, are failures of the
 /// reconstruction, not places: georeferenced ones stay below 1e8, even in
-/// millimetres below 1e11.
+/// millimeters below 1e11.
 const LARGEST_COORDINATE: f64 = 1e12;
 
-/// Recentre when the cameras are farther from the origin than this many
+/// Recenter when the cameras are farther from the origin than this many
 /// extents: f32 then has less than 2⁻²⁴ · 100 ≈ 6e-6 of the extent as its step.
 const RECENTRE_EXTENTS: f64 = 100.0;
 
@@ -294,7 +294,7 @@ impl Capture {
             rejected,
             distortion,
         };
-        capture.recentre();
+        capture.recenter();
         Ok(capture)
     }
 
@@ -328,7 +328,7 @@ impl Capture {
         }
     }
 
-    /// The mean of the camera centres.
+    /// The mean of the camera centers.
     pub fn center(&self) -> DVec3 {
         let sum: DVec3 = self.views.iter().map(|view| view.camera.center()).sum();
         sum / self.views.len().max(1) as f64
@@ -336,14 +336,14 @@ impl Capture {
 
     /// Moves coordinates that are large against the scene, such as UTM ones,
     /// to the origin while they are still f64.
-    fn recentre(&mut self) {
+    fn recenter(&mut self) {
         let center = self.center();
         if center.length() <= RECENTRE_EXTENTS * self.extent() {
             return;
         }
         let offset = center.round();
         for view in &mut self.views {
-            view.camera = view.camera.recentred(offset);
+            view.camera = view.camera.recentered(offset);
         }
         for point in &mut self.points {
             point.position -= offset;

@@ -18,7 +18,7 @@ pub struct LoadOptions {
     pub holdout: bool,
     /// Whether the lens's distortion is taken out.
     pub lens: Choice,
-    /// What of a colour photo becomes gray.
+    /// What of a color photo becomes gray.
     pub channel: Channel,
     /// What the files' values are.
     pub encoding: Encoding,
@@ -55,7 +55,7 @@ impl LoadOptions {
     }
 }
 
-/// What of a colour photo becomes gray; a gray photo is what it is.
+/// What of a color photo becomes gray; a gray photo is what it is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Channel {

@@ -21,9 +21,9 @@ pub struct Photo {
     /// Height in pixels.
     pub height: u32,
     /// Gray, `[height · width]`: the file's own if it is gray, else the gray
-    /// with the same `L*` as the colour.
+    /// with the same `L*` as the color.
     pub gray: Vec<u8>,
-    /// Colours, `[height · width]`, where the photo has a pixel that is not gray.
+    /// Colors, `[height · width]`, where the photo has a pixel that is not gray.
     pub rgb: Option<Vec<[u8; 3]>>,
     /// What each pixel counts, `[height · width]`: 255 fully, 0 not at all. `None`
     /// where every pixel counts. With [`MaskUse::Remove`], what is 0 is black as well.

@@ -45,7 +45,7 @@ fn saved(picture: impl Into<DynamicImage>, name: &str) -> (TempDir, std::path::P
     (dir, path)
 }
 
-fn colours(width: u32, height: u32) -> RgbImage {
+fn colors(width: u32, height: u32) -> RgbImage {
     RgbImage::from_fn(width, height, |x, y| {
         Rgb([(x * 37) as u8, (y * 53) as u8, (x * y) as u8])
     })
@@ -63,8 +63,8 @@ fn assert_fails(path: &Path, size: (u32, u32), words: &[&str]) {
 }
 
 #[test]
-fn colour_photos_keep_their_colours_and_lightness() {
-    let picture = colours(12, 9);
+fn color_photos_keep_their_colors_and_lightness() {
+    let picture = colors(12, 9);
     let (_dir, path) = saved(picture.clone(), "photo.png");
     let (photo, camera) = load(&view(&path, 12, 9), None).unwrap();
     assert_eq!((photo.width, photo.height), (12, 9));
@@ -101,7 +101,7 @@ fn gray_photos_pass_through_whatever_their_container() {
 
 #[test]
 fn jpeg_is_told_by_its_content() {
-    let (_dir, path) = saved(colours(16, 16), "photo.jpg");
+    let (_dir, path) = saved(colors(16, 16), "photo.jpg");
     let disguised = path.with_extension("png");
     fs::rename(&path, &disguised).unwrap();
     let (photo, _) = load(&view(&disguised, 16, 16), None).unwrap();
@@ -131,7 +131,7 @@ fn sizes_near_the_camera_or_of_its_aspect_are_taken() {
 
 #[test]
 fn long_photos_are_shrunk_with_their_camera() {
-    let (_dir, path) = saved(colours(120, 90), "photo.png");
+    let (_dir, path) = saved(colors(120, 90), "photo.png");
     let (photo, camera) = load(&view(&path, 120, 90), Some(40)).unwrap();
     assert_eq!((photo.width, photo.height), (40, 30));
     assert_eq!(
@@ -142,7 +142,7 @@ fn long_photos_are_shrunk_with_their_camera() {
         (camera.width, camera.height, camera.fx, camera.cx),
         (40, 30, 10.0, 20.0)
     );
-    let picture = colours(120, 90);
+    let picture = colors(120, 90);
     for channel in 0..3 {
         let mean: u32 = (0..9)
             .map(|i| u32::from(picture.get_pixel(3 + i % 3, 6 + i / 3).0[channel]))
@@ -172,7 +172,7 @@ fn other_formats_name_the_remedy() {
 #[test]
 fn cut_off_photos_are_errors() {
     for name in ["photo.png", "photo.jpg"] {
-        let (_dir, path) = saved(colours(40, 30), name);
+        let (_dir, path) = saved(colors(40, 30), name);
         let whole = fs::read(&path).unwrap();
         for end in [whole.len() / 4, whole.len() / 2, whole.len() - 20] {
             fs::write(&path, &whole[..end]).unwrap();
@@ -183,7 +183,7 @@ fn cut_off_photos_are_errors() {
 
 #[test]
 fn cmyk_is_refused() {
-    let (_dir, path) = saved(colours(16, 16), "photo.jpg");
+    let (_dir, path) = saved(colors(16, 16), "photo.jpg");
     let mut file = fs::read(&path).unwrap();
     let frame = file.windows(2).position(|w| w == [0xff, 0xc0]).unwrap();
     file[frame + 9] = 4;
@@ -193,7 +193,7 @@ fn cmyk_is_refused() {
 
 #[test]
 fn sizes_that_cannot_be_are_refused_before_decoding() {
-    let (_dir, path) = saved(colours(16, 16), "photo.jpg");
+    let (_dir, path) = saved(colors(16, 16), "photo.jpg");
     let mut file = fs::read(&path).unwrap();
     let frame = file.windows(2).position(|w| w == [0xff, 0xc0]).unwrap();
     file[frame + 5..frame + 9].fill(0xff);

@@ -308,7 +308,7 @@ fn views_with_bad_poses_are_rejected_by_name() {
 }
 
 #[test]
-fn rounded_quaternions_are_normalised() {
+fn rounded_quaternions_are_normalized() {
     let mut model = Model::example();
     model.images[0].quaternion = [0.8005, 0.0, 0.6, 0.0];
     let capture = load(&model).unwrap();
@@ -363,7 +363,7 @@ fn faulty_text_names_its_line() {
     assert_says(
         replaced(2, "200", "256"),
         "points3D.txt",
-        &["line 1", "the colour"],
+        &["line 1", "the color"],
     );
     let mut files = model.text();
     files[2][0] = 0xff;
@@ -409,7 +409,7 @@ fn extent_is_the_camera_radius_or_else_the_distance_to_the_points() {
     for image in &mut model.images {
         image.quaternion = [1.0, 0.0, 0.0, 0.0];
     }
-    // Centres at x = -1, 1, 0: their mean is in the middle.
+    // Centers at x = -1, 1, 0: their mean is in the middle.
     assert!((load(&model).unwrap().extent() - 1.1).abs() < 1e-12);
     for image in &mut model.images {
         image.translation = [0.0; 3];
@@ -423,12 +423,12 @@ fn extent_is_the_camera_radius_or_else_the_distance_to_the_points() {
 }
 
 #[test]
-fn large_coordinates_are_recentred_by_whole_numbers() {
+fn large_coordinates_are_recentered_by_whole_numbers() {
     let plain = load(&Model::example()).unwrap();
     let utm = DVec3::new(567_890.5, 4_123_456.25, -321.75);
     let mut model = Model::example();
     for (image, view) in model.images.iter_mut().zip([1, 2, 0]) {
-        let camera = plain.views[view].camera.recentred(-utm);
+        let camera = plain.views[view].camera.recentered(-utm);
         image.translation = camera.translation.to_array();
     }
     for point in &mut model.points {

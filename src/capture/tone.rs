@@ -25,7 +25,7 @@ pub(super) fn develop(picture: Picture, options: &LoadOptions) -> Pixels {
             Values::Gray(rgb(step).map(|[gray, ..]| [gray]).collect())
         }
         (step, Channel::Luma) => Values::Rgb(rgb(step).collect()),
-        // The other channels are of another light; together they are no colour.
+        // The other channels are of another light; together they are no color.
         (step, channel) => {
             let at = channel.samples().start;
             Values::Gray(levels.chunks_exact(step).map(|p| [p[at]]).collect())
@@ -68,7 +68,7 @@ fn used(channels: usize, channel: Channel) -> std::ops::Range<usize> {
 }
 
 /// Values of pixels on an even grid of at most about `most`, in the file's unit: of a
-/// colour photo those of every channel in use. Values that are not finite and pixels
+/// color photo those of every channel in use. Values that are not finite and pixels
 /// that count nothing are left out.
 pub(super) fn sample(
     picture: &Picture,

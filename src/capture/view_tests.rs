@@ -93,12 +93,12 @@ fn wide_photos_become_faces_of_one_photo() {
         "left/a c.png",
     ];
     assert_eq!(names, expected);
-    let centre = capture.views[0].camera.center();
+    let center = capture.views[0].camera.center();
     let loader = Loader::new(LoadOptions::default());
     for view in &capture.views[..5] {
         assert_eq!(view.photo, "a.png");
         assert_eq!(view.photo_size(), [8, 6]);
-        assert!(view.camera.center().distance(centre) < 1e-12);
+        assert!(view.camera.center().distance(center) < 1e-12);
         assert!(loader.load(view).is_ok());
     }
     // Three photos: the first is held out.

@@ -1,27 +1,27 @@
-//! Colour for Gaussians that the views hardly show: that of their neighbours.
+//! Color for Gaussians that the views hardly show: that of their neighbors.
 
 use crate::splats::{ShField, Splats, nearest_neighbors, sh};
 
-/// Neighbours that a Gaussian looks to.
+/// Neighbors that a Gaussian looks to.
 const NEIGHBORS: usize = 8;
 
-/// Difference in gray at which a neighbour's word has lost most of its weight: edges of
-/// luma are where colours end.
+/// Difference in gray at which a neighbor's word has lost most of its weight: edges of
+/// luma are where colors end.
 const GRAY_RANGE: f64 = 0.1;
 
-/// What all neighbours together weigh against the views, in pixels that show the
+/// What all neighbors together weigh against the views, in pixels that show the
 /// Gaussian fully.
 const NEIGHBOR_PIXELS: f64 = 1.0;
 
-/// Sweeps over all Gaussians: colour travels at least so many neighbours far into what
+/// Sweeps over all Gaussians: color travels at least so many neighbors far into what
 /// nobody sees.
 const SWEEPS: usize = 100;
 
-/// Draws the constant harmonic of `chroma` towards that of the neighbours in position
+/// Draws the constant harmonic of `chroma` towards that of the neighbors in position
 /// and gray: the less a Gaussian is seen, the more.
 ///
-/// `seen` is how far the views decide each Gaussian's colour, in pixels that show it
-/// fully. Minimises `Σ seen_i |c_i - chroma_i|² + Σ w_ij |c_i - c_j|²` by Gauss–Seidel
+/// `seen` is how far the views decide each Gaussian's color, in pixels that show it
+/// fully. Minimizes `Σ seen_i |c_i - chroma_i|² + Σ w_ij |c_i - c_j|²` by Gauss–Seidel
 /// sweeps. The higher harmonics of Gaussians seen less than a pixel fade with `seen`.
 ///
 /// # Panics
@@ -51,7 +51,7 @@ pub fn fill_unseen(luma: &Splats, chroma: &mut ShField, seen: &[f32]) {
     let mut filled = found.clone();
     for sweep in 0..SWEEPS {
         for k in 0..count {
-            // There and back, or colour would travel one way only.
+            // There and back, or color would travel one way only.
             let i = if sweep % 2 == 0 { k } else { count - 1 - k };
             let own = f64::from(seen[i]);
             let (mut sum, mut weight) = ([own * found[i][0], own * found[i][1]], own);
@@ -104,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn the_unseen_take_their_neighbours_colour() {
+    fn the_unseen_take_their_neighbors_color() {
         let luma = row(&[0.5; 12]);
         let mut values = [[30.0, -20.0]; 12];
         let mut seen = [100.0; 12];
@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn colour_does_not_cross_an_edge_of_luma() {
+    fn color_does_not_cross_an_edge_of_luma() {
         let mut grays = [0.2; 20];
         grays[10..].fill(0.9);
         let mut values = [[10.0, 0.0]; 20];

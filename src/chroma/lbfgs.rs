@@ -34,7 +34,7 @@ const SHARED_SCALARS: usize = 6;
 /// The loss before the first point is accepted, as the first scalar.
 const UNKNOWN: f32 = f32::MAX;
 
-/// What is minimised over, planes `[harmonics, channels, N]`, and what the caller leaves
+/// What is minimized over, planes `[harmonics, channels, N]`, and what the caller leaves
 /// before [`Lbfgs::step`].
 pub struct System {
     /// What is solved for: the first planes of this, as many as the gradient has.
@@ -48,7 +48,7 @@ pub struct System {
     pub origin: Buffer<f32>,
     /// The least that each unknown may be; [`UNBOUNDED`] where nothing bounds it.
     pub floors: Buffer<f32>,
-    /// The losses whose sum is minimised.
+    /// The losses whose sum is minimized.
     pub losses: Buffer<f32>,
 }
 
@@ -275,7 +275,7 @@ impl Lbfgs {
         Ok(lbfgs)
     }
 
-    /// Forgets everything, because what is minimised is another function from now on.
+    /// Forgets everything, because what is minimized is another function from now on.
     pub fn restart(&self, gpu: &Gpu) {
         self.scalars.write_at(gpu, 0, &[UNKNOWN]);
     }

@@ -28,7 +28,7 @@ pub struct ChromaLossWeights {
 
 impl ChromaLossWeights {
     /// The teacher's part of a loss that levels off at the residual `robust` in CIELAB
-    /// units, and then judges a and b together: a colour that is wrong in one is not to be
+    /// units, and then judges a and b together: a color that is wrong in one is not to be
     /// believed in the other. Without it, L1 of each.
     pub(super) fn robust(robust: Option<f32>) -> Self {
         Self {

@@ -27,8 +27,8 @@ impl SolverKind {
 pub struct ChromaSettings {
     /// Who solves.
     pub solver: SolverKind,
-    /// Degree of the chroma harmonics, 0 to 3. Degree 0 cannot memorise that a
-    /// teacher colours the views differently.
+    /// Degree of the chroma harmonics, 0 to 3. Degree 0 cannot memorize that a
+    /// teacher colors the views differently.
     pub sh_degree: u32,
     /// Coarser scales that count for Adam beside the full one, each half as large as the
     /// last. The paper leaves it open; see docs/decisions.md for the ablation.
@@ -41,7 +41,7 @@ pub struct ChromaSettings {
     /// Iterations of Adam; each takes one view through all scales, one step a scale.
     pub iterations: usize,
     /// Adam's rate at the first and last iteration, in CIELAB units: the first
-    /// lets a colour cross the whole a/b range within some hundred steps, the
+    /// lets a color cross the whole a/b range within some hundred steps, the
     /// last leaves it steadier than half a unit. Exponential between.
     pub rates: [f64; 2],
     /// The rate of the terms beyond the constant one, as a share of it (3DGS).
@@ -62,7 +62,7 @@ pub struct ChromaSettings {
     /// Bytes of the device that solving and baking may take; views that do not fit are brought
     /// one at a time. `None`: all that is worth keeping, up to 2 GiB.
     pub memory_limit: Option<u64>,
-    /// Whether Gaussians that no view sees well take their neighbours' colour after
+    /// Whether Gaussians that no view sees well take their neighbors' color after
     /// least squares.
     pub fill: bool,
 }

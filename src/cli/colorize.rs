@@ -19,7 +19,7 @@ use crate::run::{ColorizeOptions, TeachOptions, colorize};
 /// How a teacher's small picture becomes as large as the photo.
 const UPSAMPLE: &[(Upsample, &str)] = &[
     (Upsample::Guided, "Along the photo's edges"),
-    (Upsample::Bilinear, "Evenly: colours spill over edges"),
+    (Upsample::Bilinear, "Evenly: colors spill over edges"),
 ];
 
 /// How chroma is solved for.
@@ -34,12 +34,12 @@ const SOLVERS: &[(SolverKind, &str)] = &[
     ),
 ];
 
-/// Colour a trained run with a colorization network or a folder of coloured photos.
+/// Color a trained run with a colorization network or a folder of colored photos.
 #[derive(Args)]
 pub struct Colorize {
     /// Run folder, or a gray .ply with --colmap [default: newest under runs/].
     run: Option<PathBuf>,
-    /// A colorization network (.onnx) or a folder of coloured photos named like the originals;
+    /// A colorization network (.onnx) or a folder of colored photos named like the originals;
     /// given more than once, their mean.
     #[arg(long, value_name = "FILE.onnx|DIR", required_unless_present = "hints")]
     teacher: Vec<PathBuf>,
@@ -57,13 +57,13 @@ pub struct Colorize {
     /// How a teacher's small picture becomes as large as the photo.
     #[arg(long, value_parser = one_of(UPSAMPLE), default_value = "guided")]
     upsample: Upsample,
-    /// How strong the teachers' colours become; hints stay as painted.
+    /// How strong the teachers' colors become; hints stay as painted.
     #[arg(long, value_name = "0..1", default_value_t = 1.0, value_parser = share::<f32>)]
     strength: f32,
-    /// A folder of hints: PNG images named like the photos, colour painted on transparency.
+    /// A folder of hints: PNG images named like the photos, color painted on transparency.
     #[arg(long, value_name = "DIR")]
     hints: Option<PathBuf>,
-    /// Coloured splat file to write [default: color.ply in the run folder].
+    /// Colored splat file to write [default: color.ply in the run folder].
     #[arg(short, long, value_name = "FILE.ply")]
     output: Option<PathBuf>,
     /// How chroma is solved for.
@@ -86,7 +86,7 @@ pub struct Colorize {
     /// disagree about the same points].
     #[arg(long, value_enum, value_name = "on|off")]
     correct_views: Option<Switch>,
-    /// Give Gaussians that no view sees well their neighbours' colour [default: on with irls].
+    /// Give Gaussians that no view sees well their neighbors' color [default: on with irls].
     #[arg(long, value_enum, value_name = "on|off")]
     fill: Option<Switch>,
     /// Coarser scales that count for Adam beside the full one [default: 2].

@@ -8,7 +8,7 @@ use super::{CliError, print, progress::Progress};
 use crate::chroma::teacher::TeacherSettings;
 use crate::run::{EvalOptions, eval};
 
-/// Measure a coloured run: fidelity, colourfulness, and whether views agree.
+/// Measure a colored run: fidelity, colorfulness, and whether views agree.
 #[derive(Args)]
 pub struct Eval {
     /// Run folder [default: newest under runs/].
@@ -22,7 +22,7 @@ pub struct Eval {
     /// Side in pixels at which a network sees photos, as for `colorize`.
     #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(1..=8192), requires = "teacher")]
     teacher_size: Option<u32>,
-    /// Measure other ways to colour a scene as well: RGB splats fitted to the teacher's pictures,
+    /// Measure other ways to color a scene as well: RGB splats fitted to the teacher's pictures,
     /// and the teacher on each drawn gray frame.
     #[arg(long, requires = "teacher")]
     baselines: bool,

@@ -15,7 +15,7 @@ pub struct Export {
     /// Splat file to write.
     #[arg(short, long, value_name = "FILE.ply")]
     output: PathBuf,
-    /// Write the luminance although the scene is coloured.
+    /// Write the luminance although the scene is colored.
     #[arg(long)]
     luma: bool,
 }

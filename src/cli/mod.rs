@@ -29,7 +29,7 @@ pub use error::CliError;
 
 use crate::run::RunError;
 
-/// Turns grayscale photos with COLMAP poses into a coloured 3D Gaussian scene.
+/// Turns grayscale photos with COLMAP poses into a colored 3D Gaussian scene.
 #[derive(Parser)]
 #[command(version, about)]
 pub struct Cli {

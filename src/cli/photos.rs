@@ -44,7 +44,7 @@ pub(super) struct Photos {
     /// Train on all views; by default every 8th is held out to measure with.
     #[arg(long)]
     no_holdout: bool,
-    /// What of a colour photo becomes gray: an infra-red camera may have its signal in one channel.
+    /// What of a color photo becomes gray: an infra-red camera may have its signal in one channel.
     #[arg(long, value_parser = one_of(CHANNELS), default_value = "luma")]
     channel: Channel,
     /// What the files' values are; auto: linear light in floats, sRGB in all others.

@@ -26,7 +26,7 @@ pub struct Tradeoff {
     /// runs/<folder name>-tradeoff].
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
-    /// A colorization network or a folder of coloured photos, for points in colour.
+    /// A colorization network or a folder of colored photos, for points in color.
     #[arg(long, value_name = "FILE.onnx|DIR")]
     teacher: Option<PathBuf>,
     /// What knobs are turned around [default: paper on a GPU, draft without one].

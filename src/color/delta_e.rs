@@ -1,8 +1,8 @@
-//! The CIEDE2000 colour difference.
+//! The CIEDE2000 color difference.
 
 use std::f64::consts::{PI, TAU};
 
-/// CIEDE2000 between two Lab colours, with kL = kC = kH = 1.
+/// CIEDE2000 between two Lab colors, with kL = kC = kH = 1.
 ///
 /// Formula and numbering: G. Sharma, W. Wu, E. N. Dalal, *The CIEDE2000
 /// Color-Difference Formula: Implementation Notes, Supplementary Test Data, and
@@ -69,7 +69,7 @@ fn hue(a: f64, b: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Table 1 of Sharma, Wu and Dalal (2005): two Lab colours and ΔE00.
+    /// Table 1 of Sharma, Wu and Dalal (2005): two Lab colors and ΔE00.
     const SHARMA: [([f64; 3], [f64; 3], f64); 34] = [
         ([50.0, 2.6772, -79.7751], [50.0, 0.0, -82.7485], 2.0425),
         ([50.0, 3.1571, -77.2803], [50.0, 0.0, -82.7485], 2.8615),

@@ -1,9 +1,9 @@
-//! Bringing Lab colours into the sRGB gamut.
+//! Bringing Lab colors into the sRGB gamut.
 
 use super::lab::lab_to_linear;
 use super::srgb::linear_to_srgb;
 
-/// Linear components may leave `[0, 1]` by this much before a colour counts as
+/// Linear components may leave `[0, 1]` by this much before a color counts as
 /// out of gamut: rounding of the Lab round trip, far below what 8 bits show.
 const TOLERANCE: f64 = 1e-9;
 
@@ -11,9 +11,9 @@ const TOLERANCE: f64 = 1e-9;
 const HALVINGS: u32 = 32;
 
 /// Lab to encoded sRGB in `[0, 1]`, reducing chroma at constant `L*` and hue
-/// until the colour fits.
+/// until the color fits.
 ///
-/// Colours in gamut are left untouched; clipping components instead would turn
+/// Colors in gamut are left untouched; clipping components instead would turn
 /// the hue. `L*` is clamped to `[0, 100]` first. A component that is not
 /// finite gives NaN in all three.
 pub fn gamut_map_lab([l, a, b]: [f64; 3]) -> [f64; 3] {
@@ -52,7 +52,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn colours_in_gamut_are_untouched() {
+    fn colors_in_gamut_are_untouched() {
         for i in 0..11_i32.pow(3) {
             let rgb = [i % 11, i / 11 % 11, i / 121].map(|k| f64::from(k) / 10.0);
             let mapped = gamut_map_lab(srgb_to_lab(rgb));
@@ -63,7 +63,7 @@ mod tests {
     }
 
     #[test]
-    fn colours_out_of_gamut_keep_lightness_and_hue_and_reach_the_border() {
+    fn colors_out_of_gamut_keep_lightness_and_hue_and_reach_the_border() {
         for lightness in [1.0, 20.0, 50.0, 80.0, 99.0] {
             for degrees in (0..360).step_by(15) {
                 let (sin, cos) = f64::from(degrees).to_radians().sin_cos();

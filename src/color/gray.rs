@@ -1,9 +1,9 @@
-//! Gray with the lightness of a colour.
+//! Gray with the lightness of a color.
 
 use super::lab::{LUMINANCE, lightness_to_luminance, luminance_to_lightness};
 use super::srgb::{linear_to_srgb, srgb_to_linear};
 
-/// The encoded gray with the same `L*` as an encoded sRGB colour.
+/// The encoded gray with the same `L*` as an encoded sRGB color.
 ///
 /// `L*` depends on relative luminance alone and rises with it, so equal `L*`
 /// means equal luminance: the way over Lab reduces to encoding Y.
@@ -25,7 +25,7 @@ pub fn lightness_to_gray(lightness: f64) -> f64 {
     linear_to_srgb(lightness_to_luminance(lightness))
 }
 
-/// [`gray_from_rgb`] for 8-bit colours, by tables, rounded to the nearest
+/// [`gray_from_rgb`] for 8-bit colors, by tables, rounded to the nearest
 /// 8-bit gray.
 pub struct GrayTable {
     /// What each 8-bit value of R, G and B adds to luminance.
@@ -61,7 +61,7 @@ impl GrayTable {
         }
     }
 
-    /// The 8-bit gray with the `L*` of an 8-bit colour. Grays map to themselves.
+    /// The 8-bit gray with the `L*` of an 8-bit color. Grays map to themselves.
     pub fn gray(&self, [r, g, b]: [u8; 3]) -> u8 {
         let y = self.luminance[0][usize::from(r)]
             + self.luminance[1][usize::from(g)]

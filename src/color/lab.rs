@@ -1,4 +1,4 @@
-//! CIELAB (CIE 15:2004) of sRGB colours.
+//! CIELAB (CIE 15:2004) of sRGB colors.
 
 use super::srgb::{linear_to_srgb, srgb_to_linear};
 
@@ -36,7 +36,7 @@ pub fn srgb_to_lab(rgb: [f64; 3]) -> [f64; 3] {
 }
 
 /// Lab to encoded sRGB, not clamped: components outside `[0, 1]` tell that no
-/// display shows the colour. See [`gamut_map_lab`](super::gamut_map_lab).
+/// display shows the color. See [`gamut_map_lab`](super::gamut_map_lab).
 pub fn lab_to_srgb(lab: [f64; 3]) -> [f64; 3] {
     lab_to_linear(lab).map(linear_to_srgb)
 }

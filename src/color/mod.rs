@@ -1,4 +1,4 @@
-//! Colour arithmetic: sRGB, CIELAB, colour differences and the display gamut.
+//! Color arithmetic: sRGB, CIELAB, color differences and the display gamut.
 //!
 //! Everything is in `f64`. Encoded sRGB values are in `[0, 1]`; Lab is
 //! `[L*, a*, b*]` with `L*` in `[0, 100]`, under D65.

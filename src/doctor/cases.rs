@@ -203,7 +203,7 @@ pub const CASES: &[Case] = cases! {
         broken(0, |s| s.log_scales[ODD] = [50.0; 3]), [5.68e-7, 2.90e-6];
     "one deviation overflows", "exp gives infinity, radius still counted",
         broken(1, |s| s.log_scales[ODD][0] = 89.0), [5.68e-7, 2.90e-6];
-    "zero quaternion", "0/0 in the normalisation",
+    "zero quaternion", "0/0 in the normalization",
         broken(1, |s| s.quats[ODD] = [0.0; 4]), [5.68e-7, 2.90e-6];
     "quaternion next to zero", "1/‖q‖ and its square in the adjoint",
         broken(1, |s| s.quats[ODD] = [3e-5, -3e-5, 3e-5, 3e-5].map(round)), [5.68e-7, 2.90e-6];
@@ -213,9 +213,9 @@ pub const CASES: &[Case] = cases! {
         with(|s, _| s.quats[ODD] = [1e15, 2e15, -1e15, 3e15].map(round)), [5.68e-7, 2.92e-6];
     "quaternion whose square overflows", "1/∞ = 0: a rotation of zeros",
         broken(1, |s| s.quats[ODD] = [1e30; 4].map(round)), [5.68e-7, 2.90e-6];
-    "far beside the image", "the linearised projection stretches without bound",
+    "far beside the image", "the linearized projection stretches without bound",
         with(|s, v| { s.means[ODD] = at(v, [2.5, 0.4, 0.8]); s.log_scales[ODD] = [0.2; 3]; }), [4.51e-7, 3.02e-6];
-    "far beside, principal point off centre", "limits that assume a centred one",
+    "far beside, principal point off center", "limits that assume a centered one",
         { let mut h = seen_through(|v| (v.cx, v.cy) = (8.0, 33.0));
           h.scene.means[ODD] = at(&h.view, [2.5, -1.5, 0.8]); h.scene.log_scales[ODD] = [0.5; 3]; h }, [7.83e-7, 1.18e-6];
     "just beyond the near plane", "1/z at its largest",
@@ -253,7 +253,7 @@ pub const CASES: &[Case] = cases! {
         balls(straight_view(6, 6), [0.004, 0.02], (0..1500).map(|i| {
             ([(i % 7) as f64 * 0.02 - 0.06, (i % 5) as f64 * 0.02 - 0.04, 2.0 + i as f64 / 500.0], 0.3)
         })), [9.62e-7, 3.17e-5];
-    "centres on tile borders", "count and emit that round differently",
+    "centers on tile borders", "count and emit that round differently",
         balls(straight_view(64, 64), [0.3, 0.9], (0..9).map(|i| {
             ([(i % 3) as f64 - 1.0, (i / 3) as f64 - 1.0, 2.0 + i as f64 * 1e-3], 0.1)
         })), [4.52e-7, 6.44e-6];
@@ -274,17 +274,17 @@ pub const CASES: &[Case] = cases! {
         broken(1, |s| s.opacity_logits[ODD] = f64::NAN), [5.68e-7, 2.90e-6];
     "opacity is infinite", "∞ in the adjoint of the sigmoid",
         broken(1, |s| s.opacity_logits[ODD] = f64::INFINITY), [5.68e-7, 2.90e-6];
-    "harmonic is not a number", "one pixel poisons its neighbours in SSIM",
+    "harmonic is not a number", "one pixel poisons its neighbors in SSIM",
         broken(1, |s| s.sh[ODD * 4 + 3][0] = f64::NAN), [5.68e-7, 2.90e-6];
     "harmonic is infinite", "∞ - ∞ between directions",
         broken(1, |s| s.sh[ODD * 4 + 2][0] = f64::INFINITY), [5.68e-7, 2.90e-6];
-    "harmonics far above white", "gradients scale with the colour",
+    "harmonics far above white", "gradients scale with the color",
         with(|s, _| s.sh[ODD * 4] = [1000.0]), [7.06e-7, 9.15e-6];
-    "harmonics beyond any colour", "finite, but gradients overflow",
+    "harmonics beyond any color", "finite, but gradients overflow",
         broken(1, |s| s.sh[ODD * 4] = [1e38].map(round)), [5.68e-7, 2.90e-6];
     "harmonics below black", "clamped at 0, so no gradient",
         with(|s, _| s.sh[ODD * 4] = [-50.0]), [5.68e-7, 2.92e-6];
-    "harmonics of degree 3, close", "the colour moves with the mean",
+    "harmonics of degree 3, close", "the color moves with the mean",
         sound({ let view = oblique_view(); let mut s = random_scene_before(&view, 23, COUNT, 3);
           s.means[ODD] = at(&view, [0.02, 0.03, 0.3]); s.log_scales[ODD] = [-3.5; 3];
           for sh in &mut s.sh[ODD * 16 + 1..ODD * 16 + 16] { sh[0] = round(sh[0] * 4.0 + 0.3); } (s, view) }), [3.45e-7, 1.28e-6];

@@ -52,7 +52,7 @@ struct Holes {
     /// Side of a cell in pixels.
     side: f64,
     columns: usize,
-    /// Whether no point lies in the cell or a neighbour of it, row by row.
+    /// Whether no point lies in the cell or a neighbor of it, row by row.
     empty: Vec<bool>,
 }
 

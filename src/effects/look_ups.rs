@@ -116,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn a_masked_neighbour_says_nothing() {
+    fn a_masked_neighbor_says_nothing() {
         let mut photo = photo();
         photo.mask = Some(vec![255, 255, 0, 255, 255, 255]);
         assert_eq!(mean_around(&photo, [2.2, 1.0], 1.0), None);

@@ -1,6 +1,6 @@
 //! Whether photos show what the scene does not: dust, scratches, passers-by.
 //!
-//! Places half-way between neighbouring points mostly lie on the surface too. COLMAP
+//! Places half-way between neighboring points mostly lie on the surface too. COLMAP
 //! matched nothing there, so that a defect has not driven the match away as it does at
 //! the points themselves. Where several views agree about such a place and one does not,
 //! that one shows something else.
@@ -13,7 +13,7 @@ use crate::{
     splats::nearest_neighbors,
 };
 
-/// Neighbours of each point: more lie farther off, and so do the places between from
+/// Neighbors of each point: more lie farther off, and so do the places between from
 /// the surface.
 const NEIGHBORS: usize = 3;
 
@@ -29,7 +29,7 @@ const AGREEMENT: f64 = 0.06;
 /// One disagrees when it is this far from their median, in gray.
 const DISAGREEMENT: f64 = 0.2;
 
-/// Places half-way between neighbouring points, and what the views that see both show there.
+/// Places half-way between neighboring points, and what the views that see both show there.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Midpoints {
     /// Of each place the views.

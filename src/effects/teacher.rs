@@ -1,4 +1,4 @@
-//! Whether a teacher colours the same place alike in all views.
+//! Whether a teacher colors the same place alike in all views.
 
 use super::{
     exposure::find_exposures,
@@ -105,7 +105,7 @@ mod tests {
         effects::fixtures::{capture, looking_along_z, photo},
     };
 
-    /// Four views of points on a plane, coloured by place; `tint` is added to each view's a.
+    /// Four views of points on a plane, colored by place; `tint` is added to each view's a.
     fn spread(tint: [f32; 4]) -> Option<TeacherSpread> {
         let photos: Vec<_> = (0..4)
             .map(|k| {

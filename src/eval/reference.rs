@@ -42,7 +42,7 @@ impl<'a> Reference<'a> {
         self.photo.gray_values()
     }
 
-    /// RGB in [0, 1], `[height, width]`, where the photo has colours.
+    /// RGB in [0, 1], `[height, width]`, where the photo has colors.
     pub fn rgb(&self) -> Option<Vec<[f32; 3]>> {
         self.photo.rgb.as_ref().map(|_| self.photo.rgb_values())
     }
@@ -114,7 +114,7 @@ impl<'a> Reference<'a> {
         measure::mean_delta_e(&self.counted(a), &self.counted(b)).into()
     }
 
-    /// Colourfulness of a picture.
+    /// Colorfulness of a picture.
     pub fn colorfulness(&self, rgb: &[[f32; 3]]) -> f64 {
         measure::colorfulness(&self.counted(rgb))
     }
@@ -142,7 +142,7 @@ mod tests {
             photo: &photo,
             exposure: Exposure::NONE,
         };
-        let truth = reference.rgb().expect("colours");
+        let truth = reference.rgb().expect("colors");
         let mut other = truth.clone();
         other[1] = [0.0, 1.0, 0.0];
         assert_eq!(reference.color_error(&other, &truth).mean, 0.0);

@@ -7,7 +7,7 @@ use crate::{
     splats::{ShField, Splats},
 };
 
-/// A Gaussian goes when more than this share of the views that see its centre have it
+/// A Gaussian goes when more than this share of the views that see its center have it
 /// removed: the hull of the silhouettes, with some patience for masks drawn by hand.
 const REMOVED_SHARE: f64 = 0.25;
 

@@ -3,7 +3,7 @@
 //! A pixel that the picture misses by far may be one that is not learned yet; but then
 //! other views miss the same place as far. So each Gaussian is given the mean residual of
 //! the pixels that it is drawn to in all other views (the adjoint of blending), these
-//! means are drawn like a colour, and a pixel is taken for a defect where its residual is
+//! means are drawn like a color, and a pixel is taken for a defect where its residual is
 //! far above what the others lead to expect.
 
 use std::sync::Arc;
@@ -261,7 +261,7 @@ impl Scene<'_> {
     }
 }
 
-/// How far the picture is from the photo, each pixel with its neighbours.
+/// How far the picture is from the photo, each pixel with its neighbors.
 fn residuals(photo: &Photo, luma: &[f32]) -> Vec<f32> {
     let sizes: Vec<f32> = (luma.iter().zip(&photo.gray))
         .map(|(&luma, &gray)| {
@@ -294,7 +294,7 @@ fn mask(photo: &Photo, residuals: &[f32], expectation: &[f32]) -> Vec<u8> {
         .collect()
 }
 
-/// What `of` makes of each pixel's neighbourhood.
+/// What `of` makes of each pixel's neighborhood.
 fn around(
     camera: &Camera,
     values: &[f32],

@@ -1,11 +1,11 @@
-//! Colourfulness of a picture.
+//! Colorfulness of a picture.
 
-/// Colourfulness by D. Hasler and S. Süsstrunk, *Measuring Colourfulness in
+/// Colorfulness by D. Hasler and S. Süsstrunk, *Measuring Colorfulness in
 /// Natural Images*, SPIE Human Vision and Electronic Imaging VIII (2003).
 ///
 /// With the opponent axes `rg = R - G` and `yb = (R + G)/2 - B`, both signed:
 /// `√(σ²rg + σ²yb) + 0.3 √(μ²rg + μ²yb)`. `rgb` is encoded sRGB in `[0, 1]`;
-/// the result is on the paper's scale of 0 to 255: 0 is not colourful, 15
+/// the result is on the paper's scale of 0 to 255: 0 is not colorful, 15
 /// slightly, 33 moderately, 45 averagely, 59 quite, 82 highly, 109 extremely.
 /// No pixels give 0; a NaN anywhere gives NaN.
 pub fn colorfulness(rgb: &[[f32; 3]]) -> f64 {
@@ -35,14 +35,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn gray_is_not_colourful() {
+    fn gray_is_not_colorful() {
         let gray: Vec<[f32; 3]> = (0..50).map(|i| [i as f32 / 50.0; 3]).collect();
         assert_eq!(colorfulness(&gray), 0.0);
         assert_eq!(colorfulness(&[]), 0.0);
     }
 
     #[test]
-    fn one_colour_has_its_mean_alone() {
+    fn one_color_has_its_mean_alone() {
         // rg = 255, yb = 127.5.
         let want = 0.3 * 255_f64.hypot(127.5);
         assert!((colorfulness(&[[1.0, 0.0, 0.0]; 9]) - want).abs() < 1e-9);

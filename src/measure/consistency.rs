@@ -1,4 +1,4 @@
-//! How much colours differ between two pictures of one scene.
+//! How much colors differ between two pictures of one scene.
 
 use super::flow::{Flow, sample};
 

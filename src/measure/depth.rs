@@ -1,4 +1,4 @@
-//! Depth of a splat scene, drawn as if it were colour.
+//! Depth of a splat scene, drawn as if it were color.
 
 use glam::DVec3;
 
@@ -97,7 +97,7 @@ impl DepthSteps {
                         let share = f64::from((half - below) / (above - below));
                         self.depths[k - 1] + share * (self.depths[k] - self.depths[k - 1])
                     }
-                    // Half of what is seen lies beyond all centres in the picture.
+                    // Half of what is seen lies beyond all centers in the picture.
                     None => f64::NAN,
                 };
                 depth as f32

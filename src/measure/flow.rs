@@ -76,7 +76,7 @@ impl Flow {
         miss.is_finite().then_some((index, miss))
     }
 
-    /// Where the centre of a pixel goes, in pixels from the top left corner.
+    /// Where the center of a pixel goes, in pixels from the top left corner.
     pub fn target(&self, index: usize) -> [f64; 2] {
         let [u, v] = self.vectors[index].map(f64::from);
         [
@@ -87,7 +87,7 @@ impl Flow {
 }
 
 /// Bilinear value of a picture, `[height, width]`, at a place in pixels from the top
-/// left corner; none where one of the four pixel centres around it is missing.
+/// left corner; none where one of the four pixel centers around it is missing.
 pub fn sample(
     pixels: &[[f32; 2]],
     [width, height]: [usize; 2],
@@ -180,7 +180,7 @@ pub(super) mod tests {
         let offset = DVec3::new(1e6, -2e6, 3e6);
         let depth = [3.0; 1200];
         let flow = Flow::geometric(&from, &to, &depth);
-        let moved = Flow::geometric(&from.recentred(offset), &to.recentred(offset), &depth);
+        let moved = Flow::geometric(&from.recentered(offset), &to.recentered(offset), &depth);
         for (a, b) in flow.vectors.iter().zip(&moved.vectors) {
             assert!((a[0] - b[0]).abs() < 1e-3 && (a[1] - b[1]).abs() < 1e-3);
         }

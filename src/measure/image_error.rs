@@ -84,7 +84,7 @@ pub fn delta_e(a: &[[f32; 3]], b: &[[f32; 3]]) -> Vec<f64> {
 }
 
 /// Root mean square of the differences of a and of b, in CIELAB units: the error of a
-/// picture's colours where its lightness is taken from the reference.
+/// picture's colors where its lightness is taken from the reference.
 ///
 /// # Panics
 /// If the lengths differ or are zero.

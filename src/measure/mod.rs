@@ -1,4 +1,4 @@
-//! How good a picture is: fidelity to a reference, colourfulness, and whether views of
+//! How good a picture is: fidelity to a reference, colorfulness, and whether views of
 //! one scene agree.
 //!
 //! Images are row by row from the top left, encoded sRGB in `[0, 1]`.

@@ -15,7 +15,7 @@ const ROUNDS: usize = 20;
 const SMALLEST_STEP: f64 = 1e-9;
 
 /// `frames` cameras along an open path through the given ones, or a good choice of
-/// them: a Catmull–Rom spline through their centres, spherical interpolation of their
+/// them: a Catmull–Rom spline through their centers, spherical interpolation of their
 /// rotations, at a speed that is even in distance and turn together. All have the first
 /// camera's intrinsics and size. `extent` is the size of the scene in world units.
 ///

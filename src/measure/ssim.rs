@@ -1,6 +1,6 @@
 //! Structural similarity.
 
-/// Pixels from a window's centre to its edge: windows are 11 × 11.
+/// Pixels from a window's center to its edge: windows are 11 × 11.
 const RADIUS: usize = 5;
 const WINDOW: usize = 2 * RADIUS + 1;
 /// Standard deviation of the window's Gaussian in pixels.
@@ -19,7 +19,7 @@ type Moments = [f64; 5];
 /// (2004): 11 × 11 Gaussian windows of σ 1.5, K1 = 0.01, K2 = 0.03, data range
 /// 1, averaged over the windows that lie inside the image. An image less than
 /// 11 pixels wide or high holds no such window: it is framed with zeros and
-/// every pixel is the centre of one. Identical images give 1; a NaN anywhere
+/// every pixel is the center of one. Identical images give 1; a NaN anywhere
 /// gives NaN.
 ///
 /// # Panics

@@ -183,7 +183,7 @@ pub fn screen_gradient<const C: usize>(
 }
 
 /// The pull on each Gaussian, `[N]`: the sum over pixels of the length of the
-/// gradient with respect to its center in normalised device coordinates.
+/// gradient with respect to its center in normalized device coordinates.
 pub fn pulls<const C: usize>(
     scene: &Scene<f64, C>,
     view: &View,

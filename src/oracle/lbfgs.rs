@@ -1,5 +1,5 @@
 //! L-BFGS (Nocedal 1980; Nocedal and Wright 2006, algorithm 7.4) whose steps nobody
-//! searches along: one that raised the loss is undone for the majoriser's. With floors
+//! searches along: one that raised the loss is undone for the majorizer's. With floors
 //! (Bertsekas 1982), and elimination to compare with.
 
 use std::collections::VecDeque;
@@ -37,7 +37,7 @@ pub struct Lbfgs {
     ridge: f64,
     /// The accepted point, its gradient and its loss.
     accepted: Option<(Vec<f64>, Vec<f64>, f64)>,
-    /// One over the majoriser's diagonal there; zero for what is held at its floor.
+    /// One over the majorizer's diagonal there; zero for what is held at its floor.
     preconditioner: Vec<f64>,
     /// Newest first; nothing in the place of a pair that does not count.
     pairs: VecDeque<Option<Pair>>,
@@ -61,7 +61,7 @@ impl Lbfgs {
     }
 
     /// One step from where loss and gradient are these, the ridge's parts left out.
-    /// `diagonal` is positive and the majoriser's, the ridge included.
+    /// `diagonal` is positive and the majorizer's, the ridge included.
     pub fn step(&mut self, loss: f64, gradient: &[f64], diagonal: &[f64]) {
         let loss = self.with_ridge(loss);
         let mut gradient: Vec<f64> = (gradient.iter().zip(&self.unknowns))
@@ -244,7 +244,7 @@ mod tests {
         }
     }
 
-    /// Far fewer steps than the majoriser alone takes.
+    /// Far fewer steps than the majorizer alone takes.
     #[test]
     fn ends_where_the_loss_is_least() {
         let quadratic = Quadratic::random(2, 12);
@@ -283,7 +283,7 @@ mod tests {
             lbfgs.step(5.0, &[1.0, -1.0], &[2.0, 4.0]);
             assert_eq!(lbfgs.unknowns, [2.5, -1.75]);
             lbfgs.step(bad, &[9.0, 9.0], &[1.0, 1.0]);
-            // Once more the majoriser's step from the start, with the diagonal there.
+            // Once more the majorizer's step from the start, with the diagonal there.
             assert_eq!((lbfgs.undone, &lbfgs.unknowns[..]), (1, &[2.5, -1.75][..]));
             let mut ended = lbfgs.clone();
             lbfgs.step(4.0, &[0.5, -0.5], &[1.0, 1.0]);

@@ -197,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn window_is_normalised_and_symmetric() {
+    fn window_is_normalized_and_symmetric() {
         for side in [11, 7, 5] {
             let (w, middle) = (window(side), side / 2);
             assert!((w.iter().sum::<f64>() - 1.0).abs() < 1e-15);

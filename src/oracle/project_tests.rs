@@ -54,7 +54,7 @@ fn quaternion_turns_the_long_axis_from_x_to_y() {
 
 /// J by dual numbers, Σ entry by entry: neither is how `project` does it.
 #[test]
-fn covariance_is_that_of_the_linearised_projection() {
+fn covariance_is_that_of_the_linearized_projection() {
     let view = oblique_view();
     let (quat, log_scale) = ([0.7, -0.2, 0.5, 0.9], [-2.0, -3.5, -2.6_f64]);
     let center = view.center();
@@ -144,12 +144,12 @@ fn quarter_turns_are_right_handed() {
 
 #[test]
 fn limits_follow_the_principal_point() {
-    let off_centre = View {
+    let off_center = View {
         cx: 10.0,
         cy: 30.0,
         ..view()
     };
-    let [[left, right], [top, bottom]] = jacobian_limits(&off_centre);
+    let [[left, right], [top, bottom]] = jacobian_limits(&off_center);
     for (actual, expected) in [
         (left, -0.10 - 0.3 * 0.24),
         (right, 0.38 + 0.3 * 0.24),

@@ -106,7 +106,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn one_gaussian_in_the_centre_has_the_analytic_value() {
+    fn one_gaussian_in_the_center_has_the_analytic_value() {
         let mut view = oblique_view();
         (view.cx, view.cy) = (24.5, 20.5);
         view.fy = view.fx;

@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn little_colour_says_little() {
+    fn little_color_says_little() {
         let flat = vec![(1.0, [5.0, 5.0], [9.0, 2.0]); 10];
         let found = teacher_of(&flat);
         assert_eq!(found.gain, Affine::IDENTITY.gain);

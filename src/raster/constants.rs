@@ -11,11 +11,11 @@ pub const ALPHA_MAX: f32 = 0.99;
 pub const ALPHA_MIN: f32 = 1.0 / 255.0;
 /// Transmittance below which a pixel is finished.
 pub const TRANSMITTANCE_MIN: f32 = 1e-4;
-/// Largest magnitude of a colour in any kind's units.
+/// Largest magnitude of a color in any kind's units.
 pub const COLOR_MAX: f32 = 1e4;
 /// Squared length below which a quaternion has no direction.
 pub const QUAT_NORM_MIN_SQ: f32 = 1e-8;
-/// Share of the half image beyond its border where the linearised projection is clamped.
+/// Share of the half image beyond its border where the linearized projection is clamped.
 pub const FRUSTUM_MARGIN: f64 = 0.3;
 
 /// Planes of the geometry array: mean 3, quaternion 4, log-scale 3, opacity logit 1.
@@ -32,7 +32,7 @@ pub const PLANE_OPACITY: usize = 10;
 pub const STATISTICS_PLANES: usize = 2;
 /// The plane of the pulls: over the views that showed a Gaussian, the sum over
 /// pixels of the length of the loss's gradient with respect to the Gaussian's
-/// centre in normalised device coordinates.
+/// center in normalized device coordinates.
 pub const STAT_PULL: usize = 0;
 /// The plane of the counts of these views.
 pub const STAT_VIEWS: usize = 1;

@@ -1,4 +1,4 @@
-//! One field of colour drawn over a view's tile lists: `shade` and `blend`.
+//! One field of color drawn over a view's tile lists: `shade` and `blend`.
 
 use super::{
     ColorKind, Raster,
@@ -50,7 +50,7 @@ impl Canvas {
 pub struct Layer {
     /// What is drawn.
     pub kind: ColorKind,
-    /// Colour of each visible Gaussian, `[N]` of the kind's stride.
+    /// Color of each visible Gaussian, `[N]` of the kind's stride.
     pub colors: Buffer<f32>,
     /// The picture, `[pixels]` of the kind's stride.
     pub image: Buffer<f32>,

@@ -15,7 +15,7 @@ use crate::gpu::{
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Projected {
-    /// Centre in pixels.
+    /// Center in pixels.
     pub mean: [f32; 2],
     /// Half width and height of its box in pixels.
     pub extent: [f32; 2],

@@ -2,7 +2,7 @@
 //!
 //! project → depth sort → tile lists → tile sort → blend, then back. Every step
 //! is a kernel in `shaders/`; [`Lists`] records those that depend on the
-//! geometry alone, [`Layer`] those that draw one field of colour over it,
+//! geometry alone, [`Layer`] those that draw one field of color over it,
 //! [`LumaAdjoint`] and [`ChromaAdjoint`] their adjoints.
 
 mod adam;
@@ -65,7 +65,7 @@ impl ColorKind {
         }
     }
 
-    /// Channels of one colour.
+    /// Channels of one color.
     pub fn channels(self) -> usize {
         match self {
             Self::Luma => 1,
@@ -74,7 +74,7 @@ impl ColorKind {
         }
     }
 
-    /// Floats between two colours in a device array (`vec3f` is aligned to 16 bytes).
+    /// Floats between two colors in a device array (`vec3f` is aligned to 16 bytes).
     pub fn stride(self) -> usize {
         match self {
             Self::Luma => 1,

@@ -94,7 +94,7 @@ impl Renderer {
     }
 
     /// Makes tile lists once a view, not once a field: for fields in which every
-    /// Gaussian has a colour that can be drawn. One that shading refuses would be missing
+    /// Gaussian has a color that can be drawn. One that shading refuses would be missing
     /// in the fields behind.
     pub fn with_one_list(mut self) -> Self {
         self.one_list = true;

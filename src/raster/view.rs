@@ -11,11 +11,11 @@ use crate::capture::Camera;
 pub struct ViewUniform {
     /// World-to-camera rows, translation last.
     pub rows: [[f32; 4]; 3],
-    /// Camera centre in world space; near distance.
+    /// Camera center in world space; near distance.
     pub center_near: [f32; 4],
     /// fx, fy, cx, cy in pixels.
     pub intrinsics: [f32; 4],
-    /// Lowest x/z, y/z, highest x/z, y/z of the linearised projection.
+    /// Lowest x/z, y/z, highest x/z, y/z of the linearized projection.
     pub slope_limits: [f32; 4],
     /// Width and height in pixels.
     pub size: [u32; 2],

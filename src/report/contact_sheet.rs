@@ -1,4 +1,4 @@
-//! Pictures side by side: photo, luma, teacher, colour.
+//! Pictures side by side: photo, luma, teacher, color.
 
 use image::{Rgb, RgbImage, imageops};
 

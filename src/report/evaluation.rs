@@ -23,7 +23,7 @@ pub enum Method {
     Teacher,
     /// RGB splats on the same geometry, fitted to the teacher's pictures.
     RgbSplats,
-    /// The gray scene, drawn and then coloured by the teacher frame by frame.
+    /// The gray scene, drawn and then colored by the teacher frame by frame.
     PerFrame,
     /// The photo itself.
     Photo,
@@ -51,9 +51,9 @@ pub struct Evaluation {
     pub program: String,
     /// The COLMAP folder's name.
     pub scene: String,
-    /// Who coloured the photos, where `--teacher` names someone.
+    /// Who colored the photos, where `--teacher` names someone.
     pub teacher: Option<serde_json::Value>,
-    /// Colourfulness of the teacher's pictures, mean over all photos that it coloured.
+    /// Colorfulness of the teacher's pictures, mean over all photos that it colored.
     pub teacher_colorfulness: Option<f64>,
     /// Views that were measured: `test`, or `train` without held-out ones.
     pub measured_on: String,
@@ -61,7 +61,7 @@ pub struct Evaluation {
     pub luma: LumaScore,
     /// ΔE00 between native and exported pictures, mean over these views.
     pub bake: Option<ColorError>,
-    /// Coloured pictures, mean over these views.
+    /// Colored pictures, mean over these views.
     pub pictures: Vec<PictureScore>,
     /// Each of these views.
     pub views: Vec<ViewScore>,
@@ -86,7 +86,7 @@ pub struct LumaScore {
     pub lpips: Option<f64>,
 }
 
-/// Quality of one method's coloured pictures; fidelity only where photos have colours.
+/// Quality of one method's colored pictures; fidelity only where photos have colors.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PictureScore {
     /// Whose pictures.
@@ -99,7 +99,7 @@ pub struct PictureScore {
     pub delta_e: Option<ColorError>,
     /// Root mean square of the differences of a and b, in CIELAB units.
     pub ab_error: Option<f64>,
-    /// Colourfulness (Hasler and Süsstrunk 2003).
+    /// Colorfulness (Hasler and Süsstrunk 2003).
     pub colorfulness: f64,
     /// Learned perceptual distance to the photo, with `--lpips`.
     pub lpips: Option<f64>,
@@ -112,7 +112,7 @@ pub struct ViewScore {
     pub name: String,
     /// Its gray picture.
     pub luma: LumaScore,
-    /// Its coloured pictures.
+    /// Its colored pictures.
     pub pictures: Vec<PictureScore>,
 }
 
@@ -223,7 +223,7 @@ pub struct Table {
 impl Evaluation {
     /// The evaluation as indented JSON.
     pub fn to_json(&self) -> String {
-        // Plain structs with string keys: serialising them cannot fail.
+        // Plain structs with string keys: serializing them cannot fail.
         serde_json::to_string_pretty(self).unwrap_or_default()
     }
 
@@ -240,7 +240,7 @@ impl Evaluation {
             "ΔE00",
             "95 %",
             "a/b error",
-            "colourful",
+            "colorful",
             "LPIPS",
         ];
         let luma = vec![

@@ -200,7 +200,7 @@ pub struct ChromaReport {
     pub upsample: Upsample,
     /// Training views with painted hints.
     pub hints: usize,
-    /// Training views that a teacher coloured or that have hints.
+    /// Training views that a teacher colored or that have hints.
     pub colored_views: usize,
     /// How chroma was solved for.
     pub settings: ChromaSettings,
@@ -274,7 +274,7 @@ impl ChromaSeconds {
     }
 }
 
-/// A colour difference.
+/// A color difference.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ColorError {
     /// Mean ΔE00.
@@ -297,18 +297,18 @@ impl From<DeltaE> for ColorError {
     }
 }
 
-/// Quality of coloured pictures.
+/// Quality of colored pictures.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ColorQuality {
-    /// ΔE00 to the photo, where the photo has colours.
+    /// ΔE00 to the photo, where the photo has colors.
     pub delta_e: Option<ColorError>,
-    /// Colourfulness (Hasler and Süsstrunk 2003).
+    /// Colorfulness (Hasler and Süsstrunk 2003).
     pub colorfulness: f64,
-    /// Colourfulness of the teacher's picture.
+    /// Colorfulness of the teacher's picture.
     pub teacher_colorfulness: Option<f64>,
 }
 
-/// One coloured picture.
+/// One colored picture.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ColorView {
     /// The photo's name.
@@ -321,7 +321,7 @@ pub struct ColorView {
 impl Report {
     /// The report as indented JSON.
     pub fn to_json(&self) -> String {
-        // Plain structs with string keys: serialising them cannot fail.
+        // Plain structs with string keys: serializing them cannot fail.
         serde_json::to_string_pretty(self).unwrap_or_default()
     }
 
@@ -374,13 +374,13 @@ impl Report {
     /// Stage 2 on one line.
     pub fn chroma_summary(&self) -> String {
         let Some(chroma) = &self.chroma else {
-            return "not coloured yet".to_owned();
+            return "not colored yet".to_owned();
         };
         let truth = chroma.pictures.delta_e.map_or(String::new(), |error| {
             format!(", ΔE00 to the photos {:.2}", error.mean)
         });
         format!(
-            "coloured from {} views in {:.0} s{truth}, export off by ΔE00 {:.2}",
+            "colored from {} views in {:.0} s{truth}, export off by ΔE00 {:.2}",
             chroma.colored_views,
             chroma.seconds.total(),
             chroma.bake.mean

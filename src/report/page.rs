@@ -7,7 +7,7 @@ use super::{
     html::{TAIL, escaped, head, push_table},
 };
 
-/// Colours of a map of errors, from none to [`MAP_END`] and beyond.
+/// Colors of a map of errors, from none to [`MAP_END`] and beyond.
 const RAMP: [[f64; 3]; 5] = [
     [0.06, 0.05, 0.12],
     [0.36, 0.10, 0.43],

@@ -115,7 +115,7 @@ mod tests {
             [rows[0].share, rows[1].share].map(|s| (4.0 * s).round()),
             [3.0, 1.0]
         );
-        // 9 words an entry, a colour and a count a pixel.
+        // 9 words an entry, a color and a count a pixel.
         assert_eq!(rows[0].minimum_bytes, 4.0 * (9.0 * 5000.0 + 2.0 * 60_000.0));
         let table = timings_table(&rows);
         assert!(

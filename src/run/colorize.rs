@@ -1,4 +1,4 @@
-//! `colorize`: a teacher's colours into a trained scene.
+//! `colorize`: a teacher's colors into a trained scene.
 
 use std::{
     fmt::Write,
@@ -33,9 +33,9 @@ use crate::{
 pub struct ColorizeOptions {
     /// Run folder or gray splat file; the newest run by default.
     pub run: Option<PathBuf>,
-    /// Who colours the photos.
+    /// Who colors the photos.
     pub teach: TeachOptions,
-    /// The coloured splat file; `color.ply` in the run folder by default.
+    /// The colored splat file; `color.ply` in the run folder by default.
     pub output: Option<PathBuf>,
     /// Last iteration, counted from the start of stage 1; the preset's by default.
     pub until: Option<usize>,
@@ -56,16 +56,16 @@ pub struct ColorizeOptions {
 /// What `colorize` wrote.
 #[derive(Clone, Debug)]
 pub struct Output {
-    /// The coloured splat file.
+    /// The colored splat file.
     pub ply: PathBuf,
-    /// The contact sheet, when a run was coloured.
+    /// The contact sheet, when a run was colored.
     pub contact_sheet: Option<PathBuf>,
 }
 
-/// Colours a run or a gray splat file.
+/// Colors a run or a gray splat file.
 ///
 /// # Errors
-/// [`RunError`]; nothing is written before the colours are found.
+/// [`RunError`]; nothing is written before the colors are found.
 pub fn colorize(
     options: &ColorizeOptions,
     observe: &mut Observer<'_>,
@@ -330,7 +330,7 @@ fn adam_iterations(
 }
 
 /// Puts the chroma rows behind the luma rows, in place of those of an earlier
-/// colouring.
+/// coloring.
 fn append_log(folder: &RunFolder, luma: usize, rows: &str) -> Result<(), RunError> {
     let path = folder.log();
     let log = read_or_empty(&path);

@@ -1,4 +1,4 @@
-//! `eval`: how good a coloured run is.
+//! `eval`: how good a colored run is.
 
 use std::{
     path::{Path, PathBuf},
@@ -45,7 +45,7 @@ pub struct EvalOptions {
     pub colmap: Option<PathBuf>,
     /// Frames of the path, at least 2.
     pub frames: usize,
-    /// Whether other ways to colour a scene are measured beside it.
+    /// Whether other ways to color a scene are measured beside it.
     pub baselines: bool,
     /// Bytes of the device that fitting RGB splats may take.
     pub memory_limit: Option<u64>,
@@ -178,7 +178,7 @@ fn load(
     };
     let color = folder.color();
     if !color.exists() {
-        return Err(refused(color, "the run is not coloured yet"));
+        return Err(refused(color, "the run is not colored yet"));
     }
     // A run's own files are moved already.
     let offset = glam::DVec3::ZERO;
@@ -227,8 +227,7 @@ fn ask(
         && !chroma.teachers.iter().any(is_same)
     {
         observe(Event::Note(
-            "the run was coloured by another teacher than the one it is measured against"
-                .to_owned(),
+            "the run was colored by another teacher than the one it is measured against".to_owned(),
         ));
     }
     let frames = if options.baselines && teacher.is_network() {
@@ -238,7 +237,7 @@ fn ask(
     };
     if options.baselines && frames.is_none() {
         observe(Event::Note(
-            "a folder of images cannot colour frames: no baseline of luma, then teacher".to_owned(),
+            "a folder of images cannot color frames: no baseline of luma, then teacher".to_owned(),
         ));
     }
     let mut told = |progress: Progress<'_>| observe(event(progress));

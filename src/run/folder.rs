@@ -59,12 +59,12 @@ impl RunFolder {
         self.0.join("luma.ply")
     }
 
-    /// The coloured scene.
+    /// The colored scene.
     pub fn color(&self) -> PathBuf {
         self.0.join("color.ply")
     }
 
-    /// The native a/b harmonics of the coloured scene.
+    /// The native a/b harmonics of the colored scene.
     pub fn chroma(&self) -> PathBuf {
         self.0.join("chroma.npy")
     }
@@ -94,7 +94,7 @@ impl RunFolder {
         self.0.join("teacher")
     }
 
-    /// Photo, luma, teacher and colour side by side.
+    /// Photo, luma, teacher and color side by side.
     pub fn contact_sheet(&self) -> PathBuf {
         self.0.join("contact-sheet.png")
     }

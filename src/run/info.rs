@@ -66,7 +66,7 @@ fn splat_info(path: &Path) -> Result<Value, RunError> {
         "skipped": read.skipped,
         "sh_degree": splats.sh.degree,
         "antialiased": read.antialiased,
-        // Half an 8-bit step: what no viewer shows as a colour.
+        // Half an 8-bit step: what no viewer shows as a color.
         "gray": splats.is_gray(0.5 / 255.0),
         "lowest": bound(f32::min, f32::INFINITY),
         "highest": bound(f32::max, f32::NEG_INFINITY),

@@ -36,7 +36,7 @@ pub struct RenderOptions {
     pub colmap: Option<PathBuf>,
     /// Which views; those held out by default, or all where none is.
     pub views: Option<Views>,
-    /// Draw the luma although the scene is coloured.
+    /// Draw the luma although the scene is colored.
     pub luma: bool,
     /// Folder for the pictures.
     pub output: PathBuf,

@@ -31,7 +31,7 @@ pub(super) fn open(
                 message: name.to_owned(),
             },
             Notice::Normalized([low, high]) => Event::Note(format!(
-                "photos are normalised: {low:.6} becomes black and {high:.6} white (--normalize off leaves them)"
+                "photos are normalized: {low:.6} becomes black and {high:.6} white (--normalize off leaves them)"
             )),
         });
     })?)
@@ -80,7 +80,7 @@ pub(super) fn tell_not_finite(dataset: &Dataset, observe: &mut Observer<'_>) {
 }
 
 /// Reads a splat file that has at least one Gaussian and subtracts `offset`, in
-/// world units, from its centres; also gives how the file wants to be drawn.
+/// world units, from its centers; also gives how the file wants to be drawn.
 pub(super) fn read_splats(
     path: &Path,
     offset: DVec3,

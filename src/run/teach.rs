@@ -1,4 +1,4 @@
-//! Asking the teachers: what each view's colours are to be, and how much each
+//! Asking the teachers: what each view's colors are to be, and how much each
 //! pixel of that counts.
 
 use std::{
@@ -18,12 +18,12 @@ use crate::{
     report::TeacherReport,
 };
 
-/// How much a painted pixel counts where one that a teacher coloured counts 1:
+/// How much a painted pixel counts where one that a teacher colored counts 1:
 /// more than the views that see the same place from elsewhere and say something
 /// else, of which there are seldom more than a few dozen.
 pub const HINT_WEIGHT: f32 = 50.0;
 
-/// Who colours the photos.
+/// Who colors the photos.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TeachOptions {
     /// Teachers and their weights, above 0; may be empty where there are hints.

@@ -4,7 +4,7 @@ use glam::{DMat3, DQuat, DVec3};
 
 use super::{ShField, Splats, sh};
 
-/// Standard deviation of a Gaussian as a share of the distance to its neighbours on the
+/// Standard deviation of a Gaussian as a share of the distance to its neighbors on the
 /// lattice: what two of them show half-way between them is even.
 const WIDTH: f64 = 0.7;
 

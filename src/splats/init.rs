@@ -3,11 +3,11 @@
 
 use super::{ShField, Splats, nearest_neighbor_distances, sh};
 
-/// Neighbours that set the width of an initial Gaussian (Kerbl et al. 2023).
+/// Neighbors that set the width of an initial Gaussian (Kerbl et al. 2023).
 const NEIGHBORS: usize = 3;
 
 /// Standard deviation of an initial Gaussian as a share of the distance to its
-/// neighbours, and its opacity. 3DGS begins with 1 and 0.1: a fog that must first
+/// neighbors, and its opacity. 3DGS begins with 1 and 0.1: a fog that must first
 /// find its surface. Smaller and denser ones stand on it from the start (figures
 /// in docs/decisions.md).
 const INITIAL_WIDTH: f32 = 0.5;
@@ -20,7 +20,7 @@ const MIN_RELATIVE_SCALE: f32 = 1e-4;
 
 /// One isotropic Gaussian a point: its standard deviation is half the root
 /// mean square distance to the three nearest other points, its opacity 0.5, its
-/// constant colour the point's gray value.
+/// constant color the point's gray value.
 ///
 /// `points` are `(position, gray)` in world units and sRGB-encoded `0..=1`;
 /// points that are not finite are left out. `extent` is the scene's size in

@@ -1,4 +1,4 @@
-//! The Gaussians: arrays on the host, spherical harmonics, initialisation and
+//! The Gaussians: arrays on the host, spherical harmonics, initialization and
 //! splat files.
 
 pub mod dome;
@@ -18,7 +18,7 @@ pub use sh::ShField;
 /// Arrays are parallel; index `i` is the same Gaussian in all of them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Splats {
-    /// Centres in world units, `[N, 3]`.
+    /// Centers in world units, `[N, 3]`.
     pub means: Vec<[f32; 3]>,
     /// Rotations as quaternions `w x y z`, `[N, 4]`; not necessarily of unit length.
     pub quats: Vec<[f32; 4]>,

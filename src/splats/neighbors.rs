@@ -1,4 +1,4 @@
-//! Nearest neighbours in a cloud of points, by a bounding volume hierarchy.
+//! Nearest neighbors in a cloud of points, by a bounding volume hierarchy.
 
 use glam::{Vec3, Vec3A};
 use obvhs::Boundable;
@@ -12,7 +12,7 @@ use std::collections::HashMap;
 ///
 /// A duplicate is another point at distance 0. The distance is 0 where there is
 /// no other point, and for points that are not finite, which nobody has as a
-/// neighbour either.
+/// neighbor either.
 pub fn nearest_neighbor_distances(points: &[[f32; 3]], k: usize) -> Vec<f32> {
     let tree = PointTree::new(points);
     let mut of_place = vec![0.0; tree.places.len()];
@@ -29,7 +29,7 @@ pub fn nearest_neighbor_distances(points: &[[f32; 3]], k: usize) -> Vec<f32> {
 
 /// Up to `k` points at the nearest other places to each point, nearest first: of
 /// points that lie in one place the first stands for all. None for points that are not
-/// finite, nor are they anybody's neighbours.
+/// finite, nor are they anybody's neighbors.
 pub fn nearest_neighbors(points: &[[f32; 3]], k: usize) -> Vec<Vec<u32>> {
     let tree = PointTree::new(points);
     let mut first_of = vec![u32::MAX; tree.places.len()];
@@ -83,7 +83,7 @@ impl PointTree {
         }
     }
 
-    /// All places, neighbours in space mostly one after the other.
+    /// All places, neighbors in space mostly one after the other.
     fn leaf_order(&self) -> Vec<usize> {
         let mut places = Vec::with_capacity(self.places.len());
         let mut stack: Vec<u32> = (!self.places.is_empty()).then_some(0).into_iter().collect();
@@ -113,7 +113,7 @@ enum Counted {
     Places,
 }
 
-/// Scratch memory of a neighbour search.
+/// Scratch memory of a neighbor search.
 #[derive(Default)]
 struct Search {
     /// Squared distances to the nearest points so far, ascending, and their places; at
@@ -146,7 +146,7 @@ impl Search {
 
         stack.push((0, 0.0));
         while let Some((index, lower_bound)) = stack.pop() {
-            // The radius shrinks once k neighbours are known.
+            // The radius shrinks once k neighbors are known.
             if nearest.len() == k
                 && nearest
                     .last()
@@ -187,7 +187,7 @@ fn squared_distance(a: Vec3, b: Vec3) -> f64 {
 
 /// A hierarchy with tight boxes over distinct, finite positions.
 ///
-/// The builder pairs neighbours by the surface of their common box, and takes
+/// The builder pairs neighbors by the surface of their common box, and takes
 /// quadratic time where all of those are equal: on a line along an axis (no
 /// surface at all) and on evenly spaced points. So it is shown a copy of the
 /// cloud in the unit cube (where nothing overflows) whose points have a slight
@@ -367,7 +367,7 @@ mod tests {
     }
 
     #[test]
-    fn neighbours_are_other_places_nearest_first() {
+    fn neighbors_are_other_places_nearest_first() {
         let points = [
             [0.0; 3],
             [1.0, 0.0, 0.0],
@@ -388,7 +388,7 @@ mod tests {
     }
 
     #[test]
-    fn neighbours_match_brute_force() {
+    fn neighbors_match_brute_force() {
         let points = cloud(300);
         let position = |i: usize| Vec3::from(points[i]);
         for (i, found) in nearest_neighbors(&points, 5).iter().enumerate() {

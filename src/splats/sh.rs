@@ -30,7 +30,7 @@ const C3: [f64; 5] = [
 /// signs of 3D Gaussian Splatting files (Condon–Shortley phase kept: odd
 /// orders are negative).
 ///
-/// `direction` has unit length and points from the camera's centre to the
+/// `direction` has unit length and points from the camera's center to the
 /// Gaussian. Functions beyond `degree` are 0; a degree above [`MAX_DEGREE`]
 /// counts as [`MAX_DEGREE`].
 ///

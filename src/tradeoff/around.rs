@@ -22,11 +22,11 @@ pub(super) struct Around {
     pub adam: usize,
     /// The names of the other presets, and the work of each over the base's.
     pub presets: Vec<(&'static str, f64)>,
-    /// How the base is coloured, once it is.
+    /// How the base is colored, once it is.
     pub color: Option<ColorAround>,
 }
 
-/// How the base is coloured.
+/// How the base is colored.
 #[derive(Clone, Debug)]
 pub(super) struct ColorAround {
     /// Rounds of least squares at full size.
@@ -82,10 +82,10 @@ impl Around {
         self.splats as f64 > 0.9 * self.luma.max_splats as f64
     }
 
-    /// With what the coloured base's report says.
+    /// With what the colored base's report says.
     pub fn colored(mut self, base: &Report) -> Self {
         self.color = base.chroma.as_ref().map(|chroma| ColorAround {
-            // The base is coloured by the default solver.
+            // The base is colored by the default solver.
             rounds: ChromaSettings::irls().rounds,
             coarse_rounds: ChromaSettings::irls().coarse_rounds,
             corrects_views: chroma.settings.correct_views,
@@ -96,7 +96,7 @@ impl Around {
         self
     }
 
-    /// The same of the colours; of nothing to try where there are none.
+    /// The same of the colors; of nothing to try where there are none.
     pub fn of_color(&self, values: impl Fn(&ColorAround) -> Vec<String>) -> Vec<String> {
         self.color.as_ref().map_or(Vec::new(), values)
     }

@@ -42,7 +42,7 @@ fn values_lie_around_the_base() {
 }
 
 #[test]
-fn colours_have_knobs_once_there_are_colours() {
+fn colors_have_knobs_once_there_are_colors() {
     let gray = values(&around(), &[]);
     assert!(gray.iter().all(|value| value.stage == PointStage::Luma));
     let mut colored = Around {

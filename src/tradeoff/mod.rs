@@ -45,7 +45,7 @@ pub struct TradeoffOptions {
     pub load: LoadOptions,
     /// Effects that are on or off in every point.
     pub overrules: Overrules,
-    /// The teacher, for points in colour.
+    /// The teacher, for points in color.
     pub teacher: Option<PathBuf>,
     /// Wall seconds that all points may take together.
     pub budget: f64,

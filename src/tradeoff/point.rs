@@ -159,7 +159,7 @@ impl<'a> Bench<'a> {
         })
     }
 
-    /// A point in colour has the base's luma and, but for the first that asked, the
+    /// A point in color has the base's luma and, but for the first that asked, the
     /// answers that the teacher has given.
     fn begin_from_base(&self, name: &str) -> Result<(), RunError> {
         let (base, here) = (self.folder(base_name(PointStage::Luma)), self.folder(name));
@@ -413,7 +413,7 @@ mod tests {
     }
 
     #[test]
-    fn a_point_in_colour_is_coloured_and_measured() {
+    fn a_point_in_color_is_colored_and_measured() {
         let overlay: Overlay = Box::new(|_| {});
         let commands = bench(&overlay).commands(&task(PointStage::Color, "until", "900"));
         let commands = commands.expect("paths");

@@ -182,7 +182,7 @@ fn on_curve(curve: &[[f64; 2]], x: f64) -> Option<f64> {
 }
 
 /// What decides about a stage's points while it is searched. Where photos are gray,
-/// nothing does for colours, and single knobs are all that is tried.
+/// nothing does for colors, and single knobs are all that is tried.
 fn decisive(stage: PointStage) -> Measure {
     Measure::of(stage)[0]
 }

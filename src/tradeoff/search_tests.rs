@@ -188,7 +188,7 @@ fn a_preset_stands_alone() {
 }
 
 #[test]
-fn colours_are_combined_too() {
+fn colors_are_combined_too() {
     let points = sweep(&space(true), Vec::new(), PLENTY);
     assert!(names(&points).contains(&"scales-1+chroma-degree-1"));
 }
@@ -255,9 +255,9 @@ fn nothing_follows_a_base_that_failed() {
     assert_eq!(next(&space, &[base], PLENTY), None);
 }
 
-/// Gray photos say nothing about colours: no ΔE00, and nothing to combine by.
+/// Gray photos say nothing about colors: no ΔE00, and nothing to combine by.
 #[test]
-fn without_a_truth_colours_are_not_combined() {
+fn without_a_truth_colors_are_not_combined() {
     let space = space(true);
     let mut points = Vec::new();
     while let Some(task) = next(&space, &points, PLENTY) {

@@ -17,7 +17,7 @@ fn run_far_away() -> Place {
     place
 }
 
-/// The mean of the Gaussians' centres.
+/// The mean of the Gaussians' centers.
 fn middle(place: &Place, name: &str) -> [f64; 3] {
     let file = SplatFile::read(place, name);
     ["x", "y", "z"].map(|axis| {

@@ -107,7 +107,7 @@ fn the_photos_as_a_teacher_make_no_error() {
     let place = place_with_run();
     let found = evaluated(&place, &["--teacher", "scene/images", "--baselines"]);
     let teacher = of(&found["pictures"], "teacher");
-    // The gray has 8 bits, the colours have all theirs.
+    // The gray has 8 bits, the colors have all theirs.
     assert!(number(&teacher["ab_error"]) < 1e-3, "{teacher}");
     assert!(number(&teacher["delta_e"]["mean"]) < 0.5, "{teacher}");
     let photo = of(&found["pictures"], "photo");
@@ -115,7 +115,7 @@ fn the_photos_as_a_teacher_make_no_error() {
     assert_eq!(photo["ab_error"], Value::Null);
     let rms = |method| number(&of(&found["between"]["consistency"], method)["rms"]);
     assert!((rms("teacher") - rms("photo")).abs() < 1e-3);
-    // A folder colours no frames.
+    // A folder colors no frames.
     let methods: Vec<&Value> = found["pictures"]
         .as_array()
         .expect("a list")
@@ -159,7 +159,7 @@ fn the_page_shows_every_view_with_files_that_are_there() {
     assert_eq!(sources, 5 * scene::HELD_OUT + 3);
     assert!(page.contains(&scene::name(8)), "{page}");
 
-    // A second evaluation leaves nothing of the first, a new colouring neither.
+    // A second evaluation leaves nothing of the first, a new coloring neither.
     place.write("runs/scene/eval/frame-0099.png", "old");
     place.succeed(&["eval", "--frames", "2"]);
     let files = place.files("runs/scene");
@@ -303,7 +303,7 @@ fn what_cannot_be_measured_is_said_with_the_remedy() {
     assert_eq!(found["bake"], Value::Null);
     of(&found["pictures"], "exported");
 
-    // Colours of other Gaussians, then none.
+    // Colors of other Gaussians, then none.
     place.write("runs/scene/color.ply", place.read("runs/scene/luma.ply"));
     assert!(
         place.run(&eval).code == Some(0),
@@ -324,7 +324,7 @@ fn what_cannot_be_measured_is_said_with_the_remedy() {
     assert!(error.contains("luma.ply"), "{error}");
     fs::remove_file(place.path("runs/scene/color.ply")).expect("a file");
     let error = fails(&place, &eval, 1);
-    assert!(error.contains("not coloured yet"), "{error}");
+    assert!(error.contains("not colored yet"), "{error}");
     // Nothing of a failure stays behind.
     let files = place.files("runs/scene");
     assert!(
@@ -334,7 +334,7 @@ fn what_cannot_be_measured_is_said_with_the_remedy() {
 }
 
 #[test]
-fn gray_photos_have_no_colours_to_compare() {
+fn gray_photos_have_no_colors_to_compare() {
     let place = place_with_run();
     for index in 0..scene::VIEWS {
         let path = place.path("scene/images").join(scene::name(index));
@@ -376,7 +376,7 @@ fn a_single_photo_is_measured_on_itself() {
     assert_eq!(found["measured_on"], "train");
     assert_eq!(found["views"].as_array().expect("views").len(), 1);
     assert_eq!(found["between"]["consistency"], serde_json::json!([]));
-    // The path stands still, and so do its colours.
+    // The path stands still, and so do its colors.
     let score = of(&found["path"]["consistency"], "native");
     assert!(number(&score["rms"]) < 1e-3, "{score}");
     let words = place.succeed(&["eval", "--frames", "2"]);

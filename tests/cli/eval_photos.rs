@@ -90,7 +90,7 @@ fn a_photo_that_became_darker_is_no_error_of_the_scene() {
         (known[4] - before[4] - lower).abs() < 0.1,
         "{before:?} {known:?}"
     );
-    // Colours pale with it: nothing but its size changes the error.
+    // Colors pale with it: nothing but its size changes the error.
     let paled = known[2] / before[2];
     assert!(paled > gain && paled < 1.0, "{before:?} {known:?}");
     // Not knowing it costs.

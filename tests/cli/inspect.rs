@@ -67,7 +67,7 @@ fn info_on_a_colmap_folder() {
 }
 
 #[test]
-fn export_writes_colours_or_luma() {
+fn export_writes_colors_or_luma() {
     let place = place_with_run();
     let count = SplatFile::read(&place, "runs/scene/color.ply").count();
     for (name, options) in [("new/color.ply", &[][..]), ("luma.ply", &["--luma"])] {
@@ -79,7 +79,7 @@ fn export_writes_colours_or_luma() {
         let gray = file.column("f_dc_0") == file.column("f_dc_1");
         assert_eq!(gray, !options.is_empty());
     }
-    // The run's colour is what is exported, and luma where there is none.
+    // The run's color is what is exported, and luma where there is none.
     let [out, run] = ["new/color.ply", "runs/scene/color.ply"]
         .map(|name| SplatFile::read(&place, name).column("f_rest_3"));
     assert_eq!(out, run);

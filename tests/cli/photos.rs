@@ -78,7 +78,7 @@ fn a_range_that_is_not_used_is_found() {
     let done = place.run(&QUICK_FIT);
     assert_eq!(done.code, Some(0), "{}", done.stderr);
     assert!(
-        done.stderr.contains("photos are normalised"),
+        done.stderr.contains("photos are normalized"),
         "{}",
         done.stderr
     );

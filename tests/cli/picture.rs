@@ -1,4 +1,4 @@
-//! Pictures of a coloured file against the oracle, which knows the file alone.
+//! Pictures of a colored file against the oracle, which knows the file alone.
 
 use super::oracle::render::render;
 use super::oracle::shade::Shading;
@@ -42,7 +42,7 @@ fn the_exported_file_alone_gives_the_rendered_pictures() {
         let found = psnr(&png(&place, &name), &expected);
         println!("{name}: {found:.1} dB");
         assert!(found >= LEAST_PSNR, "{name}: {found:.1} dB");
-        // Something is to be seen, and in colour.
+        // Something is to be seen, and in color.
         let mean = expected.iter().sum::<f64>() / expected.len() as f64;
         let spread = expected
             .iter()
@@ -56,7 +56,7 @@ fn the_exported_file_alone_gives_the_rendered_pictures() {
     }
 }
 
-/// The header says how a file wants to be drawn, here and in the file coloured from it.
+/// The header says how a file wants to be drawn, here and in the file colored from it.
 #[test]
 fn a_file_that_was_trained_antialiased_is_drawn_so() {
     let place = place_with_run();

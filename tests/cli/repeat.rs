@@ -72,7 +72,7 @@ fn relocated_and_coarse_runs_repeat_too() {
 }
 
 #[test]
-fn colouring_again_gives_the_same_bytes() {
+fn coloring_again_gives_the_same_bytes() {
     let place = place_with_run();
     let teacher = onnx("ddcolor_tiny.onnx");
     let until = UNTIL.to_string();

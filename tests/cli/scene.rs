@@ -1,4 +1,4 @@
-//! A small COLMAP folder: coloured discs seen from an arc.
+//! A small COLMAP folder: colored discs seen from an arc.
 
 use std::fs;
 use std::path::Path;
@@ -43,10 +43,10 @@ fn angle(view: usize) -> f64 {
 pub fn view(view: usize, offset: [f64; 3]) -> View {
     let (sin, cos) = angle(view).sin_cos();
     let rotation = [[cos, 0.0, sin], [0.0, 1.0, 0.0], [-sin, 0.0, cos]];
-    let centre: [f64; 3] = std::array::from_fn(|k| offset[k] - DISTANCE * rotation[2][k]);
+    let center: [f64; 3] = std::array::from_fn(|k| offset[k] - DISTANCE * rotation[2][k]);
     let translation = std::array::from_fn(|row| {
         -(0..3)
-            .map(|column| rotation[row][column] * centre[column])
+            .map(|column| rotation[row][column] * center[column])
             .sum::<f64>()
     });
     View {
@@ -65,7 +65,7 @@ pub fn view(view: usize, offset: [f64; 3]) -> View {
     }
 }
 
-/// Position and colour of each point, the world moved by `offset`.
+/// Position and color of each point, the world moved by `offset`.
 fn points(offset: [f64; 3]) -> Vec<([f64; 3], [u8; 3])> {
     (0..POINTS)
         .map(|i| {

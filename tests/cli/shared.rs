@@ -1,4 +1,4 @@
-//! One run that many tests read: trained and coloured once.
+//! One run that many tests read: trained and colored once.
 
 use std::fs;
 use std::path::PathBuf;
@@ -40,7 +40,7 @@ pub fn place_with_scene() -> Place {
 /// Files with their bytes, and the path of `scene/` in their report.
 type Made = (Vec<(String, Vec<u8>)>, String);
 
-/// A folder with `scene/` and its coloured run in `runs/scene`, luma of degree 2
+/// A folder with `scene/` and its colored run in `runs/scene`, luma of degree 2
 /// and chroma of degree 1.
 pub fn place_with_run() -> Place {
     static MADE: LazyLock<Made> = LazyLock::new(|| {

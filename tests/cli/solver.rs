@@ -116,7 +116,7 @@ fn options_of_the_other_solver_are_refused() {
     }
 }
 
-/// Paints some photos' copies in one colour, keeping their lightness out of it.
+/// Paints some photos' copies in one color, keeping their lightness out of it.
 fn paint(place: &Place, photos: &[usize], color: [u8; 3]) {
     let [width, height] = scene::SIZE;
     let flat = RgbImage::from_pixel(4, 4, Rgb(color));
@@ -129,9 +129,9 @@ fn paint(place: &Place, photos: &[usize], color: [u8; 3]) {
     }
 }
 
-/// Three frames coloured by hand colour the whole scene, from every side.
+/// Three frames colored by hand color the whole scene, from every side.
 #[test]
-fn three_painted_frames_colour_the_whole_scene() {
+fn three_painted_frames_color_the_whole_scene() {
     let place = place_with_run();
     paint(&place, &[1, 2, 3], [200, 120, 80]);
     let report = place.json(&[&QUICK[..], &["three"]].concat());
@@ -142,7 +142,7 @@ fn three_painted_frames_colour_the_whole_scene() {
         let file = format!("pictures/{}", scene::name(photo));
         let file = place.path(&file).with_extension("png");
         let picture = image::open(file).expect("a picture").to_rgb8();
-        // Where the scene is bright enough to have a colour, it is warm.
+        // Where the scene is bright enough to have a color, it is warm.
         let lit: Vec<_> = (picture.pixels()).filter(|p| p.0[0] > 60).collect();
         let warm = lit.iter().filter(|p| p.0[0] > p.0[2] + 8).count();
         grays.push(1.0 - warm as f64 / lit.len().max(1) as f64);

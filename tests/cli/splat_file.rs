@@ -137,7 +137,7 @@ fn each_degree_has_its_properties() {
         let file = SplatFile::read(&place, "runs/scene/luma.ply");
         assert_eq!(file.header, expected_header(file.count(), rest));
     }
-    // The colours' degree may exceed the luminance's.
+    // The colors' degree may exceed the luminance's.
     place.succeed(&[&QUICK_FIT[..], &["--sh-degree", "0"]].concat());
     let teacher = onnx("ddcolor_tiny.onnx");
     let colorize = [

@@ -15,7 +15,7 @@ fn network() -> String {
     onnx("ddcolor_tiny.onnx")
 }
 
-/// Colours `painted/` into the run, a few iterations long.
+/// Colors `painted/` into the run, a few iterations long.
 fn with_painted(place: &Place) -> serde_json::Value {
     let until = (LUMA + 60).to_string();
     place.json(&[
@@ -31,7 +31,7 @@ fn with_painted(place: &Place) -> serde_json::Value {
 }
 
 #[test]
-fn the_files_of_a_coloured_run() {
+fn the_files_of_a_colored_run() {
     let place = place_with_run();
     let files = place.files("runs/scene");
     let own: Vec<_> = files.iter().filter(|name| !name.contains('/')).collect();
@@ -80,7 +80,7 @@ fn json_is_the_report_and_words_name_the_files() {
     assert_eq!(printed, place.report("runs/scene"));
     assert_eq!(printed["chroma"]["iterations"], 5);
     let words = place.succeed(&short);
-    assert!(words.contains("coloured from 8 views"), "{words}");
+    assert!(words.contains("colored from 8 views"), "{words}");
     assert!(
         words.contains("color.ply") && words.contains("contact-sheet.png"),
         "{words}"
@@ -90,7 +90,7 @@ fn json_is_the_report_and_words_name_the_files() {
     let printed = place.json(&[&colorize[..], &["--json"]].concat());
     assert_eq!(printed["chroma"]["iterations"], 150);
 
-    // Rows of the colouring before are replaced.
+    // Rows of the coloring before are replaced.
     let log = String::from_utf8(place.read("runs/scene/log.csv")).expect("text");
     let rows: Vec<&str> = log.lines().collect();
     assert_eq!(rows[0], "iteration,loss,splats,seconds,poisoned");
@@ -145,7 +145,7 @@ fn the_newest_run_is_taken() {
 }
 
 #[test]
-fn an_own_output_leaves_the_runs_colours() {
+fn an_own_output_leaves_the_runs_colors() {
     let place = place_with_run();
     let own = || ["color.ply", "chroma.npy"].map(|name| place.read(&format!("runs/scene/{name}")));
     let before = own();
@@ -233,7 +233,7 @@ fn a_folder_teaches_some_views_at_its_own_sizes() {
 }
 
 #[test]
-fn the_teachers_colour_becomes_the_scenes() {
+fn the_teachers_color_becomes_the_scenes() {
     let place = place_with_run();
     let [width, height] = scene::SIZE;
     let colors = [[200, 90, 60], [60, 110, 200]];
@@ -259,7 +259,7 @@ fn the_teachers_colour_becomes_the_scenes() {
 }
 
 #[test]
-fn a_splat_file_is_coloured_with_colmaps_cameras() {
+fn a_splat_file_is_colored_with_colmaps_cameras() {
     let place = place_with_run();
     fs::rename(place.path("runs/scene/luma.ply"), place.path("gray.ply")).expect("a file");
     let teacher = network();

@@ -13,7 +13,7 @@ use super::splat_file::SplatFile;
 const RED: [u8; 3] = [200, 90, 60];
 const BLUE: [u8; 3] = [60, 110, 200];
 
-/// Writes images of one colour for some views.
+/// Writes images of one color for some views.
 fn paint(place: &Place, folder: &str, color: [u8; 3], views: &[usize]) {
     let [width, height] = scene::SIZE;
     for &view in views {
@@ -37,7 +37,7 @@ fn hint(place: &Place, color: [u8; 3], views: &[usize], columns: u32) {
     }
 }
 
-/// The chroma report of a short colouring with these arguments.
+/// The chroma report of a short coloring with these arguments.
 fn colorize(place: &Place, arguments: &[&str]) -> Value {
     let start = ["colorize", "--solver", "adam", "--until", "120", "--json"];
     place.json(&[&start[..], arguments].concat())["chroma"].clone()
@@ -59,7 +59,7 @@ fn all() -> Vec<usize> {
 fn two_teachers_are_averaged_by_weight() {
     let place = place_with_run();
     paint(&place, "red", RED, &all());
-    // The second teacher does not know the last view, which the first colours alone.
+    // The second teacher does not know the last view, which the first colors alone.
     paint(&place, "blue", BLUE, &all()[..scene::VIEWS - 1]);
     let both = ["--teacher", "red", "--teacher", "blue"];
     let chroma = colorize(&place, &[&both[..], &["--weights", "1,9"]].concat());
@@ -89,7 +89,7 @@ fn a_network_and_a_folder_teach_together() {
 }
 
 #[test]
-fn strength_scales_the_teachers_colours() {
+fn strength_scales_the_teachers_colors() {
     let place = place_with_run();
     paint(&place, "red", RED, &all());
     let colorfulness = |strength: &str| {

@@ -42,7 +42,7 @@ fn names(sweep: &Value) -> Vec<&str> {
 }
 
 #[test]
-fn a_sweep_in_gray_and_colour() {
+fn a_sweep_in_gray_and_color() {
     let place = place_with_scene();
     let teacher = onnx("ddcolor_tiny.onnx");
     let knobs = ["--knobs", "densify,teacher-size,correct-views", "--json"];

@@ -272,7 +272,7 @@ fn the_default_preset_depends_on_the_device() {
 }
 
 #[test]
-fn fitting_again_forgets_the_old_colours() {
+fn fitting_again_forgets_the_old_colors() {
     let place = place_with_run();
     place.succeed(&["eval", "--frames", "2"]);
     let mut fit = QUICK_FIT;

@@ -4,7 +4,7 @@ use super::program::Place;
 use super::scene;
 use super::shared::{QUICK_FIT, place_with_run, place_with_scene};
 
-/// Whether no pixel of a picture has a colour.
+/// Whether no pixel of a picture has a color.
 fn is_gray(place: &Place, name: &str) -> bool {
     let image = image::open(place.path(name))
         .expect("a picture")
@@ -46,7 +46,7 @@ fn luma_is_gray() {
             .iter()
             .all(|name| is_gray(&place, &format!("luma/{name}")))
     );
-    // The same without a colour to leave away.
+    // The same without a color to leave away.
     std::fs::remove_file(place.path("runs/scene/color.ply")).expect("a file");
     place.succeed(&["render", "-o", "gray"]);
     for name in place.files("luma") {

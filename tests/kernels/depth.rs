@@ -123,6 +123,6 @@ fn a_walls_depth_and_the_flow_between_two_views_of_it() {
     let right = of(&forward);
     let still = of(&Flow::geometric(&cameras[0], &cameras[0], &drawn[0].0));
     println!("{right:.3} with the flow, {still:.3} without");
-    // The colours stand on the wall: what is left is the drawing's own.
+    // The colors stand on the wall: what is left is the drawing's own.
     assert!(right < 0.6 && still > 4.0, "{right} {still}");
 }

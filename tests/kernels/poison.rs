@@ -75,8 +75,8 @@ fn scenes() -> (Splats, View, Splats) {
     let (mut scene, _) = random_scene::<1>(7, COUNT, 1);
     let view = oblique_view();
     // In front, in the middle: what is wrong with it would be seen everywhere.
-    let centre = view.center();
-    scene.means[AT] = std::array::from_fn(|k| f64::from((centre[k] + view.rotation[2][k]) as f32));
+    let center = view.center();
+    scene.means[AT] = std::array::from_fn(|k| f64::from((center[k] + view.rotation[2][k]) as f32));
     let others = (0..COUNT).filter(|&i| i != AT).map(|i| scene.gaussian(i));
     (splats(&scene), view.clone(), splats(&Scene::of(1, others)))
 }
@@ -110,7 +110,7 @@ fn broken_geometry_leaves_no_trace() {
 /// The broken Gaussian keeps its places in the tile lists, which moves the
 /// order in which an adjoint's 32 shares are added: rounding may differ.
 #[test]
-fn broken_colours_leave_no_trace_but_rounding() {
+fn broken_colors_leave_no_trace_but_rounding() {
     let (whole, view, without) = scenes();
     let (stage, gradient) = run(&without, &view);
     let picture = bits(&stage.image());

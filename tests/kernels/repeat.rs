@@ -454,10 +454,10 @@ fn overflow_changes_nothing() {
     assert_eq!(view_at(FAR_FIRST, entries.len(), 0), 0);
     let bystanders = 500;
     assert!(entries.iter().all(|&needed| 2 * needed < bystanders * ROOM));
-    let [centre, forward] = [oblique_view().center(), oblique_view().rotation[2]];
+    let [center, forward] = [oblique_view().center(), oblique_view().rotation[2]];
     let mut roomy = start.clone();
     for _ in 0..bystanders {
-        let behind = std::array::from_fn(|k| (centre[k] - 50.0 * forward[k]) as f32);
+        let behind = std::array::from_fn(|k| (center[k] - 50.0 * forward[k]) as f32);
         roomy.means.push(behind);
         roomy.quats.push([1.0, 0.0, 0.0, 0.0]);
         roomy.log_scales.push([-3.0; 3]);

@@ -48,8 +48,8 @@ fn distance(a: &[Vec<[f32; 3]>], b: &[Vec<[f32; 3]>]) -> f64 {
     differences.iter().sum::<f64>() / differences.len() as f64
 }
 
-/// Colours of which some are far below black.
-fn colourful() -> Splats {
+/// Colors of which some are far below black.
+fn colorful() -> Splats {
     let mut splats = overlapping::<3>();
     for (k, value) in splats.sh.coefficients.iter_mut().enumerate() {
         let level = (k * 37 % 101) as f64 / 100.0;
@@ -73,7 +73,7 @@ fn settings() -> ChromaSettings {
 
 #[test]
 fn rgb_harmonics_are_fitted_to_what_is_shown() {
-    let truth = colourful();
+    let truth = colorful();
     let pictures = shown(&truth);
     let fitted = |spoilt: f32| {
         // Degree 3 settles slowly: an error of 0.011 with ten rounds.
@@ -130,7 +130,7 @@ fn the_bake_comes_closer_than_each_gaussian_by_itself() {
     .unwrap();
     let together = distance(&shown(&baked), &native);
     assert!(together < 0.8 * alone, "{together} {alone}");
-    // Nothing but colours has moved.
+    // Nothing but colors has moved.
     assert_eq!(baked.means, luma.means);
 }
 

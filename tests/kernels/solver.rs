@@ -1,4 +1,4 @@
-//! The least-squares solver of stage 2 as a whole, on scenes whose colours are known.
+//! The least-squares solver of stage 2 as a whole, on scenes whose colors are known.
 
 use std::ops::ControlFlow;
 
@@ -143,7 +143,7 @@ fn constant_views(colors: &[[f64; 2]]) -> Vec<ChromaView> {
         .collect()
 }
 
-/// A smooth field of colour on the wall.
+/// A smooth field of color on the wall.
 fn truth(x: f64, y: f64) -> [f64; 2] {
     [
         35.0 * (1.5 * x).sin() + 5.0,
@@ -268,7 +268,7 @@ fn results_do_not_depend_on_the_budget() {
 }
 
 #[test]
-fn views_of_one_colour_give_that_colour() {
+fn views_of_one_color_give_that_color() {
     let ab = [21.0, -34.0];
     let chroma = solved(&ChromaSettings::irls(), &wall(), &constant_views(&[ab; 3]));
     assert!(chroma.coefficients.iter().all(|c| c.is_finite()));
@@ -278,7 +278,7 @@ fn views_of_one_colour_give_that_colour() {
 }
 
 #[test]
-fn what_no_view_sees_takes_its_neighbours_colour() {
+fn what_no_view_sees_takes_its_neighbors_color() {
     let ab = [40.0, 25.0];
     let mut luma = wall();
     // More of the wall, beside all pictures and behind the cameras.

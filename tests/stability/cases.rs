@@ -34,7 +34,7 @@ COLMAP models, kernels broken on purpose, a lint of the shaders, and whole train
 points; flat, doubled and collapsed clouds; a camera inside a Gaussian; black, white
 and gray photos; 100,000 Gaussians in one tile; a strip as wide as 8K): some hundred
 iterations each. A whole 8K photo trains one iteration there, which takes half a minute
-without a GPU. Georeferenced coordinates, colour
+without a GPU. Georeferenced coordinates, color
 conversions and files have their own tests in `tests/cli` and `src/color`.
 
 This file is written by `WRITE_DOCS=1 cargo test --release --test stability`.

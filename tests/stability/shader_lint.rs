@@ -2,7 +2,7 @@
 //!
 //! No kernel may test for NaN by comparing floats with `!=`: compilers may
 //! assume that there is no NaN. Every division, root, logarithm, power and
-//! normalisation of floats stands in [`REASONS`] with what keeps it finite.
+//! normalization of floats stands in [`REASONS`] with what keeps it finite.
 
 use std::collections::BTreeSet;
 

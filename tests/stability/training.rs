@@ -259,7 +259,7 @@ fn worlds_of_any_size_place_and_attitude_train_alike() {
                 ..Frame::ORDINARY
             },
         ),
-        // Poses are recentred when they are read: what is left is a few extents.
+        // Poses are recentered when they are read: what is left is a few extents.
         (
             "shifted",
             Frame {

@@ -7,7 +7,7 @@
 Any of --brush PROGRAM, --gsplat "python path/to/simple_trainer.py" and --opensplat PROGRAM may be
 given. What is done for fairness:
 
-- All read the same photos: 8-bit gray with the L* of the colours, scaled here. Cameras and points in
+- All read the same photos: 8-bit gray with the L* of the colors, scaled here. Cameras and points in
   COLMAP's model are changed to match.
 - Every 8th photo by name is held out. Programs train on a folder without these photos, so that none
   spends time on measuring. gsplat's trainer always holds some out: it gets the whole folder, leaves

@@ -21,7 +21,7 @@ ASPECT_SLACK = 0.01
 
 
 def to_gray(rgb: ArrayLike) -> np.ndarray:
-    """8-bit gray with the L* of 8-bit colours, as the program makes it: equal L* is equal luminance."""
+    """8-bit gray with the L* of 8-bit colors, as the program makes it: equal L* is equal luminance."""
     return np.rint(255 * encode(decode(np.asarray(rgb) / 255) @ RGB_TO_XYZ[1])).astype(np.uint8)
 
 

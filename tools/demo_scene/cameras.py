@@ -18,10 +18,10 @@ TARGET = np.array([0.0, 0.0, 0.32])
 
 @dataclass
 class Camera:
-    """A pinhole camera: name, centre in world space, world-to-camera rotation (3, 3)."""
+    """A pinhole camera: name, center in world space, world-to-camera rotation (3, 3)."""
 
     name: str
-    centre: Array
+    center: Array
     rotation: Array
 
 
@@ -30,14 +30,14 @@ def focal_pixels(width: int) -> float:
     return LENS_MM / SENSOR_MM * width
 
 
-def look_at(name: str, centre: Array, target: Array, roll: float = 0.0) -> Camera:
-    """A camera at `centre` that looks at `target`; `roll` in radians about the view axis."""
-    forward = (target - centre) / np.linalg.norm(target - centre)
+def look_at(name: str, center: Array, target: Array, roll: float = 0.0) -> Camera:
+    """A camera at `center` that looks at `target`; `roll` in radians about the view axis."""
+    forward = (target - center) / np.linalg.norm(target - center)
     right = np.cross(forward, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)
     down = np.cross(forward, right)
     c, s = np.cos(roll), np.sin(roll)
-    return Camera(name, centre, np.stack([c * right + s * down, c * down - s * right, forward]))
+    return Camera(name, center, np.stack([c * right + s * down, c * down - s * right, forward]))
 
 
 def _on_sphere(azimuth: float, elevation: float, distance: float) -> Array:

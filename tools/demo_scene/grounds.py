@@ -26,8 +26,8 @@ def lawn(garden: Garden) -> None:
     roots = np.stack([x, y, np.zeros(BLADES)], axis=1)
     garden.add(blades(rng, roots, 0.075, 0.0032), "grass", smooth=False)
 
-    centres = rng.uniform((-2.2, -1.6), (2.2, 1.0), (22, 2))
-    ground = np.repeat(centres, 7, axis=0) + rng.normal(0, 0.09, (154, 2))
+    centers = rng.uniform((-2.2, -1.6), (2.2, 1.0), (22, 2))
+    ground = np.repeat(centers, 7, axis=0) + rng.normal(0, 0.09, (154, 2))
     ground = ground[ground[:, 1] < WALL_Y - 0.08]
     heads = np.column_stack([ground, rng.uniform(0.06, 0.085, len(ground))])
     count = len(heads)

@@ -72,7 +72,7 @@ def demo_layout() -> Layout:
 
 
 def random_layout(seed: int) -> Layout:
-    """Another arrangement, light and shade of colour; the same seed gives the same scene."""
+    """Another arrangement, light and shade of color; the same seed gives the same scene."""
     rng = np.random.default_rng([20250, seed])
     cloth_width = float(rng.uniform(0.5, 1.0))
     cloth_x = float(rng.uniform(-0.3, 0.3))

@@ -1,4 +1,4 @@
-"""The garden's surfaces: each has its own pattern, so a gray photo still tells its colour.
+"""The garden's surfaces: each has its own pattern, so a gray photo still tells its color.
 
 Every function takes a `Palette` and returns a Blender material.
 """
@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from .nodes import Colour, Graph
+from .nodes import Color, Graph
 
-BASE_COLOURS: dict[str, str] = {
+BASE_COLORS: dict[str, str] = {
     "grass": "#5f9a2c",
     "soil": "#4b3a2a",
     "brick": "#a8472f",
@@ -40,34 +40,34 @@ BASE_COLOURS: dict[str, str] = {
 
 @dataclass
 class Palette:
-    """Base colours as linear sRGB; `tuned` shifts each of them a little by chance."""
+    """Base colors as linear sRGB; `tuned` shifts each of them a little by chance."""
 
-    colours: dict[str, Colour] = field(
-        default_factory=lambda: {name: linear(code) for name, code in BASE_COLOURS.items()}
+    colors: dict[str, Color] = field(
+        default_factory=lambda: {name: linear(code) for name, code in BASE_COLORS.items()}
     )
 
-    def __getitem__(self, name: str) -> Colour:
-        """The base colour of that name."""
-        return self.colours[name]
+    def __getitem__(self, name: str) -> Color:
+        """The base color of that name."""
+        return self.colors[name]
 
-    def shade(self, name: str, value: float, saturation: float = 1.0, hue: float = 0.0) -> Colour:
-        """A relative of a base colour: brightness and saturation factors, hue shift in turns."""
-        h, s, v = colorsys.rgb_to_hsv(*self.colours[name])
+    def shade(self, name: str, value: float, saturation: float = 1.0, hue: float = 0.0) -> Color:
+        """A relative of a base color: brightness and saturation factors, hue shift in turns."""
+        h, s, v = colorsys.rgb_to_hsv(*self.colors[name])
         r, g, b = colorsys.hsv_to_rgb((h + hue) % 1.0, min(s * saturation, 1.0), v * value)
         return (min(r, 1.0), min(g, 1.0), min(b, 1.0))
 
     def tuned(self, rng: np.random.Generator) -> Palette:
-        """Every colour with a small random change of hue, saturation and brightness."""
+        """Every color with a small random change of hue, saturation and brightness."""
         changed = {}
-        for name in self.colours:
+        for name in self.colors:
             hue = float(rng.normal(0.0, 0.008))
             saturation = float(rng.uniform(0.94, 1.06))
             changed[name] = self.shade(name, float(rng.uniform(0.85, 1.15)), saturation, hue)
         return Palette(changed)
 
 
-def linear(code: str) -> Colour:
-    """A "#rrggbb" sRGB colour as linear light."""
+def linear(code: str) -> Color:
+    """A "#rrggbb" sRGB color as linear light."""
     encoded = np.array([int(code[i : i + 2], 16) / 255 for i in (1, 3, 5)])
     light = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
     return (float(light[0]), float(light[1]), float(light[2]))
@@ -192,7 +192,7 @@ def wood(p: Palette) -> Any:
 
 
 def cloth(p: Palette) -> Any:
-    """Gingham: two sets of stripes whose crossings are full colour, and a woven thread bump."""
+    """Gingham: two sets of stripes whose crossings are full color, and a woven thread bump."""
     g = Graph("cloth")
     surface = g.attribute("surface")
     u, v = g.component(surface, "X"), g.component(surface, "Y")

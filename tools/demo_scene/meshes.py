@@ -1,6 +1,6 @@
 """Vertex and face arrays: lathes, radial bodies, tubes, and many copies of one small template.
 
-Lengths are metres, z is up. A `Shape` is plain data; `props` hands it to Blender.
+Lengths are meters, z is up. A `Shape` is plain data; `props` hands it to Blender.
 """
 
 from __future__ import annotations
@@ -132,12 +132,12 @@ def box(size: tuple[float, float, float], chamfer: float) -> Shape:
     points = np.array(vertices)
 
     def outward(indices: list[int]) -> tuple[int, ...]:
-        centre = points[indices].mean(axis=0)
-        normal = centre / np.linalg.norm(centre)
+        center = points[indices].mean(axis=0)
+        normal = center / np.linalg.norm(center)
         helper = np.eye(3)[np.argmin(np.abs(normal))]
         u = np.cross(normal, helper)
         v = np.cross(normal, u)
-        spoke = points[indices] - centre
+        spoke = points[indices] - center
         order = np.argsort(np.arctan2(spoke @ v, spoke @ u))
         return tuple(indices[i] for i in order)
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import bpy
 
-Colour = tuple[float, float, float]
+Color = tuple[float, float, float]
 Socket = Any  # a bpy.types.NodeSocket; bpy ships no usable type stubs
 
 
@@ -37,7 +37,7 @@ class Graph:
         else:
             socket.default_value = value
 
-    def position(self, stretch: Colour = (1.0, 1.0, 1.0)) -> Socket:
+    def position(self, stretch: Color = (1.0, 1.0, 1.0)) -> Socket:
         """Object-space position, scaled per axis, and shifted from object to object."""
         coordinate = self.node("ShaderNodeTexCoord").outputs["Object"]
         shift = self.math("MULTIPLY", self.per_object(), 40.0)
@@ -92,15 +92,15 @@ class Graph:
         self._feed(node.inputs[1], b)
         return node.outputs[0]
 
-    def ramp(self, value: Socket, stops: Sequence[tuple[float, Colour]]) -> Socket:
-        """A colour by linear interpolation between (position, colour) stops."""
+    def ramp(self, value: Socket, stops: Sequence[tuple[float, Color]]) -> Socket:
+        """A color by linear interpolation between (position, color) stops."""
         node = self.node("ShaderNodeValToRGB", {"Fac": value})
         elements = node.color_ramp.elements
         while len(elements) < len(stops):
             elements.new(1.0)
-        for element, (place, colour) in zip(elements, stops):
+        for element, (place, color) in zip(elements, stops):
             element.position = place
-            element.color = (*colour, 1.0)
+            element.color = (*color, 1.0)
         return node.outputs["Color"]
 
     def step(self, value: Socket, low: float, high: float) -> Socket:
@@ -109,9 +109,9 @@ class Graph:
         return node.outputs[0]
 
     def mix(
-        self, factor: Socket | float, a: Socket | Colour, b: Socket | Colour, mode: str = "MIX"
+        self, factor: Socket | float, a: Socket | Color, b: Socket | Color, mode: str = "MIX"
     ) -> Socket:
-        """Blends two colours."""
+        """Blends two colors."""
         node = self.tree.nodes.new("ShaderNodeMix")
         node.data_type = "RGBA"
         node.blend_type = mode
@@ -121,13 +121,13 @@ class Graph:
         return node.outputs[2]
 
     def finish(
-        self, colour: Socket | Colour, roughness: Socket | float = 0.6,
+        self, color: Socket | Color, roughness: Socket | float = 0.6,
         bump: Socket | None = None, depth: float = 0.002, coat: float = 0.0,
         translucent: float = 0.0,
     ) -> Any:  # fmt: skip
-        """Closes the graph with a principled surface; `depth` is the bump's height in metres."""
+        """Closes the graph with a principled surface; `depth` is the bump's height in meters."""
         inputs: dict[str, Any] = {
-            "Base Color": colour, "Roughness": roughness, "Coat Weight": coat,
+            "Base Color": color, "Roughness": roughness, "Coat Weight": coat,
             "Coat Roughness": 0.15, "Specular IOR Level": 0.4,
         }  # fmt: skip
         if bump is not None:
@@ -136,7 +136,7 @@ class Graph:
             ).outputs[0]
         surface = self.node("ShaderNodeBsdfPrincipled", inputs).outputs[0]
         if translucent > 0.0:
-            through = self.node("ShaderNodeBsdfTranslucent", {"Color": colour}).outputs[0]
+            through = self.node("ShaderNodeBsdfTranslucent", {"Color": color}).outputs[0]
             blend = self.tree.nodes.new("ShaderNodeMixShader")
             self._feed(blend.inputs[0], translucent)
             self._feed(blend.inputs[1], surface)

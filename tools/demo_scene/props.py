@@ -239,7 +239,7 @@ def planter(garden: Garden, at: Point, turn: float, size: float) -> None:
 
 
 def flower(petals: int, length: float) -> Shape:
-    """A ring of petals, each `length` metres long, opening upwards."""
+    """A ring of petals, each `length` meters long, opening upwards."""
     angle = np.arange(petals) * 2 * np.pi / petals
     spin = rotations(angle, np.full(petals, 0.25), np.zeros(petals))
     wide = (

@@ -74,15 +74,15 @@ def align(source: Array, target: Array) -> tuple[float, Array, Array]:
 
 
 def compare(model: Any, truth: list[Camera], width: int) -> dict[str, Any]:
-    """Errors of the recovered poses after alignment: millimetres, degrees, and the focal length."""
+    """Errors of the recovered poses after alignment: millimeters, degrees, and the focal length."""
     by_name = {Path(image.name).stem: image for image in model.images.values()}
     poses = [by_name[camera.name].cam_from_world() for camera in truth]
     rotations = np.stack([pose.rotation.matrix() for pose in poses])
     shifts = np.stack([pose.translation for pose in poses])
-    centres = -np.einsum("nji,nj->ni", rotations, shifts)
-    true_centres = np.stack([camera.centre for camera in truth])
-    scale, turn, shift = align(centres, true_centres)
-    residual = 1000 * np.linalg.norm(scale * centres @ turn.T + shift - true_centres, axis=1)
+    centers = -np.einsum("nji,nj->ni", rotations, shifts)
+    true_centers = np.stack([camera.center for camera in truth])
+    scale, turn, shift = align(centers, true_centers)
+    residual = 1000 * np.linalg.norm(scale * centers @ turn.T + shift - true_centers, axis=1)
     angles = []
     for found, camera in zip(rotations, truth):
         difference = found @ turn.T @ camera.rotation.T
@@ -91,7 +91,7 @@ def compare(model: Any, truth: list[Camera], width: int) -> dict[str, Any]:
         angles.append(float(np.degrees(np.arctan2(sine, (np.trace(difference) - 1) / 2))))
     focal = next(iter(model.cameras.values())).params[0]
     return {
-        "centre_error_mm": _mean_and_max(residual),
+        "center_error_mm": _mean_and_max(residual),
         "rotation_error_deg": _mean_and_max(np.array(angles)),
         "focal_error_percent": round(100 * (focal / focal_pixels(width) - 1), 3),
         "all_points": model.num_points3D(),

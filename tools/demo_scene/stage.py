@@ -91,7 +91,7 @@ def shoot(
         pose = np.eye(4)
         # Blender's cameras look along -z with y up; COLMAP's along +z with y down.
         pose[:3, :3] = camera.rotation.T @ np.diag([1.0, -1.0, -1.0])
-        pose[:3, 3] = camera.centre
+        pose[:3, 3] = camera.center
         tripod.matrix_world = Matrix(pose.tolist())
         scene.render.filepath = str(target)
         bpy.ops.render.render(write_still=True)

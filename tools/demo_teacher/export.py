@@ -1,4 +1,4 @@
-"""Writes the network as ONNX, runs that file with ONNX Runtime, and measures its colours."""
+"""Writes the network as ONNX, runs that file with ONNX Runtime, and measures its colors."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def export(network: Network, path: Path) -> None:
     onnx.save(model, path)
 
 
-def colourise(
+def colorize(
     session: Any, rgb: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(L, a, b) of a picture with a, b from the teacher, and its true Lab; both (H, W, 3)."""
@@ -53,17 +53,17 @@ def colourise(
 
 
 def measure(model: Path, photos: list[Path], sheet: Path | None) -> dict[str, float]:
-    """Mean a, b error and colourfulness of `photos`; `sheet` gets rows of gray, coloured, true."""
+    """Mean a, b error and colorfulness of `photos`; `sheet` gets rows of gray, colored, true."""
     session = onnxruntime.InferenceSession(str(model), providers=["CPUExecutionProvider"])
     errors, gray_errors, ours, true, rows = [], [], [], [], []
     for photo in photos:
         rgb = data.load(photo)
-        coloured, truth = colourise(session, rgb)
-        shown = lab.lab_to_rgb(coloured)
-        errors.append(np.linalg.norm(coloured[..., 1:] - truth[..., 1:], axis=-1).mean())
+        colored, truth = colorize(session, rgb)
+        shown = lab.lab_to_rgb(colored)
+        errors.append(np.linalg.norm(colored[..., 1:] - truth[..., 1:], axis=-1).mean())
         gray_errors.append(np.linalg.norm(truth[..., 1:], axis=-1).mean())
-        ours.append(lab.colourfulness(shown))
-        true.append(lab.colourfulness(rgb))
+        ours.append(lab.colorfulness(shown))
+        true.append(lab.colorfulness(rgb))
         gray = np.repeat(lab.lightness_to_gray(truth[..., :1]), 3, axis=-1)
         rows.append(np.concatenate([gray, shown, rgb], axis=1))
     if sheet is not None:
@@ -73,6 +73,6 @@ def measure(model: Path, photos: list[Path], sheet: Path | None) -> dict[str, fl
         "photos": len(photos),
         "mean_ab_distance": round(float(np.mean(errors)), 2),
         "mean_ab_distance_of_gray": round(float(np.mean(gray_errors)), 2),
-        "colourfulness": round(float(np.mean(ours)), 2),
-        "colourfulness_of_truth": round(float(np.mean(true)), 2),
+        "colorfulness": round(float(np.mean(ours)), 2),
+        "colorfulness_of_truth": round(float(np.mean(true)), 2),
     }

@@ -1,4 +1,4 @@
-"""Fits the network: smooth L1 on a, b with rare colours counted more."""
+"""Fits the network: smooth L1 on a, b with rare colors counted more."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import torch
 from . import data
 from .network import Network
 
-BIN = 10.0  # Lab units; the side of one cell of the colour histogram.
+BIN = 10.0  # Lab units; the side of one cell of the color histogram.
 HALF_BINS = 11
 UNIFORM_SHARE = 0.5  # Zhang et al. 2016: mix the histogram with a uniform one before inverting.
 MOST_WEIGHT = 8.0  # A few stray pixels must not steer the network.
@@ -43,8 +43,8 @@ def fit(
     """Trains in place with Adam and a one-cycle rate."""
     rng = np.random.default_rng(seed)
     weights = cell_weights(pictures)
-    optimiser = torch.optim.AdamW(network.parameters(), lr=RATE, weight_decay=1e-4)
-    schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, RATE, iterations, pct_start=0.15)
+    optimizer = torch.optim.AdamW(network.parameters(), lr=RATE, weight_decay=1e-4)
+    schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, RATE, iterations, pct_start=0.15)
     network.train()
     start, recent = time.monotonic(), 0.0
     for iteration in range(1, iterations + 1):
@@ -53,9 +53,9 @@ def fit(
             network(gray), chroma, reduction="none", beta=2.0
         ).sum(dim=1)
         loss = (error * weights[cell(chroma)].clamp(max=MOST_WEIGHT)).mean()
-        optimiser.zero_grad()
+        optimizer.zero_grad()
         loss.backward()
-        optimiser.step()
+        optimizer.step()
         schedule.step()
         recent = loss.item() if iteration == 1 else 0.95 * recent + 0.05 * loss.item()
         if iteration % 25 == 0 or iteration == iterations:

@@ -15,7 +15,7 @@ use crate::capture::lens::{MOST_PARAMETERS, ModelName};
 const SMALLEST_CAMERA: u64 = 4 + 4 + 8 + 8 + 2 * 8;
 /// Id, quaternion, translation, camera, an ended empty name, a zero count.
 const SMALLEST_IMAGE: u64 = 4 + 4 * 8 + 3 * 8 + 4 + 1 + 8;
-/// Id, position, colour, error, a zero count.
+/// Id, position, color, error, a zero count.
 const SMALLEST_POINT: u64 = 8 + 3 * 8 + 3 + 8 + 8;
 /// x, y and the point's id.
 const OBSERVATION: u64 = 8 + 8 + 8;
@@ -101,7 +101,7 @@ pub(super) fn points(path: &Path, sightings: &Sightings) -> Result<Vec<Point>, C
     while records.next_record() {
         let id = records.u64("the id")?;
         let position = DVec3::from(records.f64s::<3>("the position")?);
-        let color = records.bytes("the colour")?;
+        let color = records.bytes("the color")?;
         records.f64("the error")?;
         let count = records.elements("the track's length", TRACK_ELEMENT, "track elements")?;
         let mut track = Vec::new();

@@ -121,7 +121,7 @@ pub(super) fn points(path: &Path, sightings: &Sightings) -> Result<Vec<Point>, C
         let position = DVec3::from(lines.numbers::<3>(&mut fields, "the position")?);
         let mut color = [0; 3];
         for channel in &mut color {
-            *channel = lines.field(&mut fields, "the colour")?;
+            *channel = lines.field(&mut fields, "the color")?;
         }
         lines.field::<f64>(&mut fields, "the error")?;
         let mut track = Vec::new();

@@ -13,7 +13,7 @@ const ANGLES: usize = 512;
 /// Directions around the axis, where it is not radial only.
 const DIRECTIONS: usize = 24;
 
-/// Halvings of an interval until its ends are neighbours: about 60, and at most as
+/// Halvings of an interval until its ends are neighbors: about 60, and at most as
 /// many as lead from the largest f64 to the smallest.
 const HALVINGS: usize = 2100;
 

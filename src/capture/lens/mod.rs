@@ -3,7 +3,7 @@
 //!
 //! The rasterizer draws pinholes only. A photo whose lens moves pixels visibly is
 //! resampled when it is loaded: to one pinhole picture, or, where its field is too
-//! wide for one, to several that share its centre.
+//! wide for one, to several that share its center.
 
 mod cuts;
 mod distortion;

@@ -153,7 +153,7 @@ fn sampled<T, const N: usize>(
 }
 
 /// A picture's values at several places, by cubic interpolation (Keys 1981,
-/// a = −1/2) between pixel centres; beyond the border it goes on as it ends. Next to
+/// a = −1/2) between pixel centers; beyond the border it goes on as it ends. Next to
 /// an edge a result may exceed all values by a twelfth of their range. NaN gives zeros.
 pub(super) fn sample<'a, T, const N: usize>(
     picture: &'a [T],

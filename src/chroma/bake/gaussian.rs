@@ -1,7 +1,7 @@
 //! Each Gaussian by itself, from luma and chroma to RGB.
 //!
 //! Viewers blend sRGB values; the native picture blends gray and a/b and
-//! converts afterwards. Gaussian by Gaussian, the colour at the mean gray is
+//! converts afterwards. Gaussian by Gaussian, the color at the mean gray is
 //! exact, and the harmonics of the gray become those of R, G and B through the
 //! slope of each channel over the range in which the gray varies.
 
@@ -11,7 +11,7 @@ use crate::{
 };
 
 /// Bounds on half the range over which the slope is taken: below, rounding
-/// shows; above, the colour would no longer be that of this gray.
+/// shows; above, the color would no longer be that of this gray.
 const HALF_RANGE: [f64; 2] = [0.01, 0.25];
 
 /// Grays at which a Gaussian's own lightness decides what its a/b amount to; beyond,
@@ -80,7 +80,7 @@ fn spread(terms: &mut dyn Iterator<Item = f32>) -> f64 {
 }
 
 /// The mean gray, of a Gaussian that is black from everywhere the brightest that looks
-/// the same: of a darker one, which is drawn as black, the channels that its colour
+/// the same: of a darker one, which is drawn as black, the channels that its color
 /// raises would stay black too.
 fn shown_gray(luma: &[f32]) -> f64 {
     let mean = 0.5 + sh::C0 * f64::from(luma[0]);
@@ -101,7 +101,7 @@ pub(super) fn darkest(rest: &mut dyn Iterator<Item = f32>) -> f64 {
 /// chroma at which the pixel may well be.
 ///
 /// A single Gaussian is often darker than black or brighter than white, where no
-/// colour is left: what it adds to a pixel of middling gray would be lost. So it is with
+/// color is left: what it adds to a pixel of middling gray would be lost. So it is with
 /// a/b beyond any pixel's, which others outweigh. Nor is it brought into the gamut: the
 /// sum is what is shown, and viewers clip that.
 fn color(gray: f64, ab: [f64; 2]) -> [f64; 3] {
@@ -147,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn a_constant_colour_is_exact() {
+    fn a_constant_color_is_exact() {
         let (gray, ab) = (0.55, [12.0, -18.0]);
         let luma = [((gray - 0.5) / sh::C0) as f32];
         let baked = one(&luma, &ab.map(|v| (v / sh::C0) as f32), [0, 0]);
@@ -158,10 +158,10 @@ mod tests {
         }
     }
 
-    /// A pair that blends to a middling gray keeps its colour, wherever each stands that is
+    /// A pair that blends to a middling gray keeps its color, wherever each stands that is
     /// not drawn as black.
     #[test]
-    fn colours_survive_beyond_white() {
+    fn colors_survive_beyond_white() {
         let ab = [20.0, -30.0];
         let shown = |gray: f64| {
             let luma = [((gray - 0.5) / sh::C0) as f32];
@@ -200,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn black_takes_the_channels_that_its_colour_raises() {
+    fn black_takes_the_channels_that_its_color_raises() {
         let shown = |luma: &[f32], degree| {
             let ab = [-20.0, 15.0].map(|v: f64| (v / sh::C0) as f32);
             let baked = one(luma, &ab, [degree, 0]);

@@ -1,4 +1,4 @@
-//! Answers of a network on disk, so that each photo is coloured once.
+//! Answers of a network on disk, so that each photo is colored once.
 
 use super::{AbImage, GrayImage, TeacherError};
 use crate::{atomic_file, npy};

@@ -15,7 +15,7 @@ fn settings(profile: Option<&str>, size: Option<u32>) -> TeacherSettings {
     }
 }
 
-/// The answer for a photo of one gray, which has one colour, and the kind of
+/// The answer for a photo of one gray, which has one color, and the kind of
 /// network that gave it.
 fn color(name: &str, settings: &TeacherSettings, level: u8) -> ([f64; 2], String) {
     let mut teacher = open_with(&fixture(name), None, settings).unwrap();
@@ -63,7 +63,7 @@ fn lightness(level: u8) -> f64 {
     116.0 * cie(linear(f64::from(level) / 255.0)) - 16.0
 }
 
-/// a*, b* of an encoded sRGB colour under D65, by the matrix of IEC 61966-2-1.
+/// a*, b* of an encoded sRGB color under D65, by the matrix of IEC 61966-2-1.
 fn ab_of_rgb(rgb: [f64; 3]) -> [f64; 2] {
     let [r, g, b] = rgb.map(linear);
     let x = cie((0.4124 * r + 0.3576 * g + 0.1805 * b) / 0.9505);

@@ -3,7 +3,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Why a teacher could not be opened or could not colour a photo.
+/// Why a teacher could not be opened or could not color a photo.
 #[derive(Debug, thiserror::Error)]
 pub enum TeacherError {
     /// The file system refused.
@@ -15,7 +15,7 @@ pub enum TeacherError {
         source: io::Error,
     },
     /// The path leads to something else.
-    #[error("{}: a teacher is an .onnx file or a folder of coloured images", path.display())]
+    #[error("{}: a teacher is an .onnx file or a folder of colored images", path.display())]
     NoTeacher {
         /// The path.
         path: PathBuf,
@@ -134,7 +134,7 @@ pub enum TeacherError {
         path: PathBuf,
     },
     /// Two images of the folder stand for one photo.
-    #[error("{} and {}: both would colour one photo; keep one of them", first.display(), second.display())]
+    #[error("{} and {}: both would color one photo; keep one of them", first.display(), second.display())]
     TwoImages {
         /// One image.
         first: PathBuf,

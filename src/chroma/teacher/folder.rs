@@ -1,11 +1,11 @@
-//! A folder of coloured images as a teacher.
+//! A folder of colored images as a teacher.
 
 use super::named_images::NamedImages;
 use super::{AbImage, GrayImage, Query, TeacherError, TeacherInfo, file_name};
 use crate::color::srgb_to_lab;
 use std::path::{Path, PathBuf};
 
-/// Images that were coloured elsewhere, for any subset of the photos.
+/// Images that were colored elsewhere, for any subset of the photos.
 ///
 /// An image belongs to the photo with the same path below the folder, whatever
 /// the two extensions are. Symbolic links to folders are not followed.
@@ -43,7 +43,7 @@ impl FolderTeacher {
         }
     }
 
-    /// Colours of the photo's image at the image's size, or at the photo's where the
+    /// Colors of the photo's image at the image's size, or at the photo's where the
     /// image is of the photo before its lens was taken out; none where there is no
     /// image.
     pub(super) fn colorize<'a>(
@@ -149,7 +149,7 @@ mod tests {
         assert_eq!((small.width, small.height, small.ab.len()), (8, 4, 32));
         let a = |rgb| srgb_to_lab(rgb)[1] as f32;
         let mean = (a([1.0, 0.0, 0.0]) + a([0.0, 1.0, 1.0])) / 2.0;
-        // The border sees half a stripe more of one colour.
+        // The border sees half a stripe more of one color.
         for ab in small.ab.chunks(8).flat_map(|row| &row[1..7]) {
             assert!((ab[0] - mean).abs() < 0.01, "{} {mean}", ab[0]);
         }

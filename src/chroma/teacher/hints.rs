@@ -1,4 +1,4 @@
-//! Colours painted on a few places of a photo.
+//! Colors painted on a few places of a photo.
 
 use super::images::{Filter, resample};
 use super::named_images::NamedImages;
@@ -59,7 +59,7 @@ impl HintFolder {
         let size = [found.image.width(), found.image.height()];
         let rgba = found.image.into_rgba32f();
         let paint = rgba.pixels().map(|rgba| match rgba.0 {
-            // Most of a hint is transparent, and its colour means nothing.
+            // Most of a hint is transparent, and its color means nothing.
             [.., 0.0] => [0.0; 3],
             [r, g, b, alpha] => {
                 let [_, a, b] = srgb_to_lab([r, g, b].map(f64::from));
@@ -101,7 +101,7 @@ impl HintImage {
         }
     }
 
-    /// Opaque colour `[a, b]` and α of each pixel; a and b are 0 where α is 0.
+    /// Opaque color `[a, b]` and α of each pixel; a and b are 0 where α is 0.
     pub fn colors(&self) -> impl Iterator<Item = ([f32; 2], f32)> {
         self.paint.iter().map(|&[a, b, alpha]| {
             let opaque = if alpha > 0.0 {

@@ -3,7 +3,7 @@
 use super::TeacherError;
 use serde::{Deserialize, Serialize};
 
-/// A gray photo that is to be coloured.
+/// A gray photo that is to be colored.
 #[derive(Clone, Copy, Debug)]
 pub struct GrayImage<'a> {
     /// Width in pixels, at least 1.
@@ -14,7 +14,7 @@ pub struct GrayImage<'a> {
     pub pixels: &'a [u8],
 }
 
-/// The colours of a photo without its lightness.
+/// The colors of a photo without its lightness.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AbImage {
     /// Width in pixels, at least 1.
@@ -44,7 +44,7 @@ impl GrayImage<'_> {
 impl AbImage {
     /// The same image at another size (at least 1 × 1).
     ///
-    /// Enlarging is bilinear interpolation with half-pixel centres. Where an
+    /// Enlarging is bilinear interpolation with half-pixel centers. Where an
     /// axis shrinks, the weights widen with the step, so that every pixel counts
     /// and nothing aliases.
     pub fn resized(&self, width: u32, height: u32) -> Self {
@@ -72,7 +72,7 @@ pub enum Filter {
 }
 
 /// Resamples `pixels`, `[height, width]` values of `C` channels, with half-pixel
-/// centres. Sizes are width and height; a target size of 0 counts as 1.
+/// centers. Sizes are width and height; a target size of 0 counts as 1.
 pub(in crate::chroma) fn resample<const C: usize>(
     pixels: &[[f32; C]],
     size: [u32; 2],
@@ -116,8 +116,8 @@ struct Taps {
     weights: Vec<f32>,
 }
 
-/// A tent around each target pixel's centre, cut off at the image's border; for
-/// [`Filter::Nearest`] the one pixel at the centre.
+/// A tent around each target pixel's center, cut off at the image's border; for
+/// [`Filter::Nearest`] the one pixel at the center.
 fn taps(length: usize, new_length: usize, filter: Filter) -> Vec<Taps> {
     let step = length as f64 / new_length as f64;
     let radius = match filter {
@@ -132,7 +132,7 @@ fn taps(length: usize, new_length: usize, filter: Filter) -> Vec<Taps> {
                 weights: vec![1.0],
             };
         }
-        // Position of the target's centre, in source pixels from the first centre.
+        // Position of the target's center, in source pixels from the first center.
         let center = ((i as f64 + 0.5) * step - 0.5).clamp(0.0, (length - 1) as f64);
         // The tent's feet themselves weigh nothing.
         let first = ((center - radius).floor() + 1.0).max(0.0) as usize;
@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn the_nearest_pixel_is_the_one_at_the_centre() {
+    fn the_nearest_pixel_is_the_one_at_the_center() {
         let pixels = [[0.0], [1.0], [2.0], [3.0], [4.0], [5.0]];
         let small = resample(&pixels, [6, 1], [2, 1], Filter::Nearest);
         assert_eq!(small, [[1.0], [4.0]]);

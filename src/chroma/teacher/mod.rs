@@ -1,7 +1,7 @@
-//! Teachers: who says which colour a gray photo has.
+//! Teachers: who says which color a gray photo has.
 //!
 //! A teacher is a colorization network (an ONNX file) or a folder of images
-//! that somebody or something else has coloured. Both answer with CIELAB a, b
+//! that somebody or something else has colored. Both answer with CIELAB a, b
 //! for a whole photo; lightness always stays the photo's.
 
 mod cache;
@@ -29,7 +29,7 @@ pub use upsample::Upsample;
 use serde::Serialize;
 use std::path::Path;
 
-/// Someone who colours photos.
+/// Someone who colors photos.
 pub struct Teacher {
     source: Source,
     upsample: Upsample,
@@ -70,7 +70,7 @@ pub struct TeacherInfo {
 }
 
 impl Teacher {
-    /// Opens an `.onnx` file or a folder of coloured images.
+    /// Opens an `.onnx` file or a folder of colored images.
     ///
     /// A network's answers are kept in `cache_dir` (created where missing) and
     /// used again for the same photo, model, profile, input size and hints; a
@@ -118,7 +118,7 @@ impl Teacher {
         }
     }
 
-    /// Colours one photo, which may be given by its path relative to the photo folder;
+    /// Colors one photo, which may be given by its path relative to the photo folder;
     /// `hints` are told to a network that takes hints.
     ///
     /// Answers at the photo's size; `None` where a folder has no image for this

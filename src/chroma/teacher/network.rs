@@ -20,7 +20,7 @@ const HINT_COVER: f32 = 0.25;
 /// Seed of the random code that some networks take.
 const NOISE_SEED: u64 = 0;
 
-/// An ONNX model that colours photos, with the answers it gave before.
+/// An ONNX model that colors photos, with the answers it gave before.
 pub struct NetworkTeacher {
     path: PathBuf,
     session: Session,
@@ -91,7 +91,7 @@ impl NetworkTeacher {
         }
     }
 
-    /// Colours one photo; the answer has the network's size.
+    /// Colors one photo; the answer has the network's size.
     pub(super) fn colorize(
         &mut self,
         name: &str,
@@ -197,7 +197,7 @@ fn image(profile: &Profile, photo: &GrayImage<'_>, size: [u32; 2]) -> Vec<f32> {
 }
 
 /// What a network is told of hints at its own size: `[2, height, width]` for
-/// their colours, `[1, height, width]` for the mask.
+/// their colors, `[1, height, width]` for the mask.
 fn told(profile: &Profile, hints: Option<&HintImage>, size: [u32; 2], role: Role) -> Vec<f32> {
     let pixels = size[0] as usize * size[1] as usize;
     let mut colors = match hints {

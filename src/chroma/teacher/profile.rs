@@ -11,7 +11,7 @@ use std::path::Path;
 pub(super) const MAX_SIDE: u32 = 8192;
 
 /// CIELAB a and b that an `output_range` or `hint_range` speaks of: that of
-/// SIGGRAPH17's tanh, which no sRGB colour exceeds.
+/// SIGGRAPH17's tanh, which no sRGB color exceeds.
 const AB_LIMIT: f32 = 110.0;
 
 /// The contract of one kind of network, and the fields of a manifest.
@@ -235,7 +235,7 @@ impl Profile {
 
     /// The profile in full, for a cache's keys.
     pub fn identity(&self) -> String {
-        // Plain fields: serialising them cannot fail.
+        // Plain fields: serializing them cannot fail.
         serde_json::to_string(self).unwrap_or_default()
     }
 }
@@ -365,8 +365,8 @@ mod tests {
             ("size = 512", "sise = 512", "unknown field `sise`"),
             (
                 "size = 512",
-                "size = 512\ncolour = 1",
-                "line 10: unknown field `colour`",
+                "size = 512\ncolor = 1",
+                "line 10: unknown field `color`",
             ),
             ("size = 512", "size = \"large\"", "line 9: "),
             ("size = 512", "size = 0", "size: "),

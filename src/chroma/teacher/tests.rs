@@ -95,7 +95,7 @@ fn logarithm_model() -> Vec<u8> {
 }
 
 #[test]
-fn a_network_colours_in_closed_form() {
+fn a_network_colors_in_closed_form() {
     let mut teacher = open(&fixture("ddcolor_tiny.onnx"), None).unwrap();
     for (level, a, b) in [(0u8, -40.0, 40.0), (255, 40.0, -20.0), (51, -24.0, 28.0)] {
         let pixels = [level; 15];

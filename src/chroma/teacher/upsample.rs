@@ -10,7 +10,7 @@ pub enum Upsample {
     /// Along the photo's edges: joint bilateral upsampling.
     #[default]
     Guided,
-    /// Bilinear interpolation: colours bleed over edges.
+    /// Bilinear interpolation: colors bleed over edges.
     Bilinear,
 }
 
@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn colours_keep_to_their_side_of_an_edge() {
+    fn colors_keep_to_their_side_of_an_edge() {
         // Red on dark, green on bright; the edge is not on the answer's grid.
         let (width, height) = (64, 40);
         let dark = |i: u32| i % width < 27;

@@ -51,7 +51,7 @@ pub(super) fn pictures<const C: usize>(
     pictures.collect()
 }
 
-/// `worst` is the largest error seen per unit of colour, `brightest` the largest colour.
+/// `worst` is the largest error seen per unit of color, `brightest` the largest color.
 fn bounds(allowed: Allowance, worst: f64, brightest: f64) -> FlipBounds {
     FlipBounds {
         rest: allowed.relative(worst, brightest),

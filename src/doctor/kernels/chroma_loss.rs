@@ -114,7 +114,7 @@ pub(super) fn in_steps(value: f64) -> f64 {
     (256.0 * value).round() / 256.0
 }
 
-/// Bilinear sample with half-pixel centres, as images are resized everywhere.
+/// Bilinear sample with half-pixel centers, as images are resized everywhere.
 fn upsample(coarser: &[[f64; 2]], from: [usize; 2], to: [usize; 2]) -> Vec<[f64; 2]> {
     let taps = |index: usize, axis: usize| {
         let at = (index as f64 + 0.5) * from[axis] as f64 / to[axis] as f64 - 0.5;

@@ -293,7 +293,7 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
             Ok(Sample::new(problem.on_device(gpu, &[0.0; 2])?, zeros))
         })
         .collect::<Result<Vec<_>, GpuError>>()?;
-    // In units of the colours.
+    // In units of the colors.
     let row = |what, worst, samples: &[Sample]| {
         Row::elementwise("lbfgs", what, allowed.relative(worst, 100.0), samples)
     };

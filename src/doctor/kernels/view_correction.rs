@@ -24,10 +24,10 @@ struct Taught {
 }
 
 impl Taught {
-    /// Colours of this spread about a mean, and a teacher that strays from them by gain,
+    /// Colors of this spread about a mean, and a teacher that strays from them by gain,
     /// offset and noise.
     fn random(random: &mut Random, size: [usize; 2], spread: f64) -> Self {
-        let centre: [f64; 2] = random.array(-40.0, 40.0);
+        let center: [f64; 2] = random.array(-40.0, 40.0);
         let gain: [f64; 2] = random.array(0.6, 1.3);
         let (turn, offset) = (random.range(-0.2, 0.2), random.array::<2>(-8.0, 8.0));
         let pixels = (0..size[0] * size[1])
@@ -35,7 +35,7 @@ impl Taught {
                 let x: [f64; 2] = random.array(-spread, spread);
                 // Here and there nothing is drawn.
                 let drawn = f64::from(u8::from(k % 11 != 3));
-                let x = [0, 1].map(|c| drawn * round(x[c] + centre[c]));
+                let x = [0, 1].map(|c| drawn * round(x[c] + center[c]));
                 let noise: [f64; 2] = random.array(-4.0, 4.0);
                 let t = [0, 1]
                     .map(|c| in_steps(gain[c] * x[c] + turn * x[1 - c] + offset[c] + noise[c]));
@@ -61,7 +61,7 @@ impl Taught {
         self
     }
 
-    /// The pixels that the teacher coloured.
+    /// The pixels that the teacher colored.
     fn counted(&self) -> Vec<Pixel> {
         let weight = |p: usize| self.weights.as_ref().map_or(1.0, |weights| weights[p]);
         (self.pixels.iter().enumerate())
@@ -161,7 +161,7 @@ fn hard(random: &mut Random) -> Vec<Vec<Taught>> {
             view(20.0),
         ],
         vec![view(30.0).with_pixels(|p| p.0 = 0.0)],
-        // A picture of one colour: no variance, far from the origin.
+        // A picture of one color: no variance, far from the origin.
         vec![
             view(30.0),
             view(0.0).with_pixels(|p| p.1 = [59.0, -43.0]),
@@ -169,7 +169,7 @@ fn hard(random: &mut Random) -> Vec<Vec<Taught>> {
         ],
         // Both channels the same: no variance across.
         vec![view(30.0), view(30.0).with_pixels(|p| p.1[1] = p.1[0])],
-        // A teacher without colour, whose gain cannot be undone.
+        // A teacher without color, whose gain cannot be undone.
         vec![
             view(60.0),
             view(60.0),

@@ -1,4 +1,4 @@
-//! Networks that colour the photos while luma trains: a processor's work beside a GPU's.
+//! Networks that color the photos while luma trains: a processor's work beside a GPU's.
 
 use std::{
     path::PathBuf,
@@ -15,7 +15,7 @@ use crate::{
 /// Teachers that are asked while luma trains; may be none.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct AheadOptions {
-    /// Colorization networks. A folder of coloured photos may be named, but has nothing to
+    /// Colorization networks. A folder of colored photos may be named, but has nothing to
     /// be asked.
     pub teachers: Vec<PathBuf>,
     /// How they are asked, as `colorize` will ask them.

@@ -54,7 +54,7 @@ pub struct FitOptions {
     pub goal: Goal,
     /// Whether the report says where the device's time went.
     pub timings: bool,
-    /// Who is to colour the photos meanwhile.
+    /// Who is to color the photos meanwhile.
     pub ahead: AheadOptions,
 }
 

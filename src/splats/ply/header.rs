@@ -14,7 +14,7 @@ const MAX_HEADER_BYTES: u64 = 64 * 1024;
 pub(super) struct VertexLayout {
     /// SH degree.
     pub degree: u32,
-    /// For each needed number, in the order centre, SH, shape: the place among
+    /// For each needed number, in the order center, SH, shape: the place among
     /// the vertex's properties.
     pub columns: Vec<usize>,
     /// Types of all properties of a vertex, in file order.

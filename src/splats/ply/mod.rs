@@ -1,7 +1,7 @@
 //! Splat files: the `.ply` layout of the 3D Gaussian Splatting reference
 //! implementation, which every viewer reads.
 //!
-//! A vertex is a Gaussian: `x y z` (centre), `f_dc_0..2` and `f_rest_*` (SH of
+//! A vertex is a Gaussian: `x y z` (center), `f_dc_0..2` and `f_rest_*` (SH of
 //! red, green, blue), `opacity` (logit), `scale_0..2` (natural logarithms of
 //! the standard deviations), `rot_0..3` (quaternion w x y z). Normals are
 //! written as zeros because some readers expect them.
@@ -21,10 +21,10 @@ use super::sh::{MAX_DEGREE, coefficient_count};
 /// spreads: Brush's, which splat-transform reads as well.
 pub const ANTIALIASED: &str = "SplatRenderMode: mip";
 
-/// Colour channels of a splat file.
+/// Color channels of a splat file.
 const CHANNELS: usize = 3;
 
-/// Properties before the SH: centre and normal.
+/// Properties before the SH: center and normal.
 const NORMALS: [&str; 3] = ["nx", "ny", "nz"];
 const CENTER: [&str; 3] = ["x", "y", "z"];
 

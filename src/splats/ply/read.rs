@@ -253,7 +253,7 @@ impl Collector {
         }
     }
 
-    /// `values` hold centre, SH and shape in this order.
+    /// `values` hold center, SH and shape in this order.
     fn push(&mut self, values: &[f32]) {
         let (center, rest) = values.split_at(3);
         let (sh, shape) = rest.split_at(self.sh_positions.len());

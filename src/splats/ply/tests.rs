@@ -193,7 +193,7 @@ type Spoil = fn(&mut Splats);
 #[test]
 fn what_cannot_be_written_is_refused_and_leaves_no_file() {
     let spoils: [(&str, Spoil); 9] = [
-        ("the centre of splat 1 is NaN", |s| s.means[1][2] = f32::NAN),
+        ("the center of splat 1 is NaN", |s| s.means[1][2] = f32::NAN),
         ("the scale of splat 0 is inf", |s| {
             s.log_scales[0][1] = f32::INFINITY
         }),

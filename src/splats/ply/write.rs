@@ -19,7 +19,7 @@ const CHUNK_ROWS: usize = 4096;
 /// order, unit quaternions, finite numbers.
 ///
 /// A field with one channel is written as gray RGB. `offset` is added to the
-/// centres in f64 before they are rounded to f32. `comments` become comment
+/// centers in f64 before they are rounded to f32. `comments` become comment
 /// lines (line breaks become spaces); those that would make the header longer
 /// than 8 KiB are left out because some readers give up on long headers.
 ///
@@ -65,7 +65,7 @@ fn check_arrays(path: &Path, splats: &Splats) -> Result<(), PlyError> {
     let reason = if field.degree > sh::MAX_DEGREE {
         format!("SH degree {} is above {}", field.degree, sh::MAX_DEGREE)
     } else if field.channels != 1 && field.channels != CHANNELS {
-        format!("a field of {} channels has no colour", field.channels)
+        format!("a field of {} channels has no color", field.channels)
     } else {
         let stride = sh::coefficient_count(field.degree) * field.channels;
         let lengths = [
@@ -78,7 +78,7 @@ fn check_arrays(path: &Path, splats: &Splats) -> Result<(), PlyError> {
             return Ok(());
         }
         format!(
-            "{} centres, but other arrays hold {lengths:?}",
+            "{} centers, but other arrays hold {lengths:?}",
             splats.len()
         )
     };
@@ -128,7 +128,7 @@ fn push_row(
     };
     let center = splats.means[index].map(f64::from);
     for (value, offset) in center.into_iter().zip(offset.to_array()) {
-        push("the centre", value + offset)?;
+        push("the center", value + offset)?;
     }
     for _ in NORMALS {
         push("the normal", 0.0)?;

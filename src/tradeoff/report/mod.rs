@@ -80,7 +80,7 @@ pub struct Point {
 pub enum PointStage {
     /// Geometry and luma.
     Luma,
-    /// Colour, on the base's luma.
+    /// Color, on the base's luma.
     Color,
 }
 
@@ -139,14 +139,14 @@ pub struct Outcome {
     pub psnr: Option<f64>,
     /// Structural similarity of the gray pictures.
     pub ssim: Option<f64>,
-    /// Mean ΔE00 of the coloured pictures to the photos, where these have colours.
+    /// Mean ΔE00 of the colored pictures to the photos, where these have colors.
     pub delta_e: Option<f64>,
     /// Root mean square difference of a and b, in CIELAB units, between photographed
     /// views of the same places.
     pub consistency: Option<f64>,
-    /// Colourfulness (Hasler and Süsstrunk 2003).
+    /// Colorfulness (Hasler and Süsstrunk 2003).
     pub colorfulness: Option<f64>,
-    /// Colourfulness of the teacher's pictures.
+    /// Colorfulness of the teacher's pictures.
     pub teacher_colorfulness: Option<f64>,
     /// Largest resident memory of a process in bytes, where the system tells.
     pub peak_host_memory: Option<u64>,
@@ -167,9 +167,9 @@ pub struct Seconds {
     pub measure: f64,
     /// Asking the teacher: of the point that asked, where this one took its answers.
     pub teacher: f64,
-    /// Solving for the colours.
+    /// Solving for the colors.
     pub distill: f64,
-    /// Baking and measuring colours.
+    /// Baking and measuring colors.
     pub bake: f64,
 }
 
@@ -222,7 +222,7 @@ impl Measure {
             Self::Ssim => "SSIM",
             Self::DeltaE => "ΔE00 to the photos",
             Self::Consistency => "inconsistency of views",
-            Self::Colorfulness => "colourfulness",
+            Self::Colorfulness => "colorfulness",
         }
     }
 
@@ -261,7 +261,7 @@ impl Measure {
         }
     }
 
-    /// 1 where more is better, −1 where less is; `None` where neither is: colours may be
+    /// 1 where more is better, −1 where less is; `None` where neither is: colors may be
     /// too strong as well as too weak.
     pub fn sign(self) -> Option<f64> {
         match self {
@@ -307,7 +307,7 @@ impl Point {
 impl Tradeoff {
     /// The file as indented JSON.
     pub fn to_json(&self) -> String {
-        // Plain structs with string keys: serialising them cannot fail.
+        // Plain structs with string keys: serializing them cannot fail.
         serde_json::to_string_pretty(self).unwrap_or_default()
     }
 

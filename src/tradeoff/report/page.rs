@@ -106,8 +106,8 @@ fn push_stage(html: &mut String, sweep: &Tradeoff, stage: PointStage, pictures: 
             "Seconds are those of <code>fit</code>: reading, training, measuring.",
         ),
         PointStage::Color => (
-            "Colour",
-            "Seconds contain the base's luma, on which all of these points are coloured, and asking the teacher, measured where it was asked. A colourfulness is neither good nor bad by itself.",
+            "Color",
+            "Seconds contain the base's luma, on which all of these points are colored, and asking the teacher, measured where it was asked. A colorfulness is neither good nor bad by itself.",
         ),
     };
     let _ = writeln!(
@@ -184,7 +184,7 @@ fn push_points(html: &mut String, sweep: &Tradeoff, stage: PointStage, pictures:
     let (title, stages): (_, &[&str]) = match stage {
         PointStage::Luma => ("All points of luma", &["load", "train", "measure"]),
         PointStage::Color => (
-            "All points in colour",
+            "All points in color",
             &["luma", "teacher", "distil", "bake and measure"],
         ),
     };
@@ -211,7 +211,7 @@ fn push_points(html: &mut String, sweep: &Tradeoff, stage: PointStage, pictures:
     html.push_str(match stage {
         PointStage::Luma => "</p>\n",
         PointStage::Color => {
-            " The folder of a point in colour begins with the base's <code>luma.ply</code> and <code>report.json</code>, which the base's command makes again.</p>\n"
+            " The folder of a point in color begins with the base's <code>luma.ply</code> and <code>report.json</code>, which the base's command makes again.</p>\n"
         }
     });
 }
@@ -309,7 +309,7 @@ mod tests {
             "<garden>",
             "<memory>",
             "<scene>",
-            "All points in colour",
+            "All points in color",
             "<script src",
         ] {
             assert!(!html.contains(piece), "{piece}");

@@ -6,19 +6,19 @@ use std::fmt::Write;
 use super::{Measure, Phase, Point, PointStage, Tradeoff};
 use crate::report::html::escaped;
 
-/// Colours of the knobs, in the order in which they first appear.
+/// Colors of the knobs, in the order in which they first appear.
 const COLORS: [&str; 10] = [
     "#3b6ea8", "#c8643c", "#4f8f4f", "#8a5a9e", "#b0912f", "#3f9aa0", "#b3557c", "#7a6a58",
     "#5f74c4", "#8aa23c",
 ];
 
-/// Colour of what turns several knobs.
+/// Color of what turns several knobs.
 const COMBINED: &str = "#9aa0a8";
 
-/// Colour of bases and of the front.
+/// Color of bases and of the front.
 const INK: &str = "#22252a";
 
-/// Points that are drawn alike: name, colour.
+/// Points that are drawn alike: name, color.
 pub(super) struct Group {
     /// The knob, `base` or `combinations`.
     pub name: String,

@@ -25,7 +25,7 @@ pub fn front_table(sweep: &Tradeoff, stage: PointStage) -> Option<Table> {
     Some(Table {
         title: match stage {
             PointStage::Luma => "Luma: the best that each time buys".to_owned(),
-            PointStage::Color => "Colour: the best that each time buys".to_owned(),
+            PointStage::Color => "Color: the best that each time buys".to_owned(),
         },
         head: head.chain(titles(&measures)).collect(),
         rows: rows.collect(),
@@ -65,7 +65,7 @@ pub(super) fn cost_table(sweep: &Tradeoff, stage: PointStage) -> Option<Table> {
     (!rows.is_empty()).then(|| Table {
         title: match stage {
             PointStage::Luma => "What each knob of luma costs".to_owned(),
-            PointStage::Color => "What each knob of colour costs".to_owned(),
+            PointStage::Color => "What each knob of color costs".to_owned(),
         },
         head: (head.into_iter())
             .chain(titles(&measures))

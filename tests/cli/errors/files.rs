@@ -43,7 +43,7 @@ fn no_holdout(place: &Place) {
 
 pub(super) const CASES: &[Case] = &[
     case(
-        "no run to colour",
+        "no run to color",
         no_runs,
         COLORIZE,
         &["no run under runs/", "gs-chroma fit"],
@@ -61,7 +61,7 @@ pub(super) const CASES: &[Case] = &[
         &["no run under runs/"],
     ),
     case(
-        "no such run to colour",
+        "no such run to color",
         nothing,
         "colorize runs/none --teacher onnx/ddcolor_tiny.onnx",
         &["runs/none/report.json", "gs-chroma fit"],
@@ -85,7 +85,7 @@ pub(super) const CASES: &[Case] = &[
         &["runs/none", "no such folder"],
     ),
     case(
-        "a damaged report to colour",
+        "a damaged report to color",
         cut_report,
         COLORIZE,
         &[REPORT, "damaged", "line", "gs-chroma fit"],
@@ -139,7 +139,7 @@ pub(super) const CASES: &[Case] = &[
         &["luma.ply", "--colmap"],
     ),
     case(
-        "an empty file to colour",
+        "an empty file to color",
         empty_ply,
         "colorize empty.ply --colmap scene --teacher onnx/ddcolor_tiny.onnx",
         &["empty.ply", "no Gaussians", "gs-chroma fit"],

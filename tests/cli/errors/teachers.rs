@@ -12,7 +12,7 @@ fn paint(place: &Place, name: &str, [width, height]: [u32; 2]) {
         .expect("writable");
 }
 
-/// Saves an image of one colour as the hints for view 1.
+/// Saves an image of one color as the hints for view 1.
 fn hint<P: image::PixelWithColorType<Subpixel = u8>>(place: &Place, pixel: P)
 where
     [u8]: image::EncodableLayout,

@@ -41,7 +41,7 @@ impl Lens {
         }
     }
 
-    /// Coefficients after focal lengths and centre.
+    /// Coefficients after focal lengths and center.
     pub fn coefficients(&self) -> &[f64] {
         match self {
             Self::Pinhole => &[],

@@ -3,7 +3,7 @@
 use image::{Rgb, RgbImage};
 
 /// A picture of `size` whose pixel at `p` shows what `picture` has at `source(p)`, both
-/// in pixels, the centre of the top left one at (0.5, 0.5).
+/// in pixels, the center of the top left one at (0.5, 0.5).
 pub fn remap(
     picture: &RgbImage,
     [width, height]: [u32; 2],

@@ -48,7 +48,7 @@ pub struct Point {
 /// Where a view sees a point.
 pub struct Observation {
     pub view: usize,
-    /// x and y; the centre of the top left pixel is at (0.5, 0.5).
+    /// x and y; the center of the top left pixel is at (0.5, 0.5).
     pub pixel: [f64; 2],
 }
 
@@ -58,7 +58,7 @@ impl View {
         self.rotation * point + self.translation
     }
 
-    /// The camera's centre in the world.
+    /// The camera's center in the world.
     pub fn center(&self) -> DVec3 {
         -(self.rotation.transpose() * self.translation)
     }
@@ -71,7 +71,7 @@ impl Scene {
         let held_out = capture::split(&capture.views, true).test;
         let views = capture.views.iter().enumerate().map(|(index, view)| {
             // The capture may have been moved to the origin: move it back.
-            let camera = view.camera.recentred(-capture.offset);
+            let camera = view.camera.recentered(-capture.offset);
             let picture = picture(&view.image_path, [camera.width, camera.height])?;
             Ok(View {
                 stem: Path::new(&view.name)
@@ -126,7 +126,7 @@ impl Scene {
         });
     }
 
-    /// The mean of the cameras' centres.
+    /// The mean of the cameras' centers.
     pub fn center(&self) -> DVec3 {
         let sum: DVec3 = self.views.iter().map(View::center).sum();
         sum / self.views.len() as f64

@@ -4,11 +4,11 @@ use super::lens::{Camera, Lens};
 use super::resample::remap;
 use super::scene::Scene;
 
-/// What `barrel` moves the corners by, in parts of their distance to the centre: the part
+/// What `barrel` moves the corners by, in parts of their distance to the center: the part
 /// that grows with the third power of it, and with the fifth. Real wide lenses have as much.
 const BARREL: [f64; 2] = [-0.11, 0.02];
 
-/// Of tangential distortion at the corners, in the same unit: a lens not quite centred.
+/// Of tangential distortion at the corners, in the same unit: a lens not quite centered.
 const TANGENTIAL: [f64; 2] = [0.002, -0.001];
 
 /// What `barrel-control` moves the corners by, in pixels.
