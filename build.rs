@@ -1,7 +1,7 @@
 //! Compiles the WESL kernels in `shaders/` to plain WGSL, one file for each
-//! kernel and variant.
+//! kernel and variant, and writes the constants of `src/gpu/shaders.rs` that hold them.
 
-use std::{env, fs, path::Path};
+use std::{env, fmt::Write, fs, path::Path};
 
 use wesl::{ModulePath, Wesl};
 
@@ -38,38 +38,41 @@ const SSIM_WINDOWS: [(&str, &str); 3] = [
 
 fn main() {
     println!("cargo::rerun-if-changed=shaders");
-    let out = env::var("OUT_DIR").expect("cargo sets OUT_DIR");
+    let mut kernels = Kernels::default();
+    let mut compile = |kernel, suffix: &str, features: &[&str]| {
+        kernels.compile(kernel, suffix, features);
+    };
     for kernel in PLAIN {
-        compile(&out, kernel, "", &[]);
+        compile(kernel, "", &[]);
     }
     for kernel in COLORED {
         for color in ["luma", "chroma", "rgb"] {
-            compile(&out, kernel, &format!("_{color}"), &[color]);
+            compile(kernel, &format!("_{color}"), &[color]);
         }
     }
-    compile(&out, "chroma_loss", "_agreeing", &["agreeing"]);
+    compile("chroma_loss", "_agreeing", &["agreeing"]);
     // Luma trains the geometry too; on frozen geometry the gradient of a/b or RGB and its
     // curvature come back as four figures.
     for kernel in ["blend_backward", "sum_instances"] {
-        compile(&out, kernel, "_luma", &["luma", "geometry"]);
-        compile(&out, kernel, "_figures", &["figures"]);
+        compile(kernel, "_luma", &["luma", "geometry"]);
+        compile(kernel, "_figures", &["figures"]);
     }
-    compile(&out, "shade_backward", "_luma", &["luma", "geometry"]);
-    compile(&out, "shade_backward", "_chroma", &["chroma"]);
-    compile(&out, "shade_backward", "_rgb", &["rgb"]);
-    compile(&out, "project_backward", "", &["luma", "geometry"]);
+    compile("shade_backward", "_luma", &["luma", "geometry"]);
+    compile("shade_backward", "_chroma", &["chroma"]);
+    compile("shade_backward", "_rgb", &["rgb"]);
+    compile("project_backward", "", &["luma", "geometry"]);
     // In training the two that reach the parameters take Adam's step at once.
     for kernel in ["project_backward", "shade_backward"] {
-        compile(&out, kernel, "_step", &["luma", "geometry", "step"]);
+        compile(kernel, "_step", &["luma", "geometry", "step"]);
     }
     // What training may trade for time (`src/luma/numerics.rs`): Adam steps for what the
     // view shows alone, and gradients wait for their sums at half the size.
     let lazy = ["luma", "geometry", "step", "lazy", "mip"];
-    compile(&out, "project_backward", "_step_lazy", &lazy[..4]);
-    compile(&out, "project_backward", "_mip_step_lazy", &lazy);
-    compile(&out, "shade_backward", "_step_lazy", &lazy[..4]);
+    compile("project_backward", "_step_lazy", &lazy[..4]);
+    compile("project_backward", "_mip_step_lazy", &lazy);
+    compile("shade_backward", "_step_lazy", &lazy[..4]);
     for kernel in ["blend_backward", "sum_instances"] {
-        compile(&out, kernel, "_luma_half", &["luma", "geometry", "half"]);
+        compile(kernel, "_luma_half", &["luma", "geometry", "half"]);
     }
     // Each effect of the photos is in the loss only where a scene calls for it.
     for subset in 0..1 << LOSS_EFFECTS.len() {
@@ -80,36 +83,73 @@ fn main() {
         let suffix: String = effects.iter().map(|effect| format!("_{effect}")).collect();
         for (window, name) in SSIM_WINDOWS {
             let features = [&effects[..], &[window]].concat();
-            compile(&out, "luma_loss", &format!("{suffix}{name}"), &features);
+            compile("luma_loss", &format!("{suffix}{name}"), &features);
         }
     }
     // Antialiasing is in the projection only where a scene calls for it.
     let mip = ["luma", "geometry", "mip", "step"];
-    compile(&out, "project", "_mip", &mip[2..3]);
-    compile(&out, "project_backward", "_mip", &mip[..3]);
-    compile(&out, "project_backward", "_mip_step", &mip);
+    compile("project", "_mip", &mip[2..3]);
+    compile("project_backward", "_mip", &mip[..3]);
+    compile("project_backward", "_mip_step", &mip);
+    kernels.write();
 }
 
-fn compile(out: &str, kernel: &str, suffix: &str, features: &[&str]) {
-    let mut compiler = Wesl::new("shaders");
-    compiler.keep_all_entrypoints();
-    for feature in [
-        "luma", "chroma", "rgb", "agreeing", "figures", "geometry", "step", "exposed", "masked",
-        "mip", "lazy", "half", "window11", "window7", "window5",
-    ] {
-        compiler.set_feature(feature, features.contains(&feature));
+/// Everything compiled so far.
+#[derive(Default)]
+struct Kernels {
+    /// A constant for each.
+    constants: String,
+    /// Name and constant of each.
+    all: String,
+}
+
+impl Kernels {
+    /// Compiles a kernel with these conditions; `suffix` tells the variant from others.
+    fn compile(&mut self, kernel: &str, suffix: &str, features: &[&str]) {
+        let mut compiler = Wesl::new("shaders");
+        compiler.keep_all_entrypoints();
+        for feature in [
+            "luma", "chroma", "rgb", "agreeing", "figures", "geometry", "step", "exposed",
+            "masked", "mip", "lazy", "half", "window11", "window7", "window5",
+        ] {
+            compiler.set_feature(feature, features.contains(&feature));
+        }
+        // Plain names: imported functions keep the name they have in their file.
+        compiler.set_mangler(wesl::ManglerKind::None);
+        let module: ModulePath = format!("package::{kernel}")
+            .parse()
+            .expect("a kernel's name is a module path");
+        let wgsl = compiler
+            .compile(&module)
+            .unwrap_or_else(|error| panic!("shaders/{kernel}.wgsl: {error}"));
+        let name = format!("{kernel}{suffix}");
+        write(&format!("{name}.wgsl"), &wgsl.to_string());
+        let conditions = match features {
+            [] => String::new(),
+            some => format!(" with {}", some.join(", ")),
+        };
+        let constant = name.to_uppercase();
+        let file = format!("include_str!(concat!(env!(\"OUT_DIR\"), \"/{name}.wgsl\"))");
+        // Writing to a string cannot fail.
+        let _ = write!(
+            self.constants,
+            "/// `shaders/{kernel}.wgsl`{conditions}.\npub const {constant}: &str = {file};\n\n"
+        );
+        let _ = write!(self.all, "(\"{name}\", {constant}), ");
     }
-    // Plain names: imported functions keep the name they have in their file.
-    compiler.set_mangler(wesl::ManglerKind::None);
-    let module: ModulePath = format!("package::{kernel}")
-        .parse()
-        .expect("a kernel's name is a module path");
-    let wgsl = compiler
-        .compile(&module)
-        .unwrap_or_else(|error| panic!("shaders/{kernel}.wgsl: {error}"));
-    fs::write(
-        Path::new(out).join(format!("{kernel}{suffix}.wgsl")),
-        wgsl.to_string(),
-    )
-    .expect("OUT_DIR is writable");
+
+    /// Writes the constants.
+    fn write(self) {
+        let Self { constants, all } = self;
+        let list = format!(
+            "/// Every compiled kernel by name, for tests that reflect them.\n\
+             pub const ALL: &[(&str, &str)] = &[{all}];\n"
+        );
+        write("shaders.rs", &(constants + &list));
+    }
+}
+
+fn write(name: &str, text: &str) {
+    let out = env::var("OUT_DIR").expect("cargo sets OUT_DIR");
+    fs::write(Path::new(&out).join(name), text).expect("OUT_DIR is writable");
 }
