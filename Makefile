@@ -17,7 +17,7 @@ demo: setup
 	cargo run --release --quiet -- colorize runs/demo --teacher assets/teacher/demo-teacher.onnx
 	@echo
 	@echo "Gray scene:      runs/demo/luma.ply"
-	@echo "Colored scene:  runs/demo/color.ply"
+	@echo "Colored scene:   runs/demo/color.ply"
 	@echo "Contact sheet:   runs/demo/contact-sheet.png"
 
 test: setup
