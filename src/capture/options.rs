@@ -233,16 +233,4 @@ mod tests {
         );
         assert_eq!(serde_json::from_str::<LoadOptions>(&text).unwrap(), options);
     }
-
-    #[test]
-    fn reports_of_earlier_versions_had_8_bits_and_no_masks() {
-        let options: LoadOptions =
-            serde_json::from_str(r#"{"max_side":null,"holdout":true}"#).unwrap();
-        let expected = LoadOptions {
-            normalize: Normalize::Off,
-            masks: MaskSource::Off,
-            ..LoadOptions::default()
-        };
-        assert_eq!(options, expected);
-    }
 }

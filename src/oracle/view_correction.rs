@@ -54,7 +54,7 @@ pub fn teacher_of(pixels: &[Pixel]) -> Affine {
     let x = [0, 1].map(|c| mean(&|pixel| pixel.1[c]));
     let t = [0, 1].map(|c| mean(&|pixel| pixel.2[c]));
     let prior = |i: usize, j: usize| if i == j { CORRECTION_PRIOR } else { 0.0 };
-    // Centerd before it is squared: nothing cancels.
+    // Centered before it is squared: nothing cancels.
     let within =
         [0, 1].map(|i| [0, 1].map(|j| mean(&|p| (p.1[i] - x[i]) * (p.1[j] - x[j])) + prior(i, j)));
     let across =
