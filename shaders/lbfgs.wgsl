@@ -1,9 +1,12 @@
 // L-BFGS (Nocedal 1980; Nocedal and Wright 2006, algorithm 7.4) on arrays that stay on the
 // device: no number is read back between the steps. Sums run in a fixed order.
 //
-// There is no line search. A step that raised the loss is undone, what is remembered is
-// forgotten, and the step of the majorizer is taken instead: the quadratic that touches the
-// loss from above, its matrix AᵀWA replaced by row sums, which bound it.
+// Steps have length 1 until one raises the loss. Then a shorter one is tried, where the
+// parabola through both losses and the slope is least (Nocedal and Wright 2006, 3.5); should
+// that raise the loss too, what is remembered is forgotten, and the step of the majorizer is
+// taken: the quadratic that touches the loss from above, its matrix AᵀWA replaced by row
+// sums, which bound it. The second step is the majorizer's as well: the first spans residuals
+// from far to near, and says little about the curvature where it ends.
 //
 // Unknowns may have floors. One that stands at its floor, and would go below, is held there;
 // the others are put onto theirs if they go below (after Bertsekas 1982, projected Newton).
@@ -20,15 +23,19 @@ struct LbfgsParameters {
     ridge: f32,
     // What a diagonal entry is of the sum of weights that `diagonal` holds.
     diagonal_scale: f32,
+    // How many of the first unknowns are constant harmonics.
+    constants: u32,
+    // What a constant harmonic of one adds to a color.
+    color: f32,
 }
 
 // Pairs of displacements and changes of the gradient that are remembered.
 const MEMORY: u32 = 5u;
 // Scalars that the steps share. The loss at the accepted point, UNKNOWN before the first.
 const LOSS: u32 = 0u;
-// 1 where the present point is accepted.
-const ACCEPTED: u32 = 1u;
-// 1 where there is an accepted point before it.
+// What the next step is: one of those below.
+const NEXT: u32 = 1u;
+// 1 where the present point is accepted and makes a pair with the one before.
 const PAIRED: u32 = 2u;
 // Displacement · change of the newest pair.
 const CURVATURE: u32 = 3u;
@@ -36,11 +43,31 @@ const CURVATURE: u32 = 3u;
 const SCALE: u32 = 4u;
 // What `lbfgs_add` multiplies by.
 const FACTOR: u32 = 5u;
+// What the step is of `direction`.
+const LENGTH: u32 = 6u;
+// Of the loss along `direction`, at the accepted point.
+const SLOPE: u32 = 7u;
+// Points accepted so far.
+const AGE: u32 = 8u;
+// How far the colors went from the accepted point before to this: the mean over what is drawn.
+const MOVED: u32 = 9u;
+// 1 where what is minimized has changed since the accepted point, as the views' corrections do.
+const CHANGED: u32 = 10u;
 // For each pair: one over displacement · change, 0 where it does not count.
-const RHO: u32 = 6u;
+const RHO: u32 = 11u;
 const ALPHA: u32 = RHO + MEMORY;
 
 const UNKNOWN: f32 = 3.4028235e38;
+
+// The present point is accepted: a step onward.
+const ONWARD: f32 = 0.0;
+// It is not: less of the same step.
+const SHORTER: f32 = 1.0;
+// Nor is the shorter one: the majorizer's step.
+const SAFE: f32 = 2.0;
+
+// A shorter step is this share of the last at least and at most.
+const SHORTENED: vec2f = vec2f(0.1, 0.5);
 
 // A loss may rise by this share: the views' corrections, which it is measured with, move
 // from step to step.
@@ -76,8 +103,6 @@ const LEAST_SCALE: f32 = 1e-3;
 // Any of the arrays above.
 @group(0) @binding(15) var<storage, read> left: array<f32>;
 @group(0) @binding(16) var<storage, read> right: array<f32>;
-// What the ridge draws the unknowns to.
-@group(0) @binding(17) var<storage, read> origin: array<f32>;
 
 var<workgroup> sums: array<f32, 256>;
 
@@ -94,7 +119,7 @@ fn sum_of_group(local: u32, own: f32) -> f32 {
     return sums[0];
 }
 
-// Leaves the workgroup's sum for the kernel that adds up the blocks.
+// Leaves the workgroup's sum for the kernel that adds up the blocks: the first of two.
 fn leave_sum(block: u32, local: u32, own: f32) {
     let sum = sum_of_group(local, own);
     if local == 0u && block < parameters.blocks {
@@ -102,11 +127,23 @@ fn leave_sum(block: u32, local: u32, own: f32) {
     }
 }
 
+// The same for the second.
+fn leave_second_sum(block: u32, local: u32, own: f32) {
+    let sum = sum_of_group(local, own);
+    if local == 0u && block < parameters.blocks {
+        block_sums[parameters.blocks + block] = sum;
+    }
+}
+
 // The sum of what the blocks left, valid in thread 0.
 fn total(local: u32) -> f32 {
+    return total_from(0u, local);
+}
+
+fn total_from(first: u32, local: u32) -> f32 {
     var own = 0.0;
     for (var block = local; block < parameters.blocks; block += 256u) {
-        own += block_sums[block];
+        own += block_sums[first + block];
     }
     return sum_of_group(local, own);
 }
@@ -114,9 +151,13 @@ fn total(local: u32) -> f32 {
 // One over the majorizer's diagonal. Blend weights sum to at most one a pixel, so the sum
 // of a Gaussian's weights bounds its row.
 fn inverse_diagonal(k: u32) -> f32 {
+    return 1.0 / (parameters.diagonal_scale * diagonal[of_channel(k)] + parameters.ridge);
+}
+
+// Where `diagonal` has an unknown's.
+fn of_channel(k: u32) -> u32 {
     let n = parameters.splats;
-    let of_channel = (k / n) % parameters.diagonals * n + k % n;
-    return 1.0 / (parameters.diagonal_scale * diagonal[of_channel] + parameters.ridge);
+    return (k / n) % parameters.diagonals * n + k % n;
 }
 
 // The ridge's part of the gradient, and partial sums of its part of the loss.
@@ -126,9 +167,9 @@ fn lbfgs_ridge(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) gro
     let k = block * 256u + local;
     var own = 0.0;
     if k < parameters.length {
-        let off = unknowns[k] - origin[k];
-        gradient[k] += parameters.ridge * off;
-        own = 0.5 * parameters.ridge * off * off;
+        let x = unknowns[k];
+        gradient[k] += parameters.ridge * x;
+        own = 0.5 * parameters.ridge * x * x;
     }
     leave_sum(block, local, own);
 }
@@ -147,11 +188,28 @@ fn lbfgs_judge(@builtin(local_invocation_index) local: u32) {
         return;
     }
     let first = scalars[LOSS] == UNKNOWN;
-    let accepted = first || loss <= scalars[LOSS] * (1.0 + TOLERANCE);
-    scalars[ACCEPTED] = select(0.0, 1.0, accepted);
-    scalars[PAIRED] = select(0.0, 1.0, accepted && !first);
-    scalars[LOSS] = select(UNKNOWN, loss, accepted);
-    if first || !accepted {
+    let rise = loss - scalars[LOSS];
+    let changed = scalars[CHANGED] > 0.0;
+    scalars[CHANGED] = 0.0;
+    if first || loss <= scalars[LOSS] * (1.0 + TOLERANCE) {
+        scalars[PAIRED] = select(0.0, 1.0, !first && !changed && scalars[AGE] >= 2.0);
+        scalars[AGE] += 1.0;
+        scalars[LOSS] = loss;
+        scalars[NEXT] = ONWARD;
+        scalars[LENGTH] = 1.0;
+        return;
+    }
+    scalars[PAIRED] = 0.0;
+    if scalars[NEXT] == ONWARD {
+        let slope = scalars[SLOPE];
+        let bend = rise - slope;
+        // Nothing is known of a loss that is none, nor of a slope that rises.
+        let least = select(SHORTENED.x, -0.5 * slope / bend, slope < 0.0 && bend < UNKNOWN);
+        scalars[LENGTH] = clamp(least, SHORTENED.x, SHORTENED.y);
+        scalars[NEXT] = SHORTER;
+    } else {
+        scalars[NEXT] = SAFE;
+        scalars[LENGTH] = 1.0;
         scalars[SCALE] = 1.0;
         for (var i = 0u; i < MEMORY; i++) {
             scalars[RHO + i] = 0.0;
@@ -167,25 +225,56 @@ fn lbfgs_pair(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) grou
     if k >= parameters.length {
         return;
     }
-    if scalars[ACCEPTED] == 0.0 {
+    if scalars[NEXT] == ONWARD {
+        displacement[k] = unknowns[k] - accepted_unknowns[k];
+        change[k] = gradient[k] - accepted_gradient[k];
+        accepted_unknowns[k] = unknowns[k];
+        accepted_gradient[k] = gradient[k];
+    } else {
         unknowns[k] = accepted_unknowns[k];
         gradient[k] = accepted_gradient[k];
-        return;
     }
-    displacement[k] = unknowns[k] - accepted_unknowns[k];
-    change[k] = gradient[k] - accepted_gradient[k];
-    accepted_unknowns[k] = unknowns[k];
-    accepted_gradient[k] = gradient[k];
+}
+
+// Partial sums of how far the unknowns went, and of what they are weighed by: as Gaussians
+// are drawn, and as the loss weighs the pixels.
+@compute @workgroup_size(256)
+fn lbfgs_moved(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
+    let block = linear_group(group, groups);
+    let k = block * 256u + local;
+    var moved = 0.0;
+    var weight = 0.0;
+    if k < parameters.length {
+        let own = diagonal[of_channel(k)];
+        moved = own * abs(displacement[k]);
+        // Once for all harmonics.
+        weight = select(0.0, own, k < parameters.constants);
+    }
+    leave_sum(block, local, moved);
+    workgroupBarrier();
+    leave_second_sum(block, local, weight);
+}
+
+// After `lbfgs_moved`.
+@compute @workgroup_size(256)
+fn lbfgs_mean(@builtin(local_invocation_index) local: u32) {
+    let moved = total(local);
+    workgroupBarrier();
+    let weight = total_from(parameters.blocks, local);
+    if local == 0u {
+        let accepted = scalars[NEXT] == ONWARD;
+        scalars[MOVED] = select(0.0, parameters.color * moved / weight, accepted && weight > 0.0);
+    }
 }
 
 // What is held, and the gradient of the rest as the direction to begin with.
 @compute @workgroup_size(256)
 fn lbfgs_begin(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
     let k = linear_group(group, groups) * 256u + local;
-    if k >= parameters.length {
+    if k >= parameters.length || scalars[NEXT] == SHORTER {
         return;
     }
-    if scalars[ACCEPTED] > 0.0 {
+    if scalars[NEXT] == ONWARD {
         let held = unknowns[k] <= floors[k] && gradient[k] >= 0.0;
         preconditioner[k] = select(inverse_diagonal(k), 0.0, held);
     }
@@ -255,18 +344,20 @@ fn lbfgs_alpha(@builtin(local_invocation_index) local: u32) {
 @compute @workgroup_size(256)
 fn lbfgs_add(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
     let k = linear_group(group, groups) * 256u + local;
-    if k < parameters.length {
-        direction[k] += scalars[FACTOR] * left[k];
+    if k >= parameters.length || scalars[NEXT] == SHORTER {
+        return;
     }
+    direction[k] += scalars[FACTOR] * left[k];
 }
 
 // Between the two passes over the pairs.
 @compute @workgroup_size(256)
 fn lbfgs_precondition(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
     let k = linear_group(group, groups) * 256u + local;
-    if k < parameters.length {
-        direction[k] *= scalars[SCALE] * preconditioner[k];
+    if k >= parameters.length || scalars[NEXT] == SHORTER {
+        return;
     }
+    direction[k] *= scalars[SCALE] * preconditioner[k];
 }
 
 // After `lbfgs_dot` of change and direction, oldest pair first: the displacement is to be added.
@@ -278,11 +369,20 @@ fn lbfgs_beta(@builtin(local_invocation_index) local: u32) {
     }
 }
 
+// After `lbfgs_dot` of gradient and direction, which is that of the step turned around.
+@compute @workgroup_size(256)
+fn lbfgs_slope(@builtin(local_invocation_index) local: u32) {
+    let sum = total(local);
+    if local == 0u {
+        scalars[SLOPE] = -sum;
+    }
+}
+
 // The step, but for what is held.
 @compute @workgroup_size(256)
 fn lbfgs_step(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
     let k = linear_group(group, groups) * 256u + local;
     if k < parameters.length && preconditioner[k] > 0.0 {
-        unknowns[k] = max(unknowns[k] - direction[k], floors[k]);
+        unknowns[k] = max(unknowns[k] - scalars[LENGTH] * direction[k], floors[k]);
     }
 }

@@ -1,7 +1,9 @@
 // What brings each view's teacher into line with the colors found so far. The
 // teacher's a/b are taken to be M · x + m of the rendered x, by weighted least squares;
-// over the views M is made to average to the identity and m to zero, so that the
-// scene's own color cannot drift; what is wanted becomes M⁻¹(t - m).
+// the views' M and m are made to gather about the identity and zero, so that the
+// scene's own color cannot drift; what is wanted becomes M⁻¹(t - m). Where they gather is
+// Huber's: a mean of views that are near, a median where they are far apart, so that one view
+// of a color of its own does not tint the others.
 import package::common::correction::Correction;
 import package::common::numeric::linear_group;
 import package::common::view::View;
@@ -14,6 +16,12 @@ const SUMS: u32 = 12u;
 // Variance in squared CIELAB units that is added to both sides: a view with hardly any
 // color says nothing about the gain, which then stays at the identity.
 const PRIOR_VARIANCE: f32 = 4.0;
+// A gain's difference of one is as far as an offset's of so many CIELAB units.
+const GAIN_UNITS: f32 = 10.0;
+// Views count alike within so many CIELAB units, and less the farther they are beyond.
+const NEAR: f32 = 10.0;
+// Steps to where the views gather (Weiszfeld 1937).
+const GATHERINGS: u32 = 16u;
 // A gain that all but loses a direction cannot be undone.
 const DETERMINANT_MIN: f32 = 0.1;
 
@@ -114,37 +122,62 @@ fn teacher_of(index: u32) -> Correction {
     return Correction(gain, t - vec2f(dot(gain.xy, x), dot(gain.zw, x)), vec2f());
 }
 
-// One workgroup, a thread for every 256th view.
-@compute @workgroup_size(256)
-fn view_correction(@builtin(local_invocation_index) local: u32) {
-    var mean = Correction();
+fn distance_of(a: Correction, b: Correction) -> f32 {
+    return length(a.offset - b.offset) + GAIN_UNITS * length(a.gain - b.gain);
+}
+
+// The mean of all views' maps, weighed by how near they are to `center`; valid in all threads.
+fn gathered(local: u32, center: Correction, alike: bool) -> Correction {
+    var gain = vec4f();
+    var offset = vec2f();
+    var weights = 0.0;
     for (var v = local; v < parameters.views; v += 256u) {
-        let teacher = teacher_of(v);
-        corrections[v] = teacher;
-        mean.gain += teacher.gain;
-        mean.offset += teacher.offset;
+        let own = corrections[v];
+        let weight = select(1.0 / max(distance_of(own, center), NEAR), 1.0, alike);
+        gain += weight * own.gain;
+        offset += weight * own.offset;
+        weights += weight;
     }
-    sums[local] = mean.gain.x;
-    sums[256u + local] = mean.gain.y;
-    sums[512u + local] = mean.gain.z;
-    sums[768u + local] = mean.gain.w;
-    sums[1024u + local] = mean.offset.x;
-    sums[1280u + local] = mean.offset.y;
+    sums[local] = gain.x;
+    sums[256u + local] = gain.y;
+    sums[512u + local] = gain.z;
+    sums[768u + local] = gain.w;
+    sums[1024u + local] = offset.x;
+    sums[1280u + local] = offset.y;
+    sums[1536u + local] = weights;
     workgroupBarrier();
     for (var half = 128u; half > 0u; half /= 2u) {
         if local < half {
-            for (var s = 0u; s < 6u; s++) {
+            for (var s = 0u; s < 7u; s++) {
                 sums[s * 256u + local] += sums[s * 256u + local + half];
             }
         }
         workgroupBarrier();
     }
-    let views = f32(parameters.views);
-    let mean_gain = vec4f(sums[0], sums[256], sums[512], sums[768]) / views;
-    let mean_offset = vec2f(sums[1024], sums[1280]) / views;
+    let sum = sums[1536];
+    let found = Correction(
+        vec4f(sums[0], sums[256], sums[512], sums[768]) / sum,
+        vec2f(sums[1024], sums[1280]) / sum,
+        vec2f(),
+    );
+    // Before the next sums take their place.
+    workgroupBarrier();
+    return found;
+}
+
+// One workgroup, a thread for every 256th view.
+@compute @workgroup_size(256)
+fn view_correction(@builtin(local_invocation_index) local: u32) {
     for (var v = local; v < parameters.views; v += 256u) {
-        let gain = corrections[v].gain + vec4f(1.0, 0.0, 0.0, 1.0) - mean_gain;
-        let offset = corrections[v].offset - mean_offset;
+        corrections[v] = teacher_of(v);
+    }
+    var center = gathered(local, Correction(), true);
+    for (var k = 0u; k < GATHERINGS; k++) {
+        center = gathered(local, center, false);
+    }
+    for (var v = local; v < parameters.views; v += 256u) {
+        let gain = corrections[v].gain + vec4f(1.0, 0.0, 0.0, 1.0) - center.gain;
+        let offset = corrections[v].offset - center.offset;
         let determinant = gain.x * gain.w - gain.y * gain.z;
         if determinant > DETERMINANT_MIN {
             let inverse = vec4f(gain.w, -gain.y, -gain.z, gain.x) / determinant;

@@ -35,7 +35,7 @@
 //!
 //! let raster = Arc::new(Raster::with(&gpu, scene.settings.raster_options()));
 //! let mut teacher = Teacher::open(Path::new("assets/demo/images"), None, &TeacherSettings::default())?;
-//! let settings = ChromaSettings { rounds: 1, coarse_rounds: 1, ..ChromaSettings::irls() };
+//! let settings = ChromaSettings { rounds: 2, ..ChromaSettings::irls() };
 //! let colored = chroma::colorize(
 //!     &raster, &dataset, &scene.splats, &mut teacher, &settings, &mut |_| ControlFlow::Continue(()),
 //! )?;

@@ -44,7 +44,7 @@ def commands(photos: int, arguments: argparse.Namespace, folder: Path) -> list[l
     limit = ["--memory-limit", str(arguments.memory_limit)]
     fit += ["--iterations", str(arguments.iterations), *limit]
     color = [str(PROGRAM), "colorize", run, "--teacher", teacher]
-    color += ["--rounds", "1", "--coarse-rounds", "1", *limit]
+    color += ["--rounds", "2", *limit]
     return [make, fit, color]
 
 

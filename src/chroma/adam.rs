@@ -6,7 +6,6 @@ use std::time::Instant;
 use super::{
     ChromaError, ChromaObserver, ChromaProgress, ChromaSettings, FrozenViews, Targets, Task,
     passes::{Ending, Judging, Passes},
-    progress::share,
 };
 use crate::{
     capture::view_at,
@@ -100,6 +99,7 @@ impl<'a> AdamSolver<'a> {
                 let told = observe(ChromaProgress {
                     iteration: done,
                     total: self.settings.iterations,
+                    moved: None,
                     loss: recent.iter().map(|&loss| f64::from(loss)).sum::<f64>()
                         / recent.len() as f64,
                     passes: done as f64
@@ -162,4 +162,9 @@ impl<'a> AdamSolver<'a> {
         }
         Ok(())
     }
+}
+
+/// What a pass over one scale is of a pass at full size.
+fn share(scale: usize) -> f64 {
+    0.25_f64.powi(scale as i32)
 }

@@ -47,6 +47,8 @@ impl CorrectionKernels {
 pub struct Corrections {
     /// One for each view; they change nothing until the first are found.
     pub corrections: Buffer<Correction>,
+    /// Those before the last.
+    before: Buffer<Correction>,
     view_sums: Buffer<f32>,
     solve: Bindings,
     views: usize,
@@ -58,8 +60,8 @@ impl Corrections {
     /// # Errors
     /// [`GpuError::TooLarge`].
     pub fn new(gpu: &Gpu, kernels: &CorrectionKernels, views: usize) -> Result<Self, GpuError> {
-        let corrections =
-            Buffer::from_slice(gpu, "view corrections", &vec![Correction::NONE; views])?;
+        let none = || Buffer::from_slice(gpu, "view corrections", &vec![Correction::NONE; views]);
+        let (corrections, before) = (none()?, none()?);
         let view_sums = Buffer::zeros(gpu, "view sums", views * SUM_GROUPS * SUMS)?;
         let parameters = CorrectionParameters::of(views, 0, false);
         let parameters = Buffer::uniform(gpu, "correction parameters", &parameters)?;
@@ -73,6 +75,7 @@ impl Corrections {
         );
         Ok(Self {
             corrections,
+            before,
             view_sums,
             solve,
             views,
@@ -139,7 +142,15 @@ impl Corrections {
 
     /// Records the corrections that follow from all views' sums.
     pub fn solve(&self, kernels: &CorrectionKernels, recorder: &mut Recorder) {
+        recorder.copy(self.corrections.raw(), self.before.raw());
         recorder.dispatch(&kernels.solve, &self.solve, 1);
+    }
+}
+
+impl Corrections {
+    /// Records the return to those before the last.
+    pub fn undo(&self, recorder: &mut Recorder) {
+        recorder.copy(self.before.raw(), self.corrections.raw());
     }
 }
 

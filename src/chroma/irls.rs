@@ -7,12 +7,11 @@ use std::time::Instant;
 
 use super::{
     ChromaError, ChromaObserver, ChromaProgress, ChromaSettings, FrozenViews, Targets, Task,
-    lbfgs::{Lbfgs, System, UNBOUNDED},
+    lbfgs::{Lbfgs, State, System, UNBOUNDED},
     passes::{Ending, Judging, Passes},
-    progress::share,
 };
 use crate::{
-    gpu::{Buffer, Gpu, Readback, Recorder},
+    gpu::{Buffer, Gpu, Recorder},
     raster::{ColorKind, Field, Load},
     splats::{ShField, sh},
 };
@@ -23,51 +22,40 @@ const TYPICAL_RESIDUAL: f64 = 3.0;
 /// Black to white of RGB in the units of the loss.
 const RGB_UNITS: f64 = 100.0;
 
-/// One reweighting.
-#[derive(Clone, Debug, PartialEq)]
-struct Round {
-    /// How often the pictures' size is halved.
-    scale: usize,
-    /// Residual at which the loss of a and b together levels off; without one, each has
-    /// its own.
-    robust: Option<f32>,
-    /// Whether the views' corrections are found anew after it.
-    corrects: bool,
-}
-
-/// The rounds that the settings ask for: on each coarser scale, to bring the views'
-/// corrections and the colors close at little cost, then at full size.
-fn rounds(settings: &ChromaSettings) -> Vec<Round> {
-    let round = |scale, settled: bool| Round {
-        scale,
-        // It never levels off at first: what is far off now may be right once the rest is
-        // in place.
-        robust: (settings.robust).map(|residual| if settled { residual } else { f32::INFINITY }),
-        corrects: settings.correct_views,
-    };
-    let coarsest = settings.coarse_scales as usize;
-    let coarse = (1..=coarsest).rev().flat_map(|scale| {
-        let settled = move |index| scale < coarsest || index >= PLAIN_ROUNDS;
-        (0..settings.coarse_rounds).map(move |index| round(scale, settled(index)))
-    });
-    let full = (0..settings.rounds).map(|index| round(0, coarsest > 0 || index >= PLAIN_ROUNDS));
-    coarse.chain(full).collect()
-}
-
-/// Rounds before the loss levels off.
+/// The loss levels off after so many rounds at the earliest, and once one moves the colors by
+/// less than so many CIELAB units: what is far off at first may be right once the rest is in
+/// place.
 const PLAIN_ROUNDS: usize = 4;
+const PLAIN_MOVES: f64 = 2.0;
+
+/// Every so many rounds the views' corrections are found anew; while the loss does not level
+/// off, in each. A gradient before and one after tell nothing about the curvature, so that the
+/// others give the pairs.
+const CORRECT_EVERY: usize = 2;
+
+/// Rounds in a row that hardly move the colors before they end: a single one may be short, and
+/// one of two follows on a correction.
+const SETTLED_ROUNDS: usize = 3;
 
 /// Solves for chroma or RGB harmonics.
 pub struct IrlsSolver<'a> {
     passes: Passes<'a>,
     system: System,
     lbfgs: Lbfgs,
-    rounds: Vec<Round>,
+    settings: ChromaSettings,
     /// Of the largest view.
     pixels: usize,
     spent: f64,
     /// Rounds done.
     done: usize,
+    /// Whether the loss does not level off yet.
+    plain: bool,
+    /// Rounds of late, in a row, that hardly moved the colors.
+    settled: usize,
+    /// Whether no round will follow.
+    ended: bool,
+    /// Whether the views' corrections are not those of the accepted point.
+    corrected: bool,
 }
 
 impl<'a> IrlsSolver<'a> {
@@ -91,7 +79,7 @@ impl<'a> IrlsSolver<'a> {
     ///
     /// # Errors
     /// As [`IrlsSolver::new`].
-    pub(super) fn starting_at(
+    pub fn starting_at(
         frozen: &'a FrozenViews,
         settings: &ChromaSettings,
         targets: &'a Targets,
@@ -99,23 +87,16 @@ impl<'a> IrlsSolver<'a> {
         start: &ShField,
     ) -> Result<Self, ChromaError> {
         let gpu = &frozen.raster.gpu;
-        let rounds = rounds(settings);
-        let scales = rounds.iter().map(|round| round.scale).max().unwrap_or(0) + 1;
         let field = Field::upload(gpu, start)?;
         let channels = start.channels;
         let planes = channels * sh::coefficient_count(settings.sh_degree.min(start.degree));
-        let sizes = [scales, tasks.len()];
+        let sizes = [1, tasks.len()];
         let passes = Passes::new(frozen, targets, tasks, field, planes, sizes)?;
         let count = frozen.geometry.count;
-        let origin = Buffer::zeros(gpu, "origin", planes * count)?;
-        let mut recorder = Recorder::new(gpu);
-        recorder.copy_front(passes.field.planes.raw(), origin.raw());
-        recorder.submit();
         let system = System {
             unknowns: passes.field.planes.clone(),
             gradient: passes.gradient.clone(),
             diagonal: passes.diagonal.clone(),
-            origin,
             floors: Buffer::from_slice(gpu, "floors", &vec![UNBOUNDED; planes * count])?,
             losses: passes.log.losses.clone(),
         };
@@ -132,10 +113,14 @@ impl<'a> IrlsSolver<'a> {
             passes,
             system,
             lbfgs,
-            rounds,
+            settings: settings.clone(),
             pixels,
             spent: 0.0,
             done: 0,
+            plain: settings.robust.is_some(),
+            settled: 0,
+            ended: false,
+            corrected: false,
         })
     }
 
@@ -148,9 +133,11 @@ impl<'a> IrlsSolver<'a> {
         self.system.floors.write(self.gpu(), floors);
     }
 
-    /// Rounds that [`IrlsSolver::run`] takes.
-    pub fn round_count(&self) -> usize {
-        self.rounds.len()
+    /// Residual at which the loss of a and b together levels off now; without one, each has
+    /// its own.
+    fn robust(&self) -> Option<f32> {
+        let levels = |residual| if self.plain { f32::INFINITY } else { residual };
+        self.settings.robust.map(levels)
     }
 
     /// Solves, telling `observe` after each round.
@@ -158,7 +145,7 @@ impl<'a> IrlsSolver<'a> {
     /// # Errors
     /// [`ChromaError`] when the device is lost or targets cannot be read.
     pub fn run(&mut self, observe: &mut ChromaObserver<'_>) -> Result<(), ChromaError> {
-        self.run_to(self.rounds.len(), observe)
+        self.run_to(self.settings.rounds, observe)
     }
 
     /// Goes on until so many rounds are done, and leaves the rest for later.
@@ -172,47 +159,74 @@ impl<'a> IrlsSolver<'a> {
     ) -> Result<(), ChromaError> {
         let begun = Instant::now();
         let gpu = self.gpu();
-        let mut pending: Option<(usize, f64, Readback<f32>)> = None;
-        let until = until.min(self.rounds.len());
-        for index in self.done..until {
-            let round = self.rounds[index].clone();
-            if index > 0 && self.rounds[index - 1] != round {
-                self.lbfgs.restart(gpu);
-            }
-            self.draw(&round, true)?;
-            let log = self.passes.log.read_later(gpu);
+        while self.done < until.min(self.settings.rounds) && !self.ended {
+            let round = self.done;
+            self.draw(self.robust(), true)?;
             let mut recorder = Recorder::new(gpu);
-            // The first picture is gray and says nothing about the teachers.
-            if round.corrects && index > 0 {
-                let kernels = &self.passes.frozen.kernels.correction;
-                self.passes.corrections.solve(kernels, &mut recorder);
-            }
             self.lbfgs.step(&mut recorder);
             recorder.submit();
-            self.done = index + 1;
-            if self.done == self.rounds.len() {
-                self.draw(&round, false)?;
-                let mut recorder = Recorder::new(gpu);
-                self.lbfgs.end(&mut recorder);
-                recorder.submit();
+            let mut state = State::of(&self.lbfgs.state_later(gpu).wait(gpu)?);
+            self.correct(round, state.moved.is_some());
+            self.done = round + 1;
+            let moves_less = |than| state.moved.is_some_and(|moved| moved < than);
+            let settles = !self.plain && moves_less(self.settings.settled);
+            self.settled = if settles { self.settled + 1 } else { 0 };
+            self.ended = self.done == self.settings.rounds || self.settled == SETTLED_ROUNDS;
+            let levels_off = self.plain && self.done >= PLAIN_ROUNDS && moves_less(PLAIN_MOVES);
+            if self.ended || levels_off {
+                self.end()?;
+                state = State::of(&self.lbfgs.state_later(gpu).wait(gpu)?);
             }
-            let due = pending.replace((index, self.spent, log));
-            let last = if self.done == until {
-                pending.take()
-            } else {
-                None
-            };
-            for (index, passes, losses) in due.into_iter().chain(last) {
-                let told = observe(ChromaProgress {
-                    iteration: index + 1,
-                    total: self.rounds.len(),
-                    loss: mean(&losses.wait(gpu)?),
-                    passes,
-                    seconds: begun.elapsed().as_secs_f64(),
-                });
-                if told.is_break() {
-                    return Err(ChromaError::Cancelled);
-                }
+            if levels_off && !self.ended {
+                self.plain = false;
+                self.lbfgs.restart(gpu);
+            }
+            let told = observe(ChromaProgress {
+                iteration: self.done,
+                total: self.settings.rounds,
+                loss: state.loss / self.passes.tasks.len() as f64,
+                moved: state.moved,
+                passes: self.spent,
+                seconds: begun.elapsed().as_secs_f64(),
+            });
+            if told.is_break() {
+                return Err(ChromaError::Cancelled);
+            }
+        }
+        Ok(())
+    }
+
+    /// Finds the views' corrections anew where the point is accepted; undoes those that it was
+    /// judged with where it is not.
+    fn correct(&mut self, round: usize, accepted: bool) {
+        let corrections = &self.passes.corrections;
+        let mut recorder = Recorder::new(self.gpu());
+        if std::mem::take(&mut self.corrected) && !accepted {
+            corrections.undo(&mut recorder);
+        }
+        // The first picture is gray and says nothing about the teachers.
+        let due = round > 0 && (round < PLAIN_ROUNDS || round.is_multiple_of(CORRECT_EVERY));
+        if self.settings.correct_views && accepted && due {
+            corrections.solve(&self.passes.frozen.kernels.correction, &mut recorder);
+            self.corrected = true;
+            self.lbfgs.changed(self.gpu());
+        }
+        recorder.submit();
+    }
+
+    /// Judges the last step.
+    fn end(&mut self) -> Result<(), ChromaError> {
+        self.draw(self.robust(), false)?;
+        let mut recorder = Recorder::new(self.gpu());
+        self.lbfgs.end(&mut recorder);
+        recorder.submit();
+        if std::mem::take(&mut self.corrected) {
+            let gpu = self.gpu();
+            let state = State::of(&self.lbfgs.state_later(gpu).wait(gpu)?);
+            if state.moved.is_none() {
+                let mut recorder = Recorder::new(gpu);
+                self.passes.corrections.undo(&mut recorder);
+                recorder.submit();
             }
         }
         Ok(())
@@ -231,12 +245,7 @@ impl<'a> IrlsSolver<'a> {
         recorder.copy(planes.raw(), self.passes.field.planes.raw());
         recorder.submit();
         let spent = self.spent;
-        let plain = Round {
-            scale: 0,
-            robust: None,
-            corrects: false,
-        };
-        self.draw(&plain, false)?;
+        self.draw(None, false)?;
         self.spent = spent;
         self.lbfgs.restart(gpu);
         Ok(mean(&self.passes.log.read_later(gpu).wait(gpu)?))
@@ -269,28 +278,26 @@ impl<'a> IrlsSolver<'a> {
 
     /// What a dispatch works on, the mean over the passes.
     pub fn load(&self) -> Load {
-        let scales = self.rounds.iter().map(|round| round.scale).max();
-        self.passes.load(scales.unwrap_or(0) + 1)
+        self.passes.load(1)
     }
 
     /// Draws every view for its loss, and with `adjoint` finds the gradient and the sums
     /// of the corrections.
-    fn draw(&mut self, round: &Round, adjoint: bool) -> Result<(), ChromaError> {
+    fn draw(&mut self, robust: Option<f32>, adjoint: bool) -> Result<(), ChromaError> {
         self.passes.clear(adjoint);
         let judging = Judging {
             agreement: 0.0,
-            robust: round.robust,
+            robust,
         };
-        let ending = match (adjoint, round.corrects) {
+        let ending = match (adjoint, self.settings.correct_views) {
             (false, _) => Ending::Loss,
             (true, false) => Ending::Gradient,
             (true, true) => Ending::GradientAndSums,
         };
         for task in 0..self.passes.tasks.len() {
-            self.passes.draw(task, round.scale, judging, task, ending)?;
+            self.passes.draw(task, 0, judging, task, ending)?;
         }
-        let of_view = if adjoint { 1.0 } else { DRAWING } * share(round.scale);
-        self.spent += of_view * self.passes.tasks.len() as f64;
+        self.spent += if adjoint { 1.0 } else { DRAWING } * self.passes.tasks.len() as f64;
         Ok(())
     }
 }

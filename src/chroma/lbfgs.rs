@@ -3,7 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 
 use crate::{
-    gpu::{Bindings, Buffer, Gpu, GpuError, Kernel, Recorder, groups_for, shaders},
+    gpu::{Bindings, Buffer, Gpu, GpuError, Kernel, Readback, Recorder, groups_for, shaders},
     splats::sh,
 };
 
@@ -23,13 +23,24 @@ pub struct LbfgsParameters {
     pub ridge: f32,
     /// What a diagonal entry is of the sum of weights.
     pub diagonal_scale: f32,
+    /// How many of the first unknowns are constant harmonics.
+    pub constants: u32,
+    /// What a constant harmonic of one adds to a color.
+    pub color: f32,
 }
 
 /// Twin of `MEMORY`: pairs that are remembered. Eight do no better (docs/decisions.md).
 const MEMORY: usize = 5;
 
 /// Twin of `RHO`: scalars before those of the pairs, of which each has two.
-const SHARED_SCALARS: usize = 6;
+const SHARED_SCALARS: usize = 11;
+
+/// Twins of the scalars that the host knows.
+const LOSS: usize = 0;
+const NEXT: usize = 1;
+const SCALE: usize = 4;
+const MOVED: usize = 9;
+const CHANGED: usize = 10;
 
 /// The loss before the first point is accepted, as the first scalar.
 const UNKNOWN: f32 = f32::MAX;
@@ -44,8 +55,6 @@ pub struct System {
     /// Sums of the pixels' curvatures, weighed as Gaussians are drawn there: a plane for
     /// each channel, or one for all.
     pub diagonal: Buffer<f32>,
-    /// What the ridge draws the unknowns to.
-    pub origin: Buffer<f32>,
     /// The least that each unknown may be; [`UNBOUNDED`] where nothing bounds it.
     pub floors: Buffer<f32>,
     /// The losses whose sum is minimized.
@@ -56,9 +65,9 @@ pub struct System {
 pub const UNBOUNDED: f32 = f32::MIN;
 
 /// Planes of floats that a system and its solver take for each plane of unknowns, beside
-/// these: gradient, origin, floors, the accepted point and its gradient, preconditioner,
+/// these: gradient, floors, the accepted point and its gradient, preconditioner,
 /// direction, and the pairs.
-const PLANES: usize = 7 + 2 * MEMORY;
+const PLANES: usize = 6 + 2 * MEMORY;
 
 /// Bytes of a system of `planes` planes of unknowns, and of its solver.
 pub(super) fn bytes(splats: usize, planes: usize) -> u64 {
@@ -76,10 +85,13 @@ pub struct LbfgsKernels {
     curvature: Kernel,
     spread: Kernel,
     scale: Kernel,
+    moved: Kernel,
+    mean: Kernel,
     alpha: Kernel,
     add: Kernel,
     precondition: Kernel,
     beta: Kernel,
+    slope: Kernel,
     step: Kernel,
 }
 
@@ -96,10 +108,13 @@ impl LbfgsKernels {
             curvature: kernel("lbfgs_curvature"),
             spread: kernel("lbfgs_spread"),
             scale: kernel("lbfgs_scale"),
+            moved: kernel("lbfgs_moved"),
+            mean: kernel("lbfgs_mean"),
             alpha: kernel("lbfgs_alpha"),
             add: kernel("lbfgs_add"),
             precondition: kernel("lbfgs_precondition"),
             beta: kernel("lbfgs_beta"),
+            slope: kernel("lbfgs_slope"),
             step: kernel("lbfgs_step"),
         }
     }
@@ -113,6 +128,7 @@ struct OfPair {
     keep: Bound,
     curvature: [Bound; 2],
     spread: [Bound; 2],
+    moved: [Bound; 2],
     along_displacement: Bound,
     alpha: Bound,
     add_change: Bound,
@@ -128,10 +144,32 @@ pub struct Lbfgs {
     judge: Bound,
     begin: Bound,
     precondition: Bound,
+    slope: [Bound; 2],
     step: Bound,
     pairs: Vec<OfPair>,
     newest: usize,
     blocks: u32,
+}
+
+/// Where the iteration stands.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct State {
+    /// The least loss so far, the ridge's part included.
+    pub loss: f64,
+    /// Mean change of the colors by the last step: as Gaussians are drawn, and as the loss
+    /// weighs the pixels. `None` where that step was undone.
+    pub moved: Option<f64>,
+}
+
+impl State {
+    /// From what [`Lbfgs::state_later`] reads.
+    pub fn of(scalars: &[f32]) -> Self {
+        let at = |index: usize| f64::from(scalars[index]);
+        Self {
+            loss: at(LOSS),
+            moved: (at(NEXT) == 0.0).then(|| at(MOVED)),
+        }
+    }
 }
 
 impl Lbfgs {
@@ -161,12 +199,14 @@ impl Lbfgs {
                 blocks,
                 ridge,
                 diagonal_scale: (sh::C0 * harmonics as f64) as f32,
+                constants: (channels * splats) as u32,
+                color: sh::C0 as f32,
             },
         )?;
         let zeros = |label| Buffer::<f32>::zeros(gpu, label, length);
         let [accepted_unknowns, accepted_gradient] = [zeros("accepted")?, zeros("accepted")?];
         let (preconditioner, direction) = (zeros("preconditioner")?, zeros("direction")?);
-        let block_sums = Buffer::<f32>::zeros(gpu, "lbfgs sums", blocks as usize)?;
+        let block_sums = Buffer::<f32>::zeros(gpu, "lbfgs sums", 2 * blocks as usize)?;
         let scalars = Buffer::<f32>::zeros(gpu, "scalars", SHARED_SCALARS + 2 * MEMORY)?;
         let bind = |kernel: &Kernel, used: &[(u32, &wgpu::Buffer)]| {
             Bound(kernel.clone(), kernel.bind_at(gpu, used))
@@ -221,6 +261,18 @@ impl Lbfgs {
                         ),
                         sum(&kernels.scale),
                     ],
+                    moved: [
+                        bind(
+                            &kernels.moved,
+                            &[
+                                parameters,
+                                (4, system.diagonal.raw()),
+                                (11, displacement.raw()),
+                                sums,
+                            ],
+                        ),
+                        bind(&kernels.mean, &[parameters, sums, of_scalars]),
+                    ],
                     along_displacement: product(&displacement, &direction),
                     alpha: sum(&kernels.alpha),
                     add_change: add(&change),
@@ -231,16 +283,7 @@ impl Lbfgs {
             })
             .collect::<Result<_, GpuError>>()?;
         let lbfgs = Self {
-            ridge: bind(
-                &kernels.ridge,
-                &[
-                    parameters,
-                    unknowns,
-                    gradient,
-                    sums,
-                    (17, system.origin.raw()),
-                ],
-            ),
+            ridge: bind(&kernels.ridge, &[parameters, unknowns, gradient, sums]),
             judge: bind(
                 &kernels.judge,
                 &[parameters, (6, system.losses.raw()), sums, of_scalars],
@@ -262,34 +305,56 @@ impl Lbfgs {
                 &kernels.precondition,
                 &[parameters, inverse, of_direction, of_scalars],
             ),
+            slope: [
+                bind(
+                    &kernels.dot,
+                    &[
+                        parameters,
+                        sums,
+                        (15, system.gradient.raw()),
+                        (16, direction.raw()),
+                    ],
+                ),
+                bind(&kernels.slope, &[parameters, sums, of_scalars]),
+            ],
             step: bind(
                 &kernels.step,
-                &[parameters, unknowns, floors, inverse, of_direction],
+                &[
+                    parameters,
+                    unknowns,
+                    floors,
+                    inverse,
+                    of_direction,
+                    of_scalars,
+                ],
             ),
             pairs,
             newest: 0,
             blocks,
             scalars,
         };
+        lbfgs.scalars.write_at(gpu, SCALE, &[1.0]);
         lbfgs.restart(gpu);
         Ok(lbfgs)
     }
 
-    /// Forgets everything, because what is minimized is another function from now on.
+    /// What is minimized is another function from now on, though one like that before: the
+    /// present point is accepted whatever the loss there.
     pub fn restart(&self, gpu: &Gpu) {
-        self.scalars.write_at(gpu, 0, &[UNKNOWN]);
+        self.scalars.write_at(gpu, LOSS, &[UNKNOWN]);
+    }
+
+    /// What is minimized is a little different from now on: the next step is judged by the loss
+    /// so far, but what the gradient changes by says nothing of the curvature.
+    pub fn changed(&self, gpu: &Gpu) {
+        self.scalars.write_at(gpu, CHANGED, &[1.0]);
     }
 
     /// Records a step from where loss and gradient are ready.
     pub fn step(&mut self, recorder: &mut Recorder) {
-        self.newest = (self.newest + 1) % MEMORY;
         self.judge(recorder);
-        let newest = &self.pairs[self.newest];
         self.all(recorder, &self.begin);
-        for [terms, sum] in [&newest.curvature, &newest.spread] {
-            self.all(recorder, terms);
-            self.one(recorder, sum);
-        }
+        self.compare(recorder);
         let from_newest = || (0..MEMORY).map(|age| (self.newest + MEMORY - age) % MEMORY);
         for pair in from_newest().map(|k| &self.pairs[k]) {
             self.all(recorder, &pair.along_displacement);
@@ -302,20 +367,40 @@ impl Lbfgs {
             self.one(recorder, &pair.beta);
             self.all(recorder, &pair.add_displacement);
         }
+        let [terms, sum] = &self.slope;
+        self.all(recorder, terms);
+        self.one(recorder, sum);
         self.all(recorder, &self.step);
     }
 
-    /// Records the end, where the loss is ready: a last step that raised it is undone.
+    /// Records the end of what is minimized, where the loss is ready: a last step that raised
+    /// it is undone.
     pub fn end(&mut self, recorder: &mut Recorder) {
-        self.newest = (self.newest + 1) % MEMORY;
         self.judge(recorder);
+        // No gradient, no pair.
+        self.compare(recorder);
+    }
+
+    /// Orders where it stands.
+    pub fn state_later(&self, gpu: &Gpu) -> Readback<f32> {
+        self.scalars.read_later(gpu)
     }
 
     /// Records whether the present point is accepted, and the return from it if it is not.
-    fn judge(&self, recorder: &mut Recorder) {
+    fn judge(&mut self, recorder: &mut Recorder) {
+        self.newest = (self.newest + 1) % MEMORY;
         self.all(recorder, &self.ridge);
         self.one(recorder, &self.judge);
         self.all(recorder, &self.pairs[self.newest].keep);
+    }
+
+    /// Records what the newest pair is worth, and how far it goes.
+    fn compare(&self, recorder: &mut Recorder) {
+        let newest = &self.pairs[self.newest];
+        for [terms, sum] in [&newest.curvature, &newest.spread, &newest.moved] {
+            self.all(recorder, terms);
+            self.one(recorder, sum);
+        }
     }
 
     /// A thread for each unknown.

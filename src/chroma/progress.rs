@@ -9,9 +9,12 @@ pub struct ChromaProgress {
     pub iteration: usize,
     /// Of them in all.
     pub total: usize,
-    /// Mean loss of the finest scale in use, in CIELAB units: since the last report, or
-    /// at the start of the round.
+    /// Mean loss of a pixel in CIELAB units: of Adam at full size since the last report, of
+    /// least squares the least so far.
     pub loss: f64,
+    /// How far the last step of least squares moved the colors, in CIELAB units: the mean over
+    /// what is drawn, as the loss weighs it. `None` where it was undone, and of Adam.
+    pub moved: Option<f64>,
     /// Drawings of a view with their adjoints, those of coarser scales by their share of
     /// the pixels.
     pub passes: f64,
@@ -21,8 +24,3 @@ pub struct ChromaProgress {
 
 /// Who is told; a [`ControlFlow::Break`] ends it with [`ChromaError::Cancelled`].
 pub type ChromaObserver<'a> = dyn FnMut(ChromaProgress) -> ControlFlow<()> + 'a;
-
-/// What a pass over one scale is of a pass at full size.
-pub(super) fn share(scale: usize) -> f64 {
-    0.25_f64.powi(scale as i32)
-}

@@ -50,12 +50,11 @@ pub struct ChromaSettings {
     pub seed: u64,
     /// Whether least squares brings each view's teacher into line with the others.
     pub correct_views: bool,
-    /// Coarser scales that least squares passes through on its way.
-    pub coarse_scales: u32,
-    /// Rounds on each of them: in each all views are drawn, reweighted, and a step taken.
-    pub coarse_rounds: usize,
-    /// Rounds at full size.
+    /// Rounds of least squares at most: in each all views are drawn, reweighted, and a step taken.
     pub rounds: usize,
+    /// Rounds end when some in a row move the colors by less, in CIELAB units: the mean over
+    /// what is drawn, as the loss weighs it. 0: never.
+    pub settled: f64,
     /// How strongly least squares draws every Gaussian towards gray, in pixels that show it:
     /// what depends on less stays where the others leave it.
     pub ridge: f64,
@@ -71,6 +70,13 @@ pub struct ChromaSettings {
 /// this does: a Gaussian of 30 units is held like one that a third of a pixel wants gray. A
 /// hundredth of it fits the teacher better and held-out photos worse (docs/decisions.md).
 const RIDGE: f64 = 0.01;
+
+/// Beyond these the loss falls further, but held-out photos are met no better and views agree
+/// less (docs/decisions.md).
+const ROUNDS: usize = 12;
+
+/// A tenth of what is just seen (docs/decisions.md).
+const SETTLED: f64 = 0.1;
 
 impl ChromaSettings {
     /// The paper's distillation: Adam for so many iterations, three scales.
@@ -99,9 +105,8 @@ impl ChromaSettings {
             rest_share: 1.0 / 20.0,
             seed: 0,
             correct_views: true,
-            coarse_scales: 2,
-            coarse_rounds: 10,
-            rounds: 10,
+            rounds: ROUNDS,
+            settled: SETTLED,
             ridge: RIDGE,
             memory_limit: None,
             fill: true,
@@ -114,7 +119,7 @@ impl ChromaSettings {
         Self {
             robust: None,
             correct_views: false,
-            coarse_rounds: 4,
+            settled: 0.0,
             fill: false,
             ..Self::irls()
         }
@@ -122,17 +127,9 @@ impl ChromaSettings {
 
     /// Scales that targets are needed at, the full one included.
     pub fn target_scales(&self) -> usize {
-        1 + match self.solver {
-            SolverKind::Adam => self.scales,
-            SolverKind::Irls => self.coarse_scales,
-        } as usize
-    }
-
-    /// Iterations of Adam, or rounds of least squares on all scales.
-    pub fn steps_to_report(&self) -> usize {
         match self.solver {
-            SolverKind::Adam => self.iterations,
-            SolverKind::Irls => self.coarse_scales as usize * self.coarse_rounds + self.rounds,
+            SolverKind::Adam => 1 + self.scales as usize,
+            SolverKind::Irls => 1,
         }
     }
 

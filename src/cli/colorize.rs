@@ -72,12 +72,10 @@ pub struct Colorize {
     /// Adam's last iteration, counted from the start of `fit` [default: the preset's].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     until: Option<u32>,
-    /// Rounds of least squares at full size [default: 10].
+    /// Rounds of least squares at most; they end when the colors hardly move any more
+    /// [default: 12].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
     rounds: Option<u32>,
-    /// Rounds of least squares at each of a quarter and half the size before [default: 10].
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
-    coarse_rounds: Option<u32>,
     /// Difference in CIELAB units from which on a view is not believed, or `off` [default: 10
     /// with irls, off with adam].
     #[arg(long, value_name = "UNITS|off", value_parser = robust)]
@@ -163,10 +161,8 @@ impl Colorize {
             // As many iterations as the run says.
             SolverKind::Adam => ChromaSettings::adam(0),
         };
-        let count = |said: Option<u32>, default: usize| said.map_or(default, |n| n as usize);
         settings.scales = self.scales.unwrap_or(settings.scales);
-        settings.rounds = count(self.rounds, settings.rounds);
-        settings.coarse_rounds = count(self.coarse_rounds, settings.coarse_rounds);
+        settings.rounds = self.rounds.map_or(settings.rounds, |n| n as usize);
         if let Some(residual) = self.robust {
             settings.robust = Some(residual).filter(|residual| residual.is_finite());
         }
@@ -181,7 +177,6 @@ impl Colorize {
     fn check_solver(&self) {
         let of_irls = [
             ("--rounds", self.rounds.is_some()),
-            ("--coarse-rounds", self.coarse_rounds.is_some()),
             ("--correct-views", self.correct_views == Some(Switch::On)),
             ("--fill", self.fill == Some(Switch::On)),
         ];

@@ -6,7 +6,9 @@ use super::{
 };
 use crate::capture::{Camera, Capture};
 
-/// CIELAB units that become one, so that a/b are of the size of gray: -128 to 127.
+/// CIELAB units that become one, so that a/b are of the size of gray: -128 to 127. They are
+/// counted from their mean over all points: a gain about another value would shift the views
+/// against each other, and what pale teachers say would decide by how much.
 const UNITS: f64 = 255.0;
 
 /// How far the teacher's views differ in saturation and tint, in CIELAB units.
@@ -65,6 +67,14 @@ impl TeacherSamples {
         let taught: Vec<usize> = (0..views).filter(|&v| self.cameras[v].is_some()).collect();
         let (mut spread, mut noise) = (0.0, 0.0);
         for channel in 0..2 {
+            let known = || {
+                self.ab
+                    .iter()
+                    .flatten()
+                    .flatten()
+                    .map(|ab| f64::from(ab[channel]))
+            };
+            let mean = known().sum::<f64>() / known().count().max(1) as f64;
             let tracks: Vec<Vec<Sample>> = (capture.points.iter().zip(&self.ab))
                 .map(|(point, ab)| {
                     (point.track.iter().zip(ab))
@@ -73,7 +83,7 @@ impl TeacherSamples {
                             let value = f64::from((*ab)?[channel]);
                             Some(Sample {
                                 view: seen.view,
-                                value: 0.5 + value / UNITS,
+                                value: (value - mean) / UNITS,
                                 direction: (point.position - camera.center()).normalize_or_zero(),
                             })
                         })
@@ -105,11 +115,12 @@ mod tests {
         effects::fixtures::{capture, looking_along_z, photo},
     };
 
-    /// Four views of points on a plane, colored by place; `tint` is added to each view's a.
-    fn spread(tint: [f32; 4]) -> Option<TeacherSpread> {
-        let photos: Vec<_> = (0..4)
+    /// Views of points on a plane, and what each says of a point.
+    fn spread(views: usize, says: impl Fn(usize, usize) -> [f32; 2]) -> TeacherSpread {
+        const SIDE: u32 = 32;
+        let photos: Vec<_> = (0..views)
             .map(|k| {
-                let camera = looking_along_z(DVec3::new(0.1 * f64::from(k), 0.0, -4.0), 32);
+                let camera = looking_along_z(DVec3::new(0.02 * k as f64, 0.0, -4.0), SIDE);
                 (photo(&camera, |_, _| 128), camera)
             })
             .collect();
@@ -118,36 +129,70 @@ mod tests {
         });
         let mut capture = capture(&photos, points);
         for point in &mut capture.points {
-            point.track = (0..4)
+            point.track = (0..views)
                 .filter_map(|view| {
                     let pixel = photos[view].1.pixel_of(point.position)?;
                     Some(Observation { view, pixel })
                 })
                 .collect();
         }
-        let answers: Vec<Vec<[f32; 2]>> = photos
-            .iter()
-            .zip(tint)
-            .map(|((_, camera), tint)| {
-                let pixels = 0..camera.width * camera.height;
-                pixels
-                    .map(|p| [20.0 + tint, (p / camera.width) as f32])
-                    .collect()
-            })
-            .collect();
         let mut samples = TeacherSamples::new(&capture);
-        for (view, ((_, camera), ab)) in photos.iter().zip(&answers).enumerate() {
-            samples.take(&capture, view, camera, ab);
+        for (view, (_, camera)) in photos.iter().enumerate() {
+            let ab: Vec<[f32; 2]> = (0..camera.width * camera.height)
+                .map(|p| says(view, p as usize))
+                .collect();
+            samples.take(&capture, view, camera, &ab);
         }
-        samples.spread(&capture)
+        samples.spread(&capture).expect("points in many views")
+    }
+
+    /// A color by place, that changes from pixel to pixel by this much.
+    fn by_place(pixel: usize, strength: f32) -> [f32; 2] {
+        let [x, y] = [pixel % 32, pixel / 32].map(|v| v as f32 / 16.0 - 1.0);
+        [strength * x, strength * y]
+    }
+
+    /// Noise of a teacher, -1 to 1.
+    fn whim(view: usize, pixel: usize) -> f32 {
+        fastrand::Rng::with_seed((view * 4096 + pixel) as u64).f32() * 2.0 - 1.0
     }
 
     #[test]
     fn tints_are_found() {
-        let found = spread([-9.0, 3.0, -3.0, 9.0]).unwrap();
-        assert!((5.0..8.0).contains(&found.spread), "{found:?}");
+        let tints = [-9.0, 3.0, -3.0, 9.0];
+        let found = spread(4, |view, p| {
+            let [a, b] = by_place(p, 12.0);
+            [20.0 + a + tints[view], b]
+        });
+        // Root mean square of the tints.
+        assert!((found.spread - 6.7).abs() < 0.7, "{found:?}");
         assert!(found.spread > 3.0 * found.noise, "{found:?}");
-        let alike = spread([0.0; 4]).unwrap();
+        let alike = spread(4, |_, p| by_place(p, 12.0));
         assert!(alike.spread < 1.0, "{alike:?}");
+    }
+
+    /// A teacher that hardly says anything, far from gray or not, does not differ from view
+    /// to view.
+    #[test]
+    fn pale_and_constant_teachers_do_not_differ() {
+        for far in [0.0, 60.0] {
+            let constant = spread(12, |_, _| [far, -far]);
+            assert!(constant.spread < 0.1, "{constant:?}");
+            let pale = spread(12, |view, p| [far + whim(view, p), whim(view + 50, p)]);
+            assert!(pale.spread < 3.0 * pale.noise.max(0.1), "{pale:?}");
+        }
+    }
+
+    #[test]
+    fn one_view_of_a_color_of_its_own_is_found() {
+        let found = spread(12, |view, p| {
+            let tint = if view == 4 { [30.0, 20.0] } else { [0.0; 2] };
+            let own = by_place(p, 2.0);
+            [0, 1].map(|c| own[c] + tint[c] + 0.5 * whim(view + 50 * c, p))
+        });
+        // Its tint about the mean of all. The prior holds what is so far off back a little.
+        let expected = (1300.0_f64 * 11.0).sqrt() / 12.0;
+        let share = found.spread / expected;
+        assert!((0.75..1.05).contains(&share), "{found:?}");
     }
 }

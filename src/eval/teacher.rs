@@ -17,9 +17,9 @@ use crate::{
     splats::{ShField, sh},
 };
 
-/// RGB splats get so many times the chroma solver's rounds: harmonics of degree 3 settle more
-/// slowly than a color for each Gaussian.
-const RGB_ROUNDS: usize = 3;
+/// Rounds for RGB splats, three times what chroma takes as a rule: harmonics of degree 3 settle
+/// more slowly than a color for each Gaussian.
+const RGB_ROUNDS: usize = 45;
 
 /// A teacher and its answers for the photos.
 pub struct MeasuredTeacher {
@@ -110,14 +110,13 @@ impl MeasuredTeacher {
             total: 1,
             name: "",
         });
-        let ours = ChromaSettings::irls();
         let settings = ChromaSettings {
             sh_degree: sh::MAX_DEGREE,
             robust: None,
             correct_views: false,
-            coarse_rounds: RGB_ROUNDS * ours.coarse_rounds,
-            rounds: RGB_ROUNDS * ours.rounds,
-            ..ours
+            rounds: RGB_ROUNDS,
+            settled: 0.0,
+            ..ChromaSettings::irls()
         };
         let mut targets = Targets::new(settings.target_scales());
         let (mut tasks, mut cameras) = (Vec::new(), Vec::new());

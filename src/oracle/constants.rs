@@ -47,6 +47,12 @@ pub const CHROMA_EPSILON: f64 = 0.5;
 /// Variance in squared Lab units that is added to both sides of a view's regression.
 pub const CORRECTION_PRIOR: f64 = 4.0;
 
+/// A gain's difference of one is as far as an offset's of so many Lab units.
+pub const CORRECTION_GAIN_UNITS: f64 = 10.0;
+
+/// Views count alike within so many Lab units of where they gather.
+pub const CORRECTION_NEAR: f64 = 10.0;
+
 /// A gain whose determinant is no larger cannot be undone.
 pub const CORRECTION_DETERMINANT_MIN: f64 = 0.1;
 

@@ -1,6 +1,6 @@
-//! L-BFGS (Nocedal 1980; Nocedal and Wright 2006, algorithm 7.4) whose steps nobody
-//! searches along: one that raised the loss is undone for the majorizer's. With floors
-//! (Bertsekas 1982), and elimination to compare with.
+//! L-BFGS (Nocedal 1980; Nocedal and Wright 2006, algorithm 7.4): a step that raised the loss
+//! is shortened where a parabola says (3.5 there), and if that raises it too, undone for the
+//! majorizer's. With floors (Bertsekas 1982), and elimination to compare with.
 
 use std::collections::VecDeque;
 
@@ -22,9 +22,21 @@ pub const MEMORY: usize = 5;
 const TOLERANCE: f64 = 1e-4;
 /// The least that the scale of a pair that counts may be.
 const LEAST_SCALE: f64 = 1e-3;
+/// The least and the most that a shorter step is of the last.
+const SHORTENED: [f64; 2] = [0.1, 0.5];
+/// Points that are accepted before a pair counts.
+const AGE: usize = 2;
 
 /// A displacement, the change of the gradient along it, and one over their product.
 type Pair = (Vec<f64>, Vec<f64>, f64);
+
+/// What the next step is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Next {
+    Onward,
+    Shorter,
+    Safe,
+}
 
 /// Where the iteration stands.
 #[derive(Clone, Debug)]
@@ -33,10 +45,19 @@ pub struct Lbfgs {
     pub unknowns: Vec<f64>,
     /// Steps that were undone.
     pub undone: usize,
+    /// From the accepted point before to this one.
+    displacement: Vec<f64>,
     floors: Vec<f64>,
     ridge: f64,
-    /// The accepted point, its gradient and its loss.
-    accepted: Option<(Vec<f64>, Vec<f64>, f64)>,
+    /// The accepted point and its gradient.
+    accepted: (Vec<f64>, Vec<f64>),
+    /// The loss there, of what is minimized now.
+    loss: Option<f64>,
+    next: Next,
+    direction: Vec<f64>,
+    slope: f64,
+    /// Points accepted so far.
+    age: usize,
     /// One over the majorizer's diagonal there; zero for what is held at its floor.
     preconditioner: Vec<f64>,
     /// Newest first; nothing in the place of a pair that does not count.
@@ -50,11 +71,17 @@ impl Lbfgs {
     pub fn new(unknowns: Vec<f64>, floors: Vec<f64>, ridge: f64) -> Self {
         Self {
             preconditioner: vec![0.0; unknowns.len()],
+            direction: vec![0.0; unknowns.len()],
+            displacement: vec![0.0; unknowns.len()],
+            accepted: (unknowns.clone(), vec![0.0; unknowns.len()]),
             unknowns,
             undone: 0,
             floors,
             ridge,
-            accepted: None,
+            loss: None,
+            next: Next::Onward,
+            slope: 0.0,
+            age: 0,
             pairs: VecDeque::new(),
             scale: 1.0,
         }
@@ -63,41 +90,105 @@ impl Lbfgs {
     /// One step from where loss and gradient are these, the ridge's parts left out.
     /// `diagonal` is positive and the majorizer's, the ridge included.
     pub fn step(&mut self, loss: f64, gradient: &[f64], diagonal: &[f64]) {
-        let loss = self.with_ridge(loss);
-        let mut gradient: Vec<f64> = (gradient.iter().zip(&self.unknowns))
+        let gradient: Vec<f64> = (gradient.iter().zip(&self.unknowns))
             .map(|(g, x)| g + self.ridge * x)
             .collect();
-        match self.accepted.take() {
-            Some((x, g, before)) if !rises(before, loss) => {
-                let difference = |to: &[f64], from: &[f64]| -> Vec<f64> {
-                    to.iter().zip(from).map(|(to, from)| to - from).collect()
-                };
-                self.hold(&gradient, diagonal);
-                let (s, y) = (difference(&self.unknowns, &x), difference(&gradient, &g));
-                let spread: f64 = (y.iter().zip(&self.preconditioner))
-                    .map(|(y, m)| y * m * y)
-                    .sum();
-                let curvature = dot(&s, &y);
-                let counts = spread > 0.0 && curvature > LEAST_SCALE * spread;
-                if counts {
-                    self.scale = curvature / spread;
-                }
-                self.pairs
-                    .push_front(counts.then(|| (s, y, 1.0 / curvature)));
-                self.pairs.truncate(MEMORY);
-                self.accepted = Some((self.unknowns.clone(), gradient.clone(), loss));
+        let paired = self.loss.is_some() && self.age >= AGE;
+        let length = self.judge(loss);
+        if self.next == Next::Onward {
+            let before = std::mem::replace(&mut self.accepted, (self.unknowns.clone(), gradient));
+            let difference = |to: &[f64], from: &[f64]| -> Vec<f64> {
+                to.iter().zip(from).map(|(to, from)| to - from).collect()
+            };
+            self.hold(diagonal);
+            let s = difference(&self.unknowns, &before.0);
+            let y = difference(&self.accepted.1, &before.1);
+            self.displacement = s.clone();
+            let spread: f64 = (y.iter().zip(&self.preconditioner))
+                .map(|(y, m)| y * m * y)
+                .sum();
+            let curvature = dot(&s, &y);
+            let counts = paired && spread > 0.0 && curvature > LEAST_SCALE * spread;
+            if counts {
+                self.scale = curvature / spread;
             }
-            Some((x, g, _)) => {
-                (self.unknowns, gradient) = (x, g);
-                self.undone += 1;
-                self.forget();
-            }
-            None => {
-                self.hold(&gradient, diagonal);
-                self.forget();
-                self.accepted = Some((self.unknowns.clone(), gradient.clone(), loss));
+            self.remember(counts.then(|| (s, y, 1.0 / curvature)));
+        } else {
+            self.remember(None);
+        }
+        if self.next != Next::Shorter {
+            self.direction = self.direction();
+        }
+        self.slope = -dot(&self.accepted.1, &self.direction);
+        for (k, d) in self.direction.iter().enumerate() {
+            if self.preconditioner[k] > 0.0 {
+                self.unknowns[k] = (self.unknowns[k] - length * d).max(self.floors[k]);
             }
         }
+    }
+
+    /// What is minimized is another function from now on.
+    pub fn restart(&mut self) {
+        self.loss = None;
+    }
+
+    /// The end, where the loss is this: a last step that raised it is undone.
+    pub fn end(&mut self, loss: f64) {
+        self.judge(loss);
+        if self.next == Next::Onward {
+            let from = self.unknowns.iter().zip(&self.accepted.0);
+            self.displacement = from.map(|(to, from)| to - from).collect();
+            self.accepted.0.clone_from(&self.unknowns);
+        }
+        self.remember(None);
+    }
+
+    /// The mean of what the last step moved, weighed; the weights of the first `constants` sum
+    /// to the whole. `None` where it was undone.
+    pub fn moved(&self, weights: &[f64], constants: usize) -> Option<f64> {
+        let moved = weights.iter().zip(&self.displacement);
+        let moved: f64 = moved.map(|(w, s)| w * s.abs()).sum();
+        let whole: f64 = weights[..constants].iter().sum();
+        // Nothing is drawn.
+        let mean = if whole > 0.0 { moved / whole } else { 0.0 };
+        (self.next == Next::Onward).then_some(mean)
+    }
+
+    /// Accepts the present point or goes back; gives the length of the next step.
+    fn judge(&mut self, loss: f64) -> f64 {
+        let loss = self.with_ridge(loss);
+        match self.loss {
+            Some(before) if rises(before, loss) => {
+                self.unknowns.clone_from(&self.accepted.0);
+                self.undone += 1;
+                if self.next == Next::Onward {
+                    self.next = Next::Shorter;
+                    let bend = loss - before - self.slope;
+                    let known = self.slope < 0.0 && bend.is_finite();
+                    let least = if known { -0.5 * self.slope / bend } else { 0.0 };
+                    return least.clamp(SHORTENED[0], SHORTENED[1]);
+                }
+                self.next = Next::Safe;
+                self.pairs.clear();
+                self.scale = 1.0;
+            }
+            _ => {
+                self.loss = Some(loss);
+                self.next = Next::Onward;
+                self.age += 1;
+            }
+        }
+        1.0
+    }
+
+    fn remember(&mut self, pair: Option<Pair>) {
+        self.pairs.push_front(pair);
+        self.pairs.truncate(MEMORY);
+    }
+
+    /// From the accepted point, turned around.
+    fn direction(&self) -> Vec<f64> {
+        let gradient = &self.accepted.1;
         let free = |k: usize| self.preconditioner[k] > 0.0;
         let mut direction: Vec<f64> = (0..gradient.len())
             .map(|k| if free(k) { gradient[k] } else { 0.0 })
@@ -121,38 +212,18 @@ impl Lbfgs {
             let beta = rho * dot(y, &direction);
             add(&mut direction, alpha - beta, s);
         }
-        for (k, d) in direction.iter().enumerate() {
-            if free(k) {
-                self.unknowns[k] = (self.unknowns[k] - d).max(self.floors[k]);
-            }
-        }
-    }
-
-    /// The end, where the loss is this: a last step that raised it is undone.
-    pub fn end(&mut self, loss: f64) {
-        let loss = self.with_ridge(loss);
-        if let Some((x, _, before)) = self.accepted.take()
-            && rises(before, loss)
-        {
-            self.unknowns = x;
-            self.undone += 1;
-        }
+        direction
     }
 
     fn with_ridge(&self, loss: f64) -> f64 {
         loss + 0.5 * self.ridge * dot(&self.unknowns, &self.unknowns)
     }
 
-    fn hold(&mut self, gradient: &[f64], diagonal: &[f64]) {
+    fn hold(&mut self, diagonal: &[f64]) {
         for (k, m) in self.preconditioner.iter_mut().enumerate() {
-            let held = self.unknowns[k] <= self.floors[k] && gradient[k] >= 0.0;
+            let held = self.unknowns[k] <= self.floors[k] && self.accepted.1[k] >= 0.0;
             *m = if held { 0.0 } else { 1.0 / diagonal[k] };
         }
-    }
-
-    fn forget(&mut self) {
-        self.pairs.clear();
-        self.scale = 1.0;
     }
 }
 
@@ -274,25 +345,33 @@ mod tests {
         assert_eq!(done.unknowns, [1.0]);
     }
 
-    /// A loss that rises, or is none, sends it back to where it was.
+    /// A loss that rises, or is none, sends it back to where it was: first for a shorter
+    /// step, then for the majorizer's.
     #[test]
     fn a_step_that_raises_the_loss_is_undone() {
         let start = vec![3.0, -2.0];
-        for bad in [7.0, f64::NAN] {
+        // A slope of -0.75 and a rise of 2.25: least after an eighth of the step. Of a loss
+        // that is none, a tenth.
+        for (bad, share) in [(7.25, 0.125), (f64::NAN, 0.1), (1e9, 0.1)] {
             let mut lbfgs = Lbfgs::new(start.clone(), vec![f64::NEG_INFINITY; 2], 0.0);
             lbfgs.step(5.0, &[1.0, -1.0], &[2.0, 4.0]);
             assert_eq!(lbfgs.unknowns, [2.5, -1.75]);
             lbfgs.step(bad, &[9.0, 9.0], &[1.0, 1.0]);
+            let shorter = [3.0 - 0.5 * share, -2.0 + 0.25 * share];
+            assert_eq!((lbfgs.undone, &lbfgs.unknowns[..]), (1, &shorter[..]));
+            assert_eq!(lbfgs.moved(&[1.0, 1.0], 2), None);
+            lbfgs.step(bad, &[9.0, 9.0], &[1.0, 1.0]);
             // Once more the majorizer's step from the start, with the diagonal there.
-            assert_eq!((lbfgs.undone, &lbfgs.unknowns[..]), (1, &[2.5, -1.75][..]));
-            let mut ended = lbfgs.clone();
+            assert_eq!((lbfgs.undone, &lbfgs.unknowns[..]), (2, &[2.5, -1.75][..]));
             lbfgs.step(4.0, &[0.5, -0.5], &[1.0, 1.0]);
             assert_eq!(lbfgs.unknowns, [2.0, -1.25]);
+            assert_eq!(lbfgs.moved(&[1.0, 3.0], 2), Some(0.3125));
             lbfgs.end(4.1);
             assert_eq!(lbfgs.unknowns, [2.5, -1.75]);
-            // Right after going back there is nothing to go back to.
-            ended.end(99.0);
-            assert_eq!(ended.unknowns, [2.5, -1.75]);
+            // Another function is another loss.
+            lbfgs.restart();
+            lbfgs.end(99.0);
+            assert_eq!((lbfgs.undone, &lbfgs.unknowns[..]), (3, &[2.5, -1.75][..]));
         }
     }
 

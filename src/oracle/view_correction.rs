@@ -1,8 +1,10 @@
 //! What brings the views' teachers into line: of each view, the affine map from
-//! rendered to taught a/b by weighted least squares; of all, what is left when their
-//! mean is taken out, undone.
+//! rendered to taught a/b by weighted least squares; of all, what is left when that about
+//! which they gather (Huber's location) is taken out, undone.
 
-use super::constants::{CORRECTION_DETERMINANT_MIN, CORRECTION_PRIOR};
+use super::constants::{
+    CORRECTION_DETERMINANT_MIN, CORRECTION_GAIN_UNITS, CORRECTION_NEAR, CORRECTION_PRIOR,
+};
 
 /// `gain · ab + offset`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,13 +68,49 @@ pub fn teacher_of(pixels: &[Pixel]) -> Affine {
     Affine { gain, offset }
 }
 
+/// The mean of maps, weighed.
+fn mean_of(maps: &[Affine], weight: impl Fn(&Affine) -> f64) -> Affine {
+    let weights: f64 = maps.iter().map(&weight).sum();
+    let mean = |of: &dyn Fn(&Affine) -> f64| {
+        maps.iter().map(|map| weight(map) * of(map)).sum::<f64>() / weights
+    };
+    Affine {
+        gain: [0, 1].map(|i| [0, 1].map(|j| mean(&|map| map.gain[i][j]))),
+        offset: [0, 1].map(|i| mean(&|map| map.offset[i])),
+    }
+}
+
+/// How far two maps are apart, in Lab units.
+fn distance(a: &Affine, b: &Affine) -> f64 {
+    let length = |a: &[f64], b: &[f64]| {
+        let squares = a.iter().zip(b).map(|(a, b)| (a - b).powi(2));
+        squares.sum::<f64>().sqrt()
+    };
+    length(&a.offset, &b.offset)
+        + CORRECTION_GAIN_UNITS * length(a.gain.as_flattened(), b.gain.as_flattened())
+}
+
+/// Where maps gather: Huber's location by reweighted means.
+pub fn center_of(maps: &[Affine]) -> Affine {
+    let mut center = mean_of(maps, |_| 1.0);
+    for _ in 0..GATHERINGS {
+        center = mean_of(maps, |map| {
+            1.0 / distance(map, &center).max(CORRECTION_NEAR)
+        });
+    }
+    center
+}
+
+/// Steps of [`center_of`].
+const GATHERINGS: usize = 16;
+
 /// What wanted a/b of each view have to go through.
 pub fn view_corrections(views: &[Vec<Pixel>]) -> Vec<Affine> {
     let teachers: Vec<Affine> = views.iter().map(|pixels| teacher_of(pixels)).collect();
-    let mean =
-        |of: &dyn Fn(&Affine) -> f64| teachers.iter().map(of).sum::<f64>() / teachers.len() as f64;
-    let mean_gain = [0, 1].map(|i| [0, 1].map(|j| mean(&|t| t.gain[i][j])));
-    let mean_offset = [0, 1].map(|i| mean(&|t| t.offset[i]));
+    let Affine {
+        gain: mean_gain,
+        offset: mean_offset,
+    } = center_of(&teachers);
     (teachers.iter())
         .map(|teacher| {
             let identity = Affine::IDENTITY.gain;
@@ -108,6 +146,23 @@ mod tests {
         let gains = a.gain.as_flattened().iter().zip(b.gain.as_flattened());
         let offsets = a.offset.iter().zip(&b.offset);
         gains.chain(offsets).all(|(a, b)| (a - b).abs() < far)
+    }
+
+    /// One view in twelve is far off: the others stay as they are.
+    #[test]
+    fn one_view_does_not_move_the_others() {
+        let mut maps = vec![Affine::IDENTITY; 12];
+        maps[4].offset = [30.0, 20.0];
+        let center = center_of(&maps);
+        // It pulls as strongly as if it stood no farther than what is near.
+        let pull = CORRECTION_NEAR / 11.0;
+        let length = center.offset[0].hypot(center.offset[1]);
+        assert!((length - pull).abs() < 1e-3, "{center:?}");
+        // Where none is far, it is their mean.
+        for (k, map) in maps.iter_mut().enumerate() {
+            map.offset = [0.05 * k as f64, 0.3];
+        }
+        assert!((center_of(&maps).offset[0] - 0.275).abs() < 1e-12);
     }
 
     const WARM: Affine = Affine {

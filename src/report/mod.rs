@@ -204,13 +204,16 @@ pub struct ChromaReport {
     pub colored_views: usize,
     /// How chroma was solved for.
     pub settings: ChromaSettings,
-    /// Iterations of Adam, or rounds of least squares on all scales.
+    /// Iterations of Adam, or rounds of least squares that were needed.
     pub iterations: usize,
     /// The last of them, counted from the start of stage 1.
     pub until: usize,
     /// Drawings of a view with their adjoints, those of coarser scales by their share of
     /// the pixels.
     pub passes: f64,
+    /// How far the last round of least squares moved the colors, in CIELAB units; `None` of
+    /// Adam, and where it was undone.
+    pub moved: Option<f64>,
     /// What was decided about each effect of stage 2.
     pub effects: Vec<EffectReport>,
     /// Loss at the end, in CIELAB units.

@@ -120,7 +120,7 @@ pub fn colorize(
         sh_degree: options.sh_degree,
         correct_views: options.correct_views,
     };
-    let (mut log, total) = (String::new(), settings.steps_to_report());
+    let mut log = String::new();
     let told = |stage, progress: ChromaProgress, message| Event::Progress {
         stage,
         done: progress.iteration,
@@ -143,7 +143,9 @@ pub fn colorize(
                     luma.len(),
                     progress.seconds
                 );
-                let message = format!("loss {:.3}", progress.loss);
+                let moved = progress.moved;
+                let moved = moved.map_or(String::new(), |moved| format!(", moved {moved:.2}"));
+                let message = format!("loss {:.3}{moved}", progress.loss);
                 observe(told(Stage::Chroma, progress, message));
             }
             ColorizeEvent::Trying { degree, progress } => {
@@ -172,15 +174,17 @@ pub fn colorize(
         &lesson,
     )?;
     let [distilling, baking] = colored.seconds;
+    let steps = colored.last.map_or(0, |progress| progress.iteration);
     report.chroma = Some(ChromaReport {
         teachers: teachers.describe(),
         strength: options.teach.strength,
         upsample: options.teach.settings.upsample,
         hints: hinted,
         colored_views: colored.colored_views,
-        iterations: total,
-        until: report.luma.iterations + total,
+        iterations: steps,
+        until: report.luma.iterations + steps,
         passes: colored.last.map_or(0.0, |progress| progress.passes),
+        moved: colored.last.and_then(|progress| progress.moved),
         effects: EffectReport::of(&colored.effects),
         loss: colored.last.map_or(0.0, |progress| progress.loss),
         seconds: ChromaSeconds {

@@ -1,6 +1,6 @@
 //! The base, around which knobs are turned, and what work costs beside it.
 
-use crate::{chroma::ChromaSettings, luma::LumaSettings, report::Report, run::Work};
+use crate::{luma::LumaSettings, report::Report, run::Work};
 
 /// Share of an iteration of stage 1 that goes by pixels and not by Gaussians: about half.
 pub(super) const PIXELS_SHARE: f64 = 0.5;
@@ -29,10 +29,8 @@ pub(super) struct Around {
 /// How the base is colored.
 #[derive(Clone, Debug)]
 pub(super) struct ColorAround {
-    /// Rounds of least squares at full size.
+    /// Rounds of least squares.
     pub rounds: usize,
-    /// Rounds on each coarser scale.
-    pub coarse_rounds: usize,
     /// Whether views are brought into line.
     pub corrects_views: bool,
     /// Shorter side at which the network sees photos; `None` for a folder.
@@ -86,8 +84,7 @@ impl Around {
     pub fn colored(mut self, base: &Report) -> Self {
         self.color = base.chroma.as_ref().map(|chroma| ColorAround {
             // The base is colored by the default solver.
-            rounds: ChromaSettings::irls().rounds,
-            coarse_rounds: ChromaSettings::irls().coarse_rounds,
+            rounds: chroma.iterations,
             corrects_views: chroma.settings.correct_views,
             teacher_size: (chroma.teachers.first())
                 .and_then(|teacher| teacher.input_size)

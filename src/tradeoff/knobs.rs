@@ -140,35 +140,16 @@ const KNOBS: &[Knob] = &[
         values: |around| around.of_color(|_| owned(&["adam"])),
         turn: Turn::Option("--solver"),
         time: |_, _| 1.0,
-        conflicts: &[
-            "rounds",
-            "coarse-rounds",
-            "until",
-            "scales",
-            "correct-views",
-        ],
+        conflicts: &["rounds", "until", "scales", "correct-views"],
     },
     Knob {
         name: BASELINE_OF_COLOR,
         stage: PointStage::Color,
-        values: |around| around.of_color(|color| scaled(color.rounds, &[0.5, 2.0, 0.25])),
+        values: |around| around.of_color(|color| scaled(color.rounds, &[0.5, 0.25])),
         turn: Turn::Option("--rounds"),
         time: |around, value| {
             let rounds = around.color.as_ref().map_or(1, |color| color.rounds);
-            (1.0 + number(value) / rounds.max(1) as f64) / 2.0
-        },
-        conflicts: &["solver", "until", "scales"],
-    },
-    Knob {
-        name: "coarse-rounds",
-        stage: PointStage::Color,
-        values: |around| around.of_color(|color| scaled(color.coarse_rounds, &[0.5, 0.25, 2.0])),
-        turn: Turn::Option("--coarse-rounds"),
-        // They take about half of the time, those at full size the rest: there are as many
-        // Gaussians at every scale (docs/performance.md).
-        time: |around, value| {
-            let rounds = around.color.as_ref().map_or(1, |color| color.coarse_rounds);
-            (1.0 + number(value) / rounds.max(1) as f64) / 2.0
+            number(value) / rounds.max(1) as f64
         },
         conflicts: &["solver", "until", "scales"],
     },
@@ -190,7 +171,7 @@ const KNOBS: &[Knob] = &[
         time: |around, value| {
             (number(value) - around.iterations as f64) / around.adam.max(1) as f64
         },
-        conflicts: &["solver", "rounds", "coarse-rounds", "correct-views"],
+        conflicts: &["solver", "rounds", "correct-views"],
     },
     Knob {
         name: "scales",
@@ -202,7 +183,7 @@ const KNOBS: &[Knob] = &[
             vec![solver, ("--scales", Some(value.to_owned()))]
         }),
         time: |_, value| 1.0 + 0.25 * number(value),
-        conflicts: &["solver", "rounds", "coarse-rounds", "correct-views"],
+        conflicts: &["solver", "rounds", "correct-views"],
     },
     Knob {
         name: "chroma-degree",

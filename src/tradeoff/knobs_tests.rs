@@ -48,14 +48,12 @@ fn colors_have_knobs_once_there_are_colors() {
     let mut colored = Around {
         color: Some(ColorAround {
             rounds: 4,
-            coarse_rounds: 8,
             corrects_views: true,
             teacher_size: Some(256),
         }),
         ..around()
     };
-    assert_eq!(of(&colored, "rounds"), ["2", "8", "1"]);
-    assert_eq!(of(&colored, "coarse-rounds"), ["4", "2", "16"]);
+    assert_eq!(of(&colored, "rounds"), ["2", "1"]);
     assert_eq!(of(&colored, "until"), ["775", "1000"]);
     assert_eq!(of(&colored, "teacher-size"), ["128", "384"]);
     assert_eq!(of(&colored, "correct-views"), ["off"]);

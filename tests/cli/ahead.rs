@@ -43,14 +43,7 @@ fn what_was_asked_ahead_changes_nothing_but_the_wait() {
 
     let alone = fitted(&place, "alone", &[]);
     assert!(told(&alone).is_none() && answers(&place, "alone").is_empty());
-    let colorize = [
-        "--rounds",
-        "1",
-        "--coarse-rounds",
-        "1",
-        "--teacher",
-        &network,
-    ];
+    let colorize = ["--rounds", "2", "--teacher", &network];
     for run in ["ahead", "alone"] {
         place.succeed(&[&["colorize", run], &colorize[..]].concat());
     }

@@ -7,10 +7,7 @@ use super::program::Place;
 use super::scene;
 use super::shared::{LUMA, onnx, place_with_run};
 
-/// Rounds on the two coarser scales, which come before those at full size.
-const WARM: usize = 20;
-
-/// Two rounds at full size; one would do to be quick, but then nothing is repeated.
+/// Two rounds; one would do to be quick, but then nothing is repeated.
 const QUICK: [&str; 5] = ["colorize", "--rounds", "2", "--json", "--teacher"];
 
 #[test]
@@ -19,8 +16,8 @@ fn the_default_solver_says_what_it_did() {
     let teacher = onnx("ddcolor_tiny.onnx");
     let chroma = &place.json(&[&QUICK[..], &[&teacher]].concat())["chroma"];
     assert_eq!(chroma["settings"]["solver"], "irls");
-    assert_eq!(chroma["iterations"], WARM + 2);
-    assert_eq!(chroma["until"], LUMA + WARM + 2);
+    assert_eq!(chroma["iterations"], 2);
+    assert_eq!(chroma["until"], LUMA + 2);
     assert_eq!(chroma["settings"]["robust"], 10.0);
     assert_eq!(chroma["settings"]["correct_views"], true);
     assert_eq!(chroma["settings"]["fill"], true);
@@ -31,18 +28,18 @@ fn the_default_solver_says_what_it_did() {
     );
     assert!(estimated.as_u64() > Some(0), "{estimated}");
     assert!(taken.is_null() || taken.as_u64() > Some(0), "{taken}");
-    // Eight views a round: all at full size, 1/4 and 1/16 before; in the end half a pass.
-    let passes = 8.0 * (2.5 + 10.0 / 4.0 + 10.0 / 16.0);
-    assert_eq!(chroma["passes"], passes);
+    // Eight views a round; in the end half a pass.
+    assert_eq!(chroma["passes"], 8.0 * 2.5);
+    assert!(chroma["moved"].as_f64() > Some(0.1), "{}", chroma["moved"]);
 
     let plain = ["--robust", "off", "--correct-views", "off", "--fill", "off"];
-    let choices = ["--coarse-rounds", "3", "--sh-degree", "1"];
+    let choices = ["--sh-degree", "1"];
     let arguments = [&QUICK[..], &[&teacher], &plain, &choices].concat();
     let chroma = &place.json(&arguments)["chroma"];
     assert_eq!(chroma["settings"]["robust"], serde_json::Value::Null);
     assert_eq!(chroma["settings"]["correct_views"], false);
     assert_eq!(chroma["settings"]["fill"], false);
-    assert_eq!(chroma["iterations"], 2 * 3 + 2);
+    assert_eq!(chroma["iterations"], 2);
     assert_eq!(chroma["settings"]["sh_degree"], 1);
 }
 
@@ -78,16 +75,12 @@ fn options_of_the_other_solver_are_refused() {
     let place = place_with_run();
     let teacher = onnx("ddcolor_tiny.onnx");
     let adam = ["--solver", "adam"];
-    let cases: [(&[&str], &str); 6] = [
+    let cases: [(&[&str], &str); 5] = [
         (&["--until", "62"], "--until needs --solver adam"),
         (&["--scales", "1"], "--scales needs --solver adam"),
         (
             &[&adam[..], &["--rounds", "2"]].concat(),
             "--rounds needs --solver irls",
-        ),
-        (
-            &[&adam[..], &["--coarse-rounds", "2"]].concat(),
-            "--coarse-rounds needs --solver irls",
         ),
         (
             &[&adam[..], &["--fill", "on"]].concat(),
@@ -109,7 +102,6 @@ fn options_of_the_other_solver_are_refused() {
         ["--sh-degree", "4"],
         ["--scales", "5"],
         ["--rounds", "0"],
-        ["--coarse-rounds", "0"],
     ] {
         let done = place.run(&[&["colorize", "--teacher", &teacher], &wrong[..]].concat());
         assert_eq!(done.code, Some(2), "{wrong:?}");

@@ -173,7 +173,9 @@ fn twins() -> Vec<Twin> {
                 diagonals,
                 blocks,
                 ridge,
-                diagonal_scale
+                diagonal_scale,
+                constants,
+                color
             }
         ),
         twin!(
@@ -355,6 +357,12 @@ fn constants_are_those_of_the_oracle() {
             "PRIOR_VARIANCE",
             vec![oracle::CORRECTION_PRIOR],
         ),
+        (
+            "view_correction",
+            "GAIN_UNITS",
+            vec![oracle::CORRECTION_GAIN_UNITS],
+        ),
+        ("view_correction", "NEAR", vec![oracle::CORRECTION_NEAR]),
         (
             "view_correction",
             "DETERMINANT_MIN",

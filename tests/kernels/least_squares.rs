@@ -179,7 +179,6 @@ fn the_least_loss_is_reached() {
         for (rounds, near) in [(24, 1e-3), (150, 1e-7)] {
             let settings = ChromaSettings {
                 sh_degree: degree as u32,
-                coarse_scales: 0,
                 rounds,
                 ..ChromaSettings::exact()
             };

@@ -143,8 +143,7 @@ fn coloring(sh_degree: u32, limit: Option<u64>) -> Result<(u64, u64, usize), Chr
     };
     let settings = ChromaSettings {
         sh_degree,
-        rounds: 1,
-        coarse_rounds: 1,
+        rounds: 2,
         ..ChromaSettings::irls()
     };
     let solved = solve(&frozen, &settings, &targets, tasks, &luma, &mut look)?;

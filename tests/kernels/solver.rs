@@ -13,7 +13,10 @@ use gs_chroma::{
     splats::{ShField, Splats, sh},
 };
 
-use crate::harness::{bits, gpu, raster};
+use crate::{
+    harness::{bits, gpu, raster},
+    oracle::view_correction::{Affine, center_of},
+};
 
 pub const WIDTH: usize = 32;
 pub const HEIGHT: usize = 24;
@@ -364,6 +367,7 @@ fn a_wrong_view_moves_nothing_unless_it_counts() {
         let settings = ChromaSettings {
             robust,
             rounds: 80,
+            settled: 0.0,
             ..settings()
         };
         let of = |views| inner(&solved(&settings, &wall(), views));
@@ -375,9 +379,9 @@ fn a_wrong_view_moves_nothing_unless_it_counts() {
     assert!(counted > 0.5, "{counted}");
 }
 
-/// Teachers that are each too pale or too strong and tinted come out as one: their mean.
+/// Teachers that are each too pale or too strong and tinted come out as one: where they gather.
 #[test]
-fn views_with_gains_and_tints_agree_on_their_mean() {
+fn views_with_gains_and_tints_agree() {
     let gains = [0.6, 1.1, 0.9, 0.7, 1.0, 0.8];
     let tints = [
         [4.0, -3.0],
@@ -414,10 +418,12 @@ fn views_with_gains_and_tints_agree_on_their_mean() {
         (inner(&solver.chroma().unwrap()), last)
     };
     let (one, floor) = of(false, &steady);
-    let mean = gains.iter().sum::<f64>() / 6.0;
-    let expected: Vec<[f64; 2]> = (one.iter())
-        .map(|ab| [0, 1].map(|c| mean * ab[c] + tints.iter().map(|t| t[c]).sum::<f64>() / 6.0))
-        .collect();
+    let maps = gains.iter().zip(tints).map(|(&gain, offset)| Affine {
+        gain: [[gain, 0.0], [0.0, gain]],
+        offset,
+    });
+    let center = center_of(&maps.collect::<Vec<_>>());
+    let expected: Vec<[f64; 2]> = one.iter().map(|&ab| center.of(ab)).collect();
     let ((corrected, loss), (raw, raw_loss)) = (of(true, &views), of(false, &views));
     let spread = |colors: &[[f64; 2]]| {
         let mean = |c: usize| colors.iter().map(|ab| ab[c]).sum::<f64>() / colors.len() as f64;
@@ -450,4 +456,70 @@ fn a_view_that_shows_nothing_tints_nothing() {
     let inner = inner(&solved(&ChromaSettings::irls(), &wall(), &views));
     let away = farthest(&inner, &vec![ab; inner.len()]);
     assert!(away < 1.0, "{away}");
+}
+
+/// Teachers that real networks are like: of a picture, hardly any color, one color, one view
+/// of a color of its own, one view alone.
+fn teachers() -> Vec<(&'static str, Vec<ChromaView>)> {
+    let gray = constant_views(&[[0.0; 2]; 8]);
+    let mut one_colored = gray.clone();
+    one_colored[5].wanted.ab.fill([30.0, 20.0]);
+    let pale = cameras(6).into_iter().map(|camera| {
+        let ab = pictured(&camera).into_iter();
+        chroma_view(camera.clone(), ab.map(|ab| ab.map(|v| 0.05 * v)).collect())
+    });
+    vec![
+        ("a picture", six_views()),
+        ("hardly any color", pale.collect()),
+        ("one color", constant_views(&[[60.0, -45.0]; 5])),
+        ("one colored view among gray ones", one_colored),
+        ("one view", six_views()[1..2].to_vec()),
+    ]
+}
+
+/// Every round ends with a loss that is no greater, and all starts end with the same colors.
+#[test]
+fn the_end_does_not_depend_on_the_start() {
+    let luma = wall();
+    let field = |of: &dyn Fn(usize) -> f32| ShField {
+        degree: 0,
+        channels: 2,
+        coefficients: (0..2 * luma.len()).map(of).collect(),
+    };
+    let starts = [
+        field(&|_| 0.0),
+        field(&|k| 300.0 * ((k * 37 % 101) as f32 / 50.0 - 1.0)),
+        field(&|k| [-150.0, 200.0][k % 2]),
+    ];
+    for (what, views) in teachers() {
+        let problem = Problem::new(&luma, &views);
+        let ends = starts.each_ref().map(|start| {
+            let (targets, tasks) = (&problem.targets, problem.tasks.clone());
+            let frozen = &problem.frozen;
+            let settings = ChromaSettings {
+                rounds: 60,
+                settled: 0.01,
+                ..settings()
+            };
+            let mut solver =
+                IrlsSolver::starting_at(frozen, &settings, targets, tasks, start).unwrap();
+            let mut losses = Vec::new();
+            solver
+                .run(&mut |progress| {
+                    losses.push(progress.loss);
+                    ControlFlow::Continue(())
+                })
+                .unwrap();
+            // The loss that levels off is another, and smaller.
+            assert!(
+                losses.is_sorted_by(|a, b| *b <= a * 1.0002),
+                "{what}: {losses:?}"
+            );
+            drawn(&solver.chroma().unwrap(), &views[0].camera)
+        });
+        for end in &ends[1..] {
+            let away = farthest(&ends[0], end);
+            assert!(away < 0.5, "{what}: {away}");
+        }
+    }
 }

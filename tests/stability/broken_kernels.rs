@@ -162,12 +162,6 @@ fn broken_losses_and_steps_are_noticed() {
             "vec4f(residual, 1.0)",
         ),
         (
-            "lbfgs",
-            "lbfgs_ridge",
-            "unknowns[k] - origin[k]",
-            "unknowns[k] + origin[k]",
-        ),
-        (
             "adjoint",
             "shade_backward",
             "SH_C0 * gradients",
@@ -176,8 +170,8 @@ fn broken_losses_and_steps_are_noticed() {
         (
             "lbfgs",
             "lbfgs_ridge",
-            "gradient[k] += parameters.ridge * off",
-            "gradient[k] -= parameters.ridge * off",
+            "gradient[k] += parameters.ridge * x",
+            "gradient[k] -= parameters.ridge * x",
         ),
         (
             "lbfgs",
@@ -185,6 +179,20 @@ fn broken_losses_and_steps_are_noticed() {
             "loss <= scalars[LOSS] * (1.0 + TOLERANCE)",
             "true",
         ),
+        (
+            "lbfgs",
+            "lbfgs_judge",
+            "-0.5 * slope / bend",
+            "-0.4 * slope / bend",
+        ),
+        (
+            "lbfgs",
+            "lbfgs_slope",
+            "scalars[SLOPE] = -sum",
+            "scalars[SLOPE] = sum",
+        ),
+        ("lbfgs", "lbfgs_moved", "k < parameters.constants", "true"),
+        ("lbfgs", "lbfgs_mean", "moved / weight", "moved"),
         ("lbfgs", "lbfgs_judge", "i += 256u", "i += 512u"),
         (
             "lbfgs",
@@ -203,13 +211,13 @@ fn broken_losses_and_steps_are_noticed() {
         (
             "lbfgs",
             "lbfgs_step",
-            "max(unknowns[k] - direction[k], floors[k])",
-            "min(unknowns[k] - direction[k], floors[k])",
+            "max(unknowns[k] - scalars[LENGTH] * direction[k], floors[k])",
+            "min(unknowns[k] - scalars[LENGTH] * direction[k], floors[k])",
         ),
         (
             "view correction",
             "view_correction",
-            "corrections[v].offset - mean_offset",
+            "corrections[v].offset - center.offset",
             "corrections[v].offset",
         ),
         (
@@ -217,6 +225,12 @@ fn broken_losses_and_steps_are_noticed() {
             "view_correction",
             "v += 256u",
             "v += 1024u",
+        ),
+        (
+            "view correction",
+            "view_correction",
+            "max(distance_of(own, center), NEAR)",
+            "NEAR",
         ),
         (
             "view correction",

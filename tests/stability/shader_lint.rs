@@ -66,8 +66,18 @@ const REASONS: &[(&str, &str, &str)] = &[
     ),
     (
         "inverse_diagonal",
-        "1.0 / (parameters.diagonal_scale * diagonal[of_channel] + parameters.ridge)",
+        "1.0 / (parameters.diagonal_scale * diagonal[of_channel(k)] + parameters.ridge)",
         "the ridge is positive, sums of weights are not negative",
+    ),
+    (
+        "lbfgs_judge",
+        "-0.5 * slope / bend",
+        "chosen where the slope falls and the loss rises, so that the bend is positive",
+    ),
+    (
+        "lbfgs_mean",
+        "parameters.color * moved / weight",
+        "chosen where the weight is positive",
     ),
     (
         "lbfgs_scale",
@@ -281,9 +291,9 @@ const REASONS: &[(&str, &str, &str)] = &[
         "the kernel runs for images of at least one pixel",
     ),
     (
-        "view_correction",
-        "vec2f(sums[1024], sums[1280]) / views",
-        "the host sets a count of at least one view",
+        "gathered",
+        "vec2f(sums[1024], sums[1280]) / sum",
+        "the host sets a count of at least one view, and each has a positive weight",
     ),
     (
         "view_correction",
@@ -291,9 +301,14 @@ const REASONS: &[(&str, &str, &str)] = &[
         "in the branch where it is at least DETERMINANT_MIN",
     ),
     (
-        "view_correction",
-        "vec4f(sums[0], sums[256], sums[512], sums[768]) / views",
-        "the host sets a count of at least one view",
+        "gathered",
+        "vec4f(sums[0], sums[256], sums[512], sums[768]) / sum",
+        "the host sets a count of at least one view, and each has a positive weight",
+    ),
+    (
+        "gathered",
+        "1.0 / max(distance_of(own, center), NEAR)",
+        "NEAR is positive",
     ),
 ];
 

@@ -52,7 +52,6 @@ pub fn bake(
     observe: &mut ChromaObserver<'_>,
 ) -> Result<Splats, ChromaError> {
     let settings = ChromaSettings {
-        coarse_scales: 0,
         rounds: BAKE_ROUNDS,
         ..ChromaSettings::exact()
     };

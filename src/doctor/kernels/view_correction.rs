@@ -199,7 +199,7 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
     Ok(vec![
         row("gain", 1.20e-6, 1.0, &gains),
         row("offset, in CIELAB units", 3.54e-5, 1.0, &offsets),
-        row("gain, views that say little", 6.30e-5, 1.0, &hard_gains),
+        row("gain, views that say little", 9.42e-5, 1.0, &hard_gains),
         row("offset, views that say little", 3.57e-4, 1.0, &hard_offsets),
     ])
 }
