@@ -161,7 +161,12 @@ impl<'a> IrlsSolver<'a> {
         let gpu = self.gpu();
         while self.done < until.min(self.settings.rounds) && !self.ended {
             let round = self.done;
-            self.draw(self.robust(), true)?;
+            let ending = if self.correction_is_due(round) {
+                Ending::GradientAndSums
+            } else {
+                Ending::Gradient
+            };
+            self.draw(self.robust(), ending)?;
             let mut recorder = Recorder::new(gpu);
             self.lbfgs.step(&mut recorder);
             recorder.submit();
@@ -204,9 +209,7 @@ impl<'a> IrlsSolver<'a> {
         if std::mem::take(&mut self.corrected) && !accepted {
             corrections.undo(&mut recorder);
         }
-        // The first picture is gray and says nothing about the teachers.
-        let due = round > 0 && (round < PLAIN_ROUNDS || round.is_multiple_of(CORRECT_EVERY));
-        if self.settings.correct_views && accepted && due {
+        if accepted && self.correction_is_due(round) {
             corrections.solve(&self.passes.frozen.kernels.correction, &mut recorder);
             self.corrected = true;
             self.lbfgs.changed(self.gpu());
@@ -214,9 +217,16 @@ impl<'a> IrlsSolver<'a> {
         recorder.submit();
     }
 
+    /// Whether a round finds the views' corrections anew. The first picture is gray and says
+    /// nothing about the teachers.
+    fn correction_is_due(&self, round: usize) -> bool {
+        let due = round > 0 && (round < PLAIN_ROUNDS || round.is_multiple_of(CORRECT_EVERY));
+        self.settings.correct_views && due
+    }
+
     /// Judges the last step.
     fn end(&mut self) -> Result<(), ChromaError> {
-        self.draw(self.robust(), false)?;
+        self.draw(self.robust(), Ending::Loss)?;
         let mut recorder = Recorder::new(self.gpu());
         self.lbfgs.end(&mut recorder);
         recorder.submit();
@@ -245,7 +255,7 @@ impl<'a> IrlsSolver<'a> {
         recorder.copy(planes.raw(), self.passes.field.planes.raw());
         recorder.submit();
         let spent = self.spent;
-        self.draw(None, false)?;
+        self.draw(None, Ending::Loss)?;
         self.spent = spent;
         self.lbfgs.restart(gpu);
         Ok(mean(&self.passes.log.read_later(gpu).wait(gpu)?))
@@ -281,18 +291,13 @@ impl<'a> IrlsSolver<'a> {
         self.passes.load(1)
     }
 
-    /// Draws every view for its loss, and with `adjoint` finds the gradient and the sums
-    /// of the corrections.
-    fn draw(&mut self, robust: Option<f32>, adjoint: bool) -> Result<(), ChromaError> {
+    /// Draws every view for its loss and what follows on it.
+    fn draw(&mut self, robust: Option<f32>, ending: Ending) -> Result<(), ChromaError> {
+        let adjoint = ending != Ending::Loss;
         self.passes.clear(adjoint);
         let judging = Judging {
             agreement: 0.0,
             robust,
-        };
-        let ending = match (adjoint, self.settings.correct_views) {
-            (false, _) => Ending::Loss,
-            (true, false) => Ending::Gradient,
-            (true, true) => Ending::GradientAndSums,
         };
         for task in 0..self.passes.tasks.len() {
             self.passes.draw(task, 0, judging, task, ending)?;

@@ -42,6 +42,9 @@ const SCALE: usize = 4;
 const MOVED: usize = 9;
 const CHANGED: usize = 10;
 
+/// Twin of `ONWARD`.
+const ONWARD: f64 = 0.0;
+
 /// The loss before the first point is accepted, as the first scalar.
 const UNKNOWN: f32 = f32::MAX;
 
@@ -167,7 +170,7 @@ impl State {
         let at = |index: usize| f64::from(scalars[index]);
         Self {
             loss: at(LOSS),
-            moved: (at(NEXT) == 0.0).then(|| at(MOVED)),
+            moved: (at(NEXT) == ONWARD).then(|| at(MOVED)),
         }
     }
 }

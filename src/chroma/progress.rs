@@ -22,5 +22,6 @@ pub struct ChromaProgress {
     pub seconds: f64,
 }
 
-/// Who is told; a [`ControlFlow::Break`] ends it with [`ChromaError::Cancelled`].
+/// Who is told; a [`ControlFlow::Break`] ends it with
+/// [`ChromaError::Cancelled`](super::ChromaError::Cancelled).
 pub type ChromaObserver<'a> = dyn FnMut(ChromaProgress) -> ControlFlow<()> + 'a;

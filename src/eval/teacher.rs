@@ -17,7 +17,7 @@ use crate::{
     splats::{ShField, sh},
 };
 
-/// Rounds for RGB splats, three times what chroma takes as a rule: harmonics of degree 3 settle
+/// Rounds for RGB splats, nearly four times those of chroma: harmonics of degree 3 settle
 /// more slowly than a color for each Gaussian.
 const RGB_ROUNDS: usize = 45;
 
@@ -91,8 +91,7 @@ impl MeasuredTeacher {
     }
 
     /// RGB splats on the run's geometry, fitted to the teacher's pictures of the training
-    /// views: harmonics of degree 3 as splat trainers have, in [`RGB_ROUNDS`] times the
-    /// default rounds of the chroma solver. They are told what the training knew: exposures, masks.
+    /// views: harmonics of degree 3 as splat trainers have, in [`RGB_ROUNDS`]. They are told what the training knew: exposures, masks.
     ///
     /// # Errors
     /// [`EvalError`] of a photo or the solver, [`EvalError::NothingTaught`].

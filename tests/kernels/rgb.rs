@@ -77,7 +77,7 @@ fn rgb_harmonics_are_fitted_to_what_is_shown() {
     let truth = colorful();
     let pictures = shown(&truth);
     let fitted = |spoilt: f32| {
-        // Degree 3 settles slowly: an error of 0.011 with ten rounds.
+        // Degree 3 settles slowly.
         let settings = ChromaSettings {
             rounds: 60,
             ..settings()

@@ -109,7 +109,7 @@ const COLUMNS: usize = 8;
 const ROWS: usize = 5;
 
 /// A wall of Gaussians that all views show; hardly anything shows through.
-fn wall() -> Splats {
+pub fn wall() -> Splats {
     let mut wall = Splats::default();
     for i in 0..COLUMNS * ROWS {
         let x = STEP * ((i % COLUMNS) as f64 - 0.5 * (COLUMNS - 1) as f64);
@@ -124,7 +124,7 @@ fn wall() -> Splats {
 }
 
 /// Views of the wall from places beside each other.
-fn cameras(count: usize) -> Vec<Camera> {
+pub fn cameras(count: usize) -> Vec<Camera> {
     (0..count)
         .map(|k| Camera {
             width: WIDTH as u32,
@@ -140,7 +140,7 @@ fn cameras(count: usize) -> Vec<Camera> {
 }
 
 /// The same a/b in every pixel of each view.
-fn constant_views(colors: &[[f64; 2]]) -> Vec<ChromaView> {
+pub fn constant_views(colors: &[[f64; 2]]) -> Vec<ChromaView> {
     (cameras(colors.len()).into_iter().zip(colors))
         .map(|(camera, &ab)| chroma_view(camera, vec![ab; PIXELS]))
         .collect()
@@ -155,7 +155,7 @@ fn truth(x: f64, y: f64) -> [f64; 2] {
 }
 
 /// That field in the pixels of a camera before the wall.
-fn pictured(camera: &Camera) -> Vec<[f64; 2]> {
+pub fn pictured(camera: &Camera) -> Vec<[f64; 2]> {
     (0..PIXELS)
         .map(|p| {
             let [u, v] = [p % WIDTH, p / WIDTH].map(|side| side as f64 + 0.5);
@@ -174,7 +174,7 @@ fn colors(chroma: &ShField) -> Vec<[f64; 2]> {
 }
 
 /// The wall's picture.
-fn drawn(chroma: &ShField, camera: &Camera) -> Vec<[f64; 2]> {
+pub fn drawn(chroma: &ShField, camera: &Camera) -> Vec<[f64; 2]> {
     let geometry = Geometry::upload(gpu(), &wall()).unwrap();
     let field = Field::upload(gpu(), chroma).unwrap();
     let mut renderer = Renderer::new(raster(), geometry, vec![field], 0.01).unwrap();
@@ -195,13 +195,13 @@ fn inner(chroma: &ShField) -> Vec<[f64; 2]> {
 }
 
 /// The largest difference of a channel.
-fn farthest(a: &[[f64; 2]], b: &[[f64; 2]]) -> f64 {
+pub fn farthest(a: &[[f64; 2]], b: &[[f64; 2]]) -> f64 {
     assert_eq!(a.len(), b.len());
     let pairs = a.as_flattened().iter().zip(b.as_flattened());
     pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
-fn settings() -> ChromaSettings {
+pub fn settings() -> ChromaSettings {
     ChromaSettings {
         correct_views: false,
         ..ChromaSettings::irls()
@@ -209,7 +209,7 @@ fn settings() -> ChromaSettings {
 }
 
 /// Six views of the wall, every other one with weights.
-fn six_views() -> Vec<ChromaView> {
+pub fn six_views() -> Vec<ChromaView> {
     (cameras(6).into_iter().enumerate())
         .map(|(k, camera)| {
             let mut view = chroma_view(camera.clone(), pictured(&camera));
@@ -456,70 +456,4 @@ fn a_view_that_shows_nothing_tints_nothing() {
     let inner = inner(&solved(&ChromaSettings::irls(), &wall(), &views));
     let away = farthest(&inner, &vec![ab; inner.len()]);
     assert!(away < 1.0, "{away}");
-}
-
-/// Teachers that real networks are like: of a picture, hardly any color, one color, one view
-/// of a color of its own, one view alone.
-fn teachers() -> Vec<(&'static str, Vec<ChromaView>)> {
-    let gray = constant_views(&[[0.0; 2]; 8]);
-    let mut one_colored = gray.clone();
-    one_colored[5].wanted.ab.fill([30.0, 20.0]);
-    let pale = cameras(6).into_iter().map(|camera| {
-        let ab = pictured(&camera).into_iter();
-        chroma_view(camera.clone(), ab.map(|ab| ab.map(|v| 0.05 * v)).collect())
-    });
-    vec![
-        ("a picture", six_views()),
-        ("hardly any color", pale.collect()),
-        ("one color", constant_views(&[[60.0, -45.0]; 5])),
-        ("one colored view among gray ones", one_colored),
-        ("one view", six_views()[1..2].to_vec()),
-    ]
-}
-
-/// Every round ends with a loss that is no greater, and all starts end with the same colors.
-#[test]
-fn the_end_does_not_depend_on_the_start() {
-    let luma = wall();
-    let field = |of: &dyn Fn(usize) -> f32| ShField {
-        degree: 0,
-        channels: 2,
-        coefficients: (0..2 * luma.len()).map(of).collect(),
-    };
-    let starts = [
-        field(&|_| 0.0),
-        field(&|k| 300.0 * ((k * 37 % 101) as f32 / 50.0 - 1.0)),
-        field(&|k| [-150.0, 200.0][k % 2]),
-    ];
-    for (what, views) in teachers() {
-        let problem = Problem::new(&luma, &views);
-        let ends = starts.each_ref().map(|start| {
-            let (targets, tasks) = (&problem.targets, problem.tasks.clone());
-            let frozen = &problem.frozen;
-            let settings = ChromaSettings {
-                rounds: 60,
-                settled: 0.01,
-                ..settings()
-            };
-            let mut solver =
-                IrlsSolver::starting_at(frozen, &settings, targets, tasks, start).unwrap();
-            let mut losses = Vec::new();
-            solver
-                .run(&mut |progress| {
-                    losses.push(progress.loss);
-                    ControlFlow::Continue(())
-                })
-                .unwrap();
-            // The loss that levels off is another, and smaller.
-            assert!(
-                losses.is_sorted_by(|a, b| *b <= a * 1.0002),
-                "{what}: {losses:?}"
-            );
-            drawn(&solver.chroma().unwrap(), &views[0].camera)
-        });
-        for end in &ends[1..] {
-            let away = farthest(&ends[0], end);
-            assert!(away < 0.5, "{what}: {away}");
-        }
-    }
 }
