@@ -4,7 +4,7 @@
 //!
 //! ```text
 //! cli → tradeoff → run → eval → report, doctor → luma, chroma → effects, measure → raster
-//! → capture, splats → gpu, color, atomic_file, npy, oracle, compare
+//! → capture, splats → gpu, color, atomic_file, download, npy, oracle, compare
 //! ```
 //!
 //! [`doctor`] compares the kernels of [`raster`], [`luma`] and [`chroma`] with the [`oracle`],
@@ -52,6 +52,8 @@ pub mod cli;
 pub mod color;
 pub mod compare;
 pub mod doctor;
+#[cfg(feature = "cli")]
+mod download;
 pub mod effects;
 pub mod eval;
 pub mod gpu;

@@ -39,9 +39,13 @@ const SOLVERS: &[(SolverKind, &str)] = &[
 pub struct Colorize {
     /// Run folder, or a gray .ply with --colmap [default: newest under runs/].
     run: Option<PathBuf>,
-    /// A colorization network (.onnx) or a folder of colored photos named like the originals;
-    /// given more than once, their mean.
-    #[arg(long, value_name = "FILE.onnx|DIR", required_unless_present = "hints")]
+    /// A colorization network, by its name in `gs-chroma teacher list` or as an .onnx file, or a
+    /// folder of colored photos named like the originals; given more than once, their mean.
+    #[arg(
+        long,
+        value_name = "NAME|FILE.onnx|DIR",
+        required_unless_present = "hints"
+    )]
     teacher: Vec<PathBuf>,
     /// What each teacher counts, in their order [default: all the same].
     #[arg(long, value_name = "N,N,…", value_delimiter = ',', value_parser = positive::<f32>, requires = "teacher")]

@@ -1,7 +1,9 @@
 //! What can stop the program.
 
+use std::path::PathBuf;
+
 use super::remedy;
-use crate::{run::RunError, tradeoff::TradeoffError};
+use crate::{download::DownloadError, run::RunError, tradeoff::TradeoffError};
 
 /// What stopped a command; one line that names the file and the remedy.
 #[derive(Debug, thiserror::Error)]
@@ -12,6 +14,24 @@ pub enum CliError {
     /// A sweep.
     #[error("{}", remedy::of_sweep(.0))]
     Tradeoff(#[from] TradeoffError),
+    /// A network was not fetched.
+    #[error("{}", remedy::of_download(error, by_hand.as_ref()))]
+    Fetch {
+        /// What happened.
+        error: DownloadError,
+        /// The URL to fetch by hand, and where to put the file.
+        by_hand: Option<(String, PathBuf)>,
+    },
+    /// Nobody can say whether a network is to be fetched.
+    #[error(
+        "{name} is given away under {license}: say --yes to fetch it where nobody can be asked"
+    )]
+    NobodyToAsk {
+        /// The network.
+        name: String,
+        /// Its license.
+        license: String,
+    },
     /// The device computes something else than the reference.
     #[error(
         "{failed} of {checks} checks fail on {adapter}: update its driver, or choose another adapter with WGPU_ADAPTER_NAME, and please report the output of `gs-chroma doctor --json`"

@@ -13,8 +13,8 @@ use crate::run::{EvalOptions, eval};
 pub struct Eval {
     /// Run folder [default: newest under runs/].
     run: Option<PathBuf>,
-    /// The teacher, to be measured beside the scene: an .onnx file or a folder.
-    #[arg(long, value_name = "FILE.onnx|DIR")]
+    /// The teacher, to be measured beside the scene, as for `colorize`.
+    #[arg(long, value_name = "NAME|FILE.onnx|DIR")]
     teacher: Option<PathBuf>,
     /// What the network takes and gives, as for `colorize`.
     #[arg(long, value_name = "NAME|FILE.toml", requires = "teacher")]

@@ -51,7 +51,7 @@ pub struct Fit {
     effects: EffectArguments,
     /// Ask this colorization network about the photos while luma trains, so that `colorize` need
     /// not; may be given more than once.
-    #[arg(long, value_name = "FILE.onnx")]
+    #[arg(long, value_name = "NAME|FILE.onnx")]
     teacher: Vec<PathBuf>,
     /// What the network takes and gives, as for `colorize`.
     #[arg(long, value_name = "NAME|FILE.toml", requires = "teacher")]

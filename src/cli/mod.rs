@@ -14,6 +14,7 @@ mod plan;
 mod progress;
 mod remedy;
 mod render;
+mod teacher;
 mod tradeoff;
 mod values;
 
@@ -42,6 +43,7 @@ enum Command {
     Plan(plan::Plan),
     Fit(fit::Fit),
     Colorize(colorize::Colorize),
+    Teacher(teacher::TeacherCommand),
     Render(render::Render),
     Eval(eval::Eval),
     Export(export::Export),
@@ -60,6 +62,7 @@ impl Cli {
             Command::Plan(command) => command.run(),
             Command::Fit(command) => command.run(),
             Command::Colorize(command) => command.run(),
+            Command::Teacher(command) => command.run(),
             Command::Render(command) => command.run(),
             Command::Eval(command) => command.run(),
             Command::Export(command) => command.run(),

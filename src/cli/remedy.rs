@@ -1,8 +1,11 @@
 //! What the program can do about an error: the library knows none of its options.
 
+use std::path::PathBuf;
+
 use crate::{
     capture::CaptureError,
     chroma::{ChromaError, teacher::TeacherError},
+    download::DownloadError,
     eval::EvalError,
     gpu::GpuError,
     run::RunError,
@@ -55,6 +58,17 @@ pub(super) fn of_sweep(error: &TradeoffError) -> String {
     }
 }
 
+/// What the user reads of a network that was not fetched.
+pub(super) fn of_download(error: &DownloadError, by_hand: Option<&(String, PathBuf)>) -> String {
+    match by_hand {
+        Some((url, path)) => format!(
+            "{error}; or fetch {url} by other means (behind a proxy HTTPS_PROXY has to name it) and put it at {}",
+            path.display()
+        ),
+        None => error.to_string(),
+    }
+}
+
 fn of_gpu(error: &GpuError) -> String {
     match error {
         GpuError::TooLarge { .. } => format!("{error}: lower --max-splats or --max-side"),
@@ -85,6 +99,12 @@ fn of_teacher(error: &TeacherError) -> String {
             "{}: several kinds of networks have its inputs and outputs, and only you can know which it is: give --teacher-profile {profiles}",
             path.display()
         ),
+        TeacherError::UnknownTeacher { .. } => {
+            format!("{error} (`gs-chroma teacher list` says more)")
+        }
+        TeacherError::NotFetched { name } => {
+            format!("{error}: get it with `gs-chroma teacher fetch {name}`")
+        }
         TeacherError::UnknownProfile { .. } => format!("--teacher-profile {error}"),
         TeacherError::BadSize { path, size, reason } => {
             format!("{}: --teacher-size {size}: {reason}", path.display())

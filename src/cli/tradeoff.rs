@@ -27,7 +27,7 @@ pub struct Tradeoff {
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
     /// A colorization network or a folder of colored photos, for points in color.
-    #[arg(long, value_name = "FILE.onnx|DIR")]
+    #[arg(long, value_name = "NAME|FILE.onnx|DIR")]
     teacher: Option<PathBuf>,
     /// What knobs are turned around [default: paper on a GPU, draft without one].
     #[arg(long, value_parser = one_of(PRESETS))]

@@ -16,6 +16,7 @@ use super::{
 };
 use crate::{
     capture::{LoadOptions, MaskSource, Normalize},
+    chroma::teacher::located,
     effects::Overrules,
     luma::LumaSettings,
     report::{Evaluation, Method},
@@ -62,10 +63,11 @@ impl<'a> Bench<'a> {
     ) -> Result<Self, RunError> {
         let absolute = |path: &Path| fs::canonicalize(path).map_err(files::at(path));
         let load = preset.load_options(&options.load, &options.overrules);
+        let teacher = options.teacher.as_deref().map(located).transpose()?;
         Ok(Self {
             points: absolute(folder)?.join("points"),
             scene: absolute(&options.colmap_dir)?,
-            teacher: options.teacher.as_deref().map(absolute).transpose()?,
+            teacher: teacher.as_deref().map(absolute).transpose()?,
             preset,
             overlay: &options.settings,
             options: [

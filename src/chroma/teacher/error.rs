@@ -78,6 +78,36 @@ pub enum TeacherError {
         /// Names of the built-in profiles.
         known: String,
     },
+    /// Neither a path nor a network that is known by name.
+    #[error("{name}: no such file or folder, and no network of that name; there are {known}")]
+    UnknownTeacher {
+        /// What was asked for.
+        name: String,
+        /// Names of the networks.
+        known: String,
+    },
+    /// A network that is known by name is not on this machine.
+    #[error("{name}: not on this machine yet")]
+    NotFetched {
+        /// Its name.
+        name: String,
+    },
+    /// A network that is kept under its name has other bytes.
+    #[error("{}: is not {name}, whose SHA-256 is another; delete it, and fetch it anew", path.display())]
+    OtherBytes {
+        /// The `.onnx` file.
+        path: PathBuf,
+        /// The name.
+        name: String,
+    },
+    /// A table of networks does not describe them.
+    #[error("{}: {reason}; assets/teachers.toml shows how it is written", path.display())]
+    BadCatalog {
+        /// The `.toml` file.
+        path: PathBuf,
+        /// The network, the field and what is wrong with it.
+        reason: String,
+    },
     /// A manifest does not describe a network.
     #[error("{}: {reason}; docs/guide.md lists the fields of a manifest", path.display())]
     BadManifest {

@@ -5,6 +5,7 @@
 //! for a whole photo; lightness always stays the photo's.
 
 mod cache;
+mod catalog;
 mod error;
 mod folder;
 mod hints;
@@ -12,11 +13,14 @@ mod images;
 mod model;
 mod named_images;
 mod network;
+mod places;
 mod profile;
 mod query;
 pub(crate) mod runtime;
+mod tensor;
 mod upsample;
 
+pub use catalog::{Catalog, KnownTeacher};
 pub use error::TeacherError;
 pub use folder::FolderTeacher;
 pub use hints::{HintFolder, HintImage};
@@ -27,7 +31,7 @@ pub use query::Query;
 pub use upsample::Upsample;
 
 use serde::Serialize;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Someone who colors photos.
 pub struct Teacher {
@@ -70,14 +74,16 @@ pub struct TeacherInfo {
 }
 
 impl Teacher {
-    /// Opens an `.onnx` file or a folder of colored images.
+    /// Opens an `.onnx` file, a folder of colored images, or a network of the [`Catalog`] by
+    /// its name.
     ///
     /// A network's answers are kept in `cache_dir` (created where missing) and
     /// used again for the same photo, model, profile, input size and hints; a
     /// folder needs no cache.
     ///
     /// # Errors
-    /// A [`TeacherError`] where the path is neither, the folder holds no image
+    /// A [`TeacherError`] where the path is none of these, the network is not on this machine
+    /// or another than the catalog says, the folder holds no image
     /// or two images of one name, ONNX Runtime is not installed, the model is
     /// damaged, or its inputs and outputs fit no profile, not the one that is
     /// asked for, or more than one.
@@ -86,6 +92,8 @@ impl Teacher {
         cache_dir: Option<&Path>,
         settings: &TeacherSettings,
     ) -> Result<Self, TeacherError> {
+        let catalog = Catalog::open()?;
+        let path = &*catalog.locate(path)?;
         let metadata = std::fs::metadata(path).map_err(TeacherError::io(path))?;
         let is_onnx = path
             .extension()
@@ -93,7 +101,9 @@ impl Teacher {
         let source = if metadata.is_dir() {
             Source::Folder(FolderTeacher::open(path)?)
         } else if is_onnx {
-            Source::Network(Box::new(NetworkTeacher::open(path, cache_dir, settings)?))
+            Source::Network(Box::new(NetworkTeacher::open(
+                path, cache_dir, settings, &catalog,
+            )?))
         } else {
             return Err(TeacherError::NoTeacher {
                 path: path.to_path_buf(),
@@ -155,6 +165,16 @@ impl Teacher {
             Source::Folder(_) => Ok(()),
         }
     }
+}
+
+/// The file or folder that a user means by what is given as a teacher: what is at this path, or
+/// else the network of the [`Catalog`] of this name.
+///
+/// # Errors
+/// [`TeacherError::UnknownTeacher`], [`TeacherError::NotFetched`], and those of
+/// [`Catalog::open`].
+pub fn located(path: &Path) -> Result<PathBuf, TeacherError> {
+    Catalog::open()?.locate(path)
 }
 
 /// The last part of a path, for reports.

@@ -2,7 +2,7 @@
 //! profiles' contracts.
 
 use super::TeacherError;
-use super::profile::{BUILT_IN, BuiltIn, MAX_SIDE, Profile, Role};
+use super::profile::{BUILT_IN, BuiltIn, Layout, MAX_SIDE, Profile, Role};
 use ort::session::Session;
 use ort::value::{Outlet, TensorElementType, ValueType};
 use std::path::Path;
@@ -11,10 +11,22 @@ use std::path::Path;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Element {
     F32,
+    F16,
+    U8,
     I64,
     I32,
     Other,
 }
+
+impl Element {
+    /// Whether a picture can consist of it.
+    fn is_number(self) -> bool {
+        matches!(self, Self::F32 | Self::F16 | Self::U8)
+    }
+}
+
+/// More pictures at once than any export asks for.
+const MAX_BATCH: i64 = 64;
 
 /// An input or output of a model.
 #[derive(Clone, Debug)]
@@ -41,6 +53,10 @@ pub(super) struct Fit {
     pub roles: Vec<Role>,
     /// Width and height of the model's image where it fixes them.
     pub fixed: [Option<u32>; 2],
+    /// How many pictures the model wants at once.
+    pub batch: usize,
+    /// Which of the model's outputs is the answer.
+    pub answer: usize,
 }
 
 impl Ports {
@@ -72,21 +88,25 @@ impl Ports {
     ///
     /// An input goes to the first role that it can play and that no other has.
     pub fn fit(&self, profile: &Profile) -> Option<Fit> {
-        let [output] = &self.outputs[..] else {
-            return None;
+        let answer = match &profile.answer {
+            Some(name) => self.outputs.iter().position(|port| port.name == *name)?,
+            None => (self.outputs.len() == 1).then_some(0)?,
         };
-        output.image(profile.output.channels())?;
+        self.outputs[answer].image(profile.output.channels(), profile.layout)?;
         let mut left: Vec<Option<Role>> = profile.inputs.iter().copied().map(Some).collect();
         let mut fit = Fit {
             roles: Vec::new(),
             fixed: [None; 2],
+            batch: 1,
+            answer,
         };
         for input in &self.inputs {
             let plays =
                 |slot: &&mut Option<Role>| slot.is_some_and(|role| input.plays(role, profile));
             let role = left.iter_mut().find(plays)?.take()?;
             if role == Role::Image {
-                fit.fixed = input.image(profile.image.channels())?;
+                fit.fixed = input.image(profile.image.channels(), profile.layout)?;
+                fit.batch = usize::try_from(input.shape[0]).unwrap_or(1);
             }
             fit.roles.push(role);
         }
@@ -99,8 +119,8 @@ impl Ports {
     /// Whether input and output have the ratio of sides of a kind of network,
     /// as far as the model fixes both.
     fn has_stride(&self, fit: &Fit, profile: &Profile, stride: u32) -> bool {
-        let answer = self.outputs[0]
-            .image(profile.output.channels())
+        let answer = self.outputs[fit.answer]
+            .image(profile.output.channels(), profile.layout)
             .unwrap_or_default();
         let mut sides = fit.fixed.into_iter().zip(answer);
         sides.all(|sides| match sides {
@@ -166,6 +186,8 @@ impl Port {
                 words: format!("{name} {ty:?} {}", shape_in_words(shape)),
                 element: match ty {
                     TensorElementType::Float32 => Element::F32,
+                    TensorElementType::Float16 => Element::F16,
+                    TensorElementType::Uint8 => Element::U8,
                     TensorElementType::Int64 => Element::I64,
                     TensorElementType::Int32 => Element::I32,
                     _ => Element::Other,
@@ -182,14 +204,13 @@ impl Port {
         }
     }
 
-    /// Width and height, where fixed, of an image `[1, channels, H, W]` of f32;
-    /// none where this is no such tensor.
-    fn image(&self, channels: usize) -> Option<[Option<u32>; 2]> {
-        let [batch, own, height, width] = self.shape[..] else {
-            return None;
-        };
-        let fits = |side: i64, expected: usize| side == -1 || side == expected as i64;
-        let is_image = self.element == Element::F32 && fits(batch, 1) && fits(own, channels);
+    /// Width and height, where fixed, of a picture `[batch, channels, H, W]` or in the other
+    /// layout; none where this is no such tensor.
+    fn image(&self, channels: usize, layout: Layout) -> Option<[Option<u32>; 2]> {
+        let [batch, own, height, width] = layout.sides(self.shape[..].try_into().ok()?);
+        let batches = batch == -1 || (1..=MAX_BATCH).contains(&batch);
+        let fits = own == -1 || own == channels as i64;
+        let is_image = self.element.is_number() && batches && fits;
         let side = |side: i64| match side {
             -1 => Some(None),
             side => Some(Some(
@@ -202,16 +223,20 @@ impl Port {
         Some([side(width)?, side(height)?])
     }
 
+    fn is_image(&self, channels: usize, profile: &Profile) -> bool {
+        self.image(channels, profile.layout).is_some()
+    }
+
     /// Whether this input can play a role.
     fn plays(&self, role: Role, profile: &Profile) -> bool {
         match role {
-            Role::Image => self.image(profile.image.channels()).is_some(),
-            Role::Hints => self.image(2).is_some(),
-            Role::Mask => self.image(1).is_some(),
+            Role::Image => self.is_image(profile.image.channels(), profile),
+            Role::Hints => self.is_image(2, profile),
+            Role::Mask => self.is_image(1, profile),
             Role::Class => {
                 matches!(self.element, Element::I64 | Element::I32) && self.len().is_some()
             }
-            Role::Noise | Role::Zeros => self.element == Element::F32 && self.len().is_some(),
+            Role::Noise | Role::Zeros => self.element.is_number() && self.len().is_some(),
         }
     }
 

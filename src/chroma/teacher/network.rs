@@ -3,13 +3,13 @@
 use super::cache::{Cache, Question, hash_file, key};
 use super::error::first_line;
 use super::images::resample;
-use super::model::{Element, Fit, Port, Ports};
+use super::model::{Fit, Port, Ports};
 use super::profile::{self, OutputKind, Profile, Role};
+use super::tensor::{self, Picture};
 use super::{AbImage, GrayImage, HintImage, TeacherError, TeacherInfo, TeacherSettings};
-use super::{file_name, runtime};
+use super::{Catalog, file_name, runtime};
 use crate::color::srgb_to_lab;
 use ort::session::{Session, SessionInputValue, builder::GraphOptimizationLevel};
-use ort::value::Tensor;
 use std::f32::consts::TAU;
 use std::path::{Path, PathBuf};
 
@@ -42,14 +42,17 @@ impl NetworkTeacher {
         path: &Path,
         cache_dir: Option<&Path>,
         settings: &TeacherSettings,
+        catalog: &Catalog,
     ) -> Result<Self, TeacherError> {
         let manifest = path.with_extension("toml");
-        let told = match &settings.profile {
-            Some(name) => Some(profile::named(name)?),
-            None if manifest.exists() => Some(Profile::read(&manifest)?),
-            None => None,
-        };
         let sha256 = hash_file(path).map_err(TeacherError::io(path))?;
+        let known = catalog.identify(path, &sha256)?;
+        let told = match (&settings.profile, known) {
+            (Some(name), _) => Some(profile::named(name)?),
+            _ if manifest.exists() => Some(Profile::read(&manifest)?),
+            (None, Some(known)) => Some(known.contract()?),
+            (None, None) => None,
+        };
         let environment = runtime::environment()?;
         let session = load(path, &environment).map_err(|error| TeacherError::BadModel {
             path: path.to_path_buf(),
@@ -133,19 +136,25 @@ impl NetworkTeacher {
         size: [u32; 2],
         hints: Option<&HintImage>,
     ) -> Result<AbImage, String> {
+        let picture = |values: Vec<f32>| Picture {
+            layout: self.profile.layout,
+            batch: self.fit.batch,
+            size,
+            values,
+        };
         let inputs = self.fit.roles.iter().zip(&self.ports.inputs);
         let inputs: Result<Vec<SessionInputValue<'_>>, String> = inputs
             .map(|(&role, port)| match role {
-                Role::Image => image_tensor(size, image(&self.profile, photo, size)),
+                Role::Image => picture(image(&self.profile, photo, size)).tensor(port.element),
                 Role::Hints | Role::Mask => {
-                    image_tensor(size, told(&self.profile, hints, size, role))
+                    picture(told(&self.profile, hints, size, role)).tensor(port.element)
                 }
                 Role::Class | Role::Noise | Role::Zeros => other(&self.profile, role, port),
             })
             .collect();
         let outputs = self.session.run(&inputs?[..]).map_err(first_line)?;
-        let (shape, values) = outputs[0].try_extract_tensor::<f32>().map_err(first_line)?;
-        answer(&self.profile, shape, values)
+        let (shape, values) = tensor::read(&outputs[self.fit.answer])?;
+        answer(&self.profile, &shape, &values)
     }
 }
 
@@ -163,21 +172,6 @@ fn check_size(asked: Option<u32>, profile: &Profile, fit: &Fit) -> Result<(), St
         return Err(format!("must be a multiple of {multiple}, such as {next}"));
     }
     Ok(())
-}
-
-/// A tensor of f32.
-fn tensor(shape: Vec<i64>, values: Vec<f32>) -> Result<SessionInputValue<'static>, String> {
-    let tensor = Tensor::from_array((shape, values)).map_err(first_line)?;
-    Ok(tensor.into())
-}
-
-/// A tensor `[1, channels, height, width]` of f32.
-fn image_tensor(
-    [width, height]: [u32; 2],
-    values: Vec<f32>,
-) -> Result<SessionInputValue<'static>, String> {
-    let channels = values.len() as i64 / (i64::from(width) * i64::from(height));
-    tensor(vec![1, channels, height.into(), width.into()], values)
 }
 
 /// The photo as the network takes it, `[channels, height, width]`.
@@ -220,19 +214,12 @@ fn told(profile: &Profile, hints: Option<&HintImage>, size: [u32; 2], role: Role
 
 /// An input that has nothing to do with the photo.
 fn other(profile: &Profile, role: Role, port: &Port) -> Result<SessionInputValue<'static>, String> {
-    let (shape, count) = (port.closed(), port.len().unwrap_or(0));
-    match (role, port.element) {
-        (_, Element::I64) => {
-            let tensor = Tensor::from_array((shape, vec![0_i64; count])).map_err(first_line)?;
-            Ok(tensor.into())
-        }
-        (_, Element::I32) => {
-            let tensor = Tensor::from_array((shape, vec![0_i32; count])).map_err(first_line)?;
-            Ok(tensor.into())
-        }
-        (Role::Noise, _) => tensor(shape, noise(count, profile.noise_std.unwrap_or(1.0))),
-        _ => tensor(shape, vec![0.0; count]),
-    }
+    let count = port.len().unwrap_or(0);
+    let values = match role {
+        Role::Noise => noise(count, profile.noise_std.unwrap_or(1.0)),
+        _ => vec![0.0; count],
+    };
+    tensor::of(port.element, port.closed(), values)
 }
 
 /// Normal numbers of mean 0 (Box and Muller 1958), always the same.
@@ -250,24 +237,31 @@ fn noise(count: usize, deviation: f32) -> Vec<f32> {
 fn answer(profile: &Profile, shape: &[i64], values: &[f32]) -> Result<AbImage, String> {
     let side = |side: i64| u32::try_from(side).ok().filter(|&side| side > 0);
     let channels = profile.output.channels();
-    let sides = match shape[..] {
-        [1, c, height, width] if c == channels as i64 => side(width).zip(side(height)),
+    let sides = shape.try_into().map(|shape| profile.layout.sides(shape));
+    let sides = match sides {
+        Ok([batch, c, height, width]) if batch > 0 && c == channels as i64 => {
+            side(width).zip(side(height))
+        }
         _ => None,
     };
     let (width, height) =
         sides.ok_or_else(|| format!("its answer has the wrong shape {shape:?}"))?;
-    if let Some(value) = values.iter().find(|value| !value.is_finite()) {
+    let pixels = width as usize * height as usize;
+    // Of several pictures, which are all the same, the first.
+    let first = values.get(..pixels * channels);
+    let first = first.ok_or_else(|| format!("its answer is shorter than its shape {shape:?}"))?;
+    if let Some(value) = first.iter().find(|value| !value.is_finite()) {
         return Err(format!("its answer contains {value}"));
     }
-    let planes: Vec<&[f32]> = values.chunks_exact(values.len() / channels).collect();
+    let at = |c: usize, i: usize| first[profile.layout.index(c, i, [channels, pixels])];
     let pixel = |i: usize| match profile.output {
-        OutputKind::Ab => [0, 1].map(|c: usize| profile.ab(planes[c][i])),
+        OutputKind::Ab => [0, 1].map(|c: usize| profile.ab(at(c, i))),
         OutputKind::Rgb => {
-            let [_, a, b] = srgb_to_lab([0, 1, 2].map(|c: usize| profile.rgb(planes[c][i]).into()));
+            let [_, a, b] = srgb_to_lab([0, 1, 2].map(|c: usize| profile.rgb(at(c, i)).into()));
             [a as f32, b as f32]
         }
     };
-    let ab = (0..planes[0].len()).map(pixel).collect();
+    let ab = (0..pixels).map(pixel).collect();
     Ok(AbImage { width, height, ab })
 }
 

@@ -40,6 +40,12 @@ pub(super) struct Profile {
     pub resize: Resize,
     /// How the photo's pixels become the input's.
     pub filter: Filter,
+    /// In which order a picture's numbers stand.
+    #[serde(default, skip_serializing_if = "Layout::is_planes")]
+    pub layout: Layout,
+    /// Name of the output that is the answer, where a model has several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub answer: Option<String>,
     /// What the answer is.
     pub output: OutputKind,
     /// What black and white are, or a, b of -110 and 110.
@@ -56,18 +62,18 @@ pub(super) struct Profile {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum Role {
-    /// The photo: f32 `[1, channels, H, W]`.
+    /// The photo, `[1, channels, H, W]`.
     Image,
-    /// Painted a, b: f32 `[1, 2, H, W]`, 0 where nothing is painted.
+    /// Painted a, b, `[1, 2, H, W]`, 0 where nothing is painted.
     Hints,
-    /// 1 where something is painted, else 0: f32 `[1, 1, H, W]`.
+    /// 1 where something is painted, else 0, `[1, 1, H, W]`.
     Mask,
     /// The number of a class: integers, all 0.
     Class,
-    /// A random code: f32, the same normally distributed numbers for each photo,
+    /// A random code: the same normally distributed numbers for each photo,
     /// of mean 0 and deviation `noise_std`.
     Noise,
-    /// Something not to be used: f32, all 0.
+    /// Something not to be used: all 0.
     Zeros,
 }
 
@@ -93,6 +99,17 @@ pub(super) enum Resize {
     ShortSide,
 }
 
+/// In which order the numbers of pictures stand, the network's and its answer's.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum Layout {
+    /// Channel by channel, `[1, channels, H, W]`.
+    #[default]
+    Nchw,
+    /// Pixel by pixel, `[1, H, W, channels]`.
+    Nhwc,
+}
+
 /// What a network answers with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -101,6 +118,37 @@ pub(super) enum OutputKind {
     Ab,
     /// Encoded sRGB, of which a and b are taken.
     Rgb,
+}
+
+impl Layout {
+    fn is_planes(&self) -> bool {
+        *self == Self::Nchw
+    }
+
+    /// A tensor's sides, `[batch, channels, height, width]`.
+    pub fn sides(self, shape: [i64; 4]) -> [i64; 4] {
+        let [batch, a, b, c] = shape;
+        match self {
+            Self::Nchw => shape,
+            Self::Nhwc => [batch, c, a, b],
+        }
+    }
+
+    /// The shape of a tensor with these sides.
+    pub fn shape(self, [batch, channels, height, width]: [i64; 4]) -> [i64; 4] {
+        match self {
+            Self::Nchw => [batch, channels, height, width],
+            Self::Nhwc => [batch, height, width, channels],
+        }
+    }
+
+    /// Where a value stands in one picture of so many channels and pixels.
+    pub fn index(self, channel: usize, pixel: usize, [channels, pixels]: [usize; 2]) -> usize {
+        match self {
+            Self::Nchw => channel * pixels + pixel,
+            Self::Nhwc => pixel * channels + channel,
+        }
+    }
 }
 
 impl ImageKind {
@@ -152,7 +200,8 @@ impl Profile {
         Ok(profile)
     }
 
-    fn check(&self) -> Result<(), String> {
+    /// Whether the fields make sense; if not, which does not and why.
+    pub fn check(&self) -> Result<(), String> {
         let count = |role| self.inputs.iter().filter(|&&input| input == role).count();
         let ranges = [
             Some(self.input_range),

@@ -3,6 +3,7 @@
 
 use super::TeacherError;
 use super::error::first_line;
+use super::places::cache_folder;
 use ort::environment::Environment;
 use std::env;
 use std::error::Error;
@@ -11,6 +12,9 @@ use std::sync::{Mutex, PoisonError};
 
 /// Environment variable that names the library.
 const LIBRARY_VARIABLE: &str = "ORT_DYLIB_PATH";
+
+/// Where the project keeps the library.
+const FOLDER: &str = "onnxruntime";
 
 /// File name of the library; releases append their version.
 const LIBRARY_STEM: &str = if cfg!(windows) {
@@ -40,7 +44,7 @@ pub(crate) fn environment() -> Result<Environment, TeacherError> {
             .as_deref()
             .and_then(Path::parent)
             .map(Path::to_path_buf),
-        Some(cache_folder()),
+        Some(cache_folder(FOLDER)),
     ];
     let named = env::var_os(LIBRARY_VARIABLE).filter(|path| !path.is_empty());
     let built = match find(named.map(PathBuf::from), folders.into_iter().flatten()) {
@@ -49,7 +53,7 @@ pub(crate) fn environment() -> Result<Environment, TeacherError> {
             .iter()
             .find_map(|name| load(Path::new(name)).ok())
             .ok_or_else(|| TeacherError::NoRuntime {
-                cache: cache_folder(),
+                cache: cache_folder(FOLDER),
             })?,
     };
     Ok(environment.insert(built).clone())
@@ -98,21 +102,6 @@ fn system_names() -> Vec<String> {
         ".so" => vec![plain.clone(), plain + ".1"],
         _ => vec![plain],
     }
-}
-
-/// The folder of the project's cache where the library is looked for.
-fn cache_folder() -> PathBuf {
-    let variable = |name| {
-        env::var_os(name)
-            .filter(|path| !path.is_empty())
-            .map(PathBuf::from)
-    };
-    variable("XDG_CACHE_HOME")
-        .or_else(|| variable("HOME").map(|home| home.join(".cache")))
-        .or_else(|| variable("LOCALAPPDATA"))
-        .unwrap_or_default()
-        .join("gs-chroma")
-        .join("onnxruntime")
 }
 
 #[cfg(test)]
@@ -167,7 +156,7 @@ mod tests {
     #[test]
     fn the_error_says_how_to_get_it() {
         let error = TeacherError::NoRuntime {
-            cache: cache_folder(),
+            cache: cache_folder(FOLDER),
         };
         let message = error.to_string();
         for part in ["gs-chroma", "ORT_DYLIB_PATH", "https://"] {

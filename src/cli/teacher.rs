@@ -1,0 +1,179 @@
+//! `gs-chroma teacher`.
+
+use std::{
+    io::{self, IsTerminal, Write},
+    ops::ControlFlow,
+    time::Duration,
+};
+
+use clap::{Args, Subcommand};
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::{CliError, print};
+use crate::{
+    chroma::teacher::{Catalog, KnownTeacher, TeacherError},
+    download::{DownloadError, Source, download},
+    run::RunError,
+};
+
+/// List and fetch colorization networks
+#[derive(Args)]
+pub struct TeacherCommand {
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Subcommand)]
+enum Action {
+    List(List),
+    Fetch(Fetch),
+}
+
+/// Show the networks that are known by name, and which are on this machine
+#[derive(Args)]
+struct List {
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Fetch a network from its host and check its SHA-256
+///
+/// What was cut off is taken up where it ended. Proxies are those that HTTPS_PROXY names.
+#[derive(Args)]
+struct Fetch {
+    /// Its name, as `gs-chroma teacher list` shows it.
+    name: String,
+    /// Fetch it without a question.
+    #[arg(long, short)]
+    yes: bool,
+    /// Seconds for which the host may keep silent.
+    #[arg(long, value_name = "SECONDS", default_value_t = 30, value_parser = clap::value_parser!(u16).range(1..))]
+    patience: u16,
+}
+
+impl TeacherCommand {
+    pub(super) fn run(self) -> Result<(), CliError> {
+        match self.action {
+            Action::List(command) => command.run(),
+            Action::Fetch(command) => command.run(),
+        }
+    }
+}
+
+/// The table of networks.
+fn catalog() -> Result<Catalog, CliError> {
+    Catalog::open().map_err(teacher_error)
+}
+
+fn teacher_error(error: TeacherError) -> CliError {
+    CliError::Run(RunError::Teacher(error))
+}
+
+impl List {
+    fn run(self) -> Result<(), CliError> {
+        let catalog = catalog()?;
+        if self.json {
+            let teachers = catalog.teachers.iter().map(|teacher| {
+                let path = catalog.path(teacher);
+                let here = path.is_file();
+                serde_json::json!({ "teacher": teacher, "path": path, "here": here })
+            });
+            let teachers: Vec<_> = teachers.collect();
+            return print(format_args!("{:#}", serde_json::json!(teachers)));
+        }
+        let names = catalog.teachers.iter().map(|teacher| teacher.name.len());
+        let width = names.max().unwrap_or(0);
+        for teacher in &catalog.teachers {
+            let here = match catalog.path(teacher).is_file() {
+                true => "here",
+                false => "",
+            };
+            print(format_args!(
+                "{:width$}  {here:4}  {:12}  {}",
+                teacher.name, teacher.license, teacher.about
+            ))?;
+        }
+        Ok(())
+    }
+}
+
+impl Fetch {
+    fn run(self) -> Result<(), CliError> {
+        let catalog = catalog()?;
+        let teacher = catalog.find(&self.name).map_err(teacher_error)?;
+        let path = catalog.path(teacher);
+        if catalog.is_fetched(teacher).map_err(teacher_error)? {
+            return print(format_args!("{} is there", path.display()));
+        }
+        if !self.yes && !io::stdin().is_terminal() {
+            return Err(CliError::NobodyToAsk {
+                name: self.name,
+                license: teacher.license.clone(),
+            });
+        }
+        let source = Source {
+            url: &teacher.url,
+            sha256: &teacher.sha256,
+            bytes: teacher.bytes,
+            hosts: &catalog.hosts,
+            patience: Duration::from_secs(self.patience.into()),
+        };
+        let mut bar: Option<ProgressBar> = None;
+        let fetched = download(&source, &path, &mut |done, total| {
+            let bar = match &mut bar {
+                Some(bar) => bar,
+                None if self.may(teacher, total) => bar.insert(bytes_bar(total)),
+                None => return ControlFlow::Break(()),
+            };
+            bar.set_position(done);
+            ControlFlow::Continue(())
+        });
+        if let Some(bar) = bar {
+            bar.abandon();
+        }
+        fetched.map_err(|error| CliError::Fetch {
+            by_hand: match error {
+                // The user's own wish, and what the file system says, tell enough.
+                DownloadError::Canceled | DownloadError::Io { .. } | DownloadError::Busy { .. } => {
+                    None
+                }
+                _ => Some((teacher.url.clone(), path.clone())),
+            },
+            error,
+        })?;
+        print(format_args!("wrote {}", path.display()))
+    }
+
+    /// Names size and license, and asks whether to go on.
+    fn may(&self, teacher: &KnownTeacher, total: Option<u64>) -> bool {
+        let size = total.map_or("of unknown size".to_owned(), |total| {
+            format!("{:.1} MB", total as f64 / 1e6)
+        });
+        let host = teacher.url.split('/').nth(2).unwrap_or_default();
+        eprintln!(
+            "{}: {}\n{}, {size}, from {host}",
+            teacher.name, teacher.about, teacher.license
+        );
+        if self.yes {
+            return true;
+        }
+        eprint!("Fetch it? [y/N] ");
+        // A terminal that takes no question gives no answer either.
+        drop(io::stderr().flush());
+        let mut answer = String::new();
+        let read = io::stdin().read_line(&mut answer);
+        read.is_ok() && matches!(answer.trim(), "y" | "Y" | "yes")
+    }
+}
+
+/// A bar that counts bytes.
+fn bytes_bar(total: Option<u64>) -> ProgressBar {
+    let template = "{bar:30} {bytes}/{total_bytes} {bytes_per_sec} ETA {eta}";
+    let style = ProgressStyle::with_template(template);
+    let bar = match total {
+        Some(total) => ProgressBar::new(total),
+        None => ProgressBar::no_length(),
+    };
+    bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+}
