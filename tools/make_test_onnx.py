@@ -11,6 +11,7 @@ import argparse
 from pathlib import Path
 
 import onnx
+import onnx.numpy_helper
 from onnx import TensorProto, helper
 
 OPSET = 17
@@ -27,10 +28,10 @@ Shape = list[int | str]
 
 def save(
     path: Path, nodes: list[onnx.NodeProto], inputs: dict[str, Shape], outputs: dict[str, Shape],
-    constants: list[onnx.TensorProto], integers: tuple[str, ...] = (),
+    constants: list[onnx.TensorProto], kind: dict[str, int] | None = None, opset: int = OPSET,
 ) -> None:  # fmt: skip
-    """Checks and writes one graph, float32 but for the inputs named in `integers`."""
-    kind = {name: TensorProto.INT64 for name in integers}
+    """Checks and writes one graph, float32 but for inputs and outputs of another `kind`."""
+    kind = kind or {}
     graph = helper.make_graph(
         nodes,
         path.stem,
@@ -38,13 +39,19 @@ def save(
             helper.make_tensor_value_info(n, kind.get(n, TensorProto.FLOAT), s)
             for n, s in inputs.items()
         ],
-        [helper.make_tensor_value_info(n, TensorProto.FLOAT, s) for n, s in outputs.items()],
+        [
+            helper.make_tensor_value_info(n, kind.get(n, TensorProto.FLOAT), s)
+            for n, s in outputs.items()
+        ],
         constants,
     )
     # Format 8 is what opset 17 came with; older runtimes refuse newer ones.
-    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=8)
-    onnx.checker.check_model(model, full_check=True)
+    format_version = 8 if opset <= OPSET else 10
+    imports = [helper.make_opsetid("", opset)]
+    model = helper.make_model(graph, opset_imports=imports, ir_version=format_version)
     onnx.save(model, path)
+    # By its path, so that weights beside it are found.
+    onnx.checker.check_model(str(path), full_check=True)
 
 
 def convolution(
@@ -115,7 +122,7 @@ def bigcolor_tiny(path: Path) -> None:
         {"gray": [1, 1, *side], "class": [1], "z": [1, 119]}, {"rgb": [1, 3, *side]},
         [*convolution(1, 3, [2 * RGB_SLOPE] * 3, [2 * offset - 1 for offset in RGB_OFFSET]),
          helper.make_tensor("nothing", TensorProto.FLOAT, [], [0.0])],
-        integers=("class",),
+        kind={"class": TensorProto.INT64},
     )  # fmt: skip
 
 
@@ -137,6 +144,92 @@ def deoldify_tiny(path: Path) -> None:
 def deoldify_browser_tiny(path: Path) -> None:
     """DeOldify from 0 to 1."""
     rgb_network(path, 1.0, [SIDE, SIDE])
+
+
+AB_WEIGHTS = [A_SLOPE / 3] * 3 + [B_SLOPE / 3] * 3
+AB_BIAS = [A_OFFSET, B_OFFSET]
+AB_NODES = [helper.make_node("Conv", ["input", "weights", "bias"], ["output"])]
+AB_SHAPES: tuple[dict[str, Shape], dict[str, Shape]] = (
+    {"input": [1, 3, SIDE, SIDE]},
+    {"output": [1, 2, SIDE, SIDE]},
+)
+
+
+def half_tiny(path: Path) -> None:
+    """ddcolor_tiny in 16-bit floats, in and out."""
+    constants = [
+        helper.make_tensor("weights", TensorProto.FLOAT16, [2, 3, 1, 1], AB_WEIGHTS),
+        helper.make_tensor("bias", TensorProto.FLOAT16, [2], AB_BIAS),
+    ]
+    kind = {"input": TensorProto.FLOAT16, "output": TensorProto.FLOAT16}
+    save(path, AB_NODES, *AB_SHAPES, constants, kind)
+
+
+def int8_tiny(path: Path) -> None:
+    """ddcolor_tiny with weights of 8 bits, a third of whose steps is the unit of a and b."""
+    nodes = [helper.make_node("DequantizeLinear", ["bytes", "step"], ["weights"]), *AB_NODES]
+    weights = [round(3 * weight / 2) for weight in AB_WEIGHTS]
+    constants = [
+        helper.make_tensor("bytes", TensorProto.INT8, [2, 3, 1, 1], weights),
+        helper.make_tensor("step", TensorProto.FLOAT, [], [2 / 3]),
+        helper.make_tensor("bias", TensorProto.FLOAT, [2], AB_BIAS),
+    ]
+    save(path, nodes, *AB_SHAPES, constants)
+
+
+def old_tiny(path: Path) -> None:
+    """ddcolor_tiny in opset 11."""
+    save(path, AB_NODES, *AB_SHAPES, convolution(3, 2, AB_WEIGHTS, AB_BIAS), opset=11)
+
+
+def new_tiny(path: Path) -> None:
+    """ddcolor_tiny in opset 21."""
+    save(path, AB_NODES, *AB_SHAPES, convolution(3, 2, AB_WEIGHTS, AB_BIAS), opset=21)
+
+
+def outside_tiny(path: Path) -> None:
+    """ddcolor_tiny whose weights lie in outside_tiny.data."""
+    data = b""
+    constants = []
+    for constant in convolution(3, 2, AB_WEIGHTS, AB_BIAS):
+        floats = onnx.numpy_helper.to_array(constant).tobytes()
+        constant.ClearField("float_data")
+        constant.data_location = TensorProto.EXTERNAL
+        where = {"location": "outside_tiny.data", "offset": len(data), "length": len(floats)}
+        for key, value in where.items():
+            constant.external_data.add(key=key, value=str(value))
+        data += floats
+        constants.append(constant)
+    path.with_suffix(".data").write_bytes(data)
+    save(path, AB_NODES, *AB_SHAPES, constants)
+
+
+def pixels_tiny(path: Path) -> None:
+    """RGB in bytes, pixel by pixel and two pictures at once: r, g, b of half the gray, moved."""
+    nodes = [
+        helper.make_node("Cast", ["input"], ["floats"], to=TensorProto.FLOAT),
+        helper.make_node("Transpose", ["floats"], ["planes"], perm=[0, 3, 1, 2]),
+        helper.make_node("Conv", ["planes", "weights", "bias"], ["moved"]),
+        helper.make_node("Transpose", ["moved"], ["pixels"], perm=[0, 2, 3, 1]),
+        helper.make_node("Cast", ["pixels"], ["output"], to=TensorProto.UINT8),
+    ]
+    weights = [RGB_SLOPE * (i == j) for i in range(3) for j in range(3)]
+    shape: Shape = [2, SIDE, SIDE, 3]
+    kind = {"input": TensorProto.UINT8, "output": TensorProto.UINT8}
+    bias = [255.0 * offset for offset in RGB_OFFSET]
+    save(path, nodes, {"input": shape}, {"output": shape}, convolution(3, 3, weights, bias), kind)
+
+
+def two_answers_tiny(path: Path) -> None:
+    """ddcolor_tiny's answer, `ab`, behind another output of its shape, `half`."""
+    nodes = [
+        helper.make_node("Conv", ["input", "weights", "bias"], ["ab"]),
+        helper.make_node("Mul", ["ab", "share"], ["half"]),
+    ]
+    share = helper.make_tensor("share", TensorProto.FLOAT, [], [0.5])
+    outputs: dict[str, Shape] = {"half": [1, 2, SIDE, SIDE], "ab": [1, 2, SIDE, SIDE]}
+    constants = [*convolution(3, 2, AB_WEIGHTS, AB_BIAS), share]
+    save(path, nodes, {"input": [1, 3, SIDE, SIDE]}, outputs, constants)
 
 
 def wrong_rank(path: Path) -> None:
@@ -194,7 +287,8 @@ def main() -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for make in (
         ddcolor_tiny, siggraph17_tiny, siggraph17_full_tiny, caffe_v2_tiny, bigcolor_tiny,
-        deoldify_tiny, deoldify_browser_tiny, wrong_rank, wrong_channels, two_inputs,
+        deoldify_tiny, deoldify_browser_tiny, half_tiny, int8_tiny, old_tiny, new_tiny,
+        outside_tiny, pixels_tiny, two_answers_tiny, wrong_rank, wrong_channels, two_inputs,
     ):  # fmt: skip
         make(folder / f"{make.__name__}.onnx")
     truncated(folder / "truncated.onnx", folder / "ddcolor_tiny.onnx")

@@ -5,7 +5,9 @@ use std::path::PathBuf;
 use clap::{Args, CommandFactory, ValueEnum, error::ErrorKind};
 
 use super::{
-    Cli, CliError, print,
+    Cli, CliError,
+    network::NetworkArguments,
+    print,
     progress::Progress,
     values::{one_of, positive, share},
 };
@@ -50,14 +52,8 @@ pub struct Colorize {
     /// What each teacher counts, in their order [default: all the same].
     #[arg(long, value_name = "N,N,…", value_delimiter = ',', value_parser = positive::<f32>, requires = "teacher")]
     weights: Vec<f32>,
-    /// What the network takes and gives: a profile (ddcolor, siggraph17, siggraph17-full, eccv16,
-    /// caffe-v2, bigcolor, deoldify, deoldify-browser) or a manifest [default: FILE.toml beside
-    /// FILE.onnx, or what its inputs and outputs tell].
-    #[arg(long, value_name = "NAME|FILE.toml", requires = "teacher")]
-    teacher_profile: Option<String>,
-    /// Side in pixels at which a network sees photos, where it leaves that open [default: the profile's].
-    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(1..=8192), requires = "teacher")]
-    teacher_size: Option<u32>,
+    #[command(flatten)]
+    network: NetworkArguments,
     /// How a teacher's small picture becomes as large as the photo.
     #[arg(long, value_parser = one_of(UPSAMPLE), default_value = "guided")]
     upsample: Upsample,
@@ -208,9 +204,8 @@ impl Colorize {
             teach: TeachOptions {
                 teachers: self.teachers(),
                 settings: TeacherSettings {
-                    profile: self.teacher_profile,
-                    size: self.teacher_size,
                     upsample: self.upsample,
+                    ..self.network.settings()
                 },
                 strength: self.strength,
                 hints: self.hints,

@@ -4,8 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{CliError, print, progress::Progress};
-use crate::chroma::teacher::TeacherSettings;
+use super::{CliError, network::NetworkArguments, print, progress::Progress};
 use crate::run::{EvalOptions, eval};
 
 /// Measure a colored run: fidelity, colorfulness, and whether views agree.
@@ -16,12 +15,8 @@ pub struct Eval {
     /// The teacher, to be measured beside the scene, as for `colorize`.
     #[arg(long, value_name = "NAME|FILE.onnx|DIR")]
     teacher: Option<PathBuf>,
-    /// What the network takes and gives, as for `colorize`.
-    #[arg(long, value_name = "NAME|FILE.toml", requires = "teacher")]
-    teacher_profile: Option<String>,
-    /// Side in pixels at which a network sees photos, as for `colorize`.
-    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(1..=8192), requires = "teacher")]
-    teacher_size: Option<u32>,
+    #[command(flatten)]
+    network: NetworkArguments,
     /// Measure other ways to color a scene as well: RGB splats fitted to the teacher's pictures,
     /// and the teacher on each drawn gray frame.
     #[arg(long, requires = "teacher")]
@@ -53,11 +48,7 @@ impl Eval {
         let options = EvalOptions {
             run: self.run,
             teacher: self.teacher,
-            teacher_settings: TeacherSettings {
-                profile: self.teacher_profile,
-                size: self.teacher_size,
-                ..TeacherSettings::default()
-            },
+            teacher_settings: self.network.settings(),
             colmap: self.colmap,
             frames: self.frames as usize,
             baselines: self.baselines,

@@ -8,12 +8,12 @@ use super::{
     CliError,
     effects::EffectArguments,
     luma::LumaArguments,
+    network::NetworkArguments,
     photos::Photos,
     print,
     progress::Progress,
     values::{PRESETS, one_of, positive},
 };
-use crate::chroma::teacher::TeacherSettings;
 use crate::luma::Goal;
 use crate::report::timings_table;
 use crate::run::{AheadOptions, FitOptions, Preset, fit};
@@ -53,12 +53,8 @@ pub struct Fit {
     /// not; may be given more than once.
     #[arg(long, value_name = "NAME|FILE.onnx")]
     teacher: Vec<PathBuf>,
-    /// What the network takes and gives, as for `colorize`.
-    #[arg(long, value_name = "NAME|FILE.toml", requires = "teacher")]
-    teacher_profile: Option<String>,
-    /// Side in pixels at which it sees photos, as for `colorize`.
-    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(1..=8192), requires = "teacher")]
-    teacher_size: Option<u32>,
+    #[command(flatten)]
+    network: NetworkArguments,
     /// Start from these Gaussians instead of COLMAP's points.
     #[arg(long, value_name = "FILE.ply")]
     init: Option<PathBuf>,
@@ -92,11 +88,7 @@ impl Fit {
             timings: self.timings,
             ahead: AheadOptions {
                 teachers: self.teacher,
-                settings: TeacherSettings {
-                    profile: self.teacher_profile,
-                    size: self.teacher_size,
-                    ..TeacherSettings::default()
-                },
+                settings: self.network.settings(),
             },
         };
         let (folder, report) = fit(&options, &mut |event| progress.show(&event))?;

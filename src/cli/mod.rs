@@ -9,6 +9,7 @@ mod export;
 mod fit;
 mod info;
 mod luma;
+mod network;
 mod photos;
 mod plan;
 mod progress;

@@ -96,7 +96,7 @@ fn of_capture(error: &CaptureError) -> String {
 fn of_teacher(error: &TeacherError) -> String {
     match error {
         TeacherError::SeveralProfiles { path, profiles } => format!(
-            "{}: several kinds of networks have its inputs and outputs, and only you can know which it is: give --teacher-profile {profiles}",
+            "{}: several kinds of networks have its inputs and outputs, and only you can know which it is: give --teacher-profile {profiles} (`gs-chroma teacher check` tries them)",
             path.display()
         ),
         TeacherError::UnknownTeacher { .. } => {
@@ -105,6 +105,9 @@ fn of_teacher(error: &TeacherError) -> String {
         TeacherError::NotFetched { name } => {
             format!("{error}: get it with `gs-chroma teacher fetch {name}`")
         }
+        TeacherError::NoDevice { .. } => format!(
+            "{error}: choose another --teacher-device, or let ORT_DYLIB_PATH name a library that has it"
+        ),
         TeacherError::UnknownProfile { .. } => format!("--teacher-profile {error}"),
         TeacherError::BadSize { path, size, reason } => {
             format!("{}: --teacher-size {size}: {reason}", path.display())

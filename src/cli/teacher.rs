@@ -3,20 +3,22 @@
 use std::{
     io::{self, IsTerminal, Write},
     ops::ControlFlow,
+    path::{Path, PathBuf},
     time::Duration,
 };
 
 use clap::{Args, Subcommand};
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::{CliError, print};
+use super::{CliError, network::NetworkArguments, print};
 use crate::{
-    chroma::teacher::{Catalog, KnownTeacher, TeacherError},
+    atomic_file,
+    chroma::teacher::{Catalog, Checkup, GrayImage, KnownTeacher, TeacherError, ToldBy, check},
     download::{DownloadError, Source, download},
     run::RunError,
 };
 
-/// List and fetch colorization networks
+/// List, fetch and check colorization networks
 #[derive(Args)]
 pub struct TeacherCommand {
     #[command(subcommand)]
@@ -27,6 +29,7 @@ pub struct TeacherCommand {
 enum Action {
     List(List),
     Fetch(Fetch),
+    Check(Check),
 }
 
 /// Show the networks that are known by name, and which are on this machine
@@ -52,11 +55,124 @@ struct Fetch {
     patience: u16,
 }
 
+/// Ask a network about a ramp and a photo, and say what is understood of it
+///
+/// Where nothing tells what its numbers mean, the usual ways are tried, and that whose answers
+/// make most sense is taken; `colorize` does so only if a manifest says the same.
+#[derive(Args)]
+struct Check {
+    /// An .onnx file, or a network's name in `gs-chroma teacher list`.
+    #[arg(value_name = "NAME|FILE.onnx")]
+    teacher: PathBuf,
+    #[command(flatten)]
+    network: NetworkArguments,
+    /// The photo [default: one of the bundled garden].
+    #[arg(long, value_name = "FILE")]
+    photo: Option<PathBuf>,
+    /// Write what is understood as a manifest.
+    #[arg(long, value_name = "FILE.toml")]
+    manifest: Option<PathBuf>,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// A photo for those who name none.
+const PHOTO: &[u8] = include_bytes!("../../assets/demo/images/garden_05.jpg");
+
+impl Check {
+    fn run(self) -> Result<(), CliError> {
+        let (name, bytes) = match &self.photo {
+            Some(path) => {
+                let bytes = std::fs::read(path);
+                let bytes = bytes.map_err(|error| unreadable(path, &error))?;
+                (path.display().to_string(), bytes)
+            }
+            None => ("garden".to_owned(), PHOTO.to_vec()),
+        };
+        let photo = image::load_from_memory(&bytes)
+            .map_err(|error| unreadable(Path::new(&name), &error))?
+            .to_luma8();
+        let gray = GrayImage {
+            width: photo.width(),
+            height: photo.height(),
+            pixels: photo.as_raw(),
+        };
+        let checkup = check(&self.teacher, &self.network.settings(), (&name, gray));
+        let checkup = checkup.map_err(teacher_error)?;
+        if let Some(path) = &self.manifest {
+            let mut file = atomic_file::create(path).map_err(|error| unreadable(path, &error))?;
+            file.write_all(checkup.manifest.as_bytes())
+                .map_err(|error| unreadable(path, &error))?;
+            file.persist(path)
+                .map_err(|error| unreadable(path, &error))?;
+        }
+        if self.json {
+            return print(format_args!("{:#}", serde_json::json!(checkup)));
+        }
+        for line in lines(&checkup) {
+            print(line)?;
+        }
+        match &self.manifest {
+            Some(path) => print(format_args!("wrote {}", path.display())),
+            None => Ok(()),
+        }
+    }
+}
+
+fn unreadable(path: &Path, reason: &impl ToString) -> CliError {
+    CliError::Run(RunError::File {
+        path: path.to_path_buf(),
+        reason: reason.to_string(),
+    })
+}
+
+/// Candidates that are further off, in CIELAB units, are not worth a line.
+const FAR: f64 = 60.0;
+
+/// A checkup in words.
+fn lines(checkup: &Checkup) -> Vec<String> {
+    let info = &checkup.info;
+    let by = match checkup.told_by {
+        ToldBy::User => "as --teacher-profile says",
+        ToldBy::Manifest => "as the manifest beside it says",
+        ToldBy::Catalog => "as its SHA-256 tells",
+        ToldBy::Shapes => "as inputs and outputs tell",
+        ToldBy::Trial => "a guess, from answers to what was tried",
+    };
+    let known = checkup.known_as.as_ref();
+    let known = known.map_or(String::new(), |name| format!(", {name} of `teacher list`"));
+    let mut lines = vec![
+        format!("{}{known}", info.name),
+        format!("SHA-256 {}", info.sha256.as_deref().unwrap_or("none")),
+        checkup.ports.clone(),
+        format!("{}: {by}", info.kind),
+    ];
+    let (told, far): (Vec<_>, Vec<_>) = (checkup.trials.iter()).partition(|trial| trial.off < FAR);
+    let tried = told.into_iter();
+    lines.extend(tried.map(|t| format!("  tried {}: {:.1} units off", t.candidate, t.off)));
+    if !far.is_empty() {
+        lines.push(format!("  and {} more, which are far off", far.len()));
+    }
+    if let (Some([width, height]), Some(device)) = (info.input_size, info.device) {
+        lines.push(format!("sees {width} x {height} on {}", device.name()));
+    }
+    lines.extend(checkup.answers.iter().map(|answer| {
+        let [least, most] = answer.range;
+        format!(
+            "{}: answers {least:.3} to {most:.3}, colorfulness {:.1}, {:.2} s",
+            answer.picture, answer.colorfulness, answer.seconds
+        )
+    }));
+    lines
+}
+
 impl TeacherCommand {
     pub(super) fn run(self) -> Result<(), CliError> {
         match self.action {
             Action::List(command) => command.run(),
             Action::Fetch(command) => command.run(),
+            Action::Check(command) => command.run(),
         }
     }
 }

@@ -24,7 +24,10 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::{
     capture::{Exposure, LoadOptions},
-    chroma::{ChromaSettings, teacher::Upsample},
+    chroma::{
+        ChromaSettings,
+        teacher::{TeacherInfo, Upsample},
+    },
     luma::{CurvePoint, Goal, LumaSettings, Preset},
     measure::DeltaE,
 };
@@ -245,14 +248,9 @@ pub struct ChromaReport {
 /// A teacher.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TeacherReport {
-    /// Name of its file or folder.
-    pub name: String,
-    /// A network's profile, such as `DDColor`, or `folder`.
-    pub kind: String,
-    /// SHA-256 of the `.onnx` file in hexadecimal.
-    pub sha256: Option<String>,
-    /// Width and height at which the network sees photos.
-    pub input_size: Option<[u32; 2]>,
+    /// Name, kind and identity.
+    #[serde(flatten)]
+    pub info: TeacherInfo,
     /// What its answers count beside the other teachers'.
     pub weight: f32,
 }

@@ -222,7 +222,7 @@ fn ask(
     let settings = &options.teacher_settings;
     let teacher = Teacher::open(path, Some(&folder.teacher()), settings)?;
     let info = teacher.describe();
-    let is_same = |t: &TeacherReport| (&t.name, &t.sha256) == (&info.name, &info.sha256);
+    let is_same = |t: &TeacherReport| (&t.info.name, &t.info.sha256) == (&info.name, &info.sha256);
     if let Some(chroma) = &report.chroma
         && !chroma.teachers.iter().any(is_same)
     {

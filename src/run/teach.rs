@@ -11,9 +11,7 @@ use crate::{
     capture::Dataset,
     chroma::{
         Colorizer, ColorizerError, Lesson, Wanted, teach,
-        teacher::{
-            AbImage, GrayImage, HintFolder, HintImage, Query, Teacher, TeacherInfo, TeacherSettings,
-        },
+        teacher::{AbImage, GrayImage, HintFolder, HintImage, Query, Teacher, TeacherSettings},
     },
     report::TeacherReport,
 };
@@ -159,20 +157,9 @@ impl Teachers {
 
     /// Name, kind and weight of each teacher.
     pub fn describe(&self) -> Vec<TeacherReport> {
-        let describe = |member: &Member| {
-            let TeacherInfo {
-                name,
-                kind,
-                sha256,
-                input_size,
-            } = member.teacher.describe();
-            TeacherReport {
-                name,
-                kind,
-                sha256,
-                input_size,
-                weight: member.weight,
-            }
+        let describe = |member: &Member| TeacherReport {
+            info: member.teacher.describe(),
+            weight: member.weight,
         };
         self.teachers.iter().map(describe).collect()
     }

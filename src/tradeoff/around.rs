@@ -87,7 +87,7 @@ impl Around {
             rounds: chroma.iterations,
             corrects_views: chroma.settings.correct_views,
             teacher_size: (chroma.teachers.first())
-                .and_then(|teacher| teacher.input_size)
+                .and_then(|teacher| teacher.info.input_size)
                 .map(|[width, height]| width.min(height)),
         });
         self

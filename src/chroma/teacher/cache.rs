@@ -8,7 +8,7 @@ use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
 /// Part of every key; counts up when the meaning of an answer changes.
-const FORMAT_VERSION: u32 = 2;
+const FORMAT_VERSION: u32 = 3;
 
 /// A folder of answers: `<key>.npy`, f32 `[2, h, w]`, a then b in CIELAB units
 /// at the network's own resolution.
@@ -53,6 +53,8 @@ pub(super) struct Question<'a> {
     pub photo: GrayImage<'a>,
     /// SHA-256 of the model's file.
     pub model: &'a str,
+    /// Where it ran: processors round differently.
+    pub device: &'a str,
     /// The profile in full.
     pub profile: &'a str,
     /// Width and height of the network's input.
@@ -66,8 +68,9 @@ pub(super) fn key(question: &Question<'_>) -> String {
     let (photo, [width, height]) = (&question.photo, question.input);
     let mut hash = Sha256::new();
     hash.update(format!(
-        "gs-chroma teacher answer {FORMAT_VERSION}\n{}\n{}\n{width}x{height}\n{}x{}\n{}\n",
+        "gs-chroma teacher answer {FORMAT_VERSION}\n{}\n{}\n{}\n{width}x{height}\n{}x{}\n{}\n",
         question.model,
+        question.device,
         question.profile,
         photo.width,
         photo.height,
@@ -82,15 +85,35 @@ pub(super) fn key(question: &Question<'_>) -> String {
 
 /// SHA-256 of a file in hexadecimal.
 pub(super) fn hash_file(path: &Path) -> io::Result<String> {
-    let mut file = File::open(path)?;
-    let mut hash = Sha256::new();
-    let mut buffer = vec![0; 1 << 20];
-    loop {
-        let count = file.read(&mut buffer)?;
-        if count == 0 {
-            return Ok(hexadecimal(&hash.finalize()));
+    let mut hasher = Hasher::default();
+    hasher.update_with_file(path)?;
+    Ok(hasher.finish())
+}
+
+/// SHA-256 of what it is told, one after the other.
+#[derive(Default)]
+pub(super) struct Hasher(Sha256);
+
+impl Hasher {
+    pub fn update(&mut self, bytes: &[u8]) {
+        self.0.update(bytes);
+    }
+
+    /// All of a file.
+    pub fn update_with_file(&mut self, path: &Path) -> io::Result<()> {
+        let mut file = File::open(path)?;
+        let mut buffer = vec![0; 1 << 20];
+        loop {
+            match file.read(&mut buffer)? {
+                0 => return Ok(()),
+                count => self.0.update(&buffer[..count]),
+            }
         }
-        hash.update(&buffer[..count]);
+    }
+
+    /// In hexadecimal.
+    pub fn finish(self) -> String {
+        hexadecimal(&self.0.finalize())
     }
 }
 
@@ -183,6 +206,7 @@ mod tests {
         let base = Question {
             photo: photo(2, 1, &[1, 2]),
             model: "m",
+            device: "cpu",
             profile: "p",
             input: [8, 8],
             hints: None,
@@ -197,6 +221,7 @@ mod tests {
             asked(&|q| q.photo = photo(2, 1, &[1, 3])),
             asked(&|q| q.photo = photo(1, 2, &[1, 2])),
             asked(&|q| q.model = "n"),
+            asked(&|q| q.device = "cuda"),
             asked(&|q| q.profile = "q"),
             asked(&|q| q.input = [8, 16]),
             asked(&|q| q.hints = Some(&[[0.0; 3]])),

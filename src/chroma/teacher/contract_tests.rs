@@ -7,17 +7,17 @@ use super::*;
 use std::fs;
 use std::path::Path;
 
-fn settings(profile: Option<&str>, size: Option<u32>) -> TeacherSettings {
+pub(super) fn settings(profile: Option<&str>, size: Option<u32>) -> TeacherSettings {
     TeacherSettings {
         profile: profile.map(str::to_owned),
         size,
-        upsample: Upsample::Guided,
+        ..TeacherSettings::default()
     }
 }
 
 /// The answer for a photo of one gray, which has one color, and the kind of
 /// network that gave it.
-fn color(name: &str, settings: &TeacherSettings, level: u8) -> ([f64; 2], String) {
+pub(super) fn color(name: &str, settings: &TeacherSettings, level: u8) -> ([f64; 2], String) {
     let mut teacher = open_with(&fixture(name), None, settings).unwrap();
     let pixels = vec![level; 40 * 24];
     let answer = teacher.colorize("v.png", gray(40, 24, &pixels), None);
@@ -33,7 +33,7 @@ fn color(name: &str, settings: &TeacherSettings, level: u8) -> ([f64; 2], String
     (first.map(f64::from), teacher.describe().kind)
 }
 
-fn assert_near(found: [f64; 2], expected: [f64; 2], tolerance: f64) {
+pub(super) fn assert_near(found: [f64; 2], expected: [f64; 2], tolerance: f64) {
     let near = found
         .iter()
         .zip(expected)
@@ -73,7 +73,7 @@ fn ab_of_rgb(rgb: [f64; 3]) -> [f64; 2] {
 }
 
 /// What the networks of RGB answer: half the gray, moved by 0.4, 0.2 and 0.1.
-fn ab_of_moved(level: u8) -> [f64; 2] {
+pub(super) fn ab_of_moved(level: u8) -> [f64; 2] {
     let half = f64::from(level) / 510.0;
     ab_of_rgb([half + 0.4, half + 0.2, half + 0.1])
 }
@@ -209,7 +209,7 @@ fn rgb_from_0_to_255_and_from_0_to_1() {
     }
 }
 
-fn refusal(path: &Path, settings: &TeacherSettings) -> String {
+pub(super) fn refusal(path: &Path, settings: &TeacherSettings) -> String {
     let refused = open_with(path, None, settings)
         .err()
         .expect("must be refused");

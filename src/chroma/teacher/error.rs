@@ -46,6 +46,25 @@ pub enum TeacherError {
         /// The runtime's reason.
         reason: String,
     },
+    /// The library cannot use the device that is asked for.
+    #[error("{}: the ONNX Runtime at hand was built without {device}", path.display())]
+    NoDevice {
+        /// The `.onnx` file.
+        path: PathBuf,
+        /// The device's name.
+        device: &'static str,
+    },
+    /// A file of weights that the model names is not there.
+    #[error(
+        "{}: its weights lie in {weights}, which is not there; both files belong into one folder",
+        path.display()
+    )]
+    NoWeights {
+        /// The `.onnx` file.
+        path: PathBuf,
+        /// The name that it has for the other.
+        weights: String,
+    },
     /// The model is no colorization network that is known here.
     #[error(
         "{}: no known colorization network: it has {found}; accepted: {accepted}; a .toml beside \

@@ -39,6 +39,7 @@ impl FolderTeacher {
             name: file_name(&self.folder),
             kind: "folder".to_owned(),
             sha256: None,
+            device: None,
             input_size: None,
         }
     }

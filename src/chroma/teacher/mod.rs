@@ -6,6 +6,8 @@
 
 mod cache;
 mod catalog;
+mod checkup;
+mod device;
 mod error;
 mod folder;
 mod hints;
@@ -18,19 +20,23 @@ mod profile;
 mod query;
 pub(crate) mod runtime;
 mod tensor;
+mod trial;
 mod upsample;
+mod weights;
 
 pub use catalog::{Catalog, KnownTeacher};
+pub use checkup::{Answered, Checkup, Trial, check};
+pub use device::TeacherDevice;
 pub use error::TeacherError;
 pub use folder::FolderTeacher;
 pub use hints::{HintFolder, HintImage};
 pub use images::{AbImage, GrayImage};
 pub(super) use images::{Filter, resample};
-pub use network::NetworkTeacher;
+pub use network::{NetworkTeacher, ToldBy};
 pub use query::Query;
 pub use upsample::Upsample;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// Someone who colors photos.
@@ -54,20 +60,24 @@ pub struct TeacherSettings {
     /// Side in pixels of a network's input where the model leaves it open; none
     /// for the profile's.
     pub size: Option<u32>,
+    /// On which processor a network runs.
+    pub device: TeacherDevice,
     /// How answers smaller than the photo are enlarged.
     pub upsample: Upsample,
 }
 
 /// What a report says about a teacher.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TeacherInfo {
     /// Name of the file or folder.
     pub name: String,
     /// The network's profile, such as `DDColor`, or `folder`.
     pub kind: String,
-    /// SHA-256 of the `.onnx` file in hexadecimal; weights that lie in separate
-    /// files beside it are not in it.
+    /// SHA-256 of the `.onnx` file in hexadecimal, and of the files of weights beside it, if it
+    /// names any.
     pub sha256: Option<String>,
+    /// Where the network runs.
+    pub device: Option<TeacherDevice>,
     /// Width and height at which the network sees photos; twice the shorter side
     /// where the longer follows the photo's aspect.
     pub input_size: Option<[u32; 2]>,
@@ -185,5 +195,7 @@ fn file_name(path: &Path) -> String {
 
 #[cfg(test)]
 mod contract_tests;
+#[cfg(test)]
+mod export_tests;
 #[cfg(test)]
 mod tests;

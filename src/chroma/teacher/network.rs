@@ -1,15 +1,17 @@
 //! A colorization network as a teacher.
 
-use super::cache::{Cache, Question, hash_file, key};
+use super::cache::{Cache, Question, key};
 use super::error::first_line;
 use super::images::resample;
 use super::model::{Fit, Port, Ports};
 use super::profile::{self, OutputKind, Profile, Role};
 use super::tensor::{self, Picture};
-use super::{AbImage, GrayImage, HintImage, TeacherError, TeacherInfo, TeacherSettings};
-use super::{Catalog, file_name, runtime};
+use super::{AbImage, GrayImage, HintImage};
+use super::{Catalog, device, file_name, runtime, weights};
+use super::{TeacherDevice, TeacherError, TeacherInfo, TeacherSettings};
 use crate::color::srgb_to_lab;
-use ort::session::{Session, SessionInputValue, builder::GraphOptimizationLevel};
+use ort::session::{Session, SessionInputValue};
+use serde::Serialize;
 use std::f32::consts::TAU;
 use std::path::{Path, PathBuf};
 
@@ -22,15 +24,80 @@ const NOISE_SEED: u64 = 0;
 
 /// An ONNX model that colors photos, with the answers it gave before.
 pub struct NetworkTeacher {
-    path: PathBuf,
-    session: Session,
-    ports: Ports,
-    profile: Profile,
+    pub(super) loaded: Loaded,
+    pub(super) profile: Profile,
     fit: Fit,
     /// Side of the model's input where the model leaves it open.
     size: u32,
-    sha256: String,
     cache: Option<Cache>,
+}
+
+/// A model before it is known what its numbers mean.
+pub(super) struct Loaded {
+    pub path: PathBuf,
+    pub ports: Ports,
+    session: Session,
+    device: TeacherDevice,
+    sha256: String,
+    /// What the table of networks says of it: its name there and its contract.
+    pub known: Option<(String, Profile)>,
+}
+
+/// Who says what a network takes and gives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ToldBy {
+    /// The user.
+    User,
+    /// The manifest beside the model.
+    Manifest,
+    /// The table of networks, which knows its SHA-256.
+    Catalog,
+    /// Its inputs and outputs.
+    Shapes,
+    /// Answers to what was tried.
+    Trial,
+}
+
+impl Loaded {
+    pub fn open(
+        path: &Path,
+        settings: &TeacherSettings,
+        catalog: &Catalog,
+    ) -> Result<Self, TeacherError> {
+        let sha256 = weights::identity(path)?;
+        let known = catalog.identify(path, &sha256)?;
+        let known = known.map(|known| Ok((known.name.clone(), known.contract()?)));
+        let environment = runtime::environment()?;
+        let (session, device) = device::load(path, &environment, settings.device)?;
+        Ok(Self {
+            path: path.to_path_buf(),
+            ports: Ports::of(&session),
+            session,
+            device,
+            sha256,
+            known: known.transpose()?,
+        })
+    }
+
+    /// What the model takes and gives, as far as somebody says so or its inputs and outputs do.
+    pub fn contract(
+        &self,
+        settings: &TeacherSettings,
+    ) -> Result<(Profile, Fit, ToldBy), TeacherError> {
+        let manifest = self.path.with_extension("toml");
+        let (profile, by) = match (&settings.profile, &self.known) {
+            (Some(name), _) => (profile::named(name)?, ToldBy::User),
+            _ if manifest.exists() => (Profile::read(&manifest)?, ToldBy::Manifest),
+            (None, Some((_, contract))) => (contract.clone(), ToldBy::Catalog),
+            (None, None) => {
+                let (profile, fit) = self.ports.choose(&self.path)?;
+                return Ok((profile, fit, ToldBy::Shapes));
+            }
+        };
+        let fit = self.ports.check(&self.path, &profile)?;
+        Ok((profile, fit, by))
+    }
 }
 
 impl NetworkTeacher {
@@ -44,28 +111,8 @@ impl NetworkTeacher {
         settings: &TeacherSettings,
         catalog: &Catalog,
     ) -> Result<Self, TeacherError> {
-        let manifest = path.with_extension("toml");
-        let sha256 = hash_file(path).map_err(TeacherError::io(path))?;
-        let known = catalog.identify(path, &sha256)?;
-        let told = match (&settings.profile, known) {
-            (Some(name), _) => Some(profile::named(name)?),
-            _ if manifest.exists() => Some(Profile::read(&manifest)?),
-            (None, Some(known)) => Some(known.contract()?),
-            (None, None) => None,
-        };
-        let environment = runtime::environment()?;
-        let session = load(path, &environment).map_err(|error| TeacherError::BadModel {
-            path: path.to_path_buf(),
-            reason: first_line(error),
-        })?;
-        let ports = Ports::of(&session);
-        let (profile, fit) = match told {
-            Some(profile) => {
-                let fit = ports.check(path, &profile)?;
-                (profile, fit)
-            }
-            None => ports.choose(path)?,
-        };
+        let loaded = Loaded::open(path, settings, catalog)?;
+        let (profile, fit, _) = loaded.contract(settings)?;
         let size = settings.size.unwrap_or(profile.size);
         check_size(settings.size, &profile, &fit).map_err(|reason| TeacherError::BadSize {
             path: path.to_path_buf(),
@@ -73,23 +120,35 @@ impl NetworkTeacher {
             reason,
         })?;
         Ok(Self {
-            path: path.to_path_buf(),
-            session,
-            ports,
+            cache: cache_dir.map(Cache::open).transpose()?,
+            ..Self::following(loaded, profile, fit, settings)
+        })
+    }
+
+    /// A model that is asked as a contract says which fits it, and keeps no answers.
+    pub(super) fn following(
+        loaded: Loaded,
+        profile: Profile,
+        fit: Fit,
+        settings: &TeacherSettings,
+    ) -> Self {
+        let size = settings.size.unwrap_or(profile.size);
+        Self {
+            loaded,
             profile,
             fit,
             size,
-            sha256,
-            cache: cache_dir.map(Cache::open).transpose()?,
-        })
+            cache: None,
+        }
     }
 
     pub(super) fn describe(&self) -> TeacherInfo {
         let square = [self.size; 2];
         TeacherInfo {
-            name: file_name(&self.path),
+            name: file_name(&self.loaded.path),
             kind: self.profile.name.clone(),
-            sha256: Some(self.sha256.clone()),
+            sha256: Some(self.loaded.sha256.clone()),
+            device: Some(self.loaded.device),
             input_size: Some(self.profile.input_size(square, self.fit.fixed, self.size)),
         }
     }
@@ -108,7 +167,8 @@ impl NetworkTeacher {
         let hints = hints.map(|hints| hints.resized(input[0], input[1]));
         let key = key(&Question {
             photo,
-            model: &self.sha256,
+            model: &self.loaded.sha256,
+            device: self.loaded.device.name(),
             profile: &self.profile.identity(),
             input,
             hints: hints.as_ref().map(|hints| &hints.paint[..]),
@@ -118,7 +178,7 @@ impl NetworkTeacher {
         }
         let answer = self.ask(&photo, input, hints.as_ref());
         let answer = answer.map_err(|reason| TeacherError::Network {
-            path: self.path.clone(),
+            path: self.loaded.path.clone(),
             photo: name.to_string(),
             reason,
         })?;
@@ -136,13 +196,24 @@ impl NetworkTeacher {
         size: [u32; 2],
         hints: Option<&HintImage>,
     ) -> Result<AbImage, String> {
+        let (shape, values) = self.numbers(photo, size, hints)?;
+        answer(&self.profile, &shape, &values)
+    }
+
+    /// The same, before anything is made of it: the answer's sides and numbers.
+    fn numbers(
+        &mut self,
+        photo: &GrayImage<'_>,
+        size: [u32; 2],
+        hints: Option<&HintImage>,
+    ) -> Result<(Vec<i64>, Vec<f32>), String> {
         let picture = |values: Vec<f32>| Picture {
             layout: self.profile.layout,
             batch: self.fit.batch,
             size,
             values,
         };
-        let inputs = self.fit.roles.iter().zip(&self.ports.inputs);
+        let inputs = self.fit.roles.iter().zip(&self.loaded.ports.inputs);
         let inputs: Result<Vec<SessionInputValue<'_>>, String> = inputs
             .map(|(&role, port)| match role {
                 Role::Image => picture(image(&self.profile, photo, size)).tensor(port.element),
@@ -152,10 +223,44 @@ impl NetworkTeacher {
                 Role::Class | Role::Noise | Role::Zeros => other(&self.profile, role, port),
             })
             .collect();
-        let outputs = self.session.run(&inputs?[..]).map_err(first_line)?;
-        let (shape, values) = tensor::read(&outputs[self.fit.answer])?;
-        answer(&self.profile, &shape, &values)
+        let session = &mut self.loaded.session;
+        let outputs = session.run(&inputs?[..]).map_err(first_line)?;
+        tensor::read(&outputs[self.fit.answer])
     }
+
+    /// Asks about a picture without hints: the numbers as they come.
+    ///
+    /// # Errors
+    /// [`TeacherError::Network`], also where one of them is not finite.
+    pub(super) fn look(
+        &mut self,
+        name: &str,
+        photo: &GrayImage<'_>,
+    ) -> Result<Numbers, TeacherError> {
+        let size = [photo.width, photo.height];
+        let input = self.profile.input_size(size, self.fit.fixed, self.size);
+        let looked = self.numbers(photo, input, None);
+        let looked = looked.and_then(|(shape, values)| {
+            let AbImage { width, height, .. } = answer(&self.profile, &shape, &values)?;
+            Ok(Numbers {
+                size: [width, height],
+                values,
+            })
+        });
+        looked.map_err(|reason| TeacherError::Network {
+            path: self.loaded.path.clone(),
+            photo: name.to_owned(),
+            reason,
+        })
+    }
+}
+
+/// An answer before anything is made of it.
+pub(super) struct Numbers {
+    /// Width and height.
+    pub size: [u32; 2],
+    /// In the network's layout.
+    pub values: Vec<f32>,
 }
 
 /// Whether a network can be asked at a side; if not, why not.
@@ -263,22 +368,6 @@ fn answer(profile: &Profile, shape: &[i64], values: &[f32]) -> Result<AbImage, S
     };
     let ab = (0..pixels).map(pixel).collect();
     Ok(AbImage { width, height, ab })
-}
-
-/// Loads a model so that one machine always answers alike: a fixed number of
-/// threads (how a sum is divided depends on it) and kernels that repeat.
-fn load(path: &Path, environment: &ort::environment::Environment) -> ort::Result<Session> {
-    let threads = std::thread::available_parallelism().map_or(1, |count| count.get());
-    Session::builder(environment)?
-        .with_intra_threads(threads)?
-        .with_inter_threads(1)?
-        // Photos come one by one with other work between: no busy waiting.
-        .with_intra_op_spinning(false)?
-        .with_deterministic_compute(true)?
-        .with_optimization_level(GraphOptimizationLevel::Level3)?
-        // What goes wrong is in the errors.
-        .with_log_level(ort::logging::LogLevel::Fatal)?
-        .commit_from_file(path)
 }
 
 #[cfg(test)]

@@ -282,6 +282,12 @@ impl Profile {
         std::array::from_fn(|axis| fixed[axis].unwrap_or_else(|| side(axis)))
     }
 
+    /// The profile as a manifest.
+    pub fn to_toml(&self) -> String {
+        // Plain fields: serializing them cannot fail.
+        toml::to_string(self).unwrap_or_default()
+    }
+
     /// The profile in full, for a cache's keys.
     pub fn identity(&self) -> String {
         // Plain fields: serializing them cannot fail.

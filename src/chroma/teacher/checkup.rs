@@ -1,0 +1,125 @@
+//! What the program understands of a network, and how it answers.
+
+use super::network::{Loaded, NetworkTeacher, ToldBy};
+use super::{Catalog, GrayImage, TeacherError, TeacherInfo, TeacherSettings, Upsample, trial};
+use crate::color::{gray_to_lightness, lab_to_srgb};
+use crate::measure::colorfulness;
+use serde::Serialize;
+use std::path::Path;
+use std::time::Instant;
+
+pub use trial::Trial;
+
+/// Width and height of a picture whose gray rises from left to right.
+const RAMP: [u32; 2] = [256, 64];
+
+/// What a look at a network tells.
+#[derive(Clone, Debug, Serialize)]
+pub struct Checkup {
+    /// Name, kind and identity.
+    #[serde(flatten)]
+    pub info: TeacherInfo,
+    /// Its name in the table of networks, if it is one of those.
+    pub known_as: Option<String>,
+    /// Inputs and outputs in words.
+    pub ports: String,
+    /// Who says what they mean.
+    pub told_by: ToldBy,
+    /// What was tried where nobody does.
+    pub trials: Vec<Trial>,
+    /// What its numbers are taken for: a manifest.
+    pub manifest: String,
+    /// Answers to a ramp from black to white and to a photo.
+    pub answers: Vec<Answered>,
+}
+
+/// How a network answers for one picture.
+#[derive(Clone, Debug, Serialize)]
+pub struct Answered {
+    /// The picture's name.
+    pub picture: String,
+    /// Least and largest of the answer's numbers, as they come.
+    pub range: [f32; 2],
+    /// Colorfulness (Hasler and Süsstrunk) of the picture in these colors.
+    pub colorfulness: f64,
+    /// Seconds that it takes, once the network has answered before.
+    pub seconds: f64,
+}
+
+/// Looks at a network: what is understood of it, who says so, and how it answers for a ramp
+/// and for a photo. One that nobody describes is asked in the ways that are usual, and taken for
+/// the one whose answers make most sense.
+///
+/// # Errors
+/// As for [`Teacher::open`](super::Teacher::open), [`TeacherError::Network`].
+pub fn check(
+    path: &Path,
+    settings: &TeacherSettings,
+    (name, photo): (&str, GrayImage<'_>),
+) -> Result<Checkup, TeacherError> {
+    photo.check(name)?;
+    let catalog = Catalog::open()?;
+    let path = catalog.locate(path)?;
+    let loaded = Loaded::open(&path, settings, &catalog)?;
+    let known_as = loaded.known.as_ref().map(|(name, _)| name.clone());
+    let ports = loaded.ports.describe();
+    let (mut teacher, told_by, trials) = match loaded.contract(settings) {
+        Ok((profile, fit, by)) => {
+            let teacher = NetworkTeacher::following(loaded, profile, fit, settings);
+            (teacher, by, Vec::new())
+        }
+        Err(TeacherError::SeveralProfiles { .. } | TeacherError::NoProfile { .. })
+            if settings.profile.is_none() =>
+        {
+            let (teacher, trials) = trial::guess(loaded, settings, &[(name, photo)])?;
+            (teacher, ToldBy::Trial, trials)
+        }
+        Err(error) => return Err(error),
+    };
+    let pixels: Vec<u8> = (0..RAMP[0] * RAMP[1])
+        .map(|i| (i % RAMP[0] * 255 / (RAMP[0] - 1)) as u8)
+        .collect();
+    let ramp = GrayImage {
+        width: RAMP[0],
+        height: RAMP[1],
+        pixels: &pixels,
+    };
+    let answers: Result<_, _> = [("ramp", ramp), (name, photo)]
+        .into_iter()
+        .map(|(name, picture)| answered(&mut teacher, name, picture))
+        .collect();
+    Ok(Checkup {
+        info: teacher.describe(),
+        known_as,
+        ports,
+        told_by,
+        trials,
+        manifest: teacher.profile.to_toml(),
+        answers: answers?,
+    })
+}
+
+fn answered(
+    teacher: &mut NetworkTeacher,
+    name: &str,
+    picture: GrayImage<'_>,
+) -> Result<Answered, TeacherError> {
+    let numbers = teacher.look(name, &picture)?.values;
+    let range = |f: fn(f32, f32) -> f32| numbers.iter().copied().reduce(f).unwrap_or(0.0);
+    // The first time a network prepares itself.
+    let begun = Instant::now();
+    let answer = teacher.colorize(name, picture, None)?;
+    let seconds = begun.elapsed().as_secs_f64();
+    let ab = answer.upsampled(picture, Upsample::Guided).ab;
+    let rgb = ab.iter().zip(picture.pixels).map(|(ab, &gray)| {
+        let lightness = gray_to_lightness(f64::from(gray) / 255.0);
+        let rgb = lab_to_srgb([lightness, ab[0].into(), ab[1].into()]);
+        rgb.map(|value| value.clamp(0.0, 1.0) as f32)
+    });
+    Ok(Answered {
+        picture: name.to_owned(),
+        range: [range(f32::min), range(f32::max)],
+        colorfulness: colorfulness(&rgb.collect::<Vec<_>>()),
+        seconds,
+    })
+}
