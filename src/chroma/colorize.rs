@@ -4,7 +4,7 @@ use std::{ops::ControlFlow, sync::Arc, time::Instant};
 
 use super::{
     ChosenDegree, ChromaError, ChromaProgress, ChromaSettings, Colorizer, Degree, FrozenViews,
-    Lesson, Room, Task, bake, choose_degree, plan, solve, teach,
+    Lesson, Room, Task, bake, choose_degree, match_saturation, plan, solve, teach,
 };
 use crate::{
     capture::{Camera, Dataset},
@@ -26,6 +26,8 @@ pub struct Colored {
     pub effects: [Decision; 2],
     /// Training views with colors.
     pub colored_views: usize,
+    /// What colors were multiplied by to be as strong as the teachers'; in `chroma` and `splats`.
+    pub saturation: f64,
     /// The last report of the solver.
     pub last: Option<ChromaProgress>,
     /// What a dispatch of the solver worked on, the mean over the passes.
@@ -184,7 +186,7 @@ impl Distill<'_> {
             &frozen,
             &settings,
             &lesson.targets,
-            tasks,
+            tasks.clone(),
             self.luma,
             &mut |progress| {
                 last = Some(progress);
@@ -192,15 +194,24 @@ impl Distill<'_> {
                 observe(ColorizeEvent::Solving(progress))
             },
         )?;
+        let mut chroma = solved.chroma;
+        let mut saturation = 1.0;
+        // Where no point is seen twice nobody knows what views agree on.
+        if let (true, Some(spread)) = (settings.match_saturation, lesson.spread) {
+            let agreed = spread.agreed;
+            saturation = match_saturation(&frozen, &lesson.targets, &tasks, agreed, &mut chroma)?;
+            peak = peak.max(gpu.allocated_bytes());
+        }
         let solving = begun.elapsed().as_secs_f64();
         let begun = Instant::now();
-        let splats = bake(&frozen, self.luma, &solved.chroma, &mut |progress| {
+        let splats = bake(&frozen, self.luma, &chroma, &mut |progress| {
             peak = peak.max(gpu.allocated_bytes());
             observe(ColorizeEvent::Baking(progress))
         })?;
         Ok(Colored {
             splats,
-            chroma: solved.chroma,
+            chroma,
+            saturation,
             effects,
             colored_views,
             last,

@@ -61,6 +61,8 @@ pub struct ChromaSettings {
     /// Bytes of the device that solving and baking may take; views that do not fit are brought
     /// one at a time. `None`: all that is worth keeping, up to 2 GiB.
     pub memory_limit: Option<u64>,
+    /// Whether colors end as strong as the teachers', as far as these agree.
+    pub match_saturation: bool,
     /// Whether Gaussians that no view sees well take their neighbors' color after
     /// least squares.
     pub fill: bool,
@@ -87,6 +89,7 @@ impl ChromaSettings {
             iterations,
             robust: None,
             correct_views: false,
+            match_saturation: false,
             fill: false,
             ..Self::irls()
         }
@@ -109,6 +112,7 @@ impl ChromaSettings {
             settled: SETTLED,
             ridge: RIDGE,
             memory_limit: None,
+            match_saturation: true,
             fill: true,
         }
     }
@@ -120,6 +124,7 @@ impl ChromaSettings {
             robust: None,
             correct_views: false,
             settled: 0.0,
+            match_saturation: false,
             fill: false,
             ..Self::irls()
         }

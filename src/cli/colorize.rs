@@ -87,6 +87,10 @@ pub struct Colorize {
     /// Give Gaussians that no view sees well their neighbors' color [default: on with irls].
     #[arg(long, value_enum, value_name = "on|off")]
     fill: Option<Switch>,
+    /// Make colors as strong as the teachers', as far as views agree, where there are no hints
+    /// [default: on with irls].
+    #[arg(long, value_enum, value_name = "on|off")]
+    match_saturation: Option<Switch>,
     /// Coarser scales that count for Adam beside the full one [default: 2].
     #[arg(long, value_name = "0..4", value_parser = clap::value_parser!(u32).range(0..=4))]
     scales: Option<u32>,
@@ -168,6 +172,9 @@ impl Colorize {
         }
         if let Some(switch) = self.fill {
             settings.fill = switch == Switch::On;
+        }
+        if let Some(switch) = self.match_saturation {
+            settings.match_saturation = switch == Switch::On;
         }
         settings.memory_limit = self.memory_limit.map(|mib| u64::from(mib) << 20);
         settings

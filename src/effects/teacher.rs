@@ -18,6 +18,10 @@ pub struct TeacherSpread {
     pub spread: f64,
     /// How large that would be by chance, from the noise at the points.
     pub noise: f64,
+    /// Share of the mean square of a and b, 0 to 1, that the views agree on at the points: what
+    /// one says times what another says, over what each says squared. Whims of single views
+    /// cancel in the first.
+    pub agreed: f64,
 }
 
 /// What a teacher says at COLMAP's points, taken view by view.
@@ -101,7 +105,32 @@ impl TeacherSamples {
         Some(TeacherSpread {
             spread: UNITS * spread.sqrt(),
             noise: UNITS * noise.sqrt(),
+            agreed: self.agreed(),
         })
+    }
+
+    /// See [`TeacherSpread::agreed`].
+    fn agreed(&self) -> f64 {
+        let (mut between, mut own) = (0.0, 0.0);
+        for point in &self.ab {
+            let known = || point.iter().flatten();
+            let count = known().count() as f64;
+            if count < 2.0 {
+                continue;
+            }
+            for channel in 0..2 {
+                let values = || known().map(|ab| f64::from(ab[channel]));
+                let (sum, squares) = (values().sum::<f64>(), values().map(|v| v * v).sum::<f64>());
+                // All products of two different views.
+                between += (sum * sum - squares) / (count * (count - 1.0));
+                own += squares / count;
+            }
+        }
+        if own > 0.0 {
+            (between / own).clamp(0.0, 1.0)
+        } else {
+            1.0
+        }
     }
 }
 
@@ -169,6 +198,26 @@ mod tests {
         assert!(found.spread > 3.0 * found.noise, "{found:?}");
         let alike = spread(4, |_, p| by_place(p, 12.0));
         assert!(alike.spread < 1.0, "{alike:?}");
+    }
+
+    #[test]
+    fn what_views_agree_on() {
+        // Uniform in [-h, h] has a variance of h²/3; a row of places in [-1, 1] likewise.
+        let share = |signal: f64, whim: f64| signal * signal / (signal * signal + whim * whim);
+        for (strength, amount) in [(12.0, 0.0), (12.0, 6.0), (6.0, 12.0), (0.0, 9.0)] {
+            let found = spread(6, |view, p| {
+                let own = by_place(p, strength);
+                [0, 1].map(|c| own[c] + amount * whim(view + 50 * c, p))
+            });
+            let expected = share(strength.into(), amount.into());
+            // Places are rounded to pixels, which moves them a little from view to view.
+            assert!(
+                (found.agreed - expected).abs() < 0.08,
+                "{found:?} {expected}"
+            );
+        }
+        assert_eq!(spread(4, |_, _| [0.0; 2]).agreed, 1.0);
+        assert!(spread(4, |_, _| [3.0, -40.0]).agreed > 0.9999);
     }
 
     /// A teacher that hardly says anything, far from gray or not, does not differ from view

@@ -207,6 +207,8 @@ pub struct ChromaReport {
     pub colored_views: usize,
     /// How chroma was solved for.
     pub settings: ChromaSettings,
+    /// What colors were multiplied by to be as strong as the teachers'.
+    pub saturation: f64,
     /// Iterations of Adam, or rounds of least squares that were needed.
     pub iterations: usize,
     /// The last of them, counted from the start of stage 1.
@@ -380,8 +382,12 @@ impl Report {
         let truth = chroma.pictures.delta_e.map_or(String::new(), |error| {
             format!(", ΔE00 to the photos {:.2}", error.mean)
         });
+        let moved = chroma.moved.map_or(String::new(), |moved| {
+            let rounds = chroma.iterations;
+            format!("; round {rounds} still moved colors by {moved:.2} units")
+        });
         format!(
-            "colored from {} views in {:.0} s{truth}, export off by ΔE00 {:.2}",
+            "colored from {} views in {:.0} s{truth}, export off by ΔE00 {:.2}{moved}",
             chroma.colored_views,
             chroma.seconds.total(),
             chroma.bake.mean

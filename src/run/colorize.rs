@@ -102,6 +102,12 @@ pub fn colorize(
         ..options.settings.clone()
     };
     let (lesson, hinted) = teachers.ask(&dataset, settings.target_scales(), observe)?;
+    // Hints stay as painted.
+    let match_saturation = settings.match_saturation && hinted == 0;
+    let settings = ChromaSettings {
+        match_saturation,
+        ..settings
+    };
     let seconds_teacher = begun.elapsed().as_secs_f64();
     tell_not_finite(&dataset, observe);
     if source.report.is_none() {
@@ -181,6 +187,7 @@ pub fn colorize(
         upsample: options.teach.settings.upsample,
         hints: hinted,
         colored_views: colored.colored_views,
+        saturation: colored.saturation,
         iterations: steps,
         until: report.luma.iterations + steps,
         passes: colored.last.map_or(0.0, |progress| progress.passes),

@@ -6,8 +6,8 @@ use glam::{DMat3, DVec3};
 use gs_chroma::{
     capture::Camera,
     chroma::{
-        ChromaError, ChromaSettings, FrozenViews, IrlsSolver, Room, Targets, Task, bake, solve,
-        teacher::AbImage,
+        ChromaError, ChromaSettings, FrozenViews, IrlsSolver, Room, Targets, Task, bake,
+        match_saturation, solve, teacher::AbImage,
     },
     raster::{Field, Geometry, Renderer},
     splats::{ShField, Splats, sh},
@@ -310,6 +310,38 @@ fn what_no_view_sees_takes_its_neighbors_color() {
     .unwrap();
     let away = farthest(&colors(&filled.chroma)[hidden], &[ab; 6]);
     assert!(away < 1.0, "{away}");
+}
+
+/// Colors that are right are left alone, paler ones become right, as far as views agree.
+#[test]
+fn pale_colors_become_as_strong_as_the_teachers() {
+    let (luma, views) = (wall(), six_views());
+    let problem = Problem::new(&luma, &views);
+    let (frozen, targets, tasks) = (&problem.frozen, &problem.targets, &problem.tasks);
+    let mut solver = problem.solver(&settings());
+    solver.run(&mut |_| ControlFlow::Continue(())).unwrap();
+    let right = solver.chroma().unwrap();
+    let after = |share: f32, agreed: f64| {
+        let mut chroma = right.clone();
+        chroma.coefficients.iter_mut().for_each(|c| *c *= share);
+        let factor = match_saturation(frozen, targets, tasks, agreed, &mut chroma).unwrap();
+        for (found, right) in chroma.coefficients.iter().zip(&right.coefficients) {
+            let expected = f64::from(right * share) * factor;
+            assert!(
+                (f64::from(*found) - expected).abs() < 1e-4,
+                "{found} {expected}"
+            );
+        }
+        factor
+    };
+    let whole = after(1.0, 1.0);
+    assert!((1.0..1.03).contains(&whole), "{whole}");
+    let pale = after(1.0 / 1.15, 1.0);
+    assert!((pale / (1.15 * whole) - 1.0).abs() < 1e-3, "{pale} {whole}");
+    // Half of what the views say is contradiction.
+    assert_eq!(after(1.0 / 1.15, 0.5), 1.0);
+    assert_eq!(after(0.5, 1.0), 1.25);
+    assert_eq!(after(0.0, 1.0), 1.0);
 }
 
 /// Somebody painted the right of one of eleven views.
