@@ -26,6 +26,8 @@ pub struct Colored {
     pub effects: [Decision; 2],
     /// Training views with colors.
     pub colored_views: usize,
+    /// Share of the Gaussians that no colored view shows to speak of; see [`Solved`](super::Solved).
+    pub unseen: Option<f64>,
     /// What colors were multiplied by to be as strong as the teachers'; in `chroma` and `splats`.
     pub saturation: f64,
     /// The last report of the solver.
@@ -211,6 +213,7 @@ impl Distill<'_> {
         Ok(Colored {
             splats,
             chroma,
+            unseen: solved.unseen,
             saturation,
             effects,
             colored_views,

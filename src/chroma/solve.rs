@@ -15,7 +15,13 @@ pub struct Solved {
     pub chroma: ShField,
     /// What a dispatch worked on, the mean over the passes.
     pub load: Load,
+    /// Share of the Gaussians that no view shows to speak of, whose colors come from their
+    /// neighbors if from anywhere; `None` of Adam, which does not know.
+    pub unseen: Option<f64>,
 }
+
+/// Gaussians that views show in fewer pixels than this are hardly seen.
+const SEEN: f32 = 0.5;
 
 /// Distills the wanted a/b of `tasks` into chroma harmonics of the frozen geometry, that of
 /// `luma`.
@@ -38,18 +44,22 @@ pub fn solve(
             Ok(Solved {
                 chroma: adam.chroma()?,
                 load: adam.load(),
+                unseen: None,
             })
         }
         SolverKind::Irls => {
             let mut solver = IrlsSolver::new(frozen, settings, targets, tasks)?;
             solver.run(observe)?;
             let mut chroma = solver.chroma()?;
+            let seen = solver.seen()?;
             if settings.fill {
-                fill_unseen(luma, &mut chroma, &solver.seen()?);
+                fill_unseen(luma, &mut chroma, &seen);
             }
+            let unseen = seen.iter().filter(|&&seen| seen < SEEN).count();
             Ok(Solved {
                 chroma,
                 load: solver.load(),
+                unseen: Some(unseen as f64 / seen.len().max(1) as f64),
             })
         }
     }

@@ -207,6 +207,8 @@ pub struct ChromaReport {
     pub colored_views: usize,
     /// How chroma was solved for.
     pub settings: ChromaSettings,
+    /// Share of the Gaussians that no colored view shows to speak of; `None` of Adam.
+    pub unseen: Option<f64>,
     /// What colors were multiplied by to be as strong as the teachers'.
     pub saturation: f64,
     /// Iterations of Adam, or rounds of least squares that were needed.

@@ -28,6 +28,9 @@ use crate::{
     splats::ply,
 };
 
+/// A share of Gaussians without a colored photo that is worth a warning.
+const UNSEEN: f64 = 0.05;
+
 /// What `colorize` is asked to do.
 #[derive(Clone, Debug)]
 pub struct ColorizeOptions {
@@ -169,6 +172,10 @@ pub fn colorize(
         .then(|| Ok::<_, RunError>(kernel_reports(&gpu.timings()?, &colored.load)))
         .transpose()?;
 
+    let views = [colored.colored_views, dataset.split.train.len()];
+    if let Some(warning) = few_colors(colored.unseen, views) {
+        observe(Event::Note(warning));
+    }
     let begun = Instant::now();
     let exposures = exposures(&dataset, &report.luma.exposures);
     let measured = Measured::of(
@@ -187,6 +194,7 @@ pub fn colorize(
         upsample: options.teach.settings.upsample,
         hints: hinted,
         colored_views: colored.colored_views,
+        unseen: colored.unseen,
         saturation: colored.saturation,
         iterations: steps,
         until: report.luma.iterations + steps,
@@ -361,4 +369,35 @@ fn append_log(folder: &RunFolder, luma: usize, rows: &str) -> Result<(), RunErro
 
 fn read_or_empty(path: &Path) -> String {
     std::fs::read_to_string(path).unwrap_or_default()
+}
+
+/// What to say where some of the views have colors and these do not show all; without any that
+/// has none, it is what no photo shows at all.
+fn few_colors(unseen: Option<f64>, [colored, views]: [usize; 2]) -> Option<String> {
+    let unseen = unseen.filter(|&unseen| unseen >= UNSEEN && colored < views)?;
+    Some(format!(
+        "warning: {colored} of {views} photos have colors, and {:.0} % of the Gaussians are in none of these: they take their neighbors' color; color photos that show the rest",
+        100.0 * unseen
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_no_colored_photo_shows_is_told() {
+        let told = few_colors(Some(0.37), [2, 15]).expect("a warning");
+        assert!(
+            told.starts_with("warning: 2 of 15 photos") && told.contains("37 %"),
+            "{told}"
+        );
+        for (unseen, views) in [
+            (Some(0.37), [15, 15]),
+            (Some(0.01), [2, 15]),
+            (None, [2, 15]),
+        ] {
+            assert_eq!(few_colors(unseen, views), None);
+        }
+    }
 }
