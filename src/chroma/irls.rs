@@ -52,6 +52,8 @@ pub struct IrlsSolver<'a> {
     plain: bool,
     /// Rounds of late, in a row, that hardly moved the colors.
     settled: usize,
+    /// Whether the last round's step was undone, for a shorter one to be tried.
+    undone: bool,
     /// Whether no round will follow.
     ended: bool,
     /// Whether the views' corrections are not those of the accepted point.
@@ -119,6 +121,7 @@ impl<'a> IrlsSolver<'a> {
             done: 0,
             plain: settings.robust.is_some(),
             settled: 0,
+            undone: false,
             ended: false,
             corrected: false,
         })
@@ -174,7 +177,9 @@ impl<'a> IrlsSolver<'a> {
             self.correct(round, state.moved.is_some());
             self.done = round + 1;
             let moves_less = |than| state.moved.is_some_and(|moved| moved < than);
-            let settles = !self.plain && moves_less(self.settings.settled);
+            // What is left of an undone step is short whatever remains to be done.
+            let whole = !std::mem::replace(&mut self.undone, state.moved.is_none());
+            let settles = whole && !self.plain && moves_less(self.settings.settled);
             self.settled = if settles { self.settled + 1 } else { 0 };
             self.ended = self.done == self.settings.rounds || self.settled == SETTLED_ROUNDS;
             let levels_off = self.plain && self.done >= PLAIN_ROUNDS && moves_less(PLAIN_MOVES);
