@@ -87,7 +87,7 @@ def row(scene: str, found: dict, chroma: dict) -> list[str]:
 
 
 def losses(run_folder: Path) -> list[float]:
-    """The loss that each round of `colorize` ended with."""
+    """The loss of each round of `colorize`, as its log has it."""
     report = json.loads((run_folder / "report.json").read_text())
     last = report["luma"]["iterations"]
     with (run_folder / "log.csv").open(encoding="utf-8") as file:
@@ -138,7 +138,7 @@ def compare_rounds(program: str, scene: str, out: Path, teacher: str, flags: lis
 
 
 def draw(curves: dict[str, list[float]], path: Path) -> None:
-    """Loss after every round, a curve for each scene, as a share of the first round's."""
+    """The loss of every round, a curve for each scene."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -148,7 +148,9 @@ def draw(curves: dict[str, list[float]], path: Path) -> None:
     figure, axes = plt.subplots(figsize=(5.5, 3.2), layout="constrained")
     for scene, curve in curves.items():
         axes.plot(range(1, len(curve) + 1), curve, marker="o", markersize=3, label=scene)
-    axes.set(xlabel="round", ylabel="loss after it", yscale="log")
+    axes.set(xlabel="round", ylabel="loss, CIELAB units", yscale="log")
+    axes.set_yticks([0.4, 0.6, 1, 2, 4], labels=["0.4", "0.6", "1", "2", "4"])
+    axes.minorticks_off()
     axes.grid(alpha=0.3, which="both")
     axes.legend(frameon=False)
     figure.savefig(path, metadata={"Date": None})
