@@ -10,6 +10,7 @@ mod checkup;
 mod device;
 mod error;
 mod folder;
+mod guess;
 mod hints;
 mod images;
 mod model;

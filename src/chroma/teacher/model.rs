@@ -59,33 +59,6 @@ pub(super) struct Fit {
     pub answer: usize,
 }
 
-/// What shapes let suppose of a network that nobody knows.
-#[derive(Clone, Debug)]
-pub(super) struct Guess {
-    /// The first picture, and nothing for the others.
-    pub inputs: Vec<Role>,
-    /// Channels of that picture.
-    pub image: usize,
-    /// Whether it consists of bytes.
-    pub bytes: bool,
-    /// Width and height where the model fixes them.
-    pub fixed: [Option<u32>; 2],
-    /// Channels of the answer.
-    pub answer: usize,
-    /// Name of the answer where there are several outputs.
-    pub name: Option<String>,
-}
-
-impl Guess {
-    /// This, or the largest power of two that goes into it and into the fixed sides.
-    pub fn multiple(&self, most: u32) -> u32 {
-        let sides = self.fixed.into_iter().flatten();
-        sides.fold(most, |multiple, side| {
-            multiple.min(1 << side.trailing_zeros())
-        })
-    }
-}
-
 impl Ports {
     pub fn of(session: &Session) -> Self {
         let ports = |outlets: &[Outlet]| outlets.iter().map(Port::of).collect();
@@ -186,31 +159,6 @@ impl Ports {
         chosen.ok_or_else(|| self.unknown(path))
     }
 
-    /// The roles that inputs may have where nobody says so, the channels of the photo and of the
-    /// answer: the first picture of one or three channels, and the first answer of two or three.
-    /// None where there are no such.
-    pub fn guess(&self, layout: Layout) -> Option<Guess> {
-        let channels = |port: &Port, among: [usize; 2]| {
-            let is_it = |&count: &usize| port.image(count, layout).is_some();
-            among.into_iter().find(is_it)
-        };
-        let image = (self.inputs.iter()).position(|port| channels(port, [3, 1]).is_some())?;
-        let answer = (self.outputs.iter()).position(|port| channels(port, [2, 3]).is_some())?;
-        let role = |(i, port): (usize, &Port)| match port.element {
-            _ if i == image => Role::Image,
-            Element::I64 | Element::I32 => Role::Class,
-            _ => Role::Zeros,
-        };
-        Some(Guess {
-            inputs: self.inputs.iter().enumerate().map(role).collect(),
-            image: channels(&self.inputs[image], [3, 1])?,
-            bytes: self.inputs[image].element == Element::U8,
-            fixed: self.inputs[image].image(channels(&self.inputs[image], [3, 1])?, layout)?,
-            answer: channels(&self.outputs[answer], [2, 3])?,
-            name: (self.outputs.len() > 1).then(|| self.outputs[answer].name.clone()),
-        })
-    }
-
     /// How the profile that was asked for fits.
     ///
     /// # Errors
@@ -267,7 +215,7 @@ impl Port {
 
     /// Width and height, where fixed, of a picture `[batch, channels, H, W]` or in the other
     /// layout; none where this is no such tensor.
-    fn image(&self, channels: usize, layout: Layout) -> Option<[Option<u32>; 2]> {
+    pub fn image(&self, channels: usize, layout: Layout) -> Option<[Option<u32>; 2]> {
         let [batch, own, height, width] = layout.sides(self.shape[..].try_into().ok()?);
         let batches = batch == -1 || (1..=MAX_BATCH).contains(&batch);
         let fits = own == -1 || own == channels as i64;

@@ -1,8 +1,9 @@
 //! What a network's numbers mean, where nobody says so: candidates are tried, and the answers
 //! looked at.
 
+use super::guess::Guess;
 use super::images::{Filter, resample};
-use super::model::{Fit, Guess};
+use super::model::Fit;
 use super::network::{Loaded, NetworkTeacher, Numbers};
 use super::profile::{ImageKind, Layout, OutputKind, Profile, Resize};
 use super::{GrayImage, TeacherError, TeacherSettings};
