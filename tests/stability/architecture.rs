@@ -14,7 +14,15 @@ const FLOORS: [&[&str]; 10] = [
     &["effects", "measure"],
     &["raster"],
     &["capture", "splats"],
-    &["gpu", "color", "atomic_file", "npy", "oracle", "compare"],
+    &[
+        "gpu",
+        "color",
+        "atomic_file",
+        "download",
+        "npy",
+        "oracle",
+        "compare",
+    ],
 ];
 
 fn floor(name: &str) -> Option<usize> {
