@@ -166,7 +166,7 @@ def half_tiny(path: Path) -> None:
 
 
 def int8_tiny(path: Path) -> None:
-    """ddcolor_tiny with weights of 8 bits, a third of whose steps is the unit of a and b."""
+    """ddcolor_tiny with weights of 8 bits, in steps of 2/3."""
     nodes = [helper.make_node("DequantizeLinear", ["bytes", "step"], ["weights"]), *AB_NODES]
     weights = [round(3 * weight / 2) for weight in AB_WEIGHTS]
     constants = [

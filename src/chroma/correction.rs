@@ -145,9 +145,7 @@ impl Corrections {
         recorder.copy(self.corrections.raw(), self.before.raw());
         recorder.dispatch(&kernels.solve, &self.solve, 1);
     }
-}
 
-impl Corrections {
     /// Records the return to those before the last.
     pub fn undo(&self, recorder: &mut Recorder) {
         recorder.copy(self.before.raw(), self.corrections.raw());

@@ -82,6 +82,10 @@ fn what_cannot_be_checked() {
             vec![network.clone(), "--photo".into(), "no.jpg".into()],
             vec!["no.jpg"],
         ),
+        (
+            vec![network.clone(), "--teacher-size".into(), "64".into()],
+            vec!["--teacher-size 64", "takes 32"],
+        ),
         (vec!["nonsense".into()], vec!["nonsense", "eccv16"]),
         (
             vec![network, "--teacher-device".into(), "cuda".into()],

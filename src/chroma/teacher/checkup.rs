@@ -65,7 +65,7 @@ pub fn check(
     let ports = loaded.ports.describe();
     let (mut teacher, told_by, trials) = match loaded.contract(settings) {
         Ok((profile, fit, by)) => {
-            let teacher = NetworkTeacher::following(loaded, profile, fit, settings);
+            let teacher = NetworkTeacher::following(loaded, profile, fit, settings)?;
             (teacher, by, Vec::new())
         }
         Err(TeacherError::SeveralProfiles { .. } | TeacherError::NoProfile { .. })

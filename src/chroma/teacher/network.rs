@@ -113,33 +113,35 @@ impl NetworkTeacher {
     ) -> Result<Self, TeacherError> {
         let loaded = Loaded::open(path, settings, catalog)?;
         let (profile, fit, _) = loaded.contract(settings)?;
-        let size = settings.size.unwrap_or(profile.size);
-        check_size(settings.size, &profile, &fit).map_err(|reason| TeacherError::BadSize {
-            path: path.to_path_buf(),
-            size,
-            reason,
-        })?;
         Ok(Self {
             cache: cache_dir.map(Cache::open).transpose()?,
-            ..Self::following(loaded, profile, fit, settings)
+            ..Self::following(loaded, profile, fit, settings)?
         })
     }
 
     /// A model that is asked as a contract says which fits it, and keeps no answers.
+    ///
+    /// # Errors
+    /// [`TeacherError::BadSize`] where it cannot be asked at the settings' size.
     pub(super) fn following(
         loaded: Loaded,
         profile: Profile,
         fit: Fit,
         settings: &TeacherSettings,
-    ) -> Self {
+    ) -> Result<Self, TeacherError> {
         let size = settings.size.unwrap_or(profile.size);
-        Self {
+        check_size(settings.size, &profile, &fit).map_err(|reason| TeacherError::BadSize {
+            path: loaded.path.clone(),
+            size,
+            reason,
+        })?;
+        Ok(Self {
             loaded,
             profile,
             fit,
             size,
             cache: None,
-        }
+        })
     }
 
     pub(super) fn describe(&self) -> TeacherInfo {

@@ -131,7 +131,8 @@ pub(super) fn guess(
         let Some(fit) = loaded.ports.fit(&profile) else {
             continue;
         };
-        let mut teacher = NetworkTeacher::following(loaded, profile.clone(), fit.clone(), settings);
+        let mut teacher =
+            NetworkTeacher::following(loaded, profile.clone(), fit.clone(), settings)?;
         let answers: Result<Vec<_>, _> = (photos.iter())
             .map(|(name, photo)| teacher.look(name, photo))
             .collect();
@@ -162,7 +163,7 @@ pub(super) fn guess(
     }
     match (best, refused) {
         (Some((_, profile, fit)), _) => {
-            let teacher = NetworkTeacher::following(loaded, profile, fit, settings);
+            let teacher = NetworkTeacher::following(loaded, profile, fit, settings)?;
             Ok((teacher, trials))
         }
         (None, Some(error)) => Err(error),
