@@ -11,6 +11,7 @@ const PLAIN: &[&str] = &[
     "chroma_loss",
     "compact",
     "densify",
+    "lab_loss",
     "lbfgs",
     "project",
     "relocation",
@@ -50,7 +51,9 @@ fn main() {
             compile(kernel, &format!("_{color}"), &[color]);
         }
     }
-    compile("chroma_loss", "_agreeing", &["agreeing"]);
+    for kernel in ["chroma_loss", "lab_loss"] {
+        compile(kernel, "_agreeing", &["agreeing"]);
+    }
     // Luma trains the geometry too; on frozen geometry the gradient of a/b or RGB and its
     // curvature come back as four figures.
     for kernel in ["blend_backward", "sum_instances"] {

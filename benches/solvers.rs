@@ -151,7 +151,7 @@ fn compare(problem: &Problem, paper: ChromaSettings) -> Fallible<Vec<Point>> {
             passes = progress.passes;
             ControlFlow::Continue(())
         })?;
-        let chroma = adam.chroma()?;
+        let chroma = adam.harmonics()?;
         spent += begun.elapsed().as_secs_f64();
         points.push(Point {
             solver: "adam",

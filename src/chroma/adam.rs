@@ -1,26 +1,41 @@
 //! The paper's distillation: Adam on per-Gaussian a/b against the teacher,
-//! coarse to fine (ChromaDistill, WACV 2025, algorithm 1).
+//! coarse to fine (ChromaDistill, WACV 2025, algorithm 1); and on RGB, as recipes say.
 
-use std::time::Instant;
+use std::{ops::RangeInclusive, time::Instant};
 
 use super::{
-    ChromaError, ChromaObserver, ChromaProgress, ChromaSettings, FrozenViews, Targets, Task,
-    passes::{Ending, Judging, Passes},
+    ChromaError, ChromaObserver, ChromaProgress, ChromaSettings, FrozenViews, Recipe, Targets,
+    Task,
+    passes::{Ending, Judging, Passes, Space},
+    recipe::gray_rgb,
 };
 use crate::{
     capture::view_at,
     gpu::{Gpu, Recorder},
     raster::{Adam, Field, Load},
-    splats::{ShField, sh},
+    splats::{ShField, Splats, sh},
 };
 
 /// Iterations between two reports.
 const REPORT_EVERY: usize = 50;
 
-/// Distills a teacher into chroma harmonics by Adam.
+/// How steps follow each other.
+struct Course {
+    iterations: usize,
+    rates: [f64; 2],
+    rest_share: f64,
+    seed: u64,
+    /// Scales that are drawn, 0 the full one; the coarsest is drawn first.
+    scales: RangeInclusive<usize>,
+    judging: Judging,
+    /// Planes of the constant harmonics, then of all that are solved for.
+    planes: [usize; 2],
+}
+
+/// Distills a teacher into chroma harmonics by Adam, or RGB harmonics by a [`Recipe`].
 pub struct AdamSolver<'a> {
     passes: Passes<'a>,
-    settings: ChromaSettings,
+    course: Course,
     adam: Adam,
     /// Iterations done.
     done: usize,
@@ -37,23 +52,80 @@ impl<'a> AdamSolver<'a> {
         targets: &'a Targets,
         tasks: Vec<Task>,
     ) -> Result<Self, ChromaError> {
+        let start = ShField::zeros(frozen.geometry.count, settings.sh_degree, 2);
+        let course = Course {
+            iterations: settings.iterations,
+            rates: settings.rates,
+            rest_share: settings.rest_share,
+            seed: settings.seed,
+            scales: 0..=settings.scales as usize,
+            judging: Judging {
+                agreement: settings.agreement,
+                robust: settings.robust,
+                ..Judging::default()
+            },
+            planes: [2, 2 * sh::coefficient_count(settings.sh_degree)],
+        };
+        Self::along(frozen, course, targets, tasks, &start)
+    }
+
+    /// A solver for RGB harmonics by `recipe`, starting from the gray of `luma`; `seed` is that
+    /// of the views' order. Targets are RGB.
+    ///
+    /// # Errors
+    /// As [`AdamSolver::new`].
+    pub fn by_recipe(
+        frozen: &'a FrozenViews,
+        recipe: &Recipe,
+        targets: &'a Targets,
+        tasks: Vec<Task>,
+        luma: &Splats,
+        seed: u64,
+    ) -> Result<Self, ChromaError> {
+        let start = gray_rgb(luma);
+        let of_rest = match recipe.rest_share {
+            Some(_) => sh::coefficient_count(start.degree) - 1,
+            None => 0,
+        };
+        let course = Course {
+            iterations: recipe.iterations,
+            rates: recipe.rates,
+            rest_share: recipe.rest_share.unwrap_or_default(),
+            seed,
+            scales: recipe.scales.clone(),
+            judging: Judging {
+                agreement: recipe.agreement,
+                robust: None,
+                lab: recipe.loss,
+            },
+            planes: [3, 3 + 3 * of_rest],
+        };
+        Self::along(frozen, course, targets, tasks, &start)
+    }
+
+    fn along(
+        frozen: &'a FrozenViews,
+        course: Course,
+        targets: &'a Targets,
+        tasks: Vec<Task>,
+        start: &ShField,
+    ) -> Result<Self, ChromaError> {
         let gpu = &frozen.raster.gpu;
-        let count = frozen.geometry.count;
-        let field = Field::upload(gpu, &ShField::zeros(count, settings.sh_degree, 2))?;
-        let planes = 2 * sh::coefficient_count(settings.sh_degree);
-        let sizes = [1 + settings.scales as usize, REPORT_EVERY];
-        let passes = Passes::new(frozen, targets, tasks, field, planes, sizes)?;
+        let field = Field::upload(gpu, start)?;
+        let sizes = [1 + course.scales.end(), REPORT_EVERY];
+        let [_, planes] = course.planes;
+        let passes = Passes::new(frozen, targets, tasks, field, planes, Space::Lab, sizes)?;
         let adam = Adam::new(
             gpu,
             &frozen.kernels.adam,
             &passes.status,
             &passes.gradient,
             &passes.field.planes,
-            count,
+            frozen.geometry.count,
         )?;
         Ok(Self {
             passes,
-            settings,
+            course,
             adam,
             done: 0,
         })
@@ -68,7 +140,7 @@ impl<'a> AdamSolver<'a> {
     /// # Errors
     /// [`ChromaError`] when the device is lost or targets cannot be read.
     pub fn run(&mut self, observe: &mut ChromaObserver<'_>) -> Result<(), ChromaError> {
-        self.run_to(self.settings.iterations, observe)
+        self.run_to(self.course.iterations, observe)
     }
 
     /// Goes on until so many iterations are done, and leaves the rest for later.
@@ -82,7 +154,7 @@ impl<'a> AdamSolver<'a> {
     ) -> Result<(), ChromaError> {
         let begun = Instant::now();
         let mut pending = None;
-        let until = until.min(self.settings.iterations);
+        let until = until.min(self.course.iterations);
         for iteration in self.done..until {
             self.step(iteration)?;
             let done = iteration + 1;
@@ -98,12 +170,11 @@ impl<'a> AdamSolver<'a> {
                 let recent = &losses[..done - (done - 1) / REPORT_EVERY * REPORT_EVERY];
                 let told = observe(ChromaProgress {
                     iteration: done,
-                    total: self.settings.iterations,
+                    total: self.course.iterations,
                     moved: None,
                     loss: recent.iter().map(|&loss| f64::from(loss)).sum::<f64>()
                         / recent.len() as f64,
-                    passes: done as f64
-                        * (0..=self.settings.scales as usize).map(share).sum::<f64>(),
+                    passes: done as f64 * self.course.scales.clone().map(share).sum::<f64>(),
                     seconds: begun.elapsed().as_secs_f64(),
                 });
                 if told.is_break() {
@@ -114,46 +185,42 @@ impl<'a> AdamSolver<'a> {
         Ok(())
     }
 
-    /// Reads the chroma distilled so far.
+    /// Reads the harmonics distilled so far.
     ///
     /// # Errors
     /// [`ChromaError::Gpu`] when the device is lost.
-    pub fn chroma(&self) -> Result<ShField, ChromaError> {
+    pub fn harmonics(&self) -> Result<ShField, ChromaError> {
         Ok(self.passes.field.download(self.gpu())?)
     }
 
     /// What a dispatch works on, the mean over the passes.
     pub fn load(&self) -> Load {
-        self.passes.load(1 + self.settings.scales as usize)
+        self.passes.load(1 + self.course.scales.end())
     }
 
     /// One view through all scales, one step of Adam a scale.
     fn step(&mut self, iteration: usize) -> Result<(), ChromaError> {
         let gpu = self.gpu();
-        let task = view_at(self.settings.seed, self.passes.tasks.len(), iteration);
-        let rate = self.settings.rate(iteration);
-        let mut rates = vec![
-            (rate * self.settings.rest_share) as f32;
-            2 * sh::coefficient_count(self.settings.sh_degree)
-        ];
-        rates[..2].fill(rate as f32);
-        let coarsest = self.settings.scales as usize;
-        for scale in (0..=coarsest).rev() {
+        let course = &self.course;
+        let task = view_at(course.seed, self.passes.tasks.len(), iteration);
+        let rate = exponential(course.rates, iteration, course.iterations);
+        let [constants, planes] = course.planes;
+        let mut rates = vec![(rate * course.rest_share) as f32; planes];
+        rates[..constants].fill(rate as f32);
+        let (finest, coarsest) = (*course.scales.start(), *course.scales.end());
+        for scale in (finest..=coarsest).rev() {
             let mut recorder = Recorder::new(gpu);
             recorder.clear(self.passes.gradient.raw());
             recorder.submit();
+            let agreement = course.judging.agreement;
             let judging = Judging {
-                agreement: if scale < coarsest {
-                    self.settings.agreement
-                } else {
-                    0.0
-                },
-                robust: self.settings.robust,
+                agreement: if scale < coarsest { agreement } else { 0.0 },
+                ..course.judging
             };
             // The finest scale is drawn last, and its loss stays.
             self.passes
                 .draw(task, scale, judging, iteration, Ending::Gradient)?;
-            let done = iteration * (coarsest + 1) + coarsest - scale;
+            let done = iteration * (coarsest - finest + 1) + coarsest - scale;
             let step = u32::try_from(done + 1).unwrap_or(u32::MAX);
             let mut recorder = Recorder::new(gpu);
             let kernel = &self.passes.frozen.kernels.adam;
@@ -162,6 +229,13 @@ impl<'a> AdamSolver<'a> {
         }
         Ok(())
     }
+}
+
+/// A rate that falls from the first to the last by the same share in each of so many
+/// iterations.
+fn exponential([first, last]: [f64; 2], iteration: usize, iterations: usize) -> f64 {
+    let t = iteration as f64 / iterations.max(1) as f64;
+    first * (last / first).powf(t.min(1.0))
 }
 
 /// What a pass over one scale is of a pass at full size.

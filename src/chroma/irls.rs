@@ -8,7 +8,7 @@ use std::time::Instant;
 use super::{
     ChromaError, ChromaObserver, ChromaProgress, ChromaSettings, FrozenViews, Targets, Task,
     lbfgs::{Lbfgs, State, System, UNBOUNDED},
-    passes::{Ending, Judging, Passes},
+    passes::{Ending, Judging, Passes, Space},
 };
 use crate::{
     gpu::{Buffer, Gpu, Recorder},
@@ -93,7 +93,7 @@ impl<'a> IrlsSolver<'a> {
         let channels = start.channels;
         let planes = channels * sh::coefficient_count(settings.sh_degree.min(start.degree));
         let sizes = [1, tasks.len()];
-        let passes = Passes::new(frozen, targets, tasks, field, planes, sizes)?;
+        let passes = Passes::new(frozen, targets, tasks, field, planes, Space::Rgb, sizes)?;
         let count = frozen.geometry.count;
         let system = System {
             unknowns: passes.field.planes.clone(),
@@ -301,8 +301,8 @@ impl<'a> IrlsSolver<'a> {
         let adjoint = ending != Ending::Loss;
         self.passes.clear(adjoint);
         let judging = Judging {
-            agreement: 0.0,
             robust,
+            ..Judging::default()
         };
         for task in 0..self.passes.tasks.len() {
             self.passes.draw(task, 0, judging, task, ending)?;

@@ -1,4 +1,5 @@
-//! The losses of stage 2 (`shaders/chroma_loss.wgsl`, `shaders/rgb_loss.wgsl`).
+//! The losses of stage 2 (`shaders/chroma_loss.wgsl`, `shaders/rgb_loss.wgsl`,
+//! `shaders/lab_loss.wgsl`).
 
 use bytemuck::{Pod, Zeroable};
 
@@ -65,6 +66,26 @@ impl Correction {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct RgbLossParameters {
+    /// 1 where each pixel has a weight.
+    pub weighted: u32,
+}
+
+/// Twin of `struct LabLossParameters`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct LabLossParameters {
+    /// Width and height of the coarser image.
+    pub coarser_size: [u32; 2],
+    /// Weight of the lightness.
+    pub lightness: f32,
+    /// 1 where the lightness's difference is squared.
+    pub squared: u32,
+    /// Weight of a and of b.
+    pub chroma: f32,
+    /// Weight of the agreement of a and of b with the coarser image; 0 where there is none.
+    pub agreement: f32,
+    /// Weight of the total variation of R, G and B.
+    pub variation: f32,
     /// 1 where each pixel has a weight.
     pub weighted: u32,
 }

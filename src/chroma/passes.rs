@@ -5,7 +5,7 @@
 use super::{
     ChromaError, FrozenViews, Targets,
     correction::{CorrectionParameters, Corrections},
-    loss::{ChromaLossWeights, LOSS_BLOCK, RgbLossParameters},
+    loss::{ChromaLossWeights, LOSS_BLOCK, LabLossParameters, RgbLossParameters},
 };
 use crate::{
     gpu::{Bindings, Buffer, Recorder},
@@ -25,13 +25,24 @@ pub struct Task {
 }
 
 /// How a view is judged.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Judging {
     /// Weight of the agreement with the next coarser scale, drawn just before.
     pub agreement: f32,
     /// Residual at which the loss of a and b together levels off; without one, each has
     /// its own.
     pub robust: Option<f32>,
+    /// What counts in CIELAB, where RGB is judged there.
+    pub lab: LabLossParameters,
+}
+
+/// Where RGB pictures are judged; a/b have one place only.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Space {
+    /// By their distance in RGB.
+    Rgb,
+    /// By lightness, a and b.
+    Lab,
 }
 
 /// What follows on the loss.
@@ -58,6 +69,12 @@ enum Judge {
     Rgb {
         parameters: Buffer<RgbLossParameters>,
         loss: Bindings,
+    },
+    Lab {
+        parameters: Buffer<LabLossParameters>,
+        loss: Bindings,
+        /// Where there is a coarser scale.
+        agreeing: Option<Bindings>,
     },
 }
 
@@ -86,6 +103,7 @@ pub(super) struct Passes<'a> {
     /// A seat for each scale of each pinned task, then one for each scale that all
     /// others take turns in.
     seats: Vec<Seat>,
+    space: Space,
     scales: usize,
     kept: usize,
 }
@@ -99,6 +117,7 @@ impl<'a> Passes<'a> {
         mut tasks: Vec<Task>,
         field: Field,
         planes: usize,
+        space: Space,
         [scales, entries]: [usize; 2],
     ) -> Result<Self, ChromaError> {
         let raster = &frozen.raster;
@@ -150,6 +169,7 @@ impl<'a> Passes<'a> {
             status,
             corrections,
             seats: Vec::new(),
+            space,
             scales,
             kept,
         };
@@ -222,6 +242,29 @@ impl<'a> Passes<'a> {
         );
         let block_losses = self.log.block_losses.raw();
         let judge = match field.kind {
+            ColorKind::Rgb if self.space == Space::Lab => {
+                let parameters =
+                    Buffer::uniform(gpu, "lab loss parameters", &LabLossParameters::default())?;
+                let mut buffers = vec![
+                    lists.view.raw(),
+                    layer.image.raw(),
+                    wanted.raw(),
+                    parameters.raw(),
+                    block_losses,
+                    image_gradient.raw(),
+                    weights.raw(),
+                ];
+                let loss = kernels.lab_loss.bind(gpu, &buffers);
+                let agreeing = coarser.map(|coarser| {
+                    buffers.push(coarser.image().raw());
+                    kernels.agreeing_lab_loss.bind(gpu, &buffers)
+                });
+                Judge::Lab {
+                    parameters,
+                    loss,
+                    agreeing,
+                }
+            }
             ColorKind::Rgb => {
                 let parameters =
                     Buffer::uniform(gpu, "rgb loss parameters", &RgbLossParameters::default())?;
@@ -341,6 +384,29 @@ impl<'a> Passes<'a> {
                 let weighted = u32::from(weighted);
                 parameters.write(gpu, &[RgbLossParameters { weighted }]);
                 recorder.dispatch(&frozen.kernels.rgb_loss, loss, blocks);
+            }
+            Judge::Lab {
+                parameters,
+                loss,
+                agreeing,
+            } => {
+                let agreeing = agreeing.as_ref().filter(|_| judging.agreement > 0.0);
+                let coarser = scale + usize::from(agreeing.is_some());
+                parameters.write(
+                    gpu,
+                    &[LabLossParameters {
+                        coarser_size: frozen.uniform(view, coarser).size,
+                        agreement: judging.agreement,
+                        weighted: u32::from(weighted),
+                        ..judging.lab
+                    }],
+                );
+                match agreeing {
+                    Some(loss) => {
+                        recorder.dispatch(&frozen.kernels.agreeing_lab_loss, loss, blocks);
+                    }
+                    None => recorder.dispatch(&frozen.kernels.lab_loss, loss, blocks),
+                }
             }
             Judge::Chroma {
                 weights,

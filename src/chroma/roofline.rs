@@ -18,6 +18,8 @@ pub fn minimum_words(kernel: &str, load: &Load) -> Option<f64> {
         "chroma_loss" => 7.0 * pixels,
         // Picture, wanted RGB, gradient and curvature.
         "rgb_loss" => 9.0 * pixels,
+        // Picture, wanted RGB, gradient.
+        "lab_loss" => 8.0 * pixels,
         // Picture, wanted a/b and curvature.
         "view_correction_sums" => 5.0 * pixels,
         // A few sums of each view.

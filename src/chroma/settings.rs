@@ -137,11 +137,4 @@ impl ChromaSettings {
             SolverKind::Irls => 1,
         }
     }
-
-    /// Adam's rate at `iteration`.
-    pub fn rate(&self, iteration: usize) -> f64 {
-        let [first, last] = self.rates;
-        let t = iteration as f64 / self.iterations.max(1) as f64;
-        first * (last / first).powf(t.min(1.0))
-    }
 }

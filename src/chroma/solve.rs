@@ -42,7 +42,7 @@ pub fn solve(
             let mut adam = AdamSolver::new(frozen, settings.clone(), targets, tasks)?;
             adam.run(observe)?;
             Ok(Solved {
-                chroma: adam.chroma()?,
+                chroma: adam.harmonics()?,
                 load: adam.load(),
                 unseen: None,
             })

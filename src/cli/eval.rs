@@ -4,8 +4,23 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{CliError, network::NetworkArguments, print, progress::Progress};
-use crate::run::{EvalOptions, eval};
+use super::{CliError, network::NetworkArguments, print, progress::Progress, values::one_of};
+use crate::{
+    eval::Peer,
+    run::{EvalOptions, eval},
+};
+
+/// Ways of others to color a scene.
+const RECIPES: &[(Peer, &str)] = &[
+    (
+        Peer::ChromadistillPaper,
+        "As ChromaDistill's paper says: 15,000 iterations, all harmonics, three scales",
+    ),
+    (
+        Peer::ChromadistillCode,
+        "As its released code does: 3,000 iterations, constant harmonics, half size; without the content loss, which needs VGG",
+    ),
+];
 
 /// Measure a colored run: fidelity, colorfulness, and whether views agree.
 #[derive(Args)]
@@ -21,8 +36,11 @@ pub struct Eval {
     /// and the teacher on each drawn gray frame.
     #[arg(long, requires = "teacher")]
     baselines: bool,
-    /// Device memory in MiB for fitting these RGB splats.
-    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u32).range(1..), requires = "baselines")]
+    /// Color the scene by another's recipe as well, and measure that; may be given more than once.
+    #[arg(long, value_parser = one_of(RECIPES), requires = "teacher")]
+    recipe: Vec<Peer>,
+    /// Device memory in MiB for fitting what is measured beside the scene.
+    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u32).range(1..), requires = "teacher")]
     memory_limit: Option<u32>,
     /// Frames of the rendered path.
     #[arg(long, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u32).range(2..=9999))]
@@ -52,6 +70,7 @@ impl Eval {
             colmap: self.colmap,
             frames: self.frames as usize,
             baselines: self.baselines,
+            recipes: self.recipe,
             memory_limit: self.memory_limit.map(|mib| u64::from(mib) << 20),
             flow: self.flow,
             lpips: self.lpips,

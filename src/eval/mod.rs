@@ -5,6 +5,7 @@ mod colored;
 mod lpips;
 mod luma;
 mod painter;
+mod peers;
 mod picture;
 mod reference;
 mod scene;
@@ -18,6 +19,7 @@ pub use colored::Measured;
 pub use lpips::Lpips;
 pub use luma::{mean_quality, measure_luma};
 pub use painter::{Drawing, Layer, Painter};
+pub use peers::Peer;
 pub use reference::{Reference, exposures};
 pub use scene::ColoredScene;
 pub use score::{Scored, Shot, mean_bake, mean_luma, mean_pictures, teacher_colorfulness};
@@ -78,8 +80,8 @@ pub enum EvalError {
 pub enum Task {
     /// Asking the teacher.
     Teacher,
-    /// Fitting RGB splats to compare with.
-    RgbSplats,
+    /// Coloring the scene in another way to compare with.
+    Peer,
     /// Drawing and comparing the frames of a path.
     Path,
     /// Drawing and comparing photographed views.

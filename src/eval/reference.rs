@@ -101,6 +101,12 @@ impl<'a> Reference<'a> {
         }
     }
 
+    /// Variance of the Laplacian of a gray picture where it counts, on the scale of 0 to 255.
+    pub fn sharpness(&self, gray: &[f32]) -> f64 {
+        let (width, height) = (self.photo.width as usize, self.photo.height as usize);
+        measure::variance(&self.counted(&measure::laplacian(width, height, gray)))
+    }
+
     /// Structural similarity. Where a pixel does not count the picture is taken to be
     /// right, and the others answer for all that is wrong.
     pub fn ssim(&self, shown: &[f32], truth: &[f32]) -> f64 {

@@ -6,6 +6,7 @@ use super::{
 };
 use crate::{
     chroma::teacher::AbImage,
+    color::gray_from_rgb,
     measure,
     report::{ColorError, LumaScore, Method, PictureScore, ViewScore, error_map},
 };
@@ -34,10 +35,20 @@ pub struct Shot {
 
 /// Methods on the page; the exported picture stands for the native one, and what that
 /// costs is the bake's figure.
-const SHOWN: [(Method, &str, &str); 4] = [
+const SHOWN: [(Method, &str, &str); 6] = [
     (Method::Teacher, "teacher", "teacher"),
     (Method::Exported, "ours", "ours"),
     (Method::RgbSplats, "rgb-splats", "teacher, then RGB splats"),
+    (
+        Method::ChromadistillPaper,
+        "chromadistill-paper",
+        "ChromaDistill, as its paper says",
+    ),
+    (
+        Method::ChromadistillCode,
+        "chromadistill-code",
+        "ChromaDistill, as its code does",
+    ),
     (Method::PerFrame, "per-frame", "luma, then teacher"),
 ];
 
@@ -70,9 +81,12 @@ impl Scored {
         show("photo", "photo", shown.clone());
         show("luma", "luma", drawn_gray.clone());
         let quality = reference.luma_quality(&luma_shown);
+        let wanted_gray = reference.gray();
         let luma = LumaScore {
             psnr: quality.psnr,
             ssim: quality.ssim,
+            sharpness: reference.sharpness(&luma_shown),
+            photo_sharpness: reference.sharpness(&wanted_gray),
             lpips: match &mut lpips {
                 Some(lpips) => {
                     let gray = rgb_of(&reference.gray());
@@ -90,6 +104,7 @@ impl Scored {
             let counted = reference.counted(&rgb);
             let wanted = truth.map(|truth| reference.counted(truth));
             let wanted = wanted.as_deref();
+            let gray = gray_of(&rgb);
             scores.push(PictureScore {
                 method,
                 psnr: wanted
@@ -98,6 +113,9 @@ impl Scored {
                 delta_e: truth.map(|t| reference.color_error(&rgb, t)),
                 ab_error: wanted.map(|t| measure::ab_error(&reference.counted(ab), &ab_of(t))),
                 colorfulness: measure::colorfulness(&counted),
+                diversity: measure::color_diversity(&reference.counted(ab)),
+                gray_psnr: reference.luma_quality(&gray).psnr,
+                sharpness: reference.sharpness(&gray),
                 lpips: match (&mut lpips, truth) {
                     (Some(lpips), Some(t)) => {
                         Some(lpips.distance(&reference.patched(&rgb, t), t, size)?)
@@ -155,6 +173,9 @@ impl Scored {
             delta_e: None,
             ab_error: None,
             colorfulness: reference.colorfulness(&shown),
+            diversity: measure::color_diversity(&reference.counted(&ab_of(&shown))),
+            gray_psnr: measure::IDENTICAL_PSNR,
+            sharpness: luma.photo_sharpness,
             lpips: None,
         });
         Ok(Self {
@@ -173,6 +194,12 @@ impl Scored {
 /// Gray as RGB.
 fn rgb_of(gray: &[f32]) -> Vec<[f32; 3]> {
     gray.iter().map(|&v| [v; 3]).collect()
+}
+
+/// The gray with the lightness of each color.
+fn gray_of(rgb: &[[f32; 3]]) -> Vec<f32> {
+    let gray = |rgb: &[f32; 3]| gray_from_rgb(rgb.map(f64::from)) as f32;
+    rgb.iter().map(gray).collect()
 }
 
 /// What the export costs, of the scene as it is.
@@ -213,6 +240,8 @@ pub fn mean_luma(views: &[Scored]) -> LumaScore {
     LumaScore {
         psnr: mean(lumas().map(|l| Some(l.psnr))).unwrap_or(f64::NAN),
         ssim: mean(lumas().map(|l| Some(l.ssim))).unwrap_or(f64::NAN),
+        sharpness: mean(lumas().map(|l| Some(l.sharpness))).unwrap_or(f64::NAN),
+        photo_sharpness: mean(lumas().map(|l| Some(l.photo_sharpness))).unwrap_or(f64::NAN),
         lpips: mean(lumas().map(|l| l.lpips)),
     }
 }
@@ -263,6 +292,9 @@ pub fn mean_pictures(views: &[Scored]) -> Vec<PictureScore> {
                 delta_e: mean_error(own().map(|s| s.delta_e)),
                 ab_error: mean(own().map(|s| s.ab_error)),
                 colorfulness: mean(own().map(|s| Some(s.colorfulness))).unwrap_or(f64::NAN),
+                diversity: mean(own().map(|s| Some(s.diversity))).unwrap_or(f64::NAN),
+                gray_psnr: mean(own().map(|s| Some(s.gray_psnr))).unwrap_or(f64::NAN),
+                sharpness: mean(own().map(|s| Some(s.sharpness))).unwrap_or(f64::NAN),
                 lpips: mean(own().map(|s| s.lpips)),
             }
         })

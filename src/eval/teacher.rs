@@ -1,25 +1,15 @@
 //! The teacher as one to be measured: its own pictures, and what it makes of the gray
 //! scene frame by frame.
 
-use std::sync::Arc;
-
-use super::{
-    ColoredScene, EvalError, Observer, Progress, Task as Step,
-    picture::{gray_picture, to_picture},
-};
+use super::{EvalError, Observer, Progress, Task as Step};
 use crate::{
     capture::Dataset,
     chroma::{
-        ChromaSettings, FrozenViews, Room, Targets, Task, fit_rgb, masked_weights, native_rgb,
+        Targets,
         teacher::{AbImage, GrayImage, Query, Teacher},
     },
-    raster::{Picture, Raster},
-    splats::{ShField, sh},
+    raster::Picture,
 };
-
-/// Rounds for RGB splats, nearly four times those of chroma: harmonics of degree 3 settle
-/// more slowly than a color for each Gaussian.
-const RGB_ROUNDS: usize = 45;
 
 /// A teacher and its answers for the photos.
 pub struct MeasuredTeacher {
@@ -88,63 +78,6 @@ impl MeasuredTeacher {
     pub fn answer(&self, view: usize) -> Result<Option<AbImage>, EvalError> {
         let kept = self.of_view[view].map(|index| self.answers.read(index, 0));
         Ok(kept.transpose()?.map(|target| target.ab()))
-    }
-
-    /// RGB splats on the run's geometry, fitted to the teacher's pictures of the training
-    /// views: harmonics of degree 3 as splat trainers have, in [`RGB_ROUNDS`]. They are told what the training knew: exposures, masks.
-    ///
-    /// # Errors
-    /// [`EvalError`] of a photo or the solver, [`EvalError::NothingTaught`].
-    pub fn rgb_splats(
-        &self,
-        raster: &Arc<Raster>,
-        scene: &ColoredScene,
-        memory_limit: Option<u64>,
-        observe: &mut Observer<'_>,
-    ) -> Result<ShField, EvalError> {
-        let dataset = &scene.dataset;
-        observe(Progress {
-            task: Step::RgbSplats,
-            done: 0,
-            total: 1,
-            name: "",
-        });
-        let settings = ChromaSettings {
-            sh_degree: sh::MAX_DEGREE,
-            robust: None,
-            correct_views: false,
-            rounds: RGB_ROUNDS,
-            settled: 0.0,
-            ..ChromaSettings::irls()
-        };
-        let mut targets = Targets::new(settings.target_scales());
-        let (mut tasks, mut cameras) = (Vec::new(), Vec::new());
-        dataset.visit(&dataset.split.train, |view, photo| {
-            let Some(answer) = self.answer(view)? else {
-                return Ok(());
-            };
-            let colored = native_rgb(&gray_picture(photo), &to_picture(&answer));
-            let wanted = scene.reference(view, photo).unexposed(&colored);
-            let weights = masked_weights(None, photo);
-            let size = [photo.width, photo.height];
-            tasks.push(Task {
-                view: cameras.len(),
-                target: targets.push_rgb(size, &wanted, weights.as_deref())?,
-            });
-            cameras.push(dataset.cameras[view].clone());
-            Ok::<_, EvalError>(())
-        })?;
-        if tasks.is_empty() {
-            return Err(EvalError::NothingTaught);
-        }
-        let room = Room {
-            limit: memory_limit,
-            sh_degree: sh::MAX_DEGREE,
-            weighted: targets.weighted(),
-        };
-        let (luma, extent, scales) = (&scene.luma, dataset.extent, targets.scales());
-        let frozen = FrozenViews::new(raster, luma, extent, &cameras, scales, room)?;
-        Ok(fit_rgb(&frozen, &settings, &targets, tasks)?)
     }
 
     /// What the teacher makes of a drawn gray picture; `None` without that baseline.

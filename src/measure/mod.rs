@@ -6,21 +6,25 @@
 mod colorfulness;
 mod consistency;
 mod depth;
+mod diversity;
 mod flo;
 mod flow;
 mod image_error;
 mod path;
+mod sharpness;
 mod ssim;
 mod visibility;
 
 pub use colorfulness::colorfulness;
 pub use consistency::{Consistency, DENOMINATOR_RULE, SCALE_RULE};
 pub use depth::DepthSteps;
+pub use diversity::color_diversity;
 pub use flo::decode_flo;
 pub use flow::Flow;
 pub use image_error::{
     DeltaE, IDENTICAL_PSNR, ab_error, delta_e, mean_delta_e, psnr, reported_psnr,
 };
 pub use path::{camera_path, distance};
+pub use sharpness::{laplacian, variance};
 pub use ssim::ssim;
 pub use visibility::{MASK_RULE, MIN_OPACITY, visible};

@@ -1,7 +1,7 @@
 //! The oracle: every kernel once more, in `f64` and plain loops.
 //!
 //! One file a kernel, under the kernel's own name: [`project`], [`shade`],
-//! [`tiles`], [`blend`], [`luma_loss`], [`chroma_loss`], [`lbfgs`],
+//! [`tiles`], [`blend`], [`luma_loss`], [`chroma_loss`], [`lab_loss`], [`lbfgs`],
 //! [`view_correction`], [`adam`], [`relocation`]. [`render`] chains the first four
 //! without tiles; [`gradient`] differentiates the chain
 //! with dual numbers, so no derivative in here was worked out by hand.
@@ -17,6 +17,7 @@ pub mod constants;
 pub mod gradient;
 #[cfg(test)]
 mod gradient_tests;
+pub mod lab_loss;
 pub mod lbfgs;
 pub mod linear;
 pub mod luma_loss;

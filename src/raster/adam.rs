@@ -135,7 +135,8 @@ pub struct Adam {
 }
 
 impl Adam {
-    /// Adam on `values` (planes of `count` elements) with `gradient`, from rest.
+    /// Adam on the first of `values` (planes of `count` elements), as many as have a
+    /// `gradient`, from rest.
     ///
     /// # Errors
     /// [`GpuError::TooLarge`].
@@ -147,8 +148,8 @@ impl Adam {
         values: &Buffer<f32>,
         count: usize,
     ) -> Result<Self, GpuError> {
-        let moments = AdamMoments::zeros(gpu, values.len())?;
-        let step = AdamStep::new(gpu, values.len() / count.max(1), count)?;
+        let moments = AdamMoments::zeros(gpu, gradient.len())?;
+        let step = AdamStep::new(gpu, gradient.len() / count.max(1), count)?;
         let bindings = kernel.0.bind(
             gpu,
             &[

@@ -23,10 +23,30 @@ pub enum Method {
     Teacher,
     /// RGB splats on the same geometry, fitted to the teacher's pictures.
     RgbSplats,
+    /// The same by the recipe of ChromaDistill's paper.
+    ChromadistillPaper,
+    /// The same by that of its released code.
+    ChromadistillCode,
     /// The gray scene, drawn and then colored by the teacher frame by frame.
     PerFrame,
     /// The photo itself.
     Photo,
+}
+
+impl Method {
+    /// Part of the names of its files.
+    pub fn file_stem(self) -> &'static str {
+        match self {
+            Self::Native => "native",
+            Self::Exported => "exported",
+            Self::Teacher => "teacher",
+            Self::RgbSplats => "rgb-splats",
+            Self::ChromadistillPaper => "chromadistill-paper",
+            Self::ChromadistillCode => "chromadistill-code",
+            Self::PerFrame => "per-frame",
+            Self::Photo => "photo",
+        }
+    }
 }
 
 impl fmt::Display for Method {
@@ -36,6 +56,8 @@ impl fmt::Display for Method {
             Self::Exported => "exported",
             Self::Teacher => "teacher",
             Self::RgbSplats => "RGB splats",
+            Self::ChromadistillPaper => "ChromaDistill, paper",
+            Self::ChromadistillCode => "ChromaDistill, code",
             Self::PerFrame => "per frame",
             Self::Photo => "photo",
         })
@@ -65,6 +87,8 @@ pub struct Evaluation {
     pub pictures: Vec<PictureScore>,
     /// Each of these views.
     pub views: Vec<ViewScore>,
+    /// What other ways to color the scene took.
+    pub peers: Vec<PeerReport>,
     /// How the figures of consistency come about.
     pub rules: Rules,
     /// Along a rendered path.
@@ -82,8 +106,25 @@ pub struct LumaScore {
     pub psnr: f64,
     /// Structural similarity.
     pub ssim: f64,
+    /// Variance of the picture's Laplacian, on the scale of 0 to 255.
+    pub sharpness: f64,
+    /// That of the photo.
+    pub photo_sharpness: f64,
     /// Learned perceptual distance, with `--lpips`.
     pub lpips: Option<f64>,
+}
+
+/// What coloring the scene in another way took.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PeerReport {
+    /// Which way.
+    pub method: Method,
+    /// Rounds, or iterations of Adam.
+    pub iterations: usize,
+    /// Passes over a view at full size.
+    pub passes: f64,
+    /// Seconds, the teacher's not among them.
+    pub seconds: f64,
 }
 
 /// Quality of one method's colored pictures; fidelity only where photos have colors.
@@ -101,6 +142,12 @@ pub struct PictureScore {
     pub ab_error: Option<f64>,
     /// Colorfulness (Hasler and Süsstrunk 2003).
     pub colorfulness: f64,
+    /// Effective number of colors; see [`color_diversity`](crate::measure::color_diversity).
+    pub diversity: f64,
+    /// Peak signal-to-noise ratio in dB of the picture's lightness, as gray, to the photo's.
+    pub gray_psnr: f64,
+    /// Variance of the Laplacian of that gray, on the scale of 0 to 255.
+    pub sharpness: f64,
     /// Learned perceptual distance to the photo, with `--lpips`.
     pub lpips: Option<f64>,
 }
@@ -241,6 +288,9 @@ impl Evaluation {
             "95 %",
             "a/b error",
             "colorful",
+            "colors",
+            "gray PSNR",
+            "sharp",
             "LPIPS",
         ];
         let luma = vec![
@@ -252,6 +302,9 @@ impl Evaluation {
             dash(),
             dash(),
             dash(),
+            dash(),
+            figure(Some(self.luma.psnr), 2),
+            figure(Some(self.luma.sharpness), 0),
             figure(self.luma.lpips, 3),
         ];
         let colored = self.pictures.iter().map(|score| {
@@ -263,6 +316,9 @@ impl Evaluation {
                 figure(score.delta_e.map(|e| e.percentile_95), 2),
                 figure(score.ab_error, 2),
                 figure(Some(score.colorfulness), 1),
+                figure(Some(score.diversity), 1),
+                figure(Some(score.gray_psnr), 2),
+                figure(Some(score.sharpness), 0),
                 figure(score.lpips, 3),
             ]
         });
@@ -274,7 +330,15 @@ impl Evaluation {
         let mut notes = vec![
             "PSNR in dB; a/b error: root mean square in CIELAB units, lightness taken from the photo."
                 .to_owned(),
+            "Colors: effective number of a/b squares five units wide; sharp: variance of the Laplacian of the gray picture, 0 to 255."
+                .to_owned(),
         ];
+        notes.extend(self.peers.iter().map(|peer| {
+            format!(
+                "{}: {} steps, {:.0} passes over a view, {:.1} s.",
+                peer.method, peer.iterations, peer.passes, peer.seconds
+            )
+        }));
         notes.extend(self.bake.map(|bake| {
             format!(
                 "Exported against native: ΔE00 {:.2}, 95 % {:.2}.",

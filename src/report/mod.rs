@@ -13,7 +13,7 @@ pub use contact_sheet::{Row, contact_sheet, to_image};
 pub use effects::EffectReport;
 pub use evaluation::{
     BetweenScore, ConsistencyScore, EVALUATION_VERSION, Evaluation, LumaScore, Method,
-    PathConsistency, PathScore, PictureScore, Rules, Table, ViewScore,
+    PathConsistency, PathScore, PeerReport, PictureScore, Rules, Table, ViewScore,
 };
 pub use page::{Figure, MAP_END, PageRow, error_map, evaluation_page};
 pub use timings::{KernelReport, kernel_reports, timings_table};

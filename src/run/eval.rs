@@ -8,22 +8,23 @@ use std::{
 
 use super::{
     Event, Observer, RunError, RunFolder, Stage, files,
-    fit::open_gpu,
+    fit::{comments, open_gpu},
     scene::{open, read_splats},
 };
 use crate::{
     capture::Dataset,
     chroma::teacher::{Teacher, TeacherSettings},
     eval::{
-        ColoredScene, EvalError, Lpips, MeasuredTeacher, Painter, Progress, Scored, Task,
+        ColoredScene, EvalError, Lpips, MeasuredTeacher, Painter, Peer, Progress, Scored, Task,
         along_path, between_views, exposures, mean_bake, mean_luma, mean_pictures,
         teacher_colorfulness,
     },
     raster::Raster,
     report::{
-        EVALUATION_VERSION, Evaluation, Figure, Method, PageRow, Report, Rules, TeacherReport,
-        evaluation_page, to_image,
+        EVALUATION_VERSION, Evaluation, Figure, Method, PageRow, PeerReport, Report, Rules,
+        TeacherReport, evaluation_page, to_image,
     },
+    splats::{Splats, ply},
 };
 
 /// Views on the page: a browser should not have to load a thousand pictures.
@@ -47,6 +48,8 @@ pub struct EvalOptions {
     pub frames: usize,
     /// Whether other ways to color a scene are measured beside it.
     pub baselines: bool,
+    /// Ways of others to color the scene that are measured as well.
+    pub recipes: Vec<Peer>,
     /// Bytes of the device that fitting RGB splats may take.
     pub memory_limit: Option<u64>,
     /// Folder of `.flo` files between the path's frames; geometric flow by default.
@@ -77,17 +80,36 @@ pub fn eval(
     };
     let drawn = report.luma.settings.raster_options();
     let raster = Arc::new(Raster::with(&open_gpu(false)?, drawn));
-    let splats = match (&teacher, &options.teacher) {
-        (Some(teacher), Some(path)) if options.baselines => {
+    let seed = report.luma.settings.seed;
+    let mut peers = Vec::new();
+    if let (Some(teacher), Some(path)) = (&teacher, &options.teacher) {
+        let baseline = options.baselines.then_some(Peer::RgbSplats);
+        for peer in baseline.into_iter().chain(options.recipes.iter().copied()) {
+            if peers
+                .iter()
+                .any(|(_, told): &(_, PeerReport)| told.method == peer.method())
+            {
+                continue;
+            }
             let limit = options.memory_limit;
             let mut told = |progress: Progress<'_>| observe(event(progress));
-            let splats = teacher.rgb_splats(&raster, &scene, limit, &mut told);
-            Some(splats.map_err(covers_nothing(path, &scene.dataset))?)
+            let colored = peer.color(&raster, &scene, teacher, seed, limit, &mut told);
+            peers.push(colored.map_err(covers_nothing(path, &scene.dataset))?);
         }
-        _ => None,
-    };
+    }
+    for (field, told) in &peers {
+        let splats = Splats {
+            sh: field.clone(),
+            ..scene.luma.clone()
+        };
+        let path = made
+            .path()
+            .join(told.method.file_stem())
+            .with_extension("ply");
+        ply::write_ply(&path, &splats, glam::DVec3::ZERO, &comments(drawn))?;
+    }
     let mut rgb = vec![(Method::Exported, &scene.exported)];
-    rgb.extend(splats.as_ref().map(|field| (Method::RgbSplats, field)));
+    rgb.extend(peers.iter().map(|(field, told)| (told.method, field)));
     let mut painter = Painter::new(&raster, &scene, &rgb, teacher.as_mut())?;
 
     let mut views = Vec::new();
@@ -149,6 +171,7 @@ pub fn eval(
         bake: mean_bake(&views),
         pictures: mean_pictures(&views),
         views: views.into_iter().map(|scored| scored.score).collect(),
+        peers: peers.into_iter().map(|(_, told)| told).collect(),
         rules: Rules::default(),
         path,
         between,
@@ -260,16 +283,13 @@ fn event(progress: Progress<'_>) -> Event {
     Event::Progress {
         stage: match progress.task {
             Task::Teacher => Stage::Teacher,
-            Task::RgbSplats => Stage::Chroma,
+            Task::Peer => Stage::Peer,
             Task::Path => Stage::Path,
             Task::Pairs => Stage::Pairs,
         },
         done: progress.done,
         total: progress.total,
-        message: match progress.task {
-            Task::RgbSplats => "RGB splats to compare with".to_owned(),
-            _ => progress.name.to_owned(),
-        },
+        message: progress.name.to_owned(),
     }
 }
 

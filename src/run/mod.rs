@@ -175,6 +175,8 @@ pub enum Stage {
     Chroma,
     /// From a/b to the RGB that splat files have.
     Bake,
+    /// Coloring a scene in another way, to compare with.
+    Peer,
     /// Drawing pictures.
     Render,
     /// Measuring pictures against photos.
@@ -198,6 +200,7 @@ impl fmt::Display for Stage {
             Self::Degree => "degree",
             Self::Chroma => "chroma",
             Self::Bake => "bake",
+            Self::Peer => "peer",
             Self::Render => "render",
             Self::Measure => "measure",
             Self::Path => "path",

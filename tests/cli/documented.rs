@@ -39,8 +39,9 @@ fn every_key_of_a_report_and_no_other() {
 #[test]
 fn every_key_of_an_evaluation_and_no_other() {
     let teacher = onnx("ddcolor_tiny.onnx");
-    let eval = ["eval", "--frames", "2", "--json", "--teacher", &teacher];
-    let evaluation = place_with_run().json(&eval);
+    let eval = ["eval", "--frames", "2", "--json"];
+    let teacher = ["--teacher", &teacher, "--baselines"];
+    let evaluation = place_with_run().json(&[&eval[..], &teacher].concat());
     are_documented(&evaluation, "## eval.json");
 }
 

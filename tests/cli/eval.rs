@@ -129,6 +129,38 @@ fn the_photos_as_a_teacher_make_no_error() {
 }
 
 #[test]
+fn another_recipe_is_measured_beside_the_scene() {
+    let place = place_with_run();
+    let recipe = ["--recipe", "chromadistill-code"];
+    let teacher = ["--teacher", "scene/images"];
+    let found = evaluated(&place, &[&teacher[..], &recipe, &recipe].concat());
+    let peers = found["peers"].as_array().expect("a list");
+    // Named twice, done once.
+    assert_eq!(peers.len(), 1, "{peers:?}");
+    assert_eq!(peers[0]["method"], "chromadistill_code");
+    assert_eq!(
+        (&peers[0]["iterations"], &peers[0]["passes"]),
+        (&3000.into(), &750.0.into())
+    );
+    let [theirs, ours, teacher] =
+        ["chromadistill_code", "native", "teacher"].map(|method| of(&found["pictures"], method));
+    // It colors; and what it has of lightness is its own, whereas ours is luma's.
+    assert!(number(&theirs["ab_error"]) < 0.9 * number(&teacher["colorfulness"]));
+    assert!(number(&theirs["diversity"]) > 1.5, "{theirs}");
+    let luma = &found["luma"];
+    assert!((number(&ours["gray_psnr"]) - number(&luma["psnr"])).abs() < 0.1);
+    assert!((number(&ours["sharpness"]) / number(&luma["sharpness"]) - 1.0).abs() < 0.05);
+    assert!((number(&theirs["gray_psnr"]) - number(&luma["psnr"])).abs() > 0.1);
+    assert_eq!(number(&teacher["gray_psnr"]), 100.0);
+    // Its splats can be looked at.
+    let words = place.succeed(&["info", "runs/scene/eval/chromadistill-code.ply"]);
+    assert!(
+        words.contains("Gaussians") || words.contains("splats"),
+        "{words}"
+    );
+}
+
+#[test]
 fn the_page_shows_every_view_with_files_that_are_there() {
     let place = place_with_run();
     let words = place.succeed(&["eval", "--frames", "3"]);

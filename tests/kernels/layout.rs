@@ -4,8 +4,8 @@ use std::{collections::BTreeMap, mem::offset_of};
 
 use gs_chroma::{
     chroma::{
-        ChromaLossWeights, Correction, CorrectionParameters, LbfgsParameters, RgbLossParameters,
-        SUM_GROUPS, SUMS,
+        ChromaLossWeights, Correction, CorrectionParameters, LabLossParameters, LbfgsParameters,
+        RgbLossParameters, SUM_GROUPS, SUMS,
     },
     gpu::{STORAGE_BUFFERS, shaders},
     luma::{
@@ -24,7 +24,7 @@ use naga::{
     valid::{Capabilities, ValidationFlags, Validator},
 };
 
-use crate::oracle::{constants as oracle, luma_loss::window};
+use crate::oracle::{constants as oracle, lab_loss::RELATIVE_XYZ, luma_loss::window};
 
 fn parse(name: &str, source: &str) -> Module {
     wgsl::parse_str(source).unwrap_or_else(|error| panic!("{name}: {error}"))
@@ -151,6 +151,17 @@ fn twins() -> Vec<Twin> {
             }
         ),
         twin!("RgbLossParameters" = RgbLossParameters { weighted }),
+        twin!(
+            "LabLossParameters" = LabLossParameters {
+                coarser_size,
+                lightness,
+                squared,
+                chroma,
+                agreement,
+                variation,
+                weighted
+            }
+        ),
         twin!(
             "Correction" = Correction {
                 gain,
@@ -307,6 +318,7 @@ fn constants_are_those_of_the_oracle() {
         ("luma_loss_window5", shaders::LUMA_LOSS_WINDOW5),
         ("chroma_loss", shaders::CHROMA_LOSS),
         ("rgb_loss", shaders::RGB_LOSS),
+        ("lab_loss", shaders::LAB_LOSS),
         ("view_correction", shaders::VIEW_CORRECTION),
         ("adam", shaders::ADAM),
     ];
@@ -352,6 +364,10 @@ fn constants_are_those_of_the_oracle() {
         ("luma_loss", "L1_WEIGHT", vec![1.0 - oracle::SSIM_WEIGHT]),
         ("chroma_loss", "SMOOTHING", vec![oracle::CHROMA_EPSILON]),
         ("rgb_loss", "SMOOTHING", vec![oracle::CHROMA_EPSILON]),
+        ("lab_loss", "SMOOTHING", vec![oracle::CHROMA_EPSILON]),
+        ("lab_loss", "TO_X", RELATIVE_XYZ[0].to_vec()),
+        ("lab_loss", "TO_Y", RELATIVE_XYZ[1].to_vec()),
+        ("lab_loss", "TO_Z", RELATIVE_XYZ[2].to_vec()),
         (
             "view_correction",
             "PRIOR_VARIANCE",

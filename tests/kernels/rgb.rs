@@ -5,7 +5,8 @@ use std::ops::ControlFlow;
 
 use gs_chroma::{
     chroma::{
-        ChromaSettings, FrozenViews, Room, Targets, Task, bake, bake_rgb, fit_rgb, native_rgb,
+        ChromaSettings, FrozenViews, Recipe, Room, Targets, Task, bake, bake_rgb, fit_rgb,
+        follow_recipe, native_rgb,
     },
     raster::{Field, Geometry, Picture, Renderer, constants::NEAR_SHARE},
     splats::{ShField, Splats, sh},
@@ -97,7 +98,8 @@ fn rgb_harmonics_are_fitted_to_what_is_shown() {
         });
         let tasks = tasks.collect();
         let frozen = frozen(&truth);
-        fit_rgb(&frozen, &settings, &targets, tasks).unwrap()
+        let mut told = |_| ControlFlow::Continue(());
+        fit_rgb(&frozen, &settings, &targets, tasks, &mut told).unwrap()
     };
     let sh = fitted(0.0);
     let error = distance(
@@ -158,4 +160,86 @@ fn the_bake_knows_that_nothing_gets_darker_than_black() {
     assert!(error < 0.007, "{error}");
     let black = (-0.5 / sh::C0) as f32;
     assert!(baked.sh.coefficients.iter().all(|&c| c >= black - 1e-4));
+}
+
+/// Recipes start from gray and end near what is wanted, with the same bits each time; one that
+/// moves constant harmonics alone leaves the others gray.
+#[test]
+fn recipes_color_what_is_gray() {
+    let mut truth = colorful();
+    // Not below black, where nothing pulls a Gaussian up again.
+    for value in &mut truth.sh.coefficients {
+        *value = value.max(-1.5);
+    }
+    let pictures = shown(&truth);
+    let mut luma = truth.to_luma();
+    assert_eq!(luma.sh.degree, 0);
+    luma.sh = ShField {
+        degree: 1,
+        coefficients: (luma.sh.coefficients.iter())
+            .flat_map(|&constant| [constant, 0.0, 0.0, 0.0])
+            .collect(),
+        ..luma.sh
+    };
+    for (recipe, closer) in [
+        (
+            Recipe {
+                iterations: 150,
+                rates: [2e-2, 2e-3],
+                ..Recipe::chromadistill_paper()
+            },
+            0.5,
+        ),
+        (
+            Recipe {
+                iterations: 300,
+                ..Recipe::chromadistill_code()
+            },
+            0.6,
+        ),
+    ] {
+        let mut targets = Targets::new(recipe.target_scales());
+        let tasks: Vec<Task> = (pictures.iter().enumerate())
+            .map(|(view, wanted)| {
+                let camera = &cameras()[view];
+                let size = [camera.width, camera.height];
+                let target = targets.push_rgb(size, wanted, None).unwrap();
+                Task { view, target }
+            })
+            .collect();
+        let colored = || {
+            let frozen = frozen(&luma);
+            let mut told = |_| ControlFlow::Continue(());
+            follow_recipe(
+                &frozen,
+                &recipe,
+                &targets,
+                tasks.clone(),
+                &luma,
+                3,
+                &mut told,
+            )
+            .unwrap()
+        };
+        let found = colored();
+        assert!(bits(&found.coefficients) == bits(&colored().coefficients));
+        let rest = found
+            .coefficients
+            .chunks_exact(3 * sh::coefficient_count(found.degree));
+        let gray_rest = rest
+            .flat_map(|of_splat| of_splat[3..].as_chunks::<3>().0)
+            .all(|rgb| rgb.iter().all(|value| *value == rgb[0]));
+        assert_eq!(gray_rest, recipe.rest_share.is_none());
+        let with = |sh: ShField| shown(&Splats { sh, ..luma.clone() });
+        let gray = ShField {
+            channels: 3,
+            coefficients: luma.sh.coefficients.iter().flat_map(|&v| [v; 3]).collect(),
+            ..luma.sh.clone()
+        };
+        let (before, after) = (
+            distance(&with(gray), &pictures),
+            distance(&with(found), &pictures),
+        );
+        assert!(after < closer * before, "{before} became {after}");
+    }
 }

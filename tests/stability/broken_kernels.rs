@@ -161,6 +161,8 @@ fn broken_losses_and_steps_are_noticed() {
             "vec4f(residual, UNITS)",
             "vec4f(residual, 1.0)",
         ),
+        ("lab loss", "lab_loss", "if at.x > 0u", "if at.x > 1u"),
+        ("lab loss", "lab_loss", "2.0 * residual.x", "residual.x"),
         (
             "adjoint",
             "shade_backward",

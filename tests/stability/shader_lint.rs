@@ -233,6 +233,47 @@ const REASONS: &[(&str, &str, &str)] = &[
         "weight / length",
         "a length is at least SMOOTHING",
     ),
+    (
+        "distance_of",
+        "r / length",
+        "a length is at least its smoothing",
+    ),
+    (
+        "distance_of",
+        "sqrt",
+        "the square of the smoothing is added to a square",
+    ),
+    (
+        "lab_loss",
+        "vec4f(gradient, 0.0) / f32(pixels)",
+        "the kernel runs for images of at least one pixel",
+    ),
+    (
+        "lab_of",
+        "(fourth * fifth - base * base) / (5.0 * fourth)",
+        "the base is above 0.09, and its fifth root above 0.3",
+    ),
+    (
+        "lab_of",
+        "(max(rgb, vec3f(POWER_FROM)) + 0.055) / 1.055",
+        "a constant divisor",
+    ),
+    (
+        "lab_of",
+        "(root * root * root - bright) / (3.0 * root * root)",
+        "what is brighter than CUBE_ROOT_FROM has a root above 0.2",
+    ),
+    (
+        "lab_of",
+        "1.0 / (3.0 * root * root)",
+        "what is brighter than CUBE_ROOT_FROM has a root above 0.2",
+    ),
+    (
+        "lab_of",
+        "pow",
+        "bases are kept above POWER_FROM or CUBE_ROOT_FROM, exponents below 1",
+    ),
+    ("lab_of", "rgb / 12.92", "a constant divisor"),
     ("wanted_ab", "vec2f(halves) / 256.0", "a constant divisor"),
     (
         "wanted_rgb",

@@ -1,8 +1,6 @@
 //! RGB harmonics fitted to pictures, as viewers draw them: no Gaussian gets darker than
 //! black, and no pixel brighter than white.
 
-use std::ops::ControlFlow;
-
 use super::gaussian::{bake_rgb, darkest};
 use crate::{
     chroma::{
@@ -30,11 +28,12 @@ pub fn fit_rgb(
     settings: &ChromaSettings,
     targets: &Targets,
     tasks: Vec<Task>,
+    observe: &mut ChromaObserver<'_>,
 ) -> Result<ShField, ChromaError> {
     // Mid-gray.
     let start = ShField::zeros(frozen.splat_count(), settings.sh_degree, 3);
     let mut solver = IrlsSolver::starting_at(frozen, settings, targets, tasks, &start)?;
-    solver.run(&mut |_| ControlFlow::Continue(()))?;
+    solver.run(observe)?;
     solver.chroma()
 }
 

@@ -6,6 +6,7 @@ mod blend;
 mod chroma_loss;
 mod densify;
 mod gradient;
+mod lab_loss;
 mod lbfgs;
 mod losses;
 pub mod numerics;
@@ -30,7 +31,7 @@ use crate::{gpu::GpuError, raster::Raster};
 type Measure = fn(&Arc<Raster>) -> Result<Vec<Row>, GpuError>;
 
 /// The topics in the order in which an iteration meets them.
-pub const TOPICS: [(&str, Measure); 15] = [
+pub const TOPICS: [(&str, Measure); 16] = [
     ("project", project::rows),
     ("scan", scan::rows),
     ("sort", sort::rows),
@@ -38,6 +39,7 @@ pub const TOPICS: [(&str, Measure); 15] = [
     ("losses", losses::rows),
     ("chroma loss", chroma_loss::rows),
     ("rgb loss", rgb_loss::rows),
+    ("lab loss", lab_loss::rows),
     ("adjoint", gradient::rows),
     ("numerics", numerics::rows),
     ("step", step::rows),

@@ -1,0 +1,104 @@
+//! How others color splats, to compare with: RGB harmonics that Adam moves until pictures are
+//! like the teacher's in CIELAB.
+
+use std::ops::RangeInclusive;
+
+use super::{
+    AdamSolver, ChromaError, ChromaObserver, FrozenViews, LabLossParameters, Targets, Task,
+};
+use crate::splats::{ShField, Splats};
+
+/// A way to color RGB splats whose geometry stays.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recipe {
+    /// Iterations; each takes one view through all scales, one step a scale.
+    pub iterations: usize,
+    /// Adam's rate of the constant harmonics at the first and the last iteration, exponential
+    /// between.
+    pub rates: [f64; 2],
+    /// The rate of the other harmonics as a share of it; `None`: they stay as luma has them,
+    /// the same in all channels.
+    pub rest_share: Option<f64>,
+    /// Scales that are drawn, 0 the full one, each half as large as the last.
+    pub scales: RangeInclusive<usize>,
+    /// Weight of a's and b's agreement with the next coarser scale.
+    pub agreement: f32,
+    /// What counts in a picture.
+    pub loss: LabLossParameters,
+}
+
+impl Recipe {
+    /// ChromaDistill's paper (WACV 2025) for splats: the square of lightness's difference and
+    /// the size of a's and of b's in CIELAB units, coarse to fine by algorithm 1, from
+    /// iteration 15,000 to 30,000 at the rates of 3DGS, by which all harmonics learn. The
+    /// number of scales it leaves open; three are taken, as for a/b by Adam here.
+    pub fn chromadistill_paper() -> Self {
+        Self {
+            iterations: 15_000,
+            rates: [2.5e-3; 2],
+            rest_share: Some(1.0 / 20.0),
+            scales: 0..=2,
+            agreement: 1.0,
+            loss: LabLossParameters {
+                lightness: 1.0,
+                squared: 1,
+                chroma: 1.0,
+                ..LabLossParameters::default()
+            },
+        }
+    }
+
+    /// ChromaDistill's released code for splats: 3,000 steps of the constant harmonics at half
+    /// the size, on L/50, a/110 and b/110, with total variation. Its content loss, a
+    /// thousandth of VGG's features, needs a network that it brings along; it is left out.
+    pub fn chromadistill_code() -> Self {
+        Self {
+            iterations: 3_000,
+            rates: [1e-2, 1e-3],
+            rest_share: None,
+            scales: 1..=1,
+            agreement: 0.0,
+            loss: LabLossParameters {
+                lightness: 1.0 / 50.0,
+                chroma: 1.0 / 110.0,
+                variation: 1.0 / 3.0,
+                ..LabLossParameters::default()
+            },
+        }
+    }
+
+    /// Scales that targets are needed at, the full one included.
+    pub fn target_scales(&self) -> usize {
+        1 + self.scales.end()
+    }
+}
+
+/// Colors `luma` by `recipe`; the targets of `tasks` are RGB pictures, and `seed` is that of
+/// the views' order.
+///
+/// # Errors
+/// As [`solve`](super::solve); [`ChromaError::Cancelled`] where `observe` says so.
+pub fn follow_recipe(
+    frozen: &FrozenViews,
+    recipe: &Recipe,
+    targets: &Targets,
+    tasks: Vec<Task>,
+    luma: &Splats,
+    seed: u64,
+    observe: &mut ChromaObserver<'_>,
+) -> Result<ShField, ChromaError> {
+    let mut adam = AdamSolver::by_recipe(frozen, recipe, targets, tasks, luma, seed)?;
+    adam.run(observe)?;
+    adam.harmonics()
+}
+
+/// The gray of one channel in three.
+pub(super) fn gray_rgb(luma: &Splats) -> ShField {
+    ShField {
+        degree: luma.sh.degree,
+        channels: 3,
+        coefficients: (luma.sh.coefficients.iter())
+            .flat_map(|&value| [value; 3])
+            .collect(),
+    }
+}
