@@ -8,7 +8,7 @@ use super::options::MaskSource;
 use super::photo::same_shape;
 use super::resample::downscale;
 use super::sample::{Depth, Samples};
-use super::{Capture, View};
+use super::{Capture, IMAGES, View};
 
 /// Where masks lie unless told otherwise.
 const BESIDE: &str = "masks";
@@ -25,7 +25,7 @@ impl MaskFolder {
     /// If a folder is named that is not there or holds the photos themselves, or if
     /// it has no mask for any photo.
     pub fn open(capture: &Capture, source: &MaskSource) -> Result<Option<Self>, CaptureError> {
-        let images = capture.root.join("images");
+        let images = capture.root.join(IMAGES);
         let masks = match source {
             MaskSource::Off => return Ok(None),
             MaskSource::Beside => capture.root.join(BESIDE),

@@ -50,6 +50,9 @@ pub use photo::Photo;
 pub use resample::downscale;
 pub use split::{Split, split};
 
+/// Where a COLMAP folder has its photos.
+pub const IMAGES: &str = "images";
+
 /// A quaternion's length may be off by so much: text files round its digits.
 /// Beyond it the pose is no rotation that anyone meant.
 const QUATERNION_SLACK: f64 = 1e-3;
@@ -195,7 +198,7 @@ impl Capture {
         if !dir.is_dir() {
             return Err(CaptureError::NoFolder { dir: dir.into() });
         }
-        let photos = dir.join("images");
+        let photos = dir.join(IMAGES);
         if !photos.is_dir() {
             return Err(CaptureError::NoImagesFolder { dir: dir.into() });
         }

@@ -21,7 +21,7 @@ pub struct Solved {
 }
 
 /// Gaussians that views show in fewer pixels than this are hardly seen.
-const SEEN: f32 = 0.5;
+pub(super) const SEEN: f32 = 0.5;
 
 /// Distills the wanted a/b of `tasks` into chroma harmonics of the frozen geometry, that of
 /// `luma`.

@@ -41,11 +41,12 @@ const SOLVERS: &[(SolverKind, &str)] = &[
 pub struct Colorize {
     /// Run folder, or a gray .ply with --colmap [default: newest under runs/].
     run: Option<PathBuf>,
-    /// A colorization network, by its name in `gs-chroma teacher list` or as an .onnx file, or a
-    /// folder of colored photos named like the originals; given more than once, their mean.
+    /// A colorization network, by its name in `gs-chroma teacher list` or as an .onnx file, a
+    /// folder of colored photos named like the originals, or `photos` where these are in color
+    /// themselves; given more than once, their mean.
     #[arg(
         long,
-        value_name = "NAME|FILE.onnx|DIR",
+        value_name = "NAME|FILE.onnx|DIR|photos",
         required_unless_present = "hints"
     )]
     teacher: Vec<PathBuf>,
@@ -101,6 +102,10 @@ pub struct Colorize {
     /// COLMAP folder with the photos, when it is not where `fit` found it.
     #[arg(long, value_name = "COLMAP_DIR")]
     colmap: Option<PathBuf>,
+    /// Take lightness, too, from the photos, as those of --colmap in another light show it; a run
+    /// keeps its own files.
+    #[arg(long, requires = "output")]
+    relight: bool,
     /// Device memory in MiB for solving and baking: what does not fit is brought from the host
     /// view by view.
     #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u32).range(1..))]
@@ -224,6 +229,7 @@ impl Colorize {
             sh_degree: self.sh_degree,
             correct_views: self.correct_views.map(|switch| switch == Switch::On),
             colmap: self.colmap,
+            relight: self.relight,
             timings: self.timings,
         };
         let (output, report) = colorize(&options, &mut |event| progress.show(&event))?;

@@ -28,7 +28,7 @@ pub struct Eval {
     /// Run folder [default: newest under runs/].
     run: Option<PathBuf>,
     /// The teacher, to be measured beside the scene, as for `colorize`.
-    #[arg(long, value_name = "NAME|FILE.onnx|DIR")]
+    #[arg(long, value_name = "NAME|FILE.onnx|DIR|photos")]
     teacher: Option<PathBuf>,
     #[command(flatten)]
     network: NetworkArguments,

@@ -11,12 +11,15 @@ use std::{
 use super::{
     Event, Observer, Preset, RunError, RunFolder, Stage, files,
     fit::{capture_report, comments, open_gpu},
+    foreign::drawn_like_photos,
     scene::{open, read_splats, tell_not_finite},
     teach::{TeachOptions, Teachers},
 };
 use crate::{
     capture::LoadOptions,
-    chroma::{ChosenDegree, ChromaProgress, ChromaSettings, ColorizeEvent, Degree, Distill},
+    chroma::{
+        ChosenDegree, ChromaProgress, ChromaSettings, ColorizeEvent, Degree, Distill, relight,
+    },
     effects::{Overrules, table},
     eval::{Measured, exposures},
     gpu::Gpu,
@@ -52,6 +55,9 @@ pub struct ColorizeOptions {
     pub correct_views: Option<bool>,
     /// COLMAP folder, where it is not the one that `fit` noted.
     pub colmap: Option<PathBuf>,
+    /// Whether lightness, too, is what the photos show, and not what was trained; a run keeps
+    /// its own files then.
+    pub relight: bool,
     /// Whether the report says where the device's time went.
     pub timings: bool,
 }
@@ -75,10 +81,10 @@ pub fn colorize(
 ) -> Result<(Output, Report), RunError> {
     let source = Source::find(options)?;
     let cache = source.folder.as_ref().map(RunFolder::teacher);
-    let mut teachers = Teachers::open(&options.teach, cache.as_deref())?;
+    let colmap_dir = source.colmap_dir(options)?;
+    let mut teachers = Teachers::open(&options.teach, &colmap_dir, cache.as_deref())?;
     let gpu = open_gpu(options.timings)?;
     let mut report = source.report(&gpu);
-    let colmap_dir = source.colmap_dir(options, &report.capture)?;
     // Every photo is looked at once.
     let dataset = open(&colmap_dir, &report.capture.load, observe)?.caching(0);
     // A run's own files are moved already; others lie where COLMAP has the cameras.
@@ -86,15 +92,19 @@ pub fn colorize(
         Some(_) => glam::DVec3::ZERO,
         None => dataset.capture.offset,
     };
-    let (luma, drawn) = read_splats(&source.splats, offset, observe)?;
-    let luma = luma.to_luma();
+    let (luma, mut drawn) = read_splats(&source.splats, offset, observe)?;
+    let mut luma = luma.to_luma();
+    if source.report.is_none() {
+        let splats = (source.splats.as_path(), &luma);
+        drawn = drawn_like_photos(&gpu, &dataset, splats, drawn, observe)?;
+    }
     let iterations = adam_iterations(options, report.preset, report.luma.iterations)?;
     let output = Output {
         ply: options
             .output
             .clone()
             .unwrap_or_else(|| source.default_output()),
-        contact_sheet: source.folder.as_ref().map(RunFolder::contact_sheet),
+        contact_sheet: source.kept(options).map(RunFolder::contact_sheet),
     };
     files::make_folder_of(&output.ply)?;
 
@@ -121,6 +131,23 @@ pub fn colorize(
     }
     let drawn = report.luma.settings.raster_options();
     let raster = Arc::new(Raster::with(&gpu, drawn));
+    let told = |stage, progress: ChromaProgress, message| Event::Progress {
+        stage,
+        done: progress.iteration,
+        total: progress.total,
+        message,
+    };
+    if options.relight {
+        let limit = settings.memory_limit;
+        let mut told = |progress: ChromaProgress| {
+            let message = format!("loss {:.3}", progress.loss);
+            observe(told(Stage::Relight, progress, message));
+            ControlFlow::Continue(())
+        };
+        luma = relight(&raster, &dataset, &luma, limit, &mut told)?;
+        // These are other photos than those whose exposures the run knows.
+        report.luma.exposures.clear();
+    }
     let distill = Distill {
         raster: &raster,
         dataset: &dataset,
@@ -130,12 +157,6 @@ pub fn colorize(
         correct_views: options.correct_views,
     };
     let mut log = String::new();
-    let told = |stage, progress: ChromaProgress, message| Event::Progress {
-        stage,
-        done: progress.iteration,
-        total: progress.total,
-        message,
-    };
     let colored = distill.run(&settings, &mut |event| {
         match event {
             // It has been asked already.
@@ -220,7 +241,7 @@ pub fn colorize(
         timings,
     });
     ply::write_ply(&output.ply, &colored.splats, offset, &comments(drawn))?;
-    if let Some(folder) = &source.folder {
+    if let Some(folder) = source.kept(options) {
         if output.ply == folder.color() {
             folder.write_chroma(&colored.chroma)?;
         }
@@ -279,14 +300,15 @@ impl Source {
         }
     }
 
-    fn colmap_dir(
-        &self,
-        options: &ColorizeOptions,
-        capture: &CaptureReport,
-    ) -> Result<PathBuf, RunError> {
+    /// The run folder, where what is found is to be kept there.
+    fn kept(&self, options: &ColorizeOptions) -> Option<&RunFolder> {
+        self.folder.as_ref().filter(|_| !options.relight)
+    }
+
+    fn colmap_dir(&self, options: &ColorizeOptions) -> Result<PathBuf, RunError> {
         match (&options.colmap, &self.report) {
             (Some(path), _) => Ok(path.clone()),
-            (None, Some(_)) => Ok(PathBuf::from(&capture.path)),
+            (None, Some(report)) => Ok(PathBuf::from(&report.capture.path)),
             (None, None) => Err(RunError::NoCameras(self.splats.clone())),
         }
     }

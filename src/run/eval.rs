@@ -10,6 +10,7 @@ use super::{
     Event, Observer, RunError, RunFolder, Stage, files,
     fit::{comments, open_gpu},
     scene::{open, read_splats},
+    teach::teacher_or_photos,
 };
 use crate::{
     capture::Dataset,
@@ -74,7 +75,9 @@ pub fn eval(
         .map_err(files::at(folder.path()))?;
     files::check_page(&folder.evaluation_page())?;
     let mut lpips = options.lpips.as_deref().map(Lpips::open).transpose()?;
-    let mut teacher = match &options.teacher {
+    let asked = (options.teacher.as_deref())
+        .map(|teacher| teacher_or_photos(teacher, &scene.dataset.capture.root));
+    let mut teacher = match &asked {
         Some(path) => Some(ask(path, options, &folder, &report, &scene, observe)?),
         None => None,
     };
@@ -82,7 +85,7 @@ pub fn eval(
     let raster = Arc::new(Raster::with(&open_gpu(false)?, drawn));
     let seed = report.luma.settings.seed;
     let mut peers = Vec::new();
-    if let (Some(teacher), Some(path)) = (&teacher, &options.teacher) {
+    if let (Some(teacher), Some(path)) = (&teacher, &asked) {
         let baseline = options.baselines.then_some(Peer::RgbSplats);
         for peer in baseline.into_iter().chain(options.recipes.iter().copied()) {
             if peers

@@ -5,6 +5,7 @@ mod eval;
 pub(crate) mod files;
 mod fit;
 mod folder;
+mod foreign;
 mod info;
 mod plan;
 mod preset;
@@ -22,7 +23,7 @@ pub use info::{export, info};
 pub use plan::{PlanOptions, plan};
 pub use preset::Work;
 pub use render::{RenderOptions, Views, render};
-pub use teach::{HINT_WEIGHT, TeachOptions};
+pub use teach::{HINT_WEIGHT, TeachOptions, teacher_or_photos};
 
 pub use crate::luma::Preset;
 use crate::{
@@ -89,6 +90,9 @@ pub enum RunError {
     /// There are hints for training views, but no paint.
     #[error("{}: nothing is painted on any training photo: paint on one", .0.display())]
     NothingPainted(PathBuf),
+    /// Photos that are to give the colors have none.
+    #[error("{}: these photos are gray: name a teacher that colors them", .0.display())]
+    GrayPhotos(PathBuf),
     /// Nothing is left for stage 2.
     #[error("stage 1 already took {luma} iterations: choose a larger number")]
     NothingUntil {
@@ -169,6 +173,8 @@ pub enum Stage {
     Luma,
     /// Asking the teacher.
     Teacher,
+    /// Solving for the lightness of other photos.
+    Relight,
     /// Solving for chroma harmonics of one degree after the other.
     Degree,
     /// Stage 2.
@@ -197,6 +203,7 @@ impl fmt::Display for Stage {
             Self::Trial => "trial",
             Self::Luma => "luma",
             Self::Teacher => "teacher",
+            Self::Relight => "relight",
             Self::Degree => "degree",
             Self::Chroma => "chroma",
             Self::Bake => "bake",

@@ -8,7 +8,7 @@ use std::{
 
 use super::{Event, Observer, RunError, Stage};
 use crate::{
-    capture::Dataset,
+    capture::{Dataset, IMAGES},
     chroma::{
         Colorizer, ColorizerError, Lesson, Wanted, teach,
         teacher::{AbImage, GrayImage, HintFolder, HintImage, Query, Teacher, TeacherSettings},
@@ -45,6 +45,19 @@ impl Default for TeachOptions {
     }
 }
 
+/// The teacher that stands for the photos themselves.
+const PHOTOS: &str = "photos";
+
+/// The file, folder or name that `teacher` stands for: `photos`, where nothing of that name
+/// lies here, are those of the COLMAP folder.
+pub fn teacher_or_photos(teacher: &Path, colmap_dir: &Path) -> PathBuf {
+    if teacher == Path::new(PHOTOS) && !teacher.exists() {
+        colmap_dir.join(IMAGES)
+    } else {
+        teacher.to_owned()
+    }
+}
+
 /// The teachers and hints of a command, opened.
 pub(super) struct Teachers {
     teachers: Vec<Member>,
@@ -67,8 +80,8 @@ struct Asking<'a, 'o> {
     observe: &'a mut Observer<'o>,
     /// The view that comes next.
     view: usize,
-    /// Which teachers have an answer for a training view.
-    covers: Vec<bool>,
+    /// For how many training views each teacher has an answer, and how many of these are gray.
+    answered: Vec<[usize; 2]>,
     /// Whether there is a hint for one.
     hints_cover: bool,
     /// Training views that have hints.
@@ -102,10 +115,12 @@ impl Colorizer for Asking<'_, '_> {
             hints = None;
         }
         let mut answers = Vec::new();
-        for (member, covers) in self.teachers.teachers.iter_mut().zip(&mut self.covers) {
+        let members = self.teachers.teachers.iter_mut();
+        for (member, [answered, in_gray]) in members.zip(&mut self.answered) {
             if let Some(answer) = member.teacher.colorize(query, gray, hints.as_ref())? {
+                *answered += usize::from(trained);
+                *in_gray += usize::from(trained && is_gray(&answer));
                 answers.push((answer, member.weight));
-                *covers |= trained;
             }
         }
         let strength = self.teachers.strength;
@@ -119,16 +134,21 @@ impl Colorizer for Asking<'_, '_> {
 }
 
 impl Teachers {
-    /// Opens them; networks keep their answers in `cache`.
+    /// Opens them for the photos of a COLMAP folder; networks keep their answers in `cache`.
     ///
     /// # Errors
     /// [`RunError::Teacher`].
-    pub fn open(options: &TeachOptions, cache: Option<&Path>) -> Result<Self, RunError> {
+    pub fn open(
+        options: &TeachOptions,
+        colmap_dir: &Path,
+        cache: Option<&Path>,
+    ) -> Result<Self, RunError> {
         let member = |(path, weight): &(PathBuf, f32)| {
+            let path = teacher_or_photos(path, colmap_dir);
             Ok(Member {
-                path: path.clone(),
-                teacher: Teacher::open(path, cache, &options.settings)?,
+                teacher: Teacher::open(&path, cache, &options.settings)?,
                 weight: *weight,
+                path,
             })
         };
         let hints = options.hints.as_ref();
@@ -183,7 +203,7 @@ impl Teachers {
             ));
         }
         let mut asking = Asking {
-            covers: vec![false; self.teachers.len()],
+            answered: vec![[0; 2]; self.teachers.len()],
             hints_cover: false,
             hinted: 0,
             view: 0,
@@ -193,9 +213,15 @@ impl Teachers {
         };
         let told = &mut |_| ControlFlow::Continue(());
         let lesson = teach(dataset, &mut asking, scales, told)?;
-        let (mut covers, hinted) = (asking.covers, asking.hinted);
+        let (answered, hinted) = (asking.answered, asking.hinted);
+        let mut covers: Vec<bool> = answered.iter().map(|[count, _]| *count > 0).collect();
         covers.push(asking.hints_cover);
         self.check(&covers, dataset, &lesson)?;
+        for (member, counts) in self.teachers.iter().zip(answered) {
+            if let Some(warning) = gray_images(member, counts, dataset)? {
+                observe(Event::Note(warning));
+            }
+        }
         Ok((lesson, hinted))
     }
 
@@ -225,6 +251,35 @@ impl Teachers {
         }
     }
 }
+
+/// What to say of a folder whose images are gray: they would make gray what they show. Where the
+/// photos themselves are the teacher and all are gray, there is nothing to color by.
+fn gray_images(
+    member: &Member,
+    [answered, in_gray]: [usize; 2],
+    dataset: &Dataset,
+) -> Result<Option<String>, RunError> {
+    if in_gray == 0 || member.teacher.is_network() {
+        return Ok(None);
+    }
+    let path = &member.path;
+    if in_gray == answered && *path == dataset.capture.root.join(IMAGES) {
+        return Err(RunError::GrayPhotos(path.clone()));
+    }
+    Ok(Some(format!(
+        "warning: {in_gray} of {answered} images in {} are gray: what they show becomes gray; leave them out where nothing is known of their colors",
+        path.display()
+    )))
+}
+
+/// Whether nothing in a picture has any color.
+fn is_gray(answer: &AbImage) -> bool {
+    let gray = |ab: &[f32; 2]| ab.iter().all(|value| value.abs() < GRAY);
+    answer.ab.iter().all(gray)
+}
+
+/// Sizes of a and b, in CIELAB units, that no picture in color stays below.
+const GRAY: f32 = 1.0;
 
 /// The mean of several answers of one size by their weights.
 fn mean(answers: Vec<(AbImage, f32)>) -> Option<AbImage> {

@@ -20,7 +20,7 @@ use crate::{
     effects::Overrules,
     luma::LumaSettings,
     report::{Evaluation, Method},
-    run::{Overlay, Preset, RunError, RunFolder, files},
+    run::{Overlay, Preset, RunError, RunFolder, files, teacher_or_photos},
 };
 
 /// The option of `fit` for the longer side at which held-out views are measured: only
@@ -63,7 +63,9 @@ impl<'a> Bench<'a> {
     ) -> Result<Self, RunError> {
         let absolute = |path: &Path| fs::canonicalize(path).map_err(files::at(path));
         let load = preset.load_options(&options.load, &options.overrules);
-        let teacher = options.teacher.as_deref().map(located).transpose()?;
+        let teacher = options.teacher.as_deref();
+        let teacher = teacher.map(|teacher| teacher_or_photos(teacher, &options.colmap_dir));
+        let teacher = teacher.as_deref().map(located).transpose()?;
         Ok(Self {
             points: absolute(folder)?.join("points"),
             scene: absolute(&options.colmap_dir)?,

@@ -10,6 +10,7 @@ mod checkup;
 mod coordinates;
 mod doctor;
 mod documented;
+mod elsewhere;
 mod errors;
 mod eval;
 mod eval_photos;

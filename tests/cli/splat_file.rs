@@ -47,15 +47,20 @@ impl SplatFile {
         line.expect("a vertex element").parse().expect("a count")
     }
 
-    /// A property of every Gaussian.
-    pub fn column(&self, property: &str) -> Vec<f32> {
+    /// Where a row has a property.
+    pub fn place(&self, property: &str) -> usize {
         let line = format!("property float {property}");
         let names = self
             .header
             .iter()
             .filter(|line| line.starts_with("property"));
         let place = names.into_iter().position(|name| *name == line);
-        let place = place.unwrap_or_else(|| panic!("no property {property}"));
+        place.unwrap_or_else(|| panic!("no property {property}"))
+    }
+
+    /// A property of every Gaussian.
+    pub fn column(&self, property: &str) -> Vec<f32> {
+        let place = self.place(property);
         self.rows.iter().map(|row| row[place]).collect()
     }
 

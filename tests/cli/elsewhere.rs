@@ -1,0 +1,195 @@
+//! What comes from elsewhere: splats that another program trained, and photos that are in color
+//! or were taken in another light.
+
+use std::fs;
+
+use image::RgbImage;
+use serde_json::Value;
+
+use super::program::{Done, Place, files_below};
+use super::scene;
+use super::shared::{onnx, place_with_run};
+use super::splat_file::SplatFile;
+
+fn write(place: &Place, file: &SplatFile) {
+    let mut bytes = (file.header.join("\n") + "\n").into_bytes();
+    let values = file.rows.iter().flatten();
+    bytes.extend(values.flat_map(|value| value.to_le_bytes()));
+    place.write("gray.ply", bytes);
+}
+
+/// The place with a run, and its luma as a file of its own, changed by `change`.
+fn place_with_splats(change: impl Fn(&mut SplatFile)) -> Place {
+    let place = place_with_run();
+    let mut file = SplatFile::read(&place, "runs/scene/luma.ply");
+    change(&mut file);
+    write(&place, &file);
+    place
+}
+
+fn colorized(place: &Place, more: &[&str]) -> Done {
+    let teacher = onnx("ddcolor_tiny.onnx");
+    let colorize = ["colorize", "gray.ply", "--colmap", "scene", "--rounds", "1"];
+    let done = place.run(&[&colorize[..], &["--teacher", &teacher], more].concat());
+    assert_eq!(done.code, Some(0), "{}", done.stderr);
+    done
+}
+
+#[test]
+fn splats_that_show_something_else_are_told() {
+    let sound = colorized(&place_with_splats(|_| ()), &[]);
+    assert!(!sound.stderr.contains("warning"), "{}", sound.stderr);
+    // To the side of every camera; upside down and backwards, as OpenGL has it.
+    let aside = |file: &mut SplatFile| file.rows.iter_mut().for_each(|row| row[0] += 50.0);
+    let turned = |file: &mut SplatFile| {
+        for row in &mut file.rows {
+            (row[1], row[2]) = (-row[1], 3.0 - row[2]);
+        }
+    };
+    for place in [place_with_splats(aside), place_with_splats(turned)] {
+        let told = colorized(&place, &[]).stderr;
+        assert!(
+            told.lines().any(
+                |line| line.starts_with("warning: gray.ply") && line.contains("COLMAP's frame")
+            ),
+            "{told}"
+        );
+    }
+}
+
+/// Photos of Gaussians smaller than a pixel, as an antialiased scene shows them; the file does
+/// not say that it is one.
+#[test]
+fn splats_that_were_trained_antialiased_are_drawn_so() {
+    let place = place_with_splats(|file| {
+        let scales = file.place("scale_0");
+        for row in &mut file.rows {
+            row[scales..scales + 3].iter_mut().for_each(|s| *s -= 1.5);
+        }
+        file.header
+            .insert(2, "comment SplatRenderMode: mip".to_owned());
+    });
+    let render = ["render", "gray.ply", "--colmap", "scene", "--views", "all"];
+    place.succeed(&[&render[..], &["-o", "scene/images"]].concat());
+    let told = colorized(&place, &[]).stderr;
+    assert!(!told.contains("is drawn"), "{told}");
+    let mut file = SplatFile::read(&place, "gray.ply");
+    file.header.retain(|line| !line.contains("SplatRenderMode"));
+    write(&place, &file);
+    let told = colorized(&place, &[]).stderr;
+    assert!(told.contains("gray.ply is drawn antialiased"), "{told}");
+    let colored = String::from_utf8_lossy(&place.read("gray-color.ply")).into_owned();
+    assert!(colored.contains("SplatRenderMode: mip"));
+}
+
+#[test]
+fn photos_in_color_are_a_teacher() {
+    let place = place_with_run();
+    let colorize = ["colorize", "runs/scene", "--json", "--teacher"];
+    let of = |teacher: &str| -> Value {
+        place.json(&[&colorize[..], &[teacher]].concat())["chroma"].clone()
+    };
+    let (photos, folder) = (of("photos"), of("scene/images"));
+    assert_eq!(photos["pictures"], folder["pictures"]);
+    assert_eq!(photos["teachers"][0]["name"], "images");
+    let error = photos["pictures"]["ab_error"].as_f64();
+    assert!(error.is_none_or(|error| error < 12.0), "{photos}");
+    // A folder of that name comes first.
+    place.write("photos/00.txt", "no image");
+    let done = place.run(&[&colorize[..], &["photos"]].concat());
+    assert!(
+        done.code == Some(1) && done.stderr.contains("photos: holds no"),
+        "{}",
+        done.stderr
+    );
+}
+
+#[test]
+fn gray_photos_and_gray_images_color_nothing() {
+    let place = place_with_run();
+    for index in 0..scene::VIEWS {
+        let gray = image::DynamicImage::from(scene::photo(index)).to_luma8();
+        for folder in ["scene/images", "some"] {
+            let path = place.path(folder).join(scene::name(index));
+            fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
+            match (folder, index) {
+                ("some", 1) => scene::photo(index).save(&path),
+                _ => gray.save(&path),
+            }
+            .expect("an image");
+        }
+    }
+    let done = place.run(&["colorize", "runs/scene", "--teacher", "photos"]);
+    assert!(
+        done.code == Some(1) && done.stderr.lines().count() == 1,
+        "{}",
+        done.stderr
+    );
+    assert!(
+        done.stderr.contains("scene/images: these photos are gray"),
+        "{}",
+        done.stderr
+    );
+    let done = place.run(&["colorize", "runs/scene", "--teacher", "some"]);
+    assert_eq!(done.code, Some(0), "{}", done.stderr);
+    let told = done
+        .stderr
+        .lines()
+        .find(|line| line.starts_with("warning:"));
+    assert!(
+        told.is_some_and(|line| line.contains("7 of 8 images in some are gray")),
+        "{}",
+        done.stderr
+    );
+}
+
+/// The same scene in another light, from the same places: its colors and its lightness are
+/// taken, the geometry stays, and the run keeps its own files.
+#[test]
+fn a_scene_is_lit_anew() {
+    let place = place_with_run();
+    scene::write(&place.path("evening"));
+    for index in 0..scene::VIEWS {
+        let mut photo: RgbImage = scene::photo(index);
+        for (x, _, pixel) in photo.enumerate_pixels_mut() {
+            let left = 1.0 - 0.6 * x as f32 / scene::SIZE[0] as f32;
+            let [r, g, b] = pixel.0.map(|value| left * f32::from(value));
+            pixel.0 = [r, 0.8 * g, 0.5 * b].map(|value| value as u8);
+        }
+        let path = place.path("evening/images").join(scene::name(index));
+        photo.save(path).expect("a photo");
+    }
+    let before = files_below(&place.path("runs"));
+    let colorize = [
+        "colorize",
+        "runs/scene",
+        "--colmap",
+        "evening",
+        "--teacher",
+        "photos",
+    ];
+    let error = |more: &[&str], output: &str| -> f64 {
+        let output = ["-o", output, "--json"];
+        let report = place.json(&[&colorize[..], &output, more].concat());
+        report["chroma"]["pictures"]["delta_e"]["mean"]
+            .as_f64()
+            .expect("a number")
+    };
+    let lit = error(&["--relight"], "lit.ply");
+    assert_eq!(files_below(&place.path("runs")), before);
+    let (luma, found) = (
+        SplatFile::read(&place, "runs/scene/luma.ply"),
+        SplatFile::read(&place, "lit.ply"),
+    );
+    for property in ["x", "y", "z", "opacity", "scale_0", "rot_2"] {
+        assert_eq!(luma.column(property), found.column(property), "{property}");
+    }
+    let plain = error(&[], "plain.ply");
+    assert!(lit < 0.7 * plain, "{lit} of {plain}");
+    let done = place.run(&[&colorize[..], &["--relight"]].concat());
+    assert!(
+        done.code == Some(2) && done.stderr.contains("--output"),
+        "{}",
+        done.stderr
+    );
+}
