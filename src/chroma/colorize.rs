@@ -3,12 +3,12 @@
 use std::{ops::ControlFlow, sync::Arc, time::Instant};
 
 use super::{
-    ChosenDegree, ChromaError, ChromaProgress, ChromaSettings, Colorizer, Degree, FrozenViews,
-    Lesson, Room, Task, bake, choose_degree, match_saturation, plan, solve, teach,
+    ChosenDegree, ChromaError, ChromaProgress, ChromaSettings, Colorizer, Correction, Degree,
+    FrozenViews, Lesson, Room, Task, bake, choose_degree, match_saturation, plan, solve, teach,
 };
 use crate::{
     capture::{Camera, Dataset},
-    effects::Decision,
+    effects::{Decider, Decision},
     raster::{Load, Raster},
     splats::{ShField, Splats, sh},
 };
@@ -67,6 +67,14 @@ pub enum ColorizeEvent<'a> {
     Plan(&'a [Decision; 2]),
     /// The solver.
     Solving(ChromaProgress),
+    /// What brought the views into line is taken back, and all is solved anew without, for they
+    /// disagree more with it: shares of the colors' mean square about their mean.
+    Uncorrected {
+        /// Without it.
+        before: f64,
+        /// With it.
+        after: f64,
+    },
     /// The bake; its loss is in hundredths of the way from black to white.
     Baking(ChromaProgress),
 }
@@ -182,20 +190,31 @@ impl Distill<'_> {
                 chosen.insert(found).degree
             }
         };
-        let effects = [correction, plan::degree(self.sh_degree, chosen.as_ref())];
+        let mut effects = [correction, plan::degree(self.sh_degree, chosen.as_ref())];
         go_on(observe(ColorizeEvent::Plan(&effects)))?;
-        let solved = solve(
-            &frozen,
-            &settings,
-            &lesson.targets,
-            tasks.clone(),
-            self.luma,
-            &mut |progress| {
-                last = Some(progress);
-                peak = peak.max(gpu.allocated_bytes());
-                observe(ColorizeEvent::Solving(progress))
-            },
-        )?;
+        let mut solved = |settings: &ChromaSettings| {
+            solve(
+                &frozen,
+                settings,
+                &lesson.targets,
+                tasks.clone(),
+                self.luma,
+                &mut |progress| {
+                    last = Some(progress);
+                    peak = peak.max(gpu.allocated_bytes());
+                    observe(ColorizeEvent::Solving(progress))
+                },
+            )
+        };
+        let mut found = solved(&settings)?;
+        if let Some([before, after]) = self.worse(&found.corrections) {
+            settings.correct_views = false;
+            effects[0].on = false;
+            effects[0].decided_by = Decider::Trial;
+            found = solved(&settings)?;
+            go_on(observe(ColorizeEvent::Uncorrected { before, after }))?;
+        }
+        let solved = found;
         let mut chroma = solved.chroma;
         let mut saturation = 1.0;
         // Where no point is seen twice nobody knows what views agree on.
@@ -225,6 +244,22 @@ impl Distill<'_> {
             seconds: [solving, begun.elapsed().as_secs_f64()],
             settings,
         })
+    }
+}
+
+impl Distill<'_> {
+    /// How far views disagree without and with `corrections`, where these make them disagree
+    /// more.
+    fn worse(&self, corrections: &[(Task, Correction)]) -> Option<[f64; 2]> {
+        let (capture, split) = (&self.dataset.capture, &self.dataset.split);
+        let mut of_view = vec![Correction::NONE; capture.views.len()];
+        for (task, correction) in corrections {
+            of_view[split.train[task.view]] = *correction;
+        }
+        let samples = &self.lesson.samples;
+        let before = samples.disagreement(capture, |_, ab| ab)?;
+        let after = samples.disagreement(capture, |view, ab| of_view[view].of(ab))?;
+        (after > before).then_some([before, after])
     }
 }
 

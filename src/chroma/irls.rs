@@ -6,7 +6,8 @@
 use std::time::Instant;
 
 use super::{
-    ChromaError, ChromaObserver, ChromaProgress, ChromaSettings, FrozenViews, Targets, Task,
+    ChromaError, ChromaObserver, ChromaProgress, ChromaSettings, Correction, FrozenViews, Targets,
+    Task,
     lbfgs::{Lbfgs, State, System, UNBOUNDED},
     passes::{Ending, Judging, Passes, Space},
 };
@@ -289,6 +290,15 @@ impl<'a> IrlsSolver<'a> {
     /// [`ChromaError::Gpu`] when the device is lost.
     pub fn chroma(&self) -> Result<ShField, ChromaError> {
         Ok(self.passes.field.download(self.gpu())?)
+    }
+
+    /// Each view's correction, and what was wanted there.
+    ///
+    /// # Errors
+    /// [`ChromaError::Gpu`] when the device is lost.
+    pub fn corrections(&self) -> Result<Vec<(Task, Correction)>, ChromaError> {
+        let found = self.passes.corrections.corrections.read(self.gpu())?;
+        Ok(self.passes.tasks.iter().copied().zip(found).collect())
     }
 
     /// What a dispatch works on, the mean over the passes.

@@ -53,6 +53,8 @@ pub struct Lesson {
     pub of_view: Vec<Option<usize>>,
     /// How far the training views disagree about COLMAP's points.
     pub spread: Option<TeacherSpread>,
+    /// What they say there.
+    pub samples: TeacherSamples,
 }
 
 /// Asks about every view, and keeps what is wanted at so many scales. Held-out views are
@@ -103,6 +105,7 @@ pub fn teach(
         targets,
         of_view,
         spread: samples.spread(capture),
+        samples,
     })
 }
 

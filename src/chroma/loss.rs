@@ -60,6 +60,11 @@ impl Correction {
         offset: [0.0; 2],
         padding: [0.0; 2],
     };
+
+    /// A wanted a/b as corrected.
+    pub fn of(&self, [a, b]: [f32; 2]) -> [f32; 2] {
+        [0, 1].map(|c: usize| self.gain[c][0] * a + self.gain[c][1] * b + self.offset[c])
+    }
 }
 
 /// Twin of `struct RgbLossParameters`.

@@ -1,8 +1,8 @@
 //! Stage 2 as a whole: one of the solvers, and color for what no view shows.
 
 use super::{
-    AdamSolver, ChromaError, ChromaObserver, ChromaSettings, FrozenViews, IrlsSolver, SolverKind,
-    Targets, Task, fill_unseen,
+    AdamSolver, ChromaError, ChromaObserver, ChromaSettings, Correction, FrozenViews, IrlsSolver,
+    SolverKind, Targets, Task, fill_unseen,
 };
 use crate::{
     raster::Load,
@@ -13,6 +13,8 @@ use crate::{
 pub struct Solved {
     /// The chroma of each Gaussian.
     pub chroma: ShField,
+    /// What brought each view into line with the others, where that was asked for.
+    pub corrections: Vec<(Task, Correction)>,
     /// What a dispatch worked on, the mean over the passes.
     pub load: Load,
     /// Share of the Gaussians that no view shows to speak of, whose colors come from their
@@ -43,6 +45,7 @@ pub fn solve(
             adam.run(observe)?;
             Ok(Solved {
                 chroma: adam.harmonics()?,
+                corrections: Vec::new(),
                 load: adam.load(),
                 unseen: None,
             })
@@ -58,6 +61,10 @@ pub fn solve(
             let unseen = seen.iter().filter(|&&seen| seen < SEEN).count();
             Ok(Solved {
                 chroma,
+                corrections: match settings.correct_views {
+                    true => solver.corrections()?,
+                    false => Vec::new(),
+                },
                 load: solver.load(),
                 unseen: Some(unseen as f64 / seen.len().max(1) as f64),
             })

@@ -109,6 +109,39 @@ impl TeacherSamples {
         })
     }
 
+    /// How far views disagree about the points once `corrected` has changed what each says:
+    /// the mean square of a and b about their point's mean, over that about the mean of all.
+    /// It does not fall where corrections make all paler or tint all alike. `None` where no
+    /// point is seen in two views, or all say the same.
+    pub fn disagreement(
+        &self,
+        capture: &Capture,
+        corrected: impl Fn(usize, [f32; 2]) -> [f32; 2],
+    ) -> Option<f64> {
+        let (mut within, mut freedom) = (0.0, 0.0);
+        let (mut count, mut sums, mut squares) = (0.0, [0.0; 2], 0.0);
+        for (point, ab) in capture.points.iter().zip(&self.ab) {
+            let known: Vec<[f64; 2]> = (point.track.iter().zip(ab))
+                .filter_map(|(seen, ab)| Some(corrected(seen.view, (*ab)?).map(f64::from)))
+                .collect();
+            if known.len() < 2 {
+                continue;
+            }
+            let views = known.len() as f64;
+            for channel in 0..2 {
+                let sum: f64 = known.iter().map(|ab| ab[channel]).sum();
+                let square: f64 = known.iter().map(|ab| ab[channel] * ab[channel]).sum();
+                within += square - sum * sum / views;
+                sums[channel] += sum;
+                squares += square;
+            }
+            freedom += views - 1.0;
+            count += views;
+        }
+        let about_all = squares - sums.iter().map(|sum| sum * sum / count).sum::<f64>();
+        (about_all > 0.0).then(|| within / freedom / (about_all / count))
+    }
+
     /// See [`TeacherSpread::agreed`].
     fn agreed(&self) -> f64 {
         let (mut between, mut own) = (0.0, 0.0);
@@ -146,6 +179,11 @@ mod tests {
 
     /// Views of points on a plane, and what each says of a point.
     fn spread(views: usize, says: impl Fn(usize, usize) -> [f32; 2]) -> TeacherSpread {
+        let (capture, samples) = sampled(views, says);
+        samples.spread(&capture).expect("points in many views")
+    }
+
+    fn sampled(views: usize, says: impl Fn(usize, usize) -> [f32; 2]) -> (Capture, TeacherSamples) {
         const SIDE: u32 = 32;
         let photos: Vec<_> = (0..views)
             .map(|k| {
@@ -172,7 +210,7 @@ mod tests {
                 .collect();
             samples.take(&capture, view, camera, &ab);
         }
-        samples.spread(&capture).expect("points in many views")
+        (capture, samples)
     }
 
     /// A color by place, that changes from pixel to pixel by this much.
@@ -216,6 +254,31 @@ mod tests {
         }
         assert_eq!(spread(4, |_, _| [0.0; 2]).agreed, 1.0);
         assert!(spread(4, |_, _| [3.0, -40.0]).agreed > 0.9999);
+    }
+
+    #[test]
+    fn corrections_are_judged_by_what_they_bring() {
+        let color = |p: usize| by_place(p, 20.0);
+        let tint = |view: usize| [view as f32 - 1.5, 0.0];
+        let says = |view, p| [0, 1].map(|c| color(p)[c] + tint(view)[c] + 0.1 * whim(c, p));
+        let (capture, samples) = sampled(4, says);
+        let disagreement = |corrected: &dyn Fn(usize, [f32; 2]) -> [f32; 2]| {
+            let found = samples.disagreement(&capture, corrected);
+            found.expect("points in many views")
+        };
+        let before = disagreement(&|_, ab| ab);
+        let right = disagreement(&|view, [a, b]| [a - tint(view)[0], b]);
+        let wrong = disagreement(&|view, [a, b]| [a + tint(view)[0], b]);
+        assert!(
+            right < 0.7 * before && wrong > 1.5 * before,
+            "{right} {before} {wrong}"
+        );
+        // All paler and all of one tint agree no better.
+        let pale = disagreement(&|_, [a, b]| [0.1 * a + 30.0, 0.1 * b]);
+        assert!((pale / before - 1.0).abs() < 1e-3, "{pale} {before}");
+        // One color everywhere says nothing.
+        let (capture, samples) = sampled(4, |_, _| [5.0, 5.0]);
+        assert_eq!(samples.disagreement(&capture, |_, ab| ab), None);
     }
 
     /// A teacher that hardly says anything, far from gray or not, does not differ from view

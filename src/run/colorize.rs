@@ -163,6 +163,11 @@ pub fn colorize(
             ColorizeEvent::Asked { .. } => {}
             ColorizeEvent::Chosen(chosen) => observe(Event::Note(describe(chosen))),
             ColorizeEvent::Plan(effects) => observe(Event::Note(table(effects))),
+            ColorizeEvent::Uncorrected { before, after } => observe(Event::Note(format!(
+                "brought into line, the teacher's views would disagree more ({:.0} % instead of {:.0} % of its colors' mean square): they are taken as they are",
+                100.0 * after,
+                100.0 * before
+            ))),
             ColorizeEvent::Solving(progress) => {
                 // Writing to a string cannot fail.
                 let _ = writeln!(

@@ -148,6 +148,52 @@ pub fn write_moved_model(folder: &Path, offset: [f64; 3]) {
     }
 }
 
+/// Puts a text model with tracks in the place of what is in `sparse`: of each disc that more
+/// than two views show where `at` says, in pixels.
+pub fn write_tracks(folder: &Path, at: impl Fn([f64; 2]) -> bool) {
+    fs::remove_dir_all(folder.join("sparse")).expect("a model");
+    write_moved_model(folder, [0.0; 3]);
+    let mut of_images = vec![String::new(); VIEWS];
+    let mut counts = [0; VIEWS];
+    let mut lines = String::new();
+    for (i, (position, [r, g, b])) in points([0.0; 3]).into_iter().enumerate() {
+        let seen: Vec<_> = (0..VIEWS)
+            .filter_map(|index| Some((index, pixel(index, position).filter(|&p| at(p))?)))
+            .collect();
+        if seen.len() < 3 {
+            continue;
+        }
+        let [x, y, z] = position;
+        lines += &format!("{i} {x} {y} {z} {r} {g} {b} 0.5");
+        for (index, [x, y]) in seen {
+            of_images[index] += &format!("{x} {y} {i} ");
+            lines += &format!(" {} {}", index + 1, counts[index]);
+            counts[index] += 1;
+        }
+        lines.push('\n');
+    }
+    let images = folder.join("sparse/images.txt");
+    let poses = fs::read_to_string(&images).expect("a model");
+    let poses = poses.lines().filter(|line| !line.is_empty());
+    let text: String = (poses.zip(of_images))
+        .map(|(pose, seen)| format!("{pose}\n{seen}\n"))
+        .collect();
+    fs::write(images, text).expect("writable");
+    fs::write(folder.join("sparse/points3D.txt"), lines).expect("writable");
+}
+
+/// Where a view shows a place, if it does.
+fn pixel(index: usize, position: [f64; 3]) -> Option<[f64; 2]> {
+    let view = view(index, [0.0; 3]);
+    let [x, y, z]: [f64; 3] = std::array::from_fn(|row| {
+        let turned = (0..3).map(|k| view.rotation[row][k] * position[k]);
+        view.translation[row] + turned.sum::<f64>()
+    });
+    let at = [x / z * FOCAL + view.cx, y / z * FOCAL + view.cy];
+    let inside = (at.iter().zip(SIZE)).all(|(&at, side)| at >= 0.0 && at < f64::from(side));
+    (z > 0.0 && inside).then_some(at)
+}
+
 fn write_photos(folder: &Path) {
     fs::create_dir_all(folder.join("images/left")).expect("writable");
     for index in 0..VIEWS {

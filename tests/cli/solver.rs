@@ -43,6 +43,37 @@ fn the_default_solver_says_what_it_did() {
     assert_eq!(chroma["settings"]["sh_degree"], 1);
 }
 
+/// A teacher that agrees about what COLMAP's points show and contradicts itself elsewhere: to
+/// bring its views into line there would set them apart here.
+#[test]
+fn views_that_would_disagree_more_are_taken_as_they_are() {
+    let place = place_with_run();
+    scene::write_tracks(&place.path("scene"), |[x, _]| x < 26.0);
+    for index in 0..scene::VIEWS {
+        let gray = image::DynamicImage::from(scene::photo(index)).to_luma8();
+        let painted = RgbImage::from_fn(scene::SIZE[0], scene::SIZE[1], |x, y| {
+            let level = f32::from(gray.get_pixel(x, y).0[0]);
+            let tint = match (x < 30, index % 2) {
+                (true, _) => [1.0 + 0.2 * (y as f32 / 24.0 - 1.0), 1.0, 0.8],
+                (false, 0) => [1.5, 0.9, 0.5],
+                (false, _) => [0.5, 0.9, 1.5],
+            };
+            Rgb(tint.map(|t| (t * level).min(255.0) as u8))
+        });
+        let path = place.path("painted").join(scene::name(index));
+        std::fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
+        painted.save(path).expect("an image");
+    }
+    let colorize = ["colorize", "--teacher", "painted", "--correct-views"];
+    let told = |switch: &str| {
+        let done = place.run(&[&colorize[..], &[switch, "-o", switch]].concat());
+        assert_eq!(done.code, Some(0), "{}", done.stderr);
+        done.stderr.contains("they are taken as they are")
+    };
+    assert!(told("on") && !told("off"));
+    assert!(place.read("on") == place.read("off"));
+}
+
 #[test]
 fn solving_again_gives_the_same_bytes() {
     let place = place_with_run();
