@@ -101,6 +101,9 @@ pub struct Colorize {
     /// COLMAP folder with the photos, when it is not where `fit` found it.
     #[arg(long, value_name = "COLMAP_DIR")]
     colmap: Option<PathBuf>,
+    /// Go on with all photos where they, their poses and COLMAP's points contradict each other.
+    #[arg(long)]
+    force: bool,
     /// Device memory in MiB for solving and baking: what does not fit is brought from the host
     /// view by view.
     #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u32).range(1..))]
@@ -224,6 +227,7 @@ impl Colorize {
             sh_degree: self.sh_degree,
             correct_views: self.correct_views.map(|switch| switch == Switch::On),
             colmap: self.colmap,
+            force: self.force,
             timings: self.timings,
         };
         let (output, report) = colorize(&options, &mut |event| progress.show(&event))?;

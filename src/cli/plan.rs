@@ -46,7 +46,7 @@ impl Plan {
             let report = crate::report::EffectReport::of(&plan.decisions);
             print(format_args!(
                 "{:#}",
-                serde_json::json!({ "effects": report })
+                serde_json::json!({ "effects": report, "warnings": progress.warnings })
             ))
         } else {
             print(plan)

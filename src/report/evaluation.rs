@@ -67,6 +67,8 @@ pub struct Evaluation {
     pub views: Vec<ViewScore>,
     /// How the figures of consistency come about.
     pub rules: Rules,
+    /// What was found doubtful and done all the same.
+    pub warnings: Vec<String>,
     /// Along a rendered path.
     pub path: PathScore,
     /// Between photographed views.

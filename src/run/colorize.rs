@@ -1,6 +1,7 @@
 //! `colorize`: a teacher's colors into a trained scene.
 
 use std::{
+    cell::RefCell,
     fmt::Write,
     ops::ControlFlow,
     path::{Path, PathBuf},
@@ -11,7 +12,9 @@ use std::{
 use super::{
     Event, Observer, Preset, RunError, RunFolder, Stage, files,
     fit::{capture_report, comments, open_gpu},
-    scene::{open, read_splats, tell_not_finite},
+    keeping,
+    scene::{read_splats, tell_not_finite},
+    sound::{open_checked, open_examined},
     teach::{TeachOptions, Teachers},
 };
 use crate::{
@@ -52,6 +55,8 @@ pub struct ColorizeOptions {
     pub correct_views: Option<bool>,
     /// COLMAP folder, where it is not the one that `fit` noted.
     pub colmap: Option<PathBuf>,
+    /// Whether photos are taken as they are where they and the model contradict each other.
+    pub force: bool,
     /// Whether the report says where the device's time went.
     pub timings: bool,
 }
@@ -73,14 +78,25 @@ pub fn colorize(
     options: &ColorizeOptions,
     observe: &mut Observer<'_>,
 ) -> Result<(Output, Report), RunError> {
+    let warnings = RefCell::default();
+    let observe = &mut keeping(&warnings, observe);
     let source = Source::find(options)?;
     let cache = source.folder.as_ref().map(RunFolder::teacher);
     let mut teachers = Teachers::open(&options.teach, cache.as_deref())?;
     let gpu = open_gpu(options.timings)?;
     let mut report = source.report(&gpu);
     let colmap_dir = source.colmap_dir(options, &report.capture)?;
-    // Every photo is looked at once.
-    let dataset = open(&colmap_dir, &report.capture.load, observe)?.caching(0);
+    let load = LoadOptions {
+        force: options.force || report.capture.load.force,
+        ..report.capture.load.clone()
+    };
+    let dataset = match (&source.report, &options.colmap) {
+        // `fit` has compared these photos with their model.
+        (Some(_), None) => open_checked(&colmap_dir, &load, observe)?,
+        _ => open_examined(&colmap_dir, &load, observe)?.0,
+    };
+    // From here on every photo is looked at once.
+    let dataset = dataset.caching(0);
     // A run's own files are moved already; others lie where COLMAP has the cameras.
     let offset = match source.folder {
         Some(_) => glam::DVec3::ZERO,
@@ -174,7 +190,7 @@ pub fn colorize(
 
     let views = [colored.colored_views, dataset.split.train.len()];
     if let Some(warning) = few_colors(colored.unseen, views) {
-        observe(Event::Note(warning));
+        observe(Event::Warning(warning));
     }
     let begun = Instant::now();
     let exposures = exposures(&dataset, &report.luma.exposures);
@@ -201,6 +217,7 @@ pub fn colorize(
         passes: colored.last.map_or(0.0, |progress| progress.passes),
         moved: colored.last.and_then(|progress| progress.moved),
         effects: EffectReport::of(&colored.effects),
+        warnings: warnings.take(),
         loss: colored.last.map_or(0.0, |progress| progress.loss),
         seconds: ChromaSeconds {
             teacher: seconds_teacher,
@@ -317,6 +334,7 @@ impl Source {
             },
             preset,
             effects: Vec::new(),
+            warnings: Vec::new(),
             luma: LumaReport::default(),
             chroma: None,
         })
@@ -376,7 +394,7 @@ fn read_or_empty(path: &Path) -> String {
 fn few_colors(unseen: Option<f64>, [colored, views]: [usize; 2]) -> Option<String> {
     let unseen = unseen.filter(|&unseen| unseen >= UNSEEN && colored < views)?;
     Some(format!(
-        "warning: {colored} of {views} photos have colors, and {:.0} % of the Gaussians are in none of these: they take their neighbors' color; color photos that show the rest",
+        "{colored} of {views} photos have colors, and {:.0} % of the Gaussians are in none of these: they take their neighbors' color; color photos that show the rest",
         100.0 * unseen
     ))
 }
@@ -389,7 +407,7 @@ mod tests {
     fn what_no_colored_photo_shows_is_told() {
         let told = few_colors(Some(0.37), [2, 15]).expect("a warning");
         assert!(
-            told.starts_with("warning: 2 of 15 photos") && told.contains("37 %"),
+            told.starts_with("2 of 15 photos") && told.contains("37 %"),
             "{told}"
         );
         for (unseen, views) in [

@@ -1,6 +1,7 @@
 //! `eval`: how good a colored run is.
 
 use std::{
+    cell::RefCell,
     path::{Path, PathBuf},
     sync::Arc,
     time::Instant,
@@ -9,6 +10,7 @@ use std::{
 use super::{
     Event, Observer, RunError, RunFolder, Stage, files,
     fit::open_gpu,
+    keeping,
     scene::{open, read_splats},
 };
 use crate::{
@@ -64,6 +66,8 @@ pub fn eval(
     observe: &mut Observer<'_>,
 ) -> Result<(RunFolder, Evaluation), RunError> {
     let begun = Instant::now();
+    let warnings = RefCell::default();
+    let observe = &mut keeping(&warnings, observe);
     let (folder, report, scene) = load(options, observe)?;
     let made = tempfile::Builder::new()
         .prefix(".eval-")
@@ -133,7 +137,7 @@ pub fn eval(
     let path = along_path(&mut painter, &scene, frames, flow, &mut told, &mut keep)?;
     let between = between_views(&mut painter, &scene, &mut told)?;
     if !path.skipped.is_empty() {
-        observe(Event::Note(format!(
+        observe(Event::Warning(format!(
             "a path of {} frames is too short for Δ = {:?}: choose more",
             path.frames, path.skipped
         )));
@@ -150,6 +154,7 @@ pub fn eval(
         pictures: mean_pictures(&views),
         views: views.into_iter().map(|scored| scored.score).collect(),
         rules: Rules::default(),
+        warnings: warnings.take(),
         path,
         between,
         seconds: begun.elapsed().as_secs_f64(),
@@ -189,7 +194,7 @@ fn load(
     }
     let chroma = folder.read_chroma(luma.len())?;
     if chroma.is_none() {
-        observe(Event::Note(format!(
+        observe(Event::Warning(format!(
             "{} is missing: the native picture is not measured; `gs-chroma colorize` writes it",
             folder.chroma().display()
         )));
@@ -226,7 +231,7 @@ fn ask(
     if let Some(chroma) = &report.chroma
         && !chroma.teachers.iter().any(is_same)
     {
-        observe(Event::Note(
+        observe(Event::Warning(
             "the run was colored by another teacher than the one it is measured against".to_owned(),
         ));
     }
@@ -236,7 +241,7 @@ fn ask(
         None
     };
     if options.baselines && frames.is_none() {
-        observe(Event::Note(
+        observe(Event::Warning(
             "a folder of images cannot color frames: no baseline of luma, then teacher".to_owned(),
         ));
     }

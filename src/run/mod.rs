@@ -10,9 +10,10 @@ mod plan;
 mod preset;
 mod render;
 mod scene;
+mod sound;
 mod teach;
 
-use std::{fmt, path::PathBuf};
+use std::{cell::RefCell, fmt, path::PathBuf};
 
 pub use colorize::{ColorizeOptions, Output, colorize};
 pub use eval::{EvalOptions, eval};
@@ -28,6 +29,7 @@ pub use crate::luma::Preset;
 use crate::{
     capture::CaptureError,
     chroma::{ChromaError, teacher::TeacherError},
+    effects::Contradiction,
     eval::EvalError,
     gpu::GpuError,
     luma::LumaError,
@@ -40,6 +42,9 @@ pub enum RunError {
     /// The photos or their poses.
     #[error(transparent)]
     Capture(#[from] CaptureError),
+    /// Photos, poses and points, which contradict each other.
+    #[error(transparent)]
+    Unsound(#[from] Contradiction),
     /// The device.
     #[error(transparent)]
     Gpu(#[from] GpuError),
@@ -212,6 +217,8 @@ impl fmt::Display for Stage {
 pub enum Event {
     /// A line worth reading once.
     Note(String),
+    /// A line about something doubtful that does not stop the run.
+    Warning(String),
     /// How far a stage is.
     Progress {
         /// Which stage.
@@ -227,3 +234,16 @@ pub enum Event {
 
 /// Who is told.
 pub type Observer<'a> = dyn FnMut(Event) + 'a;
+
+/// Tells `observe` everything and keeps the warnings.
+fn keeping<'a>(
+    warnings: &'a RefCell<Vec<String>>,
+    observe: &'a mut Observer<'_>,
+) -> impl FnMut(Event) + 'a {
+    move |event| {
+        if let Event::Warning(line) = &event {
+            warnings.borrow_mut().push(line.clone());
+        }
+        observe(event);
+    }
+}

@@ -2,11 +2,7 @@
 
 use std::{ops::ControlFlow, path::PathBuf, sync::Arc};
 
-use super::{
-    Observer, Preset, RunError,
-    fit::open_gpu,
-    scene::{examine, open, tell_trial},
-};
+use super::{Observer, Preset, RunError, fit::open_gpu, scene::tell_trial, sound::open_examined};
 use crate::{
     capture::LoadOptions,
     effects::{Overrules, Plan},
@@ -37,8 +33,8 @@ pub fn plan(options: &PlanOptions, observe: &mut Observer<'_>) -> Result<Plan, R
         None => Preset::for_device(&open_gpu(false)?),
     };
     let load = preset.load_options(&options.load, &options.overrules);
-    let dataset = Arc::new(open(&options.colmap_dir, &load, observe)?);
-    let evidence = examine(&dataset, observe)?;
+    let (dataset, evidence) = open_examined(&options.colmap_dir, &load, observe)?;
+    let dataset = Arc::new(dataset);
     let raster = || Ok(Arc::new(Raster::new(&open_gpu(false)?)));
     planned(
         &dataset,

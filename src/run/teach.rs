@@ -95,7 +95,7 @@ impl Colorizer for Asking<'_, '_> {
         let mut hints = folder.transpose()?.flatten();
         self.hints_cover |= trained && hints.is_some();
         if hints.as_ref().is_some_and(HintImage::is_empty) {
-            (self.observe)(Event::Note(format!(
+            (self.observe)(Event::Warning(format!(
                 "left out the hints for {}: nothing is painted there",
                 query.name
             )));
@@ -178,7 +178,7 @@ impl Teachers {
         observe: &mut Observer<'_>,
     ) -> Result<(Lesson, usize), RunError> {
         if self.asks_no_network() {
-            observe(Event::Note(
+            observe(Event::Warning(
                 "profile and size change nothing: no teacher is a network".into(),
             ));
         }
