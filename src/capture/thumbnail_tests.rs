@@ -9,8 +9,11 @@ use ::tiff::tags::Tag;
 use super::fixtures::{Model, folder, write};
 use super::{Capture, Headers, LoadOptions, Loader, Shrunk};
 
-/// A TIFF of these pictures: sides, gray level, tags with values.
-fn tiff(pictures: &[([u32; 2], u8, &[(u16, u32)])]) -> Vec<u8> {
+/// Sides, gray level, tags with values.
+type Picture<'a> = ([u32; 2], u8, &'a [(u16, u32)]);
+
+/// A TIFF of these pictures.
+fn tiff(pictures: &[Picture<'_>]) -> Vec<u8> {
     let mut file = Cursor::new(Vec::new());
     let mut encoder = TiffEncoder::new(&mut file).unwrap();
     for &([width, height], gray, tags) in pictures {

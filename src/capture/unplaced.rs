@@ -15,7 +15,7 @@ const USUAL: f64 = 0.1;
 /// More photos without a pose than COLMAP usually leaves, or more photos in another model.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Unplaced {
-    /// Photos with a pose.
+    /// Photos that the model knows.
     pub placed: usize,
     /// Photos in `images/`.
     pub photos: usize,
@@ -33,12 +33,15 @@ impl Unplaced {
     /// If the capture's model is gone.
     pub fn of(capture: &Capture) -> Result<Option<Self>, CaptureError> {
         let views = first_views(&capture.views);
-        let placed: BTreeSet<&str> = views.map(|view| view.photo.as_str()).collect();
-        let mut others = 0;
-        count_photos(&capture.root.join("images"), "", &mut |name| {
-            others += usize::from(!placed.contains(name));
+        let used: BTreeSet<&str> = views.map(|view| view.photo.as_str()).collect();
+        let rejected = capture.rejected.iter();
+        let rejected: BTreeSet<&str> = rejected.map(|photo| photo.name.as_str()).collect();
+        let (mut placed, mut others) = (used.len(), 0);
+        find_photos(&capture.root.join("images"), "", &mut |name| {
+            // That a photo was left out for another reason has been said.
+            placed += usize::from(rejected.contains(name));
+            others += usize::from(!(used.contains(name) || rejected.contains(name)));
         });
-        let placed = placed.len();
         let photos = placed + others;
         let model = colmap::folder(&capture.root)?;
         let better = best_model(&capture.root, &model);
@@ -54,7 +57,7 @@ impl Unplaced {
 
 /// Hands every photo's path below `images/` to `found`; a linked folder is not followed, for it
 /// may lead in a circle.
-fn count_photos(dir: &Path, below: &str, found: &mut dyn FnMut(&str)) {
+fn find_photos(dir: &Path, below: &str, found: &mut dyn FnMut(&str)) {
     for entry in fs::read_dir(dir).into_iter().flatten().flatten() {
         let Ok(kind) = entry.file_type() else {
             continue;
@@ -62,7 +65,7 @@ fn count_photos(dir: &Path, below: &str, found: &mut dyn FnMut(&str)) {
         let name = format!("{below}{}", entry.file_name().to_string_lossy());
         let path = entry.path();
         if kind.is_dir() {
-            count_photos(&path, &(name + "/"), found);
+            find_photos(&path, &(name + "/"), found);
         } else if path.extension().is_some_and(|extension| {
             (EXTENSIONS.iter()).any(|known| extension.eq_ignore_ascii_case(known))
         }) {
@@ -90,6 +93,7 @@ fn best_model(root: &Path, used: &Path) -> Option<(PathBuf, u64)> {
 #[cfg(test)]
 mod tests {
     use super::super::fixtures::{Model, folder, write};
+    use super::super::{CaptureOptions, Rejected};
     use super::*;
 
     fn unplaced(dir: &Path) -> Option<Unplaced> {
@@ -110,6 +114,16 @@ mod tests {
         let found = unplaced(dir.path()).expect("two of five have no pose");
         assert_eq!((found.placed, found.photos), (3, 5));
         assert_eq!(found.better, None);
+        // What is left out has a pose all the same.
+        let options = CaptureOptions {
+            left_out: vec![Rejected {
+                name: "b.png".into(),
+                reason: "turned".into(),
+            }],
+            ..CaptureOptions::default()
+        };
+        let capture = Capture::load_with(dir.path(), &options).unwrap();
+        assert_eq!(Unplaced::of(&capture).unwrap(), Some(found));
     }
 
     #[test]
@@ -130,5 +144,10 @@ mod tests {
             assert_eq!(unplaced(dir.path()), None);
             fs::remove_dir_all(better).unwrap();
         }
+        // Nor is what a file cannot hold.
+        let mut lies = all.binary();
+        lies[1][..8].copy_from_slice(&u64::MAX.to_le_bytes());
+        write(dir.path(), "sparse/1", lies, "bin");
+        assert_eq!(unplaced(dir.path()), None);
     }
 }

@@ -26,8 +26,8 @@ pub use plan::{Decider, Decision, Effect, Overrules, Plan, Room, table};
 pub use sampling::sampling_spread;
 pub(crate) use soundness::listed;
 pub use soundness::{
-    Agreement, Cause, Contradiction, Contradictory, FEW_POINTS, Place, PointColors, Reprojection,
-    Unseeing,
+    Agreement, Cause, Contradiction, Contradictory, FEW_POINTS, PointColors, Reprojection,
+    Unseeing, observe_where_projected,
 };
 pub use teacher::{TeacherSamples, TeacherSpread};
 pub use tracks::Sample;

@@ -93,7 +93,7 @@ pub fn colorize(
     let dataset = match (&source.report, &options.colmap) {
         // `fit` has compared these photos with their model.
         (Some(_), None) => open_checked(&colmap_dir, &load, observe)?,
-        _ => open_examined(&colmap_dir, &load, observe)?.0,
+        _ => open_examined(&colmap_dir, &load, observe)?.dataset,
     };
     // From here on every photo is looked at once.
     let dataset = dataset.caching(0);

@@ -9,11 +9,11 @@ use super::{
     Event, Observer, RunError, RunFolder, files,
     fit::comments,
     keeping,
+    scene::tell_skipped,
     sound::{check_model, tell_folder},
 };
 use crate::{
     capture::{Camera, Capture, Headers, LoadOptions, Loader, Normalize, Rejected},
-    effects::Reprojection,
     splats::ply,
 };
 
@@ -24,7 +24,7 @@ use crate::{
 /// [`RunError`] when it is none of them or damaged.
 pub fn info(path: &Path, observe: &mut Observer<'_>) -> Result<Value, RunError> {
     if path.is_file() {
-        return splat_info(path);
+        return splat_info(path, observe);
     }
     let folder = RunFolder::at(path);
     if folder.report().is_file() {
@@ -62,7 +62,6 @@ fn colmap_info(path: &Path, observe: &mut Observer<'_>) -> Result<Value, RunErro
     for Rejected { name, reason } in &model.photos {
         observe(Event::Warning(format!("{name}: {reason}")));
     }
-    let error = Reprojection::of(&capture, &cameras).map(|found| found.error);
     Ok(json!({
         "kind": "COLMAP folder",
         "photos": headers.kinds,
@@ -74,13 +73,15 @@ fn colmap_info(path: &Path, observe: &mut Observer<'_>) -> Result<Value, RunErro
         "extent": capture.extent(),
         "offset": capture.offset.to_array(),
         // In pixels of the model's cameras; infinite is null.
-        "reprojection_error": error,
+        "reprojection_error": model.reprojection_error,
         "warnings": warnings.take(),
     }))
 }
 
-fn splat_info(path: &Path) -> Result<Value, RunError> {
+fn splat_info(path: &Path, observe: &mut Observer<'_>) -> Result<Value, RunError> {
+    let warnings = RefCell::default();
     let read = ply::read_ply(path)?;
+    tell_skipped(path, read.skipped, &mut keeping(&warnings, observe));
     let splats = &read.splats;
     let bound = |pick: fn(f32, f32) -> f32, start: f32| -> [f32; 3] {
         std::array::from_fn(|axis| {
@@ -100,6 +101,7 @@ fn splat_info(path: &Path) -> Result<Value, RunError> {
         "gray": splats.is_gray(0.5 / 255.0),
         "lowest": bound(f32::min, f32::INFINITY),
         "highest": bound(f32::max, f32::NEG_INFINITY),
+        "warnings": warnings.take(),
     }))
 }
 

@@ -20,9 +20,10 @@ pub use eval::{EvalOptions, eval};
 pub use fit::{AheadOptions, FitOptions, Overlay, fit};
 pub use folder::RunFolder;
 pub use info::{export, info};
-pub use plan::{PlanOptions, plan};
+pub use plan::{PlanOptions, Planned, plan};
 pub use preset::Work;
 pub use render::{RenderOptions, Views, render};
+pub use sound::Soundness;
 pub use teach::{HINT_WEIGHT, TeachOptions};
 
 pub use crate::luma::Preset;

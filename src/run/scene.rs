@@ -60,6 +60,16 @@ pub(super) fn tell_not_finite(dataset: &Dataset, observe: &mut Observer<'_>) {
     }
 }
 
+/// Warns of Gaussians of a splat file that are not used.
+pub(super) fn tell_skipped(path: &Path, count: usize, observe: &mut Observer<'_>) {
+    if count > 0 {
+        observe(Event::Warning(format!(
+            "{}: skipped {count} Gaussians with values that are not finite or no rotation",
+            path.display()
+        )));
+    }
+}
+
 /// Reads a splat file that has at least one Gaussian and subtracts `offset`, in
 /// world units, from its centers; also gives how the file wants to be drawn.
 pub(super) fn read_splats(
@@ -68,13 +78,7 @@ pub(super) fn read_splats(
     observe: &mut Observer<'_>,
 ) -> Result<(Splats, RasterOptions), RunError> {
     let read = ply::read_ply(path)?;
-    if read.skipped > 0 {
-        observe(Event::Warning(format!(
-            "{}: skipped {} Gaussians with values that are not finite or no rotation",
-            path.display(),
-            read.skipped
-        )));
-    }
+    tell_skipped(path, read.skipped, observe);
     let mut splats = read.splats;
     if splats.is_empty() {
         return Err(RunError::NoSplats(path.to_owned()));

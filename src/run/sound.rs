@@ -2,25 +2,58 @@
 
 use std::path::Path;
 
+use serde::Serialize;
+
 use super::{Event, Observer, RunError, Stage, scene};
 use crate::{
     capture::{
         Camera, Capture, CaptureError, Dataset, Headers, LoadOptions, Rejected, Shrunk, Unplaced,
     },
     effects::{
-        Cause, Contradiction, Contradictory, Evidence, FEW_POINTS, Place, PointColors,
-        Reprojection, Survey, Unseeing, listed,
+        Agreement, Cause, Contradiction, Contradictory, Evidence, FEW_POINTS, PointColors,
+        Reprojection, Survey, Unseeing, listed, observe_where_projected,
     },
 };
 
+/// How well photos, poses and points agree; each figure `None` where nothing tells.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Soundness {
+    /// The median distance of observations from where their points project, in pixels at
+    /// working size; infinite, in JSON `null`, where most points lie behind the cameras.
+    pub reprojection_error: Option<f64>,
+    /// The lowest correlation, -1 to 1, of what a photo shows at the points with their colors.
+    pub lowest_correlation: Option<f64>,
+    /// That of the photo in the middle.
+    pub median_correlation: Option<f64>,
+}
+
+/// A capture that can be worked with.
+pub(super) struct Examined {
+    pub dataset: Dataset,
+    /// What its photos say.
+    pub evidence: Evidence,
+    /// How well it agreed before anything was left out.
+    pub soundness: Soundness,
+}
+
 /// What follows from the model alone.
 pub(super) struct Model {
+    /// See [`Soundness`].
+    pub reprojection_error: Option<f64>,
     /// Photos with poses that contradict it.
     pub photos: Vec<Rejected>,
-    /// Whether its observations are where its points project to.
-    tracks: bool,
-    /// Where photos can be compared with the points' colors, if anywhere.
-    colors: Option<Place>,
+    tracks: Tracks,
+}
+
+/// Of what use a model's observations are.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Tracks {
+    /// They are where its points project to.
+    Sound,
+    /// Which photo saw which point is known; where says only the projection.
+    Misplaced,
+    /// There are none, or they belong to something else.
+    Useless,
 }
 
 /// Opens a COLMAP folder and judges the model; of the photos only headers are read.
@@ -36,7 +69,7 @@ pub(super) fn open_checked(
     for Rejected { name, reason } in &model.photos {
         observe(Event::Warning(format!("{name}: {reason}")));
     }
-    model.keep_tracks(&mut dataset.capture);
+    model.mend(&mut dataset.capture);
     Ok(dataset)
 }
 
@@ -50,45 +83,50 @@ pub(super) fn open_examined(
     dir: &Path,
     options: &LoadOptions,
     observe: &mut Observer<'_>,
-) -> Result<(Dataset, Evidence), RunError> {
+) -> Result<Examined, RunError> {
     let mut dataset = scene::open(dir, options, observe)?;
     let headers = Headers::read(&dataset.capture.views)?;
     tell_folder(&dataset.capture, &headers, observe)?;
     let model = check_model(&dataset.capture, &dataset.cameras, options.force, observe)?;
-    let colors = model
-        .colors
-        .map(|place| PointColors::of(&dataset.capture, &dataset.cameras, options.channel, place));
-    model.keep_tracks(&mut dataset.capture);
-    let (evidence, photos) = examine(&dataset, colors, observe)?;
+    model.mend(&mut dataset.capture);
+    let (evidence, agreement) = examine(&dataset, observe)?;
+    let soundness = Soundness {
+        reprojection_error: model.reprojection_error,
+        lowest_correlation: agreement.lowest(),
+        median_correlation: agreement.median(),
+    };
     let mut unfit = model.photos.clone();
-    unfit.extend(photos);
+    unfit.extend(unlike(&agreement, &dataset, observe)?);
     unfit.sort_by(|a, b| a.name.cmp(&b.name));
     unfit.dedup_by(|b, a| a.name == b.name);
-    if unfit.is_empty() {
-        return Ok((dataset, evidence));
-    }
-    let done = match options.force {
-        true => "used all the same",
-        false => "left out",
-    };
     for Rejected { name, reason } in &unfit {
-        observe(Event::Warning(format!("{done}: {name}: {reason}")));
+        observe(Event::Warning(match options.force {
+            true => format!("used {name} all the same: {reason}"),
+            false => format!("left out {name}: {reason}"),
+        }));
     }
-    if options.force {
-        return Ok((dataset, evidence));
-    }
-    let mut options = dataset.options.clone();
-    options.left_out.extend(unfit);
-    // What is to be said has been said.
-    let quietly = &mut |event| {
-        if matches!(event, Event::Progress { .. }) {
-            observe(event);
+    let (dataset, evidence) = match unfit.is_empty() || options.force {
+        true => (dataset, evidence),
+        false => {
+            let mut options = dataset.options.clone();
+            options.left_out.extend(unfit);
+            // What is to be said has been said.
+            let quietly = &mut |event| {
+                if matches!(event, Event::Progress { .. }) {
+                    observe(event);
+                }
+            };
+            let mut dataset = scene::open(dir, &options, quietly)?;
+            model.mend(&mut dataset.capture);
+            let (evidence, _) = examine(&dataset, quietly)?;
+            (dataset, evidence)
         }
     };
-    let mut dataset = scene::open(dir, &options, quietly)?;
-    model.keep_tracks(&mut dataset.capture);
-    let (evidence, _) = examine(&dataset, None, quietly)?;
-    Ok((dataset, evidence))
+    Ok(Examined {
+        dataset,
+        evidence,
+        soundness,
+    })
 }
 
 /// Judges the model of a capture; `cameras` are those of its views at working size.
@@ -104,9 +142,12 @@ pub(super) fn check_model(
     let reprojection = Reprojection::of(capture, cameras);
     let found = (reprojection.as_ref()).and_then(|found| found.contradictory(capture, cameras));
     let mut model = Model {
+        reprojection_error: reprojection.as_ref().map(|found| found.error),
         photos: Vec::new(),
-        tracks: reprojection.is_some(),
-        colors: Some(Place::Seen),
+        tracks: match reprojection {
+            Some(_) => Tracks::Sound,
+            None => Tracks::Useless,
+        },
     };
     match found {
         None => {}
@@ -122,14 +163,18 @@ pub(super) fn check_model(
             if !(forced || cameras_are_right) {
                 return Err(error.into());
             }
-            observe(Event::Warning(format!(
-                "{error}; its observations are no evidence of anything"
-            )));
-            model.tracks = false;
-            model.colors = cameras_are_right.then_some(Place::Projected);
+            let (tracks, instead) = match cameras_are_right {
+                true => (
+                    Tracks::Misplaced,
+                    "photos are looked at where points project to",
+                ),
+                false => (Tracks::Useless, "observations are not used"),
+            };
+            observe(Event::Warning(format!("{error}; {instead}")));
+            model.tracks = tracks;
         }
     }
-    if !model.tracks
+    if model.tracks != Tracks::Sound
         && let Some(unseeing) = Unseeing::of(capture, cameras)
     {
         observe(Event::Warning(of_unseeing(&unseeing)));
@@ -138,29 +183,28 @@ pub(super) fn check_model(
 }
 
 impl Model {
-    /// Drops the observations of a capture if they are of no use.
-    fn keep_tracks(&self, capture: &mut Capture) {
-        if !self.tracks {
-            for point in &mut capture.points {
-                point.track.clear();
-            }
+    /// Leaves of the observations of a capture what is of use.
+    fn mend(&self, capture: &mut Capture) {
+        match self.tracks {
+            Tracks::Sound => {}
+            Tracks::Misplaced => observe_where_projected(capture),
+            Tracks::Useless => (capture.points.iter_mut()).for_each(|point| point.track.clear()),
         }
     }
 }
 
-/// Examines all photos, each decoded once; also gives those that do not show what COLMAP saw.
+/// Examines all photos, each decoded once; also gives how they agree with the points' colors.
 fn examine(
     dataset: &Dataset,
-    mut colors: Option<PointColors>,
     observe: &mut Observer<'_>,
-) -> Result<(Evidence, Vec<Rejected>), RunError> {
+) -> Result<(Evidence, Agreement), RunError> {
+    let channel = dataset.options.channel;
+    let mut colors = PointColors::of(&dataset.capture, &dataset.cameras, channel);
     let mut survey = Survey::new(&dataset.capture, &dataset.cameras, &dataset.split);
     let all: Vec<usize> = (0..dataset.cameras.len()).collect();
     dataset.visit(&all, |view, photo| {
         survey.look(view, photo);
-        if let Some(colors) = &mut colors {
-            colors.look(view, photo);
-        }
+        colors.look(view, photo);
         observe(Event::Progress {
             stage: Stage::Photos,
             done: view,
@@ -170,18 +214,27 @@ fn examine(
         Ok::<_, CaptureError>(())
     })?;
     scene::tell_not_finite(dataset, observe);
-    let agreement = colors.map(|colors| colors.finish(&dataset.capture));
-    let found = agreement.and_then(|agreement| agreement.contradictory(&dataset.capture));
-    let photos = match found {
-        None => Vec::new(),
-        Some(Contradictory::Some(photos)) => photos,
+    Ok((survey.finish(), colors.finish(&dataset.capture)))
+}
+
+/// The photos that do not show what COLMAP saw.
+///
+/// # Errors
+/// [`RunError::Unsound`] where these are most of them, unless that does not matter.
+fn unlike(
+    agreement: &Agreement,
+    dataset: &Dataset,
+    observe: &mut Observer<'_>,
+) -> Result<Vec<Rejected>, RunError> {
+    match agreement.contradictory(&dataset.capture) {
+        None => Ok(Vec::new()),
+        Some(Contradictory::Some(photos)) => Ok(photos),
         Some(Contradictory::All(error)) if dataset.options.force => {
             observe(Event::Warning(error.to_string()));
-            Vec::new()
+            Ok(Vec::new())
         }
-        Some(Contradictory::All(error)) => return Err(error.into()),
-    };
-    Ok((survey.finish(), photos))
+        Some(Contradictory::All(error)) => Err(error.into()),
+    }
 }
 
 /// Warns where few of the photos that are there are used, or small versions of them.

@@ -198,6 +198,13 @@ fn a_sound_scene_gives_no_warning() {
             let error = printed["reprojection_error"].as_f64().expect("a number");
             assert!((0.01..0.3).contains(&error), "{error}");
         }
+        if arguments[0] == "plan" {
+            let soundness = &printed["soundness"];
+            let error = soundness["reprojection_error"].as_f64();
+            assert!(error.is_some_and(|error| error < 0.3), "{soundness}");
+            let lowest = soundness["lowest_correlation"].as_f64();
+            assert!(lowest.is_some_and(|lowest| lowest > 0.6), "{soundness}");
+        }
         if arguments[0] == "colorize" {
             assert_eq!(printed["chroma"]["warnings"], json!([]));
         }
@@ -241,16 +248,23 @@ fn models_that_contradict_themselves_are_refused() {
 
 #[test]
 fn observations_of_another_scale_are_no_evidence() {
+    let sound = place_with(|_| {});
     let place = place_with(|model| {
         for pixel in model.pixels() {
             *pixel = pixel.map(|along| 0.25 * along);
         }
     });
-    let words = ["observations", "0.25 times", "no evidence"];
+    let words = ["observations", "0.25 times", "where points project"];
     let plan = warns(&place, &PLAN, &words);
-    assert_eq!(plan["effects"][2]["name"], "exposure");
-    assert_eq!(plan["effects"][2]["evidence"], Value::Null);
     warns(&place, &["info", "scene", "--json"], &words);
+    // Where points project to they show what they show in the sound scene, but for a twentieth
+    // of a pixel.
+    let exposure = |plan: &Value| {
+        assert_eq!(plan["effects"][2]["name"], "exposure");
+        plan["effects"][2]["evidence"].as_f64().expect("evidence")
+    };
+    let [found, expected] = [exposure(&plan), exposure(&sound.json(&PLAN))];
+    assert!((found - expected).abs() < 0.3, "{found}, not {expected}");
     // That the photos are the right ones is looked at all the same.
     for index in 0..14 {
         change_photo(&place, index, |photo| photo.rotate180());
@@ -306,7 +320,7 @@ fn photos_of_another_model_are_refused() {
 fn single_photos_are_left_out_and_named() {
     let place = place_with(|_| {});
     change_photo(&place, 5, |photo| photo.rotate180());
-    let words = ["left out: garden_05.jpg", "does not show what COLMAP saw"];
+    let words = ["left out garden_05.jpg", "does not show what COLMAP saw"];
     let fit = ["fit", "scene", "--json", "-o", "run", "--max-side", "96"];
     let fit = [&fit[..], &["--preset", "draft", "--iterations", "3"]].concat();
     let report = warns(&place, &fit, &words);
@@ -333,7 +347,7 @@ fn single_photos_are_left_out_and_named() {
     let forced = warns(
         &place,
         &[&fit[..], &["--force"]].concat(),
-        &["used all the same"],
+        &["used garden_05.jpg all the same"],
     );
     assert_eq!(forced["capture"]["views"], 14);
 }

@@ -26,11 +26,13 @@ const NO_POINT: u64 = u64::MAX;
 /// Linux's longest path; a name that goes on beyond it never ends.
 const LONGEST_NAME: u64 = 4096;
 
-/// How many records a file announces.
-pub(super) fn announced(path: &Path) -> Option<u64> {
+/// How many images a file announces, if it is long enough for them.
+pub(super) fn count_images(path: &Path) -> Option<u64> {
+    let mut file = File::open(path).ok()?;
+    let most = file.metadata().ok()?.len() / SMALLEST_IMAGE;
     let mut count = [0; 8];
-    File::open(path).ok()?.read_exact(&mut count).ok()?;
-    Some(u64::from_le_bytes(count))
+    file.read_exact(&mut count).ok()?;
+    Some(u64::from_le_bytes(count)).filter(|&count| count <= most)
 }
 
 pub(super) fn cameras(path: &Path) -> Result<Cameras, CaptureError> {

@@ -81,7 +81,7 @@ pub(super) fn folder(root: &Path) -> Result<PathBuf, CaptureError> {
 pub(super) fn images_in(dir: &Path) -> Option<u64> {
     let ([_, images, _], extension) = files_in(dir).ok()?;
     match extension {
-        "bin" => binary::announced(&images),
+        "bin" => binary::count_images(&images),
         _ => text::count_images(&images).ok(),
     }
 }

@@ -1,6 +1,6 @@
 //! Whether photos show at the points what COLMAP saw there.
 
-use super::{Contradiction, Contradictory, ENOUGH, median, photos, reprojection::project};
+use super::{Contradiction, Contradictory, ENOUGH, median, photos};
 use crate::{
     capture::{Camera, Capture, Channel, Photo, Rejected},
     color::GrayTable,
@@ -9,7 +9,7 @@ use crate::{
 
 /// Correlation of a photo with the points' colors from which on it is the one that COLMAP saw.
 /// The lowest photo of any sound scene tried has 0.69; turned, mirrored, renumbered and much
-/// cropped ones have at most 0.18 in the median.
+/// cropped ones have at most 0.21 in the median.
 pub(super) const LEAST: f64 = 0.3;
 
 /// Side of the square over which a photo is averaged, in pixels: points lie where luma has an
@@ -19,15 +19,6 @@ const SIDE: f64 = 1.0;
 /// Standard deviation of the points' grays, 0 to 1, below which they say nothing: a step of 5
 /// in 255.
 const SPREAD: f64 = 0.02;
-
-/// Where observations are looked up in the photos.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Place {
-    /// Where the model says that they are.
-    Seen,
-    /// Where the points project to: observations are of no use.
-    Projected,
-}
 
 /// What photos show where points were seen; photos are shown to it one after the other, in the
 /// order of the views.
@@ -49,7 +40,7 @@ pub struct Agreement {
 impl PointColors {
     /// Decides where photos will be looked at. `cameras` are those of the capture's views at
     /// working size; `channel` is what of a color photo becomes gray.
-    pub fn of(capture: &Capture, cameras: &[Camera], channel: Channel, place: Place) -> Self {
+    pub fn of(capture: &Capture, cameras: &[Camera], channel: Channel) -> Self {
         let (_, photo_of) = photos(capture);
         let table = GrayTable::new();
         let mut look_ups = LookUps::of(cameras.len());
@@ -63,17 +54,9 @@ impl PointColors {
             };
             for seen in &point.track {
                 let camera = &cameras[seen.view];
-                let at = match place {
-                    Place::Seen => {
-                        let of_model = &capture.views[seen.view].camera;
-                        Some(place_in(camera, of_model, seen.pixel))
-                    }
-                    Place::Projected => project(camera, point.position),
-                };
-                if let Some(at) = at {
-                    look_ups.ask(seen.view, at, SIDE);
-                    asked.push((photo_of[seen.view], f64::from(gray) / 255.0));
-                }
+                let of_model = &capture.views[seen.view].camera;
+                look_ups.ask(seen.view, place_in(camera, of_model, seen.pixel), SIDE);
+                asked.push((photo_of[seen.view], f64::from(gray) / 255.0));
             }
         }
         Self { look_ups, asked }
@@ -105,6 +88,17 @@ impl PointColors {
 }
 
 impl Agreement {
+    /// The lowest correlation.
+    pub fn lowest(&self) -> Option<f64> {
+        let correlations = self.photos.iter().map(|(_, found)| *found);
+        correlations.min_by(f64::total_cmp)
+    }
+
+    /// The correlation of the photo in the middle.
+    pub fn median(&self) -> Option<f64> {
+        median(self.photos.iter().map(|(_, found)| *found).collect())
+    }
+
     /// The photos that do not show what COLMAP saw: all, where more than half of them do not.
     pub fn contradictory(&self, capture: &Capture) -> Option<Contradictory> {
         let below = self.photos.iter().filter(|(_, found)| *found < LEAST);
@@ -112,13 +106,12 @@ impl Agreement {
             .map(|(name, found)| Rejected {
                 name: name.clone(),
                 reason: format!(
-                    "it does not show what COLMAP saw: turned, cropped or another photo (what it shows at the points correlates with their colors by {found:.2}, below {LEAST})"
+                    "it does not show what COLMAP saw: turned, cropped or another photo (what it shows at the points correlates with their colors by {found:.3}, below {LEAST})"
                 ),
             })
             .collect();
         let judged = self.photos.len();
-        let all = self.photos.iter().map(|(_, found)| *found).collect();
-        match median(all) {
+        match self.median() {
             Some(median) if 2 * photos.len() > judged => {
                 Some(Contradictory::All(Contradiction::Photos {
                     images: capture.root.join("images"),

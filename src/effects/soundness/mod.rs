@@ -12,9 +12,9 @@ mod reprojection;
 use std::{collections::BTreeSet, path::PathBuf};
 
 pub use cause::Cause;
-pub use colors::{Agreement, Place, PointColors};
+pub use colors::{Agreement, PointColors};
 pub use coverage::{FEW_POINTS, Unseeing};
-pub use reprojection::Reprojection;
+pub use reprojection::{Reprojection, observe_where_projected};
 
 use crate::capture::{Capture, Rejected};
 
@@ -39,7 +39,7 @@ pub enum Contradiction {
     },
     /// Photos do not show what COLMAP saw.
     #[error(
-        "{}: {} of {judged} photos do not show what COLMAP saw: what they show at its points correlates with the points' colors by {median:.2} in the median, below {:.1}; they are turned, cropped, renamed or others: put the photos there that COLMAP saw",
+        "{}: {} of {judged} photos do not show what COLMAP saw: what they show at its points correlates with the points' colors by {median:.3} in the median, below {:.1}; they are turned, cropped, renamed or others: put the photos there that COLMAP saw",
         .images.display(), .photos.len(), colors::LEAST
     )]
     Photos {

@@ -71,6 +71,17 @@ pub(super) fn project(camera: &Camera, place: DVec3) -> Option<[f64; 2]> {
     })
 }
 
+/// Moves every observation to where its point projects; drops those outside the photos.
+pub fn observe_where_projected(capture: &mut Capture) {
+    for point in &mut capture.points {
+        point.track.retain_mut(|seen| {
+            let pixel = capture.views[seen.view].camera.pixel_of(point.position);
+            seen.pixel = pixel.unwrap_or(seen.pixel);
+            pixel.is_some()
+        });
+    }
+}
+
 /// How far apart two places in a camera's photo are.
 fn error(camera: &Camera, seen: [f64; 2], projected: Option<[f64; 2]>) -> Error {
     let tolerated = (SHARE * f64::from(camera.width.max(camera.height))).max(PIXELS);

@@ -231,13 +231,9 @@ fn a_single_wrong_pose_is_named() {
 }
 
 /// How photos agree with the points' colors, and what follows.
-fn compared(
-    capture: &Capture,
-    photos: &[Photo],
-    place: Place,
-) -> (Agreement, Option<Contradictory>) {
+fn compared(capture: &Capture, photos: &[Photo]) -> (Agreement, Option<Contradictory>) {
     let cameras: Vec<Camera> = cameras(capture);
-    let mut colors = PointColors::of(capture, &cameras, Channel::Luma, place);
+    let mut colors = PointColors::of(capture, &cameras, Channel::Luma);
     for (view, photo) in photos.iter().enumerate() {
         colors.look(view, photo);
     }
@@ -259,7 +255,7 @@ fn photos_of_the_model_agree_whatever_their_exposure() {
             *gray = (f64::from(*gray) * (0.3 + 0.1 * i as f64)) as u8 + 20;
         }
     }
-    let (agreement, found) = compared(&capture, &photos, Place::Seen);
+    let (agreement, found) = compared(&capture, &photos);
     assert_eq!(agreement.photos.len(), VIEWS);
     assert!(agreement.photos.iter().all(|(_, found)| *found > 0.9));
     assert_eq!(found, None);
@@ -269,7 +265,7 @@ fn photos_of_the_model_agree_whatever_their_exposure() {
 fn turned_photos_are_told_one_by_one_or_all_together() {
     let (capture, mut photos) = sound();
     turn(&mut photos[4]);
-    match compared(&capture, &photos, Place::Seen).1 {
+    match compared(&capture, &photos).1 {
         Some(Contradictory::Some(photos)) => {
             assert_eq!(photos.len(), 1, "{photos:?}");
             assert_eq!(photos[0].name, "4.png");
@@ -277,7 +273,7 @@ fn turned_photos_are_told_one_by_one_or_all_together() {
         other => panic!("{other:?}"),
     }
     photos[..4].iter_mut().for_each(turn);
-    match compared(&capture, &photos, Place::Seen).1 {
+    match compared(&capture, &photos).1 {
         Some(Contradictory::All(Contradiction::Photos { photos, judged, .. })) => {
             assert_eq!((photos.len(), judged), (5, VIEWS));
         }
@@ -293,12 +289,12 @@ fn points_without_colors_masks_and_few_points_say_nothing() {
     for photo in &mut masked {
         photo.mask = Some(vec![0; photo.gray.len()]);
     }
-    assert_eq!(compared(&capture, &masked, Place::Seen).1, None);
+    assert_eq!(compared(&capture, &masked).1, None);
     let mut few = capture.clone();
     few.points.truncate(ENOUGH - 1);
-    assert_eq!(compared(&few, &photos, Place::Seen).1, None);
+    assert_eq!(compared(&few, &photos).1, None);
     (capture.points.iter_mut()).for_each(|point| point.color = [0; 3]);
-    let (agreement, found) = compared(&capture, &photos, Place::Seen);
+    let (agreement, found) = compared(&capture, &photos);
     assert_eq!((agreement.photos, found), (Vec::new(), None));
 }
 
@@ -308,9 +304,17 @@ fn points_tell_where_observations_do_not() {
     for seen in capture.points.iter_mut().flat_map(|point| &mut point.track) {
         seen.pixel = seen.pixel.map(|along| 0.25 * along);
     }
-    assert_eq!(compared(&capture, &photos, Place::Projected).1, None);
-    let seen = compared(&capture, &photos, Place::Seen).1;
+    let seen = compared(&capture, &photos).1;
     assert!(matches!(seen, Some(Contradictory::All(_))), "{seen:?}");
+    observe_where_projected(&mut capture);
+    assert_eq!(compared(&capture, &photos).1, None);
+    let error = Reprojection::of(&capture, &cameras(&capture)).map(|found| found.error);
+    assert!(error.is_some_and(|error| error < 1e-9), "{error:?}");
+    // Not outside the photos.
+    capture.views[0].camera.cx = -2000.0;
+    observe_where_projected(&mut capture);
+    let mut seen = capture.points.iter().flat_map(|point| &point.track);
+    assert!(seen.all(|seen| seen.view != 0));
 }
 
 #[test]

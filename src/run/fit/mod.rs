@@ -102,8 +102,8 @@ pub fn fit(
         lens: options.overrules.choice(Effect::Lens),
         ..options.load.clone()
     };
-    let (dataset, evidence) = open_examined(&options.colmap_dir, &load, observe)?;
-    let dataset = Arc::new(dataset);
+    let examined = open_examined(&options.colmap_dir, &load, observe)?;
+    let (dataset, evidence) = (Arc::new(examined.dataset), examined.evidence);
     let judge = match options.measure_side {
         Some(_) => {
             let load = LoadOptions {
