@@ -27,6 +27,8 @@ mod depth_tests;
 #[cfg(test)]
 mod fixtures;
 #[cfg(test)]
+mod left_out_tests;
+#[cfg(test)]
 mod tests;
 #[cfg(test)]
 mod thumbnail_tests;

@@ -40,7 +40,7 @@ fn colmap_info(path: &Path, observe: &mut Observer<'_>) -> Result<Value, RunErro
     let mut observe = keeping(&warnings, observe);
     let capture = Capture::load(path)?;
     for Rejected { name, reason } in &capture.rejected {
-        observe(Event::Warning(format!("{name} is left out: {reason}")));
+        observe(Event::Warning(format!("left out {name}: {reason}")));
     }
     let sizes: Vec<_> = capture
         .views

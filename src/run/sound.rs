@@ -8,12 +8,16 @@ use super::{Event, Observer, RunError, Stage, scene};
 use crate::{
     capture::{
         Camera, Capture, CaptureError, Dataset, Headers, LoadOptions, Rejected, Shrunk, Unplaced,
+        first_views,
     },
     effects::{
         Agreement, Cause, Contradiction, Contradictory, Evidence, FEW_POINTS, PointColors,
         Reprojection, Survey, Unseeing, listed, observe_where_projected,
     },
 };
+
+/// Fewer photos make no scene: before as few are left, all are used.
+const FEWEST: usize = 2;
 
 /// How well photos, poses and points agree; each figure `None` where nothing tells.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -57,20 +61,34 @@ enum Tracks {
 }
 
 /// Opens a COLMAP folder and judges the model; of the photos only headers are read.
+///
+/// # Errors
+/// [`RunError::Unsound`] where the model contradicts itself, unless the options say that this
+/// does not matter.
 pub(super) fn open_checked(
     dir: &Path,
     options: &LoadOptions,
     observe: &mut Observer<'_>,
 ) -> Result<Dataset, RunError> {
+    let (dataset, model) = open_judged(dir, options, observe)?;
+    for Rejected { name, reason } in &model.photos {
+        observe(Event::Warning(format!("{name}: {reason}")));
+    }
+    Ok(dataset)
+}
+
+/// Opens a COLMAP folder, judges the model and leaves of its observations what is of use.
+fn open_judged(
+    dir: &Path,
+    options: &LoadOptions,
+    observe: &mut Observer<'_>,
+) -> Result<(Dataset, Model), RunError> {
     let mut dataset = scene::open(dir, options, observe)?;
     let headers = Headers::read(&dataset.capture.views)?;
     tell_folder(&dataset.capture, &headers, observe)?;
     let model = check_model(&dataset.capture, &dataset.cameras, options.force, observe)?;
-    for Rejected { name, reason } in &model.photos {
-        observe(Event::Warning(format!("{name}: {reason}")));
-    }
     model.mend(&mut dataset.capture);
-    Ok(dataset)
+    Ok((dataset, model))
 }
 
 /// Opens a COLMAP folder, judges model and photos and examines the photos, each decoded once.
@@ -84,11 +102,7 @@ pub(super) fn open_examined(
     options: &LoadOptions,
     observe: &mut Observer<'_>,
 ) -> Result<Examined, RunError> {
-    let mut dataset = scene::open(dir, options, observe)?;
-    let headers = Headers::read(&dataset.capture.views)?;
-    tell_folder(&dataset.capture, &headers, observe)?;
-    let model = check_model(&dataset.capture, &dataset.cameras, options.force, observe)?;
-    model.mend(&mut dataset.capture);
+    let (dataset, model) = open_judged(dir, options, observe)?;
     let (evidence, agreement) = examine(&dataset, observe)?;
     let soundness = Soundness {
         reprojection_error: model.reprojection_error,
@@ -99,13 +113,15 @@ pub(super) fn open_examined(
     unfit.extend(unlike(&agreement, &dataset, observe)?);
     unfit.sort_by(|a, b| a.name.cmp(&b.name));
     unfit.dedup_by(|b, a| a.name == b.name);
+    let photos = first_views(&dataset.capture.views).count();
+    let all_are_used = options.force || photos < unfit.len() + FEWEST;
     for Rejected { name, reason } in &unfit {
-        observe(Event::Warning(match options.force {
+        observe(Event::Warning(match all_are_used {
             true => format!("used {name} all the same: {reason}"),
             false => format!("left out {name}: {reason}"),
         }));
     }
-    let (dataset, evidence) = match unfit.is_empty() || options.force {
+    let (dataset, evidence) = match unfit.is_empty() || all_are_used {
         true => (dataset, evidence),
         false => {
             let mut options = dataset.options.clone();

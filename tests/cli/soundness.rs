@@ -353,6 +353,22 @@ fn single_photos_are_left_out_and_named() {
 }
 
 #[test]
+fn of_two_photos_none_is_left_out() {
+    let place = place_with(|model| {
+        model.images.truncate(2);
+        for point in &mut model.points {
+            point.track.retain(|seen| seen.view < 2);
+        }
+    });
+    for index in 2..14 {
+        let photo = format!("scene/images/garden_{index:02}.jpg");
+        fs::remove_file(place.path(&photo)).expect("a photo");
+    }
+    change_photo(&place, 1, |photo| photo.rotate180());
+    warns(&place, &PLAN, &["used garden_01.jpg all the same"]);
+}
+
+#[test]
 fn photos_without_a_pose_and_a_better_model_are_told() {
     let place = place_with(|_| {});
     let mut part = Model::demo();

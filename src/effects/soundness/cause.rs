@@ -75,12 +75,6 @@ impl fmt::Display for Cause {
     }
 }
 
-/// A place as a camera at working size sees it.
-pub(super) struct Projected<'a> {
-    pub camera: &'a Camera,
-    pub place: DVec3,
-}
-
 impl Cause {
     /// Tries one after the other; `cameras` are those of the capture's views at working size.
     pub(super) fn find(capture: &Capture, cameras: &[Camera]) -> Self {
@@ -89,7 +83,7 @@ impl Cause {
                 // Poses as they are in the file.
                 .map(|camera| pose(&camera.recentered(-capture.offset)).recentered(capture.offset))
                 .collect();
-            fits(capture, &mended, |seen| project(seen.camera, seen.place))
+            fits(capture, &mended, project)
         };
         if posed(inverted) {
             return Self::CameraToWorld;
@@ -127,9 +121,8 @@ impl Cause {
                 height * (y.scale * pixel[1] / height + y.offset),
             ]
         };
-        let found = fits(capture, cameras, |seen| {
-            let pixel = project(seen.camera, seen.place)?;
-            Some(moved(seen.camera, pixel))
+        let found = fits(capture, cameras, |camera, place| {
+            Some(moved(camera, project(camera, place)?))
         });
         if !found {
             return None;

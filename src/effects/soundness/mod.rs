@@ -39,8 +39,8 @@ pub enum Contradiction {
     },
     /// Photos do not show what COLMAP saw.
     #[error(
-        "{}: {} of {judged} photos do not show what COLMAP saw: what they show at its points correlates with the points' colors by {median:.3} in the median, below {:.1}; they are turned, cropped, renamed or others: put the photos there that COLMAP saw",
-        .images.display(), .photos.len(), colors::LEAST
+        "{}: {} of {judged} photos ({}) do not show what COLMAP saw: what they show at its points correlates with the points' colors by {median:.3} in the median, below {:.1}; they are turned, cropped, renamed or others: put the photos there that COLMAP saw",
+        .images.display(), .photos.len(), listed(.photos.iter().map(|photo| photo.name.as_str())), colors::LEAST
     )]
     Photos {
         /// The folder of the photos.

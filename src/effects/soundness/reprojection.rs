@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::{Cause, Contradiction, Contradictory, ENOUGH, cause::Projected, distance, photos};
+use super::{Cause, Contradiction, Contradictory, ENOUGH, distance, photos};
 use crate::{
     capture::{Camera, Capture, Rejected},
     effects::tracks::place_in,
@@ -147,18 +147,14 @@ impl Reprojection {
 pub(super) fn fits(
     capture: &Capture,
     cameras: &[Camera],
-    projected: impl Fn(&Projected) -> Option<[f64; 2]>,
+    projected: impl Fn(&Camera, DVec3) -> Option<[f64; 2]>,
 ) -> bool {
     let errors = capture.points.iter().flat_map(|point| {
         let projected = &projected;
         point.track.iter().map(move |seen| {
             let camera = &cameras[seen.view];
             let seen_at = place_in(camera, &capture.views[seen.view].camera, seen.pixel);
-            let found = projected(&Projected {
-                camera,
-                place: point.position,
-            });
-            error(camera, seen_at, found)
+            error(camera, seen_at, projected(camera, point.position))
         })
     });
     Median::of(errors.collect()).is_some_and(|median| !median.is_off())
