@@ -11,8 +11,8 @@ use tempfile::{TempDir, tempdir};
 
 use super::fixtures::{Model, SIZE, folder, write};
 use super::{
-    Camera, Capture, CaptureError, Channel, Encoding, LoadOptions, Loader, Normalize, Photo, View,
-    kinds,
+    Camera, Capture, CaptureError, Channel, Encoding, Headers, LoadOptions, Loader, Normalize,
+    Photo, View,
 };
 use crate::color::{GrayTable, linear_to_srgb};
 
@@ -239,7 +239,7 @@ fn the_range_of_all_photos_is_found() {
             .unwrap();
     });
     assert_eq!(
-        kinds(&capture.views).unwrap(),
+        Headers::read(&capture.views).unwrap().kinds,
         [("gray, 16 bits".to_owned(), 3)].into()
     );
     let mut loader = Loader::open(&capture, &LoadOptions::default()).unwrap();

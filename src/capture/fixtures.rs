@@ -81,6 +81,15 @@ impl Model {
         }
     }
 
+    /// The example with all images under its first camera.
+    pub fn of_one_camera() -> Self {
+        let mut model = Self::example();
+        for image in &mut model.images {
+            image.camera = model.cameras[0].id;
+        }
+        model
+    }
+
     /// The three `.bin` files: cameras, images, points3D.
     pub fn binary(&self) -> [Vec<u8>; 3] {
         let mut cameras = (self.cameras.len() as u64).to_le_bytes().to_vec();

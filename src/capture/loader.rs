@@ -227,21 +227,55 @@ pub fn first_views(views: &[View]) -> impl Iterator<Item = &View> {
         .map(|views| &views[0])
 }
 
-/// What the photos of a capture are, in words, and how many of each kind.
-///
-/// # Errors
-/// If the header of one cannot be read.
-pub fn kinds(views: &[View]) -> Result<BTreeMap<String, usize>, CaptureError> {
-    let mut kinds = BTreeMap::new();
-    for view in first_views(views) {
-        let header = decode::header(&view.image_path)?;
-        let color = ["gray", "gray and alpha", "RGB", "RGB and alpha"];
-        let color = color[header.channels.clamp(1, 4) - 1];
-        *kinds
-            .entry(format!("{color}, {}", header.depth))
-            .or_default() += 1;
+/// What the headers of a capture's photos say.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Headers {
+    /// Kinds of photos in words, and how many there are of each.
+    pub kinds: BTreeMap<String, usize>,
+    /// Photos that have less than half the sides of their cameras.
+    pub shrunk: Option<Shrunk>,
+}
+
+/// Photos that are much smaller than their cameras: small versions of the photos that COLMAP
+/// saw, or thumbnails.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Shrunk {
+    /// How many.
+    pub count: usize,
+    /// The first of them.
+    pub name: String,
+    /// Its width and height.
+    pub photo: [u32; 2],
+    /// Its camera's width and height.
+    pub camera: [u32; 2],
+}
+
+impl Headers {
+    /// Reads the header of every photo.
+    ///
+    /// # Errors
+    /// If one cannot be read.
+    pub fn read(views: &[View]) -> Result<Self, CaptureError> {
+        let mut read = Self::default();
+        for view in first_views(views) {
+            let header = decode::header(&view.image_path)?;
+            let color = ["gray", "gray and alpha", "RGB", "RGB and alpha"];
+            let color = color[header.channels.clamp(1, 4) - 1];
+            let kind = format!("{color}, {}", header.depth);
+            *read.kinds.entry(kind).or_default() += 1;
+            let (photo, camera) = (header.size, view.photo_size());
+            if (0..2).all(|side| 2 * u64::from(photo[side]) < u64::from(camera[side])) {
+                let shrunk = read.shrunk.get_or_insert_with(|| Shrunk {
+                    count: 0,
+                    name: view.photo.clone(),
+                    photo,
+                    camera,
+                });
+                shrunk.count += 1;
+            }
+        }
+        Ok(read)
     }
-    Ok(kinds)
 }
 
 /// A folder's path that holds wherever the program runs next.

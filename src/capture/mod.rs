@@ -20,13 +20,18 @@ mod sample;
 mod split;
 mod tiff;
 mod tone;
+mod unplaced;
 
 #[cfg(test)]
 mod depth_tests;
 #[cfg(test)]
 mod fixtures;
 #[cfg(test)]
+mod left_out_tests;
+#[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod thumbnail_tests;
 #[cfg(test)]
 mod view_tests;
 
@@ -43,12 +48,13 @@ pub use exposure::Exposure;
 pub(crate) use in_order::in_order;
 pub use lens::IMPERCEPTIBLE;
 use lens::Undistortion;
-pub use loader::{Loader, first_views, kinds};
+pub use loader::{Headers, Loader, Shrunk, first_views};
 pub use options::{Channel, Encoding, LoadOptions, MaskSource, MaskUse, Normalize};
 pub use order::view_at;
 pub use photo::Photo;
 pub use resample::downscale;
 pub use split::{Split, split};
+pub use unplaced::Unplaced;
 
 /// Where a COLMAP folder has its photos.
 pub const IMAGES: &str = "images";
@@ -114,7 +120,7 @@ pub enum Choice {
 }
 
 /// How to load a capture.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct CaptureOptions {
     /// Whether the lens's distortion is taken out of photos; without it lenses are
     /// taken for pinholes of their focal length.
@@ -122,6 +128,8 @@ pub struct CaptureOptions {
     /// The longest side that photos will be shrunk to, in pixels: it decides what
     /// can be seen.
     pub max_side: Option<u32>,
+    /// Photos that are not to be used, and why.
+    pub left_out: Vec<Rejected>,
 }
 
 /// A point that COLMAP triangulated.
@@ -146,9 +154,9 @@ pub struct Observation {
 }
 
 /// Something in the model that was left out.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Rejected {
-    /// The view's name, or the points file's for points.
+    /// The photo's name, or the points file's for points.
     pub name: String,
     /// Why, in words.
     pub reason: String,
@@ -166,11 +174,11 @@ pub struct Capture {
     /// What was subtracted from every position; add it to come back to COLMAP's
     /// coordinates. Zero unless these were large; whole numbers.
     pub offset: DVec3,
-    /// Views without a usable pose, sorted by name, and one entry for all points
-    /// without a usable position.
+    /// Photos without a usable pose or camera and those that were not to be used, sorted by
+    /// name, and one entry for all points without a usable position.
     pub rejected: Vec<Rejected>,
     /// The farthest that a camera's lens displaces a pixel from where its pinhole
-    /// would show it, over all cameras, in pixels at working size; whether that is
+    /// would show it, over all cameras that a photo has, in pixels at working size; whether that is
     /// taken out or not.
     pub distortion: f64,
 }
@@ -187,12 +195,13 @@ impl Capture {
     /// Loads a COLMAP folder: `images/` and a model in `sparse/0/`, `sparse/` or
     /// the folder itself, `.bin` before `.txt`.
     ///
-    /// Views and points whose coordinates are not finite, or no rotation, are
-    /// left out and named in `rejected`. Photos are checked to exist, not read.
+    /// Views and points whose coordinates are not finite, or no rotation, and photos with a
+    /// camera that cannot be are left out and named in `rejected`. Cameras without photos do
+    /// not matter. Photos are checked to exist, not read.
     ///
     /// # Errors
-    /// If a folder, a file or a photo is missing, a file is damaged, a camera's model
-    /// is unknown or its calibration no lens's, a name leads out of `images/`, or
+    /// If a folder, a file or a photo is missing, a file is damaged, no photo's camera has a
+    /// known model and a lens's calibration, a name leads out of `images/`, or
     /// nothing usable is left.
     pub fn load_with(dir: &Path, options: &CaptureOptions) -> Result<Self, CaptureError> {
         if !dir.is_dir() {
@@ -217,22 +226,18 @@ impl Capture {
             });
         }
 
-        let mut distortion: f64 = 0.0;
-        let mut cameras = Vec::with_capacity(model.cameras.len());
-        for camera in model.cameras {
-            let lens_model = camera.lens.model;
-            let arranged = Arrangement::new(camera.lens, options);
-            let arranged = arranged.map_err(|reason| CaptureError::Lens {
-                path: model.cameras_path.clone(),
-                camera_id: camera.id,
-                model: lens_model,
-                reason,
-            })?;
-            distortion = distortion.max(arranged.displacement);
-            cameras.push(arranged);
+        let mut used = vec![false; model.cameras.len()];
+        for (_, image) in &images {
+            used[image.camera] = true;
         }
+        let mut cameras: Vec<_> = (model.cameras.into_iter().zip(used))
+            .map(|(camera, used)| used.then(|| arranged(camera, &model.cameras_path, options)))
+            .collect();
 
         let (mut views, mut rejected) = (Vec::new(), Vec::new());
+        let mut distortion: f64 = 0.0;
+        // The first camera that cannot be.
+        let mut impossible = None;
         // Of each image its first view and its camera.
         let mut view_at = vec![None; images.len()];
         for (place, image) in images {
@@ -242,16 +247,35 @@ impl Capture {
                 translation,
                 camera,
             } = image;
+            if let Some(unwanted) = options.left_out.iter().find(|photo| photo.name == name) {
+                rejected.push(unwanted.clone());
+                continue;
+            }
+            let arrangement = match &cameras[camera] {
+                Some(Ok(arrangement)) => arrangement,
+                Some(Err(error)) => {
+                    impossible = impossible.or(Some(camera));
+                    let reason = format!("its camera cannot be ({error})");
+                    rejected.push(Rejected { name, reason });
+                    continue;
+                }
+                // Not arranged because no image has it.
+                None => continue,
+            };
             match pose(quaternion, translation) {
                 Ok(rotation) => {
                     view_at[place] = Some((views.len(), camera));
                     let image_path = photos.join(&name);
-                    views.extend(cameras[camera].views(&name, &image_path, rotation, translation));
+                    views.extend(arrangement.views(&name, &image_path, rotation, translation));
+                    distortion = distortion.max(arrangement.displacement);
                 }
                 Err(reason) => rejected.push(Rejected { name, reason }),
             }
         }
         if views.is_empty() {
+            if let Some(Some(Err(error))) = impossible.map(|camera| cameras.swap_remove(camera)) {
+                return Err(error);
+            }
             let path = model.images_path;
             return Err(match rejected.first() {
                 None => CaptureError::NoImages { path },
@@ -285,7 +309,9 @@ impl Capture {
 
         for point in &mut points {
             point.track.retain_mut(|seen| match view_at[seen.view] {
-                Some((first, camera)) => cameras[camera].place(seen, first),
+                Some((first, camera)) => (cameras[camera].as_ref())
+                    .and_then(|arranged| arranged.as_ref().ok())
+                    .is_some_and(|arrangement| arrangement.place(seen, first)),
                 None => false,
             });
         }
@@ -353,6 +379,22 @@ impl Capture {
         }
         self.offset = offset;
     }
+}
+
+/// The views that a camera's photos become.
+fn arranged(
+    camera: colmap::Camera,
+    path: &Path,
+    options: &CaptureOptions,
+) -> Result<Arrangement, CaptureError> {
+    let lens = camera.lens?;
+    let model = lens.model;
+    Arrangement::new(lens, options).map_err(|reason| CaptureError::Lens {
+        path: path.into(),
+        camera_id: camera.id,
+        model,
+        reason,
+    })
 }
 
 /// The rotation of a pose, or why it is none.

@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-use super::{CaptureOptions, Choice};
+use super::{CaptureOptions, Choice, Rejected};
 
 /// How a capture's photos are loaded. `report.json` keeps it, so that every later
 /// command loads them alike.
@@ -28,6 +28,12 @@ pub struct LoadOptions {
     pub masks: MaskSource,
     /// What is where a mask is black.
     pub masked: MaskUse,
+    /// Whether photos are taken as they are where they and the model contradict each other.
+    #[serde(default)]
+    pub force: bool,
+    /// Photos that are not used because they contradict the model, and how.
+    #[serde(default)]
+    pub left_out: Vec<Rejected>,
 }
 
 impl Default for LoadOptions {
@@ -41,6 +47,8 @@ impl Default for LoadOptions {
             normalize: Normalize::default(),
             masks: MaskSource::default(),
             masked: MaskUse::default(),
+            force: false,
+            left_out: Vec::new(),
         }
     }
 }
@@ -51,6 +59,7 @@ impl LoadOptions {
         CaptureOptions {
             lens: self.lens,
             max_side: self.max_side,
+            left_out: self.left_out.clone(),
         }
     }
 }
@@ -225,12 +234,21 @@ mod tests {
             normalize: Normalize::Range([0.125, 20.0]),
             masks: MaskSource::Folder("/photos/masks".into()),
             masked: MaskUse::Remove,
+            force: true,
+            left_out: vec![Rejected {
+                name: "a.png".into(),
+                reason: "turned".into(),
+            }],
         };
         let text = serde_json::to_string(&options).unwrap();
         assert_eq!(
             text,
-            r#"{"max_side":640,"holdout":false,"lens":"off","channel":"r","encoding":"linear","normalize":[0.125,20.0],"masks":"/photos/masks","masked":"remove"}"#
+            r#"{"max_side":640,"holdout":false,"lens":"off","channel":"r","encoding":"linear","normalize":[0.125,20.0],"masks":"/photos/masks","masked":"remove","force":true,"left_out":[{"name":"a.png","reason":"turned"}]}"#
         );
         assert_eq!(serde_json::from_str::<LoadOptions>(&text).unwrap(), options);
+        // Runs of before have neither.
+        let (older, _) = text.split_once(r#","force""#).unwrap();
+        let read: LoadOptions = serde_json::from_str(&(older.to_owned() + "}")).unwrap();
+        assert!(!read.force && read.left_out.is_empty());
     }
 }

@@ -104,7 +104,7 @@ fn missing_folders_and_files_are_named() {
 #[test]
 fn unknown_camera_models_name_the_remedy() {
     for number in [-1, 18, i32::MAX] {
-        let mut model = Model::example();
+        let mut model = Model::of_one_camera();
         model.cameras[0].model = ("WARP", number);
         let words = ["camera 7", "image_undistorter"];
         let number = number.to_string();
@@ -225,7 +225,7 @@ fn unknown_and_doubled_ids_and_names_are_errors() {
 #[test]
 fn damaged_cameras_are_errors() {
     for (index, value) in [(0, f64::NAN), (0, -1.0), (1, 0.0), (2, f64::INFINITY)] {
-        let mut model = Model::example();
+        let mut model = Model::of_one_camera();
         model.cameras[0].parameters[index] = value;
         assert_says(load(&model), "cameras.bin", &["camera 1 of 2", "byte"]);
         assert_says(
@@ -234,9 +234,9 @@ fn damaged_cameras_are_errors() {
             &["line 2"],
         );
     }
-    let mut model = Model::example();
-    model.cameras[1].width = u64::MAX;
-    assert_says(load(&model), "cameras.bin", &["camera 2 of 2", "width"]);
+    let mut model = Model::of_one_camera();
+    model.cameras[0].width = u64::MAX;
+    assert_says(load(&model), "cameras.bin", &["camera 1 of 2", "width"]);
     let mut model = Model::example();
     model.cameras[0].parameters.push(1.0);
     assert_says(

@@ -1,4 +1,4 @@
-//! TIFF files: the first picture of one, gray or RGB, of integers or floats.
+//! TIFF files: the first full picture of one, gray or RGB, of integers or floats.
 
 use tiff::ColorType;
 use tiff::decoder::{DecodingResult, DecodingSampleType, Limits};
@@ -12,6 +12,12 @@ pub(super) type Decoder = Box<tiff::decoder::Decoder<Box<dyn Bytes>>>;
 /// The tag's value where each channel is a picture of its own.
 const PLANAR: u16 = 2;
 
+/// The tag that makes a TIFF file a DNG.
+const DNG_VERSION: u16 = 50_706;
+
+/// The bit of NewSubfileType that says that the picture is a smaller one of another.
+const REDUCED: u32 = 1;
+
 /// Reads the header. Errors are what is wrong and what helps.
 pub(super) fn open(bytes: Box<dyn Bytes>) -> Result<(Header, Decoder), String> {
     let mut limits = Limits::default();
@@ -20,6 +26,7 @@ pub(super) fn open(bytes: Box<dyn Bytes>) -> Result<(Header, Decoder), String> {
     limits.intermediate_buffer_size = limits.decoding_buffer_size;
     let decoder = tiff::decoder::Decoder::new(bytes).map_err(unreadable)?;
     let mut decoder = Box::new(decoder.with_limits(limits));
+    find_full_picture(&mut decoder)?;
     let (width, height) = decoder.dimensions().map_err(unreadable)?;
     let (bits, channels) = match decoder.colortype().map_err(unreadable)? {
         ColorType::Gray(bits) => (bits, 1),
@@ -64,6 +71,27 @@ pub(super) fn open(bytes: Box<dyn Bytes>) -> Result<(Header, Decoder), String> {
         },
         decoder,
     ))
+}
+
+/// Goes to the first picture of the file that is not a thumbnail.
+fn find_full_picture(decoder: &mut Decoder) -> Result<(), String> {
+    let version = decoder.find_tag(Tag::Unknown(DNG_VERSION));
+    if version.map_err(unreadable)?.is_some() {
+        return Err("is a camera's raw file (DNG); develop it to TIFF or PNG".into());
+    }
+    loop {
+        let kind = decoder.find_tag_unsigned::<u32>(Tag::NewSubfileType);
+        if kind.map_err(unreadable)?.unwrap_or(0) & REDUCED == 0 {
+            return Ok(());
+        }
+        if !decoder.more_images() {
+            return Err(
+                "holds thumbnails, and no full picture beside them that is read; save it as a plain TIFF or PNG"
+                    .into(),
+            );
+        }
+        decoder.next_image().map_err(unreadable)?;
+    }
 }
 
 /// Decodes the picture. Errors are what is wrong and what helps.

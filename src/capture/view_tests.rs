@@ -20,7 +20,7 @@ fn load_choosing(model: &Model, lens: Choice) -> Result<Capture, CaptureError> {
     write(dir.path(), "sparse/0", model.binary(), "bin");
     let options = CaptureOptions {
         lens,
-        max_side: None,
+        ..CaptureOptions::default()
     };
     Capture::load_with(dir.path(), &options)
 }
@@ -60,8 +60,8 @@ fn lenses_are_taken_out_where_they_show_or_as_asked() {
     let dir = folder(&strong);
     write(dir.path(), "sparse/0", strong.binary(), "bin");
     let options = CaptureOptions {
-        lens: Choice::Auto,
         max_side: Some(1),
+        ..CaptureOptions::default()
     };
     let small = Capture::load_with(dir.path(), &options).unwrap();
     assert!(small.distortion < 0.5, "{}", small.distortion);
@@ -139,11 +139,16 @@ fn tracks_move_with_the_lens() {
 
 #[test]
 fn calibrations_of_no_lens_name_the_camera() {
-    let folded = with_lens(("SIMPLE_RADIAL", 2), &[10.0, 4.0, 3.0, -1e9]);
+    let of_all = |model, parameters: &[f64]| {
+        let mut example = with_lens(model, parameters);
+        (example.images.iter_mut()).for_each(|image| image.camera = 7);
+        example
+    };
+    let folded = of_all(("SIMPLE_RADIAL", 2), &[10.0, 4.0, 3.0, -1e9]);
     let words = ["camera 7", "SIMPLE_RADIAL", "folds"];
     assert_says(load(&folded), "cameras.bin", &words);
     assert!(load_choosing(&folded, Choice::Off).is_ok());
-    let strange = with_lens(("EUCM", 16), &[10.0, 10.0, 4.0, 3.0, 2.0, 1.0]);
+    let strange = of_all(("EUCM", 16), &[10.0, 10.0, 4.0, 3.0, 2.0, 1.0]);
     assert_says(load(&strange), "cameras.bin", &["camera 1 of 2", "alpha"]);
 }
 

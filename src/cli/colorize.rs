@@ -106,6 +106,9 @@ pub struct Colorize {
     /// keeps its own files.
     #[arg(long, requires = "output")]
     relight: bool,
+    /// Go on with all photos where they, their poses and COLMAP's points contradict each other.
+    #[arg(long)]
+    force: bool,
     /// Device memory in MiB for solving and baking: what does not fit is brought from the host
     /// view by view.
     #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u32).range(1..))]
@@ -230,6 +233,7 @@ impl Colorize {
             correct_views: self.correct_views.map(|switch| switch == Switch::On),
             colmap: self.colmap,
             relight: self.relight,
+            force: self.force,
             timings: self.timings,
         };
         let (output, report) = colorize(&options, &mut |event| progress.show(&event))?;

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{CliError, print};
+use super::{CliError, print, progress::Progress};
 use crate::run::info;
 
 /// Say what a run, a splat file or a COLMAP folder holds.
@@ -19,7 +19,8 @@ pub struct Info {
 
 impl Info {
     pub(super) fn run(self) -> Result<(), CliError> {
-        let value = info(&self.path)?;
+        let mut progress = Progress::default();
+        let value = info(&self.path, &mut |event| progress.show(&event))?;
         if self.json {
             print(format_args!("{value:#}"))?;
         } else {

@@ -66,6 +66,9 @@ pub(super) struct Photos {
     /// What is where a mask is black: anything, or nothing.
     #[arg(long, value_parser = one_of(MASK_USES), default_value = "ignore")]
     masked: MaskUse,
+    /// Go on with all photos where they, their poses and COLMAP's points contradict each other.
+    #[arg(long)]
+    force: bool,
 }
 
 impl Photos {
@@ -80,6 +83,7 @@ impl Photos {
                 .masks
                 .map_or_else(MaskSource::default, MaskSource::from),
             masked: self.masked,
+            force: self.force,
             ..LoadOptions::default()
         }
     }

@@ -12,7 +12,7 @@ use super::{
     progress::Progress,
     values::{PRESETS, one_of},
 };
-use crate::run::{PlanOptions, Preset, plan};
+use crate::run::{PlanOptions, Planned, Preset, plan};
 
 /// Say which effects a capture calls for, and why, without fitting it.
 #[derive(Args)]
@@ -40,13 +40,17 @@ impl Plan {
             load: self.photos.options(),
             overrules: self.effects.overrules(),
         };
-        let plan = plan(&options, &mut |event| progress.show(&event))?;
+        let Planned { plan, soundness } = plan(&options, &mut |event| progress.show(&event))?;
         progress.finish();
         if self.json {
             let report = crate::report::EffectReport::of(&plan.decisions);
             print(format_args!(
                 "{:#}",
-                serde_json::json!({ "effects": report })
+                serde_json::json!({
+                    "effects": report,
+                    "soundness": soundness,
+                    "warnings": progress.warnings,
+                })
             ))
         } else {
             print(plan)

@@ -10,16 +10,19 @@ use crate::run::{Event, Stage};
 #[derive(Default)]
 pub struct Progress {
     bar: Option<(Stage, ProgressBar)>,
+    /// All warnings so far.
+    pub warnings: Vec<String>,
 }
 
 impl Progress {
     /// Shows one event.
     pub fn show(&mut self, event: &Event) {
         match event {
-            Event::Note(line) => match &self.bar {
-                Some((_, bar)) if !bar.is_hidden() => bar.println(line),
-                _ => eprintln!("{line}"),
-            },
+            Event::Note(line) => self.print(line),
+            Event::Warning(line) => {
+                self.print(&format!("warning: {line}"));
+                self.warnings.push(line.clone());
+            }
             Event::Progress {
                 stage,
                 done,
@@ -35,6 +38,14 @@ impl Progress {
                     bar.set_message(message.clone());
                 }
             }
+        }
+    }
+
+    /// Prints a line above the bar.
+    fn print(&self, line: &str) {
+        match &self.bar {
+            Some((_, bar)) if !bar.is_hidden() => bar.println(line),
+            _ => eprintln!("{line}"),
         }
     }
 

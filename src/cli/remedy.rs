@@ -16,6 +16,7 @@ use crate::{
 pub(super) fn of_run(error: &RunError) -> String {
     match error {
         RunError::Capture(error) => of_capture(error),
+        RunError::Unsound(error) => format!("{error}; or go on all the same with --force"),
         RunError::Gpu(error) => of_gpu(error),
         RunError::Teacher(error) => of_teacher(error),
         RunError::Chroma(ChromaError::OverLimit { .. }) => format!(

@@ -1,4 +1,5 @@
-//! Which effects of image formation a scene calls for.
+//! Which effects of image formation a scene calls for, and whether its photos and its model
+//! agree at all.
 //!
 //! Each effect has a number that speaks for it, found in the capture, and a threshold.
 //! What is off is in no kernel and no buffer.
@@ -13,6 +14,7 @@ mod look_ups;
 mod outliers;
 mod plan;
 mod sampling;
+mod soundness;
 mod teacher;
 mod tracks;
 
@@ -22,5 +24,10 @@ pub use evidence::{Evidence, Survey};
 pub use exposure::{Exposures, find_exposures, find_photo_exposures};
 pub use plan::{Decider, Decision, Effect, Overrules, Plan, Room, table};
 pub use sampling::sampling_spread;
+pub(crate) use soundness::listed;
+pub use soundness::{
+    Agreement, Cause, Contradiction, Contradictory, FEW_POINTS, PointColors, Reprojection,
+    Unseeing, observe_where_projected,
+};
 pub use teacher::{TeacherSamples, TeacherSpread};
 pub use tracks::Sample;

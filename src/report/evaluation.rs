@@ -91,6 +91,8 @@ pub struct Evaluation {
     pub peers: Vec<PeerReport>,
     /// How the figures of consistency come about.
     pub rules: Rules,
+    /// What was found doubtful and done all the same.
+    pub warnings: Vec<String>,
     /// Along a rendered path.
     pub path: PathScore,
     /// Between photographed views.

@@ -50,6 +50,9 @@ pub struct Report {
     pub preset: Preset,
     /// What was decided about each effect of image formation.
     pub effects: Vec<EffectReport>,
+    /// What `fit` found doubtful and did all the same.
+    #[serde(default)]
+    pub warnings: Vec<String>,
     /// Stage 1.
     pub luma: LumaReport,
     /// Stage 2, once `colorize` has run.
@@ -223,6 +226,9 @@ pub struct ChromaReport {
     pub moved: Option<f64>,
     /// What was decided about each effect of stage 2.
     pub effects: Vec<EffectReport>,
+    /// What `colorize` found doubtful and did all the same.
+    #[serde(default)]
+    pub warnings: Vec<String>,
     /// Loss at the end, in CIELAB units.
     #[serde(deserialize_with = "number_or_nan")]
     pub loss: f64,

@@ -1,6 +1,7 @@
 //! `colorize`: a teacher's colors into a trained scene.
 
 use std::{
+    cell::RefCell,
     fmt::Write,
     ops::ControlFlow,
     path::{Path, PathBuf},
@@ -12,7 +13,9 @@ use super::{
     Event, Observer, Preset, RunError, RunFolder, Stage, files,
     fit::{capture_report, comments, open_gpu},
     foreign::drawn_like_photos,
-    scene::{open, read_splats, tell_not_finite},
+    keeping,
+    scene::{read_splats, tell_not_finite},
+    sound::{open_checked, open_examined},
     teach::{TeachOptions, Teachers},
 };
 use crate::{
@@ -58,6 +61,8 @@ pub struct ColorizeOptions {
     /// Whether lightness, too, is what the photos show, and not what was trained; a run keeps
     /// its own files then.
     pub relight: bool,
+    /// Whether photos are taken as they are where they and the model contradict each other.
+    pub force: bool,
     /// Whether the report says where the device's time went.
     pub timings: bool,
 }
@@ -79,14 +84,27 @@ pub fn colorize(
     options: &ColorizeOptions,
     observe: &mut Observer<'_>,
 ) -> Result<(Output, Report), RunError> {
+    let warnings = RefCell::default();
+    let observe = &mut keeping(&warnings, observe);
     let source = Source::find(options)?;
     let cache = source.folder.as_ref().map(RunFolder::teacher);
     let colmap_dir = source.colmap_dir(options)?;
     let mut teachers = Teachers::open(&options.teach, &colmap_dir, cache.as_deref())?;
     let gpu = open_gpu(options.timings)?;
     let mut report = source.report(&gpu);
-    // Every photo is looked at once.
-    let dataset = open(&colmap_dir, &report.capture.load, observe)?.caching(0);
+    let load = LoadOptions {
+        force: options.force || report.capture.load.force,
+        ..report.capture.load.clone()
+    };
+    let dataset = match (&source.report, &options.colmap) {
+        // `fit` has compared these photos with their model.
+        (Some(_), None) => open_checked(&colmap_dir, &load, observe)?,
+        // In another light they may well show something else.
+        _ if options.relight => open_checked(&colmap_dir, &load, observe)?,
+        _ => open_examined(&colmap_dir, &load, observe)?.dataset,
+    };
+    // From here on every photo is looked at once.
+    let dataset = dataset.caching(0);
     // A run's own files are moved already; others lie where COLMAP has the cameras.
     let offset = match source.folder {
         Some(_) => glam::DVec3::ZERO,
@@ -200,7 +218,7 @@ pub fn colorize(
 
     let views = [colored.colored_views, dataset.split.train.len()];
     if let Some(warning) = few_colors(colored.unseen, views) {
-        observe(Event::Note(warning));
+        observe(Event::Warning(warning));
     }
     let begun = Instant::now();
     let exposures = exposures(&dataset, &report.luma.exposures);
@@ -227,6 +245,7 @@ pub fn colorize(
         passes: colored.last.map_or(0.0, |progress| progress.passes),
         moved: colored.last.and_then(|progress| progress.moved),
         effects: EffectReport::of(&colored.effects),
+        warnings: warnings.take(),
         loss: colored.last.map_or(0.0, |progress| progress.loss),
         seconds: ChromaSeconds {
             teacher: seconds_teacher,
@@ -344,6 +363,7 @@ impl Source {
             },
             preset,
             effects: Vec::new(),
+            warnings: Vec::new(),
             luma: LumaReport::default(),
             chroma: None,
         })
@@ -403,7 +423,7 @@ fn read_or_empty(path: &Path) -> String {
 fn few_colors(unseen: Option<f64>, [colored, views]: [usize; 2]) -> Option<String> {
     let unseen = unseen.filter(|&unseen| unseen >= UNSEEN && colored < views)?;
     Some(format!(
-        "warning: {colored} of {views} photos have colors, and {:.0} % of the Gaussians are in none of these: they take their neighbors' color; color photos that show the rest",
+        "{colored} of {views} photos have colors, and {:.0} % of the Gaussians are in none of these: they take their neighbors' color; color photos that show the rest",
         100.0 * unseen
     ))
 }
@@ -416,7 +436,7 @@ mod tests {
     fn what_no_colored_photo_shows_is_told() {
         let told = few_colors(Some(0.37), [2, 15]).expect("a warning");
         assert!(
-            told.starts_with("warning: 2 of 15 photos") && told.contains("37 %"),
+            told.starts_with("2 of 15 photos") && told.contains("37 %"),
             "{told}"
         );
         for (unseen, views) in [

@@ -1,6 +1,7 @@
 //! `eval`: how good a colored run is.
 
 use std::{
+    cell::RefCell,
     path::{Path, PathBuf},
     sync::Arc,
     time::Instant,
@@ -9,6 +10,7 @@ use std::{
 use super::{
     Event, Observer, RunError, RunFolder, Stage, files,
     fit::{comments, open_gpu},
+    keeping,
     scene::{open, read_splats},
     teach::teacher_or_photos,
 };
@@ -68,6 +70,8 @@ pub fn eval(
     observe: &mut Observer<'_>,
 ) -> Result<(RunFolder, Evaluation), RunError> {
     let begun = Instant::now();
+    let warnings = RefCell::default();
+    let observe = &mut keeping(&warnings, observe);
     let (folder, report, scene) = load(options, observe)?;
     let made = tempfile::Builder::new()
         .prefix(".eval-")
@@ -158,7 +162,7 @@ pub fn eval(
     let path = along_path(&mut painter, &scene, frames, flow, &mut told, &mut keep)?;
     let between = between_views(&mut painter, &scene, &mut told)?;
     if !path.skipped.is_empty() {
-        observe(Event::Note(format!(
+        observe(Event::Warning(format!(
             "a path of {} frames is too short for Δ = {:?}: choose more",
             path.frames, path.skipped
         )));
@@ -176,6 +180,7 @@ pub fn eval(
         views: views.into_iter().map(|scored| scored.score).collect(),
         peers: peers.into_iter().map(|(_, told)| told).collect(),
         rules: Rules::default(),
+        warnings: warnings.take(),
         path,
         between,
         seconds: begun.elapsed().as_secs_f64(),
@@ -215,7 +220,7 @@ fn load(
     }
     let chroma = folder.read_chroma(luma.len())?;
     if chroma.is_none() {
-        observe(Event::Note(format!(
+        observe(Event::Warning(format!(
             "{} is missing: the native picture is not measured; `gs-chroma colorize` writes it",
             folder.chroma().display()
         )));
@@ -252,7 +257,7 @@ fn ask(
     if let Some(chroma) = &report.chroma
         && !chroma.teachers.iter().any(is_same)
     {
-        observe(Event::Note(
+        observe(Event::Warning(
             "the run was colored by another teacher than the one it is measured against".to_owned(),
         ));
     }
@@ -262,7 +267,7 @@ fn ask(
         None
     };
     if options.baselines && frames.is_none() {
-        observe(Event::Note(
+        observe(Event::Warning(
             "a folder of images cannot color frames: no baseline of luma, then teacher".to_owned(),
         ));
     }

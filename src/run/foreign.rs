@@ -53,8 +53,8 @@ pub(super) fn drawn_like_photos(
     let [as_said, otherwise] = fits(gpu, dataset, &chosen, luma, [said, other])?;
     let path = path.display();
     if as_said.correlation.max(otherwise.correlation) < CORRELATED {
-        observe(Event::Note(format!(
-            "warning: {path} does not show what the photos show (correlation {:.2}; of the same scene 0.8 and more): its Gaussians lie in another frame than these cameras, or are another scene; export them in COLMAP's frame",
+        observe(Event::Warning(format!(
+            "{path} does not show what the photos show (correlation {:.2}; of the same scene 0.8 and more): its Gaussians lie in another frame than these cameras, or are another scene; export them in COLMAP's frame",
             as_said.correlation
         )));
     } else if otherwise.psnr > as_said.psnr + GAIN {

@@ -1,30 +1,47 @@
 //! `info` and `export`.
 
-use std::path::Path;
+use std::{cell::RefCell, path::Path};
 
 use glam::DVec3;
 use serde_json::{Value, json};
 
-use super::{RunError, RunFolder, files, fit::comments};
+use super::{
+    Event, Observer, RunError, RunFolder, files,
+    fit::comments,
+    keeping,
+    scene::tell_skipped,
+    sound::{check_model, tell_folder},
+};
 use crate::{
-    capture::{Capture, LoadOptions, Loader, Normalize, kinds},
+    capture::{Camera, Capture, Headers, LoadOptions, Loader, Normalize, Rejected},
     splats::ply,
 };
 
-/// What a run folder, a splat file or a COLMAP folder holds.
+/// What a run folder, a splat file or a COLMAP folder holds, and what is doubtful about the
+/// last.
 ///
 /// # Errors
 /// [`RunError`] when it is none of them or damaged.
-pub fn info(path: &Path) -> Result<Value, RunError> {
+pub fn info(path: &Path, observe: &mut Observer<'_>) -> Result<Value, RunError> {
     if path.is_file() {
-        return splat_info(path);
+        return splat_info(path, observe);
     }
     let folder = RunFolder::at(path);
     if folder.report().is_file() {
         let report = folder.read_report()?;
         return Ok(serde_json::to_value(report).unwrap_or_default());
     }
+    colmap_info(path, observe)
+}
+
+/// What a COLMAP folder holds; no photo is decoded.
+fn colmap_info(path: &Path, observe: &mut Observer<'_>) -> Result<Value, RunError> {
+    let warnings = RefCell::default();
+    let mut observe = keeping(&warnings, observe);
     let capture = Capture::load(path)?;
+    for Rejected { name, reason } in &capture.rejected {
+        observe(Event::Warning(format!("left out {name}: {reason}")));
+    }
     let sizes: Vec<_> = capture
         .views
         .iter()
@@ -36,9 +53,18 @@ pub fn info(path: &Path) -> Result<Value, RunError> {
         ..LoadOptions::default()
     };
     let masked = Loader::open(&capture, &options)?.masked_views(views);
+    let headers = Headers::read(views)?;
+    tell_folder(&capture, &headers, &mut observe)?;
+    // What size they will be worked on is the preset's to say.
+    let cameras: Vec<Camera> = views.iter().map(|view| view.camera.clone()).collect();
+    let forced = true;
+    let model = check_model(&capture, &cameras, forced, &mut observe)?;
+    for Rejected { name, reason } in &model.photos {
+        observe(Event::Warning(format!("{name}: {reason}")));
+    }
     Ok(json!({
         "kind": "COLMAP folder",
-        "photos": kinds(views)?,
+        "photos": headers.kinds,
         "masked_views": masked,
         "views": capture.views.len(),
         "points": capture.points.len(),
@@ -46,11 +72,16 @@ pub fn info(path: &Path) -> Result<Value, RunError> {
         "largest_photo": sizes.iter().max_by_key(|&&[w, h]| u64::from(w) * u64::from(h)),
         "extent": capture.extent(),
         "offset": capture.offset.to_array(),
+        // In pixels of the model's cameras; infinite is null.
+        "reprojection_error": model.reprojection_error,
+        "warnings": warnings.take(),
     }))
 }
 
-fn splat_info(path: &Path) -> Result<Value, RunError> {
+fn splat_info(path: &Path, observe: &mut Observer<'_>) -> Result<Value, RunError> {
+    let warnings = RefCell::default();
     let read = ply::read_ply(path)?;
+    tell_skipped(path, read.skipped, &mut keeping(&warnings, observe));
     let splats = &read.splats;
     let bound = |pick: fn(f32, f32) -> f32, start: f32| -> [f32; 3] {
         std::array::from_fn(|axis| {
@@ -70,6 +101,7 @@ fn splat_info(path: &Path) -> Result<Value, RunError> {
         "gray": splats.is_gray(0.5 / 255.0),
         "lowest": bound(f32::min, f32::INFINITY),
         "highest": bound(f32::max, f32::NEG_INFINITY),
+        "warnings": warnings.take(),
     }))
 }
 

@@ -11,24 +11,27 @@ mod plan;
 mod preset;
 mod render;
 mod scene;
+mod sound;
 mod teach;
 
-use std::{fmt, path::PathBuf};
+use std::{cell::RefCell, fmt, path::PathBuf};
 
 pub use colorize::{ColorizeOptions, Output, colorize};
 pub use eval::{EvalOptions, eval};
 pub use fit::{AheadOptions, FitOptions, Overlay, fit};
 pub use folder::RunFolder;
 pub use info::{export, info};
-pub use plan::{PlanOptions, plan};
+pub use plan::{PlanOptions, Planned, plan};
 pub use preset::Work;
 pub use render::{RenderOptions, Views, render};
+pub use sound::Soundness;
 pub use teach::{HINT_WEIGHT, TeachOptions, teacher_or_photos};
 
 pub use crate::luma::Preset;
 use crate::{
     capture::CaptureError,
     chroma::{ChromaError, teacher::TeacherError},
+    effects::Contradiction,
     eval::EvalError,
     gpu::GpuError,
     luma::LumaError,
@@ -41,6 +44,9 @@ pub enum RunError {
     /// The photos or their poses.
     #[error(transparent)]
     Capture(#[from] CaptureError),
+    /// Photos, poses and points, which contradict each other.
+    #[error(transparent)]
+    Unsound(#[from] Contradiction),
     /// The device.
     #[error(transparent)]
     Gpu(#[from] GpuError),
@@ -222,6 +228,8 @@ impl fmt::Display for Stage {
 pub enum Event {
     /// A line worth reading once.
     Note(String),
+    /// A line about something doubtful that does not stop the run.
+    Warning(String),
     /// How far a stage is.
     Progress {
         /// Which stage.
@@ -237,3 +245,16 @@ pub enum Event {
 
 /// Who is told.
 pub type Observer<'a> = dyn FnMut(Event) + 'a;
+
+/// Tells `observe` everything and keeps the warnings.
+fn keeping<'a>(
+    warnings: &'a RefCell<Vec<String>>,
+    observe: &'a mut Observer<'_>,
+) -> impl FnMut(Event) + 'a {
+    move |event| {
+        if let Event::Warning(line) = &event {
+            warnings.borrow_mut().push(line.clone());
+        }
+        observe(event);
+    }
+}

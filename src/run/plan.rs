@@ -5,7 +5,8 @@ use std::{ops::ControlFlow, path::PathBuf, sync::Arc};
 use super::{
     Observer, Preset, RunError,
     fit::open_gpu,
-    scene::{examine, open, tell_trial},
+    scene::tell_trial,
+    sound::{Examined, Soundness, open_examined},
 };
 use crate::{
     capture::LoadOptions,
@@ -27,20 +28,33 @@ pub struct PlanOptions {
     pub overrules: Overrules,
 }
 
+/// What a capture calls for, and whether it is sound.
+#[derive(Clone, Debug)]
+pub struct Planned {
+    /// The effects.
+    pub plan: Plan,
+    /// How well photos and model agree.
+    pub soundness: Soundness,
+}
+
 /// Examines a capture as `fit` would.
 ///
 /// # Errors
 /// [`RunError`].
-pub fn plan(options: &PlanOptions, observe: &mut Observer<'_>) -> Result<Plan, RunError> {
+pub fn plan(options: &PlanOptions, observe: &mut Observer<'_>) -> Result<Planned, RunError> {
     let preset = match options.preset {
         Some(preset) => preset,
         None => Preset::for_device(&open_gpu(false)?),
     };
     let load = preset.load_options(&options.load, &options.overrules);
-    let dataset = Arc::new(open(&options.colmap_dir, &load, observe)?);
-    let evidence = examine(&dataset, observe)?;
+    let Examined {
+        dataset,
+        evidence,
+        soundness,
+    } = open_examined(&options.colmap_dir, &load, observe)?;
+    let dataset = Arc::new(dataset);
     let raster = || Ok(Arc::new(Raster::new(&open_gpu(false)?)));
-    planned(
+    let plan = planned(
         &dataset,
         &evidence,
         preset.work().room(),
@@ -50,5 +64,6 @@ pub fn plan(options: &PlanOptions, observe: &mut Observer<'_>) -> Result<Plan, R
             tell_trial(&progress, observe);
             ControlFlow::Continue(())
         },
-    )
+    );
+    plan.map(|plan| Planned { plan, soundness })
 }

@@ -6,8 +6,7 @@ use glam::DVec3;
 
 use super::{Event, Observer, RunError, Stage};
 use crate::{
-    capture::{CaptureError, Dataset, LoadOptions, Notice, Rejected},
-    effects::{Evidence, Survey},
+    capture::{Dataset, LoadOptions, Notice, Rejected},
     luma::TrialProgress,
     raster::RasterOptions,
     splats::{Splats, ply},
@@ -22,7 +21,7 @@ pub(super) fn open(
     Ok(Dataset::open(colmap_dir, options, &mut |notice| {
         observe(match notice {
             Notice::LeftOut(Rejected { name, reason }) => {
-                Event::Note(format!("left out {name}: {reason}"))
+                Event::Warning(format!("left out {name}: {reason}"))
             }
             Notice::Sampled { done, total, name } => Event::Progress {
                 stage: Stage::Survey,
@@ -35,24 +34,6 @@ pub(super) fn open(
             )),
         });
     })?)
-}
-
-/// Examines all photos, each decoded once.
-pub(super) fn examine(dataset: &Dataset, observe: &mut Observer<'_>) -> Result<Evidence, RunError> {
-    let mut survey = Survey::new(&dataset.capture, &dataset.cameras, &dataset.split);
-    let all: Vec<usize> = (0..dataset.cameras.len()).collect();
-    dataset.visit(&all, |view, photo| {
-        survey.look(view, photo);
-        observe(Event::Progress {
-            stage: Stage::Photos,
-            done: view,
-            total: all.len(),
-            message: dataset.capture.views[view].name.clone(),
-        });
-        Ok::<_, CaptureError>(())
-    })?;
-    tell_not_finite(dataset, observe);
-    Ok(survey.finish())
 }
 
 /// Tells how far a trial is.
@@ -73,8 +54,18 @@ pub(super) fn tell_trial(progress: &TrialProgress, observe: &mut Observer<'_>) {
 pub(super) fn tell_not_finite(dataset: &Dataset, observe: &mut Observer<'_>) {
     let count = dataset.not_finite();
     if count > 0 {
-        observe(Event::Note(format!(
+        observe(Event::Warning(format!(
             "{count} pixels of the photos are not finite and do not count"
+        )));
+    }
+}
+
+/// Warns of Gaussians of a splat file that are not used.
+pub(super) fn tell_skipped(path: &Path, count: usize, observe: &mut Observer<'_>) {
+    if count > 0 {
+        observe(Event::Warning(format!(
+            "{}: skipped {count} Gaussians with values that are not finite or no rotation",
+            path.display()
         )));
     }
 }
@@ -87,13 +78,7 @@ pub(super) fn read_splats(
     observe: &mut Observer<'_>,
 ) -> Result<(Splats, RasterOptions), RunError> {
     let read = ply::read_ply(path)?;
-    if read.skipped > 0 {
-        observe(Event::Note(format!(
-            "{}: skipped {} Gaussians with values that are not finite or no rotation",
-            path.display(),
-            read.skipped
-        )));
-    }
+    tell_skipped(path, read.skipped, observe);
     let mut splats = read.splats;
     if splats.is_empty() {
         return Err(RunError::NoSplats(path.to_owned()));

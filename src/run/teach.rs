@@ -108,7 +108,7 @@ impl Colorizer for Asking<'_, '_> {
         let mut hints = folder.transpose()?.flatten();
         self.hints_cover |= trained && hints.is_some();
         if hints.as_ref().is_some_and(HintImage::is_empty) {
-            (self.observe)(Event::Note(format!(
+            (self.observe)(Event::Warning(format!(
                 "left out the hints for {}: nothing is painted there",
                 query.name
             )));
@@ -198,7 +198,7 @@ impl Teachers {
         observe: &mut Observer<'_>,
     ) -> Result<(Lesson, usize), RunError> {
         if self.asks_no_network() {
-            observe(Event::Note(
+            observe(Event::Warning(
                 "profile and size change nothing: no teacher is a network".into(),
             ));
         }
@@ -219,7 +219,7 @@ impl Teachers {
         self.check(&covers, dataset, &lesson)?;
         for (member, counts) in self.teachers.iter().zip(answered) {
             if let Some(warning) = gray_images(member, counts, dataset)? {
-                observe(Event::Note(warning));
+                observe(Event::Warning(warning));
             }
         }
         Ok((lesson, hinted))
@@ -267,7 +267,7 @@ fn gray_images(
         return Err(RunError::GrayPhotos(path.clone()));
     }
     Ok(Some(format!(
-        "warning: {in_gray} of {answered} images in {} are gray: what they show becomes gray; leave them out where nothing is known of their colors",
+        "{in_gray} of {answered} images in {} are gray: what they show becomes gray; leave them out where nothing is known of their colors",
         path.display()
     )))
 }

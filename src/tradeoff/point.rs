@@ -297,6 +297,10 @@ fn load_options(load: &LoadOptions) -> Result<Vec<Given>, RunError> {
         given(normalize, "--normalize"),
         given(masks, "--masks"),
         given(chosen(load.masked, plain.masked), "--masked"),
+        load.force
+            .then_some(("--force", None))
+            .into_iter()
+            .collect(),
     ]
     .concat())
 }

@@ -27,6 +27,7 @@ mod repeat;
 mod scene;
 mod shared;
 mod solver;
+mod soundness;
 mod splat_file;
 mod teach;
 mod teach_together;

@@ -26,12 +26,23 @@ const NO_POINT: u64 = u64::MAX;
 /// Linux's longest path; a name that goes on beyond it never ends.
 const LONGEST_NAME: u64 = 4096;
 
+/// How many images a file announces, if it is long enough for them.
+pub(super) fn count_images(path: &Path) -> Option<u64> {
+    let mut file = File::open(path).ok()?;
+    let most = file.metadata().ok()?.len() / SMALLEST_IMAGE;
+    let mut count = [0; 8];
+    file.read_exact(&mut count).ok()?;
+    Some(u64::from_le_bytes(count)).filter(|&count| count <= most)
+}
+
 pub(super) fn cameras(path: &Path) -> Result<Cameras, CaptureError> {
     let mut records = Records::open(path, "camera", SMALLEST_CAMERA)?;
     let mut cameras = Cameras::default();
     while records.next_record() {
         let id = records.u32("the id")?;
         let number = records.i32("the model")?;
+        // How long the record is only its model tells: no image's camera or not, what
+        // follows cannot be read.
         let Some(model) = ModelName::numbered(number) else {
             return Err(CaptureError::CameraModel {
                 path: path.into(),
@@ -45,9 +56,9 @@ pub(super) fn cameras(path: &Path) -> Result<Cameras, CaptureError> {
         for parameter in &mut *parameters {
             *parameter = records.f64("the parameters")?;
         }
-        let checked =
-            lens(model, width, height, parameters).and_then(|lens| cameras.insert(id, lens));
-        checked.map_err(|reason| records.malformed(reason))?;
+        let lens = lens(model, width, height, parameters);
+        let lens = lens.map_err(|reason| records.malformed(reason));
+        (cameras.insert(id, lens)).map_err(|reason| records.malformed(reason))?;
     }
     records.finish()?;
     Ok(cameras)

@@ -49,7 +49,8 @@ pub(super) struct Image {
 pub(super) struct Camera {
     /// COLMAP's id.
     pub id: u32,
-    pub lens: Lens,
+    /// What is wrong with it matters where an image uses it.
+    pub lens: Result<Lens, CaptureError>,
 }
 
 /// Cameras in the order of the file, and their places by COLMAP's id.
@@ -65,27 +66,60 @@ const MAX_SIDE: u64 = 1 << 20;
 /// Finds the model of a COLMAP folder and reads it: `sparse/0`, then `sparse`,
 /// then the folder itself; `.bin` before `.txt`.
 pub(super) fn read(root: &Path) -> Result<Model, CaptureError> {
+    let (paths, extension) = find(root)?;
+    read_files(paths, extension)
+}
+
+/// The folder of the model that [`read`] reads.
+pub(super) fn folder(root: &Path) -> Result<PathBuf, CaptureError> {
+    let ([cameras, ..], _) = find(root)?;
+    Ok(cameras.parent().unwrap_or(root).into())
+}
+
+/// How many images the model in this very folder places; `None` where there is no whole
+/// model or its file cannot be read.
+pub(super) fn images_in(dir: &Path) -> Option<u64> {
+    let ([_, images, _], extension) = files_in(dir).ok()?;
+    match extension {
+        "bin" => binary::count_images(&images),
+        _ => text::count_images(&images).ok(),
+    }
+}
+
+/// The three files of a model, and their extension.
+type Files = ([PathBuf; 3], &'static str);
+
+fn find(root: &Path) -> Result<Files, CaptureError> {
     let mut incomplete = None;
     for dir in [root.join("sparse/0"), root.join("sparse"), root.into()] {
-        for extension in ["bin", "txt"] {
-            let paths = ["cameras", "images", "points3D"]
-                .map(|stem| dir.join(stem).with_extension(extension));
-            let (present, missing): (Vec<_>, Vec<_>) =
-                paths.iter().partition(|path| path.is_file());
-            match (present.first(), missing.first()) {
-                (_, None) => return read_files(paths, extension),
-                (Some(present), Some(missing)) if incomplete.is_none() => {
-                    incomplete = Some(CaptureError::IncompleteModel {
-                        dir: dir.clone(),
-                        present: file_name(present),
-                        missing: file_name(missing),
-                    });
-                }
-                _ => {}
-            }
+        match files_in(&dir) {
+            Ok(files) => return Ok(files),
+            Err(error) => incomplete = incomplete.or(error),
         }
     }
     Err(incomplete.unwrap_or_else(|| CaptureError::NoModel { dir: root.into() }))
+}
+
+/// The model's files in this very folder, or what is wrong where only some of them are there.
+fn files_in(dir: &Path) -> Result<Files, Option<CaptureError>> {
+    let mut incomplete = None;
+    for extension in ["bin", "txt"] {
+        let paths =
+            ["cameras", "images", "points3D"].map(|stem| dir.join(stem).with_extension(extension));
+        let (present, missing): (Vec<_>, Vec<_>) = paths.iter().partition(|path| path.is_file());
+        match (present.first(), missing.first()) {
+            (_, None) => return Ok((paths, extension)),
+            (Some(present), Some(missing)) if incomplete.is_none() => {
+                incomplete = Some(CaptureError::IncompleteModel {
+                    dir: dir.into(),
+                    present: file_name(present),
+                    missing: file_name(missing),
+                });
+            }
+            _ => {}
+        }
+    }
+    Err(incomplete)
 }
 
 fn read_files(
@@ -160,7 +194,7 @@ impl Cameras {
     }
 
     /// Adds a camera; ids are unique.
-    fn insert(&mut self, id: u32, lens: Lens) -> Result<(), String> {
+    fn insert(&mut self, id: u32, lens: Result<Lens, CaptureError>) -> Result<(), String> {
         match self.places.insert(id, self.cameras.len()) {
             None => {
                 self.cameras.push(Camera { id, lens });

@@ -21,11 +21,13 @@ pub(super) fn cameras(path: &Path) -> Result<Cameras, CaptureError> {
         let id = lines.field(&mut fields, "the id")?;
         let name: String = lines.field(&mut fields, "the model")?;
         let Some(model) = ModelName::named(&name) else {
-            return Err(CaptureError::CameraModel {
+            let unknown = CaptureError::CameraModel {
                 path: path.into(),
                 camera_id: id,
                 model: name,
-            });
+            };
+            (cameras.insert(id, Err(unknown))).map_err(|reason| lines.malformed(reason))?;
+            continue;
         };
         let width = lines.field(&mut fields, "the width")?;
         let height = lines.field(&mut fields, "the height")?;
@@ -40,9 +42,9 @@ pub(super) fn cameras(path: &Path) -> Result<Cameras, CaptureError> {
                 model.parameters
             )));
         }
-        let checked =
-            lens(model, width, height, parameters).and_then(|lens| cameras.insert(id, lens));
-        checked.map_err(|reason| lines.malformed(reason))?;
+        let lens = lens(model, width, height, parameters);
+        let lens = lens.map_err(|reason| lines.malformed(reason));
+        (cameras.insert(id, lens)).map_err(|reason| lines.malformed(reason))?;
     }
     Ok(cameras)
 }
@@ -87,6 +89,15 @@ pub(super) fn images(
         sightings.insert(id, place, seen);
     }
     Ok((images, sightings))
+}
+
+/// How many images a file holds.
+pub(super) fn count_images(path: &Path) -> Result<u64, CaptureError> {
+    let mut lines = Lines::open(path, "image")?;
+    while lines.next_record()? {
+        lines.next_line()?;
+    }
+    Ok(lines.current)
 }
 
 /// The 2D points of an image that belong to a 3D point; none where the line is no

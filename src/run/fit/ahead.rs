@@ -49,7 +49,7 @@ impl Ahead {
     /// answered by then is left to `colorize`; at most one answer is waited for.
     ///
     /// # Errors
-    /// Those of `work`: a network that fails is a note, and `colorize`'s to mend.
+    /// Those of `work`: a network that fails is a warning, and `colorize`'s to mend.
     pub fn meanwhile<T>(
         mut self,
         dataset: &Dataset,
@@ -70,10 +70,10 @@ impl Ahead {
             (done, asking.join().unwrap_or_default())
         });
         let done = done?;
-        observe(Event::Note(match came.failure {
-            Some(error) => format!("asked ahead: {error}"),
-            None => format!("asked ahead: {} of {wanted} answers", came.answers),
-        }));
+        observe(match came.failure {
+            Some(error) => Event::Warning(format!("asked ahead: {error}")),
+            None => Event::Note(format!("asked ahead: {} of {wanted} answers", came.answers)),
+        });
         Ok(done)
     }
 }

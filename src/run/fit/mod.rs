@@ -5,11 +5,10 @@ mod budget;
 mod report;
 mod training;
 
-use std::{path::PathBuf, sync::Arc, time::Instant};
+use std::{cell::RefCell, path::PathBuf, sync::Arc, time::Instant};
 
 use super::{
-    Observer, Preset, RunError, RunFolder, files,
-    scene::{examine, open},
+    Observer, Preset, RunError, RunFolder, files, keeping, scene::open, sound::open_examined,
 };
 use crate::{
     capture::LoadOptions,
@@ -87,6 +86,8 @@ pub fn fit(
     observe: &mut Observer<'_>,
 ) -> Result<(RunFolder, Report), RunError> {
     let begun = Instant::now();
+    let warnings = RefCell::default();
+    let observe = &mut keeping(&warnings, observe);
     let gpu = open_gpu(options.timings)?;
     let raster = Arc::new(Raster::new(&gpu));
     let folder = match &options.output {
@@ -101,7 +102,8 @@ pub fn fit(
         lens: options.overrules.choice(Effect::Lens),
         ..options.load.clone()
     };
-    let dataset = Arc::new(open(&options.colmap_dir, &load, observe)?);
+    let examined = open_examined(&options.colmap_dir, &load, observe)?;
+    let (dataset, evidence) = (Arc::new(examined.dataset), examined.evidence);
     let judge = match options.measure_side {
         Some(_) => {
             let load = LoadOptions {
@@ -113,7 +115,6 @@ pub fn fit(
         }
         None => None,
     };
-    let evidence = examine(&dataset, observe)?;
     let job = Job {
         options,
         gpu: &gpu,
@@ -125,7 +126,10 @@ pub fn fit(
         loading: begun.elapsed().as_secs_f64(),
     };
     let trained = ahead.meanwhile(&dataset, observe, |observe| job.train(&budget, observe))?;
-    let report = job.report(budget.preset, &trained);
+    let report = Report {
+        warnings: warnings.take(),
+        ..job.report(budget.preset, &trained)
+    };
     write(&folder, &trained, &report)?;
     match options.goal.psnr().and_then(|psnr| trained.misses(psnr)) {
         Some(error) => Err(error),

@@ -29,6 +29,7 @@ impl Job<'_> {
             },
             preset,
             effects: EffectReport::of(&scene.plan.decisions),
+            warnings: Vec::new(),
             luma: LumaReport {
                 settings: scene.settings.clone(),
                 iterations: scene.iterations,

@@ -154,7 +154,7 @@ impl Job<'_> {
                         if drawn.antialiased != antialiased {
                             let [is, is_not] = ["antialiased", "not antialiased"];
                             let named = |is_so| if is_so { is } else { is_not };
-                            observe(Event::Note(format!(
+                            observe(Event::Warning(format!(
                                 "{} was trained {}, this run is {}: small Gaussians will have to adapt",
                                 path.display(),
                                 named(drawn.antialiased),

@@ -60,6 +60,20 @@ fn save_16_bits(place: &Place) {
     image.save(place.path(PHOTO)).expect("writable");
 }
 
+/// A TIFF with the tag of a DNG.
+fn save_raw(place: &Place) {
+    let mut file = std::io::Cursor::new(Vec::new());
+    let mut encoder = tiff::encoder::TiffEncoder::new(&mut file).expect("a file");
+    let picture = encoder.new_image::<tiff::encoder::colortype::Gray8>(SIZE[0], SIZE[1]);
+    let mut picture = picture.expect("a picture");
+    let version = tiff::tags::Tag::Unknown(50_706);
+    let tagged = picture.encoder().write_tag(version, &[1_u8, 4, 0, 0][..]);
+    tagged.expect("a tag");
+    let pixels = vec![0; (SIZE[0] * SIZE[1]) as usize];
+    picture.write_data(&pixels).expect("pixels");
+    place.write(PHOTO, file.into_inner());
+}
+
 fn save_mask(place: &Place, name: &str, [width, height]: [u32; 2], value: u8) {
     let path = place.path(name);
     std::fs::create_dir_all(path.parent().expect("a folder")).expect("writable");
@@ -236,6 +250,12 @@ pub(super) const CASES: &[Case] = &[
         |p| p.write(PHOTO, b"II*\0\x08\0\0\0\x0c\0\0\x01"),
         FIT,
         &["03.png", "cannot be decoded", "save it anew"],
+    ),
+    case(
+        "a camera's raw file",
+        save_raw,
+        FIT,
+        &["03.png", "raw file (DNG)", "develop it to TIFF or PNG"],
     ),
     case(
         "a mask of another shape",

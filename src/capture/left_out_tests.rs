@@ -1,0 +1,72 @@
+//! Photos that a capture does without, and cameras that no photo has.
+
+use super::fixtures::{Model, folder, load, load_files, write};
+use super::{Capture, CaptureOptions, Rejected};
+
+#[test]
+fn cameras_without_photos_do_not_matter() {
+    let wide = ("SIMPLE_RADIAL", 2);
+    let strange: [(_, u64, &[f64]); 3] = [
+        (("SIMPLE_PINHOLE", 0), 8, &[0.0, 4.5, 3.5]),
+        (("SIMPLE_PINHOLE", 0), u64::MAX, &[12.0, 4.5, 3.5]),
+        (wide, 8, &[1.5, 4.0, 3.0, -8.1]),
+    ];
+    for (kind, width, parameters) in strange {
+        let sound = load(&Model::of_one_camera()).unwrap();
+        let mut unused = Model::of_one_camera();
+        unused.cameras[1].model = kind;
+        unused.cameras[1].width = width;
+        unused.cameras[1].parameters = parameters.into();
+        let mut used = unused.clone();
+        used.images[1].camera = 3;
+        for extension in ["bin", "txt"] {
+            let load = |model: &Model| match extension {
+                "bin" => load(model),
+                _ => load_files(model, model.text(), extension),
+            };
+            let capture = load(&unused).unwrap();
+            assert_eq!(capture.views.len(), sound.views.len());
+            assert_eq!((capture.rejected.len(), capture.distortion), (0, 0.0));
+            // Its photo goes, with a reason, and the others stay.
+            let capture = load(&used).unwrap();
+            assert_eq!((capture.views.len(), capture.distortion), (2, 0.0));
+            let [photo] = &capture.rejected[..] else {
+                panic!("{:?}", capture.rejected)
+            };
+            assert_eq!(photo.name, "left/a c.png");
+            let named = ["its camera cannot be", "cameras", "camera"];
+            assert!(
+                named.iter().all(|word| photo.reason.contains(word)),
+                "{photo:?}"
+            );
+        }
+    }
+    // Text files have a line for each, whatever it says.
+    let mut unused = Model::of_one_camera();
+    unused.cameras[1].model = ("WARP", 99);
+    let capture = load_files(&unused, unused.text(), "txt").unwrap();
+    assert_eq!(capture.views.len(), 3);
+}
+
+#[test]
+fn photos_that_are_not_wanted_are_left_out() {
+    let model = Model::example();
+    let dir = folder(&model);
+    write(dir.path(), "sparse/0", model.binary(), "bin");
+    let unwanted = Rejected {
+        name: "b.png".into(),
+        reason: "turned".into(),
+    };
+    let options = CaptureOptions {
+        left_out: vec![unwanted.clone()],
+        ..CaptureOptions::default()
+    };
+    let capture = Capture::load_with(dir.path(), &options).unwrap();
+    assert_eq!(capture.rejected, [unwanted]);
+    let names: Vec<&str> = capture.views.iter().map(|v| v.name.as_str()).collect();
+    assert_eq!(names, ["a.png", "left/a c.png"]);
+    // Tracks know the views that are left.
+    assert_eq!(capture.points[0].track.len(), 1);
+    assert_eq!(capture.points[0].track[0].view, 0);
+    assert!(capture.points[1].track.is_empty());
+}

@@ -1,0 +1,153 @@
+//! Photos that are there but have no pose.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::{Capture, CaptureError, colmap, first_views};
+
+/// What photos are called.
+const EXTENSIONS: [&str; 5] = ["jpg", "jpeg", "png", "tif", "tiff"];
+
+/// A share of the photos without a pose that is not worth a word: COLMAP seldom places all.
+const USUAL: f64 = 0.1;
+
+/// More photos without a pose than COLMAP usually leaves, or more photos in another model.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Unplaced {
+    /// Photos that the model knows.
+    pub placed: usize,
+    /// Photos in `images/`.
+    pub photos: usize,
+    /// The model that is used.
+    pub model: PathBuf,
+    /// The model beside it that places the most photos, if these are more.
+    pub better: Option<(PathBuf, u64)>,
+}
+
+impl Unplaced {
+    /// Counts photos and models; none where nearly all photos have a pose and no other model
+    /// has more.
+    ///
+    /// # Errors
+    /// If the capture's model is gone.
+    pub fn of(capture: &Capture) -> Result<Option<Self>, CaptureError> {
+        let views = first_views(&capture.views);
+        let used: BTreeSet<&str> = views.map(|view| view.photo.as_str()).collect();
+        let rejected = capture.rejected.iter();
+        let rejected: BTreeSet<&str> = rejected.map(|photo| photo.name.as_str()).collect();
+        let (mut placed, mut others) = (used.len(), 0);
+        find_photos(&capture.root.join("images"), "", &mut |name| {
+            // That a photo was left out for another reason has been said.
+            placed += usize::from(rejected.contains(name));
+            others += usize::from(!(used.contains(name) || rejected.contains(name)));
+        });
+        let photos = placed + others;
+        let model = colmap::folder(&capture.root)?;
+        let better = best_model(&capture.root, &model);
+        let few = others as f64 > USUAL * photos as f64;
+        Ok((few || better.is_some()).then_some(Self {
+            placed,
+            photos,
+            model,
+            better,
+        }))
+    }
+}
+
+/// Hands every photo's path below `images/` to `found`; a linked folder is not followed, for it
+/// may lead in a circle.
+fn find_photos(dir: &Path, below: &str, found: &mut dyn FnMut(&str)) {
+    for entry in fs::read_dir(dir).into_iter().flatten().flatten() {
+        let Ok(kind) = entry.file_type() else {
+            continue;
+        };
+        let name = format!("{below}{}", entry.file_name().to_string_lossy());
+        let path = entry.path();
+        if kind.is_dir() {
+            find_photos(&path, &(name + "/"), found);
+        } else if path.extension().is_some_and(|extension| {
+            (EXTENSIONS.iter()).any(|known| extension.eq_ignore_ascii_case(known))
+        }) {
+            found(&name);
+        }
+    }
+}
+
+/// The model in a folder of `sparse/` that places the most images, if these are more than those
+/// of the model that is used.
+fn best_model(root: &Path, used: &Path) -> Option<(PathBuf, u64)> {
+    let own = colmap::images_in(used)?;
+    let entries = fs::read_dir(root.join("sparse")).ok()?;
+    let others = entries.flatten().map(|entry| entry.path());
+    let counts = others.filter_map(|path| {
+        let count = colmap::images_in(&path)?;
+        Some((path, count))
+    });
+    // Of several with as many the first by name.
+    counts
+        .filter(|(_, count)| *count > own)
+        .max_by(|(a, more), (b, than)| more.cmp(than).then(b.cmp(a)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::fixtures::{Model, folder, write};
+    use super::super::{CaptureOptions, Rejected};
+    use super::*;
+
+    fn unplaced(dir: &Path) -> Option<Unplaced> {
+        Unplaced::of(&Capture::load(dir).unwrap()).unwrap()
+    }
+
+    #[test]
+    fn photos_without_a_pose_are_counted() {
+        let model = Model::example();
+        let dir = folder(&model);
+        write(dir.path(), "sparse/0", model.binary(), "bin");
+        assert_eq!(unplaced(dir.path()), None);
+        fs::write(dir.path().join("images/notes.txt"), "").unwrap();
+        assert_eq!(unplaced(dir.path()), None);
+        for name in ["d.JPG", "left/e.tif"] {
+            fs::write(dir.path().join("images").join(name), "").unwrap();
+        }
+        let found = unplaced(dir.path()).expect("two of five have no pose");
+        assert_eq!((found.placed, found.photos), (3, 5));
+        assert_eq!(found.better, None);
+        // What is left out has a pose all the same.
+        let options = CaptureOptions {
+            left_out: vec![Rejected {
+                name: "b.png".into(),
+                reason: "turned".into(),
+            }],
+            ..CaptureOptions::default()
+        };
+        let capture = Capture::load_with(dir.path(), &options).unwrap();
+        assert_eq!(Unplaced::of(&capture).unwrap(), Some(found));
+    }
+
+    #[test]
+    fn a_model_that_places_more_is_named() {
+        let all = Model::example();
+        let dir = folder(&all);
+        let mut part = all.clone();
+        part.images.truncate(1);
+        for (extension, files) in [("bin", all.binary()), ("txt", all.text())] {
+            write(dir.path(), "sparse/0", part.binary(), "bin");
+            write(dir.path(), "sparse/1", files, extension);
+            let found = unplaced(dir.path()).expect("one of three has a pose");
+            let better = dir.path().join("sparse/1");
+            assert_eq!(found.better, Some((better.clone(), 3)));
+            assert_eq!((found.placed, found.photos), (1, 3));
+            // As many are not more.
+            write(dir.path(), "sparse/0", all.binary(), "bin");
+            assert_eq!(unplaced(dir.path()), None);
+            fs::remove_dir_all(better).unwrap();
+        }
+        // Nor is what a file cannot hold.
+        let mut lies = all.binary();
+        lies[1][..8].copy_from_slice(&u64::MAX.to_le_bytes());
+        write(dir.path(), "sparse/1", lies, "bin");
+        assert_eq!(unplaced(dir.path()), None);
+    }
+}

@@ -1,0 +1,316 @@
+//! Whether photos and model can be worked with, and what is told where that is doubtful.
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::{Event, Observer, RunError, Stage, scene};
+use crate::{
+    capture::{
+        Camera, Capture, CaptureError, Dataset, Headers, LoadOptions, Rejected, Shrunk, Unplaced,
+        first_views,
+    },
+    effects::{
+        Agreement, Cause, Contradiction, Contradictory, Evidence, FEW_POINTS, PointColors,
+        Reprojection, Survey, Unseeing, listed, observe_where_projected,
+    },
+};
+
+/// Fewer photos make no scene: before as few are left, all are used.
+const FEWEST: usize = 2;
+
+/// How well photos, poses and points agree; each figure `None` where nothing tells.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Soundness {
+    /// The median distance of observations from where their points project, in pixels at
+    /// working size; infinite, in JSON `null`, where most points lie behind the cameras.
+    pub reprojection_error: Option<f64>,
+    /// The lowest correlation, -1 to 1, of what a photo shows at the points with their colors.
+    pub lowest_correlation: Option<f64>,
+    /// That of the photo in the middle.
+    pub median_correlation: Option<f64>,
+}
+
+/// A capture that can be worked with.
+pub(super) struct Examined {
+    pub dataset: Dataset,
+    /// What its photos say.
+    pub evidence: Evidence,
+    /// How well it agreed before anything was left out.
+    pub soundness: Soundness,
+}
+
+/// What follows from the model alone.
+pub(super) struct Model {
+    /// See [`Soundness`].
+    pub reprojection_error: Option<f64>,
+    /// Photos with poses that contradict it.
+    pub photos: Vec<Rejected>,
+    tracks: Tracks,
+}
+
+/// Of what use a model's observations are.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Tracks {
+    /// They are where its points project to.
+    Sound,
+    /// Which photo saw which point is known; where says only the projection.
+    Misplaced,
+    /// There are none, or they belong to something else.
+    Useless,
+}
+
+/// Opens a COLMAP folder and judges the model; of the photos only headers are read.
+///
+/// # Errors
+/// [`RunError::Unsound`] where the model contradicts itself, unless the options say that this
+/// does not matter.
+pub(super) fn open_checked(
+    dir: &Path,
+    options: &LoadOptions,
+    observe: &mut Observer<'_>,
+) -> Result<Dataset, RunError> {
+    let (dataset, model) = open_judged(dir, options, observe)?;
+    for Rejected { name, reason } in &model.photos {
+        observe(Event::Warning(format!("{name}: {reason}")));
+    }
+    Ok(dataset)
+}
+
+/// Opens a COLMAP folder, judges the model and leaves of its observations what is of use.
+fn open_judged(
+    dir: &Path,
+    options: &LoadOptions,
+    observe: &mut Observer<'_>,
+) -> Result<(Dataset, Model), RunError> {
+    let mut dataset = scene::open(dir, options, observe)?;
+    let headers = Headers::read(&dataset.capture.views)?;
+    tell_folder(&dataset.capture, &headers, observe)?;
+    let model = check_model(&dataset.capture, &dataset.cameras, options.force, observe)?;
+    model.mend(&mut dataset.capture);
+    Ok((dataset, model))
+}
+
+/// Opens a COLMAP folder, judges model and photos and examines the photos, each decoded once.
+/// Where single photos contradict the model, all is done again without them.
+///
+/// # Errors
+/// [`RunError::Unsound`] where all contradict it, unless the options say that this does not
+/// matter.
+pub(super) fn open_examined(
+    dir: &Path,
+    options: &LoadOptions,
+    observe: &mut Observer<'_>,
+) -> Result<Examined, RunError> {
+    let (dataset, model) = open_judged(dir, options, observe)?;
+    let (evidence, agreement) = examine(&dataset, observe)?;
+    let soundness = Soundness {
+        reprojection_error: model.reprojection_error,
+        lowest_correlation: agreement.lowest(),
+        median_correlation: agreement.median(),
+    };
+    let mut unfit = model.photos.clone();
+    unfit.extend(unlike(&agreement, &dataset, observe)?);
+    unfit.sort_by(|a, b| a.name.cmp(&b.name));
+    unfit.dedup_by(|b, a| a.name == b.name);
+    let photos = first_views(&dataset.capture.views).count();
+    let all_are_used = options.force || photos < unfit.len() + FEWEST;
+    for Rejected { name, reason } in &unfit {
+        observe(Event::Warning(match all_are_used {
+            true => format!("used {name} all the same: {reason}"),
+            false => format!("left out {name}: {reason}"),
+        }));
+    }
+    let (dataset, evidence) = match unfit.is_empty() || all_are_used {
+        true => (dataset, evidence),
+        false => {
+            let mut options = dataset.options.clone();
+            options.left_out.extend(unfit);
+            // What is to be said has been said.
+            let quietly = &mut |event| {
+                if matches!(event, Event::Progress { .. }) {
+                    observe(event);
+                }
+            };
+            let mut dataset = scene::open(dir, &options, quietly)?;
+            model.mend(&mut dataset.capture);
+            let (evidence, _) = examine(&dataset, quietly)?;
+            (dataset, evidence)
+        }
+    };
+    Ok(Examined {
+        dataset,
+        evidence,
+        soundness,
+    })
+}
+
+/// Judges the model of a capture; `cameras` are those of its views at working size.
+///
+/// # Errors
+/// [`RunError::Unsound`] where it contradicts itself, unless it is `forced`.
+pub(super) fn check_model(
+    capture: &Capture,
+    cameras: &[Camera],
+    forced: bool,
+    observe: &mut Observer<'_>,
+) -> Result<Model, RunError> {
+    let reprojection = Reprojection::of(capture, cameras);
+    let found = (reprojection.as_ref()).and_then(|found| found.contradictory(capture, cameras));
+    let mut model = Model {
+        reprojection_error: reprojection.as_ref().map(|found| found.error),
+        photos: Vec::new(),
+        tracks: match reprojection {
+            Some(_) => Tracks::Sound,
+            None => Tracks::Useless,
+        },
+    };
+    match found {
+        None => {}
+        Some(Contradictory::Some(photos)) => model.photos = photos,
+        Some(Contradictory::All(error)) => {
+            let cameras_are_right = matches!(
+                error,
+                Contradiction::Model {
+                    cause: Cause::Observations(_),
+                    ..
+                }
+            );
+            if !(forced || cameras_are_right) {
+                return Err(error.into());
+            }
+            let (tracks, instead) = match cameras_are_right {
+                true => (
+                    Tracks::Misplaced,
+                    "photos are looked at where points project to",
+                ),
+                false => (Tracks::Useless, "observations are not used"),
+            };
+            observe(Event::Warning(format!("{error}; {instead}")));
+            model.tracks = tracks;
+        }
+    }
+    if model.tracks != Tracks::Sound
+        && let Some(unseeing) = Unseeing::of(capture, cameras)
+    {
+        observe(Event::Warning(of_unseeing(&unseeing)));
+    }
+    Ok(model)
+}
+
+impl Model {
+    /// Leaves of the observations of a capture what is of use.
+    fn mend(&self, capture: &mut Capture) {
+        match self.tracks {
+            Tracks::Sound => {}
+            Tracks::Misplaced => observe_where_projected(capture),
+            Tracks::Useless => (capture.points.iter_mut()).for_each(|point| point.track.clear()),
+        }
+    }
+}
+
+/// Examines all photos, each decoded once; also gives how they agree with the points' colors.
+fn examine(
+    dataset: &Dataset,
+    observe: &mut Observer<'_>,
+) -> Result<(Evidence, Agreement), RunError> {
+    let channel = dataset.options.channel;
+    let mut colors = PointColors::of(&dataset.capture, &dataset.cameras, channel);
+    let mut survey = Survey::new(&dataset.capture, &dataset.cameras, &dataset.split);
+    let all: Vec<usize> = (0..dataset.cameras.len()).collect();
+    dataset.visit(&all, |view, photo| {
+        survey.look(view, photo);
+        colors.look(view, photo);
+        observe(Event::Progress {
+            stage: Stage::Photos,
+            done: view,
+            total: all.len(),
+            message: dataset.capture.views[view].name.clone(),
+        });
+        Ok::<_, CaptureError>(())
+    })?;
+    scene::tell_not_finite(dataset, observe);
+    Ok((survey.finish(), colors.finish(&dataset.capture)))
+}
+
+/// The photos that do not show what COLMAP saw.
+///
+/// # Errors
+/// [`RunError::Unsound`] where these are most of them, unless that does not matter.
+fn unlike(
+    agreement: &Agreement,
+    dataset: &Dataset,
+    observe: &mut Observer<'_>,
+) -> Result<Vec<Rejected>, RunError> {
+    match agreement.contradictory(&dataset.capture) {
+        None => Ok(Vec::new()),
+        Some(Contradictory::Some(photos)) => Ok(photos),
+        Some(Contradictory::All(error)) if dataset.options.force => {
+            observe(Event::Warning(error.to_string()));
+            Ok(Vec::new())
+        }
+        Some(Contradictory::All(error)) => Err(error.into()),
+    }
+}
+
+/// Warns where few of the photos that are there are used, or small versions of them.
+///
+/// # Errors
+/// [`RunError::Capture`] if the model is gone.
+pub(super) fn tell_folder(
+    capture: &Capture,
+    headers: &Headers,
+    observe: &mut Observer<'_>,
+) -> Result<(), RunError> {
+    if let Some(unplaced) = Unplaced::of(capture)? {
+        observe(Event::Warning(of_unplaced(&unplaced)));
+    }
+    if let Some(shrunk) = &headers.shrunk {
+        observe(Event::Warning(of_shrunk(shrunk)));
+    }
+    Ok(())
+}
+
+fn of_unplaced(found: &Unplaced) -> String {
+    let Unplaced {
+        placed,
+        photos,
+        model,
+        better,
+    } = found;
+    let has = format!(
+        "{placed} of {photos} photos in images/ have a pose in {}",
+        model.display()
+    );
+    match better {
+        Some((path, count)) => format!(
+            "{has}, and {} places {count}: put that model in its place",
+            path.display()
+        ),
+        None => format!("{has}: the others are not used"),
+    }
+}
+
+fn of_shrunk(found: &Shrunk) -> String {
+    let Shrunk {
+        count,
+        name,
+        photo: [width, height],
+        camera: [of_camera, by],
+    } = found;
+    format!(
+        "{count} photos are less than half as large as their cameras, such as {name} with {width}×{height} of {of_camera}×{by} pixels: put the photos there that COLMAP saw, unless you shrank them"
+    )
+}
+
+fn of_unseeing(found: &Unseeing) -> String {
+    let (count, total) = (found.photos.len(), found.total);
+    let names = listed(found.photos.iter().map(String::as_str));
+    let center = match found.center_outside {
+        true => ", and a principal point lies outside its photo",
+        false => "",
+    };
+    format!(
+        "{count} of {total} photos have fewer than {FEW_POINTS} of the points before them ({names}){center}: poses or intrinsics may be wrong"
+    )
+}

@@ -1,0 +1,220 @@
+#!/usr/bin/env python3
+"""Runs `info` and `plan` on scenes that contradict themselves and on sound ones, and prints what
+was said of each as Markdown.
+
+    cargo build --release && python3 tools/check_soundness.py CASES [--sound SCENES]
+
+CASES holds `_base`, a sound COLMAP folder with a text model, and cases beside it, each a folder
+that is spoilt in one way. What is one edit away from `_base` is made from it in a temporary
+folder; cases whose photos are changed need Pillow. SCENES holds sound COLMAP folders. What is
+missing is skipped.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+# Folders of CASES that are scenes.
+FOLDERS = [
+    "_base",
+    "model-contradicts-itself/camera-to-world",
+    "observations-at-other-scale/scene",
+    "photos-of-another-model/turned",
+    "most-photos-unused/scene",
+    "thumbnail-first/scene",
+    "alpha-ignored/scene",
+]
+# Cameras files of CASES to be put into `_base`.
+CAMERAS = [f"unused-camera/{name}" for name in ("diverged", "zero-focal", "unknown-model")]
+
+
+def intrinsics(edit: Callable[[list[float]], list[float]]) -> Callable[[Path], None]:
+    """Changes fx, fy, cx, cy of every camera."""
+
+    def spoil(scene: Path) -> None:
+        path = scene / "sparse/0/cameras.txt"
+        lines = []
+        for line in path.read_text().splitlines():
+            if not line.startswith("#"):
+                fields = line.split()
+                values = edit([float(value) for value in fields[4:]])
+                line = " ".join(fields[:4] + [repr(value) for value in values])
+            lines.append(line)
+        path.write_text("\n".join(lines) + "\n")
+
+    return spoil
+
+
+def open_gl(scene: Path) -> None:
+    """Turns y and z of every camera around."""
+    path = scene / "sparse/0/images.txt"
+    lines, image = [], True
+    for line in path.read_text().splitlines():
+        if line.startswith("#"):
+            lines.append(line)
+            continue
+        if image:
+            fields = line.split()
+            w, x, y, z, tx, ty, tz = map(float, fields[1:8])
+            # Half a turn about x, then the pose.
+            pose = (-x, w, -z, y, tx, -ty, -tz)
+            line = " ".join([fields[0], *map(repr, pose), *fields[8:]])
+        image = not image
+        lines.append(line)
+    path.write_text("\n".join(lines) + "\n")
+
+
+def photos(edit: Callable) -> Callable[[Path], None]:
+    """Changes every photo."""
+
+    def spoil(scene: Path) -> None:
+        from PIL import Image
+
+        for path in sorted((scene / "images").iterdir()):
+            with Image.open(path) as photo:
+                changed = edit(photo.copy())
+            changed.save(path, quality=95)
+
+    return spoil
+
+
+def cropped(share: float) -> Callable[[Path], None]:
+    """Cuts a share of each side's length away and enlarges what is left."""
+
+    def edit(photo):
+        width, height = photo.size
+        dx, dy = round(width * share / 2), round(height * share / 2)
+        return photo.crop((dx, dy, width - dx, height - dy)).resize((width, height))
+
+    return photos(edit)
+
+
+def mirrored(photo):
+    return photo.transpose(0)
+
+
+def renumbered(scene: Path) -> None:
+    """Gives each photo the next one's name."""
+    paths = sorted((scene / "images").iterdir())
+    contents = [path.read_bytes() for path in paths]
+    for path, content in zip(paths, contents[1:] + contents[:1]):
+        path.write_bytes(content)
+
+
+def one_turned(scene: Path) -> None:
+    from PIL import Image
+
+    path = sorted((scene / "images").iterdir())[5]
+    with Image.open(path) as photo:
+        turned = photo.rotate(180)
+    turned.save(path, quality=95)
+
+
+def untracked(scene: Path) -> None:
+    """Removes all observations."""
+    path = scene / "sparse/0/points3D.txt"
+    lines = [line if line.startswith("#") else " ".join(line.split()[:8]) for line in path.read_text().splitlines()]
+    path.write_text("\n".join(lines) + "\n")
+
+
+def both(*edits: Callable[[Path], None]) -> Callable[[Path], None]:
+    def spoil(scene: Path) -> None:
+        for edit in edits:
+            edit(scene)
+
+    return spoil
+
+
+EDITS = {
+    "OpenGL axes": open_gl,
+    "intrinsics × 4": intrinsics(lambda values: [4 * value for value in values]),
+    "focal length × 1.5": intrinsics(lambda v: [1.5 * v[0], 1.5 * v[1], v[2], v[3]]),
+    "principal point 0, 0": intrinsics(lambda v: [v[0], v[1], 0.0, 0.0]),
+    "photos mirrored": photos(mirrored),
+    "photos renumbered": renumbered,
+    "photos cropped by 1 %": cropped(0.012),
+    "photos cropped by 10 %": cropped(0.1),
+    "photos cropped by 25 %": cropped(0.25),
+    "one photo turned": one_turned,
+    "photos a third as large": photos(lambda photo: photo.resize([side // 3 for side in photo.size])),
+    "no observations": untracked,
+    "no observations, OpenGL axes": both(untracked, open_gl),
+}
+
+
+def said(done: subprocess.CompletedProcess[str], folder: Path) -> list[str]:
+    """Errors and warnings, without the folder's own path."""
+    lines = [line for line in done.stderr.splitlines() if line.startswith(("error: ", "warning: "))]
+    return [line.replace(f"{folder}/", "").replace(str(folder), "scene") for line in lines]
+
+
+def number(value: float | None) -> str:
+    return "–" if value is None else f"{value:.2f}"
+
+
+def row(program: str, name: str, folder: Path) -> str:
+    """What was said of a scene."""
+    info = subprocess.run([program, "info", folder, "--json"], capture_output=True, text=True)
+    command = [program, "plan", folder, "--json", "--preset", "draft", "--with", "exposure"]
+    plan = subprocess.run(command, capture_output=True, text=True)
+    error = json.loads(info.stdout)["reprojection_error"] if info.returncode == 0 else None
+    soundness = json.loads(plan.stdout)["soundness"] if plan.returncode == 0 else {}
+    lowest, median = (soundness.get(f"{which}_correlation") for which in ("lowest", "median"))
+    figures = f"{number(error)} | {number(lowest)} | {number(median)}"
+    outcome = "<br>".join(said(plan, folder)) or "nothing"
+    return f"| {name} | {figures} | {plan.returncode} | {outcome} |"
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("cases", type=Path, help="folder of cases")
+    parser.add_argument("--sound", type=Path, help="folder of sound scenes")
+    parser.add_argument("--program", default="target/release/gs-chroma")
+    arguments = parser.parse_args()
+    base = arguments.cases / "_base"
+    print("| scene | reprojection error, px | correlation, lowest | median | exit | `plan` says |")
+    print("|---|---|---|---|---|---|")
+
+    def show(name: str, folder: Path) -> None:
+        print(row(arguments.program, name, folder), flush=True)
+
+    def skip(name: str, why: str) -> None:
+        print(f"| {name} | skipped: {why} | | | | |", flush=True)
+
+    for scene in sorted(arguments.sound.iterdir()) if arguments.sound else []:
+        if (scene / "images").is_dir():
+            show(scene.name, scene)
+    for name in FOLDERS:
+        folder = arguments.cases / name
+        show(name, folder) if folder.is_dir() else skip(name, "missing")
+    with tempfile.TemporaryDirectory() as temporary:
+
+        def make(name: str, spoil: Callable[[Path], object]) -> None:
+            if not base.is_dir():
+                return skip(name, "_base is missing")
+            scene = Path(temporary) / "scene"
+            shutil.rmtree(scene, ignore_errors=True)
+            shutil.copytree(base, scene)
+            try:
+                spoil(scene)
+            except (FileNotFoundError, ImportError) as error:
+                return skip(name, str(error))
+            show(name, scene)
+
+        for name in CAMERAS:
+            file = arguments.cases / name / "cameras.txt"
+            make(name, lambda scene: shutil.copy(file, scene / "sparse/0/cameras.txt"))
+        for name, spoil in EDITS.items():
+            make(name, spoil)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
