@@ -6,6 +6,7 @@
 // coarser scale as well.
 import package::common::correction::{Correction, corrected};
 import package::common::numeric::linear_group;
+import package::common::pyramid::place_in_coarser;
 import package::common::view::View;
 import package::common::wanted::{SMOOTHING, wanted_ab};
 
@@ -60,17 +61,13 @@ fn penalty(residual: vec2f, decline: f32, joint: bool) -> Penalty {
 }
 
 // Bilinear sample of the coarser image at this pixel, half-pixel centers.
-// The position is counted in halves of a fine pixel: integers are exact where a
-// quotient in f32 would lose the fraction.
 @if(agreeing) fn upsampled(pixel: vec2u) -> vec2f {
-    let at = max((2u * pixel + 1u) * weights.coarser_size, view.size) - view.size;
-    let low = at / (2u * view.size);
-    let high = min(low + 1u, weights.coarser_size - 1u);
-    let t = vec2f(at % (2u * view.size)) / vec2f(2u * view.size);
+    let x = place_in_coarser(pixel.x, view.size.x, weights.coarser_size.x);
+    let y = place_in_coarser(pixel.y, view.size.y, weights.coarser_size.y);
     let width = weights.coarser_size.x;
-    let top = mix(coarser[low.y * width + low.x], coarser[low.y * width + high.x], t.x);
-    let bottom = mix(coarser[high.y * width + low.x], coarser[high.y * width + high.x], t.x);
-    return mix(top, bottom, t.y);
+    let top = mix(coarser[y.low * width + x.low], coarser[y.low * width + x.high], x.share);
+    let bottom = mix(coarser[y.high * width + x.low], coarser[y.high * width + x.high], x.share);
+    return mix(top, bottom, y.share);
 }
 
 @compute @workgroup_size(256)

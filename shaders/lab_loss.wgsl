@@ -3,6 +3,7 @@
 // and gradient. `agreeing`: a and b shall agree with those of the next coarser scale as well.
 import package::common::lab::{lab_of, rgb_gradient};
 import package::common::numeric::linear_group;
+import package::common::pyramid::place_in_coarser;
 import package::common::view::View;
 import package::common::wanted::{SMOOTHING, wanted_rgb};
 
@@ -73,17 +74,14 @@ fn total_variation(p: u32) -> Distance {
     return sum;
 }
 
-// a and b of the coarser picture at this pixel: bilinear, half-pixel centers, counted in
-// halves of a fine pixel as in `chroma_loss`.
+// a and b of the coarser picture at this pixel, bilinear.
 @if(agreeing) fn upsampled(pixel: vec2u) -> vec2f {
-    let at = max((2u * pixel + 1u) * parameters.coarser_size, view.size) - view.size;
-    let low = at / (2u * view.size);
-    let high = min(low + 1u, parameters.coarser_size - 1u);
-    let t = vec2f(at % (2u * view.size)) / vec2f(2u * view.size);
+    let x = place_in_coarser(pixel.x, view.size.x, parameters.coarser_size.x);
+    let y = place_in_coarser(pixel.y, view.size.y, parameters.coarser_size.y);
     let width = parameters.coarser_size.x;
-    let top = mix(coarser_ab(low.y * width + low.x), coarser_ab(low.y * width + high.x), t.x);
-    let bottom = mix(coarser_ab(high.y * width + low.x), coarser_ab(high.y * width + high.x), t.x);
-    return mix(top, bottom, t.y);
+    let top = mix(coarser_ab(y.low * width + x.low), coarser_ab(y.low * width + x.high), x.share);
+    let bottom = mix(coarser_ab(y.high * width + x.low), coarser_ab(y.high * width + x.high), x.share);
+    return mix(top, bottom, y.share);
 }
 
 @if(agreeing) fn coarser_ab(p: u32) -> vec2f {

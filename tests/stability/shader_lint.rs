@@ -274,6 +274,11 @@ const REASONS: &[(&str, &str, &str)] = &[
         "bases are kept above POWER_FROM or CUBE_ROOT_FROM, exponents below 1",
     ),
     ("lab_of", "rgb / 12.92", "a constant divisor"),
+    (
+        "place_in_coarser",
+        "f32(at % (2u * size)) / f32(2u * size)",
+        "the kernel runs for images of at least one pixel",
+    ),
     ("wanted_ab", "vec2f(halves) / 256.0", "a constant divisor"),
     (
         "wanted_rgb",
@@ -325,11 +330,6 @@ const REASONS: &[(&str, &str, &str)] = &[
         "uniform_above_zero",
         "(f32(bits >> 8u) + 1.0) / 16777216.0",
         "a constant divisor",
-    ),
-    (
-        "upsampled",
-        "vec2f(at % (2u * view.size)) / vec2f(2u * view.size)",
-        "the kernel runs for images of at least one pixel",
     ),
     (
         "gathered",
