@@ -64,6 +64,7 @@ pub mod oracle;
 pub mod raster;
 pub mod report;
 pub mod run;
+mod sections;
 pub mod splats;
 #[cfg(feature = "cli")]
 pub mod tradeoff;

@@ -84,6 +84,11 @@ impl RunFolder {
         self.0.join("report.json")
     }
 
+    /// What an interrupted training goes on from.
+    pub fn checkpoint(&self) -> PathBuf {
+        self.0.join("checkpoint")
+    }
+
     /// The losses.
     pub fn log(&self) -> PathBuf {
         self.0.join("log.csv")

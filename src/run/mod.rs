@@ -3,6 +3,7 @@
 mod colorize;
 mod eval;
 pub(crate) mod files;
+mod fingerprint;
 mod fit;
 mod folder;
 mod foreign;
@@ -18,7 +19,7 @@ use std::{cell::RefCell, fmt, path::PathBuf};
 
 pub use colorize::{ColorizeOptions, Output, colorize};
 pub use eval::{EvalOptions, eval};
-pub use fit::{AheadOptions, FitOptions, Overlay, fit};
+pub use fit::{AheadOptions, CheckpointOptions, EVERY, FitOptions, Interrupt, Overlay, fit};
 pub use folder::RunFolder;
 pub use info::{export, info};
 pub use plan::{PlanOptions, Planned, plan};
@@ -99,6 +100,28 @@ pub enum RunError {
     /// Photos that are to give the colors have none.
     #[error("{}: these photos are gray: name a teacher that colors them", .0.display())]
     GrayPhotos(PathBuf),
+    /// The system does not let the program hear of signals.
+    #[error("signals cannot be heeded: {0}")]
+    Signals(String),
+    /// There is no training that was interrupted.
+    #[error("{}: nothing to go on with: the run is finished", .0.display())]
+    NothingToResume(PathBuf),
+    /// A checkpoint of another training.
+    #[error("{}: belongs to another training: {differs}", path.display())]
+    OtherCheckpoint {
+        /// The checkpoint.
+        path: PathBuf,
+        /// What was otherwise.
+        differs: String,
+    },
+    /// A training was ended from outside, and can go on.
+    #[error("interrupted after iteration {iteration}; {} goes on from there", path.display())]
+    Interrupted {
+        /// Iterations done.
+        iteration: usize,
+        /// The checkpoint.
+        path: PathBuf,
+    },
     /// Nothing is left for stage 2.
     #[error("stage 1 already took {luma} iterations: choose a larger number")]
     NothingUntil {

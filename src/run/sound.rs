@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::{Event, Observer, RunError, Stage, scene};
+use super::{Event, Observer, RunError, Stage, fingerprint::Fingerprint, scene};
 use crate::{
     capture::{
         Camera, Capture, CaptureError, Dataset, Headers, LoadOptions, Rejected, Shrunk, Unplaced,
@@ -38,6 +38,8 @@ pub(super) struct Examined {
     pub evidence: Evidence,
     /// How well it agreed before anything was left out.
     pub soundness: Soundness,
+    /// Photos, cameras and points in a few digits.
+    pub fingerprint: String,
 }
 
 /// What follows from the model alone.
@@ -103,7 +105,7 @@ pub(super) fn open_examined(
     observe: &mut Observer<'_>,
 ) -> Result<Examined, RunError> {
     let (dataset, model) = open_judged(dir, options, observe)?;
-    let (evidence, agreement) = examine(&dataset, observe)?;
+    let (evidence, agreement, fingerprint) = examine(&dataset, observe)?;
     let soundness = Soundness {
         reprojection_error: model.reprojection_error,
         lowest_correlation: agreement.lowest(),
@@ -121,8 +123,8 @@ pub(super) fn open_examined(
             false => format!("left out {name}: {reason}"),
         }));
     }
-    let (dataset, evidence) = match unfit.is_empty() || all_are_used {
-        true => (dataset, evidence),
+    let (dataset, evidence, fingerprint) = match unfit.is_empty() || all_are_used {
+        true => (dataset, evidence, fingerprint),
         false => {
             let mut options = dataset.options.clone();
             options.left_out.extend(unfit);
@@ -134,14 +136,15 @@ pub(super) fn open_examined(
             };
             let mut dataset = scene::open(dir, &options, quietly)?;
             model.mend(&mut dataset.capture);
-            let (evidence, _) = examine(&dataset, quietly)?;
-            (dataset, evidence)
+            let (evidence, _, fingerprint) = examine(&dataset, quietly)?;
+            (dataset, evidence, fingerprint)
         }
     };
     Ok(Examined {
         dataset,
         evidence,
         soundness,
+        fingerprint,
     })
 }
 
@@ -209,11 +212,13 @@ impl Model {
     }
 }
 
-/// Examines all photos, each decoded once; also gives how they agree with the points' colors.
+/// Examines all photos, each decoded once; also gives how they agree with the points' colors,
+/// and all of it in a few digits.
 fn examine(
     dataset: &Dataset,
     observe: &mut Observer<'_>,
-) -> Result<(Evidence, Agreement), RunError> {
+) -> Result<(Evidence, Agreement, String), RunError> {
+    let mut fingerprint = Fingerprint::default();
     let channel = dataset.options.channel;
     let mut colors = PointColors::of(&dataset.capture, &dataset.cameras, channel);
     let mut survey = Survey::new(&dataset.capture, &dataset.cameras, &dataset.split);
@@ -221,6 +226,7 @@ fn examine(
     dataset.visit(&all, |view, photo| {
         survey.look(view, photo);
         colors.look(view, photo);
+        fingerprint.look(dataset, view, photo);
         observe(Event::Progress {
             stage: Stage::Photos,
             done: view,
@@ -230,7 +236,9 @@ fn examine(
         Ok::<_, CaptureError>(())
     })?;
     scene::tell_not_finite(dataset, observe);
-    Ok((survey.finish(), colors.finish(&dataset.capture)))
+    let agreement = colors.finish(&dataset.capture);
+    let fingerprint = fingerprint.finish(&dataset.capture);
+    Ok((survey.finish(), agreement, fingerprint))
 }
 
 /// The photos that do not show what COLMAP saw.

@@ -24,6 +24,7 @@ mod photos;
 mod picture;
 mod program;
 mod repeat;
+mod resume;
 mod scene;
 mod shared;
 mod solver;

@@ -2,6 +2,7 @@
 
 mod ahead;
 mod budget;
+mod checkpoint;
 mod report;
 mod training;
 
@@ -22,6 +23,8 @@ use crate::{
 use ahead::Ahead;
 pub use ahead::AheadOptions;
 use budget::Budget;
+pub use checkpoint::{CheckpointOptions, EVERY, Interrupt};
+use checkpoint::{Found, question, tell_given_up};
 pub(super) use report::capture_report;
 use training::{Job, Trained};
 
@@ -55,6 +58,8 @@ pub struct FitOptions {
     pub timings: bool,
     /// Who is to color the photos meanwhile.
     pub ahead: AheadOptions,
+    /// How it can go on where it is interrupted.
+    pub checkpoints: CheckpointOptions,
 }
 
 impl FitOptions {
@@ -72,6 +77,7 @@ impl FitOptions {
             goal: Goal::Fixed,
             timings: false,
             ahead: AheadOptions::default(),
+            checkpoints: CheckpointOptions::default(),
         }
     }
 }
@@ -85,7 +91,7 @@ pub fn fit(
     options: &FitOptions,
     observe: &mut Observer<'_>,
 ) -> Result<(RunFolder, Report), RunError> {
-    let begun = Instant::now();
+    let mut begun = Instant::now();
     let warnings = RefCell::default();
     let observe = &mut keeping(&warnings, observe);
     let gpu = open_gpu(options.timings)?;
@@ -96,7 +102,18 @@ pub fn fit(
     };
     files::make_folder(folder.path())?;
     let ahead = Ahead::open(&options.ahead, &folder)?;
-    let budget = Budget::of(options, &raster, begun, observe)?;
+    let found = match options.checkpoints.resume {
+        true => Found::in_folder(&folder, observe)?,
+        false => {
+            tell_given_up(&folder.checkpoint(), observe);
+            None
+        }
+    };
+    // How much there is time for was found out once.
+    let budget = match &found {
+        Some(found) if options.goal.seconds().is_some() => found.budget(),
+        _ => Budget::of(options, &raster, begun, observe)?,
+    };
     let load = LoadOptions {
         max_side: budget.work.max_side,
         lens: options.overrules.choice(Effect::Lens),
@@ -104,6 +121,17 @@ pub fn fit(
     };
     let examined = open_examined(&options.colmap_dir, &load, observe)?;
     let (dataset, evidence) = (Arc::new(examined.dataset), examined.evidence);
+    let question = question(
+        options,
+        &budget,
+        &dataset.options,
+        &gpu,
+        &examined.fingerprint,
+    )?;
+    if let Some(found) = &found {
+        found.check(&question)?;
+        begun = found.begun();
+    }
     let judge = match options.measure_side {
         Some(_) => {
             let load = LoadOptions {
@@ -125,12 +153,15 @@ pub fn fit(
         begun,
         loading: begun.elapsed().as_secs_f64(),
     };
-    let trained = ahead.meanwhile(&dataset, observe, |observe| job.train(&budget, observe))?;
+    let trained = ahead.meanwhile(&dataset, observe, |observe| {
+        job.train(&budget, &folder, question, found.as_ref(), observe)
+    })?;
     let report = Report {
         warnings: warnings.take(),
         ..job.report(budget.preset, &trained)
     };
     write(&folder, &trained, &report)?;
+    files::remove(&folder.checkpoint())?;
     match options.goal.psnr().and_then(|psnr| trained.misses(psnr)) {
         Some(error) => Err(error),
         None => Ok((folder, report)),
