@@ -2,13 +2,10 @@
 
 use std::{
     collections::BTreeMap,
-    io::{self, BufWriter, Write},
-    path::Path,
+    io::{self, Write},
 };
 
 use sha2::{Digest, Sha256};
-
-use crate::atomic_file;
 
 /// What the file begins with.
 const MAGIC: &[u8] = b"gs-chroma sections\n";
@@ -16,15 +13,13 @@ const MAGIC: &[u8] = b"gs-chroma sections\n";
 /// Bytes of the SHA-256.
 const SUM: usize = 32;
 
-/// Writes sections beside `path` and renames, once they are on the disk; gives the file's size.
+/// Writes sections; gives how many bytes these take.
 ///
 /// # Errors
-/// The system's.
-pub(crate) fn write(path: &Path, sections: &[(&str, &[u8])]) -> io::Result<u64> {
-    let mut file = atomic_file::create(path)?;
+/// The writer's.
+pub(crate) fn write(to: &mut dyn Write, sections: &[(&str, &[u8])]) -> io::Result<u64> {
     let mut hasher = Sha256::new();
     let mut size = 0;
-    let mut to = BufWriter::new(file.as_file_mut());
     let mut put = |bytes: &[u8]| {
         hasher.update(bytes);
         size += bytes.len() as u64;
@@ -38,19 +33,7 @@ pub(crate) fn write(path: &Path, sections: &[(&str, &[u8])]) -> io::Result<u64> 
         put(bytes)?;
     }
     to.write_all(&hasher.finalize())?;
-    to.flush()?;
-    drop(to);
-    file.as_file().sync_all()?;
-    file.persist(path)?;
     Ok(size + SUM as u64)
-}
-
-/// Reads what [`write`] wrote; `None` of a file that is damaged or something else.
-///
-/// # Errors
-/// The system's.
-pub(crate) fn read(path: &Path) -> io::Result<Option<BTreeMap<String, Vec<u8>>>> {
-    Ok(parse(&std::fs::read(path)?))
 }
 
 /// In hexadecimal.
@@ -59,7 +42,8 @@ pub(crate) fn sha256(bytes: &[u8]) -> String {
     sum.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-fn parse(bytes: &[u8]) -> Option<BTreeMap<String, Vec<u8>>> {
+/// What [`write`] wrote; `None` of what is damaged or something else.
+pub(crate) fn read(bytes: &[u8]) -> Option<BTreeMap<String, Vec<u8>>> {
     let (body, sum) = bytes.split_at_checked(bytes.len().checked_sub(SUM)?)?;
     if Sha256::digest(body)[..] != *sum {
         return None;
@@ -86,32 +70,36 @@ fn take<'a>(rest: &mut &'a [u8]) -> Option<&'a [u8]> {
 mod tests {
     use super::*;
 
-    #[test]
-    fn sections_come_back() {
-        let place = tempfile::tempdir().unwrap();
-        let path = place.path().join("kept");
-        let size = write(&path, &[("one", b"1"), ("none", b""), ("two", &[7; 300])]).unwrap();
-        assert_eq!(size, std::fs::metadata(&path).unwrap().len());
-        let found = read(&path).unwrap().unwrap();
-        assert_eq!(found.len(), 3);
-        assert_eq!(found["two"], [7; 300]);
-        assert!(found["none"].is_empty());
-        assert!(read(&place.path().join("nowhere")).is_err());
+    fn written(sections: &[(&str, &[u8])]) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        let size = write(&mut bytes, sections).unwrap();
+        assert_eq!(size, bytes.len() as u64);
+        bytes
     }
 
     #[test]
-    fn a_damaged_file_is_none() {
-        let place = tempfile::tempdir().unwrap();
-        let path = place.path().join("kept");
-        write(&path, &[("one", &[3; 40])]).unwrap();
-        let whole = std::fs::read(&path).unwrap();
+    fn sections_come_back() {
+        let found = read(&written(&[
+            ("one", b"1"),
+            ("none", b""),
+            ("two", &[7; 300]),
+        ]));
+        let found = found.unwrap();
+        assert_eq!(found.len(), 3);
+        assert_eq!(found["two"], [7; 300]);
+        assert!(found["none"].is_empty());
+    }
+
+    #[test]
+    fn damaged_bytes_are_none() {
+        let whole = written(&[("one", &[3; 40])]);
         for length in 0..whole.len() {
-            assert!(parse(&whole[..length]).is_none());
+            assert!(read(&whole[..length]).is_none());
         }
         for at in 0..whole.len() {
             let mut other = whole.clone();
             other[at] ^= 0x10;
-            assert!(parse(&other).is_none(), "{at}");
+            assert!(read(&other).is_none(), "{at}");
         }
     }
 
@@ -124,7 +112,7 @@ mod tests {
             bytes.push(b'x');
             let sum = Sha256::digest(&bytes);
             bytes.extend(sum);
-            assert!(parse(&bytes).is_none());
+            assert!(read(&bytes).is_none());
         }
     }
 }

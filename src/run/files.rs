@@ -2,7 +2,7 @@
 
 use std::{
     fs,
-    io::{self, Write},
+    io::{self, BufWriter, Write},
     path::Path,
 };
 
@@ -22,10 +22,25 @@ pub(crate) fn at(path: &Path) -> impl FnOnce(std::io::Error) -> RunError {
 
 /// Writes beside and renames.
 pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), RunError> {
-    let mut file = atomic_file::create(path).map_err(at(path))?;
-    file.write_all(bytes).map_err(at(path))?;
-    file.persist(path).map_err(|error| at(path)(error.error))?;
-    Ok(())
+    write_by(path, |to| to.write_all(bytes))
+}
+
+/// Lets `fill` write beside, and renames what is on the disk.
+pub(super) fn write_by<T>(
+    path: &Path,
+    fill: impl FnOnce(&mut dyn Write) -> io::Result<T>,
+) -> Result<T, RunError> {
+    let filled = || {
+        let mut file = atomic_file::create(path)?;
+        let mut to = BufWriter::new(file.as_file_mut());
+        let made = fill(&mut to)?;
+        to.flush()?;
+        drop(to);
+        file.as_file().sync_all()?;
+        file.persist(path)?;
+        Ok(made)
+    };
+    filled().map_err(at(path))
 }
 
 /// Writes a PNG beside and renames.

@@ -124,8 +124,8 @@ impl Found {
             path: path.clone(),
             reason: format!("{reason}: remove it, and train anew"),
         };
-        let sections = sections::read(&path).map_err(files::at(&path))?;
-        let sections = sections.ok_or_else(|| damaged("is damaged"))?;
+        let bytes = std::fs::read(&path).map_err(files::at(&path))?;
+        let sections = sections::read(&bytes).ok_or_else(|| damaged("is damaged"))?;
         let header = sections.get("run").map(Vec::as_slice).unwrap_or_default();
         let version = serde_json::from_slice::<Value>(header).ok();
         if version.is_none_or(|header| header["version"] != VERSION) {
@@ -285,7 +285,7 @@ impl<'a> FolderKeeper<'a> {
         let training = checkpoint.to_sections();
         let mut all = vec![("run", header.as_slice())];
         all.extend(training.iter().map(|(name, bytes)| (&name[..], &bytes[..])));
-        sections::write(&self.path, &all).map_err(files::at(&self.path))
+        files::write_by(&self.path, |to| sections::write(to, &all))
     }
 }
 
