@@ -1,6 +1,7 @@
 //! Whole runs: what a command does from its options to its files.
 
 mod colorize;
+mod commit;
 mod eval;
 pub(crate) mod files;
 mod fingerprint;
@@ -8,6 +9,7 @@ mod fit;
 mod folder;
 mod foreign;
 mod info;
+mod lock;
 mod plan;
 mod preset;
 mod render;
@@ -103,6 +105,14 @@ pub enum RunError {
     /// The system does not let the program hear of signals.
     #[error("signals cannot be heeded: {0}")]
     Signals(String),
+    /// Another process writes into the run.
+    #[error("{}: {holder} is writing into it: wait for it, or choose another folder with -o", folder.display())]
+    InUse {
+        /// The run's folder.
+        folder: PathBuf,
+        /// Who it is.
+        holder: String,
+    },
     /// There is no training that was interrupted.
     #[error("{}: nothing to go on with: the run is finished", .0.display())]
     NothingToResume(PathBuf),

@@ -9,7 +9,8 @@ mod training;
 use std::{cell::RefCell, path::PathBuf, sync::Arc, time::Instant};
 
 use super::{
-    Observer, Preset, RunError, RunFolder, files, keeping, scene::open, sound::open_examined,
+    Observer, Preset, RunError, RunFolder, commit::Commit, files, keeping, lock::RunLock,
+    scene::open, sound::open_examined,
 };
 use crate::{
     capture::LoadOptions,
@@ -101,6 +102,7 @@ pub fn fit(
         None => RunFolder::for_capture(&options.colmap_dir),
     };
     files::make_folder(folder.path())?;
+    let _lock = RunLock::take(folder.path())?;
     let ahead = Ahead::open(&options.ahead, &folder)?;
     let found = match options.checkpoints.resume {
         true => Found::in_folder(&folder, observe)?,
@@ -161,7 +163,6 @@ pub fn fit(
         ..job.report(budget.preset, &trained)
     };
     write(&folder, &trained, &report)?;
-    files::remove(&folder.checkpoint())?;
     match options.goal.psnr().and_then(|psnr| trained.misses(psnr)) {
         Some(error) => Err(error),
         None => Ok((folder, report)),
@@ -170,16 +171,25 @@ pub fn fit(
 
 /// Writes the run's files in the place of those of an earlier one.
 fn write(folder: &RunFolder, trained: &Trained, report: &Report) -> Result<(), RunError> {
+    let mut commit = Commit::new(folder.path())?;
     // The old colors do not belong to the new geometry.
-    for stale in [folder.color(), folder.chroma(), folder.contact_sheet()] {
-        files::remove(&stale)?;
+    for stale in [
+        folder.color(),
+        folder.chroma(),
+        folder.contact_sheet(),
+        folder.evaluation(),
+        folder.checkpoint(),
+    ] {
+        commit.remove(&stale);
     }
-    folder.forget_evaluation()?;
+    commit.remove_page(&folder.evaluation_page());
     let comments = comments(trained.scene.settings.raster_options());
     let origin = glam::DVec3::ZERO;
-    ply::write_ply(&folder.luma(), &trained.scene.splats, origin, &comments)?;
-    files::write(&folder.log(), trained.log.as_bytes())?;
-    folder.write_report(report)
+    let luma = commit.place(&folder.luma());
+    ply::write_ply(&luma, &trained.scene.splats, origin, &comments)?;
+    files::write(&commit.place(&folder.log()), trained.log.as_bytes())?;
+    files::write(&commit.place(&folder.report()), &report.to_file())?;
+    commit.finish()
 }
 
 /// The device; with `timed`, its dispatches are.
