@@ -6,6 +6,8 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
+use super::names::Ambiguous;
+
 /// Where in a file something is wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Position {
@@ -213,15 +215,15 @@ pub enum CaptureError {
         /// The photo's width and height.
         size: [u32; 2],
     },
+    /// Nobody knows which mask belongs to which photo.
+    #[error(transparent)]
+    Mask(#[from] Ambiguous),
     /// Nothing of a photo is left.
-    #[error(
-        "{path}: {}; mend it, or remove the photo with COLMAP's image_deleter",
-        .mask.as_ref().map_or("has no finite value".into(), |m| format!("its mask {} leaves no pixel", m.display()))
-    )]
+    #[error("{path}: {reason}; mend it, or remove the photo with COLMAP's image_deleter")]
     NothingCounts {
         /// The photo.
         path: PathBuf,
-        /// Its mask, if it has one.
-        mask: Option<PathBuf>,
+        /// What leaves nothing of it.
+        reason: String,
     },
 }

@@ -299,17 +299,11 @@ struct Source {
 impl Source {
     fn find(options: &ColorizeOptions) -> Result<Self, RunError> {
         match &options.run {
-            Some(path)
-                if path
-                    .extension()
-                    .is_some_and(|e| e.eq_ignore_ascii_case("ply")) =>
-            {
-                Ok(Self {
-                    folder: None,
-                    report: None,
-                    splats: path.clone(),
-                })
-            }
+            Some(path) if ply::is_splat_file(path)? => Ok(Self {
+                folder: None,
+                report: None,
+                splats: path.clone(),
+            }),
             run => {
                 let folder = match run {
                     Some(path) => RunFolder::at(path),

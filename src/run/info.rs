@@ -10,7 +10,7 @@ use super::{
     fit::comments,
     keeping,
     scene::tell_skipped,
-    sound::{check_model, tell_folder},
+    sound::{check_model, tell_folder, tell_masks},
 };
 use crate::{
     capture::{Camera, Capture, Headers, LoadOptions, Loader, Normalize, Rejected},
@@ -52,9 +52,11 @@ fn colmap_info(path: &Path, observe: &mut Observer<'_>) -> Result<Value, RunErro
         normalize: Normalize::Off,
         ..LoadOptions::default()
     };
-    let masked = Loader::open(&capture, &options)?.masked_views(views);
+    let loader = Loader::open(&capture, &options)?;
+    let masked = loader.masked_views(views);
     let headers = Headers::read(views)?;
     tell_folder(&capture, &headers, &mut observe)?;
+    tell_masks(loader.masked(), &mut observe);
     // What size they will be worked on is the preset's to say.
     let cameras: Vec<Camera> = views.iter().map(|view| view.camera.clone()).collect();
     let forced = true;
@@ -81,7 +83,7 @@ fn colmap_info(path: &Path, observe: &mut Observer<'_>) -> Result<Value, RunErro
 fn splat_info(path: &Path, observe: &mut Observer<'_>) -> Result<Value, RunError> {
     let warnings = RefCell::default();
     let read = ply::read_ply(path)?;
-    tell_skipped(path, read.skipped, &mut keeping(&warnings, observe));
+    tell_skipped(path, &read, &mut keeping(&warnings, observe));
     let splats = &read.splats;
     let bound = |pick: fn(f32, f32) -> f32, start: f32| -> [f32; 3] {
         std::array::from_fn(|axis| {
@@ -111,6 +113,9 @@ fn splat_info(path: &Path, observe: &mut Observer<'_>) -> Result<Value, RunError
 /// # Errors
 /// [`RunError`].
 pub fn export(run: Option<&Path>, output: &Path, luma: bool) -> Result<usize, RunError> {
+    if let Some(path) = run {
+        ply::is_splat_file(path)?;
+    }
     let folder = match run {
         Some(path) => RunFolder::at(path),
         None => RunFolder::newest()?,

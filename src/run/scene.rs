@@ -9,7 +9,7 @@ use crate::{
     capture::{Dataset, LoadOptions, Notice, Rejected},
     luma::TrialProgress,
     raster::RasterOptions,
-    splats::{Splats, ply},
+    splats::{ReadSplats, Splats, ply},
 };
 
 /// Opens a COLMAP folder; nothing is decoded but what [`Dataset::open`] has to.
@@ -61,11 +61,17 @@ pub(super) fn tell_not_finite(dataset: &Dataset, observe: &mut Observer<'_>) {
 }
 
 /// Warns of Gaussians of a splat file that are not used.
-pub(super) fn tell_skipped(path: &Path, count: usize, observe: &mut Observer<'_>) {
-    if count > 0 {
+pub(super) fn tell_skipped(path: &Path, read: &ReadSplats, observe: &mut Observer<'_>) {
+    let (path, skipped, surplus) = (path.display(), read.skipped, read.surplus);
+    if skipped > 0 {
         observe(Event::Warning(format!(
-            "{}: skipped {count} Gaussians with values that are not finite or no rotation",
-            path.display()
+            "{path}: skipped {skipped} Gaussians with values that are not finite or no rotation"
+        )));
+    }
+    if surplus > 0 {
+        observe(Event::Warning(format!(
+            "{path}: {surplus} bytes follow the {} Gaussians that the header announces, and are not read: its count may be too small",
+            read.splats.len() + skipped
         )));
     }
 }
@@ -78,7 +84,7 @@ pub(super) fn read_splats(
     observe: &mut Observer<'_>,
 ) -> Result<(Splats, RasterOptions), RunError> {
     let read = ply::read_ply(path)?;
-    tell_skipped(path, read.skipped, observe);
+    tell_skipped(path, &read, observe);
     let mut splats = read.splats;
     if splats.is_empty() {
         return Err(RunError::NoSplats(path.to_owned()));
