@@ -81,6 +81,20 @@ pub enum CaptureError {
         /// What is wrong.
         reason: String,
     },
+    /// An image's name leads to no photo.
+    #[error(
+        "{path}: {record}, {position}: {reason}; rename the photos and run COLMAP again, or edit the names in images.txt (COLMAP's model_converter writes one)"
+    )]
+    ImageName {
+        /// The images file.
+        path: PathBuf,
+        /// The record, such as `image 3 of 12`.
+        record: String,
+        /// Where in the file.
+        position: Position,
+        /// What is wrong with the name.
+        reason: String,
+    },
     /// A camera's model is not one of COLMAP's.
     #[error(
         "{path}: camera {camera_id} has the model {model}, which is none of COLMAP 4.2's; run its image_undistorter and give the output folder"

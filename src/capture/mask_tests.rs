@@ -144,7 +144,7 @@ fn a_mask_of_two_photos_is_refused() {
     write(dir.path(), "sparse/0", model.binary(), "bin");
     let capture = Capture::load(dir.path()).unwrap();
     put(&capture, "b.png", half(SIZE.0, SIZE.1, 255));
-    let words = ["masks/b.png", "b.jpg", "b.jpeg", "b.jpg.png"];
+    let words = ["masks/b.png", "b.jpg", "b.jpeg", "b.jpeg.png"];
     assert_fails(&capture, MaskSource::Beside, &words);
 }
 

@@ -30,6 +30,8 @@ mod fixtures;
 #[cfg(test)]
 mod left_out_tests;
 #[cfg(test)]
+mod name_tests;
+#[cfg(test)]
 mod tests;
 #[cfg(test)]
 mod thumbnail_tests;

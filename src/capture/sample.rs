@@ -52,7 +52,7 @@ pub(super) struct Header {
 impl Header {
     /// Whether the last channel is alpha.
     pub fn has_alpha(&self) -> bool {
-        self.channels % 2 == 0
+        self.channels.is_multiple_of(2)
     }
 }
 
