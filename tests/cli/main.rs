@@ -20,6 +20,8 @@ mod fetch;
 #[cfg(target_os = "linux")]
 mod host;
 mod inspect;
+mod masks;
+mod names;
 mod photos;
 mod picture;
 mod program;

@@ -4,8 +4,10 @@ use super::error::first_line;
 use super::query::Original;
 use super::{GrayImage, Query, TeacherError};
 use crate::capture::Capture;
-use crate::capture::names::{NamedFiles, known, visit_files};
-use image::DynamicImage;
+use crate::capture::names::{NamedFiles, known, stem, visit_files};
+use image::{DynamicImage, ImageFormat};
+use std::fs::File;
+use std::io::Read;
 use std::path::Path;
 
 /// How far the aspects of photo and image may differ: rounding to whole pixels
@@ -126,9 +128,24 @@ impl NamedImages {
     }
 }
 
+/// Whether a file's name says that it is an image that can be read, or its first bytes do where
+/// its name does not say that it is a picture.
 fn is_image(path: &Path) -> bool {
     let extension = path.extension().unwrap_or_default();
-    ["png", "jpg", "jpeg"]
+    let named = ["png", "jpg", "jpeg"];
+    if named
         .iter()
         .any(|known| extension.eq_ignore_ascii_case(known))
+    {
+        return true;
+    }
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let mut magic = Vec::new();
+    let read = |mut file: File| file.by_ref().take(16).read_to_end(&mut magic);
+    stem(&name) == name
+        && File::open(path).and_then(read).is_ok()
+        && matches!(
+            image::guess_format(&magic),
+            Ok(ImageFormat::Png | ImageFormat::Jpeg)
+        )
 }
