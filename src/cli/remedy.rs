@@ -35,6 +35,9 @@ pub(super) fn of_run(error: &RunError) -> String {
         RunError::NoSplats(_) => {
             format!("{error}: name another file, or train again with `gs-chroma fit`")
         }
+        RunError::Coarse { .. } => format!(
+            "{error}: leave --colmap-coordinates out, and the file lies near the origin and says by how much"
+        ),
         RunError::NoHeldOut => format!("{error}: choose --views train or --views all"),
         RunError::NothingPainted(_) => format!("{error}, or give a --teacher as well"),
         RunError::NothingUntil { until, .. } => format!("--until {until}: {error}"),

@@ -9,12 +9,14 @@ use std::{
     time::Instant,
 };
 
+use glam::DVec3;
+
 use super::{
     Event, Observer, Preset, RunError, RunFolder, Stage, files,
-    fit::{capture_report, comments, open_gpu},
+    fit::{capture_report, open_gpu},
     foreign::drawn_like_photos,
     keeping,
-    scene::{read_splats, tell_not_finite},
+    scene::{comments_of_moved, read_scene, tell_not_finite},
     sound::{open_checked, open_examined},
     teach::{TeachOptions, Teachers},
 };
@@ -107,11 +109,11 @@ pub fn colorize(
     let dataset = dataset.caching(0);
     // A run's own files are moved already; others lie where COLMAP has the cameras.
     let offset = match source.folder {
-        Some(_) => glam::DVec3::ZERO,
+        Some(_) => DVec3::ZERO,
         None => dataset.capture.offset,
     };
-    let (luma, mut drawn) = read_splats(&source.splats, offset, observe)?;
-    let mut luma = luma.to_luma();
+    let read = read_scene(&source.splats, offset, observe)?;
+    let (mut luma, mut drawn) = (read.splats.to_luma(), read.drawn);
     if source.report.is_none() {
         let splats = (source.splats.as_path(), &luma);
         drawn = drawn_like_photos(&gpu, &dataset, splats, drawn, observe)?;
@@ -264,7 +266,17 @@ pub fn colorize(
         views: measured.views,
         timings,
     });
-    ply::write_ply(&output.ply, &colored.splats, offset, &comments(drawn))?;
+    let moved = dataset.capture.offset;
+    let (added, left) = match &source.folder {
+        // The run's report has it.
+        Some(folder) if output.ply == folder.color() => (DVec3::ZERO, DVec3::ZERO),
+        Some(_) => (DVec3::ZERO, moved),
+        // As the gray file has it.
+        None if read.offset != DVec3::ZERO => (DVec3::ZERO, moved),
+        None => (moved, DVec3::ZERO),
+    };
+    let comments = comments_of_moved(drawn, left);
+    ply::write_ply(&output.ply, &colored.splats, added, &comments)?;
     if let Some(folder) = source.kept(options) {
         if output.ply == folder.color() {
             folder.write_chroma(&colored.chroma)?;

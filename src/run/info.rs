@@ -1,14 +1,11 @@
-//! `info` and `export`.
+//! `info`.
 
 use std::{cell::RefCell, path::Path};
 
-use glam::DVec3;
 use serde_json::{Value, json};
 
 use super::{
-    Event, Observer, RunError, RunFolder, files,
-    fit::comments,
-    keeping,
+    Event, Observer, RunError, RunFolder, keeping,
     scene::tell_skipped,
     sound::{check_model, tell_folder, tell_masks},
 };
@@ -99,41 +96,12 @@ fn splat_info(path: &Path, observe: &mut Observer<'_>) -> Result<Value, RunError
         "skipped": read.skipped,
         "sh_degree": splats.sh.degree,
         "antialiased": read.antialiased,
+        // Subtracted from the coordinates.
+        "offset": read.offset.to_array(),
         // Half an 8-bit step: what no viewer shows as a color.
         "gray": splats.is_gray(0.5 / 255.0),
         "lowest": bound(f32::min, f32::INFINITY),
         "highest": bound(f32::max, f32::NEG_INFINITY),
         "warnings": warnings.take(),
     }))
-}
-
-/// Writes a run's scene with the photos' own coordinates; gives the number of
-/// Gaussians.
-///
-/// # Errors
-/// [`RunError`].
-pub fn export(run: Option<&Path>, output: &Path, luma: bool) -> Result<usize, RunError> {
-    if let Some(path) = run {
-        ply::is_splat_file(path)?;
-    }
-    let folder = match run {
-        Some(path) => RunFolder::at(path),
-        None => RunFolder::newest()?,
-    };
-    let report = folder.read_report()?;
-    let colored = !luma && folder.color().exists();
-    let file = if colored {
-        folder.color()
-    } else {
-        folder.luma()
-    };
-    let splats = ply::read_ply(&file)?.splats;
-    files::make_folder_of(output)?;
-    ply::write_ply(
-        output,
-        &splats,
-        DVec3::from(report.capture.offset),
-        &comments(report.luma.settings.raster_options()),
-    )?;
-    Ok(splats.len())
 }

@@ -5,15 +5,21 @@ use std::{path::PathBuf, sync::Arc};
 use glam::DVec3;
 
 use super::{
-    Event, Observer, RunError, RunFolder, Stage, files, picture_names, scene::read_splats,
+    Event, Observer, RunError, RunFolder, Stage, files,
+    foreign::tell_unlike,
+    picture_names,
+    scene::{open, read_splats},
 };
 use crate::{
-    capture::{Capture, LoadOptions, Loader, split},
+    capture::{Capture, LoadOptions, Loader, Normalize, split},
     gpu::Gpu,
     raster::{Raster, Renderer},
     report::to_image,
     splats::ply,
 };
+
+/// Longer side in pixels at which a splat file is compared with the photos.
+const CHECKED_SIDE: u32 = 640;
 
 /// Which of a capture's views.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
@@ -96,6 +102,17 @@ pub fn render(options: &RenderOptions, observe: &mut Observer<'_>) -> Result<usi
     files::make_folder(&options.output)?;
     let names = picture_names(&capture.views);
     let gpu = Gpu::open()?;
+    if run.is_none() {
+        let load = LoadOptions {
+            max_side: Some(CHECKED_SIDE),
+            normalize: Normalize::Off,
+            ..LoadOptions::default()
+        };
+        // Pictures do not depend on what photos show: where they cannot be compared, they are not.
+        if let Ok(dataset) = open(&colmap, &load, &mut |_| {}) {
+            tell_unlike(&gpu, &dataset, (&file, &splats.to_luma()), drawn, observe)?;
+        }
+    }
     let raster = Arc::new(Raster::with(&gpu, run.unwrap_or(drawn)));
     let mut renderer = Renderer::of(&raster, &splats, &[&splats.sh], capture.extent())?;
     for (done, &i) in chosen.iter().enumerate() {

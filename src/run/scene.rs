@@ -4,7 +4,7 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::{Event, Observer, RunError, Stage};
+use super::{Event, Observer, RunError, Stage, fit::comments};
 use crate::{
     capture::{Dataset, LoadOptions, Notice, Rejected},
     luma::TrialProgress,
@@ -76,26 +76,58 @@ pub(super) fn tell_skipped(path: &Path, read: &ReadSplats, observe: &mut Observe
     }
 }
 
-/// Reads a splat file that has at least one Gaussian and subtracts `offset`, in
-/// world units, from its centers; also gives how the file wants to be drawn.
-pub(super) fn read_splats(
+/// A splat file as a scene.
+pub(super) struct ReadScene {
+    pub splats: Splats,
+    /// How the file wants to be drawn.
+    pub drawn: RasterOptions,
+    /// What its header says was subtracted from its centers, in world units.
+    pub offset: DVec3,
+}
+
+/// Reads a splat file that has at least one Gaussian and moves it to where `offset`, in world
+/// units, is subtracted from COLMAP's coordinates.
+pub(super) fn read_scene(
     path: &Path,
     offset: DVec3,
     observe: &mut Observer<'_>,
-) -> Result<(Splats, RasterOptions), RunError> {
+) -> Result<ReadScene, RunError> {
     let read = ply::read_ply(path)?;
     tell_skipped(path, &read, observe);
     let mut splats = read.splats;
     if splats.is_empty() {
         return Err(RunError::NoSplats(path.to_owned()));
     }
-    for mean in &mut splats.means {
-        *mean = (DVec3::from(mean.map(f64::from)) - offset)
-            .as_vec3()
-            .to_array();
+    let by = read.offset - offset;
+    if by != DVec3::ZERO {
+        for mean in &mut splats.means {
+            *mean = (DVec3::from(mean.map(f64::from)) + by).as_vec3().to_array();
+        }
     }
-    let options = RasterOptions {
-        antialiased: read.antialiased,
-    };
-    Ok((splats, options))
+    Ok(ReadScene {
+        splats,
+        drawn: RasterOptions {
+            antialiased: read.antialiased,
+        },
+        offset: read.offset,
+    })
+}
+
+/// [`read_scene`] for whoever writes no such file.
+pub(super) fn read_splats(
+    path: &Path,
+    offset: DVec3,
+    observe: &mut Observer<'_>,
+) -> Result<(Splats, RasterOptions), RunError> {
+    let scene = read_scene(path, offset, observe)?;
+    Ok((scene.splats, scene.drawn))
+}
+
+/// Comments of a splat file whose centers are COLMAP's less `offset`, in world units.
+pub(super) fn comments_of_moved(drawn: RasterOptions, offset: DVec3) -> Vec<String> {
+    let mut comments = comments(drawn);
+    if offset != DVec3::ZERO {
+        comments.push(ply::offset_comment(offset));
+    }
+    comments
 }

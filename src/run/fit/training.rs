@@ -4,6 +4,7 @@ use std::{fmt::Write, ops::ControlFlow, sync::Arc, time::Instant};
 
 use super::super::{
     Event, Observer, RunError, Stage,
+    foreign::tell_unlike,
     scene::{read_splats, tell_trial},
 };
 use super::{
@@ -128,6 +129,10 @@ impl Job<'_> {
         let init = options.init.as_ref();
         let init = init.map(|path| read_splats(path, dataset.capture.offset, observe));
         let init = init.transpose()?;
+        if let (Some(path), Some((splats, drawn))) = (&options.init, &init) {
+            let splats = (path.as_path(), &splats.to_luma());
+            tell_unlike(self.gpu, dataset, splats, *drawn, observe)?;
+        }
         let seconds = options.goal.seconds();
         // Held-out views have to be seen as they are measured, where they are to be reached.
         let reaches = options.goal.psnr().is_some() && !self.judge.split.test.is_empty();

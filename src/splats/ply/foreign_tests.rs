@@ -65,6 +65,23 @@ fn colors_of_eight_bits() {
 }
 
 #[test]
+fn what_was_subtracted_is_known() {
+    let offset = DVec3::new(456_789.125, 5_412_345.0, -97.1);
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("scene.ply");
+    let read = |comments: &[String]| {
+        write_ply(&file, &splats(0, 3), DVec3::ZERO, comments).unwrap();
+        read_ply(&file).unwrap()
+    };
+    let found = read(&[offset_comment(offset)]);
+    assert_eq!(found.offset, offset);
+    assert_eq!(found.splats, splats(0, 3));
+    for nothing in ["offset of the camera", "offset 1 2", "offset 1 2 inf"] {
+        assert_eq!(read(&[nothing.into()]).offset, DVec3::ZERO);
+    }
+}
+
+#[test]
 fn bytes_behind_the_last_row_are_counted() {
     let names = names();
     let properties: Vec<_> = names.iter().map(|name| ("float", name.as_str())).collect();

@@ -1,6 +1,7 @@
 //! The header of a PLY file and where its numbers lie.
 
-use super::{CENTER, PlyError, SHAPE, THIRD_SCALE, degree_of_rest_count, sh_names};
+use super::{CENTER, OFFSET, PlyError, SHAPE, THIRD_SCALE, degree_of_rest_count, sh_names};
+use glam::DVec3;
 use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{DefaultElement, ElementDef, Header, PropertyType, ScalarType};
 use std::io::{BufRead, Read};
@@ -94,6 +95,19 @@ pub(super) fn is_antialiased(comments: &[String]) -> bool {
         }
     });
     modes.next_back().unwrap_or(false)
+}
+
+/// What the header's comments say was subtracted from the centers; the last one counts.
+pub(super) fn offset(comments: &[String]) -> DVec3 {
+    let mut offsets = comments.iter().filter_map(|comment| {
+        let words: Vec<_> = comment.split_whitespace().collect();
+        let [OFFSET, x, y, z] = words[..] else {
+            return None;
+        };
+        let [x, y, z] = [x, y, z].map(|word| word.parse().ok());
+        Some(DVec3::new(x?, y?, z?)).filter(|offset| offset.is_finite())
+    });
+    offsets.next_back().unwrap_or_default()
 }
 
 impl VertexLayout {

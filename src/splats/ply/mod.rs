@@ -21,6 +21,8 @@ pub use write::write_ply;
 
 use std::path::Path;
 
+use glam::DVec3;
+
 use super::sh::{MAX_DEGREE, coefficient_count};
 
 /// Extensions of splat files of other formats.
@@ -45,6 +47,16 @@ pub fn is_splat_file(path: &Path) -> Result<bool, PlyError> {
 /// The comment that tells readers to draw with opacities that fall by what the blur
 /// spreads: Brush's, which splat-transform reads as well.
 pub const ANTIALIASED: &str = "SplatRenderMode: mip";
+
+/// The word that begins the comment with what was subtracted from the centers.
+const OFFSET: &str = "offset";
+
+/// The comment of a file from whose centers `offset` was subtracted because they would be too
+/// large for 32-bit floats: `offset X Y Z`.
+pub fn offset_comment(offset: DVec3) -> String {
+    let [x, y, z] = offset.to_array();
+    format!("{OFFSET} {x} {y} {z}")
+}
 
 /// Color channels of a splat file.
 const CHANNELS: usize = 3;

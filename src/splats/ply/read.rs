@@ -1,9 +1,10 @@
 //! Reading splat files of any make.
 
 use super::collect::Collector;
-use super::header::{VertexLayout, byte_size, decode, is_antialiased, read_header};
+use super::header::{VertexLayout, byte_size, decode, is_antialiased, offset, read_header};
 use super::{PlyError, is_splat_file};
 use crate::splats::Splats;
+use glam::DVec3;
 use ply_rs_bw::ply::{ElementDef, Encoding, PropertyType, ScalarType};
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, ErrorKind, Read};
@@ -22,6 +23,9 @@ pub struct ReadSplats {
     /// quaternion zero. An infinite opacity is not counted: it is opaque or transparent; nor is
     /// a scale of minus infinity: it is flat.
     pub skipped: usize,
+    /// What was subtracted from the centers, in world units, as the header says
+    /// ([`offset_comment`](super::offset_comment)); zero where it says nothing.
+    pub offset: DVec3,
     /// Bytes behind all that the header announces: its count is likely too small.
     pub surplus: u64,
     /// Whether the header says that the Gaussians were trained antialiased
@@ -73,6 +77,7 @@ pub fn read_ply(path: &Path) -> Result<ReadSplats, PlyError> {
         let read = body.read_vertices(element, &layout)?;
         return Ok(ReadSplats {
             antialiased,
+            offset: offset(&header.comments),
             surplus: body.surplus(elements)?,
             ..read
         });
