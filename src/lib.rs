@@ -4,7 +4,7 @@
 //!
 //! ```text
 //! cli → tradeoff → run → eval → report, doctor → luma, chroma → effects, measure → raster
-//! → capture, splats → gpu, color, atomic_file, download, npy, oracle, compare
+//! → capture, splats → gpu, color, atomic_file, sections, download, npy, oracle, compare
 //! ```
 //!
 //! [`doctor`] compares the kernels of [`raster`], [`luma`] and [`chroma`] with the [`oracle`],
@@ -64,6 +64,7 @@ pub mod oracle;
 pub mod raster;
 pub mod report;
 pub mod run;
+mod sections;
 pub mod splats;
 #[cfg(feature = "cli")]
 pub mod tradeoff;

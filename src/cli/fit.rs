@@ -1,6 +1,6 @@
 //! `gs-chroma fit`.
 
-use std::path::PathBuf;
+use std::{path::PathBuf, sync::Arc};
 
 use clap::Args;
 
@@ -16,7 +16,7 @@ use super::{
 };
 use crate::luma::Goal;
 use crate::report::timings_table;
-use crate::run::{AheadOptions, FitOptions, Preset, fit};
+use crate::run::{AheadOptions, CheckpointOptions, FitOptions, Interrupt, Preset, RunError, fit};
 
 /// Rows of the curve that is printed.
 const CURVE_ROWS: usize = 8;
@@ -58,12 +58,53 @@ pub struct Fit {
     /// Start from these Gaussians instead of COLMAP's points.
     #[arg(long, value_name = "FILE.ply")]
     init: Option<PathBuf>,
+    /// Go on with the same training where it was interrupted, from the checkpoint in the run
+    /// folder; begins anew where there is neither.
+    #[arg(long)]
+    resume: bool,
+    /// Minutes between two checkpoints, or `off`; it takes longer where they take more than a
+    /// fiftieth of the time.
+    #[arg(long, value_name = "MIN|off", default_value = "10", value_parser = minutes)]
+    checkpoint: Minutes,
     /// Time every kernel, and print a table of it.
     #[arg(long)]
     timings: bool,
     /// Print the report as JSON.
     #[arg(long)]
     json: bool,
+}
+
+/// Minutes, if any.
+#[derive(Clone, Copy, Debug)]
+struct Minutes(Option<f64>);
+
+fn minutes(text: &str) -> Result<Minutes, String> {
+    match text {
+        "off" => Ok(Minutes(None)),
+        _ => positive(text)
+            .map(|minutes| Minutes(Some(minutes)))
+            .map_err(|reason| reason + ", or off"),
+    }
+}
+
+/// The status with which a shell expects a program that was interrupted to end.
+const INTERRUPTED: i32 = 130;
+
+/// Heeds SIGINT and SIGTERM: the first is an interrupt where a training can be kept, any other
+/// ends the program.
+fn interrupt() -> Result<Arc<Interrupt>, CliError> {
+    let interrupt = Arc::<Interrupt>::default();
+    let raised = interrupt.clone();
+    let handled = ctrlc::set_handler(move || {
+        if !raised.raise() {
+            std::process::exit(INTERRUPTED);
+        }
+        eprintln!("writing a checkpoint; once more ends at once");
+    });
+    match handled {
+        Ok(()) => Ok(interrupt),
+        Err(error) => Err(RunError::Signals(error.to_string()).into()),
+    }
 }
 
 impl Fit {
@@ -86,6 +127,11 @@ impl Fit {
             goal,
             measure_side: self.measure_side,
             timings: self.timings,
+            checkpoints: CheckpointOptions {
+                resume: self.resume,
+                every: self.checkpoint.0,
+                interrupt: interrupt()?,
+            },
             ahead: AheadOptions {
                 teachers: self.teacher,
                 settings: self.network.settings(),

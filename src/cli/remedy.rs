@@ -38,6 +38,13 @@ pub(super) fn of_run(error: &RunError) -> String {
         RunError::Coarse { .. } => format!(
             "{error}: leave --colmap-coordinates out, and the file lies near the origin and says by how much"
         ),
+        RunError::NothingToResume(_) => {
+            format!("{error}; without --resume all is trained anew")
+        }
+        RunError::OtherCheckpoint { .. } => {
+            format!("{error}: give the same options, or leave out --resume to train anew")
+        }
+        RunError::Interrupted { .. } => format!("{error} with the same command and --resume"),
         RunError::NoHeldOut => format!("{error}: choose --views train or --views all"),
         RunError::NothingPainted(_) => format!("{error}, or give a --teacher as well"),
         RunError::NothingUntil { until, .. } => format!("--until {until}: {error}"),

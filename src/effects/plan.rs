@@ -219,7 +219,7 @@ impl Overrules {
 }
 
 /// Which effects are simulated, and how.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
     /// About each effect, in the order of [`Effect::ALL`].
     pub decisions: Vec<Decision>,

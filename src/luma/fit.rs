@@ -3,8 +3,8 @@
 use std::{ops::ControlFlow, sync::Arc, time::Instant};
 
 use super::{
-    CurvePoint, Demand, Goal, LumaError, LumaProgress, LumaSettings, LumaTrainer, PlannedViews,
-    TrialProgress,
+    Checkpoint, CurvePoint, Demand, Goal, Keeper, LumaError, LumaProgress, LumaSettings,
+    LumaTrainer, NoKeeper, PlannedViews, TrialProgress,
     carve::carved,
     planned,
     planned::WatchedViews,
@@ -15,7 +15,7 @@ use crate::{
     effects::{Effect, Evidence, Overrules, Plan, Room, Survey},
     gpu::{Gpu, GpuError},
     raster::{Load, Raster},
-    splats::Splats,
+    splats::{ShField, Splats},
 };
 
 /// Views that are looked at while training goes on, at most.
@@ -144,9 +144,28 @@ impl Fit<'_> {
         settings: &LumaSettings,
         observe: &mut LumaObserver<'_>,
     ) -> Result<LumaScene, LumaError> {
+        self.run_from(None, &mut NoKeeper, settings, observe)
+    }
+
+    /// Trains, or goes on with what an interrupted training of the same kept; seconds of the
+    /// goal count from its beginning. `keeper` is asked now and then whether it wants a
+    /// checkpoint.
+    ///
+    /// # Errors
+    /// As [`fit`].
+    pub fn run_from(
+        &self,
+        checkpoint: Option<&Checkpoint>,
+        keeper: &mut dyn Keeper,
+        settings: &LumaSettings,
+        observe: &mut LumaObserver<'_>,
+    ) -> Result<LumaScene, LumaError> {
         let begun = Instant::now();
         let dataset = self.dataset;
-        let plan = self.plan(settings, observe)?;
+        let plan = match checkpoint.and_then(|checkpoint| checkpoint.state.plan.clone()) {
+            Some(plan) => plan,
+            None => self.plan(settings, observe)?,
+        };
         go_on(observe(LumaEvent::Plan(&plan)))?;
         let mut settings = LumaSettings {
             sh_degree: plan.sh_degree,
@@ -156,9 +175,11 @@ impl Fit<'_> {
             ..settings.clone()
         };
         let demand = self.fit_memory(&mut settings, &plan, observe)?;
-        let start = match self.start {
-            Some(splats) => started(splats, &settings),
-            None => placed_splats(dataset, self.evidence, &settings)?,
+        let start = match (checkpoint, self.start) {
+            // Anything that can be uploaded: all will be replaced.
+            (Some(_), _) => placeholder(settings.sh_degree),
+            (None, Some(splats)) => started(splats, &settings),
+            (None, None) => placed_splats(dataset, self.evidence, &settings)?,
         };
         let preparing = begun.elapsed().as_secs_f64();
 
@@ -177,8 +198,15 @@ impl Fit<'_> {
             views,
             exposures: plan.exposures.clone(),
         })?;
+        if let Some(checkpoint) = checkpoint {
+            trainer.resume(checkpoint)?;
+        }
         let (mut last, mut peak_device_memory) = (None, None);
-        trainer.train_while(&mut |progress| {
+        let mut keeper = Planned {
+            plan: &plan,
+            keeper,
+        };
+        trainer.train_keeping(&mut keeper, &mut |progress| {
             last = Some(progress);
             peak_device_memory = peak_device_memory.max(gpu.allocated_bytes());
             observe(LumaEvent::Training(progress))
@@ -188,7 +216,8 @@ impl Fit<'_> {
             splats = carved(dataset, &splats)?;
         }
         let watching = trainer.watched_seconds();
-        let training = begun.elapsed().as_secs_f64() - watching;
+        let before = checkpoint.map_or(0.0, Checkpoint::seconds);
+        let training = before + begun.elapsed().as_secs_f64() - watching;
         Ok(LumaScene {
             settings: trainer.settings().clone(),
             extent: dataset.extent,
@@ -275,6 +304,34 @@ impl Fit<'_> {
         let count = measured.len().min(WATCHED);
         let spread = (0..count).map(|k| measured[k * measured.len() / count]);
         (self.dataset, spread.collect())
+    }
+}
+
+/// Adds the plan to what is kept.
+struct Planned<'a> {
+    plan: &'a Plan,
+    keeper: &'a mut dyn Keeper,
+}
+
+impl Keeper for Planned<'_> {
+    fn wants(&mut self, iteration: usize) -> bool {
+        self.keeper.wants(iteration)
+    }
+
+    fn keep(&mut self, mut checkpoint: Checkpoint) -> bool {
+        checkpoint.state.plan = Some(self.plan.clone());
+        self.keeper.keep(checkpoint)
+    }
+}
+
+/// One Gaussian.
+fn placeholder(sh_degree: u32) -> Splats {
+    Splats {
+        means: vec![[0.0; 3]],
+        quats: vec![[1.0, 0.0, 0.0, 0.0]],
+        log_scales: vec![[0.0; 3]],
+        opacity_logits: vec![0.0],
+        sh: ShField::zeros(1, sh_degree, 1),
     }
 }
 

@@ -1,6 +1,7 @@
 //! Stage 1: geometry and luminance from grayscale photographs.
 
 pub mod carve;
+mod checkpoint;
 mod curve;
 pub mod densify;
 mod error;
@@ -26,6 +27,7 @@ mod trial;
 mod view;
 mod workspace;
 
+pub use checkpoint::{Checkpoint, Keeper, NoKeeper};
 pub use curve::{CurvePoint, gain_of_doubling};
 pub use densify::DensifyParameters;
 pub use error::LumaError;

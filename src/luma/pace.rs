@@ -1,5 +1,7 @@
 //! When a training that has so many seconds will have to end.
 
+use serde::{Deserialize, Serialize};
+
 /// An iteration's cost is taken from the last iterations, this share of all so far.
 const RECENT: f64 = 0.1;
 
@@ -15,7 +17,7 @@ const WARM_UP: usize = 16;
 const SHARE_OF_SPLATS: f64 = 0.5;
 
 /// The clock of a training: which iteration was done when.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Pace {
     reports: Vec<(usize, f64)>,
 }

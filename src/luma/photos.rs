@@ -1,6 +1,6 @@
 //! The photos on the device: all of them, or one at a time.
 
-use std::{collections::HashMap, sync::Arc};
+use std::{collections::BTreeMap, sync::Arc};
 
 use super::{
     LumaError, TrainingView, TrainingViews,
@@ -25,14 +25,10 @@ pub struct Picture {
 pub struct Photos {
     /// One for each photo, or one in which they take turns.
     pictures: Vec<Picture>,
-    stream: Option<Stream>,
-}
-
-/// Photos that stay where they are.
-struct Stream {
-    prefetch: Prefetch<Result<TrainingView, LumaError>>,
+    /// Photos that stay where they are until they are shown.
+    stream: Option<Prefetch<Result<TrainingView, LumaError>>>,
     /// Of some views the pixels that no longer count, a bit each.
-    left_out: HashMap<usize, Vec<u8>>,
+    left_out: BTreeMap<usize, Vec<u8>>,
 }
 
 impl Photos {
@@ -58,10 +54,8 @@ impl Photos {
             let load = move |photo| view::load(&*views, photo);
             return Ok(Self {
                 pictures: vec![Picture::zeros(gpu, words, masked)?],
-                stream: Some(Stream {
-                    prefetch: Prefetch::new(Arc::new(load)),
-                    left_out: HashMap::new(),
-                }),
+                stream: Some(Prefetch::new(Arc::new(load))),
+                left_out: BTreeMap::new(),
             });
         }
         let mut pictures = Vec::new();
@@ -89,6 +83,7 @@ impl Photos {
         Ok(Self {
             pictures,
             stream: None,
+            left_out: BTreeMap::new(),
         })
     }
 
@@ -99,20 +94,45 @@ impl Photos {
 
     /// Lets only what `mask` says count of a photo.
     pub fn leave_out(&mut self, gpu: &Gpu, photo: usize, mask: &[u8]) {
-        match &mut self.stream {
-            None => {
-                if let Some(buffer) = &self.pictures[photo].mask {
-                    buffer.write(gpu, &pack(mask));
-                }
-            }
-            Some(stream) => {
-                let bits = mask.chunks(8).map(|pixels| {
-                    let bits = pixels.iter().enumerate();
-                    bits.fold(0, |bits, (bit, &count)| bits | u8::from(count == 0) << bit)
-                });
-                stream.left_out.insert(photo, bits.collect());
-            }
+        if self.stream.is_none()
+            && let Some(buffer) = &self.pictures[photo].mask
+        {
+            buffer.write(gpu, &pack(mask));
         }
+        let bits = mask.chunks(8).map(|pixels| {
+            let bits = pixels.iter().enumerate();
+            bits.fold(0, |bits, (bit, &count)| bits | u8::from(count == 0) << bit)
+        });
+        self.left_out.insert(photo, bits.collect());
+    }
+
+    /// The same with a bit for each pixel that does not count, as [`Photos::left_out`] has them.
+    ///
+    /// # Errors
+    /// [`LumaError`] of the photo.
+    pub fn leave_out_bits(
+        &mut self,
+        gpu: &Gpu,
+        views: &dyn TrainingViews,
+        photo: usize,
+        bits: Vec<u8>,
+    ) -> Result<(), LumaError> {
+        if self.stream.is_some() {
+            self.left_out.insert(photo, bits);
+        } else {
+            let mut mask = view::load(views, photo)?.counts();
+            without(&mut mask, &bits);
+            self.leave_out(gpu, photo, &mask);
+        }
+        Ok(())
+    }
+
+    /// Of which photos which pixels do not count, a bit each.
+    pub fn left_out(&self) -> Vec<(usize, Vec<u8>)> {
+        let left_out = self.left_out.iter();
+        left_out
+            .map(|(&photo, bits)| (photo, bits.clone()))
+            .collect()
     }
 
     /// Readies a photo for what is submitted next, and gives its picture's place; those of
@@ -129,14 +149,10 @@ impl Photos {
         let Some(stream) = &mut self.stream else {
             return Ok(photo);
         };
-        let mut view = stream.prefetch.take(photo, next)?;
-        if let Some(left_out) = stream.left_out.get(&photo) {
+        let mut view = stream.take(photo, next)?;
+        if let Some(left_out) = self.left_out.get(&photo) {
             let mut mask = view.counts();
-            for (pixel, count) in mask.iter_mut().enumerate() {
-                if left_out[pixel / 8] >> (pixel % 8) & 1 == 1 {
-                    *count = 0;
-                }
-            }
+            without(&mut mask, left_out);
             view.mask = Some(mask);
         }
         self.pictures[0].write(gpu, view);
@@ -157,6 +173,18 @@ impl Picture {
         self.gray.write(gpu, &pack(&view.gray));
         if let Some(mask) = &self.mask {
             mask.write(gpu, &pack(&view.counts()));
+        }
+    }
+}
+
+/// Lets pixels whose bit is set count no longer.
+fn without(mask: &mut [u8], left_out: &[u8]) {
+    for (pixel, count) in mask.iter_mut().enumerate() {
+        if left_out
+            .get(pixel / 8)
+            .is_some_and(|bits| bits >> (pixel % 8) & 1 == 1)
+        {
+            *count = 0;
         }
     }
 }

@@ -1,9 +1,11 @@
 //! When things happen in a training, which follows from its settings.
 
+use serde::{Deserialize, Serialize};
+
 use super::{Densification, LumaSettings, PAPER_ITERATIONS, settings::SHORT_RUN};
 
 /// When things happen in a training, in iterations.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Schedule {
     /// The last iteration: those of the settings, until the goal or a flat curve moves it.
     pub end: usize,

@@ -9,18 +9,23 @@
 
 mod best;
 mod changes;
+mod checkpoint;
 mod ends;
 mod room;
 mod watch;
 
 pub use watch::Look;
 
-use std::{ops::ControlFlow, sync::Arc, time::Instant};
+use std::{
+    ops::ControlFlow,
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
 use watch::Watch;
 
 use super::{
-    Densification, Goal, LumaError, LumaSettings, Schedule,
+    Densification, Goal, Keeper, LumaError, LumaSettings, NoKeeper, Schedule,
     loss::{self, LossEffects, Targets},
     memory::{Demand, ENTRIES_PER_SPLAT},
     pace::Pace,
@@ -97,6 +102,8 @@ pub struct LumaTrainer {
     seen: Load,
     /// Reports.
     reports: usize,
+    /// Iterations and seconds that an interrupted training had done.
+    done: (usize, f64),
 }
 
 impl LumaTrainer {
@@ -179,6 +186,7 @@ impl LumaTrainer {
             watch: Watch::default(),
             seen: Load::default(),
             reports: 0,
+            done: (0, 0.0),
         })
     }
 
@@ -203,9 +211,24 @@ impl LumaTrainer {
         &mut self,
         observe: &mut dyn FnMut(LumaProgress) -> ControlFlow<()>,
     ) -> Result<(), LumaError> {
-        let begun = Instant::now();
-        self.pace = Pace::default();
-        let mut iteration = 0;
+        self.train_keeping(&mut NoKeeper, observe)
+    }
+
+    /// The same; `keeper` is asked now and then whether it wants a checkpoint, which changes
+    /// nothing in what is trained.
+    ///
+    /// # Errors
+    /// As there; [`LumaError::Cancelled`] also where the keeper wants no more.
+    pub fn train_keeping(
+        &mut self,
+        keeper: &mut dyn Keeper,
+        observe: &mut dyn FnMut(LumaProgress) -> ControlFlow<()>,
+    ) -> Result<(), LumaError> {
+        let (mut iteration, seconds) = self.done;
+        let now = Instant::now();
+        let begun = now
+            .checked_sub(Duration::from_secs_f64(seconds))
+            .unwrap_or(now);
         let mut pending: Option<Report> = None;
         while iteration < self.schedule.end {
             self.step(iteration)?;
@@ -216,7 +239,9 @@ impl LumaTrainer {
                 self.settings.robust && schedule.find_outliers_at.contains(&iteration);
             let ends = iteration == schedule.end;
             let looks = self.watch.is_due(iteration, schedule.end);
-            let pauses = densifies || finds_outliers || looks || ends;
+            // Its losses are told by then.
+            let keeps = iteration.is_multiple_of(SYNC_EVERY) && !ends && keeper.wants(iteration);
+            let pauses = densifies || finds_outliers || looks || ends || keeps;
             // The first views say how much room is needed: those lost to an overflow
             // are few if it is noticed early.
             let early = iteration < SYNC_EVERY && iteration.is_power_of_two();
@@ -268,6 +293,12 @@ impl LumaTrainer {
             }
             if finds_outliers {
                 self.leave_out_outliers()?;
+            }
+            if keeps {
+                let checkpoint = self.checkpoint(iteration, begun.elapsed().as_secs_f64())?;
+                if !keeper.keep(checkpoint) {
+                    return Err(LumaError::Cancelled);
+                }
             }
         }
         Ok(())

@@ -117,5 +117,22 @@ impl Model {
 pub struct Snapshot {
     count: usize,
     /// In the order of the model's buffers.
-    planes: Vec<Vec<f32>>,
+    pub planes: Vec<Vec<f32>>,
+}
+
+impl Snapshot {
+    /// A snapshot of these planes; `None` where they are those of no model.
+    pub fn of(planes: impl Iterator<Item = Vec<f32>>) -> Option<Self> {
+        let planes: Vec<Vec<f32>> = planes.collect();
+        let [geometry, field, moments @ ..] = &planes[..] else {
+            return None;
+        };
+        let count = geometry.len() / GEOMETRY_PLANES;
+        let whole = count > 0
+            && geometry.len() == count * GEOMETRY_PLANES
+            && field.len().is_multiple_of(count);
+        let sizes = [geometry.len(), geometry.len(), field.len(), field.len()];
+        let fits = moments.iter().map(Vec::len).eq(sizes);
+        (whole && fits).then_some(Self { count, planes })
+    }
 }

@@ -1,10 +1,12 @@
 //! What the kernels must read and write at least, if every input is read once and the
 //! caches hold the rest: the measure of how fast they could be.
 
+use serde::{Deserialize, Serialize};
+
 use super::{AdamSteps, RasterNumerics, Storage};
 
 /// Average size of what the kernels of a stage worked on, a dispatch.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Load {
     /// Gaussians.
     pub splats: f64,

@@ -336,6 +336,11 @@ impl Report {
         serde_json::to_string_pretty(self).unwrap_or_default()
     }
 
+    /// The bytes of `report.json`.
+    pub fn to_file(&self) -> Vec<u8> {
+        (self.to_json() + "\n").into_bytes()
+    }
+
     /// Stage 1 on one line.
     pub fn luma_summary(&self) -> String {
         let luma = &self.luma;

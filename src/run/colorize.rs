@@ -12,10 +12,13 @@ use std::{
 use glam::DVec3;
 
 use super::{
-    Event, Observer, Preset, RunError, RunFolder, Stage, files,
+    Event, Observer, Preset, RunError, RunFolder, Stage,
+    commit::Commit,
+    files,
     fit::{capture_report, open_gpu},
     foreign::drawn_like_photos,
     keeping,
+    lock::RunLock,
     scene::{comments_of_moved, read_scene, tell_not_finite},
     sound::{open_checked, open_examined},
     teach::{TeachOptions, Teachers},
@@ -33,7 +36,7 @@ use crate::{
         CaptureReport, ChromaReport, ChromaSeconds, DeviceReport, EffectReport, LumaReport,
         REPORT_VERSION, Report, contact_sheet, kernel_reports,
     },
-    splats::ply,
+    splats::{npy, ply},
 };
 
 /// A share of Gaussians without a colored photo that is worth a warning.
@@ -89,6 +92,10 @@ pub fn colorize(
     let warnings = RefCell::default();
     let observe = &mut keeping(&warnings, observe);
     let source = Source::find(options)?;
+    let folder = source.folder.as_ref();
+    let _lock = folder
+        .map(|folder| RunLock::take(folder.path()))
+        .transpose()?;
     let cache = source.folder.as_ref().map(RunFolder::teacher);
     let colmap_dir = source.colmap_dir(options)?;
     let mut teachers = Teachers::open(&options.teach, &colmap_dir, cache.as_deref())?;
@@ -276,14 +283,28 @@ pub fn colorize(
         None => (moved, DVec3::ZERO),
     };
     let comments = comments_of_moved(drawn, left);
-    ply::write_ply(&output.ply, &colored.splats, added, &comments)?;
-    if let Some(folder) = source.kept(options) {
-        if output.ply == folder.color() {
-            folder.write_chroma(&colored.chroma)?;
+    let write_to = |path: &Path| ply::write_ply(path, &colored.splats, added, &comments);
+    match source.kept(options) {
+        Some(folder) => {
+            let mut commit = Commit::new(folder.path())?;
+            if output.ply == folder.color() {
+                write_to(&commit.place(&output.ply))?;
+                // What was measured of other colors goes.
+                commit.remove(&folder.evaluation());
+                commit.remove_page(&folder.evaluation_page());
+                let chroma = npy::encode(&colored.chroma);
+                files::write(&commit.place(&folder.chroma()), &chroma)?;
+            } else {
+                write_to(&output.ply)?;
+            }
+            let log = with_rows(&folder.log(), report.luma.iterations, &log);
+            files::write(&commit.place(&folder.log()), log.as_bytes())?;
+            let sheet = contact_sheet(&measured.rows);
+            files::write_png(&commit.place(&folder.contact_sheet()), &sheet)?;
+            files::write(&commit.place(&folder.report()), &report.to_file())?;
+            commit.finish()?;
         }
-        append_log(folder, report.luma.iterations, &log)?;
-        files::write_png(&folder.contact_sheet(), &contact_sheet(&measured.rows))?;
-        folder.write_report(&report)?;
+        None => write_to(&output.ply)?,
     }
     Ok((output, report))
 }
@@ -401,11 +422,9 @@ fn adam_iterations(
     }
 }
 
-/// Puts the chroma rows behind the luma rows, in place of those of an earlier
-/// coloring.
-fn append_log(folder: &RunFolder, luma: usize, rows: &str) -> Result<(), RunError> {
-    let path = folder.log();
-    let log = read_or_empty(&path);
+/// The log with the chroma rows behind the luma rows, in place of those of an earlier coloring.
+fn with_rows(path: &Path, luma: usize, rows: &str) -> String {
+    let log = read_or_empty(path);
     let mut kept: String = log
         .lines()
         .filter(|line| {
@@ -417,7 +436,7 @@ fn append_log(folder: &RunFolder, luma: usize, rows: &str) -> Result<(), RunErro
         .flat_map(|line| [line, "\n"])
         .collect();
     kept.push_str(rows);
-    files::write(&path, kept.as_bytes())
+    kept
 }
 
 fn read_or_empty(path: &Path) -> String {

@@ -8,9 +8,12 @@ use std::{
 };
 
 use super::{
-    Event, Observer, RunError, RunFolder, Stage, files,
+    Event, Observer, RunError, RunFolder, Stage,
+    commit::Commit,
+    files,
     fit::{comments, open_gpu},
     keeping,
+    lock::RunLock,
     scene::{open, read_splats},
     teach::teacher_or_photos,
 };
@@ -73,11 +76,11 @@ pub fn eval(
     let warnings = RefCell::default();
     let observe = &mut keeping(&warnings, observe);
     let (folder, report, scene) = load(options, observe)?;
-    let made = tempfile::Builder::new()
-        .prefix(".eval-")
-        .tempdir_in(folder.path())
-        .map_err(files::at(folder.path()))?;
+    let _lock = RunLock::take(folder.path())?;
     files::check_page(&folder.evaluation_page())?;
+    let commit = Commit::new(folder.path())?;
+    let page = commit.place(&folder.evaluation_page());
+    files::make_folder(&page)?;
     let mut lpips = options.lpips.as_deref().map(Lpips::open).transpose()?;
     let asked = (options.teacher.as_deref())
         .map(|teacher| teacher_or_photos(teacher, &scene.dataset.capture.root));
@@ -109,10 +112,7 @@ pub fn eval(
             sh: field.clone(),
             ..scene.luma.clone()
         };
-        let path = made
-            .path()
-            .join(told.method.file_stem())
-            .with_extension("ply");
+        let path = page.join(told.method.file_stem()).with_extension("ply");
         ply::write_ply(&path, &splats, glam::DVec3::ZERO, &comments(drawn))?;
     }
     let mut rgb = vec![(Method::Exported, &scene.exported)];
@@ -141,7 +141,7 @@ pub fn eval(
         let answer = painter.answer(i)?;
         let scored = Scored::of(name, reference, &drawing, answer.as_ref(), lpips.as_mut())?;
         if rows.len() < MAX_ROWS {
-            rows.push(page_row(made.path(), rows.len(), &scored)?);
+            rows.push(page_row(&page, rows.len(), &scored)?);
         }
         views.push(scored);
         Ok::<_, RunError>(())
@@ -151,7 +151,7 @@ pub fn eval(
     let flow = options.flow.as_deref();
     let mut keep = |frame, image| {
         let file = format!("frame-{frame:04}.png");
-        files::write_png(&made.path().join(&file), &image)?;
+        files::write_png(&page.join(&file), &image)?;
         if frame % every == 0 {
             strip.push(file);
         }
@@ -186,10 +186,10 @@ pub fn eval(
         seconds: begun.elapsed().as_secs_f64(),
     };
     let html = evaluation_page(&evaluation, &rows, &strip);
-    files::write(&made.path().join(files::PAGE), html.as_bytes())?;
-    files::replace_page(made, &folder.evaluation_page())?;
+    files::write(&page.join(files::PAGE), html.as_bytes())?;
     let json = evaluation.to_json() + "\n";
-    files::write(&folder.evaluation(), json.as_bytes())?;
+    files::write(&commit.place(&folder.evaluation()), json.as_bytes())?;
+    commit.finish()?;
     Ok((folder, evaluation))
 }
 

@@ -2,7 +2,7 @@
 
 use std::{
     fs,
-    io::{self, Write},
+    io::{self, BufWriter, Write},
     path::Path,
 };
 
@@ -22,10 +22,25 @@ pub(crate) fn at(path: &Path) -> impl FnOnce(std::io::Error) -> RunError {
 
 /// Writes beside and renames.
 pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), RunError> {
-    let mut file = atomic_file::create(path).map_err(at(path))?;
-    file.write_all(bytes).map_err(at(path))?;
-    file.persist(path).map_err(|error| at(path)(error.error))?;
-    Ok(())
+    write_by(path, |to| to.write_all(bytes))
+}
+
+/// Lets `fill` write beside, and renames what is on the disk.
+pub(super) fn write_by<T>(
+    path: &Path,
+    fill: impl FnOnce(&mut dyn Write) -> io::Result<T>,
+) -> Result<T, RunError> {
+    let filled = || {
+        let mut file = atomic_file::create(path)?;
+        let mut to = BufWriter::new(file.as_file_mut());
+        let made = fill(&mut to)?;
+        to.flush()?;
+        drop(to);
+        file.as_file().sync_all()?;
+        file.persist(path)?;
+        Ok(made)
+    };
+    filled().map_err(at(path))
 }
 
 /// Writes a PNG beside and renames.
@@ -72,26 +87,10 @@ pub(super) fn make_folder_of(path: &Path) -> Result<(), RunError> {
     make_folder(folder_of(path))
 }
 
-/// Removes a file that may be there.
-pub(super) fn remove(path: &Path) -> Result<(), RunError> {
-    match fs::remove_file(path) {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(at(path)(error)),
-        _ => Ok(()),
-    }
-}
-
 /// What makes a folder a page that may be replaced.
 pub(super) const PAGE: &str = "index.html";
 
-/// Removes a page's folder that may be there; other folders are left alone.
-pub(super) fn remove_page(folder: &Path) -> Result<(), RunError> {
-    if folder.join(PAGE).is_file() {
-        fs::remove_dir_all(folder).map_err(at(folder))?;
-    }
-    Ok(())
-}
-
-/// Refuses a folder that [`replace_page`] would not replace.
+/// Refuses a folder that `eval` would not replace.
 pub(super) fn check_page(folder: &Path) -> Result<(), RunError> {
     if folder.exists() && !folder.join(PAGE).is_file() {
         return Err(RunError::File {
@@ -99,16 +98,6 @@ pub(super) fn check_page(folder: &Path) -> Result<(), RunError> {
             reason: format!("is in the way: no page ({PAGE} is missing); move it elsewhere"),
         });
     }
-    Ok(())
-}
-
-/// Puts a finished folder where a page of its kind was, or nothing.
-pub(super) fn replace_page(made: tempfile::TempDir, folder: &Path) -> Result<(), RunError> {
-    check_page(folder)?;
-    remove_page(folder)?;
-    fs::rename(made.path(), folder).map_err(at(folder))?;
-    // What it would remove is elsewhere now.
-    let _ = made.keep();
     Ok(())
 }
 

@@ -6,7 +6,7 @@ use std::{
     time::SystemTime,
 };
 
-use super::{RunError, files};
+use super::{RunError, files, lock::finish_what_is_left};
 use crate::{
     report::Report,
     splats::{ShField, npy},
@@ -84,6 +84,11 @@ impl RunFolder {
         self.0.join("report.json")
     }
 
+    /// What an interrupted training goes on from.
+    pub fn checkpoint(&self) -> PathBuf {
+        self.0.join("checkpoint")
+    }
+
     /// The losses.
     pub fn log(&self) -> PathBuf {
         self.0.join("log.csv")
@@ -104,6 +109,7 @@ impl RunFolder {
     /// # Errors
     /// [`RunError::File`] when there is none or it is damaged.
     pub fn read_report(&self) -> Result<Report, RunError> {
+        finish_what_is_left(&self.0);
         let path = self.report();
         let text = fs::read_to_string(&path).map_err(|error| RunError::File {
             path: path.clone(),
@@ -131,22 +137,5 @@ impl RunFolder {
             reason: format!("{reason}: run `gs-chroma colorize` again"),
         })?;
         Ok(Some(field))
-    }
-
-    /// Writes the native chroma; what was measured of an earlier one goes.
-    pub(super) fn write_chroma(&self, chroma: &ShField) -> Result<(), RunError> {
-        let path = self.chroma();
-        self.forget_evaluation()?;
-        files::write(&path, &npy::encode(chroma))
-    }
-
-    /// Removes what `eval` wrote.
-    pub(super) fn forget_evaluation(&self) -> Result<(), RunError> {
-        files::remove(&self.evaluation())?;
-        files::remove_page(&self.evaluation_page())
-    }
-
-    pub(super) fn write_report(&self, report: &Report) -> Result<(), RunError> {
-        files::write(&self.report(), (report.to_json() + "\n").as_bytes())
     }
 }

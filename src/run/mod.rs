@@ -1,13 +1,16 @@
 //! Whole runs: what a command does from its options to its files.
 
 mod colorize;
+mod commit;
 mod eval;
 mod export;
 pub(crate) mod files;
+mod fingerprint;
 mod fit;
 mod folder;
 mod foreign;
 mod info;
+mod lock;
 mod picture_names;
 mod plan;
 mod preset;
@@ -21,7 +24,7 @@ use std::{cell::RefCell, fmt, path::PathBuf};
 pub use colorize::{ColorizeOptions, Output, colorize};
 pub use eval::{EvalOptions, eval};
 pub use export::{ExportOptions, Exported, export};
-pub use fit::{AheadOptions, FitOptions, Overlay, fit};
+pub use fit::{AheadOptions, CheckpointOptions, EVERY, FitOptions, Interrupt, Overlay, fit};
 pub use folder::RunFolder;
 pub use info::info;
 pub(crate) use picture_names::picture_names;
@@ -118,6 +121,36 @@ pub enum RunError {
     /// Photos that are to give the colors have none.
     #[error("{}: these photos are gray: name a teacher that colors them", .0.display())]
     GrayPhotos(PathBuf),
+    /// The system does not let the program hear of signals.
+    #[error("signals cannot be heeded: {0}")]
+    Signals(String),
+    /// Another process writes into the run.
+    #[error("{}: {holder} is writing into it: wait for it, or choose another folder with -o", folder.display())]
+    InUse {
+        /// The run's folder.
+        folder: PathBuf,
+        /// Who it is.
+        holder: String,
+    },
+    /// There is no training that was interrupted.
+    #[error("{}: nothing to go on with: the run is finished", .0.display())]
+    NothingToResume(PathBuf),
+    /// A checkpoint of another training.
+    #[error("{}: belongs to another training: {differs}", path.display())]
+    OtherCheckpoint {
+        /// The checkpoint.
+        path: PathBuf,
+        /// What was otherwise.
+        differs: String,
+    },
+    /// A training was ended from outside, and can go on.
+    #[error("interrupted after iteration {iteration}; {} goes on from there", path.display())]
+    Interrupted {
+        /// Iterations done.
+        iteration: usize,
+        /// The checkpoint.
+        path: PathBuf,
+    },
     /// Nothing is left for stage 2.
     #[error("stage 1 already took {luma} iterations: choose a larger number")]
     NothingUntil {

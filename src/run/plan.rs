@@ -51,6 +51,7 @@ pub fn plan(options: &PlanOptions, observe: &mut Observer<'_>) -> Result<Planned
         dataset,
         evidence,
         soundness,
+        ..
     } = open_examined(&options.colmap_dir, &load, observe)?;
     let dataset = Arc::new(dataset);
     let raster = || Ok(Arc::new(Raster::new(&open_gpu(false)?)));

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::{Event, Observer, RunError, Stage, scene};
+use super::{Event, Observer, RunError, Stage, fingerprint::Fingerprint, scene};
 use crate::{
     capture::{
         Camera, Capture, CaptureError, Dataset, Headers, LoadOptions, MaskSource, Masked, Rejected,
@@ -38,6 +38,8 @@ pub(super) struct Examined {
     pub evidence: Evidence,
     /// How well it agreed before anything was left out.
     pub soundness: Soundness,
+    /// Photos, cameras and points in a few digits.
+    pub fingerprint: String,
 }
 
 /// What follows from the model alone.
@@ -104,7 +106,7 @@ pub(super) fn open_examined(
     observe: &mut Observer<'_>,
 ) -> Result<Examined, RunError> {
     let (mut dataset, model) = open_judged(dir, options, observe)?;
-    let (evidence, agreement) = examine(&dataset, observe)?;
+    let (evidence, agreement, fingerprint) = examine(&dataset, observe)?;
     let transparent = dataset.settle_transparency();
     if transparent > 0 && options.masks != MaskSource::Alpha {
         observe(Event::Warning(format!(
@@ -128,8 +130,8 @@ pub(super) fn open_examined(
             false => format!("left out {name}: {reason}"),
         }));
     }
-    let (dataset, evidence) = match unfit.is_empty() || all_are_used {
-        true => (dataset, evidence),
+    let (dataset, evidence, fingerprint) = match unfit.is_empty() || all_are_used {
+        true => (dataset, evidence, fingerprint),
         false => {
             let mut options = dataset.options.clone();
             options.left_out.extend(unfit);
@@ -141,15 +143,16 @@ pub(super) fn open_examined(
             };
             let mut dataset = scene::open(dir, &options, quietly)?;
             model.mend(&mut dataset.capture);
-            let (evidence, _) = examine(&dataset, quietly)?;
+            let (evidence, _, fingerprint) = examine(&dataset, quietly)?;
             dataset.settle_transparency();
-            (dataset, evidence)
+            (dataset, evidence, fingerprint)
         }
     };
     Ok(Examined {
         dataset,
         evidence,
         soundness,
+        fingerprint,
     })
 }
 
@@ -217,11 +220,13 @@ impl Model {
     }
 }
 
-/// Examines all photos, each decoded once; also gives how they agree with the points' colors.
+/// Examines all photos, each decoded once; also gives how they agree with the points' colors,
+/// and all of it in a few digits.
 fn examine(
     dataset: &Dataset,
     observe: &mut Observer<'_>,
-) -> Result<(Evidence, Agreement), RunError> {
+) -> Result<(Evidence, Agreement, String), RunError> {
+    let mut fingerprint = Fingerprint::default();
     let channel = dataset.options.channel;
     let mut colors = PointColors::of(&dataset.capture, &dataset.cameras, channel);
     let mut survey = Survey::new(&dataset.capture, &dataset.cameras, &dataset.split);
@@ -229,6 +234,7 @@ fn examine(
     dataset.visit(&all, |view, photo| {
         survey.look(view, photo);
         colors.look(view, photo);
+        fingerprint.look(dataset, view, photo);
         observe(Event::Progress {
             stage: Stage::Photos,
             done: view,
@@ -238,7 +244,9 @@ fn examine(
         Ok::<_, CaptureError>(())
     })?;
     scene::tell_not_finite(dataset, observe);
-    Ok((survey.finish(), colors.finish(&dataset.capture)))
+    let agreement = colors.finish(&dataset.capture);
+    let fingerprint = fingerprint.finish(&dataset.capture);
+    Ok((survey.finish(), agreement, fingerprint))
 }
 
 /// The photos that do not show what COLMAP saw.

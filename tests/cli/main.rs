@@ -17,6 +17,7 @@ mod eval_photos;
 // The host is trusted by OpenSSL's variable, which other systems do not ask.
 #[cfg(target_os = "linux")]
 mod fetch;
+mod folder;
 #[cfg(target_os = "linux")]
 mod host;
 mod inspect;
@@ -26,6 +27,7 @@ mod photos;
 mod picture;
 mod program;
 mod repeat;
+mod resume;
 mod scene;
 mod shared;
 mod solver;

@@ -108,6 +108,10 @@ pub fn files_below(folder: &Path) -> Vec<(String, Vec<u8>)> {
             } else {
                 let below = path.strip_prefix(folder).expect("below");
                 let name = below.to_string_lossy().replace('\\', "/");
+                // It says who wrote last, and stays.
+                if name.ends_with(".lock") {
+                    continue;
+                }
                 found.push((name, fs::read(&path).unwrap_or_default()));
             }
         }

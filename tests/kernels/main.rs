@@ -28,6 +28,7 @@ mod numerics;
 mod poison;
 mod renderer;
 mod repeat;
+mod resume;
 mod rgb;
 mod scan;
 mod solver;

@@ -105,7 +105,7 @@ fn trainer(start: &Splats, target: &Splats) -> LumaTrainer {
     trainer_by(settings, schedule, 4.0, start, photos(target))
 }
 
-fn trainer_by(
+pub fn trainer_by(
     settings: LumaSettings,
     schedule: Schedule,
     extent: f64,
@@ -117,7 +117,7 @@ fn trainer_by(
     trainer
 }
 
-fn settings(start: &Splats) -> LumaSettings {
+pub fn settings(start: &Splats) -> LumaSettings {
     let mut settings = LumaSettings::new(60);
     settings.seed = FAR_FIRST;
     settings.sh_degree = 1;
@@ -128,7 +128,7 @@ fn settings(start: &Splats) -> LumaSettings {
 }
 
 /// What the views show of a scene.
-fn photos(target: &Splats) -> Vec<TrainingView> {
+pub fn photos(target: &Splats) -> Vec<TrainingView> {
     let geometry = Geometry::upload(gpu(), target).unwrap();
     let field = Field::upload(gpu(), &target.sh).unwrap();
     let mut renderer = Renderer::new(raster(), geometry, vec![field], 0.01).unwrap();
@@ -141,7 +141,7 @@ fn photos(target: &Splats) -> Vec<TrainingView> {
     views().into_iter().map(photo).collect()
 }
 
-fn start_and_target() -> [Splats; 2] {
+pub fn start_and_target() -> [Splats; 2] {
     let mut target = splats(&random_scene::<1>(12, COUNT, 1).0);
     let scales = target.log_scales.as_flattened_mut();
     scales.iter_mut().for_each(|scale| *scale += 0.9);
@@ -155,7 +155,7 @@ fn start_and_target() -> [Splats; 2] {
     [start, target]
 }
 
-fn same(a: &Splats, b: &Splats) -> bool {
+pub fn same(a: &Splats, b: &Splats) -> bool {
     let all = |s: &Splats| {
         let [means, scales] = [&s.means, &s.log_scales].map(|v| bits(v.as_flattened()));
         let quats = bits(s.quats.as_flattened());

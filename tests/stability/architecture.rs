@@ -18,6 +18,7 @@ const FLOORS: [&[&str]; 10] = [
         "gpu",
         "color",
         "atomic_file",
+        "sections",
         "download",
         "npy",
         "oracle",

@@ -7,9 +7,9 @@ use crate::{gpu::GpuError, raster::Snapshot};
 /// All that a training changes but what it leaves out as outliers, in host memory: the
 /// device may have no room for a second set.
 pub(super) struct Best {
-    iteration: usize,
-    psnr: f64,
-    model: Snapshot,
+    pub iteration: usize,
+    pub psnr: f64,
+    pub model: Snapshot,
 }
 
 impl LumaTrainer {

@@ -41,7 +41,7 @@ pub(super) struct Watch {
     /// Those of which something counts.
     counting: Vec<usize>,
     /// The next look is after this iteration.
-    next: usize,
+    pub next: usize,
     pub curve: Vec<CurvePoint>,
     /// Seconds spent on it.
     pub seconds: f64,

@@ -2,13 +2,15 @@
 
 mod ahead;
 mod budget;
+mod checkpoint;
 mod report;
 mod training;
 
 use std::{cell::RefCell, path::PathBuf, sync::Arc, time::Instant};
 
 use super::{
-    Observer, Preset, RunError, RunFolder, files, keeping, scene::open, sound::open_examined,
+    Observer, Preset, RunError, RunFolder, commit::Commit, files, keeping, lock::RunLock,
+    scene::open, sound::open_examined,
 };
 use crate::{
     capture::LoadOptions,
@@ -22,6 +24,8 @@ use crate::{
 use ahead::Ahead;
 pub use ahead::AheadOptions;
 use budget::Budget;
+pub use checkpoint::{CheckpointOptions, EVERY, Interrupt};
+use checkpoint::{Found, question, tell_given_up};
 pub(super) use report::capture_report;
 use training::{Job, Trained};
 
@@ -55,6 +59,8 @@ pub struct FitOptions {
     pub timings: bool,
     /// Who is to color the photos meanwhile.
     pub ahead: AheadOptions,
+    /// How it can go on where it is interrupted.
+    pub checkpoints: CheckpointOptions,
 }
 
 impl FitOptions {
@@ -72,6 +78,7 @@ impl FitOptions {
             goal: Goal::Fixed,
             timings: false,
             ahead: AheadOptions::default(),
+            checkpoints: CheckpointOptions::default(),
         }
     }
 }
@@ -85,7 +92,7 @@ pub fn fit(
     options: &FitOptions,
     observe: &mut Observer<'_>,
 ) -> Result<(RunFolder, Report), RunError> {
-    let begun = Instant::now();
+    let mut begun = Instant::now();
     let warnings = RefCell::default();
     let observe = &mut keeping(&warnings, observe);
     let gpu = open_gpu(options.timings)?;
@@ -95,8 +102,20 @@ pub fn fit(
         None => RunFolder::for_capture(&options.colmap_dir),
     };
     files::make_folder(folder.path())?;
+    let _lock = RunLock::take(folder.path())?;
     let ahead = Ahead::open(&options.ahead, &folder)?;
-    let budget = Budget::of(options, &raster, begun, observe)?;
+    let found = match options.checkpoints.resume {
+        true => Found::in_folder(&folder, observe)?,
+        false => {
+            tell_given_up(&folder.checkpoint(), observe);
+            None
+        }
+    };
+    // How much there is time for was found out once.
+    let budget = match &found {
+        Some(found) if options.goal.seconds().is_some() => found.budget(),
+        _ => Budget::of(options, &raster, begun, observe)?,
+    };
     let load = LoadOptions {
         max_side: budget.work.max_side,
         lens: options.overrules.choice(Effect::Lens),
@@ -104,6 +123,17 @@ pub fn fit(
     };
     let examined = open_examined(&options.colmap_dir, &load, observe)?;
     let (dataset, evidence) = (Arc::new(examined.dataset), examined.evidence);
+    let question = question(
+        options,
+        &budget,
+        &dataset.options,
+        &gpu,
+        &examined.fingerprint,
+    )?;
+    if let Some(found) = &found {
+        found.check(&question)?;
+        begun = found.begun();
+    }
     let judge = match options.measure_side {
         Some(_) => {
             let load = LoadOptions {
@@ -125,7 +155,9 @@ pub fn fit(
         begun,
         loading: begun.elapsed().as_secs_f64(),
     };
-    let trained = ahead.meanwhile(&dataset, observe, |observe| job.train(&budget, observe))?;
+    let trained = ahead.meanwhile(&dataset, observe, |observe| {
+        job.train(&budget, &folder, question, found.as_ref(), observe)
+    })?;
     let report = Report {
         warnings: warnings.take(),
         ..job.report(budget.preset, &trained)
@@ -139,16 +171,25 @@ pub fn fit(
 
 /// Writes the run's files in the place of those of an earlier one.
 fn write(folder: &RunFolder, trained: &Trained, report: &Report) -> Result<(), RunError> {
+    let mut commit = Commit::new(folder.path())?;
     // The old colors do not belong to the new geometry.
-    for stale in [folder.color(), folder.chroma(), folder.contact_sheet()] {
-        files::remove(&stale)?;
+    for stale in [
+        folder.color(),
+        folder.chroma(),
+        folder.contact_sheet(),
+        folder.evaluation(),
+        folder.checkpoint(),
+    ] {
+        commit.remove(&stale);
     }
-    folder.forget_evaluation()?;
+    commit.remove_page(&folder.evaluation_page());
     let comments = comments(trained.scene.settings.raster_options());
     let origin = glam::DVec3::ZERO;
-    ply::write_ply(&folder.luma(), &trained.scene.splats, origin, &comments)?;
-    files::write(&folder.log(), trained.log.as_bytes())?;
-    folder.write_report(report)
+    let luma = commit.place(&folder.luma());
+    ply::write_ply(&luma, &trained.scene.splats, origin, &comments)?;
+    files::write(&commit.place(&folder.log()), trained.log.as_bytes())?;
+    files::write(&commit.place(&folder.report()), &report.to_file())?;
+    commit.finish()
 }
 
 /// The device; with `timed`, its dispatches are.

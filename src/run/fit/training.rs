@@ -1,15 +1,18 @@
 //! One training, from settings to measured splats.
 
-use std::{fmt::Write, ops::ControlFlow, sync::Arc, time::Instant};
+use std::{cell::RefCell, fmt::Write, ops::ControlFlow, sync::Arc, time::Instant};
+
+use serde_json::Value;
 
 use super::super::{
-    Event, Observer, RunError, Stage,
+    Event, Observer, RunError, RunFolder, Stage,
     foreign::tell_unlike,
     scene::{read_splats, tell_trial},
 };
 use super::{
     FitOptions,
     budget::{Budget, ITERATIONS_MIN, WRITING},
+    checkpoint::{FolderKeeper, Found},
 };
 use crate::{
     capture::{CaptureError, Dataset, Exposure},
@@ -122,7 +125,14 @@ impl Job<'_> {
     ///
     /// # Errors
     /// [`RunError`].
-    pub fn train(&self, budget: &Budget, observe: &mut Observer<'_>) -> Result<Trained, RunError> {
+    pub fn train(
+        &self,
+        budget: &Budget,
+        folder: &RunFolder,
+        question: Value,
+        found: Option<&Found>,
+        observe: &mut Observer<'_>,
+    ) -> Result<Trained, RunError> {
         let (options, dataset) = (self.options, self.dataset);
         let limit = self.time_for_training(budget.each)?;
         let settings = &budget.work.settings;
@@ -146,8 +156,24 @@ impl Job<'_> {
             start: init.as_ref().map(|(splats, _)| splats),
             watched: reaches.then(|| (self.judge, self.judge.split.test.clone())),
         };
-        let mut log = String::from("iteration,loss,splats,seconds,poisoned\n");
-        let scene = fit.run(settings, &mut |event| {
+        let log = RefCell::new(match found {
+            Some(found) => found.log(),
+            None => String::from("iteration,loss,splats,seconds,poisoned\n"),
+        });
+        let observe = RefCell::new(observe);
+        let tell = |event| observe.borrow_mut()(event);
+        let mut keeper = FolderKeeper::new(
+            folder,
+            question,
+            budget,
+            &options.checkpoints,
+            &log,
+            &tell,
+            self.begun,
+        );
+        let checkpoint = found.map(|found| &found.checkpoint);
+        let scene = fit.run_from(checkpoint, &mut keeper, settings, &mut |event| {
+            let observe = &mut *observe.borrow_mut();
             match event {
                 // Not asked for: the evidence is there.
                 LumaEvent::Examined { .. } => {}
@@ -175,7 +201,7 @@ impl Job<'_> {
                 LumaEvent::Training(progress) => {
                     // Writing to a string cannot fail.
                     let _ = writeln!(
-                        log,
+                        log.borrow_mut(),
                         "{},{:.6},{},{:.3},{}",
                         progress.iteration,
                         progress.loss,
@@ -192,7 +218,17 @@ impl Job<'_> {
                 }
             }
             ControlFlow::Continue(())
-        })?;
+        });
+        let scene = match keeper.interrupted.take() {
+            Some(written) => {
+                return Err(RunError::Interrupted {
+                    iteration: written?,
+                    path: folder.checkpoint(),
+                });
+            }
+            None => scene?,
+        };
+        drop(keeper);
         let timings = (options.timings)
             .then(|| Ok::<_, RunError>(kernel_reports(&self.gpu.timings()?, &scene.load)))
             .transpose()?;
@@ -202,7 +238,7 @@ impl Job<'_> {
         let held_out_views = measure_luma(&drawn, self.judge, &scene.splats, scene.exposures())?;
         Ok(Trained {
             scene,
-            log,
+            log: log.into_inner(),
             held_out_views,
             timings,
             measuring: begun.elapsed().as_secs_f64(),

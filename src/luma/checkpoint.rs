@@ -1,0 +1,143 @@
+//! A training on disk: all that decides how it goes on.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use super::{CurvePoint, LumaSettings, Schedule, pace::Pace};
+use crate::{
+    effects::Plan,
+    raster::{Load, Snapshot},
+};
+
+/// A training between two iterations. What goes on from it ends with the bytes of one that was
+/// never interrupted.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Checkpoint {
+    pub(super) state: State,
+    pub(super) model: Snapshot,
+    /// Densification statistics since the set last changed.
+    pub(super) statistics: Vec<f32>,
+    /// The best set so far, while the training may go back to it.
+    pub(super) best: Option<Snapshot>,
+    /// Of some photos the pixels that no longer count, a bit each.
+    pub(super) left_out: Vec<(usize, Vec<u8>)>,
+}
+
+/// What of it is few numbers.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct State {
+    /// What it is trained with: what plan and memory decided included.
+    pub settings: LumaSettings,
+    /// Which effects are simulated; filled in by who planned.
+    pub plan: Option<Plan>,
+    /// Iterations done.
+    pub iteration: usize,
+    /// Seconds of training, those of watching included.
+    pub seconds: f64,
+    pub schedule: Schedule,
+    pub longest: usize,
+    pub pace: Pace,
+    /// Iteration at which the device began to count steps, and what it has counted.
+    pub base: usize,
+    pub status: Vec<u32>,
+    /// Entries of the tile lists.
+    pub capacity: usize,
+    pub next_look: usize,
+    pub curve: Vec<CurvePoint>,
+    pub watched_seconds: f64,
+    /// Iteration and PSNR of the best set.
+    pub best: Option<(usize, f64)>,
+    pub given_up: Option<usize>,
+    pub seen: Load,
+    pub reports: usize,
+}
+
+/// Who keeps checkpoints.
+pub trait Keeper {
+    /// Whether one is wanted after this iteration.
+    fn wants(&mut self, iteration: usize) -> bool;
+
+    /// Takes one; `false` ends the training with [`LumaError::Cancelled`](super::LumaError).
+    fn keep(&mut self, checkpoint: Checkpoint) -> bool;
+}
+
+/// Keeps none.
+pub struct NoKeeper;
+
+impl Keeper for NoKeeper {
+    fn wants(&mut self, _: usize) -> bool {
+        false
+    }
+
+    fn keep(&mut self, _: Checkpoint) -> bool {
+        true
+    }
+}
+
+impl Checkpoint {
+    /// Iterations done.
+    pub fn iteration(&self) -> usize {
+        self.state.iteration
+    }
+
+    /// Seconds of training so far.
+    pub fn seconds(&self) -> f64 {
+        self.state.seconds
+    }
+
+    /// What is trained with.
+    pub fn settings(&self) -> &LumaSettings {
+        &self.state.settings
+    }
+
+    /// As named sections of bytes.
+    pub fn to_sections(&self) -> Vec<(String, Vec<u8>)> {
+        // Plain structs with string keys: serializing them cannot fail.
+        let state = serde_json::to_vec(&self.state).unwrap_or_default();
+        let mut sections = vec![("training".to_owned(), state)];
+        let floats = |values: &[f32]| bytemuck::cast_slice(values).to_vec();
+        let best = self.best.iter().map(|best| ("best", best));
+        for (name, snapshot) in best.chain([("model", &self.model)]) {
+            for (index, plane) in snapshot.planes.iter().enumerate() {
+                sections.push((format!("{name} {index}"), floats(plane)));
+            }
+        }
+        sections.push(("statistics".to_owned(), floats(&self.statistics)));
+        for (photo, bits) in &self.left_out {
+            sections.push((format!("left out {photo}"), bits.clone()));
+        }
+        sections
+    }
+
+    /// What [`Checkpoint::to_sections`] gave; `None` of anything else.
+    pub fn from_sections(sections: &BTreeMap<String, Vec<u8>>) -> Option<Self> {
+        let state: State = serde_json::from_slice(sections.get("training")?).ok()?;
+        let floats = |name: &str| -> Option<Vec<f32>> {
+            let bytes = sections.get(name)?;
+            let floats = bytes.chunks_exact(4);
+            floats.remainder().is_empty().then(|| {
+                floats
+                    .map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+                    .collect()
+            })
+        };
+        let snapshot =
+            |name: &str| Snapshot::of((0..).map_while(|k| floats(&format!("{name} {k}"))));
+        let left_out = sections.iter().filter_map(|(name, bits)| {
+            let photo = name.strip_prefix("left out ")?.parse().ok()?;
+            Some((photo, bits.clone()))
+        });
+        let best = match state.best {
+            Some(_) => Some(snapshot("best")?),
+            None => None,
+        };
+        Some(Self {
+            model: snapshot("model")?,
+            statistics: floats("statistics")?,
+            left_out: left_out.collect(),
+            best,
+            state,
+        })
+    }
+}

@@ -1,0 +1,255 @@
+//! Files of a run that belong together appear together: they are written into a folder beside,
+//! which is renamed once it is complete and then emptied into the run. Whoever dies in between
+//! leaves either the old files or a folder that the next command empties.
+
+use std::{
+    ffi::OsStr,
+    fs::{self, File},
+    io,
+    path::{Path, PathBuf},
+};
+
+use tempfile::TempDir;
+
+use super::{RunError, files};
+
+/// What is complete, and is to be moved into its place.
+const COMPLETE: &str = ".commit";
+
+/// What is being written.
+const BEGUN: &str = ".next-";
+
+/// In [`COMPLETE`], the names of what has to go, a line each.
+const REMOVED: &str = ".removed";
+
+/// New files of a run, not in their place yet. Dropped, it leaves nothing behind.
+pub(super) struct Commit {
+    folder: PathBuf,
+    made: TempDir,
+    removed: Vec<String>,
+}
+
+impl Commit {
+    /// An empty one for the run in `folder`.
+    ///
+    /// # Errors
+    /// [`RunError::File`].
+    pub fn new(folder: &Path) -> Result<Self, RunError> {
+        let mut builder = tempfile::Builder::new();
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt;
+            // Folders of a page go with it, and are to be as public as others.
+            builder.permissions(fs::Permissions::from_mode(0o777));
+        }
+        let made = builder.prefix(BEGUN).tempdir_in(folder);
+        Ok(Self {
+            folder: folder.to_owned(),
+            made: made.map_err(files::at(folder))?,
+            removed: Vec::new(),
+        })
+    }
+
+    /// Where to write what will be `path` in the run's folder.
+    pub fn place(&self, path: &Path) -> PathBuf {
+        self.made.path().join(name(path))
+    }
+
+    /// Lets a file or a page of the run go.
+    pub fn remove(&mut self, path: &Path) {
+        self.removed.push(name(path).to_string_lossy().into_owned());
+    }
+
+    /// Lets a page of the run go, where it is one.
+    pub fn remove_page(&mut self, path: &Path) {
+        if path.join(files::PAGE).is_file() {
+            self.remove(path);
+        }
+    }
+
+    /// Puts all in its place.
+    ///
+    /// # Errors
+    /// [`RunError::File`]; then either nothing has changed, or [`finish`] will do what is left.
+    pub fn finish(self) -> Result<(), RunError> {
+        finish(&self.folder)?;
+        let list = self.made.path().join(REMOVED);
+        files::write(&list, self.removed.join("\n").as_bytes())?;
+        let complete = self.folder.join(COMPLETE);
+        fs::rename(self.made.path(), &complete).map_err(files::at(&complete))?;
+        // What it would remove is elsewhere now.
+        let _ = self.made.keep();
+        sync(&self.folder);
+        finish(&self.folder)
+    }
+}
+
+/// Puts in its place what a process that ended too early has left complete.
+///
+/// # Errors
+/// [`RunError::File`].
+pub(super) fn finish(folder: &Path) -> Result<(), RunError> {
+    let complete = folder.join(COMPLETE);
+    let list = match fs::read_to_string(complete.join(REMOVED)) {
+        Ok(list) => list,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
+        Err(error) => return Err(files::at(&complete)(error)),
+    };
+    for name in list.lines() {
+        remove(&folder.join(name))?;
+    }
+    for entry in fs::read_dir(&complete).map_err(files::at(&complete))? {
+        let made = entry.map_err(files::at(&complete))?.path();
+        if made.file_name() == Some(OsStr::new(REMOVED)) {
+            continue;
+        }
+        let place = folder.join(name(&made));
+        if made.is_dir() {
+            remove(&place)?;
+        }
+        fs::rename(&made, &place).map_err(files::at(&place))?;
+    }
+    sync(folder);
+    // The list goes last: as long as it is there, all of this can be done again.
+    remove(&complete)
+}
+
+/// Whether there is something to finish.
+pub(super) fn is_left(folder: &Path) -> bool {
+    folder.join(COMPLETE).join(REMOVED).exists()
+}
+
+/// Removes what processes that ended too early have begun. Nobody may be writing.
+pub(super) fn clean(folder: &Path) {
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        // `.tmp` and `.eval-` are what files and pages are called before they have a name.
+        let emptied = name == COMPLETE && !is_left(folder);
+        if emptied
+            || [BEGUN, ".tmp", ".eval-"]
+                .iter()
+                .any(|begun| name.starts_with(begun))
+        {
+            let _ = remove(&entry.path());
+        }
+    }
+}
+
+fn remove(path: &Path) -> Result<(), RunError> {
+    let removed = match path.symlink_metadata() {
+        Ok(metadata) if metadata.is_dir() => fs::remove_dir_all(path),
+        Ok(_) => fs::remove_file(path),
+        Err(error) => Err(error),
+    };
+    match removed {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(files::at(path)(error)),
+        _ => Ok(()),
+    }
+}
+
+/// Brings renames to the disk, where the system has a way to.
+fn sync(folder: &Path) {
+    // Some file systems cannot; the files themselves are there.
+    let _ = File::open(folder).and_then(|folder| folder.sync_all());
+}
+
+fn name(path: &Path) -> &OsStr {
+    path.file_name().unwrap_or(path.as_os_str())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn run() -> TempDir {
+        let run = tempfile::tempdir().unwrap();
+        for (name, text) in [("a", "old a"), ("b", "old b"), ("c", "old c")] {
+            fs::write(run.path().join(name), text).unwrap();
+        }
+        fs::create_dir(run.path().join("page")).unwrap();
+        fs::write(run.path().join("page/old"), "old").unwrap();
+        run
+    }
+
+    fn filled(run: &Path) -> Commit {
+        let mut commit = Commit::new(run).unwrap();
+        fs::write(commit.place(&run.join("a")), "new a").unwrap();
+        fs::write(commit.place(&run.join("d")), "new d").unwrap();
+        fs::create_dir(commit.place(&run.join("page"))).unwrap();
+        fs::write(commit.place(&run.join("page")).join("new"), "new").unwrap();
+        commit.remove(&run.join("b"));
+        commit.remove(&run.join("nowhere"));
+        commit
+    }
+
+    fn names(folder: &Path) -> Vec<String> {
+        let entries = fs::read_dir(folder).unwrap();
+        let mut names: Vec<String> = entries
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect();
+        names.sort();
+        names
+    }
+
+    fn is_new(run: &Path) {
+        assert_eq!(names(run), ["a", "c", "d", "page"]);
+        assert_eq!(fs::read_to_string(run.join("a")).unwrap(), "new a");
+        assert_eq!(fs::read_to_string(run.join("c")).unwrap(), "old c");
+        assert_eq!(names(&run.join("page")), ["new"]);
+    }
+
+    #[test]
+    fn files_appear_together() {
+        let run = run();
+        let commit = filled(run.path());
+        assert_eq!(fs::read_to_string(run.path().join("a")).unwrap(), "old a");
+        commit.finish().unwrap();
+        is_new(run.path());
+    }
+
+    #[test]
+    fn what_is_dropped_changes_nothing() {
+        let run = run();
+        drop(filled(run.path()));
+        assert_eq!(names(run.path()), ["a", "b", "c", "page"]);
+        assert_eq!(names(&run.path().join("page")), ["old"]);
+    }
+
+    /// Whoever dies after so many of its steps.
+    #[test]
+    fn what_is_complete_is_finished_by_the_next() {
+        let run_out_at = |steps: usize| {
+            let run = run();
+            let commit = filled(run.path());
+            files::write(&commit.made.path().join(REMOVED), b"b\nnowhere").unwrap();
+            let complete = run.path().join(COMPLETE);
+            fs::rename(commit.made.path(), &complete).unwrap();
+            let _ = commit.made.keep();
+            let done: [&dyn Fn(); 3] = [
+                &|| fs::remove_file(run.path().join("b")).unwrap(),
+                &|| fs::rename(complete.join("a"), run.path().join("a")).unwrap(),
+                &|| fs::remove_dir_all(run.path().join("page")).unwrap(),
+            ];
+            done[..steps].iter().for_each(|step| step());
+            finish(run.path()).unwrap();
+            is_new(run.path());
+            // There is nothing left to do.
+            finish(run.path()).unwrap();
+            is_new(run.path());
+        };
+        (0..=3).for_each(run_out_at);
+    }
+
+    #[test]
+    fn what_was_only_begun_is_removed() {
+        let run = run();
+        let commit = filled(run.path());
+        let _ = commit.made.keep();
+        fs::write(run.path().join(".tmpAb12"), "half").unwrap();
+        fs::create_dir(run.path().join(".eval-x")).unwrap();
+        finish(run.path()).unwrap();
+        clean(run.path());
+        assert_eq!(names(run.path()), ["a", "b", "c", "page"]);
+    }
+}

@@ -1,0 +1,92 @@
+//! One process at a time writes into a run.
+
+use std::{
+    fs::{self, File, OpenOptions, TryLockError},
+    io::Write,
+    path::Path,
+};
+
+use super::{RunError, commit, files};
+
+/// The file that is locked; it says who holds it.
+const LOCK: &str = ".lock";
+
+/// The right to write into a run's folder. The system takes it back when the process ends,
+/// however it does.
+#[derive(Debug)]
+pub(super) struct RunLock {
+    _file: File,
+}
+
+impl RunLock {
+    /// Takes it, finishes what a process that held it has left complete, and removes what it
+    /// had only begun.
+    ///
+    /// # Errors
+    /// [`RunError::InUse`], [`RunError::File`].
+    pub fn take(folder: &Path) -> Result<Self, RunError> {
+        let path = folder.join(LOCK);
+        let opened = OpenOptions::new()
+            .read(true)
+            .write(true)
+            .create(true)
+            .truncate(false)
+            .open(&path);
+        let mut file = opened.map_err(files::at(&path))?;
+        match file.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => {
+                return Err(RunError::InUse {
+                    folder: folder.to_owned(),
+                    holder: holder(&path),
+                });
+            }
+            // Some file systems cannot lock; then nobody can know.
+            Err(TryLockError::Error(_)) => return Ok(Self { _file: file }),
+        }
+        let mut told = || {
+            file.set_len(0)?;
+            writeln!(file, "{}", std::process::id())
+        };
+        told().map_err(files::at(&path))?;
+        commit::finish(folder)?;
+        commit::clean(folder);
+        Ok(Self { _file: file })
+    }
+}
+
+/// Who holds a lock, in words.
+fn holder(path: &Path) -> String {
+    let told = fs::read_to_string(path).unwrap_or_default();
+    match told.trim().parse::<u32>() {
+        Ok(process) => format!("process {process}"),
+        // Windows lets nobody read it.
+        Err(_) => "another process".to_owned(),
+    }
+}
+
+/// Finishes what a process has left complete, unless somebody is about to.
+pub(super) fn finish_what_is_left(folder: &Path) {
+    if commit::is_left(folder) {
+        // Whoever holds the lock does it.
+        let _: Result<RunLock, RunError> = RunLock::take(folder);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_at_a_time() {
+        let run = tempfile::tempdir().unwrap();
+        let lock = RunLock::take(run.path()).unwrap();
+        let error = RunLock::take(run.path()).unwrap_err().to_string();
+        let here = std::process::id().to_string();
+        if cfg!(unix) {
+            assert!(error.contains(&here), "{error}");
+        }
+        drop(lock);
+        RunLock::take(run.path()).unwrap();
+    }
+}

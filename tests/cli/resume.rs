@@ -1,0 +1,201 @@
+//! `fit --resume`: what is interrupted goes on, and ends with the same bytes.
+
+use std::{
+    process::{Child, Stdio},
+    thread::sleep,
+    time::{Duration, Instant},
+};
+
+use super::program::{Done, Place};
+use super::shared::place_with_scene;
+
+/// A training of a few seconds.
+const FIT: [&str; 10] = [
+    "fit",
+    "scene",
+    "--preset",
+    "draft",
+    "--iterations",
+    "600",
+    "--without",
+    "background",
+    "-o",
+    "run",
+];
+
+/// Checkpoints as often as they are cheap.
+const OFTEN: [&str; 2] = ["--checkpoint", "0.0001"];
+
+fn fit(more: &[&'static str]) -> Vec<&'static str> {
+    [&FIT[..], &OFTEN, more].concat()
+}
+
+fn started(place: &Place, more: &[&'static str]) -> Child {
+    let mut command = place.command(&fit(more));
+    let quiet = command.stdout(Stdio::piped()).stderr(Stdio::piped());
+    quiet.spawn().expect("the program starts")
+}
+
+/// Waits until there is a checkpoint; `false` where the training ended before.
+fn has_checkpoint(place: &Place, child: &mut Child) -> bool {
+    let begun = Instant::now();
+    while !place.path("run/checkpoint").exists() {
+        if child.try_wait().expect("a child").is_some() {
+            return false;
+        }
+        assert!(begun.elapsed() < Duration::from_secs(120), "no checkpoint");
+        sleep(Duration::from_millis(10));
+    }
+    true
+}
+
+/// The log but for its times.
+fn log(place: &Place) -> Vec<String> {
+    let text = String::from_utf8(place.read("run/log.csv")).expect("text");
+    let kept = |line: &str| {
+        let mut cells: Vec<&str> = line.split(',').collect();
+        cells.remove(3);
+        cells.join(",")
+    };
+    text.lines().map(kept).collect()
+}
+
+/// The bytes and the log of a training that nothing interrupts.
+fn whole() -> (Vec<u8>, Vec<String>) {
+    let place = place_with_scene();
+    place.succeed(&fit(&[]));
+    assert_eq!(place.files("run"), ["log.csv", "luma.ply", "report.json"]);
+    (place.read("run/luma.ply"), log(&place))
+}
+
+#[test]
+fn a_training_that_is_killed_goes_on() {
+    let whole = whole();
+    let mut interrupted = 0;
+    for pause in [0, 150, 400, 900] {
+        let place = place_with_scene();
+        // Killed again on its way from the first checkpoint.
+        for more in [&[][..], &["--resume"]] {
+            let mut child = started(&place, more);
+            if has_checkpoint(&place, &mut child) {
+                sleep(Duration::from_millis(pause));
+                interrupted += usize::from(child.try_wait().expect("a child").is_none());
+            }
+            child.kill().expect("it is there or gone");
+            child.wait().expect("a child");
+        }
+        if place.path("run/checkpoint").exists() {
+            place.succeed(&fit(&["--resume"]));
+        }
+        assert!(place.read("run/luma.ply") == whole.0, "after {pause} ms");
+        assert_eq!(log(&place), whole.1, "after {pause} ms");
+        assert!(!place.path("run/checkpoint").exists());
+    }
+    assert!(interrupted >= 4, "{interrupted}");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_signal_is_heeded_and_says_how_to_go_on() {
+    let whole = whole();
+    for signal in ["-INT", "-TERM"] {
+        let place = place_with_scene();
+        // None but when it is interrupted.
+        let mut command = place.command(&[&FIT[..], &["--checkpoint", "off"]].concat());
+        let child = command.stdout(Stdio::piped()).stderr(Stdio::piped());
+        let child = child.spawn().expect("the program starts");
+        // It trains once it has asked what kind of scene this is.
+        sleep(Duration::from_millis(1500));
+        let sent = std::process::Command::new("kill")
+            .args([signal, &child.id().to_string()])
+            .status();
+        assert!(sent.expect("kill").success());
+        let done = Done::of(child.wait_with_output());
+        if done.code == Some(130) {
+            // It was not training yet, and ended at once.
+            continue;
+        }
+        assert_eq!(done.code, Some(1), "{}", done.stderr);
+        assert!(
+            done.stderr.contains("writing a checkpoint"),
+            "{}",
+            done.stderr
+        );
+        let last = done.stderr.lines().last().unwrap_or_default();
+        assert!(
+            last.starts_with("error: interrupted after iteration")
+                && last.ends_with("with the same command and --resume"),
+            "{last}"
+        );
+        place.succeed(&fit(&["--resume"]));
+        assert!(place.read("run/luma.ply") == whole.0 && log(&place) == whole.1);
+    }
+}
+
+#[test]
+fn what_cannot_go_on_is_refused_with_what_differs() {
+    let place = place_with_scene();
+    let refused = |more: &[&'static str], parts: &[&str]| {
+        let done = place.run(&fit(more));
+        assert_eq!(done.code, Some(1), "{}", done.stderr);
+        let errors = done
+            .stderr
+            .lines()
+            .filter(|line| line.starts_with("error:"));
+        assert_eq!(errors.count(), 1, "{}", done.stderr);
+        for part in parts {
+            assert!(done.stderr.contains(part), "{part}: {}", done.stderr);
+        }
+    };
+    let mut child = started(&place, &[]);
+    assert!(has_checkpoint(&place, &mut child));
+    child.kill().expect("it is there");
+    child.wait().expect("a child");
+    let kept = place.read("run/checkpoint");
+    refused(
+        &["--resume", "--seed", "7"],
+        &["run/checkpoint", "settings.seed (0, now 7)"],
+    );
+    refused(&["--resume", "--max-side", "48"], &["load.max_side"]);
+    refused(&["--resume", "--without", "robust"], &["effects"]);
+    // Nothing of it was harmed.
+    assert!(place.read("run/checkpoint") == kept);
+    let photo = place.read("scene/images/03.png");
+    let mut other = super::scene::photo(3);
+    other.get_pixel_mut(5, 5).0 = [255, 255, 255];
+    other
+        .save(place.path("scene/images/03.png"))
+        .expect("a photo");
+    refused(&["--resume"], &["another training: photos"]);
+    place.write("scene/images/03.png", photo);
+    let mut damaged = kept.clone();
+    damaged[kept.len() / 2] ^= 1;
+    place.write("run/checkpoint", damaged);
+    refused(&["--resume"], &["run/checkpoint", "is damaged"]);
+    place.write("run/checkpoint", &kept);
+    // Without the option it is given up, which is told.
+    let done = place.run(&fit(&[]));
+    assert_eq!(done.code, Some(0), "{}", done.stderr);
+    let told =
+        |line: &str| line.starts_with("warning: run/checkpoint") && line.contains("--resume");
+    assert!(done.stderr.lines().any(told), "{}", done.stderr);
+    assert!(!place.path("run/checkpoint").exists());
+    refused(
+        &["--resume"],
+        &["run: nothing to go on with", "without --resume"],
+    );
+}
+
+#[test]
+fn what_was_never_begun_begins() {
+    let place = place_with_scene();
+    let done = place.run(&[&FIT[..], &["--resume"]].concat());
+    assert_eq!(done.code, Some(0), "{}", done.stderr);
+    assert!(
+        done.stderr.contains("training begins anew"),
+        "{}",
+        done.stderr
+    );
+    let wrong = place.run(&[&FIT[..], &["--checkpoint", "0"]].concat());
+    assert_eq!(wrong.code, Some(2));
+}

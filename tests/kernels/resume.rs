@@ -1,0 +1,200 @@
+//! A training that goes on from a checkpoint ends with the bytes of one that was never
+//! interrupted.
+
+use std::{collections::BTreeMap, ops::ControlFlow};
+
+use gs_chroma::{
+    luma::{
+        Checkpoint, Densification, Keeper, LumaError, LumaProgress, LumaSettings, LumaTrainer,
+        Schedule,
+    },
+    splats::{ShField, Splats},
+};
+
+use crate::repeat::{photos, same, settings, start_and_target, trainer_by};
+
+/// Wants a checkpoint wherever one can be, and ends after so many.
+struct EndsAfter {
+    left: usize,
+    kept: Vec<Checkpoint>,
+}
+
+impl Keeper for EndsAfter {
+    fn wants(&mut self, _: usize) -> bool {
+        true
+    }
+
+    fn keep(&mut self, checkpoint: Checkpoint) -> bool {
+        self.kept.push(checkpoint);
+        self.left -= 1;
+        self.left > 0
+    }
+}
+
+/// What is reported but for times.
+fn told(progress: &LumaProgress) -> (usize, u64, usize, usize, Option<u64>) {
+    let looked = progress.looked.map(|look| look.psnr.to_bits());
+    let loss = progress.loss.to_bits();
+    (
+        progress.iteration,
+        loss,
+        progress.splats,
+        progress.poisoned,
+        looked,
+    )
+}
+
+/// Trains to the end, and then once for each place where a checkpoint can be: to there, and on
+/// in another trainer. Gives these places.
+fn resumes_everywhere(of: &dyn Fn(&Splats) -> LumaTrainer, start: &Splats) -> Vec<usize> {
+    let mut whole = of(start);
+    let mut reports = Vec::new();
+    whole
+        .train(&mut |progress| reports.push(told(&progress)))
+        .unwrap();
+    let expected = whole.splats().unwrap();
+    // All that the settings say of a start is its number of harmonics.
+    let mut elsewhere = start.clone();
+    elsewhere.sh = ShField {
+        coefficients: vec![0.7; start.sh.coefficients.len()],
+        ..elsewhere.sh
+    };
+    let mut places = Vec::new();
+    for stop in 1.. {
+        let mut keeper = EndsAfter {
+            left: stop,
+            kept: Vec::new(),
+        };
+        let mut seen = Vec::new();
+        let mut first = of(start);
+        let ended = first.train_keeping(&mut keeper, &mut |progress| {
+            seen.push(told(&progress));
+            ControlFlow::Continue(())
+        });
+        if ended.is_ok() {
+            // There are no more places; asking for checkpoints changed nothing.
+            assert!(same(&first.splats().unwrap(), &expected) && seen == reports);
+            return places;
+        }
+        assert!(matches!(ended, Err(LumaError::Cancelled)));
+        let kept = keeper.kept.pop().unwrap();
+        let sections: BTreeMap<_, _> = kept.to_sections().into_iter().collect();
+        let read = Checkpoint::from_sections(&sections).unwrap();
+        assert!(read == kept);
+        let mut second = of(&elsewhere);
+        second.resume(&read).unwrap();
+        second
+            .train(&mut |progress| seen.push(told(&progress)))
+            .unwrap();
+        assert!(
+            same(&second.splats().unwrap(), &expected),
+            "from {}",
+            kept.iteration()
+        );
+        assert_eq!(seen, reports, "from {}", kept.iteration());
+        assert!(second.curve().len() == whole.curve().len());
+        places.push(kept.iteration());
+    }
+    places
+}
+
+#[test]
+fn a_set_that_is_split() {
+    let [start, target] = start_and_target();
+    let of = |from: &Splats| {
+        let settings = settings(&start);
+        let schedule = Schedule {
+            densify_from: 20,
+            densify_every: 25,
+            densify_until: 60,
+            raise_degree_every: 20,
+            ..Schedule::of(&settings)
+        };
+        trainer_by(settings, schedule, 4.0, from, photos(&target))
+    };
+    assert_eq!(resumes_everywhere(&of, &start), [25, 50]);
+}
+
+/// Relocation, outliers, small photos at first, and views that are watched.
+#[test]
+fn with_every_effect() {
+    let [start, target] = start_and_target();
+    let of = |from: &Splats| {
+        let mut settings = LumaSettings {
+            iterations: 150,
+            robust: true,
+            ..settings(&start)
+        };
+        settings.densify_by(Densification::Relocate);
+        settings.coarse = 0.3;
+        let schedule = Schedule {
+            densify_from: 20,
+            densify_every: 30,
+            densify_until: 110,
+            raise_degree_every: 20,
+            ..Schedule::of(&settings)
+        };
+        let mut photos = photos(&target);
+        // Someone walks by.
+        let width = photos[1].camera.width as usize;
+        for (pixel, gray) in photos[1].gray.iter_mut().enumerate() {
+            if (40..60).contains(&(pixel % width)) {
+                *gray = 255 - *gray;
+            }
+        }
+        let mut trainer = trainer_by(settings, schedule, 4.0, from, photos.clone());
+        trainer.watch(photos).unwrap();
+        trainer
+    };
+    assert_eq!(resumes_everywhere(&of, &start), [25, 50, 75, 100, 125]);
+}
+
+/// What it goes back to was kept.
+#[test]
+fn a_training_that_goes_back_to_its_best() {
+    let [start, target] = start_and_target();
+    let of = |from: &Splats| {
+        let mut settings = LumaSettings {
+            iterations: 400,
+            stop_when_flat: Some(0.1),
+            ..settings(&start)
+        };
+        settings.rates.means = [1.6e-4; 2];
+        let schedule = Schedule {
+            densify_from: 20,
+            densify_every: 30,
+            raise_degree_every: 20,
+            ..Schedule::of(&settings)
+        };
+        let mut trainer = trainer_by(settings, schedule, 4.0, from, photos(&target));
+        trainer.watch(photos(&start)).unwrap();
+        trainer
+    };
+    assert_eq!(resumes_everywhere(&of, &start), [25, 50, 75, 100]);
+    let mut trainer = of(&start);
+    trainer.train(&mut |_| {}).unwrap();
+    assert_eq!(trainer.given_up(), Some(125));
+}
+
+#[test]
+fn what_is_no_checkpoint_is_refused() {
+    let [start, target] = start_and_target();
+    let settings = settings(&start);
+    let schedule = Schedule::of(&settings);
+    let mut keeper = EndsAfter {
+        left: 1,
+        kept: Vec::new(),
+    };
+    let mut trainer = trainer_by(settings, schedule, 4.0, &start, photos(&target));
+    let ended = trainer.train_keeping(&mut keeper, &mut |_| ControlFlow::Continue(()));
+    assert!(ended.is_err());
+    let sections: BTreeMap<_, _> = keeper.kept[0].to_sections().into_iter().collect();
+    for name in sections.keys() {
+        let mut other = sections.clone();
+        other.remove(name);
+        assert_eq!(Checkpoint::from_sections(&other), None, "without {name}");
+        let mut other = sections.clone();
+        other.get_mut(name).unwrap().push(0);
+        assert_eq!(Checkpoint::from_sections(&other), None, "more of {name}");
+    }
+}
