@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Runs `info` and `plan` on scenes that contradict themselves and on sound ones, and prints what
-was said of each as Markdown.
+"""Runs `info` and `plan` on scenes that contradict themselves and on sound ones, and other
+commands on files and names that are easily mistaken, and prints what was said of each as
+Markdown.
 
     cargo build --release && python3 tools/check_soundness.py CASES [--sound SCENES]
 
@@ -18,6 +19,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import unicodedata
 from collections.abc import Callable
 from pathlib import Path
 
@@ -124,6 +126,67 @@ def untracked(scene: Path) -> None:
     path.write_text("\n".join(lines) + "\n")
 
 
+def composed_names(cases: Path) -> Callable[[Path], None]:
+    """Composed names in the model, decomposed ones on the disk."""
+
+    def spoil(scene: Path) -> None:
+        model = cases / "names/nfc-images.txt"
+        shutil.copy(model, scene / "sparse/0/images.txt")
+        names = [line.split()[-1] for line in model.read_text().splitlines() if line.endswith(".jpg")]
+        for name in names:
+            photo = scene / "images" / name[name.index("garden") :]
+            photo.rename(photo.with_name(unicodedata.normalize("NFD", name)))
+
+    return spoil
+
+
+def with_files(cases: Path) -> dict[str, Callable[[Path], object]]:
+    """Scenes that get a file of CASES."""
+
+    def first_photo(name: str) -> Callable[[Path], object]:
+        return lambda scene: shutil.copy(cases / "messages" / name, scene / "images/garden_00.jpg")
+
+    return {
+        "masks-partly-found": lambda scene: shutil.copytree(cases / "masks-partly-found/masks", scene / "masks"),
+        "names: composed and decomposed": composed_names(cases),
+        "names: byte order mark": lambda scene: shutil.copy(
+            cases / "names/bom-cameras.txt", scene / "sparse/0/cameras.txt"
+        ),
+        "messages: 12-bit JPEG": first_photo("twelve-bits.jpg"),
+        "messages: BigTIFF": first_photo("big.tif"),
+    }
+
+
+# Of each case its commands; those before the last prepare it. CASES and OUT stand for folders.
+DRAFT = "--preset draft --iterations 60 --max-splats 3000"
+COMMANDS = {
+    "ply-infinite-opacity": ["info CASES/ply-infinite-opacity/opaque.ply"],
+    "ply-of-others: two scales": ["info CASES/ply-of-others/two-scales.ply"],
+    "ply-of-others: colors of 8 bits": ["info CASES/ply-of-others/uchar-colours.ply"],
+    "ply-of-others: count too small": ["info CASES/ply-of-others/count-too-small.ply"],
+    "ply-of-others: .splat": ["render CASES/ply-of-others/scene.splat --colmap CASES/_base -o OUT/p"],
+    "messages: points as --init": [f"fit CASES/_base {DRAFT} --init CASES/messages/points.ply -o OUT/points"],
+    "ply-of-another-frame: render": [
+        "render CASES/ply-of-another-frame/turned-and-scaled.ply --colmap CASES/_base -o OUT/frame"
+    ],
+    "ply-of-another-frame: fit --init": [
+        f"fit CASES/_base {DRAFT} --init CASES/ply-of-another-frame/turned-and-scaled.ply -o OUT/init"
+    ],
+    "render-overwrites": [
+        f"fit CASES/render-overwrites/scene {DRAFT} -o OUT/shots",
+        "render OUT/shots --views all -o OUT/shot-pictures",
+    ],
+    "teacher-same-stem: 7 painted": ["colorize OUT/shots --rounds 1 --teacher CASES/teacher-same-stem/painted"],
+    "teacher-same-stem: all photos": ["colorize OUT/shots --rounds 1 --teacher CASES/render-overwrites/scene/images"],
+    "export-georeferenced": [
+        f"fit CASES/export-georeferenced/scene {DRAFT} -o OUT/utm",
+        "export OUT/utm -o OUT/utm.ply",
+        "render OUT/utm.ply --colmap CASES/export-georeferenced/scene -o OUT/utm-pictures",
+    ],
+    "export-georeferenced: COLMAP's": ["export OUT/utm --colmap-coordinates -o OUT/coarse.ply"],
+}
+
+
 def both(*edits: Callable[[Path], None]) -> Callable[[Path], None]:
     def spoil(scene: Path) -> None:
         for edit in edits:
@@ -172,6 +235,19 @@ def row(program: str, name: str, folder: Path) -> str:
     return f"| {name} | {figures} | {plan.returncode} | {outcome} |"
 
 
+def command_row(program: str, name: str, commands: list[str], cases: Path, out: Path) -> str:
+    """What the last of some commands said; of pictures, how many there are."""
+    for command in commands:
+        words = [word.replace("CASES", str(cases)).replace("OUT", str(out)) for word in command.split()]
+        done = subprocess.run([program, *words], capture_output=True, text=True)
+    lines = [line for line in done.stderr.splitlines() if line.startswith(("error: ", "warning: "))]
+    lines += [line for line in done.stdout.splitlines() if line.startswith(("wrote ", "its ", "colored ", "splats: "))]
+    text = "<br>".join(lines).replace(f"{cases}/", "").replace(f"{out}/", "")
+    if words[0] == "render" and Path(words[-1]).is_dir():
+        text += f" ({sum(1 for _ in Path(words[-1]).rglob('*.png'))} files)"
+    return f"| {name} | {done.returncode} | {text} |"
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("cases", type=Path, help="folder of cases")
@@ -211,8 +287,15 @@ def main() -> int:
         for name in CAMERAS:
             file = arguments.cases / name / "cameras.txt"
             make(name, lambda scene: shutil.copy(file, scene / "sparse/0/cameras.txt"))
-        for name, spoil in EDITS.items():
+        for name, spoil in (EDITS | with_files(arguments.cases)).items():
             make(name, spoil)
+        print("\n| case | exit | what is said |\n|---|---|---|")
+        for name, commands in COMMANDS.items():
+            if not (arguments.cases / name.split(":")[0]).is_dir():
+                print(f"| {name} | skipped: missing | |", flush=True)
+                continue
+            out = Path(temporary)
+            print(command_row(arguments.program, name, commands, arguments.cases, out), flush=True)
     return 0
 
 

@@ -10,8 +10,8 @@ use std::{
 };
 
 use super::{
-    Camera, Capture, CaptureError, LoadOptions, Loader, MaskUse, Normalize, Photo, Rejected, Split,
-    View, first_views, in_order, split,
+    Camera, Capture, CaptureError, LoadOptions, Loader, MaskSource, MaskUse, Masked, Normalize,
+    Photo, Rejected, Split, View, first_views, in_order, split,
 };
 
 /// What is worth telling while a dataset is opened.
@@ -44,7 +44,7 @@ pub struct Dataset {
     pub options: LoadOptions,
     /// Of each view, at working size.
     pub cameras: Vec<Camera>,
-    /// Views whose photo has a mask file.
+    /// Views whose photo has a mask file, or an alpha channel that is taken for its mask.
     pub masked_views: usize,
     /// The scene's extent in world units, see [`Capture::extent`].
     pub extent: f64,
@@ -187,6 +187,22 @@ impl Dataset {
     /// Whether nothing is where masks are black; photos are black there, and that counts.
     pub fn removes_masked(&self) -> bool {
         self.masked_views > 0 && self.options.masked == MaskUse::Remove
+    }
+
+    /// What the folder of masks holds, if there is one.
+    pub fn masked(&self) -> Option<&Masked> {
+        self.loader.masked()
+    }
+
+    /// Once all photos have been decoded: how many are transparent and masked by that. Alpha
+    /// channels that are opaque everywhere are no masks from here on.
+    pub fn settle_transparency(&mut self) -> usize {
+        let transparent = self.loader.transparent();
+        if transparent == 0 && self.options.masks == MaskSource::Alpha {
+            self.options.masks = MaskSource::Off;
+            self.masked_views = 0;
+        }
+        transparent
     }
 
     /// Pixels of the photos decoded so far whose values are not finite.

@@ -10,6 +10,9 @@ use super::error::CaptureError;
 use super::sample::{Bytes, Depth, Header, LARGEST_FILE, Samples};
 use super::{jpeg, tiff};
 
+/// How TIFF files begin that may be larger than 4 GiB, in either byte order.
+const BIG_TIFF: [&[u8]; 2] = [b"II+\0", b"MM\0+"];
+
 /// The longest of the formats' magic numbers, in bytes.
 const MAGIC: u64 = 16;
 
@@ -23,7 +26,12 @@ pub(super) struct Picture {
 /// Reads what a file announces, and of TIFF and PNG files nothing else.
 pub(super) fn header(path: &Path) -> Result<Header, CaptureError> {
     let file = File::open(path).map_err(unread(path))?;
-    Ok(open(path, Box::new(BufReader::new(file)))?.0)
+    let opened = open(path, Box::new(BufReader::new(file)));
+    if opened.is_err() {
+        // The decoder's words about what it does not read help nobody.
+        check_jpeg(&std::fs::read(path).map_err(unread(path))?).map_err(failure(path))?;
+    }
+    Ok(opened?.0)
 }
 
 /// Decodes a file once `check` has agreed to its size: before any pixel is
@@ -33,9 +41,7 @@ pub(super) fn decode(
     check: impl FnOnce([u32; 2]) -> Result<(), CaptureError>,
 ) -> Result<Picture, CaptureError> {
     let file = std::fs::read(path).map_err(unread(path))?;
-    if image::guess_format(&file).ok() == Some(ImageFormat::Jpeg) {
-        check_jpeg(&file).map_err(failure(path))?;
-    }
+    check_jpeg(&file).map_err(failure(path))?;
     let (header, source) = open(path, Box::new(Cursor::new(file)))?;
     check(header.size)?;
     let [width, height] = header.size;
@@ -77,7 +83,12 @@ fn open(path: &Path, mut bytes: Box<dyn Bytes>) -> Result<(Header, Source), Capt
         .take(MAGIC)
         .read_to_end(&mut magic)
         .and_then(|_| bytes.rewind())
-        .map(|()| image::guess_format(&magic))
+        .map(
+            |()| match BIG_TIFF.iter().any(|big| magic.starts_with(big)) {
+                true => Ok(ImageFormat::Tiff),
+                false => image::guess_format(&magic),
+            },
+        )
         .map_err(unread(path))?;
     let format = match format {
         Ok(ImageFormat::Tiff) => {
@@ -125,7 +136,11 @@ fn samples_of(picture: DynamicImage) -> Result<Samples, String> {
     })
 }
 
+/// What is wrong with a file that is a JPEG.
 fn check_jpeg(file: &[u8]) -> Result<(), String> {
+    if image::guess_format(file).ok() != Some(ImageFormat::Jpeg) {
+        return Ok(());
+    }
     match jpeg::inspect(file) {
         None => Err("ends before its end-of-image marker; copy it again".into()),
         Some(frame) if frame.precision != 8 => Err(format!(

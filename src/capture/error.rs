@@ -6,6 +6,8 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
+use super::names::Ambiguous;
+
 /// Where in a file something is wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Position {
@@ -77,6 +79,20 @@ pub enum CaptureError {
         /// Where in the file.
         position: Position,
         /// What is wrong.
+        reason: String,
+    },
+    /// An image's name leads to no photo.
+    #[error(
+        "{path}: {record}, {position}: {reason}; rename the photos and run COLMAP again, or edit the names in images.txt (COLMAP's model_converter writes one)"
+    )]
+    ImageName {
+        /// The images file.
+        path: PathBuf,
+        /// The record, such as `image 3 of 12`.
+        record: String,
+        /// Where in the file.
+        position: Position,
+        /// What is wrong with the name.
         reason: String,
     },
     /// A camera's model is not one of COLMAP's.
@@ -213,15 +229,15 @@ pub enum CaptureError {
         /// The photo's width and height.
         size: [u32; 2],
     },
+    /// Nobody knows which mask belongs to which photo.
+    #[error(transparent)]
+    Mask(#[from] Ambiguous),
     /// Nothing of a photo is left.
-    #[error(
-        "{path}: {}; mend it, or remove the photo with COLMAP's image_deleter",
-        .mask.as_ref().map_or("has no finite value".into(), |m| format!("its mask {} leaves no pixel", m.display()))
-    )]
+    #[error("{path}: {reason}; mend it, or remove the photo with COLMAP's image_deleter")]
     NothingCounts {
         /// The photo.
         path: PathBuf,
-        /// Its mask, if it has one.
-        mask: Option<PathBuf>,
+        /// What leaves nothing of it.
+        reason: String,
     },
 }

@@ -1,12 +1,12 @@
 //! All photos of a capture, loaded alike.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use super::decode;
 use super::error::CaptureError;
-use super::mask::{self, MaskFolder};
+use super::mask::{self, MaskFolder, Masked};
 use super::options::{LoadOptions, MaskSource, Normalize};
 use super::photo::{Photo, check_size, working_size};
 use super::sample::Depth;
@@ -35,6 +35,10 @@ pub struct Loader {
     /// Of each photo loaded, pixels whose values are not finite; a photo may be loaded
     /// for several views.
     not_finite: Mutex<BTreeMap<String, usize>>,
+    /// Photos whose files have an alpha channel that is taken for their mask.
+    with_alpha: BTreeSet<String>,
+    /// Of those loaded, the ones that are transparent anywhere.
+    transparent: Mutex<BTreeSet<String>>,
 }
 
 impl Loader {
@@ -53,6 +57,8 @@ impl Loader {
             masks: None,
             depth: None,
             not_finite: Mutex::default(),
+            with_alpha: BTreeSet::new(),
+            transparent: Mutex::default(),
         }
     }
 
@@ -64,19 +70,20 @@ impl Loader {
     pub fn open(capture: &Capture, options: &LoadOptions) -> Result<Self, CaptureError> {
         let masks = MaskFolder::open(capture, &options.masks)?;
         let mut loader = Self::new(options.clone());
-        loader.options.masks = match masks {
-            None => MaskSource::Off,
-            Some(_) => absolute(&options.masks),
-        };
-        loader.masks = masks;
-        if options.normalize == Normalize::Off {
-            return Ok(loader);
-        }
+        let takes_alpha = masks.is_none() && options.masks != MaskSource::Off;
+        let one_range = options.normalize != Normalize::Off;
         let mut first: Option<(&View, Depth)> = None;
         for view in first_views(&capture.views) {
-            let depth = decode::header(&view.image_path)?.depth;
+            if !(takes_alpha || one_range) {
+                break;
+            }
+            let header = decode::header(&view.image_path)?;
+            if takes_alpha && header.has_alpha() {
+                loader.with_alpha.insert(view.photo.clone());
+            }
+            let depth = header.depth;
             match first {
-                Some((other, other_depth)) if other_depth != depth => {
+                Some((other, other_depth)) if one_range && other_depth != depth => {
                     return Err(CaptureError::MixedDepths {
                         path: view.image_path.clone(),
                         depth: depth.to_string(),
@@ -87,7 +94,13 @@ impl Loader {
                 _ => first = Some((view, depth)),
             }
         }
-        loader.depth = first.map(|(_, depth)| depth);
+        loader.options.masks = match (&masks, loader.with_alpha.is_empty()) {
+            (Some(_), _) => absolute(&options.masks),
+            (None, false) => MaskSource::Alpha,
+            (None, true) => MaskSource::Off,
+        };
+        loader.masks = masks;
+        loader.depth = first.map(|(_, depth)| depth).filter(|_| one_range);
         if loader.depth > Some(Depth::Eight) {
             loader.options.normalize = options.normalize;
         }
@@ -105,7 +118,10 @@ impl Loader {
     /// As [`Self::load`].
     pub fn sample(&self, view: &View) -> Result<Vec<f32>, CaptureError> {
         let picture = decode::decode(&view.image_path, |size| check_size(view, size))?;
-        let mask = self.mask(view, picture.header.size)?;
+        let mask = match self.alpha(view, &picture) {
+            Some(alpha) => Some(alpha),
+            None => self.mask(view, picture.header.size)?,
+        };
         let channel = self.options.channel;
         Ok(tone::sample(
             &picture,
@@ -129,8 +145,8 @@ impl Loader {
     /// the view says so, and resizes its camera to it.
     ///
     /// Reads JPEG, PNG and TIFF: 8 or 16 bits a channel or floats, gray or RGB.
-    /// Transparency, color profiles and the EXIF orientation are ignored, the last
-    /// because COLMAP ignores it. A photo whose longer side exceeds `max_side` is
+    /// Transparency is its mask where the options say so; color profiles and the EXIF
+    /// orientation are ignored, the latter because COLMAP ignores it. A photo whose longer side exceeds `max_side` is
     /// downscaled to it by area averaging of the encoded values, at its aspect ratio.
     ///
     /// # Errors
@@ -141,10 +157,13 @@ impl Loader {
     pub fn load(&self, view: &View) -> Result<(Photo, Camera), CaptureError> {
         let picture = decode::decode(&view.image_path, |size| check_size(view, size))?;
         let mask = self.mask(view, picture.header.size)?;
+        let alpha = self.alpha(view, &picture);
+        let transparent = alpha.is_some();
         let mut pixels = tone::develop(picture, &self.options);
         let not_finite = pixels.mask.iter().flatten().filter(|&&count| count == 0);
         self.counts().insert(view.photo.clone(), not_finite.count());
         pixels.cover(mask);
+        pixels.cover(alpha);
         if pixels
             .mask
             .as_ref()
@@ -152,7 +171,11 @@ impl Loader {
         {
             return Err(CaptureError::NothingCounts {
                 path: view.image_path.clone(),
-                mask: self.masks.as_ref().and_then(|masks| masks.of(view)),
+                reason: match self.masks.as_ref().and_then(|masks| masks.of(view)) {
+                    Some(mask) => format!("its mask {} leaves no pixel", mask.display()),
+                    None if transparent => "its transparency leaves no pixel".into(),
+                    None => "has no finite value".into(),
+                },
             });
         }
         let (lens, max_side) = (view.undistortion.as_ref(), self.options.max_side);
@@ -195,9 +218,24 @@ impl Loader {
         &self.options
     }
 
-    /// How many of the views have a mask.
+    /// How many of the views have a mask, or a photo with an alpha channel that is taken for it.
     pub fn masked_views(&self, views: &[View]) -> usize {
-        self.masks.as_ref().map_or(0, |masks| masks.count(views))
+        let masked = |view: &&View| {
+            let of_file = self.masks.as_ref().and_then(|masks| masks.of(view));
+            of_file.is_some() || self.with_alpha.contains(&view.photo)
+        };
+        views.iter().filter(masked).count()
+    }
+
+    /// What the folder of masks holds, if there is one.
+    pub fn masked(&self) -> Option<&Masked> {
+        self.masks.as_ref().map(|masks| &masks.found)
+    }
+
+    /// How many of the photos loaded so far are transparent where that is taken for a mask.
+    pub fn transparent(&self) -> usize {
+        let known = self.transparent.lock();
+        known.unwrap_or_else(PoisonError::into_inner).len()
     }
 
     /// Pixels of the photos loaded so far, at the files' sizes, whose values are not
@@ -215,8 +253,19 @@ impl Loader {
 
     fn mask(&self, view: &View, size: [u32; 2]) -> Result<Option<Vec<u8>>, CaptureError> {
         let path = self.masks.as_ref().and_then(|masks| masks.of(view));
-        path.map(|path| mask::read(&path, &view.image_path, size))
+        path.map(|path| mask::read(path, &view.image_path, size))
             .transpose()
+    }
+
+    /// The photo's transparency, where it is its mask.
+    fn alpha(&self, view: &View, picture: &decode::Picture) -> Option<Vec<u8>> {
+        let taken = self.with_alpha.contains(&view.photo);
+        let alpha = taken.then(|| tone::alpha(picture)).flatten()?;
+        let known = self.transparent.lock();
+        // A name is whole even where a thread has panicked.
+        let mut known = known.unwrap_or_else(PoisonError::into_inner);
+        known.insert(view.photo.clone());
+        Some(alpha)
     }
 }
 

@@ -4,30 +4,48 @@ use std::path::{Path, PathBuf};
 
 use super::decode::{self, Picture};
 use super::error::CaptureError;
+use super::names::{self, NamedFiles, composed, is_one_of, visit_files};
 use super::options::MaskSource;
 use super::photo::same_shape;
 use super::resample::downscale;
 use super::sample::{Depth, Samples};
-use super::{Capture, IMAGES, View};
+use super::unplaced::photos_in;
+use super::{Capture, IMAGES, View, first_views};
 
 /// Where masks lie unless told otherwise.
 const BESIDE: &str = "masks";
 
 /// A folder of masks with COLMAP's names: for `images/a/b.jpg` the file
-/// `a/b.jpg.png`, and where there is none, `a/b.png`.
+/// `a/b.jpg.png`, and where there is none and no other photo is meant, `a/b.png`.
 #[derive(Debug)]
-pub(super) struct MaskFolder(PathBuf);
+pub(super) struct MaskFolder {
+    files: NamedFiles,
+    pub found: Masked,
+}
+
+/// What a folder of masks holds.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Masked {
+    /// The folder.
+    pub dir: PathBuf,
+    /// Photos that the capture has views of.
+    pub photos: usize,
+    /// How many of these have a mask.
+    pub masked: usize,
+    /// Pictures in the folder that belong to no photo in `images/`, sorted.
+    pub strays: Vec<String>,
+}
 
 impl MaskFolder {
     /// The folder that `source` names, if there is one.
     ///
     /// # Errors
-    /// If a folder is named that is not there or holds the photos themselves, or if
-    /// it has no mask for any photo.
+    /// If a folder is named that is not there or holds the photos themselves, if
+    /// it has no mask for any photo, or if nobody knows which photo a mask belongs to.
     pub fn open(capture: &Capture, source: &MaskSource) -> Result<Option<Self>, CaptureError> {
         let images = capture.root.join(IMAGES);
         let masks = match source {
-            MaskSource::Off => return Ok(None),
+            MaskSource::Off | MaskSource::Alpha => return Ok(None),
             MaskSource::Beside => capture.root.join(BESIDE),
             MaskSource::Folder(path) => path.clone(),
         };
@@ -37,29 +55,49 @@ impl MaskFolder {
                 _ => Ok(None),
             };
         }
-        let folder = Self(masks);
-        if same_folder(&folder.0, &images) || folder.count(&capture.views) == 0 {
+        let (mut files, mut others) = (NamedFiles::default(), Vec::new());
+        let read = visit_files(&masks, &mut |name, path| {
+            let extension = path.extension().unwrap_or_default().to_string_lossy();
+            if is_one_of(&extension, &["png"]) {
+                files.insert(&name, path);
+            } else if names::stem(&name) != name {
+                others.push(composed(&name));
+            }
+        });
+        read.map_err(|(path, source)| CaptureError::Read { path, source })?;
+        files.know(names::known(capture));
+        let (mut photos, mut masked) = (0, 0);
+        for view in first_views(&capture.views) {
+            photos += 1;
+            masked += usize::from(files.of(&view.photo)?.is_some());
+        }
+        if same_folder(&masks, &images) || masked == 0 {
             return Err(CaptureError::NoMasks {
-                dir: folder.0,
+                dir: masks,
                 example: with_png(Path::new(&capture.views[0].photo)),
             });
         }
-        Ok(Some(folder))
-    }
-
-    /// How many of the views have a mask.
-    pub fn count(&self, views: &[View]) -> usize {
-        views.iter().filter(|view| self.of(view).is_some()).count()
+        // Photos without a pose may have masks as well.
+        let mut all = files.clone();
+        let placed_or_not = photos_in(&images);
+        all.know(placed_or_not.iter().map(String::as_str));
+        others.extend(all.strays().into_iter().map(str::to_owned));
+        others.sort();
+        Ok(Some(Self {
+            files,
+            found: Masked {
+                dir: masks,
+                photos,
+                masked,
+                strays: others,
+            },
+        }))
     }
 
     /// The view's mask, if it has one.
-    pub fn of(&self, view: &View) -> Option<PathBuf> {
-        let name = Path::new(&view.photo);
-        let candidates = [with_png(name), name.with_extension("png")];
-        candidates
-            .into_iter()
-            .map(|name| self.0.join(name))
-            .find(|path| path.is_file())
+    pub fn of(&self, view: &View) -> Option<&Path> {
+        // `open` has asked for every photo.
+        self.files.of(&view.photo).ok().flatten()
     }
 }
 

@@ -109,6 +109,102 @@ fn another_folder_may_be_named() {
 }
 
 #[test]
+fn masks_and_photos_without_each_other_are_counted() {
+    let (_dir, capture) = capture();
+    put(&capture, "a.png", half(SIZE.0, SIZE.1, 255));
+    let found = || {
+        let loader = Loader::open(&capture, &LoadOptions::default()).unwrap();
+        loader.masked().unwrap().clone()
+    };
+    assert_eq!((found().photos, found().masked), (3, 1));
+    assert_eq!(found().strays, [""; 0]);
+    put(&capture, "left/b_mask.png", half(SIZE.0, SIZE.1, 255));
+    fs::write(capture.root.join("masks/b.jpg"), "").unwrap();
+    fs::write(capture.root.join("masks/notes.txt"), "").unwrap();
+    // That of a photo without a pose.
+    fs::write(capture.root.join("images/d.JPG"), "").unwrap();
+    put(&capture, "d.png", half(SIZE.0, SIZE.1, 255));
+    assert_eq!((found().photos, found().masked), (3, 1));
+    assert_eq!(found().strays, ["b.jpg", "left/b_mask.png"]);
+}
+
+#[test]
+fn a_mask_of_two_photos_is_refused() {
+    let mut model = Model::example();
+    model.images[1].name = "b.jpg".into();
+    let dir = folder(&model);
+    write(dir.path(), "sparse/0", model.binary(), "bin");
+    let capture = Capture::load(dir.path()).unwrap();
+    // Photo b.png has it for itself.
+    put(&capture, "b.png", half(SIZE.0, SIZE.1, 255));
+    let loader = Loader::open(&capture, &LoadOptions::default()).unwrap();
+    assert_eq!(loader.masked_views(&capture.views), 1);
+    model.images[0].name = "b.jpeg".into();
+    let dir = folder(&model);
+    write(dir.path(), "sparse/0", model.binary(), "bin");
+    let capture = Capture::load(dir.path()).unwrap();
+    put(&capture, "b.png", half(SIZE.0, SIZE.1, 255));
+    let words = ["masks/b.png", "b.jpg", "b.jpeg", "b.jpeg.png"];
+    assert_fails(&capture, MaskSource::Beside, &words);
+}
+
+/// Gray 200 where it is opaque; what is under the transparency of the right half is 9.
+fn transparent(opacity: u8) -> RgbaImage {
+    RgbaImage::from_fn(SIZE.0, SIZE.1, |x, _| match 2 * x < SIZE.0 {
+        true => Rgba([200, 200, 200, 255]),
+        false => Rgba([9, 9, 9, opacity]),
+    })
+}
+
+#[test]
+fn transparency_is_a_mask_where_no_other_is() {
+    let (_dir, capture) = capture();
+    transparent(0).save(&capture.views[1].image_path).unwrap();
+    let beside = LoadOptions::default();
+    let off = LoadOptions {
+        masks: MaskSource::Off,
+        ..LoadOptions::default()
+    };
+    assert_eq!(load(&capture, &off, 1).mask, None);
+    let mut loader = Loader::open(&capture, &beside).unwrap();
+    assert_eq!(loader.options().masks, MaskSource::Alpha);
+    assert_eq!(loader.masked_views(&capture.views), 1);
+    assert_eq!(loader.load(&capture.views[0]).unwrap().0.mask, None);
+    assert_eq!(loader.transparent(), 0);
+    let (photo, _) = loader.load(&capture.views[1]).unwrap();
+    let expected = Some(half(SIZE.0, SIZE.1, 255).into_raw());
+    assert_eq!(photo.mask, expected);
+    assert_eq!(loader.transparent(), 1);
+    // What is under it has no part in the range of 16 bits.
+    let deep = DynamicImage::from(transparent(0)).into_rgba16();
+    for view in &capture.views {
+        deep.save(&view.image_path).unwrap();
+    }
+    loader = Loader::open(&capture, &beside).unwrap();
+    let sample = loader.sample(&capture.views[1]).unwrap();
+    assert!(sample.iter().all(|&value| value == 200.0 * 257.0));
+    assert_eq!(load(&capture, &beside, 1).mask, expected);
+    // Masks go before it.
+    put(&capture, "a.png", half(SIZE.0, SIZE.1, 255));
+    assert_eq!(load(&capture, &beside, 1).mask, None);
+}
+
+#[test]
+fn opaque_alpha_is_no_mask_and_nothing_else_is_left_of_none() {
+    let (_dir, capture) = capture();
+    transparent(255).save(&capture.views[1].image_path).unwrap();
+    let loader = Loader::open(&capture, &LoadOptions::default()).unwrap();
+    assert_eq!(loader.load(&capture.views[1]).unwrap().0.mask, None);
+    assert_eq!(loader.transparent(), 0);
+    RgbaImage::new(SIZE.0, SIZE.1)
+        .save(&capture.views[1].image_path)
+        .unwrap();
+    let words = ["images/b.png", "transparency leaves no pixel"];
+    assert_fails(&capture, MaskSource::Beside, &words);
+    assert_fails(&capture, MaskSource::Alpha, &words);
+}
+
+#[test]
 fn every_kind_of_mask_says_the_same() {
     let expected: Vec<u8> = half(SIZE.0, SIZE.1, 255).into_raw();
     let gray = half(SIZE.0, SIZE.1, 255);

@@ -12,6 +12,7 @@ mod jpeg;
 pub mod lens;
 mod loader;
 mod mask;
+pub(crate) mod names;
 mod options;
 mod order;
 mod photo;
@@ -28,6 +29,8 @@ mod depth_tests;
 mod fixtures;
 #[cfg(test)]
 mod left_out_tests;
+#[cfg(test)]
+mod name_tests;
 #[cfg(test)]
 mod tests;
 #[cfg(test)]
@@ -49,6 +52,8 @@ pub(crate) use in_order::in_order;
 pub use lens::IMPERCEPTIBLE;
 use lens::Undistortion;
 pub use loader::{Headers, Loader, Shrunk, first_views};
+pub use mask::Masked;
+pub use names::Ambiguous;
 pub use options::{Channel, Encoding, LoadOptions, MaskSource, MaskUse, Normalize};
 pub use order::view_at;
 pub use photo::Photo;
@@ -287,6 +292,7 @@ impl Capture {
                 },
             });
         }
+        names::find_spelled(&mut views, &photos);
         check_photos_exist(&views)?;
 
         let announced = model.points.len();

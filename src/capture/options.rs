@@ -156,13 +156,16 @@ impl FromStr for Normalize {
 
 /// Where masks are: for `images/a/b.jpg` in the file `a/b.jpg.png` or `a/b.png`.
 ///
-/// In JSON `beside`, `off` or the folder.
+/// In JSON `beside`, `alpha`, `off` or the folder.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(into = "String", from = "String")]
 pub enum MaskSource {
-    /// In `masks/` beside `images/`, if it is there.
+    /// In `masks/` beside `images/`, if it is there, and else in the photos' transparency, if
+    /// they have any.
     #[default]
     Beside,
+    /// In the photos' transparency.
+    Alpha,
     /// Nowhere.
     Off,
     /// In this folder.
@@ -173,6 +176,7 @@ impl fmt::Display for MaskSource {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Beside => f.write_str("beside"),
+            Self::Alpha => f.write_str("alpha"),
             Self::Off => f.write_str("off"),
             Self::Folder(path) => write!(f, "{}", path.display()),
         }
@@ -189,6 +193,7 @@ impl From<String> for MaskSource {
     fn from(text: String) -> Self {
         match text.as_str() {
             "beside" => Self::Beside,
+            "alpha" => Self::Alpha,
             "off" => Self::Off,
             _ => Self::Folder(text.into()),
         }

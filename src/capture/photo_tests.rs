@@ -201,3 +201,18 @@ fn sizes_that_cannot_be_are_refused_before_decoding() {
     assert_fails(&path, (16, 8), &["65535×65535", "16×8"]);
     assert_fails(&path, (65535, 65535), &["65535×65535", "--max_image_size"]);
 }
+
+#[test]
+fn twelve_bits_are_told_before_anything_is_decoded() {
+    let (_dir, path) = saved(GrayImage::new(16, 16), "photo.jpg");
+    let mut file = fs::read(&path).unwrap();
+    let frame = file.windows(2).position(|marker| marker == b"\xff\xc0");
+    file[frame.expect("a frame") + 4] = 12;
+    fs::write(&path, file).unwrap();
+    let words = ["photo.jpg", "12 bits", "convert it to 8 bits"];
+    assert_fails(&path, (16, 16), &words);
+    let error = crate::capture::decode::header(&path)
+        .unwrap_err()
+        .to_string();
+    assert!(words.iter().all(|word| error.contains(word)), "{error}");
+}

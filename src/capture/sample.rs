@@ -49,6 +49,13 @@ pub(super) struct Header {
     pub channels: usize,
 }
 
+impl Header {
+    /// Whether the last channel is alpha.
+    pub fn has_alpha(&self) -> bool {
+        self.channels.is_multiple_of(2)
+    }
+}
+
 /// Values as they stand in the file.
 pub(super) enum Samples {
     Eight(Vec<u8>),

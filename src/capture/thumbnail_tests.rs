@@ -93,3 +93,14 @@ fn photos_much_smaller_than_their_cameras_are_told() {
     };
     assert_eq!(shrunk(), Some(expected));
 }
+
+#[test]
+fn files_that_may_be_larger_than_four_gibibytes_are_read() {
+    let mut file = Cursor::new(Vec::new());
+    let mut encoder = TiffEncoder::new_big(&mut file).unwrap();
+    let pixels = [77; 48];
+    encoder
+        .write_image::<colortype::Gray8>(8, 6, &pixels)
+        .unwrap();
+    assert_eq!(load(&file.into_inner()), Ok((8, 77)));
+}

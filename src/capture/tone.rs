@@ -58,6 +58,24 @@ fn finite(values: &[f32], channels: usize, channel: Channel) -> Option<Vec<u8>> 
     mask.contains(&0).then_some(mask)
 }
 
+/// What each pixel counts by its transparency; `None` where all are opaque.
+pub(super) fn alpha(picture: &Picture) -> Option<Vec<u8>> {
+    let channels = picture.header.channels;
+    if !picture.header.has_alpha() {
+        return None;
+    }
+    let at = |i: usize| match &picture.samples {
+        Samples::Eight(values) => values[i],
+        Samples::Sixteen(values) => ((u32::from(values[i]) + 128) / 257) as u8,
+        // Not a number counts nothing.
+        Samples::Float(values) => (255.0 * values[i].clamp(0.0, 1.0)).round() as u8,
+    };
+    let [width, height] = picture.header.size.map(|side| side as usize);
+    let pixels = 0..width * height;
+    let mask: Vec<u8> = pixels.map(|pixel| at((pixel + 1) * channels - 1)).collect();
+    mask.iter().any(|&count| count < u8::MAX).then_some(mask)
+}
+
 /// The samples of a pixel of so many channels that say something.
 fn used(channels: usize, channel: Channel) -> std::ops::Range<usize> {
     if channels < 3 {

@@ -4,7 +4,8 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::{Capture, CaptureError, colmap, first_views};
+use super::names::{composed, is_one_of, visit_files};
+use super::{Capture, CaptureError, IMAGES, colmap, first_views};
 
 /// What photos are called.
 const EXTENSIONS: [&str; 5] = ["jpg", "jpeg", "png", "tif", "tiff"];
@@ -33,15 +34,16 @@ impl Unplaced {
     /// If the capture's model is gone.
     pub fn of(capture: &Capture) -> Result<Option<Self>, CaptureError> {
         let views = first_views(&capture.views);
-        let used: BTreeSet<&str> = views.map(|view| view.photo.as_str()).collect();
+        let used: BTreeSet<String> = views.map(|view| composed(&view.photo)).collect();
         let rejected = capture.rejected.iter();
-        let rejected: BTreeSet<&str> = rejected.map(|photo| photo.name.as_str()).collect();
+        let rejected: BTreeSet<String> = rejected.map(|photo| composed(&photo.name)).collect();
         let (mut placed, mut others) = (used.len(), 0);
-        find_photos(&capture.root.join("images"), "", &mut |name| {
+        for name in photos_in(&capture.root.join(IMAGES)) {
+            let name = composed(&name);
             // That a photo was left out for another reason has been said.
-            placed += usize::from(rejected.contains(name));
-            others += usize::from(!(used.contains(name) || rejected.contains(name)));
-        });
+            placed += usize::from(rejected.contains(&name));
+            others += usize::from(!(used.contains(&name) || rejected.contains(&name)));
+        }
         let photos = placed + others;
         let model = colmap::folder(&capture.root)?;
         let better = best_model(&capture.root, &model);
@@ -55,23 +57,16 @@ impl Unplaced {
     }
 }
 
-/// Hands every photo's path below `images/` to `found`; a linked folder is not followed, for it
-/// may lead in a circle.
-fn find_photos(dir: &Path, below: &str, found: &mut dyn FnMut(&str)) {
-    for entry in fs::read_dir(dir).into_iter().flatten().flatten() {
-        let Ok(kind) = entry.file_type() else {
-            continue;
-        };
-        let name = format!("{below}{}", entry.file_name().to_string_lossy());
-        let path = entry.path();
-        if kind.is_dir() {
-            find_photos(&path, &(name + "/"), found);
-        } else if path.extension().is_some_and(|extension| {
-            (EXTENSIONS.iter()).any(|known| extension.eq_ignore_ascii_case(known))
-        }) {
-            found(&name);
+/// The paths of photos below `images/`, as far as it can be read.
+pub(super) fn photos_in(images: &Path) -> Vec<String> {
+    let mut photos = Vec::new();
+    let _ = visit_files(images, &mut |name, path| {
+        let extension = path.extension().unwrap_or_default().to_string_lossy();
+        if is_one_of(&extension, &EXTENSIONS) {
+            photos.push(name);
         }
-    }
+    });
+    photos
 }
 
 /// The model in a folder of `sparse/` that places the most images, if these are more than those

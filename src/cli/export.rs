@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::{CliError, print};
-use crate::run::export;
+use crate::run::{ExportOptions, export};
 
-/// Write a run's scene as a splat file in the photos' own coordinates.
+/// Write a run's scene as a splat file, near the origin where COLMAP's coordinates are large.
 #[derive(Args)]
 pub struct Export {
     /// Run folder [default: newest under runs/].
@@ -18,15 +18,31 @@ pub struct Export {
     /// Write the luminance although the scene is colored.
     #[arg(long)]
     luma: bool,
+    /// Write COLMAP's coordinates even where the scene was moved to the origin.
+    #[arg(long)]
+    colmap_coordinates: bool,
 }
 
 impl Export {
     pub(super) fn run(self) -> Result<(), CliError> {
-        let count = export(self.run.as_deref(), &self.output, self.luma)?;
+        let options = ExportOptions {
+            run: self.run,
+            output: self.output,
+            luma: self.luma,
+            colmap_coordinates: self.colmap_coordinates,
+        };
+        let wrote = export(&options)?;
         print(format_args!(
-            "wrote {count} Gaussians to {}",
-            self.output.display()
+            "wrote {} Gaussians to {}",
+            wrote.splats,
+            options.output.display()
         ))?;
+        if wrote.offset != [0.0; 3] {
+            let [x, y, z] = wrote.offset;
+            print(format_args!(
+                "its coordinates are COLMAP's less {x} {y} {z}, as its header says (--colmap-coordinates for COLMAP's own)"
+            ))?;
+        }
         Ok(())
     }
 }

@@ -59,9 +59,10 @@ pub(super) struct Photos {
         allow_hyphen_values = true
     )]
     normalize: Normalize,
-    /// Folder of masks, b.jpg.png or b.png for the photo b.jpg, black where nothing counts
-    /// [default: masks/ beside images/, if it is there].
-    #[arg(long, value_name = "DIR|off")]
+    /// Folder of masks, b.jpg.png or b.png for the photo b.jpg, black where nothing counts; or
+    /// alpha for the photos' transparency [default: masks/ beside images/, if it is there, and
+    /// else alpha].
+    #[arg(long, value_name = "DIR|alpha|off")]
     masks: Option<String>,
     /// What is where a mask is black: anything, or nothing.
     #[arg(long, value_parser = one_of(MASK_USES), default_value = "ignore")]

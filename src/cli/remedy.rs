@@ -35,6 +35,9 @@ pub(super) fn of_run(error: &RunError) -> String {
         RunError::NoSplats(_) => {
             format!("{error}: name another file, or train again with `gs-chroma fit`")
         }
+        RunError::Coarse { .. } => format!(
+            "{error}: leave --colmap-coordinates out, and the file lies near the origin and says by how much"
+        ),
         RunError::NothingToResume(_) => {
             format!("{error}; without --resume all is trained anew")
         }

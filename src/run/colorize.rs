@@ -9,15 +9,17 @@ use std::{
     time::Instant,
 };
 
+use glam::DVec3;
+
 use super::{
     Event, Observer, Preset, RunError, RunFolder, Stage,
     commit::Commit,
     files,
-    fit::{capture_report, comments, open_gpu},
+    fit::{capture_report, open_gpu},
     foreign::drawn_like_photos,
     keeping,
     lock::RunLock,
-    scene::{read_splats, tell_not_finite},
+    scene::{comments_of_moved, read_scene, tell_not_finite},
     sound::{open_checked, open_examined},
     teach::{TeachOptions, Teachers},
 };
@@ -114,11 +116,11 @@ pub fn colorize(
     let dataset = dataset.caching(0);
     // A run's own files are moved already; others lie where COLMAP has the cameras.
     let offset = match source.folder {
-        Some(_) => glam::DVec3::ZERO,
+        Some(_) => DVec3::ZERO,
         None => dataset.capture.offset,
     };
-    let (luma, mut drawn) = read_splats(&source.splats, offset, observe)?;
-    let mut luma = luma.to_luma();
+    let read = read_scene(&source.splats, offset, observe)?;
+    let (mut luma, mut drawn) = (read.splats.to_luma(), read.drawn);
     if source.report.is_none() {
         let splats = (source.splats.as_path(), &luma);
         drawn = drawn_like_photos(&gpu, &dataset, splats, drawn, observe)?;
@@ -271,8 +273,17 @@ pub fn colorize(
         views: measured.views,
         timings,
     });
-    let comments = comments(drawn);
-    let write_to = |path: &Path| ply::write_ply(path, &colored.splats, offset, &comments);
+    let moved = dataset.capture.offset;
+    let (added, left) = match &source.folder {
+        // The run's report has it.
+        Some(folder) if output.ply == folder.color() => (DVec3::ZERO, DVec3::ZERO),
+        Some(_) => (DVec3::ZERO, moved),
+        // As the gray file has it.
+        None if read.offset != DVec3::ZERO => (DVec3::ZERO, moved),
+        None => (moved, DVec3::ZERO),
+    };
+    let comments = comments_of_moved(drawn, left);
+    let write_to = |path: &Path| ply::write_ply(path, &colored.splats, added, &comments);
     match source.kept(options) {
         Some(folder) => {
             let mut commit = Commit::new(folder.path())?;
@@ -321,17 +332,11 @@ struct Source {
 impl Source {
     fn find(options: &ColorizeOptions) -> Result<Self, RunError> {
         match &options.run {
-            Some(path)
-                if path
-                    .extension()
-                    .is_some_and(|e| e.eq_ignore_ascii_case("ply")) =>
-            {
-                Ok(Self {
-                    folder: None,
-                    report: None,
-                    splats: path.clone(),
-                })
-            }
+            Some(path) if ply::is_splat_file(path)? => Ok(Self {
+                folder: None,
+                report: None,
+                splats: path.clone(),
+            }),
             run => {
                 let folder = match run {
                     Some(path) => RunFolder::at(path),

@@ -251,7 +251,8 @@ fn ask(
     observe: &mut Observer<'_>,
 ) -> Result<MeasuredTeacher, RunError> {
     let settings = &options.teacher_settings;
-    let teacher = Teacher::open(path, Some(&folder.teacher()), settings)?;
+    let mut teacher = Teacher::open(path, Some(&folder.teacher()), settings)?;
+    teacher.know(&scene.dataset.capture);
     let info = teacher.describe();
     let is_same = |t: &TeacherReport| (&t.info.name, &t.info.sha256) == (&info.name, &info.sha256);
     if let Some(chroma) = &report.chroma

@@ -1,16 +1,13 @@
-//! `info` and `export`.
+//! `info`.
 
 use std::{cell::RefCell, path::Path};
 
-use glam::DVec3;
 use serde_json::{Value, json};
 
 use super::{
-    Event, Observer, RunError, RunFolder, files,
-    fit::comments,
-    keeping,
+    Event, Observer, RunError, RunFolder, keeping,
     scene::tell_skipped,
-    sound::{check_model, tell_folder},
+    sound::{check_model, tell_folder, tell_masks},
 };
 use crate::{
     capture::{Camera, Capture, Headers, LoadOptions, Loader, Normalize, Rejected},
@@ -52,9 +49,11 @@ fn colmap_info(path: &Path, observe: &mut Observer<'_>) -> Result<Value, RunErro
         normalize: Normalize::Off,
         ..LoadOptions::default()
     };
-    let masked = Loader::open(&capture, &options)?.masked_views(views);
+    let loader = Loader::open(&capture, &options)?;
+    let masked = loader.masked_views(views);
     let headers = Headers::read(views)?;
     tell_folder(&capture, &headers, &mut observe)?;
+    tell_masks(loader.masked(), &mut observe);
     // What size they will be worked on is the preset's to say.
     let cameras: Vec<Camera> = views.iter().map(|view| view.camera.clone()).collect();
     let forced = true;
@@ -81,7 +80,7 @@ fn colmap_info(path: &Path, observe: &mut Observer<'_>) -> Result<Value, RunErro
 fn splat_info(path: &Path, observe: &mut Observer<'_>) -> Result<Value, RunError> {
     let warnings = RefCell::default();
     let read = ply::read_ply(path)?;
-    tell_skipped(path, read.skipped, &mut keeping(&warnings, observe));
+    tell_skipped(path, &read, &mut keeping(&warnings, observe));
     let splats = &read.splats;
     let bound = |pick: fn(f32, f32) -> f32, start: f32| -> [f32; 3] {
         std::array::from_fn(|axis| {
@@ -97,38 +96,12 @@ fn splat_info(path: &Path, observe: &mut Observer<'_>) -> Result<Value, RunError
         "skipped": read.skipped,
         "sh_degree": splats.sh.degree,
         "antialiased": read.antialiased,
+        // Subtracted from the coordinates.
+        "offset": read.offset.to_array(),
         // Half an 8-bit step: what no viewer shows as a color.
         "gray": splats.is_gray(0.5 / 255.0),
         "lowest": bound(f32::min, f32::INFINITY),
         "highest": bound(f32::max, f32::NEG_INFINITY),
         "warnings": warnings.take(),
     }))
-}
-
-/// Writes a run's scene with the photos' own coordinates; gives the number of
-/// Gaussians.
-///
-/// # Errors
-/// [`RunError`].
-pub fn export(run: Option<&Path>, output: &Path, luma: bool) -> Result<usize, RunError> {
-    let folder = match run {
-        Some(path) => RunFolder::at(path),
-        None => RunFolder::newest()?,
-    };
-    let report = folder.read_report()?;
-    let colored = !luma && folder.color().exists();
-    let file = if colored {
-        folder.color()
-    } else {
-        folder.luma()
-    };
-    let splats = ply::read_ply(&file)?.splats;
-    files::make_folder_of(output)?;
-    ply::write_ply(
-        output,
-        &splats,
-        DVec3::from(report.capture.offset),
-        &comments(report.luma.settings.raster_options()),
-    )?;
-    Ok(splats.len())
 }

@@ -3,6 +3,7 @@
 mod colorize;
 mod commit;
 mod eval;
+mod export;
 pub(crate) mod files;
 mod fingerprint;
 mod fit;
@@ -10,6 +11,7 @@ mod folder;
 mod foreign;
 mod info;
 mod lock;
+mod picture_names;
 mod plan;
 mod preset;
 mod render;
@@ -21,9 +23,11 @@ use std::{cell::RefCell, fmt, path::PathBuf};
 
 pub use colorize::{ColorizeOptions, Output, colorize};
 pub use eval::{EvalOptions, eval};
+pub use export::{ExportOptions, Exported, export};
 pub use fit::{AheadOptions, CheckpointOptions, EVERY, FitOptions, Interrupt, Overlay, fit};
 pub use folder::RunFolder;
-pub use info::{export, info};
+pub use info::info;
+pub(crate) use picture_names::picture_names;
 pub use plan::{PlanOptions, Planned, plan};
 pub use preset::Work;
 pub use render::{RenderOptions, Views, render};
@@ -85,6 +89,21 @@ pub enum RunError {
     /// A splat file without Gaussians.
     #[error("{}: holds no Gaussians", .0.display())]
     NoSplats(PathBuf),
+    /// Coordinates that are too large for a splat file.
+    #[error(
+        "{}: not written: near {coordinate} 32-bit floats are {step} apart, {:.2} times the size of the Gaussians (the median of their smallest scales is {size:.4})",
+        path.display(), step / size
+    )]
+    Coarse {
+        /// The file that was to be written.
+        path: PathBuf,
+        /// The largest of the coordinates.
+        coordinate: f64,
+        /// How far floats are apart there, in world units.
+        step: f64,
+        /// The Gaussians' size in world units.
+        size: f64,
+    },
     /// All views were trained on.
     #[error("no view is held out")]
     NoHeldOut,

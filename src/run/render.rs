@@ -1,19 +1,25 @@
 //! `render`: pictures from the photographed viewpoints.
 
-use std::{
-    path::{Path, PathBuf},
-    sync::Arc,
-};
+use std::{path::PathBuf, sync::Arc};
 
 use glam::DVec3;
 
-use super::{Event, Observer, RunError, RunFolder, Stage, files, scene::read_splats};
+use super::{
+    Event, Observer, RunError, RunFolder, Stage, files,
+    foreign::tell_unlike,
+    picture_names,
+    scene::{open, read_splats},
+};
 use crate::{
-    capture::{Capture, LoadOptions, Loader, split},
+    capture::{Capture, LoadOptions, Loader, Normalize, split},
     gpu::Gpu,
     raster::{Raster, Renderer},
     report::to_image,
+    splats::ply,
 };
+
+/// Longer side in pixels at which a splat file is compared with the photos.
+const CHECKED_SIDE: u32 = 640;
 
 /// Which of a capture's views.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
@@ -47,12 +53,8 @@ pub struct RenderOptions {
 /// # Errors
 /// [`RunError`].
 pub fn render(options: &RenderOptions, observe: &mut Observer<'_>) -> Result<usize, RunError> {
-    let is_file = |path: &Path| {
-        path.extension()
-            .is_some_and(|e| e.eq_ignore_ascii_case("ply"))
-    };
     let (file, colmap, load, run) = match &options.run {
-        Some(path) if is_file(path) => {
+        Some(path) if ply::is_splat_file(path)? => {
             let colmap = options
                 .colmap
                 .clone()
@@ -98,7 +100,19 @@ pub fn render(options: &RenderOptions, observe: &mut Observer<'_>) -> Result<usi
         return Err(RunError::NoHeldOut);
     }
     files::make_folder(&options.output)?;
+    let names = picture_names(&capture.views);
     let gpu = Gpu::open()?;
+    if run.is_none() {
+        let load = LoadOptions {
+            max_side: Some(CHECKED_SIDE),
+            normalize: Normalize::Off,
+            ..LoadOptions::default()
+        };
+        // Pictures do not depend on what photos show: where they cannot be compared, they are not.
+        if let Ok(dataset) = open(&colmap, &load, &mut |_| {}) {
+            tell_unlike(&gpu, &dataset, (&file, &splats.to_luma()), drawn, observe)?;
+        }
+    }
     let raster = Arc::new(Raster::with(&gpu, run.unwrap_or(drawn)));
     let mut renderer = Renderer::of(&raster, &splats, &[&splats.sh], capture.extent())?;
     for (done, &i) in chosen.iter().enumerate() {
@@ -112,7 +126,7 @@ pub fn render(options: &RenderOptions, observe: &mut Observer<'_>) -> Result<usi
         // The photo decides the size, which the model's camera may miss by a pixel.
         let camera = loader.camera(view)?;
         let picture = renderer.render(&camera)?.remove(0);
-        let path = options.output.join(&view.name).with_extension("png");
+        let path = options.output.join(&names[i]);
         if let Some(folder) = path.parent() {
             files::make_folder(folder)?;
         }

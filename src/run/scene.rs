@@ -4,12 +4,12 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::{Event, Observer, RunError, Stage};
+use super::{Event, Observer, RunError, Stage, fit::comments};
 use crate::{
     capture::{Dataset, LoadOptions, Notice, Rejected},
     luma::TrialProgress,
     raster::RasterOptions,
-    splats::{Splats, ply},
+    splats::{ReadSplats, Splats, ply},
 };
 
 /// Opens a COLMAP folder; nothing is decoded but what [`Dataset::open`] has to.
@@ -61,35 +61,73 @@ pub(super) fn tell_not_finite(dataset: &Dataset, observe: &mut Observer<'_>) {
 }
 
 /// Warns of Gaussians of a splat file that are not used.
-pub(super) fn tell_skipped(path: &Path, count: usize, observe: &mut Observer<'_>) {
-    if count > 0 {
+pub(super) fn tell_skipped(path: &Path, read: &ReadSplats, observe: &mut Observer<'_>) {
+    let (path, skipped, surplus) = (path.display(), read.skipped, read.surplus);
+    if skipped > 0 {
         observe(Event::Warning(format!(
-            "{}: skipped {count} Gaussians with values that are not finite or no rotation",
-            path.display()
+            "{path}: skipped {skipped} Gaussians with values that are not finite or no rotation"
+        )));
+    }
+    if surplus > 0 {
+        observe(Event::Warning(format!(
+            "{path}: {surplus} bytes follow the {} Gaussians that the header announces, and are not read: its count may be too small",
+            read.splats.len() + skipped
         )));
     }
 }
 
-/// Reads a splat file that has at least one Gaussian and subtracts `offset`, in
-/// world units, from its centers; also gives how the file wants to be drawn.
+/// A splat file as a scene.
+pub(super) struct ReadScene {
+    pub splats: Splats,
+    /// How the file wants to be drawn.
+    pub drawn: RasterOptions,
+    /// What its header says was subtracted from its centers, in world units.
+    pub offset: DVec3,
+}
+
+/// Reads a splat file that has at least one Gaussian and moves it to where `offset`, in world
+/// units, is subtracted from COLMAP's coordinates.
+pub(super) fn read_scene(
+    path: &Path,
+    offset: DVec3,
+    observe: &mut Observer<'_>,
+) -> Result<ReadScene, RunError> {
+    let read = ply::read_ply(path)?;
+    tell_skipped(path, &read, observe);
+    let mut splats = read.splats;
+    if splats.is_empty() {
+        return Err(RunError::NoSplats(path.to_owned()));
+    }
+    let by = read.offset - offset;
+    if by != DVec3::ZERO {
+        for mean in &mut splats.means {
+            *mean = (DVec3::from(mean.map(f64::from)) + by).as_vec3().to_array();
+        }
+    }
+    Ok(ReadScene {
+        splats,
+        drawn: RasterOptions {
+            antialiased: read.antialiased,
+        },
+        offset: read.offset,
+    })
+}
+
+/// [`read_scene`] for whoever writes no such file.
 pub(super) fn read_splats(
     path: &Path,
     offset: DVec3,
     observe: &mut Observer<'_>,
 ) -> Result<(Splats, RasterOptions), RunError> {
-    let read = ply::read_ply(path)?;
-    tell_skipped(path, read.skipped, observe);
-    let mut splats = read.splats;
-    if splats.is_empty() {
-        return Err(RunError::NoSplats(path.to_owned()));
+    let scene = read_scene(path, offset, observe)?;
+    Ok((scene.splats, scene.drawn))
+}
+
+/// Comments of a splat file whose centers are COLMAP's less `offset`, in world units.
+pub(super) fn comments_of_moved(drawn: RasterOptions, offset: DVec3) -> Vec<String> {
+    let mut comments = comments(drawn);
+    if offset != DVec3::ZERO {
+        comments.push(ply::offset_comment(offset));
     }
-    for mean in &mut splats.means {
-        *mean = (DVec3::from(mean.map(f64::from)) - offset)
-            .as_vec3()
-            .to_array();
-    }
-    let options = RasterOptions {
-        antialiased: read.antialiased,
-    };
-    Ok((splats, options))
+    comments
 }

@@ -7,8 +7,8 @@ use serde::Serialize;
 use super::{Event, Observer, RunError, Stage, fingerprint::Fingerprint, scene};
 use crate::{
     capture::{
-        Camera, Capture, CaptureError, Dataset, Headers, LoadOptions, Rejected, Shrunk, Unplaced,
-        first_views,
+        Camera, Capture, CaptureError, Dataset, Headers, LoadOptions, MaskSource, Masked, Rejected,
+        Shrunk, Unplaced, first_views,
     },
     effects::{
         Agreement, Cause, Contradiction, Contradictory, Evidence, FEW_POINTS, PointColors,
@@ -88,6 +88,7 @@ fn open_judged(
     let mut dataset = scene::open(dir, options, observe)?;
     let headers = Headers::read(&dataset.capture.views)?;
     tell_folder(&dataset.capture, &headers, observe)?;
+    tell_masks(dataset.masked(), observe);
     let model = check_model(&dataset.capture, &dataset.cameras, options.force, observe)?;
     model.mend(&mut dataset.capture);
     Ok((dataset, model))
@@ -104,8 +105,14 @@ pub(super) fn open_examined(
     options: &LoadOptions,
     observe: &mut Observer<'_>,
 ) -> Result<Examined, RunError> {
-    let (dataset, model) = open_judged(dir, options, observe)?;
+    let (mut dataset, model) = open_judged(dir, options, observe)?;
     let (evidence, agreement, fingerprint) = examine(&dataset, observe)?;
+    let transparent = dataset.settle_transparency();
+    if transparent > 0 && options.masks != MaskSource::Alpha {
+        observe(Event::Warning(format!(
+            "{transparent} photos have transparency, which is taken for their masks (--masks alpha says so, --masks off ignores it)"
+        )));
+    }
     let soundness = Soundness {
         reprojection_error: model.reprojection_error,
         lowest_correlation: agreement.lowest(),
@@ -137,6 +144,7 @@ pub(super) fn open_examined(
             let mut dataset = scene::open(dir, &options, quietly)?;
             model.mend(&mut dataset.capture);
             let (evidence, _, fingerprint) = examine(&dataset, quietly)?;
+            dataset.settle_transparency();
             (dataset, evidence, fingerprint)
         }
     };
@@ -277,6 +285,24 @@ pub(super) fn tell_folder(
         observe(Event::Warning(of_shrunk(shrunk)));
     }
     Ok(())
+}
+
+/// Warns where only some of the photos have masks, or some masks no photo.
+pub(super) fn tell_masks(masked: Option<&Masked>, observe: &mut Observer<'_>) {
+    let Some(found) = masked else { return };
+    let dir = found.dir.display();
+    if let Some(first) = found.strays.first() {
+        observe(Event::Warning(format!(
+            "{} files in {dir} belong to no photo, such as {first}: name masks like photos, with .png behind the name",
+            found.strays.len()
+        )));
+    }
+    if found.masked < found.photos {
+        observe(Event::Warning(format!(
+            "{} of {} photos have a mask in {dir}: all of the others counts",
+            found.masked, found.photos
+        )));
+    }
 }
 
 fn of_unplaced(found: &Unplaced) -> String {

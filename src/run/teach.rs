@@ -202,6 +202,12 @@ impl Teachers {
                 "profile and size change nothing: no teacher is a network".into(),
             ));
         }
+        for member in &mut self.teachers {
+            member.teacher.know(&dataset.capture);
+        }
+        if let Some((_, hints)) = &mut self.hints {
+            hints.know(&dataset.capture);
+        }
         let mut asking = Asking {
             answered: vec![[0; 2]; self.teachers.len()],
             hints_cover: false,

@@ -6,7 +6,7 @@ use image::{DynamicImage, RgbImage, codecs::jpeg::JpegEncoder};
 
 use crate::{
     capture::{Capture, Loader, View, split},
-    run::RunFolder,
+    run::{RunFolder, picture_names},
 };
 
 use super::{
@@ -30,6 +30,8 @@ pub(super) struct Album {
     points: PathBuf,
     capture: Capture,
     pictures: Pictures,
+    /// The path of the view's picture below a point's folder of pictures.
+    file: String,
 }
 
 impl Album {
@@ -39,6 +41,7 @@ impl Album {
             points: folder.join("points"),
             capture,
             pictures: Pictures::default(),
+            file: String::new(),
         }
     }
 
@@ -59,7 +62,9 @@ impl Album {
                 .test
                 .first()
                 .copied();
-            if let Some(view) = first.map(|i| &self.capture.views[i]) {
+            if let Some(i) = first {
+                let view = &self.capture.views[i];
+                self.file = picture_names(&self.capture.views).swap_remove(i);
                 self.pictures.view = view.name.clone();
                 self.pictures.photo = photo(&Loader::new(load), view);
             }
@@ -75,12 +80,8 @@ impl Album {
     }
 
     fn picture(&self, name: &str) -> Option<Vec<u8>> {
-        let file = self
-            .points
-            .join(name)
-            .join(FOLDER)
-            .join(&self.pictures.view);
-        small(image::open(file.with_extension("png")).ok()?)
+        let file = self.points.join(name).join(FOLDER).join(&self.file);
+        small(image::open(file).ok()?)
     }
 }
 

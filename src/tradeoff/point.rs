@@ -282,6 +282,7 @@ fn load_options(load: &LoadOptions) -> Result<Vec<Given>, RunError> {
     let plain = LoadOptions::default();
     let masks = match &load.masks {
         MaskSource::Beside => None,
+        MaskSource::Alpha => Some("alpha".to_owned()),
         MaskSource::Off => Some("off".to_owned()),
         MaskSource::Folder(path) => Some(text(&path::absolute(path).map_err(files::at(path))?)?),
     };

@@ -35,6 +35,22 @@ fn assert_near(found: [f64; 3], wanted: [f64; 3]) {
     }
 }
 
+/// Whether a splat file shows in gray from the cameras what `run/` has of the run's luma.
+#[track_caller]
+fn draws_like_the_run(place: &Place, file: &str) {
+    let ply = format!("{file}.ply");
+    let render = ["render", &ply, "--colmap", "scene", "--views", "all", "-o"];
+    let done = place.run(&[&render[..], &[file, "--luma"]].concat());
+    assert_eq!(done.code, Some(0), "{}", done.stderr);
+    assert!(!done.stderr.contains("warning"), "{}", done.stderr);
+    for index in [0, 5] {
+        let name = scene::name(index);
+        let [run, file] = ["run", file].map(|from| png(place, &format!("{from}/{name}")));
+        assert!(run.iter().any(|v| *v > 0.2), "something is to be seen");
+        assert!(psnr(&run, &file) > 40.0, "{name}: {} dB", psnr(&run, &file));
+    }
+}
+
 #[test]
 fn export_gives_colmaps_coordinates_back() {
     let place = run_far_away();
@@ -42,35 +58,49 @@ fn export_gives_colmaps_coordinates_back() {
     let offset: Vec<f64> = (0..3)
         .map(|k| report["capture"]["offset"][k].as_f64().expect("a number"))
         .collect();
-    place.succeed(&["export", "-o", "far.ply"]);
-    assert_near(middle(&place, "far.ply"), OFFSET);
-    // In the run they lie near the origin, where f32 is fine enough.
+    // In the run and beside it they lie near the origin, where f32 is fine enough.
     let inside = std::array::from_fn(|k| OFFSET[k] - offset[k]);
     assert_near(middle(&place, "runs/scene/luma.ply"), inside);
+    let said = place.succeed(&["export", "-o", "near.ply"]);
+    assert_near(middle(&place, "near.ply"), inside);
+    let moved = format!("{} {} {}", offset[0], offset[1], offset[2]);
+    assert!(said.contains(&format!("less {moved},")), "{said}");
+    let header = SplatFile::read(&place, "near.ply").header;
+    assert!(header.contains(&format!("comment offset {moved}")));
+    let info = place.json(&["info", "near.ply", "--json"]);
+    assert_eq!(info["offset"], report["capture"]["offset"]);
+    // Where the steps of f32 do no harm they may lie where COLMAP has the cameras.
+    let said = place.succeed(&["export", "--colmap-coordinates", "-o", "far.ply"]);
+    assert_near(middle(&place, "far.ply"), OFFSET);
+    assert_eq!(said.lines().count(), 1, "{said}");
     assert!(offset.iter().any(|v| v.abs() > 100.0));
 }
 
 #[test]
 fn exported_files_come_back_to_their_photos() {
     let place = run_far_away();
-    place.succeed(&["export", "-o", "far.ply"]);
+    place.succeed(&["export", "-o", "near.ply"]);
+    place.succeed(&["export", "--colmap-coordinates", "-o", "far.ply"]);
     place.succeed(&["render", "--views", "all", "-o", "run"]);
-    place.succeed(&[
-        "render", "far.ply", "--colmap", "scene", "--views", "all", "-o", "file",
-    ]);
-    for index in [0, 5] {
-        let name = scene::name(index);
-        let [run, file] = ["run", "file"].map(|from| png(&place, &format!("{from}/{name}")));
-        assert!(run.iter().any(|v| *v > 0.2), "something is to be seen");
-        assert!(psnr(&run, &file) > 40.0, "{name}: {} dB", psnr(&run, &file));
+    for file in ["near", "far"] {
+        draws_like_the_run(&place, file);
     }
 
     let teacher = onnx("ddcolor_tiny.onnx");
-    let colorize = [
-        "colorize", "far.ply", "--colmap", "scene", "--solver", "adam", "--until", "5",
-    ];
-    place.succeed(&[&colorize[..], &["--teacher", &teacher]].concat());
-    assert_near(middle(&place, "far-color.ply"), OFFSET);
+    let colorize = |run: &str, more: &[&str]| {
+        let begin = ["colorize", run, "--solver", "adam", "--teacher", &teacher];
+        place.succeed(&[&begin[..], more].concat());
+    };
+    // Each lies where the gray file did, and says so.
+    for file in ["near", "far"] {
+        let gray = format!("{file}.ply");
+        colorize(&gray, &["--colmap", "scene", "--until", "5"]);
+        let [gray, color] = [gray, format!("{file}-color.ply")].map(|f| middle(&place, &f));
+        assert_near(color, gray);
+        draws_like_the_run(&place, &format!("{file}-color"));
+    }
+    colorize("runs/scene", &["--until", "45", "-o", "beside.ply"]);
+    draws_like_the_run(&place, "beside");
 
     let held_out = |run: &str| {
         let psnr = &place.report(run)["luma"]["held_out"]["psnr"];
@@ -79,7 +109,7 @@ fn exported_files_come_back_to_their_photos() {
     let mut fit = QUICK_FIT;
     fit[5] = "1";
     place.succeed(&[&fit[..], &["-o", "runs/points"]].concat());
-    place.succeed(&[&fit[..], &["-o", "runs/init", "--init", "far.ply"]].concat());
+    place.succeed(&[&fit[..], &["-o", "runs/init", "--init", "near.ply"]].concat());
     let [trained, init, points] = ["runs/scene", "runs/init", "runs/points"].map(held_out);
     assert!((trained - init).abs() < 0.5, "{trained} {init}");
     assert!(init > points + 0.5, "{init} {points}");
@@ -103,6 +133,19 @@ fn utm_coordinates_train_like_those_at_the_origin() {
     });
     assert!((near - away).abs() < 0.5, "{near} dB and {away} dB");
     assert!(near > 15.0, "{near} dB");
+    // Beside the run, too, nothing is lost.
     far.succeed(&["export", "-o", "utm.ply"]);
-    assert_near(middle(&far, "utm.ply"), utm);
+    far.succeed(&["render", "--views", "all", "-o", "run"]);
+    draws_like_the_run(&far, "utm");
+    let asked = far.run(&["export", "--colmap-coordinates", "-o", "coarse.ply"]);
+    assert_eq!(asked.code, Some(1), "{}", asked.stderr);
+    for word in [
+        "coarse.ply",
+        "near 540321",
+        "are 0.5 apart",
+        "leave --colmap-coordinates out",
+    ] {
+        assert!(asked.stderr.contains(word), "no {word}: {}", asked.stderr);
+    }
+    assert!(!far.path("coarse.ply").exists());
 }

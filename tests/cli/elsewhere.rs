@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use super::program::{Done, Place, files_below};
 use super::scene;
-use super::shared::{onnx, place_with_run};
+use super::shared::{QUICK_FIT, onnx, place_with_run};
 use super::splat_file::SplatFile;
 
 fn write(place: &Place, file: &SplatFile) {
@@ -46,14 +46,72 @@ fn splats_that_show_something_else_are_told() {
             (row[1], row[2]) = (-row[1], 3.0 - row[2]);
         }
     };
+    let frame = |told: &str| {
+        let mut lines = told.lines();
+        lines.any(|line| line.starts_with("warning: gray.ply") && line.contains("COLMAP's frame"))
+    };
     for place in [place_with_splats(aside), place_with_splats(turned)] {
         let told = colorized(&place, &[]).stderr;
-        assert!(
-            told.lines().any(
-                |line| line.starts_with("warning: gray.ply") && line.contains("COLMAP's frame")
-            ),
-            "{told}"
-        );
+        assert!(frame(&told), "{told}");
+    }
+    // Whoever takes such a file is told.
+    let init = [&QUICK_FIT[..], &["-o", "init", "--init", "gray.ply"]].concat();
+    let render = ["render", "gray.ply", "--colmap", "scene", "-o", "pictures"];
+    for arguments in [&render[..], &init] {
+        for (place, wrong) in [(place_with_splats(aside), true), (place_with_run(), false)] {
+            if !wrong {
+                place.write("gray.ply", place.read("runs/scene/luma.ply"));
+            }
+            let done = place.run(arguments);
+            assert_eq!(done.code, Some(0), "{}", done.stderr);
+            assert_eq!(frame(&done.stderr), wrong, "{}", done.stderr);
+        }
+    }
+}
+
+#[test]
+fn what_is_wholly_opaque_is_drawn() {
+    let opaque = |logit: f32| {
+        let place = place_with_splats(|file| {
+            let opacity = file.place("opacity");
+            file.rows
+                .iter_mut()
+                .step_by(3)
+                .for_each(|row| row[opacity] = logit);
+        });
+        let render = ["render", "gray.ply", "--colmap", "scene", "-o", "pictures"];
+        let done = place.run(&render);
+        assert_eq!(done.code, Some(0), "{}", done.stderr);
+        assert!(!done.stderr.contains("skipped"), "{}", done.stderr);
+        super::picture::png(&place, "pictures/00.png")
+    };
+    let [infinite, large] = [f32::INFINITY, 20.0].map(opaque);
+    assert!(super::picture::psnr(&infinite, &large) > 50.0);
+}
+
+#[test]
+fn other_formats_are_named_with_the_remedy() {
+    let place = place_with_run();
+    place.write("scene.splat", [0; 64]);
+    for arguments in [
+        &["info", "scene.splat"][..],
+        &["render", "scene.splat", "--colmap", "scene", "-o", "out"],
+        &[
+            "colorize",
+            "scene.splat",
+            "--colmap",
+            "scene",
+            "--teacher",
+            "photos",
+        ],
+        &["export", "scene.splat", "-o", "out.ply"],
+        &[&QUICK_FIT[..], &["--init", "scene.splat"]].concat(),
+    ] {
+        let done = place.run(arguments);
+        assert_eq!(done.code, Some(1), "{arguments:?}: {}", done.stderr);
+        let line = done.stderr.lines().last().unwrap_or_default();
+        let words = ["error: scene.splat", "convert it to .ply"];
+        assert!(words.iter().all(|word| line.contains(word)), "{line}");
     }
 }
 

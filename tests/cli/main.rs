@@ -21,6 +21,8 @@ mod folder;
 #[cfg(target_os = "linux")]
 mod host;
 mod inspect;
+mod masks;
+mod names;
 mod photos;
 mod picture;
 mod program;

@@ -80,7 +80,7 @@ pub(super) fn images(
             .place(camera_id)
             .map_err(|reason| records.malformed(reason))?;
         let name = records.name()?;
-        let name = relative_name(&name).map_err(|reason| records.malformed(reason))?;
+        let name = relative_name(&name).map_err(|reason| records.bad_name(reason))?;
         let count = records.elements("the number of observations", OBSERVATION, "observations")?;
         let mut seen = Vec::new();
         for index in 0..count {
@@ -260,8 +260,10 @@ impl Records {
         if name.pop() != Some(0) {
             return Err(self.malformed("the name does not end".into()));
         }
-        let name =
-            String::from_utf8(name).map_err(|_| self.malformed("the name is not UTF-8".into()))?;
+        let name = String::from_utf8(name).map_err(|error| {
+            let name = String::from_utf8_lossy(error.as_bytes());
+            self.bad_name(format!("the name {name:?} is not UTF-8 text"))
+        })?;
         self.offset += length;
         Ok(name)
     }
@@ -277,8 +279,9 @@ impl Records {
         }
     }
 
-    fn malformed(&self, reason: String) -> CaptureError {
-        let record = match self.current {
+    /// The current record, in words.
+    fn record(&self) -> String {
+        match self.current {
             0 => "header".into(),
             current => format!(
                 "{} {} of {}",
@@ -286,10 +289,22 @@ impl Records {
                 current.min(self.count),
                 self.count
             ),
-        };
+        }
+    }
+
+    fn bad_name(&self, reason: String) -> CaptureError {
+        CaptureError::ImageName {
+            path: self.path.clone(),
+            record: self.record(),
+            position: Position::Byte(self.field),
+            reason,
+        }
+    }
+
+    fn malformed(&self, reason: String) -> CaptureError {
         CaptureError::Malformed {
             path: self.path.clone(),
-            record,
+            record: self.record(),
             position: Position::Byte(self.field),
             reason,
         }

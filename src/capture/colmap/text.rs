@@ -1,7 +1,8 @@
 //! COLMAP's `.txt` files: a record a line (two for an image), `#` comments.
 
+use std::borrow::Cow;
 use std::fs::File;
-use std::io::{BufRead, BufReader, ErrorKind};
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::str::{FromStr, SplitWhitespace};
 
@@ -11,6 +12,12 @@ use super::tracks::{Sighting, Sightings};
 use super::{Cameras, Image, Point, lens, relative_name};
 use crate::capture::error::{CaptureError, Position};
 use crate::capture::lens::{MOST_PARAMETERS, ModelName};
+
+/// What some editors write before the text.
+const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
+
+/// A record of the images file, for errors.
+const IMAGE: &str = "image";
 
 /// `CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]`
 pub(super) fn cameras(path: &Path) -> Result<Cameras, CaptureError> {
@@ -55,7 +62,7 @@ pub(super) fn images(
     path: &Path,
     cameras: &Cameras,
 ) -> Result<(Vec<Image>, Sightings), CaptureError> {
-    let mut lines = Lines::open(path, "image")?;
+    let mut lines = Lines::open(path, IMAGE)?;
     let mut images = Vec::new();
     let mut sightings = Sightings::default();
     while lines.next_record()? {
@@ -68,8 +75,8 @@ pub(super) fn images(
             .place(camera_id)
             .map_err(|reason| lines.malformed(reason))?;
         // The name is the tenth field and may contain spaces.
-        let name = relative_name(after_fields(&lines.line, 9))
-            .map_err(|reason| lines.malformed(reason))?;
+        let name =
+            relative_name(after_fields(&lines.line, 9)).map_err(|reason| lines.bad_name(reason))?;
         let place = images.len();
         images.push(Image {
             name,
@@ -162,7 +169,9 @@ fn after_fields(line: &str, count: usize) -> &str {
 struct Lines {
     path: PathBuf,
     reader: BufReader<File>,
-    /// The current line.
+    /// The current line as it stands in the file.
+    bytes: Vec<u8>,
+    /// And as text.
     line: String,
     /// The current line's number, from 1.
     number: u64,
@@ -181,6 +190,7 @@ impl Lines {
         Ok(Self {
             path: path.into(),
             reader: BufReader::new(file),
+            bytes: Vec::new(),
             line: String::new(),
             number: 0,
             kind,
@@ -188,20 +198,35 @@ impl Lines {
         })
     }
 
-    /// Goes to the next line; false at the file's end.
+    /// Goes to the next line; false at the file's end. Comments may have any encoding.
     fn next_line(&mut self) -> Result<bool, CaptureError> {
-        self.line.clear();
         self.number += 1;
-        match self.reader.read_line(&mut self.line) {
-            Ok(length) => Ok(length > 0),
-            Err(source) if source.kind() == ErrorKind::InvalidData => {
-                Err(self.malformed("the line is not UTF-8 text".into()))
-            }
-            Err(source) => Err(CaptureError::Read {
+        self.bytes.clear();
+        let length = (self.reader.read_until(b'\n', &mut self.bytes)).map_err(|source| {
+            CaptureError::Read {
                 path: self.path.clone(),
                 source,
-            }),
+            }
+        })?;
+        let bytes = match self.bytes.strip_prefix(BYTE_ORDER_MARK) {
+            Some(rest) if self.number == 1 => rest,
+            _ => &self.bytes,
+        };
+        let text = String::from_utf8_lossy(bytes);
+        let is_utf8 = matches!(text, Cow::Borrowed(_));
+        self.line.clear();
+        self.line.push_str(&text);
+        if is_utf8 || self.line.trim_start().starts_with('#') {
+            return Ok(length > 0);
         }
+        let name = after_fields(&self.line, 9);
+        if self.kind == IMAGE && !name.is_empty() {
+            let reason = format!("the name {name:?} is not UTF-8 text");
+            // The record that this line begins.
+            self.current += 1;
+            return Err(self.bad_name(reason));
+        }
+        Err(self.malformed("the line is not UTF-8 text".into()))
     }
 
     /// Goes to the next line that is neither empty nor a comment.
@@ -244,6 +269,15 @@ impl Lines {
             *value = self.field(fields, name)?;
         }
         Ok(values)
+    }
+
+    fn bad_name(&self, reason: String) -> CaptureError {
+        CaptureError::ImageName {
+            path: self.path.clone(),
+            record: format!("{} {}", self.kind, self.current.max(1)),
+            position: Position::Line(self.number),
+            reason,
+        }
     }
 
     fn malformed(&self, reason: String) -> CaptureError {

@@ -3,6 +3,8 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use crate::capture::Ambiguous;
+
 /// Why a teacher could not be opened or could not color a photo.
 #[derive(Debug, thiserror::Error)]
 pub enum TeacherError {
@@ -182,14 +184,9 @@ pub enum TeacherError {
         /// The folder.
         path: PathBuf,
     },
-    /// Two images of the folder stand for one photo.
-    #[error("{} and {}: both would color one photo; keep one of them", first.display(), second.display())]
-    TwoImages {
-        /// One image.
-        first: PathBuf,
-        /// The other.
-        second: PathBuf,
-    },
+    /// Nobody knows which image of the folder belongs to which photo.
+    #[error(transparent)]
+    Ambiguous(Ambiguous),
     /// An image of the folder does not decode.
     #[error("{}: not a readable image: {reason}", path.display())]
     BadImage {
@@ -200,8 +197,12 @@ pub enum TeacherError {
     },
     /// An image of the folder shows another cut of the photo.
     #[error(
-        "{}: {} x {} has another aspect than photo {photo} of {} x {}; crop or pad it to the photo's",
-        path.display(), size[0], size[1], photo_size[0], photo_size[1]
+        "{}: {} x {} has another aspect than photo {photo}, which is used at {} x {}; {}",
+        path.display(), size[0], size[1], photo_size[0], photo_size[1],
+        match turned(*size, *photo_size) {
+            true => "it seems to be turned by 90 degrees: turn it back",
+            false => "crop or pad it to the photo's aspect",
+        }
     )]
     Aspect {
         /// The image.
@@ -210,9 +211,15 @@ pub enum TeacherError {
         size: [u32; 2],
         /// The photo's name.
         photo: String,
-        /// The photo's width and height.
+        /// The photo's width and height where it is used.
         photo_size: [u32; 2],
     },
+}
+
+/// Whether a picture has the other's aspect once it is turned, to within 2 %.
+fn turned([width, height]: [u32; 2], [of_width, of_height]: [u32; 2]) -> bool {
+    let aspect = f64::from(width) * f64::from(of_width);
+    (aspect / (f64::from(height) * f64::from(of_height)) - 1.0).abs() <= 0.02
 }
 
 impl TeacherError {

@@ -2,13 +2,15 @@
 
 use super::named_images::NamedImages;
 use super::{AbImage, GrayImage, Query, TeacherError, TeacherInfo, file_name};
+use crate::capture::Capture;
 use crate::color::srgb_to_lab;
 use std::path::{Path, PathBuf};
 
 /// Images that were colored elsewhere, for any subset of the photos.
 ///
-/// An image belongs to the photo with the same path below the folder, whatever
-/// the two extensions are. Symbolic links to folders are not followed.
+/// An image belongs to the photo with the same path below the folder, with the extension of a
+/// picture behind it or without; where there is none, to the only photo whose path differs in
+/// nothing but the extension. Symbolic links to folders are not followed.
 pub struct FolderTeacher {
     folder: PathBuf,
     images: NamedImages,
@@ -19,7 +21,6 @@ impl FolderTeacher {
     ///
     /// # Errors
     /// [`TeacherError::EmptyFolder`] where there is none,
-    /// [`TeacherError::TwoImages`] where two differ only in their extension,
     /// [`TeacherError::Io`] where a folder cannot be read.
     pub fn open(folder: &Path) -> Result<Self, TeacherError> {
         Ok(Self {
@@ -28,9 +29,17 @@ impl FolderTeacher {
         })
     }
 
+    /// Says which photos there are, so that an image of one is not taken for another's.
+    pub fn know(&mut self, capture: &Capture) {
+        self.images.know(capture);
+    }
+
     /// Whether there is an image for the photo with this path below the photo
     /// folder.
-    pub fn covers(&self, name: &str) -> bool {
+    ///
+    /// # Errors
+    /// [`TeacherError::Ambiguous`] where nobody knows.
+    pub fn covers(&self, name: &str) -> Result<bool, TeacherError> {
         self.images.covers(name)
     }
 
@@ -101,6 +110,10 @@ mod tests {
             .unwrap();
     }
 
+    fn teacher_of(folder: &TempDir) -> FolderTeacher {
+        FolderTeacher::open(folder.path()).unwrap()
+    }
+
     #[test]
     fn images_match_by_path_without_extension() {
         let folder = tempfile::tempdir().unwrap();
@@ -110,13 +123,13 @@ mod tests {
         fs::write(folder.path().join("notes.txt"), "text").unwrap();
         let teacher = FolderTeacher::open(folder.path()).unwrap();
         for known in ["left/0001.png", "right/0001.png", "a.b.png"] {
-            assert!(teacher.covers(known));
+            assert!(teacher.covers(known).unwrap());
         }
-        assert!(teacher.covers("left/0001.jpeg"));
-        assert!(teacher.covers("./left/0001.tiff"));
-        assert!(teacher.covers("a.b.png"));
+        assert!(teacher.covers("left/0001.jpeg").unwrap());
+        assert!(teacher.covers("./left/0001.tiff").unwrap());
+        assert!(teacher.covers("a.b").unwrap());
         for other in ["0001.png", "left/0002.png", "left/0001/x.png", "a.png", ""] {
-            assert!(!teacher.covers(other), "{other}");
+            assert!(!teacher.covers(other).unwrap(), "{other}");
             assert_eq!(teacher.colorize(other, photo(8, 8)).unwrap(), None);
         }
         // Blue has a strongly negative b, red a strongly positive a.
@@ -130,6 +143,39 @@ mod tests {
             .unwrap()
             .unwrap();
         assert!(blue.ab[9][1] < -90.0);
+    }
+
+    #[test]
+    fn an_image_is_not_taken_for_another_photos() {
+        let folder = tempfile::tempdir().unwrap();
+        save(&folder, "shot0.png", 8, 8, [255, 0, 0]);
+        let view = |name: &str| View {
+            name: name.into(),
+            photo: name.into(),
+            undistortion: None,
+            ..face(name)
+        };
+        let mut capture = Capture {
+            root: folder.path().into(),
+            views: vec![view("shot0.jpg"), view("shot0.png")],
+            points: Vec::new(),
+            offset: glam::DVec3::ZERO,
+            rejected: Vec::new(),
+            distortion: 0.0,
+        };
+        let mut teacher = teacher_of(&folder);
+        assert!(teacher.covers("shot0.jpg").unwrap());
+        teacher.know(&capture);
+        assert!(!teacher.covers("shot0.jpg").unwrap());
+        assert!(teacher.covers("shot0.png").unwrap());
+        capture.views[1] = view("shot0.tif");
+        let mut teacher = teacher_of(&folder);
+        teacher.know(&capture);
+        let error = teacher.colorize("shot0.jpg", photo(8, 8)).unwrap_err();
+        let error = error.to_string();
+        for name in ["shot0.png", "shot0.jpg", "shot0.tif", "shot0.jpg.png"] {
+            assert!(error.contains(name), "{error}");
+        }
     }
 
     #[test]
@@ -167,9 +213,13 @@ mod tests {
             .colorize("wide.jpg", photo(8, 8))
             .unwrap_err()
             .to_string();
-        for part in ["wide.png", "wide.jpg", "103 x 100", "8 x 8"] {
+        for part in ["wide.png", "wide.jpg", "103 x 100", "8 x 8", "crop"] {
             assert!(error.contains(part), "{error}");
         }
+        save(&folder, "turned.png", 4, 6, [10, 20, 30]);
+        let error = teacher_of(&folder).colorize("turned.jpg", photo(6, 4));
+        let error = error.unwrap_err().to_string();
+        assert!(error.contains("turn it back"), "{error}");
     }
 
     #[test]
@@ -179,12 +229,17 @@ mod tests {
             FolderTeacher::open(folder.path()),
             Err(TeacherError::EmptyFolder { .. })
         ));
+    }
+
+    #[test]
+    fn two_images_that_may_be_one_photos() {
+        let folder = tempfile::tempdir().unwrap();
         save(&folder, "v.png", 4, 4, [1, 2, 3]);
         save(&folder, "v.jpg", 4, 4, [1, 2, 3]);
-        let error = FolderTeacher::open(folder.path())
-            .err()
-            .unwrap()
-            .to_string();
+        let teacher = FolderTeacher::open(folder.path()).unwrap();
+        assert!(teacher.colorize("v.jpg", photo(4, 4)).unwrap().is_some());
+        let error = teacher.colorize("v.tif", photo(4, 4)).unwrap_err();
+        let error = error.to_string();
         assert!(
             error.contains("v.png") && error.contains("v.jpg"),
             "{error}"
@@ -282,7 +337,7 @@ mod tests {
             .unwrap();
         let teacher = FolderTeacher::open(folder.path()).unwrap();
         for (name, known) in [("v", true), ("w.jpg", true), ("loop/v.png", false)] {
-            assert_eq!(teacher.covers(name), known, "{name}");
+            assert_eq!(teacher.covers(name).unwrap(), known, "{name}");
         }
     }
 }

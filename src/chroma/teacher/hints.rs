@@ -3,6 +3,7 @@
 use super::images::{Filter, resample};
 use super::named_images::NamedImages;
 use super::{GrayImage, Query, TeacherError};
+use crate::capture::Capture;
 use crate::color::srgb_to_lab;
 use std::path::Path;
 
@@ -32,6 +33,11 @@ impl HintFolder {
     pub fn open(folder: &Path) -> Result<Self, TeacherError> {
         let images = NamedImages::open(folder)?;
         Ok(Self { images })
+    }
+
+    /// Says which photos there are, so that paint on one is not taken for another's.
+    pub fn know(&mut self, capture: &Capture) {
+        self.images.know(capture);
     }
 
     /// The paint on a photo, at the paint's own size or, where it is painted on the

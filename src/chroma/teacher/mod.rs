@@ -131,6 +131,13 @@ impl Teacher {
         matches!(self.source, Source::Network(_))
     }
 
+    /// Says which photos there are, so that a folder's image of one is not taken for another's.
+    pub fn know(&mut self, capture: &crate::capture::Capture) {
+        if let Source::Folder(folder) = &mut self.source {
+            folder.know(capture);
+        }
+    }
+
     /// Name, kind and identity, for reports.
     pub fn describe(&self) -> TeacherInfo {
         match &self.source {

@@ -3,11 +3,12 @@
 use super::error::first_line;
 use super::query::Original;
 use super::{GrayImage, Query, TeacherError};
-use image::DynamicImage;
-use std::collections::BTreeMap;
-use std::collections::btree_map::Entry;
-use std::fs;
-use std::path::{Path, PathBuf};
+use crate::capture::Capture;
+use crate::capture::names::{NamedFiles, known, stem, visit_files};
+use image::{DynamicImage, ImageFormat};
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
 
 /// How far the aspects of photo and image may differ: rounding to whole pixels
 /// in a tool that works at a small size, not another cut of the photo.
@@ -15,11 +16,11 @@ const ASPECT_TOLERANCE: f64 = 0.02;
 
 /// Images for any subset of the photos.
 ///
-/// An image belongs to the photo with the same path below the folder, whatever
-/// the two extensions are. Symbolic links to folders are not followed.
+/// An image belongs to the photo with the same path below the folder, with the extension of a
+/// picture behind it or without; where there is none, to the only photo whose path differs in
+/// nothing but the extension. Symbolic links to folders are not followed.
 pub(super) struct NamedImages {
-    /// Images by path below the folder, without extension.
-    images: BTreeMap<String, PathBuf>,
+    images: NamedFiles,
 }
 
 /// An image that belongs to a photo.
@@ -36,34 +37,15 @@ impl NamedImages {
     ///
     /// # Errors
     /// [`TeacherError::EmptyFolder`] where there is none,
-    /// [`TeacherError::TwoImages`] where two differ only in their extension,
     /// [`TeacherError::Io`] where a folder cannot be read.
     pub fn open(folder: &Path) -> Result<Self, TeacherError> {
-        let mut images = BTreeMap::new();
-        let mut folders = vec![folder.to_path_buf()];
-        while let Some(current) = folders.pop() {
-            for entry in fs::read_dir(&current).map_err(TeacherError::io(&current))? {
-                let entry = entry.map_err(TeacherError::io(&current))?;
-                let path = entry.path();
-                let kind = entry.file_type().map_err(TeacherError::io(&path))?;
-                if kind.is_dir() {
-                    folders.push(path);
-                } else if is_image(&path) && path.is_file() {
-                    let below = path.strip_prefix(folder).unwrap_or(&path);
-                    match images.entry(key(below)) {
-                        Entry::Vacant(entry) => {
-                            entry.insert(path);
-                        }
-                        Entry::Occupied(entry) => {
-                            return Err(TeacherError::TwoImages {
-                                first: entry.get().min(&path).clone(),
-                                second: entry.get().max(&path).clone(),
-                            });
-                        }
-                    }
-                }
+        let mut images = NamedFiles::default();
+        let read = visit_files(folder, &mut |name, path| {
+            if is_image(&path) {
+                images.insert(&name, path);
             }
-        }
+        });
+        read.map_err(|(path, source)| TeacherError::Io { path, source })?;
         if images.is_empty() {
             return Err(TeacherError::EmptyFolder {
                 path: folder.to_path_buf(),
@@ -72,10 +54,22 @@ impl NamedImages {
         Ok(Self { images })
     }
 
+    /// Says which photos there are, so that an image of one is not taken for another's.
+    pub fn know(&mut self, capture: &Capture) {
+        self.images.know(known(capture));
+    }
+
     /// Whether there is an image for the photo with this path below the photo
     /// folder.
-    pub fn covers(&self, name: &str) -> bool {
-        self.images.contains_key(&key(Path::new(name)))
+    ///
+    /// # Errors
+    /// [`TeacherError::Ambiguous`] where nobody knows.
+    pub fn covers(&self, name: &str) -> Result<bool, TeacherError> {
+        Ok(self.find(name)?.is_some())
+    }
+
+    fn find(&self, name: &str) -> Result<Option<&Path>, TeacherError> {
+        self.images.of(name).map_err(TeacherError::Ambiguous)
     }
 
     /// The image for a photo; none where there is none. A face of a photo may have
@@ -83,32 +77,36 @@ impl NamedImages {
     ///
     /// # Errors
     /// [`TeacherError::BadImage`] where it is damaged, [`TeacherError::Aspect`]
-    /// where it shows another cut of the photo, [`TeacherError::Io`].
+    /// where it shows another cut of the photo, [`TeacherError::Ambiguous`] where two images
+    /// may be the photo's or the image may be another's, [`TeacherError::Io`].
     pub fn load<'a>(
         &'a self,
         query: Query<'a>,
         photo: GrayImage<'_>,
     ) -> Result<Option<Found<'a>>, TeacherError> {
-        let find = |name: &str| self.images.get(&key(Path::new(name)));
-        let whole = || {
-            let original = query.original?;
-            Some((original.name, find(original.name)?, Some(original)))
-        };
         // A view with its photo's name has no image of its own, but its photo's.
         let own = match query.original {
             Some(original) if original.name == query.name => None,
-            _ => find(query.name).map(|path| (query.name, path, None)),
+            _ => self.find(query.name)?.map(|path| (path, None)),
         };
-        let Some((name, path, original)) = own.or_else(whole) else {
+        let found = match (own, query.original) {
+            (None, Some(original)) => {
+                let path = self.find(original.name)?;
+                path.map(|path| (path, Some(original)))
+            }
+            (own, _) => own,
+        };
+        let Some((path, original)) = found else {
             return Ok(None);
         };
+        let name = original.map_or(query.name, |original| original.name);
         let photo_size = original.map_or([photo.width, photo.height], |original| original.size());
         let reader = image::ImageReader::open(path).map_err(TeacherError::io(path))?;
         // A .png that is really a JPEG is a common slip and does no harm.
         let reader = reader.with_guessed_format();
         let decoded = reader.map_err(TeacherError::io(path))?.decode();
         let image = decoded.map_err(|error| TeacherError::BadImage {
-            path: path.clone(),
+            path: path.to_path_buf(),
             reason: first_line(error),
         })?;
         let (width, height) = (image.width(), image.height());
@@ -116,7 +114,7 @@ impl NamedImages {
             / (f64::from(height) * f64::from(photo_size[0]));
         if (aspect - 1.0).abs() > ASPECT_TOLERANCE {
             return Err(TeacherError::Aspect {
-                path: path.clone(),
+                path: path.to_path_buf(),
                 size: [width, height],
                 photo: name.to_string(),
                 photo_size,
@@ -130,20 +128,24 @@ impl NamedImages {
     }
 }
 
+/// Whether a file's name says that it is an image that can be read, or its first bytes do where
+/// its name does not say that it is a picture.
 fn is_image(path: &Path) -> bool {
     let extension = path.extension().unwrap_or_default();
-    ["png", "jpg", "jpeg"]
+    let named = ["png", "jpg", "jpeg"];
+    if named
         .iter()
         .any(|known| extension.eq_ignore_ascii_case(known))
-}
-
-/// A path without its extension, with `/` between its parts on every system.
-fn key(path: &Path) -> String {
-    let path = path.with_extension("");
-    let parts: Vec<_> = path
-        .components()
-        .filter(|part| !matches!(part, std::path::Component::CurDir))
-        .map(|part| part.as_os_str().to_string_lossy())
-        .collect();
-    parts.join("/")
+    {
+        return true;
+    }
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let mut magic = Vec::new();
+    let read = |mut file: File| file.by_ref().take(16).read_to_end(&mut magic);
+    stem(&name) == name
+        && File::open(path).and_then(read).is_ok()
+        && matches!(
+            image::guess_format(&magic),
+            Ok(ImageFormat::Png | ImageFormat::Jpeg)
+        )
 }

@@ -6,6 +6,7 @@ use serde_json::Value;
 
 use super::super::{
     Event, Observer, RunError, RunFolder, Stage,
+    foreign::tell_unlike,
     scene::{read_splats, tell_trial},
 };
 use super::{
@@ -138,6 +139,10 @@ impl Job<'_> {
         let init = options.init.as_ref();
         let init = init.map(|path| read_splats(path, dataset.capture.offset, observe));
         let init = init.transpose()?;
+        if let (Some(path), Some((splats, drawn))) = (&options.init, &init) {
+            let splats = (path.as_path(), &splats.to_luma());
+            tell_unlike(self.gpu, dataset, splats, *drawn, observe)?;
+        }
         let seconds = options.goal.seconds();
         // Held-out views have to be seen as they are measured, where they are to be reached.
         let reaches = options.goal.psnr().is_some() && !self.judge.split.test.is_empty();

@@ -1,6 +1,7 @@
 //! The header of a PLY file and where its numbers lie.
 
-use super::{CENTER, PlyError, SHAPE, degree_of_rest_count, sh_names};
+use super::{CENTER, OFFSET, PlyError, SHAPE, THIRD_SCALE, degree_of_rest_count, sh_names};
+use glam::DVec3;
 use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{DefaultElement, ElementDef, Header, PropertyType, ScalarType};
 use std::io::{BufRead, Read};
@@ -10,13 +11,18 @@ use std::path::Path;
 /// `end_header` must not be read to its end.
 const MAX_HEADER_BYTES: u64 = 64 * 1024;
 
+/// Colors that some programs write instead of `f_dc_0..2`.
+const BYTE_COLORS: [&str; 3] = ["red", "green", "blue"];
+
 /// Which numbers of a vertex make a Gaussian.
 pub(super) struct VertexLayout {
     /// SH degree.
     pub degree: u32,
     /// For each needed number, in the order center, SH, shape: the place among
-    /// the vertex's properties.
-    pub columns: Vec<usize>,
+    /// the vertex's properties; none for the third scale of a disc.
+    pub columns: Vec<Option<usize>>,
+    /// Whether the first three SH are colors of 8 bits.
+    pub byte_colors: bool,
     /// Types of all properties of a vertex, in file order.
     pub types: Vec<ScalarType>,
 }
@@ -91,6 +97,19 @@ pub(super) fn is_antialiased(comments: &[String]) -> bool {
     modes.next_back().unwrap_or(false)
 }
 
+/// What the header's comments say was subtracted from the centers; the last one counts.
+pub(super) fn offset(comments: &[String]) -> DVec3 {
+    let mut offsets = comments.iter().filter_map(|comment| {
+        let words: Vec<_> = comment.split_whitespace().collect();
+        let [OFFSET, x, y, z] = words[..] else {
+            return None;
+        };
+        let [x, y, z] = [x, y, z].map(|word| word.parse().ok());
+        Some(DVec3::new(x?, y?, z?)).filter(|offset| offset.is_finite())
+    });
+    offsets.next_back().unwrap_or_default()
+}
+
 impl VertexLayout {
     /// Finds the properties of a Gaussian among those of the vertex element.
     pub fn new(path: &Path, vertex: &ElementDef) -> Result<Self, PlyError> {
@@ -118,19 +137,36 @@ impl VertexLayout {
             count,
         })?;
 
+        let has = |name: &str| properties.contains_key(name);
+        if has(CENTER[0]) && !(SHAPE[..2].iter().any(|name| has(name)) || has("f_dc_0")) {
+            return Err(PlyError::PointCloud {
+                path: path.to_path_buf(),
+            });
+        }
+        let byte_colors = !has("f_dc_0")
+            && (BYTE_COLORS.iter()).all(|&name| {
+                let property = properties.get(name);
+                property.is_some_and(|p| p.data_type == PropertyType::Scalar(ScalarType::UChar))
+            });
         let names = CENTER.into_iter().map(String::from);
-        let names = names.chain(sh_names(degree));
+        let names = names.chain(sh_names(degree).enumerate().map(|(place, name)| {
+            match BYTE_COLORS.get(place).filter(|_| byte_colors) {
+                Some(&color) => color.to_owned(),
+                None => name,
+            }
+        }));
         let names = names.chain(SHAPE.into_iter().map(String::from));
-        let columns = names.map(|property| {
-            let column = properties.get_index_of(&property);
-            column.ok_or_else(|| PlyError::MissingProperty {
+        let columns = names.map(|property| match properties.get_index_of(&property) {
+            None if property != THIRD_SCALE => Err(PlyError::MissingProperty {
                 path: path.to_path_buf(),
                 property,
-            })
+            }),
+            column => Ok(column),
         });
         Ok(Self {
             degree,
             columns: columns.collect::<Result<_, _>>()?,
+            byte_colors,
             types,
         })
     }

@@ -5,7 +5,11 @@
 //! red, green, blue), `opacity` (logit), `scale_0..2` (natural logarithms of
 //! the standard deviations), `rot_0..3` (quaternion w x y z). Normals are
 //! written as zeros because some readers expect them.
+//!
+//! Files of other programs may have two scales (discs, as 2DGS trains them) and colors of
+//! 8 bits, `red green blue`, in the place of `f_dc_0..2`.
 
+mod collect;
 mod error;
 mod header;
 mod read;
@@ -15,11 +19,44 @@ pub use error::PlyError;
 pub use read::{ReadSplats, read_ply};
 pub use write::write_ply;
 
+use std::path::Path;
+
+use glam::DVec3;
+
 use super::sh::{MAX_DEGREE, coefficient_count};
+
+/// Extensions of splat files of other formats.
+const OTHER_FORMATS: [&str; 4] = ["splat", "ksplat", "spz", "sog"];
+
+/// Whether a path is named like a splat file that can be read.
+///
+/// # Errors
+/// [`PlyError::OtherFormat`] where it is named like one that cannot.
+pub fn is_splat_file(path: &Path) -> Result<bool, PlyError> {
+    let extension = path.extension().unwrap_or_default();
+    let other = (OTHER_FORMATS.iter()).find(|format| extension.eq_ignore_ascii_case(format));
+    match other {
+        Some(format) => Err(PlyError::OtherFormat {
+            path: path.to_path_buf(),
+            format: format!(".{format}"),
+        }),
+        None => Ok(extension.eq_ignore_ascii_case("ply")),
+    }
+}
 
 /// The comment that tells readers to draw with opacities that fall by what the blur
 /// spreads: Brush's, which splat-transform reads as well.
 pub const ANTIALIASED: &str = "SplatRenderMode: mip";
+
+/// The word that begins the comment with what was subtracted from the centers.
+const OFFSET: &str = "offset";
+
+/// The comment of a file from whose centers `offset` was subtracted because they would be too
+/// large for 32-bit floats: `offset X Y Z`.
+pub fn offset_comment(offset: DVec3) -> String {
+    let [x, y, z] = offset.to_array();
+    format!("{OFFSET} {x} {y} {z}")
+}
 
 /// Color channels of a splat file.
 const CHANNELS: usize = 3;
@@ -32,6 +69,9 @@ const CENTER: [&str; 3] = ["x", "y", "z"];
 const SHAPE: [&str; 8] = [
     "opacity", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3",
 ];
+
+/// The scale that discs do not have.
+const THIRD_SCALE: &str = "scale_2";
 
 /// Names of the SH properties at a degree: `f_dc_0..2`, then `f_rest_*`.
 fn sh_names(degree: u32) -> impl Iterator<Item = String> {
@@ -58,5 +98,7 @@ fn sh_position(degree: u32, k: usize, channel: usize) -> usize {
     }
 }
 
+#[cfg(test)]
+mod foreign_tests;
 #[cfg(test)]
 mod tests;

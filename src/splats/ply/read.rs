@@ -1,8 +1,10 @@
 //! Reading splat files of any make.
 
-use super::header::{VertexLayout, byte_size, decode, is_antialiased, read_header};
-use super::{CHANNELS, PlyError, sh_position};
-use crate::splats::{ShField, Splats, sh::coefficient_count};
+use super::collect::Collector;
+use super::header::{VertexLayout, byte_size, decode, is_antialiased, offset, read_header};
+use super::{PlyError, is_splat_file};
+use crate::splats::Splats;
+use glam::DVec3;
 use ply_rs_bw::ply::{ElementDef, Encoding, PropertyType, ScalarType};
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, ErrorKind, Read};
@@ -11,9 +13,6 @@ use std::path::Path;
 /// Bytes of the body that are read at once.
 const CHUNK_BYTES: usize = 1 << 20;
 
-/// Norm below which a quaternion has no direction.
-const MIN_QUATERNION_NORM: f64 = 1e-12;
-
 /// What a splat file holds.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ReadSplats {
@@ -21,8 +20,14 @@ pub struct ReadSplats {
     /// necessarily of unit length.
     pub splats: Splats,
     /// Gaussians that were left out because a number was not finite or the
-    /// quaternion zero. Viewers draw nothing sensible for those.
+    /// quaternion zero. An infinite opacity is not counted: it is opaque or transparent; nor is
+    /// a scale of minus infinity: it is flat.
     pub skipped: usize,
+    /// What was subtracted from the centers, in world units, as the header says
+    /// ([`offset_comment`](super::offset_comment)); zero where it says nothing.
+    pub offset: DVec3,
+    /// Bytes behind all that the header announces: its count is likely too small.
+    pub surplus: u64,
     /// Whether the header says that the Gaussians were trained antialiased
     /// ([`ANTIALIASED`](super::ANTIALIASED), or Postshot's `antialiased 1`).
     pub antialiased: bool,
@@ -32,13 +37,14 @@ pub struct ReadSplats {
 ///
 /// Text or binary of either byte order; properties in any order and of any
 /// type; further properties and elements are ignored. Numbers are rounded to
-/// f32.
+/// f32. Gaussians of two scales are flat; `red green blue` of 8 bits stand for `f_dc_0..2`.
 ///
 /// # Errors
-/// A [`PlyError`] where the header is damaged or longer than 64 KiB, a property
+/// A [`PlyError`] where the name is that of another format, the header is damaged or longer than 64 KiB, a property
 /// is missing, the number of `f_rest_*` fits no degree, or the file is shorter
 /// than its header says (found out before memory is taken for it).
 pub fn read_ply(path: &Path) -> Result<ReadSplats, PlyError> {
+    is_splat_file(path)?;
     let file = File::open(path).map_err(PlyError::io(path))?;
     let file_bytes = file.metadata().map_err(PlyError::io(path))?.len();
     let mut file = BufReader::with_capacity(CHUNK_BYTES, file);
@@ -51,7 +57,8 @@ pub fn read_ply(path: &Path) -> Result<ReadSplats, PlyError> {
         line: String::new(),
     };
 
-    for element in header.elements.values() {
+    let mut elements = header.elements.values();
+    while let Some(element) = elements.next() {
         if element.name != "vertex" {
             body.skip(element)?;
             continue;
@@ -70,6 +77,8 @@ pub fn read_ply(path: &Path) -> Result<ReadSplats, PlyError> {
         let read = body.read_vertices(element, &layout)?;
         return Ok(ReadSplats {
             antialiased,
+            offset: offset(&header.comments),
+            surplus: body.surplus(elements)?,
             ..read
         });
     }
@@ -125,7 +134,30 @@ impl Body<'_> {
         }
     }
 
-    /// Passes over an element that stands before the vertices.
+    /// Bytes after the last row of these elements, unless all are white space: some programs
+    /// end binary files like lines. None where the elements themselves are cut off, which does
+    /// the vertices no harm.
+    fn surplus<'e>(
+        &mut self,
+        mut elements: impl Iterator<Item = &'e ElementDef>,
+    ) -> Result<u64, PlyError> {
+        if elements.any(|element| self.skip(element).is_err()) {
+            return Ok(0);
+        }
+        let (mut bytes, mut blank) = (0, true);
+        loop {
+            let chunk = self.file.fill_buf().map_err(PlyError::io(self.path))?;
+            let length = chunk.len();
+            if length == 0 {
+                return Ok(if blank { 0 } else { bytes });
+            }
+            bytes += length as u64;
+            blank &= chunk.iter().all(u8::is_ascii_whitespace);
+            self.file.consume(length);
+        }
+    }
+
+    /// Passes over an element.
     fn skip(&mut self, element: &ElementDef) -> Result<(), PlyError> {
         if element.properties.is_empty() {
             return Ok(());
@@ -167,11 +199,11 @@ impl Body<'_> {
     }
 
     fn read_vertices(
-        mut self,
+        &mut self,
         element: &ElementDef,
         layout: &VertexLayout,
     ) -> Result<ReadSplats, PlyError> {
-        let mut collected = Collector::with_capacity(element.count, layout.degree);
+        let mut collected = Collector::new(element.count, layout);
         let mut needed = vec![0.0; layout.columns.len()];
         if self.encoding == Encoding::Ascii {
             let mut row = Vec::new();
@@ -182,10 +214,10 @@ impl Body<'_> {
                 if row.len() != layout.types.len() {
                     return Err(self.bad_row(element, index));
                 }
-                for (value, &column) in needed.iter_mut().zip(&layout.columns) {
-                    *value = row[column] as f32;
+                for (value, column) in needed.iter_mut().zip(&layout.columns) {
+                    *value = column.map_or(f32::NEG_INFINITY, |column| row[column] as f32);
                 }
-                collected.push(&needed);
+                collected.push(&mut needed);
             }
             return Ok(collected.finish());
         }
@@ -197,8 +229,9 @@ impl Body<'_> {
             offsets.push(stride);
             stride += byte_size(kind);
         }
-        let place = |&column: &usize| (offsets[column], layout.types[column].clone());
-        let places: Vec<_> = layout.columns.iter().map(place).collect();
+        let place = |column: usize| (offsets[column], layout.types[column].clone());
+        let columns = layout.columns.iter();
+        let places: Vec<_> = columns.map(|column| column.map(place)).collect();
 
         let big_endian = self.big_endian();
         let chunk_rows = (CHUNK_BYTES / stride).clamp(1, element.count.max(1));
@@ -210,73 +243,17 @@ impl Body<'_> {
             let read = self.file.read_exact(chunk);
             read.map_err(|error| self.failed(element, error))?;
             for row in chunk.chunks_exact(stride) {
-                for (value, (offset, kind)) in needed.iter_mut().zip(&places) {
-                    *value = decode(kind, big_endian, &row[*offset..]) as f32;
+                for (value, place) in needed.iter_mut().zip(&places) {
+                    *value = match place {
+                        Some((offset, kind)) => decode(kind, big_endian, &row[*offset..]) as f32,
+                        // A disc has no extent along its normal.
+                        None => f32::NEG_INFINITY,
+                    };
                 }
-                collected.push(&needed);
+                collected.push(&mut needed);
             }
             remaining -= rows;
         }
         Ok(collected.finish())
-    }
-}
-
-/// Sorts the numbers of each Gaussian into the arrays.
-struct Collector {
-    read: ReadSplats,
-    /// For each coefficient of the field its place among the SH properties.
-    sh_positions: Vec<usize>,
-}
-
-impl Collector {
-    fn with_capacity(count: usize, degree: u32) -> Self {
-        let sh_positions: Vec<usize> = (0..coefficient_count(degree))
-            .flat_map(|k| (0..CHANNELS).map(move |channel| sh_position(degree, k, channel)))
-            .collect();
-        let splats = Splats {
-            means: Vec::with_capacity(count),
-            quats: Vec::with_capacity(count),
-            log_scales: Vec::with_capacity(count),
-            opacity_logits: Vec::with_capacity(count),
-            sh: ShField {
-                degree,
-                channels: CHANNELS,
-                coefficients: Vec::with_capacity(count * sh_positions.len()),
-            },
-        };
-        Self {
-            read: ReadSplats {
-                splats,
-                ..ReadSplats::default()
-            },
-            sh_positions,
-        }
-    }
-
-    /// `values` hold center, SH and shape in this order.
-    fn push(&mut self, values: &[f32]) {
-        let (center, rest) = values.split_at(3);
-        let (sh, shape) = rest.split_at(self.sh_positions.len());
-        let quaternion = [shape[4], shape[5], shape[6], shape[7]];
-        let norm = quaternion
-            .iter()
-            .map(|&q| f64::from(q).powi(2))
-            .sum::<f64>()
-            .sqrt();
-        if !values.iter().all(|value| value.is_finite()) || norm < MIN_QUATERNION_NORM {
-            self.read.skipped += 1;
-            return;
-        }
-        let splats = &mut self.read.splats;
-        splats.means.push([center[0], center[1], center[2]]);
-        splats.opacity_logits.push(shape[0]);
-        splats.log_scales.push([shape[1], shape[2], shape[3]]);
-        splats.quats.push(quaternion);
-        let coefficients = self.sh_positions.iter().map(|&position| sh[position]);
-        splats.sh.coefficients.extend(coefficients);
-    }
-
-    fn finish(self) -> ReadSplats {
-        self.read
     }
 }

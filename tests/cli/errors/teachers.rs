@@ -182,11 +182,11 @@ pub(super) const CASES: &[Case] = &[
     case(
         "two images for a photo",
         |p| {
-            paint(p, "01.png", scene::SIZE);
+            paint(p, "01.jpeg", scene::SIZE);
             paint(p, "01.jpg", scene::SIZE);
         },
         PAINTED,
-        &["01.png", "01.jpg", "keep one"],
+        &["01.jpeg", "01.jpg", "keep one"],
     ),
     case(
         "a damaged image",

@@ -1,0 +1,94 @@
+//! From the numbers of a vertex to a Gaussian.
+
+use super::header::VertexLayout;
+use super::{CHANNELS, ReadSplats, sh_position};
+use crate::splats::sh::{C0, coefficient_count};
+use crate::splats::{ShField, Splats};
+
+/// Norm below which a quaternion has no direction.
+const MIN_QUATERNION_NORM: f64 = 1e-12;
+
+/// The logit that stands for an opacity of 1: 3e-7 below it, which is opaque, and which f32
+/// still tells from it, so that training can move it.
+pub(super) const OPAQUE: f32 = 15.0;
+
+/// The logarithm that stands for that of 0: a scale of 2e-9 is flat in any unit that a scene
+/// has, and its square is an f32.
+pub(super) const FLAT: f32 = -20.0;
+
+/// Sorts the numbers of each Gaussian into the arrays.
+pub(super) struct Collector {
+    read: ReadSplats,
+    /// For each coefficient of the field its place among the SH properties.
+    sh_positions: Vec<usize>,
+    byte_colors: bool,
+}
+
+impl Collector {
+    pub fn new(count: usize, layout: &VertexLayout) -> Self {
+        let degree = layout.degree;
+        let sh_positions: Vec<usize> = (0..coefficient_count(degree))
+            .flat_map(|k| (0..CHANNELS).map(move |channel| sh_position(degree, k, channel)))
+            .collect();
+        let splats = Splats {
+            means: Vec::with_capacity(count),
+            quats: Vec::with_capacity(count),
+            log_scales: Vec::with_capacity(count),
+            opacity_logits: Vec::with_capacity(count),
+            sh: ShField {
+                degree,
+                channels: CHANNELS,
+                coefficients: Vec::with_capacity(count * sh_positions.len()),
+            },
+        };
+        Self {
+            read: ReadSplats {
+                splats,
+                ..ReadSplats::default()
+            },
+            sh_positions,
+            byte_colors: layout.byte_colors,
+        }
+    }
+
+    /// `values` hold center, SH and shape in this order; those that mean a limit become finite.
+    pub fn push(&mut self, values: &mut [f32]) {
+        let (center, rest) = values.split_at_mut(3);
+        let (sh, shape) = rest.split_at_mut(self.sh_positions.len());
+        if shape[0].is_infinite() {
+            shape[0] = OPAQUE.copysign(shape[0]);
+        }
+        for scale in &mut shape[1..4] {
+            if *scale == f32::NEG_INFINITY {
+                *scale = FLAT;
+            }
+        }
+        if self.byte_colors {
+            for color in &mut sh[..CHANNELS] {
+                *color = ((f64::from(*color) / 255.0 - 0.5) / C0) as f32;
+            }
+        }
+        let quaternion = [shape[4], shape[5], shape[6], shape[7]];
+        let norm = quaternion
+            .iter()
+            .map(|&q| f64::from(q).powi(2))
+            .sum::<f64>()
+            .sqrt();
+        let finite = |values: &[f32]| values.iter().all(|value| value.is_finite());
+        if !(finite(center) && finite(sh) && finite(shape)) || norm < MIN_QUATERNION_NORM {
+            self.read.skipped += 1;
+            return;
+        }
+        let splats = &mut self.read.splats;
+        splats.means.push([center[0], center[1], center[2]]);
+        splats.opacity_logits.push(shape[0]);
+        splats.log_scales.push([shape[1], shape[2], shape[3]]);
+        splats.quats.push(quaternion);
+        let coefficients = self.sh_positions.iter().map(|&position| sh[position]);
+        splats.sh.coefficients.extend(coefficients);
+    }
+
+    pub fn finish(self) -> ReadSplats {
+        self.read
+    }
+}
