@@ -12,7 +12,7 @@ pub(crate) fn folder_of(path: &Path) -> &Path {
     }
 }
 
-/// An empty file beside `path`, which [`NamedTempFile::persist`] puts there once it is
+/// An empty file beside `path`, which [`persist`] puts there once it is
 /// complete. Dropped before that it leaves nothing behind.
 ///
 /// # Errors
@@ -29,6 +29,16 @@ pub(crate) fn create(path: &Path) -> io::Result<NamedTempFile> {
     builder.tempfile_in(folder_of(path))
 }
 
+/// Puts a complete file where it belongs, once all of it is on the disk.
+///
+/// # Errors
+/// The system's.
+pub(crate) fn persist(file: NamedTempFile, path: &Path) -> io::Result<()> {
+    file.as_file().sync_all()?;
+    file.persist(path)?;
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
     use std::{fs, io::Write};
@@ -42,7 +52,7 @@ mod tests {
         let mut file = create(&path).unwrap();
         file.write_all(b"whole").unwrap();
         assert!(!path.exists());
-        file.persist(&path).unwrap();
+        persist(file, &path).unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"whole");
         drop(create(&path).unwrap());
         assert_eq!(fs::read_dir(place.path()).unwrap().count(), 1);
@@ -55,7 +65,7 @@ mod tests {
         use std::os::unix::fs::PermissionsExt;
         let place = tempfile::tempdir().unwrap();
         let [ours, plain] = ["ours", "plain"].map(|name| place.path().join(name));
-        create(&ours).unwrap().persist(&ours).unwrap();
+        persist(create(&ours).unwrap(), &ours).unwrap();
         fs::write(&plain, []).unwrap();
         let [ours, plain] = [ours, plain].map(|path| fs::metadata(path).unwrap().permissions());
         assert_eq!(ours.mode(), plain.mode());

@@ -36,10 +36,14 @@ pub(crate) fn write(to: &mut dyn Write, sections: &[(&str, &[u8])]) -> io::Resul
     Ok(size + SUM as u64)
 }
 
-/// In hexadecimal.
+/// The SHA-256 of bytes, in hexadecimal.
 pub(crate) fn sha256(bytes: &[u8]) -> String {
-    let sum = Sha256::digest(bytes);
-    sum.iter().map(|byte| format!("{byte:02x}")).collect()
+    hexadecimal(&Sha256::digest(bytes))
+}
+
+/// Two digits a byte.
+pub(crate) fn hexadecimal(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// What [`write`] wrote; `None` of what is damaged or something else.

@@ -16,7 +16,9 @@ use super::{
 };
 use crate::luma::Goal;
 use crate::report::timings_table;
-use crate::run::{AheadOptions, CheckpointOptions, FitOptions, Interrupt, Preset, RunError, fit};
+use crate::run::{
+    AheadOptions, CheckpointOptions, EVERY, FitOptions, Interrupt, Preset, RunError, fit,
+};
 
 /// Rows of the curve that is printed.
 const CURVE_ROWS: usize = 8;
@@ -64,7 +66,7 @@ pub struct Fit {
     resume: bool,
     /// Minutes between two checkpoints, or `off`; it takes longer where they take more than a
     /// fiftieth of the time.
-    #[arg(long, value_name = "MIN|off", default_value = "10", value_parser = minutes)]
+    #[arg(long, value_name = "MIN|off", default_value = EVERY.to_string(), value_parser = minutes)]
     checkpoint: Minutes,
     /// Time every kernel, and print a table of it.
     #[arg(long)]

@@ -104,8 +104,7 @@ impl Check {
             let mut file = atomic_file::create(path).map_err(|error| unreadable(path, &error))?;
             file.write_all(checkup.manifest.as_bytes())
                 .map_err(|error| unreadable(path, &error))?;
-            file.persist(path)
-                .map_err(|error| unreadable(path, &error))?;
+            atomic_file::persist(file, path).map_err(|error| unreadable(path, &error))?;
         }
         if self.json {
             return print(format_args!("{:#}", serde_json::json!(checkup)));

@@ -4,10 +4,13 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::{CurvePoint, LumaSettings, Schedule, pace::Pace};
+use super::{CurvePoint, Schedule, pace::Pace};
 use crate::{
     effects::Plan,
-    raster::{Load, Snapshot},
+    raster::{
+        Load, Snapshot,
+        constants::{STATISTICS_PLANES, STATUS_WORDS},
+    },
 };
 
 /// A training between two iterations. What goes on from it ends with the bytes of one that was
@@ -27,8 +30,6 @@ pub struct Checkpoint {
 /// What of it is few numbers.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct State {
-    /// What it is trained with: what plan and memory decided included.
-    pub settings: LumaSettings,
     /// Which effects are simulated; filled in by who planned.
     pub plan: Option<Plan>,
     /// Iterations done.
@@ -86,11 +87,6 @@ impl Checkpoint {
         self.state.seconds
     }
 
-    /// What is trained with.
-    pub fn settings(&self) -> &LumaSettings {
-        &self.state.settings
-    }
-
     /// As named sections of bytes.
     pub fn to_sections(&self) -> Vec<(String, Vec<u8>)> {
         // Plain structs with string keys: serializing them cannot fail.
@@ -132,9 +128,12 @@ impl Checkpoint {
             Some(_) => Some(snapshot("best")?),
             None => None,
         };
-        Some(Self {
-            model: snapshot("model")?,
-            statistics: floats("statistics")?,
+        let (model, statistics) = (snapshot("model")?, floats("statistics")?);
+        let fits = statistics.len() == STATISTICS_PLANES * model.len()
+            && state.status.len() == STATUS_WORDS;
+        fits.then_some(Self {
+            model,
+            statistics,
             left_out: left_out.collect(),
             best,
             state,

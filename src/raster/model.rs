@@ -121,6 +121,16 @@ pub struct Snapshot {
 }
 
 impl Snapshot {
+    /// Number of Gaussians.
+    pub fn len(&self) -> usize {
+        self.count
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
     /// A snapshot of these planes; `None` where they are those of no model.
     pub fn of(planes: impl Iterator<Item = Vec<f32>>) -> Option<Self> {
         let planes: Vec<Vec<f32>> = planes.collect();

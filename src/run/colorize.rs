@@ -92,10 +92,6 @@ pub fn colorize(
     let warnings = RefCell::default();
     let observe = &mut keeping(&warnings, observe);
     let source = Source::find(options)?;
-    let folder = source.folder.as_ref();
-    let _lock = folder
-        .map(|folder| RunLock::take(folder.path()))
-        .transpose()?;
     let cache = source.folder.as_ref().map(RunFolder::teacher);
     let colmap_dir = source.colmap_dir(options)?;
     let mut teachers = Teachers::open(&options.teach, &colmap_dir, cache.as_deref())?;
@@ -105,12 +101,12 @@ pub fn colorize(
         force: options.force || report.capture.load.force,
         ..report.capture.load.clone()
     };
-    let dataset = match (&source.report, &options.colmap) {
-        // `fit` has compared these photos with their model.
-        (Some(_), None) => open_checked(&colmap_dir, &load, observe)?,
-        // In another light they may well show something else.
-        _ if options.relight => open_checked(&colmap_dir, &load, observe)?,
-        _ => open_examined(&colmap_dir, &load, observe)?.dataset,
+    // `fit` has compared a run's photos with their model; in another light they may well show
+    // something else.
+    let trusted = options.relight || (source.report.is_some() && options.colmap.is_none());
+    let dataset = match trusted {
+        true => open_checked(&colmap_dir, &load, observe)?,
+        false => open_examined(&colmap_dir, &load, observe)?.dataset,
     };
     // From here on every photo is looked at once.
     let dataset = dataset.caching(0);
@@ -149,7 +145,9 @@ pub fn colorize(
         ..settings
     };
     let seconds_teacher = begun.elapsed().as_secs_f64();
-    tell_not_finite(&dataset, observe);
+    if trusted {
+        tell_not_finite(&dataset, observe);
+    }
     if source.report.is_none() {
         report.capture = capture_report(&colmap_dir, &dataset);
         report.luma.splats = luma.len();
@@ -327,6 +325,8 @@ struct Source {
     folder: Option<RunFolder>,
     report: Option<Report>,
     splats: PathBuf,
+    /// On the run folder.
+    _lock: Option<RunLock>,
 }
 
 impl Source {
@@ -336,14 +336,17 @@ impl Source {
                 folder: None,
                 report: None,
                 splats: path.clone(),
+                _lock: None,
             }),
             run => {
                 let folder = match run {
                     Some(path) => RunFolder::at(path),
                     None => RunFolder::newest()?,
                 };
+                let (lock, report) = RunLock::of_run(&folder)?;
                 Ok(Self {
-                    report: Some(folder.read_report()?),
+                    report: Some(report),
+                    _lock: Some(lock),
                     splats: folder.luma(),
                     folder: Some(folder),
                 })

@@ -72,7 +72,6 @@ impl Commit {
     /// # Errors
     /// [`RunError::File`]; then either nothing has changed, or [`finish`] will do what is left.
     pub fn finish(self) -> Result<(), RunError> {
-        finish(&self.folder)?;
         let list = self.made.path().join(REMOVED);
         files::write(&list, self.removed.join("\n").as_bytes())?;
         let complete = self.folder.join(COMPLETE);
@@ -124,13 +123,13 @@ pub(super) fn clean(folder: &Path) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let name = entry.file_name();
         let name = name.to_string_lossy();
-        // `.tmp` and `.eval-` are what files and pages are called before they have a name.
         let emptied = name == COMPLETE && !is_left(folder);
-        if emptied
-            || [BEGUN, ".tmp", ".eval-"]
-                .iter()
-                .any(|begun| name.starts_with(begun))
-        {
+        // `.tmp` and six letters is what a file is called before it has a name.
+        let begun = [BEGUN, ".tmp"].iter().any(|prefix| {
+            let rest = name.strip_prefix(prefix);
+            rest.is_some_and(|rest| rest.len() == 6 && rest.chars().all(char::is_alphanumeric))
+        });
+        if emptied || begun {
             let _ = remove(&entry.path());
         }
     }
@@ -246,10 +245,11 @@ mod tests {
         let run = run();
         let commit = filled(run.path());
         let _ = commit.made.keep();
-        fs::write(run.path().join(".tmpAb12"), "half").unwrap();
-        fs::create_dir(run.path().join(".eval-x")).unwrap();
+        fs::write(run.path().join(".tmpAb12Cd"), "half").unwrap();
+        fs::write(run.path().join(".tmp-notes"), "somebody's").unwrap();
+        fs::create_dir(run.path().join(COMPLETE)).unwrap();
         finish(run.path()).unwrap();
         clean(run.path());
-        assert_eq!(names(run.path()), ["a", "b", "c", "page"]);
+        assert_eq!(names(run.path()), [".tmp-notes", "a", "b", "c", "page"]);
     }
 }

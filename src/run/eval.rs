@@ -11,10 +11,10 @@ use super::{
     Event, Observer, RunError, RunFolder, Stage,
     commit::Commit,
     files,
-    fit::{comments, open_gpu},
+    fit::open_gpu,
     keeping,
     lock::RunLock,
-    scene::{open, read_splats},
+    scene::{comments_of_moved, open, read_splats},
     teach::teacher_or_photos,
 };
 use crate::{
@@ -75,8 +75,12 @@ pub fn eval(
     let begun = Instant::now();
     let warnings = RefCell::default();
     let observe = &mut keeping(&warnings, observe);
-    let (folder, report, scene) = load(options, observe)?;
-    let _lock = RunLock::take(folder.path())?;
+    let folder = match &options.run {
+        Some(path) => RunFolder::at(path),
+        None => RunFolder::newest()?,
+    };
+    let (_lock, report) = RunLock::of_run(&folder)?;
+    let scene = load(&folder, &report, options, observe)?;
     files::check_page(&folder.evaluation_page())?;
     let commit = Commit::new(folder.path())?;
     let page = commit.place(&folder.evaluation_page());
@@ -113,7 +117,8 @@ pub fn eval(
             ..scene.luma.clone()
         };
         let path = page.join(told.method.file_stem()).with_extension("ply");
-        ply::write_ply(&path, &splats, glam::DVec3::ZERO, &comments(drawn))?;
+        let comments = comments_of_moved(drawn, scene.dataset.capture.offset);
+        ply::write_ply(&path, &splats, glam::DVec3::ZERO, &comments)?;
     }
     let mut rgb = vec![(Method::Exported, &scene.exported)];
     rgb.extend(peers.iter().map(|(field, told)| (told.method, field)));
@@ -195,14 +200,11 @@ pub fn eval(
 
 /// Opens the run that is to be measured.
 fn load(
+    folder: &RunFolder,
+    report: &Report,
     options: &EvalOptions,
     observe: &mut Observer<'_>,
-) -> Result<(RunFolder, Report, ColoredScene), RunError> {
-    let folder = match &options.run {
-        Some(path) => RunFolder::at(path),
-        None => RunFolder::newest()?,
-    };
-    let report = folder.read_report()?;
+) -> Result<ColoredScene, RunError> {
     let refused = |path: PathBuf, reason: &str| RunError::File {
         path,
         reason: format!("{reason}: run `gs-chroma colorize` first"),
@@ -230,14 +232,13 @@ fn load(
         None => PathBuf::from(&report.capture.path),
     };
     let dataset = open(&colmap, &report.capture.load, observe)?;
-    let scene = ColoredScene {
+    Ok(ColoredScene {
         exposures: exposures(&dataset, &report.luma.exposures),
         dataset,
         luma,
         chroma,
         exported: exported.sh,
-    };
-    Ok((folder, report, scene))
+    })
 }
 
 /// Asks the teacher for all photos, through the run's cache; for frames too where baselines

@@ -36,8 +36,7 @@ pub(super) fn write_by<T>(
         let made = fill(&mut to)?;
         to.flush()?;
         drop(to);
-        file.as_file().sync_all()?;
-        file.persist(path)?;
+        atomic_file::persist(file, path)?;
         Ok(made)
     };
     filled().map_err(at(path))

@@ -2,7 +2,10 @@
 
 use sha2::{Digest, Sha256};
 
-use crate::capture::{Capture, Dataset, Photo};
+use crate::{
+    capture::{Capture, Dataset, Photo},
+    sections::hexadecimal,
+};
 
 /// A SHA-256 over photos at working size, their cameras and COLMAP's points.
 #[derive(Default)]
@@ -33,7 +36,6 @@ impl Fingerprint {
             }
             self.0.update(point.color);
         }
-        let sum = self.0.finalize();
-        sum.iter().map(|byte| format!("{byte:02x}")).collect()
+        hexadecimal(&self.0.finalize())
     }
 }

@@ -6,7 +6,8 @@ use std::{
     path::Path,
 };
 
-use super::{RunError, commit, files};
+use super::{RunError, RunFolder, commit, files};
+use crate::report::Report;
 
 /// The file that is locked; it says who holds it.
 const LOCK: &str = ".lock";
@@ -19,6 +20,17 @@ pub(super) struct RunLock {
 }
 
 impl RunLock {
+    /// Takes that of a run that is there, and reads its report.
+    ///
+    /// # Errors
+    /// As [`RunFolder::read_report`] and [`RunLock::take`].
+    pub fn of_run(folder: &RunFolder) -> Result<(Self, Report), RunError> {
+        // Only what is a run is locked; what its report says is read once nobody writes it.
+        folder.read_report()?;
+        let lock = Self::take(folder.path())?;
+        Ok((lock, folder.read_report()?))
+    }
+
     /// Takes it, finishes what a process that held it has left complete, and removes what it
     /// had only begun.
     ///
@@ -41,8 +53,12 @@ impl RunLock {
                     holder: holder(&path),
                 });
             }
-            // Some file systems cannot lock; then nobody can know.
-            Err(TryLockError::Error(_)) => return Ok(Self { _file: file }),
+            // Some file systems cannot lock. Nobody knows then who else is there: what is
+            // complete is finished, what was begun may still be going on.
+            Err(TryLockError::Error(_)) => {
+                commit::finish(folder)?;
+                return Ok(Self { _file: file });
+            }
         }
         let mut told = || {
             file.set_len(0)?;

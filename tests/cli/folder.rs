@@ -42,8 +42,8 @@ fn what_a_dead_process_left_is_finished_or_removed() {
     let place = place_with_run();
     let before = place.files("runs/scene");
     let report = place.read("runs/scene/report.json");
-    place.write("runs/scene/.tmpX1", "half");
-    place.write("runs/scene/.next-X2/luma.ply", "half");
+    place.write("runs/scene/.tmpX1x2X3", "half");
+    place.write("runs/scene/.next-X1x2X3/luma.ply", "half");
     place.write("runs/scene/.commit/log.csv", "iteration,loss\n");
     place.write("runs/scene/.commit/.removed", "contact-sheet.png\n");
     // Any command that looks at the run.

@@ -93,7 +93,7 @@ fn train(start: &Splats, target: &Splats) -> (Splats, Vec<LumaProgress>) {
     (trainer.splats().unwrap(), reports)
 }
 
-fn trainer(start: &Splats, target: &Splats) -> LumaTrainer {
+pub fn trainer(start: &Splats, target: &Splats) -> LumaTrainer {
     let settings = settings(start);
     let schedule = Schedule {
         densify_from: 20,

@@ -11,7 +11,7 @@ use gs_chroma::{
     splats::{ShField, Splats},
 };
 
-use crate::repeat::{photos, same, settings, start_and_target, trainer_by};
+use crate::repeat::{photos, same, settings, start_and_target, trainer, trainer_by};
 
 /// Wants a checkpoint wherever one can be, and ends after so many.
 struct EndsAfter {
@@ -101,17 +101,7 @@ fn resumes_everywhere(of: &dyn Fn(&Splats) -> LumaTrainer, start: &Splats) -> Ve
 #[test]
 fn a_set_that_is_split() {
     let [start, target] = start_and_target();
-    let of = |from: &Splats| {
-        let settings = settings(&start);
-        let schedule = Schedule {
-            densify_from: 20,
-            densify_every: 25,
-            densify_until: 60,
-            raise_degree_every: 20,
-            ..Schedule::of(&settings)
-        };
-        trainer_by(settings, schedule, 4.0, from, photos(&target))
-    };
+    let of = |from: &Splats| trainer(from, &target);
     assert_eq!(resumes_everywhere(&of, &start), [25, 50]);
 }
 

@@ -1,7 +1,7 @@
 //! Answers of a network on disk, so that each photo is colored once.
 
 use super::{AbImage, GrayImage, TeacherError};
-use crate::{atomic_file, npy};
+use crate::{atomic_file, npy, sections::hexadecimal};
 use sha2::{Digest, Sha256};
 use std::fs::{self, File};
 use std::io::{self, Read, Write};
@@ -40,8 +40,7 @@ impl Cache {
         let stored = || -> io::Result<()> {
             let mut file = atomic_file::create(&path)?;
             file.write_all(&encode(image))?;
-            file.persist(&path)?;
-            Ok(())
+            atomic_file::persist(file, &path)
         };
         stored().map_err(TeacherError::io(&path))
     }
@@ -115,10 +114,6 @@ impl Hasher {
     pub fn finish(self) -> String {
         hexadecimal(&self.0.finalize())
     }
-}
-
-fn hexadecimal(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 fn encode(image: &AbImage) -> Vec<u8> {

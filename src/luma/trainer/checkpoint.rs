@@ -24,7 +24,6 @@ impl LumaTrainer {
             best: best.map(|best| best.model.clone()),
             left_out: self.targets.photos.left_out(),
             state: State {
-                settings: self.settings.clone(),
                 plan: None,
                 iteration,
                 seconds,

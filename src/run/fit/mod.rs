@@ -92,7 +92,8 @@ pub fn fit(
     options: &FitOptions,
     observe: &mut Observer<'_>,
 ) -> Result<(RunFolder, Report), RunError> {
-    let mut begun = Instant::now();
+    let opened = Instant::now();
+    let mut begun = opened;
     let warnings = RefCell::default();
     let observe = &mut keeping(&warnings, observe);
     let gpu = open_gpu(options.timings)?;
@@ -153,7 +154,7 @@ pub fn fit(
         evidence: &evidence,
         judge: judge.as_ref().unwrap_or(&dataset),
         begun,
-        loading: begun.elapsed().as_secs_f64(),
+        loading: opened.elapsed().as_secs_f64(),
     };
     let trained = ahead.meanwhile(&dataset, observe, |observe| {
         job.train(&budget, &folder, question, found.as_ref(), observe)

@@ -77,16 +77,21 @@ impl Trained {
 
 impl Job<'_> {
     /// Seconds for training within the time limit, measuring and writing taken off; an
-    /// iteration takes about `each`.
+    /// iteration takes about `each`. Of a training that goes on, its seconds so far are among
+    /// them.
     ///
     /// # Errors
     /// [`RunError::TimeTooShort`].
-    fn time_for_training(&self, each: f64) -> Result<Option<f64>, RunError> {
+    fn time_for_training(&self, each: f64, found: Option<&Found>) -> Result<Option<f64>, RunError> {
         let Some(limit) = self.options.goal.seconds() else {
             return Ok(None);
         };
         let before = self.begun.elapsed().as_secs_f64();
         let left = (1.0 - WRITING) * limit - before - self.measuring(each)?;
+        if let Some(found) = found {
+            // Its training counts from its beginning, and ends however little is left.
+            return Ok(Some(left.max(0.0) + found.checkpoint.seconds()));
+        }
         let least = ITERATIONS_MIN as f64 * each;
         if left < least {
             return Err(RunError::TimeTooShort {
@@ -134,7 +139,7 @@ impl Job<'_> {
         observe: &mut Observer<'_>,
     ) -> Result<Trained, RunError> {
         let (options, dataset) = (self.options, self.dataset);
-        let limit = self.time_for_training(budget.each)?;
+        let limit = self.time_for_training(budget.each, found)?;
         let settings = &budget.work.settings;
         let init = options.init.as_ref();
         let init = init.map(|path| read_splats(path, dataset.capture.offset, observe));

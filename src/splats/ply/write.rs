@@ -56,8 +56,7 @@ pub fn write_ply(
         let little_endian: &[u8] = bytemuck::cast_slice(&values);
         file.write_all(little_endian).map_err(io_error(path))?;
     }
-    let persisted = file.persist(path).map_err(|error| error.error);
-    persisted.map(drop).map_err(io_error(path))
+    atomic_file::persist(file, path).map_err(io_error(path))
 }
 
 fn check_arrays(path: &Path, splats: &Splats) -> Result<(), PlyError> {
