@@ -2,14 +2,14 @@
 //! redirects to named hosts only, and is whole or not there.
 
 use std::{
-    fs::{self, File, OpenOptions, TryLockError},
+    fs::{File, TryLockError},
     io::{self, Read, Seek, SeekFrom, Write},
     ops::ControlFlow,
     path::{Path, PathBuf},
     time::Duration,
 };
 
-use sha2::{Digest, Sha256};
+use crate::{disk, hash};
 use ureq::{
     Agent, Body,
     http::{Response, StatusCode, Uri, header},
@@ -137,17 +137,13 @@ pub(crate) fn download(
     observe: &mut dyn FnMut(u64, Option<u64>) -> ControlFlow<()>,
 ) -> Result<(), DownloadError> {
     if let Some(folder) = path.parent() {
-        fs::create_dir_all(folder).map_err(io_error(folder))?;
+        disk::make_folder(folder).map_err(io_error(folder))?;
     }
     let mut part_name = path.as_os_str().to_owned();
     part_name.push(".part");
     let part_path = PathBuf::from(part_name);
     let failed = io_error(&part_path);
-    let mut part = (OpenOptions::new().create(true).truncate(false))
-        .read(true)
-        .write(true)
-        .open(&part_path)
-        .map_err(&failed)?;
+    let mut part = disk::open_in_place(&part_path).map_err(&failed)?;
     match part.try_lock() {
         Ok(()) => {}
         Err(TryLockError::WouldBlock) => {
@@ -166,12 +162,12 @@ pub(crate) fn download(
     match outcome {
         Ok(()) => {
             part.sync_all().map_err(&failed)?;
-            fs::rename(&part_path, path).map_err(io_error(path))
+            disk::rename(&part_path, path).map_err(io_error(path))
         }
         Err(error) => {
             if useless || nothing {
                 // What cannot be removed is found out by its hash the next time.
-                drop(fs::remove_file(&part_path));
+                drop(disk::remove(&part_path));
             }
             Err(error)
         }
@@ -203,17 +199,7 @@ fn fill(
         furthest = furthest.max(there);
     }
     part.seek(SeekFrom::Start(0)).map_err(failed)?;
-    let mut hash = Sha256::new();
-    let mut block = vec![0; BLOCK];
-    loop {
-        match part.read(&mut block).map_err(failed)? {
-            0 => break,
-            count => hash.update(&block[..count]),
-        }
-    }
-    let found: String = (hash.finalize().iter())
-        .map(|byte| format!("{byte:02x}"))
-        .collect();
+    let found = hash::of_file(part).map_err(failed)?;
     if found == source.sha256 {
         return Ok(());
     }
@@ -238,7 +224,9 @@ fn transfer(
         StatusCode::PARTIAL_CONTENT => {}
         // All of it, from the beginning: this host cannot go on.
         StatusCode::OK => {
-            part.set_len(0).map_err(failed)?;
+            disk::step()
+                .and_then(|()| part.set_len(0))
+                .map_err(failed)?;
             done = part.seek(SeekFrom::Start(0)).map_err(failed)?;
         }
         // Nothing is missing, or what is there is longer than the file.
@@ -278,6 +266,7 @@ fn transfer(
             }
             Ok(0) => return Ok(()),
             Ok(count) => {
+                disk::step().map_err(failed)?;
                 part.write_all(&block[..count]).map_err(failed)?;
                 done += count as u64;
             }

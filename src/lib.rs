@@ -4,7 +4,7 @@
 //!
 //! ```text
 //! cli → tradeoff → run → eval → report, doctor → luma, chroma → effects, measure → raster
-//! → capture, splats → gpu, color, atomic_file, sections, download, npy, oracle, compare
+//! → capture, splats → gpu, color, sections, download, npy, oracle, compare → disk, hash, input
 //! ```
 //!
 //! [`doctor`] compares the kernels of [`raster`], [`luma`] and [`chroma`] with the [`oracle`],
@@ -44,19 +44,21 @@
 //! # }
 //! ```
 
-mod atomic_file;
 pub mod capture;
 pub mod chroma;
 #[cfg(feature = "cli")]
 pub mod cli;
 pub mod color;
 pub mod compare;
+mod disk;
 pub mod doctor;
 #[cfg(feature = "cli")]
 mod download;
 pub mod effects;
 pub mod eval;
 pub mod gpu;
+mod hash;
+mod input;
 pub mod luma;
 pub mod measure;
 mod npy;

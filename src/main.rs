@@ -1,4 +1,4 @@
-//! The command line program: parse, run, one line of error, exit code.
+//! The command line program: parse and run.
 
 use std::process::ExitCode;
 
@@ -6,22 +6,24 @@ use clap::Parser;
 use gs_chroma::cli::Cli;
 
 fn main() -> ExitCode {
-    quiet_device_selection();
+    set_environment();
     gs_chroma::tradeoff::end_with_parent();
-    match Cli::parse().run() {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    Cli::parse().main()
 }
 
-/// Without a session, Mesa's device-selection layer complains on standard error
-/// about the Wayland display that it cannot ask; there is nothing to select by then.
-fn quiet_device_selection() {
+/// Tells libraries what they ask the environment alone.
+fn set_environment() {
+    let mut set = vec![
+        // ONNX Runtime queues its telemetry and looks for its host whatever its API is told.
+        "ORT_DISABLE_TELEMETRY",
+    ];
     if cfg!(target_os = "linux") && std::env::var_os("XDG_RUNTIME_DIR").is_none() {
+        // Without a session, Mesa's device-selection layer complains on standard error about the
+        // Wayland display that it cannot ask; there is nothing to select by then.
+        set.push("NODEVICE_SELECT");
+    }
+    for name in set {
         // SAFETY: the first statement of the program; no other thread reads the environment.
-        unsafe { std::env::set_var("NODEVICE_SELECT", "1") };
+        unsafe { std::env::set_var(name, "1") };
     }
 }

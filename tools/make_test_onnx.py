@@ -232,6 +232,32 @@ def two_answers_tiny(path: Path) -> None:
     save(path, nodes, {"input": [1, 3, SIDE, SIDE]}, outputs, constants)
 
 
+def endless_tiny(path: Path) -> None:
+    """ddcolor_tiny's answer after a loop that never ends."""
+    number, truth = TensorProto.INT64, TensorProto.BOOL
+    count = helper.make_tensor_value_info("count", number, [])
+    before = helper.make_tensor_value_info("before", truth, [])
+    after = helper.make_tensor_value_info("after", truth, [])
+    state = [
+        helper.make_tensor_value_info(name, TensorProto.FLOAT, [1, 2, SIDE, SIDE])
+        for name in ("state", "next")
+    ]
+    body = helper.make_graph(
+        [
+            helper.make_node("Identity", ["before"], ["after"]),
+            helper.make_node("Neg", ["state"], ["next"]),
+        ],
+        "body", [count, before, state[0]], [after, state[1]],
+    )  # fmt: skip
+    nodes = [
+        helper.make_node("Conv", ["input", "weights", "bias"], ["ab"]),
+        helper.make_node("Loop", ["", "true", "ab"], ["output"], body=body),
+    ]
+    forever = helper.make_tensor("true", truth, [], [True])
+    constants = [*convolution(3, 2, AB_WEIGHTS, AB_BIAS), forever]
+    save(path, nodes, {"input": [1, 3, SIDE, SIDE]}, {"output": [1, 2, SIDE, SIDE]}, constants)
+
+
 def wrong_rank(path: Path) -> None:
     """An input of rank 2, as of a table."""
     save(
@@ -288,7 +314,7 @@ def main() -> None:
     for make in (
         ddcolor_tiny, siggraph17_tiny, siggraph17_full_tiny, caffe_v2_tiny, bigcolor_tiny,
         deoldify_tiny, deoldify_browser_tiny, half_tiny, int8_tiny, old_tiny, new_tiny,
-        outside_tiny, pixels_tiny, two_answers_tiny, wrong_rank, wrong_channels, two_inputs,
+        outside_tiny, pixels_tiny, two_answers_tiny, endless_tiny, wrong_rank, wrong_channels, two_inputs,
     ):  # fmt: skip
         make(folder / f"{make.__name__}.onnx")
     truncated(folder / "truncated.onnx", folder / "ddcolor_tiny.onnx")

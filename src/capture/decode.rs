@@ -1,14 +1,16 @@
 //! Photo files as numbers.
 
-use std::fs::File;
 use std::io::{BufReader, Cursor, Read};
 use std::path::Path;
+use std::sync::Arc;
 
 use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 
 use super::error::CaptureError;
+use super::room::{self, Held};
 use super::sample::{Bytes, Depth, Header, LARGEST_FILE, Samples};
 use super::{jpeg, tiff};
+use crate::input;
 
 /// How TIFF files begin that may be larger than 4 GiB, in either byte order.
 const BIG_TIFF: [&[u8]; 2] = [b"II+\0", b"MM\0+"];
@@ -21,29 +23,84 @@ pub(super) struct Picture {
     pub header: Header,
     /// `[height, width, channels]`.
     pub samples: Samples,
+    _held: Option<Held>,
 }
+
+/// The most samples that a byte of a file can stand for: DEFLATE makes at most 1032 bytes of
+/// one (zlib's technical details), and a byte holds eight samples of one bit. JPEG and LZW
+/// stay far below.
+const SAMPLES_PER_BYTE: u64 = 8 * 1032;
 
 /// Reads what a file announces, and of TIFF and PNG files nothing else.
 pub(super) fn header(path: &Path) -> Result<Header, CaptureError> {
-    let file = File::open(path).map_err(unread(path))?;
-    let opened = open(path, Box::new(BufReader::new(file)));
+    let file = input::open(path).map_err(unread(path))?;
+    let opened = open(Box::new(BufReader::new(file)));
     if opened.is_err() {
         // The decoder's words about what it does not read help nobody.
-        check_jpeg(&std::fs::read(path).map_err(unread(path))?).map_err(failure(path))?;
+        check_jpeg(&input::read(path).map_err(unread(path))?).map_err(failure(path))?;
     }
-    Ok(opened?.0)
+    Ok(opened.map_err(failure(path))?.0)
 }
 
 /// Decodes a file once `check` has agreed to its size: before any pixel is
 /// allocated, since what a file announces may be a lie.
+///
+/// Waits until there is room for it; whoever holds a picture must not wait, see
+/// [`decode_beside`].
 pub(super) fn decode(
     path: &Path,
     check: impl FnOnce([u32; 2]) -> Result<(), CaptureError>,
 ) -> Result<Picture, CaptureError> {
-    let file = std::fs::read(path).map_err(unread(path))?;
-    check_jpeg(&file).map_err(failure(path))?;
-    let (header, source) = open(path, Box::new(Cursor::new(file)))?;
+    decode_with(path, check, |bytes| Some(room::wait_for(bytes)))
+}
+
+/// [`decode`] for a picture that belongs to one that is held.
+pub(super) fn decode_beside(
+    path: &Path,
+    check: impl FnOnce([u32; 2]) -> Result<(), CaptureError>,
+) -> Result<Picture, CaptureError> {
+    decode_with(path, check, |_| None)
+}
+
+fn decode_with(
+    path: &Path,
+    check: impl FnOnce([u32; 2]) -> Result<(), CaptureError>,
+    hold: impl FnOnce(u64) -> Option<Held>,
+) -> Result<Picture, CaptureError> {
+    let file: Arc<[u8]> = input::read(path).map_err(unread(path))?.into();
+    let frame = check_jpeg(&file).map_err(failure(path))?;
+    let (header, source) = open(Box::new(Cursor::new(file.clone()))).map_err(failure(path))?;
     check(header.size)?;
+    let bytes = check_bytes(header, file.len()).map_err(failure(path))?;
+    let held = hold(bytes);
+    let samples = match (source, frame) {
+        (Source::Tiff(mut decoder), _) => tiff::samples(&mut decoder, header),
+        (Source::Image(_), Some(frame)) => jpeg::decode(&file, &frame).and_then(samples_of),
+        (Source::Image(decoder), None) => png(decoder).and_then(samples_of),
+    };
+    Ok(Picture {
+        header,
+        samples: samples.map_err(failure(path))?,
+        _held: held,
+    })
+}
+
+/// Decodes the bytes of a PNG or JPEG file. Errors are what is wrong and what helps.
+pub(crate) fn decode_image(file: Vec<u8>) -> Result<DynamicImage, String> {
+    let file: Arc<[u8]> = file.into();
+    let frame = check_jpeg(&file)?;
+    let (header, source) = open(Box::new(Cursor::new(file.clone())))?;
+    check_bytes(header, file.len())?;
+    match (source, frame) {
+        (Source::Tiff(_), _) => Err("is a TIFF; save it as PNG or JPEG".into()),
+        (Source::Image(_), Some(frame)) => jpeg::decode(&file, &frame),
+        (Source::Image(decoder), None) => png(decoder),
+    }
+}
+
+/// The bytes of a decoded picture; refuses what would take more than there is or than the file
+/// can fill.
+fn check_bytes(header: Header, file: usize) -> Result<u64, String> {
     let [width, height] = header.size;
     let samples = u64::from(width) * u64::from(height) * header.channels as u64;
     let bytes = match header.depth {
@@ -52,23 +109,21 @@ pub(super) fn decode(
         Depth::Float => 4,
     };
     if samples.saturating_mul(bytes) > LARGEST_FILE {
-        return Err(failure(path)(format!(
+        return Err(format!(
             "announces {width}×{height} pixels, too many to decode; run image_undistorter with --max_image_size"
-        )));
+        ));
     }
-    let samples = match source {
-        Source::Image(decoder) => {
-            let unreadable = |e| format!("cannot be decoded ({e}); save it anew");
-            DynamicImage::from_decoder(decoder)
-                .map_err(unreadable)
-                .and_then(samples_of)
-        }
-        Source::Tiff(mut decoder) => tiff::samples(&mut decoder, header),
-    };
-    Ok(Picture {
-        header,
-        samples: samples.map_err(failure(path))?,
-    })
+    if samples > SAMPLES_PER_BYTE.saturating_mul(file as u64) {
+        return Err(format!(
+            "announces {width}×{height} pixels, which its {file} bytes cannot hold; copy it again"
+        ));
+    }
+    Ok(samples * bytes)
+}
+
+fn png(decoder: Box<dyn ImageDecoder>) -> Result<DynamicImage, String> {
+    let unreadable = |e| format!("cannot be decoded ({e}); save it anew");
+    DynamicImage::from_decoder(decoder).map_err(unreadable)
 }
 
 /// A file whose header has been read.
@@ -77,35 +132,28 @@ enum Source {
     Tiff(tiff::Decoder),
 }
 
-fn open(path: &Path, mut bytes: Box<dyn Bytes>) -> Result<(Header, Source), CaptureError> {
+fn open(mut bytes: Box<dyn Bytes>) -> Result<(Header, Source), String> {
     let mut magic = Vec::new();
-    let format = (&mut bytes)
+    (&mut bytes)
         .take(MAGIC)
         .read_to_end(&mut magic)
         .and_then(|_| bytes.rewind())
-        .map(
-            |()| match BIG_TIFF.iter().any(|big| magic.starts_with(big)) {
-                true => Ok(ImageFormat::Tiff),
-                false => image::guess_format(&magic),
-            },
-        )
-        .map_err(unread(path))?;
+        .map_err(|error| error.to_string())?;
+    let format = match BIG_TIFF.iter().any(|big| magic.starts_with(big)) {
+        true => Ok(ImageFormat::Tiff),
+        false => image::guess_format(&magic),
+    };
     let format = match format {
         Ok(ImageFormat::Tiff) => {
-            let (header, decoder) = tiff::open(bytes).map_err(failure(path))?;
+            let (header, decoder) = tiff::open(bytes)?;
             return Ok((header, Source::Tiff(decoder)));
         }
         Ok(format @ (ImageFormat::Jpeg | ImageFormat::Png)) => format,
-        _ => {
-            return Err(failure(path)(
-                "is neither JPEG, PNG nor TIFF; convert it (its name may stay)".into(),
-            ));
-        }
+        _ => return Err("is neither JPEG, PNG nor TIFF; convert it (its name may stay)".into()),
     };
     let decoder = ImageReader::with_format(bytes, format)
         .into_decoder()
-        .map_err(|error| format!("cannot be decoded ({error}); save it anew"))
-        .map_err(failure(path))?;
+        .map_err(|error| format!("cannot be decoded ({error}); save it anew"))?;
     let (width, height) = decoder.dimensions();
     let color = decoder.color_type();
     let header = Header {
@@ -136,10 +184,10 @@ fn samples_of(picture: DynamicImage) -> Result<Samples, String> {
     })
 }
 
-/// What is wrong with a file that is a JPEG.
-fn check_jpeg(file: &[u8]) -> Result<(), String> {
+/// The structure of a file that is a JPEG; else what is wrong with it.
+fn check_jpeg(file: &[u8]) -> Result<Option<jpeg::Frame>, String> {
     if image::guess_format(file).ok() != Some(ImageFormat::Jpeg) {
-        return Ok(());
+        return Ok(None);
     }
     match jpeg::inspect(file) {
         None => Err("ends before its end-of-image marker; copy it again".into()),
@@ -150,7 +198,7 @@ fn check_jpeg(file: &[u8]) -> Result<(), String> {
         Some(frame) if frame.components == 4 => {
             Err("has CMYK colors; convert it to RGB or gray".into())
         }
-        Some(_) => Ok(()),
+        Some(frame) => Ok(Some(frame)),
     }
 }
 

@@ -118,7 +118,9 @@ fn same_folder(a: &Path, b: &Path) -> bool {
 /// # Errors
 /// If the file cannot be read or decoded, is not of 8 bits, or has another shape.
 pub(super) fn read(path: &Path, photo: &Path, size: [u32; 2]) -> Result<Vec<u8>, CaptureError> {
-    let Picture { header, samples } = decode::decode(path, |mask| {
+    let Picture {
+        header, samples, ..
+    } = decode::decode_beside(path, |mask| {
         if same_shape(mask, size) {
             return Ok(());
         }

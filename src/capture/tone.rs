@@ -11,7 +11,9 @@ use crate::color::linear_to_srgb;
 ///
 /// `options.normalize` must be decided; `Auto` is taken for `Off`.
 pub(super) fn develop(picture: Picture, options: &LoadOptions) -> Pixels {
-    let Picture { header, samples } = picture;
+    let Picture {
+        header, samples, ..
+    } = picture;
     let mask = match &samples {
         Samples::Float(values) => finite(values, header.channels, options.channel),
         _ => None,

@@ -10,6 +10,7 @@ use super::{
     ChromaError,
     teacher::{AbImage, Filter, resample},
 };
+use crate::disk;
 
 /// Bytes of wanted pictures that stay in memory by default.
 const MEMORY: usize = 96 << 20;
@@ -181,9 +182,10 @@ impl Targets {
         }
         let file = match &mut self.file {
             Some(file) => file,
-            none => none.insert(tempfile::tempfile()?),
+            none => none.insert(disk::scratch()?),
         };
         let at = file.seek(SeekFrom::End(0))?;
+        disk::step()?;
         file.write_all(bytemuck::cast_slice(&words))?;
         Ok(Place::File(at))
     }

@@ -1,13 +1,11 @@
 //! Options that overlay the settings of stage 1.
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 
 use super::values::{one_of, positive, share};
+use crate::input;
 use crate::luma::{Densification, FLAT, LumaSettings, Numerics};
 use crate::run::{Overlay, RunError};
 
@@ -110,7 +108,7 @@ fn read(path: &Path) -> Result<LumaSettings, RunError> {
         path: path.to_owned(),
         reason,
     };
-    let text = fs::read_to_string(path).map_err(|error| file(error.to_string()))?;
+    let text = input::read_to_string(path).map_err(|error| file(error.to_string()))?;
     let settings: LumaSettings = serde_json::from_str(&text)
         .map_err(|error| file(format!("no settings of luma: {error}")))?;
     settings.check().map_err(file)?;

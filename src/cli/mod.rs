@@ -12,6 +12,7 @@ mod luma;
 mod network;
 mod photos;
 mod plan;
+mod printable;
 mod progress;
 mod remedy;
 mod render;
@@ -23,6 +24,7 @@ use std::{
     fmt::Display,
     io::{self, Write},
     path::PathBuf,
+    process::ExitCode,
 };
 
 use clap::{Parser, Subcommand};
@@ -54,11 +56,18 @@ enum Command {
 }
 
 impl Cli {
-    /// Runs the command.
-    ///
-    /// # Errors
-    /// [`CliError`].
-    pub fn run(self) -> Result<(), CliError> {
+    /// Runs the command; what stops it is told in one line on standard error.
+    pub fn main(self) -> ExitCode {
+        match self.run() {
+            Ok(()) => ExitCode::SUCCESS,
+            Err(error) => {
+                eprintln!("error: {}", printable::line(&error.to_string()));
+                ExitCode::FAILURE
+            }
+        }
+    }
+
+    fn run(self) -> Result<(), CliError> {
         match self.command {
             Command::Plan(command) => command.run(),
             Command::Fit(command) => command.run(),
@@ -77,7 +86,7 @@ impl Cli {
 /// Prints a line to standard output. A reader that has seen enough (`| head`) is
 /// no error.
 fn print(line: impl Display) -> Result<(), CliError> {
-    match writeln!(io::stdout(), "{line}") {
+    match writeln!(io::stdout(), "{}", printable::printable(&line.to_string())) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
             Err(CliError::Run(RunError::File {
                 path: PathBuf::from("standard output"),

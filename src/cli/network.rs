@@ -1,5 +1,7 @@
 //! How a network is to be asked, wherever a command takes one.
 
+use std::time::Duration;
+
 use clap::Args;
 
 use super::values::one_of;
@@ -31,6 +33,9 @@ pub struct NetworkArguments {
     /// On which processor the network runs.
     #[arg(long, value_parser = one_of(DEVICES), default_value = "auto")]
     teacher_device: TeacherDevice,
+    /// Seconds after which a network that has not answered for a photo is given up.
+    #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u32).range(1..), default_value_t = 600)]
+    teacher_timeout: u32,
 }
 
 impl NetworkArguments {
@@ -40,6 +45,7 @@ impl NetworkArguments {
             profile: self.teacher_profile,
             size: self.teacher_size,
             device: self.teacher_device,
+            time_limit: Duration::from_secs(self.teacher_timeout.into()),
             ..TeacherSettings::default()
         }
     }

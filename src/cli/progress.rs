@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
 
+use super::printable;
 use crate::run::{Event, Stage};
 
 /// Shows the events of a run as progress bars and lines.
@@ -35,7 +36,7 @@ impl Progress {
                 }
                 if let Some((_, bar)) = &self.bar {
                     bar.set_position(*done as u64);
-                    bar.set_message(message.clone());
+                    bar.set_message(printable::line(message));
                 }
             }
         }
@@ -43,6 +44,7 @@ impl Progress {
 
     /// Prints a line above the bar.
     fn print(&self, line: &str) {
+        let line = printable::line(line);
         match &self.bar {
             Some((_, bar)) if !bar.is_hidden() => bar.println(line),
             _ => eprintln!("{line}"),

@@ -17,6 +17,9 @@ pub(super) fn of_run(error: &RunError) -> String {
     match error {
         RunError::Capture(error) => of_capture(error),
         RunError::Unsound(error) => format!("{error}; or go on all the same with --force"),
+        RunError::Exchanged { .. } => {
+            format!("{error}: name them as before, train anew, or go on all the same with --force")
+        }
         RunError::Gpu(error) => of_gpu(error),
         RunError::Teacher(error) => of_teacher(error),
         RunError::Chroma(ChromaError::OverLimit { .. }) => format!(

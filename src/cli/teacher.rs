@@ -12,9 +12,11 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::{CliError, network::NetworkArguments, print};
 use crate::{
-    atomic_file,
+    capture::decode_image,
     chroma::teacher::{Catalog, Checkup, GrayImage, KnownTeacher, TeacherError, ToldBy, check},
+    disk,
     download::{DownloadError, Source, download},
+    input,
     run::RunError,
 };
 
@@ -84,13 +86,13 @@ impl Check {
     fn run(self) -> Result<(), CliError> {
         let (name, bytes) = match &self.photo {
             Some(path) => {
-                let bytes = std::fs::read(path);
+                let bytes = input::read(path);
                 let bytes = bytes.map_err(|error| unreadable(path, &error))?;
                 (path.display().to_string(), bytes)
             }
             None => ("garden".to_owned(), PHOTO.to_vec()),
         };
-        let photo = image::load_from_memory(&bytes)
+        let photo = decode_image(bytes)
             .map_err(|error| unreadable(Path::new(&name), &error))?
             .to_luma8();
         let gray = GrayImage {
@@ -101,10 +103,11 @@ impl Check {
         let checkup = check(&self.teacher, &self.network.settings(), (&name, gray));
         let checkup = checkup.map_err(teacher_error)?;
         if let Some(path) = &self.manifest {
-            let mut file = atomic_file::create(path).map_err(|error| unreadable(path, &error))?;
+            let mut file = disk::create(path).map_err(|error| unreadable(path, &error))?;
             file.write_all(checkup.manifest.as_bytes())
                 .map_err(|error| unreadable(path, &error))?;
-            atomic_file::persist(file, path).map_err(|error| unreadable(path, &error))?;
+            file.persist(path)
+                .map_err(|error| unreadable(path, &error))?;
         }
         if self.json {
             return print(format_args!("{:#}", serde_json::json!(checkup)));
@@ -190,8 +193,8 @@ impl List {
         let catalog = catalog()?;
         if self.json {
             let teachers = catalog.teachers.iter().map(|teacher| {
-                let path = catalog.path(teacher);
-                let here = path.is_file();
+                let path = catalog.path(teacher).ok();
+                let here = path.as_ref().is_some_and(|path| path.is_file());
                 serde_json::json!({ "teacher": teacher, "path": path, "here": here })
             });
             let teachers: Vec<_> = teachers.collect();
@@ -200,7 +203,7 @@ impl List {
         let names = catalog.teachers.iter().map(|teacher| teacher.name.len());
         let width = names.max().unwrap_or(0);
         for teacher in &catalog.teachers {
-            let here = match catalog.path(teacher).is_file() {
+            let here = match catalog.path(teacher).is_ok_and(|path| path.is_file()) {
                 true => "here",
                 false => "",
             };
@@ -217,7 +220,7 @@ impl Fetch {
     fn run(self) -> Result<(), CliError> {
         let catalog = catalog()?;
         let teacher = catalog.find(&self.name).map_err(teacher_error)?;
-        let path = catalog.path(teacher);
+        let path = catalog.path(teacher).map_err(teacher_error)?;
         if catalog.is_fetched(teacher).map_err(teacher_error)? {
             return print(format_args!("{} is there", path.display()));
         }

@@ -12,6 +12,7 @@ use super::{
 use crate::{
     capture::{Camera, Photo},
     chroma::teacher::AbImage,
+    input,
     measure::{Consistency, Flow, camera_path, decode_flo, visible},
     report::{BetweenScore, ConsistencyScore, Method, PathConsistency, PathScore, to_image},
 };
@@ -288,7 +289,7 @@ fn small(camera: &Camera) -> Camera {
 /// The flow from one frame to another: `0000-0007.flo`.
 fn read_flow(folder: &Path, [from, to]: [usize; 2], size: [usize; 2]) -> Result<Flow, EvalError> {
     let path = folder.join(format!("{from:04}-{to:04}.flo"));
-    let bytes = std::fs::read(&path).map_err(|error| EvalError::NoFlow {
+    let bytes = input::read(&path).map_err(|error| EvalError::NoFlow {
         path: path.clone(),
         error,
     })?;

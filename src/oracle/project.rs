@@ -136,7 +136,12 @@ pub fn project<T: Number>(
     let xy = dot(&footprint[0], &footprint[1]);
     let yy = dot(&footprint[1], &footprint[1]) + BLUR;
 
-    let determinant = xx * yy - xy * xy;
+    // xx·yy − xy², written so that nothing cancels: of a needle 10⁸ times as long as wide no digit
+    // would be left. |ρ₁ × ρ₂|² is the determinant of A·Aᵀ (Lagrange's identity).
+    let [[a, b, c], [d, e, f]] = footprint;
+    let normal = [b * f - c * e, c * d - a * f, a * e - b * d];
+    let gram = dot(&normal, &normal);
+    let determinant = gram + (xx + yy - BLUR) * BLUR;
     if !(determinant.re() > 0.0 && determinant.re().is_finite()) {
         return Err(Cull::Covariance);
     }
@@ -145,9 +150,7 @@ pub fn project<T: Number>(
     let mut opacity = ((-opacity_logit).exp() + 1.0).recip();
     if view.antialiased {
         // √(det A·Aᵀ / det (A·Aᵀ + blur)): what it shows in all stays what it was.
-        let [[a, b, c], [d, e, f]] = footprint;
-        let normal = [b * f - c * e, c * d - a * f, a * e - b * d];
-        opacity *= (dot(&normal, &normal) / determinant).sqrt();
+        opacity *= (gram / determinant).sqrt();
     }
     let reaches_a_pixel = opacity.re() >= view.numerics.alpha_min;
     if !reaches_a_pixel {

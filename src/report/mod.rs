@@ -91,6 +91,19 @@ pub struct CaptureReport {
     pub extent: f64,
     /// What was subtracted from the world's coordinates, in world units.
     pub offset: [f64; 3],
+    /// The files of the photos, in the order of their names.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub photos: Vec<PhotoReport>,
+}
+
+/// A photo's file as `fit` read it.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct PhotoReport {
+    /// Path below the folder of photos.
+    pub name: String,
+    /// The first 16 hexadecimal digits of its SHA-256: it is chance that they are to stand, not
+    /// forgers.
+    pub sha256: String,
 }
 
 /// What it ran on.

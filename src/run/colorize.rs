@@ -20,7 +20,7 @@ use super::{
     keeping,
     lock::RunLock,
     scene::{comments_of_moved, read_scene, tell_not_finite},
-    sound::{open_checked, open_examined},
+    sound::{open_examined, open_trusted},
     teach::{TeachOptions, Teachers},
 };
 use crate::{
@@ -31,6 +31,7 @@ use crate::{
     effects::{Overrules, table},
     eval::{Measured, exposures},
     gpu::Gpu,
+    input,
     raster::Raster,
     report::{
         CaptureReport, ChromaReport, ChromaSeconds, DeviceReport, EffectReport, LumaReport,
@@ -105,7 +106,7 @@ pub fn colorize(
     // something else.
     let trusted = options.relight || (source.report.is_some() && options.colmap.is_none());
     let dataset = match trusted {
-        true => open_checked(&colmap_dir, &load, observe)?,
+        true => open_trusted(&colmap_dir, &load, &report.capture.photos, observe)?,
         false => open_examined(&colmap_dir, &load, observe)?.dataset,
     };
     // From here on every photo is looked at once.
@@ -385,6 +386,7 @@ impl Source {
                 not_finite: 0,
                 extent: 0.0,
                 offset: [0.0; 3],
+                photos: Vec::new(),
             },
             device: DeviceReport {
                 name: gpu.describe(),
@@ -443,7 +445,7 @@ fn with_rows(path: &Path, luma: usize, rows: &str) -> String {
 }
 
 fn read_or_empty(path: &Path) -> String {
-    std::fs::read_to_string(path).unwrap_or_default()
+    input::read_to_string(path).unwrap_or_default()
 }
 
 /// What to say where some of the views have colors and these do not show all; without any that

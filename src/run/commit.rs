@@ -4,14 +4,14 @@
 
 use std::{
     ffi::OsStr,
-    fs::{self, File},
-    io,
+    fs, io,
     path::{Path, PathBuf},
 };
 
 use tempfile::TempDir;
 
 use super::{RunError, files};
+use crate::{disk, input};
 
 /// What is complete, and is to be moved into its place.
 const COMPLETE: &str = ".commit";
@@ -35,14 +35,7 @@ impl Commit {
     /// # Errors
     /// [`RunError::File`].
     pub fn new(folder: &Path) -> Result<Self, RunError> {
-        let mut builder = tempfile::Builder::new();
-        #[cfg(unix)]
-        {
-            use std::os::unix::fs::PermissionsExt;
-            // Folders of a page go with it, and are to be as public as others.
-            builder.permissions(fs::Permissions::from_mode(0o777));
-        }
-        let made = builder.prefix(BEGUN).tempdir_in(folder);
+        let made = disk::temporary_folder(BEGUN, folder);
         Ok(Self {
             folder: folder.to_owned(),
             made: made.map_err(files::at(folder))?,
@@ -75,10 +68,10 @@ impl Commit {
         let list = self.made.path().join(REMOVED);
         files::write(&list, self.removed.join("\n").as_bytes())?;
         let complete = self.folder.join(COMPLETE);
-        fs::rename(self.made.path(), &complete).map_err(files::at(&complete))?;
+        disk::rename(self.made.path(), &complete).map_err(files::at(&complete))?;
         // What it would remove is elsewhere now.
         let _ = self.made.keep();
-        sync(&self.folder);
+        disk::sync(&self.folder);
         finish(&self.folder)
     }
 }
@@ -89,7 +82,7 @@ impl Commit {
 /// [`RunError::File`].
 pub(super) fn finish(folder: &Path) -> Result<(), RunError> {
     let complete = folder.join(COMPLETE);
-    let list = match fs::read_to_string(complete.join(REMOVED)) {
+    let list = match input::read_to_string(&complete.join(REMOVED)) {
         Ok(list) => list,
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
         Err(error) => return Err(files::at(&complete)(error)),
@@ -106,9 +99,9 @@ pub(super) fn finish(folder: &Path) -> Result<(), RunError> {
         if made.is_dir() {
             remove(&place)?;
         }
-        fs::rename(&made, &place).map_err(files::at(&place))?;
+        disk::rename(&made, &place).map_err(files::at(&place))?;
     }
-    sync(folder);
+    disk::sync(folder);
     // The list goes last: as long as it is there, all of this can be done again.
     remove(&complete)
 }
@@ -136,21 +129,7 @@ pub(super) fn clean(folder: &Path) {
 }
 
 fn remove(path: &Path) -> Result<(), RunError> {
-    let removed = match path.symlink_metadata() {
-        Ok(metadata) if metadata.is_dir() => fs::remove_dir_all(path),
-        Ok(_) => fs::remove_file(path),
-        Err(error) => Err(error),
-    };
-    match removed {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(files::at(path)(error)),
-        _ => Ok(()),
-    }
-}
-
-/// Brings renames to the disk, where the system has a way to.
-fn sync(folder: &Path) {
-    // Some file systems cannot; the files themselves are there.
-    let _ = File::open(folder).and_then(|folder| folder.sync_all());
+    disk::remove(path).map_err(files::at(path))
 }
 
 fn name(path: &Path) -> &OsStr {

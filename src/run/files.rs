@@ -1,7 +1,6 @@
 //! Files that are whole or not there.
 
 use std::{
-    fs,
     io::{self, BufWriter, Write},
     path::Path,
 };
@@ -9,7 +8,10 @@ use std::{
 use image::RgbImage;
 
 use super::RunError;
-use crate::atomic_file::{self, folder_of};
+use crate::{
+    disk::{self, folder_of},
+    input,
+};
 
 /// Turns a system error into one that names the path.
 pub(crate) fn at(path: &Path) -> impl FnOnce(std::io::Error) -> RunError {
@@ -31,12 +33,12 @@ pub(super) fn write_by<T>(
     fill: impl FnOnce(&mut dyn Write) -> io::Result<T>,
 ) -> Result<T, RunError> {
     let filled = || {
-        let mut file = atomic_file::create(path)?;
-        let mut to = BufWriter::new(file.as_file_mut());
+        let mut file = disk::create(path)?;
+        let mut to = BufWriter::new(&mut file);
         let made = fill(&mut to)?;
         to.flush()?;
         drop(to);
-        atomic_file::persist(file, path)?;
+        file.persist(path)?;
         Ok(made)
     };
     filled().map_err(at(path))
@@ -64,9 +66,9 @@ pub(crate) fn make_folder(path: &Path) -> Result<(), RunError> {
     if path.is_file() {
         return Err(refused("is a file; name a folder".to_owned()));
     }
-    fs::create_dir_all(path).map_err(at(path))?;
-    match tempfile::tempfile_in(path) {
-        Ok(_) => Ok(()),
+    disk::make_folder(path).map_err(at(path))?;
+    match disk::try_folder(path) {
+        Ok(()) => Ok(()),
         // Only the kind: the rest names a temporary file.
         Err(error) => Err(refused(format!(
             "cannot be written to ({}); choose another folder with -o",
@@ -102,7 +104,7 @@ pub(super) fn check_page(folder: &Path) -> Result<(), RunError> {
 
 /// The largest resident memory of this process so far, in bytes.
 pub(super) fn peak_host_memory() -> Option<u64> {
-    let status = fs::read_to_string("/proc/self/status").ok()?;
+    let status = input::read_to_string(Path::new("/proc/self/status")).ok()?;
     let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
     let kib: u64 = line.split_whitespace().nth(1)?.parse().ok()?;
     Some(kib * 1024)

@@ -8,6 +8,7 @@ use std::{
 
 use super::{RunError, files, lock::finish_what_is_left};
 use crate::{
+    input,
     report::Report,
     splats::{ShField, npy},
 };
@@ -111,7 +112,7 @@ impl RunFolder {
     pub fn read_report(&self) -> Result<Report, RunError> {
         finish_what_is_left(&self.0);
         let path = self.report();
-        let text = fs::read_to_string(&path).map_err(|error| RunError::File {
+        let text = input::read_to_string(&path).map_err(|error| RunError::File {
             path: path.clone(),
             reason: format!("{error}: a run folder has a report; make one with `gs-chroma fit`"),
         })?;
@@ -131,7 +132,7 @@ impl RunFolder {
         if !path.exists() {
             return Ok(None);
         }
-        let bytes = fs::read(&path).map_err(files::at(&path))?;
+        let bytes = input::read(&path).map_err(files::at(&path))?;
         let field = npy::decode(&bytes, count, 2).map_err(|reason| RunError::File {
             path,
             reason: format!("{reason}: run `gs-chroma colorize` again"),

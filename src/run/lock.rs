@@ -1,13 +1,13 @@
 //! One process at a time writes into a run.
 
 use std::{
-    fs::{self, File, OpenOptions, TryLockError},
+    fs::{File, TryLockError},
     io::Write,
     path::Path,
 };
 
 use super::{RunError, RunFolder, commit, files};
-use crate::report::Report;
+use crate::{disk, input, report::Report};
 
 /// The file that is locked; it says who holds it.
 const LOCK: &str = ".lock";
@@ -38,13 +38,7 @@ impl RunLock {
     /// [`RunError::InUse`], [`RunError::File`].
     pub fn take(folder: &Path) -> Result<Self, RunError> {
         let path = folder.join(LOCK);
-        let opened = OpenOptions::new()
-            .read(true)
-            .write(true)
-            .create(true)
-            .truncate(false)
-            .open(&path);
-        let mut file = opened.map_err(files::at(&path))?;
+        let mut file = disk::open_in_place(&path).map_err(files::at(&path))?;
         match file.try_lock() {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => {
@@ -61,6 +55,7 @@ impl RunLock {
             }
         }
         let mut told = || {
+            disk::step()?;
             file.set_len(0)?;
             writeln!(file, "{}", std::process::id())
         };
@@ -73,7 +68,7 @@ impl RunLock {
 
 /// Who holds a lock, in words.
 fn holder(path: &Path) -> String {
-    let told = fs::read_to_string(path).unwrap_or_default();
+    let told = input::read_to_string(path).unwrap_or_default();
     match told.trim().parse::<u32>() {
         Ok(process) => format!("process {process}"),
         // Windows lets nobody read it.

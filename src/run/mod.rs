@@ -132,6 +132,18 @@ pub enum RunError {
         /// Who it is.
         holder: String,
     },
+    /// Photos have changed their names since they were trained on.
+    #[error(
+        "{}: photo {photo} is what {other} was when it was trained on", folder.display()
+    )]
+    Exchanged {
+        /// The COLMAP folder.
+        folder: PathBuf,
+        /// Its name now.
+        photo: String,
+        /// Its name then.
+        other: String,
+    },
     /// There is no training that was interrupted.
     #[error("{}: nothing to go on with: the run is finished", .0.display())]
     NothingToResume(PathBuf),

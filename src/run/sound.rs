@@ -4,7 +4,11 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::{Event, Observer, RunError, Stage, fingerprint::Fingerprint, scene};
+use super::{
+    Event, Observer, RunError, Stage,
+    fingerprint::{Changes, Fingerprint, of_files},
+    scene,
+};
 use crate::{
     capture::{
         Camera, Capture, CaptureError, Dataset, Headers, LoadOptions, MaskSource, Masked, Rejected,
@@ -14,6 +18,7 @@ use crate::{
         Agreement, Cause, Contradiction, Contradictory, Evidence, FEW_POINTS, PointColors,
         Reprojection, Survey, Unseeing, listed, observe_where_projected,
     },
+    report::PhotoReport,
 };
 
 /// Fewer photos make no scene: before as few are left, all are used.
@@ -77,6 +82,56 @@ pub(super) fn open_checked(
         observe(Event::Warning(format!("{name}: {reason}")));
     }
     Ok(dataset)
+}
+
+/// Opens the COLMAP folder of a run, whose photos `fit` has compared with their model; as far
+/// as they are those that were `trained` on, they are not looked at.
+///
+/// # Errors
+/// As [`open_checked`], and as [`open_examined`] where photos have changed;
+/// [`RunError::Exchanged`].
+pub(super) fn open_trusted(
+    dir: &Path,
+    options: &LoadOptions,
+    trained: &[PhotoReport],
+    observe: &mut Observer<'_>,
+) -> Result<Dataset, RunError> {
+    let dataset = open_checked(dir, options, observe)?;
+    // Runs of former versions say nothing.
+    if trained.is_empty() {
+        return Ok(dataset);
+    }
+    let now = of_files(&dataset.capture)?;
+    let Changes {
+        changed,
+        gone,
+        exchanged,
+    } = Changes::between(trained, &now);
+    if let Some([photo, other]) = exchanged.filter(|_| !options.force) {
+        return Err(RunError::Exchanged {
+            folder: dataset.capture.root.clone(),
+            photo: photo.to_owned(),
+            other: other.to_owned(),
+        });
+    }
+    if let [first, ..] = gone[..] {
+        observe(Event::Warning(format!(
+            "{} of {} photos that were trained on are gone from {} (such as {first}): nothing is colored by them",
+            gone.len(),
+            trained.len(),
+            dir.display()
+        )));
+    }
+    let [first, ..] = changed[..] else {
+        return Ok(dataset);
+    };
+    observe(Event::Warning(format!(
+        "{} of {} photos in {} are not what was trained on (such as {first})",
+        changed.len(),
+        now.len(),
+        dir.display()
+    )));
+    Ok(open_examined(dir, options, observe)?.dataset)
 }
 
 /// Opens a COLMAP folder, judges the model and leaves of its observations what is of use.

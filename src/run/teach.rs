@@ -228,6 +228,13 @@ impl Teachers {
                 observe(Event::Warning(warning));
             }
         }
+        for member in &mut self.teachers {
+            if let Some(error) = member.teacher.unkept() {
+                observe(Event::Warning(format!(
+                    "the network's answers are not kept for another time: {error}"
+                )));
+            }
+        }
         Ok((lesson, hinted))
     }
 

@@ -1,14 +1,14 @@
 //! The program, run by itself.
 
 use std::{
-    env,
-    fs::{self, File},
-    io,
+    env, io,
     path::Path,
     process::{Child, Command, Stdio},
     thread,
     time::{Duration, Instant},
 };
+
+use crate::{disk, input};
 
 /// Set for a program that is to end when its standard input does.
 const TETHER: &str = "GS_CHROMA_ENDS_WITH_STDIN";
@@ -38,7 +38,8 @@ pub fn end_with_parent() {
 /// The last line that it said and, unless it ended by itself, how it did.
 pub(super) fn run(arguments: &[String], log: &Path, tell: &mut dyn FnMut()) -> Result<(), String> {
     let program = env::current_exe().map_err(|error| error.to_string())?;
-    let stderr = File::create(log).map_err(|error| format!("{}: {error}", log.display()))?;
+    let stderr = disk::open_in_place(log).and_then(|log| log.set_len(0).map(|()| log));
+    let stderr = stderr.map_err(|error| format!("{}: {error}", log.display()))?;
     let child = Command::new(program)
         .args(arguments)
         .env(TETHER, "1")
@@ -52,7 +53,7 @@ pub(super) fn run(arguments: &[String], log: &Path, tell: &mut dyn FnMut()) -> R
     if status.success() {
         return Ok(());
     }
-    let said = fs::read_to_string(log).unwrap_or_default();
+    let said = input::read_to_string(log).unwrap_or_default();
     let last = said.lines().rfind(|line| !line.trim().is_empty());
     let last = last.unwrap_or_default();
     let reason = last.strip_prefix("error: ").unwrap_or(last);

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use image::{DynamicImage, RgbImage, codecs::jpeg::JpegEncoder};
 
 use crate::{
-    capture::{Capture, Loader, View, split},
+    capture::{Capture, Loader, View, decode_image, split},
+    input,
     run::{RunFolder, picture_names},
 };
 
@@ -81,7 +82,7 @@ impl Album {
 
     fn picture(&self, name: &str) -> Option<Vec<u8>> {
         let file = self.points.join(name).join(FOLDER).join(&self.file);
-        small(image::open(file).ok()?)
+        small(decode_image(input::read(&file).ok()?).ok()?)
     }
 }
 

@@ -17,7 +17,9 @@ use super::{
 use crate::{
     capture::{LoadOptions, MaskSource, Normalize},
     chroma::teacher::located,
+    disk,
     effects::Overrules,
+    input,
     luma::LumaSettings,
     report::{Evaluation, Method},
     run::{Overlay, Preset, RunError, RunFolder, files, teacher_or_photos},
@@ -130,9 +132,7 @@ impl<'a> Bench<'a> {
         let begun = Instant::now();
         let folder = self.folder(&task.name);
         // Of a sweep that was stopped in the middle of this point.
-        if folder.path().exists() {
-            fs::remove_dir_all(folder.path()).map_err(files::at(folder.path()))?;
-        }
+        disk::remove(folder.path()).map_err(files::at(folder.path()))?;
         files::make_folder(folder.path())?;
         match task.stage {
             PointStage::Color => self.begin_from_base(&task.name)?,
@@ -267,7 +267,7 @@ fn asked_elsewhere(task: &Task, points: &[Point]) -> Option<f64> {
 /// How far the exported pictures of photographed views are apart.
 fn consistency(folder: &RunFolder) -> Result<Option<f64>, RunError> {
     let path = folder.evaluation();
-    let text = fs::read_to_string(&path).map_err(files::at(&path))?;
+    let text = input::read_to_string(&path).map_err(files::at(&path))?;
     let evaluation: Evaluation = serde_json::from_str(&text).map_err(|error| RunError::File {
         path,
         reason: error.to_string(),
@@ -351,9 +351,7 @@ fn text(path: &Path) -> Result<String, RunError> {
 /// The same file in two places, copied where the file system cannot do that. Every file
 /// of a run is replaced, never changed, so neither place notices the other.
 fn link(from: &Path, to: &Path) -> Result<(), RunError> {
-    fs::hard_link(from, to)
-        .or_else(|_| fs::copy(from, to).map(|_| ()))
-        .map_err(files::at(from))
+    disk::link(from, to).map_err(files::at(from))
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! `tradeoff.json`: what a sweep goes on from.
 
 use std::{
-    fs::{self, File, TryLockError},
+    fs::{File, TryLockError},
     path::{Path, PathBuf},
 };
 
@@ -9,7 +9,10 @@ use super::{
     FILES,
     report::{Phase, Point, Subject, TRADEOFF_VERSION, Tradeoff},
 };
-use crate::run::{RunError, files};
+use crate::{
+    disk, input,
+    run::{RunError, files},
+};
 
 /// Locked while a sweep runs, and left behind empty.
 const LOCK: &str = "tradeoff.lock";
@@ -32,7 +35,7 @@ impl State {
     pub fn open(folder: &Path, subject: Subject, budget: f64) -> Result<Self, RunError> {
         let lock = lock(&folder.join(LOCK))?;
         let path = folder.join(FILES[1]);
-        let mut sweep = match fs::read_to_string(&path) {
+        let mut sweep = match input::read_to_string(&path) {
             Ok(text) => read(&text, &subject).map_err(|reason| RunError::File {
                 path: path.clone(),
                 reason,
@@ -70,7 +73,7 @@ impl State {
 
 /// Locks a file; there is no lock where the file system knows none.
 fn lock(path: &Path) -> Result<Option<File>, RunError> {
-    let Ok(file) = File::create(path) else {
+    let Ok(file) = disk::open_in_place(path) else {
         return Ok(None);
     };
     match file.try_lock() {
@@ -190,7 +193,7 @@ mod tests {
             let error = error.to_string();
             assert!(error.contains(what) && error.contains("-o"), "{error}");
         }
-        fs::write(folder.path().join(FILES[1]), "{").expect("written");
+        std::fs::write(folder.path().join(FILES[1]), "{").expect("written");
         let error = State::open(folder.path(), subject(), 60.0)
             .err()
             .expect("refused");

@@ -16,10 +16,12 @@ mod eval;
 mod eval_photos;
 // The host is trusted by OpenSSL's variable, which other systems do not ask.
 #[cfg(target_os = "linux")]
+mod faults;
 mod fetch;
 mod folder;
 #[cfg(target_os = "linux")]
 mod host;
+mod hostile;
 mod inspect;
 mod masks;
 mod names;

@@ -4,7 +4,7 @@ use std::{collections::BTreeSet, fs, path::Path};
 
 /// The folders and files right below `src`, from top to bottom. What stands on one floor
 /// does not know each other.
-const FLOORS: [&[&str]; 10] = [
+const FLOORS: [&[&str]; 11] = [
     &["cli"],
     &["tradeoff"],
     &["run"],
@@ -15,15 +15,9 @@ const FLOORS: [&[&str]; 10] = [
     &["raster"],
     &["capture", "splats"],
     &[
-        "gpu",
-        "color",
-        "atomic_file",
-        "sections",
-        "download",
-        "npy",
-        "oracle",
-        "compare",
+        "gpu", "color", "sections", "download", "npy", "oracle", "compare",
     ],
+    &["disk", "hash", "input"],
 ];
 
 fn floor(name: &str) -> Option<usize> {
@@ -115,6 +109,50 @@ fn imports_go_down_only() {
     wrong.sort();
     wrong.dedup();
     assert!(wrong.is_empty(), "{wrong:?}");
+}
+
+/// What reads and writes files, by whatever name.
+const ACCESS: [&str; 11] = [
+    "File::open",
+    "File::create",
+    "OpenOptions",
+    "fs::read(",
+    "fs::read_to_string",
+    "fs::write",
+    "fs::rename",
+    "fs::remove",
+    "fs::create_dir",
+    "tempfile::",
+    "image::open",
+];
+
+/// So that pipes are refused everywhere, and every write can be made to fail.
+#[test]
+fn files_are_read_and_written_in_one_place() {
+    fn look(path: &Path, found: &mut Vec<String>) {
+        let name = path.to_string_lossy();
+        if path.is_dir() {
+            for entry in fs::read_dir(path).expect("a folder") {
+                look(&entry.expect("an entry").path(), found);
+            }
+            return;
+        }
+        let may = ["src/disk.rs", "src/input.rs", "tests.rs", "fixtures.rs"];
+        if may.iter().any(|end| name.ends_with(end)) {
+            return;
+        }
+        let text = fs::read_to_string(path).expect("a source file");
+        let code = text.split("#[cfg(test)]").next().unwrap_or_default();
+        let code = code.replace("use tempfile::", "use ");
+        let used = ACCESS.iter().filter(|access| code.contains(**access));
+        found.extend(used.map(|access| format!("{name}: {access}")));
+    }
+    let mut found = Vec::new();
+    look(
+        &Path::new(env!("CARGO_MANIFEST_DIR")).join("src"),
+        &mut found,
+    );
+    assert!(found.is_empty(), "{found:?}");
 }
 
 #[test]

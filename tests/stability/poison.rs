@@ -157,6 +157,18 @@ fn every_poison_in_every_parameter() {
     }
 }
 
+/// However long and thin: the covariance of such a one has no digits left in `f64`.
+#[test]
+fn needles_are_drawn() {
+    for log_length in [4.0, 12.0, 18.0, 24.0, 40.0] {
+        let mut changed = splats(&SCENE.0);
+        *parameter(&mut changed, 0, 7) = log_length;
+        let (picture, poisoned, _) = run(&changed);
+        assert_eq!(poisoned, 0);
+        assert!(as_the_oracle_says(&picture, &changed), "{log_length}");
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
 

@@ -10,6 +10,7 @@ use super::tracks::{Sighting, Sightings};
 use super::{Cameras, Image, Point, lens, relative_name};
 use crate::capture::error::{CaptureError, Position};
 use crate::capture::lens::{MOST_PARAMETERS, ModelName};
+use crate::input;
 
 /// Id, model, width, height and the 2 parameters of EQUIRECTANGULAR.
 const SMALLEST_CAMERA: u64 = 4 + 4 + 8 + 8 + 2 * 8;
@@ -28,7 +29,7 @@ const LONGEST_NAME: u64 = 4096;
 
 /// How many images a file announces, if it is long enough for them.
 pub(super) fn count_images(path: &Path) -> Option<u64> {
-    let mut file = File::open(path).ok()?;
+    let mut file = input::open(path).ok()?;
     let most = file.metadata().ok()?.len() / SMALLEST_IMAGE;
     let mut count = [0; 8];
     file.read_exact(&mut count).ok()?;
@@ -158,7 +159,7 @@ impl Records {
             path: path.into(),
             source,
         };
-        let file = File::open(path).map_err(read_error)?;
+        let file = input::open(path).map_err(read_error)?;
         let length = file.metadata().map_err(read_error)?.len();
         let mut records = Self {
             path: path.into(),

@@ -12,6 +12,7 @@ use super::tracks::{Sighting, Sightings};
 use super::{Cameras, Image, Point, lens, relative_name};
 use crate::capture::error::{CaptureError, Position};
 use crate::capture::lens::{MOST_PARAMETERS, ModelName};
+use crate::input;
 
 /// What some editors write before the text.
 const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
@@ -183,7 +184,7 @@ struct Lines {
 
 impl Lines {
     fn open(path: &Path, kind: &'static str) -> Result<Self, CaptureError> {
-        let file = File::open(path).map_err(|source| CaptureError::Read {
+        let file = input::open(path).map_err(|source| CaptureError::Read {
             path: path.into(),
             source,
         })?;

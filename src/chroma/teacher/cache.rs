@@ -1,10 +1,8 @@
 //! Answers of a network on disk, so that each photo is colored once.
 
 use super::{AbImage, GrayImage, TeacherError};
-use crate::{atomic_file, npy, sections::hexadecimal};
-use sha2::{Digest, Sha256};
-use std::fs::{self, File};
-use std::io::{self, Read, Write};
+use crate::{disk, hash::Hasher, input, npy};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 /// Part of every key; counts up when the meaning of an answer changes.
@@ -19,7 +17,7 @@ pub(super) struct Cache {
 impl Cache {
     /// Creates the folder where it is missing.
     pub fn open(folder: &Path) -> Result<Self, TeacherError> {
-        fs::create_dir_all(folder).map_err(TeacherError::io(folder))?;
+        disk::make_folder(folder).map_err(TeacherError::io(folder))?;
         Ok(Self {
             folder: folder.to_path_buf(),
         })
@@ -31,16 +29,16 @@ impl Cache {
 
     /// The answer to a key; none where there is none or it is damaged.
     pub fn load(&self, key: &str) -> Option<AbImage> {
-        decode(&fs::read(self.path(key)).ok()?)
+        decode(&input::read(&self.path(key)).ok()?)
     }
 
     /// Keeps an answer. The file appears when it is complete.
     pub fn store(&self, key: &str, image: &AbImage) -> Result<(), TeacherError> {
         let path = self.path(key);
         let stored = || -> io::Result<()> {
-            let mut file = atomic_file::create(&path)?;
+            let mut file = disk::create(&path)?;
             file.write_all(&encode(image))?;
-            atomic_file::persist(file, &path)
+            file.persist(&path)
         };
         stored().map_err(TeacherError::io(&path))
     }
@@ -65,8 +63,8 @@ pub(super) struct Question<'a> {
 /// The key of a question's answer.
 pub(super) fn key(question: &Question<'_>) -> String {
     let (photo, [width, height]) = (&question.photo, question.input);
-    let mut hash = Sha256::new();
-    hash.update(format!(
+    let mut hash = Hasher::default();
+    let asked = format!(
         "gs-chroma teacher answer {FORMAT_VERSION}\n{}\n{}\n{}\n{width}x{height}\n{}x{}\n{}\n",
         question.model,
         question.device,
@@ -74,46 +72,13 @@ pub(super) fn key(question: &Question<'_>) -> String {
         photo.width,
         photo.height,
         question.hints.is_some(),
-    ));
+    );
+    hash.update(asked.as_bytes());
     hash.update(photo.pixels);
     for value in question.hints.unwrap_or_default().as_flattened() {
-        hash.update(value.to_le_bytes());
+        hash.update(&value.to_le_bytes());
     }
-    hexadecimal(&hash.finalize())
-}
-
-/// SHA-256 of a file in hexadecimal.
-pub(super) fn hash_file(path: &Path) -> io::Result<String> {
-    let mut hasher = Hasher::default();
-    hasher.update_with_file(path)?;
-    Ok(hasher.finish())
-}
-
-/// SHA-256 of what it is told, one after the other.
-#[derive(Default)]
-pub(super) struct Hasher(Sha256);
-
-impl Hasher {
-    pub fn update(&mut self, bytes: &[u8]) {
-        self.0.update(bytes);
-    }
-
-    /// All of a file.
-    pub fn update_with_file(&mut self, path: &Path) -> io::Result<()> {
-        let mut file = File::open(path)?;
-        let mut buffer = vec![0; 1 << 20];
-        loop {
-            match file.read(&mut buffer)? {
-                0 => return Ok(()),
-                count => self.0.update(&buffer[..count]),
-            }
-        }
-    }
-
-    /// In hexadecimal.
-    pub fn finish(self) -> String {
-        hexadecimal(&self.0.finalize())
-    }
+    hash.finish()
 }
 
 fn encode(image: &AbImage) -> Vec<u8> {
@@ -140,6 +105,8 @@ fn decode(bytes: &[u8]) -> Option<AbImage> {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     fn image() -> AbImage {
@@ -227,15 +194,5 @@ mod tests {
             assert!(!keys[..i].contains(key), "{i}");
         }
         assert_eq!(keys[0], key(&base));
-    }
-
-    #[test]
-    fn the_hash_of_a_file() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("abc");
-        fs::write(&path, "abc").unwrap();
-        // FIPS 180-2, appendix B.1.
-        let expected = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
-        assert_eq!(hash_file(&path).unwrap(), expected);
     }
 }

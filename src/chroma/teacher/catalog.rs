@@ -1,9 +1,9 @@
 //! Networks that are known by name: where they lie, and what they are by their SHA-256.
 
 use super::TeacherError;
-use super::cache::hash_file;
 use super::places::cache_folder;
 use super::profile::{Profile, named};
+use crate::{hash, input};
 use serde::{Deserialize, Serialize};
 use std::env;
 use std::path::{Path, PathBuf};
@@ -24,7 +24,7 @@ pub struct Catalog {
     pub teachers: Vec<KnownTeacher>,
     /// Where networks are kept; some may not be there.
     #[serde(skip)]
-    folder: PathBuf,
+    folder: Option<PathBuf>,
 }
 
 /// A network that is known by name.
@@ -59,7 +59,7 @@ impl Catalog {
         let path = env::var_os(VARIABLE).filter(|path| !path.is_empty());
         let path = path.map(PathBuf::from);
         let text = match &path {
-            Some(path) => &std::fs::read_to_string(path).map_err(TeacherError::io(path))?,
+            Some(path) => &input::read_to_string(path).map_err(TeacherError::io(path))?,
             None => BUILT_IN,
         };
         Self::parse(text).map_err(|reason| TeacherError::BadCatalog {
@@ -100,20 +100,26 @@ impl Catalog {
     }
 
     /// Where a network is kept once it is fetched.
-    pub fn path(&self, teacher: &KnownTeacher) -> PathBuf {
-        self.folder.join(format!("{}.onnx", teacher.name))
+    ///
+    /// # Errors
+    /// [`TeacherError::NoCacheFolder`].
+    pub fn path(&self, teacher: &KnownTeacher) -> Result<PathBuf, TeacherError> {
+        let folder = self.folder.as_ref().ok_or(TeacherError::NoCacheFolder)?;
+        Ok(folder.join(format!("{}.onnx", teacher.name)))
     }
 
     /// Whether a network is on this machine.
     ///
     /// # Errors
-    /// [`TeacherError::OtherBytes`] where something else has its place, [`TeacherError::Io`].
+    /// [`TeacherError::OtherBytes`] where something else has its place, [`TeacherError::Io`],
+    /// [`TeacherError::NoCacheFolder`].
     pub fn is_fetched(&self, teacher: &KnownTeacher) -> Result<bool, TeacherError> {
-        let path = self.path(teacher);
+        let path = self.path(teacher)?;
         if !path.is_file() {
             return Ok(false);
         }
-        let sha256 = hash_file(&path).map_err(TeacherError::io(&path))?;
+        let sha256 = input::open(&path).and_then(hash::of_file);
+        let sha256 = sha256.map_err(TeacherError::io(&path))?;
         self.identify(&path, &sha256).map(|_| true)
     }
 
@@ -125,7 +131,7 @@ impl Catalog {
             return Ok(path.to_path_buf());
         };
         let teacher = self.find(name)?;
-        let path = self.path(teacher);
+        let path = self.path(teacher)?;
         match path.is_file() {
             true => Ok(path),
             false => Err(TeacherError::NotFetched {
@@ -144,7 +150,9 @@ impl Catalog {
         sha256: &str,
     ) -> Result<Option<&KnownTeacher>, TeacherError> {
         let mut teachers = self.teachers.iter();
-        if let Some(named) = teachers.clone().find(|teacher| self.path(teacher) == path)
+        if let Some(named) = teachers
+            .clone()
+            .find(|teacher| self.path(teacher).is_ok_and(|at| at == path))
             && named.sha256 != sha256
         {
             return Err(TeacherError::OtherBytes {
@@ -194,7 +202,7 @@ mod tests {
 
     fn catalog(folder: &Path) -> Catalog {
         let mut catalog = Catalog::parse(BUILT_IN).unwrap();
-        catalog.folder = folder.to_path_buf();
+        catalog.folder = Some(folder.to_path_buf());
         catalog
     }
 
@@ -269,7 +277,7 @@ mod tests {
         let found = identify(elsewhere, &known.sha256).unwrap();
         assert_eq!(found.as_deref(), Some("eccv16"));
         assert_eq!(identify(elsewhere, "00").unwrap(), None);
-        let message = identify(&catalog.path(known), "00")
+        let message = identify(&catalog.path(known).unwrap(), "00")
             .unwrap_err()
             .to_string();
         assert!(

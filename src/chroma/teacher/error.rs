@@ -26,12 +26,15 @@ pub enum TeacherError {
     #[error(
         "ONNX Runtime was not found: put its shared library, 1.17 or newer (lib/ in a release from \
          https://github.com/microsoft/onnxruntime/releases, or onnxruntime/capi/ in the Python \
-         package) into {}, or let ORT_DYLIB_PATH name it", cache.display()
+         package) {}", where_to(cache.as_deref())
     )]
     NoRuntime {
-        /// The project's folder for it.
-        cache: PathBuf,
+        /// The project's folder for it; none where the system names no place for caches.
+        cache: Option<PathBuf>,
     },
+    /// The system names no place for caches.
+    #[error("there is no folder to keep networks in: let HOME or XDG_CACHE_HOME name one")]
+    NoCacheFolder,
     /// The shared library of ONNX Runtime does not load.
     #[error("{}: not a usable ONNX Runtime library: {reason}", path.display())]
     BadRuntime {
@@ -227,6 +230,14 @@ impl TeacherError {
     pub(super) fn io(path: &Path) -> impl FnOnce(io::Error) -> Self {
         let path = path.to_path_buf();
         move |source| Self::Io { path, source }
+    }
+}
+
+/// Where to put the library of ONNX Runtime.
+fn where_to(cache: Option<&Path>) -> String {
+    match cache {
+        Some(cache) => format!("into {}, or let ORT_DYLIB_PATH name it", cache.display()),
+        None => "anywhere, and let ORT_DYLIB_PATH name it".to_owned(),
     }
 }
 

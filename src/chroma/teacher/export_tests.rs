@@ -1,5 +1,6 @@
 //! Exports of every kind: other numbers, layouts, opsets, outputs, weights beside the model.
 
+use super::TeacherSettings;
 use super::contract_tests::{ab_of_moved, assert_near, color, refusal, settings};
 use super::tests::{fixture, gray, open_with};
 use std::fs;
@@ -32,6 +33,23 @@ fn half_floats_bytes_for_weights_and_other_opsets() {
             let (found, kind) = color(name, &settings(None, None), level);
             assert_near(found, expected(f64::from(level) / 255.0), tolerance);
             assert_eq!(kind, "DDColor", "{name}");
+        }
+    }
+}
+
+#[test]
+fn a_network_that_never_ends_is_given_up() {
+    let limit = std::time::Duration::from_millis(300);
+    let settings = TeacherSettings {
+        time_limit: limit,
+        ..settings(None, None)
+    };
+    let mut teacher = open_with(&fixture("endless_tiny.onnx"), None, &settings).unwrap();
+    for _ in 0..2 {
+        let asked = teacher.colorize("v.png", gray(2, 1, &[0, 255]), None);
+        let message = asked.unwrap_err().to_string();
+        for part in ["endless_tiny.onnx", "v.png", "within 0.3 s"] {
+            assert!(message.contains(part), "{message}");
         }
     }
 }

@@ -39,6 +39,7 @@ pub use upsample::Upsample;
 
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 /// Someone who colors photos.
 pub struct Teacher {
@@ -52,7 +53,7 @@ enum Source {
 }
 
 /// How a teacher is to be asked.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TeacherSettings {
     /// A network's contract: the name of a built-in profile or the path of a
     /// `.toml` manifest. None for the manifest beside the model, or what its
@@ -65,6 +66,21 @@ pub struct TeacherSettings {
     pub device: TeacherDevice,
     /// How answers smaller than the photo are enlarged.
     pub upsample: Upsample,
+    /// How long a network may take for one photo.
+    pub time_limit: Duration,
+}
+
+impl Default for TeacherSettings {
+    fn default() -> Self {
+        Self {
+            profile: None,
+            size: None,
+            device: TeacherDevice::default(),
+            upsample: Upsample::default(),
+            // The largest of the networks known take 20 s on two old cores.
+            time_limit: Duration::from_secs(600),
+        }
+    }
 }
 
 /// What a report says about a teacher.
@@ -89,8 +105,8 @@ impl Teacher {
     /// its name.
     ///
     /// A network's answers are kept in `cache_dir` (created where missing) and
-    /// used again for the same photo, model, profile, input size and hints; a
-    /// folder needs no cache.
+    /// used again for the same photo, model, profile, input size and hints; where that cannot be
+    /// written to they are not kept, see [`Self::unkept`]. A folder needs no cache.
     ///
     /// # Errors
     /// A [`TeacherError`] where the path is none of these, the network is not on this machine
@@ -146,6 +162,14 @@ impl Teacher {
         }
     }
 
+    /// Why a network's answers are not kept, where they were to be.
+    pub fn unkept(&self) -> Option<&TeacherError> {
+        match &self.source {
+            Source::Network(network) => network.unkept.as_ref(),
+            Source::Folder(_) => None,
+        }
+    }
+
     /// Colors one photo, which may be given by its path relative to the photo folder;
     /// `hints` are told to a network that takes hints.
     ///
@@ -175,11 +199,17 @@ impl Teacher {
     /// [`Self::colorize`] need not wait for it. Nothing is asked of a folder.
     ///
     /// # Errors
-    /// As for [`Self::colorize`].
+    /// As for [`Self::colorize`], and where the answer is not kept.
     pub fn prepare(&mut self, name: &str, photo: GrayImage<'_>) -> Result<(), TeacherError> {
         photo.check(name)?;
         match &mut self.source {
-            Source::Network(network) => network.colorize(name, photo, None).map(drop),
+            Source::Network(network) => {
+                if network.unkept.is_none() {
+                    network.colorize(name, photo, None)?;
+                }
+                // What is not kept would be asked for again.
+                network.unkept.take().map_or(Ok(()), Err)
+            }
             Source::Folder(_) => Ok(()),
         }
     }

@@ -1,12 +1,11 @@
 //! A folder of images that belong to photos by name.
 
-use super::error::first_line;
 use super::query::Original;
 use super::{GrayImage, Query, TeacherError};
-use crate::capture::Capture;
 use crate::capture::names::{NamedFiles, known, stem, visit_files};
+use crate::capture::{Capture, decode_image};
+use crate::input;
 use image::{DynamicImage, ImageFormat};
-use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
@@ -101,13 +100,10 @@ impl NamedImages {
         };
         let name = original.map_or(query.name, |original| original.name);
         let photo_size = original.map_or([photo.width, photo.height], |original| original.size());
-        let reader = image::ImageReader::open(path).map_err(TeacherError::io(path))?;
-        // A .png that is really a JPEG is a common slip and does no harm.
-        let reader = reader.with_guessed_format();
-        let decoded = reader.map_err(TeacherError::io(path))?.decode();
-        let image = decoded.map_err(|error| TeacherError::BadImage {
+        let file = input::read(path).map_err(TeacherError::io(path))?;
+        let image = decode_image(file).map_err(|reason| TeacherError::BadImage {
             path: path.to_path_buf(),
-            reason: first_line(error),
+            reason,
         })?;
         let (width, height) = (image.width(), image.height());
         let aspect = f64::from(width) * f64::from(photo_size[1])
@@ -141,9 +137,9 @@ fn is_image(path: &Path) -> bool {
     }
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let mut magic = Vec::new();
-    let read = |mut file: File| file.by_ref().take(16).read_to_end(&mut magic);
+    let read = |mut file: std::fs::File| file.by_ref().take(16).read_to_end(&mut magic);
     stem(&name) == name
-        && File::open(path).and_then(read).is_ok()
+        && input::open(path).and_then(read).is_ok()
         && matches!(
             image::guess_format(&magic),
             Ok(ImageFormat::Png | ImageFormat::Jpeg)

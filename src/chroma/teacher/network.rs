@@ -10,10 +10,13 @@ use super::{AbImage, GrayImage, HintImage};
 use super::{Catalog, device, file_name, runtime, weights};
 use super::{TeacherDevice, TeacherError, TeacherInfo, TeacherSettings};
 use crate::color::srgb_to_lab;
-use ort::session::{Session, SessionInputValue};
+use ort::session::{RunOptions, Session, SessionInputValue, SessionOutputs};
 use serde::Serialize;
 use std::f32::consts::TAU;
 use std::path::{Path, PathBuf};
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::thread;
+use std::time::Duration;
 
 /// A network is told of paint that covers at least this share of one of its
 /// pixels; strokes are thinner than that pixel where it is a small network.
@@ -29,7 +32,10 @@ pub struct NetworkTeacher {
     fit: Fit,
     /// Side of the model's input where the model leaves it open.
     size: u32,
+    time_limit: Duration,
     cache: Option<Cache>,
+    /// Why answers are not kept, where they were to be.
+    pub(super) unkept: Option<TeacherError>,
 }
 
 /// A model before it is known what its numbers mean.
@@ -113,10 +119,12 @@ impl NetworkTeacher {
     ) -> Result<Self, TeacherError> {
         let loaded = Loaded::open(path, settings, catalog)?;
         let (profile, fit, _) = loaded.contract(settings)?;
-        Ok(Self {
-            cache: cache_dir.map(Cache::open).transpose()?,
-            ..Self::following(loaded, profile, fit, settings)?
-        })
+        let mut teacher = Self::following(loaded, profile, fit, settings)?;
+        match cache_dir.map(Cache::open).transpose() {
+            Ok(cache) => teacher.cache = cache,
+            Err(error) => teacher.unkept = Some(error),
+        }
+        Ok(teacher)
     }
 
     /// A model that is asked as a contract says which fits it, and keeps no answers.
@@ -140,7 +148,9 @@ impl NetworkTeacher {
             profile,
             fit,
             size,
+            time_limit: settings.time_limit,
             cache: None,
+            unkept: None,
         })
     }
 
@@ -184,8 +194,10 @@ impl NetworkTeacher {
             photo: name.to_string(),
             reason,
         })?;
-        if let Some(cache) = &self.cache {
-            cache.store(&key, &answer)?;
+        if let Some(Err(error)) = (self.cache.as_ref()).map(|cache| cache.store(&key, &answer)) {
+            // It was the last: a disk that is full takes no other.
+            self.cache = None;
+            self.unkept = Some(error);
         }
         Ok(answer)
     }
@@ -225,8 +237,13 @@ impl NetworkTeacher {
                 Role::Class | Role::Noise | Role::Zeros => other(&self.profile, role, port),
             })
             .collect();
-        let session = &mut self.loaded.session;
-        let outputs = session.run(&inputs?[..]).map_err(first_line)?;
+        let options = RunOptions::new().map_err(first_line)?;
+        let outputs = run_within(
+            self.time_limit,
+            &mut self.loaded.session,
+            &inputs?,
+            &options,
+        )?;
         tensor::read(&outputs[self.fit.answer])
     }
 
@@ -255,6 +272,32 @@ impl NetworkTeacher {
             reason,
         })
     }
+}
+
+/// Runs a network, and stops it where it takes longer than `limit`: a loop in one may never end.
+fn run_within<'s>(
+    limit: Duration,
+    session: &'s mut Session,
+    inputs: &[SessionInputValue<'_>],
+    options: &'s RunOptions,
+) -> Result<SessionOutputs<'s>, String> {
+    let (done, running) = mpsc::channel::<()>();
+    thread::scope(|scope| {
+        let watch = scope.spawn(move || {
+            let late = running.recv_timeout(limit) == Err(RecvTimeoutError::Timeout);
+            late && options.terminate().is_ok()
+        });
+        let outputs = session.run_with_options(inputs, options);
+        drop(done);
+        match (outputs, watch.join()) {
+            (Ok(outputs), _) => Ok(outputs),
+            (Err(_), Ok(true)) => Err(format!(
+                "gave no answer within {} s: ask it at a smaller --teacher-size, or allow more with --teacher-timeout",
+                limit.as_secs_f64()
+            )),
+            (Err(error), _) => Err(first_line(error)),
+        }
+    })
 }
 
 /// An answer before anything is made of it.

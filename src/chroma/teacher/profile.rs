@@ -2,7 +2,7 @@
 
 use super::TeacherError;
 use super::images::Filter;
-use crate::color::gray_to_lightness;
+use crate::{color::gray_to_lightness, input};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -176,7 +176,7 @@ impl Profile {
     /// [`TeacherError::BadManifest`] for a field that is missing, unknown or
     /// makes no sense, [`TeacherError::Io`].
     pub fn read(path: &Path) -> Result<Self, TeacherError> {
-        let text = std::fs::read_to_string(path).map_err(TeacherError::io(path))?;
+        let text = input::read_to_string(path).map_err(TeacherError::io(path))?;
         Self::parse(&text).map_err(|reason| TeacherError::BadManifest {
             path: path.to_path_buf(),
             reason,

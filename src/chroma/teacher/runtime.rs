@@ -44,7 +44,7 @@ pub(crate) fn environment() -> Result<Environment, TeacherError> {
             .as_deref()
             .and_then(Path::parent)
             .map(Path::to_path_buf),
-        Some(cache_folder(FOLDER)),
+        cache_folder(FOLDER),
     ];
     let named = env::var_os(LIBRARY_VARIABLE).filter(|path| !path.is_empty());
     let built = match find(named.map(PathBuf::from), folders.into_iter().flatten()) {
@@ -155,12 +155,12 @@ mod tests {
 
     #[test]
     fn the_error_says_how_to_get_it() {
-        let error = TeacherError::NoRuntime {
-            cache: cache_folder(FOLDER),
-        };
-        let message = error.to_string();
-        for part in ["gs-chroma", "ORT_DYLIB_PATH", "https://"] {
-            assert!(message.contains(part), "{message}");
+        for (cache, named) in [(Some("/cache/gs-chroma".into()), true), (None, false)] {
+            let message = TeacherError::NoRuntime { cache }.to_string();
+            assert_eq!(message.contains("/cache/gs-chroma"), named, "{message}");
+            for part in ["ORT_DYLIB_PATH", "https://"] {
+                assert!(message.contains(part), "{message}");
+            }
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Files of weights that lie beside a model, as large exports have them.
 
 use super::TeacherError;
-use super::cache::Hasher;
+use crate::{hash::Hasher, input};
 use prost::Message;
 use std::collections::BTreeSet;
 use std::path::{Component, Path};
@@ -12,7 +12,7 @@ use std::path::{Component, Path};
 /// # Errors
 /// [`TeacherError::Io`], [`TeacherError::NoWeights`] where a file of weights is not there.
 pub(super) fn identity(path: &Path) -> Result<String, TeacherError> {
-    let bytes = std::fs::read(path).map_err(TeacherError::io(path))?;
+    let bytes = input::read(path).map_err(TeacherError::io(path))?;
     let mut hasher = Hasher::default();
     hasher.update(&bytes);
     // What does not decode is for ONNX Runtime to complain of.
@@ -32,8 +32,8 @@ pub(super) fn identity(path: &Path) -> Result<String, TeacherError> {
         }
         let folder = path.parent().unwrap_or(Path::new("."));
         hasher.update(format!("\n{name}\n").as_bytes());
-        hasher
-            .update_with_file(&folder.join(&name))
+        let file = input::open(&folder.join(&name));
+        file.and_then(|file| hasher.update_with(file))
             .map_err(|_| missing())?;
     }
     Ok(hasher.finish())

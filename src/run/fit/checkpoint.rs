@@ -21,6 +21,7 @@ use super::{
 use crate::{
     capture::LoadOptions,
     gpu::Gpu,
+    hash, input,
     luma::{Checkpoint, Keeper, LumaSettings},
     sections,
 };
@@ -124,7 +125,7 @@ impl Found {
             path: path.clone(),
             reason: format!("{reason}: remove it, and train anew"),
         };
-        let bytes = std::fs::read(&path).map_err(files::at(&path))?;
+        let bytes = input::read(&path).map_err(files::at(&path))?;
         let sections = sections::read(&bytes).ok_or_else(|| damaged("is damaged"))?;
         let header = sections.get("run").map(Vec::as_slice).unwrap_or_default();
         let version = serde_json::from_slice::<Value>(header).ok();
@@ -192,8 +193,8 @@ pub(super) fn question(
     photos: &str,
 ) -> Result<Value, RunError> {
     let init = options.init.as_ref().map(|path| {
-        let bytes = std::fs::read(path).map_err(files::at(path))?;
-        Ok::<_, RunError>(sections::sha256(&bytes))
+        let sha256 = input::open(path).and_then(hash::of_file);
+        sha256.map_err(files::at(path))
     });
     Ok(serde_json::json!({
         "program": env!("CARGO_PKG_VERSION"),

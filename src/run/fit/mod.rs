@@ -9,8 +9,8 @@ mod training;
 use std::{cell::RefCell, path::PathBuf, sync::Arc, time::Instant};
 
 use super::{
-    Observer, Preset, RunError, RunFolder, commit::Commit, files, keeping, lock::RunLock,
-    scene::open, sound::open_examined,
+    Observer, Preset, RunError, RunFolder, commit::Commit, files, fingerprint::of_files, keeping,
+    lock::RunLock, scene::open, sound::open_examined,
 };
 use crate::{
     capture::LoadOptions,
@@ -152,6 +152,7 @@ pub fn fit(
         raster: &raster,
         dataset: &dataset,
         evidence: &evidence,
+        photos: &of_files(&dataset.capture)?,
         judge: judge.as_ref().unwrap_or(&dataset),
         begun,
         loading: opened.elapsed().as_secs_f64(),

@@ -21,7 +21,10 @@ impl Job<'_> {
         Report {
             version: REPORT_VERSION,
             program: env!("CARGO_PKG_VERSION").to_owned(),
-            capture: capture_report(&options.colmap_dir, self.dataset),
+            capture: CaptureReport {
+                photos: self.photos.to_vec(),
+                ..capture_report(&options.colmap_dir, self.dataset)
+            },
             device: DeviceReport {
                 name: self.gpu.describe(),
                 backend: format!("{:?}", self.gpu.info().backend),
@@ -93,5 +96,6 @@ pub(in crate::run) fn capture_report(colmap_dir: &Path, dataset: &Dataset) -> Ca
         not_finite: dataset.not_finite(),
         extent: dataset.extent,
         offset: capture.offset.to_array(),
+        photos: Vec::new(),
     }
 }

@@ -21,7 +21,7 @@ use crate::{
     gpu::Gpu,
     luma::{Fit, LumaEvent, LumaProgress, LumaScene},
     raster::Raster,
-    report::{KernelReport, LumaQuality, LumaView, kernel_reports},
+    report::{KernelReport, LumaQuality, LumaView, PhotoReport, kernel_reports},
 };
 
 /// Runs that may take no longer, in seconds, do without a trial: on a slow device it would
@@ -37,6 +37,8 @@ pub(super) struct Job<'a> {
     pub dataset: &'a Arc<Dataset>,
     /// What they say.
     pub evidence: &'a Evidence,
+    /// Their files.
+    pub photos: &'a [PhotoReport],
     /// Photos at the size that is measured at.
     pub judge: &'a Arc<Dataset>,
     /// When the run began.

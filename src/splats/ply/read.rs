@@ -3,7 +3,7 @@
 use super::collect::Collector;
 use super::header::{VertexLayout, byte_size, decode, is_antialiased, offset, read_header};
 use super::{PlyError, is_splat_file};
-use crate::splats::Splats;
+use crate::{input, splats::Splats};
 use glam::DVec3;
 use ply_rs_bw::ply::{ElementDef, Encoding, PropertyType, ScalarType};
 use std::fs::File;
@@ -45,7 +45,7 @@ pub struct ReadSplats {
 /// than its header says (found out before memory is taken for it).
 pub fn read_ply(path: &Path) -> Result<ReadSplats, PlyError> {
     is_splat_file(path)?;
-    let file = File::open(path).map_err(PlyError::io(path))?;
+    let file = input::open(path).map_err(PlyError::io(path))?;
     let file_bytes = file.metadata().map_err(PlyError::io(path))?.len();
     let mut file = BufReader::with_capacity(CHUNK_BYTES, file);
     let header = read_header(path, &mut file)?;

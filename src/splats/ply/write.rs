@@ -1,7 +1,7 @@
 //! Writing splat files that every viewer accepts.
 
 use super::{CENTER, CHANNELS, NORMALS, PlyError, SHAPE, rest_count, sh_names, sh_position};
-use crate::atomic_file;
+use crate::disk;
 use crate::splats::{Splats, sh};
 use glam::DVec3;
 use std::fmt::Write as _;
@@ -37,7 +37,7 @@ pub fn write_ply(
     comments: &[String],
 ) -> Result<(), PlyError> {
     check_arrays(path, splats)?;
-    let mut file = atomic_file::create(path).map_err(PlyError::io(path))?;
+    let mut file = disk::create(path).map_err(PlyError::io(path))?;
 
     let header = header(splats.len(), splats.sh.degree, comments);
     let io_error = PlyError::io;
@@ -56,7 +56,7 @@ pub fn write_ply(
         let little_endian: &[u8] = bytemuck::cast_slice(&values);
         file.write_all(little_endian).map_err(io_error(path))?;
     }
-    atomic_file::persist(file, path).map_err(io_error(path))
+    file.persist(path).map_err(io_error(path))
 }
 
 fn check_arrays(path: &Path, splats: &Splats) -> Result<(), PlyError> {

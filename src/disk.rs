@@ -1,0 +1,276 @@
+//! All that is written. Output files are whole or not there: they are written beside and
+//! renamed. Every step can be made to fail, so that tests see what is left then.
+
+use std::{
+    env,
+    fs::{self, File, OpenOptions},
+    io::{self, Write},
+    path::Path,
+    sync::{
+        LazyLock,
+        atomic::{AtomicU64, Ordering},
+    },
+};
+
+use tempfile::{Builder, NamedTempFile, TempDir};
+
+/// Names the step that fails, counted from 1, for tests: `7` the seventh, `7-` the seventh and
+/// all after it, as on a disk that is full.
+const FAULT: &str = "GS_CHROMA_TEST_FAULT";
+
+static ASKED: LazyLock<Option<Fault>> =
+    LazyLock::new(|| Fault::parse(&env::var(FAULT).unwrap_or_default()));
+
+/// Steps so far.
+static STEPS: AtomicU64 = AtomicU64::new(0);
+
+/// Which steps fail.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Fault {
+    step: u64,
+    lasts: bool,
+}
+
+impl Fault {
+    fn parse(text: &str) -> Option<Self> {
+        let (step, lasts) = match text.strip_suffix('-') {
+            Some(step) => (step, true),
+            None => (text, false),
+        };
+        let step = step.parse().ok()?;
+        Some(Self { step, lasts })
+    }
+
+    fn strikes(self, step: u64) -> bool {
+        step == self.step || (self.lasts && step > self.step)
+    }
+}
+
+/// Whoever writes passes here first, here or in [`crate::download`].
+///
+/// # Errors
+/// As a full disk, where a test asks for it.
+pub(crate) fn step() -> io::Result<()> {
+    let Some(fault) = *ASKED else { return Ok(()) };
+    match fault.strikes(STEPS.fetch_add(1, Ordering::Relaxed) + 1) {
+        true => Err(io::ErrorKind::StorageFull.into()),
+        false => Ok(()),
+    }
+}
+
+/// The folder of a file.
+pub(crate) fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    }
+}
+
+/// A file that is not in its place yet. Dropped, it leaves nothing behind.
+pub(crate) struct Draft(NamedTempFile);
+
+/// An empty file beside `path`, which [`Draft::persist`] puts there once it is complete.
+///
+/// # Errors
+/// The system's, when the folder is missing or cannot be written to.
+pub(crate) fn create(path: &Path) -> io::Result<Draft> {
+    step()?;
+    let mut builder = Builder::new();
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        // Temporary files are private by default; this one will be as public as the
+        // user's other files, whose umask takes away from this.
+        builder.permissions(fs::Permissions::from_mode(0o666));
+    }
+    builder.tempfile_in(folder_of(path)).map(Draft)
+}
+
+impl Draft {
+    /// Puts the file where it belongs, once all of it is on the disk.
+    ///
+    /// # Errors
+    /// The system's.
+    pub fn persist(self, path: &Path) -> io::Result<()> {
+        step()?;
+        self.0.as_file().sync_all()?;
+        step()?;
+        self.0.persist(path)?;
+        Ok(())
+    }
+}
+
+impl Write for Draft {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        step()?;
+        self.0.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.0.flush()
+    }
+}
+
+/// An empty folder in another one, whose name begins with `prefix`. Dropped, it is removed.
+///
+/// # Errors
+/// The system's.
+pub(crate) fn temporary_folder(prefix: &str, folder: &Path) -> io::Result<TempDir> {
+    step()?;
+    let mut builder = Builder::new();
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        // What lies in it may be moved elsewhere, and is to be as public as other folders.
+        builder.permissions(fs::Permissions::from_mode(0o777));
+    }
+    builder.prefix(prefix).tempdir_in(folder)
+}
+
+/// A file without a name, in the system's folder for these.
+///
+/// # Errors
+/// The system's.
+pub(crate) fn scratch() -> io::Result<File> {
+    step()?;
+    tempfile::tempfile()
+}
+
+/// A file that is changed in place, made where it is missing.
+///
+/// # Errors
+/// The system's.
+pub(crate) fn open_in_place(path: &Path) -> io::Result<File> {
+    step()?;
+    let mut options = OpenOptions::new();
+    options.read(true).write(true).create(true).truncate(false);
+    options.open(path)
+}
+
+/// Makes a folder and those above it, where they are missing.
+///
+/// # Errors
+/// The system's.
+pub(crate) fn make_folder(path: &Path) -> io::Result<()> {
+    if path.is_dir() {
+        return Ok(());
+    }
+    step()?;
+    fs::create_dir_all(path)
+}
+
+/// Tries whether a folder can be written to.
+///
+/// # Errors
+/// The system's.
+pub(crate) fn try_folder(path: &Path) -> io::Result<()> {
+    step()?;
+    tempfile::tempfile_in(path).map(drop)
+}
+
+/// Renames a file or a folder.
+///
+/// # Errors
+/// The system's.
+pub(crate) fn rename(from: &Path, to: &Path) -> io::Result<()> {
+    step()?;
+    fs::rename(from, to)
+}
+
+/// Brings renames in a folder to the disk, where the system has a way to.
+pub(crate) fn sync(folder: &Path) {
+    // Some file systems cannot; the files themselves are there.
+    let _ = File::open(folder).and_then(|folder| folder.sync_all());
+}
+
+/// Removes a file or a folder with all that is in it. Nothing there is no error.
+///
+/// # Errors
+/// The system's.
+pub(crate) fn remove(path: &Path) -> io::Result<()> {
+    let removed = path.symlink_metadata().and_then(|metadata| {
+        step()?;
+        match metadata.is_dir() {
+            true => fs::remove_dir_all(path),
+            false => fs::remove_file(path),
+        }
+    });
+    match removed {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
+        _ => Ok(()),
+    }
+}
+
+/// The same file in two places, copied where the file system cannot do that.
+///
+/// # Errors
+/// The system's.
+pub(crate) fn link(from: &Path, to: &Path) -> io::Result<()> {
+    step()?;
+    fs::hard_link(from, to).or_else(|_| fs::copy(from, to).map(drop))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_appears_when_it_is_complete() {
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join("out");
+        let mut file = create(&path).unwrap();
+        file.write_all(b"whole").unwrap();
+        assert!(!path.exists());
+        file.persist(&path).unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"whole");
+        drop(create(&path).unwrap());
+        assert_eq!(fs::read_dir(place.path()).unwrap().count(), 1);
+        assert!(create(&place.path().join("no folder/out")).is_err());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn it_is_as_public_as_any_file() {
+        use std::os::unix::fs::PermissionsExt;
+        let place = tempfile::tempdir().unwrap();
+        let [ours, plain] = ["ours", "plain"].map(|name| place.path().join(name));
+        create(&ours).unwrap().persist(&ours).unwrap();
+        fs::write(&plain, []).unwrap();
+        let [ours, plain] = [ours, plain].map(|path| fs::metadata(path).unwrap().permissions());
+        assert_eq!(ours.mode(), plain.mode());
+    }
+
+    #[test]
+    fn a_bare_name_lies_in_the_current_folder() {
+        assert_eq!(folder_of(Path::new("scene.ply")), Path::new("."));
+        assert_eq!(folder_of(Path::new("a/scene.ply")), Path::new("a"));
+    }
+
+    #[test]
+    fn what_is_removed_is_gone() {
+        let place = tempfile::tempdir().unwrap();
+        let [folder, file] = ["folder", "file"].map(|name| place.path().join(name));
+        make_folder(&folder.join("below")).unwrap();
+        make_folder(&folder).unwrap();
+        fs::write(&file, "text").unwrap();
+        link(&file, &folder.join("file")).unwrap();
+        for path in [&folder, &file, &file] {
+            remove(path).unwrap();
+            assert!(!path.exists());
+        }
+    }
+
+    #[test]
+    fn the_step_that_fails() {
+        assert_eq!(Fault::parse(""), None);
+        assert_eq!(Fault::parse("x"), None);
+        let struck = |text: &str| {
+            let fault = Fault::parse(text).unwrap();
+            (1..5)
+                .filter(|&step| fault.strikes(step))
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(struck("2"), [2]);
+        assert_eq!(struck("2-"), [2, 3, 4]);
+    }
+}

@@ -1,0 +1,107 @@
+//! Writes that fail, each in turn: nothing is half-written, one line says so, and the next
+//! command finds everything as it was. With `GS_CHROMA_EVERY_FAULT` set no step is passed over.
+
+use super::program::{Done, Place, files_below};
+use super::shared::{onnx, place_with_run};
+
+/// Successes in a row after which no step is left to fail.
+const ENOUGH: usize = 3;
+
+/// Runs a command with each of its steps of writing failing in turn, alone or with all that
+/// follow. Files in `kept` belong together: all are as they were, or all as a whole command
+/// leaves them. Other files are those of `made`, or none.
+fn every_write_fails_well(arguments: &[&str], kept: &[&str], made: &[&str]) {
+    let whole = place_with_run();
+    let before: Vec<_> = kept.iter().map(|name| whole.read(name)).collect();
+    let files_before = whole.files("");
+    whole.succeed(arguments);
+    let after: Vec<_> = kept.iter().map(|name| whole.read(name)).collect();
+    let files_after = whole.files("");
+    let made: Vec<_> = made.iter().map(|name| (*name, whole.read(name))).collect();
+    let every = std::env::var_os("GS_CHROMA_EVERY_FAULT").is_some();
+    for lasts in ["", "-"] {
+        let place = place_with_run();
+        let (mut struck, mut in_a_row) = (0, 0);
+        let mut step = 1_u64;
+        loop {
+            let done = failing(&place, arguments, &format!("{step}{lasts}"));
+            let told: Vec<&str> = done.stderr.lines().collect();
+            let context = format!("{arguments:?}, step {step}{lasts}: {told:?}");
+            let errors = told.iter().filter(|line| line.starts_with("error: "));
+            match done.code {
+                Some(0) => in_a_row += 1,
+                Some(1) => {
+                    (struck, in_a_row) = (struck + 1, 0);
+                    assert_eq!(errors.count(), 1, "{context}");
+                    assert!(told.last().is_some_and(|line| line.starts_with("error: ")));
+                    assert!(done.stderr.contains("storage"), "{context}");
+                }
+                _ => panic!("{context}"),
+            }
+            // Any command that looks at the run finishes what is complete.
+            place.succeed(&["info", "runs/scene"]);
+            let now: Vec<_> = kept.iter().map(|name| place.read(name)).collect();
+            assert!(now == before || now == after, "{context}");
+            for (name, bytes) in &made {
+                let whole = !place.path(name).exists() || place.read(name) == *bytes;
+                assert!(whole, "{context}: {name}");
+            }
+            for (name, _) in files_below(&place.path("")) {
+                let known = files_before.contains(&name) || files_after.contains(&name);
+                assert!(known, "{context}: left {name}");
+            }
+            if in_a_row == ENOUGH {
+                break;
+            }
+            // The first steps one by one, then every third of those before.
+            step += if every { 1 } else { (step / 3).max(1) };
+        }
+        assert!(struck > 2, "{arguments:?}: {struck}");
+        println!("{arguments:?}: {struck} of {step} steps{lasts} failed");
+        place.succeed(arguments);
+        assert_eq!(place.files(""), files_after, "{arguments:?}");
+    }
+}
+
+fn failing(place: &Place, arguments: &[&str], fault: &str) -> Done {
+    let mut command = place.command(arguments);
+    Done::of(command.env("GS_CHROMA_TEST_FAULT", fault).output())
+}
+
+#[test]
+fn fit_fails_well() {
+    let fit = ["fit", "scene", "--preset", "draft", "--iterations", "3"];
+    let kept = ["runs/scene/luma.ply"];
+    every_write_fails_well(
+        &[&fit[..], &["--without", "background"]].concat(),
+        &kept,
+        &[],
+    );
+}
+
+#[test]
+fn colorize_fails_well() {
+    let teacher = onnx("ddcolor_tiny.onnx");
+    let colorize = ["colorize", "runs/scene", "--teacher", &teacher];
+    let short = ["--rounds", "1", "--sh-degree", "0", "--teacher-size", "32"];
+    let kept = ["runs/scene/color.ply", "runs/scene/chroma.npy"];
+    every_write_fails_well(&[&colorize[..], &short].concat(), &kept, &[]);
+}
+
+#[test]
+fn what_only_reads_a_run_fails_well() {
+    let kept = ["runs/scene/luma.ply", "runs/scene/color.ply"];
+    let render = ["render", "runs/scene", "-o", "pictures"];
+    let place = place_with_run();
+    place.succeed(&render);
+    let pictures = place.files("pictures");
+    let pictures: Vec<_> = pictures.iter().map(|n| format!("pictures/{n}")).collect();
+    let made: Vec<&str> = pictures.iter().map(String::as_str).collect();
+    every_write_fails_well(&render, &kept, &made);
+    let export = ["export", "runs/scene", "-o", "far/scene.ply"];
+    every_write_fails_well(&export, &kept, &["far/scene.ply"]);
+    every_write_fails_well(&["eval", "runs/scene"], &kept, &[]);
+    let network = onnx("ddcolor_tiny.onnx");
+    let check = ["teacher", "check", &network, "--manifest", "network.toml"];
+    every_write_fails_well(&check, &kept, &["network.toml"]);
+}
