@@ -14,9 +14,9 @@ mod elsewhere;
 mod errors;
 mod eval;
 mod eval_photos;
+mod faults;
 // The host is trusted by OpenSSL's variable, which other systems do not ask.
 #[cfg(target_os = "linux")]
-mod faults;
 mod fetch;
 mod folder;
 #[cfg(target_os = "linux")]

@@ -1,0 +1,395 @@
+//! Damaged files of every kind that is read: no panic, no wait, and no more memory than the
+//! file's size can explain.
+//!
+//! `cargo test --release --test fuzz` tries each kind a thousand times or less;
+//! `GS_CHROMA_MUTATIONS=100000` as often as it says. What failed once is kept in
+//! `tests/proptest-regressions/fuzz/`.
+
+use std::{
+    cell::Cell,
+    fs,
+    path::{Path, PathBuf},
+    sync::{Mutex, PoisonError},
+    time::{Duration, Instant},
+};
+
+use gs_chroma::{
+    capture::{Capture, LoadOptions, Loader, View},
+    chroma::teacher::{GrayImage, Teacher, TeacherError, TeacherSettings},
+    measure::decode_flo,
+    oracle,
+    run::RunFolder,
+    splats::{self, read_ply},
+};
+use peak_alloc::PeakAlloc;
+use proptest::{
+    prelude::*,
+    test_runner::{Config, FailurePersistence, FileFailurePersistence, TestRunner},
+};
+
+mod mutation;
+#[allow(dead_code, reason = "tests of the program use all of it")]
+#[path = "../cli/scene.rs"]
+mod scene;
+
+use mutation::{Mutation, mutation};
+
+#[global_allocator]
+static MEMORY: PeakAlloc = PeakAlloc;
+
+/// Memory is counted for the whole process: one kind at a time.
+static ALONE: Mutex<()> = Mutex::new(());
+
+/// No file of these sizes may take longer.
+const PATIENCE: Duration = Duration::from_secs(10);
+
+/// What reading may take however small a file is: buffers, tables of decoders.
+const FIXED: usize = 24 << 20;
+
+/// Times a file's size, of what is stored as it is read: lists and maps of small parts.
+const PLAIN: usize = 64;
+
+/// Times a file's size, of what is compressed: samples that a byte can stand for, as bytes, gray
+/// and weights, see `capture::decode`.
+const COMPRESSED: usize = 8 * 1032 * 8;
+
+/// A kind of file.
+struct Kind<'a> {
+    name: &'a str,
+    /// Sound files of it.
+    corpus: Vec<Vec<u8>>,
+    /// Where it is read from.
+    path: PathBuf,
+    /// Reads it, and may refuse it.
+    read: &'a dyn Fn(&Path),
+    /// Bytes of memory for each of the file's.
+    memory: usize,
+    /// How often it is tried by default.
+    cases: u32,
+}
+
+/// Tries damaged files of a kind; what fails is kept.
+fn survives(kind: &Kind<'_>) {
+    let kept = format!("tests/proptest-regressions/fuzz/{}.txt", kind.name);
+    let kept = FileFailurePersistence::Direct(kept.leak());
+    let [highest, slowest] =
+        tried(kind, Some(Box::new(kept))).unwrap_or_else(|error| panic!("{error}"));
+    println!(
+        "| {} | {} | {highest:.1} | {slowest:.0} |",
+        kind.name,
+        cases(kind)
+    );
+}
+
+fn cases(kind: &Kind<'_>) -> u32 {
+    let asked = std::env::var("GS_CHROMA_MUTATIONS").ok();
+    asked.map_or(kind.cases, |count| count.parse().expect("a number"))
+}
+
+/// The highest memory in MB, and the longest time in ms; else the smallest damage that is not
+/// survived.
+fn tried(kind: &Kind<'_>, kept: Option<Box<dyn FailurePersistence>>) -> Result<[f64; 2], String> {
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut runner = TestRunner::new(Config {
+        cases: cases(kind),
+        failure_persistence: kept,
+        max_shrink_iters: 500,
+        ..Config::default()
+    });
+    let (highest, slowest) = (Cell::new(0), Cell::new(Duration::ZERO));
+    let files = prop::sample::select((0..kind.corpus.len()).collect::<Vec<_>>());
+    let damage = prop::collection::vec(mutation(), 0..5);
+    let outcome = runner.run(
+        &(files, damage),
+        |(file, damage): (usize, Vec<Mutation>)| {
+            let mut bytes = kind.corpus[file].clone();
+            damage
+                .iter()
+                .for_each(|mutation| mutation.apply(&mut bytes));
+            fs::write(&kind.path, &bytes).expect("writable");
+            let (before, begun) = (MEMORY.current_usage(), Instant::now());
+            MEMORY.reset_peak_usage();
+            (kind.read)(&kind.path);
+            let taken = MEMORY.peak_usage().saturating_sub(before);
+            let took = begun.elapsed();
+            prop_assert!(took < PATIENCE, "takes {took:?}");
+            let bound = FIXED + kind.memory * bytes.len();
+            prop_assert!(taken <= bound, "takes {taken} bytes, not {bound}");
+            highest.set(highest.get().max(taken));
+            slowest.set(slowest.get().max(took));
+            Ok(())
+        },
+    );
+    outcome.map_err(|error| format!("{}: {error}", kind.name))?;
+    Ok([
+        highest.get() as f64 / 1e6,
+        slowest.get().as_secs_f64() * 1e3,
+    ])
+}
+
+/// Readers that do not survive are found.
+#[test]
+fn bad_readers_are_found() {
+    let place = tempfile::tempdir().expect("a folder");
+    let sound = vec![7; 100];
+    let panics = |path: &Path| assert!(fs::read(path).expect("a file").len() < 120, "too long");
+    let allocates = |path: &Path| {
+        let file = fs::read(path).expect("a file");
+        let count = file.get(9).map_or(0, |&byte| usize::from(byte) << 20);
+        drop(std::hint::black_box(vec![1_u8; count]));
+    };
+    let good = |path: &Path| drop(fs::read(path));
+    for (read, expected) in [
+        (&panics as &dyn Fn(&Path), Some("too long")),
+        (&allocates, Some("bytes, not")),
+        (&good, None),
+    ] {
+        let kind = Kind {
+            name: "bytes",
+            corpus: vec![sound.clone()],
+            path: place.path().join("file"),
+            read,
+            memory: PLAIN,
+            cases: 1000,
+        };
+        let outcome = tried(&kind, None);
+        match expected {
+            Some(words) => assert!(outcome.unwrap_err().contains(words)),
+            None => assert!(outcome.is_ok()),
+        }
+    }
+}
+
+/// A folder with a small scene.
+fn place() -> tempfile::TempDir {
+    let below = Path::new(env!("CARGO_TARGET_TMPDIR"));
+    let made = tempfile::Builder::new().prefix("fuzz-").tempdir_in(below);
+    let made = made.expect("the target folder is writable");
+    scene::write(made.path());
+    made
+}
+
+#[test]
+fn models() {
+    for (text, name) in [
+        (false, "cameras.bin"),
+        (false, "images.bin"),
+        (false, "points3D.bin"),
+        (true, "cameras.txt"),
+        (true, "images.txt"),
+        (true, "points3D.txt"),
+    ] {
+        let place = place();
+        let mut model = place.path().join("sparse/0");
+        if text {
+            fs::remove_dir_all(&model).expect("a model");
+            scene::write_moved(place.path(), [0.0; 3]);
+            model = place.path().join("sparse");
+        }
+        let path = model.join(name);
+        survives(&Kind {
+            name: &name.replace('.', "-"),
+            corpus: vec![fs::read(&path).expect("a file")],
+            path,
+            read: &|_| drop(Capture::load(place.path())),
+            memory: PLAIN,
+            cases: 1000,
+        });
+    }
+}
+
+/// A photo of the small scene as files of every kind.
+fn pictures() -> [(&'static str, Vec<Vec<u8>>); 3] {
+    use image::ImageFormat::{Jpeg, Png};
+    let photo = image::DynamicImage::from(scene::photo(3));
+    let gray = image::DynamicImage::from(photo.to_luma8());
+    let alpha = image::DynamicImage::from(photo.to_rgba8());
+    let deep = image::DynamicImage::from(photo.to_luma16());
+    let encoded = |picture: &image::DynamicImage, format| {
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        picture.write_to(&mut bytes, format).expect("a picture");
+        bytes.into_inner()
+    };
+    let mut tiffs = Vec::new();
+    for compression in [
+        tiff::encoder::Compression::Uncompressed,
+        tiff::encoder::Compression::Lzw,
+        tiff::encoder::Compression::Deflate(tiff::encoder::DeflateLevel::Balanced),
+    ] {
+        let mut file = std::io::Cursor::new(Vec::new());
+        let encoder = tiff::encoder::TiffEncoder::new(&mut file).expect("a file");
+        encoder
+            .with_compression(compression)
+            .write_image::<tiff::encoder::colortype::Gray16>(
+                gray.width(),
+                gray.height(),
+                deep.as_luma16().expect("16 bits"),
+            )
+            .expect("a picture");
+        tiffs.push(file.into_inner());
+    }
+    [
+        (
+            "png",
+            [&photo, &gray, &alpha, &deep]
+                .map(|p| encoded(p, Png))
+                .to_vec(),
+        ),
+        ("jpeg", [&photo, &gray].map(|p| encoded(p, Jpeg)).to_vec()),
+        ("tiff", tiffs),
+    ]
+}
+
+#[test]
+fn photos() {
+    let place = place();
+    let capture = Capture::load(place.path()).expect("a scene");
+    let loader = Loader::new(LoadOptions::default());
+    for (name, corpus) in pictures() {
+        let path = place.path().join("photo");
+        let view = View {
+            image_path: path.clone(),
+            ..capture.views[0].clone()
+        };
+        survives(&Kind {
+            name,
+            corpus,
+            path,
+            read: &|_| drop((loader.camera(&view), loader.load(&view))),
+            memory: COMPRESSED,
+            cases: 500,
+        });
+    }
+}
+
+#[test]
+fn splat_files() {
+    let place = place();
+    let splats = splats::Splats {
+        means: vec![[0.5, -1.0, 2.0]; 20],
+        quats: vec![[1.0, 0.0, 0.0, 0.5]; 20],
+        log_scales: vec![[-1.0; 3]; 20],
+        opacity_logits: vec![0.5; 20],
+        sh: splats::ShField::zeros(20, 2, 1),
+    };
+    let path = place.path().join("scene.ply");
+    let offset = glam::DVec3::ZERO;
+    splats::write_ply(&path, &splats, offset, &[]).expect("writable");
+    let ours = fs::read(&path).expect("a file");
+    let text = b"ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\nproperty float f_dc_0\nproperty float f_dc_1\nproperty float f_dc_2\nproperty float opacity\nproperty float scale_0\nproperty float scale_1\nproperty float scale_2\nproperty float rot_0\nproperty float rot_1\nproperty float rot_2\nproperty float rot_3\nend_header\n0 0 1 .1 .2 .3 1 -2 -2 -2 1 0 0 0\n1 0 1 .1 .2 .3 1 -2 -2 -2 1 0 0 0\n";
+    survives(&Kind {
+        name: "ply",
+        corpus: vec![ours, text.to_vec()],
+        path,
+        read: &|path| drop(read_ply(path)),
+        memory: PLAIN,
+        cases: 1000,
+    });
+    let path = place.path().join("chroma.npy");
+    let field = splats::ShField::zeros(20, 1, 2);
+    survives(&Kind {
+        name: "npy",
+        corpus: vec![splats::npy::encode(&field)],
+        path,
+        read: &|path| drop(splats::npy::decode(&fs::read(path).expect("a file"), 20, 2)),
+        memory: PLAIN,
+        cases: 1000,
+    });
+    let flow = [
+        &b"PIEH"[..],
+        &4_u32.to_le_bytes(),
+        &3_u32.to_le_bytes(),
+        &[0; 96],
+    ]
+    .concat();
+    let path = place.path().join("pair.flo");
+    survives(&Kind {
+        name: "flo",
+        corpus: vec![flow],
+        path,
+        read: &|path| drop(decode_flo(&fs::read(path).expect("a file"), 4, 3)),
+        memory: PLAIN,
+        cases: 500,
+    });
+}
+
+#[test]
+fn reports() {
+    let place = place();
+    let example = include_str!("../../docs/run-folder.md");
+    let begin = example.find("```json\n").expect("an example") + "```json\n".len();
+    let end = begin + example[begin..].find("```").expect("its end");
+    let path = place.path().join("report.json");
+    let folder = RunFolder::at(place.path());
+    survives(&Kind {
+        name: "report",
+        corpus: vec![example.as_bytes()[begin..end].to_vec()],
+        path,
+        read: &|_| drop(folder.read_report()),
+        memory: PLAIN,
+        cases: 1000,
+    });
+}
+
+fn network(name: &str) -> PathBuf {
+    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/onnx");
+    fixtures.join(name)
+}
+
+/// Opens a teacher and asks it.
+fn ask(path: &Path, profile: Option<&Path>) -> Result<(), TeacherError> {
+    let settings = TeacherSettings {
+        profile: profile.map(|path| path.to_string_lossy().into_owned()),
+        time_limit: Duration::from_secs(2),
+        ..TeacherSettings::default()
+    };
+    let [width, height] = scene::SIZE;
+    let pixels = vec![128; (width * height) as usize];
+    let gray = GrayImage {
+        width,
+        height,
+        pixels: &pixels,
+    };
+    Teacher::open(path, None, &settings)?
+        .colorize("00.png", gray, None)
+        .map(drop)
+}
+
+#[test]
+fn teachers() {
+    let place = place();
+    ask(&network("ddcolor_tiny.onnx"), None).expect("a network");
+    let path = place.path().join("network.onnx");
+    let names = ["ddcolor_tiny", "deoldify_tiny", "siggraph17_full_tiny"];
+    let read = |name: &&str| fs::read(network(&format!("{name}.onnx"))).expect("a network");
+    survives(&Kind {
+        name: "onnx",
+        corpus: names.iter().map(read).collect(),
+        path,
+        read: &|path| drop(ask(path, None)),
+        memory: PLAIN,
+        cases: 1000,
+    });
+    let path = place.path().join("manifest.toml");
+    let manifest = "name = \"Mine\"\ninputs = [\"image\"]\nimage = \"gray-rgb\"\ninput_range = [0.0, 1.0]\nmean = [0, 0, 0]\nstd = [1, 1, 1]\nsize = 32\nsize_multiple = 1\nresize = \"stretch\"\nfilter = \"average\"\noutput = \"ab\"\n";
+    let plain = network("deoldify_tiny.onnx");
+    survives(&Kind {
+        name: "manifest",
+        corpus: vec![manifest.as_bytes().to_vec()],
+        path,
+        read: &|path| drop(ask(&plain, Some(path))),
+        memory: PLAIN,
+        cases: 500,
+    });
+    let [png, ..] = pictures();
+    let folder = place.path().join("colored");
+    fs::create_dir(&folder).expect("writable");
+    survives(&Kind {
+        name: "teacher-image",
+        corpus: png.1,
+        path: folder.join("00.png"),
+        read: &|_| drop(ask(&folder, None)),
+        memory: COMPRESSED,
+        cases: 500,
+    });
+}
