@@ -2,10 +2,10 @@
 
 use std::{path::PathBuf, sync::Arc};
 
-use clap::Args;
+use clap::{Args, CommandFactory, error::ErrorKind};
 
 use super::{
-    CliError,
+    Cli, CliError,
     effects::EffectArguments,
     luma::LumaArguments,
     network::NetworkArguments,
@@ -14,10 +14,12 @@ use super::{
     progress::Progress,
     values::{PRESETS, one_of, positive},
 };
+use crate::capture::LoadOptions;
+use crate::effects::Overrules;
 use crate::luma::Goal;
 use crate::report::timings_table;
 use crate::run::{
-    AheadOptions, CheckpointOptions, EVERY, FitOptions, Interrupt, Preset, RunError, fit,
+    AheadOptions, CheckpointOptions, EVERY, FitOptions, Init, Interrupt, Preset, RunError, fit,
 };
 
 /// Rows of the curve that is printed.
@@ -26,7 +28,9 @@ const CURVE_ROWS: usize = 8;
 /// Train geometry and luminance on a folder of photos with COLMAP poses.
 #[derive(Args)]
 pub struct Fit {
-    /// Folder with images/ and a COLMAP model (sparse/0, sparse or the folder itself).
+    /// Folder with images/ and a COLMAP model (sparse/0, sparse or the folder itself), or a run
+    /// that is to go on: with its photos, effects and settings, for --iterations more.
+    #[arg(value_name = "COLMAP_DIR|RUN")]
     colmap_dir: PathBuf,
     /// Run folder to write [default: runs/<folder name>].
     #[arg(short, long, value_name = "RUN")]
@@ -109,6 +113,13 @@ fn interrupt() -> Result<Arc<Interrupt>, CliError> {
     }
 }
 
+/// Ends the program as one that was called wrongly.
+fn refuse(reason: &str) -> ! {
+    Cli::command()
+        .error(ErrorKind::ArgumentConflict, reason)
+        .exit()
+}
+
 impl Fit {
     pub(super) fn run(self) -> Result<(), CliError> {
         let mut progress = Progress::default();
@@ -118,16 +129,45 @@ impl Fit {
             (None, Some(seconds)) => Goal::Within { seconds },
             (None, None) => Goal::Fixed,
         };
+        let (load, overrules) = (self.photos.options(), self.effects.overrules());
+        let overlay = self.luma.overlay()?;
+        let asked = match FitOptions::continuing(&self.colmap_dir)? {
+            Some(run) => {
+                if [
+                    load != LoadOptions::default(),
+                    overrules != Overrules::default(),
+                    self.preset.is_some(),
+                    self.init.is_some(),
+                ]
+                .contains(&true)
+                {
+                    refuse(
+                        "a run goes on with its own photos, effects, preset and Gaussians: leave out the options that name others",
+                    );
+                }
+                FitOptions {
+                    output: self.output.or(run.output),
+                    measure_side: self.measure_side.or(run.measure_side),
+                    settings: Box::new(move |settings| {
+                        (run.settings)(settings);
+                        overlay(settings);
+                    }),
+                    ..run
+                }
+            }
+            None => FitOptions {
+                output: self.output,
+                preset: self.preset,
+                settings: overlay,
+                load,
+                overrules,
+                init: self.init.map(Init::File),
+                measure_side: self.measure_side,
+                ..FitOptions::new(self.colmap_dir)
+            },
+        };
         let options = FitOptions {
-            colmap_dir: self.colmap_dir,
-            output: self.output,
-            preset: self.preset,
-            settings: self.luma.overlay()?,
-            load: self.photos.options(),
-            overrules: self.effects.overrules(),
-            init: self.init,
             goal,
-            measure_side: self.measure_side,
             timings: self.timings,
             checkpoints: CheckpointOptions {
                 resume: self.resume,
@@ -138,6 +178,7 @@ impl Fit {
                 teachers: self.teacher,
                 settings: self.network.settings(),
             },
+            ..asked
         };
         let (folder, report) = fit(&options, &mut |event| progress.show(&event))?;
         progress.finish();

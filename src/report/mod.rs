@@ -122,7 +122,7 @@ pub struct DeviceReport {
 pub struct LumaReport {
     /// What it was trained with.
     pub settings: LumaSettings,
-    /// Iterations that led to the set that was kept.
+    /// Iterations that led to the set that was kept, those of a run that went on included.
     pub iterations: usize,
     /// The iteration at which training went back to an earlier one, where it was best.
     pub given_up: Option<usize>,

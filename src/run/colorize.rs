@@ -428,7 +428,7 @@ fn adam_iterations(
 }
 
 /// The log with the chroma rows behind the luma rows, in place of those of an earlier coloring.
-fn with_rows(path: &Path, luma: usize, rows: &str) -> String {
+pub(super) fn with_rows(path: &Path, luma: usize, rows: &str) -> String {
     let log = read_or_empty(path);
     let mut kept: String = log
         .lines()

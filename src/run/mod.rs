@@ -24,7 +24,7 @@ use std::{cell::RefCell, fmt, path::PathBuf};
 pub use colorize::{ColorizeOptions, Output, colorize};
 pub use eval::{EvalOptions, eval};
 pub use export::{ExportOptions, Exported, export};
-pub use fit::{AheadOptions, CheckpointOptions, EVERY, FitOptions, Interrupt, Overlay, fit};
+pub use fit::{AheadOptions, CheckpointOptions, EVERY, FitOptions, Init, Interrupt, Overlay, fit};
 pub use folder::RunFolder;
 pub use info::info;
 pub(crate) use picture_names::picture_names;

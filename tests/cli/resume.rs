@@ -7,7 +7,8 @@ use std::{
 };
 
 use super::program::{Done, Place};
-use super::shared::place_with_scene;
+use super::scene;
+use super::shared::{place_with_run, place_with_scene};
 
 /// A training of a few seconds.
 const FIT: [&str; 10] = [
@@ -198,4 +199,36 @@ fn what_was_never_begun_begins() {
     );
     let wrong = place.run(&[&FIT[..], &["--checkpoint", "0"]].concat());
     assert_eq!(wrong.code, Some(2));
+}
+
+#[test]
+fn a_finished_run_goes_on() {
+    // Also where coordinates are large, and the run has moved them.
+    for offset in [[0.0; 3], [4e5, -5e6, 100.0]] {
+        let place = Place::new();
+        scene::write_moved(&place.path("scene"), offset);
+        place.succeed(&FIT);
+        let psnr = |run: &str| {
+            let report = place.report(run);
+            report["luma"]["held_out"]["psnr"].as_f64().expect("a PSNR")
+        };
+        let before = psnr("run");
+        let more = ["fit", "run", "--iterations", "200"];
+        place.succeed(&[&more[..], &["-o", "more"]].concat());
+        place.succeed(&more);
+        let report = place.report("run");
+        assert_eq!(report["luma"]["iterations"], 800);
+        assert_eq!(report["luma"]["settings"]["iterations"], 200);
+        let rows = log(&place);
+        assert!(rows.iter().any(|row| row.starts_with("800,")), "{rows:?}");
+        assert!(rows.iter().any(|row| row.starts_with("600,")), "{rows:?}");
+        // It is the better for it, and repeats.
+        assert!(psnr("run") > before - 0.1, "{} {before}", psnr("run"));
+        assert!(place.read("run/luma.ply") == place.read("more/luma.ply"));
+    }
+    let place = place_with_run();
+    for other in [["--preset", "draft"], ["--max-side", "32"]] {
+        let done = place.run(&[&["fit", "runs/scene"][..], &other].concat());
+        assert_eq!(done.code, Some(2), "{other:?}: {}", done.stderr);
+    }
 }

@@ -15,7 +15,7 @@ use serde_json::Value;
 
 use super::{
     super::{Event, Observer, Preset, RunError, RunFolder, files, preset::Work},
-    FitOptions,
+    FitOptions, Init,
     budget::Budget,
 };
 use crate::{
@@ -192,9 +192,9 @@ pub(super) fn question(
     gpu: &Gpu,
     photos: &str,
 ) -> Result<Value, RunError> {
-    let init = options.init.as_ref().map(|path| {
-        let sha256 = input::open(path).and_then(hash::of_file);
-        sha256.map_err(files::at(path))
+    let init = options.init.as_ref().map(Init::path).map(|path| {
+        let sha256 = input::open(&path).and_then(hash::of_file);
+        sha256.map_err(files::at(&path))
     });
     Ok(serde_json::json!({
         "program": env!("CARGO_PKG_VERSION"),

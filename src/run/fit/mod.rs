@@ -3,6 +3,7 @@
 mod ahead;
 mod budget;
 mod checkpoint;
+mod continued;
 mod report;
 mod training;
 
@@ -32,6 +33,33 @@ use training::{Job, Trained};
 /// Changes settings: what is asked for over what a preset or a time limit has chosen.
 pub type Overlay = Box<dyn Fn(&mut LumaSettings)>;
 
+/// Gaussians to start from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Init {
+    /// Those of a splat file.
+    File(PathBuf),
+    /// Those of a run after so many iterations, which goes on.
+    Run(RunFolder, usize),
+}
+
+impl Init {
+    /// The splat file.
+    pub fn path(&self) -> PathBuf {
+        match self {
+            Self::File(path) => path.clone(),
+            Self::Run(folder, _) => folder.luma(),
+        }
+    }
+
+    /// Iterations that led to them, as far as the run's log has them.
+    fn iterations(&self) -> usize {
+        match self {
+            Self::File(_) => 0,
+            Self::Run(_, iterations) => *iterations,
+        }
+    }
+}
+
 /// What `fit` is asked to do; `None` leaves it to the preset.
 pub struct FitOptions {
     /// The COLMAP folder.
@@ -51,7 +79,7 @@ pub struct FitOptions {
     /// Effects that are on or off whatever the evidence.
     pub overrules: Overrules,
     /// Gaussians to start from.
-    pub init: Option<PathBuf>,
+    pub init: Option<Init>,
     /// What is to end the run; seconds are those of all of it. A PSNR is that of the held-out
     /// views, or of some training views where none is held out.
     pub goal: Goal,

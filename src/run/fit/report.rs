@@ -3,7 +3,10 @@
 use std::path::Path;
 
 use super::super::{Preset, files};
-use super::training::{Job, Trained};
+use super::{
+    Init,
+    training::{Job, Trained},
+};
 use crate::{
     capture::Dataset,
     effects::{Effect, Plan},
@@ -35,7 +38,7 @@ impl Job<'_> {
             warnings: Vec::new(),
             luma: LumaReport {
                 settings: scene.settings.clone(),
-                iterations: scene.iterations,
+                iterations: scene.iterations + options.init.as_ref().map_or(0, Init::iterations),
                 given_up: scene.given_up,
                 splats: scene.splats.len(),
                 poisoned: last.map_or(0, |progress| progress.poisoned),

@@ -2,15 +2,17 @@
 
 use std::{cell::RefCell, fmt::Write, ops::ControlFlow, sync::Arc, time::Instant};
 
+use glam::DVec3;
 use serde_json::Value;
 
 use super::super::{
     Event, Observer, RunError, RunFolder, Stage,
+    colorize::with_rows,
     foreign::tell_unlike,
     scene::{read_splats, tell_trial},
 };
 use super::{
-    FitOptions,
+    FitOptions, Init,
     budget::{Budget, ITERATIONS_MIN, WRITING},
     checkpoint::{FolderKeeper, Found},
 };
@@ -143,13 +145,22 @@ impl Job<'_> {
         let (options, dataset) = (self.options, self.dataset);
         let limit = self.time_for_training(budget.each, found)?;
         let settings = &budget.work.settings;
-        let init = options.init.as_ref();
-        let init = init.map(|path| read_splats(path, dataset.capture.offset, observe));
+        let init = options.init.as_ref().map(|init| {
+            let offset = match init {
+                Init::File(_) => dataset.capture.offset,
+                // They are moved already.
+                Init::Run(..) => DVec3::ZERO,
+            };
+            let path = init.path();
+            let (splats, drawn) = read_splats(&path, offset, observe)?;
+            Ok::<_, RunError>((path, splats, drawn))
+        });
         let init = init.transpose()?;
-        if let (Some(path), Some((splats, drawn))) = (&options.init, &init) {
+        if let Some((path, splats, drawn)) = &init {
             let splats = (path.as_path(), &splats.to_luma());
             tell_unlike(self.gpu, dataset, splats, *drawn, observe)?;
         }
+        let before = options.init.as_ref().map_or(0, Init::iterations);
         let seconds = options.goal.seconds();
         // Held-out views have to be seen as they are measured, where they are to be reached.
         let reaches = options.goal.psnr().is_some() && !self.judge.split.test.is_empty();
@@ -160,12 +171,15 @@ impl Job<'_> {
             overrules: &options.overrules,
             goal: limit.map_or(options.goal, |limit| options.goal.with_seconds(limit)),
             tries: seconds.is_none_or(|limit| limit >= TRIAL_FROM),
-            start: init.as_ref().map(|(splats, _)| splats),
+            start: init.as_ref().map(|(_, splats, _)| splats),
             watched: reaches.then(|| (self.judge, self.judge.split.test.clone())),
         };
-        let log = RefCell::new(match found {
-            Some(found) => found.log(),
-            None => String::from("iteration,loss,splats,seconds,poisoned\n"),
+        let log = RefCell::new(match (found, &options.init) {
+            (Some(found), _) => found.log(),
+            (None, Some(Init::Run(folder, iterations))) => {
+                with_rows(&folder.log(), *iterations, "")
+            }
+            (None, _) => String::from("iteration,loss,splats,seconds,poisoned\n"),
         });
         let observe = RefCell::new(observe);
         let tell = |event| observe.borrow_mut()(event);
@@ -187,7 +201,7 @@ impl Job<'_> {
                 LumaEvent::Trial(progress) => tell_trial(&progress, observe),
                 LumaEvent::Plan(plan) => {
                     observe(Event::Note(plan.to_string()));
-                    if let (Some(path), Some((_, drawn))) = (&options.init, init.as_ref()) {
+                    if let Some((path, _, drawn)) = &init {
                         let antialiased = plan.has(Effect::Antialias);
                         if drawn.antialiased != antialiased {
                             let [is, is_not] = ["antialiased", "not antialiased"];
@@ -210,7 +224,7 @@ impl Job<'_> {
                     let _ = writeln!(
                         log.borrow_mut(),
                         "{},{:.6},{},{:.3},{}",
-                        progress.iteration,
+                        before + progress.iteration,
                         progress.loss,
                         progress.splats,
                         progress.seconds,

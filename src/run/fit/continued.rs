@@ -1,0 +1,47 @@
+//! `fit RUN`: a finished training goes on.
+
+use std::{fs, path::Path};
+
+use super::super::{RunError, RunFolder};
+use super::{FitOptions, Init};
+use crate::effects::Overrules;
+
+impl FitOptions {
+    /// What goes on with a run that is finished, as it was asked for: the same photos, effects
+    /// and settings, from its Gaussians, with the rates that it ended with and photos at full
+    /// size, for as many iterations again; none where the folder is no run.
+    ///
+    /// # Errors
+    /// [`RunError::File`] where the run's report is damaged.
+    pub fn continuing(run: &Path) -> Result<Option<Self>, RunError> {
+        let folder = RunFolder::at(run);
+        if !(folder.report().exists() && folder.luma().exists()) {
+            return Ok(None);
+        }
+        let report = folder.read_report()?;
+        let named = |on| {
+            let of_kind = report.effects.iter().filter(move |effect| effect.on == on);
+            of_kind.map(|effect| effect.name).collect()
+        };
+        let mut settings = report.luma.settings.clone();
+        settings.coarse = 0.0;
+        let [_, last] = settings.rates.means;
+        settings.rates.means = [last; 2];
+        Ok(Some(Self {
+            output: Some(run.to_owned()),
+            preset: Some(report.preset),
+            settings: Box::new(move |asked| asked.clone_from(&settings)),
+            overrules: Overrules {
+                with: named(true),
+                without: named(false),
+                sh_degree: Some(report.luma.settings.sh_degree),
+            },
+            load: report.capture.load,
+            measure_side: report.luma.measured_side,
+            init: Some(Init::Run(folder, report.luma.iterations)),
+            ..Self::new(
+                fs::canonicalize(&report.capture.path).unwrap_or(report.capture.path.into()),
+            )
+        }))
+    }
+}
