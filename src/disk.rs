@@ -2,12 +2,13 @@
 //! renamed. Every step can be made to fail, so that tests see what is left then.
 
 use std::{
+    collections::BTreeSet,
     env,
     fs::{self, File, OpenOptions},
     io::{self, Write},
-    path::Path,
+    path::{Path, PathBuf},
     sync::{
-        LazyLock,
+        LazyLock, Mutex, MutexGuard, PoisonError,
         atomic::{AtomicU64, Ordering},
     },
 };
@@ -66,8 +67,48 @@ pub(crate) fn folder_of(path: &Path) -> &Path {
     }
 }
 
+/// Files and folders that are not in their place yet.
+static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+/// Something that is not in its place yet, as long as this lives.
+struct Unfinished(PathBuf);
+
+impl Unfinished {
+    fn new(path: &Path) -> Self {
+        unfinished().insert(path.to_owned());
+        Self(path.to_owned())
+    }
+}
+
+impl Drop for Unfinished {
+    fn drop(&mut self) {
+        unfinished().remove(&self.0);
+    }
+}
+
+/// A set is whole even where a thread has panicked.
+fn unfinished() -> MutexGuard<'static, BTreeSet<PathBuf>> {
+    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Removes what is not in its place yet: for a program that is told to end at once. Nothing can
+/// be begun or finished as long as the set that is given back lives.
+pub(crate) fn give_up() -> impl Sized {
+    let all = unfinished();
+    for path in &*all {
+        let _ = match path.is_dir() {
+            true => fs::remove_dir_all(path),
+            false => fs::remove_file(path),
+        };
+    }
+    all
+}
+
 /// A file that is not in its place yet. Dropped, it leaves nothing behind.
-pub(crate) struct Draft(NamedTempFile);
+pub(crate) struct Draft {
+    file: NamedTempFile,
+    _listed: Unfinished,
+}
 
 /// An empty file beside `path`, which [`Draft::persist`] puts there once it is complete.
 ///
@@ -83,7 +124,9 @@ pub(crate) fn create(path: &Path) -> io::Result<Draft> {
         // user's other files, whose umask takes away from this.
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
-    builder.tempfile_in(folder_of(path)).map(Draft)
+    let file = builder.tempfile_in(folder_of(path))?;
+    let _listed = Unfinished::new(file.path());
+    Ok(Draft { file, _listed })
 }
 
 impl Draft {
@@ -93,9 +136,9 @@ impl Draft {
     /// The system's.
     pub fn persist(self, path: &Path) -> io::Result<()> {
         step()?;
-        self.0.as_file().sync_all()?;
+        self.file.as_file().sync_all()?;
         step()?;
-        self.0.persist(path)?;
+        self.file.persist(path)?;
         Ok(())
     }
 }
@@ -103,19 +146,43 @@ impl Draft {
 impl Write for Draft {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         step()?;
-        self.0.write(bytes)
+        self.file.write(bytes)
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        self.0.flush()
+        self.file.flush()
     }
 }
 
-/// An empty folder in another one, whose name begins with `prefix`. Dropped, it is removed.
+/// A folder that is not in its place yet. Dropped, it leaves nothing behind.
+pub(crate) struct DraftFolder {
+    made: TempDir,
+    _listed: Unfinished,
+}
+
+impl DraftFolder {
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        self.made.path()
+    }
+
+    /// Puts the folder where it belongs.
+    ///
+    /// # Errors
+    /// The system's.
+    pub fn persist(self, path: &Path) -> io::Result<()> {
+        rename(self.path(), path)?;
+        // What it would remove is elsewhere now.
+        let _ = self.made.keep();
+        Ok(())
+    }
+}
+
+/// An empty folder in another one, whose name begins with `prefix`.
 ///
 /// # Errors
 /// The system's.
-pub(crate) fn temporary_folder(prefix: &str, folder: &Path) -> io::Result<TempDir> {
+pub(crate) fn create_folder(prefix: &str, folder: &Path) -> io::Result<DraftFolder> {
     step()?;
     let mut builder = Builder::new();
     #[cfg(unix)]
@@ -124,7 +191,9 @@ pub(crate) fn temporary_folder(prefix: &str, folder: &Path) -> io::Result<TempDi
         // What lies in it may be moved elsewhere, and is to be as public as other folders.
         builder.permissions(fs::Permissions::from_mode(0o777));
     }
-    builder.prefix(prefix).tempdir_in(folder)
+    let made = builder.prefix(prefix).tempdir_in(folder)?;
+    let _listed = Unfinished::new(made.path());
+    Ok(DraftFolder { made, _listed })
 }
 
 /// A file without a name, in the system's folder for these.

@@ -1,12 +1,13 @@
 //! `gs-chroma fit`.
 
-use std::{path::PathBuf, sync::Arc};
+use std::path::PathBuf;
 
 use clap::{Args, CommandFactory, error::ErrorKind};
 
 use super::{
     Cli, CliError,
     effects::EffectArguments,
+    interrupt::interrupt,
     luma::LumaArguments,
     network::NetworkArguments,
     photos::Photos,
@@ -18,9 +19,7 @@ use crate::capture::LoadOptions;
 use crate::effects::Overrules;
 use crate::luma::Goal;
 use crate::report::timings_table;
-use crate::run::{
-    AheadOptions, CheckpointOptions, EVERY, FitOptions, Init, Interrupt, Preset, RunError, fit,
-};
+use crate::run::{AheadOptions, CheckpointOptions, EVERY, FitOptions, Init, Preset, fit};
 
 /// Rows of the curve that is printed.
 const CURVE_ROWS: usize = 8;
@@ -93,26 +92,6 @@ fn minutes(text: &str) -> Result<Minutes, String> {
     }
 }
 
-/// The status with which a shell expects a program that was interrupted to end.
-const INTERRUPTED: i32 = 130;
-
-/// Heeds SIGINT and SIGTERM: the first is an interrupt where a training can be kept, any other
-/// ends the program.
-fn interrupt() -> Result<Arc<Interrupt>, CliError> {
-    let interrupt = Arc::<Interrupt>::default();
-    let raised = interrupt.clone();
-    let handled = ctrlc::set_handler(move || {
-        if !raised.raise() {
-            std::process::exit(INTERRUPTED);
-        }
-        eprintln!("writing a checkpoint; once more ends at once");
-    });
-    match handled {
-        Ok(()) => Ok(interrupt),
-        Err(error) => Err(RunError::Signals(error.to_string()).into()),
-    }
-}
-
 /// Ends the program as one that was called wrongly.
 fn refuse(reason: &str) -> ! {
     Cli::command()
@@ -172,7 +151,7 @@ impl Fit {
             checkpoints: CheckpointOptions {
                 resume: self.resume,
                 every: self.checkpoint.0,
-                interrupt: interrupt()?,
+                interrupt: interrupt(),
             },
             ahead: AheadOptions {
                 teachers: self.teacher,

@@ -8,6 +8,7 @@ mod eval;
 mod export;
 mod fit;
 mod info;
+mod interrupt;
 mod luma;
 mod network;
 mod photos;
@@ -58,7 +59,7 @@ enum Command {
 impl Cli {
     /// Runs the command; what stops it is told in one line on standard error.
     pub fn main(self) -> ExitCode {
-        match self.run() {
+        match interrupt::heed_signals().and_then(|()| self.run()) {
             Ok(()) => ExitCode::SUCCESS,
             Err(error) => {
                 eprintln!("error: {}", printable::line(&error.to_string()));

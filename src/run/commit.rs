@@ -8,10 +8,11 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use tempfile::TempDir;
-
 use super::{RunError, files};
-use crate::{disk, input};
+use crate::{
+    disk::{self, DraftFolder},
+    input,
+};
 
 /// What is complete, and is to be moved into its place.
 const COMPLETE: &str = ".commit";
@@ -25,7 +26,7 @@ const REMOVED: &str = ".removed";
 /// New files of a run, not in their place yet. Dropped, it leaves nothing behind.
 pub(super) struct Commit {
     folder: PathBuf,
-    made: TempDir,
+    made: DraftFolder,
     removed: Vec<String>,
 }
 
@@ -35,7 +36,7 @@ impl Commit {
     /// # Errors
     /// [`RunError::File`].
     pub fn new(folder: &Path) -> Result<Self, RunError> {
-        let made = disk::temporary_folder(BEGUN, folder);
+        let made = disk::create_folder(BEGUN, folder);
         Ok(Self {
             folder: folder.to_owned(),
             made: made.map_err(files::at(folder))?,
@@ -68,9 +69,7 @@ impl Commit {
         let list = self.made.path().join(REMOVED);
         files::write(&list, self.removed.join("\n").as_bytes())?;
         let complete = self.folder.join(COMPLETE);
-        disk::rename(self.made.path(), &complete).map_err(files::at(&complete))?;
-        // What it would remove is elsewhere now.
-        let _ = self.made.keep();
+        self.made.persist(&complete).map_err(files::at(&complete))?;
         disk::sync(&self.folder);
         finish(&self.folder)
     }
@@ -138,6 +137,8 @@ fn name(path: &Path) -> &OsStr {
 
 #[cfg(test)]
 mod tests {
+    use tempfile::TempDir;
+
     use super::*;
 
     fn run() -> TempDir {
@@ -202,8 +203,7 @@ mod tests {
             let commit = filled(run.path());
             files::write(&commit.made.path().join(REMOVED), b"b\nnowhere").unwrap();
             let complete = run.path().join(COMPLETE);
-            fs::rename(commit.made.path(), &complete).unwrap();
-            let _ = commit.made.keep();
+            commit.made.persist(&complete).unwrap();
             let done: [&dyn Fn(); 3] = [
                 &|| fs::remove_file(run.path().join("b")).unwrap(),
                 &|| fs::rename(complete.join("a"), run.path().join("a")).unwrap(),
@@ -222,8 +222,8 @@ mod tests {
     #[test]
     fn what_was_only_begun_is_removed() {
         let run = run();
-        let commit = filled(run.path());
-        let _ = commit.made.keep();
+        // As if the process had ended.
+        std::mem::forget(filled(run.path()));
         fs::write(run.path().join(".tmpAb12Cd"), "half").unwrap();
         fs::write(run.path().join(".tmp-notes"), "somebody's").unwrap();
         fs::create_dir(run.path().join(COMPLETE)).unwrap();

@@ -58,3 +58,30 @@ fn what_a_dead_process_left_is_finished_or_removed() {
     assert_eq!(place.read("runs/scene/log.csv"), b"iteration,loss\n");
     assert_eq!(place.read("runs/scene/report.json"), report);
 }
+
+#[cfg(unix)]
+#[test]
+fn a_program_that_is_told_to_end_leaves_nothing_behind() {
+    let place = place_with_run();
+    let before = place.files("runs/scene");
+    for signal in ["-INT", "-TERM"] {
+        let mut command = place.command(&["eval", "runs/scene"]);
+        let quiet = command.stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut child = quiet.spawn().expect("the program starts");
+        let begun = Instant::now();
+        while place.files("runs/scene").len() <= before.len() {
+            assert!(
+                begun.elapsed() < Duration::from_secs(60),
+                "nothing is begun"
+            );
+            sleep(Duration::from_millis(2));
+        }
+        let sent = std::process::Command::new("kill")
+            .args([signal, &child.id().to_string()])
+            .status();
+        assert!(sent.expect("kill").success());
+        assert_eq!(child.wait().expect("a child").code(), Some(130));
+        assert_eq!(place.files("runs/scene"), before);
+    }
+    place.succeed(&["eval", "runs/scene"]);
+}

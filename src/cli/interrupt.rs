@@ -1,0 +1,39 @@
+//! SIGINT and SIGTERM.
+
+use std::{
+    process::exit,
+    sync::{Arc, OnceLock},
+};
+
+use super::CliError;
+use crate::{
+    disk,
+    run::{Interrupt, RunError},
+};
+
+/// The status with which a shell expects a program that was interrupted to end.
+const INTERRUPTED: i32 = 130;
+
+/// What a signal interrupts, where it does not end the program.
+static HEEDED: OnceLock<Arc<Interrupt>> = OnceLock::new();
+
+/// Lets signals end the program without leaving files behind that were only begun.
+///
+/// # Errors
+/// [`RunError::Signals`].
+pub(super) fn heed_signals() -> Result<(), CliError> {
+    let handled = ctrlc::set_handler(|| {
+        if HEEDED.get().is_some_and(|interrupt| interrupt.raise()) {
+            eprintln!("writing a checkpoint; once more ends at once");
+            return;
+        }
+        let _nothing_new = disk::give_up();
+        exit(INTERRUPTED);
+    });
+    handled.map_err(|error| RunError::Signals(error.to_string()).into())
+}
+
+/// What the first signal interrupts from now on, where that can be kept.
+pub(super) fn interrupt() -> Arc<Interrupt> {
+    HEEDED.get_or_init(Arc::default).clone()
+}
