@@ -59,6 +59,11 @@ pub(crate) fn step() -> io::Result<()> {
     }
 }
 
+/// An error without the temporary file that it names.
+fn plain(error: io::Error) -> io::Error {
+    error.kind().into()
+}
+
 /// The folder of a file.
 pub(crate) fn folder_of(path: &Path) -> &Path {
     match path.parent() {
@@ -124,7 +129,7 @@ pub(crate) fn create(path: &Path) -> io::Result<Draft> {
         // user's other files, whose umask takes away from this.
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
-    let file = builder.tempfile_in(folder_of(path))?;
+    let file = builder.tempfile_in(folder_of(path)).map_err(plain)?;
     let _listed = Unfinished::new(file.path());
     Ok(Draft { file, _listed })
 }
@@ -138,7 +143,7 @@ impl Draft {
         step()?;
         self.file.as_file().sync_all()?;
         step()?;
-        self.file.persist(path)?;
+        self.file.persist(path).map_err(|failed| failed.error)?;
         Ok(())
     }
 }
@@ -146,11 +151,11 @@ impl Draft {
 impl Write for Draft {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         step()?;
-        self.file.write(bytes)
+        self.file.as_file_mut().write(bytes)
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        self.file.flush()
+        self.file.as_file_mut().flush()
     }
 }
 
@@ -191,7 +196,7 @@ pub(crate) fn create_folder(prefix: &str, folder: &Path) -> io::Result<DraftFold
         // What lies in it may be moved elsewhere, and is to be as public as other folders.
         builder.permissions(fs::Permissions::from_mode(0o777));
     }
-    let made = builder.prefix(prefix).tempdir_in(folder)?;
+    let made = builder.prefix(prefix).tempdir_in(folder).map_err(plain)?;
     let _listed = Unfinished::new(made.path());
     Ok(DraftFolder { made, _listed })
 }
@@ -202,7 +207,7 @@ pub(crate) fn create_folder(prefix: &str, folder: &Path) -> io::Result<DraftFold
 /// The system's.
 pub(crate) fn scratch() -> io::Result<File> {
     step()?;
-    tempfile::tempfile()
+    tempfile::tempfile().map_err(plain)
 }
 
 /// A file that is changed in place, made where it is missing.
@@ -234,7 +239,7 @@ pub(crate) fn make_folder(path: &Path) -> io::Result<()> {
 /// The system's.
 pub(crate) fn try_folder(path: &Path) -> io::Result<()> {
     step()?;
-    tempfile::tempfile_in(path).map(drop)
+    tempfile::tempfile_in(path).map(drop).map_err(plain)
 }
 
 /// Renames a file or a folder.

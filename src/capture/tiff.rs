@@ -25,7 +25,7 @@ pub(super) fn open(bytes: Box<dyn Bytes>) -> Result<(Header, Decoder), String> {
     limits.decoding_buffer_size = 2 * LARGEST_FILE as usize;
     limits.intermediate_buffer_size = limits.decoding_buffer_size;
     let decoder = tiff::decoder::Decoder::new(bytes).map_err(unreadable)?;
-    let mut decoder = Box::new(decoder.with_limits(limits));
+    let mut decoder = Box::new(decoder.with_limits(limits.clone()));
     find_full_picture(&mut decoder)?;
     let (width, height) = decoder.dimensions().map_err(unreadable)?;
     let (bits, channels) = match decoder.colortype().map_err(unreadable)? {
@@ -62,6 +62,11 @@ pub(super) fn open(bytes: Box<dyn Bytes>) -> Result<(Header, Decoder), String> {
             ));
         }
     };
+    // Strips or tiles may announce more than the picture that they make up; twice as much is
+    // what is left over at its borders.
+    let bytes = u64::from(width) * u64::from(height) * channels as u64 * u64::from(bits) / 8;
+    limits.decoding_buffer_size = bytes.min(2 * LARGEST_FILE) as usize;
+    limits.intermediate_buffer_size = 2 * limits.decoding_buffer_size;
     let size = [width, height];
     Ok((
         Header {
@@ -69,7 +74,7 @@ pub(super) fn open(bytes: Box<dyn Bytes>) -> Result<(Header, Decoder), String> {
             depth,
             channels,
         },
-        decoder,
+        Box::new(decoder.with_limits(limits)),
     ))
 }
 

@@ -69,10 +69,8 @@ pub(crate) fn make_folder(path: &Path) -> Result<(), RunError> {
     disk::make_folder(path).map_err(at(path))?;
     match disk::try_folder(path) {
         Ok(()) => Ok(()),
-        // Only the kind: the rest names a temporary file.
         Err(error) => Err(refused(format!(
-            "cannot be written to ({}); choose another folder with -o",
-            error.kind()
+            "cannot be written to ({error}); choose another folder with -o"
         ))),
     }
 }
