@@ -31,7 +31,7 @@ const PLAIN_MOVES: f64 = 2.0;
 
 /// Rounds after which the colors are anchored at the earliest, and not before the loss levels
 /// off: what these have not settled is what the pictures decide badly (docs/decisions.md).
-const FREE_ROUNDS: usize = 6;
+const FREE_ROUNDS: usize = 8;
 
 /// Every so many rounds the views' corrections are found anew; while the loss does not level
 /// off, in each. A gradient before and one after tell nothing about the curvature, so that the

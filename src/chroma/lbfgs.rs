@@ -279,12 +279,7 @@ impl Lbfgs {
                     moved: [
                         bind(
                             &kernels.moved,
-                            &[
-                                parameters,
-                                diagonal,
-                                (11, displacement.raw()),
-                                sums,
-                            ],
+                            &[parameters, diagonal, (11, displacement.raw()), sums],
                         ),
                         bind(&kernels.mean, &[parameters, sums, of_scalars]),
                     ],
