@@ -181,7 +181,7 @@ mod tests {
     /// color of what is as light, though the road lies between.
     #[test]
     fn what_is_like_the_seen_takes_its_color() {
-        let gray = |i: usize| if i < 10 || i >= 30 { 0.3 } else { 0.8 };
+        let gray = |i: usize| if (10..30).contains(&i) { 0.8 } else { 0.3 };
         let luma = row(&(0..40).map(gray).collect::<Vec<f32>>());
         let seen: Vec<f32> = (0..40).map(|i| if i < 20 { 50.0 } else { 0.0 }).collect();
         let color = |i: usize| match i {

@@ -63,9 +63,9 @@ impl TeacherDevice {
     }
 }
 
-/// Where a model runs.
-pub(super) struct Placed {
-    pub session: Session,
+/// What is made of a model, a session for one, and where it runs.
+pub(super) struct Placed<T> {
+    pub made: T,
     pub device: TeacherDevice,
     /// The devices that the library at hand has, and that come first, but that do not take the
     /// model; with what they say.
@@ -81,7 +81,7 @@ pub(super) fn load(
     path: &Path,
     environment: &Environment,
     device: TeacherDevice,
-) -> Result<Placed, TeacherError> {
+) -> Result<Placed<Session>, TeacherError> {
     let on = |device: TeacherDevice| {
         let provider = device.provider().map_err(|device| TeacherError::NoDevice {
             path: path.to_path_buf(),
@@ -97,24 +97,25 @@ pub(super) fn load(
         TeacherDevice::Auto => &TRIED[..],
         _ => &[device],
     };
-    let (session, device, refused) = first_that_takes(tried, on)?;
-    Ok(Placed {
-        session,
-        device,
-        refused,
-    })
+    first_that_takes(tried, on)
 }
 
-/// What is made on the first of some devices where that succeeds, and what those before say that
-/// are there; the last one's error where none does.
+/// What is made on the first of some devices where that succeeds; the last one's error where none
+/// does.
 fn first_that_takes<T>(
     tried: &[TeacherDevice],
     on: impl Fn(TeacherDevice) -> Result<T, TeacherError>,
-) -> Result<(T, TeacherDevice, Vec<(TeacherDevice, String)>), TeacherError> {
+) -> Result<Placed<T>, TeacherError> {
     let mut refused = Vec::new();
     for (k, &device) in tried.iter().enumerate() {
         match on(device) {
-            Ok(made) => return Ok((made, device, refused)),
+            Ok(made) => {
+                return Ok(Placed {
+                    made,
+                    device,
+                    refused,
+                });
+            }
             Err(error) if k + 1 == tried.len() => return Err(error),
             // A library without it has nothing to say.
             Err(TeacherError::NoDevice { .. }) => (),
@@ -164,9 +165,12 @@ mod tests {
                 device: other.name(),
             }),
         };
-        let (made, device, refused) = first_that_takes(&TRIED, on).unwrap();
-        assert_eq!((made, device), (7, TeacherDevice::Cpu));
-        assert_eq!(refused, [(TeacherDevice::Cuda, "no driver".to_owned())]);
+        let placed = first_that_takes(&TRIED, on).unwrap();
+        assert_eq!((placed.made, placed.device), (7, TeacherDevice::Cpu));
+        assert_eq!(
+            placed.refused,
+            [(TeacherDevice::Cuda, "no driver".to_owned())]
+        );
         // What is asked for by name has no other to fall back on.
         let alone = first_that_takes(&[TeacherDevice::Cuda], on);
         assert!(matches!(alone, Err(TeacherError::BadModel { .. })));

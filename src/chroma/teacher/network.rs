@@ -74,8 +74,8 @@ impl Loaded {
         let placed = device::load(path, &environment, settings.device)?;
         Ok(Self {
             path: path.to_path_buf(),
-            ports: Ports::of(&placed.session),
-            session: placed.session,
+            ports: Ports::of(&placed.made),
+            session: placed.made,
             device: placed.device,
             refused: placed.refused,
             sha256,
