@@ -77,12 +77,12 @@ pub struct ChromaSettings {
 /// hundredth of it fits the teacher better and held-out photos worse (docs/decisions.md).
 const RIDGE: f64 = 0.01;
 
-/// A twentieth: directions that a change of the pictures bends the loss twenty times less along
-/// than along the best decided stay half of the way back (docs/decisions.md).
+/// A twentieth: along directions in which the loss bends twenty times less than in those that are
+/// decided best, colors go half of their way (docs/decisions.md).
 const ANCHOR: f64 = 0.05;
 
-/// Beyond these the loss falls further, but held-out photos are met no better and views agree
-/// less (docs/decisions.md).
+/// By then anchored colors have come to rest: four times as many change the pictures by less than
+/// 0.1 ΔE00 (docs/decisions.md).
 const ROUNDS: usize = 12;
 
 /// A tenth of what is just seen (docs/decisions.md).
