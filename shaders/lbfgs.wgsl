@@ -8,6 +8,10 @@
 // sums, which bound it. The second step is the majorizer's as well: the first spans residuals
 // from far to near, and says little about the curvature where it ends.
 //
+// Unknowns may be anchored: from then on each is drawn to where it was accepted, the more the
+// more the pictures bent the loss there. Directions that these decide badly, which only a great
+// many steps would go along, stay as they are; what they decide goes on.
+//
 // Unknowns may have floors. One that stands at its floor, and would go below, is held there;
 // the others are put onto theirs if they go below (after Bertsekas 1982, projected Newton).
 import package::common::numeric::linear_group;
@@ -27,6 +31,8 @@ struct LbfgsParameters {
     constants: u32,
     // What a constant harmonic of one adds to a color.
     color: f32,
+    // What an anchor's pull is of the pictures'.
+    anchor: f32,
 }
 
 // Pairs of displacements and changes of the gradient that are remembered.
@@ -103,6 +109,9 @@ const LEAST_SCALE: f32 = 1e-3;
 // Any of the arrays above.
 @group(0) @binding(15) var<storage, read> left: array<f32>;
 @group(0) @binding(16) var<storage, read> right: array<f32>;
+// Where the unknowns are drawn to, and how strongly, planes as `diagonal`: 0 until they are anchored.
+@group(0) @binding(17) var<storage, read_write> anchors: array<f32>;
+@group(0) @binding(18) var<storage, read_write> pulls: array<f32>;
 
 var<workgroup> sums: array<f32, 256>;
 
@@ -151,7 +160,8 @@ fn total_from(first: u32, local: u32) -> f32 {
 // One over the majorizer's diagonal. Blend weights sum to at most one a pixel, so the sum
 // of a Gaussian's weights bounds its row.
 fn inverse_diagonal(k: u32) -> f32 {
-    return 1.0 / (parameters.diagonal_scale * diagonal[of_channel(k)] + parameters.ridge);
+    let own = of_channel(k);
+    return 1.0 / (parameters.diagonal_scale * diagonal[own] + parameters.ridge + pulls[own]);
 }
 
 // Where `diagonal` has an unknown's.
@@ -160,7 +170,7 @@ fn of_channel(k: u32) -> u32 {
     return (k / n) % parameters.diagonals * n + k % n;
 }
 
-// The ridge's part of the gradient, and partial sums of its part of the loss.
+// The parts of ridge and anchors in the gradient, and partial sums of theirs in the loss.
 @compute @workgroup_size(256)
 fn lbfgs_ridge(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
     let block = linear_group(group, groups);
@@ -168,8 +178,10 @@ fn lbfgs_ridge(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) gro
     var own = 0.0;
     if k < parameters.length {
         let x = unknowns[k];
-        gradient[k] += parameters.ridge * x;
-        own = 0.5 * parameters.ridge * x * x;
+        let off = x - anchors[k];
+        let pull = pulls[of_channel(k)];
+        gradient[k] += parameters.ridge * x + pull * off;
+        own = 0.5 * (parameters.ridge * x * x + pull * off * off);
     }
     leave_sum(block, local, own);
 }
@@ -233,6 +245,19 @@ fn lbfgs_pair(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) grou
     } else {
         unknowns[k] = accepted_unknowns[k];
         gradient[k] = accepted_gradient[k];
+    }
+}
+
+// Anchors the unknowns at the accepted point, where `diagonal` is of it still. Neither the loss
+// there changes nor its gradient.
+@compute @workgroup_size(256)
+fn lbfgs_anchor(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
+    let k = linear_group(group, groups) * 256u + local;
+    if k < parameters.length {
+        anchors[k] = accepted_unknowns[k];
+        if k < parameters.diagonals * parameters.splats {
+            pulls[k] = parameters.anchor * parameters.color * diagonal[k];
+        }
     }
 }
 

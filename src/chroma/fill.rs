@@ -1,5 +1,7 @@
-//! Color for Gaussians that the views hardly show: that of their neighbors.
+//! Color for Gaussians that the views hardly show: that of their neighbors, and of those that
+//! are like them.
 
+use super::likeness::likely_colors;
 use crate::splats::{ShField, Splats, nearest_neighbors, sh};
 
 /// Neighbors that a Gaussian looks to.
@@ -13,16 +15,22 @@ const GRAY_RANGE: f64 = 0.1;
 /// Gaussian fully.
 const NEIGHBOR_PIXELS: f64 = 1.0;
 
-/// Sweeps over all Gaussians: color travels at least so many neighbors far into what
-/// nobody sees.
-const SWEEPS: usize = 100;
+/// Pixels that decide a color: what the views lack of them is left to likeness.
+const DECIDED: f32 = 1.0;
+
+/// The sweeps end once none moves a harmonic by more, in CIELAB units, or after so many:
+/// every Gaussian holds on to a pixel's worth of its own, so that a few dozen do.
+const SETTLED: f64 = 0.01;
+const SWEEPS: usize = 200;
 
 /// Draws the constant harmonic of `chroma` towards that of the neighbors in position
-/// and gray: the less a Gaussian is seen, the more.
+/// and gray, and of seen Gaussians that are like it in gray, texture, size and place: the less a
+/// Gaussian is seen, the more.
 ///
 /// `seen` is how far the views decide each Gaussian's color, in pixels that show it
-/// fully. Minimizes `Σ seen_i |c_i - chroma_i|² + Σ w_ij |c_i - c_j|²` by Gauss–Seidel
-/// sweeps. The higher harmonics of Gaussians seen less than a pixel fade with `seen`.
+/// fully. Minimizes `Σ seen_i |c_i - chroma_i|² + Σ (1 - seen_i)₊ |c_i - like_i|² +
+/// Σ w_ij |c_i - c_j|²` by Gauss–Seidel sweeps. The higher harmonics of Gaussians seen less than
+/// a pixel fade with `seen`.
 ///
 /// # Panics
 /// When the three have not the same number of Gaussians.
@@ -31,40 +39,26 @@ pub fn fill_unseen(luma: &Splats, chroma: &mut ShField, seen: &[f32]) {
     assert_eq!(count, seen.len());
     let stride = 2 * sh::coefficient_count(chroma.degree);
     assert_eq!(chroma.coefficients.len(), count * stride);
-    let grays: Vec<f64> = (0..count)
-        .map(|i| 0.5 + sh::C0 * f64::from(luma.sh.of(i)[0]))
-        .collect();
     let neighbors = nearest_neighbors(&luma.means, NEIGHBORS);
-    // Both ends weigh an edge alike, so that the sweeps descend one energy.
-    let mut edges: Vec<Vec<(u32, f64)>> = vec![Vec::new(); count];
-    for (i, others) in neighbors.iter().enumerate() {
-        for &j in others {
-            let apart = (grays[i] - grays[j as usize]) / GRAY_RANGE;
-            let weight = NEIGHBOR_PIXELS / NEIGHBORS as f64 * (-apart * apart).exp();
-            edges[i].push((j, 0.5 * weight));
-            edges[j as usize].push((i as u32, 0.5 * weight));
-        }
-    }
     let found: Vec<[f64; 2]> = (chroma.coefficients.chunks_exact(stride))
         .map(|c| [f64::from(c[0]), f64::from(c[1])])
         .collect();
-    let mut filled = found.clone();
-    for sweep in 0..SWEEPS {
-        for k in 0..count {
-            // There and back, or color would travel one way only.
-            let i = if sweep % 2 == 0 { k } else { count - 1 - k };
-            let own = f64::from(seen[i]);
-            let (mut sum, mut weight) = ([own * found[i][0], own * found[i][1]], own);
-            for &(j, w) in &edges[i] {
-                let other = filled[j as usize];
-                sum = [sum[0] + w * other[0], sum[1] + w * other[1]];
-                weight += w;
+    let likely = likely_colors(luma, &neighbors, &found, seen, DECIDED);
+    // What each Gaussian holds on to, and how strongly.
+    let own: Vec<([f64; 2], f64)> = (0..count)
+        .map(|i| {
+            let by_views = f64::from(seen[i]);
+            let likeness = f64::from(DECIDED) - by_views;
+            match likely[i] {
+                Some(like) => {
+                    let sum = [0, 1].map(|c| by_views * found[i][c] + likeness * like[c]);
+                    (sum, f64::from(DECIDED))
+                }
+                None => (found[i].map(|v| by_views * v), by_views),
             }
-            if weight > 0.0 {
-                filled[i] = sum.map(|s| s / weight);
-            }
-        }
-    }
+        })
+        .collect();
+    let filled = relaxed(&own, &edges(luma, &neighbors), found);
     for (i, out) in chroma.coefficients.chunks_exact_mut(stride).enumerate() {
         let sure = seen[i].min(1.0);
         out[0] = filled[i][0] as f32;
@@ -73,6 +67,53 @@ pub fn fill_unseen(luma: &Splats, chroma: &mut ShField, seen: &[f32]) {
             *c *= sure;
         }
     }
+}
+
+/// Neighbors of each Gaussian, and what their word weighs; both ends weigh an edge alike, so that
+/// sweeps descend one energy.
+fn edges(luma: &Splats, neighbors: &[Vec<u32>]) -> Vec<Vec<(u32, f64)>> {
+    let gray = |i: usize| sh::C0 * f64::from(luma.sh.of(i)[0]);
+    let mut edges: Vec<Vec<(u32, f64)>> = vec![Vec::new(); neighbors.len()];
+    for (i, others) in neighbors.iter().enumerate() {
+        for &j in others {
+            let apart = (gray(i) - gray(j as usize)) / GRAY_RANGE;
+            let weight = NEIGHBOR_PIXELS / NEIGHBORS as f64 * (-apart * apart).exp();
+            edges[i].push((j, 0.5 * weight));
+            edges[j as usize].push((i as u32, 0.5 * weight));
+        }
+    }
+    edges
+}
+
+/// Gauss–Seidel sweeps from `colors` until nothing moves: `own` are weighed sums and weights.
+fn relaxed(
+    own: &[([f64; 2], f64)],
+    edges: &[Vec<(u32, f64)>],
+    mut colors: Vec<[f64; 2]>,
+) -> Vec<[f64; 2]> {
+    let count = colors.len();
+    for sweep in 0..SWEEPS {
+        let mut moved = 0.0_f64;
+        for k in 0..count {
+            // There and back, or color would travel one way only.
+            let i = if sweep % 2 == 0 { k } else { count - 1 - k };
+            let (mut sum, mut weight) = own[i];
+            for &(j, w) in &edges[i] {
+                let other = colors[j as usize];
+                sum = [sum[0] + w * other[0], sum[1] + w * other[1]];
+                weight += w;
+            }
+            if weight > 0.0 {
+                let new = sum.map(|s| s / weight);
+                moved = (0..2).fold(moved, |most, c| most.max((new[c] - colors[i][c]).abs()));
+                colors[i] = new;
+            }
+        }
+        if moved < SETTLED {
+            break;
+        }
+    }
+    colors
 }
 
 #[cfg(test)]
@@ -134,6 +175,28 @@ mod tests {
         fill_unseen(&row(&grays), &mut field, &seen);
         assert!((field.of(9)[0] - 10.0).abs() < 0.5, "{:?}", field.of(9));
         assert!((field.of(10)[0] + 40.0).abs() < 0.5, "{:?}", field.of(10));
+    }
+
+    /// A meadow and a road, of which only the nearer halves are seen: the farther ones take the
+    /// color of what is as light, though the road lies between.
+    #[test]
+    fn what_is_like_the_seen_takes_its_color() {
+        let gray = |i: usize| if (10..30).contains(&i) { 0.8 } else { 0.3 };
+        let luma = row(&(0..40).map(gray).collect::<Vec<f32>>());
+        let seen: Vec<f32> = (0..40).map(|i| if i < 20 { 50.0 } else { 0.0 }).collect();
+        let color = |i: usize| match i {
+            0..10 => [-30.0, 40.0],
+            10..20 => [2.0, 3.0],
+            _ => [0.0; 2],
+        };
+        let mut field = chroma(&(0..40).map(color).collect::<Vec<_>>());
+        fill_unseen(&luma, &mut field, &seen);
+        for (i, expected) in [(23, [2.0, 3.0]), (35, [-30.0, 40.0])] {
+            let found = field.of(i);
+            for c in 0..2 {
+                assert!((found[c] - expected[c]).abs() < 4.0, "{i}: {found:?}");
+            }
+        }
     }
 
     #[test]

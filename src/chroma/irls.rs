@@ -29,6 +29,10 @@ const RGB_UNITS: f64 = 100.0;
 const PLAIN_ROUNDS: usize = 4;
 const PLAIN_MOVES: f64 = 2.0;
 
+/// Rounds after which the colors are anchored at the earliest, and not before the loss levels
+/// off: what these have not settled is what the pictures decide badly (docs/decisions.md).
+const FREE_ROUNDS: usize = 8;
+
 /// Every so many rounds the views' corrections are found anew; while the loss does not level
 /// off, in each. A gradient before and one after tell nothing about the curvature, so that the
 /// others give the pairs.
@@ -51,6 +55,8 @@ pub struct IrlsSolver<'a> {
     done: usize,
     /// Whether the loss does not level off yet.
     plain: bool,
+    /// Whether the colors are anchored.
+    anchored: bool,
     /// Rounds of late, in a row, that hardly moved the colors.
     settled: usize,
     /// Whether the last round's step was undone, for a shorter one to be tried.
@@ -111,7 +117,8 @@ impl<'a> IrlsSolver<'a> {
         };
         let ridge = units * settings.ridge * 0.5 / pixels as f64 * sh::C0 * sh::C0;
         let size = [count, channels];
-        let lbfgs = Lbfgs::new(gpu, &frozen.kernels.lbfgs, &system, size, ridge as f32)?;
+        let priors = [ridge, settings.anchor].map(|prior| prior as f32);
+        let lbfgs = Lbfgs::new(gpu, &frozen.kernels.lbfgs, &system, size, priors)?;
         Ok(Self {
             passes,
             system,
@@ -121,6 +128,7 @@ impl<'a> IrlsSolver<'a> {
             spent: 0.0,
             done: 0,
             plain: settings.robust.is_some(),
+            anchored: settings.anchor == 0.0,
             settled: 0,
             undone: false,
             ended: false,
@@ -175,8 +183,15 @@ impl<'a> IrlsSolver<'a> {
             self.lbfgs.step(&mut recorder);
             recorder.submit();
             let mut state = State::of(&self.lbfgs.state_later(gpu).wait(gpu)?);
-            self.correct(round, state.moved.is_some());
+            let accepted = state.moved.is_some();
+            self.correct(round, accepted);
             self.done = round + 1;
+            if !self.anchored && !self.plain && accepted && self.done >= FREE_ROUNDS {
+                self.anchored = true;
+                let mut recorder = Recorder::new(gpu);
+                self.lbfgs.anchor(&mut recorder);
+                recorder.submit();
+            }
             let moves_less = |than| state.moved.is_some_and(|moved| moved < than);
             // What is left of an undone step is short whatever remains to be done.
             let whole = !std::mem::replace(&mut self.undone, state.moved.is_none());

@@ -27,6 +27,8 @@ pub struct LbfgsParameters {
     pub constants: u32,
     /// What a constant harmonic of one adds to a color.
     pub color: f32,
+    /// What an anchor's pull is of the pictures'.
+    pub anchor: f32,
 }
 
 /// Twin of `MEMORY`: pairs that are remembered. Eight do no better (docs/decisions.md).
@@ -69,13 +71,13 @@ pub const UNBOUNDED: f32 = f32::MIN;
 
 /// Planes of floats that a system and its solver take for each plane of unknowns, beside
 /// these: gradient, floors, the accepted point and its gradient, preconditioner,
-/// direction, and the pairs.
-const PLANES: usize = 6 + 2 * MEMORY;
+/// direction, anchors, and the pairs.
+const PLANES: usize = 7 + 2 * MEMORY;
 
 /// Bytes of a system of `planes` planes of unknowns, and of its solver.
 pub(super) fn bytes(splats: usize, planes: usize) -> u64 {
-    // And the diagonal's, two at most.
-    4 * splats as u64 * ((1 + PLANES) * planes + 2) as u64
+    // And the diagonal's, two at most, with as many pulls.
+    4 * splats as u64 * ((1 + PLANES) * planes + 4) as u64
 }
 
 /// The compiled kernels.
@@ -83,6 +85,7 @@ pub struct LbfgsKernels {
     ridge: Kernel,
     judge: Kernel,
     keep: Kernel,
+    anchor: Kernel,
     begin: Kernel,
     dot: Kernel,
     curvature: Kernel,
@@ -106,6 +109,7 @@ impl LbfgsKernels {
             ridge: kernel("lbfgs_ridge"),
             judge: kernel("lbfgs_judge"),
             keep: kernel("lbfgs_pair"),
+            anchor: kernel("lbfgs_anchor"),
             begin: kernel("lbfgs_begin"),
             dot: kernel("lbfgs_dot"),
             curvature: kernel("lbfgs_curvature"),
@@ -145,6 +149,7 @@ pub struct Lbfgs {
     scalars: Buffer<f32>,
     ridge: Bound,
     judge: Bound,
+    anchor: Bound,
     begin: Bound,
     precondition: Bound,
     slope: [Bound; 2],
@@ -157,7 +162,7 @@ pub struct Lbfgs {
 /// Where the iteration stands.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct State {
-    /// The least loss so far, the ridge's part included.
+    /// The least loss so far, the parts of ridge and anchors included.
     pub loss: f64,
     /// Mean change of the colors by the last step: as Gaussians are drawn, and as the loss
     /// weighs the pixels. `None` where that step was undone.
@@ -176,7 +181,9 @@ impl State {
 }
 
 impl Lbfgs {
-    /// Ties the kernels to `system` of `splats` Gaussians with so many channels.
+    /// Ties the kernels to `system` of `splats` Gaussians with so many channels. `ridge` is
+    /// added to the matrix's diagonal, and once the unknowns are anchored the share `anchor` of
+    /// what pictures add to it.
     ///
     /// # Errors
     /// [`GpuError::TooLarge`].
@@ -185,7 +192,7 @@ impl Lbfgs {
         kernels: &LbfgsKernels,
         system: &System,
         [splats, channels]: [usize; 2],
-        ridge: f32,
+        [ridge, anchor]: [f32; 2],
     ) -> Result<Self, GpuError> {
         let length = system.gradient.len();
         // The adjoint multiplies by the constant harmonic once, the matrix by all harmonics
@@ -204,11 +211,14 @@ impl Lbfgs {
                 diagonal_scale: (sh::C0 * harmonics as f64) as f32,
                 constants: (channels * splats) as u32,
                 color: sh::C0 as f32,
+                anchor,
             },
         )?;
         let zeros = |label| Buffer::<f32>::zeros(gpu, label, length);
         let [accepted_unknowns, accepted_gradient] = [zeros("accepted")?, zeros("accepted")?];
         let (preconditioner, direction) = (zeros("preconditioner")?, zeros("direction")?);
+        let anchors = zeros("anchors")?;
+        let pulls = Buffer::<f32>::zeros(gpu, "pulls", system.diagonal.len())?;
         let block_sums = Buffer::<f32>::zeros(gpu, "lbfgs sums", 2 * blocks as usize)?;
         let scalars = Buffer::<f32>::zeros(gpu, "scalars", SHARED_SCALARS + 2 * MEMORY)?;
         let bind = |kernel: &Kernel, used: &[(u32, &wgpu::Buffer)]| {
@@ -216,6 +226,8 @@ impl Lbfgs {
         };
         let (parameters, unknowns) = ((0, parameters.raw()), (2, system.unknowns.raw()));
         let (gradient, floors) = ((3, system.gradient.raw()), (5, system.floors.raw()));
+        let diagonal = (4, system.diagonal.raw());
+        let (anchors, pulls) = ((17, anchors.raw()), (18, pulls.raw()));
         let inverse = (9, preconditioner.raw());
         let sums = (13, block_sums.raw());
         let (of_direction, of_scalars) = ((10, direction.raw()), (14, scalars.raw()));
@@ -267,12 +279,7 @@ impl Lbfgs {
                     moved: [
                         bind(
                             &kernels.moved,
-                            &[
-                                parameters,
-                                (4, system.diagonal.raw()),
-                                (11, displacement.raw()),
-                                sums,
-                            ],
+                            &[parameters, diagonal, (11, displacement.raw()), sums],
                         ),
                         bind(&kernels.mean, &[parameters, sums, of_scalars]),
                     ],
@@ -286,10 +293,23 @@ impl Lbfgs {
             })
             .collect::<Result<_, GpuError>>()?;
         let lbfgs = Self {
-            ridge: bind(&kernels.ridge, &[parameters, unknowns, gradient, sums]),
+            ridge: bind(
+                &kernels.ridge,
+                &[parameters, unknowns, gradient, sums, anchors, pulls],
+            ),
             judge: bind(
                 &kernels.judge,
                 &[parameters, (6, system.losses.raw()), sums, of_scalars],
+            ),
+            anchor: bind(
+                &kernels.anchor,
+                &[
+                    parameters,
+                    (7, accepted_unknowns.raw()),
+                    diagonal,
+                    anchors,
+                    pulls,
+                ],
             ),
             begin: bind(
                 &kernels.begin,
@@ -297,11 +317,12 @@ impl Lbfgs {
                     parameters,
                     unknowns,
                     gradient,
-                    (4, system.diagonal.raw()),
+                    diagonal,
                     floors,
                     inverse,
                     of_direction,
                     of_scalars,
+                    pulls,
                 ],
             ),
             precondition: bind(
@@ -351,6 +372,12 @@ impl Lbfgs {
     /// so far, but what the gradient changes by says nothing of the curvature.
     pub fn changed(&self, gpu: &Gpu) {
         self.scalars.write_at(gpu, CHANGED, &[1.0]);
+    }
+
+    /// Records that from now on each unknown is drawn to where it is accepted: after
+    /// [`Lbfgs::step`] that accepted it, before the diagonal is another point's.
+    pub fn anchor(&self, recorder: &mut Recorder) {
+        self.all(recorder, &self.anchor);
     }
 
     /// Records a step from where loss and gradient are ready.

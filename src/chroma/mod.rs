@@ -16,6 +16,7 @@ mod irls;
 mod kernels;
 mod lbfgs;
 mod lesson;
+mod likeness;
 mod loss;
 mod passes;
 mod picture;

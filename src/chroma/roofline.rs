@@ -24,10 +24,11 @@ pub fn minimum_words(kernel: &str, load: &Load) -> Option<f64> {
         "view_correction_sums" => 5.0 * pixels,
         // A few sums of each view.
         "view_correction" => 0.0,
-        "lbfgs_ridge" => 3.0 * planes,
+        "lbfgs_ridge" => 4.0 * planes + 2.0 * splats,
+        "lbfgs_anchor" => 2.0 * planes + 4.0 * splats,
         "lbfgs_add" | "lbfgs_precondition" => 3.0 * planes,
         "lbfgs_pair" => 8.0 * planes,
-        "lbfgs_begin" => 5.0 * planes + 2.0 * splats,
+        "lbfgs_begin" => 5.0 * planes + 4.0 * splats,
         "lbfgs_dot" | "lbfgs_spread" | "lbfgs_moved" => 2.0 * planes,
         "lbfgs_step" => 5.0 * planes,
         // One partial sum for every 256 unknowns.

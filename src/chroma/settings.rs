@@ -58,6 +58,10 @@ pub struct ChromaSettings {
     /// How strongly least squares draws every Gaussian towards gray, in pixels that show it:
     /// what depends on less stays where the others leave it.
     pub ridge: f64,
+    /// How strongly least squares holds colors where its first rounds left them, as a share of
+    /// how strongly pictures decide them: what these decide badly stays. 0: not at all.
+    #[serde(default)]
+    pub anchor: f64,
     /// Bytes of the device that solving and baking may take; views that do not fit are brought
     /// one at a time. `None`: all that is worth keeping, up to 2 GiB.
     pub memory_limit: Option<u64>,
@@ -73,8 +77,12 @@ pub struct ChromaSettings {
 /// hundredth of it fits the teacher better and held-out photos worse (docs/decisions.md).
 const RIDGE: f64 = 0.01;
 
-/// Beyond these the loss falls further, but held-out photos are met no better and views agree
-/// less (docs/decisions.md).
+/// A twentieth: along directions in which the loss bends twenty times less than in those that are
+/// decided best, colors go half of their way (docs/decisions.md).
+const ANCHOR: f64 = 0.05;
+
+/// By then anchored colors have come to rest: four times as many change the pictures by less than
+/// 0.1 ΔE00 (docs/decisions.md).
 const ROUNDS: usize = 12;
 
 /// A tenth of what is just seen (docs/decisions.md).
@@ -111,6 +119,7 @@ impl ChromaSettings {
             rounds: ROUNDS,
             settled: SETTLED,
             ridge: RIDGE,
+            anchor: ANCHOR,
             memory_limit: None,
             match_saturation: true,
             fill: true,
@@ -124,6 +133,7 @@ impl ChromaSettings {
             robust: None,
             correct_views: false,
             settled: 0.0,
+            anchor: 0.0,
             match_saturation: false,
             fill: false,
             ..Self::irls()

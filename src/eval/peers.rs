@@ -134,6 +134,7 @@ fn rgb_settings() -> ChromaSettings {
         correct_views: false,
         rounds: RGB_ROUNDS,
         settled: 0.0,
+        anchor: 0.0,
         ..ChromaSettings::irls()
     }
 }

@@ -1,6 +1,6 @@
 //! L-BFGS (Nocedal 1980; Nocedal and Wright 2006, algorithm 7.4): a step that raised the loss
 //! is shortened where a parabola says (3.5 there), and if that raises it too, undone for the
-//! majorizer's. With floors (Bertsekas 1982), and elimination to compare with.
+//! majorizer's. With anchors, with floors (Bertsekas 1982), and elimination to compare with.
 
 use std::collections::VecDeque;
 
@@ -49,6 +49,8 @@ pub struct Lbfgs {
     displacement: Vec<f64>,
     floors: Vec<f64>,
     ridge: f64,
+    /// Where each unknown is drawn to, and how strongly.
+    anchors: (Vec<f64>, Vec<f64>),
     /// The accepted point and its gradient.
     accepted: (Vec<f64>, Vec<f64>),
     /// The loss there, of what is minimized now.
@@ -74,6 +76,7 @@ impl Lbfgs {
             direction: vec![0.0; unknowns.len()],
             displacement: vec![0.0; unknowns.len()],
             accepted: (unknowns.clone(), vec![0.0; unknowns.len()]),
+            anchors: (unknowns.clone(), vec![0.0; unknowns.len()]),
             unknowns,
             undone: 0,
             floors,
@@ -87,11 +90,17 @@ impl Lbfgs {
         }
     }
 
-    /// One step from where loss and gradient are these, the ridge's parts left out.
+    /// From now on each unknown is drawn to where it is accepted, its `pulls / 2` times the
+    /// square of the distance.
+    pub fn anchor(&mut self, pulls: Vec<f64>) {
+        self.anchors = (self.accepted.0.clone(), pulls);
+    }
+
+    /// One step from where loss and gradient are these, the parts of ridge and anchors left out.
     /// `diagonal` is positive and the majorizer's, the ridge included.
     pub fn step(&mut self, loss: f64, gradient: &[f64], diagonal: &[f64]) {
-        let gradient: Vec<f64> = (gradient.iter().zip(&self.unknowns))
-            .map(|(g, x)| g + self.ridge * x)
+        let gradient: Vec<f64> = (gradient.iter().zip(&self.unknowns).zip(self.off_anchors()))
+            .map(|((g, x), (pull, off))| g + self.ridge * x + pull * off)
             .collect();
         let paired = self.loss.is_some() && self.age >= AGE;
         let length = self.judge(loss);
@@ -156,7 +165,7 @@ impl Lbfgs {
 
     /// Accepts the present point or goes back; gives the length of the next step.
     fn judge(&mut self, loss: f64) -> f64 {
-        let loss = self.with_ridge(loss);
+        let loss = self.with_priors(loss);
         match self.loss {
             Some(before) if rises(before, loss) => {
                 self.unknowns.clone_from(&self.accepted.0);
@@ -215,14 +224,26 @@ impl Lbfgs {
         direction
     }
 
-    fn with_ridge(&self, loss: f64) -> f64 {
-        loss + 0.5 * self.ridge * dot(&self.unknowns, &self.unknowns)
+    fn with_priors(&self, loss: f64) -> f64 {
+        let anchored: f64 = self.off_anchors().map(|(pull, off)| pull * off * off).sum();
+        loss + 0.5 * (self.ridge * dot(&self.unknowns, &self.unknowns) + anchored)
+    }
+
+    /// Each anchor's pull, and how far off its unknown is.
+    fn off_anchors(&self) -> impl Iterator<Item = (f64, f64)> {
+        let (anchors, pulls) = &self.anchors;
+        let off = self.unknowns.iter().zip(anchors).map(|(x, a)| x - a);
+        pulls.iter().copied().zip(off)
     }
 
     fn hold(&mut self, diagonal: &[f64]) {
         for (k, m) in self.preconditioner.iter_mut().enumerate() {
             let held = self.unknowns[k] <= self.floors[k] && self.accepted.1[k] >= 0.0;
-            *m = if held { 0.0 } else { 1.0 / diagonal[k] };
+            *m = if held {
+                0.0
+            } else {
+                1.0 / (diagonal[k] + self.anchors.1[k])
+            };
         }
     }
 }

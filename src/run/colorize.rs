@@ -453,7 +453,7 @@ fn read_or_empty(path: &Path) -> String {
 fn few_colors(unseen: Option<f64>, [colored, views]: [usize; 2]) -> Option<String> {
     let unseen = unseen.filter(|&unseen| unseen >= UNSEEN && colored < views)?;
     Some(format!(
-        "{colored} of {views} photos have colors, and {:.0} % of the Gaussians are in none of these: they take their neighbors' color; color photos that show the rest",
+        "{colored} of {views} photos have colors, and {:.0} % of the Gaussians are in none of these: they take the color of what is like them; color photos that show the rest",
         100.0 * unseen
     ))
 }

@@ -203,6 +203,8 @@ impl Teachers {
             ));
         }
         for member in &mut self.teachers {
+            let told = member.teacher.passed_over().into_iter();
+            told.for_each(|line| observe(Event::Warning(line)));
             member.teacher.know(&dataset.capture);
         }
         if let Some((_, hints)) = &mut self.hints {

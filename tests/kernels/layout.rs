@@ -186,7 +186,8 @@ fn twins() -> Vec<Twin> {
                 ridge,
                 diagonal_scale,
                 constants,
-                color
+                color,
+                anchor
             }
         ),
         twin!(

@@ -69,6 +69,7 @@ fn settings() -> ChromaSettings {
         robust: None,
         fill: false,
         settled: 0.0,
+        anchor: 0.0,
         ..ChromaSettings::irls()
     }
 }

@@ -175,6 +175,19 @@ fn broken_losses_and_steps_are_noticed() {
             "gradient[k] += parameters.ridge * x",
             "gradient[k] -= parameters.ridge * x",
         ),
+        ("lbfgs", "lbfgs_ridge", "pull * off;", "-pull * off;"),
+        (
+            "lbfgs",
+            "lbfgs_begin",
+            " + pulls[own]",
+            " + 3.0 * pulls[own]",
+        ),
+        (
+            "lbfgs",
+            "lbfgs_anchor",
+            "anchors[k] = accepted_unknowns[k]",
+            "anchors[k] = 0.5 * accepted_unknowns[k]",
+        ),
         (
             "lbfgs",
             "lbfgs_judge",

@@ -63,7 +63,16 @@ impl TeacherDevice {
     }
 }
 
-/// Loads a model, and says where it runs.
+/// What is made of a model, a session for one, and where it runs.
+pub(super) struct Placed<T> {
+    pub made: T,
+    pub device: TeacherDevice,
+    /// The devices that the library at hand has, and that come first, but that do not take the
+    /// model; with what they say.
+    pub refused: Vec<(TeacherDevice, String)>,
+}
+
+/// Loads a model.
 ///
 /// # Errors
 /// [`TeacherError::NoDevice`] where the library has not the one that is asked for,
@@ -72,7 +81,7 @@ pub(super) fn load(
     path: &Path,
     environment: &Environment,
     device: TeacherDevice,
-) -> Result<(Session, TeacherDevice), TeacherError> {
+) -> Result<Placed<Session>, TeacherError> {
     let on = |device: TeacherDevice| {
         let provider = device.provider().map_err(|device| TeacherError::NoDevice {
             path: path.to_path_buf(),
@@ -84,17 +93,37 @@ pub(super) fn load(
             reason: first_line(error),
         })
     };
-    if device != TeacherDevice::Auto {
-        return Ok((on(device)?, device));
+    let tried = match device {
+        TeacherDevice::Auto => &TRIED[..],
+        _ => &[device],
+    };
+    first_that_takes(tried, on)
+}
+
+/// What is made on the first of some devices where that succeeds; the last one's error where none
+/// does.
+fn first_that_takes<T>(
+    tried: &[TeacherDevice],
+    on: impl Fn(TeacherDevice) -> Result<T, TeacherError>,
+) -> Result<Placed<T>, TeacherError> {
+    let mut refused = Vec::new();
+    for (k, &device) in tried.iter().enumerate() {
+        match on(device) {
+            Ok(made) => {
+                return Ok(Placed {
+                    made,
+                    device,
+                    refused,
+                });
+            }
+            Err(error) if k + 1 == tried.len() => return Err(error),
+            // A library without it has nothing to say.
+            Err(TeacherError::NoDevice { .. }) => (),
+            Err(TeacherError::BadModel { reason, .. }) => refused.push((device, reason)),
+            Err(error) => refused.push((device, first_line(error))),
+        }
     }
-    let [others @ .., last] = TRIED;
-    let taken = others
-        .into_iter()
-        .find_map(|device| Some((on(device).ok()?, device)));
-    match taken {
-        Some(taken) => Ok(taken),
-        None => Ok((on(last)?, last)),
-    }
+    unreachable!("the last one is returned")
 }
 
 /// A session that always answers alike on one machine: a fixed number of threads (how a sum is
@@ -116,4 +145,34 @@ fn session(
         // What goes wrong is in the errors.
         .with_log_level(ort::logging::LogLevel::Fatal)?
         .commit_from_file(path)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn devices_that_fail_are_told_and_those_that_are_not_there_are_not() {
+        let path = || "net.onnx".into();
+        let on = |device| match device {
+            TeacherDevice::Cuda => Err(TeacherError::BadModel {
+                path: path(),
+                reason: "no driver".into(),
+            }),
+            TeacherDevice::Cpu => Ok(7),
+            other => Err(TeacherError::NoDevice {
+                path: path(),
+                device: other.name(),
+            }),
+        };
+        let placed = first_that_takes(&TRIED, on).unwrap();
+        assert_eq!((placed.made, placed.device), (7, TeacherDevice::Cpu));
+        assert_eq!(
+            placed.refused,
+            [(TeacherDevice::Cuda, "no driver".to_owned())]
+        );
+        // What is asked for by name has no other to fall back on.
+        let alone = first_that_takes(&[TeacherDevice::Cuda], on);
+        assert!(matches!(alone, Err(TeacherError::BadModel { .. })));
+    }
 }

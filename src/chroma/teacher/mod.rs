@@ -170,6 +170,14 @@ impl Teacher {
         }
     }
 
+    /// What to say of processors that a network would rather run on, but that fail.
+    pub fn passed_over(&self) -> Vec<String> {
+        match &self.source {
+            Source::Network(network) => network.passed_over(),
+            Source::Folder(_) => Vec::new(),
+        }
+    }
+
     /// Colors one photo, which may be given by its path relative to the photo folder;
     /// `hints` are told to a network that takes hints.
     ///

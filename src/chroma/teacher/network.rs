@@ -44,6 +44,8 @@ pub(super) struct Loaded {
     pub ports: Ports,
     session: Session,
     device: TeacherDevice,
+    /// See [`device::Placed`].
+    refused: Vec<(TeacherDevice, String)>,
     sha256: String,
     /// What the table of networks says of it: its name there and its contract.
     pub known: Option<(String, Profile)>,
@@ -75,12 +77,13 @@ impl Loaded {
         let known = catalog.identify(path, &sha256)?;
         let known = known.map(|known| Ok((known.name.clone(), known.contract()?)));
         let environment = runtime::environment()?;
-        let (session, device) = device::load(path, &environment, settings.device)?;
+        let placed = device::load(path, &environment, settings.device)?;
         Ok(Self {
             path: path.to_path_buf(),
-            ports: Ports::of(&session),
-            session,
-            device,
+            ports: Ports::of(&placed.made),
+            session: placed.made,
+            device: placed.device,
+            refused: placed.refused,
             sha256,
             known: known.transpose()?,
         })
@@ -163,6 +166,17 @@ impl NetworkTeacher {
             device: Some(self.loaded.device),
             input_size: Some(self.profile.input_size(square, self.fit.fixed, self.size)),
         }
+    }
+
+    /// What to say of devices that would have come first.
+    pub(super) fn passed_over(&self) -> Vec<String> {
+        let (name, taken) = (file_name(&self.loaded.path), self.loaded.device.name());
+        (self.loaded.refused.iter())
+            .map(|(device, reason)| {
+                let device = device.name();
+                format!("{name} runs on {taken}: {device} is there, but fails ({reason})")
+            })
+            .collect()
     }
 
     /// Colors one photo; the answer has the network's size.

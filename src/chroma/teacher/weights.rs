@@ -2,24 +2,33 @@
 
 use super::TeacherError;
 use crate::{hash::Hasher, input};
-use prost::Message;
 use std::collections::BTreeSet;
+use std::io::{self, BufReader, Read, Seek};
 use std::path::{Component, Path};
 
 /// SHA-256 of a model in hexadecimal: of its `.onnx` file, and where that names files of
-/// weights, of these names and files as well, in the order of the names.
+/// weights, of these names and files as well, in the order of the names. No file is in memory as
+/// a whole.
 ///
 /// # Errors
 /// [`TeacherError::Io`], [`TeacherError::NoWeights`] where a file of weights is not there.
 pub(super) fn identity(path: &Path) -> Result<String, TeacherError> {
-    let bytes = input::read(path).map_err(TeacherError::io(path))?;
     let mut hasher = Hasher::default();
-    hasher.update(&bytes);
-    // What does not decode is for ONNX Runtime to complain of.
-    let model = Model::decode(&bytes[..]).unwrap_or_default();
-    drop(bytes);
+    let mut file = input::open(path).map_err(TeacherError::io(path))?;
+    hasher
+        .update_with(&mut file)
+        .and_then(|()| file.rewind())
+        .map_err(TeacherError::io(path))?;
+    let length = file.metadata().map_err(TeacherError::io(path))?.len();
     let mut names = BTreeSet::new();
-    model.collect(&mut names);
+    let mut messages = Messages {
+        from: BufReader::new(file),
+        names: &mut names,
+    };
+    // What does not decode is for ONNX Runtime to complain of.
+    if messages.walk(Kind::Model, length, 0).is_err() {
+        names.clear();
+    }
     for name in names {
         let inside = |part| matches!(part, Component::Normal(_) | Component::CurDir);
         let missing = || TeacherError::NoWeights {
@@ -39,90 +48,108 @@ pub(super) fn identity(path: &Path) -> Result<String, TeacherError> {
     Ok(hasher.finish())
 }
 
-/// What of ONNX's messages leads to files of weights; tags are those of `onnx.proto`.
-#[derive(Clone, PartialEq, Message)]
-struct Model {
-    #[prost(message, optional, tag = "7")]
-    graph: Option<Graph>,
-    #[prost(message, repeated, tag = "25")]
-    functions: Vec<Function>,
+/// ONNX's messages that lead to files of weights.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Model,
+    Function,
+    Graph,
+    Node,
+    Attribute,
+    Tensor,
+    /// A key and a value.
+    Entry,
+    Text,
 }
 
-#[derive(Clone, PartialEq, Message)]
-struct Graph {
-    #[prost(message, repeated, tag = "1")]
-    nodes: Vec<Node>,
-    #[prost(message, repeated, tag = "5")]
-    initializers: Vec<Tensor>,
-}
-
-#[derive(Clone, PartialEq, Message)]
-struct Function {
-    #[prost(message, repeated, tag = "7")]
-    nodes: Vec<Node>,
-}
-
-#[derive(Clone, PartialEq, Message)]
-struct Node {
-    #[prost(message, repeated, tag = "5")]
-    attributes: Vec<Attribute>,
-}
-
-#[derive(Clone, PartialEq, Message)]
-struct Attribute {
-    #[prost(message, optional, tag = "5")]
-    tensor: Option<Tensor>,
-    #[prost(message, optional, tag = "6")]
-    graph: Option<Graph>,
-    #[prost(message, repeated, tag = "10")]
-    tensors: Vec<Tensor>,
-    #[prost(message, repeated, tag = "11")]
-    graphs: Vec<Graph>,
-}
-
-#[derive(Clone, PartialEq, Message)]
-struct Tensor {
-    #[prost(message, repeated, tag = "13")]
-    outside: Vec<Entry>,
-}
-
-#[derive(Clone, PartialEq, Message)]
-struct Entry {
-    #[prost(string, tag = "1")]
-    key: String,
-    #[prost(string, tag = "2")]
-    value: String,
-}
-
-impl Model {
-    fn collect(&self, names: &mut BTreeSet<String>) {
-        let of_functions = self.functions.iter().flat_map(|function| &function.nodes);
-        self.graph.iter().for_each(|graph| graph.collect(names));
-        of_functions.for_each(|node| node.collect(names));
+impl Kind {
+    /// What a field holds; none where it leads nowhere. Tags are those of `onnx.proto`.
+    fn field(self, tag: u64) -> Option<Self> {
+        Some(match (self, tag) {
+            (Self::Model, 7) | (Self::Attribute, 6 | 11) => Self::Graph,
+            (Self::Model, 25) => Self::Function,
+            (Self::Graph, 1) | (Self::Function, 7) => Self::Node,
+            (Self::Node, 5) => Self::Attribute,
+            (Self::Graph, 5) | (Self::Attribute, 5 | 10) => Self::Tensor,
+            (Self::Tensor, 13) => Self::Entry,
+            (Self::Entry, 1 | 2) => Self::Text,
+            _ => return None,
+        })
     }
 }
 
-impl Graph {
-    fn collect(&self, names: &mut BTreeSet<String>) {
-        self.nodes.iter().for_each(|node| node.collect(names));
-        (self.initializers.iter()).for_each(|tensor| tensor.collect(names));
-    }
+/// Graphs in attributes of graphs are followed so far: none comes near it.
+const DEPTH: usize = 100;
+
+/// Protobuf's ways to write a field.
+const VARINT: u64 = 0;
+const FIXED_64: u64 = 1;
+const DELIMITED: u64 = 2;
+const FIXED_32: u64 = 5;
+
+/// A model as its messages come by.
+struct Messages<'a, R> {
+    from: R,
+    names: &'a mut BTreeSet<String>,
 }
 
-impl Node {
-    fn collect(&self, names: &mut BTreeSet<String>) {
-        for attribute in &self.attributes {
-            let tensors = attribute.tensor.iter().chain(&attribute.tensors);
-            tensors.for_each(|tensor| tensor.collect(names));
-            let graphs = attribute.graph.iter().chain(&attribute.graphs);
-            graphs.for_each(|graph| graph.collect(names));
+impl<R: Read> Messages<'_, R> {
+    /// Reads a message of so many bytes.
+    fn walk(&mut self, kind: Kind, length: u64, depth: usize) -> io::Result<()> {
+        let damaged = || io::Error::from(io::ErrorKind::InvalidData);
+        if depth > DEPTH {
+            return Err(damaged());
         }
+        let (mut left, mut entry) = (length, [const { String::new() }; 2]);
+        while left > 0 {
+            let key = self.varint(&mut left)?;
+            let size = match key & 7 {
+                VARINT => {
+                    self.varint(&mut left)?;
+                    continue;
+                }
+                FIXED_64 => 8,
+                FIXED_32 => 4,
+                DELIMITED => self.varint(&mut left)?,
+                _ => return Err(damaged()),
+            };
+            left = left.checked_sub(size).ok_or_else(damaged)?;
+            match kind.field(key >> 3).filter(|_| key & 7 == DELIMITED) {
+                None => self.skip(size)?,
+                Some(Kind::Text) => {
+                    let text = &mut entry[usize::from(key >> 3 == 2)];
+                    text.clear();
+                    (&mut self.from).take(size).read_to_string(text)?;
+                }
+                Some(inner) => self.walk(inner, size, depth + 1)?,
+            }
+        }
+        let [key, value] = entry;
+        if kind == Kind::Entry && key == "location" {
+            self.names.insert(value);
+        }
+        Ok(())
     }
-}
 
-impl Tensor {
-    fn collect(&self, names: &mut BTreeSet<String>) {
-        let locations = self.outside.iter().filter(|entry| entry.key == "location");
-        names.extend(locations.map(|entry| entry.value.clone()));
+    fn varint(&mut self, left: &mut u64) -> io::Result<u64> {
+        let mut value = 0;
+        for shift in (0..64).step_by(7) {
+            let mut byte = [0];
+            self.from.read_exact(&mut byte)?;
+            *left = left.checked_sub(1).ok_or(io::ErrorKind::InvalidData)?;
+            value |= u64::from(byte[0] & 127) << shift;
+            if byte[0] < 128 {
+                return Ok(value);
+            }
+        }
+        Err(io::ErrorKind::InvalidData.into())
+    }
+
+    fn skip(&mut self, size: u64) -> io::Result<()> {
+        let skipped = io::copy(&mut (&mut self.from).take(size), &mut io::sink())?;
+        if skipped < size {
+            return Err(io::ErrorKind::UnexpectedEof.into());
+        }
+        Ok(())
     }
 }

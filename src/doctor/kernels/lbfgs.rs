@@ -27,6 +27,8 @@ struct Problem {
     start: Vec<f64>,
     floors: Vec<f64>,
     ridge: f64,
+    /// Steps after which the unknowns are anchored.
+    anchored: Option<usize>,
     /// The loss at the start.
     offset: f64,
 }
@@ -105,6 +107,7 @@ impl Problem {
             start: (0..length).map(|_| random.range(-20.0, 20.0)).collect(),
             floors: vec![f64::from(UNBOUNDED); length],
             ridge: round(0.02 * scale * SH_C0 * SH_C0),
+            anchored: None,
             matrix: Product::Full(matrix),
         }
     }
@@ -129,6 +132,7 @@ impl Problem {
             start: draw(-20.0, 20.0),
             floors: vec![f64::from(UNBOUNDED); 2 * splats],
             ridge: round(1e-3),
+            anchored: None,
             weights,
         }
     }
@@ -144,6 +148,14 @@ impl Problem {
             }
         }
         self
+    }
+
+    /// The same anchored after so many steps.
+    fn anchored(self, steps: usize) -> Self {
+        Self {
+            anchored: Some(steps),
+            ..self
+        }
     }
 
     /// Loss and gradient at `x`, without the ridge.
@@ -166,9 +178,13 @@ impl Problem {
             .map(|weight| round(scale) * weight + self.ridge)
             .collect();
         let mut lbfgs = oracle::Lbfgs::new(self.start.clone(), self.floors.clone(), self.ridge);
-        for more in told {
+        for (step, more) in told.iter().enumerate() {
             let (loss, gradient) = self.at(&lbfgs.unknowns);
             lbfgs.step(loss + more, &gradient, &diagonal);
+            if self.anchored == Some(step + 1) {
+                let pulls = weights.iter().map(|weight| ANCHOR * SH_C0 * weight);
+                lbfgs.anchor(pulls.collect());
+            }
         }
         lbfgs.end(self.at(&lbfgs.unknowns).0);
         let moved = lbfgs.moved(&weights, 2 * self.splats);
@@ -193,7 +209,7 @@ impl Problem {
             &LbfgsKernels::new(gpu),
             &system,
             [self.splats, 2],
-            self.ridge as f32,
+            [self.ridge, ANCHOR].map(|prior| prior as f32),
         )?;
         let evaluate = |more: f64| {
             let (loss, gradient) = self.at(&widen(&system.unknowns.read(gpu)?));
@@ -204,10 +220,13 @@ impl Problem {
             system.losses.write(gpu, &losses);
             Ok::<(), GpuError>(())
         };
-        for &more in told {
+        for (step, &more) in told.iter().enumerate() {
             evaluate(more)?;
             let mut recorder = Recorder::new(gpu);
             lbfgs.step(&mut recorder);
+            if self.anchored == Some(step + 1) {
+                lbfgs.anchor(&mut recorder);
+            }
             recorder.submit();
         }
         evaluate(0.0)?;
@@ -218,6 +237,9 @@ impl Problem {
         Ok((widen(&system.unknowns.read(gpu)?), moved))
     }
 }
+
+/// What anchors pull of what pictures do.
+const ANCHOR: f64 = 0.25;
 
 /// Losses that sum to the whole: more than a workgroup has threads.
 const LOSSES: usize = 300;
@@ -274,6 +296,8 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
     let undone = after(&free, &[0.0, 0.0, 0.0, 9.0, 9.0, 0.0])?;
     let bounded: Vec<Problem> = problems().into_iter().map(Problem::bounded).collect();
     let above_floors = after(&bounded, &[0.0; 5])?;
+    let anchored: Vec<Problem> = problems().into_iter().map(|p| p.anchored(3)).collect();
+    let drawn_to_anchors = after(&anchored, &[0.0; 6])?;
     let still = (free.into_iter())
         .map(|mut problem| {
             problem.start.fill(0.0);
@@ -292,6 +316,7 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
         row("unknowns after 5 steps", 1.85e-5, &rows_after[1]),
         row("unknowns in the end", 2.78e-7, &solved),
         row("unknowns with floors", 4.38e-5, &above_floors),
+        row("unknowns with anchors", 1.21e-5, &drawn_to_anchors),
         row("unknowns after a shorter step", 1.39e-5, &shortened),
         row("unknowns after two steps undone", 1.01e-6, &undone),
         row("how far the last step went", 1.97e-6, &moved),

@@ -54,8 +54,8 @@ pub const REASONS: &[(&str, &str, &str)] = &[
     ),
     (
         "inverse_diagonal",
-        "1.0 / (parameters.diagonal_scale * diagonal[of_channel(k)] + parameters.ridge)",
-        "the ridge is positive, sums of weights are not negative",
+        "1.0 / (parameters.diagonal_scale * diagonal[own] + parameters.ridge + pulls[own])",
+        "the ridge is positive, sums of weights and shares of them are not negative",
     ),
     (
         "lbfgs_judge",
