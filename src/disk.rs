@@ -98,6 +98,7 @@ fn unfinished() -> MutexGuard<'static, BTreeSet<PathBuf>> {
 
 /// Removes what is not in its place yet: for a program that is told to end at once. Nothing can
 /// be begun or finished as long as the set that is given back lives.
+#[cfg(feature = "cli")]
 pub(crate) fn give_up() -> impl Sized {
     let all = unfinished();
     for path in &*all {
@@ -279,6 +280,7 @@ pub(crate) fn remove(path: &Path) -> io::Result<()> {
 ///
 /// # Errors
 /// The system's.
+#[cfg(feature = "cli")]
 pub(crate) fn link(from: &Path, to: &Path) -> io::Result<()> {
     step()?;
     fs::hard_link(from, to).or_else(|_| fs::copy(from, to).map(drop))

@@ -4,7 +4,7 @@
     tools/check_kills.py [--kills N] [--seed N] [COLMAP_DIR]
 
 Each training is killed (SIGKILL) two to four times and resumed with `fit --resume`; each coloring
-is killed once and begun again. Whatever the moment, the next command must be able to go on, and
+is killed twice and resumed with `colorize --resume`. Whatever the moment, the next command must be able to go on, and
 the files must end with the bytes of runs that nobody killed. Prints a table, and exits with 1
 where a byte differs or a command fails. Linux and macOS.
 """
@@ -84,14 +84,18 @@ def main():
                 kills += killed(dice.uniform(0.0, 1.05 * fitting), *fit, part, *more)
             if (part / "checkpoint").exists() or not (part / "report.json").exists():
                 run(*fit, part, "--resume")
-            color = ["colorize", part, "--teacher", TEACHER]
-            kills += killed(dice.uniform(0.0, 1.05 * coloring), *color)
-            run(*color)
+            color = ["colorize", part, "--teacher", TEACHER, "--checkpoint", "0.0001"]
+            for _ in range(2):
+                more = ["--resume"] if (part / "checkpoint-color").exists() else []
+                resumed += bool(more)
+                kills += killed(dice.uniform(0.0, 1.05 * coloring), *color, *more)
+            run(*color, "--resume")
             found = [digest(part / name) for name in ("luma.ply", "color.ply", "chroma.npy")]
             different += found != wanted
             left = [path.name for path in part.iterdir() if path.name.startswith((".tmp", ".next"))]
-            if left or (part / "checkpoint").exists():
-                sys.exit(f"left behind: {left or 'checkpoint'}")
+            left += [path.name for path in part.glob("checkpoint*")]
+            if left:
+                sys.exit(f"left behind: {left}")
         print("| kills | runs | resumed | runs with other bytes |")
         print("|---:|---:|---:|---:|")
         print(f"| {kills} | {rounds} | {resumed} | {different} |")

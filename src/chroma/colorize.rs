@@ -1,10 +1,14 @@
 //! Stage 2 as a whole: a gray scene and someone who colors photos in, a colored scene out.
 
-use std::{ops::ControlFlow, sync::Arc, time::Instant};
+use std::{cell::Cell, ops::ControlFlow, sync::Arc, time::Instant};
 
 use super::{
     ChosenDegree, ChromaError, ChromaProgress, ChromaSettings, Colorizer, Correction, Degree,
-    FrozenViews, Lesson, Room, Task, bake, choose_degree, match_saturation, plan, solve, teach,
+    FrozenViews, IrlsSolver, Lesson, Room, Task, bake,
+    checkpoint::{ChromaCheckpoint, ChromaKeeper, NoChromaKeeper, State},
+    choose_degree, match_saturation, plan,
+    solve::solve_from,
+    teach,
 };
 use crate::{
     capture::{Camera, Dataset},
@@ -137,6 +141,21 @@ impl Distill<'_> {
         settings: &ChromaSettings,
         observe: &mut ColorizeObserver<'_>,
     ) -> Result<Colored, ChromaError> {
+        self.run_from(None, &mut NoChromaKeeper, settings, observe)
+    }
+
+    /// The same from a checkpoint on, and with checkpoints for `keeper` after rounds.
+    ///
+    /// # Errors
+    /// As [`colorize`], [`ChromaError::OtherCheckpoint`], and [`ChromaError::Cancelled`] where
+    /// the keeper ends it.
+    pub fn run_from(
+        &self,
+        checkpoint: Option<&ChromaCheckpoint>,
+        keeper: &mut dyn ChromaKeeper,
+        settings: &ChromaSettings,
+        observe: &mut ColorizeObserver<'_>,
+    ) -> Result<Colored, ChromaError> {
         let begun = Instant::now();
         // No photo is looked at any more.
         self.dataset.release();
@@ -170,11 +189,16 @@ impl Distill<'_> {
         )?;
         let correction = plan::correction(lesson.spread, settings.solver, self.correct_views);
         settings.correct_views = correction.on;
-        let (mut last, mut peak) = (None, None);
-        let mut chosen = None;
-        settings.sh_degree = match self.sh_degree {
-            Degree::Fixed(degree) => degree,
-            Degree::Auto => {
+        let last = Cell::new(checkpoint.and_then(|found| found.state.last));
+        let mut peak = None;
+        let mut chosen = checkpoint.and_then(|found| found.state.chosen.clone());
+        settings.sh_degree = match (self.sh_degree, &chosen) {
+            (Degree::Fixed(degree), _) => degree,
+            (Degree::Auto, Some(chosen)) => {
+                go_on(observe(ColorizeEvent::Chosen(chosen)))?;
+                chosen.degree
+            }
+            (Degree::Auto, None) => {
                 let found = choose_degree(
                     &frozen,
                     &settings,
@@ -192,29 +216,55 @@ impl Distill<'_> {
         };
         let mut effects = [correction, plan::degree(self.sh_degree, chosen.as_ref())];
         go_on(observe(ColorizeEvent::Plan(&effects)))?;
-        let mut solved = |settings: &ChromaSettings| {
-            solve(
+        let mut solved = |settings: &ChromaSettings, from, uncorrected| {
+            let between = &mut |solver: &IrlsSolver<'_>| {
+                if !keeper.wants() {
+                    return Ok(true);
+                }
+                Ok(keeper.keep(ChromaCheckpoint {
+                    state: State {
+                        chosen: chosen.clone(),
+                        uncorrected,
+                        last: last.get(),
+                    },
+                    solver: solver.state()?,
+                }))
+            };
+            solve_from(
+                (from, between),
                 &frozen,
                 settings,
                 &lesson.targets,
                 tasks.clone(),
                 self.luma,
                 &mut |progress| {
-                    last = Some(progress);
+                    last.set(Some(progress));
                     peak = peak.max(gpu.allocated_bytes());
                     observe(ColorizeEvent::Solving(progress))
                 },
             )
         };
-        let mut found = solved(&settings)?;
-        if let Some([before, after]) = self.worse(&found.corrections) {
-            settings.correct_views = false;
-            effects[0].on = false;
-            effects[0].decided_by = Decider::Trial;
-            found = solved(&settings)?;
-            go_on(observe(ColorizeEvent::Uncorrected { before, after }))?;
+        let mut from = checkpoint.map(|found| &found.solver);
+        let mut worse = checkpoint.and_then(|found| found.state.uncorrected);
+        let mut corrected = None;
+        if worse.is_none() {
+            let found = solved(&settings, from.take(), None)?;
+            worse = self.worse(&found.corrections);
+            corrected = Some(found);
         }
-        let solved = found;
+        let solved = match (corrected, worse) {
+            (Some(found), None) => found,
+            (_, worse) => {
+                settings.correct_views = false;
+                effects[0].on = false;
+                effects[0].decided_by = Decider::Trial;
+                let found = solved(&settings, from, worse)?;
+                let [before, after] = worse.unwrap_or_default();
+                go_on(observe(ColorizeEvent::Uncorrected { before, after }))?;
+                found
+            }
+        };
+        keeper.end();
         let mut chroma = solved.chroma;
         let mut saturation = 1.0;
         // Where no point is seen twice nobody knows what views agree on.
@@ -236,7 +286,7 @@ impl Distill<'_> {
             saturation,
             effects,
             colored_views,
-            last,
+            last: last.get(),
             load: solved.load,
             estimated_device_memory: frozen.demand(),
             peak_device_memory: peak,

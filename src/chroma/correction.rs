@@ -146,6 +146,14 @@ impl Corrections {
         recorder.dispatch(&kernels.solve, &self.solve, 1);
     }
 
+    /// What the next round goes by, by name.
+    pub(super) fn kept(&self) -> [(&'static str, &Buffer<Correction>); 2] {
+        [
+            ("corrections", &self.corrections),
+            ("corrections before", &self.before),
+        ]
+    }
+
     /// Records the return to those before the last.
     pub fn undo(&self, recorder: &mut Recorder) {
         recorder.copy(self.before.raw(), self.corrections.raw());

@@ -1,5 +1,6 @@
 //! Which degree of the chroma harmonics the views prove useful.
 
+use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 
 use super::{
@@ -15,7 +16,7 @@ const HELD_BACK: usize = 5;
 pub const LEAST_GAIN: f64 = 0.03;
 
 /// The degree that was chosen, and what each that was tried gave.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ChosenDegree {
     /// The lowest degree that no higher one beats by enough.
     pub degree: u32,

@@ -38,6 +38,9 @@ pub enum ChromaError {
         /// Of the camera.
         expected: [u32; 2],
     },
+    /// A checkpoint is one of another distillation.
+    #[error("the checkpoint is one of another distillation")]
+    OtherCheckpoint,
     /// The memory limit does not hold what one view needs.
     #[error(
         "{splats} Gaussians and one view at a time need {} MiB of the device but the memory limit is {}",

@@ -3,11 +3,12 @@
 //! least squares, whose steps L-BFGS makes longer, over all views and all of it on the
 //! device.
 
-use std::time::Instant;
+use std::{collections::BTreeMap, time::Instant};
 
 use super::{
     ChromaError, ChromaObserver, ChromaProgress, ChromaSettings, Correction, FrozenViews, Targets,
     Task,
+    checkpoint::{Rounds, SolverState},
     lbfgs::{Lbfgs, State, System, UNBOUNDED},
     passes::{Ending, Judging, Passes, Space},
 };
@@ -51,6 +52,8 @@ pub struct IrlsSolver<'a> {
     /// Of the largest view.
     pixels: usize,
     spent: f64,
+    /// Seconds of earlier rounds.
+    seconds: f64,
     /// Rounds done.
     done: usize,
     /// Whether the loss does not level off yet.
@@ -126,6 +129,7 @@ impl<'a> IrlsSolver<'a> {
             settings: settings.clone(),
             pixels,
             spent: 0.0,
+            seconds: 0.0,
             done: 0,
             plain: settings.robust.is_some(),
             anchored: settings.anchor == 0.0,
@@ -158,6 +162,101 @@ impl<'a> IrlsSolver<'a> {
     /// [`ChromaError`] when the device is lost or targets cannot be read.
     pub fn run(&mut self, observe: &mut ChromaObserver<'_>) -> Result<(), ChromaError> {
         self.run_to(self.settings.rounds, observe)
+    }
+
+    /// The same, with `between` after each round: `false` ends it.
+    ///
+    /// # Errors
+    /// As [`IrlsSolver::run`], those of `between`, and [`ChromaError::Cancelled`].
+    pub(super) fn run_between(
+        &mut self,
+        observe: &mut ChromaObserver<'_>,
+        between: &mut dyn FnMut(&Self) -> Result<bool, ChromaError>,
+    ) -> Result<(), ChromaError> {
+        while self.done < self.settings.rounds && !self.ended {
+            self.run_to(self.done + 1, observe)?;
+            if !between(self)? {
+                return Err(ChromaError::Cancelled);
+            }
+        }
+        Ok(())
+    }
+
+    /// What of the system itself a checkpoint has.
+    fn of_system(&self) -> [(&'static str, &Buffer<f32>); 2] {
+        [
+            ("unknowns", &self.system.unknowns),
+            ("diagonal", &self.system.diagonal),
+        ]
+    }
+
+    /// All that the next rounds go by.
+    ///
+    /// # Errors
+    /// [`ChromaError::Gpu`] when the device is lost.
+    pub(super) fn state(&self) -> Result<SolverState, ChromaError> {
+        let gpu = self.gpu();
+        let (newest, kept) = self.lbfgs.kept();
+        let mut buffers = BTreeMap::new();
+        for (name, buffer) in self.of_system() {
+            buffers.insert(name.to_owned(), buffer.read(gpu)?);
+        }
+        for (name, buffer) in kept {
+            buffers.insert(name.clone(), buffer.read(gpu)?);
+        }
+        for (name, buffer) in self.passes.corrections.kept() {
+            let values = bytemuck::cast_slice(&buffer.read(gpu)?).to_vec();
+            buffers.insert(name.to_owned(), values);
+        }
+        let rounds = Rounds {
+            done: self.done,
+            plain: self.plain,
+            settled: self.settled,
+            undone: self.undone,
+            corrected: self.corrected,
+            anchored: self.anchored,
+            ended: self.ended,
+            newest,
+            spent: self.spent,
+        };
+        Ok(SolverState { rounds, buffers })
+    }
+
+    /// Goes on from a state of the same problem; `false` where it is of another.
+    pub(super) fn go_on_from(&mut self, state: &SolverState) -> bool {
+        let gpu = self.gpu();
+        let put = |name: &str, buffer: &Buffer<f32>| {
+            let values = state.buffers.get(name);
+            let values = values.filter(|values| values.len() == buffer.len());
+            values.map(|values| buffer.write(gpu, values)).is_some()
+        };
+        let mut fits = true;
+        for (name, buffer) in self.of_system() {
+            fits &= put(name, buffer);
+        }
+        for (name, buffer) in self.lbfgs.kept().1 {
+            fits &= put(name, buffer);
+        }
+        for (name, buffer) in self.passes.corrections.kept() {
+            let values = state.buffers.get(name).map(Vec::as_slice);
+            let found: Result<&[Correction], _> =
+                bytemuck::try_cast_slice(values.unwrap_or_default());
+            match found {
+                Ok(found) if found.len() == buffer.len() => buffer.write(gpu, found),
+                _ => fits = false,
+            }
+        }
+        let rounds = state.rounds;
+        self.lbfgs.go_on_after(rounds.newest);
+        self.done = rounds.done;
+        self.plain = rounds.plain;
+        self.settled = rounds.settled;
+        self.undone = rounds.undone;
+        self.corrected = rounds.corrected;
+        self.anchored = rounds.anchored;
+        self.ended = rounds.ended;
+        self.spent = rounds.spent;
+        fits
     }
 
     /// Goes on until so many rounds are done, and leaves the rest for later.
@@ -213,12 +312,13 @@ impl<'a> IrlsSolver<'a> {
                 loss: state.loss / self.passes.tasks.len() as f64,
                 moved: state.moved,
                 passes: self.spent,
-                seconds: begun.elapsed().as_secs_f64(),
+                seconds: self.seconds + begun.elapsed().as_secs_f64(),
             });
             if told.is_break() {
                 return Err(ChromaError::Cancelled);
             }
         }
+        self.seconds += begun.elapsed().as_secs_f64();
         Ok(())
     }
 

@@ -147,6 +147,8 @@ struct OfPair {
 /// The kernels tied to one system.
 pub struct Lbfgs {
     scalars: Buffer<f32>,
+    /// All that the next step goes by, by name.
+    kept: Vec<(String, Buffer<f32>)>,
     ridge: Bound,
     judge: Bound,
     anchor: Bound,
@@ -226,6 +228,16 @@ impl Lbfgs {
         };
         let (parameters, unknowns) = ((0, parameters.raw()), (2, system.unknowns.raw()));
         let (gradient, floors) = ((3, system.gradient.raw()), (5, system.floors.raw()));
+        let mut kept: Vec<(String, Buffer<f32>)> = [
+            ("accepted unknowns", &accepted_unknowns),
+            ("accepted gradient", &accepted_gradient),
+            ("preconditioner", &preconditioner),
+            ("direction", &direction),
+            ("anchors", &anchors),
+            ("pulls", &pulls),
+        ]
+        .map(|(name, buffer)| (name.to_owned(), buffer.clone()))
+        .into();
         let diagonal = (4, system.diagonal.raw());
         let (anchors, pulls) = ((17, anchors.raw()), (18, pulls.raw()));
         let inverse = (9, preconditioner.raw());
@@ -236,6 +248,8 @@ impl Lbfgs {
             .map(|index| {
                 let displacement = zeros("displacement")?;
                 let change = zeros("change")?;
+                kept.push((format!("displacement {index}"), displacement.clone()));
+                kept.push((format!("change {index}"), change.clone()));
                 let index = Buffer::uniform(gpu, "pair", &(index as u32))?;
                 let index = (1, index.raw());
                 let product = |left: &Buffer<f32>, right: &Buffer<f32>| {
@@ -292,7 +306,9 @@ impl Lbfgs {
                 })
             })
             .collect::<Result<_, GpuError>>()?;
+        kept.push(("scalars".to_owned(), scalars.clone()));
         let lbfgs = Self {
+            kept,
             ridge: bind(
                 &kernels.ridge,
                 &[parameters, unknowns, gradient, sums, anchors, pulls],
@@ -378,6 +394,16 @@ impl Lbfgs {
     /// [`Lbfgs::step`] that accepted it, before the diagonal is another point's.
     pub fn anchor(&self, recorder: &mut Recorder) {
         self.all(recorder, &self.anchor);
+    }
+
+    /// Of what the next step goes by, the newest pair and the buffers.
+    pub(super) fn kept(&self) -> (usize, &[(String, Buffer<f32>)]) {
+        (self.newest, &self.kept)
+    }
+
+    /// Goes on after this pair, where the buffers hold what they held then.
+    pub(super) fn go_on_after(&mut self, newest: usize) {
+        self.newest = newest % MEMORY;
     }
 
     /// Records a step from where loss and gradient are ready.

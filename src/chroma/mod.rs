@@ -6,6 +6,7 @@
 
 mod adam;
 mod bake;
+mod checkpoint;
 mod colorize;
 mod correction;
 mod degree;
@@ -33,6 +34,7 @@ pub mod teacher;
 
 pub use adam::AdamSolver;
 pub use bake::{bake, bake_rgb, fit_rgb};
+pub use checkpoint::{ChromaCheckpoint, ChromaKeeper, NoChromaKeeper};
 pub use colorize::{Colored, ColorizeEvent, ColorizeObserver, Distill, colorize};
 pub use correction::{CorrectionKernels, CorrectionParameters, Corrections, SUM_GROUPS, SUMS};
 pub use degree::{ChosenDegree, LEAST_GAIN, choose_degree};

@@ -1,9 +1,10 @@
 //! What a solver tells of itself.
 
+use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 
 /// How far a distillation is.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ChromaProgress {
     /// Iterations of Adam, or rounds of reweighting, done.
     pub iteration: usize,

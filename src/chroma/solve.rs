@@ -2,7 +2,7 @@
 
 use super::{
     AdamSolver, ChromaError, ChromaObserver, ChromaSettings, Correction, FrozenViews, IrlsSolver,
-    SolverKind, Targets, Task, fill_unseen,
+    SolverKind, Targets, Task, checkpoint::SolverState, fill_unseen,
 };
 use crate::{
     raster::Load,
@@ -39,6 +39,36 @@ pub fn solve(
     luma: &Splats,
     observe: &mut ChromaObserver<'_>,
 ) -> Result<Solved, ChromaError> {
+    solve_from(
+        (None, &mut |_| Ok(true)),
+        frozen,
+        settings,
+        targets,
+        tasks,
+        luma,
+        observe,
+    )
+}
+
+/// Where to go on from, and what is done with the solver after each round.
+pub(super) type Between<'a> = (
+    Option<&'a SolverState>,
+    &'a mut dyn FnMut(&IrlsSolver<'_>) -> Result<bool, ChromaError>,
+);
+
+/// [`solve`] that can be interrupted and go on, if not by Adam.
+///
+/// # Errors
+/// As [`solve`], and [`ChromaError::OtherCheckpoint`].
+pub(super) fn solve_from(
+    (from, between): Between<'_>,
+    frozen: &FrozenViews,
+    settings: &ChromaSettings,
+    targets: &Targets,
+    tasks: Vec<Task>,
+    luma: &Splats,
+    observe: &mut ChromaObserver<'_>,
+) -> Result<Solved, ChromaError> {
     match settings.solver {
         SolverKind::Adam => {
             let mut adam = AdamSolver::new(frozen, settings.clone(), targets, tasks)?;
@@ -52,7 +82,10 @@ pub fn solve(
         }
         SolverKind::Irls => {
             let mut solver = IrlsSolver::new(frozen, settings, targets, tasks)?;
-            solver.run(observe)?;
+            if from.is_some_and(|state| !solver.go_on_from(state)) {
+                return Err(ChromaError::OtherCheckpoint);
+            }
+            solver.run_between(observe, between)?;
             let mut chroma = solver.chroma()?;
             let seen = solver.seen()?;
             if settings.fill {

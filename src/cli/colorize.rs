@@ -6,6 +6,7 @@ use clap::{Args, CommandFactory, ValueEnum, error::ErrorKind};
 
 use super::{
     Cli, CliError,
+    checkpoint::CheckpointArguments,
     network::NetworkArguments,
     print,
     progress::Progress,
@@ -116,6 +117,8 @@ pub struct Colorize {
     /// Time every kernel, and print a table of it.
     #[arg(long)]
     timings: bool,
+    #[command(flatten)]
+    checkpoints: CheckpointArguments,
     /// Print the report as JSON.
     #[arg(long)]
     json: bool,
@@ -235,6 +238,7 @@ impl Colorize {
             relight: self.relight,
             force: self.force,
             timings: self.timings,
+            checkpoints: self.checkpoints.options(),
         };
         let (output, report) = colorize(&options, &mut |event| progress.show(&event))?;
         progress.finish();

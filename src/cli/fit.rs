@@ -6,8 +6,8 @@ use clap::{Args, CommandFactory, error::ErrorKind};
 
 use super::{
     Cli, CliError,
+    checkpoint::CheckpointArguments,
     effects::EffectArguments,
-    interrupt::interrupt,
     luma::LumaArguments,
     network::NetworkArguments,
     photos::Photos,
@@ -19,7 +19,7 @@ use crate::capture::LoadOptions;
 use crate::effects::Overrules;
 use crate::luma::Goal;
 use crate::report::timings_table;
-use crate::run::{AheadOptions, CheckpointOptions, EVERY, FitOptions, Init, Preset, fit};
+use crate::run::{AheadOptions, FitOptions, Init, Preset, fit};
 
 /// Rows of the curve that is printed.
 const CURVE_ROWS: usize = 8;
@@ -63,33 +63,14 @@ pub struct Fit {
     /// Start from these Gaussians instead of COLMAP's points.
     #[arg(long, value_name = "FILE.ply")]
     init: Option<PathBuf>,
-    /// Go on with the same training where it was interrupted, from the checkpoint in the run
-    /// folder; begins anew where there is neither.
-    #[arg(long)]
-    resume: bool,
-    /// Minutes between two checkpoints, or `off`; it takes longer where they take more than a
-    /// fiftieth of the time.
-    #[arg(long, value_name = "MIN|off", default_value = EVERY.to_string(), value_parser = minutes)]
-    checkpoint: Minutes,
+    #[command(flatten)]
+    checkpoints: CheckpointArguments,
     /// Time every kernel, and print a table of it.
     #[arg(long)]
     timings: bool,
     /// Print the report as JSON.
     #[arg(long)]
     json: bool,
-}
-
-/// Minutes, if any.
-#[derive(Clone, Copy, Debug)]
-struct Minutes(Option<f64>);
-
-fn minutes(text: &str) -> Result<Minutes, String> {
-    match text {
-        "off" => Ok(Minutes(None)),
-        _ => positive(text)
-            .map(|minutes| Minutes(Some(minutes)))
-            .map_err(|reason| reason + ", or off"),
-    }
 }
 
 /// Ends the program as one that was called wrongly.
@@ -148,11 +129,7 @@ impl Fit {
         let options = FitOptions {
             goal,
             timings: self.timings,
-            checkpoints: CheckpointOptions {
-                resume: self.resume,
-                every: self.checkpoint.0,
-                interrupt: interrupt(),
-            },
+            checkpoints: self.checkpoints.options(),
             ahead: AheadOptions {
                 teachers: self.teacher,
                 settings: self.network.settings(),

@@ -1,5 +1,6 @@
 //! The commands: arguments in, text out. What they do is in [`crate::run`].
 
+mod checkpoint;
 mod colorize;
 mod doctor;
 mod effects;

@@ -13,30 +13,29 @@ use glam::DVec3;
 
 use super::{
     Event, Observer, Preset, RunError, RunFolder, Stage,
+    checkpoints::{CheckpointOptions, FileKeeper, Found, tell_given_up},
+    color_checkpoint::{found_in, question},
+    color_source::Source,
     commit::Commit,
     files,
     fit::{capture_report, open_gpu},
     foreign::drawn_like_photos,
     keeping,
-    lock::RunLock,
     scene::{comments_of_moved, read_scene, tell_not_finite},
     sound::{open_examined, open_trusted},
-    teach::{TeachOptions, Teachers},
+    teach::{Taught, TeachOptions, Teachers},
 };
 use crate::{
     capture::LoadOptions,
     chroma::{
-        ChosenDegree, ChromaProgress, ChromaSettings, ColorizeEvent, Degree, Distill, relight,
+        ChosenDegree, ChromaKeeper, ChromaProgress, ChromaSettings, ColorizeEvent, Degree, Distill,
+        NoChromaKeeper, SolverKind, relight,
     },
-    effects::{Overrules, table},
+    effects::table,
     eval::{Measured, exposures},
-    gpu::Gpu,
     input,
     raster::Raster,
-    report::{
-        CaptureReport, ChromaReport, ChromaSeconds, DeviceReport, EffectReport, LumaReport,
-        REPORT_VERSION, Report, contact_sheet, kernel_reports,
-    },
+    report::{ChromaReport, ChromaSeconds, EffectReport, Report, contact_sheet, kernel_reports},
     splats::{npy, ply},
 };
 
@@ -71,6 +70,8 @@ pub struct ColorizeOptions {
     pub force: bool,
     /// Whether the report says where the device's time went.
     pub timings: bool,
+    /// How it can go on where it is interrupted, if not by Adam or without a run.
+    pub checkpoints: CheckpointOptions,
 }
 
 /// What `colorize` wrote.
@@ -138,7 +139,11 @@ pub fn colorize(
         seed: report.luma.settings.seed,
         ..options.settings.clone()
     };
-    let (lesson, hinted) = teachers.ask(&dataset, settings.target_scales(), observe)?;
+    let Taught {
+        lesson,
+        hinted,
+        wanted,
+    } = teachers.ask(&dataset, settings.target_scales(), observe)?;
     // Hints stay as painted.
     let match_saturation = settings.match_saturation && hinted == 0;
     let settings = ChromaSettings {
@@ -182,8 +187,47 @@ pub fn colorize(
         sh_degree: options.sh_degree,
         correct_views: options.correct_views,
     };
-    let mut log = String::new();
-    let colored = distill.run(&settings, &mut |event| {
+    let found = match options.checkpoints.resume {
+        true => found_in(source.kept(options), observe)?,
+        false => {
+            if let Some(folder) = source.kept(options) {
+                tell_given_up(&folder.color_checkpoint(), observe);
+            }
+            None
+        }
+    };
+    let log = RefCell::new(found.as_ref().map_or(String::new(), Found::log));
+    let observe = RefCell::new(observe);
+    let tell = |event| observe.borrow_mut()(event);
+    // Adam keeps none.
+    let keeps_some = settings.solver == SolverKind::Irls;
+    let mut keeper = match source.kept(options).filter(|_| keeps_some) {
+        Some(folder) => {
+            let question = question(folder, options, &settings, &gpu, &wanted)?;
+            if let Some(found) = &found {
+                found.check(&question)?;
+            }
+            let path = folder.color_checkpoint();
+            let checkpoints = &options.checkpoints;
+            Some(FileKeeper::new(
+                path,
+                question,
+                (),
+                checkpoints,
+                &log,
+                &tell,
+                begun,
+            ))
+        }
+        None => None,
+    };
+    let checkpoint = found.as_ref().map(|found| &found.checkpoint);
+    let keeps: &mut dyn ChromaKeeper = match &mut keeper {
+        Some(keeper) => keeper,
+        None => &mut NoChromaKeeper,
+    };
+    let colored = distill.run_from(checkpoint, keeps, &settings, &mut |event| {
+        let observe = &mut *observe.borrow_mut();
         match event {
             // It has been asked already.
             ColorizeEvent::Asked { .. } => {}
@@ -197,7 +241,7 @@ pub fn colorize(
             ColorizeEvent::Solving(progress) => {
                 // Writing to a string cannot fail.
                 let _ = writeln!(
-                    log,
+                    log.borrow_mut(),
                     "{},{:.6},{},{:.3},",
                     report.luma.iterations + progress.iteration,
                     progress.loss,
@@ -219,7 +263,19 @@ pub fn colorize(
             }
         }
         ControlFlow::Continue(())
-    })?;
+    });
+    if let Some(written) = keeper.as_mut().and_then(|keeper| keeper.interrupted.take()) {
+        return Err(RunError::Interrupted {
+            iteration: written?,
+            path: source
+                .kept(options)
+                .map(RunFolder::color_checkpoint)
+                .unwrap_or_default(),
+        });
+    }
+    drop(keeper);
+    let colored = colored?;
+    let (observe, log) = (observe.into_inner(), log.into_inner());
     let timings = (options.timings)
         .then(|| Ok::<_, RunError>(kernel_reports(&gpu.timings()?, &colored.load)))
         .transpose()?;
@@ -286,6 +342,7 @@ pub fn colorize(
     match source.kept(options) {
         Some(folder) => {
             let mut commit = Commit::new(folder.path())?;
+            commit.remove(&folder.color_checkpoint());
             if output.ply == folder.color() {
                 write_to(&commit.place(&output.ply))?;
                 // What was measured of other colors goes.
@@ -319,99 +376,6 @@ fn describe(chosen: &ChosenDegree) -> String {
         chosen.degree,
         losses.join(", ")
     )
-}
-
-/// Where the gray Gaussians come from.
-struct Source {
-    folder: Option<RunFolder>,
-    report: Option<Report>,
-    splats: PathBuf,
-    /// On the run folder.
-    _lock: Option<RunLock>,
-}
-
-impl Source {
-    fn find(options: &ColorizeOptions) -> Result<Self, RunError> {
-        match &options.run {
-            Some(path) if ply::is_splat_file(path)? => Ok(Self {
-                folder: None,
-                report: None,
-                splats: path.clone(),
-                _lock: None,
-            }),
-            run => {
-                let folder = match run {
-                    Some(path) => RunFolder::at(path),
-                    None => RunFolder::newest()?,
-                };
-                let (lock, report) = RunLock::of_run(&folder)?;
-                Ok(Self {
-                    report: Some(report),
-                    _lock: Some(lock),
-                    splats: folder.luma(),
-                    folder: Some(folder),
-                })
-            }
-        }
-    }
-
-    /// The run folder, where what is found is to be kept there.
-    fn kept(&self, options: &ColorizeOptions) -> Option<&RunFolder> {
-        self.folder.as_ref().filter(|_| !options.relight)
-    }
-
-    fn colmap_dir(&self, options: &ColorizeOptions) -> Result<PathBuf, RunError> {
-        match (&options.colmap, &self.report) {
-            (Some(path), _) => Ok(path.clone()),
-            (None, Some(report)) => Ok(PathBuf::from(&report.capture.path)),
-            (None, None) => Err(RunError::NoCameras(self.splats.clone())),
-        }
-    }
-
-    /// The run's report, or an empty one for a splat file.
-    fn report(&self, gpu: &Gpu) -> Report {
-        let preset = Preset::for_device(gpu);
-        self.report.clone().unwrap_or_else(|| Report {
-            version: REPORT_VERSION,
-            program: env!("CARGO_PKG_VERSION").to_owned(),
-            capture: CaptureReport {
-                path: String::new(),
-                views: 0,
-                train: 0,
-                test: 0,
-                points: 0,
-                rejected: Vec::new(),
-                load: preset.load_options(&LoadOptions::default(), &Overrules::default()),
-                masked_views: 0,
-                not_finite: 0,
-                extent: 0.0,
-                offset: [0.0; 3],
-                photos: Vec::new(),
-            },
-            device: DeviceReport {
-                name: gpu.describe(),
-                backend: format!("{:?}", gpu.info().backend),
-                software: gpu.is_software(),
-            },
-            preset,
-            effects: Vec::new(),
-            warnings: Vec::new(),
-            luma: LumaReport::default(),
-            chroma: None,
-        })
-    }
-
-    fn default_output(&self) -> PathBuf {
-        match &self.folder {
-            Some(folder) => folder.color(),
-            None => {
-                let stem = self.splats.file_stem().unwrap_or_default();
-                let mut name = stem.to_owned();
-                name.push("-color.ply");
-                self.splats.with_file_name(name)
-            }
-        }
-    }
 }
 
 fn adam_iterations(

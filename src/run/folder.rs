@@ -90,6 +90,11 @@ impl RunFolder {
         self.0.join("checkpoint")
     }
 
+    /// What an interrupted coloring goes on from.
+    pub fn color_checkpoint(&self) -> PathBuf {
+        self.0.join("checkpoint-color")
+    }
+
     /// The losses.
     pub fn log(&self) -> PathBuf {
         self.0.join("log.csv")

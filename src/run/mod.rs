@@ -1,5 +1,8 @@
 //! Whole runs: what a command does from its options to its files.
 
+mod checkpoints;
+mod color_checkpoint;
+mod color_source;
 mod colorize;
 mod commit;
 mod eval;
@@ -21,10 +24,11 @@ mod teach;
 
 use std::{cell::RefCell, fmt, path::PathBuf};
 
+pub use checkpoints::{CheckpointOptions, EVERY, Interrupt};
 pub use colorize::{ColorizeOptions, Output, colorize};
 pub use eval::{EvalOptions, eval};
 pub use export::{ExportOptions, Exported, export};
-pub use fit::{AheadOptions, CheckpointOptions, EVERY, FitOptions, Init, Interrupt, Overlay, fit};
+pub use fit::{AheadOptions, FitOptions, Init, Overlay, fit};
 pub use folder::RunFolder;
 pub use info::info;
 pub(crate) use picture_names::picture_names;

@@ -13,6 +13,7 @@ use crate::{
         Colorizer, ColorizerError, Lesson, Wanted, teach,
         teacher::{AbImage, GrayImage, HintFolder, HintImage, Query, Teacher, TeacherSettings},
     },
+    hash::Hasher,
     report::TeacherReport,
 };
 
@@ -73,6 +74,15 @@ struct Member {
     weight: f32,
 }
 
+/// What teachers and hints say.
+pub(super) struct Taught {
+    pub lesson: Lesson,
+    /// Training views that have hints.
+    pub hinted: usize,
+    /// SHA-256 of all that is wanted.
+    pub wanted: String,
+}
+
 /// Teachers while they are asked about the views of a dataset, in order.
 struct Asking<'a, 'o> {
     teachers: &'a mut Teachers,
@@ -86,6 +96,8 @@ struct Asking<'a, 'o> {
     hints_cover: bool,
     /// Training views that have hints.
     hinted: usize,
+    /// Of all that is wanted.
+    wanted: Hasher,
 }
 
 impl Colorizer for Asking<'_, '_> {
@@ -126,10 +138,17 @@ impl Colorizer for Asking<'_, '_> {
         let strength = self.teachers.strength;
         let answer = mean(answers).map(|answer| scaled(answer, strength));
         self.hinted += usize::from(trained && hints.is_some());
-        Ok(match hints {
+        let wanted = match hints {
             Some(hints) => Some(with_hints(answer, &hints.resized(gray.width, gray.height))),
             None => answer.map(|ab| Wanted { ab, weights: None }),
-        })
+        };
+        self.wanted.update(query.name.as_bytes());
+        if let Some(Wanted { ab, weights }) = &wanted {
+            self.wanted.update(bytemuck::cast_slice(&ab.ab));
+            let weights = weights.as_deref().unwrap_or_default();
+            self.wanted.update(bytemuck::cast_slice(weights));
+        }
+        Ok(wanted)
     }
 }
 
@@ -184,8 +203,7 @@ impl Teachers {
         self.teachers.iter().map(describe).collect()
     }
 
-    /// Asks about every view, and keeps what is wanted at so many scales; also gives how many
-    /// training views have hints.
+    /// Asks about every view, and keeps what is wanted at so many scales.
     ///
     /// # Errors
     /// [`RunError::Teacher`], [`RunError::TeacherCoversNothing`] where a teacher
@@ -196,7 +214,7 @@ impl Teachers {
         dataset: &Dataset,
         scales: usize,
         observe: &mut Observer<'_>,
-    ) -> Result<(Lesson, usize), RunError> {
+    ) -> Result<Taught, RunError> {
         if self.asks_no_network() {
             observe(Event::Warning(
                 "profile and size change nothing: no teacher is a network".into(),
@@ -214,6 +232,7 @@ impl Teachers {
             answered: vec![[0; 2]; self.teachers.len()],
             hints_cover: false,
             hinted: 0,
+            wanted: Hasher::default(),
             view: 0,
             dataset,
             observe,
@@ -221,7 +240,7 @@ impl Teachers {
         };
         let told = &mut |_| ControlFlow::Continue(());
         let lesson = teach(dataset, &mut asking, scales, told)?;
-        let (answered, hinted) = (asking.answered, asking.hinted);
+        let (answered, hinted, wanted) = (asking.answered, asking.hinted, asking.wanted.finish());
         let mut covers: Vec<bool> = answered.iter().map(|[count, _]| *count > 0).collect();
         covers.push(asking.hints_cover);
         self.check(&covers, dataset, &lesson)?;
@@ -237,7 +256,11 @@ impl Teachers {
                 )));
             }
         }
-        Ok((lesson, hinted))
+        Ok(Taught {
+            lesson,
+            hinted,
+            wanted,
+        })
     }
 
     /// Whether every source has something for a training view; `covers` says so

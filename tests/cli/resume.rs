@@ -232,3 +232,112 @@ fn a_finished_run_goes_on() {
         assert_eq!(done.code, Some(2), "{other:?}: {}", done.stderr);
     }
 }
+
+/// A coloring with all that a checkpoint has to hold: a degree that is chosen, corrections, a
+/// loss that levels off, anchors.
+const COLORIZE: [&str; 8] = [
+    "colorize",
+    "runs/scene",
+    "--teacher",
+    "colored",
+    "--sh-degree",
+    "auto",
+    "--correct-views",
+    "on",
+];
+
+/// The run with a folder of images as teacher, whose views contradict each other.
+fn place_to_color() -> Place {
+    let place = place_with_run();
+    for view in 0..scene::VIEWS {
+        let mut image = scene::photo(view);
+        let cast = 3 * view as u8;
+        for pixel in image.pixels_mut() {
+            pixel.0[0] = pixel.0[0].saturating_add(cast);
+            pixel.0[2] = pixel.0[2].saturating_sub(cast);
+        }
+        let path = place.path("colored").join(scene::name(view));
+        std::fs::create_dir_all(path.parent().expect("a folder")).expect("writable");
+        image.save(path).expect("writable");
+    }
+    place
+}
+
+fn colors(place: &Place) -> [Vec<u8>; 2] {
+    ["color.ply", "chroma.npy"].map(|name| place.read(&format!("runs/scene/{name}")))
+}
+
+#[test]
+fn a_coloring_that_is_killed_goes_on() {
+    let whole = place_to_color();
+    whole.succeed(&COLORIZE);
+    let chroma = whole.report("runs/scene")["chroma"].clone();
+    let whole = colors(&whole);
+    let mut interrupted = 0;
+    for rounds in 1..=12 {
+        let place = place_to_color();
+        let mut child = {
+            let mut command = place.command(&[&COLORIZE[..], &OFTEN].concat());
+            let quiet = command.stdout(Stdio::piped()).stderr(Stdio::piped());
+            quiet.spawn().expect("the program starts")
+        };
+        // So many checkpoints later.
+        let mut seen = Vec::new();
+        let begun = Instant::now();
+        while seen.len() < rounds && child.try_wait().expect("a child").is_none() {
+            assert!(begun.elapsed() < Duration::from_secs(120), "no checkpoint");
+            let now = std::fs::read(place.path("runs/scene/checkpoint-color")).unwrap_or_default();
+            if !now.is_empty() && !seen.contains(&now) {
+                seen.push(now);
+            }
+        }
+        child.kill().expect("it is there or gone");
+        child.wait().expect("a child");
+        if !place.path("runs/scene/checkpoint-color").exists() {
+            continue;
+        }
+        interrupted += 1;
+        place.succeed(&[&COLORIZE[..], &["--resume"]].concat());
+        assert!(colors(&place) == whole, "after {rounds} checkpoints");
+        let now = place.report("runs/scene")["chroma"].clone();
+        for key in [
+            "loss",
+            "iterations",
+            "moved",
+            "passes",
+            "effects",
+            "saturation",
+        ] {
+            assert_eq!(now[key], chroma[key], "{key}");
+        }
+        assert!(!place.path("runs/scene/checkpoint-color").exists());
+    }
+    assert!(interrupted >= 4, "{interrupted}");
+}
+
+#[test]
+fn a_coloring_by_others_is_not_gone_on_with() {
+    let place = place_to_color();
+    let mut command = place.command(&[&COLORIZE[..], &OFTEN].concat());
+    let quiet = command.stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = quiet.spawn().expect("the program starts");
+    let begun = Instant::now();
+    while !place.path("runs/scene/checkpoint-color").exists() {
+        assert!(begun.elapsed() < Duration::from_secs(120), "no checkpoint");
+    }
+    child.kill().expect("it is there or gone");
+    child.wait().expect("a child");
+    std::fs::copy(place.path("colored/00.png"), place.path("colored/03.png")).expect("copied");
+    let done = place.run(&[&COLORIZE[..], &["--resume"]].concat());
+    assert_eq!(done.code, Some(1), "{}", done.stderr);
+    assert!(done.stderr.contains("taught"), "{}", done.stderr);
+    // Begun anew it says that it gives up what there is.
+    let done = place.run(&COLORIZE);
+    assert_eq!(done.code, Some(0), "{}", done.stderr);
+    assert!(
+        done.stderr.contains("checkpoint-color is left of"),
+        "{}",
+        done.stderr
+    );
+    assert!(!place.path("runs/scene/checkpoint-color").exists());
+}

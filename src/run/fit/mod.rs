@@ -10,8 +10,15 @@ mod training;
 use std::{cell::RefCell, path::PathBuf, sync::Arc, time::Instant};
 
 use super::{
-    Observer, Preset, RunError, RunFolder, commit::Commit, files, fingerprint::of_files, keeping,
-    lock::RunLock, scene::open, sound::open_examined,
+    Observer, Preset, RunError, RunFolder,
+    checkpoints::{CheckpointOptions, tell_given_up},
+    commit::Commit,
+    files,
+    fingerprint::of_files,
+    keeping,
+    lock::RunLock,
+    scene::open,
+    sound::open_examined,
 };
 use crate::{
     capture::LoadOptions,
@@ -25,8 +32,7 @@ use crate::{
 use ahead::Ahead;
 pub use ahead::AheadOptions;
 use budget::Budget;
-pub use checkpoint::{CheckpointOptions, EVERY, Interrupt};
-use checkpoint::{Found, question, tell_given_up};
+use checkpoint::{found_in, question};
 pub(super) use report::capture_report;
 use training::{Job, Trained};
 
@@ -134,7 +140,7 @@ pub fn fit(
     let _lock = RunLock::take(folder.path())?;
     let ahead = Ahead::open(&options.ahead, &folder)?;
     let found = match options.checkpoints.resume {
-        true => Found::in_folder(&folder, observe)?,
+        true => found_in(&folder, observe)?,
         false => {
             tell_given_up(&folder.checkpoint(), observe);
             None
@@ -142,7 +148,7 @@ pub fn fit(
     };
     // How much there is time for was found out once.
     let budget = match &found {
-        Some(found) if options.goal.seconds().is_some() => found.budget(),
+        Some(found) if options.goal.seconds().is_some() => found.started().budget(),
         _ => Budget::of(options, &raster, begun, observe)?,
     };
     let load = LoadOptions {
@@ -209,6 +215,7 @@ fn write(folder: &RunFolder, trained: &Trained, report: &Report) -> Result<(), R
         folder.contact_sheet(),
         folder.evaluation(),
         folder.checkpoint(),
+        folder.color_checkpoint(),
     ] {
         commit.remove(&stale);
     }

@@ -7,6 +7,7 @@ use serde_json::Value;
 
 use super::super::{
     Event, Observer, RunError, RunFolder, Stage,
+    checkpoints::FileKeeper,
     colorize::with_rows,
     foreign::tell_unlike,
     scene::{read_splats, tell_trial},
@@ -14,7 +15,7 @@ use super::super::{
 use super::{
     FitOptions, Init,
     budget::{Budget, ITERATIONS_MIN, WRITING},
-    checkpoint::{FolderKeeper, Found},
+    checkpoint::{FoundTraining, Started},
 };
 use crate::{
     capture::{CaptureError, Dataset, Exposure},
@@ -86,7 +87,11 @@ impl Job<'_> {
     ///
     /// # Errors
     /// [`RunError::TimeTooShort`].
-    fn time_for_training(&self, each: f64, found: Option<&Found>) -> Result<Option<f64>, RunError> {
+    fn time_for_training(
+        &self,
+        each: f64,
+        found: Option<&FoundTraining>,
+    ) -> Result<Option<f64>, RunError> {
         let Some(limit) = self.options.goal.seconds() else {
             return Ok(None);
         };
@@ -139,7 +144,7 @@ impl Job<'_> {
         budget: &Budget,
         folder: &RunFolder,
         question: Value,
-        found: Option<&Found>,
+        found: Option<&FoundTraining>,
         observe: &mut Observer<'_>,
     ) -> Result<Trained, RunError> {
         let (options, dataset) = (self.options, self.dataset);
@@ -183,10 +188,10 @@ impl Job<'_> {
         });
         let observe = RefCell::new(observe);
         let tell = |event| observe.borrow_mut()(event);
-        let mut keeper = FolderKeeper::new(
-            folder,
+        let mut keeper = FileKeeper::new(
+            folder.checkpoint(),
             question,
-            budget,
+            Started::of(budget),
             &options.checkpoints,
             &log,
             &tell,

@@ -1,0 +1,149 @@
+//! A distillation on disk: all that decides how it goes on.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use super::{ChosenDegree, ChromaProgress};
+
+/// A distillation after a round of [`IrlsSolver`](super::IrlsSolver). What goes on from it
+/// ends with the bytes of one that was never interrupted.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ChromaCheckpoint {
+    pub(super) state: State,
+    pub(super) solver: SolverState,
+}
+
+/// What was decided before.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct State {
+    /// The degree that views held back have chosen, where they were asked.
+    pub chosen: Option<ChosenDegree>,
+    /// How far views disagreed before and after corrections that were taken back.
+    pub uncorrected: Option<[f64; 2]>,
+    /// The solver's last report.
+    pub last: Option<ChromaProgress>,
+}
+
+/// A solver between two rounds.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct SolverState {
+    pub rounds: Rounds,
+    /// What its buffers hold.
+    pub buffers: BTreeMap<String, Vec<f32>>,
+}
+
+/// What the host knows of a solver.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct Rounds {
+    /// Rounds done.
+    pub done: usize,
+    /// See [`IrlsSolver`](super::IrlsSolver).
+    pub plain: bool,
+    pub settled: usize,
+    pub undone: bool,
+    pub corrected: bool,
+    pub anchored: bool,
+    pub ended: bool,
+    /// The newest pair of L-BFGS.
+    pub newest: usize,
+    /// Passes over all views.
+    pub spent: f64,
+}
+
+/// Who keeps checkpoints.
+pub trait ChromaKeeper {
+    /// Whether one is wanted after a round.
+    fn wants(&mut self) -> bool;
+
+    /// Takes one; `false` ends the distillation with
+    /// [`ChromaError::Cancelled`](super::ChromaError).
+    fn keep(&mut self, checkpoint: ChromaCheckpoint) -> bool;
+
+    /// There will be no other.
+    fn end(&mut self) {}
+}
+
+/// Keeps none.
+pub struct NoChromaKeeper;
+
+impl ChromaKeeper for NoChromaKeeper {
+    fn wants(&mut self) -> bool {
+        false
+    }
+
+    fn keep(&mut self, _: ChromaCheckpoint) -> bool {
+        true
+    }
+}
+
+impl ChromaCheckpoint {
+    /// Rounds done.
+    pub fn rounds(&self) -> usize {
+        self.solver.rounds.done
+    }
+
+    /// As named sections of bytes.
+    pub fn to_sections(&self) -> Vec<(String, Vec<u8>)> {
+        // Plain structs with string keys: serializing them cannot fail.
+        let numbers = serde_json::to_vec(&(&self.state, self.solver.rounds)).unwrap_or_default();
+        let mut sections = vec![("distillation".to_owned(), numbers)];
+        let buffers = self.solver.buffers.iter();
+        sections.extend(buffers.map(|(name, values)| {
+            let bytes = bytemuck::cast_slice(values).to_vec();
+            (format!("{BUFFER}{name}"), bytes)
+        }));
+        sections
+    }
+
+    /// What [`ChromaCheckpoint::to_sections`] gave; `None` of anything else.
+    pub fn from_sections(sections: &BTreeMap<String, Vec<u8>>) -> Option<Self> {
+        let numbers = serde_json::from_slice(sections.get("distillation")?);
+        let (state, rounds): (State, Rounds) = numbers.ok()?;
+        let buffers = sections.iter().filter_map(|(name, bytes)| {
+            let (floats, rest) = bytes.as_chunks::<4>();
+            let values = floats.iter().map(|&bytes| f32::from_le_bytes(bytes));
+            let name = name.strip_prefix(BUFFER).filter(|_| rest.is_empty())?;
+            Some((name.to_owned(), values.collect()))
+        });
+        let buffers = buffers.collect();
+        Some(Self {
+            state,
+            solver: SolverState { rounds, buffers },
+        })
+    }
+}
+
+/// How the names of buffers' sections begin.
+const BUFFER: &str = "solver ";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_written_is_read_again() {
+        let checkpoint = ChromaCheckpoint {
+            state: State {
+                chosen: Some(ChosenDegree {
+                    degree: 1,
+                    losses: vec![2.5, 1.0 / 3.0],
+                }),
+                uncorrected: None,
+                last: None,
+            },
+            solver: SolverState {
+                rounds: Rounds {
+                    done: 5,
+                    plain: true,
+                    spent: 0.1,
+                    ..Rounds::default()
+                },
+                buffers: [("unknowns".to_owned(), vec![0.5, -0.0, f32::MAX])].into(),
+            },
+        };
+        let sections: BTreeMap<_, _> = checkpoint.to_sections().into_iter().collect();
+        assert_eq!(ChromaCheckpoint::from_sections(&sections), Some(checkpoint));
+        assert_eq!(ChromaCheckpoint::from_sections(&BTreeMap::new()), None);
+    }
+}

@@ -1,0 +1,43 @@
+//! Checkpoints, wherever a command keeps some.
+
+use clap::Args;
+
+use super::{interrupt::interrupt, values::positive};
+use crate::run::{CheckpointOptions, EVERY};
+
+/// How a command can go on.
+#[derive(Args)]
+pub struct CheckpointArguments {
+    /// Go on with the same work where it was interrupted, from the checkpoint in the run folder;
+    /// begins anew where there is none.
+    #[arg(long)]
+    resume: bool,
+    /// Minutes between two checkpoints, or `off`; it takes longer where they take more than a
+    /// fiftieth of the time.
+    #[arg(long, value_name = "MIN|off", default_value = EVERY.to_string(), value_parser = minutes)]
+    checkpoint: Minutes,
+}
+
+/// Minutes, if any.
+#[derive(Clone, Copy, Debug)]
+struct Minutes(Option<f64>);
+
+fn minutes(text: &str) -> Result<Minutes, String> {
+    match text {
+        "off" => Ok(Minutes(None)),
+        _ => positive(text)
+            .map(|minutes| Minutes(Some(minutes)))
+            .map_err(|reason| reason + ", or off"),
+    }
+}
+
+impl CheckpointArguments {
+    /// What was said of them; the next signal interrupts the work.
+    pub(super) fn options(&self) -> CheckpointOptions {
+        CheckpointOptions {
+            resume: self.resume,
+            every: self.checkpoint.0,
+            interrupt: interrupt(),
+        }
+    }
+}
