@@ -17,7 +17,7 @@ use tempfile::{Builder, NamedTempFile, TempDir};
 
 /// Names the step that fails, counted from 1, for tests: `7` the seventh, `7-` the seventh and
 /// all after it, as on a disk that is full.
-const FAULT: &str = "GS_CHROMA_TEST_FAULT";
+pub(crate) const FAULT: &str = "GS_CHROMA_TEST_FAULT";
 
 static ASKED: LazyLock<Option<Fault>> =
     LazyLock::new(|| Fault::parse(&env::var(FAULT).unwrap_or_default()));

@@ -43,6 +43,8 @@ pub(super) fn run(arguments: &[String], log: &Path, tell: &mut dyn FnMut()) -> R
     let child = Command::new(program)
         .args(arguments)
         .env(TETHER, "1")
+        // A fault of a test is this program's own.
+        .env_remove(disk::FAULT)
         // Kept open until the child is done.
         .stdin(Stdio::piped())
         .stdout(Stdio::null())

@@ -105,3 +105,29 @@ fn what_only_reads_a_run_fails_well() {
     let check = ["teacher", "check", &network, "--manifest", "network.toml"];
     every_write_fails_well(&check, &kept, &["network.toml"]);
 }
+
+/// A sweep goes on where its own files could not be written.
+#[test]
+fn a_sweep_fails_well() {
+    let place = place_with_run();
+    let sweep = ["tradeoff", "scene", "-o", "out", "--preset", "draft"];
+    let short = ["--iterations", "3", "--without", "background"];
+    let knobs = ["--knobs", "densify", "--budget", "0.2"];
+    let sweep = [&sweep[..], &short, &knobs].concat();
+    let mut struck = 0;
+    for step in [1, 2, 3, 5, 8, 12] {
+        let done = failing(&place, &sweep, &step.to_string());
+        if done.code == Some(1) {
+            struck += 1;
+            let last = done.stderr.lines().last().unwrap_or_default();
+            assert!(last.starts_with("error: "), "{step}: {}", done.stderr);
+        }
+        if place.path("out/tradeoff.json").exists() {
+            let kept =
+                serde_json::from_slice::<serde_json::Value>(&place.read("out/tradeoff.json"));
+            assert!(kept.is_ok(), "{step}");
+        }
+    }
+    assert!(struck > 2, "{struck}");
+    place.succeed(&sweep);
+}

@@ -280,3 +280,32 @@ fn the_readmes_way_to_colors() {
     let message = &changed.stderr;
     assert!(message.contains(&format!("is not {name}")), "{message}");
 }
+
+#[test]
+fn writes_that_fail_keep_nothing_that_is_not_whole() {
+    let place = Place::new();
+    let host = host(&place, (0..20).map(|_| Answer::File(network())).collect());
+    let fetch_it = ["teacher", "fetch", "small", "--yes", "--patience", "1"];
+    let mut struck = 0;
+    for step in 1..10 {
+        let mut command = host.command(&place, &fetch_it);
+        let done = Done::of(
+            command
+                .env("GS_CHROMA_TEST_FAULT", step.to_string())
+                .output(),
+        );
+        let whole = place.path(KEPT).exists();
+        assert_eq!(done.code == Some(0), whole, "{step}: {}", done.stderr);
+        if whole {
+            break;
+        }
+        struck += 1;
+        let last = done.stderr.lines().last().unwrap_or_default();
+        assert!(
+            last.starts_with("error: ") && last.contains("storage"),
+            "{last}"
+        );
+    }
+    assert!(struck > 2, "{struck}");
+    assert_eq!(place.read(KEPT), network());
+}

@@ -4,7 +4,7 @@ use std::fs;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::path::PathBuf;
-use std::process::Stdio;
+use std::process::{Command, Stdio};
 use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::Duration;
@@ -86,6 +86,11 @@ impl Host {
     /// Runs the program in a world where this host is trusted and the table in `table.toml`
     /// is the one of networks.
     pub fn run(&self, place: &Place, arguments: &[&str]) -> Done {
+        Done::of(self.command(place, arguments).output())
+    }
+
+    /// The same, not yet started.
+    pub fn command(&self, place: &Place, arguments: &[&str]) -> Command {
         let mut command = place.command(arguments);
         // ONNX Runtime stays where it is.
         let runtime = place.path("cache/gs-chroma/onnxruntime");
@@ -104,7 +109,7 @@ impl Host {
         for proxy in ["HTTPS_PROXY", "https_proxy", "ALL_PROXY", "all_proxy"] {
             command.env_remove(proxy);
         }
-        Done::of(command.output())
+        command
     }
 }
 
