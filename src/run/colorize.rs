@@ -21,7 +21,7 @@ use super::{
     fit::{capture_report, open_gpu},
     foreign::drawn_like_photos,
     keeping,
-    scene::{comments_of_moved, read_scene, tell_not_finite},
+    scene::{Frame, comments_of_moved, read_scene, tell_not_finite},
     sound::{open_examined, open_trusted},
     teach::{Taught, TeachOptions, Teachers},
 };
@@ -112,12 +112,11 @@ pub fn colorize(
     };
     // From here on every photo is looked at once.
     let dataset = dataset.caching(0);
-    // A run's own files are moved already; others lie where COLMAP has the cameras.
-    let offset = match source.folder {
-        Some(_) => DVec3::ZERO,
-        None => dataset.capture.offset,
+    let frame = match source.folder {
+        Some(_) => Frame::Own,
+        None => Frame::World(dataset.capture.offset),
     };
-    let read = read_scene(&source.splats, offset, observe)?;
+    let read = read_scene(&source.splats, frame, observe)?;
     let (mut luma, mut drawn) = (read.splats.to_luma(), read.drawn);
     if source.report.is_none() {
         let splats = (source.splats.as_path(), &luma);
@@ -330,8 +329,6 @@ pub fn colorize(
     });
     let moved = dataset.capture.offset;
     let (added, left) = match &source.folder {
-        // The run's report has it.
-        Some(folder) if output.ply == folder.color() => (DVec3::ZERO, DVec3::ZERO),
         Some(_) => (DVec3::ZERO, moved),
         // As the gray file has it.
         None if read.offset != DVec3::ZERO => (DVec3::ZERO, moved),

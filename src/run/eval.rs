@@ -14,7 +14,7 @@ use super::{
     fit::open_gpu,
     keeping,
     lock::RunLock,
-    scene::{comments_of_moved, open, read_splats},
+    scene::{Frame, comments_of_moved, open, read_splats},
     teach::teacher_or_photos,
 };
 use crate::{
@@ -76,7 +76,10 @@ pub fn eval(
     let warnings = RefCell::default();
     let observe = &mut keeping(&warnings, observe);
     let folder = match &options.run {
-        Some(path) => RunFolder::at(path),
+        Some(path) => {
+            ply::is_splat_file(path)?;
+            RunFolder::at(path)
+        }
         None => RunFolder::newest()?,
     };
     let (_lock, report) = RunLock::of_run(&folder)?;
@@ -213,10 +216,10 @@ fn load(
     if !color.exists() {
         return Err(refused(color, "the run is not colored yet"));
     }
-    // A run's own files are moved already.
-    let offset = glam::DVec3::ZERO;
-    let luma = read_splats(&folder.luma(), offset, observe)?.0.to_luma();
-    let exported = read_splats(&color, offset, observe)?.0;
+    let luma = read_splats(&folder.luma(), Frame::Own, observe)?
+        .0
+        .to_luma();
+    let exported = read_splats(&color, Frame::Own, observe)?.0;
     if exported.means != luma.means || exported.sh.channels != 3 {
         return Err(refused(color, "its Gaussians are not those of luma.ply"));
     }

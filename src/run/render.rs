@@ -2,13 +2,11 @@
 
 use std::{path::PathBuf, sync::Arc};
 
-use glam::DVec3;
-
 use super::{
     Event, Observer, RunError, RunFolder, Stage, files,
     foreign::tell_unlike,
     picture_names,
-    scene::{open, read_splats},
+    scene::{Frame, open, read_splats},
 };
 use crate::{
     capture::{Capture, LoadOptions, Loader, Normalize, split},
@@ -80,9 +78,11 @@ pub fn render(options: &RenderOptions, observe: &mut Observer<'_>) -> Result<usi
         }
     };
     let capture = Capture::load_with(&colmap, &load.capture())?;
-    // A run's own files are moved already; others lie where COLMAP has the cameras.
-    let offset = run.map_or(capture.offset, |_| DVec3::ZERO);
-    let (splats, drawn) = read_splats(&file, offset, observe)?;
+    let frame = match run {
+        Some(_) => Frame::Own,
+        None => Frame::World(capture.offset),
+    };
+    let (splats, drawn) = read_splats(&file, frame, observe)?;
     let splats = if options.luma {
         splats.to_luma()
     } else {

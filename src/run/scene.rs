@@ -85,11 +85,19 @@ pub(super) struct ReadScene {
     pub offset: DVec3,
 }
 
-/// Reads a splat file that has at least one Gaussian and moves it to where `offset`, in world
-/// units, is subtracted from COLMAP's coordinates.
+/// Which coordinates Gaussians are wanted in.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Frame {
+    /// COLMAP's, less this, in world units.
+    World(DVec3),
+    /// Their run's, as its own files have them.
+    Own,
+}
+
+/// Reads a splat file that has at least one Gaussian and moves it to a frame.
 pub(super) fn read_scene(
     path: &Path,
-    offset: DVec3,
+    frame: Frame,
     observe: &mut Observer<'_>,
 ) -> Result<ReadScene, RunError> {
     let read = ply::read_ply(path)?;
@@ -98,7 +106,10 @@ pub(super) fn read_scene(
     if splats.is_empty() {
         return Err(RunError::NoSplats(path.to_owned()));
     }
-    let by = read.offset - offset;
+    let by = match frame {
+        Frame::World(offset) => read.offset - offset,
+        Frame::Own => DVec3::ZERO,
+    };
     if by != DVec3::ZERO {
         for mean in &mut splats.means {
             *mean = (DVec3::from(mean.map(f64::from)) + by).as_vec3().to_array();
@@ -116,10 +127,10 @@ pub(super) fn read_scene(
 /// [`read_scene`] for whoever writes no such file.
 pub(super) fn read_splats(
     path: &Path,
-    offset: DVec3,
+    frame: Frame,
     observe: &mut Observer<'_>,
 ) -> Result<(Splats, RasterOptions), RunError> {
-    let scene = read_scene(path, offset, observe)?;
+    let scene = read_scene(path, frame, observe)?;
     Ok((scene.splats, scene.drawn))
 }
 

@@ -82,7 +82,10 @@ fn exported_files_come_back_to_their_photos() {
     place.succeed(&["export", "-o", "near.ply"]);
     place.succeed(&["export", "--colmap-coordinates", "-o", "far.ply"]);
     place.succeed(&["render", "--views", "all", "-o", "run"]);
-    for file in ["near", "far"] {
+    // The run's own, named as any other file.
+    let own = place.read("runs/scene/luma.ply");
+    place.write("own.ply", own);
+    for file in ["near", "far", "own"] {
         draws_like_the_run(&place, file);
     }
 
@@ -109,10 +112,12 @@ fn exported_files_come_back_to_their_photos() {
     let mut fit = QUICK_FIT;
     fit[5] = "1";
     place.succeed(&[&fit[..], &["-o", "runs/points"]].concat());
-    place.succeed(&[&fit[..], &["-o", "runs/init", "--init", "near.ply"]].concat());
-    let [trained, init, points] = ["runs/scene", "runs/init", "runs/points"].map(held_out);
-    assert!((trained - init).abs() < 0.5, "{trained} {init}");
-    assert!(init > points + 0.5, "{init} {points}");
+    for (run, init) in [("runs/init", "near.ply"), ("runs/own", "own.ply")] {
+        place.succeed(&[&fit[..], &["-o", run, "--init", init]].concat());
+        let [trained, init, points] = ["runs/scene", run, "runs/points"].map(held_out);
+        assert!((trained - init).abs() < 0.5, "{trained} {init}");
+        assert!(init > points + 0.5, "{init} {points}");
+    }
 }
 
 /// Georeferenced: where the steps of `f32` are half a unit.

@@ -17,7 +17,7 @@ use super::{
     fingerprint::of_files,
     keeping,
     lock::RunLock,
-    scene::open,
+    scene::{comments_of_moved, open},
     sound::open_examined,
 };
 use crate::{
@@ -220,7 +220,8 @@ fn write(folder: &RunFolder, trained: &Trained, report: &Report) -> Result<(), R
         commit.remove(&stale);
     }
     commit.remove_page(&folder.evaluation_page());
-    let comments = comments(trained.scene.settings.raster_options());
+    let drawn = trained.scene.settings.raster_options();
+    let comments = comments_of_moved(drawn, report.capture.offset.into());
     let origin = glam::DVec3::ZERO;
     let luma = commit.place(&folder.luma());
     ply::write_ply(&luma, &trained.scene.splats, origin, &comments)?;

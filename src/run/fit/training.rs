@@ -2,7 +2,6 @@
 
 use std::{cell::RefCell, fmt::Write, ops::ControlFlow, sync::Arc, time::Instant};
 
-use glam::DVec3;
 use serde_json::Value;
 
 use super::super::{
@@ -10,7 +9,7 @@ use super::super::{
     checkpoints::FileKeeper,
     colorize::with_rows,
     foreign::tell_unlike,
-    scene::{read_splats, tell_trial},
+    scene::{Frame, read_splats, tell_trial},
 };
 use super::{
     FitOptions, Init,
@@ -151,13 +150,12 @@ impl Job<'_> {
         let limit = self.time_for_training(budget.each, found)?;
         let settings = &budget.work.settings;
         let init = options.init.as_ref().map(|init| {
-            let offset = match init {
-                Init::File(_) => dataset.capture.offset,
-                // They are moved already.
-                Init::Run(..) => DVec3::ZERO,
+            let frame = match init {
+                Init::File(_) => Frame::World(dataset.capture.offset),
+                Init::Run(..) => Frame::Own,
             };
             let path = init.path();
-            let (splats, drawn) = read_splats(&path, offset, observe)?;
+            let (splats, drawn) = read_splats(&path, frame, observe)?;
             Ok::<_, RunError>((path, splats, drawn))
         });
         let init = init.transpose()?;
