@@ -1,6 +1,6 @@
 //! Adapter and device.
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use super::stopwatch::{KernelTime, Stopwatch};
 
@@ -74,7 +74,7 @@ pub enum GpuError {
     },
     /// The device was lost or a read-back failed.
     #[error(
-        "device {0}: read-back failed ({1}): the driver may have reset; run again with fewer splats or smaller images"
+        "device {0}: work on it failed ({1}): its memory may be full or the driver may have reset; run again with fewer splats or smaller images"
     )]
     Lost(String, String),
     /// A training that had no room is asked to go on.
@@ -128,6 +128,8 @@ struct Inner {
     device: wgpu::Device,
     queue: wgpu::Queue,
     info: wgpu::AdapterInfo,
+    /// What the device has refused, such as memory that is not there.
+    failed: Arc<OnceLock<String>>,
 }
 
 impl Gpu {
@@ -156,7 +158,14 @@ impl Gpu {
             adapter: info.name.clone(),
             reason: error.to_string(),
         })?;
-        Self::on(device, queue, info)
+        let failed = Arc::<OnceLock<String>>::default();
+        let told = failed.clone();
+        // wgpu would panic. What it says here is an error of whoever reads next.
+        device.on_uncaptured_error(Arc::new(move |error| {
+            let words = error.to_string().replace('\n', " ");
+            let _first = told.set(words);
+        }));
+        Self::with(device, queue, info, failed)
     }
 
     /// The device of a program that has one already, such as a viewer's; `info` is its
@@ -169,6 +178,16 @@ impl Gpu {
         device: wgpu::Device,
         queue: wgpu::Queue,
         info: wgpu::AdapterInfo,
+    ) -> Result<Self, GpuError> {
+        // Its program hears of errors that nobody waits for.
+        Self::with(device, queue, info, Arc::default())
+    }
+
+    fn with(
+        device: wgpu::Device,
+        queue: wgpu::Queue,
+        info: wgpu::AdapterInfo,
+        failed: Arc<OnceLock<String>>,
     ) -> Result<Self, GpuError> {
         let binds = device.limits().max_storage_buffers_per_shader_stage;
         if binds < STORAGE_BUFFERS {
@@ -184,6 +203,7 @@ impl Gpu {
                 device,
                 queue,
                 info,
+                failed,
             }),
             patch: None,
             stopwatch: None,
@@ -312,7 +332,10 @@ impl Gpu {
         self.inner
             .device
             .poll(wgpu::PollType::wait_indefinitely())
-            .map(|_| ())
-            .map_err(|error| GpuError::Lost(self.describe(), error.to_string()))
+            .map_err(|error| GpuError::Lost(self.describe(), error.to_string()))?;
+        match self.inner.failed.get() {
+            None => Ok(()),
+            Some(words) => Err(GpuError::Lost(self.describe(), words.clone())),
+        }
     }
 }

@@ -180,6 +180,8 @@ pub(super) struct FileKeeper<'a, S> {
     /// When the next is due.
     due: Option<Instant>,
     told: bool,
+    /// When the one that is being made was asked for.
+    asked: Option<Instant>,
     /// What was written when it was interrupted: how far the work was.
     pub interrupted: Option<Result<usize, RunError>>,
 }
@@ -211,6 +213,7 @@ impl<'a, S: Serialize> FileKeeper<'a, S> {
             begun,
             due: options.every.map(|minutes| Instant::now() + wait(minutes)),
             told: false,
+            asked: None,
             interrupted: None,
         }
     }
@@ -221,13 +224,17 @@ impl<'a, S: Serialize> FileKeeper<'a, S> {
     }
 
     /// Whether a checkpoint is due.
-    pub fn is_due(&self) -> bool {
-        self.options.interrupt.is_raised() || self.due.is_some_and(|due| due <= Instant::now())
+    pub fn is_due(&mut self) -> bool {
+        let now = Instant::now();
+        let is_due = self.options.interrupt.is_raised() || self.due.is_some_and(|due| due <= now);
+        self.asked = is_due.then_some(now);
+        is_due
     }
 
     /// Writes one of work that is so far; `false` where it is to end.
     pub fn write(&mut self, far: usize, sections: &[(String, Vec<u8>)]) -> bool {
-        let begun = Instant::now();
+        // What it takes to read the work back from the device belongs to it.
+        let begun = self.asked.take().unwrap_or_else(Instant::now);
         self.header.seconds = self.begun.elapsed().as_secs_f64();
         self.header.log.clone_from(&self.log.borrow());
         // Plain structs with string keys: serializing them cannot fail.

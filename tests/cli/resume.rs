@@ -341,3 +341,27 @@ fn a_coloring_by_others_is_not_gone_on_with() {
     );
     assert!(!place.path("runs/scene/checkpoint-color").exists());
 }
+
+/// What a training with a time limit took before it was killed counts.
+#[test]
+fn a_time_limit_goes_on_where_it_was() {
+    let place = place_with_scene();
+    let fit = ["fit", "scene", "--time-limit", "0.2", "-o", "run"];
+    let fit = [&fit[..], &["--without", "background"], &OFTEN].concat();
+    let mut command = place.command(&fit);
+    let quiet = command.stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = quiet.spawn().expect("the program starts");
+    let has_checkpoint = has_checkpoint(&place, &mut child);
+    sleep(Duration::from_secs(2));
+    child.kill().expect("it is there or gone");
+    child.wait().expect("a child");
+    assert!(has_checkpoint && place.path("run/checkpoint").exists());
+    let begun = Instant::now();
+    place.succeed(&[&fit[..], &["--resume"]].concat());
+    let report = place.report("run");
+    let all = report["luma"]["seconds"]["all"].as_f64().expect("seconds");
+    assert!((6.0..14.0).contains(&all), "{all} of 12 s");
+    // The seconds before are in it.
+    let now = begun.elapsed().as_secs_f64();
+    assert!(all > now + 1.0, "{all} s in all, {now} s now");
+}

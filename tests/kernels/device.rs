@@ -1,6 +1,17 @@
 //! A device that the caller brings.
 
-use gs_chroma::gpu::{Buffer, Gpu, GpuError, STORAGE_BUFFERS};
+use std::{ops::ControlFlow, path::Path, sync::Arc};
+
+use gs_chroma::{
+    capture::{Dataset, LoadOptions},
+    chroma::{
+        self, ChromaSettings, ColorizeEvent,
+        teacher::{Teacher, TeacherSettings},
+    },
+    gpu::{Buffer, Gpu, GpuError, STORAGE_BUFFERS},
+    luma::{self, LumaSettings},
+    raster::Raster,
+};
 
 /// A device of the adapter of [`Gpu::open`] with other limits.
 fn brought(storage_buffers: u32) -> Result<Gpu, GpuError> {
@@ -24,4 +35,82 @@ fn a_device_that_is_brought_works_if_kernels_can_bind_enough() {
     assert_eq!(buffer.read(&gpu).unwrap(), [1, 2, 3]);
     let refused = brought(STORAGE_BUFFERS - 1);
     assert!(matches!(refused, Err(GpuError::NoDevice { .. })));
+}
+
+fn garden() -> Arc<Dataset> {
+    let options = LoadOptions {
+        max_side: Some(48),
+        ..LoadOptions::default()
+    };
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/demo");
+    Arc::new(Dataset::open(&folder, &options, &mut |_| {}).unwrap())
+}
+
+/// Whatever was on its way: no panic, no wait without end.
+#[test]
+fn a_device_that_is_lost_is_an_error() {
+    let dataset = garden();
+    for told in [1, 3, 8] {
+        let gpu = Gpu::open().unwrap();
+        let mut events = 0;
+        let settings = LumaSettings::new(200);
+        let trained = luma::fit(&gpu, &dataset, &settings, &mut |_| {
+            events += 1;
+            if events == told {
+                gpu.device().destroy();
+            }
+            ControlFlow::Continue(())
+        });
+        let words = trained.map(drop).unwrap_err().to_string();
+        assert!(words.contains("device"), "{told}: {words}");
+    }
+}
+
+#[test]
+fn a_device_that_is_lost_while_it_colors_is_an_error() {
+    let dataset = garden();
+    let gpu = Gpu::open().unwrap();
+    let settings = LumaSettings::new(20);
+    let scene = luma::fit(
+        &gpu,
+        &dataset,
+        &settings,
+        &mut |_| ControlFlow::Continue(()),
+    );
+    let scene = scene.unwrap();
+    let raster = Arc::new(Raster::with(&gpu, scene.settings.raster_options()));
+    let photos = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/demo/images");
+    let mut teacher = Teacher::open(&photos, None, &TeacherSettings::default()).unwrap();
+    let mut rounds = 0;
+    let colored = chroma::colorize(
+        &raster,
+        &dataset,
+        &scene.splats,
+        &mut teacher,
+        &ChromaSettings::irls(),
+        &mut |event| {
+            rounds += usize::from(matches!(event, ColorizeEvent::Solving(_)));
+            if rounds == 2 {
+                gpu.device().destroy();
+            }
+            ControlFlow::Continue(())
+        },
+    );
+    let words = colored.map(drop).unwrap_err().to_string();
+    assert!(words.contains("device"), "{words}");
+}
+
+/// What the device refuses is an error of whoever waits next, and no panic.
+#[test]
+fn memory_that_is_not_there_is_an_error() {
+    let gpu = Gpu::open().unwrap();
+    let most = gpu.device().limits().max_buffer_size;
+    let _refused = gpu.device().create_buffer(&wgpu::BufferDescriptor {
+        label: None,
+        size: most + 4,
+        usage: wgpu::BufferUsages::STORAGE,
+        mapped_at_creation: false,
+    });
+    let words = gpu.wait().unwrap_err().to_string();
+    assert!(words.contains("device") && !words.contains('\n'), "{words}");
 }
