@@ -79,9 +79,16 @@ static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 struct Unfinished(PathBuf);
 
 impl Unfinished {
-    fn new(path: &Path) -> Self {
-        unfinished().insert(path.to_owned());
-        Self(path.to_owned())
+    /// Makes something, which is listed before anybody can [give up](give_up).
+    fn made<T>(
+        make: impl FnOnce() -> io::Result<T>,
+        path: impl FnOnce(&T) -> &Path,
+    ) -> io::Result<(T, Self)> {
+        let mut all = unfinished();
+        let made = make()?;
+        let path = path(&made).to_owned();
+        all.insert(path.clone());
+        Ok((made, Self(path)))
     }
 }
 
@@ -91,7 +98,8 @@ impl Drop for Unfinished {
     }
 }
 
-/// A set is whole even where a thread has panicked.
+/// Whoever holds this may make or move something. A set is whole even where a thread has
+/// panicked.
 fn unfinished() -> MutexGuard<'static, BTreeSet<PathBuf>> {
     UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -130,8 +138,8 @@ pub(crate) fn create(path: &Path) -> io::Result<Draft> {
         // user's other files, whose umask takes away from this.
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
-    let file = builder.tempfile_in(folder_of(path)).map_err(plain)?;
-    let _listed = Unfinished::new(file.path());
+    let make = || builder.tempfile_in(folder_of(path)).map_err(plain);
+    let (file, _listed) = Unfinished::made(make, NamedTempFile::path)?;
     Ok(Draft { file, _listed })
 }
 
@@ -144,7 +152,9 @@ impl Draft {
         step()?;
         self.file.as_file().sync_all()?;
         step()?;
+        let moving = unfinished();
         self.file.persist(path).map_err(|failed| failed.error)?;
+        drop(moving);
         Ok(())
     }
 }
@@ -197,8 +207,9 @@ pub(crate) fn create_folder(prefix: &str, folder: &Path) -> io::Result<DraftFold
         // What lies in it may be moved elsewhere, and is to be as public as other folders.
         builder.permissions(fs::Permissions::from_mode(0o777));
     }
-    let made = builder.prefix(prefix).tempdir_in(folder).map_err(plain)?;
-    let _listed = Unfinished::new(made.path());
+    builder.prefix(prefix);
+    let make = || builder.tempdir_in(folder).map_err(plain);
+    let (made, _listed) = Unfinished::made(make, TempDir::path)?;
     Ok(DraftFolder { made, _listed })
 }
 
@@ -231,6 +242,7 @@ pub(crate) fn make_folder(path: &Path) -> io::Result<()> {
         return Ok(());
     }
     step()?;
+    let _making = unfinished();
     fs::create_dir_all(path)
 }
 
@@ -249,6 +261,7 @@ pub(crate) fn try_folder(path: &Path) -> io::Result<()> {
 /// The system's.
 pub(crate) fn rename(from: &Path, to: &Path) -> io::Result<()> {
     step()?;
+    let _moving = unfinished();
     fs::rename(from, to)
 }
 
