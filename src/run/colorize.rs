@@ -106,8 +106,12 @@ pub fn colorize(
     // `fit` has compared a run's photos with their model; in another light they may well show
     // something else.
     let trusted = options.relight || (source.report.is_some() && options.colmap.is_none());
+    let trained = match options.relight {
+        true => &[][..],
+        false => &report.capture.photos,
+    };
     let dataset = match trusted {
-        true => open_trusted(&colmap_dir, &load, &report.capture.photos, observe)?,
+        true => open_trusted(&colmap_dir, &load, trained, observe)?,
         false => open_examined(&colmap_dir, &load, observe)?.dataset,
     };
     // From here on every photo is looked at once.
@@ -186,8 +190,11 @@ pub fn colorize(
         sh_degree: options.sh_degree,
         correct_views: options.correct_views,
     };
+    // Adam keeps none.
+    let keeps_some = settings.solver == SolverKind::Irls;
+    let kept = source.kept(options).filter(|_| keeps_some);
     let found = match options.checkpoints.resume {
-        true => found_in(source.kept(options), observe)?,
+        true => found_in(kept, observe)?,
         false => {
             if let Some(folder) = source.kept(options) {
                 tell_given_up(&folder.color_checkpoint(), observe);
@@ -198,9 +205,7 @@ pub fn colorize(
     let log = RefCell::new(found.as_ref().map_or(String::new(), Found::log));
     let observe = RefCell::new(observe);
     let tell = |event| observe.borrow_mut()(event);
-    // Adam keeps none.
-    let keeps_some = settings.solver == SolverKind::Irls;
-    let mut keeper = match source.kept(options).filter(|_| keeps_some) {
+    let mut keeper = match kept {
         Some(folder) => {
             let question = question(folder, options, &settings, &gpu, &wanted)?;
             if let Some(found) = &found {

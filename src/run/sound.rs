@@ -97,7 +97,7 @@ pub(super) fn open_trusted(
     observe: &mut Observer<'_>,
 ) -> Result<Dataset, RunError> {
     let dataset = open_checked(dir, options, observe)?;
-    // Runs of former versions say nothing.
+    // Runs of former versions say nothing, and other light is another file.
     if trained.is_empty() {
         return Ok(dataset);
     }

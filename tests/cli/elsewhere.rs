@@ -243,6 +243,10 @@ fn a_scene_is_lit_anew() {
     for property in ["x", "y", "z", "opacity", "scale_0", "rot_2"] {
         assert_eq!(luma.column(property), found.column(property), "{property}");
     }
+    // That the photos are others than those that were trained on is what was asked for.
+    let again = [&colorize[..], &["--relight", "-o", "again.ply"]].concat();
+    let told = place.run(&again).stderr;
+    assert!(!told.contains("warning"), "{told}");
     let plain = error(&[], "plain.ply");
     assert!(lit < 0.7 * plain, "{lit} of {plain}");
     let done = place.run(&[&colorize[..], &["--relight"]].concat());

@@ -322,6 +322,7 @@ fn a_coloring_by_others_is_not_gone_on_with() {
     let begun = Instant::now();
     while !place.path("runs/scene/checkpoint-color").exists() {
         assert!(begun.elapsed() < Duration::from_secs(120), "no checkpoint");
+        sleep(Duration::from_millis(1));
     }
     child.kill().expect("it is there or gone");
     child.wait().expect("a child");
@@ -329,6 +330,13 @@ fn a_coloring_by_others_is_not_gone_on_with() {
     let done = place.run(&[&COLORIZE[..], &["--resume"]].concat());
     assert_eq!(done.code, Some(1), "{}", done.stderr);
     assert!(done.stderr.contains("taught"), "{}", done.stderr);
+    // Adam does not go by what the other solver has kept.
+    let kept = place.read("runs/scene/checkpoint-color");
+    let adam = ["colorize", "runs/scene", "--teacher", "colored", "--resume"];
+    let done = place.run(&[&adam[..], &["--solver", "adam", "--until", "62"]].concat());
+    assert_eq!(done.code, Some(0), "{}", done.stderr);
+    assert!(done.stderr.contains("begins anew"), "{}", done.stderr);
+    place.write("runs/scene/checkpoint-color", kept);
     // Begun anew it says that it gives up what there is.
     let done = place.run(&COLORIZE);
     assert_eq!(done.code, Some(0), "{}", done.stderr);
