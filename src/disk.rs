@@ -144,6 +144,11 @@ pub(crate) fn create(path: &Path) -> io::Result<Draft> {
 }
 
 impl Draft {
+    /// Where it is, for another program that fills it.
+    pub fn path(&self) -> &Path {
+        self.file.path()
+    }
+
     /// Puts the file where it belongs, once all of it is on the disk.
     ///
     /// # Errors

@@ -56,6 +56,7 @@ pub mod doctor;
 mod download;
 pub mod effects;
 pub mod eval;
+pub mod frames;
 pub mod gpu;
 mod hash;
 mod input;

@@ -142,6 +142,11 @@ impl Dataset {
         Ok(self.loader.load(&self.capture.views[view])?.0)
     }
 
+    /// How its photos are loaded.
+    pub fn loader(&self) -> &Loader {
+        &self.loader
+    }
+
     /// Hands the [photos](Self::photo) of some views to `look`, in this order; threads
     /// decode those that come next meanwhile.
     ///

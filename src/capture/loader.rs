@@ -1,13 +1,14 @@
 //! All photos of a capture, loaded alike.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use super::decode;
 use super::error::CaptureError;
 use super::mask::{self, MaskFolder, Masked};
 use super::options::{LoadOptions, MaskSource, Normalize};
+use super::original::Original;
 use super::photo::{Photo, check_size, working_size};
 use super::sample::Depth;
 use super::tone;
@@ -191,12 +192,60 @@ impl Loader {
         })
     }
 
+    /// The photo of a view at its file's size and depth, with its lens's distortion, and what
+    /// masks leave of it.
+    ///
+    /// # Errors
+    /// As [`Self::load`], but a photo of which no pixel counts is none.
+    pub fn original(&self, view: &View) -> Result<Original, CaptureError> {
+        let picture = decode::decode(&view.image_path, |size| check_size(view, size))?;
+        let mask = self.mask(view, picture.header.size)?;
+        let alpha = self.alpha(view, &picture);
+        let mut original = self.made_gray(picture);
+        for mask in [mask, alpha].into_iter().flatten() {
+            original.mask = Some(match original.mask {
+                Some(own) => (own.iter().zip(&mask)).map(|(a, b)| *a.min(b)).collect(),
+                None => mask,
+            });
+        }
+        Ok(original)
+    }
+
+    /// A photo that no view shows, at its file's size and depth.
+    ///
+    /// # Errors
+    /// If it cannot be read or decoded.
+    pub fn unplaced(&self, path: &Path) -> Result<Original, CaptureError> {
+        Ok(self.made_gray(decode::decode(path, |_| Ok(()))?))
+    }
+
+    fn made_gray(&self, picture: decode::Picture) -> Original {
+        let [width, height] = picture.header.size;
+        let deep = picture.header.depth > Depth::Eight;
+        let (gray, mask) = tone::gray(picture, &self.options);
+        Original {
+            width,
+            height,
+            gray,
+            deep,
+            mask,
+        }
+    }
+
     /// The longest side that the photo of a view may have.
     fn photo_side(&self, view: &View) -> Option<u32> {
         match &view.undistortion {
             Some(lens) => lens.photo_side(&view.camera, self.options.max_side),
             None => self.options.max_side,
         }
+    }
+
+    /// Width and height of the photo of a view in its file.
+    ///
+    /// # Errors
+    /// If the header cannot be read.
+    pub fn file_size(&self, view: &View) -> Result<[u32; 2], CaptureError> {
+        Ok(decode::header(&view.image_path)?.size)
     }
 
     /// The camera that [`Self::load`] gives, from the photo's header alone.

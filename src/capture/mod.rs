@@ -16,6 +16,7 @@ mod mask;
 pub(crate) mod names;
 mod options;
 mod order;
+mod original;
 mod photo;
 mod resample;
 mod room;
@@ -60,10 +61,12 @@ pub use mask::Masked;
 pub use names::Ambiguous;
 pub use options::{Channel, Encoding, LoadOptions, MaskSource, MaskUse, Normalize};
 pub use order::view_at;
+pub use original::Original;
 pub use photo::Photo;
 pub use resample::downscale;
 pub use split::{Split, split};
 pub use unplaced::Unplaced;
+pub(crate) use unplaced::photos_in;
 
 /// Where a COLMAP folder has its photos.
 pub const IMAGES: &str = "images";

@@ -4,7 +4,7 @@ use super::decode::Picture;
 use super::options::{Channel, Encoding, LoadOptions, Normalize};
 use super::photo::{Pixels, Values};
 use super::sample::{Depth, Header, Samples};
-use crate::color::linear_to_srgb;
+use crate::color::{gray_from_rgb, linear_to_srgb};
 
 /// A photo's pixels, encoded sRGB of 8 bits. Those with a value that is not finite
 /// count nothing and are black.
@@ -40,6 +40,36 @@ pub(super) fn develop(picture: Picture, options: &LoadOptions) -> Pixels {
         values,
         mask,
     }
+}
+
+/// A photo's gray in 65,535ths of white, encoded sRGB, and what each pixel counts, as
+/// [`develop`] has it.
+pub(super) fn gray(picture: Picture, options: &LoadOptions) -> (Vec<u16>, Option<Vec<u8>>) {
+    let Picture {
+        header, samples, ..
+    } = picture;
+    let mask = match &samples {
+        Samples::Float(values) => finite(values, header.channels, options.channel),
+        _ => None,
+    };
+    let shares = Tone::of(header.depth, options).shares(samples);
+    let level = |share: f64| (f64::from(u16::MAX) * share).round() as u16;
+    let pixels = shares.chunks_exact(header.channels);
+    let gray = match (header.channels, options.channel) {
+        (1 | 2, _) => pixels.map(|pixel| level(pixel[0].into())).collect(),
+        (_, Channel::Luma) => pixels
+            .map(|pixel| match *pixel {
+                [r, g, b, ..] if r == g && g == b => level(r.into()),
+                [r, g, b, ..] => level(gray_from_rgb([r, g, b].map(f64::from))),
+                _ => 0,
+            })
+            .collect(),
+        (_, channel) => {
+            let at = channel.samples().start;
+            pixels.map(|pixel| level(pixel[at].into())).collect()
+        }
+    };
+    (gray, mask)
 }
 
 /// 255 where all values in use are finite, else 0; `None` where they are everywhere.
@@ -149,15 +179,39 @@ impl Tone {
         }
     }
 
-    /// The encoded level. NaN is black.
-    fn level(&self, value: f64) -> u8 {
+    /// The encoded value, 0 to 1. NaN stays NaN.
+    fn share(&self, value: f64) -> f64 {
         let share = ((value - self.low) / (self.high - self.low)).clamp(0.0, 1.0);
-        let encoded = if self.linear {
+        if self.linear {
             linear_to_srgb(share)
         } else {
             share
+        }
+    }
+
+    /// The encoded level. NaN is black.
+    fn level(&self, value: f64) -> u8 {
+        (255.0 * self.share(value)).round() as u8
+    }
+
+    /// [`Self::share`] of every sample, 0 for NaN.
+    fn shares(&self, samples: Samples) -> Vec<f32> {
+        let share = |value: f64| {
+            let share = self.share(value) as f32;
+            if share.is_nan() { 0.0 } else { share }
         };
-        (255.0 * encoded).round() as u8
+        let table = |count: u32| (0..count).map(|v| share(v.into())).collect::<Vec<f32>>();
+        match samples {
+            Samples::Eight(values) => {
+                let table = table(1 << 8);
+                values.iter().map(|&v| table[usize::from(v)]).collect()
+            }
+            Samples::Sixteen(values) => {
+                let table = table(1 << 16);
+                values.iter().map(|&v| table[usize::from(v)]).collect()
+            }
+            Samples::Float(values) => values.iter().map(|&v| share(v.into())).collect(),
+        }
     }
 
     fn levels(&self, samples: Samples) -> Vec<u8> {

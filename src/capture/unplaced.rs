@@ -58,7 +58,7 @@ impl Unplaced {
 }
 
 /// The paths of photos below `images/`, as far as it can be read.
-pub(super) fn photos_in(images: &Path) -> Vec<String> {
+pub(crate) fn photos_in(images: &Path) -> Vec<String> {
     let mut photos = Vec::new();
     let _ = visit_files(images, &mut |name, path| {
         let extension = path.extension().unwrap_or_default().to_string_lossy();

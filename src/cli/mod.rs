@@ -8,6 +8,7 @@ mod error;
 mod eval;
 mod export;
 mod fit;
+mod frames;
 mod info;
 mod interrupt;
 mod luma;
@@ -50,6 +51,7 @@ enum Command {
     Colorize(colorize::Colorize),
     Teacher(teacher::TeacherCommand),
     Render(render::Render),
+    Frames(frames::FramesCommand),
     Eval(eval::Eval),
     Export(export::Export),
     Tradeoff(tradeoff::Tradeoff),
@@ -76,6 +78,7 @@ impl Cli {
             Command::Colorize(command) => command.run(),
             Command::Teacher(command) => command.run(),
             Command::Render(command) => command.run(),
+            Command::Frames(command) => command.run(),
             Command::Eval(command) => command.run(),
             Command::Export(command) => command.run(),
             Command::Tradeoff(command) => command.run(),

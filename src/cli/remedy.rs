@@ -48,6 +48,7 @@ pub(super) fn of_run(error: &RunError) -> String {
             format!("{error}: give the same options, or leave out --resume to train anew")
         }
         RunError::Interrupted { .. } => format!("{error} with the same command and --resume"),
+        RunError::NoProgram("ffmpeg") => format!("{error}; or write pictures: -o FOLDER"),
         RunError::NoHeldOut => format!("{error}: choose --views train or --views all"),
         RunError::NothingPainted(_) => format!("{error}, or give a --teacher as well"),
         RunError::NothingUntil { until, .. } => format!("--until {until}: {error}"),

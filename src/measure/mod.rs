@@ -10,6 +10,7 @@ mod diversity;
 mod flo;
 mod flow;
 mod image_error;
+mod optical_flow;
 mod path;
 mod sharpness;
 mod ssim;
@@ -24,6 +25,7 @@ pub use flow::Flow;
 pub use image_error::{
     DeltaE, IDENTICAL_PSNR, ab_error, delta_e, mean_delta_e, psnr, reported_psnr,
 };
+pub use optical_flow::optical_flow;
 pub use path::{camera_path, distance};
 pub use sharpness::{laplacian, variance};
 pub use ssim::ssim;

@@ -274,6 +274,9 @@ pub struct TeacherReport {
     /// Name, kind and identity.
     #[serde(flatten)]
     pub info: TeacherInfo,
+    /// Its file or folder, absolute, or its name in the catalog; `None` where that is no UTF-8.
+    #[serde(default)]
+    pub path: Option<String>,
     /// What its answers count beside the other teachers'.
     pub weight: f32,
 }

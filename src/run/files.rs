@@ -5,11 +5,12 @@ use std::{
     path::Path,
 };
 
-use image::RgbImage;
+use image::{DynamicImage, ImageBuffer, RgbImage};
 
 use super::RunError;
 use crate::{
     disk::{self, folder_of},
+    frames::Colored,
     input,
 };
 
@@ -56,6 +57,26 @@ pub(super) fn write_png(path: &Path, image: &RgbImage) -> Result<(), RunError> {
     write(path, bytes.get_ref())
 }
 
+/// Writes a photo in color as a PNG of its depth, beside and renamed.
+pub(super) fn write_colored(path: &Path, colored: Colored) -> Result<(), RunError> {
+    let [width, height] = [colored.width, colored.height];
+    let failed = |reason: String| RunError::File {
+        path: path.to_owned(),
+        reason,
+    };
+    let image = match colored.deep {
+        true => ImageBuffer::from_raw(width, height, colored.rgb.into_flattened())
+            .map(DynamicImage::ImageRgb16),
+        false => RgbImage::from_raw(width, height, colored.bytes()).map(DynamicImage::ImageRgb8),
+    };
+    let image = image.ok_or_else(|| failed("its pixels do not fill it".to_owned()))?;
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    image
+        .write_to(&mut bytes, image::ImageFormat::Png)
+        .map_err(|error| failed(error.to_string()))?;
+    write(path, bytes.get_ref())
+}
+
 /// Makes a folder and those above it, and tries whether it can be written to:
 /// better now than after hours of work.
 pub(crate) fn make_folder(path: &Path) -> Result<(), RunError> {
@@ -80,7 +101,7 @@ pub(super) fn make_folder_of(path: &Path) -> Result<(), RunError> {
     if path.is_dir() {
         return Err(RunError::File {
             path: path.to_owned(),
-            reason: "is a folder; name a .ply file".to_owned(),
+            reason: "is a folder; name a file".to_owned(),
         });
     }
     make_folder(folder_of(path))

@@ -12,6 +12,7 @@ mod fingerprint;
 mod fit;
 mod folder;
 mod foreign;
+mod frames;
 mod info;
 mod lock;
 mod picture_names;
@@ -30,6 +31,7 @@ pub use eval::{EvalOptions, eval};
 pub use export::{ExportOptions, Exported, export};
 pub use fit::{AheadOptions, FitOptions, Init, Overlay, fit};
 pub use folder::RunFolder;
+pub use frames::{Frames, FramesOptions, frames};
 pub use info::info;
 pub(crate) use picture_names::picture_names;
 pub use plan::{PlanOptions, Planned, plan};
@@ -93,6 +95,12 @@ pub enum RunError {
     /// A splat file without Gaussians.
     #[error("{}: holds no Gaussians", .0.display())]
     NoSplats(PathBuf),
+    /// A run without colors.
+    #[error("{}: the run is not colored yet: run `gs-chroma colorize` first", .0.display())]
+    NoColors(PathBuf),
+    /// A program that is needed is not there.
+    #[error("{0} is not installed, or not on PATH (Debian: apt-get install -y {0})")]
+    NoProgram(&'static str),
     /// Coordinates that are too large for a splat file.
     #[error(
         "{}: not written: near {coordinate} 32-bit floats are {step} apart, {:.2} times the size of the Gaussians (the median of their smallest scales is {size:.4})",
@@ -259,6 +267,8 @@ pub enum Stage {
     Peer,
     /// Drawing pictures.
     Render,
+    /// Coloring photos at full size.
+    Frames,
     /// Measuring pictures against photos.
     Measure,
     /// Drawing and comparing the frames of a path.
@@ -283,6 +293,7 @@ impl fmt::Display for Stage {
             Self::Bake => "bake",
             Self::Peer => "peer",
             Self::Render => "render",
+            Self::Frames => "frames",
             Self::Measure => "measure",
             Self::Path => "path",
             Self::Pairs => "pairs",

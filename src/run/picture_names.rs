@@ -11,7 +11,8 @@ pub(crate) fn picture_names(views: &[View]) -> Vec<String> {
     distinct(&names)
 }
 
-fn distinct(names: &[&str]) -> Vec<String> {
+/// [`picture_names`] of names.
+pub(super) fn distinct(names: &[&str]) -> Vec<String> {
     let mut files: Vec<String> = (names.iter())
         .map(|name| format!("{}.png", stem(name)))
         .collect();

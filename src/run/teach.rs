@@ -8,7 +8,7 @@ use std::{
 
 use super::{Event, Observer, RunError, Stage};
 use crate::{
-    capture::{Dataset, IMAGES},
+    capture::{Capture, Dataset, IMAGES},
     chroma::{
         Colorizer, ColorizerError, Lesson, Wanted, teach,
         teacher::{AbImage, GrayImage, HintFolder, HintImage, Query, Teacher, TeacherSettings},
@@ -196,11 +196,42 @@ impl Teachers {
 
     /// Name, kind and weight of each teacher.
     pub fn describe(&self) -> Vec<TeacherReport> {
-        let describe = |member: &Member| TeacherReport {
-            info: member.teacher.describe(),
-            weight: member.weight,
+        let describe = |member: &Member| {
+            let found = member.path.canonicalize();
+            let path = found.as_ref().unwrap_or(&member.path);
+            TeacherReport {
+                info: member.teacher.describe(),
+                path: path.to_str().map(str::to_owned),
+                weight: member.weight,
+            }
         };
         self.teachers.iter().map(describe).collect()
+    }
+
+    /// Says which photos there are, so that a folder's image of one is not taken for another's.
+    pub fn know(&mut self, capture: &Capture) {
+        for member in &mut self.teachers {
+            member.teacher.know(capture);
+        }
+    }
+
+    /// What they say of one photo together, at its size; `None` where none has an answer.
+    ///
+    /// # Errors
+    /// [`RunError::Teacher`].
+    pub fn color(
+        &mut self,
+        query: Query<'_>,
+        gray: GrayImage<'_>,
+    ) -> Result<Option<AbImage>, RunError> {
+        let mut answers = Vec::new();
+        for member in &mut self.teachers {
+            if let Some(answer) = member.teacher.colorize(query, gray, None)? {
+                answers.push((answer, member.weight));
+            }
+        }
+        let strength = self.strength;
+        Ok(mean(answers).map(|answer| scaled(answer, strength)))
     }
 
     /// Asks about every view, and keeps what is wanted at so many scales.

@@ -19,6 +19,7 @@ mod faults;
 #[cfg(target_os = "linux")]
 mod fetch;
 mod folder;
+mod frames;
 #[cfg(target_os = "linux")]
 mod host;
 mod hostile;

@@ -8,7 +8,7 @@ const FLOORS: [&[&str]; 11] = [
     &["cli"],
     &["tradeoff"],
     &["run"],
-    &["eval"],
+    &["eval", "frames"],
     &["report", "doctor"],
     &["luma", "chroma"],
     &["effects", "measure"],

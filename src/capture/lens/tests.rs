@@ -365,3 +365,42 @@ fn masks_come_along() {
     assert_eq!((row[middle - 3], row[middle + 3]), (255, 0));
     assert_eq!(row[0], 0);
 }
+
+#[test]
+fn a_photos_pixels_are_where_the_picture_shows_them() {
+    for lens in [barrel(), fisheye()] {
+        let lens = std::sync::Arc::new(lens);
+        for cut in lens.cuts().unwrap() {
+            let undistortion = Undistortion {
+                lens: lens.clone(),
+                rotation: cut.rotation,
+            };
+            // The photo at half its size, the picture at a third of its own.
+            let size = [lens.width / 2, lens.height / 2];
+            let camera = cut
+                .camera
+                .resized(cut.camera.width / 3, cut.camera.height / 3);
+            let places = undistortion.places(size, &camera);
+            let sources = undistortion.sources(&camera, size);
+            assert_eq!(places.len(), (size[0] * size[1]) as usize);
+            let mut compared = 0;
+            for (i, source) in sources.iter().enumerate() {
+                let inside = (0..2).all(|k| source[k] >= 1.0 && source[k] < size[k] as f32 - 1.0);
+                if !inside {
+                    continue;
+                }
+                let at = source[1] as usize * size[0] as usize + source[0] as usize;
+                let place = places[at];
+                if place[0].is_nan() {
+                    continue;
+                }
+                // Half a pixel of the photo, as large as the picture's stretch makes it.
+                let own = [i as u32 % camera.width, i as u32 / camera.width];
+                let off = (0..2).map(|k| (place[k] - own[k] as f32 - 0.5).abs());
+                assert!(off.fold(0.0, f32::max) < 2.0, "{own:?} {place:?}");
+                compared += 1;
+            }
+            assert!(compared > 20, "{compared}");
+        }
+    }
+}

@@ -104,6 +104,31 @@ impl Undistortion {
             .collect()
     }
 
+    /// Where in the camera's picture each pixel of the photo lies, the photo being of this width
+    /// and height, in pixels from the picture's top left corner; NaN where the picture does not
+    /// show it. `[height, width]`.
+    pub fn places(&self, size: [u32; 2], camera: &Camera) -> Vec<[f32; 2]> {
+        let scale = DVec2::new(
+            f64::from(self.lens.width) / f64::from(size[0]),
+            f64::from(self.lens.height) / f64::from(size[1]),
+        );
+        let place = |x: u32, y: u32| {
+            let pixel = scale * DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
+            let ray = self.rotation * self.lens.ray(pixel)?;
+            let place = DVec2::new(
+                camera.fx * ray.x / ray.z + camera.cx,
+                camera.fy * ray.y / ray.z + camera.cy,
+            );
+            let inside = |c: f64, side: u32| (0.0..=f64::from(side)).contains(&c);
+            let shown = ray.z > 0.0 && inside(place.x, camera.width);
+            (shown && inside(place.y, camera.height)).then(|| place.as_vec2().to_array())
+        };
+        (0..size[1])
+            .flat_map(|y| (0..size[0]).map(move |x| (x, y)))
+            .map(|(x, y)| place(x, y).unwrap_or([f32::NAN; 2]))
+            .collect()
+    }
+
     /// Where in a photo of this size each pixel of the camera's picture lies, in
     /// pixels; NaN where no ray meets the photo's plane.
     pub(super) fn sources(&self, camera: &Camera, size: [u32; 2]) -> Vec<[f32; 2]> {

@@ -1,0 +1,88 @@
+//! `gs-chroma frames`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::{CliError, network::NetworkArguments, print, progress::Progress};
+use crate::run::{Frames, FramesOptions, frames};
+
+/// Color the photos themselves: each with its own lightness at its full size, and the scene's
+/// colors.
+#[derive(Args)]
+pub struct FramesCommand {
+    /// Colored run folder [default: newest under runs/].
+    run: Option<PathBuf>,
+    /// Folder for the pictures, PNG of 8 bits, or of 16 where a photo has them; or a film
+    /// (.mp4, .mov, .mkv), which ffmpeg writes.
+    #[arg(short, long, value_name = "DIR|FILM")]
+    output: PathBuf,
+    /// Who colors what the scene does not show (sky, what moved) [default: the run's teachers].
+    #[arg(long, value_name = "NAME|FILE.onnx|DIR|photos")]
+    teacher: Option<PathBuf>,
+    #[command(flatten)]
+    network: NetworkArguments,
+    /// Leave the scene out: the teacher's own pictures, to compare with.
+    #[arg(long)]
+    teacher_alone: bool,
+    /// Frames a second of a film: 24, or 24000/1001 [default: as the film that the photos come
+    /// from, or 24].
+    #[arg(long, value_name = "RATE", value_parser = rate)]
+    frame_rate: Option<Rate>,
+    /// COLMAP folder with the photos, when it is not where `fit` found it.
+    #[arg(long, value_name = "COLMAP_DIR")]
+    colmap: Option<PathBuf>,
+    /// Print what was done as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy)]
+struct Rate([u32; 2]);
+
+/// Frames a second, whole or as a fraction.
+fn rate(text: &str) -> Result<Rate, String> {
+    let (frames, seconds) = text.split_once('/').unwrap_or((text, "1"));
+    let number = |text: &str| text.trim().parse().ok().filter(|&n: &u32| n > 0);
+    match (number(frames), number(seconds)) {
+        (Some(frames), Some(seconds)) => Ok(Rate([frames, seconds])),
+        _ => Err("no rate: 24, 25 or 30000/1001".to_owned()),
+    }
+}
+
+impl FramesCommand {
+    pub(super) fn run(self) -> Result<(), CliError> {
+        let mut progress = Progress::default();
+        let options = FramesOptions {
+            run: self.run,
+            colmap: self.colmap,
+            teacher: self.teacher,
+            teacher_settings: self.network.settings(),
+            output: self.output,
+            teacher_alone: self.teacher_alone,
+            frame_rate: self.frame_rate.map(|Rate(rate)| rate),
+        };
+        let done = frames(&options, &mut |event| progress.show(&event))?;
+        progress.finish();
+        if self.json {
+            let text = serde_json::to_string_pretty(&done);
+            return print(text.unwrap_or_default());
+        }
+        print(summary(&done))
+    }
+}
+
+fn summary(done: &Frames) -> String {
+    let carried = match done.carried {
+        0 => String::new(),
+        count => format!("; {count} without a pose take their colors from their neighbors"),
+    };
+    format!(
+        "colored {} photos in {:.0} s: the scene covers {:.0} % of the {} with a pose{carried}\nwrote {}",
+        done.photos,
+        done.seconds,
+        100.0 * done.covered,
+        done.placed,
+        done.output.display()
+    )
+}

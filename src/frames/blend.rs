@@ -1,0 +1,332 @@
+//! Colors of a photo from several sources that cover parts of it.
+//!
+//! The photo takes the teacher's colors t, which have its detail, plus a smooth correction v, which
+//! brings them in line with the scene. It minimizes, over all pixels x and neighbors x, y,
+//!
+//! `Σ c |v − (s − t)|² + (1 − c) [ε |v − d|² + τ |v − (p − t)|²] + λ Σ w |v_x − v_y|²`
+//!
+//! with s the scene's colors and c how far these are believed; d what the scene differs from the
+//! teacher around; p the colors of the photo before, where these are known. So there is no seam
+//! where the scene ends (as in Pérez, Gangnet and Blake, *Poisson Image Editing*, SIGGRAPH 2003),
+//! and what blurred geometry loses comes back (docs/decisions.md). With a teacher w = 1; without
+//! one t = 0, and w = exp(−δ²/2σ²), δ the difference of the neighbors' gray: colors spread along
+//! even lightness and stop at edges (as in Levin, Lischinski and Weiss, *Colorization using
+//! Optimization*, SIGGRAPH 2004). The system is symmetric and positive definite; conjugate
+//! gradients solve it.
+
+use super::Canvas;
+
+/// λ with a teacher: half the square of the distance in pixels over which its detail stays its
+/// own. A scene is blurred over as much.
+const SMOOTH: f32 = 4.5;
+
+/// λ without one.
+const SPREAD: f32 = 1.0;
+
+/// σ, in 8-bit levels of gray.
+const GRAY_DEVIATION: f32 = 6.0;
+
+/// What an edge counts at least, so that nothing is cut off from everything.
+const LEAST_EDGE: f32 = 1e-4;
+
+/// ε: what the colors around count beside a pixel that is believed.
+const FILL: f32 = 0.02;
+
+/// τ: what the photo before counts there.
+const BEFORE: f32 = 0.2;
+
+/// The root mean square of what is left, in CIELAB units, at which the solution is near enough:
+/// below what 8 bits can tell.
+const LEFT: f64 = 0.01;
+
+/// Steps of conjugate gradients at most.
+const STEPS: usize = 200;
+
+/// Colors and how far each pixel of them is to be believed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Believed {
+    /// CIELAB a and b, `[height, width]`.
+    pub ab: Vec<[f32; 2]>,
+    /// 0 to 1.
+    pub weight: Vec<f32>,
+}
+
+impl Believed {
+    /// Nothing, for a number of pixels.
+    pub fn nothing(pixels: usize) -> Self {
+        Self {
+            ab: vec![[0.0; 2]; pixels],
+            weight: vec![0.0; pixels],
+        }
+    }
+
+    /// The mean weight: which share of a picture is known.
+    pub fn share(&self) -> f64 {
+        let sum: f64 = self.weight.iter().map(|&w| f64::from(w)).sum();
+        sum / self.weight.len().max(1) as f64
+    }
+}
+
+/// The colors of a photo: `scene` where it is believed, elsewhere the teacher's in line with it
+/// and with the photo `before`. CIELAB a and b, `[height, width]`.
+///
+/// Without a teacher, what nothing covers takes the colors around.
+pub fn blend(
+    canvas: &Canvas,
+    scene: &Believed,
+    teacher: Option<&[[f32; 2]]>,
+    before: Option<&Believed>,
+) -> Vec<[f32; 2]> {
+    let nothing;
+    let own = match teacher {
+        Some(ab) => ab,
+        None => {
+            nothing = vec![[0.0; 2]; canvas.len()];
+            &nothing
+        }
+    };
+    let from_teacher = |other: &Believed| Believed {
+        ab: (other.ab.iter().zip(own))
+            .map(|(&ab, &own)| difference(ab, own))
+            .collect(),
+        weight: other.weight.clone(),
+    };
+    let scene = from_teacher(scene);
+    let before = before.map(from_teacher);
+    let weighted: Vec<[f32; 3]> = (scene.ab.iter().zip(&scene.weight))
+        .map(|(ab, &c)| [c * ab[0], c * ab[1], c])
+        .collect();
+    let around = spread(&weighted, canvas.size());
+    let edges = match teacher {
+        Some(_) => [SMOOTH; 256],
+        None => std::array::from_fn(|d| {
+            let d = d as f32 / GRAY_DEVIATION;
+            SPREAD * ((-0.5 * d * d).exp() + LEAST_EDGE)
+        }),
+    };
+    let system = System::new(canvas, &edges, &scene, &around, before.as_ref());
+    let correction = system.solve(around);
+    let pixels = correction.iter().zip(own);
+    pixels
+        .map(|(v, own)| [v[0] + own[0], v[1] + own[1]])
+        .collect()
+}
+
+/// Weighted values, spread over where there are none: each pixel takes what is around on the
+/// finest scale on which there is something (pull and push; S. J. Gortler et al., *The
+/// Lumigraph*, SIGGRAPH 1996). Zeros where there is nothing at all.
+fn spread(weighted: &[[f32; 3]], [width, height]: [usize; 2]) -> Vec<[f32; 2]> {
+    if width * height <= 1 {
+        return weighted.iter().map(|&[a, b, w]| over(a, b, w)).collect();
+    }
+    let [half_width, half_height] = [width.div_ceil(2), height.div_ceil(2)];
+    let mut coarse = vec![[0.0; 3]; half_width * half_height];
+    for (i, value) in weighted.iter().enumerate() {
+        let (x, y) = (i % width, i / width);
+        let sum: &mut [f32; 3] = &mut coarse[y / 2 * half_width + x / 2];
+        for (sum, value) in sum.iter_mut().zip(value) {
+            *sum += value;
+        }
+    }
+    // A coarse pixel counts as much as one of the finest at most.
+    for sum in &mut coarse {
+        let scale = 1.0 / sum[2].max(1.0);
+        *sum = sum.map(|value| value * scale);
+    }
+    let below = spread(&coarse, [half_width, half_height]);
+    (weighted.iter().enumerate())
+        .map(|(i, &[a, b, w])| {
+            let place = [i % width, i / width].map(|c| (c as f32 - 0.5) / 2.0);
+            let around = bilinear(&below, [half_width, half_height], place);
+            let rest = 1.0 - w.min(1.0);
+            [a + rest * around[0], b + rest * around[1]]
+        })
+        .collect()
+}
+
+fn over(a: f32, b: f32, w: f32) -> [f32; 2] {
+    if w > 0.0 { [a / w, b / w] } else { [0.0; 2] }
+}
+
+/// Bilinear value at a place in pixel indices, the border going on as it ends.
+fn bilinear(pixels: &[[f32; 2]], size: [usize; 2], place: [f32; 2]) -> [f32; 2] {
+    let axis = |c: f32, length: usize| {
+        let c = c.clamp(0.0, (length - 1) as f32);
+        let first = c as usize;
+        (first, (first + 1).min(length - 1), c - first as f32)
+    };
+    let ((x0, x1, s), (y0, y1, t)) = (axis(place[0], size[0]), axis(place[1], size[1]));
+    let at = |x: usize, y: usize| pixels[y * size[0] + x];
+    let row = |y: usize| mix(at(x0, y), at(x1, y), s);
+    mix(row(y0), row(y1), t)
+}
+
+fn mix(a: [f32; 2], b: [f32; 2], share: f32) -> [f32; 2] {
+    [0, 1].map(|k: usize| a[k] + share * (b[k] - a[k]))
+}
+
+fn difference(a: [f32; 2], b: [f32; 2]) -> [f32; 2] {
+    [a[0] - b[0], a[1] - b[1]]
+}
+
+/// The normal equations.
+struct System {
+    size: [usize; 2],
+    /// λw of the edge to the right neighbor and to the one below; 0 at the border.
+    edges: Vec<[f32; 2]>,
+    /// What each pixel's own terms count.
+    own: Vec<f32>,
+    /// The right-hand side.
+    wanted: Vec<[f32; 2]>,
+}
+
+impl System {
+    /// `likeness` is what an edge counts by the difference of gray across it.
+    fn new(
+        canvas: &Canvas,
+        likeness: &[f32; 256],
+        scene: &Believed,
+        around: &[[f32; 2]],
+        before: Option<&Believed>,
+    ) -> Self {
+        let size @ [width, height] = canvas.size();
+        let gray = &canvas.gray;
+        let between = |i: usize, j: usize| likeness[usize::from(gray[i].abs_diff(gray[j]))];
+        let edges: Vec<[f32; 2]> = (0..gray.len())
+            .map(|i| {
+                let right = i % width + 1 < width;
+                let below = i / width + 1 < height;
+                [
+                    if right { between(i, i + 1) } else { 0.0 },
+                    if below { between(i, i + width) } else { 0.0 },
+                ]
+            })
+            .collect();
+        let (mut own, mut wanted) = (Vec::with_capacity(gray.len()), Vec::new());
+        for (i, around) in around.iter().enumerate() {
+            let c = scene.weight[i];
+            let open = 1.0 - c;
+            let (t, p) = before.map_or((0.0, [0.0; 2]), |before| {
+                (open * BEFORE * before.weight[i], before.ab[i])
+            });
+            let f = open * FILL + f32::MIN_POSITIVE;
+            own.push(c + t + f);
+            wanted.push([0, 1].map(|k: usize| c * scene.ab[i][k] + t * p[k] + f * around[k]));
+        }
+        Self {
+            size,
+            edges,
+            own,
+            wanted,
+        }
+    }
+
+    /// The matrix times `u`.
+    fn times(&self, u: &[[f32; 2]], product: &mut [[f32; 2]]) {
+        let width = self.size[0];
+        for i in 0..u.len() {
+            let mut sum = u[i].map(|u| self.own[i] * u);
+            let mut pull = |edge: f32, other: usize| {
+                for k in 0..2 {
+                    sum[k] += edge * (u[i][k] - u[other][k]);
+                }
+            };
+            let [right, below] = self.edges[i];
+            if right > 0.0 {
+                pull(right, i + 1);
+            }
+            if below > 0.0 {
+                pull(below, i + width);
+            }
+            if i % width > 0 {
+                pull(self.edges[i - 1][0], i - 1);
+            }
+            if i >= width {
+                pull(self.edges[i - width][1], i - width);
+            }
+            product[i] = sum;
+        }
+    }
+
+    /// The matrix's diagonal.
+    fn diagonal(&self) -> Vec<f32> {
+        let width = self.size[0];
+        (0..self.own.len())
+            .map(|i| {
+                let left = if i % width > 0 {
+                    self.edges[i - 1][0]
+                } else {
+                    0.0
+                };
+                let above = if i >= width {
+                    self.edges[i - width][1]
+                } else {
+                    0.0
+                };
+                self.own[i] + self.edges[i][0] + self.edges[i][1] + left + above
+            })
+            .collect()
+    }
+
+    /// Conjugate gradients from `u` on, preconditioned by the diagonal, both channels at once.
+    fn solve(&self, mut u: Vec<[f32; 2]>) -> Vec<[f32; 2]> {
+        let diagonal = self.diagonal();
+        let count = u.len();
+        let mut product = vec![[0.0; 2]; count];
+        self.times(&u, &mut product);
+        let mut left: Vec<[f32; 2]> = (self.wanted.iter().zip(&product))
+            .map(|(&wanted, &product)| difference(wanted, product))
+            .collect();
+        let scaled = |left: &[[f32; 2]]| -> Vec<[f32; 2]> {
+            let pairs = left.iter().zip(&diagonal);
+            pairs.map(|(left, d)| left.map(|left| left / d)).collect()
+        };
+        let mut direction = scaled(&left);
+        let mut energy = dot(&left, &direction);
+        for _ in 0..STEPS {
+            // In units of the colors: what is left over the diagonal.
+            let steps = scaled(&left);
+            let rms = (dot(&steps, &steps).iter().sum::<f64>() / count as f64).sqrt();
+            if rms <= LEFT {
+                break;
+            }
+            self.times(&direction, &mut product);
+            let slope = dot(&direction, &product);
+            let step = [0, 1].map(|k: usize| ratio(energy[k], slope[k]));
+            for i in 0..count {
+                for k in 0..2 {
+                    u[i][k] += step[k] * direction[i][k];
+                    left[i][k] -= step[k] * product[i][k];
+                }
+            }
+            let next = scaled(&left);
+            let now = dot(&left, &next);
+            let more = [0, 1].map(|k: usize| ratio(now[k], energy[k]));
+            for (direction, next) in direction.iter_mut().zip(&next) {
+                *direction = [0, 1].map(|k: usize| next[k] + more[k] * direction[k]);
+            }
+            energy = now;
+        }
+        u
+    }
+}
+
+/// Of each channel.
+fn dot(a: &[[f32; 2]], b: &[[f32; 2]]) -> [f64; 2] {
+    let mut sum = [0.0; 2];
+    for (a, b) in a.iter().zip(b) {
+        for k in 0..2 {
+            sum[k] += f64::from(a[k]) * f64::from(b[k]);
+        }
+    }
+    sum
+}
+
+/// 0 where nothing is left to divide.
+fn ratio(a: f64, b: f64) -> f32 {
+    if b > 0.0 { (a / b) as f32 } else { 0.0 }
+}
+
+#[cfg(test)]
+#[path = "blend_tests.rs"]
+mod tests;

@@ -1,0 +1,281 @@
+//! Which colors the scene has where a photo was taken, and how far they can be believed there.
+
+use std::sync::Arc;
+
+use super::{Believed, Canvas, canvas::working_size};
+use crate::{
+    capture::{Camera, Exposure, View, lens::Undistortion},
+    gpu::GpuError,
+    raster::{Picture, Raster, Renderer},
+    splats::{ShField, Splats, sh},
+};
+
+/// Opacities from which the scene begins to be believed, and from which it wholly is: trained
+/// before black, a scene is not opaque where photos are dark.
+const OPAQUE: [f32; 2] = [0.2, 0.6];
+
+/// Difference between drawing and photo, in 8-bit levels and in medians over the photo, at which
+/// the scene is believed by half: something has moved, or was never there.
+const UNLIKE: [f32; 2] = [12.0, 4.0];
+
+/// Reach in pixels of the mean over which they are compared, for a scene is blurred.
+const REACH: usize = 3;
+
+/// Draws a colored scene as photos show it.
+pub struct SceneDrawer {
+    renderer: Renderer,
+    /// Where views show the pixels of a photo, for the lenses met last.
+    lenses: Vec<Lens>,
+}
+
+struct Lens {
+    undistortion: Undistortion,
+    camera: [f64; 6],
+    size: [u32; 2],
+    places: Arc<Vec<[f32; 2]>>,
+}
+
+/// One view of a photo: the photo itself, or a face of it.
+#[derive(Clone, Copy)]
+pub struct ViewOf<'a> {
+    /// The view.
+    pub view: &'a View,
+    /// Its camera at working size.
+    pub camera: &'a Camera,
+    /// How bright the photo shows the scene.
+    pub exposure: Exposure,
+}
+
+impl SceneDrawer {
+    /// Of a scene with native a/b harmonics; `extent` is the capture's, in world units.
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`].
+    pub fn new(
+        raster: &Arc<Raster>,
+        luma: &Splats,
+        chroma: &ShField,
+        extent: f64,
+    ) -> Result<Self, GpuError> {
+        let mut whole = ShField::zeros(luma.len(), 0, 2);
+        whole.coefficients.fill((1.0 / sh::C0) as f32);
+        let fields = [&luma.sh, chroma, &whole];
+        Ok(Self {
+            renderer: Renderer::of(raster, luma, &fields, extent)?,
+            lenses: Vec::new(),
+        })
+    }
+
+    /// Width and height at which a photo's colors are found.
+    pub fn size(views: &[ViewOf<'_>]) -> Option<[u32; 2]> {
+        let first = views.first()?;
+        Some(working_size(first.view, first.camera))
+    }
+
+    /// The scene's colors on a photo's canvas.
+    ///
+    /// # Errors
+    /// [`GpuError`].
+    pub fn draw(&mut self, views: &[ViewOf<'_>], canvas: &Canvas) -> Result<Believed, GpuError> {
+        let mut believed = Believed::nothing(canvas.len());
+        // Drawing less photo, where the scene shows something.
+        let mut differences: Vec<Option<f32>> = vec![None; canvas.len()];
+        for seen in views {
+            let drawn = self.renderer.render(seen.camera)?;
+            let places = self.places(seen, canvas);
+            for (i, &place) in places.iter().enumerate() {
+                if differences[i].is_some() {
+                    continue;
+                }
+                let at = |picture: usize| value(&drawn[picture], place);
+                let (Some(gray), Some(ab), Some(opacity)) = (at(0), at(1), at(2)) else {
+                    continue;
+                };
+                let shown = 255.0 * seen.exposure.shown(f64::from(gray[0])) as f32;
+                differences[i] = Some(shown - f32::from(canvas.gray[i]));
+                believed.ab[i] = ab;
+                believed.weight[i] = step(opacity[0], OPAQUE);
+            }
+        }
+        let unlike = compared(&differences, canvas.size());
+        for (i, weight) in believed.weight.iter_mut().enumerate() {
+            let mask = canvas
+                .mask
+                .as_ref()
+                .map_or(1.0, |mask| f32::from(mask[i]) / 255.0);
+            *weight *= mask / (1.0 + unlike[i].powi(4));
+        }
+        Ok(believed)
+    }
+
+    /// Where a view's picture shows each pixel of the canvas.
+    fn places(&mut self, seen: &ViewOf<'_>, canvas: &Canvas) -> Arc<Vec<[f32; 2]>> {
+        let size = [canvas.width, canvas.height];
+        let Camera {
+            width,
+            height,
+            fx,
+            fy,
+            cx,
+            cy,
+            ..
+        } = *seen.camera;
+        let Some(undistortion) = &seen.view.undistortion else {
+            let scale = [
+                width as f32 / canvas.width as f32,
+                height as f32 / canvas.height as f32,
+            ];
+            let place = |i: u32| {
+                [
+                    ((i % size[0]) as f32 + 0.5) * scale[0],
+                    ((i / size[0]) as f32 + 0.5) * scale[1],
+                ]
+            };
+            return Arc::new((0..size[0] * size[1]).map(place).collect());
+        };
+        let camera = [f64::from(width), f64::from(height), fx, fy, cx, cy];
+        let known = self.lenses.iter().find(|lens| {
+            lens.size == size && lens.camera == camera && lens.undistortion == *undistortion
+        });
+        if let Some(lens) = known {
+            return lens.places.clone();
+        }
+        let places = Arc::new(undistortion.places(size, seen.camera));
+        if self.lenses.len() >= LENSES {
+            self.lenses.remove(0);
+        }
+        self.lenses.push(Lens {
+            undistortion: undistortion.clone(),
+            camera,
+            size,
+            places: places.clone(),
+        });
+        places
+    }
+}
+
+/// Lenses that are kept: those of a rig, or the faces of one photo.
+const LENSES: usize = 12;
+
+/// Bilinear value of a drawn picture at a place in pixels from its top left corner, its first two
+/// channels; none outside.
+fn value(picture: &Picture, [x, y]: [f32; 2]) -> Option<[f32; 2]> {
+    let [width, height] = [picture.width, picture.height].map(|side| side as usize);
+    // NaN fails both.
+    if !((0.0..=width as f32).contains(&x) && (0.0..=height as f32).contains(&y)) {
+        return None;
+    }
+    let axis = |c: f32, length: usize| {
+        let c = (c - 0.5).clamp(0.0, (length - 1) as f32);
+        let first = c as usize;
+        let share = c - first as f32;
+        [(first, 1.0 - share), ((first + 1).min(length - 1), share)]
+    };
+    let mut sum = [0.0; 2];
+    let last = picture.channels - 1;
+    for (row, wy) in axis(y, height) {
+        for (column, wx) in axis(x, width) {
+            let pixel = &picture.pixels[(row * width + column) * picture.channels..];
+            sum = [
+                sum[0] + wx * wy * pixel[0],
+                sum[1] + wx * wy * pixel[last.min(1)],
+            ];
+        }
+    }
+    Some(sum)
+}
+
+/// 0 below the first of two values, 1 above the second, smooth between.
+fn step(value: f32, [low, high]: [f32; 2]) -> f32 {
+    let t = ((value - low) / (high - low)).clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}
+
+/// How unlike drawing and photo are around each pixel, 1 where the scene is believed by half.
+fn compared(differences: &[Option<f32>], size: [usize; 2]) -> Vec<f32> {
+    let sums: Vec<[f32; 2]> = (differences.iter())
+        .map(|d| d.map_or([0.0; 2], |d| [d, 1.0]))
+        .collect();
+    let means: Vec<f32> = (around(&sums, size).iter())
+        .map(|&[sum, count]| {
+            if count > 0.0 {
+                (sum / count).abs()
+            } else {
+                0.0
+            }
+        })
+        .collect();
+    let mut known: Vec<f32> = (means.iter().zip(differences))
+        .filter_map(|(&mean, d)| d.map(|_| mean))
+        .collect();
+    let median = match known.len() {
+        0 => 0.0,
+        count => *known.select_nth_unstable_by(count / 2, f32::total_cmp).1,
+    };
+    let half = UNLIKE[0].max(UNLIKE[1] * median);
+    means.iter().map(|mean| mean / half).collect()
+}
+
+/// Sums over a square about each pixel, cut off at the border.
+fn around(values: &[[f32; 2]], [width, height]: [usize; 2]) -> Vec<[f32; 2]> {
+    let line = |at: &dyn Fn(usize) -> [f32; 2], length: usize, i: usize| {
+        let range = i.saturating_sub(REACH)..(i + REACH + 1).min(length);
+        range.fold([0.0; 2], |sum, j| [sum[0] + at(j)[0], sum[1] + at(j)[1]])
+    };
+    let rows: Vec<[f32; 2]> = (0..values.len())
+        .map(|i| {
+            let start = i / width * width;
+            line(&|x| values[start + x], width, i % width)
+        })
+        .collect();
+    (0..values.len())
+        .map(|i| line(&|y| rows[y * width + i % width], height, i / width))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_differs_over_an_area_is_doubted_and_grain_is_not() {
+        let size = [40, 30];
+        let mut differences: Vec<Option<f32>> = (0..1200)
+            .map(|i| {
+                Some(if (i * 7 + i / 40) % 2 == 0 {
+                    20.0
+                } else {
+                    -20.0
+                })
+            })
+            .collect();
+        for y in 10..20 {
+            for x in 10..20 {
+                differences[y * 40 + x] = Some(60.0);
+            }
+        }
+        differences[0] = None;
+        let unlike = compared(&differences, size);
+        assert!(unlike[15 * 40 + 15] > 3.0, "{}", unlike[15 * 40 + 15]);
+        assert!(unlike[25 * 40 + 30] < 0.4, "{}", unlike[25 * 40 + 30]);
+        assert_eq!(compared(&[None; 4], [2, 2]), [0.0; 4]);
+    }
+
+    #[test]
+    fn steps_and_values() {
+        assert_eq!(
+            [0.1, 0.2, 0.6, 1.0].map(|v| step(v, OPAQUE)),
+            [0.0, 0.0, 1.0, 1.0]
+        );
+        let picture = Picture {
+            width: 2,
+            height: 1,
+            channels: 1,
+            pixels: vec![1.0, 3.0],
+        };
+        assert_eq!(value(&picture, [1.0, 0.5]), Some([2.0; 2]));
+        assert_eq!(value(&picture, [0.0, 1.0]), Some([1.0; 2]));
+        assert_eq!(value(&picture, [2.1, 0.5]), None);
+        assert_eq!(value(&picture, [f32::NAN, 0.5]), None);
+    }
+}

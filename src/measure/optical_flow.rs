@@ -1,0 +1,379 @@
+//! Optical flow between two photos that nothing else relates.
+//!
+//! Coarse to fine with warping, an L1-like penalty on data and smoothness (T. Brox et al., *High
+//! accuracy optical flow estimation based on a theory for warping*, ECCV 2004), and a median
+//! after every warp (D. Sun, S. Roth and M. Black, *Secrets of optical flow estimation and their
+//! principles*, CVPR 2010). Pictures are compared with their local mean and contrast taken out, so
+//! that flicker and fading move nothing.
+
+use super::Flow;
+
+/// Reach in pixels of the local mean and contrast.
+const LOCAL: usize = 8;
+
+/// Contrast in 8-bit levels below which a place is even: grain and rounding.
+const EVEN: f32 = 4.0;
+
+/// Levels end where a side would be shorter than this.
+const SHORTEST: usize = 12;
+
+/// Warps on each level.
+const WARPS: usize = 4;
+
+/// Sweeps over all pixels for each warp.
+const SWEEPS: usize = 24;
+
+/// What smoothness counts beside data, both in units of local contrast.
+const SMOOTHNESS: f32 = 0.12;
+
+/// Below this, penalties are quadratic: of data, in local contrasts, and of slopes, in pixels.
+const ROUNDED: [f32; 2] = [0.05, 0.05];
+
+/// Successive over-relaxation.
+const OVER: f32 = 1.7;
+
+/// The flow from one picture to another of the same size, known everywhere. Gray is in 8-bit
+/// levels, `[height, width]`.
+///
+/// # Panics
+/// When a picture has not this size.
+pub fn optical_flow(from: &[f32], to: &[f32], [width, height]: [usize; 2]) -> Flow {
+    assert_eq!(
+        [from.len(), to.len()],
+        [width * height; 2],
+        "pictures of one size"
+    );
+    let size = [width, height];
+    let mut levels = vec![[from, to].map(|gray| Gray::normalized(gray, size))];
+    while let Some([last, other]) = levels.last()
+        && last.size.iter().all(|side| side / 2 >= SHORTEST)
+    {
+        let next = [last.halved(), other.halved()];
+        levels.push(next);
+    }
+    let mut vectors = Vec::new();
+    let mut coarser = [0; 2];
+    for [from, to] in levels.iter().rev() {
+        vectors = match vectors.is_empty() {
+            true => vec![[0.0; 2]; from.pixels.len()],
+            false => enlarged(&vectors, coarser, from.size),
+        };
+        for _ in 0..WARPS {
+            refine(from, to, &mut vectors);
+            vectors = median(&vectors, from.size);
+        }
+        coarser = from.size;
+    }
+    Flow {
+        width,
+        height,
+        vectors,
+    }
+}
+
+struct Gray {
+    size: [usize; 2],
+    pixels: Vec<f32>,
+}
+
+impl Gray {
+    /// Without its local mean, over its local contrast.
+    fn normalized(gray: &[f32], size: [usize; 2]) -> Self {
+        let mean = boxed(gray, size);
+        let about: Vec<f32> = gray.iter().zip(&mean).map(|(g, m)| g - m).collect();
+        let squares: Vec<f32> = about.iter().map(|v| v * v).collect();
+        let variance = boxed(&squares, size);
+        let pixels = about.iter().zip(&variance);
+        Self {
+            size,
+            pixels: pixels
+                .map(|(v, s)| v / (s.max(0.0).sqrt() + EVEN))
+                .collect(),
+        }
+    }
+
+    /// Means of four.
+    fn halved(&self) -> Self {
+        let [width, height] = self.size;
+        let size = [width / 2, height / 2];
+        let at = |x: usize, y: usize| self.pixels[y * width + x];
+        let places = (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| (2 * x, 2 * y)));
+        Self {
+            size,
+            pixels: places
+                .map(|(x, y)| 0.25 * (at(x, y) + at(x + 1, y) + at(x, y + 1) + at(x + 1, y + 1)))
+                .collect(),
+        }
+    }
+
+    /// Bilinear value at a place in pixel indices; none outside.
+    fn at(&self, x: f32, y: f32) -> Option<f32> {
+        let [width, height] = self.size;
+        let inside = |c: f32, length: usize| (0.0..=(length - 1) as f32).contains(&c);
+        // NaN is nowhere.
+        if !(inside(x, width) && inside(y, height)) {
+            return None;
+        }
+        let (column, row) = (x as usize, y as usize);
+        let (right, below) = ((column + 1).min(width - 1), (row + 1).min(height - 1));
+        let (s, t) = (x - column as f32, y - row as f32);
+        let pixel = |x: usize, y: usize| self.pixels[y * width + x];
+        let upper = pixel(column, row) + s * (pixel(right, row) - pixel(column, row));
+        let lower = pixel(column, below) + s * (pixel(right, below) - pixel(column, below));
+        Some(upper + t * (lower - upper))
+    }
+}
+
+/// Means over a square of `2 LOCAL + 1` pixels, cut off at the border.
+fn boxed(values: &[f32], [width, height]: [usize; 2]) -> Vec<f32> {
+    let mut rows = vec![0.0; values.len()];
+    for (means, row) in rows.chunks_mut(width).zip(values.chunks(width)) {
+        along(row.len(), |i| row[i], |i, mean| means[i] = mean);
+    }
+    let mut all = vec![0.0; values.len()];
+    for x in 0..width {
+        along(
+            height,
+            |y| rows[y * width + x],
+            |y, mean| all[y * width + x] = mean,
+        );
+    }
+    all
+}
+
+/// Running means of a line.
+fn along(length: usize, at: impl Fn(usize) -> f32, mut put: impl FnMut(usize, f32)) {
+    let mut sums = Vec::with_capacity(length + 1);
+    sums.push(0.0_f64);
+    for i in 0..length {
+        sums.push(sums[i] + f64::from(at(i)));
+    }
+    for i in 0..length {
+        let (first, end) = (i.saturating_sub(LOCAL), (i + LOCAL + 1).min(length));
+        put(i, ((sums[end] - sums[first]) / (end - first) as f64) as f32);
+    }
+}
+
+/// The flow of the next finer level to begin with.
+fn enlarged(vectors: &[[f32; 2]], from: [usize; 2], to: [usize; 2]) -> Vec<[f32; 2]> {
+    let scale = [0, 1].map(|k: usize| to[k] as f32 / from[k] as f32);
+    let axis = |i: usize, k: usize| {
+        let c = ((i as f32 + 0.5) / scale[k] - 0.5).clamp(0.0, (from[k] - 1) as f32);
+        let first = c as usize;
+        (first, (first + 1).min(from[k] - 1), c - first as f32)
+    };
+    let mut large = Vec::with_capacity(to[0] * to[1]);
+    for y in 0..to[1] {
+        let (y0, y1, t) = axis(y, 1);
+        for x in 0..to[0] {
+            let (x0, x1, s) = axis(x, 0);
+            let at = |x: usize, y: usize, k: usize| vectors[y * from[0] + x][k];
+            large.push([0, 1].map(|k: usize| {
+                let upper = at(x0, y0, k) + s * (at(x1, y0, k) - at(x0, y0, k));
+                let lower = at(x0, y1, k) + s * (at(x1, y1, k) - at(x0, y1, k));
+                scale[k] * (upper + t * (lower - upper))
+            }));
+        }
+    }
+    large
+}
+
+/// One pixel's part of the data term: its gradient, and the difference where the flow is now.
+#[derive(Clone, Copy, Default)]
+struct Data {
+    x: f32,
+    y: f32,
+    difference: f32,
+    weight: f32,
+}
+
+/// Moves the flow to where the pictures, linearized about it, agree best.
+fn refine(from: &Gray, to: &Gray, vectors: &mut [[f32; 2]]) {
+    let [width, height] = from.size;
+    let start = vectors.to_vec();
+    let mut data = vec![Data::default(); start.len()];
+    for (i, data) in data.iter_mut().enumerate() {
+        let (x, y) = (i % width, i / width);
+        let [u, v] = start[i];
+        let (px, py) = (x as f32 + u, y as f32 + v);
+        let Some(there) = to.at(px, py) else { continue };
+        let slope = |a: Option<f32>, b: Option<f32>| match (a, b) {
+            (Some(a), Some(b)) => 0.5 * (b - a),
+            _ => 0.0,
+        };
+        // Of both pictures, the mean.
+        let here = |x: f32, y: f32| from.at(x, y);
+        let (fx, fy) = (x as f32, y as f32);
+        *data = Data {
+            x: 0.5
+                * (slope(to.at(px - 1.0, py), to.at(px + 1.0, py))
+                    + slope(here(fx - 1.0, fy), here(fx + 1.0, fy))),
+            y: 0.5
+                * (slope(to.at(px, py - 1.0), to.at(px, py + 1.0))
+                    + slope(here(fx, fy - 1.0), here(fx, fy + 1.0))),
+            difference: there - from.pixels[i],
+            weight: 0.0,
+        };
+    }
+    let mut smooth = vec![[0.0_f32; 2]; start.len()];
+    for sweep in 0..SWEEPS {
+        if sweep % 8 == 0 {
+            for (i, data) in data.iter_mut().enumerate() {
+                let rest = data.difference
+                    + data.x * (vectors[i][0] - start[i][0])
+                    + data.y * (vectors[i][1] - start[i][1]);
+                data.weight = 1.0 / (rest * rest + ROUNDED[0] * ROUNDED[0]).sqrt();
+            }
+            for (i, smooth) in smooth.iter_mut().enumerate() {
+                let edge = |there: bool, j: usize| {
+                    if !there {
+                        return 0.0;
+                    }
+                    let [du, dv] = [0, 1].map(|k: usize| vectors[j][k] - vectors[i][k]);
+                    SMOOTHNESS / (du * du + dv * dv + ROUNDED[1] * ROUNDED[1]).sqrt()
+                };
+                *smooth = [
+                    edge(i % width + 1 < width, i + 1),
+                    edge(i / width + 1 < height, i + width),
+                ];
+            }
+        }
+        for i in 0..vectors.len() {
+            let mut sum = [0.0; 2];
+            let mut total = 0.0;
+            let mut add = |weight: f32, j: usize| {
+                total += weight;
+                sum[0] += weight * vectors[j][0];
+                sum[1] += weight * vectors[j][1];
+            };
+            if i % width + 1 < width {
+                add(smooth[i][0], i + 1);
+            }
+            if i / width + 1 < height {
+                add(smooth[i][1], i + width);
+            }
+            if i % width > 0 {
+                add(smooth[i - 1][0], i - 1);
+            }
+            if i >= width {
+                add(smooth[i - width][1], i - width);
+            }
+            let Data {
+                x,
+                y,
+                difference,
+                weight,
+            } = data[i];
+            // Both components at once: a 2 × 2 system.
+            let about = difference - x * start[i][0] - y * start[i][1];
+            let (xx, xy, yy) = (
+                weight * x * x + total,
+                weight * x * y,
+                weight * y * y + total,
+            );
+            let right = [sum[0] - weight * x * about, sum[1] - weight * y * about];
+            let determinant = xx * yy - xy * xy;
+            if determinant <= 0.0 {
+                continue;
+            }
+            let solved = [
+                (yy * right[0] - xy * right[1]) / determinant,
+                (xx * right[1] - xy * right[0]) / determinant,
+            ];
+            for k in 0..2 {
+                vectors[i][k] += OVER * (solved[k] - vectors[i][k]);
+            }
+        }
+    }
+}
+
+/// Of each component, over three by three pixels.
+fn median(vectors: &[[f32; 2]], [width, height]: [usize; 2]) -> Vec<[f32; 2]> {
+    (0..vectors.len())
+        .map(|i| {
+            let (x, y) = (i % width, i / width);
+            let columns = x.saturating_sub(1)..(x + 2).min(width);
+            let mut around = [[0.0; 9]; 2];
+            let mut count = 0;
+            for row in y.saturating_sub(1)..(y + 2).min(height) {
+                for column in columns.clone() {
+                    for k in 0..2 {
+                        around[k][count] = vectors[row * width + column][k];
+                    }
+                    count += 1;
+                }
+            }
+            around.map(|mut values| {
+                let values = &mut values[..count];
+                *values.select_nth_unstable_by(count / 2, f32::total_cmp).1
+            })
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A smooth texture with detail of several sizes.
+    fn texture(x: f32, y: f32) -> f32 {
+        128.0
+            + 40.0 * (0.11 * x + 0.05 * y).sin() * (0.07 * y - 0.02 * x).cos()
+            + 25.0 * (0.35 * x - 0.2 * y).sin()
+            + 20.0 * (0.4 * y + 0.13 * x).cos()
+    }
+
+    fn picture(size: [usize; 2], at: impl Fn(f32, f32) -> f32) -> Vec<f32> {
+        (0..size[0] * size[1])
+            .map(|i| at((i % size[0]) as f32, (i / size[0]) as f32))
+            .collect()
+    }
+
+    /// The mean distance to the true flow, eight pixels off the border.
+    fn miss(flow: &Flow, truth: impl Fn(f32, f32) -> [f32; 2]) -> f64 {
+        let (mut sum, mut count) = (0.0, 0);
+        for (i, vector) in flow.vectors.iter().enumerate() {
+            let (x, y) = (i % flow.width, i / flow.width);
+            if (8..flow.width - 8).contains(&x) && (8..flow.height - 8).contains(&y) {
+                let wanted = truth(x as f32, y as f32);
+                sum += f64::from((vector[0] - wanted[0]).hypot(vector[1] - wanted[1]));
+                count += 1;
+            }
+        }
+        sum / f64::from(count)
+    }
+
+    #[test]
+    fn shifts_are_found_though_the_light_changes() {
+        let size = [96, 72];
+        let from = picture(size, texture);
+        for [u, v] in [[0.0, 0.0], [2.3, -1.4], [-9.0, 5.0]] {
+            let moved = picture(size, |x, y| 0.6 * texture(x - u, y - v) + 31.0);
+            let found = miss(&optical_flow(&from, &moved, size), |_, _| [u, v]);
+            assert!(found < 0.2, "{u} {v}: {found}");
+        }
+    }
+
+    #[test]
+    fn a_zoom_is_found_and_two_halves_may_move_apart() {
+        let size = [96, 72];
+        let from = picture(size, texture);
+        let zoom = |x: f32, y: f32| [0.05 * (x - 48.0), 0.05 * (y - 36.0)];
+        let grown = picture(size, |x, y| texture((x + 2.4) / 1.05, (y + 1.8) / 1.05));
+        let found = miss(&optical_flow(&from, &grown, size), zoom);
+        assert!(found < 0.2, "{found}");
+        let halves = |_: f32, y: f32| [if y < 36.0 { 3.0 } else { -2.0 }, 0.0];
+        let parted = picture(size, |x, y| texture(x - halves(x, y)[0], y));
+        let found = miss(&optical_flow(&from, &parted, size), halves);
+        assert!(found < 0.5, "{found}");
+    }
+
+    #[test]
+    fn nothing_moves_where_nothing_is_seen_and_small_pictures_are_no_trouble() {
+        for size in [[1, 1], [5, 3], [40, 1], [30, 26]] {
+            let even = vec![77.0; size[0] * size[1]];
+            let flow = optical_flow(&even, &even, size);
+            assert!(flow.vectors.iter().flatten().all(|v| v.abs() < 1e-6));
+        }
+    }
+}

@@ -1,0 +1,87 @@
+//! All photos of a capture in order, with a pose or without.
+
+use std::{
+    collections::BTreeMap,
+    ops::Range,
+    path::{Path, PathBuf},
+};
+
+use crate::{
+    capture::{CaptureError, Dataset, FRAMES, Film, IMAGES, photos_in},
+    run::{RunError, picture_names::distinct},
+};
+
+/// A photo.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Shot {
+    /// Its path below the folder of photos, or of frames.
+    pub name: String,
+    /// Its file.
+    pub path: PathBuf,
+    /// Its views; none where it has no pose.
+    pub views: Range<usize>,
+    /// The path of its picture in color below a folder.
+    pub output: String,
+}
+
+/// The frames of the film, or else all photos by name. `output` must not be where they lie.
+///
+/// # Errors
+/// [`RunError::File`] where pictures would go among the photos or a frame is missing.
+pub(super) fn shots_of(
+    dataset: &Dataset,
+    film: Option<&Film>,
+    output: &Path,
+) -> Result<Vec<Shot>, RunError> {
+    let root = &dataset.capture.root;
+    let mut views = BTreeMap::<&str, Range<usize>>::new();
+    for (i, view) in dataset.capture.views.iter().enumerate() {
+        let range = views.entry(&view.photo).or_insert(i..i);
+        range.end = i + 1;
+    }
+    let (folder, names) = match film {
+        Some(film) => (root.join(FRAMES), film.frames.clone()),
+        None => {
+            let mut names = photos_in(&root.join(IMAGES));
+            names.extend(views.keys().map(|&name| name.to_owned()));
+            names.sort();
+            names.dedup();
+            (root.join(IMAGES), names)
+        }
+    };
+    for photos in [&folder, &root.join(IMAGES)] {
+        if let (Ok(photos), Ok(output)) = (photos.canonicalize(), output.canonicalize())
+            && output == photos
+        {
+            return Err(RunError::File {
+                path: output,
+                reason: "holds the photos themselves: name another folder".to_owned(),
+            });
+        }
+    }
+    let plain: Vec<&str> = names.iter().map(String::as_str).collect();
+    let outputs = distinct(&plain);
+    (names.iter().zip(outputs))
+        .map(|(name, output)| {
+            let range = views.get(name.as_str()).cloned().unwrap_or_default();
+            // A name may be spelled otherwise on the disk.
+            let path = match dataset.capture.views.get(range.start) {
+                Some(view) if !range.is_empty() => view.image_path.clone(),
+                _ => folder.join(name),
+            };
+            if film.is_some() && !path.is_file() {
+                return Err(CaptureError::Read {
+                    path,
+                    source: std::io::ErrorKind::NotFound.into(),
+                }
+                .into());
+            }
+            Ok(Shot {
+                name: name.clone(),
+                path,
+                views: range,
+                output,
+            })
+        })
+        .collect()
+}

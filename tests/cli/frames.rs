@@ -1,0 +1,233 @@
+//! `frames`: the photos themselves in color.
+
+use image::{DynamicImage, ImageBuffer, Luma};
+
+use super::program::Place;
+use super::scene;
+use super::shared::{QUICK_FIT, onnx, place_with_run, place_with_scene};
+
+/// `L*`, a and b of a picture's pixels.
+fn lab(place: &Place, name: &str) -> Vec<[f64; 3]> {
+    let image = image::open(place.path(name)).expect(name).into_rgb16();
+    let color = |pixel: &image::Rgb<u16>| pixel.0.map(|v| f64::from(v) / 65535.0);
+    let pixels = image.pixels();
+    pixels
+        .map(|pixel| gs_chroma::color::srgb_to_lab(color(pixel)))
+        .collect()
+}
+
+/// The mean distance in the a, b plane.
+fn apart(one: &[[f64; 3]], other: &[[f64; 3]]) -> f64 {
+    let pairs = one.iter().zip(other);
+    let sum: f64 = pairs.map(|(x, y)| (x[1] - y[1]).hypot(x[2] - y[2])).sum();
+    sum / one.len() as f64
+}
+
+#[test]
+fn photos_come_back_in_color_at_their_size_with_their_lightness() {
+    let place = place_with_scene();
+    place.succeed(&[&QUICK_FIT[..], &["--max-side", "32"]].concat());
+    place.succeed(&["colorize", "--teacher", &onnx("ddcolor_tiny.onnx")]);
+    let told = place.json(&["frames", "-o", "out/frames", "--json"]);
+    let names: Vec<String> = (0..scene::VIEWS).map(scene::name).collect();
+    assert_eq!(place.files("out/frames"), names);
+    assert_eq!(
+        (&told["photos"], &told["placed"], &told["carried"]),
+        (&10.into(), &10.into(), &0.into())
+    );
+    let mut colorful = 0.0_f64;
+    for (index, name) in names.iter().enumerate() {
+        let colored = image::open(place.path("out/frames").join(name)).expect("a picture");
+        assert_eq!(colored.color(), image::ColorType::Rgb8);
+        assert_eq!([colored.width(), colored.height()], scene::SIZE);
+        let colored = lab(&place, &format!("out/frames/{name}"));
+        let photo = scene::photo(index);
+        for (lab, rgb) in colored.iter().zip(photo.pixels()) {
+            let own = gs_chroma::color::srgb_to_lab(rgb.0.map(|v| f64::from(v) / 255.0))[0];
+            assert!((lab[0] - own).abs() < 0.7, "{name}: {} {own}", lab[0]);
+            colorful = colorful.max(lab[1].hypot(lab[2]));
+        }
+    }
+    assert!(colorful > 3.0, "{colorful}");
+    // The same once more, and the teacher's own pictures are others.
+    place.succeed(&["frames", "-o", "again"]);
+    place.succeed(&["frames", "-o", "alone", "--teacher-alone"]);
+    for name in &names {
+        let read = |folder: &str| place.read(&format!("{folder}/{name}"));
+        assert!(read("out/frames") == read("again"), "{name}");
+        assert!(read("out/frames") != read("alone"), "{name}");
+    }
+}
+
+#[test]
+fn a_photo_without_a_pose_takes_its_colors_from_its_neighbors() {
+    let place = place_with_run();
+    // Between 03 and 04, where both look alike.
+    scene::photo(3)
+        .save(place.path("scene/images/035.png"))
+        .expect("writable");
+    let told = place.json(&["frames", "-o", "out", "--json"]);
+    assert_eq!((&told["placed"], &told["carried"]), (&10.into(), &1.into()));
+    let [carried, own] = ["out/035.png", "out/03.png"].map(|name| lab(&place, name));
+    let gray: Vec<[f64; 3]> = own.iter().map(|lab| [lab[0], 0.0, 0.0]).collect();
+    let (to_own, to_gray) = (apart(&carried, &own), apart(&gray, &own));
+    assert!(to_own < 0.35 * to_gray, "{to_own} {to_gray}");
+    // One that is no photo is left out with a word, and so is none of the others.
+    place.write("scene/images/036.png", b"no picture");
+    let done = place.run(&["frames", "-o", "out"]);
+    assert_eq!(done.code, Some(0), "{}", done.stderr);
+    assert!(done.stderr.contains("warning: left out") && done.stderr.contains("036.png"));
+}
+
+#[test]
+fn sixteen_bits_stay_sixteen() {
+    let place = place_with_run();
+    let gray = ImageBuffer::from_fn(scene::SIZE[0], scene::SIZE[1], |x, y| {
+        Luma([(20_000 + 300 * x + 77 * y) as u16])
+    });
+    let path = place.path("scene/images/02.png");
+    DynamicImage::ImageLuma16(gray.clone())
+        .save(path)
+        .expect("writable");
+    place.succeed(&["frames", "-o", "out"]);
+    for (name, color) in [
+        ("02.png", image::ColorType::Rgb16),
+        ("03.png", image::ColorType::Rgb8),
+    ] {
+        let colored = image::open(place.path("out").join(name)).expect("a picture");
+        assert_eq!(colored.color(), color, "{name}");
+    }
+    for (lab, gray) in lab(&place, "out/02.png").iter().zip(gray.pixels()) {
+        let own = gs_chroma::color::srgb_to_lab([f64::from(gray.0[0]) / 65535.0; 3])[0];
+        assert!((lab[0] - own).abs() < 0.01, "{} {own}", lab[0]);
+    }
+}
+
+#[test]
+fn what_it_cannot_do_it_says() {
+    let place = place_with_scene();
+    place.succeed(&QUICK_FIT);
+    let done = place.run(&["frames", "-o", "out"]);
+    assert_eq!(done.code, Some(1));
+    assert!(
+        done.stderr.contains("gs-chroma colorize"),
+        "{}",
+        done.stderr
+    );
+    place.succeed(&["colorize", "--teacher", &onnx("ddcolor_tiny.onnx")]);
+    let done = place.run(&["frames", "-o", "scene/images"]);
+    assert_eq!(done.code, Some(1));
+    assert!(done.stderr.contains("photos themselves"), "{}", done.stderr);
+    for rate in ["0", "25/0", "film"] {
+        let done = place.run(&["frames", "-o", "out.mp4", "--frame-rate", rate]);
+        assert_eq!(done.code, Some(2), "{rate}");
+    }
+    let mut command = place.command(&["frames", "-o", "out.mp4"]);
+    let done = super::program::Done::of(command.env("PATH", "").output());
+    assert_eq!(done.code, Some(1));
+    assert!(
+        done.stderr.contains("ffmpeg is not installed"),
+        "{}",
+        done.stderr
+    );
+    assert!(!place.path("out.mp4").exists());
+    // A teacher that is gone is no reason to stop.
+    let mut report = place.report("runs/scene");
+    report["chroma"]["teachers"][0]["path"] = "gone.onnx".into();
+    place.write("runs/scene/report.json", report.to_string());
+    let done = place.run(&["frames", "-o", "out"]);
+    assert_eq!(done.code, Some(0), "{}", done.stderr);
+    assert!(done.stderr.contains("warning:") && done.stderr.contains("gone.onnx"));
+    let done = place.run(&["frames", "-o", "out", "--teacher", "gone.onnx"]);
+    assert_eq!(done.code, Some(1));
+}
+
+/// A stand-in for ffmpeg that keeps what it is told and given.
+#[cfg(unix)]
+fn stand_in(place: &Place, script: &str) -> String {
+    use std::os::unix::fs::PermissionsExt;
+    place.write(
+        "bin/ffmpeg",
+        format!("#!/bin/sh\n[ \"$1\" = -version ] && exit 0\n{script}\n"),
+    );
+    let path = place.path("bin/ffmpeg");
+    std::fs::set_permissions(path, std::fs::Permissions::from_mode(0o755)).expect("writable");
+    format!("{}:/usr/bin:/bin", place.path("bin").display())
+}
+
+#[cfg(unix)]
+#[test]
+fn a_film_has_all_frames_the_rate_and_the_sound_of_its_source() {
+    use super::program::Done;
+
+    let place = place_with_run();
+    let mut frames = Vec::new();
+    for index in 0..8 {
+        scene::photo(index)
+            .save(place.path("frame.png"))
+            .expect("writable");
+        frames.push(scene::name(index));
+        place.write(
+            &format!("scene/frames/{}", scene::name(index)),
+            place.read("frame.png"),
+        );
+    }
+    place.write("scene/frames/045.png", place.read("scene/frames/04.png"));
+    frames.insert(5, "045.png".to_owned());
+    place.write("street.mp4", "a film");
+    let film = serde_json::json!({
+        "source": place.path("street.mp4"), "start": 65.0, "seconds": 1.5,
+        "frame_rate": [24000, 1001], "audio": true, "size": scene::SIZE, "frames": frames,
+    });
+    place.write("scene/film.json", film.to_string());
+    let path = stand_in(
+        &place,
+        "echo \"$@\" > told.txt; for last; do :; done; cat > \"$last\"",
+    );
+    let run = |arguments: &[&str], path: &str| {
+        Done::of(place.command(arguments).env("PATH", path).output())
+    };
+    let done = run(&["frames", "-o", "films/out.mp4"], &path);
+    assert_eq!(done.code, Some(0), "{}", done.stderr);
+    let bytes = place.read("films/out.mp4");
+    assert_eq!(
+        bytes.len(),
+        9 * 3 * (scene::SIZE[0] * scene::SIZE[1]) as usize
+    );
+    assert_eq!(place.files("films"), ["out.mp4"]);
+    let told = String::from_utf8(place.read("told.txt")).expect("text");
+    for words in [
+        "-framerate 24000/1001",
+        "-ss 65 -t 1.5",
+        "street.mp4",
+        "-map 1:a?",
+        "64x48",
+    ] {
+        assert!(told.contains(words), "{words}: {told}");
+    }
+    // The same frames as in a folder.
+    place.succeed(&["frames", "-o", "out"]);
+    let first = image::open(place.path("out/00.png"))
+        .expect("a picture")
+        .into_rgb8();
+    assert!(bytes.starts_with(&first));
+    let done = run(
+        &["frames", "-o", "films/out.mp4", "--frame-rate", "25"],
+        &path,
+    );
+    assert_eq!(done.code, Some(0), "{}", done.stderr);
+    let told = String::from_utf8(place.read("told.txt")).expect("text");
+    assert!(told.contains("-framerate 25/1 "), "{told}");
+    // What fails leaves the film that was there.
+    let path = stand_in(&place, "echo warned >&2; echo 'no such codec' >&2; exit 3");
+    let done = run(&["frames", "-o", "films/out.mp4"], &path);
+    assert_eq!(done.code, Some(1));
+    assert!(done.stderr.contains("no such codec"), "{}", done.stderr);
+    assert_eq!(place.files("films"), ["out.mp4"]);
+    assert_eq!(place.read("films/out.mp4"), bytes);
+    // A frame that is not there is named.
+    std::fs::remove_file(place.path("scene/frames/045.png")).expect("a frame");
+    let done = run(&["frames", "-o", "out"], &path);
+    assert_eq!(done.code, Some(1));
+    assert!(done.stderr.contains("045.png"), "{}", done.stderr);
+}
