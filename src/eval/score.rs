@@ -1,7 +1,7 @@
 //! Pictures of a view against its photo.
 
 use super::{
-    ColoredScene, Drawing, EvalError, Layer, Lpips, Painter, Reference,
+    ColoredScene, Drawing, EvalError, Layer, Lpips, Observer, Painter, Progress, Reference, Task,
     picture::{ab_of, gray_picture, to_picture},
 };
 use crate::{
@@ -253,12 +253,20 @@ pub fn mean_luma(views: &[Scored]) -> LumaScore {
 pub fn teacher_colorfulness(
     painter: &Painter<'_>,
     scene: &ColoredScene,
+    observe: &mut Observer<'_>,
 ) -> Result<Option<f64>, EvalError> {
-    let mut values = Vec::new();
+    let (mut values, mut done) = (Vec::new(), 0);
     let views: Vec<usize> = (0..scene.dataset.cameras.len())
         .filter(|&view| painter.answers(view))
         .collect();
     scene.dataset.visit(&views, |view, photo| {
+        observe(Progress {
+            task: Task::Strength,
+            done,
+            total: views.len(),
+            name: &scene.dataset.capture.views[view].name,
+        });
+        done += 1;
         if let Some(answer) = painter.answer(view)? {
             let layer = Layer::Ab(to_picture(&answer));
             let reference = scene.reference(view, photo);

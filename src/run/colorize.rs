@@ -97,6 +97,7 @@ pub fn colorize(
     let cache = source.folder.as_ref().map(RunFolder::teacher);
     let colmap_dir = source.colmap_dir(options)?;
     let mut teachers = Teachers::open(&options.teach, &colmap_dir, cache.as_deref())?;
+    observe(Event::begins(Stage::Device));
     let gpu = open_gpu(options.timings)?;
     let mut report = source.report(&gpu);
     let load = LoadOptions {
@@ -142,6 +143,7 @@ pub fn colorize(
         seed: report.luma.settings.seed,
         ..options.settings.clone()
     };
+    observe(Event::begins(Stage::Teacher));
     let Taught {
         lesson,
         hinted,
@@ -172,6 +174,7 @@ pub fn colorize(
         message,
     };
     if options.relight {
+        observe(Event::begins(Stage::Relight));
         let limit = settings.memory_limit;
         let mut told = |progress: ChromaProgress| {
             let message = format!("loss {:.3}", progress.loss);
@@ -235,6 +238,7 @@ pub fn colorize(
         match event {
             // It has been asked already.
             ColorizeEvent::Asked { .. } => {}
+            ColorizeEvent::Listing => observe(Event::begins(Stage::Lists)),
             ColorizeEvent::Chosen(chosen) => observe(Event::Note(describe(chosen))),
             ColorizeEvent::Plan(effects) => observe(Event::Note(table(effects))),
             ColorizeEvent::Uncorrected { before, after } => observe(Event::Note(format!(
@@ -255,12 +259,24 @@ pub fn colorize(
                 let moved = progress.moved;
                 let moved = moved.map_or(String::new(), |moved| format!(", moved {moved:.2}"));
                 let message = format!("loss {:.3}{moved}", progress.loss);
-                observe(told(Stage::Chroma, progress, message));
+                observe(told(Stage::Solving, progress, message));
             }
             ColorizeEvent::Trying { degree, progress } => {
                 let message = format!("SH degree {degree}, loss {:.3}", progress.loss);
                 observe(told(Stage::Degree, progress, message));
             }
+            ColorizeEvent::Matching { view, total } => observe(Event::Progress {
+                stage: Stage::Strength,
+                done: view,
+                total,
+                message: String::new(),
+            }),
+            ColorizeEvent::Drawing { view, total } => observe(Event::Progress {
+                stage: Stage::Bake,
+                done: 0,
+                total: 0,
+                message: format!("drawing view {} of {total}", view + 1),
+            }),
             ColorizeEvent::Baking(progress) => {
                 let message = format!("loss {:.3}", progress.loss);
                 observe(told(Stage::Bake, progress, message));
@@ -297,7 +313,9 @@ pub fn colorize(
         [&luma, &colored.splats],
         &colored.chroma,
         &lesson,
+        &mut |progress| observe(progress.into()),
     )?;
+    observe(Event::begins(Stage::Saving));
     let [distilling, baking] = colored.seconds;
     let steps = colored.last.map_or(0, |progress| progress.iteration);
     report.chroma = Some(ChromaReport {
