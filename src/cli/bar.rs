@@ -22,7 +22,7 @@ const BAR: usize = 12;
 const MEMORY: f64 = 15.0;
 
 /// How often a line is drawn anew where nothing is heard.
-const TICK: Duration = Duration::from_millis(500);
+const TICK: Duration = Duration::from_millis(250);
 
 /// A line on standard error that shows how far something is; none where that is no terminal.
 pub(super) struct Bar {
@@ -62,10 +62,14 @@ impl Bar {
         }
     }
 
-    /// Leaves it at its end.
-    pub fn end(self) {
+    /// Leaves it at its end, with its last message where that is worth `keeping`.
+    pub fn end(self, keeping: bool) {
         // Dropped, it is drawn for the last time.
-        locked(&self.state).ended = Some(Instant::now());
+        let mut state = locked(&self.state);
+        state.ended = Some(Instant::now());
+        if !keeping {
+            state.message.clear();
+        }
     }
 }
 

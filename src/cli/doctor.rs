@@ -25,7 +25,7 @@ impl Doctor {
             bar.update(index, STEPS, name);
         })
         .map_err(RunError::from)?;
-        bar.end();
+        bar.end(false);
         if self.json {
             // Numbers and strings only: this cannot fail.
             let json = serde_json::to_string_pretty(&diagnosis).unwrap_or_default();

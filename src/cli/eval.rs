@@ -80,6 +80,7 @@ impl Eval {
         if self.json {
             return print(evaluation.to_json());
         }
+        print(evaluation.verdict().join("\n") + "\n")?;
         for table in evaluation.tables() {
             print(format_args!("{table}\n"))?;
         }

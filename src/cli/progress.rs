@@ -12,6 +12,17 @@ use super::{
 };
 use crate::run::{Event, Stage};
 
+/// Stages whose messages are figures, of which the last is the best known; those of others name
+/// what is at hand.
+const FIGURES: [Stage; 6] = [
+    Stage::Training,
+    Stage::Relight,
+    Stage::Degree,
+    Stage::Solving,
+    Stage::Bake,
+    Stage::Sweep,
+];
+
 /// Shows the events of a run as progress bars and lines, and knows where its time went.
 pub(super) struct Progress {
     begun: Instant,
@@ -67,7 +78,7 @@ impl Progress {
             true => self.begun,
             false => Instant::now(),
         };
-        self.finish();
+        self.leave(now);
         let place = self.stages.iter().position(|&expected| expected == stage);
         let place = place.map(|index| [index + 1, self.stages.len()]);
         let bar = Bar::begin(&stage.to_string(), place);
@@ -84,11 +95,15 @@ impl Progress {
 
     /// Ends the present stage, whose bar stays on the screen.
     pub fn finish(&mut self) {
+        self.leave(Instant::now());
+    }
+
+    fn leave(&mut self, now: Instant) {
         let Some((stage, begun, bar)) = self.present.take() else {
             return;
         };
-        bar.end();
-        let took = begun.elapsed();
+        bar.end(FIGURES.contains(&stage));
+        let took = now - begun;
         match self.spent.iter_mut().find(|(known, _)| *known == stage) {
             Some((_, spent)) => *spent += took,
             None => self.spent.push((stage, took)),

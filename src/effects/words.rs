@@ -22,7 +22,7 @@ impl Effect {
     fn found(self, figure: f64, threshold: f64) -> String {
         let (x, least) = (number(figure), number(threshold));
         match self {
-            Self::Lens => format!("the lens shifts pixels by up to {x}; {least} would be visible"),
+            Self::Lens => format!("the lens moves pixels by {x}; {least} would be visible"),
             Self::Masks => format!("{x} % of the pixels are masked"),
             Self::Exposure => {
                 format!("photos differ by {x} gray levels; {least} would be visible")

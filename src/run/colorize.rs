@@ -28,8 +28,8 @@ use super::{
 use crate::{
     capture::LoadOptions,
     chroma::{
-        ChosenDegree, ChromaKeeper, ChromaProgress, ChromaSettings, ColorizeEvent, Degree, Distill,
-        NoChromaKeeper, SolverKind, relight,
+        ChosenDegree, ChromaCheckpoint, ChromaKeeper, ChromaProgress, ChromaSettings,
+        ColorizeEvent, Degree, Distill, NoChromaKeeper, SolverKind, relight,
     },
     effects::table,
     eval::{Measured, exposures},
@@ -91,6 +91,7 @@ pub fn colorize(
     options: &ColorizeOptions,
     observe: &mut Observer<'_>,
 ) -> Result<(Output, Report), RunError> {
+    let started = Instant::now();
     let warnings = RefCell::default();
     let observe = &mut keeping(&warnings, observe);
     let source = Source::find(options)?;
@@ -229,6 +230,11 @@ pub fn colorize(
         None => None,
     };
     let checkpoint = found.as_ref().map(|found| &found.checkpoint);
+    let rounds_before = checkpoint.map_or(0, ChromaCheckpoint::rounds);
+    let rounds = match settings.solver {
+        SolverKind::Irls => settings.rounds,
+        SolverKind::Adam => settings.iterations,
+    };
     let keeps: &mut dyn ChromaKeeper = match &mut keeper {
         Some(keeper) => keeper,
         None => &mut NoChromaKeeper,
@@ -240,7 +246,15 @@ pub fn colorize(
             ColorizeEvent::Asked { .. } => {}
             ColorizeEvent::Listing => observe(Event::begins(Stage::Lists)),
             ColorizeEvent::Chosen(chosen) => observe(Event::Note(describe(chosen))),
-            ColorizeEvent::Plan(effects) => observe(Event::Note(table(effects))),
+            ColorizeEvent::Plan(effects) => {
+                observe(Event::Note(table(effects)));
+                observe(Event::Progress {
+                    stage: Stage::Solving,
+                    done: rounds_before,
+                    total: rounds,
+                    message: String::new(),
+                });
+            }
             ColorizeEvent::Uncorrected { before, after } => observe(Event::Note(format!(
                 "brought into line, the teacher's views would disagree more ({:.0} % instead of {:.0} % of its colors' mean square): they are taken as they are",
                 100.0 * after,
@@ -338,6 +352,7 @@ pub fn colorize(
             distill: distilling,
             bake: baking,
             measure: begun.elapsed().as_secs_f64(),
+            all: started.elapsed().as_secs_f64(),
         },
         peak_host_memory: files::peak_host_memory(),
         peak_device_memory: colored.peak_device_memory,

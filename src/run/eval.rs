@@ -11,6 +11,7 @@ use super::{
     Event, Observer, RunError, RunFolder, Stage,
     commit::Commit,
     files,
+    film::flight,
     fit::open_gpu,
     keeping,
     lock::RunLock,
@@ -183,6 +184,7 @@ pub fn eval(
         )));
     }
     observe(Event::begins(Stage::Page));
+    let flight = flight(&page, &path, observe);
     let evaluation = Evaluation {
         version: EVALUATION_VERSION,
         program: env!("CARGO_PKG_VERSION").to_owned(),
@@ -201,7 +203,7 @@ pub fn eval(
         between,
         seconds: begun.elapsed().as_secs_f64(),
     };
-    let html = evaluation_page(&evaluation, &rows, &strip);
+    let html = evaluation_page(&evaluation, &rows, &flight, &strip);
     files::write(&page.join(files::PAGE), html.as_bytes())?;
     let json = evaluation.to_json() + "\n";
     files::write(&commit.place(&folder.evaluation()), json.as_bytes())?;

@@ -9,6 +9,7 @@ mod eval;
 mod event;
 mod export;
 pub(crate) mod files;
+mod film;
 mod fingerprint;
 mod fit;
 mod folder;
