@@ -140,7 +140,7 @@ fn push_flight(html: &mut String, flight: &Flight) {
     let _ = match &flight.film {
         Some(film) => writeln!(
             html,
-            "<figure class=\"flight\"><video src=\"{}\" width=\"{width}\" height=\"{height}\" controls loop muted playsinline></video><figcaption>{told}</figcaption></figure>",
+            "<figure class=\"flight\"><video src=\"{}\" poster=\"frame-0000.png\" width=\"{width}\" height=\"{height}\" controls loop muted playsinline></video><figcaption>{told}</figcaption></figure>",
             escaped(film)
         ),
         None => writeln!(
