@@ -28,16 +28,16 @@ impl Effect {
                 format!("photos differ by {x} gray levels; {least} would be visible")
             }
             Self::Robust => {
-                format!("{x} % of places differ in one photo; {least} would be defects")
+                format!("{x} % of places differ in one photo; {least} would matter")
             }
             Self::Antialias => {
-                format!("near views show {x} times more than far ones; {least} would matter")
+                format!("near views are {x} times finer; {least} would matter")
             }
             Self::Background => {
-                format!("{x} % of the photos show what is far; {least} would be worth it")
+                format!("{x} % of the photos lie far behind; {least} would matter")
             }
             Self::LumaDegree => {
-                format!("{x} gray levels depend on the direction; {least} would matter")
+                format!("direction changes {x} gray levels; {least} would matter")
             }
             Self::TeacherCorrection => {
                 format!("views differ by {x} CIELAB units; {least} would be visible")
@@ -66,7 +66,7 @@ impl fmt::Display for Decision {
             None => self.effect.unknown().to_owned(),
         };
         let on = if self.on { "on" } else { "off" };
-        write!(f, "{:<18} {on:<3}  {found}", self.effect.name())?;
+        write!(f, "{:<18} {on:<3} {found}", self.effect.name())?;
         match (self.decided_by, self.effect) {
             (Decider::Evidence, _) => Ok(()),
             (Decider::Trial, Effect::TeacherCorrection) => {
@@ -116,7 +116,7 @@ mod tests {
         let exposure = Decision::new(Effect::Exposure, Some(6.7), 2.0);
         assert_eq!(
             exposure.to_string(),
-            "exposure           on   photos differ by 6.7 gray levels; 2 would be visible"
+            "exposure           on  photos differ by 6.7 gray levels; 2 would be visible"
         );
         let asked = Decision {
             on: false,
@@ -125,11 +125,11 @@ mod tests {
         };
         assert_eq!(
             asked.to_string(),
-            "exposure           off  photos differ by 6.7 gray levels; 2 would be visible; you said so"
+            "exposure           off photos differ by 6.7 gray levels; 2 would be visible; you said so"
         );
         assert_eq!(
             Decision::new(Effect::Masks, None, 0.0).to_string(),
-            "masks              off  no photo has a mask"
+            "masks              off no photo has a mask"
         );
     }
 

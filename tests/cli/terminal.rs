@@ -168,7 +168,7 @@ fn nothing_is_drawn_where_there_is_no_terminal() {
         done.stderr
     );
     // The plan is a table all the same, and no line of escaped ones.
-    let rows = done.stderr.lines().filter(|line| line.contains(" off  "));
+    let rows = done.stderr.lines().filter(|line| line.contains(" off "));
     assert!(rows.count() >= 3, "{}", done.stderr);
 }
 
@@ -189,5 +189,5 @@ fn the_plan_says_what_to_type_next() {
         last,
         "next: gs-chroma fit scene --preset draft --without exposure"
     );
-    assert!(words.contains("exposure           off  ") && words.contains("; you said so"));
+    assert!(words.contains("exposure           off ") && words.contains("; you said so"));
 }
