@@ -4,7 +4,8 @@ use std::{cell::Cell, ops::ControlFlow, sync::Arc, time::Instant};
 
 use super::{
     ChosenDegree, ChromaError, ChromaProgress, ChromaSettings, Colorizer, Correction, Degree,
-    FrozenViews, IrlsSolver, Lesson, Room, Task, bake,
+    FrozenViews, IrlsSolver, Lesson, Room, Task,
+    bake::{BakeStep, bake_telling},
     checkpoint::{ChromaCheckpoint, ChromaKeeper, NoChromaKeeper, State},
     choose_degree, match_saturation, plan,
     solve::solve_from,
@@ -58,6 +59,8 @@ pub enum ColorizeEvent<'a> {
         /// Views in all.
         total: usize,
     },
+    /// The Gaussians are projected before each view and listed.
+    Listing,
     /// The solver, at a degree that is tried.
     Trying {
         /// Degree of the chroma harmonics.
@@ -78,6 +81,20 @@ pub enum ColorizeEvent<'a> {
         before: f64,
         /// With it.
         after: f64,
+    },
+    /// The strength of the colors is compared with the teachers', view by view.
+    Matching {
+        /// Views that are compared.
+        view: usize,
+        /// Views in all.
+        total: usize,
+    },
+    /// What the bake is to come close to is drawn, view by view.
+    Drawing {
+        /// Views that are drawn.
+        view: usize,
+        /// Views in all.
+        total: usize,
     },
     /// The bake; its loss is in hundredths of the way from black to white.
     Baking(ChromaProgress),
@@ -179,6 +196,7 @@ impl Distill<'_> {
             weighted: lesson.targets.weighted(),
         };
         let scales = settings.target_scales();
+        go_on(observe(ColorizeEvent::Listing))?;
         let frozen = FrozenViews::new(
             self.raster,
             self.luma,
@@ -270,14 +288,19 @@ impl Distill<'_> {
         // Where no point is seen twice nobody knows what views agree on.
         if let (true, Some(spread)) = (settings.match_saturation, lesson.spread) {
             let agreed = spread.agreed;
-            saturation = match_saturation(&frozen, &lesson.targets, &tasks, agreed, &mut chroma)?;
+            let told = &mut |view, total| observe(ColorizeEvent::Matching { view, total });
+            let targets = &lesson.targets;
+            saturation = match_saturation(&frozen, targets, &tasks, agreed, &mut chroma, told)?;
             peak = peak.max(gpu.allocated_bytes());
         }
         let solving = begun.elapsed().as_secs_f64();
         let begun = Instant::now();
-        let splats = bake(&frozen, self.luma, &chroma, &mut |progress| {
+        let splats = bake_telling(&frozen, self.luma, &chroma, &mut |step| {
             peak = peak.max(gpu.allocated_bytes());
-            observe(ColorizeEvent::Baking(progress))
+            observe(match step {
+                BakeStep::Drawing { view, total } => ColorizeEvent::Drawing { view, total },
+                BakeStep::Solving(progress) => ColorizeEvent::Baking(progress),
+            })
         })?;
         Ok(Colored {
             splats,

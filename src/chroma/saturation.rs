@@ -6,6 +6,8 @@
 //! stronger than the scene's from the same views, times the share of their strength that views
 //! agree on.
 
+use std::ops::ControlFlow;
+
 use super::{ChromaError, FrozenViews, Targets, Task};
 use crate::{
     raster::Field,
@@ -26,16 +28,17 @@ const STEADY: f64 = 0.9;
 
 /// Multiplies the colors by what they lack of the teachers' strength, 1 to 1.25, and says by how
 /// much. `agreed` is the share of the mean square of the teachers' a and b that views agree
-/// on, 0 to 1.
+/// on, 0 to 1; `observe` hears how many of how many views are compared.
 ///
 /// # Errors
-/// [`ChromaError::Gpu`], [`ChromaError::Spill`].
+/// [`ChromaError::Gpu`], [`ChromaError::Spill`], [`ChromaError::Cancelled`].
 pub fn match_saturation(
     frozen: &FrozenViews,
     targets: &Targets,
     tasks: &[Task],
     agreed: f64,
     chroma: &mut ShField,
+    observe: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
 ) -> Result<f64, ChromaError> {
     let colors = Field::upload(frozen.gpu(), chroma)?;
     let mut whole = ShField::zeros(frozen.splat_count(), 0, 2);
@@ -43,7 +46,11 @@ pub fn match_saturation(
     let opacity = Field::upload(frozen.gpu(), &whole)?;
     let (mut wanted, mut shown) = (0.0, 0.0);
     let step = tasks.len().div_ceil(VIEWS).max(1);
-    for task in tasks.iter().step_by(step) {
+    let total = tasks.len().div_ceil(step);
+    for (view, task) in tasks.iter().step_by(step).enumerate() {
+        if observe(view, total).is_break() {
+            return Err(ChromaError::Cancelled);
+        }
         let pictures = frozen.draw(task.view, &[&colors, &opacity])?;
         let target = targets.read(task.target, 0)?;
         let ab = target.ab().ab;

@@ -1,6 +1,6 @@
 //! `gs-chroma colorize`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, CommandFactory, ValueEnum, error::ErrorKind};
 
@@ -8,7 +8,7 @@ use super::{
     Cli, CliError,
     checkpoint::CheckpointArguments,
     network::NetworkArguments,
-    print,
+    next, print,
     progress::Progress,
     values::{one_of, positive, share},
 };
@@ -217,7 +217,6 @@ impl Colorize {
     pub(super) fn run(self) -> Result<(), CliError> {
         self.check_solver();
         let settings = self.settings();
-        let mut progress = Progress::default();
         let options = ColorizeOptions {
             teach: TeachOptions {
                 teachers: self.teachers(),
@@ -240,20 +239,25 @@ impl Colorize {
             timings: self.timings,
             checkpoints: self.checkpoints.options(),
         };
+        let mut progress = Progress::through(options.stages());
         let (output, report) = colorize(&options, &mut |event| progress.show(&event))?;
         progress.finish();
         if self.json {
             print(report.to_json())?;
         } else {
             print(report.chroma_summary())?;
-            print(format_args!("wrote {}", output.ply.display()))?;
-            if let Some(sheet) = output.contact_sheet {
-                print(format_args!("wrote {}", sheet.display()))?;
-            }
             let chroma = report.chroma.as_ref();
             if let Some(rows) = chroma.and_then(|chroma| chroma.timings.as_ref()) {
                 print(timings_table(rows))?;
             }
+            let teacher = options.teach.teachers.first().map(|(path, _)| path);
+            let next = match output.contact_sheet.as_deref().and_then(Path::parent) {
+                Some(run) => next::eval(run, teacher.map(PathBuf::as_path)),
+                None => next::view(&output.ply),
+            };
+            let wrote = [Some(output.ply.as_path()), output.contact_sheet.as_deref()];
+            let wrote: Vec<&Path> = wrote.into_iter().flatten().collect();
+            progress.close(&wrote, &next)?;
         }
         Ok(())
     }

@@ -2,7 +2,7 @@
 
 use clap::Args;
 
-use super::{CliError, print, progress};
+use super::{CliError, bar::Bar, print};
 use crate::{
     doctor::{Diagnosis, STEPS, measured},
     gpu::Gpu,
@@ -20,13 +20,12 @@ pub struct Doctor {
 impl Doctor {
     pub(super) fn run(self) -> Result<(), CliError> {
         let gpu = Gpu::open().map_err(RunError::from)?;
-        let bar = progress::bar("checks", STEPS);
+        let bar = Bar::begin("checks", None);
         let diagnosis = Diagnosis::of(&gpu, &mut |index, name| {
-            bar.set_position(index as u64);
-            bar.set_message(name);
+            bar.update(index, STEPS, name);
         })
         .map_err(RunError::from)?;
-        bar.finish_and_clear();
+        bar.end(false);
         if self.json {
             // Numbers and strings only: this cannot fail.
             let json = serde_json::to_string_pretty(&diagnosis).unwrap_or_default();

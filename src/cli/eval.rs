@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{CliError, network::NetworkArguments, print, progress::Progress, values::one_of};
+use super::{CliError, network::NetworkArguments, next, print, progress::Progress, values::one_of};
 use crate::{
     eval::Peer,
     run::{EvalOptions, eval},
@@ -62,7 +62,6 @@ pub struct Eval {
 
 impl Eval {
     pub(super) fn run(self) -> Result<(), CliError> {
-        let mut progress = Progress::default();
         let options = EvalOptions {
             run: self.run,
             teacher: self.teacher,
@@ -75,16 +74,17 @@ impl Eval {
             flow: self.flow,
             lpips: self.lpips,
         };
+        let mut progress = Progress::through(options.stages());
         let (folder, evaluation) = eval(&options, &mut |event| progress.show(&event))?;
         progress.finish();
         if self.json {
             return print(evaluation.to_json());
         }
+        print(evaluation.verdict().join("\n") + "\n")?;
         for table in evaluation.tables() {
             print(format_args!("{table}\n"))?;
         }
-        print(format_args!("wrote {}", folder.evaluation().display()))?;
         let page = folder.evaluation_page().join("index.html");
-        print(format_args!("wrote {}", page.display()))
+        progress.close(&[&folder.evaluation(), &page], &next::look(&page))
     }
 }

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{CliError, print};
-use crate::run::{ExportOptions, export};
+use super::{CliError, next, print, progress::Progress};
+use crate::run::{Event, ExportOptions, Stage, export};
 
 /// Write a run's scene as a splat file, near the origin where COLMAP's coordinates are large.
 #[derive(Args)]
@@ -31,6 +31,8 @@ impl Export {
             luma: self.luma,
             colmap_coordinates: self.colmap_coordinates,
         };
+        let mut progress = Progress::through(vec![Stage::Saving]);
+        progress.show(&Event::begins(Stage::Saving));
         let wrote = export(&options)?;
         print(format_args!(
             "wrote {} Gaussians to {}",
@@ -43,6 +45,6 @@ impl Export {
                 "its coordinates are COLMAP's less {x} {y} {z}, as its header says (--colmap-coordinates for COLMAP's own)"
             ))?;
         }
-        Ok(())
+        progress.close(&[], &next::view(&options.output))
     }
 }

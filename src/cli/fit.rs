@@ -10,6 +10,7 @@ use super::{
     effects::EffectArguments,
     luma::LumaArguments,
     network::NetworkArguments,
+    next,
     photos::Photos,
     print,
     progress::Progress,
@@ -82,7 +83,6 @@ fn refuse(reason: &str) -> ! {
 
 impl Fit {
     pub(super) fn run(self) -> Result<(), CliError> {
-        let mut progress = Progress::default();
         let seconds = self.time_limit.map(|minutes| 60.0 * minutes);
         let goal = match (self.target_psnr, seconds) {
             (Some(psnr), within) => Goal::Reach { psnr, within },
@@ -136,6 +136,8 @@ impl Fit {
             },
             ..asked
         };
+        let asked = options.ahead.teachers.first().cloned();
+        let mut progress = Progress::through(options.stages());
         let (folder, report) = fit(&options, &mut |event| progress.show(&event))?;
         progress.finish();
         if self.json {
@@ -145,10 +147,11 @@ impl Fit {
                 print(curve)?;
             }
             print(report.luma_summary())?;
-            print(format_args!("wrote {}", folder.luma().display()))?;
             if let Some(rows) = &report.luma.timings {
                 print(timings_table(rows))?;
             }
+            let next = next::colorize(folder.path(), asked.as_deref());
+            progress.close(&[&folder.luma()], &next)?;
         }
         Ok(())
     }

@@ -1,5 +1,6 @@
 //! The commands: arguments in, text out. What they do is in [`crate::run`].
 
+mod bar;
 mod checkpoint;
 mod colorize;
 mod doctor;
@@ -13,6 +14,7 @@ mod info;
 mod interrupt;
 mod luma;
 mod network;
+mod next;
 mod photos;
 mod plan;
 mod printable;

@@ -7,6 +7,7 @@ use clap::Args;
 use super::{
     CliError,
     effects::EffectArguments,
+    next,
     photos::Photos,
     print,
     progress::Progress,
@@ -33,13 +34,13 @@ pub struct Plan {
 
 impl Plan {
     pub(super) fn run(self) -> Result<(), CliError> {
-        let mut progress = Progress::default();
         let options = PlanOptions {
             colmap_dir: self.colmap_dir,
             preset: self.preset,
             load: self.photos.options(),
             overrules: self.effects.overrules(),
         };
+        let mut progress = Progress::through(options.stages());
         let Planned { plan, soundness } = plan(&options, &mut |event| progress.show(&event))?;
         progress.finish();
         if self.json {
@@ -53,7 +54,8 @@ impl Plan {
                 })
             ))
         } else {
-            print(plan)
+            print(plan)?;
+            progress.close(&[], &next::fit_as_planned())
         }
     }
 }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{CliError, print, progress::Progress, values::one_of};
+use super::{CliError, next, print, progress::Progress, values::one_of};
 use crate::run::{RenderOptions, Views, render};
 
 const VIEWS: &[(Views, &str)] = &[
@@ -34,7 +34,6 @@ pub struct Render {
 
 impl Render {
     pub(super) fn run(self) -> Result<(), CliError> {
-        let mut progress = Progress::default();
         let options = RenderOptions {
             run: self.run,
             colmap: self.colmap,
@@ -42,12 +41,18 @@ impl Render {
             luma: self.luma,
             output: self.output,
         };
+        let mut progress = Progress::through(options.stages());
         let count = render(&options, &mut |event| progress.show(&event))?;
         progress.finish();
         print(format_args!(
             "wrote {count} pictures to {}",
             options.output.display()
         ))?;
-        Ok(())
+        let next = match &options.run {
+            // What is drawn is a file already.
+            Some(file) if options.colmap.is_some() && file.is_file() => next::view(file),
+            run => next::export(run.as_deref()),
+        };
+        progress.close(&[], &next)
     }
 }

@@ -8,12 +8,13 @@ use super::{
     CliError,
     effects::EffectArguments,
     luma::LumaArguments,
+    next,
     photos::Photos,
     print,
     progress::Progress,
     values::{PRESETS, one_of, positive},
 };
-use crate::run::Preset;
+use crate::run::{Preset, Stage};
 use crate::tradeoff::{FILES, PointStage, TradeoffOptions, front_table, knob_names, tradeoff};
 
 /// Find out what quality costs in time, on these photos and this device: runs `fit` (and
@@ -52,7 +53,7 @@ pub struct Tradeoff {
 
 impl Tradeoff {
     pub(super) fn run(self) -> Result<(), CliError> {
-        let mut progress = Progress::default();
+        let mut progress = Progress::through(vec![Stage::Sweep]);
         let options = TradeoffOptions {
             colmap_dir: self.colmap_dir,
             output: self.output,
@@ -74,9 +75,8 @@ impl Tradeoff {
                 print(format_args!("{table}\n"))?;
             }
         }
-        for file in FILES {
-            print(format_args!("wrote {}", folder.join(file).display()))?;
-        }
-        Ok(())
+        let wrote = FILES.map(|file| folder.join(file));
+        let [.., page] = &wrote;
+        progress.close(&wrote.each_ref().map(PathBuf::as_path), &next::look(page))
     }
 }

@@ -17,12 +17,13 @@ mod sampling;
 mod soundness;
 mod teacher;
 mod tracks;
+mod words;
 
 pub use background::{Backdrop, FarPlaces};
 pub use direction::left_out_errors;
 pub use evidence::{Evidence, Survey};
 pub use exposure::{Exposures, find_exposures, find_photo_exposures};
-pub use plan::{Decider, Decision, Effect, Overrules, Plan, Room, table};
+pub use plan::{Decider, Decision, Effect, Overrules, Plan, Room};
 pub use sampling::sampling_spread;
 pub(crate) use soundness::listed;
 pub use soundness::{
@@ -31,3 +32,4 @@ pub use soundness::{
 };
 pub use teacher::{TeacherSamples, TeacherSpread};
 pub use tracks::Sample;
+pub use words::table;

@@ -1,7 +1,5 @@
 //! What each effect's evidence is and what follows from it.
 
-use std::fmt;
-
 use serde::{Deserialize, Serialize};
 
 use super::{direction, evidence::Evidence, tracks};
@@ -20,7 +18,7 @@ const EXPOSURE_SURE: f64 = 8.0;
 
 /// Per cent by which a short training must fit the photos better with exposures than without:
 /// real exposures of 4 levels bring 3 to 4, imagined ones of 5 between -0.5 and 0.1.
-const TRIAL_GAIN: f64 = 1.0;
+pub(super) const TRIAL_GAIN: f64 = 1.0;
 
 /// Share of places at which one view disagrees with all others from which on photos are
 /// taken to have defects: clean photos stay below 0.3 %, 1.5 % of dust gives 1 to 3 %.
@@ -28,7 +26,7 @@ const OUTLIER_SHARE: f64 = 0.006;
 
 /// In a shorter run most of what is far off is only not learned yet, and leaving it out
 /// costs more than the defects do (docs/decisions.md).
-const ROBUST_ITERATIONS: usize = 1_200;
+pub(super) const ROBUST_ITERATIONS: usize = 1_200;
 
 /// Ratio of the sampling rates of near and far views from which on a blur of one size
 /// makes far views too thick or near ones too faint.
@@ -354,57 +352,6 @@ fn degree(
         ..decision
     };
     (decision, degree)
-}
-
-impl fmt::Display for Decision {
-    /// A row of the table that a user sees.
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let evidence = (self.evidence).map_or("none".to_owned(), |found| format!("{found:.2}"));
-        let by = match self.decided_by {
-            Decider::Evidence => String::new(),
-            Decider::Trial => in_words(self.trial),
-            Decider::User => "; you said so".to_owned(),
-            Decider::Preset => "; by the preset".to_owned(),
-        };
-        write!(
-            f,
-            "{:<18} {:<4} {evidence:>9} {:>10.2} {}{by}",
-            self.effect.name(),
-            if self.on { "on" } else { "off" },
-            self.threshold,
-            self.effect.unit(),
-        )?;
-        match self.on {
-            true => write!(f, "; costs {}", self.effect.cost()),
-            false => Ok(()),
-        }
-    }
-}
-
-/// What a trial showed.
-fn in_words(trial: Option<f64>) -> String {
-    let gain = trial.unwrap_or(0.0);
-    let how = if gain < 0.0 { "worse" } else { "better" };
-    format!("; a trial training fits {:.1} % {how} with it", gain.abs())
-}
-
-/// The table of some decisions.
-pub fn table(decisions: &[Decision]) -> String {
-    let head = format!(
-        "{:<18} {:<4} {:>9} {:>10}",
-        "effect", "", "evidence", "threshold"
-    );
-    let rows = decisions.iter().map(Decision::to_string);
-    std::iter::once(head)
-        .chain(rows)
-        .collect::<Vec<_>>()
-        .join("\n")
-}
-
-impl fmt::Display for Plan {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&table(&self.decisions))
-    }
 }
 
 #[cfg(test)]

@@ -36,7 +36,7 @@ fn every_effect_of_stage_1_is_decided_once() {
     let plan = plan(3, &Overrules::default());
     let order: Vec<Effect> = plan.decisions.iter().map(|d| d.effect).collect();
     assert_eq!(order, Effect::ALL);
-    assert_eq!(plan.to_string().lines().count(), 1 + Effect::ALL.len());
+    assert_eq!(plan.to_string().lines().count(), Effect::ALL.len());
 }
 
 #[test]
@@ -105,7 +105,7 @@ fn a_trial_decides_where_the_evidence_is_in_doubt() {
     assert_eq!(exposure(5.0).after(None), exposure(5.0));
     let row = exposure(5.0).after(Some(-2.0)).to_string();
     assert!(
-        row.ends_with("; a trial training fits 2.0 % worse with it"),
+        row.ends_with("but a trial training fits 2 % worse with it; 1 would count"),
         "{row}"
     );
 }

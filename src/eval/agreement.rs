@@ -189,16 +189,22 @@ pub fn between_views(
         .map(|k| candidates[k * candidates.len() / count])
         .collect();
     let mut in_color = true;
-    for &view in &chosen {
+    for (done, &view) in chosen.iter().enumerate() {
+        observe(Progress {
+            task: Task::Views,
+            done,
+            total: 2 * count,
+            name: &dataset.capture.views[view].name,
+        });
         in_color = in_color && dataset.color(view)?.rgb.is_some();
     }
     let mut frames = Vec::with_capacity(count);
     for (k, &i) in chosen.iter().enumerate() {
         let name = &dataset.capture.views[i].name;
         observe(Progress {
-            task: Task::Pairs,
-            done: k,
-            total: count,
+            task: Task::Views,
+            done: count + k,
+            total: 2 * count,
             name,
         });
         let camera = small(&dataset.cameras[i]);
@@ -226,7 +232,16 @@ pub fn between_views(
     let every = points.len().div_ceil(MAX_POINTS);
     let mut misses = Vec::new();
     let mut sums = Sums::default();
+    let pairs = count * count.saturating_sub(1) / 2;
+    let mut done = 0;
     for (i, first) in frames.iter().enumerate() {
+        observe(Progress {
+            task: Task::Pairs,
+            done,
+            total: pairs,
+            name: "",
+        });
+        done += count - 1 - i;
         for second in &frames[i + 1..] {
             let forward = first.flow_to(second);
             let seen = visible(&forward, &second.flow_to(first));

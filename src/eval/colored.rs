@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{EvalError, Reference};
+use super::{EvalError, Observer, Progress, Reference, Task};
 use crate::{
     capture::{Dataset, Exposure},
     chroma::{Lesson, native_rgb, teacher::AbImage},
@@ -38,11 +38,20 @@ impl Measured {
         [luma, baked]: [&Splats; 2],
         chroma: &ShField,
         lesson: &Lesson,
+        observe: &mut Observer<'_>,
     ) -> Result<Self, EvalError> {
         let mut renderer =
             Renderer::of(raster, luma, &[&luma.sh, chroma, &baked.sh], dataset.extent)?;
         let (mut errors, mut views, mut rows) = (Vec::new(), Vec::new(), Vec::new());
-        dataset.visit_colors(dataset.measured().1, |i, photo| {
+        let (measured, mut done) = (dataset.measured().1, 0);
+        dataset.visit_colors(measured, |i, photo| {
+            observe(Progress {
+                task: Task::Measure,
+                done,
+                total: measured.len(),
+                name: &dataset.capture.views[i].name,
+            });
+            done += 1;
             let (photo, camera) = (&photo, &dataset.cameras[i]);
             let exposure = exposures[i];
             let reference = Reference { photo, exposure };

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{EvalError, Reference};
+use super::{EvalError, Observer, Progress, Reference, Task};
 use crate::{
     capture::{Dataset, Exposure},
     raster::{Raster, Renderer},
@@ -19,10 +19,18 @@ pub fn measure_luma(
     dataset: &Dataset,
     splats: &Splats,
     exposures: &[Exposure],
+    observe: &mut Observer<'_>,
 ) -> Result<Vec<LumaView>, EvalError> {
     let mut renderer = Renderer::of(raster, splats, &[&splats.sh], dataset.extent)?;
-    let mut views = Vec::new();
+    let (mut views, mut done) = (Vec::new(), 0);
     dataset.visit(&dataset.split.test, |view, photo| {
+        observe(Progress {
+            task: Task::Measure,
+            done,
+            total: dataset.split.test.len(),
+            name: &dataset.capture.views[view].name,
+        });
+        done += 1;
         let reference = Reference {
             photo,
             exposure: exposures[view],

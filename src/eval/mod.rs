@@ -82,10 +82,16 @@ pub enum Task {
     Teacher,
     /// Coloring the scene in another way to compare with.
     Peer,
+    /// Measuring pictures against their photos.
+    Measure,
     /// Drawing and comparing the frames of a path.
     Path,
-    /// Drawing and comparing photographed views.
+    /// Drawing the photographed views.
+    Views,
+    /// Comparing them with each other.
     Pairs,
+    /// Measuring how strong the teacher's colors are.
+    Strength,
 }
 
 /// How far it is.

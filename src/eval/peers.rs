@@ -67,6 +67,13 @@ impl Peer {
         memory_limit: Option<u64>,
         observe: &mut Observer<'_>,
     ) -> Result<(ShField, PeerReport), EvalError> {
+        let name = self.method().to_string();
+        observe(Progress {
+            task: Step::Peer,
+            done: 0,
+            total: 0,
+            name: &name,
+        });
         let dataset = &scene.dataset;
         let recipe = self.recipe();
         let scales = recipe.as_ref().map_or(1, Recipe::target_scales);
@@ -98,7 +105,6 @@ impl Peer {
         };
         let (luma, extent) = (&scene.luma, dataset.extent);
         let frozen = FrozenViews::new(raster, luma, extent, &cameras, scales, room)?;
-        let name = self.method().to_string();
         let (mut iterations, mut passes) = (0, 0.0);
         let mut told = |progress: ChromaProgress| {
             (iterations, passes) = (progress.iteration, progress.passes);

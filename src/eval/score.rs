@@ -1,7 +1,7 @@
 //! Pictures of a view against its photo.
 
 use super::{
-    ColoredScene, Drawing, EvalError, Layer, Lpips, Painter, Reference,
+    ColoredScene, Drawing, EvalError, Layer, Lpips, Observer, Painter, Progress, Reference, Task,
     picture::{ab_of, gray_picture, to_picture},
 };
 use crate::{
@@ -33,23 +33,15 @@ pub struct Shot {
     pub pixels: Vec<[f32; 3]>,
 }
 
-/// Methods on the page; the exported picture stands for the native one, and what that
-/// costs is the bake's figure.
-const SHOWN: [(Method, &str, &str); 6] = [
-    (Method::Teacher, "teacher", "teacher"),
-    (Method::Exported, "ours", "ours"),
-    (Method::RgbSplats, "rgb-splats", "teacher, then RGB splats"),
-    (
-        Method::ChromadistillPaper,
-        "chromadistill-paper",
-        "ChromaDistill, as its paper says",
-    ),
-    (
-        Method::ChromadistillCode,
-        "chromadistill-code",
-        "ChromaDistill, as its code does",
-    ),
-    (Method::PerFrame, "per-frame", "luma, then teacher"),
+/// Methods on the page, and part of their files' names; the exported picture stands for the
+/// native one, and what that costs is the bake's figure.
+const SHOWN: [(Method, &str); 6] = [
+    (Method::Teacher, "teacher"),
+    (Method::Exported, "ours"),
+    (Method::RgbSplats, "rgb-splats"),
+    (Method::ChromadistillPaper, "chromadistill-paper"),
+    (Method::ChromadistillCode, "chromadistill-code"),
+    (Method::PerFrame, "per-frame"),
 ];
 
 impl Scored {
@@ -140,9 +132,9 @@ impl Scored {
                 .find(|(m, _)| *m == method)
                 .map(|(_, rgb)| rgb)
         };
-        for (method, file, caption) in SHOWN {
+        for (method, file) in SHOWN {
             if let Some(rgb) = of(method) {
-                show(file, caption, rgb.clone());
+                show(file, method.name(), rgb.clone());
             }
         }
         if let (Some(truth), Some(exported)) = (truth, of(Method::Exported)) {
@@ -253,12 +245,20 @@ pub fn mean_luma(views: &[Scored]) -> LumaScore {
 pub fn teacher_colorfulness(
     painter: &Painter<'_>,
     scene: &ColoredScene,
+    observe: &mut Observer<'_>,
 ) -> Result<Option<f64>, EvalError> {
-    let mut values = Vec::new();
+    let (mut values, mut done) = (Vec::new(), 0);
     let views: Vec<usize> = (0..scene.dataset.cameras.len())
         .filter(|&view| painter.answers(view))
         .collect();
     scene.dataset.visit(&views, |view, photo| {
+        observe(Progress {
+            task: Task::Strength,
+            done,
+            total: views.len(),
+            name: &scene.dataset.capture.views[view].name,
+        });
+        done += 1;
         if let Some(answer) = painter.answer(view)? {
             let layer = Layer::Ab(to_picture(&answer));
             let reference = scene.reference(view, photo);

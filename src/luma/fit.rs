@@ -74,6 +74,15 @@ pub enum LumaEvent<'a> {
     /// There is room for so many Gaussians only, within the settings' memory limit or, where
     /// there is none, the adapter's bindings.
     Capped(usize),
+    /// The first Gaussians are placed, and what a training needs is brought to the device.
+    Placing,
+    /// The training begins after so many iterations.
+    Starting {
+        /// Iterations done.
+        iteration: usize,
+        /// Iterations in all, as it looks now.
+        end: usize,
+    },
     /// The training.
     Training(LumaProgress),
 }
@@ -175,6 +184,7 @@ impl Fit<'_> {
             ..settings.clone()
         };
         let demand = self.fit_memory(&mut settings, &plan, observe)?;
+        go_on(observe(LumaEvent::Placing))?;
         let start = match (checkpoint, self.start) {
             // Anything that can be uploaded: all will be replaced.
             (Some(_), _) => placeholder(settings.sh_degree),
@@ -202,6 +212,10 @@ impl Fit<'_> {
             trainer.resume(checkpoint)?;
         }
         let (mut last, mut peak_device_memory) = (None, None);
+        go_on(observe(LumaEvent::Starting {
+            iteration: checkpoint.map_or(0, Checkpoint::iteration),
+            end: trainer.schedule().end,
+        }))?;
         let mut keeper = Planned {
             plan: &plan,
             keeper,

@@ -60,6 +60,14 @@ fn exposure_gain(
     plan: &Plan,
     observe: &mut dyn FnMut(TrialProgress) -> ControlFlow<()>,
 ) -> Result<f64, LumaError> {
+    let told = |which, iteration| TrialProgress {
+        done: which * ITERATIONS + iteration,
+        total: 2 * ITERATIONS,
+        exposed: which == 0,
+    };
+    if observe(told(0, 0)).is_break() {
+        return Err(LumaError::Cancelled);
+    }
     let views = PlannedViews::new(dataset.clone(), evidence, plan);
     let train = &dataset.split.train;
     let count = train.len().min(MAX_VIEWS);
@@ -86,11 +94,7 @@ fn exposure_gain(
         LumaTrainer::new(raster, settings, dataset.extent, &start, views)?.train_while(
             &mut |progress| {
                 *loss = progress.loss;
-                observe(TrialProgress {
-                    done: which * ITERATIONS + progress.iteration,
-                    total: 2 * ITERATIONS,
-                    exposed: which == 0,
-                })
+                observe(told(which, progress.iteration))
             },
         )?;
     }

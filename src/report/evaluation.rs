@@ -49,18 +49,25 @@ impl Method {
     }
 }
 
-impl fmt::Display for Method {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::Native => "native",
-            Self::Exported => "exported",
+impl Method {
+    /// What its pictures are called, in tables and under pictures.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Native => "ours, native",
+            Self::Exported => "ours",
             Self::Teacher => "teacher",
             Self::RgbSplats => "RGB splats",
             Self::ChromadistillPaper => "ChromaDistill, paper",
             Self::ChromadistillCode => "ChromaDistill, code",
-            Self::PerFrame => "per frame",
+            Self::PerFrame => "teacher per frame",
             Self::Photo => "photo",
-        })
+        }
+    }
+}
+
+impl fmt::Display for Method {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
     }
 }
 
@@ -257,241 +264,10 @@ impl ConsistencyScore {
     }
 }
 
-/// A table: title, head, rows and what has to be said below it.
-pub struct Table {
-    /// What it shows.
-    pub title: String,
-    /// Names of the columns.
-    pub head: Vec<String>,
-    /// The rows.
-    pub rows: Vec<Vec<String>>,
-    /// What has to be known to read it, a line each.
-    pub notes: Vec<String>,
-}
-
 impl Evaluation {
     /// The evaluation as indented JSON.
     pub fn to_json(&self) -> String {
         // Plain structs with string keys: serializing them cannot fail.
         serde_json::to_string_pretty(self).unwrap_or_default()
-    }
-
-    /// Quality and consistency as tables.
-    pub fn tables(&self) -> [Table; 2] {
-        [self.quality_table(), self.consistency_table()]
-    }
-
-    fn quality_table(&self) -> Table {
-        let head = [
-            "pictures",
-            "PSNR",
-            "SSIM",
-            "ΔE00",
-            "95 %",
-            "a/b error",
-            "colorful",
-            "colors",
-            "gray PSNR",
-            "sharp",
-            "LPIPS",
-        ];
-        let luma = vec![
-            "luma".to_owned(),
-            format!("{:.2}", self.luma.psnr),
-            format!("{:.3}", self.luma.ssim),
-            dash(),
-            dash(),
-            dash(),
-            dash(),
-            dash(),
-            dash(),
-            figure(Some(self.luma.psnr), 2),
-            figure(Some(self.luma.sharpness), 0),
-            figure(self.luma.lpips, 3),
-        ];
-        let colored = self.pictures.iter().map(|score| {
-            vec![
-                score.method.to_string(),
-                figure(score.psnr, 2),
-                figure(score.ssim, 3),
-                figure(score.delta_e.map(|e| e.mean), 2),
-                figure(score.delta_e.map(|e| e.percentile_95), 2),
-                figure(score.ab_error, 2),
-                figure(Some(score.colorfulness), 1),
-                figure(Some(score.diversity), 1),
-                figure(Some(score.gray_psnr), 2),
-                figure(Some(score.sharpness), 0),
-                figure(score.lpips, 3),
-            ]
-        });
-        let which = if self.measured_on == "test" {
-            "held-out"
-        } else {
-            "training"
-        };
-        let mut notes = vec![
-            "PSNR in dB; a/b error: root mean square in CIELAB units, lightness taken from the photo."
-                .to_owned(),
-            "Colors: effective number of a/b squares five units wide; sharp: variance of the Laplacian of the gray picture, 0 to 255."
-                .to_owned(),
-        ];
-        notes.extend(self.peers.iter().map(|peer| {
-            format!(
-                "{}: {} steps, {:.0} passes over a view, {:.1} s.",
-                peer.method, peer.iterations, peer.passes, peer.seconds
-            )
-        }));
-        notes.extend(self.bake.map(|bake| {
-            format!(
-                "Exported against native: ΔE00 {:.2}, 95 % {:.2}.",
-                bake.mean, bake.percentile_95
-            )
-        }));
-        Table {
-            title: match self.views.len() {
-                1 => format!("One {which} view against its photo"),
-                count => format!("{count} {which} views against their photos"),
-            },
-            head: head.map(str::to_owned).to_vec(),
-            rows: std::iter::once(luma).chain(colored).collect(),
-            notes,
-        }
-    }
-
-    fn consistency_table(&self) -> Table {
-        let methods = |scores: &mut dyn Iterator<Item = Method>| {
-            let mut methods: Vec<Method> = scores.collect();
-            methods.sort();
-            methods.dedup();
-            methods
-        };
-        let path = self.path.consistency.iter().map(|c| c.score.method);
-        let between = self.between.consistency.iter().map(|c| c.method);
-        let methods = methods(&mut path.chain(between));
-        let row = |name: String, scores: &[ConsistencyScore]| {
-            let mut cells = vec![name];
-            cells.extend(match scores.first() {
-                Some(any) => [
-                    any.pairs.to_string(),
-                    format!("{:.0} %", 100.0 * any.visible),
-                    any.values.to_string(),
-                ],
-                None => [dash(), dash(), dash()],
-            });
-            cells.extend(methods.iter().map(|method| {
-                let score = scores.iter().find(|score| score.method == *method);
-                score
-                    .and_then(|score| Some(format!("{:.2} ({:.1e})", score.rms?, score.error?)))
-                    .unwrap_or_else(dash)
-            }));
-            cells
-        };
-        let mut deltas: Vec<usize> = self.path.consistency.iter().map(|c| c.delta).collect();
-        deltas.dedup();
-        let mut rows: Vec<_> = deltas
-            .into_iter()
-            .map(|delta| {
-                let at = self.path.consistency.iter().filter(|c| c.delta == delta);
-                let scores: Vec<_> = at.map(|c| c.score).collect();
-                row(format!("path, Δ = {delta}"), &scores)
-            })
-            .collect();
-        rows.push(row(
-            "photographed views".to_owned(),
-            &self.between.consistency,
-        ));
-        let mut head: Vec<_> = ["consistency", "pairs", "visible", "values"]
-            .map(str::to_owned)
-            .to_vec();
-        head.extend(methods.iter().map(Method::to_string));
-        let mut notes = vec![
-            format!(
-                "Root mean square in CIELAB units, and in brackets the mean square of {}; denominator: {}.",
-                self.rules.scale, self.rules.denominator
-            ),
-            format!(
-                "Path of {} frames, {} flow; photographed views are a pair where {:.0} % or more is visible.",
-                self.path.frames,
-                self.path.flow,
-                100.0 * self.between.least_overlap
-            ),
-            format!("Pixels are {}.", self.rules.mask),
-        ];
-        notes.extend(self.between.flow_error.map(|pixels| {
-            format!(
-                "Between photographed views the flow misses COLMAP's points by {pixels:.1} pixels (median)."
-            )
-        }));
-        if !self.path.skipped.is_empty() {
-            notes.push(format!(
-                "The path is too short for Δ = {:?}.",
-                self.path.skipped
-            ));
-        }
-        Table {
-            title: "Differences of a, b between views of one place".to_owned(),
-            head,
-            rows,
-            notes,
-        }
-    }
-}
-
-fn dash() -> String {
-    "–".to_owned()
-}
-
-fn figure(value: Option<f64>, digits: usize) -> String {
-    value.map_or_else(dash, |value| format!("{value:.digits$}"))
-}
-
-impl fmt::Display for Table {
-    /// As Markdown with aligned columns.
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let width = |column: usize| {
-            let cells = self.rows.iter().map(|row| &row[column]);
-            let all = cells.chain([&self.head[column]]);
-            all.map(|cell| cell.chars().count()).max().unwrap_or(0)
-        };
-        let widths: Vec<usize> = (0..self.head.len()).map(width).collect();
-        writeln!(f, "{}:\n", self.title)?;
-        let line = |f: &mut fmt::Formatter<'_>, cells: &[String]| {
-            for (column, (cell, width)) in cells.iter().zip(&widths).enumerate() {
-                match column {
-                    0 => write!(f, "| {cell:<width$} |")?,
-                    _ => write!(f, " {cell:>width$} |")?,
-                }
-            }
-            writeln!(f)
-        };
-        line(f, &self.head)?;
-        for (column, width) in widths.iter().enumerate() {
-            match column {
-                0 => write!(f, "|{:-<1$}|", "", width + 2)?,
-                _ => write!(f, "{:-<1$}:|", "", width + 1)?,
-            }
-        }
-        writeln!(f)?;
-        for row in &self.rows {
-            line(f, row)?;
-        }
-        write!(f, "\n{}", self.notes.join("\n"))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn tables_are_aligned_markdown() {
-        let table = Table {
-            title: "Two".to_owned(),
-            head: vec!["a".to_owned(), "ΔE00".to_owned()],
-            rows: vec![vec!["long".to_owned(), "1.5".to_owned()]],
-            notes: vec!["one".to_owned(), "two".to_owned()],
-        };
-        let want = "Two:\n\n| a    | ΔE00 |\n|------|-----:|\n| long |  1.5 |\n\none\ntwo";
-        assert_eq!(table.to_string(), want);
     }
 }

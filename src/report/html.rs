@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::Table;
+use super::table::Table;
 
 /// The look of every page.
 const STYLE: &str = include_str!("style.css");

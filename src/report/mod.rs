@@ -5,17 +5,21 @@
 mod contact_sheet;
 mod effects;
 mod evaluation;
+mod evaluation_tables;
 pub(crate) mod html;
 mod page;
+mod table;
 mod timings;
+mod verdict;
 
 pub use contact_sheet::{Row, contact_sheet, to_image};
 pub use effects::EffectReport;
 pub use evaluation::{
     BetweenScore, ConsistencyScore, EVALUATION_VERSION, Evaluation, LumaScore, Method,
-    PathConsistency, PathScore, PeerReport, PictureScore, Rules, Table, ViewScore,
+    PathConsistency, PathScore, PeerReport, PictureScore, Rules, ViewScore,
 };
-pub use page::{Figure, MAP_END, PageRow, error_map, evaluation_page};
+pub use page::{Figure, Flight, MAP_END, PageRow, error_map, evaluation_page};
+pub use table::Table;
 pub use timings::{KernelReport, kernel_reports, timings_table};
 
 use std::fmt::Write;
@@ -292,13 +296,9 @@ pub struct ChromaSeconds {
     pub bake: f64,
     /// Measuring, and drawing the contact sheet.
     pub measure: f64,
-}
-
-impl ChromaSeconds {
-    /// All of them.
-    pub fn total(&self) -> f64 {
-        self.teacher + self.distill + self.bake + self.measure
-    }
+    /// From the start until files are written; 0 in reports of former versions.
+    #[serde(default)]
+    pub all: f64,
 }
 
 /// A color difference.
@@ -370,8 +370,8 @@ impl Report {
             format!(" (gone back to where it was best after {iteration})")
         });
         format!(
-            "{} Gaussians after {} iterations{given_up} in {:.0} s{quality}",
-            luma.splats, luma.iterations, luma.seconds.train
+            "{} Gaussians after {} iterations{given_up}{quality}",
+            luma.splats, luma.iterations
         )
     }
 
@@ -416,10 +416,8 @@ impl Report {
             format!("; round {rounds} still moved colors by {moved:.2} units")
         });
         format!(
-            "colored from {} views in {:.0} s{truth}, export off by ΔE00 {:.2}{moved}",
-            chroma.colored_views,
-            chroma.seconds.total(),
-            chroma.bake.mean
+            "colored from {} views{truth}, export off by ΔE00 {:.2}{moved}",
+            chroma.colored_views, chroma.bake.mean
         )
     }
 }

@@ -1,4 +1,4 @@
-//! The page of `eval`: one HTML file beside its pictures, without scripts.
+//! The page of `eval`: one HTML file beside its pictures.
 
 use std::fmt::Write;
 
@@ -51,28 +51,61 @@ pub fn error_map(errors: &[f64]) -> Vec<[f32; 3]> {
     errors.iter().map(color).collect()
 }
 
-/// The page's HTML: tables, a row of pictures a view, a strip of the path's frames.
-pub fn evaluation_page(evaluation: &Evaluation, rows: &[PageRow], strip: &[String]) -> String {
+/// The path in pictures.
+pub struct Flight {
+    /// Its frames, which lie beside the page as `frame-0000.png` and so on.
+    pub frames: usize,
+    /// Width and height of one in pixels.
+    pub size: [u32; 2],
+    /// Frames a second.
+    pub rate: u32,
+    /// A film of them beside the page.
+    pub film: Option<String>,
+    /// Bytes of the film; of all frames where there is none.
+    pub bytes: u64,
+}
+
+/// What the page does under the pointer.
+const SCRIPT: &str = include_str!("page.js");
+
+/// The page's HTML: a verdict, tables, the path, and a row of pictures a view. `strip` are some
+/// of the path's frames.
+pub fn evaluation_page(
+    evaluation: &Evaluation,
+    rows: &[PageRow],
+    flight: &Flight,
+    strip: &[String],
+) -> String {
     let mut html = head("gs-chroma evaluation");
     // Writing to a string cannot fail.
     let _ = write!(
         html,
-        "<h1>{}</h1>\n<p class=\"note\">gs-chroma {}{}</p>\n",
+        "<h1>{}</h1>\n<p class=\"note\">gs-chroma {}{}</p>\n<ul class=\"verdict\">\n",
         escaped(&evaluation.scene),
         escaped(&evaluation.program),
         teacher_in_words(evaluation)
     );
+    for line in evaluation.verdict() {
+        let _ = writeln!(html, "<li>{}</li>", escaped(&line));
+    }
+    html.push_str("</ul>\n");
     for table in evaluation.tables() {
         push_table(&mut html, &table);
     }
-    html.push_str("<h2>Along the path</h2>\n<div class=\"strip\">\n");
+    html.push_str("<h2>Along the path</h2>\n");
+    push_flight(&mut html, flight);
+    html.push_str("<div class=\"strip\">\n");
     for file in strip {
-        let _ = writeln!(html, "<img src=\"{0}\" alt=\"{0}\">", escaped(file));
+        let _ = writeln!(
+            html,
+            "<a href=\"{0}\"><img src=\"{0}\" alt=\"{0}\" loading=\"lazy\"></a>",
+            escaped(file)
+        );
     }
     html.push_str("</div>\n<h2>View by view</h2>\n");
     let _ = writeln!(
         html,
-        "<p class=\"note\">Maps of errors: <span class=\"ramp\" style=\"background:linear-gradient(90deg,{})\"></span> from 0 to {MAP_END:.0} and beyond, in ΔE00 or CIELAB units.</p>",
+        "<p class=\"note\">A picture opens large. Maps of errors: <span class=\"ramp\" style=\"background:linear-gradient(90deg,{})\"></span> from 0 to {MAP_END:.0} and beyond, in ΔE00 or CIELAB units.</p>",
         RAMP.map(|c| {
             let [r, g, b] = c.map(|v| (255.0 * v).round());
             format!("rgb({r},{g},{b})")
@@ -91,8 +124,31 @@ pub fn evaluation_page(evaluation: &Evaluation, rows: &[PageRow], strip: &[Strin
         }
         html.push_str("</div>\n");
     }
+    let _ = write!(html, "<script>\n{SCRIPT}</script>\n");
     html.push_str(TAIL);
     html
+}
+
+/// The path as a film, or its first frame, from which the script goes on.
+fn push_flight(html: &mut String, flight: &Flight) {
+    let [width, height] = flight.size;
+    let frames = flight.frames;
+    let told = format!(
+        "{frames} frames of {width}×{height} pixels, {:.1} MB",
+        flight.bytes as f64 / 1e6
+    );
+    let _ = match &flight.film {
+        Some(film) => writeln!(
+            html,
+            "<figure class=\"flight\"><video src=\"{}\" poster=\"frame-0000.png\" width=\"{width}\" height=\"{height}\" controls loop muted playsinline></video><figcaption>{told}</figcaption></figure>",
+            escaped(film)
+        ),
+        None => writeln!(
+            html,
+            "<figure class=\"flight\" data-frames=\"{frames}\" data-rate=\"{}\"><a href=\"frame-0000.png\"><img src=\"frame-0000.png\" alt=\"the path\"></a><figcaption>{told}; with ffmpeg on the PATH they become a film</figcaption></figure>",
+            flight.rate
+        ),
+    };
 }
 
 fn teacher_in_words(evaluation: &Evaluation) -> String {

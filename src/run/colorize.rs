@@ -28,8 +28,8 @@ use super::{
 use crate::{
     capture::LoadOptions,
     chroma::{
-        ChosenDegree, ChromaKeeper, ChromaProgress, ChromaSettings, ColorizeEvent, Degree, Distill,
-        NoChromaKeeper, SolverKind, relight,
+        ChosenDegree, ChromaCheckpoint, ChromaKeeper, ChromaProgress, ChromaSettings,
+        ColorizeEvent, Degree, Distill, NoChromaKeeper, SolverKind, relight,
     },
     effects::table,
     eval::{Measured, exposures},
@@ -91,12 +91,14 @@ pub fn colorize(
     options: &ColorizeOptions,
     observe: &mut Observer<'_>,
 ) -> Result<(Output, Report), RunError> {
+    let started = Instant::now();
     let warnings = RefCell::default();
     let observe = &mut keeping(&warnings, observe);
     let source = Source::find(options)?;
     let cache = source.folder.as_ref().map(RunFolder::teacher);
     let colmap_dir = source.colmap_dir(options)?;
     let mut teachers = Teachers::open(&options.teach, &colmap_dir, cache.as_deref())?;
+    observe(Event::begins(Stage::Device));
     let gpu = open_gpu(options.timings)?;
     let mut report = source.report(&gpu);
     let load = LoadOptions {
@@ -142,6 +144,7 @@ pub fn colorize(
         seed: report.luma.settings.seed,
         ..options.settings.clone()
     };
+    observe(Event::begins(Stage::Teacher));
     let Taught {
         lesson,
         hinted,
@@ -172,6 +175,7 @@ pub fn colorize(
         message,
     };
     if options.relight {
+        observe(Event::begins(Stage::Relight));
         let limit = settings.memory_limit;
         let mut told = |progress: ChromaProgress| {
             let message = format!("loss {:.3}", progress.loss);
@@ -226,6 +230,11 @@ pub fn colorize(
         None => None,
     };
     let checkpoint = found.as_ref().map(|found| &found.checkpoint);
+    let rounds_before = checkpoint.map_or(0, ChromaCheckpoint::rounds);
+    let rounds = match settings.solver {
+        SolverKind::Irls => settings.rounds,
+        SolverKind::Adam => settings.iterations,
+    };
     let keeps: &mut dyn ChromaKeeper = match &mut keeper {
         Some(keeper) => keeper,
         None => &mut NoChromaKeeper,
@@ -235,8 +244,17 @@ pub fn colorize(
         match event {
             // It has been asked already.
             ColorizeEvent::Asked { .. } => {}
+            ColorizeEvent::Listing => observe(Event::begins(Stage::Lists)),
             ColorizeEvent::Chosen(chosen) => observe(Event::Note(describe(chosen))),
-            ColorizeEvent::Plan(effects) => observe(Event::Note(table(effects))),
+            ColorizeEvent::Plan(effects) => {
+                observe(Event::Note(table(effects)));
+                observe(Event::Progress {
+                    stage: Stage::Solving,
+                    done: rounds_before,
+                    total: rounds,
+                    message: String::new(),
+                });
+            }
             ColorizeEvent::Uncorrected { before, after } => observe(Event::Note(format!(
                 "brought into line, the teacher's views would disagree more ({:.0} % instead of {:.0} % of its colors' mean square): they are taken as they are",
                 100.0 * after,
@@ -255,12 +273,24 @@ pub fn colorize(
                 let moved = progress.moved;
                 let moved = moved.map_or(String::new(), |moved| format!(", moved {moved:.2}"));
                 let message = format!("loss {:.3}{moved}", progress.loss);
-                observe(told(Stage::Chroma, progress, message));
+                observe(told(Stage::Solving, progress, message));
             }
             ColorizeEvent::Trying { degree, progress } => {
                 let message = format!("SH degree {degree}, loss {:.3}", progress.loss);
                 observe(told(Stage::Degree, progress, message));
             }
+            ColorizeEvent::Matching { view, total } => observe(Event::Progress {
+                stage: Stage::Strength,
+                done: view,
+                total,
+                message: String::new(),
+            }),
+            ColorizeEvent::Drawing { view, total } => observe(Event::Progress {
+                stage: Stage::Bake,
+                done: 0,
+                total: 0,
+                message: format!("drawing view {} of {total}", view + 1),
+            }),
             ColorizeEvent::Baking(progress) => {
                 let message = format!("loss {:.3}", progress.loss);
                 observe(told(Stage::Bake, progress, message));
@@ -297,7 +327,9 @@ pub fn colorize(
         [&luma, &colored.splats],
         &colored.chroma,
         &lesson,
+        &mut |progress| observe(progress.into()),
     )?;
+    observe(Event::begins(Stage::Saving));
     let [distilling, baking] = colored.seconds;
     let steps = colored.last.map_or(0, |progress| progress.iteration);
     report.chroma = Some(ChromaReport {
@@ -320,6 +352,7 @@ pub fn colorize(
             distill: distilling,
             bake: baking,
             measure: begun.elapsed().as_secs_f64(),
+            all: started.elapsed().as_secs_f64(),
         },
         peak_host_memory: files::peak_host_memory(),
         peak_device_memory: colored.peak_device_memory,

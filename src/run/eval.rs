@@ -11,6 +11,7 @@ use super::{
     Event, Observer, RunError, RunFolder, Stage,
     commit::Commit,
     files,
+    film::flight,
     fit::open_gpu,
     keeping,
     lock::RunLock,
@@ -21,7 +22,7 @@ use crate::{
     capture::Dataset,
     chroma::teacher::{Teacher, TeacherSettings},
     eval::{
-        ColoredScene, EvalError, Lpips, MeasuredTeacher, Painter, Peer, Progress, Scored, Task,
+        ColoredScene, EvalError, Lpips, MeasuredTeacher, Painter, Peer, Progress, Scored,
         along_path, between_views, exposures, mean_bake, mean_luma, mean_pictures,
         teacher_colorfulness,
     },
@@ -83,6 +84,7 @@ pub fn eval(
         None => RunFolder::newest()?,
     };
     let (_lock, report) = RunLock::of_run(&folder)?;
+    observe(Event::begins(Stage::Model));
     let scene = load(&folder, &report, options, observe)?;
     files::check_page(&folder.evaluation_page())?;
     let commit = Commit::new(folder.path())?;
@@ -92,9 +94,13 @@ pub fn eval(
     let asked = (options.teacher.as_deref())
         .map(|teacher| teacher_or_photos(teacher, &scene.dataset.capture.root));
     let mut teacher = match &asked {
-        Some(path) => Some(ask(path, options, &folder, &report, &scene, observe)?),
+        Some(path) => {
+            observe(Event::begins(Stage::Teacher));
+            Some(ask(path, options, &folder, &report, &scene, observe)?)
+        }
         None => None,
     };
+    observe(Event::begins(Stage::Device));
     let drawn = report.luma.settings.raster_options();
     let raster = Arc::new(Raster::with(&open_gpu(false)?, drawn));
     let seed = report.luma.settings.seed;
@@ -109,7 +115,7 @@ pub fn eval(
                 continue;
             }
             let limit = options.memory_limit;
-            let mut told = |progress: Progress<'_>| observe(event(progress));
+            let mut told = |progress: Progress<'_>| observe(Event::from(progress));
             let colored = peer.color(&raster, &scene, teacher, seed, limit, &mut told);
             peers.push(colored.map_err(covers_nothing(path, &scene.dataset))?);
         }
@@ -127,6 +133,7 @@ pub fn eval(
     rgb.extend(peers.iter().map(|(field, told)| (told.method, field)));
     let mut painter = Painter::new(&raster, &scene, &rgb, teacher.as_mut())?;
 
+    observe(Event::begins(Stage::Measuring));
     let mut views = Vec::new();
     let mut rows = Vec::new();
     let dataset = &scene.dataset;
@@ -135,7 +142,7 @@ pub fn eval(
     dataset.visit_colors(measured, |i, photo| {
         let name = &dataset.capture.views[i].name;
         observe(Event::Progress {
-            stage: Stage::Measure,
+            stage: Stage::Measuring,
             done,
             total: measured.len(),
             message: name.clone(),
@@ -165,22 +172,25 @@ pub fn eval(
         }
         Ok::<_, RunError>(())
     };
-    let mut told = |progress: Progress<'_>| observe(event(progress));
+    let mut told = |progress: Progress<'_>| observe(Event::from(progress));
     let frames = options.frames;
     let path = along_path(&mut painter, &scene, frames, flow, &mut told, &mut keep)?;
     let between = between_views(&mut painter, &scene, &mut told)?;
+    let teacher_colorfulness = teacher_colorfulness(&painter, &scene, &mut told)?;
     if !path.skipped.is_empty() {
         observe(Event::Warning(format!(
             "a path of {} frames is too short for Δ = {:?}: choose more",
             path.frames, path.skipped
         )));
     }
+    observe(Event::begins(Stage::Page));
+    let flight = flight(&page, &path, observe);
     let evaluation = Evaluation {
         version: EVALUATION_VERSION,
         program: env!("CARGO_PKG_VERSION").to_owned(),
         scene: scene.name(),
         teacher: painter.teacher(),
-        teacher_colorfulness: teacher_colorfulness(&painter, &scene)?,
+        teacher_colorfulness,
         measured_on: measured_on.to_owned(),
         luma: mean_luma(&views),
         bake: mean_bake(&views),
@@ -193,7 +203,7 @@ pub fn eval(
         between,
         seconds: begun.elapsed().as_secs_f64(),
     };
-    let html = evaluation_page(&evaluation, &rows, &strip);
+    let html = evaluation_page(&evaluation, &rows, &flight, &strip);
     files::write(&page.join(files::PAGE), html.as_bytes())?;
     let json = evaluation.to_json() + "\n";
     files::write(&commit.place(&folder.evaluation()), json.as_bytes())?;
@@ -276,7 +286,7 @@ fn ask(
             "a folder of images cannot color frames: no baseline of luma, then teacher".to_owned(),
         ));
     }
-    let mut told = |progress: Progress<'_>| observe(event(progress));
+    let mut told = |progress: Progress<'_>| observe(Event::from(progress));
     let asked = MeasuredTeacher::ask(teacher, frames, &scene.dataset, &mut told);
     asked.map_err(covers_nothing(path, &scene.dataset))
 }
@@ -289,20 +299,6 @@ fn covers_nothing(path: &Path, dataset: &Dataset) -> impl FnOnce(EvalError) -> R
             example: dataset.capture.views[dataset.split.train[0]].name.clone(),
         },
         other => other.into(),
-    }
-}
-
-fn event(progress: Progress<'_>) -> Event {
-    Event::Progress {
-        stage: match progress.task {
-            Task::Teacher => Stage::Teacher,
-            Task::Peer => Stage::Peer,
-            Task::Path => Stage::Path,
-            Task::Pairs => Stage::Pairs,
-        },
-        done: progress.done,
-        total: progress.total,
-        message: progress.name.to_owned(),
     }
 }
 

@@ -6,8 +6,10 @@ mod color_source;
 mod colorize;
 mod commit;
 mod eval;
+mod event;
 mod export;
 pub(crate) mod files;
+mod film;
 mod fingerprint;
 mod fit;
 mod folder;
@@ -21,13 +23,16 @@ mod preset;
 mod render;
 mod scene;
 mod sound;
+mod stages;
 mod teach;
 
-use std::{cell::RefCell, fmt, path::PathBuf};
+use std::path::PathBuf;
 
 pub use checkpoints::{CheckpointOptions, EVERY, Interrupt};
 pub use colorize::{ColorizeOptions, Output, colorize};
 pub use eval::{EvalOptions, eval};
+use event::keeping;
+pub use event::{Event, Observer, Stage};
 pub use export::{ExportOptions, Exported, export};
 pub use fit::{AheadOptions, FitOptions, Init, Overlay, fit};
 pub use folder::RunFolder;
@@ -239,101 +244,5 @@ impl From<LumaError> for RunError {
             LumaError::Capture(error) => error.into(),
             other => Self::Luma(other),
         }
-    }
-}
-
-/// A part of a run that takes time.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stage {
-    /// Looking at the range of the photos' values.
-    Survey,
-    /// Reading photos.
-    Photos,
-    /// Short trainings that tell whether the scene calls for an effect.
-    Trial,
-    /// Stage 1.
-    Luma,
-    /// Asking the teacher.
-    Teacher,
-    /// Solving for the lightness of other photos.
-    Relight,
-    /// Solving for chroma harmonics of one degree after the other.
-    Degree,
-    /// Stage 2.
-    Chroma,
-    /// From a/b to the RGB that splat files have.
-    Bake,
-    /// Coloring a scene in another way, to compare with.
-    Peer,
-    /// Drawing pictures.
-    Render,
-    /// Coloring photos at full size.
-    Frames,
-    /// Measuring pictures against photos.
-    Measure,
-    /// Drawing and comparing the frames of a path.
-    Path,
-    /// Drawing and comparing photographed views.
-    Pairs,
-    /// Whole runs, one after the other; counted in seconds.
-    Sweep,
-}
-
-impl fmt::Display for Stage {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::Survey => "survey",
-            Self::Photos => "photos",
-            Self::Trial => "trial",
-            Self::Luma => "luma",
-            Self::Teacher => "teacher",
-            Self::Relight => "relight",
-            Self::Degree => "degree",
-            Self::Chroma => "chroma",
-            Self::Bake => "bake",
-            Self::Peer => "peer",
-            Self::Render => "render",
-            Self::Frames => "frames",
-            Self::Measure => "measure",
-            Self::Path => "path",
-            Self::Pairs => "pairs",
-            Self::Sweep => "sweep",
-        })
-    }
-}
-
-/// What a run tells while it goes on.
-#[derive(Clone, Debug)]
-pub enum Event {
-    /// A line worth reading once.
-    Note(String),
-    /// A line about something doubtful that does not stop the run.
-    Warning(String),
-    /// How far a stage is.
-    Progress {
-        /// Which stage.
-        stage: Stage,
-        /// Steps done.
-        done: usize,
-        /// Steps in all.
-        total: usize,
-        /// Figures of the moment.
-        message: String,
-    },
-}
-
-/// Who is told.
-pub type Observer<'a> = dyn FnMut(Event) + 'a;
-
-/// Tells `observe` everything and keeps the warnings.
-fn keeping<'a>(
-    warnings: &'a RefCell<Vec<String>>,
-    observe: &'a mut Observer<'_>,
-) -> impl FnMut(Event) + 'a {
-    move |event| {
-        if let Event::Warning(line) = &event {
-            warnings.borrow_mut().push(line.clone());
-        }
-        observe(event);
     }
 }

@@ -3,7 +3,7 @@
 use std::{ops::ControlFlow, path::PathBuf, sync::Arc};
 
 use super::{
-    Observer, Preset, RunError,
+    Event, Observer, Preset, RunError, Stage,
     fit::open_gpu,
     scene::tell_trial,
     sound::{Examined, Soundness, open_examined},
@@ -44,7 +44,10 @@ pub struct Planned {
 pub fn plan(options: &PlanOptions, observe: &mut Observer<'_>) -> Result<Planned, RunError> {
     let preset = match options.preset {
         Some(preset) => preset,
-        None => Preset::for_device(&open_gpu(false)?),
+        None => {
+            observe(Event::begins(Stage::Device));
+            Preset::for_device(&open_gpu(false)?)
+        }
     };
     let load = preset.load_options(&options.load, &options.overrules);
     let Examined {

@@ -77,6 +77,7 @@ pub fn render(options: &RenderOptions, observe: &mut Observer<'_>) -> Result<usi
             (file, colmap, capture.load, Some(drawn))
         }
     };
+    observe(Event::begins(Stage::Model));
     let capture = Capture::load_with(&colmap, &load.capture())?;
     let frame = match run {
         Some(_) => Frame::Own,
@@ -101,6 +102,7 @@ pub fn render(options: &RenderOptions, observe: &mut Observer<'_>) -> Result<usi
     }
     files::make_folder(&options.output)?;
     let names = picture_names(&capture.views);
+    observe(Event::begins(Stage::Device));
     let gpu = Gpu::open()?;
     if run.is_none() {
         let load = LoadOptions {
@@ -118,7 +120,7 @@ pub fn render(options: &RenderOptions, observe: &mut Observer<'_>) -> Result<usi
     for (done, &i) in chosen.iter().enumerate() {
         let view = &capture.views[i];
         observe(Event::Progress {
-            stage: Stage::Render,
+            stage: Stage::Rendering,
             done,
             total: chosen.len(),
             message: view.name.clone(),

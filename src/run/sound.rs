@@ -140,6 +140,7 @@ fn open_judged(
     options: &LoadOptions,
     observe: &mut Observer<'_>,
 ) -> Result<(Dataset, Model), RunError> {
+    observe(Event::begins(Stage::Model));
     let mut dataset = scene::open(dir, options, observe)?;
     let headers = Headers::read(&dataset.capture.views)?;
     tell_folder(&dataset.capture, &headers, observe)?;
@@ -283,6 +284,7 @@ fn examine(
 ) -> Result<(Evidence, Agreement, String), RunError> {
     let mut fingerprint = Fingerprint::default();
     let channel = dataset.options.channel;
+    observe(Event::begins(Stage::Photos));
     let mut colors = PointColors::of(&dataset.capture, &dataset.cameras, channel);
     let mut survey = Survey::new(&dataset.capture, &dataset.cameras, &dataset.split);
     let all: Vec<usize> = (0..dataset.cameras.len()).collect();
@@ -292,13 +294,14 @@ fn examine(
         fingerprint.look(dataset, view, photo);
         observe(Event::Progress {
             stage: Stage::Photos,
-            done: view,
+            done: view + 1,
             total: all.len(),
             message: dataset.capture.views[view].name.clone(),
         });
         Ok::<_, CaptureError>(())
     })?;
     scene::tell_not_finite(dataset, observe);
+    observe(Event::begins(Stage::Plan));
     let agreement = colors.finish(&dataset.capture);
     let fingerprint = fingerprint.finish(&dataset.capture);
     Ok((survey.finish(), agreement, fingerprint))

@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 
 pub use child::end_with_parent;
 pub use knobs::knob_names;
-pub use report::{PointStage, Tradeoff, front_table};
+pub use report::{PointStage, Tradeoff, front_table, shell_line};
 
 use crate::{
     capture::{Capture, LoadOptions, split},

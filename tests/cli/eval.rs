@@ -176,19 +176,29 @@ fn the_page_shows_every_view_with_files_that_are_there() {
         assert!(words.contains(part), "{part}: {words}");
     }
     let page = String::from_utf8(place.read("runs/scene/eval/index.html")).expect("text");
+    // It needs nothing from elsewhere.
     assert!(
-        !page.contains("<script") && !page.contains("http"),
+        !page.contains("<script src") && !page.contains("http"),
         "{page}"
     );
+    let film = place.path("runs/scene/eval/flight.mp4").exists();
+    assert_eq!(page.contains("<video src=\"flight.mp4\""), film);
+    assert_eq!(page.contains("data-frames=\"3\""), !film);
+    for part in ["which nobody sees", "<li>the gray scene shows"] {
+        assert!(page.contains(part), "{part}: {page}");
+    }
     let mut sources = 0;
     for part in page.split("src=\"").skip(1) {
         let file = part.split('"').next().expect("a name");
+        if file.ends_with(".mp4") {
+            continue;
+        }
         let image = image::open(place.path("runs/scene/eval").join(file)).expect("a picture");
         assert_eq!([image.width(), image.height()], scene::SIZE, "{file}");
         sources += 1;
     }
-    // Photo, luma, ours and two maps a view, and the frames.
-    assert_eq!(sources, 5 * scene::HELD_OUT + 3);
+    // Photo, luma, ours and two maps a view, the frames, and the first where there is no film.
+    assert_eq!(sources, 5 * scene::HELD_OUT + 3 + usize::from(!film));
     assert!(page.contains(&scene::name(8)), "{page}");
 
     // A second evaluation leaves nothing of the first, a new coloring neither.
@@ -416,4 +426,42 @@ fn a_single_photo_is_measured_on_itself() {
         words.contains("One training view against its photo"),
         "{words}"
     );
+}
+
+/// A program that answers to ffmpeg's name, on a PATH where there is nothing else of it.
+#[cfg(unix)]
+fn with_encoder(place: &Place, script: &str) -> super::program::Done {
+    use std::os::unix::fs::PermissionsExt as _;
+    place.write("bin/ffmpeg", script);
+    let encoder = place.path("bin/ffmpeg");
+    fs::set_permissions(&encoder, fs::Permissions::from_mode(0o755)).expect("executable");
+    let mut command = place.command(&["eval", "--frames", "3"]);
+    command.env("PATH", place.path("bin"));
+    super::program::Done::of(command.output())
+}
+
+#[cfg(unix)]
+#[test]
+fn the_path_becomes_a_film_where_something_makes_films() {
+    let place = place_with_run();
+    let page = || String::from_utf8(place.read("runs/scene/eval/index.html")).expect("text");
+    let film = "#!/bin/sh\nfor last; do :; done\nprintf 12345678 > \"$last\"\n";
+    let done = with_encoder(&place, film);
+    assert_eq!(done.code, Some(0), "{}", done.stderr);
+    let film = page().contains("<video src=\"flight.mp4\"");
+    assert!(film, "{}", done.stderr);
+    assert!(!page().contains("figure class=\"flight\" data-frames"));
+    assert_eq!(place.read("runs/scene/eval/flight.mp4"), b"12345678");
+
+    let done = with_encoder(&place, "#!/bin/sh\necho no such encoder >&2\nexit 1\n");
+    assert_eq!(done.code, Some(0), "{}", done.stderr);
+    let warned = "warning: no film of the path: ffmpeg: no such encoder";
+    assert!(done.stderr.contains(warned), "{}", done.stderr);
+    assert!(page().contains("data-frames=\"3\"") && !page().contains("<video"));
+
+    fs::remove_file(place.path("bin/ffmpeg")).expect("a file");
+    let mut command = place.command(&["eval", "--frames", "3"]);
+    let done = super::program::Done::of(command.env("PATH", place.path("bin")).output());
+    assert!(!done.stderr.contains("film"), "{}", done.stderr);
+    assert!(page().contains("data-frames=\"3\"") && page().contains("frames of 64×48 pixels"));
 }

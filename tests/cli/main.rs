@@ -38,6 +38,8 @@ mod soundness;
 mod splat_file;
 mod teach;
 mod teach_together;
+#[cfg(target_os = "linux")]
+mod terminal;
 mod tradeoff;
 mod train;
 mod variants;

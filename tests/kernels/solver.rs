@@ -328,7 +328,10 @@ fn pale_colors_become_as_strong_as_the_teachers() {
     let after = |share: f32, agreed: f64| {
         let mut chroma = right.clone();
         chroma.coefficients.iter_mut().for_each(|c| *c *= share);
-        let factor = match_saturation(frozen, targets, tasks, agreed, &mut chroma).unwrap();
+        let factor = match_saturation(frozen, targets, tasks, agreed, &mut chroma, &mut |_, _| {
+            ControlFlow::Continue(())
+        })
+        .unwrap();
         for (found, right) in chroma.coefficients.iter().zip(&right.coefficients) {
             let expected = f64::from(right * share) * factor;
             assert!(

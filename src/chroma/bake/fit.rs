@@ -1,11 +1,13 @@
 //! RGB harmonics fitted to pictures, as viewers draw them: no Gaussian gets darker than
 //! black, and no pixel brighter than white.
 
+use std::ops::ControlFlow;
+
 use super::gaussian::{bake_rgb, darkest};
 use crate::{
     chroma::{
-        ChromaError, ChromaObserver, ChromaSettings, FrozenViews, IrlsSolver, Targets, Task,
-        native_rgb,
+        ChromaError, ChromaObserver, ChromaProgress, ChromaSettings, FrozenViews, IrlsSolver,
+        Targets, Task, native_rgb,
     },
     raster::Field,
     splats::{ShField, Splats, sh},
@@ -37,6 +39,14 @@ pub fn fit_rgb(
     solver.chroma()
 }
 
+/// How far a bake is.
+pub(in crate::chroma) enum BakeStep {
+    /// This view is drawn next.
+    Drawing { view: usize, total: usize },
+    /// The solver.
+    Solving(ChromaProgress),
+}
+
 /// RGB Gaussians that look like `luma` with `chroma`: each Gaussian by itself first
 /// ([`bake_rgb`]), then their constant harmonics moved together so that the exported
 /// pictures come close to the native ones, in an even choice of the frozen views. Losses are
@@ -50,6 +60,19 @@ pub fn bake(
     chroma: &ShField,
     observe: &mut ChromaObserver<'_>,
 ) -> Result<Splats, ChromaError> {
+    bake_telling(frozen, luma, chroma, &mut |step| match step {
+        BakeStep::Drawing { .. } => ControlFlow::Continue(()),
+        BakeStep::Solving(progress) => observe(progress),
+    })
+}
+
+/// [`bake`] that tells of what it draws before as well.
+pub(in crate::chroma) fn bake_telling(
+    frozen: &FrozenViews,
+    luma: &Splats,
+    chroma: &ShField,
+    observe: &mut dyn FnMut(BakeStep) -> ControlFlow<()>,
+) -> Result<Splats, ChromaError> {
     let settings = ChromaSettings {
         rounds: BAKE_ROUNDS,
         ..ChromaSettings::exact()
@@ -59,10 +82,10 @@ pub fn bake(
     // What is missing is linear in what the Gaussians are moved by: these are Gaussians
     // around mid-gray, of which none is black.
     let unmoved = ShField::zeros(frozen.splat_count(), 0, 3);
-    let (targets, tasks) = missing(frozen, [&luma.sh, chroma, &baked.sh, &unmoved])?;
+    let (targets, tasks) = missing(frozen, [&luma.sh, chroma, &baked.sh, &unmoved], observe)?;
     let mut solver = IrlsSolver::starting_at(frozen, &settings, &targets, tasks, &unmoved)?;
     solver.set_floors(&room);
-    solver.run(observe)?;
+    solver.run(&mut |progress| observe(BakeStep::Solving(progress)))?;
     let moved = solver.chroma()?;
     let stride = 3 * sh::coefficient_count(baked.sh.degree);
     let of_splats = baked.sh.coefficients.chunks_exact_mut(stride);
@@ -79,15 +102,21 @@ pub fn bake(
 fn missing(
     frozen: &FrozenViews,
     [luma, chroma, exported, unmoved]: [&ShField; 4],
+    observe: &mut dyn FnMut(BakeStep) -> ControlFlow<()>,
 ) -> Result<(Targets, Vec<Task>), ChromaError> {
     let upload = |field| Field::upload(frozen.gpu(), field);
     let (luma, chroma) = (upload(luma)?, upload(chroma)?);
     let (exported, unmoved) = (upload(exported)?, upload(unmoved)?);
     let mut targets = Targets::new(1);
     let step = frozen.len().div_ceil(BAKE_VIEWS).max(1);
+    let total = frozen.len().div_ceil(step);
     let tasks = (0..frozen.len())
         .step_by(step)
-        .map(|view| {
+        .enumerate()
+        .map(|(drawn, view)| {
+            if observe(BakeStep::Drawing { view: drawn, total }).is_break() {
+                return Err(ChromaError::Cancelled);
+            }
             let pictures = frozen.draw(view, &[&luma, &chroma, &exported, &unmoved])?;
             let native = native_rgb(&pictures[0], &pictures[1]);
             // Viewers clip: nothing is missing beyond white.

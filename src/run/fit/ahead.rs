@@ -6,7 +6,7 @@ use std::{
     thread,
 };
 
-use super::super::{Event, Observer, RunError, RunFolder};
+use super::super::{Event, Observer, RunError, RunFolder, Stage};
 use crate::{
     capture::Dataset,
     chroma::teacher::{GrayImage, Teacher, TeacherSettings},
@@ -66,6 +66,9 @@ impl Ahead {
             let asking = scope.spawn(|| ask(&mut self.0, dataset, &stop));
             let done = work(observe);
             stop.store(true, Ordering::Relaxed);
+            if !asking.is_finished() {
+                observe(Event::begins(Stage::Teacher));
+            }
             // A network that panics says so itself.
             (done, asking.join().unwrap_or_default())
         });

@@ -6,7 +6,7 @@
 
 use std::{sync::Arc, time::Instant};
 
-use super::super::{Event, Observer, Preset, RunError, preset::Work};
+use super::super::{Event, Observer, Preset, RunError, Stage, preset::Work};
 use super::{FitOptions, Overlay};
 use crate::{
     capture::{Capture, CaptureOptions},
@@ -128,6 +128,7 @@ impl Budget {
                 each: 0.0,
             });
         };
+        observe(Event::begins(Stage::Pace));
         let family = Family::of(options, max_side)?;
         let seconds = SURELY * limit - begun.elapsed().as_secs_f64();
         let (level, each) = family.level_for(seconds, raster, observe)?;

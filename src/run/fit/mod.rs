@@ -10,7 +10,7 @@ mod training;
 use std::{cell::RefCell, path::PathBuf, sync::Arc, time::Instant};
 
 use super::{
-    Observer, Preset, RunError, RunFolder,
+    Event, Observer, Preset, RunError, RunFolder, Stage,
     checkpoints::{CheckpointOptions, tell_given_up},
     commit::Commit,
     files,
@@ -130,6 +130,7 @@ pub fn fit(
     let mut begun = opened;
     let warnings = RefCell::default();
     let observe = &mut keeping(&warnings, observe);
+    observe(Event::begins(Stage::Device));
     let gpu = open_gpu(options.timings)?;
     let raster = Arc::new(Raster::new(&gpu));
     let folder = match &options.output {
@@ -171,6 +172,7 @@ pub fn fit(
     }
     let judge = match options.measure_side {
         Some(_) => {
+            observe(Event::begins(Stage::Model));
             let load = LoadOptions {
                 max_side: options.measure_side,
                 ..dataset.options.clone()
@@ -198,6 +200,7 @@ pub fn fit(
         warnings: warnings.take(),
         ..job.report(budget.preset, &trained)
     };
+    observe(Event::begins(Stage::Saving));
     write(&folder, &trained, &report)?;
     match options.goal.psnr().and_then(|psnr| trained.misses(psnr)) {
         Some(error) => Err(error),

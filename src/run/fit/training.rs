@@ -19,7 +19,7 @@ use super::{
 use crate::{
     capture::{CaptureError, Dataset, Exposure},
     effects::{Effect, Evidence},
-    eval::{Reference, mean_quality, measure_luma},
+    eval::{Progress, Reference, mean_quality, measure_luma},
     gpu::Gpu,
     luma::{Fit, LumaEvent, LumaProgress, LumaScene},
     raster::Raster,
@@ -201,6 +201,13 @@ impl Job<'_> {
             match event {
                 // Not asked for: the evidence is there.
                 LumaEvent::Examined { .. } => {}
+                LumaEvent::Placing => observe(Event::begins(Stage::Placing)),
+                LumaEvent::Starting { iteration, end } => observe(Event::Progress {
+                    stage: Stage::Training,
+                    done: iteration,
+                    total: end,
+                    message: String::new(),
+                }),
                 LumaEvent::Trial(progress) => tell_trial(&progress, observe),
                 LumaEvent::Plan(plan) => {
                     observe(Event::Note(plan.to_string()));
@@ -234,7 +241,7 @@ impl Job<'_> {
                         progress.poisoned
                     );
                     observe(Event::Progress {
-                        stage: Stage::Luma,
+                        stage: Stage::Training,
                         done: progress.iteration,
                         total: progress.end,
                         message: in_words(&progress),
@@ -259,7 +266,10 @@ impl Job<'_> {
 
         let begun = Instant::now();
         let drawn = self.raster.drawing(scene.settings.raster_options());
-        let held_out_views = measure_luma(&drawn, self.judge, &scene.splats, scene.exposures())?;
+        observe.borrow_mut()(Event::begins(Stage::Measuring));
+        let mut told = |progress: Progress<'_>| observe.borrow_mut()(progress.into());
+        let (splats, exposures) = (&scene.splats, scene.exposures());
+        let held_out_views = measure_luma(&drawn, self.judge, splats, exposures, &mut told)?;
         Ok(Trained {
             scene,
             log: log.into_inner(),
@@ -276,10 +286,10 @@ fn in_words(progress: &LumaProgress) -> String {
         let rise = look
             .per_minute
             .map_or(String::new(), |rise| format!(" ({rise:+.1}/min)"));
-        format!(", {:.2} dB{rise}", look.psnr)
+        format!("{:.2} dB{rise}, ", look.psnr)
     });
     format!(
-        "loss {:.4}, {} splats{looked}",
+        "{looked}loss {:.4}, {} splats",
         progress.loss, progress.splats
     )
 }

@@ -41,13 +41,13 @@ for (const point of document.querySelectorAll(".point")) {
 /// What this page needs besides the style of all.
 const STYLE: &str = "<style>
 .plots { display: grid; grid-template-columns: repeat(auto-fit, minmax(380px, 1fr)); gap: 1rem; }
-.plots > div { background: #fff; border-radius: 6px; box-shadow: 0 1px 3px #0002; min-width: 0; padding: .3rem; }
-.plots svg { display: block; width: 100%; }
-.point { stroke: #fff; stroke-width: 1; }
+.plots > div { background: var(--card); border-radius: 6px; box-shadow: 0 1px 3px var(--shadow); min-width: 0; padding: .3rem; }
+.plots svg { display: block; width: 100%; color: var(--ink); fill: var(--quiet); }
+.point { stroke: var(--card); stroke-width: 1; }
 .point > * { vector-effect: non-scaling-stroke; }
-.point:hover { stroke: #22252a; }
-.legend { display: flex; flex-wrap: wrap; gap: .2rem 1.1rem; margin: .5rem 0; font-size: .85rem; color: #454a52; }
-.legend i { display: inline-block; width: .7rem; height: .7rem; border-radius: 50%; margin-right: .35rem; }
+.point:hover { stroke: var(--ink); }
+.legend { display: flex; flex-wrap: wrap; gap: .2rem 1.1rem; margin: .5rem 0; font-size: .85rem; color: var(--quiet); }
+.legend i { display: inline-block; width: .7rem; height: .7rem; border-radius: 50%; margin-right: .35rem; color: var(--ink); }
 .film { display: flex; gap: .8rem; overflow-x: auto; margin: 1rem 0; padding-bottom: .3rem; }
 .film figure { flex: 0 0 230px; }
 .film .photo { border-bottom: 3px solid #c8643c; }
@@ -55,9 +55,9 @@ const STYLE: &str = "<style>
 .small img { display: block; width: 96px; border-radius: 3px; }
 td.small { padding: .25rem .4rem; }
 th.words, td.words { text-align: left; white-space: normal; min-width: 12rem; }
-td.failed { color: #a33; }
-details code { display: block; max-width: 46rem; margin: .3rem 0; padding: .35rem .5rem; background: #f4f2ee; border-radius: 4px; font-size: .78rem; white-space: pre-wrap; overflow-wrap: anywhere; user-select: all; text-align: left; }
-summary { cursor: pointer; color: #3b6ea8; }
+td.failed { color: var(--bad); }
+details code { display: block; max-width: 46rem; margin: .3rem 0; padding: .35rem .5rem; background: var(--hair); border-radius: 4px; font-size: .78rem; white-space: pre-wrap; overflow-wrap: anywhere; user-select: all; text-align: left; }
+summary { cursor: pointer; color: var(--link); }
 </style>
 ";
 

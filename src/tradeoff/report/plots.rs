@@ -16,7 +16,7 @@ const COLORS: [&str; 10] = [
 const COMBINED: &str = "#9aa0a8";
 
 /// Color of bases and of the front.
-const INK: &str = "#22252a";
+const INK: &str = "currentColor";
 
 /// Points that are drawn alike: name, color.
 pub(super) struct Group {
@@ -184,7 +184,7 @@ fn axes(seconds: &Scale, quality: &Scale, title: &str) -> String {
     let [width, height] = SIZE;
     let title = escaped(title);
     let mut svg = format!(
-        "<svg viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{title} against seconds\" font-family=\"system-ui, sans-serif\" font-size=\"12\" fill=\"#454a52\">\n<g stroke=\"#eeece8\">"
+        "<svg viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{title} against seconds\" font-family=\"system-ui, sans-serif\" font-size=\"12\">\n<g stroke=\"var(--hair)\">"
     );
     for (x, _) in seconds.ticks() {
         let _ = write!(svg, "<path d=\"M{x:.1} {TOP}V{BOTTOM}\"/>");

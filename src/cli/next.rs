@@ -1,0 +1,66 @@
+//! What to type after a command.
+
+use std::{env, path::Path};
+
+use crate::tradeoff::shell_line;
+
+/// A line to type.
+fn line(arguments: &[&str]) -> String {
+    let owned: Vec<String> = arguments.iter().map(|&word| word.to_owned()).collect();
+    shell_line(&owned)
+}
+
+/// `fit` with the options that `plan` was given.
+pub(super) fn fit_as_planned() -> String {
+    let given = env::args_os().skip(2);
+    let given: Vec<String> = given
+        .map(|word| word.to_string_lossy().into_owned())
+        .collect();
+    let mut words = vec!["fit"];
+    words.extend(given.iter().map(String::as_str));
+    line(&words)
+}
+
+/// `colorize` by the teacher that was asked ahead, if there was one.
+pub(super) fn colorize(run: &Path, asked: Option<&Path>) -> String {
+    let run = run.to_string_lossy();
+    match asked {
+        Some(teacher) => line(&["colorize", &run, "--teacher", &teacher.to_string_lossy()]),
+        None => format!(
+            "{}\n      (gs-chroma teacher list shows the names)",
+            line(&["colorize", &run, "--teacher", "NAME"])
+        ),
+    }
+}
+
+/// `eval` beside the teacher, if there was one.
+pub(super) fn eval(run: &Path, teacher: Option<&Path>) -> String {
+    let run = run.to_string_lossy();
+    let teacher = teacher.map(Path::to_string_lossy);
+    match &teacher {
+        Some(teacher) => line(&["eval", &run, "--teacher", teacher]),
+        None => line(&["eval", &run]),
+    }
+}
+
+/// `export` of a run, of the newest by default.
+pub(super) fn export(run: Option<&Path>) -> String {
+    let run = run.map(Path::to_string_lossy);
+    let mut words = vec!["export"];
+    words.extend(run.as_deref());
+    words.extend(["-o", "scene.ply"]);
+    line(&words)
+}
+
+/// A page to look at.
+pub(super) fn look(page: &Path) -> String {
+    format!("open {} in a browser", page.display())
+}
+
+/// A splat file to look at.
+pub(super) fn view(ply: &Path) -> String {
+    format!(
+        "open {} in a viewer of splats, such as SuperSplat",
+        ply.display()
+    )
+}

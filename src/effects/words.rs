@@ -1,0 +1,152 @@
+//! Decisions in words: a line an effect, with its figure, its threshold and the reason.
+
+use std::fmt;
+
+use super::{
+    Decider, Decision, Effect, Plan,
+    plan::{ROBUST_ITERATIONS, TRIAL_GAIN},
+};
+
+/// A figure with no more digits than it needs, two at most behind the point.
+fn number(value: f64) -> String {
+    let text = format!("{value:.2}");
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    match text {
+        "-0" => "0".to_owned(),
+        _ => text.to_owned(),
+    }
+}
+
+impl Effect {
+    /// What was found, and what would have to be.
+    fn found(self, figure: f64, threshold: f64) -> String {
+        let (x, least) = (number(figure), number(threshold));
+        match self {
+            Self::Lens => format!("the lens moves pixels by {x}; {least} would be visible"),
+            Self::Masks => format!("{x} % of the pixels are masked"),
+            Self::Exposure => {
+                format!("photos differ by {x} gray levels; {least} would be visible")
+            }
+            Self::Robust => {
+                format!("{x} % of places differ in one photo; {least} would matter")
+            }
+            Self::Antialias => {
+                format!("near views are {x} times finer; {least} would matter")
+            }
+            Self::Background => {
+                format!("{x} % of the photos lie far behind; {least} would matter")
+            }
+            Self::LumaDegree => {
+                format!("direction changes {x} gray levels; {least} would matter")
+            }
+            Self::TeacherCorrection => {
+                format!("views differ by {x} CIELAB units; {least} would be visible")
+            }
+            Self::ChromaDegree => {
+                format!("views held back gain {x} %; {least} would be worth it")
+            }
+        }
+    }
+
+    /// What there is to say where there is no figure.
+    fn unknown(self) -> &'static str {
+        match self {
+            Self::Masks => "no photo has a mask",
+            Self::ChromaDegree => "not tried; --sh-degree auto tries it",
+            _ => "no point that several photos show tells",
+        }
+    }
+}
+
+impl fmt::Display for Decision {
+    /// A line of the table that a user sees.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let found = match self.evidence {
+            Some(figure) => self.effect.found(figure, self.threshold),
+            None => self.effect.unknown().to_owned(),
+        };
+        let on = if self.on { "on" } else { "off" };
+        write!(f, "{:<18} {on:<3} {found}", self.effect.name())?;
+        match (self.decided_by, self.effect) {
+            (Decider::Evidence, _) => Ok(()),
+            (Decider::Trial, Effect::TeacherCorrection) => {
+                f.write_str(", but brought into line they would differ more")
+            }
+            (Decider::Trial, _) => f.write_str(&tried(self.trial.unwrap_or(0.0))),
+            (Decider::User, _) => f.write_str("; you said so"),
+            (Decider::Preset, Effect::Robust) => {
+                write!(f, "; a run of {ROBUST_ITERATIONS} iterations could tell")
+            }
+            // Said already, or what is always done.
+            (Decider::Preset, Effect::ChromaDegree) => Ok(()),
+            (Decider::Preset, _) => f.write_str("; the preset decides"),
+        }
+    }
+}
+
+/// What a trial showed, in per cent.
+fn tried(gain: f64) -> String {
+    let (how, but) = match gain < TRIAL_GAIN {
+        true if gain < 0.0 => ("worse", "but"),
+        true => ("better", "but"),
+        false => ("better", "and"),
+    };
+    let (gain, least) = (number(gain.abs()), number(TRIAL_GAIN));
+    format!(", {but} a trial training fits {gain} % {how} with it; {least} would count")
+}
+
+/// The table of some decisions.
+pub fn table(decisions: &[Decision]) -> String {
+    let rows: Vec<String> = decisions.iter().map(Decision::to_string).collect();
+    rows.join("\n")
+}
+
+impl fmt::Display for Plan {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&table(&self.decisions))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_has_figure_threshold_and_reason() {
+        let exposure = Decision::new(Effect::Exposure, Some(6.7), 2.0);
+        assert_eq!(
+            exposure.to_string(),
+            "exposure           on  photos differ by 6.7 gray levels; 2 would be visible"
+        );
+        let asked = Decision {
+            on: false,
+            decided_by: Decider::User,
+            ..exposure
+        };
+        assert_eq!(
+            asked.to_string(),
+            "exposure           off photos differ by 6.7 gray levels; 2 would be visible; you said so"
+        );
+        assert_eq!(
+            Decision::new(Effect::Masks, None, 0.0).to_string(),
+            "masks              off no photo has a mask"
+        );
+    }
+
+    #[test]
+    fn figures_have_the_digits_they_need() {
+        let numbers = [0.0, -0.001, 2.0, 0.6, 16.84, 100.0, 0.005].map(number);
+        assert_eq!(numbers, ["0", "0", "2", "0.6", "16.84", "100", "0.01"]);
+    }
+
+    #[test]
+    fn lines_that_the_evidence_decides_fit_a_terminal() {
+        let effects = [Effect::TeacherCorrection, Effect::ChromaDegree];
+        for effect in Effect::ALL.into_iter().chain(effects) {
+            for evidence in [Some(12.34), Some(100.0), None] {
+                let line = Decision::new(effect, evidence, 0.65).to_string();
+                assert!(line.len() <= 80, "{line}");
+            }
+        }
+    }
+}

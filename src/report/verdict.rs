@@ -1,0 +1,152 @@
+//! What an evaluation amounts to, in words that follow from its figures.
+
+use super::{ConsistencyScore, Evaluation, Method, PictureScore};
+
+/// Ratios between these are no difference worth a word: other views would give as much.
+const ALIKE: [f64; 2] = [0.9, 1.1];
+
+/// Ratios from which on something is so many times better.
+const TIMES: f64 = 1.5;
+
+/// ΔE00 below which nobody sees a difference, and below which one has to look for it.
+const UNSEEN: f64 = 1.0;
+const FAINT: f64 = 2.0;
+
+impl Evaluation {
+    /// What the figures say, a line each. docs/guide.md has the bounds.
+    pub fn verdict(&self) -> Vec<String> {
+        [
+            self.agreement(Method::Teacher, "the teacher's own pictures"),
+            self.agreement(Method::RgbSplats, "RGB splats fitted to these"),
+            self.agreement(Method::PerFrame, "the teacher frame by frame"),
+            self.strength(),
+            self.truth(),
+            self.export(),
+            Some(self.gray()),
+        ]
+        .into_iter()
+        .flatten()
+        .collect()
+    }
+
+    fn picture(&self, method: Method) -> Option<&PictureScore> {
+        self.pictures.iter().find(|score| score.method == method)
+    }
+
+    /// How much photographed views of one place differ.
+    fn between(&self, method: Method) -> Option<f64> {
+        let scores = self.between.consistency.iter();
+        let mut own = scores.filter(|score: &&ConsistencyScore| score.method == method);
+        own.next()?.rms
+    }
+
+    /// How well views agree beside another's.
+    fn agreement(&self, other: Method, name: &str) -> Option<String> {
+        let (ours, theirs) = (self.between(Method::Exported)?, self.between(other)?);
+        let figures = format!("({ours:.2} against {theirs:.2} CIELAB units)");
+        // What rounds to nothing is nothing.
+        let ratio = theirs.max(0.01) / ours.max(0.01);
+        Some(format!("views agree {} {name} {figures}", times(ratio)))
+    }
+
+    /// How strong colors are beside the teacher's.
+    fn strength(&self) -> Option<String> {
+        let ours = self.picture(Method::Exported)?.colorfulness;
+        let theirs = self.picture(Method::Teacher)?.colorfulness;
+        let ratio = ours / theirs;
+        if !(ratio.is_finite() && theirs > 0.0) {
+            return None;
+        }
+        let how = match () {
+            () if ratio < ALIKE[0] => "weaker than",
+            () if ratio > ALIKE[1] => "stronger than",
+            () => "as strong as",
+        };
+        Some(format!(
+            "colors are {how} the teacher's ({ratio:.2} of their colorfulness)"
+        ))
+    }
+
+    /// How near colors are to the photos', where these are in color.
+    fn truth(&self) -> Option<String> {
+        let of = |method| Some(self.picture(method)?.delta_e?.mean);
+        let ours = of(Method::Exported)?;
+        let Some(theirs) = of(Method::Teacher) else {
+            return Some(format!("colors miss the photos' by ΔE00 {ours:.1}"));
+        };
+        let ratio = ours / theirs;
+        let how = match () {
+            () if ratio < ALIKE[0] => "nearer to the photos' than",
+            () if ratio > ALIKE[1] => "farther from the photos' than",
+            () => "as near to the photos' as",
+        };
+        Some(format!(
+            "colors are {how} the teacher's (ΔE00 {ours:.1} against {theirs:.1})"
+        ))
+    }
+
+    /// What the export changes.
+    fn export(&self) -> Option<String> {
+        let change = self.bake?.mean;
+        let how = match () {
+            () if change < UNSEEN => "which nobody sees",
+            () if change < FAINT => "which one has to look for",
+            () => "which is visible",
+        };
+        Some(format!(
+            "the exported file changes colors by ΔE00 {change:.1}, {how}"
+        ))
+    }
+
+    /// How good the gray scene is.
+    fn gray(&self) -> String {
+        let luma = &self.luma;
+        let sharp = luma.sharpness / luma.photo_sharpness;
+        let sharp = match sharp.is_finite() {
+            true => format!(" and {:.0} % of their sharpness", 100.0 * sharp),
+            false => String::new(),
+        };
+        let which = match &self.measured_on[..] {
+            "test" => "photos that were held out",
+            _ => "the photos it was trained on",
+        };
+        format!(
+            "the gray scene shows {which} with {:.1} dB{sharp}",
+            luma.psnr
+        )
+    }
+}
+
+/// How a ratio is said, large ones being good.
+fn times(ratio: f64) -> String {
+    let often = |ratio: f64| match ratio < 10.0 {
+        true => format!("{ratio:.1} times"),
+        false => format!("{ratio:.0} times"),
+    };
+    match () {
+        () if ratio >= TIMES => format!("{} better than", often(ratio)),
+        () if ratio > ALIKE[1] => "a little better than".to_owned(),
+        () if ratio >= ALIKE[0] => "as well as".to_owned(),
+        () if ratio > 1.0 / TIMES => "a little worse than".to_owned(),
+        () => format!("{} worse than", often(1.0 / ratio)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ratios_have_bounds() {
+        for (ratio, words) in [
+            (23.4, "23 times better than"),
+            (7.04, "7.0 times better than"),
+            (1.3, "a little better than"),
+            (1.05, "as well as"),
+            (0.8, "a little worse than"),
+            (0.5, "2.0 times worse than"),
+        ] {
+            assert_eq!(times(ratio), words);
+        }
+    }
+}

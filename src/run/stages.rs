@@ -1,0 +1,97 @@
+//! The stages that each command goes through, in order. What only some scenes need, such as a
+//! trial, is not among them.
+
+use super::{
+    ColorizeOptions, EvalOptions, FitOptions, PlanOptions, RenderOptions,
+    Stage::{self, *},
+};
+use crate::{chroma, luma::Goal};
+
+/// A stage that is gone through only where something is asked for.
+fn only_if(asked: bool, stage: Stage) -> Option<Stage> {
+    asked.then_some(stage)
+}
+
+/// Those that are gone through.
+fn all<const N: usize>(stages: [Option<Stage>; N]) -> Vec<Stage> {
+    stages.into_iter().flatten().collect()
+}
+
+impl PlanOptions {
+    /// The stages of [`plan`](super::plan).
+    pub fn stages(&self) -> Vec<Stage> {
+        all([
+            only_if(self.preset.is_none(), Device),
+            Some(Model),
+            Some(Photos),
+            Some(Plan),
+        ])
+    }
+}
+
+impl FitOptions {
+    /// The stages of [`fit`](super::fit).
+    pub fn stages(&self) -> Vec<Stage> {
+        let limited = match self.goal {
+            Goal::Within { .. } => true,
+            Goal::Reach { within, .. } => within.is_some(),
+            Goal::Fixed => false,
+        };
+        all([
+            Some(Device),
+            only_if(limited, Pace),
+            Some(Model),
+            Some(Photos),
+            Some(Plan),
+            Some(Placing),
+            Some(Training),
+            Some(Measuring),
+            Some(Saving),
+        ])
+    }
+}
+
+impl ColorizeOptions {
+    /// The stages of [`colorize`](super::colorize).
+    pub fn stages(&self) -> Vec<Stage> {
+        all([
+            Some(Device),
+            Some(Model),
+            Some(Teacher),
+            only_if(self.relight, Relight),
+            Some(Lists),
+            only_if(self.sh_degree == chroma::Degree::Auto, Degree),
+            Some(Solving),
+            only_if(self.settings.match_saturation, Strength),
+            Some(Bake),
+            Some(Measuring),
+            Some(Saving),
+        ])
+    }
+}
+
+impl EvalOptions {
+    /// The stages of [`eval`](super::eval).
+    pub fn stages(&self) -> Vec<Stage> {
+        let taught = self.teacher.is_some();
+        all([
+            Some(Model),
+            only_if(taught, Teacher),
+            Some(Device),
+            only_if(self.baselines || !self.recipes.is_empty(), Baseline),
+            Some(Measuring),
+            Some(Path),
+            Some(Views),
+            Some(Pairs),
+            only_if(taught, Strength),
+            Some(Page),
+        ])
+    }
+}
+
+impl RenderOptions {
+    /// The stages of [`render`](super::render).
+    pub fn stages(&self) -> Vec<Stage> {
+        vec![Model, Device, Rendering]
+    }
+}
