@@ -15,7 +15,7 @@ mod teacher;
 use std::path::PathBuf;
 
 pub use agreement::{along_path, between_views};
-pub use colored::Measured;
+pub use colored::{COLUMNS, Measured};
 pub use lpips::Lpips;
 pub use luma::{mean_quality, measure_luma};
 pub use painter::{Drawing, Layer, Painter};
