@@ -146,6 +146,7 @@ impl Fit {
             }
             print(report.luma_summary())?;
             print(format_args!("wrote {}", folder.luma().display()))?;
+            print(format_args!("wrote {}", folder.contact_sheet().display()))?;
             if let Some(rows) = &report.luma.timings {
                 print(timings_table(rows))?;
             }

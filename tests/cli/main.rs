@@ -35,6 +35,7 @@ mod shared;
 mod solver;
 mod soundness;
 mod splat_file;
+mod strokes;
 mod teach;
 mod teach_together;
 mod tradeoff;

@@ -50,7 +50,9 @@ fn the_files_of_a_colored_run() {
     let sheet = image::open(place.path("runs/scene/contact-sheet.png")).expect("a picture");
     let [width, height] = scene::SIZE;
     assert_eq!(sheet.width(), 4 * (width + 4) + 4);
-    assert_eq!(sheet.height(), scene::HELD_OUT as u32 * (height + 4) + 4);
+    // Headings and captions are lines of 12 pixels.
+    let rows = scene::HELD_OUT as u32;
+    assert_eq!(sheet.height(), 12 + rows * (12 + height + 4) + 4);
 
     let report = place.report("runs/scene");
     let chroma = &report["chroma"];

@@ -34,6 +34,9 @@ const TOLERANCES: [f32; 3] = [8.0, 5.0, 0.35];
 /// Deviation of `L*` that noise has anyway.
 const NOISE: f32 = 2.0;
 
+/// A stroke is as opaque as this share of its pixels: the others are the brush's rim.
+const FULL: f32 = 0.8;
+
 /// Pixels to each side that are around one.
 const AROUND: usize = 2;
 
@@ -53,7 +56,7 @@ const SURE: f32 = 0.5;
 struct Stroke {
     /// a, b at the middle lightness.
     color: [f32; 2],
-    /// Mean α.
+    /// Its α, but for its rim.
     strength: f32,
     /// Lowest and highest of each feature.
     ranges: [[f32; 2]; 3],
@@ -192,15 +195,13 @@ impl Stroke {
         };
         let light = mean(&|i| surface.lightness[i]);
         let color = [0, 1].map(|c| mean(&|i| colors[i].0[c]));
-        let strayed = (STRAY * pixels.len() as f32) as usize;
         let ranges = std::array::from_fn(|k| {
-            let mut values: Vec<f32> = pixels.iter().map(|&i| features[i][k]).collect();
-            values.sort_by(f32::total_cmp);
-            [values[strayed], values[values.len() - 1 - strayed]]
+            let values = || pixels.iter().map(|&i| features[i][k]);
+            [quantile(values(), STRAY), quantile(values(), 1.0 - STRAY)]
         });
         Self {
             color: at_middle(color, light),
-            strength: mean(&|i| colors[i].1),
+            strength: quantile(pixels.iter().map(|&i| colors[i].1), FULL),
             ranges,
         }
     }
@@ -213,6 +214,13 @@ impl Stroke {
         }
         most
     }
+}
+
+/// The value below which this share of some lies; there is one at least.
+fn quantile(values: impl Iterator<Item = f32>, share: f32) -> f32 {
+    let mut values: Vec<f32> = values.collect();
+    let at = (share * (values.len() - 1) as f32).round() as usize;
+    *values.select_nth_unstable_by(at, f32::total_cmp).1
 }
 
 /// The eight neighbors of a pixel, and how far they are.

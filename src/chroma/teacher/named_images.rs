@@ -136,7 +136,7 @@ impl NamedImages {
 /// its name does not say that it is a picture.
 fn is_image(path: &Path) -> bool {
     let extension = path.extension().unwrap_or_default();
-    let named = ["png", "jpg", "jpeg"];
+    let named = ["png", "jpg", "jpeg", "tif", "tiff"];
     if named
         .iter()
         .any(|known| extension.eq_ignore_ascii_case(known))
@@ -150,6 +150,6 @@ fn is_image(path: &Path) -> bool {
         && input::open(path).and_then(read).is_ok()
         && matches!(
             image::guess_format(&magic),
-            Ok(ImageFormat::Png | ImageFormat::Jpeg)
+            Ok(ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::Tiff)
         )
 }
