@@ -13,7 +13,7 @@ const VIOLET: [u8; 3] = [152, 78, 184];
 /// top, right, bottom.
 const PUMPKIN: [(&str, [u32; 4]); 2] = [
     ("garden_02", [200, 172, 232, 200]),
-    ("garden_06", [236, 142, 262, 170]),
+    ("garden_06", [270, 142, 300, 170]),
 ];
 const LAWN: [(&str, [u32; 4]); 2] = [
     ("garden_02", [110, 170, 150, 205]),
