@@ -30,13 +30,11 @@ fn gathering_is_the_adjoint_of_drawing() {
         for figure in 0..4 {
             // Figures two and three are gathered on another way than zero and one.
             let channel = figure % 2;
-            let (of_pixels, size) = (picture.iter().zip(&figures)).fold(
-                (0.0, 0.0),
-                |(sum, size), (ab, figures)| {
+            let (of_pixels, size) =
+                (picture.iter().zip(&figures)).fold((0.0, 0.0), |(sum, size), (ab, figures)| {
                     let product = ab[channel] * f64::from(figures[figure]);
                     (sum + product, size + product.abs())
-                },
-            );
+                });
             let of_splats: f64 = (gathered.iter().enumerate())
                 .map(|(i, sums)| {
                     let color = sh::C0 * f64::from(chroma.coefficients[2 * i + channel]);
@@ -44,11 +42,18 @@ fn gathering_is_the_adjoint_of_drawing() {
                 })
                 .sum();
             let off = (of_pixels - of_splats).abs();
-            assert!(off < 1e-5 * size, "{figure}: {of_pixels} {of_splats} of {size}");
+            assert!(
+                off < 1e-5 * size,
+                "{figure}: {of_pixels} {of_splats} of {size}"
+            );
         }
     }
     // Ones give how much of each Gaussian all pixels show, and no more than there are pixels.
     let shown = problem.frozen.gather(0, &[[1.0; 4]; PIXELS]).unwrap();
-    assert!(shown.iter().all(|sums| (0.0..PIXELS as f32).contains(&sums[3])));
+    assert!(
+        shown
+            .iter()
+            .all(|sums| (0.0..PIXELS as f32).contains(&sums[3]))
+    );
     assert!(shown.iter().map(|sums| sums[3]).sum::<f32>() > 0.5 * PIXELS as f32);
 }

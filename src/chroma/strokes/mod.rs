@@ -26,13 +26,7 @@ const OPAQUE: f32 = 0.5;
 
 /// Drawn claims below the first are none and above the second whole: between them lies an edge
 /// that Gaussians draw softer than the photo has it.
-const EDGE: [f32; 2] = [0.2, 0.6];
-
-/// α of claims whose colors count as what a photo claims.
-const SURE: f32 = 0.1;
-
-/// Steps of simultaneous iterative reconstruction from a photo's claims to the Gaussians'.
-const SHARPENINGS: usize = 10;
+const EDGE: [f32; 2] = [0.3, 0.7];
 
 /// What is wanted of all views, with strokes laid over what the teachers want.
 pub(super) struct Laid {
@@ -125,9 +119,7 @@ pub(super) fn lay(
             .iter()
             .map(|&[a, b, alpha]| [a, b, alpha, 1.0])
             .collect();
-        let sums = frozen.gather(view, &figures)?;
-        let sums = sharpened(frozen, view, &region, sums)?;
-        claims.add(&cloud.claims(&sums));
+        claims.add(&cloud.claims(&frozen.gather(view, &figures)?));
         let (colors, alphas): (Vec<[f32; 2]>, Vec<f32>) = (region.iter())
             .map(|&[a, b, alpha]| {
                 let over = if alpha > 0.0 { 1.0 / alpha } else { 0.0 };
@@ -175,67 +167,6 @@ pub(super) fn lay(
         tasks,
         claimed: claimed as f64 / luma.len().max(1) as f64,
     })
-}
-
-/// Sums of a photo's claims by Gaussian that, drawn again, are the claims: what the photo shows of
-/// a Gaussian is the mean over all its pixels, and that alone would be drawn blurred.
-fn sharpened(
-    frozen: &FrozenViews,
-    view: usize,
-    region: &[[f32; 3]],
-    mut sums: Vec<[f32; 4]>,
-) -> Result<Vec<[f32; 4]>, ChromaError> {
-    let one = 1.0 / sh::C0 as f32;
-    let [low, high] = colors_within(region);
-    let mut fields = [(); 2].map(|()| ShField::zeros(sums.len(), 0, 2));
-    for _ in 0..SHARPENINGS {
-        for (i, &[a, b, alpha, shown]) in sums.iter().enumerate() {
-            let share = if shown > 0.0 { one / shown } else { 0.0 };
-            let [colors, alphas] = &mut fields;
-            colors.coefficients[2 * i..][..2].copy_from_slice(&[share * a, share * b]);
-            alphas.coefficients[2 * i..][..2].copy_from_slice(&[share * alpha, one]);
-        }
-        let gpu = frozen.gpu();
-        let uploaded = [
-            Field::upload(gpu, &fields[0])?,
-            Field::upload(gpu, &fields[1])?,
-        ];
-        let drawn = frozen.draw(view, &[&uploaded[0], &uploaded[1]])?;
-        let [colors, alphas] = [0, 1].map(|k: usize| drawn[k].pixels.as_chunks::<2>().0);
-        let missing: Vec<[f32; 4]> = (region.iter().zip(colors.iter().zip(alphas)))
-            .map(|(claim, (&[a, b], &[alpha, opacity]))| {
-                let over = if opacity > 0.0 { 1.0 / opacity } else { 0.0 };
-                let lacks = |k: usize, drawn: f32| claim[k] - over * drawn;
-                [lacks(0, a), lacks(1, b), lacks(2, alpha), 0.0]
-            })
-            .collect();
-        let missing = frozen.gather(view, &missing)?;
-        for (sums, missing) in sums.iter_mut().zip(missing) {
-            let shown = sums[3];
-            let alpha = (sums[2] + missing[2]).clamp(0.0, shown);
-            for c in 0..2 {
-                let color = sums[c] + missing[c];
-                sums[c] = color.clamp(low[c] * alpha, high[c] * alpha);
-            }
-            sums[2] = alpha;
-        }
-    }
-    Ok(sums)
-}
-
-/// The lowest and the highest a and b of what is claimed.
-fn colors_within(region: &[[f32; 3]]) -> [[f32; 2]; 2] {
-    let mut range = [[0.0_f32; 2]; 2];
-    let mut first = true;
-    for &[a, b, alpha] in region.iter().filter(|claim| claim[2] > SURE) {
-        for (c, value) in [a / alpha, b / alpha].into_iter().enumerate() {
-            let [low, high] = [range[0][c], range[1][c]];
-            range[0][c] = if first { value } else { low.min(value) };
-            range[1][c] = if first { value } else { high.max(value) };
-        }
-        first = false;
-    }
-    range
 }
 
 /// Claims as a view shows them: colors at the middle lightness, and α.
