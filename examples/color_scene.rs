@@ -28,7 +28,7 @@ impl Colorizer for Sepia {
         let (width, height) = (photo.width, photo.height);
         let ab = vec![[6.0, 18.0]; photo.pixels.len()];
         let ab = AbImage { width, height, ab };
-        Ok(Some(Wanted { ab, weights: None }))
+        Ok(Some(ab.into()))
     }
 }
 

@@ -4,7 +4,7 @@ use std::io::{BufReader, Cursor, Read};
 use std::path::Path;
 use std::sync::Arc;
 
-use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader};
+use image::{ColorType, DynamicImage, ImageBuffer, ImageDecoder, ImageFormat, ImageReader};
 
 use super::error::CaptureError;
 use super::room::{self, Held};
@@ -85,14 +85,17 @@ fn decode_with(
     })
 }
 
-/// Decodes the bytes of a PNG or JPEG file. Errors are what is wrong and what helps.
+/// Decodes the bytes of a PNG, JPEG or TIFF file. Errors are what is wrong and what helps.
 pub(crate) fn decode_image(file: Vec<u8>) -> Result<DynamicImage, String> {
     let file: Arc<[u8]> = file.into();
     let frame = check_jpeg(&file)?;
     let (header, source) = open(Box::new(Cursor::new(file.clone())))?;
     check_bytes(header, file.len())?;
     match (source, frame) {
-        (Source::Tiff(_), _) => Err("is a TIFF; save it as PNG or JPEG".into()),
+        (Source::Tiff(mut decoder), _) => {
+            let samples = tiff::samples(&mut decoder, header)?;
+            picture_of(header, samples)
+        }
         (Source::Image(_), Some(frame)) => jpeg::decode(&file, &frame),
         (Source::Image(decoder), None) => png(decoder),
     }
@@ -182,6 +185,44 @@ fn samples_of(picture: DynamicImage) -> Result<Samples, String> {
         DynamicImage::ImageRgba16(p) => Samples::Sixteen(p.into_raw()),
         _ => return Err("holds neither gray nor RGB; convert it to 8 or 16 bits".into()),
     })
+}
+
+/// A picture of values as they stand in a file; floats become 16 bits from 0 to 1.
+fn picture_of(header: Header, samples: Samples) -> Result<DynamicImage, String> {
+    let [width, height] = header.size;
+    let picture = match (samples, header.channels) {
+        (Samples::Eight(values), 1) => {
+            ImageBuffer::from_raw(width, height, values).map(DynamicImage::ImageLuma8)
+        }
+        (Samples::Eight(values), 2) => {
+            ImageBuffer::from_raw(width, height, values).map(DynamicImage::ImageLumaA8)
+        }
+        (Samples::Eight(values), 3) => {
+            ImageBuffer::from_raw(width, height, values).map(DynamicImage::ImageRgb8)
+        }
+        (Samples::Eight(values), _) => {
+            ImageBuffer::from_raw(width, height, values).map(DynamicImage::ImageRgba8)
+        }
+        (Samples::Sixteen(values), 1) => {
+            ImageBuffer::from_raw(width, height, values).map(DynamicImage::ImageLuma16)
+        }
+        (Samples::Sixteen(values), 2) => {
+            ImageBuffer::from_raw(width, height, values).map(DynamicImage::ImageLumaA16)
+        }
+        (Samples::Sixteen(values), 3) => {
+            ImageBuffer::from_raw(width, height, values).map(DynamicImage::ImageRgb16)
+        }
+        (Samples::Sixteen(values), _) => {
+            ImageBuffer::from_raw(width, height, values).map(DynamicImage::ImageRgba16)
+        }
+        (Samples::Float(values), _) => {
+            let white = f32::from(u16::MAX);
+            let whole = |value: f32| (value.clamp(0.0, 1.0) * white).round() as u16;
+            let values = values.into_iter().map(whole).collect();
+            return picture_of(header, Samples::Sixteen(values));
+        }
+    };
+    picture.ok_or_else(|| "has fewer samples than its size needs; save it anew".into())
 }
 
 /// The structure of a file that is a JPEG; else what is wrong with it.

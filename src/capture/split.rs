@@ -17,6 +17,16 @@ pub struct Split {
     pub test: Vec<usize>,
 }
 
+impl Split {
+    /// Trains on some of the views that are held out.
+    pub fn train_on(&mut self, some: impl Fn(usize) -> bool) {
+        let (train, test) = self.test.iter().partition(|&&view| some(view));
+        self.test = test;
+        self.train.extend::<Vec<usize>>(train);
+        self.train.sort_unstable();
+    }
+}
+
 /// Splits views, sorted by photo: with `holdout`, photos 0, 8, 16, … test. Faces of
 /// one photo stay together.
 ///
@@ -62,6 +72,14 @@ mod tests {
         assert_eq!(split.test, [0, 8, 16]);
         assert_eq!(split.train.len(), 15);
         assert!(split.train.iter().all(|i| !split.test.contains(i)));
+    }
+
+    #[test]
+    fn held_out_views_may_be_trained_on() {
+        let mut split = split_photos(18, true);
+        split.train_on(|view| view == 8 || view == 3);
+        assert_eq!(split.test, [0, 16]);
+        assert_eq!((split.train.len(), split.train[7]), (16, 8));
     }
 
     #[test]

@@ -9,6 +9,7 @@ use super::{
     checkpoint::{ChromaCheckpoint, ChromaKeeper, NoChromaKeeper, State},
     choose_degree, match_saturation, plan,
     solve::solve_from,
+    strokes::lay,
     teach,
 };
 use crate::{
@@ -29,10 +30,12 @@ pub struct Colored {
     pub settings: ChromaSettings,
     /// Which effects were reckoned with, and why.
     pub effects: [Decision; 2],
-    /// Training views with colors.
+    /// Views that colors were learnt from and that a teacher colored or that have strokes.
     pub colored_views: usize,
     /// Share of the Gaussians that no colored view shows to speak of; see [`Solved`](super::Solved).
     pub unseen: Option<f64>,
+    /// Share of the Gaussians that strokes claim by half or more; `None` without strokes.
+    pub claimed: Option<f64>,
     /// What colors were multiplied by to be as strong as the teachers'; in `chroma` and `splats`.
     pub saturation: f64,
     /// The last report of the solver.
@@ -177,15 +180,9 @@ impl Distill<'_> {
         // No photo is looked at any more.
         self.dataset.release();
         let (dataset, lesson, gpu) = (self.dataset, self.lesson, &self.raster.gpu);
-        let train = &dataset.split.train;
-        let cameras: Vec<Camera> = train.iter().map(|&i| dataset.cameras[i].clone()).collect();
-        let tasks: Vec<Task> = (train.iter().enumerate())
-            .filter_map(|(view, &i)| {
-                let target = lesson.of_view[i]?;
-                Some(Task { view, target })
-            })
-            .collect();
-        let colored_views = tasks.len();
+        let learnt = &lesson.views;
+        let cameras: Vec<Camera> = learnt.iter().map(|&i| dataset.cameras[i].clone()).collect();
+        let colored_views = lesson.colored_views();
         let mut settings = settings.clone();
         let room = Room {
             limit: settings.memory_limit,
@@ -193,7 +190,7 @@ impl Distill<'_> {
                 Degree::Fixed(degree) => degree,
                 Degree::Auto => sh::MAX_DEGREE,
             },
-            weighted: lesson.targets.weighted(),
+            weighted: lesson.targets.weighted() || lesson.has_strokes(),
         };
         let scales = settings.target_scales();
         go_on(observe(ColorizeEvent::Listing))?;
@@ -205,6 +202,14 @@ impl Distill<'_> {
             scales,
             room,
         )?;
+        let laid = match lesson.has_strokes() {
+            true => Some(lay(&frozen, dataset, lesson, self.luma)?),
+            false => None,
+        };
+        let (targets, tasks) = match &laid {
+            Some(laid) => (&laid.targets, laid.tasks.clone()),
+            None => (&lesson.targets, lesson.tasks()),
+        };
         let correction = plan::correction(lesson.spread, settings.solver, self.correct_views);
         settings.correct_views = correction.on;
         let last = Cell::new(checkpoint.and_then(|found| found.state.last));
@@ -220,7 +225,7 @@ impl Distill<'_> {
                 let found = choose_degree(
                     &frozen,
                     &settings,
-                    &lesson.targets,
+                    targets,
                     &tasks,
                     self.luma,
                     &mut |degree, progress| {
@@ -252,7 +257,7 @@ impl Distill<'_> {
                 (from, between),
                 &frozen,
                 settings,
-                &lesson.targets,
+                targets,
                 tasks.clone(),
                 self.luma,
                 &mut |progress| {
@@ -289,7 +294,6 @@ impl Distill<'_> {
         if let (true, Some(spread)) = (settings.match_saturation, lesson.spread) {
             let agreed = spread.agreed;
             let told = &mut |view, total| observe(ColorizeEvent::Matching { view, total });
-            let targets = &lesson.targets;
             saturation = match_saturation(&frozen, targets, &tasks, agreed, &mut chroma, told)?;
             peak = peak.max(gpu.allocated_bytes());
         }
@@ -306,6 +310,7 @@ impl Distill<'_> {
             splats,
             chroma,
             unseen: solved.unseen,
+            claimed: laid.as_ref().map(|laid| laid.claimed),
             saturation,
             effects,
             colored_views,
@@ -324,10 +329,10 @@ impl Distill<'_> {
     /// How far views disagree without and with `corrections`, where these make them disagree
     /// more.
     fn worse(&self, corrections: &[(Task, Correction)]) -> Option<[f64; 2]> {
-        let (capture, split) = (&self.dataset.capture, &self.dataset.split);
+        let (capture, learnt) = (&self.dataset.capture, &self.lesson.views);
         let mut of_view = vec![Correction::NONE; capture.views.len()];
         for (task, correction) in corrections {
-            of_view[split.train[task.view]] = *correction;
+            of_view[learnt[task.view]] = *correction;
         }
         let samples = &self.lesson.samples;
         let before = samples.disagreement(capture, |_, ab| ab)?;

@@ -3,11 +3,11 @@
 use std::ops::ControlFlow;
 
 use super::{
-    ChromaError, ColorizerError, Targets,
-    teacher::{AbImage, GrayImage, Query, Teacher},
+    ChromaError, ColorizerError, Targets, Task,
+    teacher::{AbImage, GrayImage, HintImage, Query, Teacher},
 };
 use crate::{
-    capture::{Dataset, Photo},
+    capture::{Dataset, Photo, Split},
     effects::{TeacherSamples, TeacherSpread},
 };
 
@@ -18,6 +18,23 @@ pub struct Wanted {
     pub ab: AbImage,
     /// How much each pixel counts, `[height, width]`; `None` stands for 1 everywhere.
     pub weights: Option<Vec<f32>>,
+    /// Strokes painted on the photo, at its size, which color what they lie on in all views.
+    pub strokes: Option<HintImage>,
+    /// Whether a person has painted it: colors are learnt from it even where the view is held
+    /// out, and it is not measured then.
+    pub by_hand: bool,
+}
+
+impl From<AbImage> for Wanted {
+    /// What a machine wants: all of it, alike, in views that are trained on.
+    fn from(ab: AbImage) -> Self {
+        Self {
+            ab,
+            weights: None,
+            strokes: None,
+            by_hand: false,
+        }
+    }
 }
 
 /// Someone who colors photos.
@@ -41,7 +58,7 @@ impl Colorizer for Teacher {
         photo: GrayImage<'_>,
     ) -> Result<Option<Wanted>, ColorizerError> {
         let answer = Self::colorize(self, query, photo, None)?;
-        Ok(answer.map(|ab| Wanted { ab, weights: None }))
+        Ok(answer.map(Wanted::from))
     }
 }
 
@@ -51,15 +68,115 @@ pub struct Lesson {
     pub targets: Targets,
     /// Each view's place among these; `None` where nothing is known.
     pub of_view: Vec<Option<usize>>,
+    /// Views that colors are learnt from, ascending: those that are trained on, and held-out
+    /// ones that were painted by hand.
+    pub views: Vec<usize>,
+    /// Strokes, as a/b and α, and each view's place among them.
+    strokes: Targets,
+    strokes_of: Vec<Option<usize>>,
+    /// Whether each view was painted by hand.
+    by_hand: Vec<bool>,
     /// How far the training views disagree about COLMAP's points.
     pub spread: Option<TeacherSpread>,
     /// What they say there.
     pub samples: TeacherSamples,
 }
 
+impl Lesson {
+    /// Whether there are strokes on any view that colors are learnt from.
+    pub fn has_strokes(&self) -> bool {
+        !self.strokes.is_empty()
+    }
+
+    /// The strokes on a view, at its size.
+    ///
+    /// # Errors
+    /// When the temporary file cannot be read.
+    pub fn paint(&self, view: usize) -> Result<Option<HintImage>, ChromaError> {
+        let Some(strokes) = self.strokes_of[view] else {
+            return Ok(None);
+        };
+        let strokes = self.strokes.read(strokes, 0)?;
+        let alphas = strokes.weights.as_deref().unwrap_or_default();
+        let colors = strokes.ab();
+        Ok(Some(HintImage {
+            width: colors.width,
+            height: colors.height,
+            paint: (colors.ab.iter().zip(alphas))
+                .map(|(&[a, b], &alpha)| [alpha * a, alpha * b, alpha])
+                .collect(),
+        }))
+    }
+
+    /// What a view is wanted to look like, with the strokes on it as they were painted; `None`
+    /// where neither is known.
+    ///
+    /// # Errors
+    /// When the temporary file cannot be read.
+    pub fn shown(&self, view: usize) -> Result<Option<AbImage>, ChromaError> {
+        let target = self.of_view[view].map(|target| self.targets.read(target, 0));
+        let taught = target.transpose()?.map(|target| target.ab());
+        let Some(paint) = self.paint(view)? else {
+            return Ok(taught);
+        };
+        let mut shown = taught.unwrap_or_else(|| AbImage {
+            width: paint.width,
+            height: paint.height,
+            ab: vec![[0.0; 2]; paint.paint.len()],
+        });
+        for (ab, &[a, b, alpha]) in shown.ab.iter_mut().zip(&paint.paint) {
+            *ab = [(1.0 - alpha) * ab[0] + a, (1.0 - alpha) * ab[1] + b];
+        }
+        Ok(Some(shown))
+    }
+
+    /// What is wanted of each view that colors are learnt from, by its place among them.
+    pub fn tasks(&self) -> Vec<Task> {
+        (self.views.iter().enumerate())
+            .filter_map(|(view, &i)| {
+                let target = self.of_view[i]?;
+                Some(Task { view, target })
+            })
+            .collect()
+    }
+
+    /// Views that colors are learnt from and that are taught or have strokes.
+    pub fn colored_views(&self) -> usize {
+        let colored = |&&i: &&usize| self.of_view[i].is_some() || self.strokes_of[i].is_some();
+        self.views.iter().filter(colored).count()
+    }
+
+    /// Views that have strokes.
+    pub fn stroked_views(&self) -> usize {
+        self.strokes_of.iter().flatten().count()
+    }
+
+    /// Whether a view was painted by hand.
+    pub fn is_painted(&self, view: usize) -> bool {
+        self.by_hand[view]
+    }
+
+    /// Held-out views that were painted by hand, ascending.
+    pub fn painted_held_out(&self, split: &Split) -> Vec<usize> {
+        let held_out = |view: &&usize| !split.train.contains(view);
+        self.views.iter().filter(held_out).copied().collect()
+    }
+
+    /// The views to measure on, and what these are called: held-out ones that no color was
+    /// learnt from, or those that it was learnt from where there is none.
+    pub fn measured(&self, split: &Split) -> (&'static str, Vec<usize>) {
+        let unseen = |view: &&usize| !self.views.contains(view);
+        let test: Vec<usize> = split.test.iter().filter(unseen).copied().collect();
+        match test.is_empty() {
+            true => ("train", self.views.clone()),
+            false => ("test", test),
+        }
+    }
+}
+
 /// Asks about every view, and keeps what is wanted at so many scales. Held-out views are
-/// asked about too: for pictures to compare with, never for training. `observe` is told of
-/// each view before.
+/// asked about too: for pictures to compare with, and for training only where they were painted
+/// by hand. `observe` is told of each view before.
 ///
 /// # Errors
 /// [`ChromaError`] of a photo, of the colorizer or of the file that answers wait in, or
@@ -73,6 +190,8 @@ pub fn teach(
     let capture = &dataset.capture;
     let mut samples = TeacherSamples::new(capture);
     let (mut targets, mut of_view) = (Targets::new(scales), Vec::new());
+    let (mut strokes, mut strokes_of) = (Targets::new(1), vec![None; dataset.cameras.len()]);
+    let (mut learnt, mut painted) = (Vec::new(), vec![false; dataset.cameras.len()]);
     let views: Vec<usize> = (0..dataset.cameras.len()).collect();
     dataset.visit(&views, |view, photo| {
         if observe(view).is_break() {
@@ -86,15 +205,42 @@ pub fn teach(
         };
         let query = Query::view(&capture.views[view], camera);
         let wanted = colorizer.colorize(query, gray);
-        let Some(Wanted { ab, weights }) = wanted.map_err(ChromaError::Colorizer)? else {
+        let wanted = wanted.map_err(ChromaError::Colorizer)?;
+        let by_hand = wanted.as_ref().is_some_and(|wanted| wanted.by_hand);
+        painted[view] = by_hand;
+        let learns = by_hand || dataset.split.train.contains(&view);
+        if learns {
+            learnt.push(view);
+        }
+        let Some(wanted) = wanted else {
             of_view.push(None);
             return Ok(());
         };
+        let Wanted { ab, weights, .. } = wanted;
         let (found, expected) = ([ab.width, ab.height], [photo.width, photo.height]);
         if found != expected {
             return Err(ChromaError::WrongSize { found, expected });
         }
-        if dataset.split.train.contains(&view) {
+        if let Some(paint) = wanted.strokes.filter(|_| learns) {
+            let (colors, alphas): (Vec<[f32; 2]>, Vec<f32>) = paint.colors().unzip();
+            let (width, height) = (paint.width, paint.height);
+            if [width, height] != expected {
+                let found = [width, height];
+                return Err(ChromaError::WrongSize { found, expected });
+            }
+            let colors = AbImage {
+                width,
+                height,
+                ab: colors,
+            };
+            strokes_of[view] = Some(strokes.push_ab(&colors, Some(&alphas))?);
+        }
+        let known = |weights: &Vec<f32>| weights.iter().any(|&weight| weight > 0.0);
+        if !weights.as_ref().is_none_or(known) {
+            of_view.push(None);
+            return Ok(());
+        }
+        if learns {
             samples.take(capture, view, camera, &ab.ab);
         }
         let weights = masked_weights(weights, photo);
@@ -104,6 +250,10 @@ pub fn teach(
     Ok(Lesson {
         targets,
         of_view,
+        views: learnt,
+        strokes,
+        strokes_of,
+        by_hand: painted,
         spread: samples.spread(capture),
         samples,
     })

@@ -13,6 +13,7 @@ mod degree;
 mod error;
 mod fill;
 mod frozen;
+mod gather;
 mod irls;
 mod kernels;
 mod lbfgs;
@@ -29,6 +30,7 @@ mod roofline;
 mod saturation;
 mod settings;
 mod solve;
+mod strokes;
 mod targets;
 pub mod teacher;
 

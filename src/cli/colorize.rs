@@ -62,9 +62,13 @@ pub struct Colorize {
     /// How strong the teachers' colors become; hints stay as painted.
     #[arg(long, value_name = "0..1", default_value_t = 1.0, value_parser = share::<f32>)]
     strength: f32,
-    /// A folder of hints: PNG images named like the photos, color painted on transparency.
+    /// A folder of hints: PNG or TIFF images named like the photos, strokes of color on
+    /// transparency or on the photo.
     #[arg(long, value_name = "DIR")]
     hints: Option<PathBuf>,
+    /// Whether a stroke colors what it lies on, in all views, or counts only where it is painted.
+    #[arg(long, value_enum, value_name = "on|off", default_value = "on")]
+    grow_hints: Switch,
     /// Colored splat file to write [default: color.ply in the run folder].
     #[arg(short, long, value_name = "FILE.ply")]
     output: Option<PathBuf>,
@@ -226,6 +230,7 @@ impl Colorize {
                 },
                 strength: self.strength,
                 hints: self.hints,
+                grow_hints: self.grow_hints == Switch::On,
             },
             run: self.run,
             output: self.output,

@@ -151,7 +151,7 @@ impl Fit {
                 print(timings_table(rows))?;
             }
             let next = next::colorize(folder.path(), asked.as_deref());
-            progress.close(&[&folder.luma()], &next)?;
+            progress.close(&[&folder.luma(), &folder.contact_sheet()], &next)?;
         }
         Ok(())
     }

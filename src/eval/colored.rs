@@ -12,8 +12,12 @@ use crate::{
     splats::{ShField, Splats},
 };
 
-/// Views on the contact sheet.
+/// Views on the contact sheet, and how many of these may be painted ones.
 const SHEET_ROWS: usize = 4;
+const PAINTED_ROWS: usize = 2;
+
+/// What the contact sheet of a colored scene shows, left to right.
+pub const COLUMNS: [&str; 4] = ["photo", "gray scene", "teacher", "colored scene"];
 
 /// Pictures of the measured views and what they amount to.
 pub struct Measured {
@@ -26,8 +30,8 @@ pub struct Measured {
 }
 
 impl Measured {
-    /// Draws and measures the held-out views, or all where none is: `luma` with `chroma`
-    /// against `baked`, and that against the photos.
+    /// Draws and measures the held-out views, or those that color was learnt from where none is
+    /// left: `luma` with `chroma` against `baked`, and that against the photos.
     ///
     /// # Errors
     /// [`EvalError`] of a photo or the device, or when wanted colors cannot be read.
@@ -43,12 +47,22 @@ impl Measured {
         let mut renderer =
             Renderer::of(raster, luma, &[&luma.sh, chroma, &baked.sh], dataset.extent)?;
         let (mut errors, mut views, mut rows) = (Vec::new(), Vec::new(), Vec::new());
-        let (measured, mut done) = (dataset.measured().1, 0);
-        dataset.visit_colors(measured, |i, photo| {
+        let measured = lesson.measured(&dataset.split).1;
+        let painted = lesson.views.iter().filter(|&&view| lesson.is_painted(view));
+        let mut on_sheet: Vec<usize> = painted.copied().take(PAINTED_ROWS).collect();
+        let others = measured.iter().filter(|view| !on_sheet.contains(view));
+        let room = SHEET_ROWS - on_sheet.len();
+        let others: Vec<usize> = others.copied().take(room).collect();
+        on_sheet.extend(others);
+        let mut drawn: Vec<usize> = measured.iter().chain(&on_sheet).copied().collect();
+        drawn.sort_unstable();
+        drawn.dedup();
+        let mut done = 0;
+        dataset.visit_colors(&drawn, |i, photo| {
             observe(Progress {
                 task: Task::Measure,
                 done,
-                total: measured.len(),
+                total: drawn.len(),
                 name: &dataset.capture.views[i].name,
             });
             done += 1;
@@ -58,12 +72,13 @@ impl Measured {
             let pictures = renderer.render(camera)?;
             let native = native_rgb(&pictures[0], &pictures[1]);
             let exported = pictures[2].shown();
-            errors.push(ColorError::from(measure::mean_delta_e(&native, &exported)));
-            let taught = (lesson.of_view[i])
-                .map(|target| lesson.targets.read(target, 0))
-                .transpose()?
-                .map(|target| teacher_picture(&photo.gray, &target.ab()));
-            if reference.measures() {
+            let measures = measured.contains(&i);
+            if measures {
+                errors.push(ColorError::from(measure::mean_delta_e(&native, &exported)));
+            }
+            let taught = lesson.shown(i)?;
+            let taught = taught.map(|ab| teacher_picture(&photo.gray, &ab));
+            if measures && reference.measures() {
                 let shown = reference.shown(&exported);
                 let colorful = |rgb: &Vec<[f32; 3]>| reference.colorfulness(rgb);
                 views.push(ColorView {
@@ -76,12 +91,13 @@ impl Measured {
                     },
                 });
             }
-            if rows.len() < SHEET_ROWS {
+            if on_sheet.contains(&i) {
                 let (width, height) = (camera.width, camera.height);
                 let bytes = |pixels: &Vec<[f32; 3]>| to_image(width, height, pixels);
                 rows.push(Row {
                     width,
                     height,
+                    caption: caption(dataset, lesson, i),
                     pictures: vec![
                         Some(bytes(&photo.rgb_values())),
                         Some(bytes(&pictures[0].shown())),
@@ -124,6 +140,17 @@ impl Measured {
                 .then(|| taught.iter().sum::<f64>() / taught.len() as f64),
         }
     }
+}
+
+/// A view's name, and what it was to the colors.
+fn caption(dataset: &Dataset, lesson: &Lesson, view: usize) -> String {
+    let name = &dataset.capture.views[view].name;
+    let role = match (lesson.is_painted(view), lesson.views.contains(&view)) {
+        (true, _) => " (painted: colors are learnt from it)",
+        (false, true) => "",
+        (false, false) => " (held out: no color is learnt from it)",
+    };
+    format!("{name}{role}")
 }
 
 fn mean_error(errors: &[ColorError]) -> ColorError {

@@ -6,7 +6,7 @@ use super::{EvalError, Observer, Progress, Reference, Task};
 use crate::{
     capture::{Dataset, Exposure},
     raster::{Raster, Renderer},
-    report::{LumaQuality, LumaView},
+    report::{LumaQuality, LumaView, Row, to_image},
     splats::Splats,
 };
 
@@ -46,6 +46,55 @@ pub fn measure_luma(
         Ok::<_, EvalError>(())
     })?;
     Ok(views)
+}
+
+/// What the contact sheet of a gray scene shows, left to right.
+pub const GRAY_COLUMNS: [&str; 2] = ["photo", "gray scene"];
+
+/// Views on it.
+const SHEET_ROWS: usize = 4;
+
+/// The rows of a contact sheet: some of the held-out views, or of all where none is held out, as
+/// far apart as they are in the photos' order.
+///
+/// # Errors
+/// [`EvalError`] of a photo or the device.
+pub fn gray_rows(
+    raster: &Arc<Raster>,
+    dataset: &Dataset,
+    splats: &Splats,
+    exposures: &[Exposure],
+) -> Result<Vec<Row>, EvalError> {
+    let mut renderer = Renderer::of(raster, splats, &[&splats.sh], dataset.extent)?;
+    let (_, measured) = dataset.measured();
+    let step = measured.len().div_ceil(SHEET_ROWS).max(1);
+    let views: Vec<usize> = measured.iter().step_by(step).copied().collect();
+    let mut rows = Vec::new();
+    dataset.visit(&views, |view, photo| {
+        let reference = Reference {
+            photo,
+            exposure: exposures[view],
+        };
+        let picture = renderer.render(&dataset.cameras[view])?.remove(0);
+        let (width, height) = (photo.width, photo.height);
+        let gray = |values: Vec<f32>| {
+            let rgb: Vec<[f32; 3]> = values.into_iter().map(|value| [value; 3]).collect();
+            Some(to_image(width, height, &rgb))
+        };
+        let name = &dataset.capture.views[view].name;
+        let held_out = dataset.split.test.contains(&view);
+        rows.push(Row {
+            width,
+            height,
+            caption: format!("{name}{}", if held_out { " (held out)" } else { "" }),
+            pictures: vec![
+                gray(reference.gray()),
+                gray(reference.luma_shown(&picture.pixels)),
+            ],
+        });
+        Ok::<_, EvalError>(())
+    })?;
+    Ok(rows)
 }
 
 /// Their mean, if there are any.

@@ -15,9 +15,9 @@ mod teacher;
 use std::path::PathBuf;
 
 pub use agreement::{along_path, between_views};
-pub use colored::Measured;
+pub use colored::{COLUMNS, Measured};
 pub use lpips::Lpips;
-pub use luma::{mean_quality, measure_luma};
+pub use luma::{GRAY_COLUMNS, gray_rows, mean_quality, measure_luma};
 pub use painter::{Drawing, Layer, Painter};
 pub use peers::Peer;
 pub use reference::{Reference, exposures};

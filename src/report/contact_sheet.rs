@@ -1,40 +1,87 @@
-//! Pictures side by side: photo, luma, teacher, color.
+//! Pictures side by side, with words: photo, gray, teacher, scene.
 
+use font8x8::legacy::BASIC_LEGACY;
 use image::{Rgb, RgbImage, imageops};
 
 /// Pixels between pictures.
 const GAP: u32 = 4;
 
-/// One view's pictures, all of one size; a missing one stays blank.
+/// Pixels of the font's characters, each way.
+const CHARACTER: u32 = 8;
+
+/// Widths of pictures that the words grow with.
+const PER_ENLARGEMENT: u32 = 400;
+
+const PAPER: Rgb<u8> = Rgb([255; 3]);
+const INK: Rgb<u8> = Rgb([30; 3]);
+
+/// In the place of a picture that does not exist: no color of any photo's sky.
+const MISSING: Rgb<u8> = Rgb([216; 3]);
+
+/// One view's pictures, all of one size.
 pub struct Row {
     /// Width in pixels.
     pub width: u32,
     /// Height in pixels.
     pub height: u32,
-    /// Left to right.
+    /// Stands above them.
+    pub caption: String,
+    /// Left to right, as many as headings.
     pub pictures: Vec<Option<RgbImage>>,
 }
 
-/// Lays rows out on white.
-pub fn contact_sheet(rows: &[Row]) -> RgbImage {
-    let width = rows
-        .iter()
-        .map(|row| row.pictures.len() as u32 * (row.width + GAP) + GAP)
-        .max()
-        .unwrap_or(GAP);
-    let height = rows.iter().map(|row| row.height + GAP).sum::<u32>() + GAP;
-    let mut sheet = RgbImage::from_pixel(width, height, Rgb([255; 3]));
-    let mut y = GAP;
+/// Lays rows out on white, below the columns' `headings` and their own captions. What is missing
+/// is gray and says so.
+pub fn contact_sheet(headings: &[&str], rows: &[Row]) -> RgbImage {
+    let widest = rows.iter().map(|row| row.width).max().unwrap_or(0);
+    let scale = 1 + widest / PER_ENLARGEMENT;
+    let line = CHARACTER * scale + GAP;
+    let width = headings.len() as u32 * (widest + GAP) + GAP;
+    let height = rows.iter().map(|row| row.height + GAP + line).sum::<u32>() + GAP + line;
+    let mut sheet = RgbImage::from_pixel(width, height, PAPER);
+    let left = |column: usize| GAP + column as u32 * (widest + GAP);
+    for (column, heading) in headings.iter().enumerate() {
+        write(&mut sheet, [left(column), GAP], widest, scale, heading);
+    }
+    let mut y = GAP + line;
     for row in rows {
-        for (column, picture) in row.pictures.iter().enumerate() {
-            if let Some(image) = picture {
-                let x = GAP + column as u32 * (row.width + GAP);
-                imageops::replace(&mut sheet, image, i64::from(x), i64::from(y));
+        write(&mut sheet, [GAP, y], width - GAP, scale, &row.caption);
+        y += line;
+        for column in 0..headings.len() {
+            let x = left(column);
+            match row.pictures.get(column).and_then(Option::as_ref) {
+                Some(image) => {
+                    imageops::replace(&mut sheet, image, i64::from(x), i64::from(y));
+                }
+                None => {
+                    let empty = RgbImage::from_pixel(row.width, row.height, MISSING);
+                    imageops::replace(&mut sheet, &empty, i64::from(x), i64::from(y));
+                    let middle = y + row.height.saturating_sub(line) / 2;
+                    write(&mut sheet, [x + GAP, middle], row.width, scale, "none");
+                }
             }
         }
         y += row.height + GAP;
     }
     sheet
+}
+
+/// Writes a line of text from its top left corner on, as much as has room in `width` pixels.
+fn write(sheet: &mut RgbImage, [left, top]: [u32; 2], width: u32, scale: u32, text: &str) {
+    let room = (width / (CHARACTER * scale)) as usize;
+    for (place, character) in (0..).zip(text.chars().take(room)) {
+        let known = BASIC_LEGACY.get(character as usize);
+        let rows = known.unwrap_or(&BASIC_LEGACY['?' as usize]);
+        for y in 0..CHARACTER * scale {
+            for x in 0..CHARACTER * scale {
+                let set = rows[(y / scale) as usize] >> (x / scale) & 1 == 1;
+                let at = [left + place * CHARACTER * scale + x, top + y];
+                if set && at[0] < sheet.width() && at[1] < sheet.height() {
+                    sheet.put_pixel(at[0], at[1], INK);
+                }
+            }
+        }
+    }
 }
 
 /// An 8-bit picture of RGB in [0, 1].
@@ -54,15 +101,40 @@ mod tests {
 
     #[test]
     fn pictures_stand_in_their_cells() {
-        let red = to_image(3, 2, &[[1.0, 0.0, 0.0]; 6]);
-        let sheet = contact_sheet(&[Row {
-            width: 3,
-            height: 2,
+        let red = to_image(40, 20, &[[1.0, 0.0, 0.0]; 800]);
+        let row = Row {
+            width: 40,
+            height: 20,
+            caption: "é1".to_owned(),
             pictures: vec![None, Some(red)],
-        }]);
-        assert_eq!(sheet.dimensions(), (2 * (3 + GAP) + GAP, 2 + 2 * GAP));
-        assert_eq!(sheet.get_pixel(GAP, GAP), &Rgb([255; 3]));
-        assert_eq!(sheet.get_pixel(2 * GAP + 3, GAP), &Rgb([255, 0, 0]));
-        assert_eq!(sheet.get_pixel(2 * GAP + 6, GAP), &Rgb([255; 3]));
+        };
+        let sheet = contact_sheet(&["photo", "gray"], &[row]);
+        let line = CHARACTER + GAP;
+        assert_eq!(
+            sheet.dimensions(),
+            (2 * (40 + GAP) + GAP, 20 + 2 * GAP + 2 * line)
+        );
+        let top = GAP + 2 * line;
+        assert_eq!(sheet.get_pixel(GAP, top), &MISSING);
+        assert_eq!(sheet.get_pixel(2 * GAP + 40, top), &Rgb([255, 0, 0]));
+        assert_eq!(sheet.get_pixel(2 * GAP + 80, top), &PAPER);
+        // Both headings and the caption are there, and stay within their lines.
+        let inked = |x: u32, y: u32, width: u32| {
+            let place = (x..x + width).flat_map(|x| (y..y + CHARACTER).map(move |y| (x, y)));
+            place
+                .filter(|&(x, y)| *sheet.get_pixel(x, y) == INK)
+                .count()
+        };
+        for (x, y) in [(GAP, GAP), (2 * GAP + 40, GAP), (GAP, GAP + line)] {
+            assert!(inked(x, y, 16) > 20, "{x} {y}");
+        }
+        // Of what the font does not have, a question mark.
+        let with = |caption: &str| {
+            let mut sheet = RgbImage::from_pixel(20, 8, PAPER);
+            write(&mut sheet, [0, 0], 20, 1, caption);
+            sheet
+        };
+        assert_eq!(with("é1"), with("?1"));
+        assert_ne!(with("11"), with("?1"));
     }
 }

@@ -221,9 +221,16 @@ pub struct ChromaReport {
     pub strength: f32,
     /// How answers smaller than the photo were enlarged.
     pub upsample: Upsample,
-    /// Training views with painted hints.
+    /// Views with painted hints.
     pub hints: usize,
-    /// Training views that a teacher colored or that have hints.
+    /// Share of the Gaussians that hints claim by half or more; `None` where none grew.
+    #[serde(default)]
+    pub claimed: Option<f64>,
+    /// Held-out views that were painted by hand: colors were learnt from them, and they were not
+    /// measured.
+    #[serde(default)]
+    pub painted_held_out: Vec<String>,
+    /// Views that colors were learnt from and that a teacher colored or that have hints.
     pub colored_views: usize,
     /// How chroma was solved for.
     pub settings: ChromaSettings,
@@ -257,7 +264,7 @@ pub struct ChromaReport {
     pub peak_device_memory: Option<u64>,
     /// Bytes of the device that solving and baking were expected to take at most.
     pub estimated_device_memory: u64,
-    /// Training views whose tile lists and wanted colors stayed on the device.
+    /// Views whose tile lists and wanted colors stayed on the device.
     pub pinned_views: usize,
     /// ΔE00 between the native picture and the exported file's.
     pub bake: ColorError,

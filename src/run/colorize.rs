@@ -32,7 +32,7 @@ use crate::{
         ColorizeEvent, Degree, Distill, NoChromaKeeper, SolverKind, relight,
     },
     effects::table,
-    eval::{Measured, exposures},
+    eval::{COLUMNS, Measured, exposures},
     input,
     raster::Raster,
     report::{ChromaReport, ChromaSeconds, EffectReport, Report, contact_sheet, kernel_reports},
@@ -134,7 +134,9 @@ pub fn colorize(
             .output
             .clone()
             .unwrap_or_else(|| source.default_output()),
-        contact_sheet: source.kept(options).map(RunFolder::contact_sheet),
+        contact_sheet: (source.kept(options))
+            .filter(|folder| options.output.is_none() || output_is_own(options, folder))
+            .map(RunFolder::contact_sheet),
     };
     files::make_folder_of(&output.ply)?;
 
@@ -156,6 +158,17 @@ pub fn colorize(
         match_saturation,
         ..settings
     };
+    let painted = lesson.painted_held_out(&dataset.split).len();
+    if painted > 0 {
+        observe(Event::Note(format!(
+            "colors are learnt from {painted} held-out {} painted by hand, too; measured {}",
+            if painted == 1 { "photo" } else { "photos" },
+            match lesson.measured(&dataset.split) {
+                ("test", views) => format!("on the other {}", views.len()),
+                _ => "on the photos that they are learnt from, for no other is left".to_owned(),
+            }
+        )));
+    }
     let seconds_teacher = begun.elapsed().as_secs_f64();
     if trusted {
         tell_not_finite(&dataset, observe);
@@ -314,7 +327,7 @@ pub fn colorize(
         .then(|| Ok::<_, RunError>(kernel_reports(&gpu.timings()?, &colored.load)))
         .transpose()?;
 
-    let views = [colored.colored_views, dataset.split.train.len()];
+    let views = [colored.colored_views, lesson.views.len()];
     if let Some(warning) = few_colors(colored.unseen, views) {
         observe(Event::Warning(warning));
     }
@@ -337,6 +350,10 @@ pub fn colorize(
         strength: options.teach.strength,
         upsample: options.teach.settings.upsample,
         hints: hinted,
+        claimed: colored.claimed,
+        painted_held_out: (lesson.painted_held_out(&dataset.split).iter())
+            .map(|&view| dataset.capture.views[view].name.clone())
+            .collect(),
         colored_views: colored.colored_views,
         unseen: colored.unseen,
         saturation: colored.saturation,
@@ -360,7 +377,7 @@ pub fn colorize(
         pinned_views: colored.pinned_views,
         settings: colored.settings,
         bake: measured.bake,
-        measured_on: dataset.measured().0.to_owned(),
+        measured_on: lesson.measured(&dataset.split).0.to_owned(),
         pictures: measured.mean(),
         views: measured.views,
         timings,
@@ -378,26 +395,32 @@ pub fn colorize(
         Some(folder) => {
             let mut commit = Commit::new(folder.path())?;
             commit.remove(&folder.color_checkpoint());
-            if output.ply == folder.color() {
+            if output.contact_sheet.is_some() {
                 write_to(&commit.place(&output.ply))?;
                 // What was measured of other colors goes.
                 commit.remove(&folder.evaluation());
                 commit.remove_page(&folder.evaluation_page());
                 let chroma = npy::encode(&colored.chroma);
                 files::write(&commit.place(&folder.chroma()), &chroma)?;
+                let log = with_rows(&folder.log(), report.luma.iterations, &log);
+                files::write(&commit.place(&folder.log()), log.as_bytes())?;
+                let sheet = contact_sheet(&COLUMNS, &measured.rows);
+                files::write_png(&commit.place(&folder.contact_sheet()), &sheet)?;
+                files::write(&commit.place(&folder.report()), &report.to_file())?;
             } else {
+                // The run's own files tell of the run's own colors.
                 write_to(&output.ply)?;
             }
-            let log = with_rows(&folder.log(), report.luma.iterations, &log);
-            files::write(&commit.place(&folder.log()), log.as_bytes())?;
-            let sheet = contact_sheet(&measured.rows);
-            files::write_png(&commit.place(&folder.contact_sheet()), &sheet)?;
-            files::write(&commit.place(&folder.report()), &report.to_file())?;
             commit.finish()?;
         }
         None => write_to(&output.ply)?,
     }
     Ok((output, report))
+}
+
+/// Whether the colors go into the run's own file.
+fn output_is_own(options: &ColorizeOptions, folder: &RunFolder) -> bool {
+    options.output.as_ref() == Some(&folder.color())
 }
 
 /// What the views held back say about the degree.

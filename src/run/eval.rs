@@ -244,7 +244,14 @@ fn load(
         Some(path) => path.clone(),
         None => PathBuf::from(&report.capture.path),
     };
-    let dataset = open(&colmap, &report.capture.load, observe)?;
+    let mut dataset = open(&colmap, &report.capture.load, observe)?;
+    if let Some(chroma) = &report.chroma {
+        // Colors were learnt from these.
+        let names = dataset.capture.views.iter().map(|view| &view.name);
+        let painted = |name: &&String| chroma.painted_held_out.contains(name);
+        let of_view: Vec<bool> = names.map(|name| painted(&name)).collect();
+        dataset.split.train_on(|view| of_view[view]);
+    }
     Ok(ColoredScene {
         exposures: exposures(&dataset, &report.luma.exposures),
         dataset,

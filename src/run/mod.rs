@@ -124,16 +124,16 @@ pub enum RunError {
     /// All views were trained on.
     #[error("no view is held out")]
     NoHeldOut,
-    /// The teacher has no picture for any training view.
-    #[error("{}: no image of it has the name of a training photo (such as {example}): name its images like the photos", teacher.display())]
+    /// The teacher has no picture for any view that counts.
+    #[error("{}: no image of it has the name of a photo (such as {example}): name its images like the photos", teacher.display())]
     TeacherCoversNothing {
         /// The teacher's folder.
         teacher: PathBuf,
         /// A photo's name.
         example: String,
     },
-    /// There are hints for training views, but no paint.
-    #[error("{}: nothing is painted on any training photo: paint on one", .0.display())]
+    /// There are hints, but no paint.
+    #[error("{}: nothing is painted on any photo: paint on one", .0.display())]
     NothingPainted(PathBuf),
     /// Photos that are to give the colors have none.
     #[error("{}: these photos are gray: name a teacher that colors them", .0.display())]

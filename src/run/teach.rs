@@ -33,6 +33,9 @@ pub struct TeachOptions {
     pub strength: f32,
     /// A folder of painted hints.
     pub hints: Option<PathBuf>,
+    /// Whether a stroke colors what it lies on, in all views; otherwise it counts where it is
+    /// painted, and nowhere else.
+    pub grow_hints: bool,
 }
 
 impl Default for TeachOptions {
@@ -42,6 +45,7 @@ impl Default for TeachOptions {
             settings: TeacherSettings::default(),
             strength: 1.0,
             hints: None,
+            grow_hints: true,
         }
     }
 }
@@ -66,18 +70,22 @@ pub(super) struct Teachers {
     asked_of_networks: bool,
     strength: f32,
     hints: Option<(PathBuf, HintFolder)>,
+    grow_hints: bool,
 }
 
 struct Member {
     path: PathBuf,
     teacher: Teacher,
     weight: f32,
+    /// Whether it is a folder that has images for some photos only: somebody's work, of which
+    /// none is held out.
+    partial: bool,
 }
 
 /// What teachers and hints say.
 pub(super) struct Taught {
     pub lesson: Lesson,
-    /// Training views that have hints.
+    /// Views that have hints.
     pub hinted: usize,
     /// SHA-256 of all that is wanted.
     pub wanted: String,
@@ -90,11 +98,12 @@ struct Asking<'a, 'o> {
     observe: &'a mut Observer<'o>,
     /// The view that comes next.
     view: usize,
-    /// For how many training views each teacher has an answer, and how many of these are gray.
+    /// For how many views that colors are learnt from each teacher has an answer, and how many of
+    /// these are gray.
     answered: Vec<[usize; 2]>,
-    /// Whether there is a hint for one.
+    /// Whether there is a hint for any view.
     hints_cover: bool,
-    /// Training views that have hints.
+    /// Views that have hints.
     hinted: usize,
     /// Of all that is wanted.
     wanted: Hasher,
@@ -118,7 +127,7 @@ impl Colorizer for Asking<'_, '_> {
         let folder = self.teachers.hints.as_ref();
         let folder = folder.map(|(_, folder)| folder.load(query, gray));
         let mut hints = folder.transpose()?.flatten();
-        self.hints_cover |= trained && hints.is_some();
+        self.hints_cover |= hints.is_some();
         if hints.as_ref().is_some_and(HintImage::is_empty) {
             (self.observe)(Event::Warning(format!(
                 "left out the hints for {}: nothing is painted there",
@@ -127,26 +136,36 @@ impl Colorizer for Asking<'_, '_> {
             hints = None;
         }
         let mut answers = Vec::new();
+        let mut by_hand = hints.is_some();
         let members = self.teachers.teachers.iter_mut();
         for (member, [answered, in_gray]) in members.zip(&mut self.answered) {
             if let Some(answer) = member.teacher.colorize(query, gray, hints.as_ref())? {
-                *answered += usize::from(trained);
-                *in_gray += usize::from(trained && is_gray(&answer));
+                let learnt = trained || member.partial;
+                *answered += usize::from(learnt);
+                *in_gray += usize::from(learnt && is_gray(&answer));
+                by_hand |= member.partial;
                 answers.push((answer, member.weight));
             }
         }
         let strength = self.teachers.strength;
         let answer = mean(answers).map(|answer| scaled(answer, strength));
-        self.hinted += usize::from(trained && hints.is_some());
+        self.hinted += usize::from(hints.is_some());
+        let hints = hints.map(|hints| hints.resized(gray.width, gray.height));
         let wanted = match hints {
-            Some(hints) => Some(with_hints(answer, &hints.resized(gray.width, gray.height))),
-            None => answer.map(|ab| Wanted { ab, weights: None }),
+            Some(hints) if self.teachers.grow_hints => Some(with_strokes(answer, hints)),
+            Some(hints) => Some(with_hints(answer, &hints)),
+            None => answer.map(Wanted::from),
         };
+        let wanted = wanted.map(|wanted| Wanted { by_hand, ..wanted });
         self.wanted.update(query.name.as_bytes());
-        if let Some(Wanted { ab, weights }) = &wanted {
-            self.wanted.update(bytemuck::cast_slice(&ab.ab));
-            let weights = weights.as_deref().unwrap_or_default();
+        if let Some(wanted) = &wanted {
+            self.wanted.update(bytemuck::cast_slice(&wanted.ab.ab));
+            let weights = wanted.weights.as_deref().unwrap_or_default();
             self.wanted.update(bytemuck::cast_slice(weights));
+            let strokes = wanted.strokes.as_ref().map(|strokes| &strokes.paint[..]);
+            self.wanted
+                .update(bytemuck::cast_slice(strokes.unwrap_or_default()));
+            self.wanted.update(&[u8::from(wanted.by_hand)]);
         }
         Ok(wanted)
     }
@@ -167,6 +186,7 @@ impl Teachers {
             Ok(Member {
                 teacher: Teacher::open(&path, cache, &options.settings)?,
                 weight: *weight,
+                partial: false,
                 path,
             })
         };
@@ -182,6 +202,7 @@ impl Teachers {
                 || options.settings.size.is_some(),
             strength: options.strength,
             hints: hints.transpose()?,
+            grow_hints: options.grow_hints,
         })
     }
 
@@ -238,7 +259,7 @@ impl Teachers {
     ///
     /// # Errors
     /// [`RunError::Teacher`], [`RunError::TeacherCoversNothing`] where a teacher
-    /// or the hints have no image for any training view, and
+    /// or the hints have no image for any view that counts, and
     /// [`RunError::NothingPainted`] where there are but hints, all of them empty.
     pub fn ask(
         &mut self,
@@ -255,6 +276,7 @@ impl Teachers {
             let told = member.teacher.passed_over().into_iter();
             told.for_each(|line| observe(Event::Warning(line)));
             member.teacher.know(&dataset.capture);
+            member.partial = is_partial(&member.teacher, dataset)?;
         }
         if let Some((_, hints)) = &mut self.hints {
             hints.know(&dataset.capture);
@@ -294,7 +316,7 @@ impl Teachers {
         })
     }
 
-    /// Whether every source has something for a training view; `covers` says so
+    /// Whether every source has something for a view that counts; `covers` says so
     /// of each teacher and then of the hints.
     fn check(&self, covers: &[bool], dataset: &Dataset, lesson: &Lesson) -> Result<(), RunError> {
         let teachers = self.teachers.iter().map(|member| &member.path);
@@ -307,18 +329,25 @@ impl Teachers {
             });
         }
         match hints {
-            Some(path)
-                if dataset
-                    .split
-                    .train
-                    .iter()
-                    .all(|&i| lesson.of_view[i].is_none()) =>
-            {
+            Some(path) if lesson.colored_views() == 0 => {
                 Err(RunError::NothingPainted(path.clone()))
             }
             _ => Ok(()),
         }
     }
+}
+
+/// Whether a teacher has nothing for some of the photos that are trained on: then it is a folder
+/// of single images, and each counts wherever it lies. One for all photos is measured on the
+/// held-out ones.
+fn is_partial(teacher: &Teacher, dataset: &Dataset) -> Result<bool, RunError> {
+    for &view in &dataset.split.train {
+        let query = Query::view(&dataset.capture.views[view], &dataset.cameras[view]);
+        if !teacher.covers(query)? {
+            return Ok(true);
+        }
+    }
+    Ok(false)
 }
 
 /// What to say of a folder whose images are gray: they would make gray what they show. Where the
@@ -373,6 +402,26 @@ fn scaled(mut answer: AbImage, strength: f32) -> AbImage {
     answer
 }
 
+/// An answer with strokes of its size that are to grow, or strokes alone.
+fn with_strokes(answer: Option<AbImage>, strokes: HintImage) -> Wanted {
+    let unknown = || {
+        let count = strokes.paint.len();
+        let ab = AbImage {
+            width: strokes.width,
+            height: strokes.height,
+            ab: vec![[0.0; 2]; count],
+        };
+        (ab, Some(vec![0.0; count]))
+    };
+    let (ab, weights) = answer.map_or_else(unknown, |ab| (ab, None));
+    Wanted {
+        ab,
+        weights,
+        strokes: Some(strokes),
+        by_hand: true,
+    }
+}
+
 /// Lays paint of the photo's size over an answer. Each pixel is the mean of the
 /// teachers' answer, of weight 1 − α (0 without one), and the paint, of weight
 /// α · [`HINT_WEIGHT`]; it counts as much as both.
@@ -394,8 +443,9 @@ fn with_hints(answer: Option<AbImage>, hints: &HintImage) -> Wanted {
         weights.push(weight);
     }
     Wanted {
-        ab: answer,
         weights: Some(weights),
+        by_hand: true,
+        ..answer.into()
     }
 }
 

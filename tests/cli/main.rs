@@ -36,6 +36,7 @@ mod shared;
 mod solver;
 mod soundness;
 mod splat_file;
+mod strokes;
 mod teach;
 mod teach_together;
 #[cfg(target_os = "linux")]

@@ -50,7 +50,9 @@ fn the_files_of_a_colored_run() {
     let sheet = image::open(place.path("runs/scene/contact-sheet.png")).expect("a picture");
     let [width, height] = scene::SIZE;
     assert_eq!(sheet.width(), 4 * (width + 4) + 4);
-    assert_eq!(sheet.height(), scene::HELD_OUT as u32 * (height + 4) + 4);
+    // Headings and captions are lines of 12 pixels.
+    let rows = scene::HELD_OUT as u32;
+    assert_eq!(sheet.height(), 12 + rows * (12 + height + 4) + 4);
 
     let report = place.report("runs/scene");
     let chroma = &report["chroma"];
@@ -209,7 +211,7 @@ fn a_folder_teaches_some_views_at_its_own_sizes() {
     let place = place_with_run();
     fs::create_dir_all(place.path("painted/left")).expect("writable");
     let [width, height] = scene::SIZE;
-    // Views 1, 2 and 9 are trained on, view 0 is held out.
+    // Views 1, 2 and 9 are trained on; view 0 would be held out, but single images count.
     for (index, [w, h], extension) in [
         (1, [2 * width, 2 * height], "png"),
         (2, [width / 2, height / 2], "jpg"),
@@ -224,12 +226,13 @@ fn a_folder_teaches_some_views_at_its_own_sizes() {
     }
     let report = with_painted(&place);
     let chroma = &report["chroma"];
-    assert_eq!(chroma["colored_views"], 3);
+    assert_eq!(chroma["colored_views"], 4);
+    assert_eq!(chroma["painted_held_out"][0], scene::name(0));
     assert_eq!(chroma["teachers"][0]["kind"], "folder");
     assert_eq!(chroma["teachers"][0]["name"], "painted");
-    // Of the held-out views 0 and 8 the teacher knows one.
-    assert!(chroma["views"][0]["teacher_colorfulness"].is_f64());
-    assert!(chroma["views"][1]["teacher_colorfulness"].is_null());
+    // View 8 is left to measure, and the teacher does not know it.
+    assert_eq!(chroma["views"][0]["name"], scene::name(8));
+    assert!(chroma["views"][0]["teacher_colorfulness"].is_null());
 }
 
 #[test]

@@ -18,6 +18,7 @@ mod convergence;
 mod depth;
 mod device;
 mod effects;
+mod gather;
 mod gradient;
 mod harness;
 mod layout;

@@ -152,8 +152,9 @@ pub enum TeacherError {
     },
     /// A hint says something about every pixel.
     #[error(
-        "{}: has no transparency, so it would paint the whole photo; save the hints alone on a \
-         transparent layer, as PNG", path.display()
+        "{}: has no transparency and is not its photo with strokes on it, so it would paint the \
+         whole photo; save the strokes alone on a transparent layer, as PNG or TIFF, or give \
+         whole pictures as a --teacher folder", path.display()
     )]
     NoTransparency {
         /// The image.
@@ -182,7 +183,7 @@ pub enum TeacherError {
         pixels: usize,
     },
     /// The folder holds no image.
-    #[error("{}: holds no .png, .jpg or .jpeg image", path.display())]
+    #[error("{}: holds no .png, .jpg or .tif image", path.display())]
     EmptyFolder {
         /// The folder.
         path: PathBuf,

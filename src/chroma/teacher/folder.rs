@@ -34,13 +34,13 @@ impl FolderTeacher {
         self.images.know(capture);
     }
 
-    /// Whether there is an image for the photo with this path below the photo
+    /// Whether there is an image for a photo, which may be given by its path below the photo
     /// folder.
     ///
     /// # Errors
     /// [`TeacherError::Ambiguous`] where nobody knows.
-    pub fn covers(&self, name: &str) -> Result<bool, TeacherError> {
-        self.images.covers(name)
+    pub fn covers<'a>(&'a self, query: impl Into<Query<'a>>) -> Result<bool, TeacherError> {
+        self.images.covers(query)
     }
 
     pub(super) fn describe(&self) -> TeacherInfo {

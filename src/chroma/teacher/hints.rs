@@ -3,15 +3,29 @@
 use super::images::{Filter, resample};
 use super::named_images::NamedImages;
 use super::{GrayImage, Query, TeacherError};
-use crate::capture::Capture;
+use crate::capture::{Capture, decode_image};
 use crate::color::srgb_to_lab;
-use std::path::Path;
+use crate::input;
+use image::Rgba32FImage;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
-/// A folder of painted hints: PNG images with transparency, named like the
-/// photos, for any subset of them. What is transparent says nothing.
+/// A folder of painted hints, named like the photos, for any subset of them: PNG or TIFF images
+/// with transparency, of which what is transparent says nothing, or opaque ones that are the photo
+/// itself, of which what is as it was says nothing.
 pub struct HintFolder {
     images: NamedImages,
+    /// Where the photos lie, by the names of their views.
+    photos: BTreeMap<String, PathBuf>,
 }
+
+/// Levels, of 255, by which saving a photo anew may change a channel of it, and from which on a
+/// pixel is painted.
+const CHANGED: [f32; 2] = [12.0, 30.0];
+
+/// Share of the pixels that must be as the photo has them, for a picture to be the photo with
+/// strokes on it.
+const UNPAINTED: f64 = 0.5;
 
 /// The paint on one photo.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,12 +46,16 @@ impl HintFolder {
     /// As for [`FolderTeacher::open`](super::FolderTeacher::open).
     pub fn open(folder: &Path) -> Result<Self, TeacherError> {
         let images = NamedImages::open(folder)?;
-        Ok(Self { images })
+        let photos = BTreeMap::new();
+        Ok(Self { images, photos })
     }
 
     /// Says which photos there are, so that paint on one is not taken for another's.
     pub fn know(&mut self, capture: &Capture) {
         self.images.know(capture);
+        let photos = capture.views.iter();
+        let photos = photos.map(|view| (view.photo.clone(), view.image_path.clone()));
+        self.photos = photos.collect();
     }
 
     /// The paint on a photo, at the paint's own size or, where it is painted on the
@@ -45,8 +63,8 @@ impl HintFolder {
     /// image. A photo may be given by its path relative to the photo folder.
     ///
     /// # Errors
-    /// [`TeacherError::NoTransparency`] where the image has no alpha channel;
-    /// otherwise as for a folder teacher's image.
+    /// [`TeacherError::NoTransparency`] where the image has no alpha channel and is not the
+    /// photo with strokes on it; otherwise as for a folder teacher's image.
     pub fn load<'a>(
         &self,
         query: impl Into<Query<'a>>,
@@ -57,13 +75,25 @@ impl HintFolder {
         let Some(found) = self.images.load(query, photo)? else {
             return Ok(None);
         };
-        if !found.image.color().has_alpha() {
-            return Err(TeacherError::NoTransparency {
-                path: found.path.to_path_buf(),
-            });
-        }
         let size = [found.image.width(), found.image.height()];
-        let rgba = found.image.into_rgba32f();
+        let has_alpha = found.image.color().has_alpha();
+        let mut rgba = found.image.into_rgba32f();
+        if rgba.pixels().all(|pixel| pixel.0[3] == 1.0) {
+            let name = found.original.map_or(query.name, |original| original.name);
+            match self.changed(name, &rgba)? {
+                Some(alphas) => {
+                    for (pixel, alpha) in rgba.pixels_mut().zip(alphas) {
+                        pixel.0[3] = alpha;
+                    }
+                }
+                None if has_alpha => {}
+                None => {
+                    return Err(TeacherError::NoTransparency {
+                        path: found.path.to_path_buf(),
+                    });
+                }
+            }
+        }
         let paint = rgba.pixels().map(|rgba| match rgba.0 {
             // Most of a hint is transparent, and its color means nothing.
             [.., 0.0] => [0.0; 3],
@@ -88,6 +118,62 @@ impl HintFolder {
             height,
             paint,
         }))
+    }
+}
+
+impl HintFolder {
+    /// How much of each pixel of an opaque picture was painted over the photo of this name, 0 to
+    /// 1; none where it is not that photo, or nobody knows it.
+    ///
+    /// # Errors
+    /// [`TeacherError::Io`] or [`TeacherError::BadImage`] of the photo.
+    fn changed(
+        &self,
+        name: &str,
+        picture: &Rgba32FImage,
+    ) -> Result<Option<Vec<f32>>, TeacherError> {
+        let Some(path) = self.photos.get(name) else {
+            return Ok(None);
+        };
+        let file = input::read(path).map_err(TeacherError::io(path))?;
+        let photo = decode_image(file).map_err(|reason| TeacherError::BadImage {
+            path: path.clone(),
+            reason,
+        })?;
+        let [width, height] = [picture.width(), picture.height()];
+        let size = [photo.width(), photo.height()];
+        let photo: Vec<[f32; 3]> = photo.into_rgb32f().pixels().map(|pixel| pixel.0).collect();
+        let photo = resample(&photo, size, [width, height], Filter::Average);
+        let apart: Vec<f32> = (picture.pixels().zip(&photo))
+            .map(|(picture, photo)| {
+                let channels = picture.0.iter().zip(photo);
+                255.0 * channels.fold(0.0, |most: f32, (a, b)| most.max((a - b).abs()))
+            })
+            .collect();
+        let same = apart.iter().filter(|&&apart| apart <= CHANGED[0]).count();
+        if (same as f64) < UNPAINTED * apart.len() as f64 {
+            return Ok(None);
+        }
+        // Specks are what saving has left; strokes are wider.
+        let (width, height) = (width as usize, height as usize);
+        let changed = |i: usize| apart[i] > CHANGED[0];
+        let of_pixel = |i: usize| {
+            let (x, y) = (i % width, i / width);
+            let rows = y.saturating_sub(1)..(y + 2).min(height);
+            let around = rows.flat_map(|y| {
+                (x.saturating_sub(1)..(x + 2).min(width)).map(move |x| y * width + x)
+            });
+            let (all, painted) = around.fold((0, 0), |(all, painted), other| {
+                (all + 1, painted + usize::from(changed(other)))
+            });
+            let strength = (apart[i] - CHANGED[0]) / (CHANGED[1] - CHANGED[0]);
+            if 2 * painted > all {
+                strength.clamp(0.0, 1.0)
+            } else {
+                0.0
+            }
+        };
+        Ok(Some((0..apart.len()).map(of_pixel).collect()))
     }
 }
 
@@ -163,6 +249,101 @@ mod tests {
             (color[0] - 80.09).abs() < 0.02 && alpha > 0.1 && alpha < 0.3,
             "{color:?} {alpha}"
         );
+    }
+
+    /// A view of a photo in `folder`, which has brightness by column.
+    fn capture(folder: &Path) -> Capture {
+        let photo = RgbImage::from_fn(20, 10, |x, _| Rgb([60 + 5 * x as u8; 3]));
+        let path = folder.join("v.png");
+        photo.save(&path).unwrap();
+        let camera = crate::capture::Camera {
+            width: 20,
+            height: 10,
+            fx: 20.0,
+            fy: 20.0,
+            cx: 10.0,
+            cy: 5.0,
+            rotation: glam::DMat3::IDENTITY,
+            translation: glam::DVec3::ZERO,
+        };
+        Capture {
+            root: folder.into(),
+            views: vec![crate::capture::View {
+                name: "v.png".into(),
+                photo: "v.png".into(),
+                image_path: path,
+                camera,
+                undistortion: None,
+            }],
+            points: Vec::new(),
+            offset: glam::DVec3::ZERO,
+            rejected: Vec::new(),
+            distortion: 0.0,
+        }
+    }
+
+    /// Strokes on the photo itself, saved without transparency or with all of it opaque.
+    #[test]
+    fn strokes_on_the_photo_are_told_from_it() {
+        const GRAY: GrayImage<'static> = GrayImage {
+            width: 20,
+            height: 10,
+            pixels: &[90; 200],
+        };
+        let (photos, folder) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        let capture = capture(photos.path());
+        let mut painted = image::open(photos.path().join("v.png"))
+            .unwrap()
+            .into_rgb8();
+        for x in 4..10 {
+            for y in 2..8 {
+                painted.put_pixel(x, y, Rgb([200, 60, 40]));
+            }
+        }
+        // What saving as JPEG does to single pixels.
+        painted.put_pixel(15, 5, Rgb([170, 150, 140]));
+        let path = folder.path().join("v.png");
+        for opaque in [false, true] {
+            match opaque {
+                false => painted.save(&path).unwrap(),
+                true => {
+                    let rgba = image::DynamicImage::from(painted.clone()).into_rgba8();
+                    rgba.save(&path).unwrap();
+                }
+            }
+            let mut hints = HintFolder::open(folder.path()).unwrap();
+            hints.know(&capture);
+            let paint = hints.load("v.png", GRAY).unwrap().unwrap();
+            let alpha = |x: usize, y: usize| paint.paint[20 * y + x][2];
+            assert_eq!((alpha(6, 5), alpha(15, 5), alpha(1, 1)), (1.0, 0.0, 0.0));
+        }
+        // Another picture is no photo with strokes on it.
+        let other = RgbImage::from_pixel(20, 10, Rgb([200, 60, 40]));
+        other.save(&path).unwrap();
+        let mut hints = HintFolder::open(folder.path()).unwrap();
+        hints.know(&capture);
+        let message = hints.load("v.png", GRAY).unwrap_err().to_string();
+        assert!(message.contains("not its photo"), "{message}");
+    }
+
+    #[test]
+    fn a_tiff_layer_is_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut pixels = vec![0_u8; 4 * 8];
+        pixels[..4].copy_from_slice(&[255, 0, 0, 255]);
+        let file = std::fs::File::create(folder.path().join("v.tif")).unwrap();
+        tiff::encoder::TiffEncoder::new(file)
+            .unwrap()
+            .write_image::<tiff::encoder::colortype::RGBA8>(4, 2, &pixels)
+            .unwrap();
+        let hints = HintFolder::open(folder.path()).unwrap();
+        let paint = hints.load("v.jpg", GRAY).unwrap().unwrap();
+        assert!(
+            (paint.paint[0][0] - 80.09).abs() < 0.02,
+            "{:?}",
+            paint.paint
+        );
+        assert!(paint.paint[1..].iter().all(|pixel| *pixel == [0.0; 3]));
     }
 
     #[test]

@@ -154,6 +154,17 @@ impl Teacher {
         }
     }
 
+    /// Whether it has an answer for a photo: a network always, a folder where there is an image.
+    ///
+    /// # Errors
+    /// [`TeacherError::Ambiguous`] where nobody knows.
+    pub fn covers<'a>(&'a self, query: impl Into<Query<'a>>) -> Result<bool, TeacherError> {
+        match &self.source {
+            Source::Network(_) => Ok(true),
+            Source::Folder(folder) => folder.covers(query),
+        }
+    }
+
     /// Name, kind and identity, for reports.
     pub fn describe(&self) -> TeacherInfo {
         match &self.source {

@@ -58,17 +58,37 @@ impl NamedImages {
         self.images.know(known(capture));
     }
 
-    /// Whether there is an image for the photo with this path below the photo
+    /// Whether there is an image for a photo, which may be given by its path below the photo
     /// folder.
     ///
     /// # Errors
     /// [`TeacherError::Ambiguous`] where nobody knows.
-    pub fn covers(&self, name: &str) -> Result<bool, TeacherError> {
-        Ok(self.find(name)?.is_some())
+    pub fn covers<'a>(&'a self, query: impl Into<Query<'a>>) -> Result<bool, TeacherError> {
+        Ok(self.of(query.into())?.is_some())
     }
 
     fn find(&self, name: &str) -> Result<Option<&Path>, TeacherError> {
         self.images.of(name).map_err(TeacherError::Ambiguous)
+    }
+
+    /// Where the image for a view lies, and of which photo it is where that is not the view as
+    /// it is.
+    fn of<'a>(
+        &'a self,
+        query: Query<'a>,
+    ) -> Result<Option<(&'a Path, Option<Original<'a>>)>, TeacherError> {
+        // A view with its photo's name has no image of its own, but its photo's.
+        let own = match query.original {
+            Some(original) if original.name == query.name => None,
+            _ => self.find(query.name)?.map(|path| (path, None)),
+        };
+        Ok(match (own, query.original) {
+            (None, Some(original)) => {
+                let path = self.find(original.name)?;
+                path.map(|path| (path, Some(original)))
+            }
+            (own, _) => own,
+        })
     }
 
     /// The image for a photo; none where there is none. A face of a photo may have
@@ -83,19 +103,7 @@ impl NamedImages {
         query: Query<'a>,
         photo: GrayImage<'_>,
     ) -> Result<Option<Found<'a>>, TeacherError> {
-        // A view with its photo's name has no image of its own, but its photo's.
-        let own = match query.original {
-            Some(original) if original.name == query.name => None,
-            _ => self.find(query.name)?.map(|path| (path, None)),
-        };
-        let found = match (own, query.original) {
-            (None, Some(original)) => {
-                let path = self.find(original.name)?;
-                path.map(|path| (path, Some(original)))
-            }
-            (own, _) => own,
-        };
-        let Some((path, original)) = found else {
+        let Some((path, original)) = self.of(query)? else {
             return Ok(None);
         };
         let name = original.map_or(query.name, |original| original.name);
@@ -128,7 +136,7 @@ impl NamedImages {
 /// its name does not say that it is a picture.
 fn is_image(path: &Path) -> bool {
     let extension = path.extension().unwrap_or_default();
-    let named = ["png", "jpg", "jpeg"];
+    let named = ["png", "jpg", "jpeg", "tif", "tiff"];
     if named
         .iter()
         .any(|known| extension.eq_ignore_ascii_case(known))
@@ -142,6 +150,6 @@ fn is_image(path: &Path) -> bool {
         && input::open(path).and_then(read).is_ok()
         && matches!(
             image::guess_format(&magic),
-            Ok(ImageFormat::Png | ImageFormat::Jpeg)
+            Ok(ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::Tiff)
         )
 }

@@ -23,10 +23,11 @@ use super::{
 use crate::{
     capture::LoadOptions,
     effects::{Effect, Overrules},
+    eval::GRAY_COLUMNS,
     gpu::Gpu,
     luma::{Goal, LumaSettings},
     raster::{Raster, RasterOptions},
-    report::Report,
+    report::{Report, contact_sheet},
     splats::ply,
 };
 use ahead::Ahead;
@@ -215,7 +216,6 @@ fn write(folder: &RunFolder, trained: &Trained, report: &Report) -> Result<(), R
     for stale in [
         folder.color(),
         folder.chroma(),
-        folder.contact_sheet(),
         folder.evaluation(),
         folder.checkpoint(),
         folder.color_checkpoint(),
@@ -228,6 +228,8 @@ fn write(folder: &RunFolder, trained: &Trained, report: &Report) -> Result<(), R
     let origin = glam::DVec3::ZERO;
     let luma = commit.place(&folder.luma());
     ply::write_ply(&luma, &trained.scene.splats, origin, &comments)?;
+    let sheet = contact_sheet(&GRAY_COLUMNS, &trained.rows);
+    files::write_png(&commit.place(&folder.contact_sheet()), &sheet)?;
     files::write(&commit.place(&folder.log()), trained.log.as_bytes())?;
     files::write(&commit.place(&folder.report()), &report.to_file())?;
     commit.finish()

@@ -19,11 +19,11 @@ use super::{
 use crate::{
     capture::{CaptureError, Dataset, Exposure},
     effects::{Effect, Evidence},
-    eval::{Progress, Reference, mean_quality, measure_luma},
+    eval::{Progress, Reference, gray_rows, mean_quality, measure_luma},
     gpu::Gpu,
     luma::{Fit, LumaEvent, LumaProgress, LumaScene},
     raster::Raster,
-    report::{KernelReport, LumaQuality, LumaView, PhotoReport, kernel_reports},
+    report::{KernelReport, LumaQuality, LumaView, PhotoReport, Row, kernel_reports},
 };
 
 /// Runs that may take no longer, in seconds, do without a trial: on a slow device it would
@@ -55,6 +55,8 @@ pub(super) struct Trained {
     /// `train.csv`.
     pub log: String,
     pub held_out_views: Vec<LumaView>,
+    /// Of the contact sheet.
+    pub rows: Vec<Row>,
     pub timings: Option<Vec<KernelReport>>,
     /// Seconds of measuring.
     pub measuring: f64,
@@ -270,7 +272,9 @@ impl Job<'_> {
         let mut told = |progress: Progress<'_>| observe.borrow_mut()(progress.into());
         let (splats, exposures) = (&scene.splats, scene.exposures());
         let held_out_views = measure_luma(&drawn, self.judge, splats, exposures, &mut told)?;
+        let rows = gray_rows(&drawn, self.judge, splats, exposures)?;
         Ok(Trained {
+            rows,
             scene,
             log: log.into_inner(),
             held_out_views,

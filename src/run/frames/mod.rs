@@ -223,7 +223,7 @@ fn open_teachers(
         },
         settings: options.teacher_settings.clone(),
         strength,
-        hints: None,
+        ..TeachOptions::default()
     };
     if teach.teachers.is_empty() {
         return Ok(None);

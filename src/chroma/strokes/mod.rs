@@ -1,0 +1,262 @@
+//! Strokes that color what they lie on, in all views.
+//!
+//! On the photo a stroke [claims](region) what it touches and is alike; what the photo shows of
+//! each Gaussian tells how much of that is claimed, and from there claims [go on](spread) to
+//! Gaussians that the photo does not show. Drawn into every view, they take the place of what the
+//! teacher wants there, so that all views agree.
+
+mod region;
+mod shade;
+mod spread;
+
+use super::{ChromaError, FrozenViews, Lesson, Targets, Task, teacher::AbImage};
+use crate::{
+    capture::{Camera, Dataset, Photo},
+    color::gray_to_lightness,
+    measure::DepthSteps,
+    raster::{Field, Picture},
+    splats::{ShField, Splats, sh},
+};
+use region::{Surface, grow};
+use shade::shaded;
+use spread::{Claim, Cloud};
+
+/// Of a pixel's opacity: from here on what is drawn there is the scene.
+const OPAQUE: f32 = 0.5;
+
+/// Drawn claims below the first are none and above the second whole: between them lies an edge
+/// that Gaussians draw softer than the photo has it.
+const EDGE: [f32; 2] = [0.3, 0.7];
+
+/// What is wanted of all views, with strokes laid over what the teachers want.
+pub(super) struct Laid {
+    pub targets: Targets,
+    pub tasks: Vec<Task>,
+    /// Share of the Gaussians that are claimed by half or more.
+    pub claimed: f64,
+}
+
+/// What all strokes together claim of each Gaussian.
+struct Claims {
+    /// Σ α² a, Σ α² b, Σ α² over the photos.
+    colors: Vec<[f32; 3]>,
+    /// The largest α.
+    alphas: Vec<f32>,
+}
+
+impl Claims {
+    fn new(count: usize) -> Self {
+        Self {
+            colors: vec![[0.0; 3]; count],
+            alphas: vec![0.0; count],
+        }
+    }
+
+    /// A photo that shows a thing without strokes takes nothing from what another's claim.
+    fn add(&mut self, claims: &[Claim]) {
+        for claim in claims {
+            let i = claim.splat as usize;
+            let weight = claim.alpha * claim.alpha;
+            let [a, b] = claim.color;
+            for (sum, value) in self.colors[i].iter_mut().zip([a, b, 1.0]) {
+                *sum += weight * value;
+            }
+            self.alphas[i] = self.alphas[i].max(claim.alpha);
+        }
+    }
+
+    /// Fields that draw α a, α b and α, 1.
+    fn fields(&self) -> [ShField; 2] {
+        let one = 1.0 / sh::C0 as f32;
+        let mut fields = [(); 2].map(|()| ShField::zeros(self.alphas.len(), 0, 2));
+        for (i, (&alpha, &[a, b, weight])) in self.alphas.iter().zip(&self.colors).enumerate() {
+            if weight > 0.0 {
+                let strength = one * alpha / weight;
+                fields[0].coefficients[2 * i] = strength * a;
+                fields[0].coefficients[2 * i + 1] = strength * b;
+            }
+            fields[1].coefficients[2 * i] = one * alpha;
+            fields[1].coefficients[2 * i + 1] = one;
+        }
+        fields
+    }
+}
+
+/// Lays the strokes of a lesson over what its teachers want, in all views that color learns
+/// from: `frozen` has these and no others, in their order.
+///
+/// # Errors
+/// [`ChromaError`] of a photo, of the device or of the file that wanted colors wait in.
+pub(super) fn lay(
+    frozen: &FrozenViews,
+    dataset: &Dataset,
+    lesson: &Lesson,
+    luma: &Splats,
+) -> Result<Laid, ChromaError> {
+    let cloud = Cloud::of(luma);
+    let mut claims = Claims::new(luma.len());
+    let mut regions = Targets::new(1);
+    let mut region_of = vec![None; lesson.views.len()];
+    for (view, &i) in lesson.views.iter().enumerate() {
+        let Some(paint) = lesson.paint(i)? else {
+            continue;
+        };
+        let photo = dataset.photo(i)?;
+        let camera = &dataset.cameras[i];
+        let lightness = lightness(&photo);
+        let surface = Surface {
+            size: [photo.width, photo.height].map(|side| side as usize),
+            lightness: &lightness,
+            depth: &depth(frozen, view, luma, camera)?,
+        };
+        let mut region = grow(&surface, &paint);
+        if let Some(mask) = &photo.mask {
+            for (claim, &counts) in region.iter_mut().zip(mask) {
+                *claim = claim.map(|value| value * f32::from(counts) / 255.0);
+            }
+        }
+        let figures: Vec<[f32; 4]> = region
+            .iter()
+            .map(|&[a, b, alpha]| [a, b, alpha, 1.0])
+            .collect();
+        claims.add(&cloud.claims(&frozen.gather(view, &figures)?));
+        let (colors, alphas): (Vec<[f32; 2]>, Vec<f32>) = (region.iter())
+            .map(|&[a, b, alpha]| {
+                let over = if alpha > 0.0 { 1.0 / alpha } else { 0.0 };
+                ([over * a, over * b], alpha)
+            })
+            .unzip();
+        let colors = AbImage {
+            width: photo.width,
+            height: photo.height,
+            ab: colors,
+        };
+        region_of[view] = Some(regions.push_ab(&colors, Some(&alphas))?);
+    }
+    let claimed = claims.alphas.iter().filter(|&&alpha| alpha >= 0.5).count();
+    let gpu = frozen.gpu();
+    let fields = claims.fields();
+    let fields = [
+        Field::upload(gpu, &fields[0])?,
+        Field::upload(gpu, &fields[1])?,
+    ];
+    let mut targets = Targets::new(lesson.targets.scales());
+    let mut tasks = Vec::new();
+    let mut view = 0;
+    dataset.visit(&lesson.views, |i, photo| {
+        let drawn = frozen.draw(view, &[&fields[0], &fields[1]])?;
+        let mut over = drawn_claims(&drawn);
+        if let Some(region) = region_of[view] {
+            let region = regions.read(region, 0)?;
+            let alphas = region.weights.as_deref().unwrap_or_default();
+            for ((own, color), &alpha) in over.iter_mut().zip(region.ab().ab).zip(alphas) {
+                if alpha > own.1 {
+                    *own = (color, alpha);
+                }
+            }
+        }
+        if let Some(target) = laid_over(lesson, i, photo, &over, &mut targets)? {
+            tasks.push(Task { view, target });
+        }
+        view += 1;
+        Ok::<_, ChromaError>(())
+    })?;
+    dataset.release();
+    Ok(Laid {
+        targets,
+        tasks,
+        claimed: claimed as f64 / luma.len().max(1) as f64,
+    })
+}
+
+/// Claims as a view shows them: colors at the middle lightness, and α.
+fn drawn_claims(drawn: &[Picture]) -> Vec<([f32; 2], f32)> {
+    let [colors, alphas] = [0, 1].map(|k: usize| drawn[k].pixels.as_chunks::<2>().0);
+    (colors.iter().zip(alphas))
+        .map(|(color, &[alpha, opacity])| {
+            if alpha <= 0.0 {
+                return ([0.0; 2], 0.0);
+            }
+            let share = alpha / opacity.max(OPAQUE);
+            let t = ((share - EDGE[0]) / (EDGE[1] - EDGE[0])).clamp(0.0, 1.0);
+            (color.map(|value| value / alpha), t * t * (3.0 - 2.0 * t))
+        })
+        .collect()
+}
+
+/// Keeps what is wanted of a view with claims over it; `None` where nothing is.
+fn laid_over(
+    lesson: &Lesson,
+    view: usize,
+    photo: &Photo,
+    claims: &[([f32; 2], f32)],
+    targets: &mut Targets,
+) -> Result<Option<usize>, ChromaError> {
+    let taught = (lesson.of_view[view])
+        .map(|target| lesson.targets.read(target, 0))
+        .transpose()?;
+    if taught.is_none() && claims.iter().all(|&(_, alpha)| alpha == 0.0) {
+        return Ok(None);
+    }
+    let size = claims.len();
+    let mut ab = match &taught {
+        Some(target) => target.ab().ab,
+        None => vec![[0.0; 2]; size],
+    };
+    let mut weights = match taught {
+        Some(target) => target.weights.unwrap_or_else(|| vec![1.0; size]),
+        None => vec![0.0; size],
+    };
+    let lightness = lightness(photo);
+    for (i, &(color, alpha)) in claims.iter().enumerate() {
+        if alpha == 0.0 {
+            continue;
+        }
+        let counts = photo
+            .mask
+            .as_ref()
+            .map_or(1.0, |mask| f32::from(mask[i]) / 255.0);
+        let color = shaded(color, lightness[i]);
+        let [own, over] = [(1.0 - alpha) * weights[i], alpha * counts];
+        if own + over > 0.0 {
+            for c in 0..2 {
+                ab[i][c] = (own * ab[i][c] + over * color[c]) / (own + over);
+            }
+        }
+        weights[i] = own + over;
+    }
+    let wanted = AbImage {
+        width: photo.width,
+        height: photo.height,
+        ab,
+    };
+    targets.push_ab(&wanted, Some(&weights)).map(Some)
+}
+
+/// `L*` of each pixel.
+fn lightness(photo: &Photo) -> Vec<f32> {
+    let of_gray: [f32; 256] =
+        std::array::from_fn(|gray| gray_to_lightness(gray as f64 / 255.0) as f32);
+    photo
+        .gray
+        .iter()
+        .map(|&gray| of_gray[usize::from(gray)])
+        .collect()
+}
+
+/// How far away is what a view shows, `[height, width]` in world units; NaN where nothing is.
+fn depth(
+    frozen: &FrozenViews,
+    view: usize,
+    luma: &Splats,
+    camera: &Camera,
+) -> Result<Vec<f32>, ChromaError> {
+    let steps = DepthSteps::new(luma, camera);
+    let mut pictures = Vec::with_capacity(steps.fields.len());
+    for field in &steps.fields {
+        let field = Field::upload(frozen.gpu(), field)?;
+        pictures.extend(frozen.draw(view, &[&field])?);
+    }
+    let pixels = camera.width as usize * camera.height as usize;
+    Ok(steps.median(&pictures, pixels))
+}
