@@ -229,6 +229,14 @@ pub enum CaptureError {
         /// The photo's width and height.
         size: [u32; 2],
     },
+    /// What is said of a capture's film cannot be.
+    #[error("{path}: {reason}; prepare the film again")]
+    Film {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        reason: String,
+    },
     /// Nobody knows which mask belongs to which photo.
     #[error(transparent)]
     Mask(#[from] Ambiguous),

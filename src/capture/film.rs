@@ -1,0 +1,140 @@
+//! `film.json`: which film the photos of a capture come from.
+
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::error::CaptureError;
+use crate::{disk, input};
+
+/// The file, in the folder of a capture.
+const FILE: &str = "film.json";
+
+/// Where a capture keeps all frames of its film.
+pub const FRAMES: &str = "frames";
+
+/// One shot of a film: all its frames lie in `frames/`, and some of them, under the same
+/// names, in `images/`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Film {
+    /// The film's file, absolute.
+    pub source: PathBuf,
+    /// Where in the film the shot begins, in seconds.
+    pub start: f64,
+    /// How long it is, in seconds.
+    pub seconds: f64,
+    /// Frames a second: numerator and denominator, both positive.
+    pub frame_rate: [u32; 2],
+    /// Whether the film has sound.
+    pub audio: bool,
+    /// Width and height of a frame, in pixels.
+    pub size: [u32; 2],
+    /// Names of all frames, in order; at least one.
+    pub frames: Vec<String>,
+}
+
+impl Film {
+    /// The film of a capture's folder; none where its photos are no frames.
+    ///
+    /// # Errors
+    /// If the file cannot be read or contradicts itself.
+    pub fn read(dir: &Path) -> Result<Option<Self>, CaptureError> {
+        let path = dir.join(FILE);
+        let text = match input::read_to_string(&path) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+            read => read.map_err(|source| CaptureError::Read {
+                path: path.clone(),
+                source,
+            })?,
+        };
+        let film: Result<Self, String> =
+            serde_json::from_str(&text).map_err(|error| error.to_string());
+        let sound = film.and_then(|film| film.check().map(|()| film));
+        sound
+            .map(Some)
+            .map_err(|reason| CaptureError::Film { path, reason })
+    }
+
+    /// Writes it into a capture's folder, whole or not at all.
+    ///
+    /// # Errors
+    /// The system's, and if the film's path is no UTF-8.
+    pub fn write(&self, dir: &Path) -> io::Result<()> {
+        let path = dir.join(FILE);
+        let mut text = serde_json::to_vec_pretty(self)?;
+        text.push(b'\n');
+        let mut file = disk::create(&path)?;
+        file.write_all(&text)?;
+        file.persist(&path)
+    }
+
+    /// What about it cannot be, if anything.
+    fn check(&self) -> Result<(), String> {
+        let time = |seconds: f64| seconds.is_finite() && seconds >= 0.0;
+        let plain =
+            |name: &str| !(name.is_empty() || name.starts_with('.') || name.contains(['/', '\\']));
+        let wrong = if !(time(self.start) && time(self.seconds)) {
+            "start and seconds have to be times".to_owned()
+        } else if self.frame_rate.contains(&0) {
+            "frame_rate has to be positive".to_owned()
+        } else if self.size.contains(&0) {
+            "size has to be positive".to_owned()
+        } else if self.frames.is_empty() {
+            "frames is empty".to_owned()
+        } else if let Some(name) = self.frames.iter().find(|name| !plain(name)) {
+            format!("{name:?} is no name of a frame")
+        } else {
+            return Ok(());
+        };
+        Err(wrong)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn film() -> Film {
+        Film {
+            source: "/films/street.mp4".into(),
+            start: 65.0,
+            seconds: 20.0,
+            frame_rate: [24000, 1001],
+            audio: true,
+            size: [640, 480],
+            frames: vec!["000001.png".to_owned(), "000002.png".to_owned()],
+        }
+    }
+
+    #[test]
+    fn it_is_read_as_it_was_written() {
+        let dir = tempfile::tempdir().unwrap();
+        assert_eq!(Film::read(dir.path()).unwrap(), None);
+        film().write(dir.path()).unwrap();
+        assert_eq!(Film::read(dir.path()).unwrap(), Some(film()));
+    }
+
+    #[test]
+    fn what_cannot_be_is_refused_by_name() {
+        let dir = tempfile::tempdir().unwrap();
+        type Change = (&'static str, fn(&mut Film));
+        let changes: [Change; 6] = [
+            ("seconds", |f| f.seconds = -1.0),
+            ("frame_rate", |f| f.frame_rate[1] = 0),
+            ("size", |f| f.size[0] = 0),
+            ("frames", |f| f.frames.clear()),
+            ("../a.png", |f| f.frames[0] = "../a.png".to_owned()),
+            (".png", |f| f.frames[0] = ".png".to_owned()),
+        ];
+        for (word, change) in changes {
+            let mut film = film();
+            change(&mut film);
+            film.write(dir.path()).unwrap();
+            let error = Film::read(dir.path()).unwrap_err().to_string();
+            assert!(error.contains(word) && error.contains(FILE), "{error}");
+        }
+        std::fs::write(dir.path().join(FILE), "{").unwrap();
+        assert!(Film::read(dir.path()).is_err());
+    }
+}
