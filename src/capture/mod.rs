@@ -17,6 +17,8 @@ pub(crate) mod names;
 mod options;
 mod order;
 mod photo;
+#[cfg(feature = "cli")]
+mod plain;
 mod resample;
 mod room;
 mod sample;
@@ -61,6 +63,10 @@ pub use names::Ambiguous;
 pub use options::{Channel, Encoding, LoadOptions, MaskSource, MaskUse, Normalize};
 pub use order::view_at;
 pub use photo::Photo;
+#[cfg(feature = "cli")]
+pub(crate) use plain::{
+    Piece, PlainHeader, plain_header, plain_mask, plain_photo, plain_range, plain_values,
+};
 pub use resample::downscale;
 pub use split::{Split, split};
 pub use unplaced::Unplaced;

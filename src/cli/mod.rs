@@ -14,6 +14,7 @@ mod luma;
 mod network;
 mod photos;
 mod plan;
+mod prepare;
 mod printable;
 mod progress;
 mod remedy;
@@ -45,6 +46,7 @@ pub struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    Prepare(prepare::Prepare),
     Plan(plan::Plan),
     Fit(fit::Fit),
     Colorize(colorize::Colorize),
@@ -71,6 +73,7 @@ impl Cli {
 
     fn run(self) -> Result<(), CliError> {
         match self.command {
+            Command::Prepare(command) => command.run(),
             Command::Plan(command) => command.run(),
             Command::Fit(command) => command.run(),
             Command::Colorize(command) => command.run(),

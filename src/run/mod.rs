@@ -267,6 +267,20 @@ pub enum Stage {
     Pairs,
     /// Whole runs, one after the other; counted in seconds.
     Sweep,
+    /// Looking for a film's cuts; counted in seconds of the film.
+    Cuts,
+    /// Writing a film's frames.
+    Frames,
+    /// Looking for a film's sharpest frames.
+    Sharpness,
+    /// Making masks.
+    Masks,
+    /// Looking for features.
+    Features,
+    /// Matching photos.
+    Matches,
+    /// Finding poses.
+    Poses,
 }
 
 impl fmt::Display for Stage {
@@ -287,6 +301,13 @@ impl fmt::Display for Stage {
             Self::Path => "path",
             Self::Pairs => "pairs",
             Self::Sweep => "sweep",
+            Self::Cuts => "cuts",
+            Self::Frames => "frames",
+            Self::Sharpness => "sharpness",
+            Self::Masks => "masks",
+            Self::Features => "features",
+            Self::Matches => "matches",
+            Self::Poses => "poses",
         })
     }
 }
