@@ -74,7 +74,7 @@ pub enum PrepareError {
     },
     /// What would be replaced is not what was made.
     #[error(
-        "{}: was changed since it was made, and would be replaced; move it elsewhere, or choose another folder with -o", path.display()
+        "{}: was changed since it was made, and would be replaced; move it elsewhere (masks are taken from there with --masks), or choose another folder with -o", path.display()
     )]
     Changed {
         /// The file or folder.

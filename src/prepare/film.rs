@@ -198,7 +198,7 @@ fn extract(
     let film = Film {
         source: source.path.clone(),
         // That of the first frame, where half a frame earlier was asked for.
-        start: (part.start * source.rate() - 1e-6).ceil() / source.rate(),
+        start: first_frame(part.start, source.rate()),
         seconds: names.len() as f64 / rate,
         frame_rate,
         audio: source.audio,
@@ -209,6 +209,11 @@ fn extract(
         .map_err(files::at(&draft.path().join(FILM)))?;
     let made = [(frames, FRAMES), (draft.path().join(FILM), FILM)];
     state.place(Step::Frames, from, &made)
+}
+
+/// When the first frame at `start` or later is shown; a rounding error is no frame.
+fn first_frame(start: f64, rate: f64) -> f64 {
+    (start * rate - 1e-6).ceil().max(0.0) / rate
 }
 
 /// The frames' names, in order.

@@ -217,7 +217,7 @@ mod tests {
 
     #[test]
     fn photos_are_told_from_other_files() {
-        let photo = |side| png(&vec![9; side * 4], [side as u32, 4]).unwrap();
+        let photo = |side: usize| png(&vec![9; side * 4], [side as u32, 4]).unwrap();
         let dir = folder(&[
             ("b.png", photo(8)),
             ("left/a.png", photo(6)),

@@ -106,7 +106,7 @@ fn difference(a: &Shape, b: &Shape) -> f32 {
 
 /// Ranges of frames between cuts, without the empty frames at their ends.
 fn shots(differences: &[f32], empty: &[bool]) -> Vec<Range<usize>> {
-    let cuts = (0..differences.len()).filter(|&at| is_cut(differences, at));
+    let cuts = (0..differences.len()).filter(|&at| is_cut(differences, empty, at));
     let ends = cuts.map(|at| at + 1).chain([empty.len()]);
     let mut shots = Vec::new();
     let mut start = 0;
@@ -126,15 +126,16 @@ fn shots(differences: &[f32], empty: &[bool]) -> Vec<Range<usize>> {
     shots
 }
 
-fn is_cut(differences: &[f32], at: usize) -> bool {
+/// Whether there is a cut behind the frame `at`.
+fn is_cut(differences: &[f32], empty: &[bool], at: usize) -> bool {
+    // How empty frames differ says nothing of how the camera moves.
+    let shows = |at: usize| !(empty[at] || empty[at + 1]);
     let around = at.saturating_sub(AROUND)..differences.len().min(at + AROUND + 1);
-    let mut others: Vec<f32> = around
-        .filter(|&other| other != at)
-        .map(|other| differences[other])
-        .collect();
+    let others = around.filter(|&other| other != at && shows(other));
+    let mut others: Vec<f32> = others.map(|other| differences[other]).collect();
     others.sort_by(f32::total_cmp);
     let usual = others.get(others.len() / 2).copied().unwrap_or(0.0);
-    differences[at] > CUT && differences[at] > STANDS_OUT * usual
+    differences[at] > CUT && (!shows(at) || differences[at] > STANDS_OUT * usual)
 }
 
 #[cfg(test)]
@@ -154,10 +155,11 @@ mod tests {
             .collect()
     }
 
-    fn shots_of(frames: impl IntoIterator<Item = Vec<u8>>) -> Vec<Range<usize>> {
+    fn shots_of(frames: impl IntoIterator<Item = Vec<u8>>) -> Vec<[usize; 2]> {
         let mut cutter = Cutter::default();
         frames.into_iter().for_each(|frame| cutter.look(&frame));
-        cutter.shots()
+        let shots = cutter.shots().into_iter();
+        shots.map(|shot| [shot.start, shot.end]).collect()
     }
 
     #[test]
@@ -165,20 +167,20 @@ mod tests {
         let lengths = [20, 3, 40];
         let frames = (0..3).flat_map(|scene| (0..lengths[scene]).map(move |n| (scene, n)));
         let found = shots_of(frames.map(|(scene, n)| frame(scene, n, 1.0)));
-        assert_eq!(found, [0..20, 20..23, 23..63]);
+        assert_eq!(found, [[0, 20], [20, 23], [23, 63]]);
     }
 
     #[test]
     fn flicker_a_flash_and_motion_are_no_cuts() {
         let flicker = (0..50).map(|n| frame(1, 2 * n, 0.6 + 0.4 * ((n * 7) % 5) as f32 / 5.0));
-        assert_eq!(shots_of(flicker), [0..50]);
+        assert_eq!(shots_of(flicker), [[0, 50]]);
         let flash = (0..50).map(|n| match n {
             25 => vec![250; SIZE[0] * SIZE[1]],
             _ => frame(2, n, 1.0),
         });
-        assert_eq!(shots_of(flash), [0..50]);
+        assert_eq!(shots_of(flash), [[0, 50]]);
         let torn = (0..50).map(|n| frame(if n == 25 { 4 } else { 2 }, n, 1.0));
-        assert_eq!(shots_of(torn), [0..50]);
+        assert_eq!(shots_of(torn), [[0, 50]]);
     }
 
     #[test]
@@ -187,11 +189,11 @@ mod tests {
         let scene = |scene| (0..20).map(move |n| frame(scene, n, 1.0));
         let film = black().into_iter().chain(scene(0)).chain(black());
         let found = shots_of(film.chain(scene(0)).chain(black()));
-        assert_eq!(found, [6..26, 32..52]);
-        assert_eq!(shots_of(black()), []);
-        assert_eq!(shots_of([]), []);
-        assert_eq!(shots_of([frame(0, 0, 1.0)]), [0..1]);
-        assert_eq!(shots_of([frame(0, 0, 1.0), frame(0, 1, 1.0)]), [0..2]);
+        assert_eq!(found, [[6, 26], [32, 52]]);
+        assert_eq!(shots_of(black()), [[0; 2]; 0]);
+        assert_eq!(shots_of([]), [[0; 2]; 0]);
+        assert_eq!(shots_of([frame(0, 0, 1.0)]), [[0, 1]]);
+        assert_eq!(shots_of([frame(0, 0, 1.0), frame(0, 1, 1.0)]), [[0, 2]]);
     }
 
     #[test]
