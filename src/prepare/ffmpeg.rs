@@ -341,7 +341,8 @@ fn scan(said: &str, rate: f64) -> Scan {
     let [upper, lower, progressive] =
         counts("Multi frame detection:", ["TFF:", "BFF:", "Progressive:"]);
     let frames = (neither + top + bottom).max(1.0);
-    let interlaced = upper + lower;
+    // Where fields are of one moment, noise passes for either order as often.
+    let interlaced = (upper - lower).abs();
     if (VIDEO_RATE[0]..VIDEO_RATE[1]).contains(&rate)
         && (top + bottom) / frames > REPEATED
         && interlaced > 0.0
@@ -456,6 +457,10 @@ and another"#;
         );
         assert_eq!(
             scan(&idet([300, 100, 100], [180, 0, 300]), 25.0),
+            Scan::Progressive
+        );
+        assert_eq!(
+            scan(&idet([100, 0, 0], [47, 44, 9]), 25.0),
             Scan::Progressive
         );
         assert_eq!(scan("", film), Scan::Progressive);

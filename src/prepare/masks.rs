@@ -88,13 +88,9 @@ pub(super) fn borders(
 /// Masks in a folder by the names of photos.
 ///
 /// # Errors
-/// If it is not there or has a mask for none of them.
+/// If it cannot be read or has a mask for none of them.
 pub(super) fn named(folder: &Path, photos: &Photos) -> Result<NamedFiles, PrepareError> {
     let mut named = NamedFiles::default();
-    if !folder.is_dir() {
-        let dir = folder.into();
-        return Err(RunError::from(CaptureError::NoMaskFolder { dir }).into());
-    }
     visit_files(folder, &mut |name, path| {
         if name.to_ascii_lowercase().ends_with(".png") {
             named.insert(&name, path);

@@ -32,7 +32,7 @@ pub use poses::Poses;
 pub(crate) use process::end_programs;
 
 use crate::{
-    capture::{Film, IMAGES},
+    capture::{CaptureError, Film, IMAGES},
     run::{Event, Observer, RunError, Stage, files},
 };
 use colmap::Colmap;
@@ -132,6 +132,7 @@ pub fn prepare(
         check_apart(options, &input, &output)?;
         check_film_options(options)?;
     }
+    check_masks(options)?;
     let colmap = Colmap::find(options.install, &mut |line| observe(Event::Note(line)))?;
     if is_film {
         ffmpeg::check_version()?;
@@ -225,6 +226,20 @@ fn check_film_options(options: &PrepareOptions) -> Result<(), PrepareError> {
     }
 }
 
+/// Refuses masks that are not there: better now than after hours of work.
+fn check_masks(options: &PrepareOptions) -> Result<(), PrepareError> {
+    if let Some(mask) = &options.mask {
+        crate::input::open(mask).map_err(files::at(mask))?;
+    }
+    match &options.masks {
+        Some(dir) if !dir.is_dir() => {
+            let dir = dir.clone();
+            Err(RunError::from(CaptureError::NoMaskFolder { dir }).into())
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Tells how far a stage is.
 fn tell(observe: &mut Observer<'_>, stage: Stage, done: usize, total: usize) {
     observe(Event::Progress {
@@ -280,7 +295,10 @@ fn make_masks(
         &of_option(&options.masks)?,
     ]);
     let folder = state.path(MASKS);
-    if !state.is_done(Step::Masks, &from) {
+    // What the user has painted stays, unless other masks are named.
+    let asked = options.mask.is_some() || options.masks.is_some();
+    let painted = !asked && state.check_own(MASKS).is_err();
+    if !(painted || state.is_done(Step::Masks, &from)) {
         state.check_own(MASKS)?;
         let borders = masks::borders(photos, &images, &mut |done, total| {
             tell(observe, Stage::Masks, done, total);

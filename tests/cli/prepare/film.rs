@@ -5,6 +5,7 @@ use std::fs;
 use serde_json::{Value, json};
 
 use super::fakes::{calls, piece, place_with, refused, succeed, version};
+use crate::documented::{documented, keys};
 use crate::program::Place;
 use crate::scene;
 
@@ -133,6 +134,13 @@ fn a_film_becomes_what_fit_takes() {
     let told: Value = serde_json::from_str(&done.stdout).expect("JSON");
     assert_eq!(told["shots"], json!([[0.0, 1.5], [1.5, 5.5], [5.5, 7.5]]));
     assert_eq!(told["film"], film);
+    let page = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/run-folder.md");
+    let page = fs::read_to_string(page).expect("the page");
+    let said = page
+        .split_once("What `prepare --json` prints")
+        .expect("a table")
+        .1;
+    assert_eq!(documented(&format!("## x\n{said}"), "## x"), keys(&told));
 }
 
 #[test]
