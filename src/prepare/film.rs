@@ -7,7 +7,7 @@ use std::{
 
 use super::{
     PrepareError, PrepareOptions,
-    ffmpeg::{Part, Scan, Source},
+    ffmpeg::{self, Part, Scan, Source},
     photos::link_all,
     sharp,
     state::{State, Step, digest, of},
@@ -29,6 +29,15 @@ const TOLD_SHOTS: usize = 12;
 /// while there is a choice.
 const SHORTEST: f64 = 0.5;
 
+/// Says what a film is.
+///
+/// # Errors
+/// [`PrepareError`]: FFmpeg is missing or too old, or the file is none.
+pub(super) fn probe(input: &Path) -> Result<Source, PrepareError> {
+    ffmpeg::check_version()?;
+    Source::probe(input)
+}
+
 /// Makes `frames/`, `film.json` and `images/`; the shots of the film, where they were looked for.
 ///
 /// # Errors
@@ -36,10 +45,10 @@ const SHORTEST: f64 = 0.5;
 pub(super) fn frames(
     state: &mut State,
     options: &PrepareOptions,
-    input: &Path,
+    source: &Source,
     observe: &mut Observer<'_>,
 ) -> Result<Vec<[f64; 2]>, PrepareError> {
-    let same_film = of(&["film", &digest(input)?]);
+    let same_film = of(&["film", &digest(&source.path)?]);
     let time = |time: Option<f64>| time.map_or(String::new(), |time| time.to_string());
     let from = of(&[
         "frames",
@@ -51,9 +60,8 @@ pub(super) fn frames(
         for result in [FRAMES, FILM, IMAGES] {
             state.check_own(result)?;
         }
-        let source = Source::probe(input)?;
-        let part = choose(state, options, &source, &same_film, observe)?;
-        extract(state, &source, part, &from, observe)?;
+        let part = choose(state, options, source, &same_film, observe)?;
+        extract(state, source, part, &from, observe)?;
     }
     choose_sharp(state, options, observe)?;
     Ok(state.shots(&same_film).unwrap_or_default().to_vec())

@@ -32,7 +32,7 @@ pub use poses::Poses;
 pub(crate) use process::end_programs;
 
 use crate::{
-    capture::{CaptureError, Film, IMAGES},
+    capture::{CaptureError, Film, IMAGES, plain_header},
     run::{Event, Observer, RunError, Stage, files},
 };
 use colmap::Colmap;
@@ -134,14 +134,15 @@ pub fn prepare(
     }
     check_masks(options)?;
     let colmap = Colmap::find(options.install, &mut |line| observe(Event::Note(line)))?;
-    if is_film {
-        ffmpeg::check_version()?;
-    }
+    let source = match is_film {
+        true => Some(film::probe(&input)?),
+        false => None,
+    };
     let mut state = State::open(&output, &input, options)?;
     let mut shots = Vec::new();
-    match is_film {
-        true => shots = film::frames(&mut state, options, &input, observe)?,
-        false => link_photos(&mut state, &input, observe)?,
+    match &source {
+        Some(source) => shots = film::frames(&mut state, options, source, observe)?,
+        None => link_photos(&mut state, &input, observe)?,
     }
     let images = state.path(IMAGES);
     let photos = Photos::of(&images)?;
@@ -190,7 +191,13 @@ fn check_input(named: &Path, input: &Path) -> Result<bool, PrepareError> {
     }
     // A pipe or a device is refused.
     crate::input::open(input).map_err(files::at(named))?;
-    Ok(true)
+    match plain_header(input) {
+        Ok(_) => Err(PrepareError::NoFilm {
+            path: named.into(),
+            reason: "is a photo; name the folder that holds it and others".to_owned(),
+        }),
+        Err(_) => Ok(true),
+    }
 }
 
 /// Refuses to write among the photos.

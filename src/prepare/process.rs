@@ -96,11 +96,14 @@ impl Program {
     pub fn run(self, folder: &Path, heard: &mut dyn FnMut(&str)) -> Result<(), PrepareError> {
         let (running, stdout, stderr) = self.start(folder)?;
         let (sender, lines) = channel();
-        let readers = [listen(stdout, sender.clone()), listen(stderr, sender)];
-        let mut last = VecDeque::new();
-        for line in lines {
+        let readers = [
+            listen(stdout, sender.clone(), Stream::Output),
+            listen(stderr, sender, Stream::Error),
+        ];
+        let mut last = Last::default();
+        for (stream, line) in lines {
             heard(&line);
-            keep(&mut last, line);
+            last.keep(stream, line);
         }
         for reader in readers {
             // It has nothing to tell but its lines.
@@ -134,7 +137,7 @@ impl Program {
     ) -> Result<(), PrepareError> {
         let (running, mut stdout, stderr) = self.start(Path::new("."))?;
         let (sender, lines) = channel();
-        let reader = listen(stderr, sender);
+        let reader = listen(stderr, sender, Stream::Error);
         let enough = loop {
             match take(&mut stdout) {
                 Ok(true) => {}
@@ -148,9 +151,9 @@ impl Program {
             let _ = locked(&running.child).kill();
         }
         drop(stdout);
-        let mut last = VecDeque::new();
-        for line in lines {
-            keep(&mut last, line);
+        let mut last = Last::default();
+        for (stream, line) in lines {
+            last.keep(stream, line);
         }
         let _ = reader.join();
         match enough {
@@ -203,18 +206,12 @@ impl Program {
         }
     }
 
-    fn judge(
-        &self,
-        ended: io::Result<ExitStatus>,
-        last: &VecDeque<String>,
-    ) -> Result<(), PrepareError> {
+    fn judge(&self, ended: io::Result<ExitStatus>, last: &Last) -> Result<(), PrepareError> {
         let status = ended.map_err(|error| self.failed(error))?;
         if status.success() {
             return Ok(());
         }
-        let said: Vec<&str> = last.iter().map(|line| message(line)).collect();
-        let said: Vec<&str> = said.into_iter().filter(|line| !line.is_empty()).collect();
-        let told = &said[said.len().saturating_sub(TOLD_LINES)..];
+        let told = last.told();
         Err(PrepareError::Program {
             program: self.known_as(),
             said: match told.is_empty() {
@@ -254,7 +251,11 @@ impl Drop for Running {
 
 /// Sends the lines that a program says: programs that show how far they are end lines with a
 /// carriage return as well.
-fn listen(said: impl Read + Send + 'static, to: Sender<String>) -> thread::JoinHandle<()> {
+fn listen(
+    said: impl Read + Send + 'static,
+    to: Sender<(Stream, String)>,
+    stream: Stream,
+) -> thread::JoinHandle<()> {
     thread::spawn(move || {
         let mut said = BufReader::new(said);
         let mut line = Vec::new();
@@ -273,21 +274,50 @@ fn listen(said: impl Read + Send + 'static, to: Sender<String>) -> thread::JoinH
             };
             if end.is_some() && !line.is_empty() {
                 // Nobody may be listening any more; the program is heard to its end.
-                let _ = to.send(String::from_utf8_lossy(&line).into_owned());
+                let _ = to.send((stream, String::from_utf8_lossy(&line).into_owned()));
                 line.clear();
             }
         }
         if !line.is_empty() {
-            let _ = to.send(String::from_utf8_lossy(&line).into_owned());
+            let _ = to.send((stream, String::from_utf8_lossy(&line).into_owned()));
         }
     })
 }
 
-fn keep(last: &mut VecDeque<String>, line: String) {
-    if last.len() == KEPT_LINES {
-        last.pop_front();
+/// Where a program says something.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stream {
+    Output,
+    Error,
+}
+
+/// What a program said last.
+#[derive(Default)]
+struct Last(VecDeque<(Stream, String)>);
+
+impl Last {
+    fn keep(&mut self, stream: Stream, line: String) {
+        if self.0.len() == KEPT_LINES {
+            self.0.pop_front();
+        }
+        self.0.push_back((stream, line));
     }
-    last.push_back(line);
+
+    /// The last lines of standard error or, where there are none, of standard output.
+    fn told(&self) -> Vec<&str> {
+        let of = |stream| {
+            let said = self.0.iter().filter(|(from, _)| *from == stream);
+            let said = said
+                .map(|(_, line)| message(line))
+                .filter(|line| !line.is_empty());
+            said.collect::<Vec<_>>()
+        };
+        let mut said = of(Stream::Error);
+        if said.is_empty() {
+            said = of(Stream::Output);
+        }
+        said.split_off(said.len().saturating_sub(TOLD_LINES))
+    }
 }
 
 /// A line without what a log puts before it (`E20250101 10:00:00.000000 123 file.cc:7] `).

@@ -249,6 +249,9 @@ fn films_that_cannot_be_used() {
         said["streams"][0]["codec_type"] = json!("data")
     });
     refused(&place, &FILM, &["film.mp4", "no moving pictures"]);
+    assert!(!place.path("house").exists());
+    let photo = ["prepare", "photos/00.png", "-o", "house"];
+    refused(&place, &photo, &["00.png", "is a photo", "folder"]);
     probe(&place, |_| {});
     place.write("fake/tiny", vec![0; 64 * 36 * 20]);
     refused(&place, &FILM, &["film.mp4", "only black"]);
