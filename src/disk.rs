@@ -294,6 +294,16 @@ pub(crate) fn remove(path: &Path) -> io::Result<()> {
     }
 }
 
+/// A file of its own with the same content.
+///
+/// # Errors
+/// The system's.
+#[cfg(feature = "cli")]
+pub(crate) fn copy(from: &Path, to: &Path) -> io::Result<()> {
+    step()?;
+    fs::copy(from, to).map(drop)
+}
+
 /// The same file in two places, copied where the file system cannot do that.
 ///
 /// # Errors

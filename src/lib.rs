@@ -3,7 +3,7 @@
 //! Imports go down only:
 //!
 //! ```text
-//! cli → tradeoff → run → eval → report, doctor → luma, chroma → effects, measure → raster
+//! cli → tradeoff, prepare → run → eval → report, doctor → luma, chroma → effects, measure → raster
 //! → capture, splats → gpu, color, sections, download, npy, oracle, compare → disk, hash, input
 //! ```
 //!
@@ -64,6 +64,8 @@ pub mod luma;
 pub mod measure;
 mod npy;
 pub mod oracle;
+#[cfg(feature = "cli")]
+pub mod prepare;
 pub mod raster;
 pub mod report;
 pub mod run;

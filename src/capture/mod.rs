@@ -18,6 +18,8 @@ mod options;
 mod order;
 mod original;
 mod photo;
+#[cfg(feature = "cli")]
+mod plain;
 mod resample;
 mod room;
 mod sample;
@@ -63,6 +65,10 @@ pub use options::{Channel, Encoding, LoadOptions, MaskSource, MaskUse, Normalize
 pub use order::view_at;
 pub use original::Original;
 pub use photo::Photo;
+#[cfg(feature = "cli")]
+pub(crate) use plain::{
+    Piece, PlainHeader, plain_header, plain_mask, plain_photo, plain_range, plain_values,
+};
 pub use resample::downscale;
 pub use split::{Split, split};
 pub use unplaced::Unplaced;

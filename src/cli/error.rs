@@ -3,7 +3,9 @@
 use std::path::PathBuf;
 
 use super::remedy;
-use crate::{download::DownloadError, run::RunError, tradeoff::TradeoffError};
+use crate::{
+    download::DownloadError, prepare::PrepareError, run::RunError, tradeoff::TradeoffError,
+};
 
 /// What stopped a command; one line that names the file and the remedy.
 #[derive(Debug, thiserror::Error)]
@@ -14,6 +16,9 @@ pub enum CliError {
     /// A sweep.
     #[error("{}", remedy::of_sweep(.0))]
     Tradeoff(#[from] TradeoffError),
+    /// A film or photos could not be prepared.
+    #[error("{}", remedy::of_preparing(.0))]
+    Prepare(#[from] PrepareError),
     /// A network was not fetched.
     #[error("{}", remedy::of_download(error, by_hand.as_ref()))]
     Fetch {

@@ -75,7 +75,7 @@ pub struct Fit {
 }
 
 /// Ends the program as one that was called wrongly.
-fn refuse(reason: &str) -> ! {
+pub(super) fn refuse(reason: &str) -> ! {
     Cli::command()
         .error(ErrorKind::ArgumentConflict, reason)
         .exit()

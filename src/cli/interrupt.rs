@@ -7,7 +7,7 @@ use std::{
 
 use super::CliError;
 use crate::{
-    disk,
+    disk, prepare,
     run::{Interrupt, RunError},
 };
 
@@ -27,6 +27,8 @@ pub(super) fn heed_signals() -> Result<(), CliError> {
             eprintln!("writing a checkpoint; once more ends at once");
             return;
         }
+        // Before their files are removed.
+        let _no_program = prepare::end_programs();
         let _nothing_new = disk::give_up();
         exit(INTERRUPTED);
     });

@@ -17,6 +17,7 @@ mod network;
 mod next;
 mod photos;
 mod plan;
+mod prepare;
 mod printable;
 mod progress;
 mod remedy;
@@ -48,6 +49,7 @@ pub struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    Prepare(prepare::Prepare),
     Plan(plan::Plan),
     Fit(fit::Fit),
     Colorize(colorize::Colorize),
@@ -75,6 +77,7 @@ impl Cli {
 
     fn run(self) -> Result<(), CliError> {
         match self.command {
+            Command::Prepare(command) => command.run(),
             Command::Plan(command) => command.run(),
             Command::Fit(command) => command.run(),
             Command::Colorize(command) => command.run(),

@@ -8,6 +8,7 @@ use crate::{
     download::DownloadError,
     eval::EvalError,
     gpu::GpuError,
+    prepare::PrepareError,
     run::RunError,
     tradeoff::TradeoffError,
 };
@@ -69,6 +70,14 @@ pub(super) fn of_run(error: &RunError) -> String {
 pub(super) fn of_sweep(error: &TradeoffError) -> String {
     match error {
         TradeoffError::Run(error) => of_run(error),
+        _ => error.to_string(),
+    }
+}
+
+/// What the user reads of what keeps a film or photos from being prepared.
+pub(super) fn of_preparing(error: &PrepareError) -> String {
+    match error {
+        PrepareError::Run(error) => of_run(error),
         _ => error.to_string(),
     }
 }

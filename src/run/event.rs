@@ -44,7 +44,7 @@ pub enum Stage {
     /// Drawing pictures.
     Rendering,
     /// Coloring photos at full size.
-    Frames,
+    Coloring,
     /// Measuring pictures against photos.
     Measuring,
     /// Drawing and comparing the frames of a path.
@@ -59,6 +59,20 @@ pub enum Stage {
     Saving,
     /// Whole runs, one after the other; counted in seconds.
     Sweep,
+    /// Looking for a film's cuts; counted in seconds of the film.
+    Cuts,
+    /// Writing a film's frames.
+    Frames,
+    /// Looking for a film's sharpest frames.
+    Sharpness,
+    /// Making masks.
+    Masks,
+    /// Looking for features.
+    Features,
+    /// Matching photos.
+    Matches,
+    /// Finding poses.
+    Poses,
 }
 
 impl fmt::Display for Stage {
@@ -82,7 +96,7 @@ impl fmt::Display for Stage {
             Self::Bake => "bake",
             Self::Baseline => "baseline",
             Self::Rendering => "rendering",
-            Self::Frames => "frames",
+            Self::Coloring => "coloring",
             Self::Measuring => "measuring",
             Self::Path => "path",
             Self::Views => "views",
@@ -90,6 +104,13 @@ impl fmt::Display for Stage {
             Self::Page => "page",
             Self::Saving => "saving",
             Self::Sweep => "sweep",
+            Self::Cuts => "cuts",
+            Self::Frames => "frames",
+            Self::Sharpness => "sharpness",
+            Self::Masks => "masks",
+            Self::Features => "features",
+            Self::Matches => "matches",
+            Self::Poses => "poses",
         })
     }
 }

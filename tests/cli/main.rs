@@ -28,6 +28,9 @@ mod masks;
 mod names;
 mod photos;
 mod picture;
+// Programs of others are stood in for by shell scripts.
+#[cfg(unix)]
+mod prepare;
 mod program;
 mod repeat;
 mod resume;

@@ -6,7 +6,7 @@ use std::{collections::BTreeSet, fs, path::Path};
 /// does not know each other.
 const FLOORS: [&[&str]; 11] = [
     &["cli"],
-    &["tradeoff"],
+    &["tradeoff", "prepare"],
     &["run"],
     &["eval", "frames"],
     &["report", "doctor"],

@@ -70,6 +70,15 @@ pub(super) fn read(root: &Path) -> Result<Model, CaptureError> {
     read_files(paths, extension)
 }
 
+/// Reads the model in this very folder; none where there is no whole one.
+#[cfg(feature = "cli")]
+pub(super) fn read_in(dir: &Path) -> Result<Option<Model>, CaptureError> {
+    match files_in(dir) {
+        Ok((paths, extension)) => read_files(paths, extension).map(Some),
+        Err(_) => Ok(None),
+    }
+}
+
 /// The folder of the model that [`read`] reads.
 pub(super) fn folder(root: &Path) -> Result<PathBuf, CaptureError> {
     let ([cameras, ..], _) = find(root)?;

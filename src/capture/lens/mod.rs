@@ -22,7 +22,7 @@ use glam::{DVec2, DVec3};
 
 pub use cuts::Cut;
 pub(super) use model::MOST_PARAMETERS;
-pub use model::ModelName;
+pub use model::{MODELS, ModelName};
 pub use undistort::Undistortion;
 
 use distortion::Distortion;

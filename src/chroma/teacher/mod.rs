@@ -34,6 +34,8 @@ pub use hints::{HintFolder, HintImage};
 pub use images::{AbImage, GrayImage};
 pub(super) use images::{Filter, resample};
 pub use network::{NetworkTeacher, ToldBy};
+#[cfg(feature = "cli")]
+pub(crate) use places::cache_folder;
 pub use query::Query;
 pub use upsample::Upsample;
 

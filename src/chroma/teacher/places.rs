@@ -3,10 +3,10 @@
 use std::env;
 use std::path::PathBuf;
 
-/// A folder of the project's cache: `onnxruntime`, `teachers`. It need not be there. None where
+/// A folder of the project's cache: `onnxruntime`, `teachers`, `pycolmap`. It need not be there. None where
 /// the system names no place for it: never one that depends on the current folder, since
 /// libraries are loaded from it.
-pub(super) fn cache_folder(name: &str) -> Option<PathBuf> {
+pub(crate) fn cache_folder(name: &str) -> Option<PathBuf> {
     let variable = |name| env::var_os(name).map(PathBuf::from);
     let candidates = [
         variable("XDG_CACHE_HOME"),

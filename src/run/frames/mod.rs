@@ -127,7 +127,7 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
     };
     let mut progress = |done: usize, name: &str| {
         observe(Event::Progress {
-            stage: Stage::Frames,
+            stage: Stage::Coloring,
             done,
             total: shots.len(),
             message: name.to_owned(),

@@ -1,0 +1,365 @@
+//! Camera poses from COLMAP: the program, or the same as a module of Python.
+
+use std::{
+    collections::BTreeSet,
+    ffi::OsString,
+    path::{Path, PathBuf},
+};
+
+use serde::{Deserialize, Serialize};
+
+use super::{PrepareError, process::Program, pycolmap};
+
+/// So many frames to either side of one are matched with it.
+const OVERLAP: u32 = 10;
+
+/// Which photos one camera with one lens took.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Cameras {
+    /// All.
+    One,
+    /// Those of one folder.
+    Folder,
+    /// Each its own, as where the lens zooms; from its EXIF data where it has some.
+    Photo,
+}
+
+/// Which photos are matched with which.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Matching {
+    /// Each with its neighbors by name, and ever fewer farther away.
+    Sequential,
+    /// Each with each.
+    Exhaustive,
+}
+
+/// What features are looked for in.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Features<'a> {
+    pub images: &'a Path,
+    /// Of each photo `masks/NAME.png`.
+    pub masks: Option<&'a Path>,
+    pub cameras: Cameras,
+    /// COLMAP's name of the camera model.
+    pub lens: &'a str,
+}
+
+/// How far a step is: done and, where it is known, of how many.
+pub(super) type Told<'a> = dyn FnMut(usize, Option<usize>) + 'a;
+
+/// Who finds poses.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Colmap {
+    /// The program, in this version.
+    Program(String),
+    /// A Python that has `pycolmap`, in this version.
+    Python(OsString, String),
+}
+
+impl Colmap {
+    /// The program on `PATH`, else a Python that can import `pycolmap`; with `install` one is
+    /// made where there is none.
+    ///
+    /// # Errors
+    /// [`PrepareError::NoColmap`] where there is neither.
+    pub fn find(install: bool, told: &mut dyn FnMut(String)) -> Result<Self, PrepareError> {
+        match Program::new("colmap").arg("help").ask() {
+            Ok(said) => Ok(Self::Program(version(&said))),
+            Err(PrepareError::NoProgram { .. }) => {
+                let (python, version) = pycolmap::find(install, told)?;
+                Ok(Self::Python(python, version))
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    /// In words.
+    pub fn name(&self) -> String {
+        match self {
+            Self::Program(version) => format!("COLMAP {version}"),
+            Self::Python(_, version) => format!("pycolmap {version}"),
+        }
+    }
+
+    /// Looks for features, and writes them into a new database.
+    ///
+    /// # Errors
+    /// [`PrepareError::Program`].
+    pub fn features(
+        &self,
+        database: &Path,
+        of: &Features,
+        told: &mut Told,
+    ) -> Result<(), PrepareError> {
+        let mut arguments = vec![
+            Argument::path("database_path", database),
+            Argument::path("image_path", of.images),
+            Argument::new("ImageReader.camera_model", of.lens),
+        ];
+        let one = match of.cameras {
+            Cameras::One => "ImageReader.single_camera",
+            Cameras::Folder => "ImageReader.single_camera_per_folder",
+            Cameras::Photo => "ImageReader.single_camera_per_image",
+        };
+        arguments.push(Argument::new(one, "1"));
+        if let Some(masks) = of.masks {
+            arguments.push(Argument::path("ImageReader.mask_path", masks));
+        }
+        arguments.extend(without_gpu(["SiftExtraction", "FeatureExtraction"]));
+        self.run("feature_extractor", arguments, told)
+    }
+
+    /// Matches the photos of a database.
+    ///
+    /// # Errors
+    /// [`PrepareError::Program`].
+    pub fn matches(
+        &self,
+        database: &Path,
+        matching: Matching,
+        told: &mut Told,
+    ) -> Result<(), PrepareError> {
+        let mut arguments = vec![Argument::path("database_path", database)];
+        arguments.extend(without_gpu(["SiftMatching", "FeatureMatching"]));
+        let command = match matching {
+            Matching::Exhaustive => "exhaustive_matcher",
+            Matching::Sequential => {
+                let overlap = OVERLAP.to_string();
+                arguments.push(Argument::new("SequentialMatching.overlap", overlap));
+                arguments.push(Argument::new("SequentialMatching.quadratic_overlap", "1"));
+                "sequential_matcher"
+            }
+        };
+        self.run(command, arguments, told)
+    }
+
+    /// Finds poses, and writes models into `0`, `1`, … below a folder that is there.
+    ///
+    /// # Errors
+    /// [`PrepareError::Program`].
+    pub fn poses(
+        &self,
+        database: &Path,
+        images: &Path,
+        models: &Path,
+        told: &mut Told,
+    ) -> Result<(), PrepareError> {
+        let arguments = vec![
+            Argument::path("database_path", database),
+            Argument::path("image_path", images),
+            Argument::path("output_path", models),
+        ];
+        self.run("mapper", arguments, told)
+    }
+
+    fn run(
+        &self,
+        command: &str,
+        mut arguments: Vec<Argument>,
+        told: &mut Told,
+    ) -> Result<(), PrepareError> {
+        arguments.push(Argument::optional("random_seed", "0"));
+        let program = match self {
+            Self::Program(_) => {
+                let said = Program::new("colmap").args([command, "--help"]).ask()?;
+                let known = options(&said);
+                let program = Program::new("colmap").arg(command);
+                given(arguments, &known)
+                    .into_iter()
+                    .fold(program, |program, argument| {
+                        program.option(&format!("--{}", argument.name), argument.value)
+                    })
+            }
+            Self::Python(python, _) => {
+                let program = pycolmap::program(python, command);
+                arguments.into_iter().fold(program, |program, argument| {
+                    program.option(argument.name, argument.value)
+                })
+            }
+        };
+        // COLMAP leaves nothing where it runs.
+        program.run(Path::new("."), &mut |line| {
+            if let Some((done, total)) = progress(line) {
+                told(done, total);
+            }
+        })
+    }
+}
+
+/// An option of a command of COLMAP's.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Argument {
+    name: &'static str,
+    value: OsString,
+    /// Whether the command does what is asked without it, where it does not know it.
+    optional: bool,
+}
+
+impl Argument {
+    fn new(name: &'static str, value: impl Into<OsString>) -> Self {
+        Self {
+            name,
+            value: value.into(),
+            optional: false,
+        }
+    }
+
+    fn path(name: &'static str, path: &Path) -> Self {
+        Self::new(name, path)
+    }
+
+    fn optional(name: &'static str, value: &str) -> Self {
+        Self {
+            optional: true,
+            ..Self::new(name, value)
+        }
+    }
+}
+
+/// The options of versions before 4 and since, each for what it is called there: no GPU, and
+/// hence no display.
+fn without_gpu(groups: [&'static str; 2]) -> [Argument; 2] {
+    groups.map(|group| {
+        let name = match group {
+            "SiftExtraction" => "SiftExtraction.use_gpu",
+            "FeatureExtraction" => "FeatureExtraction.use_gpu",
+            "SiftMatching" => "SiftMatching.use_gpu",
+            _ => "FeatureMatching.use_gpu",
+        };
+        Argument::optional(name, "0")
+    })
+}
+
+/// Those that are given to a command that knows these options.
+fn given(arguments: Vec<Argument>, known: &BTreeSet<String>) -> Vec<Argument> {
+    arguments
+        .into_iter()
+        .filter(|argument| !argument.optional || known.contains(argument.name))
+        .collect()
+}
+
+/// The names of options in what `--help` says.
+fn options(said: &str) -> BTreeSet<String> {
+    said.split_whitespace()
+        .filter_map(|word| word.strip_prefix("--"))
+        .map(str::to_owned)
+        .collect()
+}
+
+/// The version in what `colmap help` says.
+fn version(said: &str) -> String {
+    let mut words = said.split_whitespace().skip_while(|word| *word != "COLMAP");
+    let named = words
+        .nth(1)
+        .filter(|word| word.starts_with(|c: char| c.is_ascii_digit()));
+    named.unwrap_or("of an unknown version").to_owned()
+}
+
+/// How far COLMAP is, if a line says so: what is done and, where it is known, of how many.
+fn progress(line: &str) -> Option<(usize, Option<usize>)> {
+    let words = [
+        "Processed file [",
+        "Matching image [",
+        "Processing image [",
+        "Matching block [",
+        "Processing block [",
+    ];
+    if let Some((_, rest)) = words.iter().find_map(|word| line.split_once(word)) {
+        let inside = rest.split(']').next()?;
+        let parts = inside.split(',').map(|part| {
+            let (done, total) = part.trim().split_once('/')?;
+            Some((done.trim().parse().ok()?, total.trim().parse().ok()?))
+        });
+        // Blocks are counted in rows and columns.
+        return parts
+            .collect::<Option<Vec<(usize, usize)>>>()
+            .and_then(|parts| match parts[..] {
+                [(done, total)] => Some((done, Some(total))),
+                [(row, rows), (column, columns)] => {
+                    let done = row
+                        .checked_sub(1)?
+                        .checked_mul(columns)?
+                        .checked_add(column)?;
+                    Some((done, rows.checked_mul(columns)))
+                }
+                _ => None,
+            });
+    }
+    // `Registering image #7 (12)`, since 3.12 `(num_reg_frames=12)`.
+    let (_, rest) = line.split_once("Registering image #")?;
+    let (_, count) = rest.split_once('(')?;
+    let digits = count.trim_start_matches(|c: char| !c.is_ascii_digit());
+    let end = digits
+        .find(|c: char| !c.is_ascii_digit())
+        .unwrap_or(digits.len());
+    Some((digits[..end].parse().ok()?, None))
+}
+
+/// The folders `0`, `1`, … that a mapper wrote, in order.
+pub(super) fn models(folder: &Path) -> Vec<PathBuf> {
+    (0..)
+        .map(|number: usize| folder.join(number.to_string()))
+        .take_while(|model| model.is_dir())
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn versions_are_read() {
+        let help = "COLMAP 3.8 -- Structure-from-Motion and Multi-View Stereo\n  (Commit Unknown)";
+        assert_eq!(version(help), "3.8");
+        let logged = "I20250101 10:00:00 1 main.cc:3] COLMAP 4.1.0.dev0 (Commit abc)";
+        assert_eq!(version(logged), "4.1.0.dev0");
+        assert_eq!(version("nothing"), "of an unknown version");
+    }
+
+    #[test]
+    fn a_command_is_given_what_it_knows() {
+        let help =
+            "  -h [ --help ]\n  --random_seed arg (=0)\n  --SiftExtraction.use_gpu arg (=1)\n";
+        let known = options(help);
+        let mut arguments = vec![
+            Argument::new("database_path", "/db"),
+            Argument::optional("random_seed", "0"),
+        ];
+        arguments.extend(without_gpu(["SiftExtraction", "FeatureExtraction"]));
+        let names: Vec<_> = given(arguments, &known)
+            .into_iter()
+            .map(|a| a.name)
+            .collect();
+        assert_eq!(
+            names,
+            ["database_path", "random_seed", "SiftExtraction.use_gpu"]
+        );
+    }
+
+    #[test]
+    fn progress_is_read() {
+        for (line, expected) in [
+            ("Processed file [3/14]", Some((3, Some(14)))),
+            (
+                "I20250101 1 a.cc:2] Processed file [3/14]",
+                Some((3, Some(14))),
+            ),
+            ("Matching image [11/14] in 0.156s", Some((11, Some(14)))),
+            ("Processing image [1/20]", Some((1, Some(20)))),
+            ("Matching block [2/3, 1/3] in 0.2s", Some((4, Some(9)))),
+            ("Matching block [0/3, 1/3]", None),
+            ("Registering image #11 (3)", Some((3, None))),
+            (
+                "Registering image #11 (num_reg_frames=30)",
+                Some((30, None)),
+            ),
+            ("Registering image #11", None),
+            ("Processed file [x/14]", None),
+            ("Bundle adjustment", None),
+        ] {
+            assert_eq!(progress(line), expected, "{line}");
+        }
+    }
+}

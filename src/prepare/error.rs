@@ -1,0 +1,100 @@
+//! What can stop `prepare`.
+
+use std::path::PathBuf;
+
+use super::pycolmap::PINNED;
+use crate::run::RunError;
+
+/// What stopped it; one line that names the file and the remedy.
+#[derive(Debug, thiserror::Error)]
+pub enum PrepareError {
+    /// The photos or the file system.
+    #[error(transparent)]
+    Run(#[from] RunError),
+    /// A program is not installed.
+    #[error("{program} is not installed: {}", remedy(program))]
+    NoProgram {
+        /// Its name.
+        program: String,
+    },
+    /// There is neither COLMAP nor its Python module.
+    #[error(
+        "COLMAP is not installed: install it (Debian, Ubuntu: apt-get install colmap), or give --install, which puts {PINNED} into the cache"
+    )]
+    NoColmap,
+    /// FFmpeg is too old.
+    #[error("ffmpeg {found} is too old: install 5.1 or newer")]
+    OldFfmpeg {
+        /// Its version.
+        found: String,
+    },
+    /// A program failed.
+    #[error("{program} failed: {said}")]
+    Program {
+        /// Its name.
+        program: String,
+        /// What it said last, and how it ended.
+        said: String,
+    },
+    /// The input is no film that can be used.
+    #[error("{}: {reason}", path.display())]
+    NoFilm {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        reason: String,
+    },
+    /// Not enough for a scene.
+    #[error(
+        "{}: holds {found} usable photos, and depth needs two at least; name a folder of JPEG, PNG or TIFF files, or a film", input.display()
+    )]
+    TooFew {
+        /// The input.
+        input: PathBuf,
+        /// Photos that can be used.
+        found: usize,
+    },
+    /// The output folder holds what this program did not put there.
+    #[error("{}: holds other things, such as {other}; name a new folder with -o", folder.display())]
+    NotOurs {
+        /// The folder.
+        folder: PathBuf,
+        /// One of them.
+        other: String,
+    },
+    /// The output folder belongs to another input.
+    #[error(
+        "{}: was prepared from {}; name another folder with -o, or begin anew with --force", folder.display(), input.display()
+    )]
+    OtherInput {
+        /// The folder.
+        folder: PathBuf,
+        /// What it was prepared from.
+        input: PathBuf,
+    },
+    /// What would be replaced is not what was made.
+    #[error(
+        "{}: was changed since it was made, and would be replaced; move it elsewhere (masks are taken from there with --masks), or choose another folder with -o", path.display()
+    )]
+    Changed {
+        /// The file or folder.
+        path: PathBuf,
+    },
+    /// COLMAP placed nothing.
+    #[error("no photo has a pose: {remedy}")]
+    NoPoses {
+        /// What to try.
+        remedy: String,
+    },
+}
+
+/// How a program is installed.
+fn remedy(program: &str) -> &'static str {
+    match program {
+        "ffmpeg" | "ffprobe" => {
+            "install FFmpeg 5.1 or newer (Debian, Ubuntu: apt-get install ffmpeg), or give a folder of frames"
+        }
+        "colmap" => "install COLMAP (Debian, Ubuntu: apt-get install colmap)",
+        _ => "install it",
+    }
+}

@@ -1,0 +1,470 @@
+//! What FFmpeg is asked: what a film is, where it is cut, whether it is interlaced; and all frames
+//! of a shot.
+
+use std::{
+    ffi::OsString,
+    path::{Path, PathBuf},
+};
+
+use serde_json::Value;
+
+use super::{
+    PrepareError,
+    process::Program,
+    shots::{self, Cutter},
+};
+
+/// The oldest that knows `-fps_mode`.
+const OLDEST: [u32; 2] = [5, 1];
+
+/// Interlacing is looked for in so many seconds of a shot at most.
+const LOOKED_AT: f64 = 20.0;
+
+/// Of the frames of which more than one in so many repeats a field, film of 24 frames was made
+/// video of 30: two of five frames do.
+const REPEATED: f64 = 0.2;
+
+/// Video of 30 (29.97) frames a second, which film of 24 may have become.
+const VIDEO_RATE: [f64; 2] = [29.5, 30.5];
+
+/// Names of frames, as FFmpeg and C write them.
+const NAMES: &str = "%06d.png";
+
+/// A film's file and what it holds.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Source {
+    /// The file, absolute.
+    pub path: PathBuf,
+    /// FFmpeg's number of the stream of pictures.
+    stream: u64,
+    /// Frames a second: numerator and denominator.
+    pub frame_rate: [u32; 2],
+    /// Seconds; 0 where the file does not say.
+    pub seconds: f64,
+    /// Whether there is sound.
+    pub audio: bool,
+    /// Whether pixels are square.
+    square: bool,
+    /// Whether it has more than 8 bits a channel.
+    deep: bool,
+}
+
+/// How the pictures of a shot are made progressive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Scan {
+    /// They are.
+    Progressive,
+    /// Each frame is of two moments.
+    Interlaced,
+    /// Each four frames of film were made five of video.
+    Telecined,
+}
+
+impl Scan {
+    /// FFmpeg's filters.
+    fn filters(self) -> &'static [&'static str] {
+        match self {
+            Self::Progressive => &[],
+            Self::Interlaced => &["bwdif=send_frame"],
+            Self::Telecined => &["fieldmatch", "decimate"],
+        }
+    }
+
+    /// The frame rate that is left.
+    pub fn rate(self, [numerator, denominator]: [u32; 2]) -> [u32; 2] {
+        match self {
+            Self::Telecined => reduced([4 * u64::from(numerator), 5 * u64::from(denominator)]),
+            _ => [numerator, denominator],
+        }
+    }
+}
+
+/// A part of a film, in seconds; open at its end where that is the film's.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Part {
+    pub start: f64,
+    pub seconds: Option<f64>,
+}
+
+/// Refuses an FFmpeg that is too old.
+///
+/// # Errors
+/// [`PrepareError::NoProgram`] where there is none.
+pub(super) fn check_version() -> Result<(), PrepareError> {
+    let said = Program::new("ffmpeg").arg("-version").ask()?;
+    match version(&said) {
+        Some(found) if found < OLDEST => Err(PrepareError::OldFfmpeg {
+            found: format!("{}.{}", found[0], found[1]),
+        }),
+        // Builds between releases have other names.
+        _ => Ok(()),
+    }
+}
+
+fn version(said: &str) -> Option<[u32; 2]> {
+    let named = said
+        .lines()
+        .find_map(|line| line.strip_prefix("ffmpeg version "))?;
+    let number = named
+        .trim_start_matches('n')
+        .split(|c: char| !c.is_ascii_digit());
+    let mut parts = number.map(str::parse);
+    Some([parts.next()?.ok()?, parts.next()?.ok()?])
+}
+
+impl Source {
+    /// Asks `ffprobe` what a film is.
+    ///
+    /// # Errors
+    /// [`PrepareError`].
+    pub fn probe(path: &Path) -> Result<Self, PrepareError> {
+        let said = Program::new("ffprobe")
+            .args([
+                "-v",
+                "error",
+                "-of",
+                "json",
+                "-show_streams",
+                "-show_format",
+            ])
+            .arg("-i")
+            .arg(named(path))
+            .ask();
+        let said = said.map_err(|error| match error {
+            PrepareError::Program { said, .. } => PrepareError::NoFilm {
+                path: path.into(),
+                reason: format!("cannot be read as a film ({said})"),
+            },
+            other => other,
+        })?;
+        Self::parse(path, &said).map_err(|reason| PrepareError::NoFilm {
+            path: path.into(),
+            reason,
+        })
+    }
+
+    fn parse(path: &Path, said: &str) -> Result<Self, String> {
+        // Warnings may stand before the JSON, on another stream.
+        let json = &said[said.find('{').unwrap_or(0)..];
+        let json: Value = serde_json::Deserializer::from_str(json)
+            .into_iter()
+            .next()
+            .and_then(Result::ok)
+            .ok_or("cannot be read as a film: ffprobe says nothing of it")?;
+        let streams = json["streams"].as_array().map_or(&[][..], Vec::as_slice);
+        let pictures = streams.iter().find(|stream| {
+            // The picture of a cover is no film.
+            stream["codec_type"] == "video" && stream["disposition"]["attached_pic"] != 1
+        });
+        let pictures = pictures.ok_or("holds no moving pictures")?;
+        let rates = ["avg_frame_rate", "r_frame_rate"];
+        let frame_rate = rates
+            .into_iter()
+            .find_map(|key| ratio(pictures[key].as_str()?));
+        let seconds = |value: &Value| value.as_str()?.parse::<f64>().ok();
+        let seconds = seconds(&pictures["duration"]).or(seconds(&json["format"]["duration"]));
+        let format = pictures["pix_fmt"].as_str().unwrap_or_default();
+        let aspect = pictures["sample_aspect_ratio"].as_str().unwrap_or("1:1");
+        Ok(Self {
+            path: path.into(),
+            stream: pictures["index"].as_u64().unwrap_or(0),
+            frame_rate: frame_rate.ok_or("does not say how many frames a second it has")?,
+            seconds: seconds.filter(|s| s.is_finite() && *s > 0.0).unwrap_or(0.0),
+            audio: streams.iter().any(|stream| stream["codec_type"] == "audio"),
+            square: matches!(aspect, "1:1" | "0:1"),
+            deep: is_deep(format),
+        })
+    }
+
+    /// Frames a second.
+    pub fn rate(&self) -> f64 {
+        f64::from(self.frame_rate[0]) / f64::from(self.frame_rate[1])
+    }
+
+    /// FFmpeg on a part of the film, up to its output.
+    fn part(&self, part: Part, level: &str) -> Program {
+        let mut ffmpeg = Program::new("ffmpeg")
+            .args(["-hide_banner", "-nostdin", "-nostats", "-v", level])
+            .option("-ss", seconds(part.start));
+        if let Some(length) = part.seconds {
+            ffmpeg = ffmpeg.option("-t", seconds(length));
+        }
+        ffmpeg
+            .arg("-i")
+            .arg(named(&self.path))
+            .option("-map", format!("0:{}", self.stream))
+    }
+
+    /// The shots of a part of the film, as ranges of seconds of the film; only the first where
+    /// that is all that is wanted. Tells how many seconds it has seen.
+    ///
+    /// # Errors
+    /// [`PrepareError::Program`].
+    pub fn shots(
+        &self,
+        part: Part,
+        only_first: bool,
+        seen: &mut dyn FnMut(f64),
+    ) -> Result<Vec<[f64; 2]>, PrepareError> {
+        let [width, height] = shots::SIZE;
+        let [numerator, denominator] = self.frame_rate;
+        let mut cutter = Cutter::default();
+        let mut frame = vec![0; width * height];
+        self.part(part, "error")
+            .option(
+                "-vf",
+                format!("scale={width}:{height}:flags=area,format=gray"),
+            )
+            // So that a frame's number is its time, also where the film's rate varies.
+            .option("-r", format!("{numerator}/{denominator}"))
+            .args(["-fps_mode", "cfr", "-f", "rawvideo", "-"])
+            .read(|from| {
+                from.read_exact(&mut frame)?;
+                cutter.look(&frame);
+                let frames = cutter.frames();
+                let now = frames % 25 == 0;
+                if now {
+                    seen(frames as f64 / self.rate());
+                }
+                Ok(!(only_first && now && cutter.has_first()))
+            })?;
+        let time = |frame: usize| part.start + frame as f64 / self.rate();
+        let shots = cutter.shots().into_iter();
+        Ok(shots
+            .map(|shot| [time(shot.start), time(shot.end)])
+            .collect())
+    }
+
+    /// Whether the pictures of a part are interlaced.
+    ///
+    /// # Errors
+    /// [`PrepareError::Program`].
+    pub fn scan(&self, part: Part) -> Result<Scan, PrepareError> {
+        let length = part.seconds.unwrap_or(LOOKED_AT).min(LOOKED_AT);
+        let looked_at = Part {
+            seconds: Some(length),
+            ..part
+        };
+        let said = self
+            .part(looked_at, "info")
+            .args(["-vf", "idet", "-f", "null", "-"])
+            .ask()?;
+        Ok(scan(&said, self.rate()))
+    }
+
+    /// Writes all frames of a part into a folder, in gray, progressive, with square pixels. Tells
+    /// how many there are so far.
+    ///
+    /// # Errors
+    /// [`PrepareError::Program`].
+    pub fn extract(
+        &self,
+        part: Part,
+        scan: Scan,
+        folder: &Path,
+        written: &mut dyn FnMut(usize),
+    ) -> Result<(), PrepareError> {
+        let mut filters = scan.filters().to_vec();
+        if !self.square {
+            // The side that is too short grows, so that nothing is lost.
+            filters.push(
+                "scale=w=if(gt(sar\\,1)\\,trunc(iw*sar+0.5)\\,iw):h=if(gt(sar\\,1)\\,ih\\,trunc(ih/sar+0.5)),setsar=1",
+            );
+        }
+        let mut ffmpeg = self.part(part, "error");
+        if !filters.is_empty() {
+            ffmpeg = ffmpeg.option("-vf", filters.join(","));
+        }
+        ffmpeg
+            .args(["-fps_mode", "passthrough", "-pix_fmt"])
+            .arg(if self.deep { "gray16be" } else { "gray" })
+            .args(["-progress", "pipe:1", "-f", "image2"])
+            // Below the folder, whose path may hold a %.
+            .arg(NAMES)
+            .run(folder, &mut |line| {
+                if let Some(count) = line.strip_prefix("frame=") {
+                    written(count.trim().parse().unwrap_or(0));
+                }
+            })
+    }
+}
+
+/// A file's name that FFmpeg takes for nothing else: no option, no protocol.
+fn named(path: &Path) -> OsString {
+    let mut name = OsString::from("file:");
+    name.push(path);
+    name
+}
+
+/// A time as FFmpeg reads it, to the microsecond.
+fn seconds(time: f64) -> String {
+    format!("{time:.6}")
+}
+
+/// A positive ratio, such as `24000/1001`.
+fn ratio(text: &str) -> Option<[u32; 2]> {
+    let (numerator, denominator) = text.split_once('/')?;
+    let ratio = [numerator.parse().ok()?, denominator.parse().ok()?];
+    (!ratio.contains(&0)).then_some(ratio)
+}
+
+/// A ratio in its lowest terms.
+fn reduced(ratio: [u64; 2]) -> [u32; 2] {
+    let [mut a, mut b] = ratio;
+    while b != 0 {
+        (a, b) = (b, a % b);
+    }
+    ratio.map(|part| u32::try_from(part / a.max(1)).unwrap_or(u32::MAX))
+}
+
+/// Whether a pixel format has more than 8 bits a channel: these name their byte order, as do
+/// some that pack less than 8 into 16.
+fn is_deep(format: &str) -> bool {
+    let packed = ["rgb565", "bgr565", "rgb555", "bgr555", "rgb444", "bgr444"];
+    (format.ends_with("le") || format.ends_with("be"))
+        && !packed.iter().any(|packed| format.starts_with(packed))
+}
+
+/// What FFmpeg's `idet` says.
+fn scan(said: &str, rate: f64) -> Scan {
+    let counts = |title: &str, names: [&str; 3]| -> [f64; 3] {
+        let line = said.lines().rev().find(|line| line.contains(title));
+        names.map(|name| {
+            let rest = line
+                .and_then(|line| line.rsplit_once(name))
+                .map(|(_, rest)| rest);
+            let number = rest.and_then(|rest| rest.split_whitespace().next());
+            number.and_then(|number| number.parse().ok()).unwrap_or(0.0)
+        })
+    };
+    let [neither, top, bottom] = counts("Repeated Fields:", ["Neither:", "Top:", "Bottom:"]);
+    let [upper, lower, progressive] =
+        counts("Multi frame detection:", ["TFF:", "BFF:", "Progressive:"]);
+    let frames = (neither + top + bottom).max(1.0);
+    // Where fields are of one moment, noise passes for either order as often.
+    let interlaced = (upper - lower).abs();
+    if (VIDEO_RATE[0]..VIDEO_RATE[1]).contains(&rate)
+        && (top + bottom) / frames > REPEATED
+        && interlaced > 0.0
+    {
+        Scan::Telecined
+    } else if interlaced > progressive {
+        Scan::Interlaced
+    } else {
+        Scan::Progressive
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn versions() {
+        for (said, expected) in [
+            ("ffmpeg version 5.1.9-0+deb12u1 Copyright (c)", Some([5, 1])),
+            ("ffmpeg version n7.0 Copyright", Some([7, 0])),
+            ("ffmpeg version 4.4.2-0ubuntu0.22.04.1", Some([4, 4])),
+            ("ffmpeg version N-118193-g5f38c82536", None),
+            ("something else", None),
+        ] {
+            assert_eq!(version(said), expected, "{said}");
+        }
+    }
+
+    const PROBED: &str = r#"[mov @ 0x1] a warning
+{
+  "streams": [
+    {"index": 0, "codec_type": "audio"},
+    {"index": 1, "codec_type": "video", "disposition": {"attached_pic": 1}},
+    {"index": 2, "codec_type": "video", "pix_fmt": "yuv420p10le",
+     "sample_aspect_ratio": "16:15", "avg_frame_rate": "0/0", "r_frame_rate": "24000/1001",
+     "disposition": {"attached_pic": 0}}
+  ],
+  "format": {"duration": "12.500000"}
+}
+and another"#;
+
+    #[test]
+    fn a_film_is_read() {
+        let path = Path::new("/films/a.mkv");
+        let film = Source::parse(path, PROBED).unwrap();
+        let expected = Source {
+            path: path.into(),
+            stream: 2,
+            frame_rate: [24000, 1001],
+            seconds: 12.5,
+            audio: true,
+            square: false,
+            deep: true,
+        };
+        assert_eq!(film, expected);
+        for (said, word) in [
+            (
+                r#"{"streams": [{"codec_type": "audio"}]}"#,
+                "no moving pictures",
+            ),
+            (
+                r#"{"streams": [{"codec_type": "video"}]}"#,
+                "frames a second",
+            ),
+            ("", "nothing"),
+        ] {
+            let error = Source::parse(path, said).unwrap_err();
+            assert!(error.contains(word), "{error}");
+        }
+    }
+
+    #[test]
+    fn depths() {
+        for deep in ["yuv420p10le", "p010le", "gray12be", "gbrp10le", "rgb48le"] {
+            assert!(is_deep(deep), "{deep}");
+        }
+        for eight in [
+            "yuv420p", "nv12", "yuv410p", "gray", "rgb24", "rgb565le", "pal8", "",
+        ] {
+            assert!(!is_deep(eight), "{eight}");
+        }
+    }
+
+    fn idet(repeated: [u32; 3], multi: [u32; 3]) -> String {
+        format!(
+            "[Parsed_idet_0 @ 0x1] Repeated Fields: Neither: {:6} Top: {:6} Bottom: {:6}\n\
+             [Parsed_idet_0 @ 0x1] Single frame detection: TFF: 9 BFF: 9 Progressive: 9 Undetermined: 9\n\
+             [Parsed_idet_0 @ 0x1] Multi frame detection: TFF: {:6} BFF: {:6} Progressive: {:6} Undetermined: 3\n",
+            repeated[0], repeated[1], repeated[2], multi[0], multi[1], multi[2],
+        )
+    }
+
+    #[test]
+    fn interlacing() {
+        let film = 29.97;
+        assert_eq!(
+            scan(&idet([500, 0, 0], [0, 0, 480]), 25.0),
+            Scan::Progressive
+        );
+        assert_eq!(
+            scan(&idet([500, 3, 2], [400, 0, 40]), 25.0),
+            Scan::Interlaced
+        );
+        assert_eq!(
+            scan(&idet([500, 3, 2], [0, 400, 40]), film),
+            Scan::Interlaced
+        );
+        assert_eq!(
+            scan(&idet([300, 100, 100], [180, 0, 300]), film),
+            Scan::Telecined
+        );
+        assert_eq!(
+            scan(&idet([300, 100, 100], [180, 0, 300]), 25.0),
+            Scan::Progressive
+        );
+        assert_eq!(
+            scan(&idet([100, 0, 0], [47, 44, 9]), 25.0),
+            Scan::Progressive
+        );
+        assert_eq!(scan("", film), Scan::Progressive);
+        assert_eq!(Scan::Telecined.rate([30000, 1001]), [24000, 1001]);
+        assert_eq!(Scan::Interlaced.rate([25, 1]), [25, 1]);
+    }
+}

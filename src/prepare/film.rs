@@ -1,0 +1,356 @@
+//! One shot of a film: all its frames, and some of them for poses.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use super::{
+    PrepareError, PrepareOptions,
+    ffmpeg::{self, Part, Scan, Source},
+    photos::link_all,
+    sharp,
+    state::{State, Step, digest, of},
+    tell,
+};
+use crate::{
+    capture::{CaptureError, FRAMES, Film, IMAGES, in_order, plain_header},
+    disk,
+    run::{Event, Observer, RunError, Stage, files},
+};
+
+/// The file that says which film it is.
+const FILM: &str = "film.json";
+
+/// Shots that are told in one line.
+const TOLD_SHOTS: usize = 12;
+
+/// Frames of shots shorter than this, in seconds, show too little motion to be taken by themselves
+/// while there is a choice.
+const SHORTEST: f64 = 0.5;
+
+/// Says what a film is.
+///
+/// # Errors
+/// [`PrepareError`]: FFmpeg is missing or too old, or the file is none.
+pub(super) fn probe(input: &Path) -> Result<Source, PrepareError> {
+    ffmpeg::check_version()?;
+    Source::probe(input)
+}
+
+/// Makes `frames/`, `film.json` and `images/`; the shots of the film, where they were looked for.
+///
+/// # Errors
+/// [`PrepareError`].
+pub(super) fn frames(
+    state: &mut State,
+    options: &PrepareOptions,
+    source: &Source,
+    observe: &mut Observer<'_>,
+) -> Result<Vec<[f64; 2]>, PrepareError> {
+    let same_film = of(&["film", &digest(&source.path)?]);
+    let time = |time: Option<f64>| time.map_or(String::new(), |time| time.to_string());
+    let from = of(&[
+        "frames",
+        &same_film,
+        &time(options.start),
+        &time(options.end),
+    ]);
+    if !state.is_done(Step::Frames, &from) {
+        for result in [FRAMES, FILM, IMAGES] {
+            state.check_own(result)?;
+        }
+        let part = choose(state, options, source, &same_film, observe)?;
+        extract(state, source, part, &from, observe)?;
+    }
+    choose_sharp(state, options, observe)?;
+    Ok(state.shots(&same_film).unwrap_or_default().to_vec())
+}
+
+/// The part of the film that is asked for, or its longest shot.
+fn choose(
+    state: &mut State,
+    options: &PrepareOptions,
+    source: &Source,
+    same_film: &str,
+    observe: &mut Observer<'_>,
+) -> Result<Part, PrepareError> {
+    let no_film = |reason: String| PrepareError::NoFilm {
+        path: options.input.clone(),
+        reason,
+    };
+    let start = options.start.unwrap_or(0.0);
+    if source.seconds > 0.0 && start >= source.seconds {
+        return Err(no_film(format!(
+            "ends after {}, before --start; give an earlier one",
+            clock(source.seconds)
+        )));
+    }
+    let asked = Part {
+        start,
+        seconds: options.end.map(|end| end - start),
+    };
+    let total = asked
+        .seconds
+        .unwrap_or(source.seconds - start)
+        .ceil()
+        .max(1.0) as usize;
+    let chosen = options.start.is_some() || options.end.is_some();
+    let shots = match state.shots(same_film) {
+        Some(known) if !chosen => known.to_vec(),
+        _ => {
+            let only_first = chosen && options.end.is_none();
+            let found = source.shots(asked, only_first, &mut |seen| {
+                tell(observe, Stage::Cuts, seen as usize, total);
+            })?;
+            if !chosen {
+                state.keep_shots(same_film.to_owned(), found.clone())?;
+            }
+            found
+        }
+    };
+    let length = |shot: &[f64; 2]| shot[1] - shot[0];
+    // Half a frame earlier than the first frame, and half a frame before the one after the last,
+    // so that rounding decides nothing.
+    let half = 0.5 / source.rate();
+    let exactly = |[from, to]: [f64; 2]| Part {
+        start: (from - half).max(0.0),
+        seconds: Some(to - from - if from < half { half } else { 0.0 }),
+    };
+    let Some(longest) = shots
+        .iter()
+        .max_by(|a, b| length(a).total_cmp(&length(b)).then(b[0].total_cmp(&a[0])))
+    else {
+        return Err(no_film(
+            "shows nothing there: no frame, or only black ones".to_owned(),
+        ));
+    };
+    if !chosen {
+        if shots.len() > 1 {
+            observe(Event::Note(format!(
+                "{} shots, of which the longest is taken, {}; another with --start: {}",
+                shots.len(),
+                span(*longest),
+                list(&shots)
+            )));
+        }
+        return Ok(exactly(*longest));
+    }
+    if options.end.is_some() {
+        if let [_, later @ ..] = &shots[..]
+            && !later.is_empty()
+        {
+            observe(Event::Warning(format!(
+                "the film is cut at {} within the part that is asked for, and one scene is made of one shot",
+                later
+                    .iter()
+                    .map(|shot| clock(shot[0]))
+                    .collect::<Vec<_>>()
+                    .join(", ")
+            )));
+        }
+        return Ok(asked);
+    }
+    let first = shots
+        .iter()
+        .find(|shot| length(shot) >= SHORTEST)
+        .unwrap_or(longest);
+    observe(Event::Note(format!(
+        "the shot is taken from {}",
+        span(*first)
+    )));
+    Ok(exactly(*first))
+}
+
+/// Writes all frames of a part.
+fn extract(
+    state: &mut State,
+    source: &Source,
+    part: Part,
+    from: &str,
+    observe: &mut Observer<'_>,
+) -> Result<(), PrepareError> {
+    let scan = source.scan(part)?;
+    match scan {
+        Scan::Progressive => {}
+        Scan::Interlaced => observe(Event::Note(
+            "the film is interlaced: fields are woven by bwdif".to_owned(),
+        )),
+        Scan::Telecined => observe(Event::Note(
+            "the film was made 30 frames a second from 24: the repeated fields are taken out"
+                .to_owned(),
+        )),
+    }
+    let frame_rate = scan.rate(source.frame_rate);
+    let rate = f64::from(frame_rate[0]) / f64::from(frame_rate[1]);
+    let expected = part.seconds.unwrap_or(source.seconds - part.start) * rate;
+    let draft = state.draft()?;
+    let frames = draft.path().join(FRAMES);
+    disk::make_folder(&frames).map_err(files::at(&frames))?;
+    source.extract(part, scan, &frames, &mut |written| {
+        tell(
+            observe,
+            Stage::Frames,
+            written,
+            expected.round().max(1.0) as usize,
+        );
+    })?;
+    let names = names_in(&frames)?;
+    let Some(first) = names.first() else {
+        return Err(PrepareError::NoFilm {
+            path: source.path.clone(),
+            reason: "has no frame there; choose another part with --start and --end".to_owned(),
+        });
+    };
+    let header = plain_header(&frames.join(first)).map_err(RunError::from)?;
+    let film = Film {
+        source: source.path.clone(),
+        // That of the first frame, where half a frame earlier was asked for.
+        start: first_frame(part.start, source.rate()),
+        seconds: names.len() as f64 / rate,
+        frame_rate,
+        audio: source.audio,
+        size: header.size,
+        frames: names,
+    };
+    film.write(draft.path())
+        .map_err(files::at(&draft.path().join(FILM)))?;
+    let made = [(frames, FRAMES), (draft.path().join(FILM), FILM)];
+    state.place(Step::Frames, from, &made)
+}
+
+/// When the first frame at `start` or later is shown; a rounding error is no frame.
+fn first_frame(start: f64, rate: f64) -> f64 {
+    (start * rate - 1e-6).ceil().max(0.0) / rate
+}
+
+/// The frames' names, in order.
+fn names_in(frames: &Path) -> Result<Vec<String>, PrepareError> {
+    let entries = fs::read_dir(frames).map_err(files::at(frames))?;
+    let mut names: Vec<String> = entries
+        .flatten()
+        .map(|entry| entry.file_name().to_string_lossy().into_owned())
+        .collect();
+    // After a million frames names are longer.
+    names.sort_by(|a, b| a.len().cmp(&b.len()).then(a.cmp(b)));
+    Ok(names)
+}
+
+/// Links the sharpest frames of each time step to `images/`.
+fn choose_sharp(
+    state: &mut State,
+    options: &PrepareOptions,
+    observe: &mut Observer<'_>,
+) -> Result<(), PrepareError> {
+    let frames = state.path(FRAMES);
+    let asked = options
+        .per_second
+        .map_or(String::new(), |rate| rate.to_string());
+    let from = of(&["images", &digest(&frames)?, &asked]);
+    if state.is_done(Step::Images, &from) {
+        return Ok(());
+    }
+    state.check_own(IMAGES)?;
+    let film = Film::read(&state.path(".")).map_err(RunError::from)?;
+    let film = film.ok_or_else(|| RunError::File {
+        path: state.path(FILM),
+        reason: "is gone; begin anew with --force".to_owned(),
+    })?;
+    let [numerator, denominator] = film.frame_rate.map(f64::from);
+    let rate = numerator / denominator;
+    let per_second = options
+        .per_second
+        .unwrap_or_else(|| sharp::usual_rate(film.seconds));
+    let chosen: Vec<&String> = if per_second >= rate {
+        film.frames.iter().collect()
+    } else {
+        let paths: Vec<PathBuf> = film.frames.iter().map(|name| frames.join(name)).collect();
+        let mut sharpness = Vec::with_capacity(paths.len());
+        in_order(
+            &paths,
+            |path| sharp::sharpness(path),
+            |_, found| {
+                sharpness.push(found?);
+                if sharpness.len() % 8 == 0 {
+                    tell(observe, Stage::Sharpness, sharpness.len(), paths.len());
+                }
+                Ok::<_, CaptureError>(())
+            },
+        )
+        .map_err(RunError::from)?;
+        let chosen = sharp::sharpest(&sharpness, rate, per_second);
+        chosen
+            .into_iter()
+            .map(|frame| &film.frames[frame])
+            .collect()
+    };
+    observe(Event::Note(format!(
+        "{} of {} frames are for poses, {:.1} a second",
+        chosen.len(),
+        film.frames.len(),
+        chosen.len() as f64 / film.seconds
+    )));
+    let draft = state.draft()?;
+    let images = draft.path().join(IMAGES);
+    link_all(chosen.into_iter().map(String::as_str), &frames, &images)?;
+    state.place(Step::Images, &from, &[(images, IMAGES)])
+}
+
+/// A time as it is read: `1:05.00`, never later than it is, so that the frame there is in what
+/// begins at it, and not in what ends at it.
+fn clock(seconds: f64) -> String {
+    let hundredths = (100.0 * seconds).floor() as u64;
+    let (minutes, rest) = (hundredths / 6000, hundredths % 6000);
+    let rest = format!("{:02}.{:02}", rest / 100, rest % 100);
+    match minutes {
+        0..60 => format!("{minutes}:{rest}"),
+        _ => format!("{}:{:02}:{rest}", minutes / 60, minutes % 60),
+    }
+}
+
+fn span([from, to]: [f64; 2]) -> String {
+    format!("{} to {}", clock(from), clock(to))
+}
+
+/// The longest shots in the order of the film.
+fn list(shots: &[[f64; 2]]) -> String {
+    let mut longest = shots.to_vec();
+    longest.sort_by(|a, b| (b[1] - b[0]).total_cmp(&(a[1] - a[0])));
+    let left_out = longest.len().saturating_sub(TOLD_SHOTS);
+    longest.truncate(TOLD_SHOTS);
+    longest.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let mut told: Vec<String> = longest.into_iter().map(span).collect();
+    if left_out > 0 {
+        told.push(format!("and {left_out} shorter ones"));
+    }
+    told.join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_told_as_they_are_read() {
+        assert_eq!(clock(0.0), "0:00.00");
+        assert_eq!(clock(65.0417), "1:05.04");
+        assert_eq!(clock(59.999), "0:59.99");
+        assert_eq!(clock(3723.5), "1:02:03.50");
+    }
+
+    #[test]
+    fn the_longest_shots_are_listed() {
+        assert_eq!(
+            list(&[[0.0, 2.0], [2.0, 9.5]]),
+            "0:00.00 to 0:02.00, 0:02.00 to 0:09.50"
+        );
+        let many: Vec<[f64; 2]> = (0..20)
+            .map(|n| [f64::from(n), f64::from(n) + 0.1 * f64::from(n)])
+            .collect();
+        let told = list(&many);
+        assert!(
+            told.ends_with("and 8 shorter ones") && !told.contains("0:07.00"),
+            "{told}"
+        );
+    }
+}

@@ -1,0 +1,413 @@
+//! `prepare`: from a film or a folder of photos to what `fit` takes, by way of FFmpeg and COLMAP.
+//!
+//! Each step leaves its result in the output folder, or nothing: `frames/` and `film.json`,
+//! `images/`, `masks/`, `stretched/`, `database.db`, `sparse/`. A step whose result was made from
+//! the same before is skipped.
+
+mod borders;
+mod colmap;
+mod error;
+mod ffmpeg;
+mod film;
+mod masks;
+mod photos;
+mod poses;
+mod process;
+mod pycolmap;
+mod sharp;
+mod shots;
+mod state;
+
+use std::{
+    cell::RefCell,
+    fs,
+    path::{self, Path, PathBuf},
+};
+
+use serde::{Deserialize, Serialize};
+
+pub use colmap::{Cameras, Matching};
+pub use error::PrepareError;
+pub use poses::Poses;
+pub(crate) use process::end_programs;
+
+use crate::{
+    capture::{CaptureError, Film, IMAGES, plain_header},
+    run::{Event, Observer, RunError, Stage, files},
+};
+use colmap::Colmap;
+use masks::Sources;
+use photos::Photos;
+use state::{State, Step, digest, of};
+
+/// Where masks go.
+const MASKS: &str = "masks";
+
+/// Where copies of 8 bits go that COLMAP looks at.
+const STRETCHED: &str = "stretched";
+
+/// COLMAP's features and matches.
+const DATABASE: &str = "database.db";
+
+/// COLMAP's models.
+const SPARSE: &str = "sparse";
+
+/// More photos are not matched each with each: that takes hours on a processor.
+const EXHAUSTIVE: usize = 200;
+
+/// What `prepare` is asked to do; `None` leaves it to what the input calls for.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct PrepareOptions {
+    /// A film, or a folder of photos.
+    #[serde(skip)]
+    pub input: PathBuf,
+    /// The folder for `fit`: a new one, or one that was prepared before.
+    #[serde(skip)]
+    pub output: PathBuf,
+    /// Where in the film the shot begins, in seconds; the longest shot by default.
+    pub start: Option<f64>,
+    /// Where it ends; the next cut by default.
+    pub end: Option<f64>,
+    /// How many frames a second get a pose; 30 to 120 in all by default.
+    pub per_second: Option<f64>,
+    /// A mask for all photos.
+    pub mask: Option<PathBuf>,
+    /// A folder of masks by the photos' names.
+    pub masks: Option<PathBuf>,
+    /// Which photos one camera took; all of a film, and those of one folder that have one size.
+    pub cameras: Option<Cameras>,
+    /// COLMAP's name of the camera model.
+    pub lens: String,
+    /// Which photos are matched with which; those of a film one after the other.
+    pub matching: Option<Matching>,
+    /// Whether `pycolmap` is installed where there is no COLMAP.
+    #[serde(skip)]
+    pub install: bool,
+    /// Whether all is made anew.
+    #[serde(skip)]
+    pub force: bool,
+}
+
+/// What was prepared.
+#[derive(Clone, Debug, Serialize)]
+pub struct Prepared {
+    /// The folder, as it was named.
+    pub folder: PathBuf,
+    /// The shot, if photos are frames of a film.
+    pub film: Option<Film>,
+    /// All shots of the film, from when to when in seconds, where they were looked for.
+    pub shots: Vec<[f64; 2]>,
+    /// Photos that COLMAP was given.
+    pub photos: usize,
+    /// How many of them have a mask.
+    pub masked: usize,
+    /// Who found the poses.
+    pub colmap: String,
+    /// What came of it.
+    pub poses: Poses,
+    /// All that is doubtful.
+    pub warnings: Vec<String>,
+}
+
+/// Makes of a film or a folder of photos what `fit` takes; what was made from the same before
+/// stays.
+///
+/// # Errors
+/// [`PrepareError`].
+pub fn prepare(
+    options: &PrepareOptions,
+    observe: &mut Observer<'_>,
+) -> Result<Prepared, PrepareError> {
+    let warnings = RefCell::<Vec<String>>::default();
+    let observe = &mut |event: Event| {
+        if let Event::Warning(line) = &event {
+            warnings.borrow_mut().push(line.clone());
+        }
+        observe(event);
+    };
+    let input = fs::canonicalize(&options.input).map_err(files::at(&options.input))?;
+    let output = path::absolute(&options.output).map_err(files::at(&options.output))?;
+    let is_film = check_input(&options.input, &input)?;
+    if !is_film {
+        check_apart(options, &input, &output)?;
+        check_film_options(options)?;
+    }
+    check_masks(options)?;
+    let colmap = Colmap::find(options.install, &mut |line| observe(Event::Note(line)))?;
+    let source = match is_film {
+        true => Some(film::probe(&input)?),
+        false => None,
+    };
+    let mut state = State::open(&output, &input, options)?;
+    let mut shots = Vec::new();
+    match &source {
+        Some(source) => shots = film::frames(&mut state, options, source, observe)?,
+        None => link_photos(&mut state, &input, observe)?,
+    }
+    let images = state.path(IMAGES);
+    let photos = Photos::of(&images)?;
+    if photos.headers.len() < 2 {
+        return Err(PrepareError::TooFew {
+            input: options.input.clone(),
+            found: photos.headers.len(),
+        });
+    }
+    let masked = make_masks(&mut state, options, &photos, observe)?;
+    let seen = stretch(&mut state, &photos, observe)?;
+    let matching = matching(options, is_film, &photos, observe);
+    let task = poses::Task {
+        photos: &photos,
+        seen: &seen,
+        masks: (masked > 0).then(|| state.path(MASKS)),
+        cameras: cameras(options, is_film, &photos),
+        lens: &options.lens,
+        matching,
+        is_film,
+    };
+    let poses = task.find(&mut state, &colmap, observe)?;
+    Ok(Prepared {
+        folder: options.output.clone(),
+        film: Film::read(&output).map_err(RunError::from)?,
+        shots,
+        photos: photos.headers.len(),
+        masked,
+        colmap: colmap.name(),
+        poses,
+        warnings: warnings.take(),
+    })
+}
+
+/// Whether the input is a film; else it is a folder.
+fn check_input(named: &Path, input: &Path) -> Result<bool, PrepareError> {
+    if input.to_str().is_none() {
+        return Err(RunError::File {
+            path: named.into(),
+            reason: "its path is no UTF-8; rename it".to_owned(),
+        }
+        .into());
+    }
+    if input.is_dir() {
+        return Ok(false);
+    }
+    // A pipe or a device is refused.
+    crate::input::open(input).map_err(files::at(named))?;
+    match plain_header(input) {
+        Ok(_) => Err(PrepareError::NoFilm {
+            path: named.into(),
+            reason: "is a photo; name the folder that holds it and others".to_owned(),
+        }),
+        Err(_) => Ok(true),
+    }
+}
+
+/// Refuses to write among the photos.
+fn check_apart(options: &PrepareOptions, input: &Path, output: &Path) -> Result<(), PrepareError> {
+    let output = fs::canonicalize(output).unwrap_or_else(|_| output.into());
+    let own = [IMAGES, MASKS, STRETCHED, SPARSE].map(|name| output.join(name));
+    if output.starts_with(input) || own.iter().any(|own| input.starts_with(own)) {
+        return Err(RunError::File {
+            path: options.output.clone(),
+            reason: format!(
+                "would be mixed with the photos of {}; name a folder beside it with -o",
+                options.input.display()
+            ),
+        }
+        .into());
+    }
+    Ok(())
+}
+
+/// Refuses for photos what is said about films.
+fn check_film_options(options: &PrepareOptions) -> Result<(), PrepareError> {
+    let given = [
+        ("--start", options.start.is_some()),
+        ("--end", options.end.is_some()),
+        ("--per-second", options.per_second.is_some()),
+    ];
+    match given.iter().find(|(_, given)| *given) {
+        Some((option, _)) => Err(PrepareError::NoFilm {
+            path: options.input.clone(),
+            reason: format!("is a folder of photos, and {option} is for films; leave it out"),
+        }),
+        None => Ok(()),
+    }
+}
+
+/// Refuses masks that are not there: better now than after hours of work.
+fn check_masks(options: &PrepareOptions) -> Result<(), PrepareError> {
+    if let Some(mask) = &options.mask {
+        crate::input::open(mask).map_err(files::at(mask))?;
+    }
+    match &options.masks {
+        Some(dir) if !dir.is_dir() => {
+            let dir = dir.clone();
+            Err(RunError::from(CaptureError::NoMaskFolder { dir }).into())
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Tells how far a stage is.
+fn tell(observe: &mut Observer<'_>, stage: Stage, done: usize, total: usize) {
+    observe(Event::Progress {
+        stage,
+        done: done.min(total),
+        total,
+        message: String::new(),
+    });
+}
+
+/// Puts a folder's photos into `images/`.
+fn link_photos(
+    state: &mut State,
+    input: &Path,
+    observe: &mut Observer<'_>,
+) -> Result<(), PrepareError> {
+    let from = of(&["photos", &digest(input)?]);
+    if state.is_done(Step::Images, &from) {
+        return Ok(());
+    }
+    state.check_own(IMAGES)?;
+    let photos = Photos::of(input)?;
+    if let [(first, reason), ..] = &photos.others[..] {
+        observe(Event::Warning(format!(
+            "{} of {} files are no photos and were left out, such as {first}: {reason}",
+            photos.others.len(),
+            photos.others.len() + photos.headers.len(),
+        )));
+    }
+    let draft = state.draft()?;
+    let images = draft.path().join(IMAGES);
+    crate::disk::make_folder(&images).map_err(files::at(&images))?;
+    photos::link_all(photos.headers.keys().map(String::as_str), input, &images)?;
+    state.place(Step::Images, &from, &[(images, IMAGES)])
+}
+
+/// Makes `masks/` where there is anything to mask; how many photos have one.
+fn make_masks(
+    state: &mut State,
+    options: &PrepareOptions,
+    photos: &Photos,
+    observe: &mut Observer<'_>,
+) -> Result<usize, PrepareError> {
+    let of_option = |path: &Option<PathBuf>| match path {
+        Some(path) => digest(path),
+        None => Ok(String::new()),
+    };
+    let images = state.path(IMAGES);
+    let from = of(&[
+        "masks",
+        &digest(&images)?,
+        &of_option(&options.mask)?,
+        &of_option(&options.masks)?,
+    ]);
+    let folder = state.path(MASKS);
+    // What the user has painted stays, unless other masks are named.
+    let asked = options.mask.is_some() || options.masks.is_some();
+    let painted = !asked && state.check_own(MASKS).is_err();
+    if !(painted || state.is_done(Step::Masks, &from)) {
+        state.check_own(MASKS)?;
+        let borders = masks::borders(photos, &images, &mut |done, total| {
+            tell(observe, Stage::Masks, done, total);
+        })?;
+        if let Some(borders::Frame {
+            left,
+            right,
+            top,
+            bottom,
+        }) = borders
+        {
+            observe(Event::Note(format!(
+                "black borders are masked: left {left}, right {right}, top {top}, bottom {bottom} pixels"
+            )));
+        }
+        let sources = Sources {
+            borders,
+            one: options.mask.clone(),
+            each: options
+                .masks
+                .as_deref()
+                .map(|dir| masks::named(dir, photos))
+                .transpose()?,
+        };
+        let draft = state.draft()?;
+        let masks = draft.path().join(MASKS);
+        crate::disk::make_folder(&masks).map_err(files::at(&masks))?;
+        let made = sources.write(photos, &images, &masks, &mut |done, total| {
+            tell(observe, Stage::Masks, done, total);
+        })?;
+        if made.strays > 0 {
+            observe(Event::Warning(format!(
+                "{} masks belong to no photo; name them 0001.png.png for 0001.png",
+                made.strays
+            )));
+        }
+        match made.masked {
+            0 => state.place(Step::Masks, &from, &[])?,
+            _ => state.place(Step::Masks, &from, &[(masks, MASKS)])?,
+        }
+    }
+    let masked = photos
+        .headers
+        .keys()
+        .filter(|name| folder.join(format!("{name}.png")).is_file());
+    Ok(masked.count())
+}
+
+/// The folder of what COLMAP looks at: the photos, or copies of 8 bits that fill their range.
+fn stretch(
+    state: &mut State,
+    photos: &Photos,
+    observe: &mut Observer<'_>,
+) -> Result<PathBuf, PrepareError> {
+    let images = state.path(IMAGES);
+    let from = of(&["stretched", &digest(&images)?]);
+    let folder = state.path(STRETCHED);
+    if !state.is_done(Step::Stretched, &from) {
+        state.check_own(STRETCHED)?;
+        match photos.stretch(&images)? {
+            None => state.place(Step::Stretched, &from, &[])?,
+            Some(range) => {
+                let draft = state.draft()?;
+                let made = draft.path().join(STRETCHED);
+                photos::stretch_all(photos, &images, &made, range, &mut |done| {
+                    tell(observe, Stage::Photos, done, photos.headers.len());
+                })?;
+                state.place(Step::Stretched, &from, &[(made, STRETCHED)])?;
+            }
+        }
+    }
+    Ok(if folder.is_dir() { folder } else { images })
+}
+
+/// Which photos are matched with which.
+fn matching(
+    options: &PrepareOptions,
+    is_film: bool,
+    photos: &Photos,
+    observe: &mut Observer<'_>,
+) -> Matching {
+    let many = photos.headers.len() > EXHAUSTIVE;
+    match options.matching {
+        Some(matching) => matching,
+        None if is_film => Matching::Sequential,
+        None if many => {
+            observe(Event::Note(format!(
+                "more than {EXHAUSTIVE} photos: each is matched with its neighbors by name; --match exhaustive matches each with each"
+            )));
+            Matching::Sequential
+        }
+        None => Matching::Exhaustive,
+    }
+}
+
+/// Which photos one camera took: where the sizes in a folder differ, each has its own.
+fn cameras(options: &PrepareOptions, is_film: bool, photos: &Photos) -> Cameras {
+    let of_one_size = photos.folders().values().all(|sizes| sizes.len() == 1);
+    match options.cameras {
+        Some(cameras) => cameras,
+        None if is_film => Cameras::One,
+        None if of_one_size => Cameras::Folder,
+        None => Cameras::Photo,
+    }
+}

@@ -1,0 +1,286 @@
+//! From photos to a model: features, matches, poses, and which piece is taken.
+
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+};
+
+use serde::Serialize;
+
+use super::{
+    DATABASE, PrepareError, SPARSE,
+    colmap::{self, Cameras, Colmap, Features, Matching},
+    masks,
+    photos::Photos,
+    state::{State, Step, digest, of},
+    tell,
+};
+use crate::{
+    capture::Piece,
+    disk,
+    run::{Event, Observer, RunError, Stage, files},
+};
+
+/// A share of the photos without a pose that is not worth a word: COLMAP seldom places all.
+const USUAL: f64 = 0.1;
+
+/// Names that are told in one line.
+const TOLD_NAMES: usize = 6;
+
+/// What came of it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Poses {
+    /// Photos with a pose.
+    pub placed: usize,
+    /// Points that they see.
+    pub points: usize,
+    /// Names of photos without one, sorted.
+    pub unplaced: Vec<String>,
+    /// How many photos each piece has that COLMAP could not join; the first is taken.
+    pub pieces: Vec<usize>,
+}
+
+/// What poses are to be found of.
+pub(super) struct Task<'a> {
+    pub photos: &'a Photos,
+    /// The folder of what COLMAP looks at.
+    pub seen: &'a Path,
+    pub masks: Option<PathBuf>,
+    pub cameras: Cameras,
+    pub lens: &'a str,
+    pub matching: Matching,
+    pub is_film: bool,
+}
+
+impl Task<'_> {
+    /// Makes `database.db` and `sparse/`.
+    ///
+    /// # Errors
+    /// [`PrepareError`].
+    pub fn find(
+        &self,
+        state: &mut State,
+        colmap: &Colmap,
+        observe: &mut Observer<'_>,
+    ) -> Result<Poses, PrepareError> {
+        let masks = self.masks.as_deref().map_or(Ok(String::new()), digest)?;
+        let features = of(&[
+            "features",
+            &digest(self.seen)?,
+            &masks,
+            &format!("{:?}", self.cameras),
+            self.lens,
+            &colmap.name(),
+        ]);
+        let matches = of(&["matches", &features, &format!("{:?}", self.matching)]);
+        let poses = of(&["poses", &matches]);
+        let done = [
+            state.is_done(Step::Features, &features),
+            state.is_done(Step::Matches, &matches),
+            state.is_done(Step::Poses, &poses),
+        ];
+        if done != [true; 3] {
+            state.check_own(SPARSE)?;
+        }
+        // What was matched otherwise cannot be unmatched.
+        if !(done[0] && (done[1] || !state.was_done(Step::Matches))) {
+            self.look_for_features(state, colmap, &features, observe)?;
+        }
+        if !state.is_done(Step::Matches, &matches) {
+            self.match_photos(state, colmap, &matches, observe)?;
+        }
+        if !(state.is_done(Step::Poses, &poses)) {
+            self.place(state, colmap, &poses, observe)?;
+        }
+        self.judge(state, observe)
+    }
+
+    fn look_for_features(
+        &self,
+        state: &mut State,
+        colmap: &Colmap,
+        from: &str,
+        observe: &mut Observer<'_>,
+    ) -> Result<(), PrepareError> {
+        state.check_own(DATABASE)?;
+        let draft = state.draft()?;
+        let database = draft.path().join(DATABASE);
+        let all_masks = draft.path().join("masks");
+        if let Some(masks) = &self.masks {
+            masks::complete(self.photos, masks, &all_masks)?;
+        }
+        let features = Features {
+            images: self.seen,
+            masks: self.masks.is_some().then_some(all_masks.as_path()),
+            cameras: self.cameras,
+            lens: self.lens,
+        };
+        let photos = self.photos.headers.len();
+        tell(observe, Stage::Features, 0, photos);
+        colmap.features(&database, &features, &mut |done, total| {
+            tell(observe, Stage::Features, done, total.unwrap_or(photos));
+        })?;
+        // What COLMAP makes is checked where it is used; that it made nothing, here.
+        if !database.is_file() {
+            return Err(PrepareError::Program {
+                program: colmap.name(),
+                said: "wrote no database".to_owned(),
+            });
+        }
+        state.forget(Step::Matches);
+        state.place(Step::Features, from, &[(database, DATABASE)])
+    }
+
+    fn match_photos(
+        &self,
+        state: &mut State,
+        colmap: &Colmap,
+        from: &str,
+        observe: &mut Observer<'_>,
+    ) -> Result<(), PrepareError> {
+        state.check_own(DATABASE)?;
+        let draft = state.draft()?;
+        let database = draft.path().join(DATABASE);
+        disk::copy(&state.path(DATABASE), &database).map_err(files::at(&database))?;
+        let photos = self.photos.headers.len();
+        tell(observe, Stage::Matches, 0, photos);
+        colmap.matches(&database, self.matching, &mut |done, total| {
+            tell(observe, Stage::Matches, done, total.unwrap_or(photos));
+        })?;
+        state.place(Step::Matches, from, &[(database, DATABASE)])
+    }
+
+    fn place(
+        &self,
+        state: &mut State,
+        colmap: &Colmap,
+        from: &str,
+        observe: &mut Observer<'_>,
+    ) -> Result<(), PrepareError> {
+        let draft = state.draft()?;
+        let (found, sparse) = (draft.path().join("found"), draft.path().join(SPARSE));
+        for folder in [&found, &sparse] {
+            disk::make_folder(folder).map_err(files::at(folder))?;
+        }
+        // The mapper may write into the database that it reads.
+        let database = draft.path().join(DATABASE);
+        disk::copy(&state.path(DATABASE), &database).map_err(files::at(&database))?;
+        let photos = self.photos.headers.len();
+        let mut placed = 0;
+        tell(observe, Stage::Poses, 0, photos);
+        let ended = colmap.poses(&database, self.seen, &found, &mut |done, total| {
+            placed = placed.max(done);
+            tell(observe, Stage::Poses, placed, total.unwrap_or(photos));
+        });
+        let mut pieces = Vec::new();
+        for model in colmap::models(&found) {
+            if let Some(piece) = Piece::read(&model).map_err(RunError::from)? {
+                pieces.push((piece, model));
+            }
+        }
+        // Some versions end with an error where they place nothing.
+        if pieces.is_empty() {
+            return Err(match ended {
+                Err(error) if !has_no_pair(&error) => error,
+                _ => PrepareError::NoPoses {
+                    remedy: self.remedies(),
+                },
+            });
+        }
+        ended?;
+        // Of several with as many the first.
+        pieces.sort_by_key(|(piece, _)| std::cmp::Reverse(piece.photos.len()));
+        for (place, (_, model)) in pieces.iter().enumerate() {
+            let to = sparse.join(place.to_string());
+            disk::rename(model, &to).map_err(files::at(&to))?;
+        }
+        state.place(Step::Poses, from, &[(sparse, SPARSE)])
+    }
+
+    /// Counts what was placed, and says what to try where that is little.
+    fn judge(&self, state: &State, observe: &mut Observer<'_>) -> Result<Poses, PrepareError> {
+        let mut pieces = Vec::new();
+        for model in colmap::models(&state.path(SPARSE)) {
+            pieces.extend(Piece::read(&model).map_err(RunError::from)?);
+        }
+        let Some((taken, others)) = pieces.split_first() else {
+            return Err(PrepareError::NoPoses {
+                remedy: self.remedies(),
+            });
+        };
+        let placed: BTreeSet<&String> = taken.photos.iter().collect();
+        let elsewhere: BTreeSet<&String> = others.iter().flat_map(|piece| &piece.photos).collect();
+        let unplaced: Vec<&String> = (self.photos.headers.keys())
+            .filter(|name| !placed.contains(name))
+            .collect();
+        if let [first, ..] = others {
+            observe(Event::Note(format!(
+                "COLMAP found {} pieces that it could not join: the one of {} photos is taken, sparse/0; the next has {}",
+                pieces.len(),
+                taken.photos.len(),
+                first.photos.len()
+            )));
+        }
+        if unplaced.len() as f64 > USUAL * self.photos.headers.len() as f64 {
+            let alone = unplaced
+                .iter()
+                .filter(|name| !elsewhere.contains(**name))
+                .count();
+            let names: Vec<&str> = unplaced
+                .iter()
+                .take(TOLD_NAMES)
+                .map(|name| name.as_str())
+                .collect();
+            let more = if unplaced.len() > TOLD_NAMES {
+                ", …"
+            } else {
+                ""
+            };
+            observe(Event::Warning(format!(
+                "{} of {} photos have no pose ({}{more}): {} are in other pieces, {alone} have too few matches with any; {}",
+                unplaced.len(),
+                self.photos.headers.len(),
+                names.join(", "),
+                unplaced.len() - alone,
+                self.remedies()
+            )));
+        }
+        Ok(Poses {
+            placed: taken.photos.len(),
+            points: taken.points,
+            unplaced: unplaced.into_iter().cloned().collect(),
+            pieces: pieces.iter().map(|piece| piece.photos.len()).collect(),
+        })
+    }
+
+    /// What to try where photos have no pose.
+    fn remedies(&self) -> String {
+        let exhaustive = match self.matching {
+            Matching::Sequential => ", --match exhaustive",
+            Matching::Exhaustive => "",
+        };
+        match self.is_film {
+            true => format!(
+                "the camera moved too little or too fast for these frames; try more of them (--per-second){exhaustive}, or another shot (--start)"
+            ),
+            false => format!(
+                "photos have to overlap by two thirds and to be taken from different places; try more of them{exhaustive}"
+            ),
+        }
+    }
+}
+
+/// Whether COLMAP failed for want of photos that fit together.
+fn has_no_pair(error: &PrepareError) -> bool {
+    let PrepareError::Program { said, .. } = error else {
+        return false;
+    };
+    [
+        "sparse model",
+        "initial pair",
+        "initial image pair",
+        "No images with matches",
+    ]
+    .iter()
+    .any(|words| said.contains(words))
+}

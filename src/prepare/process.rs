@@ -1,0 +1,377 @@
+//! Programs of others: started without a shell, listened to, and ended with this one.
+
+use std::{
+    collections::VecDeque,
+    ffi::OsString,
+    io::{self, BufRead, BufReader, Read},
+    path::Path,
+    process::{Child, ChildStderr, ChildStdout, Command, ExitStatus, Stdio},
+    sync::{
+        Arc, Mutex, MutexGuard, PoisonError,
+        mpsc::{Sender, channel},
+    },
+    thread,
+    time::Duration,
+};
+
+use super::PrepareError;
+use crate::disk;
+
+/// How often a program is looked after that has closed its output.
+const PATIENCE: Duration = Duration::from_millis(5);
+
+/// Lines that are kept to be told if a program fails.
+const KEPT_LINES: usize = 20;
+
+/// Of these, as many of the last go into an error.
+const TOLD_LINES: usize = 2;
+
+/// A longer line is no message; the rest of it is not kept.
+const LONGEST_LINE: u64 = 4096;
+
+/// Programs that run, so that they can be ended.
+static RUNNING: Mutex<Vec<Arc<Mutex<Child>>>> = Mutex::new(Vec::new());
+
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    // A list and a child are whole even where a thread has panicked.
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Ends all programs that were started: for a program that is told to end at once. None can be
+/// started or found to have ended as long as what is given back lives.
+pub(crate) fn end_programs() -> impl Sized {
+    let running = locked(&RUNNING);
+    for child in running.iter() {
+        let mut child = locked(child);
+        // Whoever is gone already is ended.
+        let _ = child.kill();
+        let _ = child.wait();
+    }
+    running
+}
+
+/// A program with its arguments.
+#[derive(Clone, Debug)]
+pub(super) struct Program {
+    /// What it is found by: a name on `PATH`, or a path.
+    name: OsString,
+    arguments: Vec<OsString>,
+}
+
+/// A program that runs.
+struct Running {
+    child: Arc<Mutex<Child>>,
+}
+
+impl Program {
+    pub fn new(name: impl Into<OsString>) -> Self {
+        Self {
+            name: name.into(),
+            arguments: Vec::new(),
+        }
+    }
+
+    /// Adds an argument.
+    pub fn arg(mut self, argument: impl Into<OsString>) -> Self {
+        self.arguments.push(argument.into());
+        self
+    }
+
+    /// Adds arguments.
+    pub fn args<A: Into<OsString>>(mut self, arguments: impl IntoIterator<Item = A>) -> Self {
+        self.arguments.extend(arguments.into_iter().map(Into::into));
+        self
+    }
+
+    /// Adds an option and its value.
+    pub fn option(self, name: &str, value: impl Into<OsString>) -> Self {
+        self.arg(name).arg(value)
+    }
+
+    /// Runs it in a folder, and hands every line that it says to `heard`; at the end all that
+    /// was said of the last [`KEPT_LINES`] lines.
+    ///
+    /// # Errors
+    /// [`PrepareError::NoProgram`] and [`PrepareError::Program`].
+    pub fn run(self, folder: &Path, heard: &mut dyn FnMut(&str)) -> Result<(), PrepareError> {
+        let (running, stdout, stderr) = self.start(folder)?;
+        let (sender, lines) = channel();
+        let readers = [
+            listen(stdout, sender.clone(), Stream::Output),
+            listen(stderr, sender, Stream::Error),
+        ];
+        let mut last = Last::default();
+        for (stream, line) in lines {
+            heard(&line);
+            last.keep(stream, line);
+        }
+        for reader in readers {
+            // It has nothing to tell but its lines.
+            let _ = reader.join();
+        }
+        self.judge(running.finish(), &last)
+    }
+
+    /// Runs it in the current folder, and gives all that it says on standard output and standard
+    /// error.
+    ///
+    /// # Errors
+    /// As [`Self::run`].
+    pub fn ask(self) -> Result<String, PrepareError> {
+        let mut said = String::new();
+        self.run(Path::new("."), &mut |line| {
+            said.push_str(line);
+            said.push('\n');
+        })?;
+        Ok(said)
+    }
+
+    /// Runs it in the current folder and lets `take` read its standard output, until that is
+    /// at an end or `take` says that it has enough (`false`).
+    ///
+    /// # Errors
+    /// As [`Self::run`].
+    pub fn read(
+        self,
+        mut take: impl FnMut(&mut dyn Read) -> io::Result<bool>,
+    ) -> Result<(), PrepareError> {
+        let (running, mut stdout, stderr) = self.start(Path::new("."))?;
+        let (sender, lines) = channel();
+        let reader = listen(stderr, sender, Stream::Error);
+        let enough = loop {
+            match take(&mut stdout) {
+                Ok(true) => {}
+                Ok(false) => break true,
+                // The end of what it says.
+                Err(_) => break false,
+            }
+        };
+        if enough {
+            // It has done its part.
+            let _ = locked(&running.child).kill();
+        }
+        drop(stdout);
+        let mut last = Last::default();
+        for (stream, line) in lines {
+            last.keep(stream, line);
+        }
+        let _ = reader.join();
+        match enough {
+            true => running.finish().map(|_| ()).map_err(|e| self.failed(e)),
+            false => self.judge(running.finish(), &last),
+        }
+    }
+
+    fn start(&self, folder: &Path) -> Result<(Running, ChildStdout, ChildStderr), PrepareError> {
+        let mut command = Command::new(&self.name);
+        command
+            .args(&self.arguments)
+            .current_dir(folder)
+            // COLMAP asks Qt for a display even where it shows nothing.
+            .env("QT_QPA_PLATFORM", "offscreen")
+            // A fault of a test is this program's own.
+            .env_remove(disk::FAULT)
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped());
+        // Listed before anybody can end it.
+        let mut running = locked(&RUNNING);
+        let mut child = command.spawn().map_err(|error| self.failed(error))?;
+        let pipes = child.stdout.take().zip(child.stderr.take());
+        let child = Arc::new(Mutex::new(child));
+        running.push(child.clone());
+        drop(running);
+        let running = Running { child };
+        match pipes {
+            Some((stdout, stderr)) => Ok((running, stdout, stderr)),
+            None => Err(self.failed(io::ErrorKind::BrokenPipe.into())),
+        }
+    }
+
+    /// The program's name as users know it.
+    fn known_as(&self) -> String {
+        let name = Path::new(&self.name).file_stem();
+        name.unwrap_or(&self.name).to_string_lossy().into_owned()
+    }
+
+    fn failed(&self, error: io::Error) -> PrepareError {
+        match error.kind() {
+            io::ErrorKind::NotFound => PrepareError::NoProgram {
+                program: self.known_as(),
+            },
+            _ => PrepareError::Program {
+                program: self.known_as(),
+                said: error.to_string(),
+            },
+        }
+    }
+
+    fn judge(&self, ended: io::Result<ExitStatus>, last: &Last) -> Result<(), PrepareError> {
+        let status = ended.map_err(|error| self.failed(error))?;
+        if status.success() {
+            return Ok(());
+        }
+        let told = last.told();
+        Err(PrepareError::Program {
+            program: self.known_as(),
+            said: match told.is_empty() {
+                true => status.to_string(),
+                false => format!("{} ({status})", told.join(" / ")),
+            },
+        })
+    }
+}
+
+impl Running {
+    /// Waits for its end; whoever ends all programs keeps this from returning.
+    fn finish(self) -> io::Result<ExitStatus> {
+        loop {
+            // Not `Child::wait`, which would keep others from ending it.
+            let ended = locked(&self.child).try_wait();
+            if let Some(ended) = ended.transpose() {
+                return ended;
+            }
+            thread::sleep(PATIENCE);
+        }
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let mut running = locked(&RUNNING);
+        running.retain(|child| !Arc::ptr_eq(child, &self.child));
+        drop(running);
+        let mut child = locked(&self.child);
+        if matches!(child.try_wait(), Ok(None)) {
+            let _ = child.kill();
+            let _ = child.wait();
+        }
+    }
+}
+
+/// Sends the lines that a program says: programs that show how far they are end lines with a
+/// carriage return as well.
+fn listen(
+    said: impl Read + Send + 'static,
+    to: Sender<(Stream, String)>,
+    stream: Stream,
+) -> thread::JoinHandle<()> {
+    thread::spawn(move || {
+        let mut said = BufReader::new(said);
+        let mut line = Vec::new();
+        loop {
+            let end = match said.fill_buf() {
+                Ok([]) | Err(_) => break,
+                Ok(bytes) => {
+                    let end = bytes.iter().position(|byte| matches!(byte, b'\n' | b'\r'));
+                    let room = (LONGEST_LINE as usize).saturating_sub(line.len());
+                    let part = &bytes[..end.unwrap_or(bytes.len())];
+                    line.extend_from_slice(&part[..part.len().min(room)]);
+                    let used = end.map_or(bytes.len(), |end| end + 1);
+                    said.consume(used);
+                    end
+                }
+            };
+            if end.is_some() && !line.is_empty() {
+                // Nobody may be listening any more; the program is heard to its end.
+                let _ = to.send((stream, String::from_utf8_lossy(&line).into_owned()));
+                line.clear();
+            }
+        }
+        if !line.is_empty() {
+            let _ = to.send((stream, String::from_utf8_lossy(&line).into_owned()));
+        }
+    })
+}
+
+/// Where a program says something.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stream {
+    Output,
+    Error,
+}
+
+/// What a program said last.
+#[derive(Default)]
+struct Last(VecDeque<(Stream, String)>);
+
+impl Last {
+    fn keep(&mut self, stream: Stream, line: String) {
+        if self.0.len() == KEPT_LINES {
+            self.0.pop_front();
+        }
+        self.0.push_back((stream, line));
+    }
+
+    /// The last lines of standard error or, where there are none, of standard output.
+    fn told(&self) -> Vec<&str> {
+        let of = |stream| {
+            let said = self.0.iter().filter(|(from, _)| *from == stream);
+            let said = said
+                .map(|(_, line)| message(line))
+                .filter(|line| !line.is_empty());
+            said.collect::<Vec<_>>()
+        };
+        let mut said = of(Stream::Error);
+        if said.is_empty() {
+            said = of(Stream::Output);
+        }
+        said.split_off(said.len().saturating_sub(TOLD_LINES))
+    }
+}
+
+/// A line without what a log puts before it (`E20250101 10:00:00.000000 123 file.cc:7] `).
+fn message(line: &str) -> &str {
+    let bytes = line.as_bytes();
+    let logged = bytes.len() > 1
+        && matches!(bytes[0], b'I' | b'W' | b'E' | b'F')
+        && bytes[1].is_ascii_digit();
+    match line.split_once("] ") {
+        Some((_, message)) if logged => message.trim(),
+        _ => line.trim(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_log_s_prefix_is_no_message() {
+        let logged = "E20250101 10:00:00.000000 123 option.cc:7] Failed to parse";
+        assert_eq!(message(logged), "Failed to parse");
+        for line in ["Error [1] no", "I am [a] person", "E", ""] {
+            assert_eq!(message(line), line);
+        }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn lines_are_heard_and_the_last_are_told() {
+        let mut heard = Vec::new();
+        let script = "printf 'one\\rtwo\\n\\n'; echo three >&2; exit 3";
+        let failed = Program::new("sh")
+            .args(["-c", script])
+            .run(Path::new("."), &mut |line| heard.push(line.to_owned()));
+        heard.sort();
+        assert_eq!(heard, ["one", "three", "two"]);
+        let told = failed.unwrap_err().to_string();
+        assert!(told.contains("three") && told.contains("sh"), "{told}");
+        let none = Program::new("no-such-program-at-all").ask();
+        assert!(matches!(none, Err(PrepareError::NoProgram { .. })));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_program_that_has_said_enough_is_ended() {
+        let mut bytes = [0; 4];
+        let mut count = 0;
+        let enough = Program::new("cat").arg("/dev/zero").read(|from| {
+            from.read_exact(&mut bytes)?;
+            count += 1;
+            Ok(count < 3)
+        });
+        assert!(enough.is_ok());
+        assert_eq!(count, 3);
+    }
+}
