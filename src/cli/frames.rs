@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{CliError, network::NetworkArguments, print, progress::Progress};
+use super::{CliError, network::NetworkArguments, next, print, progress::Progress};
 use crate::run::{Frames, FramesOptions, frames};
 
 /// Color the photos themselves: each with its own lightness at its full size, and the scene's
@@ -52,7 +52,6 @@ fn rate(text: &str) -> Result<Rate, String> {
 
 impl FramesCommand {
     pub(super) fn run(self) -> Result<(), CliError> {
-        let mut progress = Progress::default();
         let options = FramesOptions {
             run: self.run,
             colmap: self.colmap,
@@ -62,13 +61,16 @@ impl FramesCommand {
             teacher_alone: self.teacher_alone,
             frame_rate: self.frame_rate.map(|Rate(rate)| rate),
         };
+        let mut progress = Progress::through(options.stages());
         let done = frames(&options, &mut |event| progress.show(&event))?;
         progress.finish();
         if self.json {
             let text = serde_json::to_string_pretty(&done);
             return print(text.unwrap_or_default());
         }
-        print(summary(&done))
+        print(summary(&done))?;
+        let next = next::export(options.run.as_deref());
+        progress.close(&[&done.output], &next)
     }
 }
 
@@ -78,11 +80,9 @@ fn summary(done: &Frames) -> String {
         count => format!("; {count} without a pose take their colors from their neighbors"),
     };
     format!(
-        "colored {} photos in {:.0} s: the scene covers {:.0} % of the {} with a pose{carried}\nwrote {}",
+        "colored {} photos: the scene covers {:.0} % of the {} with a pose{carried}",
         done.photos,
-        done.seconds,
         100.0 * done.covered,
         done.placed,
-        done.output.display()
     )
 }

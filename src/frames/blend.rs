@@ -8,17 +8,35 @@
 //! with s the scene's colors and c how far these are believed; d what the scene differs from the
 //! teacher around; p the colors of the photo before, where these are known. So there is no seam
 //! where the scene ends (as in Pérez, Gangnet and Blake, *Poisson Image Editing*, SIGGRAPH 2003),
-//! and what blurred geometry loses comes back (docs/decisions.md). With a teacher w = 1; without
-//! one t = 0, and w = exp(−δ²/2σ²), δ the difference of the neighbors' gray: colors spread along
+//! and what blurred geometry loses comes back (docs/decisions.md). With a teacher w is 1, but
+//! nearly 0 where it says something else than the scene beyond a cast: there the scene is taken as
+//! it is. Without one t = 0, and w = exp(−δ²/2σ²), δ the difference of the neighbors' gray: colors spread along
 //! even lightness and stop at edges (as in Levin, Lischinski and Weiss, *Colorization using
 //! Optimization*, SIGGRAPH 2004). The system is symmetric and positive definite; conjugate
 //! gradients solve it.
 
-use super::Canvas;
+use super::{Canvas, window};
 
 /// λ with a teacher: half the square of the distance in pixels over which its detail stays its
 /// own. A scene is blurred over as much.
 const SMOOTH: f32 = 4.5;
+
+/// By how much, in CIELAB units, scene and teacher differ where the teacher's detail is believed
+/// by half.
+const UNLIKE: f32 = 6.0;
+
+/// By how much that difference changes from pixel to pixel where blur is believed to be its cause
+/// by half.
+const BREAK: f32 = 24.0;
+
+/// Reach in pixels of the mean over which they are compared: that of the blur.
+const REACH: usize = 3;
+
+/// Rounds of the fit of a cast, and the difference in CIELAB units that counts half in it.
+const CAST: (usize, f64) = (6, 6.0);
+
+/// By how much a photo's saturation may differ as a whole.
+const SATURATION: f64 = 0.5;
 
 /// λ without one.
 const SPREAD: f32 = 1.0;
@@ -97,19 +115,88 @@ pub fn blend(
         .map(|(ab, &c)| [c * ab[0], c * ab[1], c])
         .collect();
     let around = spread(&weighted, canvas.size());
-    let edges = match teacher {
-        Some(_) => [SMOOTH; 256],
-        None => std::array::from_fn(|d| {
-            let d = d as f32 / GRAY_DEVIATION;
-            SPREAD * ((-0.5 * d * d).exp() + LEAST_EDGE)
-        }),
+    let system = match teacher {
+        Some(teacher) => {
+            let alike = likeness(&scene, teacher, canvas.size());
+            let edge = |i: usize, j: usize| {
+                let [a, b] = difference(scene.ab[i], scene.ab[j]);
+                let known = scene.weight[i] * scene.weight[j];
+                let unbroken = 1.0 / (1.0 + (known * a.hypot(b) / BREAK).powi(4));
+                SMOOTH * (alike[i].min(alike[j]) * unbroken + LEAST_EDGE)
+            };
+            System::new(canvas.size(), edge, &scene, &around, before.as_ref())
+        }
+        None => {
+            let gray = &canvas.gray;
+            let by_difference: [f32; 256] = std::array::from_fn(|d| {
+                let d = d as f32 / GRAY_DEVIATION;
+                SPREAD * ((-0.5 * d * d).exp() + LEAST_EDGE)
+            });
+            let edge = |i: usize, j: usize| by_difference[usize::from(gray[i].abs_diff(gray[j]))];
+            System::new(canvas.size(), edge, &scene, &around, before.as_ref())
+        }
     };
-    let system = System::new(canvas, &edges, &scene, &around, before.as_ref());
     let correction = system.solve(around);
     let pixels = correction.iter().zip(own);
     pixels
         .map(|(v, own)| [v[0] + own[0], v[1] + own[1]])
         .collect()
+}
+
+/// How far the teacher's detail can be believed at each pixel, 0 to 1: where it and the scene, of
+/// which `scene` is the difference from it, say the same but for a cast and a saturation of the
+/// whole photo.
+fn likeness(scene: &Believed, teacher: &[[f32; 2]], size: [usize; 2]) -> Vec<f32> {
+    let casts = [0, 1].map(|k: usize| {
+        let points = teacher.iter().zip(&scene.ab).zip(&scene.weight);
+        cast(points.map(|((own, ab), &c)| [own[k], ab[k], c].map(f64::from)))
+    });
+    let rest: Vec<[f32; 3]> = (teacher.iter().zip(&scene.ab).zip(&scene.weight))
+        .map(|((own, ab), &c)| {
+            let rest = |k: usize| ab[k] - (casts[k][0] + casts[k][1] * f64::from(own[k])) as f32;
+            [c * rest(0), c * rest(1), c]
+        })
+        .collect();
+    window::sums(&rest, size, REACH)
+        .iter()
+        .map(|&[a, b, c]| {
+            let far = if c > 0.0 {
+                a.hypot(b) / c / UNLIKE
+            } else {
+                0.0
+            };
+            1.0 / (1.0 + far.powi(4))
+        })
+        .collect()
+}
+
+/// Offset and slope of a line through points x, y of some weight, which most of them lie near.
+fn cast(points: impl Iterator<Item = [f64; 3]> + Clone) -> [f64; 2] {
+    let [mut offset, mut slope] = [0.0; 2];
+    for round in 0..CAST.0 {
+        let mut sums = [0.0; 5];
+        for [x, y, weight] in points.clone() {
+            let far = (y - offset - slope * x) / CAST.1;
+            // From a plain mean on, points that lie far count less and less.
+            let weight = weight / (1.0 + if round > 0 { far * far } else { 0.0 });
+            for (sum, term) in sums.iter_mut().zip([1.0, x, y, x * x, x * y]) {
+                *sum += weight * term;
+            }
+        }
+        let [w, x, y, xx, xy] = sums;
+        if w <= 0.0 {
+            break;
+        }
+        let (mean_x, mean_y) = (x / w, y / w);
+        // A wrong patch would turn the line as long as it is near nothing. A teacher without any
+        // color has no saturation.
+        if round >= CAST.0 / 2 {
+            slope = (xy / w - mean_x * mean_y) / (xx / w - mean_x * mean_x + 1.0);
+            slope = slope.clamp(-SATURATION, SATURATION);
+        }
+        offset = mean_y - slope * mean_x;
+    }
+    [offset, slope]
 }
 
 /// Weighted values, spread over where there are none: each pixel takes what is around on the
@@ -181,28 +268,26 @@ struct System {
 }
 
 impl System {
-    /// `likeness` is what an edge counts by the difference of gray across it.
+    /// `edge` is what the edge between two pixels counts.
     fn new(
-        canvas: &Canvas,
-        likeness: &[f32; 256],
+        size: [usize; 2],
+        edge: impl Fn(usize, usize) -> f32,
         scene: &Believed,
         around: &[[f32; 2]],
         before: Option<&Believed>,
     ) -> Self {
-        let size @ [width, height] = canvas.size();
-        let gray = &canvas.gray;
-        let between = |i: usize, j: usize| likeness[usize::from(gray[i].abs_diff(gray[j]))];
-        let edges: Vec<[f32; 2]> = (0..gray.len())
+        let [width, height] = size;
+        let edges: Vec<[f32; 2]> = (0..around.len())
             .map(|i| {
                 let right = i % width + 1 < width;
                 let below = i / width + 1 < height;
                 [
-                    if right { between(i, i + 1) } else { 0.0 },
-                    if below { between(i, i + width) } else { 0.0 },
+                    if right { edge(i, i + 1) } else { 0.0 },
+                    if below { edge(i, i + width) } else { 0.0 },
                 ]
             })
             .collect();
-        let (mut own, mut wanted) = (Vec::with_capacity(gray.len()), Vec::new());
+        let (mut own, mut wanted) = (Vec::with_capacity(around.len()), Vec::new());
         for (i, around) in around.iter().enumerate() {
             let c = scene.weight[i];
             let open = 1.0 - c;

@@ -133,3 +133,39 @@ fn whatever_the_size_and_nothing_known_it_ends() {
         assert!(found.iter().all(|&ab| near(ab, [7.0, 7.0], 0.05)));
     }
 }
+
+#[test]
+fn where_the_teacher_is_plainly_wrong_nothing_of_it_is_left_and_a_cast_costs_no_detail() {
+    let (width, height) = (60, 40);
+    let canvas = Canvas {
+        width,
+        height,
+        gray: vec![128; (width * height) as usize],
+        mask: None,
+    };
+    let at = |i: usize| (i % 60, i / 60);
+    // Stripes that blurred geometry has lost; a cast of 9 units; a patch of another color.
+    let stripe = |x: usize| if x.is_multiple_of(2) { 6.0 } else { -6.0 };
+    let patch = |i: usize| (35..50).contains(&at(i).0) && (10..30).contains(&at(i).1);
+    let scene = flat(&canvas, [20.0, 0.0], 1.0);
+    let teacher: Vec<[f32; 2]> = (0..canvas.len())
+        .map(|i| match patch(i) {
+            true => [-45.0, -50.0],
+            false => [29.0, stripe(at(i).0)],
+        })
+        .collect();
+    let found = blend(&canvas, &scene, Some(&teacher), None);
+    let (mut seams, mut detail) = (0.0_f32, 0.0_f32);
+    for (i, ab) in found.iter().enumerate() {
+        let (x, y) = at(i);
+        assert!((ab[0] - 20.0).abs() < 5.0, "{x} {y}: {ab:?}");
+        if (30..55).contains(&x) && (5..35).contains(&y) {
+            seams = seams.max((ab[0] - 20.0).abs());
+        } else if (4..24).contains(&x) && (4..36).contains(&y) {
+            detail += ab[1] * stripe(x) / 36.0;
+        }
+    }
+    // At the patch's corners a thirteenth of the step of 65 units, and nearly all of the stripes.
+    assert!(seams < 5.0, "{seams}");
+    assert!(detail / 640.0 > 0.85, "{}", detail / 640.0);
+}

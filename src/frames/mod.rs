@@ -11,6 +11,7 @@ mod blend;
 mod canvas;
 mod finish;
 mod scene;
+mod window;
 
 pub use between::{Between, Carried};
 pub use blend::{Believed, blend};

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Believed, Canvas, canvas::working_size};
+use super::{Believed, Canvas, canvas::working_size, window};
 use crate::{
     capture::{Camera, Exposure, View, lens::Undistortion},
     gpu::GpuError,
@@ -196,7 +196,7 @@ fn compared(differences: &[Option<f32>], size: [usize; 2]) -> Vec<f32> {
     let sums: Vec<[f32; 2]> = (differences.iter())
         .map(|d| d.map_or([0.0; 2], |d| [d, 1.0]))
         .collect();
-    let means: Vec<f32> = (around(&sums, size).iter())
+    let means: Vec<f32> = (window::sums(&sums, size, REACH).iter())
         .map(|&[sum, count]| {
             if count > 0.0 {
                 (sum / count).abs()
@@ -214,23 +214,6 @@ fn compared(differences: &[Option<f32>], size: [usize; 2]) -> Vec<f32> {
     };
     let half = UNLIKE[0].max(UNLIKE[1] * median);
     means.iter().map(|mean| mean / half).collect()
-}
-
-/// Sums over a square about each pixel, cut off at the border.
-fn around(values: &[[f32; 2]], [width, height]: [usize; 2]) -> Vec<[f32; 2]> {
-    let line = |at: &dyn Fn(usize) -> [f32; 2], length: usize, i: usize| {
-        let range = i.saturating_sub(REACH)..(i + REACH + 1).min(length);
-        range.fold([0.0; 2], |sum, j| [sum[0] + at(j)[0], sum[1] + at(j)[1]])
-    };
-    let rows: Vec<[f32; 2]> = (0..values.len())
-        .map(|i| {
-            let start = i / width * width;
-            line(&|x| values[start + x], width, i % width)
-        })
-        .collect();
-    (0..values.len())
-        .map(|i| line(&|y| rows[y * width + i % width], height, i / width))
-        .collect()
 }
 
 #[cfg(test)]

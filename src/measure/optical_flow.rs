@@ -44,7 +44,10 @@ pub fn optical_flow(from: &[f32], to: &[f32], [width, height]: [usize; 2]) -> Fl
         "pictures of one size"
     );
     let size = [width, height];
-    let mut levels = vec![[from, to].map(|gray| Gray::normalized(gray, size))];
+    let mut levels = vec![[from, to].map(|gray| Gray {
+        size,
+        pixels: gray.to_vec(),
+    })];
     while let Some([last, other]) = levels.last()
         && last.size.iter().all(|side| side / 2 >= SHORTEST)
     {
@@ -53,13 +56,15 @@ pub fn optical_flow(from: &[f32], to: &[f32], [width, height]: [usize; 2]) -> Fl
     }
     let mut vectors = Vec::new();
     let mut coarser = [0; 2];
-    for [from, to] in levels.iter().rev() {
+    for pair in levels.iter().rev() {
+        // On each level by itself: what is even over eight pixels here is not on a coarser one.
+        let [from, to] = pair.each_ref().map(Gray::normalized);
         vectors = match vectors.is_empty() {
             true => vec![[0.0; 2]; from.pixels.len()],
             false => enlarged(&vectors, coarser, from.size),
         };
         for _ in 0..WARPS {
-            refine(from, to, &mut vectors);
+            refine(&from, &to, &mut vectors);
             vectors = median(&vectors, from.size);
         }
         coarser = from.size;
@@ -78,7 +83,8 @@ struct Gray {
 
 impl Gray {
     /// Without its local mean, over its local contrast.
-    fn normalized(gray: &[f32], size: [usize; 2]) -> Self {
+    fn normalized(&self) -> Self {
+        let (gray, size) = (&self.pixels, self.size);
         let mean = boxed(gray, size);
         let about: Vec<f32> = gray.iter().zip(&mean).map(|(g, m)| g - m).collect();
         let squares: Vec<f32> = about.iter().map(|v| v * v).collect();
@@ -315,12 +321,24 @@ fn median(vectors: &[[f32; 2]], [width, height]: [usize; 2]) -> Vec<[f32; 2]> {
 mod tests {
     use super::*;
 
-    /// A smooth texture with detail of several sizes.
+    /// Smooth noise of several sizes, which repeats nowhere.
     fn texture(x: f32, y: f32) -> f32 {
-        128.0
-            + 40.0 * (0.11 * x + 0.05 * y).sin() * (0.07 * y - 0.02 * x).cos()
-            + 25.0 * (0.35 * x - 0.2 * y).sin()
-            + 20.0 * (0.4 * y + 0.13 * x).cos()
+        let lattice = |x: i32, y: i32, seed: u32| {
+            let mixed = (x as u32).wrapping_mul(0x9E37_79B1) ^ (y as u32).wrapping_mul(0x85EB_CA77);
+            let mixed = (mixed ^ seed).wrapping_mul(0xC2B2_AE3D);
+            ((mixed ^ (mixed >> 15)).wrapping_mul(0x2C1B_3C6D) >> 16) as f32 / 65535.0 - 0.5
+        };
+        let noise = |size: f32, seed: u32| {
+            let (x, y) = (x / size, y / size);
+            let (left, top) = (x.floor(), y.floor());
+            let smooth = |t: f32| t * t * (3.0 - 2.0 * t);
+            let (s, t) = (smooth(x - left), smooth(y - top));
+            let at = |i: i32, j: i32| lattice(left as i32 + i, top as i32 + j, seed);
+            let upper = at(0, 0) + s * (at(1, 0) - at(0, 0));
+            let lower = at(0, 1) + s * (at(1, 1) - at(0, 1));
+            upper + t * (lower - upper)
+        };
+        128.0 + 60.0 * noise(5.0, 1) + 70.0 * noise(11.0, 2) + 80.0 * noise(23.0, 3)
     }
 
     fn picture(size: [usize; 2], at: impl Fn(f32, f32) -> f32) -> Vec<f32> {
@@ -350,7 +368,7 @@ mod tests {
         for [u, v] in [[0.0, 0.0], [2.3, -1.4], [-9.0, 5.0]] {
             let moved = picture(size, |x, y| 0.6 * texture(x - u, y - v) + 31.0);
             let found = miss(&optical_flow(&from, &moved, size), |_, _| [u, v]);
-            assert!(found < 0.2, "{u} {v}: {found}");
+            assert!(found < 0.35, "{u} {v}: {found}");
         }
     }
 

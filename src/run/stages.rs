@@ -2,7 +2,7 @@
 //! trial, is not among them.
 
 use super::{
-    ColorizeOptions, EvalOptions, FitOptions, PlanOptions, RenderOptions,
+    ColorizeOptions, EvalOptions, FitOptions, FramesOptions, PlanOptions, RenderOptions,
     Stage::{self, *},
 };
 use crate::{chroma, luma::Goal};
@@ -86,6 +86,13 @@ impl EvalOptions {
             only_if(taught, Strength),
             Some(Page),
         ])
+    }
+}
+
+impl FramesOptions {
+    /// The stages of [`frames`](super::frames).
+    pub fn stages(&self) -> Vec<Stage> {
+        vec![Model, Device, Coloring]
     }
 }
 

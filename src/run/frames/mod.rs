@@ -91,6 +91,7 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
         Some(path) => RunFolder::at(path),
         None => RunFolder::newest()?,
     };
+    observe(Event::begins(Stage::Model));
     let report = folder.read_report()?;
     let noted = PathBuf::from(&report.capture.path);
     let colmap_dir = options.colmap.clone().unwrap_or(noted);
@@ -107,6 +108,7 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
     let teachers = open_teachers(options, &report, &folder, &dataset, observe)?;
     let luma = scene.splats.to_luma();
     let drawn = report.luma.settings.raster_options();
+    observe(Event::begins(Stage::Device));
     let raster = Arc::new(Raster::with(&open_gpu(false)?, drawn));
     let mut painter = Painter {
         drawer: SceneDrawer::new(&raster, &luma, &chroma, dataset.extent)?,
