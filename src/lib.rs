@@ -3,7 +3,7 @@
 //! Imports go down only:
 //!
 //! ```text
-//! cli → tradeoff, prepare → run → eval → report, doctor → luma, chroma → effects, measure → raster
+//! cli → auto → tradeoff, prepare → run → eval, frames → report, doctor → luma, chroma → effects, measure → raster
 //! → capture, splats → gpu, color, sections, download, npy, oracle, compare → disk, hash, input
 //! ```
 //!
@@ -44,6 +44,8 @@
 //! # }
 //! ```
 
+#[cfg(feature = "cli")]
+pub mod auto;
 pub mod capture;
 pub mod chroma;
 #[cfg(feature = "cli")]

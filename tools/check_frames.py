@@ -8,7 +8,7 @@ while its run is there, colored by the network in DATA/teacher-places (or `--tea
 their own photos where these are in color. What is not there is skipped with a word. Photos t and
 t + Δ are compared in two ways that use nothing of the program: at COLMAP's points (means of 3 × 3
 pixels around what both photos observed), and along OpenCV's DIS flow where the way there and back
-ends within a pixel. Figures are root mean squares of a, b. Needs numpy, Pillow, scikit-image,
+ends within a pixel, if that is so over half of the photos. Figures are root mean squares of a, b. Needs numpy, Pillow, scikit-image,
 opencv-python-headless.
 """
 
@@ -30,6 +30,8 @@ from skimage.color import rgb2lab
 # Bounds, as printed in the head of the table.
 AGREE = {1: 0.5, 10: 0.4}
 SIDE = 320
+# Photos farther apart than flow can follow: what is left of them says little.
+FOLLOWED = 0.5
 
 HEAD = ["scene, teacher", "photos", "scene covers"]
 for delta, most in AGREE.items():
@@ -188,14 +190,20 @@ def measure(program: str, scene: str, folder: Path, teacher: str, out: Path, fla
         if len(names) <= delta:
             cells += ["", ""]
             continue
+        # Photos agree with each other by themselves.
+        steady = teacher == "photos"
         one, other = (at_points(p, names, delta, seen, size) for p in (ours, alone))
-        cells.append(f"{one:.2f} / {other:.2f}, {judged(one / other, one <= most * other)}")
+        told = judged(one / other, steady or one <= most * other)
+        cells.append(f"{one:.2f} / {other:.2f}, {told}")
         pairs = flows(grays, delta)
         one, other = (along_flow(p, names, delta, pairs) for p in (ours, alone))
-        value = one["rms"] / other["rms"] if other["rms"] else None
-        share = one["pixels"] / sum(seen.size for _, _, seen in pairs)
-        told = judged(value, value is not None and value <= most)
-        cells.append(f"{one['rms']:.2f} / {other['rms']:.2f}, {told} ({100 * share:.0f} % of pixels)")
+        share = one["pixels"] / max(1, sum(seen.size for _, _, seen in pairs))
+        if share < FOLLOWED or not other["rms"]:
+            cells.append("")
+            continue
+        value = one["rms"] / other["rms"]
+        told = judged(value, steady or value <= most)
+        cells.append(f"{one['rms']:.2f} / {other['rms']:.2f}, {told}")
     ratios = []
     for name in names:
         paths = [next(p for p in f.rglob("*") if p.stem == Path(name).stem)

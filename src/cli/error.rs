@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use super::remedy;
 use crate::{
-    download::DownloadError, prepare::PrepareError, run::RunError, tradeoff::TradeoffError,
+    auto::AutoError, download::DownloadError, prepare::PrepareError, run::RunError,
+    tradeoff::TradeoffError,
 };
 
 /// What stopped a command; one line that names the file and the remedy.
@@ -19,6 +20,9 @@ pub enum CliError {
     /// A film or photos could not be prepared.
     #[error("{}", remedy::of_preparing(.0))]
     Prepare(#[from] PrepareError),
+    /// A step of the whole failed.
+    #[error("{}", remedy::of_auto(.0))]
+    Auto(#[from] AutoError),
     /// A network was not fetched.
     #[error("{}", remedy::of_download(error, by_hand.as_ref()))]
     Fetch {

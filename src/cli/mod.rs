@@ -1,5 +1,6 @@
 //! The commands: arguments in, text out. What they do is in [`crate::run`].
 
+mod auto;
 mod bar;
 mod checkpoint;
 mod colorize;
@@ -49,6 +50,7 @@ pub struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    Auto(auto::Auto),
     Prepare(prepare::Prepare),
     Plan(plan::Plan),
     Fit(fit::Fit),
@@ -77,6 +79,7 @@ impl Cli {
 
     fn run(self) -> Result<(), CliError> {
         match self.command {
+            Command::Auto(command) => command.run(),
             Command::Prepare(command) => command.run(),
             Command::Plan(command) => command.run(),
             Command::Fit(command) => command.run(),

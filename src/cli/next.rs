@@ -21,6 +21,11 @@ pub(super) fn fit_as_planned() -> String {
     line(&words)
 }
 
+/// `fit` of a COLMAP folder.
+pub(super) fn fit(colmap_dir: &Path) -> String {
+    line(&["fit", &colmap_dir.to_string_lossy()])
+}
+
 /// `colorize` by the teacher that was asked ahead, if there was one.
 pub(super) fn colorize(run: &Path, asked: Option<&Path>) -> String {
     let run = run.to_string_lossy();

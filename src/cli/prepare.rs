@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, builder::PossibleValuesParser};
 
 use super::{
-    CliError, print,
+    CliError, next, print,
     progress::Progress,
     values::{one_of, positive},
 };
@@ -29,16 +29,12 @@ const MATCHINGS: &[(Matching, &str)] = &[
     (Matching::Exhaustive, "Each with each"),
 ];
 
-/// Make of a film or a folder of photos what `fit` takes: frames, masks and camera poses, with
-/// FFmpeg and COLMAP. What was made from the same before stays, so that the same command goes on.
+/// What is prepared, and how.
 #[derive(Args)]
-pub struct Prepare {
+pub struct InputArguments {
     /// A film, or a folder of photos.
     #[arg(value_name = "FILM|DIR")]
     input: PathBuf,
-    /// Folder to write; one that was prepared before goes on.
-    #[arg(short, long, value_name = "DIR")]
-    output: PathBuf,
     /// Where in the film the shot begins, in seconds or as 1:05 [default: the longest shot].
     #[arg(long, value_name = "TIME", value_parser = time)]
     start: Option<f64>,
@@ -74,6 +70,43 @@ pub struct Prepare {
     /// Where there is no COLMAP, install its Python module into the cache.
     #[arg(long)]
     install: bool,
+}
+
+impl InputArguments {
+    /// What was said of it, for an output folder; ends the program where it makes no sense.
+    pub(super) fn options(self, output: PathBuf, force: bool) -> PrepareOptions {
+        if let (Some(start), Some(end)) = (self.start, self.end)
+            && end <= start
+        {
+            super::fit::refuse("--end has to be later than --start");
+        }
+        let length = self.start.zip(self.seconds);
+        PrepareOptions {
+            input: self.input,
+            output,
+            start: self.start,
+            end: self.end.or(length.map(|(start, seconds)| start + seconds)),
+            per_second: self.per_second,
+            mask: self.mask,
+            masks: self.masks,
+            cameras: self.cameras,
+            lens: self.lens,
+            matching: self.matching,
+            install: self.install,
+            force,
+        }
+    }
+}
+
+/// Make of a film or a folder of photos what `fit` takes: frames, masks and camera poses, with
+/// FFmpeg and COLMAP. What was made from the same before stays, so that the same command goes on.
+#[derive(Args)]
+pub struct Prepare {
+    #[command(flatten)]
+    input: InputArguments,
+    /// Folder to write; one that was prepared before goes on.
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
     /// Make all of it anew, also from another input.
     #[arg(long)]
     force: bool,
@@ -84,40 +117,21 @@ pub struct Prepare {
 
 impl Prepare {
     pub(super) fn run(self) -> Result<(), CliError> {
-        if let (Some(start), Some(end)) = (self.start, self.end)
-            && end <= start
-        {
-            super::fit::refuse("--end has to be later than --start");
-        }
+        let options = self.input.options(self.output, self.force);
         let mut progress = Progress::default();
-        let length = self.start.zip(self.seconds);
-        let options = PrepareOptions {
-            input: self.input,
-            output: self.output,
-            start: self.start,
-            end: self.end.or(length.map(|(start, seconds)| start + seconds)),
-            per_second: self.per_second,
-            mask: self.mask,
-            masks: self.masks,
-            cameras: self.cameras,
-            lens: self.lens,
-            matching: self.matching,
-            install: self.install,
-            force: self.force,
-        };
         let prepared = prepare(&options, &mut |event| progress.show(&event))?;
         progress.finish();
         if self.json {
             return print(format_args!("{:#}", serde_json::json!(prepared)));
         }
-        print(in_words(&prepared))
+        print(in_words(&prepared))?;
+        progress.close(&[], &next::fit(&prepared.folder))
     }
 }
 
 /// What there is now, and what comes next.
 fn in_words(prepared: &Prepared) -> String {
     let Prepared {
-        folder,
         photos,
         masked,
         colmap,
@@ -129,21 +143,9 @@ fn in_words(prepared: &Prepared) -> String {
         masked => format!(", {masked} with a mask"),
     };
     format!(
-        "{} of {photos} photos have a pose ({colmap}, {} points){masks}\nnext: gs-chroma fit {}",
-        poses.placed,
-        poses.points,
-        quoted(&folder.to_string_lossy())
+        "{} of {photos} photos have a pose ({colmap}, {} points){masks}",
+        poses.placed, poses.points
     )
-}
-
-/// A word as a shell takes it.
-fn quoted(word: &str) -> String {
-    let plain = |c: char| c.is_alphanumeric() || "/._-+,:=@%".contains(c);
-    match word.chars().all(plain) && !word.starts_with('-') {
-        true => word.to_owned(),
-        false if word.starts_with('-') => quoted(&format!("./{word}")),
-        false => format!("'{}'", word.replace('\'', "'\\''")),
-    }
 }
 
 /// Seconds, or minutes and seconds, or hours, minutes and seconds: `65`, `1:05`, `1:02:03.5`.
@@ -188,13 +190,5 @@ mod tests {
         ] {
             assert!(time(text).is_err(), "{text}");
         }
-    }
-
-    #[test]
-    fn the_next_command_can_be_typed() {
-        assert_eq!(quoted("a/house-1"), "a/house-1");
-        assert_eq!(quoted("my house"), "'my house'");
-        assert_eq!(quoted("it's"), "'it'\\''s'");
-        assert_eq!(quoted("-o"), "./-o");
     }
 }

@@ -98,12 +98,24 @@ impl Progress {
         self.leave(Instant::now());
     }
 
+    /// Ends another's present stage, and takes over what its stages took and its warnings.
+    pub fn join(&mut self, other: &mut Self) {
+        other.finish();
+        for (stage, took) in other.spent.drain(..) {
+            self.add(stage, took);
+        }
+        self.warnings.append(&mut other.warnings);
+    }
+
     fn leave(&mut self, now: Instant) {
         let Some((stage, begun, bar)) = self.present.take() else {
             return;
         };
         bar.end(FIGURES.contains(&stage));
-        let took = now - begun;
+        self.add(stage, now - begun);
+    }
+
+    fn add(&mut self, stage: Stage, took: Duration) {
         match self.spent.iter_mut().find(|(known, _)| *known == stage) {
             Some((_, spent)) => *spent += took,
             None => self.spent.push((stage, took)),

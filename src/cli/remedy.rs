@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use crate::{
+    auto::AutoError,
     capture::CaptureError,
     chroma::{ChromaError, teacher::TeacherError},
     download::DownloadError,
@@ -79,6 +80,17 @@ pub(super) fn of_preparing(error: &PrepareError) -> String {
     match error {
         PrepareError::Run(error) => of_run(error),
         _ => error.to_string(),
+    }
+}
+
+/// What the user reads of an error of a step of the whole.
+pub(super) fn of_auto(error: &AutoError) -> String {
+    match error {
+        AutoError::Prepare(error) => of_preparing(error),
+        AutoError::Run(RunError::Interrupted { iteration, .. }) => {
+            format!("interrupted after iteration {iteration}; the same command goes on from there")
+        }
+        AutoError::Run(error) => of_run(error),
     }
 }
 

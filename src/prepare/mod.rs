@@ -30,6 +30,7 @@ pub use colmap::{Cameras, Matching};
 pub use error::PrepareError;
 pub use poses::Poses;
 pub(crate) use process::end_programs;
+pub(crate) use state::{digest, of as digest_of};
 
 use crate::{
     capture::{CaptureError, Film, IMAGES, plain_header},
@@ -38,7 +39,7 @@ use crate::{
 use colmap::Colmap;
 use masks::Sources;
 use photos::Photos;
-use state::{State, Step, digest, of};
+use state::{State, Step, of};
 
 /// Where masks go.
 const MASKS: &str = "masks";

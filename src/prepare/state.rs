@@ -340,7 +340,7 @@ fn lock(path: &Path) -> Result<Option<File>, PrepareError> {
 ///
 /// # Errors
 /// If one cannot be asked for them.
-pub(super) fn digest(path: &Path) -> Result<String, PrepareError> {
+pub(crate) fn digest(path: &Path) -> Result<String, PrepareError> {
     let mut found = BTreeMap::new();
     if path.is_dir() {
         visit_files(path, &mut |name, file| {
@@ -363,7 +363,7 @@ pub(super) fn digest(path: &Path) -> Result<String, PrepareError> {
 }
 
 /// Some words in a few digits.
-pub(super) fn of<S: AsRef<str>>(words: &[S]) -> String {
+pub(crate) fn of<S: AsRef<str>>(words: &[S]) -> String {
     let mut hasher = Hasher::default();
     for word in words {
         hasher.update(word.as_ref().as_bytes());

@@ -108,7 +108,7 @@ pub(super) fn make_folder_of(path: &Path) -> Result<(), RunError> {
 }
 
 /// What makes a folder a page that may be replaced.
-pub(super) const PAGE: &str = "index.html";
+pub(crate) const PAGE: &str = "index.html";
 
 /// Refuses a folder that `eval` would not replace.
 pub(super) fn check_page(folder: &Path) -> Result<(), RunError> {

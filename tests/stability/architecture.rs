@@ -4,8 +4,9 @@ use std::{collections::BTreeSet, fs, path::Path};
 
 /// The folders and files right below `src`, from top to bottom. What stands on one floor
 /// does not know each other.
-const FLOORS: [&[&str]; 11] = [
+const FLOORS: [&[&str]; 12] = [
     &["cli"],
+    &["auto"],
     &["tradeoff", "prepare"],
     &["run"],
     &["eval", "frames"],

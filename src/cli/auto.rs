@@ -1,0 +1,120 @@
+//! `gs-chroma auto`.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use super::{
+    CliError,
+    interrupt::interrupt,
+    network::NetworkArguments,
+    next,
+    prepare::InputArguments,
+    print,
+    progress::Progress,
+    values::{PRESETS, one_of},
+};
+use crate::{
+    auto::{AutoOptions, Results, Step, Told, auto},
+    run::Preset,
+};
+
+/// From a film or a folder of photos to everything: frames and poses, the gray scene, its colors,
+/// the photos in color, a file for viewers and a page. A step whose result is there is skipped, so
+/// that the same command goes on where it was interrupted.
+#[derive(Args)]
+pub struct Auto {
+    #[command(flatten)]
+    input: InputArguments,
+    /// Folder for everything.
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    /// Who colors the photos: a network by name or file, or a folder of colored images.
+    #[arg(long, value_name = "NAME|FILE.onnx|DIR|photos")]
+    teacher: PathBuf,
+    #[command(flatten)]
+    network: NetworkArguments,
+    /// Folder of painted hints, as for `colorize`.
+    #[arg(long, value_name = "DIR")]
+    hints: Option<PathBuf>,
+    /// How long is trained [default: paper on a GPU, else draft].
+    #[arg(long, value_parser = one_of(PRESETS))]
+    preset: Option<Preset>,
+    /// Print what lies where as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Auto {
+    pub(super) fn run(self) -> Result<(), CliError> {
+        let output = self.output;
+        let options = AutoOptions {
+            prepare: self.input.options(output.join("house"), false),
+            output,
+            teacher: self.teacher,
+            teacher_settings: self.network.settings(),
+            hints: self.hints,
+            preset: self.preset,
+            interrupt: interrupt(),
+        };
+        let mut whole = Progress::default();
+        let mut progress = Progress::default();
+        let results = auto(&options, &mut |told| match told {
+            Told::Begins(step, stages) => {
+                whole.join(&mut progress);
+                eprintln!("{}", heading(step, ""));
+                progress = Progress::through(stages);
+            }
+            Told::Skips(step) => {
+                whole.join(&mut progress);
+                eprintln!("{}", heading(step, ": its result is there"));
+            }
+            Told::Event(event) => progress.show(&event),
+        })?;
+        whole.join(&mut progress);
+        if self.json {
+            let text = serde_json::to_string_pretty(&results);
+            return print(text.unwrap_or_default());
+        }
+        print(in_words(&results))?;
+        whole.close(&[], &next::look(&results.page))
+    }
+}
+
+/// Which step of how many.
+fn heading(step: Step, more: &str) -> String {
+    let place = Step::ALL.iter().position(|&other| other == step);
+    let (place, of) = (place.unwrap_or_default() + 1, Step::ALL.len());
+    format!("step {place} of {of}, {}{more}", step.command())
+}
+
+/// What lies where.
+fn in_words(results: &Results) -> String {
+    let lines: [(&Path, &str); 6] = [
+        (&results.colored, "the photos in color"),
+        (&results.scene, "the scene, for viewers of splats"),
+        (
+            &results.contact_sheet,
+            "photos, gray, teacher and scene side by side",
+        ),
+        (&results.page, "what was measured"),
+        (
+            &results.run,
+            "the run: `colorize`, `frames`, `eval` go on from it",
+        ),
+        (&results.house, "frames, masks and poses"),
+    ];
+    let paths = lines.map(|(path, _)| path.display().to_string());
+    let width = paths
+        .iter()
+        .map(|path| path.chars().count())
+        .max()
+        .unwrap_or_default();
+    let line = |(path, (_, what)): (&String, &(&Path, &str))| format!("{path:width$}  {what}");
+    paths
+        .iter()
+        .zip(&lines)
+        .map(line)
+        .collect::<Vec<_>>()
+        .join("\n")
+}
