@@ -11,7 +11,10 @@ use std::{
 
 use crate::{
     capture::{Film, IMAGES},
-    chroma::{ChromaSettings, Degree, teacher::TeacherSettings},
+    chroma::{
+        ChromaSettings, Degree,
+        teacher::{Teacher, TeacherSettings},
+    },
     prepare::{PrepareError, PrepareOptions, digest, digest_of, prepare},
     run::{
         CheckpointOptions, ColorizeOptions, EvalOptions, Event, ExportOptions, FitOptions,
@@ -131,6 +134,15 @@ pub type Teller<'a> = dyn FnMut(Told) + 'a;
 /// # Errors
 /// [`AutoError`]; what was done before it stays, and the same command goes on from there.
 pub fn auto(options: &AutoOptions, tell: &mut Teller<'_>) -> Result<Results, AutoError> {
+    // Better now than after hours of work; photos are asked for once they are there.
+    if options.teacher != Path::new("photos") {
+        let opened = Teacher::open(&options.teacher, None, &options.teacher_settings);
+        opened.map_err(RunError::from)?;
+    }
+    let hints = match &options.hints {
+        Some(hints) => digest(hints)?,
+        None => String::new(),
+    };
     let input = &options.prepare.input;
     // A folder that COLMAP has been through needs nothing.
     let prepared = input.join(IMAGES).is_dir() && input.join("sparse").is_dir();
@@ -194,10 +206,7 @@ pub fn auto(options: &AutoOptions, tell: &mut Teller<'_>) -> Result<Results, Aut
         &teacher,
         &teacher_digest(&options.teacher)?,
         &format!("{:?}", options.teacher_settings),
-        &match &options.hints {
-            Some(hints) => digest(hints)?,
-            None => String::new(),
-        },
+        &hints,
     ]);
     let goes_on = run.color_checkpoint().is_file() && kept.begun(Step::Colorize, &from);
     if kept.due(Step::Colorize, &from, &[&run.color(), &run.chroma()]) {

@@ -6,6 +6,7 @@
 use gs_chroma::oracle;
 
 mod ahead;
+mod auto;
 mod checkup;
 mod coordinates;
 mod doctor;
