@@ -5,11 +5,12 @@
 
 The film is make_film.py's of the bundled photos (or of `--photos DIR`), the teacher the network in
 DATA/teacher-places (or `--teacher`); where that is not there, it is skipped with a word. The
-colored film and one of the teacher's own pictures, written by the same codec, are decoded and
-compared frame by frame along OpenCV's DIS flow of the old film, its flicker taken out, where the
-way there and back ends within a pixel. Figures are of a, b in CIELAB units: root mean squares
-between frames t and t + Δ, and flicker: the standard deviation over so many frames where gray
-stays the same. Needs COLMAP, ffmpeg, numpy, Pillow, scikit-image, opencv-python-headless.
+colored film and one of the teacher's own pictures, written by the same codec, are decoded, and
+compared frame by frame: at COLMAP's points, and along OpenCV's DIS flow of the old film, its
+flicker taken out, where the way there and back ends within a pixel. So are the pictures that no
+codec has seen. Figures are of a, b in CIELAB units: root mean squares between frames t and t + Δ,
+and flicker: the standard deviation over so many frames where gray stays the same. Needs COLMAP,
+ffmpeg, numpy, Pillow, scikit-image, opencv-python-headless.
 """
 
 from __future__ import annotations
@@ -24,10 +25,14 @@ from pathlib import Path
 import cv2
 import numpy as np
 from check_color import judged, line, run
-from check_frames import AGREE, along_flow, flows, gray_of, sharpness
+from check_frames import AGREE, Pictures, along_flow, at_points, flows, gray_of, images_of
+from check_frames import sharpness
 from skimage.color import rgb2lab
 
 TOOLS = Path(__file__).parent
+
+# What is written beside the colored film, by flags of `frames`.
+OUTPUTS = {"--teacher-alone": "teacher.mp4", "": "colored", "--teacher-alone ": "teacher"}
 
 # Frames of a track of flicker, and by how many gray levels it may change.
 TRACK = 5
@@ -37,19 +42,21 @@ FLICKER = 0.5
 SHARPNESS = 0.1
 
 
-class Decoded:
-    """A film's frames: RGB in [0, 1], and CIELAB by number."""
+class Decoded(Pictures):
+    """The frames of a film or folder: RGB in [0, 1], and CIELAB by the name of the frame."""
 
     def __init__(self, path: Path):
+        path = path / "%06d.png" if path.is_dir() else path
         asked = ["ffprobe", "-v", "error", "-select_streams", "v", "-of", "json"]
         said = subprocess.run([*asked, "-show_streams", str(path)], check=True, capture_output=True)
         stream = json.loads(said.stdout)["streams"][0]
         self.shape = (stream["height"], stream["width"])
         self.rate, self.seconds = stream["r_frame_rate"], stream["duration"]
-        decode = ["ffmpeg", "-v", "error", "-i", str(path), "-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
-        raw = subprocess.run(decode, check=True, capture_output=True).stdout
+        decode = ["ffmpeg", "-v", "error", "-i", str(path), "-f", "rawvideo"]
+        raw = subprocess.run([*decode, "-pix_fmt", "rgb24", "-"], check=True, capture_output=True).stdout
         self.rgb = np.frombuffer(raw, np.uint8).reshape(-1, *self.shape, 3) / 255
-        self.lab = dict(enumerate(rgb2lab(self.rgb)))
+        self.names = [f"{number:06}.png" for number in range(1, len(self.rgb) + 1)]
+        self.lab = dict(zip(self.names, rgb2lab(self.rgb)))
 
     def __len__(self) -> int:
         return len(self.rgb)
@@ -60,7 +67,7 @@ class Decoded:
 
 def steadied(film: Decoded) -> list[np.ndarray]:
     """L* in bytes with the mean and the contrast of all frames."""
-    light = np.stack([film.lab[t][..., 0] for t in range(len(film))])
+    light = np.stack([film.lab[name][..., 0] for name in film.names])
     mean, contrast = light.mean((1, 2), keepdims=True), light.std((1, 2), keepdims=True)
     light = (light - mean) / contrast * contrast.mean() + mean.mean()
     return list(np.clip(light * 2.55, 0, 255).astype(np.uint8))
@@ -73,14 +80,14 @@ def flicker(film: Decoded, grays: list[np.ndarray], steps) -> tuple[float, int]:
         height, width = grays[first].shape
         y, x = np.mgrid[:height, :width].astype(np.float32)
         place, still = np.stack([x, y], -1), np.ones((height, width), bool)
-        colors = [film.lab[first][..., 1:]]
+        colors = [film.lab[film.names[first]][..., 1:]]
         for t in range(first, first + TRACK - 1):
             _, step, seen = steps[t]
             still &= moved(seen.astype(np.float32), place) > 0.99
             place = moved(step, place)
             gray = moved(grays[t + 1].astype(np.float32), place)
             still &= np.abs(gray - grays[first]) <= STILL
-            colors.append(moved(film.lab[t + 1][..., 1:], place))
+            colors.append(moved(film.lab[film.names[t + 1]][..., 1:], place))
         squares += float(np.stack(colors).var(0)[still].sum())
         count += int(still.sum())
     return (squares / max(2 * count, 1)) ** 0.5, count
@@ -109,44 +116,55 @@ def restored(program: str, film: Path, teacher: str, out: Path, flags: list[str]
         said, seconds = run([program, step, *arguments])
         line([f"`{step}`", f"{seconds:.1f}"])
         told[step] = json.loads(said) if "--json" in arguments else said
-    alone = ["--teacher-alone", "-o", str(out / "teacher.mp4")]
-    run([program, "frames", *asked, *alone])
+    for more, output in OUTPUTS.items():
+        run([program, "frames", *asked, *shlex.split(more), "-o", str(out / output)])
     print()
     return told
 
 
 def measure(out: Path, film: Path, told: dict) -> None:
     """The table of what was measured."""
-    old, ours, alone = (Decoded(p) for p in (film, out / "colored.mp4", out / "teacher.mp4"))
-    kept = old.form() == ours.form()
+    old = Decoded(film)
+    names = ["colored.mp4", "teacher.mp4", "colored", "teacher"]
+    colored = [Decoded(out / name) for name in names]
+    kept = old.form() == colored[0].form()
     frames = told["frames"]
     posed = f"{frames['placed']} of {frames['photos']} frames with a pose"
     print(f"{posed}; the scene covers {100 * frames['covered']:.0f} %.")
     print(f"Frames, size, rate and length as the old film's: {'yes' if kept else '**no**'}.")
     print()
     grays = steadied(old)
-    line(["measured", "ours", "teacher's", "ours / teacher's"])
-    line(["---"] * 4)
+    seen = images_of(out / "house" / "sparse" / "0")
+    placed = sorted(seen)
+    line(["ours / teacher's; sharpness and gray of ours alone", "as films", "as pictures"])
+    line(["---"] * 3)
+
+    def compared(name: str, found: list[float], most: float) -> None:
+        pairs = zip(found[::2], found[1::2])
+        cells = [f"{a:.2f} / {b:.2f}, {judged(a / b, a <= most * b)}" for a, b in pairs]
+        line([name, *cells])
+
     for delta, most in AGREE.items():
         if len(old) <= delta:
             continue
+        found = [at_points(film, placed, delta, seen, old.shape[::-1]) for film in colored]
+        compared(f"frames differ at points, Δ = {delta} (≤ {most})", found, most)
         pairs = flows(grays, delta)
-        found = [along_flow(film, range(len(old)), delta, pairs) for film in (ours, alone)]
-        one, other = (each["rms"] for each in found)
-        share = 100 * found[0]["pixels"] / sum(seen.size for _, _, seen in pairs)
-        name = f"frames differ, Δ = {delta} ({share:.0f} % of pixels; ≤ {most})"
-        line([name, f"{one:.2f}", f"{other:.2f}", judged(one / other, one <= most * other)])
+        found = [along_flow(film, old.names, delta, pairs) for film in colored]
+        share = 100 * found[0]["pixels"] / sum(known.size for _, _, known in pairs)
+        name = f"frames differ along flow, Δ = {delta} ({share:.0f} % of pixels; ≤ {most})"
+        compared(name, [each["rms"] for each in found], most)
     steps = flows(grays, 1)
-    (one, tracks), (other, _) = (flicker(film, grays, steps) for film in (ours, alone))
-    name = f"flicker over {TRACK} frames ({tracks:,} tracks; ≤ {FLICKER})"
-    line([name, f"{one:.2f}", f"{other:.2f}", judged(one / other, one <= FLICKER * other)])
-    gray = [[gray_of(frame) for frame in film.rgb] for film in (old, ours, alone)]
-    sharp = [np.array([sharpness(frame) for frame in film]) for film in gray]
-    one, other = (float((each / sharp[0]).mean()) for each in sharp[1:])
-    name = f"sharpness, by the old film's (± {SHARPNESS})"
-    line([name, judged(one, abs(one - 1) <= SHARPNESS), f"{other:.3f}", ""])
-    one, other = (255 * float(np.abs(np.stack(each) - gray[0]).mean()) for each in gray[1:])
-    line(["gray levels off the old film's", f"{one:.2f}", f"{other:.2f}", ""])
+    found = [flicker(film, grays, steps) for film in colored]
+    name = f"flicker over {TRACK} frames ({found[0][1]:,} tracks; ≤ {FLICKER})"
+    compared(name, [each for each, _ in found], FLICKER)
+    gray, *others = ([gray_of(frame) for frame in film.rgb] for film in (old, *colored[::2]))
+    sharp = np.array([sharpness(frame) for frame in gray])
+    found = [float((np.array([sharpness(f) for f in o]) / sharp).mean()) for o in others]
+    cells = [judged(value, abs(value - 1) <= SHARPNESS) for value in found]
+    line([f"sharpness / the old film's (± {SHARPNESS})", *cells])
+    cells = [f"{255 * float(np.abs(np.stack(o) - gray).mean()):.2f}" for o in others]
+    line(["gray levels off the old film's", *cells])
 
 
 def main() -> int:
