@@ -68,13 +68,16 @@ impl FramesCommand {
             let text = serde_json::to_string_pretty(&done);
             return print(text.unwrap_or_default());
         }
-        print(summary(&done))?;
+        print(summary(&done, options.teacher_alone))?;
         let next = next::export(options.run.as_deref());
         progress.close(&[&done.output], &next)
     }
 }
 
-fn summary(done: &Frames) -> String {
+fn summary(done: &Frames, teacher_alone: bool) -> String {
+    if teacher_alone {
+        return format!("colored {} photos by the teacher alone", done.photos);
+    }
     let carried = match done.carried {
         0 => String::new(),
         count => format!("; {count} without a pose take their colors from their neighbors"),

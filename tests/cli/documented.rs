@@ -6,7 +6,8 @@ use serde_json::Value;
 
 use super::shared::{onnx, place_with_run};
 
-fn page() -> String {
+/// The page.
+pub fn page() -> String {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/run-folder.md");
     std::fs::read_to_string(path).expect("the page")
 }

@@ -2,6 +2,7 @@
 
 use image::{DynamicImage, ImageBuffer, Luma};
 
+use super::documented::{documented, keys, page};
 use super::program::Place;
 use super::scene;
 use super::shared::{QUICK_FIT, onnx, place_with_run, place_with_scene};
@@ -29,6 +30,7 @@ fn photos_come_back_in_color_at_their_size_with_their_lightness() {
     place.succeed(&[&QUICK_FIT[..], &["--max-side", "32"]].concat());
     place.succeed(&["colorize", "--teacher", &onnx("ddcolor_tiny.onnx")]);
     let told = place.json(&["frames", "-o", "out/frames", "--json"]);
+    assert_eq!(documented(&page(), "## Photos in color"), keys(&told));
     let names: Vec<String> = (0..scene::VIEWS).map(scene::name).collect();
     assert_eq!(place.files("out/frames"), names);
     assert_eq!(

@@ -3,6 +3,7 @@
 mod fakes;
 mod film;
 mod real;
+mod restored;
 
 use std::fs;
 use std::process::{Command, Stdio};

@@ -9,10 +9,10 @@ use serde_json::Value;
 use crate::program::Place;
 
 /// The bundled scene's photos.
-const GARDEN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/demo/images");
+pub(super) const GARDEN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/demo/images");
 
 /// Whether a program can be started; says so where it cannot.
-fn is_there(program: &str, argument: &str) -> bool {
+pub(super) fn is_there(program: &str, argument: &str) -> bool {
     let asked = Command::new(program)
         .arg(argument)
         .stdout(Stdio::null())
