@@ -23,7 +23,12 @@ pub(super) fn fit_as_planned() -> String {
 
 /// `fit` of a COLMAP folder.
 pub(super) fn fit(colmap_dir: &Path) -> String {
-    line(&["fit", &colmap_dir.to_string_lossy()])
+    let dir = colmap_dir.to_string_lossy();
+    // An option is not what is meant.
+    match dir.starts_with('-') {
+        true => line(&["fit", &format!("./{dir}")]),
+        false => line(&["fit", &dir]),
+    }
 }
 
 /// `colorize` by the teacher that was asked ahead, if there was one.

@@ -225,26 +225,40 @@ fn nobody_there() {
     assert_refused(&place, &host, &["localhost:1", "HTTPS_PROXY"]);
 }
 
-/// The commands of the README for the user's own photos, without `cargo`'s.
-fn readme() -> Vec<String> {
+/// The commands of the README for the user's own photos, without `cargo`'s: at once, and step by
+/// step.
+fn readme() -> [Vec<String>; 2] {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/README.md");
     let text = fs::read_to_string(path).expect("the README");
     let section = text.split("## Your own photos").nth(1).expect("a section");
-    let block = section.split("```").nth(1).expect("a block");
-    let commands = block
-        .lines()
-        .filter_map(|line| line.strip_prefix("gs-chroma "));
-    commands.map(str::to_owned).collect()
+    [1, 3].map(|place| {
+        let block = section.split("```").nth(place).expect("a block");
+        let commands = block.lines().filter_map(|line| {
+            let command = line.split('#').next()?.trim();
+            command.strip_prefix("gs-chroma ").map(str::to_owned)
+        });
+        commands.collect()
+    })
 }
 
 #[test]
 fn the_readmes_way_to_colors() {
-    let [fit, fetch, colorize] = &readme()[..] else {
-        panic!("{:?}", readme());
+    let [at_once, steps] = readme();
+    let [fetch, auto] = &at_once[..] else {
+        panic!("{at_once:?}");
     };
-    assert_eq!(fit, "fit colmap_dir/");
+    let [_, fit, colorize, frames] = &steps[..] else {
+        panic!("{steps:?}");
+    };
     let name = fetch.strip_prefix("teacher fetch ").expect("a name");
     let fetch: Vec<_> = fetch.split(' ').chain(["--yes"]).collect();
+    // COLMAP has been through the tests' scene already.
+    let words = auto.split(' ').map(|word| match word {
+        "photos/" => "scene",
+        word => word,
+    });
+    let auto: Vec<_> = words.chain(["--json"]).collect();
+    assert_eq!(fit, "fit house");
     let colorize: Vec<_> = colorize.split(' ').chain(["--json"]).collect();
 
     let place = place_with_scene();
@@ -266,6 +280,16 @@ fn the_readmes_way_to_colors() {
     let teacher = &report["chroma"]["teachers"][0];
     assert_eq!(teacher["sha256"], sha256(&network()));
     assert_eq!(teacher["kind"], "DDColor");
+    let frames: Vec<_> = frames.split(' ').collect();
+    let done = host.run(&place, &frames);
+    assert_eq!(done.code, Some(0), "{}", done.stderr);
+    assert!(place.path("colored/00.png").is_file());
+
+    let done = host.run(&place, &auto);
+    assert_eq!(done.code, Some(0), "{}", done.stderr);
+    let results: serde_json::Value = serde_json::from_str(&done.stdout).expect("results");
+    let scene = results["scene"].as_str().expect("a path");
+    assert!(place.path(scene).is_file(), "{results}");
 
     let unknown = host.run(&place, &["colorize", "--teacher", "dcolor"]);
     let message = &unknown.stderr;

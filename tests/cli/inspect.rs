@@ -8,8 +8,9 @@ use super::scene;
 use super::shared::{place_with_run, place_with_scene};
 use super::splat_file::SplatFile;
 
-const COMMANDS: [&str; 10] = [
-    "prepare", "plan", "fit", "colorize", "eval", "render", "tradeoff", "export", "info", "doctor",
+const COMMANDS: [&str; 12] = [
+    "auto", "prepare", "plan", "fit", "colorize", "frames", "eval", "render", "tradeoff", "export",
+    "info", "doctor",
 ];
 
 #[test]

@@ -65,7 +65,10 @@ fn log(place: &Place) -> Vec<String> {
 fn whole() -> (Vec<u8>, Vec<String>) {
     let place = place_with_scene();
     place.succeed(&fit(&[]));
-    assert_eq!(place.files("run"), ["log.csv", "luma.ply", "report.json"]);
+    assert_eq!(
+        place.files("run"),
+        ["contact-sheet.png", "log.csv", "luma.ply", "report.json"]
+    );
     (place.read("run/luma.ply"), log(&place))
 }
 

@@ -16,7 +16,12 @@ fn the_run_is_named_after_the_folder() {
     place.succeed(&QUICK_FIT);
     assert_eq!(
         place.files("runs"),
-        ["scene/log.csv", "scene/luma.ply", "scene/report.json"]
+        [
+            "scene/contact-sheet.png",
+            "scene/log.csv",
+            "scene/luma.ply",
+            "scene/report.json"
+        ]
     );
     let mut again = QUICK_FIT;
     again[1] = "scene/";
@@ -28,7 +33,12 @@ fn the_run_is_named_after_the_folder() {
     place.succeed(&[&QUICK_FIT[..], &["-o", "deep/er/run"]].concat());
     assert_eq!(
         place.files("deep"),
-        ["er/run/log.csv", "er/run/luma.ply", "er/run/report.json"]
+        [
+            "er/run/contact-sheet.png",
+            "er/run/log.csv",
+            "er/run/luma.ply",
+            "er/run/report.json"
+        ]
     );
 }
 
@@ -145,8 +155,8 @@ fn timings_name_every_kernel() {
 fn words_without_json() {
     let place = place_with_scene();
     let printed = place.succeed(&QUICK_FIT);
-    // What came of it, seconds, a file, and what to type next.
-    assert_eq!(printed.lines().count(), 5, "{printed}");
+    // What came of it, seconds, two files, and what to type next in two lines.
+    assert_eq!(printed.lines().count(), 6, "{printed}");
     assert!(
         printed.contains("64 Gaussians after 3 iterations"),
         "{printed}"
@@ -281,7 +291,10 @@ fn fitting_again_forgets_the_old_colors() {
     place.succeed(&fit);
     let mut files = place.files("runs/scene");
     files.retain(|name| !name.starts_with("teacher/"));
-    assert_eq!(files, ["log.csv", "luma.ply", "report.json"]);
+    assert_eq!(
+        files,
+        ["contact-sheet.png", "log.csv", "luma.ply", "report.json"]
+    );
     assert!(place.report("runs/scene").get("chroma").is_none());
     let log = String::from_utf8(place.read("runs/scene/log.csv")).expect("text");
     let rows: Vec<_> = log.lines().map(|row| row.split(',').next()).collect();
