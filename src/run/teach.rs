@@ -53,10 +53,11 @@ impl Default for TeachOptions {
 /// The teacher that stands for the photos themselves.
 const PHOTOS: &str = "photos";
 
-/// The file, folder or name that `teacher` stands for: `photos`, where nothing of that name
-/// lies here, are those of the COLMAP folder.
+/// The file, folder or name that `teacher` stands for: `photos` are those of the COLMAP folder,
+/// whatever lies here under that name, as the photos that it was prepared from often do;
+/// `photos/` is a folder.
 pub fn teacher_or_photos(teacher: &Path, colmap_dir: &Path) -> PathBuf {
-    if teacher == Path::new(PHOTOS) && !teacher.exists() {
+    if teacher.as_os_str() == PHOTOS {
         colmap_dir.join(IMAGES)
     } else {
         teacher.to_owned()

@@ -177,6 +177,10 @@ fn gray_photos_and_gray_images_color_nothing() {
             .expect("an image");
         }
     }
+    // A folder of that name here is another's.
+    fs::create_dir_all(place.path("photos")).expect("a folder");
+    let colored = scene::photo(1).save(place.path("photos").join(scene::name(1)));
+    colored.expect("an image");
     let done = place.run(&["colorize", "runs/scene", "--teacher", "photos"]);
     assert!(
         // That the photos are others is said before.
@@ -189,6 +193,8 @@ fn gray_photos_and_gray_images_color_nothing() {
         "{}",
         done.stderr
     );
+    let done = place.run(&["colorize", "runs/scene", "--teacher", "photos/"]);
+    assert_eq!(done.code, Some(0), "{}", done.stderr);
     let done = place.run(&["colorize", "runs/scene", "--teacher", "some"]);
     assert_eq!(done.code, Some(0), "{}", done.stderr);
     let told = done
