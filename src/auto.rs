@@ -135,7 +135,7 @@ pub type Teller<'a> = dyn FnMut(Told) + 'a;
 /// [`AutoError`]; what was done before it stays, and the same command goes on from there.
 pub fn auto(options: &AutoOptions, tell: &mut Teller<'_>) -> Result<Results, AutoError> {
     // Better now than after hours of work; photos are asked for once they are there.
-    if options.teacher != Path::new("photos") {
+    if options.teacher.as_os_str() != "photos" {
         let opened = Teacher::open(&options.teacher, None, &options.teacher_settings);
         opened.map_err(RunError::from)?;
     }

@@ -152,11 +152,12 @@ fn photos_in_color_are_a_teacher() {
     assert_eq!(photos["teachers"][0]["name"], "images");
     let error = photos["pictures"]["ab_error"].as_f64();
     assert!(error.is_none_or(|error| error < 12.0), "{photos}");
-    // A folder of that name comes first.
+    // A folder of that name is meant by a slash.
     place.write("photos/00.txt", "no image");
-    let done = place.run(&[&colorize[..], &["photos"]].concat());
+    assert_eq!(of("photos")["pictures"], folder["pictures"]);
+    let done = place.run(&[&colorize[..], &["photos/"]].concat());
     assert!(
-        done.code == Some(1) && done.stderr.contains("photos: holds no"),
+        done.code == Some(1) && done.stderr.contains("photos/: holds no"),
         "{}",
         done.stderr
     );

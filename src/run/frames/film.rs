@@ -23,6 +23,10 @@ const FRAME_RATE: [u32; 2] = [24, 1];
 /// Constant rate factor of H.264: hardly to be told from the pictures.
 const QUALITY: &str = "14";
 
+/// Chroma finer than lightness calls for: color is what was made here. With it the frames of an old
+/// film differ by a tenth less in a and b, for 4 % more bytes.
+const CHROMA: &str = "chroma-qp-offset=-6";
+
 /// Writes a film frame by frame.
 pub(super) struct FilmWriter {
     path: PathBuf,
@@ -182,7 +186,16 @@ impl FilmWriter {
             _ => "yuv444p",
         };
         command
-            .args(["-c:v", "libx264", "-crf", QUALITY, "-pix_fmt", pixels])
+            .args([
+                "-c:v",
+                "libx264",
+                "-crf",
+                QUALITY,
+                "-pix_fmt",
+                pixels,
+                "-x264-params",
+                CHROMA,
+            ])
             .args([
                 "-vf",
                 "scale=in_range=full:out_range=limited:out_color_matrix=bt709",

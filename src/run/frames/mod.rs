@@ -4,6 +4,7 @@ mod film;
 mod shots;
 
 use std::{
+    cell::RefCell,
     path::{Path, PathBuf},
     sync::Arc,
 };
@@ -14,6 +15,7 @@ use shots::{Shot, shots_of};
 use super::{
     Event, Observer, RunError, RunFolder, Stage, files,
     fit::open_gpu,
+    keeping,
     scene::{Frame, open, read_scene},
     teach::{TeachOptions, Teachers},
 };
@@ -65,8 +67,8 @@ pub struct Frames {
     pub carried: usize,
     /// Which share of the photos with a pose the scene covers, their mean.
     pub covered: f64,
-    /// Photos that cannot be read, and why.
-    pub left_out: Vec<String>,
+    /// All that is doubtful, photos that cannot be read among it.
+    pub warnings: Vec<String>,
     /// Seconds of the whole.
     pub seconds: f64,
 }
@@ -87,6 +89,8 @@ fn is_film(path: &Path) -> bool {
 /// [`RunError`].
 pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Frames, RunError> {
     let begun = std::time::Instant::now();
+    let warnings = RefCell::default();
+    let observe = &mut keeping(&warnings, observe);
     let folder = match &options.run {
         Some(path) => RunFolder::at(path),
         None => RunFolder::newest()?,
@@ -124,7 +128,7 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
         placed: 0,
         carried: 0,
         covered: 0.0,
-        left_out: Vec::new(),
+        warnings: Vec::new(),
         seconds: 0.0,
     };
     let mut progress = |done: usize, name: &str| {
@@ -139,6 +143,7 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
     // The last photo with a pose, and those without one since.
     let mut last: Option<Known> = None;
     let mut open: Vec<Unknown<'_>> = Vec::new();
+    let mut unread = Vec::new();
     for shot in &shots {
         progress(told.photos + open.len(), &shot.name);
         if shot.views.is_empty() {
@@ -147,7 +152,7 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
                     shot,
                     canvas: Canvas::of(&original, painter.side(&original)),
                 }),
-                Err(error) => told.left_out.push(error.to_string()),
+                Err(error) => unread.push(error.to_string()),
             }
             continue;
         }
@@ -196,11 +201,12 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
     }
     out.finish()?;
     progress(shots.len(), "");
-    for line in &told.left_out {
+    for line in unread {
         observe(Event::Warning(format!("left out: {line}")));
     }
     told.covered /= told.placed.max(1) as f64;
     told.seconds = begun.elapsed().as_secs_f64();
+    told.warnings = warnings.take();
     Ok(told)
 }
 
