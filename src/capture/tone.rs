@@ -14,10 +14,7 @@ pub(super) fn develop(picture: Picture, options: &LoadOptions) -> Pixels {
     let Picture {
         header, samples, ..
     } = picture;
-    let mask = match &samples {
-        Samples::Float(values) => finite(values, header.channels, options.channel),
-        _ => None,
-    };
+    let mask = finite(&samples, header.channels, options.channel);
     let levels = Tone::of(header.depth, options).levels(samples);
     let rgb = |step| levels.chunks_exact(step).map(|p| [p[0], p[1], p[2]]);
     let values = match (header.channels, options.channel) {
@@ -48,10 +45,7 @@ pub(super) fn gray(picture: Picture, options: &LoadOptions) -> (Vec<u16>, Option
     let Picture {
         header, samples, ..
     } = picture;
-    let mask = match &samples {
-        Samples::Float(values) => finite(values, header.channels, options.channel),
-        _ => None,
-    };
+    let mask = finite(&samples, header.channels, options.channel);
     let shares = Tone::of(header.depth, options).shares(samples);
     let level = |share: f64| (f64::from(u16::MAX) * share).round() as u16;
     let pixels = shares.chunks_exact(header.channels);
@@ -73,7 +67,10 @@ pub(super) fn gray(picture: Picture, options: &LoadOptions) -> (Vec<u16>, Option
 }
 
 /// 255 where all values in use are finite, else 0; `None` where they are everywhere.
-fn finite(values: &[f32], channels: usize, channel: Channel) -> Option<Vec<u8>> {
+fn finite(samples: &Samples, channels: usize, channel: Channel) -> Option<Vec<u8>> {
+    let Samples::Float(values) = samples else {
+        return None;
+    };
     let used = used(channels, channel);
     if values.iter().all(|v| v.is_finite()) {
         return None;

@@ -21,6 +21,7 @@ use super::{
     fit::{capture_report, open_gpu},
     foreign::drawn_like_photos,
     keeping,
+    log::with_rows,
     scene::{Frame, comments_of_moved, read_scene, tell_not_finite},
     sound::{open_examined, open_trusted},
     teach::{Taught, TeachOptions, Teachers},
@@ -33,7 +34,6 @@ use crate::{
     },
     effects::table,
     eval::{COLUMNS, Measured, exposures},
-    input,
     raster::Raster,
     report::{ChromaReport, ChromaSeconds, EffectReport, Report, contact_sheet, kernel_reports},
     splats::{npy, ply},
@@ -447,27 +447,6 @@ fn adam_iterations(
         // As many as the preset's, however many stage 1 really took.
         None => Ok(preset.adam_iterations()),
     }
-}
-
-/// The log with the chroma rows behind the luma rows, in place of those of an earlier coloring.
-pub(super) fn with_rows(path: &Path, luma: usize, rows: &str) -> String {
-    let log = read_or_empty(path);
-    let mut kept: String = log
-        .lines()
-        .filter(|line| {
-            let first = line.split(',').next().unwrap_or_default();
-            first
-                .parse::<usize>()
-                .map_or(true, |iteration| iteration <= luma)
-        })
-        .flat_map(|line| [line, "\n"])
-        .collect();
-    kept.push_str(rows);
-    kept
-}
-
-fn read_or_empty(path: &Path) -> String {
-    input::read_to_string(path).unwrap_or_default()
 }
 
 /// What to say where some of the views have colors and these do not show all; without any that

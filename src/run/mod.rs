@@ -1,5 +1,6 @@
 //! Whole runs: what a command does from its options to its files.
 
+mod answers;
 mod checkpoints;
 mod color_checkpoint;
 mod color_source;
@@ -9,14 +10,15 @@ mod eval;
 mod event;
 mod export;
 pub(crate) mod files;
-mod film;
 mod fingerprint;
 mod fit;
+mod flight;
 mod folder;
 mod foreign;
 mod frames;
 mod info;
 mod lock;
+mod log;
 mod picture_names;
 mod plan;
 mod preset;
@@ -28,6 +30,7 @@ mod teach;
 
 use std::path::PathBuf;
 
+pub use answers::HINT_WEIGHT;
 pub use checkpoints::{CheckpointOptions, EVERY, Interrupt};
 pub use colorize::{ColorizeOptions, Output, colorize};
 pub use eval::{EvalOptions, eval};
@@ -43,7 +46,7 @@ pub use plan::{PlanOptions, Planned, plan};
 pub use preset::Work;
 pub use render::{RenderOptions, Views, render};
 pub use sound::Soundness;
-pub use teach::{HINT_WEIGHT, TeachOptions, teacher_or_photos};
+pub use teach::{TeachOptions, teacher_or_photos};
 
 pub use crate::luma::Preset;
 use crate::{

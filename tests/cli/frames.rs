@@ -82,6 +82,27 @@ fn a_photo_without_a_pose_takes_its_colors_from_its_neighbors() {
 }
 
 #[test]
+fn photos_before_the_first_pose_and_after_the_last_take_the_nearest_ones_colors() {
+    let place = place_with_run();
+    // Nobody else knows their colors.
+    let mut report = place.report("runs/scene");
+    report["chroma"]["teachers"] = serde_json::json!([]);
+    place.write("runs/scene/report.json", report.to_string());
+    for (index, name) in [(0, "0.png"), (9, "z.png")] {
+        let path = place.path("scene/images").join(name);
+        scene::photo(index).save(path).expect("writable");
+    }
+    let told = place.json(&["frames", "-o", "out", "--json"]);
+    assert_eq!(told["carried"], 2);
+    for (name, nearest) in [("0.png", "00.png"), ("z.png", "left/09.png")] {
+        let [carried, own] = [name, nearest].map(|name| lab(&place, &format!("out/{name}")));
+        let gray: Vec<[f64; 3]> = own.iter().map(|lab| [lab[0], 0.0, 0.0]).collect();
+        let (to_own, to_gray) = (apart(&carried, &own), apart(&gray, &own));
+        assert!(to_own < 0.35 * to_gray, "{name}: {to_own} {to_gray}");
+    }
+}
+
+#[test]
 fn sixteen_bits_stay_sixteen() {
     let place = place_with_run();
     let gray = ImageBuffer::from_fn(scene::SIZE[0], scene::SIZE[1], |x, y| {

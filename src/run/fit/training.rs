@@ -7,8 +7,8 @@ use serde_json::Value;
 use super::super::{
     Event, Observer, RunError, RunFolder, Stage,
     checkpoints::FileKeeper,
-    colorize::with_rows,
     foreign::tell_unlike,
+    log::with_rows,
     scene::{Frame, read_splats, tell_trial},
 };
 use super::{

@@ -166,7 +166,11 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
             Some(last)
                 if !options.teacher_alone && (!open.is_empty() || 1.0 - seen.share() > OPEN) =>
             {
-                way(&last.canvas, &open, &canvas)
+                way(&last.canvas, &open, Some(&canvas))
+            }
+            // Those before the first photo with a pose take its colors.
+            None if !options.teacher_alone => {
+                chain(open.iter().map(|unknown| &unknown.canvas).chain([&canvas]))
             }
             _ => Vec::new(),
         };
@@ -190,7 +194,10 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
         last = Some(next);
     }
     if let Some(known) = &last {
-        let steps = chain(std::iter::once(&known.canvas).chain(open.iter().map(|u| &u.canvas)));
+        let steps = match options.teacher_alone {
+            true => Vec::new(),
+            false => way(&known.canvas, &open, None),
+        };
         let ends = Ends {
             before: last.as_ref(),
             after: None,
@@ -359,9 +366,9 @@ struct Ends<'a> {
 /// Steps from each photo to the next; `None` where their shapes differ.
 type Steps = Vec<Option<Between>>;
 
-fn way(first: &Canvas, open: &[Unknown<'_>], last: &Canvas) -> Steps {
+fn way(first: &Canvas, open: &[Unknown<'_>], last: Option<&Canvas>) -> Steps {
     let inner = open.iter().map(|unknown| &unknown.canvas);
-    chain(std::iter::once(first).chain(inner).chain([last]))
+    chain(std::iter::once(first).chain(inner).chain(last))
 }
 
 fn chain<'a>(photos: impl Iterator<Item = &'a Canvas>) -> Steps {
