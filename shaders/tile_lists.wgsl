@@ -23,6 +23,12 @@ struct TileListsMode {
 @group(0) @binding(8) var<storage, read_write> slots: array<u32>;
 @group(0) @binding(9) var<storage, read_write> instance_splats: array<u32>;
 
+// Whether a Gaussian can be seen in a tile.
+fn reaches(splat: Projected, cutoff: f32, tile: vec2u) -> bool {
+    let corner = vec2f(tile * TILE_SIDE) + 0.5;
+    return touches(splat, cutoff, corner, corner + f32(TILE_SIDE - 1u));
+}
+
 @compute @workgroup_size(256)
 fn tile_lists(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
     let rank = linear_group(group, groups) * 256u + local;
@@ -49,17 +55,25 @@ fn tile_lists(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) grou
     }
     let begin = cursor;
     for (var y = low.y; y <= high.y; y++) {
-        for (var x = low.x; x <= high.x; x++) {
-            let corner = vec2f(vec2u(x, y) * TILE_SIDE) + 0.5;
-            if touches(splat, cutoff, corner, corner + (side - 1.0)) {
-                if emitting {
-                    keys[cursor] = y * view.tiles.x + x;
-                    slots[cursor] = cursor;
-                    instance_splats[cursor] = i;
-                }
-                cursor += 1u;
+        // An ellipse is convex: what it touches of a row lies between two ends.
+        var left = low.x;
+        while left <= high.x && !reaches(splat, cutoff, vec2u(left, y)) {
+            left++;
+        }
+        var right = high.x;
+        while right > left && !reaches(splat, cutoff, vec2u(right, y)) {
+            right--;
+        }
+        if emitting {
+            for (var x = left; x <= right; x++) {
+                let at = cursor + x - left;
+                keys[at] = y * view.tiles.x + x;
+                slots[at] = at;
+                instance_splats[at] = i;
             }
         }
+        // Where nothing is reached, `left` is one beyond `right`.
+        cursor += right + 1u - left;
     }
     if !emitting {
         offsets[rank] = cursor - begin;
