@@ -140,6 +140,36 @@ fn splats_that_were_trained_antialiased_are_drawn_so() {
     assert!(colored.contains("SplatRenderMode: mip"));
 }
 
+/// Colors that splats come with are no start: noise and a wrong color end where gray does.
+#[test]
+fn the_colors_that_splats_come_with_do_not_count() {
+    let channels = ["f_dc_0", "f_dc_1", "f_dc_2"];
+    // The three sum to zero, so that the luma stays; in units of the coefficients.
+    let tinted = |tint: &dyn Fn(usize) -> [f32; 3]| {
+        let place = place_with_splats(|file| {
+            let places = channels.map(|channel| file.place(channel));
+            for (i, row) in file.rows.iter_mut().enumerate() {
+                let tint = tint(i);
+                (places.iter().zip(tint)).for_each(|(&place, tint)| row[place] += tint);
+            }
+        });
+        colorized(&place, &[]);
+        let file = SplatFile::read(&place, "gray-color.ply");
+        channels.map(|channel| file.column(channel))
+    };
+    let gray = tinted(&|_| [0.0; 3]);
+    let noise = |i: usize| (i * 37 % 101) as f32 / 50.0 - 1.0;
+    let of_noise = |i: usize| [noise(i), -0.5 * noise(i), -0.5 * noise(i)];
+    let wrong = |_: usize| [1.0, 0.5, -1.5];
+    for start in [&of_noise as &dyn Fn(usize) -> [f32; 3], &wrong] {
+        let channels = tinted(start).into_iter().zip(&gray);
+        for (value, gray) in channels.flat_map(|(values, gray)| values.into_iter().zip(gray)) {
+            // A few roundings of the luma.
+            assert!((value - gray).abs() < 1e-3, "{value} and {gray}");
+        }
+    }
+}
+
 #[test]
 fn photos_in_color_are_a_teacher() {
     let place = place_with_run();
