@@ -10,7 +10,7 @@ use super::{
     picture::{ab_of, to_picture},
 };
 use crate::{
-    capture::{Camera, Photo},
+    capture::{Camera, Photo, in_order},
     chroma::teacher::AbImage,
     input,
     measure::{Consistency, Flow, camera_path, decode_flo, visible},
@@ -62,6 +62,13 @@ impl Frame {
 
     fn flow_to(&self, other: &Self) -> Flow {
         Flow::geometric(&self.camera, &other.camera, &self.depth)
+    }
+
+    /// The flow to another, and which pixels are visible there.
+    fn seen_from(&self, other: &Self) -> (Flow, Vec<bool>) {
+        let forward = self.flow_to(other);
+        let seen = visible(&forward, &other.flow_to(self));
+        (forward, seen)
     }
 
     /// Takes what is not known where the scene has no depth out of another's flow.
@@ -128,19 +135,34 @@ pub fn along_path<E: From<EvalError>>(
             keep(index, to_image(camera.width, camera.height, &pixels))?;
         }
         let frame = Frame::of(drawing, painter.depth(camera)?);
-        for (delta, sums) in &mut sums {
-            // The most recent frame is one back.
-            let Some(first) = recent.len().checked_sub(*delta).map(|at| &recent[at]) else {
-                continue;
+        // The most recent frame is one back.
+        let deltas: Vec<usize> = DELTAS.into_iter().filter(|&d| d <= recent.len()).collect();
+        let compared = |delta: &usize| {
+            let first = &recent[recent.len() - delta];
+            let Some(folder) = flow_files else {
+                return Ok(first.seen_from(&frame));
             };
-            let flow = |from: &Frame, to: &Frame, names: [usize; 2]| match flow_files {
-                Some(folder) => Ok(from.masked(read_flow(folder, names, from.size())?)),
-                None => Ok::<_, EvalError>(from.flow_to(to)),
+            let read = |from: &Frame, names| {
+                let flow = read_flow(folder, names, from.size())?;
+                Ok::<_, EvalError>(from.masked(flow))
             };
-            let forward = flow(first, &frame, [index - *delta, index])?;
-            let backward = flow(&frame, first, [index, index - *delta])?;
-            sums.add(first, &frame, &forward, &visible(&forward, &backward));
-        }
+            let forward = read(first, [index - delta, index])?;
+            let backward = read(&frame, [index, index - delta])?;
+            let seen = visible(&forward, &backward);
+            Ok((forward, seen))
+        };
+        in_order(
+            &deltas,
+            compared,
+            |delta, compared: Result<_, EvalError>| {
+                let (forward, seen) = compared?;
+                let first = &recent[recent.len() - delta];
+                for (_, sums) in sums.iter_mut().filter(|(d, _)| d == delta) {
+                    sums.add(first, &frame, &forward, &seen);
+                }
+                Ok::<_, EvalError>(())
+            },
+        )?;
         recent.push_back(frame);
         if recent.len() > DELTAS[DELTAS.len() - 1] {
             recent.pop_front();
@@ -232,31 +254,31 @@ pub fn between_views(
     let every = points.len().div_ceil(MAX_POINTS);
     let mut misses = Vec::new();
     let mut sums = Sums::default();
-    let pairs = count * count.saturating_sub(1) / 2;
+    let pairs: Vec<[usize; 2]> = (0..count)
+        .flat_map(|i| (i + 1..count).map(move |j| [i, j]))
+        .collect();
     let mut done = 0;
-    for (i, first) in frames.iter().enumerate() {
+    let compared = |&[i, j]: &[usize; 2]| frames[i].seen_from(&frames[j]);
+    in_order(&pairs, compared, |&[i, j], (forward, seen)| {
         observe(Progress {
             task: Task::Pairs,
             done,
-            total: pairs,
+            total: pairs.len(),
             name: "",
         });
-        done += count - 1 - i;
-        for second in &frames[i + 1..] {
-            let forward = first.flow_to(second);
-            let seen = visible(&forward, &second.flow_to(first));
-            let shared = seen.iter().filter(|seen| **seen).count();
-            if shared as f64 >= LEAST_OVERLAP * seen.len() as f64 {
-                sums.add(first, second, &forward, &seen);
-                let miss = points.iter().step_by(every).filter_map(|point| {
-                    let (pixel, miss) =
-                        forward.miss(&first.camera, &second.camera, point.position)?;
-                    seen[pixel].then_some(miss)
-                });
-                misses.extend(miss);
-            }
+        done += 1;
+        let (first, second) = (&frames[i], &frames[j]);
+        let shared = seen.iter().filter(|seen| **seen).count();
+        if shared as f64 >= LEAST_OVERLAP * seen.len() as f64 {
+            sums.add(first, second, &forward, &seen);
+            let miss = points.iter().step_by(every).filter_map(|point| {
+                let (pixel, miss) = forward.miss(&first.camera, &second.camera, point.position)?;
+                seen[pixel].then_some(miss)
+            });
+            misses.extend(miss);
         }
-    }
+        Ok::<_, EvalError>(())
+    })?;
     Ok(BetweenScore {
         views: count,
         size: frames
