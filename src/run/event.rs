@@ -41,6 +41,8 @@ pub enum Stage {
     Bake,
     /// Coloring a scene in another way, to compare with.
     Baseline,
+    /// Fitting the scene to a viewer.
+    Viewer,
     /// Drawing pictures.
     Rendering,
     /// Coloring photos at full size.
@@ -95,6 +97,7 @@ impl fmt::Display for Stage {
             Self::Strength => "strength",
             Self::Bake => "bake",
             Self::Baseline => "baseline",
+            Self::Viewer => "viewer",
             Self::Rendering => "rendering",
             Self::Coloring => "coloring",
             Self::Measuring => "measuring",

@@ -4,8 +4,15 @@ use std::path::PathBuf;
 
 use glam::DVec3;
 
-use super::{RunError, RunFolder, files, scene::comments_of_moved};
-use crate::splats::{Splats, ply};
+use super::{
+    Event, Observer, RunError, RunFolder, Shown, Stage, export_viewer::fitted, files,
+    scene::comments_of_moved,
+};
+use crate::{
+    raster::RasterOptions,
+    splats::{Splats, ply},
+    viewers::ViewerChoice,
+};
 
 /// The share of the Gaussians' size that the steps of 32-bit floats may have: shifts by half
 /// of it are not seen.
@@ -22,15 +29,22 @@ pub struct ExportOptions {
     pub luma: bool,
     /// Whether centers are COLMAP's even where the scene was moved to the origin.
     pub colmap_coordinates: bool,
+    /// Whom it is fitted for; without, it is what the run has.
+    pub viewer: Option<ViewerChoice>,
+    /// COLMAP folder with the cameras that it is fitted before, where it is not the one that
+    /// `fit` noted.
+    pub colmap: Option<PathBuf>,
 }
 
 /// What `export` wrote.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Exported {
     /// Gaussians.
     pub splats: usize,
     /// What is subtracted from COLMAP's coordinates, in world units; zero where nothing is.
     pub offset: [f64; 3],
+    /// What each viewer shows of it, where it was fitted to any.
+    pub shown: Vec<Shown>,
 }
 
 /// Writes a run's scene as a splat file. Where COLMAP's coordinates are so large that `fit`
@@ -39,7 +53,7 @@ pub struct Exported {
 ///
 /// # Errors
 /// [`RunError`]; [`RunError::Coarse`] where COLMAP's coordinates would spoil the scene.
-pub fn export(options: &ExportOptions) -> Result<Exported, RunError> {
+pub fn export(options: &ExportOptions, observe: &mut Observer<'_>) -> Result<Exported, RunError> {
     let folder = match &options.run {
         Some(path) => {
             ply::is_splat_file(path)?;
@@ -71,11 +85,22 @@ pub fn export(options: &ExportOptions) -> Result<Exported, RunError> {
         });
     }
     files::make_folder_of(&options.output)?;
-    let comments = comments_of_moved(report.luma.settings.raster_options(), left);
+    let (splats, drawn, shown) = match options.viewer {
+        None => (splats, report.luma.settings.raster_options(), Vec::new()),
+        Some(choice) => {
+            let colmap = options.colmap.as_deref();
+            let (splats, shown) = fitted(choice.viewers(), &splats, &report, colmap, observe)?;
+            // As these viewers draw it.
+            (splats, RasterOptions::default(), shown)
+        }
+    };
+    observe(Event::begins(Stage::Saving));
+    let comments = comments_of_moved(drawn, left);
     ply::write_ply(&options.output, &splats, added, &comments)?;
     Ok(Exported {
         splats: splats.len(),
         offset: left.to_array(),
+        shown,
     })
 }
 

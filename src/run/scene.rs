@@ -119,6 +119,7 @@ pub(super) fn read_scene(
         splats,
         drawn: RasterOptions {
             antialiased: read.antialiased,
+            ..RasterOptions::default()
         },
         offset: read.offset,
     })

@@ -2,7 +2,8 @@
 //! trial, is not among them.
 
 use super::{
-    ColorizeOptions, EvalOptions, FitOptions, FramesOptions, PlanOptions, RenderOptions,
+    ColorizeOptions, EvalOptions, ExportOptions, FitOptions, FramesOptions, PlanOptions,
+    RenderOptions,
     Stage::{self, *},
 };
 use crate::{chroma, luma::Goal};
@@ -93,6 +94,16 @@ impl FramesOptions {
     /// The stages of [`frames`](super::frames).
     pub fn stages(&self) -> Vec<Stage> {
         vec![Model, Device, Coloring]
+    }
+}
+
+impl ExportOptions {
+    /// The stages of [`export`](super::export).
+    pub fn stages(&self) -> Vec<Stage> {
+        match self.viewer {
+            None => vec![Saving],
+            Some(_) => vec![Model, Device, Viewer, Measuring, Saving],
+        }
     }
 }
 

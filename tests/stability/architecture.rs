@@ -9,7 +9,7 @@ const FLOORS: [&[&str]; 12] = [
     &["auto"],
     &["tradeoff", "prepare"],
     &["run"],
-    &["eval", "frames"],
+    &["eval", "frames", "viewers"],
     &["report", "doctor"],
     &["luma", "chroma"],
     &["effects", "measure"],
