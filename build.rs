@@ -97,21 +97,14 @@ fn main() {
     // RGB is trained with the geometry to look in a viewer as it does here, and by that
     // viewer's own kernel.
     let trained = ["rgb", "geometry"];
-    compile(
-        "shade_backward",
-        "_rgb_step",
-        &[&trained[..], &["step"]].concat(),
-    );
     for (suffix, viewer) in [("", &[][..]), ("_playcanvas", &["playcanvas"][..])] {
         let with = |more: &[&'static str]| [&trained[..], more, viewer].concat();
         for kernel in ["blend_backward", "sum_instances"] {
             compile(kernel, &format!("_rgb{suffix}"), &with(&[]));
         }
-        compile(
-            "project_backward",
-            &format!("_rgb_step{suffix}"),
-            &with(&["step"]),
-        );
+        for kernel in ["shade_backward", "project_backward"] {
+            compile(kernel, &format!("_rgb_step{suffix}"), &with(&["step"]));
+        }
     }
     compile("project", "_playcanvas", &["playcanvas"]);
     for color in ["luma", "chroma", "rgb"] {

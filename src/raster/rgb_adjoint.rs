@@ -27,22 +27,24 @@ impl RgbAdjointKernels {
         let options = raster.options();
         assert!(!options.antialiased, "no adjoint");
         let (gpu, cutoff) = (&raster.gpu, raster.numerics.alpha_cutoff());
-        let [blend, sum, project] = match options.falloff {
+        let [blend, sum, shade, project] = match options.falloff {
             Falloff::Gaussian => [
                 shaders::BLEND_BACKWARD_RGB,
                 shaders::SUM_INSTANCES_RGB,
+                shaders::SHADE_BACKWARD_RGB_STEP,
                 shaders::PROJECT_BACKWARD_RGB_STEP,
             ],
             Falloff::PlayCanvas => [
                 shaders::BLEND_BACKWARD_RGB_PLAYCANVAS,
                 shaders::SUM_INSTANCES_RGB_PLAYCANVAS,
+                shaders::SHADE_BACKWARD_RGB_STEP_PLAYCANVAS,
                 shaders::PROJECT_BACKWARD_RGB_STEP_PLAYCANVAS,
             ],
         };
         Self {
             blend: Kernel::with(gpu, "blend_backward", blend, &cutoff),
             sum: Kernel::with(gpu, "sum_instances", sum, &cutoff),
-            shade: Kernel::new(gpu, "shade_backward", shaders::SHADE_BACKWARD_RGB_STEP),
+            shade: Kernel::new(gpu, "shade_backward", shade),
             project: Kernel::new(gpu, "project_backward", project),
         }
     }

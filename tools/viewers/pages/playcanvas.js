@@ -24,6 +24,8 @@ export async function open(canvas, url, [width, height], matrix) {
     asset.once('error', (error) => reject(new Error(String(error))));
     app.assets.load(asset);
   });
+  let sorted = 0;
+  app.scene.on('gsplat:sorted', () => { sorted = performance.now(); });
   const entity = container ? asset.resource.instantiateRenderEntity() : new pc.Entity('scene');
   if (!container) entity.addComponent('gsplat', { asset });
   const root = new pc.Entity('frame');
@@ -41,11 +43,10 @@ export async function open(canvas, url, [width, height], matrix) {
   });
   eye.camera.calculateProjection = (mat) => { mat.data.set(projection); };
   app.root.addChild(eye);
-  let sorted = performance.now();
-  app.scene.on('gsplat:sorted', () => { sorted = performance.now(); });
   const frame = () => new Promise((resolve) => { app.once('frameend', resolve); });
+  // Not before the first.
   const rest = async () => {
-    while (performance.now() - sorted < REST) await frame();
+    while (sorted === 0 || performance.now() - sorted < REST) await frame();
   };
   return async (view) => {
     // The worker is asked once when the camera turns, and not heard while it is at work.

@@ -7,7 +7,9 @@ import { projectionMatrix, worldMatrix } from './camera.js';
 // How often sorting may take another turn before it is given up.
 const TURNS = 600;
 
-export async function open(canvas, url, [width, height], matrix) {
+export const open = (...what) => openWith({}, ...what);
+
+export async function openWith(kept, canvas, url, [width, height], matrix) {
   const renderer = new THREE.WebGLRenderer({ canvas, antialias: false, preserveDrawingBuffer: true });
   renderer.setPixelRatio(1);
   renderer.setSize(width, height);
@@ -27,7 +29,7 @@ export async function open(canvas, url, [width, height], matrix) {
     accumExtSplats: true,
   });
   scene.add(spark);
-  const mesh = new SplatMesh({ url });
+  const mesh = new SplatMesh({ url, ...kept });
   await mesh.initialized;
   mesh.applyMatrix4(new THREE.Matrix4().fromArray(matrix));
   scene.add(mesh);

@@ -9,7 +9,7 @@ import { readColmap, resized } from './colmap.mjs';
 import { brightness, decodePng, median, psnr, readPng } from './picture.mjs';
 import { serve } from './server.mjs';
 
-const VIEWERS = ['spark', 'playcanvas', 'three', 'sparkx', 'sparky'];
+const VIEWERS = ['spark', 'spark-ext', 'playcanvas', 'three'];
 
 // How long a file may take to open or a view to be drawn, in ms: in software a million
 // Gaussians take the better part of a minute.
@@ -45,7 +45,7 @@ async function main() {
   if (references.length === 0) throw new Error(`${values.reference}: no PNG in it`);
   const yUp = values['y-up'].split(',').filter(Boolean);
   const jobs = positionals.flatMap((argument) => {
-    const [, file, chosen] = /^(.*?)(?::([a-z,]+))?$/.exec(argument);
+    const [, file, chosen] = /^(.*?)(?::([a-z,-]+))?$/.exec(argument);
     return (chosen ?? values.viewers).split(',').map((viewer) => ({ file: resolve(file), viewer }));
   });
   const unknown = jobs.find(({ viewer }) => !VIEWERS.includes(viewer));

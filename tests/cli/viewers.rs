@@ -1,0 +1,104 @@
+//! Splat files in the viewers that people use, drawn by Chromium without a GPU: tools/viewers.
+
+use std::{
+    env,
+    path::{Path, PathBuf},
+    process::Command,
+};
+
+use serde_json::Value;
+
+use super::program::Place;
+use super::shared::place_with_run;
+
+/// Where the harness lies.
+fn tools() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tools/viewers")
+}
+
+/// Whether a program is on the PATH.
+fn on_path(name: &str) -> bool {
+    let path = env::var_os("PATH").unwrap_or_default();
+    env::split_paths(&path).any(|folder| folder.join(name).is_file())
+}
+
+/// What is missing to draw in viewers.
+fn missing() -> Option<&'static str> {
+    let browsers = [
+        "chromium",
+        "chromium-browser",
+        "google-chrome",
+        "google-chrome-stable",
+    ];
+    if !on_path("node") {
+        return Some("Node");
+    }
+    if env::var_os("CHROMIUM").is_none() && !browsers.into_iter().any(on_path) {
+        return Some("Chromium");
+    }
+    let modules = tools().join("node_modules/playcanvas");
+    (!modules.is_dir()).then_some("the viewers")
+}
+
+/// Median PSNR in dB of what a viewer shows of a file, compared with `gs-chroma render`.
+#[track_caller]
+fn psnr(results: &Value, file: &str, viewer: &str) -> f64 {
+    let results = results.as_array().expect("a list");
+    let found = results
+        .iter()
+        .find(|result| result["file"] == file && result["viewer"] == viewer);
+    let found = found.unwrap_or_else(|| panic!("{viewer} was not asked for {file}"));
+    found["psnr"]
+        .as_f64()
+        .unwrap_or_else(|| panic!("{file} in {viewer}: {}", found["error"]))
+}
+
+/// Draws files of a place in viewers; the screenshots stay in the target folder.
+fn shown(place: &Place, files: &[&str]) -> Value {
+    let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join("viewers");
+    let mut command = Command::new("node");
+    command.arg(tools().join("src/main.mjs"));
+    command.arg("--colmap").arg(place.path("scene"));
+    command.arg("--reference").arg(place.path("renders"));
+    command.arg("--out").arg(&out);
+    command.args(files.iter().map(|file| place.path(file)));
+    let done = command.output().expect("Node runs");
+    println!("{}", String::from_utf8_lossy(&done.stdout));
+    let said = String::from_utf8_lossy(&done.stderr);
+    assert!(done.status.success(), "{said}");
+    let results = std::fs::read_to_string(out.join("results.json")).expect("results");
+    serde_json::from_str(&results).expect("JSON")
+}
+
+#[test]
+fn viewers_show_what_is_rendered() {
+    if let Some(missing) = missing() {
+        println!("skipped, for {missing} is not there: make viewers");
+        return;
+    }
+    let place = place_with_run();
+    place.succeed(&["render", "-o", "renders"]);
+    place.succeed(&["export", "-o", "plain.ply"]);
+    for viewer in ["playcanvas", "any"] {
+        let output = format!("{viewer}.ply");
+        place.succeed(&["export", "--viewer", viewer, "-o", &output]);
+    }
+    let results = shown(
+        &place,
+        &[
+            "plain.ply:spark,playcanvas,three",
+            "playcanvas.ply:playcanvas",
+            "any.ply:spark,playcanvas",
+        ],
+    );
+    let psnr = |file, viewer| psnr(&results, file, viewer);
+    assert!(psnr("plain.ply", "spark") > 34.0);
+    // three.js draws every scene antialiased.
+    assert!(psnr("plain.ply", "three") > 18.0);
+    let plain = psnr("plain.ply", "playcanvas");
+    assert!(plain > 18.0);
+    assert!(psnr("playcanvas.ply", "playcanvas") > plain + 3.0);
+    let any = ["spark", "playcanvas"].map(|viewer| psnr("any.ply", viewer));
+    assert!(any[1] > plain + 1.0, "{any:?}");
+    assert!(any[0] > 28.0, "{any:?}");
+}
