@@ -2,10 +2,11 @@
 //! trial, is not among them.
 
 use super::{
-    ColorizeOptions, EvalOptions, FitOptions, FramesOptions, PlanOptions, RenderOptions,
+    ColorizeOptions, EvalOptions, ExportOptions, FitOptions, FramesOptions, PlanOptions,
+    RenderOptions,
     Stage::{self, *},
 };
-use crate::{chroma, luma::Goal};
+use crate::{chroma, luma::Goal, splats::Format};
 
 /// A stage that is gone through only where something is asked for.
 fn only_if(asked: bool, stage: Stage) -> Option<Stage> {
@@ -100,5 +101,19 @@ impl RenderOptions {
     /// The stages of [`render`](super::render).
     pub fn stages(&self) -> Vec<Stage> {
         vec![Model, Device, Rendering]
+    }
+}
+
+impl ExportOptions {
+    /// The stages of [`export`](super::export).
+    pub fn stages(&self) -> Vec<Stage> {
+        let measured = (Format::of(&self.output)).is_some_and(|format| format.is_read());
+        let lossy = measured && Format::of(&self.output) != Some(Format::Ply);
+        all([
+            Some(Model),
+            Some(Saving),
+            only_if(lossy, Device),
+            only_if(lossy, Measuring),
+        ])
     }
 }
