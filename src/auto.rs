@@ -256,15 +256,16 @@ pub fn auto(options: &AutoOptions, tell: &mut Teller<'_>) -> Result<Results, Aut
     }
 
     if kept.due(Step::Export, &from, &[&results.scene]) {
-        tell(Told::Begins(Step::Export, Vec::new()));
         let asked = ExportOptions {
             run: Some(run.path().to_owned()),
             output: results.scene.clone(),
             luma: false,
             colmap_coordinates: false,
+            spz: None,
             viewer: None,
             colmap: None,
         };
+        tell(Told::Begins(Step::Export, asked.stages()));
         export(&asked, &mut |event| tell(Told::Event(event)))?;
         kept.done(Step::Export, &from)?;
     } else {

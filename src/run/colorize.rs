@@ -22,7 +22,7 @@ use super::{
     foreign::drawn_like_photos,
     keeping,
     log::with_rows,
-    scene::{Frame, comments_of_moved, read_scene, tell_not_finite},
+    scene::{Frame, read_scene, tell_not_finite, written_as},
     sound::{open_examined, open_trusted},
     teach::{Taught, TeachOptions, Teachers},
 };
@@ -36,7 +36,7 @@ use crate::{
     eval::{COLUMNS, Measured, exposures},
     raster::Raster,
     report::{ChromaReport, ChromaSeconds, EffectReport, Report, contact_sheet, kernel_reports},
-    splats::{npy, ply},
+    splats::{Format, WriteOptions, npy, write_splats},
 };
 
 /// A share of Gaussians without a colored photo that is worth a warning.
@@ -77,7 +77,7 @@ pub struct ColorizeOptions {
 /// What `colorize` wrote.
 #[derive(Clone, Debug)]
 pub struct Output {
-    /// The colored splat file.
+    /// The colored splat file, of any format.
     pub ply: PathBuf,
     /// The contact sheet, when a run was colored.
     pub contact_sheet: Option<PathBuf>,
@@ -138,6 +138,7 @@ pub fn colorize(
             .filter(|folder| options.output.is_none() || output_is_own(options, folder))
             .map(RunFolder::contact_sheet),
     };
+    Format::to_write(&output.ply)?;
     files::make_folder_of(&output.ply)?;
 
     let begun = Instant::now();
@@ -389,8 +390,17 @@ pub fn colorize(
         None if read.offset != DVec3::ZERO => (DVec3::ZERO, moved),
         None => (moved, DVec3::ZERO),
     };
-    let comments = comments_of_moved(drawn, left);
-    let write_to = |path: &Path| ply::write_ply(path, &colored.splats, added, &comments);
+    let written = WriteOptions {
+        added,
+        ..written_as(drawn, left)
+    };
+    let mut write_to = |path: &Path| -> Result<(), RunError> {
+        let doubts = write_splats(path, &colored.splats, &written)?;
+        doubts
+            .into_iter()
+            .for_each(|doubt| observe(Event::Warning(doubt)));
+        Ok(())
+    };
     match source.kept(options) {
         Some(folder) => {
             let mut commit = Commit::new(folder.path())?;

@@ -20,6 +20,7 @@ mod frames;
 mod info;
 mod lock;
 mod log;
+mod loss;
 mod picture_names;
 mod plan;
 mod preset;
@@ -43,6 +44,7 @@ pub use fit::{AheadOptions, FitOptions, Init, Overlay, fit};
 pub use folder::RunFolder;
 pub use frames::{Frames, FramesOptions, frames};
 pub use info::info;
+pub use loss::Loss;
 pub(crate) use picture_names::picture_names;
 pub use plan::{PlanOptions, Planned, plan};
 pub use preset::Work;
@@ -58,7 +60,7 @@ use crate::{
     eval::EvalError,
     gpu::GpuError,
     luma::LumaError,
-    splats::ply::PlyError,
+    splats::SplatError,
 };
 
 /// What can stop a run.
@@ -78,7 +80,7 @@ pub enum RunError {
     Chroma(ChromaError),
     /// A splat file.
     #[error(transparent)]
-    Ply(#[from] PlyError),
+    Splats(#[from] SplatError),
     /// The teacher.
     #[error(transparent)]
     Teacher(#[from] TeacherError),
@@ -126,6 +128,9 @@ pub enum RunError {
         /// The Gaussians' size in world units.
         size: f64,
     },
+    /// A version of `.spz` for a file of another format.
+    #[error("{}: not an .spz file", .0.display())]
+    NoSpz(PathBuf),
     /// All views were trained on.
     #[error("no view is held out")]
     NoHeldOut,

@@ -13,7 +13,7 @@ use crate::{
     gpu::Gpu,
     raster::{Raster, Renderer},
     report::to_image,
-    splats::ply,
+    splats::is_splat_file,
 };
 
 /// Longer side in pixels at which a splat file is compared with the photos.
@@ -52,7 +52,7 @@ pub struct RenderOptions {
 /// [`RunError`].
 pub fn render(options: &RenderOptions, observe: &mut Observer<'_>) -> Result<usize, RunError> {
     let (file, colmap, load, run) = match &options.run {
-        Some(path) if ply::is_splat_file(path)? => {
+        Some(path) if is_splat_file(path)? => {
             let colmap = options
                 .colmap
                 .clone()

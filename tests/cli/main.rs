@@ -20,6 +20,7 @@ mod faults;
 #[cfg(target_os = "linux")]
 mod fetch;
 mod folder;
+mod formats;
 mod frames;
 #[cfg(target_os = "linux")]
 mod host;

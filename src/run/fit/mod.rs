@@ -17,7 +17,7 @@ use super::{
     fingerprint::of_files,
     keeping,
     lock::RunLock,
-    scene::{comments_of_moved, open},
+    scene::{open, written_as},
     sound::open_examined,
 };
 use crate::{
@@ -26,9 +26,9 @@ use crate::{
     eval::GRAY_COLUMNS,
     gpu::Gpu,
     luma::{Goal, LumaSettings},
-    raster::{Raster, RasterOptions},
+    raster::Raster,
     report::{Report, contact_sheet},
-    splats::ply,
+    splats::write_splats,
 };
 use ahead::Ahead;
 pub use ahead::AheadOptions;
@@ -224,10 +224,12 @@ fn write(folder: &RunFolder, trained: &Trained, report: &Report) -> Result<(), R
     }
     commit.remove_page(&folder.evaluation_page());
     let drawn = trained.scene.settings.raster_options();
-    let comments = comments_of_moved(drawn, report.capture.offset.into());
-    let origin = glam::DVec3::ZERO;
-    let luma = commit.place(&folder.luma());
-    ply::write_ply(&luma, &trained.scene.splats, origin, &comments)?;
+    let options = written_as(drawn, report.capture.offset.into());
+    write_splats(
+        &commit.place(&folder.luma()),
+        &trained.scene.splats,
+        &options,
+    )?;
     let sheet = contact_sheet(&GRAY_COLUMNS, &trained.rows);
     files::write_png(&commit.place(&folder.contact_sheet()), &sheet)?;
     files::write(&commit.place(&folder.log()), trained.log.as_bytes())?;
@@ -239,11 +241,4 @@ fn write(folder: &RunFolder, trained: &Trained, report: &Report) -> Result<(), R
 pub(super) fn open_gpu(timed: bool) -> Result<Gpu, RunError> {
     let gpu = Gpu::open()?;
     Ok(if timed { gpu.timed()? } else { gpu })
-}
-
-/// Comments in the header of every splat file; one says how it wants to be drawn.
-pub(super) fn comments(options: RasterOptions) -> Vec<String> {
-    let program = format!("gs-chroma {}", env!("CARGO_PKG_VERSION"));
-    let mode = options.antialiased.then(|| ply::ANTIALIASED.to_owned());
-    std::iter::once(program).chain(mode).collect()
 }

@@ -16,8 +16,8 @@ const VIEWERS = ['spark', 'spark-ext', 'playcanvas', 'three'];
 const PATIENCE = 120_000;
 
 const IDENTITY = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
-// Half a turn about x: from y up to COLMAP's y down.
-const HALF_TURN = [1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1];
+// Half a turn about z: from y up to COLMAP's y down.
+const HALF_TURN = [-1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
 
 const USAGE = `usage: node src/main.mjs --colmap FOLDER --reference FOLDER [--out FOLDER]
   [--viewers ${VIEWERS.join(',')}] [--y-up EXTENSIONS] FILE[:VIEWER,…]…`;
