@@ -171,9 +171,6 @@ impl LumaAdjoint {
     ///
     /// # Errors
     /// [`GpuError::TooLarge`].
-    ///
-    /// # Panics
-    /// Of a rasterizer with another falloff than a Gaussian's.
     pub fn new(
         raster: &Raster,
         geometry: &Geometry,
@@ -182,7 +179,6 @@ impl LumaAdjoint {
         layer: &Layer,
         outcome: &Outcome<'_>,
     ) -> Result<Self, GpuError> {
-        raster.assert_gaussian();
         let gpu = &raster.gpu;
         let n = geometry.count;
         let image_gradient = Buffer::zeros(gpu, "image gradient", layer.image.len())?;
@@ -261,7 +257,11 @@ impl LumaAdjoint {
     }
 
     /// Records the adjoint; lists, layer and loss must have been recorded before.
+    ///
+    /// # Panics
+    /// Of a rasterizer with another falloff than a Gaussian's.
     pub fn record(&self, raster: &Raster, recorder: &mut Recorder) {
+        raster.assert_gaussian();
         let [shade, project] = raster.luma_ending(self.steps);
         let groups = groups_for(self.blend.count);
         self.blend.record(raster.blend_backward.luma(), recorder);
@@ -293,9 +293,6 @@ impl ChromaAdjoint {
     /// The adjoint of `layer`, which draws a/b or RGB, from `image_gradient`
     /// `[pixels, 4]`: of each pixel the gradient (a, b or R, G, B), then the curvature (of
     /// a and b, or one for R, G and B).
-    ///
-    /// # Panics
-    /// Of a rasterizer with another falloff than a Gaussian's.
     pub fn new(
         raster: &Raster,
         geometry: &Geometry,
@@ -305,7 +302,6 @@ impl ChromaAdjoint {
         scratch: AdjointScratch,
         sums: ChromaSums<'_>,
     ) -> Self {
-        raster.assert_gaussian();
         let gpu = &raster.gpu;
         let shade = raster.shade_backward_color(layer.kind).bind(
             gpu,
@@ -335,7 +331,11 @@ impl ChromaAdjoint {
     }
 
     /// Records the adjoint; lists, layer and loss must have been recorded before.
+    ///
+    /// # Panics
+    /// Of a rasterizer with another falloff than a Gaussian's.
     pub fn record(&self, raster: &Raster, recorder: &mut Recorder) {
+        raster.assert_gaussian();
         self.blend.record(raster.blend_backward.color(), recorder);
         let shade = raster.shade_backward_color(self.kind);
         recorder.dispatch(shade, &self.shade, groups_for(self.blend.count));

@@ -7,7 +7,7 @@ import { FAR, NEAR, projectionMatrix, worldMatrix } from './camera.js';
 // an order draws it.
 const REST = 200;
 // A camera that has hardly turned is not sorted for: so many ms are waited to see.
-const UNTURNED = 3000;
+const UNTURNED = 1000;
 
 export async function open(canvas, url, [width, height], matrix) {
   const app = new pc.Application(canvas, { graphicsDeviceOptions: { antialias: false, preserveDrawingBuffer: true } });
