@@ -92,6 +92,7 @@ fn viewers_show_what_is_rendered() {
     place.succeed(&["export", "run", "--spz-version", "4", "-o", "v4.spz"]);
     let said = place.json(&[
         "export",
+        "run",
         "--viewer",
         "playcanvas",
         "-o",

@@ -141,29 +141,30 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
         Row::picture(
             "blend, PlayCanvas",
             "luma, 0 to 1",
-            bounds(allowed, 1.27e-6, 1.0),
+            bounds(allowed, 2.01e-6, 1.0),
             &super::blend::pictures::<1>(raster, clipped(super::blend::scenes()))?,
         ),
         Row::picture(
             "blend, PlayCanvas",
             "chroma, Lab units",
-            bounds(allowed, 1.09e-6, 80.0),
+            bounds(allowed, 1.45e-6, 80.0),
             &super::blend::pictures::<2>(raster, clipped(super::blend::scenes()))?,
         ),
         Row::picture(
             "blend, PlayCanvas",
             "RGB, 0 to 1",
-            bounds(allowed, 1.34e-6, 1.0),
+            bounds(allowed, 2.29e-6, 1.0),
             &super::blend::pictures::<3>(raster, clipped(super::blend::scenes()))?,
         ),
     ];
+    // Colors are up to five times white here.
     let bounds_of = |l2, worst| allowed.gradient(l2, allowed.relative(worst, 1.0));
     let bounds = [
-        bounds_of(3.16e-6, 1.52e-5),
-        bounds_of(4.34e-6, 5.29e-6),
-        bounds_of(1.44e-6, 2.69e-6),
-        bounds_of(2.02e-6, 8.40e-7),
-        bounds_of(1.97e-6, 1.98e-6),
+        bounds_of(3.26e-6, 4.03e-5),
+        bounds_of(7.59e-6, 3.18e-5),
+        bounds_of(2.22e-6, 1.35e-5),
+        bounds_of(2.20e-6, 4.86e-6),
+        bounds_of(2.51e-6, 2.51e-6),
     ];
     let scenes = || super::gradient::scenes::<3>(false);
     for (kernel, scenes) in [
