@@ -3,7 +3,7 @@
 //! Imports go down only:
 //!
 //! ```text
-//! cli → auto → tradeoff, prepare → run → eval, frames → report, doctor → luma, chroma → effects, measure → raster
+//! cli → auto → tradeoff, prepare, viewer → run → eval, frames → report, doctor → luma, chroma → effects, measure → raster
 //! → capture, splats → gpu, color, sections, download, npy, oracle, compare → disk, hash, input
 //! ```
 //!
@@ -75,3 +75,5 @@ mod sections;
 pub mod splats;
 #[cfg(feature = "cli")]
 pub mod tradeoff;
+#[cfg(feature = "cli")]
+pub mod viewer;

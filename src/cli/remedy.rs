@@ -12,6 +12,7 @@ use crate::{
     prepare::PrepareError,
     run::RunError,
     tradeoff::TradeoffError,
+    viewer::ViewerError,
 };
 
 /// What the user reads of an error of a run.
@@ -72,6 +73,15 @@ pub(super) fn of_sweep(error: &TradeoffError) -> String {
     match error {
         TradeoffError::Run(error) => of_run(error),
         _ => error.to_string(),
+    }
+}
+
+/// What the user reads of what keeps a scene from being shown.
+pub(super) fn of_viewer(error: &ViewerError) -> String {
+    match error {
+        ViewerError::Run(error) => of_run(error),
+        ViewerError::Port { .. } => format!("{error}: choose another --port, or leave it out"),
+        ViewerError::Nothing(_) => format!("{error}: train one with `gs-chroma fit COLMAP_DIR`"),
     }
 }
 

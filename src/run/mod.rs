@@ -19,6 +19,8 @@ mod frames;
 mod info;
 mod lock;
 mod log;
+#[cfg(feature = "cli")]
+mod look;
 mod picture_names;
 mod plan;
 mod preset;
@@ -41,6 +43,8 @@ pub use fit::{AheadOptions, FitOptions, Init, Overlay, fit};
 pub use folder::RunFolder;
 pub use frames::{Frames, FramesOptions, frames};
 pub use info::info;
+#[cfg(feature = "cli")]
+pub use look::{Look, SceneKind};
 pub(crate) use picture_names::picture_names;
 pub use plan::{PlanOptions, Planned, plan};
 pub use preset::Work;

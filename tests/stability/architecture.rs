@@ -7,7 +7,7 @@ use std::{collections::BTreeSet, fs, path::Path};
 const FLOORS: [&[&str]; 12] = [
     &["cli"],
     &["auto"],
-    &["tradeoff", "prepare"],
+    &["tradeoff", "prepare", "viewer"],
     &["run"],
     &["eval", "frames"],
     &["report", "doctor"],

@@ -1,0 +1,61 @@
+//! `gs-chroma view`.
+
+use std::{env, path::PathBuf, sync::Arc};
+
+use clap::Args;
+
+use super::{CliError, interrupt, print, progress::Progress};
+use crate::{
+    run::{Look, Stage},
+    viewer::{Content, OfRun, Server, ViewerError, answer},
+};
+
+/// Show a scene in the browser: the splats, and the photos beside them.
+#[derive(Args)]
+pub struct View {
+    /// Run folder or splat file [default: newest run under runs/].
+    #[arg(value_name = "RUN|FILE")]
+    run: Option<PathBuf>,
+    /// COLMAP folder with cameras and photos, when it is not where `fit` found it.
+    #[arg(long, value_name = "COLMAP_DIR")]
+    colmap: Option<PathBuf>,
+    /// Port on 127.0.0.1 [default: one that is free].
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
+    port: Option<u16>,
+    /// Say where the page is, and leave the browser alone.
+    #[arg(long)]
+    no_open: bool,
+}
+
+impl View {
+    pub(super) fn run(self) -> Result<(), CliError> {
+        let mut progress = Progress::through(vec![Stage::Model]);
+        let (run, colmap) = (self.run.as_deref(), self.colmap.as_deref());
+        let look = Look::open(run, colmap, &mut |event| progress.show(&event))?;
+        if look.scenes().next().is_none() {
+            return Err(ViewerError::Nothing(self.run.unwrap_or_default()).into());
+        }
+        let server = Server::bind(self.port)?;
+        progress.finish();
+        let url = server.url();
+        print(format_args!("{url} shows {}; Ctrl-C ends it", look.name))?;
+        interrupt::ends_well();
+        if !self.no_open {
+            open(&url);
+        }
+        let content: Arc<dyn Content> = Arc::new(OfRun::new(look));
+        server.serve(move |request| answer(&*content, request));
+        Ok(())
+    }
+}
+
+/// Opens a page in the browser, where there is a screen.
+pub(super) fn open(url: &str) {
+    let screens = ["DISPLAY", "WAYLAND_DISPLAY", "WSL_DISTRO_NAME"];
+    let has_screen = !cfg!(target_os = "linux")
+        || screens.iter().any(|&name| env::var_os(name).is_some_and(|set| !set.is_empty()));
+    // Where it cannot, the line above says what to open.
+    if has_screen {
+        let _ = open::that_detached(url);
+    }
+}
