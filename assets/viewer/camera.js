@@ -40,15 +40,6 @@ export class Camera {
     this.distance = distance;
   }
 
-  /** Looks from `eye` at `target`, the right side up. */
-  look(eye, target) {
-    this.eye = eye;
-    this.forward = unit(less(target, eye));
-    this.right = unit(cross(this.forward, this.up));
-    this.down = cross(this.forward, this.right);
-    this.distance = Math.hypot(...less(target, eye));
-  }
-
   pivot() {
     return add(this.eye, times(this.forward, this.distance));
   }
@@ -129,18 +120,4 @@ export function distanceOf(camera, means) {
   }
   depths.sort((a, b) => a - b);
   return depths.length > 0 ? depths[depths.length >> 1] : 1;
-}
-
-/** The middle of the Gaussians and how far most of them are from it. */
-export function middleOf(means) {
-  const count = means.length / 3;
-  const step = Math.max(1, Math.floor(count / SAMPLES));
-  const along = (axis) => {
-    const values = [];
-    for (let i = 0; i < count; i += step) values.push(means[3 * i + axis]);
-    return values.sort((a, b) => a - b);
-  };
-  const sorted = [0, 1, 2].map(along);
-  const at = (share) => sorted.map((values) => values[Math.floor(share * (values.length - 1))] ?? 0);
-  return { center: at(0.5), radius: Math.max(Math.hypot(...less(at(0.9), at(0.1))) / 2, 1e-6) };
 }

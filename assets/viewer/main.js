@@ -1,5 +1,5 @@
 // The page: what is on the screen and what the buttons do.
-import { Camera, distanceOf, middleOf, photographedView, upOf, add, times, unit } from "./camera.js";
+import { Camera, add, distanceOf, photographedView, times, upOf } from "./camera.js";
 import { drawError, dragWipe, place } from "./compare.js";
 import { control } from "./controls.js";
 import { showPanel } from "./panel.js";
@@ -20,10 +20,6 @@ const ASK_EVERY = 2000;
 /** Pixels of the canvas for one of the page, at most. */
 const DENSEST = 2;
 
-/** Where no cameras say how large a scene is: the nearest depth over most Gaussians' distance
- * from their middle. */
-const NEAR_SHARE = 0.01;
-
 const from = source();
 const camera = new Camera();
 /** The scenes by kind, "color" and "luma", as far as they are loaded. */
@@ -36,14 +32,15 @@ let main = "color";
 let photographed = null;
 let beside = "none";
 let wipe = 0.5;
+/** How coarse pictures are while the camera moves: as fast as this device needs it. */
 let scale = 1;
 let wanted = false;
 let drawing = false;
-let still = 0;
+/** Runs until the camera has stood still for a while. */
+let still = null;
 let psnr = null;
-let nearest = 0;
 
-const near = () => about.near ?? nearest;
+const near = () => about.near;
 const parts = () => {
   const scene = scenes.get(main);
   const luma = scenes.get("luma");
@@ -54,7 +51,6 @@ const parts = () => {
 /** Loads a scene, in the place of an older one of its kind. */
 async function load(kind) {
   const unpacked = await from.scene(kind);
-  nearest = NEAR_SHARE * middleOf(unpacked.means).radius;
   const old = scenes.get(kind);
   const key = `${kind} ${performance.now()}`;
   sorter.add(key, unpacked.means);
@@ -105,10 +101,10 @@ async function frame() {
   const shown = parts();
   const begun = performance.now();
   for (const { scene } of shown) catchUp(scene, view);
-  renderer.draw(view, shown, { drawn: DRAWN[at("drawn").value], scale });
+  renderer.draw(view, shown, { drawn: DRAWN[at("drawn").value], scale: still ? scale : 1 });
   // The next frame comes when this one is on the screen.
   await new Promise((done) => requestAnimationFrame(() => setTimeout(done)));
-  if (performance.now() - begun > PATIENCE) scale = Math.max(COARSEST, scale * 0.7);
+  if (still && performance.now() - begun > PATIENCE) scale = Math.max(COARSEST, scale * 0.7);
   drawing = false;
   if (wanted) requestAnimationFrame(frame);
 }
@@ -118,7 +114,7 @@ function moved() {
   if (photographed !== null) leavePhoto();
   clearTimeout(still);
   still = setTimeout(() => {
-    scale = 1;
+    still = null;
     redraw();
   }, STILL);
   redraw();
@@ -128,7 +124,6 @@ function resize() {
   const density = Math.min(window.devicePixelRatio || 1, DENSEST);
   canvas.width = Math.max(1, Math.round(stage.clientWidth * density));
   canvas.height = Math.max(1, Math.round(stage.clientHeight * density));
-  scale = 1;
   showBeside();
   redraw();
 }
@@ -139,10 +134,7 @@ function reset() {
   camera.up = upOf(about.cameras);
   leavePhoto();
   if (about.cameras.length > 0) return jump(about.first);
-  const { center, radius } = middleOf(means);
-  const side = unit(add(times(camera.up, 0.4), [0, 0, -1]));
-  camera.look(add(center, times(side, 2.2 * radius)), center);
-  scale = 1;
+  camera.take(about.start, distanceOf(about.start, means));
   redraw();
 }
 
@@ -153,7 +145,6 @@ function jump(k) {
   const chosen = about.cameras[photographed];
   camera.take(chosen, distanceOf(chosen, scenes.get(main).means));
   at("camera").value = photographed;
-  scale = 1;
   psnr = null;
   showBeside();
   redraw();
@@ -340,7 +331,6 @@ async function begin() {
     about = (await from.about()) ?? about;
   }
   main = about.scenes[0];
-  if (about.poster && from.poster) at("poster").hidden = false;
   renderer = new Renderer(canvas);
   sorter = new Sorter();
   const density = Math.min(window.devicePixelRatio || 1, DENSEST);
@@ -349,6 +339,7 @@ async function begin() {
   showAbout();
   listen();
   reset();
+  at("poster").hidden = true;
   if (about.live) follow();
 }
 
@@ -383,7 +374,7 @@ window.gsChroma = {
     const view = currentView();
     await Promise.all(parts().map(({ scene }) => sortFor(scene, view)));
     renderer.draw(view, parts(), { drawn: DRAWN[at("drawn").value] });
-    renderer.gl.finish();
+    renderer.wait();
     return performance.now() - begun;
   },
 };

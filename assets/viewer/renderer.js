@@ -97,6 +97,13 @@ export class Renderer {
     gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
 
+  /** Waits until all is drawn. */
+  wait() {
+    const { gl } = this;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
+  }
+
   /** The picture of a scene at the view's size, RGBA rows from the top. */
   read(view, scene) {
     const { gl } = this;

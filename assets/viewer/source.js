@@ -41,10 +41,9 @@ export class Embedded {
 
   async scene(kind) {
     const held = document.getElementById(`scene-${kind}`);
-    const packed = fromBase64(held.textContent);
+    const bytes = fromBase64(held.textContent);
     held.remove();
-    const whole = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
-    return unpack(new Uint8Array(await new Response(whole).arrayBuffer()));
+    return unpack(bytes);
   }
 
   picture() {

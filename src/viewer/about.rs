@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde_json::{Value, json};
 
 use crate::{
-    capture::Dataset,
+    capture::{Camera, Dataset, View},
     report::{EffectReport, Report},
     run::Look,
 };
@@ -13,8 +13,9 @@ use crate::{
 /// Points of a curve that are drawn, at most.
 const POINTS: usize = 200;
 
-/// What the page is told of a run or a splat file.
-pub fn of_look(look: &Look) -> Value {
+/// What the page is told of a run or a splat file. Without cameras it begins at `start`, and
+/// shows nothing nearer than the depth that comes with it.
+pub fn of_look(look: &Look, start: Option<(&Camera, Option<f64>)>) -> Value {
     let scenes: Vec<&str> = look.scenes().map(|kind| kind.name()).collect();
     let stamps: BTreeMap<&str, u32> = scenes.iter().map(|&kind| (kind, 0)).collect();
     let report = look.report.as_ref();
@@ -24,7 +25,8 @@ pub fn of_look(look: &Look) -> Value {
         // They do not change.
         "stamps": stamps,
         "live": null,
-        "near": look.near(),
+        "near": look.near().or(start.and_then(|(_, near)| near)),
+        "start": start.map(|(camera, _)| pose(camera)),
         "cameras": look.dataset.as_ref().map_or_else(Vec::new, |d| cameras(d, report)),
         "first": look.dataset.as_ref().map_or(0, first),
         "photos": look.dataset.is_some(),
@@ -51,24 +53,29 @@ pub fn cameras(dataset: &Dataset, report: Option<&Report>) -> Vec<Value> {
         .map(|view| (view.name.as_str(), view.quality.psnr))
         .collect();
     let views = dataset.capture.views.iter().zip(&dataset.cameras);
-    let of = |(k, (view, camera)): (usize, (&crate::capture::View, &crate::capture::Camera))| {
+    let of = |(k, (view, camera)): (usize, (&View, &Camera))| {
         let held_out = dataset.split.test.binary_search(&k).is_ok();
-        json!({
-            "name": view.name,
-            "split": if held_out { "test" } else { "train" },
-            "psnr": psnr.get(view.name.as_str()),
-            "width": camera.width,
-            "height": camera.height,
-            "fx": camera.fx,
-            "fy": camera.fy,
-            "cx": camera.cx,
-            "cy": camera.cy,
-            // Rows, world to camera.
-            "rotation": camera.rotation.transpose().to_cols_array(),
-            "translation": camera.translation.to_array(),
-        })
+        let mut told = pose(camera);
+        told["name"] = json!(view.name);
+        told["split"] = json!(if held_out { "test" } else { "train" });
+        told["psnr"] = json!(psnr.get(view.name.as_str()));
+        told
     };
     views.enumerate().map(of).collect()
+}
+
+/// A camera: its picture in pixels, and the rows that lead from the world to it.
+fn pose(camera: &Camera) -> Value {
+    json!({
+        "width": camera.width,
+        "height": camera.height,
+        "fx": camera.fx,
+        "fy": camera.fy,
+        "cx": camera.cx,
+        "cy": camera.cy,
+        "rotation": camera.rotation.transpose().to_cols_array(),
+        "translation": camera.translation.to_array(),
+    })
 }
 
 /// Name and value of what is worth knowing of a run.

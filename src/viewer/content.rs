@@ -9,10 +9,11 @@ use image::{DynamicImage, GrayImage, ImageFormat, RgbImage, imageops};
 use serde_json::Value;
 
 use super::{
-    about, assets, pack,
+    about, assets, overview, pack,
     server::{Answer, Request},
 };
 use crate::{
+    capture::{Camera, Photo},
     hash::Hasher,
     run::{Look, RunError, SceneKind},
 };
@@ -23,7 +24,10 @@ const SIDE: u32 = 2048;
 /// What a page shows.
 pub trait Content: Send + Sync {
     /// All but scenes and pictures, see [`about`].
-    fn about(&self) -> Value;
+    ///
+    /// # Errors
+    /// [`RunError`] of the scene's file.
+    fn about(&self) -> Result<Value, RunError>;
 
     /// A scene, [packed](pack); none where there is no such one.
     ///
@@ -52,15 +56,10 @@ pub fn answer(content: &dyn Content, request: &Request) -> Answer {
         "/" => text("text/html; charset=utf-8", assets::PAGE),
         "/viewer.css" => text("text/css; charset=utf-8", assets::STYLE),
         "/viewer.js" => Answer::ok("text/javascript; charset=utf-8", assets::script()),
-        "/scene.json" => {
-            let body = content.about().to_string();
-            let mut hash = Hasher::default();
-            hash.update(body.as_bytes());
-            Answer {
-                tag: Some(format!("\"{}\"", &hash.finish()[..16])),
-                ..Answer::ok("application/json", body)
-            }
-        }
+        "/scene.json" => match content.about() {
+            Ok(told) => tagged(told.to_string()),
+            Err(error) => failed(&error),
+        },
         "/scene/color" => scene(content, SceneKind::Color),
         "/scene/luma" => scene(content, SceneKind::Luma),
         path => {
@@ -75,6 +74,16 @@ pub fn answer(content: &dyn Content, request: &Request) -> Answer {
                 Answer::not_found()
             }
         }
+    }
+}
+
+/// JSON, with a tag by which the page knows whether it is another.
+fn tagged(body: String) -> Answer {
+    let mut hash = Hasher::default();
+    hash.update(body.as_bytes());
+    Answer {
+        tag: Some(format!("\"{}\"", &hash.finish()[..16])),
+        ..Answer::ok("application/json", body)
     }
 }
 
@@ -113,8 +122,16 @@ fn failed(error: &RunError) -> Answer {
 /// A run or a splat file that stays as it is.
 pub struct OfRun {
     look: Look,
-    /// The scenes, packed when they are asked for the first time.
-    packed: [Mutex<Option<Arc<Vec<u8>>>>; 2],
+    /// The scenes by kind, packed when they are asked for the first time.
+    packed: [Mutex<Option<Packed>>; 2],
+}
+
+/// A scene for the page.
+#[derive(Clone)]
+struct Packed {
+    bytes: Arc<Vec<u8>>,
+    /// Where to look from without cameras, and the nearest depth.
+    overview: (Camera, f64),
 }
 
 impl OfRun {
@@ -125,30 +142,46 @@ impl OfRun {
             packed: Default::default(),
         }
     }
-}
 
-impl Content for OfRun {
-    fn about(&self) -> Value {
-        about::of_look(&self.look)
-    }
-
-    fn scene(&self, kind: SceneKind) -> Result<Option<Arc<Vec<u8>>>, RunError> {
-        let packed = &self.packed[kind as usize];
-        let mut packed = packed.lock().unwrap_or_else(PoisonError::into_inner);
+    fn packed(&self, kind: SceneKind) -> Result<Option<Packed>, RunError> {
+        let packed = self.packed[kind as usize].lock();
+        let mut packed = packed.unwrap_or_else(PoisonError::into_inner);
         if packed.is_none() {
             // What there is to warn of was said when it was made.
             let read = self.look.read(kind, &mut |_| {})?;
-            *packed = read.map(|(splats, drawn)| Arc::new(pack(&splats, drawn)));
+            *packed = read.map(|(splats, drawn)| Packed {
+                bytes: Arc::new(pack(&splats, drawn)),
+                overview: overview(&splats),
+            });
         }
         Ok(packed.clone())
     }
+}
+
+impl Content for OfRun {
+    fn about(&self) -> Result<Value, RunError> {
+        let start = match (&self.look.dataset, self.look.scenes().next()) {
+            (None, Some(kind)) => self.packed(kind)?.map(|packed| packed.overview),
+            _ => None,
+        };
+        let start = start.as_ref().map(|(camera, near)| (camera, Some(*near)));
+        Ok(about::of_look(&self.look, start))
+    }
+
+    fn scene(&self, kind: SceneKind) -> Result<Option<Arc<Vec<u8>>>, RunError> {
+        Ok(self.packed(kind)?.map(|packed| packed.bytes))
+    }
 
     fn photo(&self, view: usize) -> Result<Option<GrayImage>, RunError> {
-        let photo = self.look.photo(view)?;
-        Ok(photo.and_then(|photo| GrayImage::from_raw(photo.width, photo.height, photo.gray.clone())))
+        Ok(self.look.photo(view)?.and_then(|photo| gray(&photo)))
     }
 
     fn teacher(&self, view: usize) -> Result<Option<RgbImage>, RunError> {
         self.look.teacher(view)
     }
+}
+
+/// A photo's gray as an image.
+fn gray(photo: &Photo) -> Option<GrayImage> {
+    GrayImage::from_raw(photo.width, photo.height, photo.gray.clone())
 }

@@ -4,12 +4,16 @@
 mod about;
 mod assets;
 mod content;
+mod html;
+mod overview;
 mod packed;
 mod server;
 
 use std::path::PathBuf;
 
 pub use content::{Content, OfRun, answer};
+pub use html::{Written, is_html, write_html};
+pub use overview::overview;
 pub use packed::pack;
 pub use server::{Answer, Request, Server};
 

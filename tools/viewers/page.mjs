@@ -4,7 +4,8 @@
 //
 // --reference: pictures of `gs-chroma render --views all`; prints the PSNR of the page's picture
 // at every photographed camera. --turn: turns the scene N times and prints milliseconds. --shot:
-// saves the page as it looks. --do: runs a script in the page before that.
+// saves the page as it looks. --do: runs a script in the page before that. --assets: takes the
+// page's script and style from assets/viewer instead of the program, to try them without a build.
 // Prints one line of JSON; status 1 where the page failed.
 import { existsSync, mkdirSync, readFileSync, writeFileSync } from "node:fs";
 import { join, parse } from "node:path";
@@ -26,6 +27,7 @@ const { values, positionals } = parseArgs({
     turn: { type: "string" },
     shot: { type: "string", multiple: true, default: [] },
     do: { type: "string" },
+    assets: { type: "string" },
   },
 });
 const [url] = positionals;
@@ -59,6 +61,14 @@ try {
   const page = await browser.newPage({ viewport: { width: 1280, height: 800 } });
   page.on("console", (message) => message.type() === "error" && found.errors.push(message.text()));
   page.on("pageerror", (error) => found.errors.push(String(error)));
+  if (values.assets) {
+    const read = (name) => readFileSync(join(values.assets, name), "utf8");
+    const modules = ["scene", "sorter", "shaders", "camera", "controls", "compare", "panel", "renderer", "source", "main"];
+    const script = modules.map((name) => read(`${name}.js`)).join("\n").replace(/^import .*$/gm, "").replace(/^export /gm, "");
+    await page.route("**/viewer.js", (route) => route.fulfill({ contentType: "text/javascript", body: script }));
+    await page.route("**/viewer.css", (route) => route.fulfill({ contentType: "text/css", body: read("style.css") }));
+    await page.route(url, (route) => route.fulfill({ contentType: "text/html", body: read("index.html") }));
+  }
   const begun = Date.now();
   await page.goto(url);
   await page.evaluate(() => window.gsChroma.ready);
