@@ -229,6 +229,7 @@ pub fn auto(options: &AutoOptions, tell: &mut Teller<'_>) -> Result<Results, Aut
             force: false,
             timings: false,
             checkpoints: checkpoints(options, goes_on),
+            live: None,
         };
         tell(Told::Begins(Step::Colorize, asked.stages()));
         colorize(&asked, &mut |event| tell(Told::Event(event)))?;

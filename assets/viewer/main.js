@@ -308,7 +308,7 @@ async function follow() {
       const before = about;
       about = now;
       if (before.scenes.join() !== now.scenes.join() && now.scenes.includes("color")) main = "color";
-      for (const kind of [main, ...scenes.keys()]) {
+      for (const kind of new Set([main, ...scenes.keys()])) {
         if (!scenes.has(kind) || before.stamps[kind] !== now.stamps[kind]) await load(kind);
       }
       showAbout();
@@ -317,7 +317,8 @@ async function follow() {
       showBeside();
       redraw();
     } catch (error) {
-      status.textContent = "gs-chroma has ended; what was last seen stays";
+      about.live = "gs-chroma has ended; this is what was seen last";
+      showStatus();
     }
   }
 }

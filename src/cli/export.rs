@@ -57,7 +57,9 @@ impl Export {
     /// The page with the scene in it.
     fn run_html(self) -> Result<(), CliError> {
         let mut progress = Progress::through(vec![Stage::Model, Stage::Rendering, Stage::Saving]);
-        let look = Look::open(self.run.as_deref(), None, &mut |event| progress.show(&event))?;
+        let look = Look::open(self.run.as_deref(), None, &mut |event| {
+            progress.show(&event)
+        })?;
         let observe = &mut |event| progress.show(&event);
         let wrote = write_html(&look, self.luma, &self.output, observe)?;
         progress.finish();

@@ -62,6 +62,11 @@ pub(super) fn export(run: Option<&Path>) -> String {
     line(&words)
 }
 
+/// The page of a run or a splat file.
+pub(super) fn see(scene: &Path) -> String {
+    line(&["view", &scene.to_string_lossy()])
+}
+
 /// A page to look at.
 pub(super) fn look(page: &Path) -> String {
     format!("open {} in a browser", page.display())

@@ -1,13 +1,18 @@
 //! `gs-chroma view`.
 
-use std::{env, path::PathBuf, sync::Arc};
+use std::{
+    env,
+    path::{Path, PathBuf},
+    sync::Arc,
+    thread,
+};
 
 use clap::Args;
 
 use super::{CliError, interrupt, print, progress::Progress};
 use crate::{
-    run::{Look, Stage},
-    viewer::{Content, OfRun, Server, ViewerError, answer},
+    run::{Live, Look, Stage},
+    viewer::{Content, OfCommand, OfRun, Server, ViewerError, answer},
 };
 
 /// Show a scene in the browser: the splats, and the photos beside them.
@@ -49,11 +54,45 @@ impl View {
     }
 }
 
+/// What shows a scene while it is made.
+#[derive(Args)]
+pub(super) struct ViewArguments {
+    /// Show the scene in the browser as it grows; nothing in the result depends on it.
+    #[arg(long)]
+    view: bool,
+    /// Port of the page on 127.0.0.1 [default: one that is free].
+    #[arg(long, requires = "view", value_parser = clap::value_parser!(u16).range(1..))]
+    port: Option<u16>,
+}
+
+impl ViewArguments {
+    /// Opens the page of the command that makes the run `folder`, if it is wanted.
+    ///
+    /// # Errors
+    /// [`ViewerError::Port`], before any work is done.
+    pub fn begin(&self, folder: &Path) -> Result<Option<Arc<Live>>, CliError> {
+        if !self.view {
+            return Ok(None);
+        }
+        let server = Server::bind(self.port)?;
+        let url = server.url();
+        eprintln!("{url} shows the scene as it grows");
+        let live = Arc::<Live>::default();
+        let content = OfCommand::new(folder, live.clone());
+        // Ends with the program.
+        thread::spawn(move || server.serve(move |request| answer(&content, request)));
+        open(&url);
+        Ok(Some(live))
+    }
+}
+
 /// Opens a page in the browser, where there is a screen.
 pub(super) fn open(url: &str) {
     let screens = ["DISPLAY", "WAYLAND_DISPLAY", "WSL_DISTRO_NAME"];
     let has_screen = !cfg!(target_os = "linux")
-        || screens.iter().any(|&name| env::var_os(name).is_some_and(|set| !set.is_empty()));
+        || screens
+            .iter()
+            .any(|&name| env::var_os(name).is_some_and(|set| !set.is_empty()));
     // Where it cannot, the line above says what to open.
     if has_screen {
         let _ = open::that_detached(url);

@@ -6,13 +6,13 @@ use std::{
     ops::ControlFlow,
     path::{Path, PathBuf},
     sync::Arc,
-    time::Instant,
+    time::{Duration, Instant},
 };
 
 use glam::DVec3;
 
 use super::{
-    Event, Observer, Preset, RunError, RunFolder, Stage,
+    Event, Live, Observer, Preset, RunError, RunFolder, SceneKind, Stage,
     checkpoints::{CheckpointOptions, FileKeeper, Found, tell_given_up},
     color_checkpoint::{found_in, question},
     color_source::Source,
@@ -21,6 +21,7 @@ use super::{
     fit::{capture_report, open_gpu},
     foreign::drawn_like_photos,
     keeping,
+    live::Showing,
     log::with_rows,
     scene::{Frame, comments_of_moved, read_scene, tell_not_finite},
     sound::{open_examined, open_trusted},
@@ -72,6 +73,8 @@ pub struct ColorizeOptions {
     pub timings: bool,
     /// How it can go on where it is interrupted, if not by Adam or without a run.
     pub checkpoints: CheckpointOptions,
+    /// Who looks on, if not with Adam.
+    pub live: Option<Arc<Live>>,
 }
 
 /// What `colorize` wrote.
@@ -117,7 +120,7 @@ pub fn colorize(
         false => open_examined(&colmap_dir, &load, observe)?.dataset,
     };
     // From here on every photo is looked at once.
-    let dataset = dataset.caching(0);
+    let dataset = Arc::new(dataset.caching(0));
     let frame = match source.folder {
         Some(_) => Frame::Own,
         None => Frame::World(dataset.capture.offset),
@@ -199,6 +202,11 @@ pub fn colorize(
         // These are other photos than those whose exposures the run knows.
         report.luma.exposures.clear();
     }
+    if let Some(live) = &options.live {
+        live.begin(&dataset);
+        live.draw(drawn);
+        live.show(SceneKind::Luma, luma.clone(), Duration::ZERO);
+    }
     let distill = Distill {
         raster: &raster,
         dataset: &dataset,
@@ -252,7 +260,12 @@ pub fn colorize(
         Some(keeper) => keeper,
         None => &mut NoChromaKeeper,
     };
-    let colored = distill.run_from(checkpoint, keeps, &settings, &mut |event| {
+    let mut showing = Showing {
+        keeper: keeps,
+        live: options.live.as_deref(),
+        luma: Some(&luma),
+    };
+    let colored = distill.run_from(checkpoint, &mut showing, &settings, &mut |event| {
         let observe = &mut *observe.borrow_mut();
         match event {
             // It has been asked already.
@@ -322,6 +335,9 @@ pub fn colorize(
     }
     drop(keeper);
     let colored = colored?;
+    if let Some(live) = &options.live {
+        live.show(SceneKind::Color, colored.splats.clone(), Duration::ZERO);
+    }
     let (observe, log) = (observe.into_inner(), log.into_inner());
     let timings = (options.timings)
         .then(|| Ok::<_, RunError>(kernel_reports(&gpu.timings()?, &colored.load)))

@@ -185,7 +185,10 @@ impl Look {
 
     /// Whether somebody can say what color photos are.
     pub fn has_teacher(&self) -> bool {
-        let chroma = self.report.as_ref().and_then(|report| report.chroma.as_ref());
+        let chroma = self
+            .report
+            .as_ref()
+            .and_then(|report| report.chroma.as_ref());
         self.dataset.is_some()
             && chroma.is_some_and(|chroma| chroma.teachers.iter().any(|t| t.path.is_some()))
     }
@@ -210,7 +213,11 @@ impl Look {
             Asked::Opened(teachers) => teachers,
             Asked::Refused(reason) => {
                 return Err(RunError::File {
-                    path: self.folder.as_ref().map(RunFolder::teacher).unwrap_or_default(),
+                    path: self
+                        .folder
+                        .as_ref()
+                        .map(RunFolder::teacher)
+                        .unwrap_or_default(),
                     reason: format!("the run's teacher cannot be asked: {reason}"),
                 });
             }
@@ -237,7 +244,10 @@ impl Look {
     }
 
     fn open_teachers(&self, dataset: &Dataset) -> Result<Teachers, RunError> {
-        let chroma = self.report.as_ref().and_then(|report| report.chroma.as_ref());
+        let chroma = self
+            .report
+            .as_ref()
+            .and_then(|report| report.chroma.as_ref());
         let teachers = chroma.into_iter().flat_map(|chroma| &chroma.teachers);
         let options = TeachOptions {
             teachers: teachers

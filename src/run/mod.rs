@@ -17,9 +17,9 @@ mod folder;
 mod foreign;
 mod frames;
 mod info;
+mod live;
 mod lock;
 mod log;
-#[cfg(feature = "cli")]
 mod look;
 mod picture_names;
 mod plan;
@@ -43,7 +43,7 @@ pub use fit::{AheadOptions, FitOptions, Init, Overlay, fit};
 pub use folder::RunFolder;
 pub use frames::{Frames, FramesOptions, frames};
 pub use info::info;
-#[cfg(feature = "cli")]
+pub use live::{Live, LiveScene, State};
 pub use look::{Look, SceneKind};
 pub(crate) use picture_names::picture_names;
 pub use plan::{PlanOptions, Planned, plan};

@@ -93,22 +93,34 @@ fn figures(report: &Report) -> Vec<[String; 2]> {
     if let Some(quality) = &luma.held_out {
         row(
             "Held-out photos",
-            format!("{:.2} dB PSNR, {:.4} SSIM (luma)", quality.psnr, quality.ssim),
+            format!(
+                "{:.2} dB PSNR, {:.4} SSIM (luma)",
+                quality.psnr, quality.ssim
+            ),
         );
     }
     row("Training", format!("{:.0} s", luma.seconds.train));
     row("Device", report.device.name.clone());
     if let Some(chroma) = &report.chroma {
-        let teachers = chroma.teachers.iter().map(|teacher| teacher.info.name.as_str());
+        let teachers = chroma
+            .teachers
+            .iter()
+            .map(|teacher| teacher.info.name.as_str());
         row("Teacher", teachers.collect::<Vec<_>>().join(", "));
         row("Degree of a and b", chroma.settings.sh_degree.to_string());
         if let Some(error) = &chroma.pictures.delta_e {
             row(
                 "From the teacher's colors",
-                format!("ΔE00 {:.2} (mean, {} views)", error.mean, chroma.measured_on),
+                format!(
+                    "ΔE00 {:.2} (mean, {} views)",
+                    error.mean, chroma.measured_on
+                ),
             );
         }
-        row("Colorfulness", format!("{:.1}", chroma.pictures.colorfulness));
+        row(
+            "Colorfulness",
+            format!("{:.1}", chroma.pictures.colorfulness),
+        );
         row("Coloring", format!("{:.0} s", chroma.seconds.all));
     }
     rows

@@ -182,6 +182,6 @@ impl Content for OfRun {
 }
 
 /// A photo's gray as an image.
-fn gray(photo: &Photo) -> Option<GrayImage> {
+pub(super) fn gray(photo: &Photo) -> Option<GrayImage> {
     GrayImage::from_raw(photo.width, photo.height, photo.gray.clone())
 }

@@ -36,7 +36,9 @@ pub struct Written {
 /// Whether a path names such a file.
 pub fn is_html(path: &Path) -> bool {
     let extension = path.extension().unwrap_or_default();
-    ["html", "htm"].iter().any(|known| extension.eq_ignore_ascii_case(known))
+    ["html", "htm"]
+        .iter()
+        .any(|known| extension.eq_ignore_ascii_case(known))
 }
 
 /// Writes a scene, the colored one where there is one and `luma` is not wanted, as one file.
@@ -97,7 +99,8 @@ fn poster(
         let mut renderer = Renderer::new(raster, geometry, vec![field], near)?;
         Ok(renderer.render(&camera)?.remove(0))
     };
-    let picture = drawing().map_err(|error: crate::gpu::GpuError| crate::run::RunError::from(error))?;
+    let picture =
+        drawing().map_err(|error: crate::gpu::GpuError| crate::run::RunError::from(error))?;
     let image = to_image(picture.width, picture.height, &picture.shown());
     let mut bytes = Cursor::new(Vec::new());
     // Into memory, and of three channels: nothing of it can fail.
@@ -131,7 +134,10 @@ fn page(about: &Value, kind: &str, packed: &[u8], poster: &[u8]) -> String {
         ("<meta charset=\"utf-8\">", policy),
         ("<link rel=\"stylesheet\" href=\"viewer.css\">", style),
         ("<img id=\"poster\" alt=\"\" hidden>", poster),
-        ("<script type=\"module\" src=\"viewer.js\"></script>", script),
+        (
+            "<script type=\"module\" src=\"viewer.js\"></script>",
+            script,
+        ),
     ];
     let mut page = assets::PAGE.to_owned();
     for (place, part) in parts {

@@ -5,6 +5,7 @@ mod about;
 mod assets;
 mod content;
 mod html;
+mod live;
 mod overview;
 mod packed;
 mod server;
@@ -13,6 +14,7 @@ use std::path::PathBuf;
 
 pub use content::{Content, OfRun, answer};
 pub use html::{Written, is_html, write_html};
+pub use live::OfCommand;
 pub use overview::overview;
 pub use packed::pack;
 pub use server::{Answer, Request, Server};

@@ -32,7 +32,11 @@ pub fn pack(splats: &Splats, drawn: RasterOptions) -> Vec<u8> {
     let (low, high) = scales.fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), scale| {
         (low.min(scale), high.max(scale))
     });
-    let (low, high) = if shown.is_empty() { (0.0, 0.0) } else { (low, high) };
+    let (low, high) = if shown.is_empty() {
+        (0.0, 0.0)
+    } else {
+        (low, high)
+    };
     let step = (high - low).max(1e-6) / STEPS;
     let (degree, channels) = (splats.sh.degree, splats.sh.channels);
     let stride = sh::coefficient_count(degree) * channels;
@@ -40,7 +44,13 @@ pub fn pack(splats: &Splats, drawn: RasterOptions) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(32 + shown.len() * (28 + 2 * stride));
     bytes.extend(MAGIC);
     let antialiased = u32::from(drawn.antialiased);
-    for word in [VERSION, shown.len() as u32, degree, channels as u32, antialiased] {
+    for word in [
+        VERSION,
+        shown.len() as u32,
+        degree,
+        channels as u32,
+        antialiased,
+    ] {
         bytes.extend(word.to_le_bytes());
     }
     for value in [low, step] {
@@ -112,7 +122,11 @@ mod tests {
         let (low, step) = (float(24), float(28));
         let first = 32 + 24;
         let scale = |steps: u32| low + step * steps as f32;
-        let scales = [word(first) & 0xffff, word(first) >> 16, word(first + 4) & 0xffff];
+        let scales = [
+            word(first) & 0xffff,
+            word(first) >> 16,
+            word(first + 4) & 0xffff,
+        ];
         for (steps, wanted) in scales.into_iter().zip([-3.0, -1.0, 1.0]) {
             assert!((scale(steps) - wanted).abs() <= step, "{wanted}");
         }

@@ -252,7 +252,11 @@ fn understood(head: &[u8], names: &[String]) -> Result<Request, Answer> {
         named.map(|header| header.value).collect()
     };
     let hosts = named("host");
-    let ours = |host: &[u8]| names.iter().any(|name| host.eq_ignore_ascii_case(name.as_bytes()));
+    let ours = |host: &[u8]| {
+        names
+            .iter()
+            .any(|name| host.eq_ignore_ascii_case(name.as_bytes()))
+    };
     if hosts.len() != 1 || !ours(hosts[0]) {
         let why = format!("this page is at http://{}/ only", names[0]);
         return Err(Answer::refused("421 Misdirected Request", why));
@@ -310,7 +314,8 @@ mod tests {
 
     #[test]
     fn what_is_known_is_told() {
-        let head = "GET /scene.json HTTP/1.1\r\nHost: localhost:4000\r\nIf-None-Match: \"a\"\r\n\r\n";
+        let head =
+            "GET /scene.json HTTP/1.1\r\nHost: localhost:4000\r\nIf-None-Match: \"a\"\r\n\r\n";
         let request = understood(head.as_bytes(), &names()).unwrap();
         assert_eq!(request.path, "/scene.json");
         assert_eq!(request.known.as_deref(), Some("\"a\""));

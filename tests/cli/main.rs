@@ -49,3 +49,4 @@ mod tradeoff;
 mod train;
 mod variants;
 mod view;
+mod view_page;

@@ -10,7 +10,7 @@ mod training;
 use std::{cell::RefCell, path::PathBuf, sync::Arc, time::Instant};
 
 use super::{
-    Event, Observer, Preset, RunError, RunFolder, Stage,
+    Event, Live, Observer, Preset, RunError, RunFolder, Stage,
     checkpoints::{CheckpointOptions, tell_given_up},
     commit::Commit,
     files,
@@ -96,6 +96,8 @@ pub struct FitOptions {
     pub ahead: AheadOptions,
     /// How it can go on where it is interrupted.
     pub checkpoints: CheckpointOptions,
+    /// Who looks on.
+    pub live: Option<Arc<Live>>,
 }
 
 impl FitOptions {
@@ -114,6 +116,7 @@ impl FitOptions {
             timings: false,
             ahead: AheadOptions::default(),
             checkpoints: CheckpointOptions::default(),
+            live: None,
         }
     }
 }
@@ -160,6 +163,9 @@ pub fn fit(
     };
     let examined = open_examined(&options.colmap_dir, &load, observe)?;
     let (dataset, evidence) = (Arc::new(examined.dataset), examined.evidence);
+    if let Some(live) = &options.live {
+        live.begin(&dataset);
+    }
     let question = question(
         options,
         &budget,
