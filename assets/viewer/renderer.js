@@ -1,5 +1,5 @@
 // Draws scenes: projects every Gaussian once, then blends from back to front.
-import { BLEND, COVER, PROJECT, QUAD, ROW_BITS, SHOW } from "./shaders.js";
+import { BLEND, COVER, PROJECT, QUAD, QUADS, ROW_BITS, SHOW } from "./shaders.js";
 
 const ROW = 1 << ROW_BITS;
 
@@ -23,6 +23,7 @@ export class Renderer {
     this.blend = program(gl, QUAD, BLEND);
     this.show = program(gl, COVER, SHOW);
     this.empty = gl.createVertexArray();
+    this.quads = quads(gl);
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
     gl.pixelStorei(gl.PACK_ALIGNMENT, 1);
   }
@@ -45,35 +46,25 @@ export class Renderer {
       colorsTexture: filled(gl, colors[0], colors[1], gl.HALF_FLOAT, scene.colors, colors[2], colorRows),
       footprints: texture(gl, gl.RGBA32UI, ROW, rows),
       shown: texture(gl, gl.RGBA32UI, ROW, rows),
-      orderBuffer: gl.createBuffer(),
-      quads: gl.createVertexArray(),
+      order: texture(gl, gl.R32UI, ROW, rows),
       ordered: 0,
     };
     uploaded.target = framebuffer(gl, [uploaded.footprints, uploaded.shown]);
-    gl.bindVertexArray(uploaded.quads);
-    gl.bindBuffer(gl.ARRAY_BUFFER, uploaded.orderBuffer);
-    gl.enableVertexAttribArray(0);
-    gl.vertexAttribIPointer(0, 1, gl.UNSIGNED_INT, 0, 0);
-    gl.vertexAttribDivisor(0, 1);
-    gl.bindVertexArray(null);
     return uploaded;
   }
 
   release(scene) {
     const { gl } = this;
-    for (const held of [scene.meansTexture, scene.shapesTexture, scene.colorsTexture, scene.footprints, scene.shown]) {
-      gl.deleteTexture(held);
-    }
+    const { meansTexture, shapesTexture, colorsTexture, footprints, shown, order } = scene;
+    for (const held of [meansTexture, shapesTexture, colorsTexture, footprints, shown, order]) gl.deleteTexture(held);
     gl.deleteFramebuffer(scene.target);
-    gl.deleteVertexArray(scene.quads);
-    gl.deleteBuffer(scene.orderBuffer);
   }
 
   /** Sets the order in which the Gaussians of a scene are drawn. */
   order(scene, order) {
     const { gl } = this;
-    gl.bindBuffer(gl.ARRAY_BUFFER, scene.orderBuffer);
-    gl.bufferData(gl.ARRAY_BUFFER, order, gl.DYNAMIC_DRAW);
+    gl.bindTexture(gl.TEXTURE_2D, scene.order);
+    fill(gl, gl.RED_INTEGER, gl.UNSIGNED_INT, order, 1);
     scene.ordered = order.length;
   }
 
@@ -154,8 +145,10 @@ export class Renderer {
       gl.scissor(left, 0, Math.max(0, right - left), view.height);
       bind(gl, 0, scene.footprints, uniforms.footprints);
       bind(gl, 1, scene.shown, uniforms.shown);
-      gl.bindVertexArray(scene.quads);
-      gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, scene.ordered);
+      bind(gl, 2, scene.order, uniforms.order);
+      gl.uniform1i(uniforms.ordered, scene.ordered);
+      gl.bindVertexArray(this.quads);
+      gl.drawElementsInstanced(gl.TRIANGLES, 6 * QUADS, gl.UNSIGNED_SHORT, 0, Math.ceil(scene.ordered / QUADS));
     }
     gl.disable(gl.SCISSOR_TEST);
     gl.disable(gl.BLEND);
@@ -257,11 +250,26 @@ function texture(gl, format, width, height, filter = gl.NEAREST) {
 /** A texture with `values`, `channels` a texel, whose last row may be short. */
 function filled(gl, internal, format, type, values, channels, rows) {
   const made = texture(gl, internal, ROW, rows);
+  fill(gl, format, type, values, channels);
+  return made;
+}
+
+function fill(gl, format, type, values, channels) {
   const texels = values.length / channels;
   const whole = Math.floor(texels / ROW);
   if (whole > 0) gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, ROW, whole, format, type, values, 0);
   const rest = texels - whole * ROW;
   if (rest > 0) gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, whole, rest, 1, format, type, values, whole * ROW * channels);
+}
+
+/** The corners of an instance's quads, two triangles each. */
+function quads(gl) {
+  const corners = Uint16Array.from({ length: 6 * QUADS }, (_, k) => 4 * Math.floor(k / 6) + [0, 1, 2, 2, 1, 3][k % 6]);
+  const made = gl.createVertexArray();
+  gl.bindVertexArray(made);
+  gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
+  gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, corners, gl.STATIC_DRAW);
+  gl.bindVertexArray(null);
   return made;
 }
 

@@ -3,6 +3,10 @@
 // Texels in a row of every texture that holds Gaussians.
 export const ROW_BITS = 12;
 
+// Quads in one instance: software draws instances one after the other, and so do some GPUs
+// with those of four corners.
+export const QUADS = 256;
+
 const HEAD = `#version 300 es
 precision highp float;
 precision highp int;
@@ -115,23 +119,26 @@ void main() {
     packHalf2x16(vec2(opacity, color.r)), packHalf2x16(color.gb));
 }`;
 
-// One instance a Gaussian, from back to front: the rectangle around its ellipse.
+// From back to front, the rectangle around each Gaussian's ellipse.
 export const QUAD = `${HEAD}
+uniform usampler2D order;
+uniform int ordered;
 uniform usampler2D footprints;
 uniform usampler2D shown;
 uniform vec2 size;
 uniform int drawn;
 
-layout(location = 0) in uint splat;
 flat out vec2 center;
 flat out vec3 conic;
 flat out vec4 color;
 
 void main() {
-  ivec2 at = texel(int(splat));
+  gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
+  int place_in_order = gl_InstanceID * ${QUADS} + (gl_VertexID >> 2);
+  if (place_in_order >= ordered) return;
+  ivec2 at = texel(int(texelFetch(order, texel(place_in_order), 0).x));
   uvec4 rest = texelFetch(shown, at, 0);
   vec2 opacity_red = unpackHalf2x16(rest.z);
-  gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
   if (opacity_red.x <= 0.0) return;
   vec4 place = uintBitsToFloat(texelFetch(footprints, at, 0));
   center = place.xy;
