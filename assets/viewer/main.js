@@ -267,6 +267,7 @@ function toggle(button, panel) {
 
 function listen() {
   control(canvas, camera, moved);
+  canvas.addEventListener("webglcontextlost", () => fail(new Error("the graphics device was lost: reload the page")));
   dragWipe(at("wipe"), stage, (share) => {
     wipe = share;
     showBeside();
