@@ -365,7 +365,6 @@ window.gsChroma = {
     const held = document.createElement("canvas");
     [held.width, held.height] = [view.width, view.height];
     held.getContext("2d").putImageData(new ImageData(pixels, view.width, view.height), 0, 0);
-    redraw();
     return held.toDataURL("image/png");
   },
   /** Turns the free camera by radians and draws; gives the milliseconds it took. */

@@ -12,7 +12,7 @@ use clap::Args;
 use super::{CliError, interrupt, print, progress::Progress};
 use crate::{
     run::{Live, Look, Stage},
-    viewer::{Content, OfCommand, OfRun, Server, ViewerError, answer},
+    viewer::{OfCommand, OfRun, Server, answer},
 };
 
 /// Show a scene in the browser: the splats, and the photos beside them.
@@ -37,19 +37,17 @@ impl View {
         let mut progress = Progress::through(vec![Stage::Model]);
         let (run, colmap) = (self.run.as_deref(), self.colmap.as_deref());
         let look = Look::open(run, colmap, &mut |event| progress.show(&event))?;
-        if look.scenes().next().is_none() {
-            return Err(ViewerError::Nothing(self.run.unwrap_or_default()).into());
-        }
+        let name = look.name.clone();
+        let content = OfRun::new(look, &mut |event| progress.show(&event))?;
         let server = Server::bind(self.port)?;
         progress.finish();
         let url = server.url();
-        print(format_args!("{url} shows {}; Ctrl-C ends it", look.name))?;
+        print(format_args!("{url} shows {name}; Ctrl-C ends it"))?;
         interrupt::ends_well();
         if !self.no_open {
             open(&url);
         }
-        let content: Arc<dyn Content> = Arc::new(OfRun::new(look));
-        server.serve(move |request| answer(&*content, request));
+        server.serve(move |request| answer(&content, request));
         Ok(())
     }
 }
@@ -69,7 +67,7 @@ impl ViewArguments {
     /// Opens the page of the command that makes the run `folder`, if it is wanted.
     ///
     /// # Errors
-    /// [`ViewerError::Port`], before any work is done.
+    /// [`ViewerError::Port`](crate::viewer::ViewerError), before any work is done.
     pub fn begin(&self, folder: &Path) -> Result<Option<Arc<Live>>, CliError> {
         if !self.view {
             return Ok(None);

@@ -6,15 +6,15 @@ use std::{
     time::{Duration, Instant},
 };
 
-use super::{Event, SceneKind};
+use super::{Event, RunError, SceneKind};
 use crate::{
     capture::{Dataset, Photo},
-    chroma::{ChromaCheckpoint, ChromaKeeper},
+    chroma::{ChromaCheckpoint, ChromaKeeper, bake_rgb},
     effects::Plan,
     luma::{Checkpoint, Keeper, LumaProgress},
     raster::RasterOptions,
     report::EffectReport,
-    splats::Splats,
+    splats::{ShField, Splats},
 };
 
 /// Whoever has not asked for so long does not look any more.
@@ -27,11 +27,11 @@ const RARELY: u32 = 20;
 
 /// What there is to see of a command that goes on.
 #[derive(Debug, Default)]
-pub struct Live(Mutex<State>);
+pub struct Live(Mutex<LiveState>);
 
 /// All that is shown.
 #[derive(Clone, Debug, Default)]
-pub struct State {
+pub struct LiveState {
     /// Photos and cameras, once they are there.
     pub dataset: Option<Arc<Dataset>>,
     /// The newest scene of each kind.
@@ -65,7 +65,7 @@ pub struct LiveScene {
 
 impl Live {
     /// What is shown now, for somebody who asks.
-    pub fn ask(&self) -> State {
+    pub fn ask(&self) -> LiveState {
         let mut state = self.state();
         state.asked = Some(Instant::now());
         state.clone()
@@ -79,8 +79,8 @@ impl Live {
     /// The photo of a view; none as long as there are no photos, or no such view.
     ///
     /// # Errors
-    /// [`CaptureError`](crate::capture::CaptureError) of the photo.
-    pub fn photo(&self, view: usize) -> Result<Option<Arc<Photo>>, super::RunError> {
+    /// [`RunError::Capture`] of the photo.
+    pub fn photo(&self, view: usize) -> Result<Option<Arc<Photo>>, RunError> {
         let dataset = self.state().dataset.clone();
         match dataset.filter(|dataset| view < dataset.cameras.len()) {
             Some(dataset) => Ok(Some(dataset.photo(view)?)),
@@ -164,7 +164,7 @@ impl Live {
         });
     }
 
-    fn state(&self) -> MutexGuard<'_, State> {
+    fn state(&self) -> MutexGuard<'_, LiveState> {
         // What is in it is whole even where a thread has panicked.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -215,9 +215,9 @@ impl<K: ChromaKeeper + ?Sized> ChromaKeeper for Showing<'_, K> {
         self.live.is_some_and(Live::wants)
     }
 
-    fn show(&mut self, chroma: &crate::splats::ShField, took: Duration) {
+    fn show(&mut self, chroma: &ShField, took: Duration) {
         if let (Some(live), Some(luma)) = (self.live, self.luma) {
-            let colored = crate::chroma::bake_rgb(luma, chroma);
+            let colored = bake_rgb(luma, chroma);
             live.show(SceneKind::Color, colored, took);
         }
     }

@@ -43,7 +43,7 @@ pub use fit::{AheadOptions, FitOptions, Init, Overlay, fit};
 pub use folder::RunFolder;
 pub use frames::{Frames, FramesOptions, frames};
 pub use info::info;
-pub use live::{Live, LiveScene, State};
+pub use live::{Live, LiveScene, LiveState};
 pub use look::{Look, SceneKind};
 pub(crate) use picture_names::picture_names;
 pub use plan::{PlanOptions, Planned, plan};

@@ -9,13 +9,13 @@ use image::{DynamicImage, GrayImage, ImageFormat, RgbImage, imageops};
 use serde_json::Value;
 
 use super::{
-    about, assets, overview, pack,
+    ViewerError, about, assets, overview, pack,
     server::{Answer, Request},
 };
 use crate::{
     capture::{Camera, Photo},
     hash::Hasher,
-    run::{Look, RunError, SceneKind},
+    run::{Look, Observer, RunError, SceneKind},
 };
 
 /// Longer side of the photos that the page shows, in pixels: what screens have.
@@ -135,20 +135,31 @@ struct Packed {
 }
 
 impl OfRun {
-    /// What there is to see.
-    pub fn new(look: Look) -> Self {
-        Self {
+    /// What there is to see, with the first of its scenes read.
+    ///
+    /// # Errors
+    /// [`ViewerError::Nothing`] without a scene, and [`RunError`] of its file.
+    pub fn new(look: Look, observe: &mut Observer<'_>) -> Result<Self, ViewerError> {
+        let Some(first) = look.scenes().next() else {
+            return Err(ViewerError::Nothing(look.name));
+        };
+        let content = Self {
             look,
             packed: Default::default(),
-        }
+        };
+        content.packed(first, observe)?;
+        Ok(content)
     }
 
-    fn packed(&self, kind: SceneKind) -> Result<Option<Packed>, RunError> {
+    fn packed(
+        &self,
+        kind: SceneKind,
+        observe: &mut Observer<'_>,
+    ) -> Result<Option<Packed>, RunError> {
         let packed = self.packed[kind as usize].lock();
         let mut packed = packed.unwrap_or_else(PoisonError::into_inner);
         if packed.is_none() {
-            // What there is to warn of was said when it was made.
-            let read = self.look.read(kind, &mut |_| {})?;
+            let read = self.look.read(kind, observe)?;
             *packed = read.map(|(splats, drawn)| Packed {
                 bytes: Arc::new(pack(&splats, drawn)),
                 overview: overview(&splats),
@@ -161,7 +172,9 @@ impl OfRun {
 impl Content for OfRun {
     fn about(&self) -> Result<Value, RunError> {
         let start = match (&self.look.dataset, self.look.scenes().next()) {
-            (None, Some(kind)) => self.packed(kind)?.map(|packed| packed.overview),
+            (None, Some(kind)) => self
+                .packed(kind, &mut |_| {})?
+                .map(|packed| packed.overview),
             _ => None,
         };
         let start = start.as_ref().map(|(camera, near)| (camera, Some(*near)));
@@ -169,7 +182,7 @@ impl Content for OfRun {
     }
 
     fn scene(&self, kind: SceneKind) -> Result<Option<Arc<Vec<u8>>>, RunError> {
-        Ok(self.packed(kind)?.map(|packed| packed.bytes))
+        Ok(self.packed(kind, &mut |_| {})?.map(|packed| packed.bytes))
     }
 
     fn photo(&self, view: usize) -> Result<Option<GrayImage>, RunError> {

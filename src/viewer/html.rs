@@ -10,10 +10,10 @@ use serde_json::Value;
 use super::{ViewerError, about, assets, overview, pack};
 use crate::{
     capture::Camera,
-    gpu::Gpu,
-    raster::{Field, Geometry, Raster, RasterOptions, Renderer},
+    gpu::{Gpu, GpuError},
+    raster::{Field, Geometry, Picture, Raster, RasterOptions, Renderer},
     report::to_image,
-    run::{Event, Look, Observer, SceneKind, Stage, files},
+    run::{Event, Look, Observer, RunError, SceneKind, Stage, files},
     splats::Splats,
 };
 
@@ -52,9 +52,9 @@ pub fn write_html(
     observe: &mut Observer<'_>,
 ) -> Result<Written, ViewerError> {
     let colored = look.scenes().find(|kind| !luma || *kind == SceneKind::Luma);
-    let kind = colored.ok_or_else(|| ViewerError::Nothing(path.to_owned()))?;
+    let kind = colored.ok_or_else(|| ViewerError::Nothing(look.name.clone()))?;
     let read = look.read(kind, observe)?;
-    let (splats, drawn) = read.ok_or_else(|| ViewerError::Nothing(path.to_owned()))?;
+    let (splats, drawn) = read.ok_or_else(|| ViewerError::Nothing(look.name.clone()))?;
     observe(Event::begins(Stage::Rendering));
     let (start, near) = match &look.dataset {
         Some(dataset) => (dataset.cameras[about::first(dataset)].clone(), look.near()),
@@ -89,8 +89,8 @@ fn poster(
     let scale = POSTER_SIDE / f64::from(camera.width.max(camera.height));
     let side = |pixels: u32| ((scale * f64::from(pixels)).round() as u32).max(1);
     let camera = camera.resized(side(camera.width), side(camera.height));
-    let gpu = Gpu::open().map_err(crate::run::RunError::from)?;
-    let drawing = || {
+    let gpu = Gpu::open().map_err(RunError::from)?;
+    let drawing = || -> Result<Picture, GpuError> {
         let raster = Arc::new(Raster::with(&gpu, drawn));
         let (geometry, field) = (
             Geometry::upload(&gpu, splats)?,
@@ -99,8 +99,7 @@ fn poster(
         let mut renderer = Renderer::new(raster, geometry, vec![field], near)?;
         Ok(renderer.render(&camera)?.remove(0))
     };
-    let picture =
-        drawing().map_err(|error: crate::gpu::GpuError| crate::run::RunError::from(error))?;
+    let picture = drawing().map_err(RunError::from)?;
     let image = to_image(picture.width, picture.height, &picture.shown());
     let mut bytes = Cursor::new(Vec::new());
     // Into memory, and of three channels: nothing of it can fail.

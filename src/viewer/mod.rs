@@ -10,8 +10,6 @@ mod overview;
 mod packed;
 mod server;
 
-use std::path::PathBuf;
-
 pub use content::{Content, OfRun, answer};
 pub use html::{Written, is_html, write_html};
 pub use live::OfCommand;
@@ -36,6 +34,6 @@ pub enum ViewerError {
         reason: String,
     },
     /// There is no such scene.
-    #[error("{}: has no scene to show", .0.display())]
-    Nothing(PathBuf),
+    #[error("{0}: has no scene to show")]
+    Nothing(String),
 }
