@@ -50,6 +50,9 @@ mod tests {
             let end = rest.find([' ', '(', '=']).unwrap_or(rest.len());
             match rest.strip_prefix('[') {
                 Some(list) => names.extend(list.split(']').next().unwrap_or("").split(", ")),
+                // Of GLSL in between, names follow types.
+                None if ["const", "let"].contains(&kind)
+                    && !rest[end..].trim_start().starts_with(['=', ';']) => {}
                 None => names.push(&rest[..end]),
             }
         }
