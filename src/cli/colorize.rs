@@ -275,12 +275,8 @@ impl Colorize {
             };
             let wrote = [Some(output.ply.as_path()), output.contact_sheet.as_deref()];
             let wrote: Vec<&Path> = wrote.into_iter().flatten().collect();
-            progress.close(&wrote, &next)?;
             let run = output.contact_sheet.as_deref().and_then(Path::parent);
-            print(format_args!(
-                "look: {}",
-                next::see(run.unwrap_or(&output.ply))
-            ))?;
+            progress.close_with(run.unwrap_or(&output.ply), &wrote, &next)?;
         }
         Ok(())
     }

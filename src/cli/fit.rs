@@ -163,8 +163,9 @@ impl Fit {
                 print(timings_table(rows))?;
             }
             let next = next::colorize(folder.path(), asked.as_deref());
-            progress.close(&[&folder.luma(), &folder.contact_sheet()], &next)?;
-            print(format_args!("look: {}", next::see(folder.path())))?;
+            let wrote = [folder.luma(), folder.contact_sheet()];
+            let wrote = wrote.each_ref().map(PathBuf::as_path);
+            progress.close_with(folder.path(), &wrote, &next)?;
         }
         Ok(())
     }
