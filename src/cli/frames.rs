@@ -4,7 +4,13 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{CliError, network::NetworkArguments, next, print, progress::Progress};
+use super::{
+    CliError,
+    network::NetworkArguments,
+    next, print,
+    progress::Progress,
+    values::{Rate, rate},
+};
 use crate::run::{Frames, FramesOptions, frames};
 
 /// Color the photos themselves: each with its own lightness at its full size, and the scene's
@@ -35,19 +41,6 @@ pub struct FramesCommand {
     /// Print what was done as JSON.
     #[arg(long)]
     json: bool,
-}
-
-#[derive(Clone, Copy)]
-struct Rate([u32; 2]);
-
-/// Frames a second, whole or as a fraction.
-fn rate(text: &str) -> Result<Rate, String> {
-    let (frames, seconds) = text.split_once('/').unwrap_or((text, "1"));
-    let number = |text: &str| text.trim().parse().ok().filter(|&n: &u32| n > 0);
-    match (number(frames), number(seconds)) {
-        (Some(frames), Some(seconds)) => Ok(Rate([frames, seconds])),
-        _ => Err("no rate: 24, 25 or 30000/1001".to_owned()),
-    }
 }
 
 impl FramesCommand {

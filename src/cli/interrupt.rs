@@ -7,7 +7,7 @@ use std::{
 
 use super::CliError;
 use crate::{
-    disk, prepare,
+    disk, programs,
     run::{Interrupt, RunError},
 };
 
@@ -28,7 +28,7 @@ pub(super) fn heed_signals() -> Result<(), CliError> {
             return;
         }
         // Before their files are removed.
-        let _no_program = prepare::end_programs();
+        let _no_program = programs::end_all();
         let _nothing_new = disk::give_up();
         exit(INTERRUPTED);
     });

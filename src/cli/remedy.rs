@@ -50,7 +50,9 @@ pub(super) fn of_run(error: &RunError) -> String {
             format!("{error}: give the same options, or leave out --resume to train anew")
         }
         RunError::Interrupted { .. } => format!("{error} with the same command and --resume"),
-        RunError::NoProgram("ffmpeg") => format!("{error}; or write pictures: -o FOLDER"),
+        RunError::Program(program) if program.lacks_ffmpeg() => {
+            format!("{error}, or write pictures: -o FOLDER")
+        }
         RunError::NoHeldOut => format!("{error}: choose --views train or --views all"),
         RunError::NothingPainted(_) => format!("{error}, or give a --teacher as well"),
         RunError::NothingUntil { until, .. } => format!("--until {until}: {error}"),
@@ -79,6 +81,9 @@ pub(super) fn of_sweep(error: &TradeoffError) -> String {
 pub(super) fn of_preparing(error: &PrepareError) -> String {
     match error {
         PrepareError::Run(error) => of_run(error),
+        PrepareError::Program(program) if program.lacks_ffmpeg() => {
+            format!("{error}, or give a folder of frames")
+        }
         _ => error.to_string(),
     }
 }

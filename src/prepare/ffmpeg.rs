@@ -10,9 +10,9 @@ use serde_json::Value;
 
 use super::{
     PrepareError,
-    process::Program,
     shots::{self, Cutter},
 };
+use crate::programs::{FFMPEG, Program, ProgramError};
 
 /// The oldest that knows `-fps_mode`.
 const OLDEST: [u32; 2] = [5, 1];
@@ -89,9 +89,9 @@ pub(super) struct Part {
 /// Refuses an FFmpeg that is too old.
 ///
 /// # Errors
-/// [`PrepareError::NoProgram`] where there is none.
+/// [`ProgramError::Missing`] where there is none.
 pub(super) fn check_version() -> Result<(), PrepareError> {
-    let said = Program::new("ffmpeg").arg("-version").ask()?;
+    let said = Program::new(FFMPEG).arg("-version").ask()?;
     match version(&said) {
         Some(found) if found < OLDEST => Err(PrepareError::OldFfmpeg {
             found: format!("{}.{}", found[0], found[1]),
@@ -131,11 +131,11 @@ impl Source {
             .arg(named(path))
             .ask();
         let said = said.map_err(|error| match error {
-            PrepareError::Program { said, .. } => PrepareError::NoFilm {
+            ProgramError::Failed { said, .. } => PrepareError::NoFilm {
                 path: path.into(),
                 reason: format!("cannot be read as a film ({said})"),
             },
-            other => other,
+            other => other.into(),
         })?;
         Self::parse(path, &said).map_err(|reason| PrepareError::NoFilm {
             path: path.into(),
@@ -183,7 +183,7 @@ impl Source {
 
     /// FFmpeg on a part of the film, up to its output.
     fn part(&self, part: Part, level: &str) -> Program {
-        let mut ffmpeg = Program::new("ffmpeg")
+        let mut ffmpeg = Program::new(FFMPEG)
             .args(["-hide_banner", "-nostdin", "-nostats", "-v", level])
             .option("-ss", seconds(part.start));
         if let Some(length) = part.seconds {
@@ -199,7 +199,7 @@ impl Source {
     /// that is all that is wanted. Tells how many seconds it has seen.
     ///
     /// # Errors
-    /// [`PrepareError::Program`].
+    /// [`ProgramError`].
     pub fn shots(
         &self,
         part: Part,
@@ -238,7 +238,7 @@ impl Source {
     /// Whether the pictures of a part are interlaced.
     ///
     /// # Errors
-    /// [`PrepareError::Program`].
+    /// [`ProgramError`].
     pub fn scan(&self, part: Part) -> Result<Scan, PrepareError> {
         let length = part.seconds.unwrap_or(LOOKED_AT).min(LOOKED_AT);
         let looked_at = Part {
@@ -256,7 +256,7 @@ impl Source {
     /// how many there are so far.
     ///
     /// # Errors
-    /// [`PrepareError::Program`].
+    /// [`ProgramError`].
     pub fn extract(
         &self,
         part: Part,
@@ -285,7 +285,8 @@ impl Source {
                 if let Some(count) = line.strip_prefix("frame=") {
                     written(count.trim().parse().unwrap_or(0));
                 }
-            })
+            })?;
+        Ok(())
     }
 }
 

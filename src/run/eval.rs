@@ -12,7 +12,7 @@ use super::{
     commit::Commit,
     files,
     fit::open_gpu,
-    flight::flight,
+    flight::Filmed,
     keeping,
     lock::RunLock,
     scene::{Frame, comments_of_moved, open, read_splats},
@@ -164,9 +164,11 @@ pub fn eval(
     let mut strip = Vec::new();
     let every = options.frames.div_ceil(STRIP_FRAMES);
     let flow = options.flow.as_deref();
+    let mut filmed = Filmed::begin(&page);
     let mut keep = |frame, image| {
         let file = format!("frame-{frame:04}.png");
         files::write_png(&page.join(&file), &image)?;
+        filmed.add(&file, &image);
         if frame % every == 0 {
             strip.push(file);
         }
@@ -184,7 +186,7 @@ pub fn eval(
         )));
     }
     observe(Event::begins(Stage::Page));
-    let flight = flight(&page, &path, observe);
+    let flight = filmed.end(&page, &path, observe);
     let evaluation = Evaluation {
         version: EVALUATION_VERSION,
         program: env!("CARGO_PKG_VERSION").to_owned(),

@@ -10,6 +10,7 @@ mod eval;
 mod event;
 mod export;
 pub(crate) mod files;
+mod film;
 mod fingerprint;
 mod fit;
 mod flight;
@@ -37,6 +38,7 @@ pub use eval::{EvalOptions, eval};
 use event::keeping;
 pub use event::{Event, Observer, Stage};
 pub use export::{ExportOptions, Exported, export};
+pub use film::is_film;
 pub use fit::{AheadOptions, FitOptions, Init, Overlay, fit};
 pub use folder::RunFolder;
 pub use frames::{Frames, FramesOptions, frames};
@@ -44,7 +46,7 @@ pub use info::info;
 pub(crate) use picture_names::picture_names;
 pub use plan::{PlanOptions, Planned, plan};
 pub use preset::Work;
-pub use render::{RenderOptions, Views, render};
+pub use render::{PathOptions, RenderOptions, Rendered, Views, Way, render, render_path};
 pub use sound::Soundness;
 pub use teach::{TeachOptions, teacher_or_photos};
 
@@ -56,7 +58,9 @@ use crate::{
     eval::EvalError,
     gpu::GpuError,
     luma::LumaError,
+    programs::ProgramError,
     splats::ply::PlyError,
+    trajectory::TrajectoryError,
 };
 
 /// What can stop a run.
@@ -94,6 +98,9 @@ pub enum RunError {
     /// Measuring.
     #[error(transparent)]
     Eval(EvalError),
+    /// A camera path.
+    #[error(transparent)]
+    Trajectory(#[from] TrajectoryError),
     /// There is no run to go on with.
     #[error("no run under runs/")]
     NoRun,
@@ -106,9 +113,9 @@ pub enum RunError {
     /// A run without colors.
     #[error("{}: the run is not colored yet: run `gs-chroma colorize` first", .0.display())]
     NoColors(PathBuf),
-    /// A program that is needed is not there.
-    #[error("{0} is not installed, or not on PATH (Debian: apt-get install -y {0})")]
-    NoProgram(&'static str),
+    /// A program of others, such as FFmpeg.
+    #[error(transparent)]
+    Program(#[from] ProgramError),
     /// Coordinates that are too large for a splat file.
     #[error(
         "{}: not written: near {coordinate} 32-bit floats are {step} apart, {:.2} times the size of the Gaussians (the median of their smallest scales is {size:.4})",

@@ -2,7 +2,8 @@
 //! trial, is not among them.
 
 use super::{
-    ColorizeOptions, EvalOptions, FitOptions, FramesOptions, PlanOptions, RenderOptions,
+    ColorizeOptions, EvalOptions, FitOptions, FramesOptions, PathOptions, PlanOptions,
+    RenderOptions,
     Stage::{self, *},
 };
 use crate::{chroma, luma::Goal};
@@ -93,6 +94,13 @@ impl FramesOptions {
     /// The stages of [`frames`](super::frames).
     pub fn stages(&self) -> Vec<Stage> {
         vec![Model, Device, Coloring]
+    }
+}
+
+impl PathOptions {
+    /// The stages of [`render_path`](super::render_path).
+    pub fn stages(&self) -> Vec<Stage> {
+        vec![Model, Device, Rendering]
     }
 }
 

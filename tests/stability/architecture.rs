@@ -12,11 +12,11 @@ const FLOORS: [&[&str]; 12] = [
     &["eval", "frames"],
     &["report", "doctor"],
     &["luma", "chroma"],
-    &["effects", "measure"],
+    &["effects", "measure", "trajectory"],
     &["raster"],
     &["capture", "splats"],
     &[
-        "gpu", "color", "sections", "download", "npy", "oracle", "compare",
+        "gpu", "color", "sections", "download", "npy", "programs", "oracle", "compare",
     ],
     &["disk", "hash", "input"],
 ];

@@ -1,19 +1,14 @@
 //! `frames`: the photos themselves in color.
 
-mod film;
 mod shots;
 
-use std::{
-    cell::RefCell,
-    path::{Path, PathBuf},
-    sync::Arc,
-};
+use std::{cell::RefCell, path::PathBuf, sync::Arc};
 
-use film::FilmWriter;
 use shots::{Shot, shots_of};
 
 use super::{
     Event, Observer, RunError, RunFolder, Stage, files,
+    film::{FRAME_RATE, FilmWriter, Purpose, is_film},
     fit::open_gpu,
     keeping,
     scene::{Frame, open, read_scene},
@@ -71,16 +66,6 @@ pub struct Frames {
     pub warnings: Vec<String>,
     /// Seconds of the whole.
     pub seconds: f64,
-}
-
-/// Extensions of films.
-const FILMS: [&str; 4] = ["mp4", "mov", "mkv", "m4v"];
-
-/// Whether a path names a film and not a folder.
-fn is_film(path: &Path) -> bool {
-    let extension = path.extension().unwrap_or_default().to_string_lossy();
-    let known = |film: &&str| extension.eq_ignore_ascii_case(film);
-    FILMS.iter().any(known) && !path.is_dir()
 }
 
 /// Colors the photos of a run and writes them.
@@ -475,14 +460,20 @@ impl Out {
             return Ok(Self::Folder(options.output.clone()));
         }
         files::make_folder_of(&options.output)?;
-        let writer = FilmWriter::new(&options.output, film, options.frame_rate)?;
-        Ok(Self::Film(Box::new(writer)))
+        // At the rate and with the sound of the film that the photos come from.
+        let rate = options.frame_rate.or(film.map(|film| film.frame_rate));
+        let writer = FilmWriter::new(
+            &options.output,
+            rate.unwrap_or(FRAME_RATE),
+            Purpose::Editing,
+        )?;
+        Ok(Self::Film(Box::new(writer.sounding_like(film))))
     }
 
     fn write(&mut self, shot: &Shot, colored: Colored) -> Result<(), RunError> {
         match self {
             Self::Folder(folder) => files::write_colored(&folder.join(&shot.output), colored),
-            Self::Film(film) => film.write(&shot.name, &colored),
+            Self::Film(film) => film.write_colored(&shot.name, &colored),
         }
     }
 
