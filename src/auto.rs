@@ -245,6 +245,7 @@ pub fn auto(options: &AutoOptions, tell: &mut Teller<'_>) -> Result<Results, Aut
             teacher: Some(options.teacher.clone()),
             teacher_settings: options.teacher_settings.clone(),
             output: results.colored.clone(),
+            hints: options.hints.clone(),
             teacher_alone: false,
             frame_rate: None,
         };

@@ -28,6 +28,10 @@ pub struct FramesCommand {
     teacher: Option<PathBuf>,
     #[command(flatten)]
     network: NetworkArguments,
+    /// Folder of painted hints, for what the scene does not show: a stroke on the sky colors the
+    /// sky, in the photos before and after as well [default: the run's].
+    #[arg(long, value_name = "DIR", conflicts_with = "teacher_alone")]
+    hints: Option<PathBuf>,
     /// Leave the scene out: the teacher's own pictures, to compare with.
     #[arg(long)]
     teacher_alone: bool,
@@ -51,6 +55,7 @@ impl FramesCommand {
             teacher: self.teacher,
             teacher_settings: self.network.settings(),
             output: self.output,
+            hints: self.hints,
             teacher_alone: self.teacher_alone,
             frame_rate: self.frame_rate.map(|Rate(rate)| rate),
         };
@@ -75,8 +80,12 @@ fn summary(done: &Frames, teacher_alone: bool) -> String {
         0 => String::new(),
         count => format!("; {count} without a pose take their colors from their neighbors"),
     };
+    let painted = match done.painted {
+        0 => String::new(),
+        count => format!("; {count} show strokes on what it does not cover"),
+    };
     format!(
-        "colored {} photos: the scene covers {:.0} % of the {} with a pose{carried}",
+        "colored {} photos: the scene covers {:.0} % of the {} with a pose{carried}{painted}",
         done.photos,
         100.0 * done.covered,
         done.placed,

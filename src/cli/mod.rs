@@ -12,6 +12,7 @@ mod export;
 mod fit;
 mod frames;
 mod info;
+mod info_page;
 mod interrupt;
 mod luma;
 mod network;

@@ -350,6 +350,11 @@ pub fn colorize(
         strength: options.teach.strength,
         upsample: options.teach.settings.upsample,
         hints: hinted,
+        hint_folder: options.teach.hints.as_ref().and_then(|folder| {
+            let found = folder.canonicalize();
+            let path = found.as_ref().unwrap_or(folder);
+            path.to_str().map(str::to_owned)
+        }),
         claimed: colored.claimed,
         painted_held_out: (lesson.painted_held_out(&dataset.split).iter())
             .map(|&view| dataset.capture.views[view].name.clone())

@@ -43,6 +43,8 @@ pub enum Stage {
     Baseline,
     /// Drawing pictures.
     Rendering,
+    /// Following strokes from photo to photo.
+    Strokes,
     /// Coloring photos at full size.
     Coloring,
     /// Measuring pictures against photos.
@@ -96,6 +98,7 @@ impl fmt::Display for Stage {
             Self::Bake => "bake",
             Self::Baseline => "baseline",
             Self::Rendering => "rendering",
+            Self::Strokes => "strokes",
             Self::Coloring => "coloring",
             Self::Measuring => "measuring",
             Self::Path => "path",

@@ -142,6 +142,20 @@ pub enum RunError {
         /// A photo's name.
         example: String,
     },
+    /// COLMAP gave no pose to any photo that is painted or colored.
+    #[error("{}: its images belong to {named}, and COLMAP placed none of these; it placed {placed} of {photos} photos, such as {example}: paint on one of those", folder.display())]
+    NotPlaced {
+        /// The folder of images.
+        folder: PathBuf,
+        /// A photo without a pose that one of them belongs to, and how many more.
+        named: String,
+        /// Photos with a pose.
+        placed: usize,
+        /// Photos in all.
+        photos: usize,
+        /// One with a pose.
+        example: String,
+    },
     /// There are hints, but no paint.
     #[error("{}: nothing is painted on any photo: paint on one", .0.display())]
     NothingPainted(PathBuf),
@@ -151,12 +165,12 @@ pub enum RunError {
     /// The system does not let the program hear of signals.
     #[error("signals cannot be heeded: {0}")]
     Signals(String),
-    /// Another process writes into the run.
-    #[error("{}: {holder} is writing into it: wait for it, or choose another folder with -o", folder.display())]
+    /// Another process writes into the run, or reads it.
+    #[error("{}: {holder}: wait for it, or choose another folder with -o", folder.display())]
     InUse {
         /// The run's folder.
         folder: PathBuf,
-        /// Who it is.
+        /// Who it is, and what it does.
         holder: String,
     },
     /// Photos have changed their names since they were trained on.

@@ -22,9 +22,10 @@ const ONE_WAY: f64 = 0.87;
 /// Cameras that leave out no larger part of the circle, in radians, go all around.
 const GAP: f64 = TAU / 3.0;
 
-/// Of cameras that look one way the path leaves the middle by so much of their spread, or by so
-/// much of the distance of what they see: enough to show depth.
-const SWAY: [f64; 2] = [1.0, 0.03];
+/// Cameras that look one way are left from their middle by as much as they spread, yet by no less
+/// and no more than these shares of the distance of what they see: enough to show depth, and not
+/// so much that sides show that no photo does.
+const SWAY: [f64; 2] = [0.03, 0.25];
 
 /// How far above a ball it is looked at from, in radians: 15°.
 const RISE: f64 = TAU / 24.0;
@@ -72,7 +73,8 @@ pub fn orbit_of_cameras(cameras: &[&Camera], points: &[DVec3], frames: usize) ->
         let sway = |axis: DVec3| {
             let square = |camera: &&Camera| (camera.center() - middle).dot(axis).powi(2);
             let spread = cameras.iter().map(square).sum::<f64>() / cameras.len() as f64;
-            (SWAY[0] * spread.sqrt()).max(SWAY[1] * distance)
+            let [least, most] = SWAY.map(|share| share * distance);
+            spread.sqrt().clamp(least, most)
         };
         let [across, down] = [sway(place.right), sway(below)];
         return (0..frames)

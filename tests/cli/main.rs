@@ -27,6 +27,7 @@ mod hostile;
 mod inspect;
 mod masks;
 mod names;
+mod paths;
 mod photos;
 mod picture;
 // Programs of others are stood in for by shell scripts.
