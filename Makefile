@@ -1,14 +1,18 @@
 # rustup puts cargo here, which is not on the PATH of every shell.
 export PATH := $(PATH):$(HOME)/.cargo/bin
 
-.PHONY: help setup demo test
+.PHONY: help setup viewers demo test
 
 help:
 	@echo "make demo   install what is missing, then fit and color the bundled scene"
 	@echo "make test   install what is missing, then check format, lints and tests"
+	@echo "make viewers   install what make test then tests splat files with: Chromium, Node, viewers"
 
 setup:
 	@python3 tools/setup.py
+
+viewers:
+	@python3 tools/setup.py --viewers
 
 demo: setup
 	cargo build --release

@@ -94,6 +94,26 @@ fn main() {
     compile("project", "_mip", &mip[2..3]);
     compile("project_backward", "_mip", &mip[..3]);
     compile("project_backward", "_mip_step", &mip);
+    // RGB is trained with the geometry to look in a viewer as it does here, and by that
+    // viewer's own kernel.
+    let trained = ["rgb", "geometry"];
+    for (suffix, viewer) in [("", &[][..]), ("_playcanvas", &["playcanvas"][..])] {
+        let with = |more: &[&'static str]| [&trained[..], more, viewer].concat();
+        for kernel in ["blend_backward", "sum_instances"] {
+            compile(kernel, &format!("_rgb{suffix}"), &with(&[]));
+        }
+        for kernel in ["shade_backward", "project_backward"] {
+            compile(kernel, &format!("_rgb_step{suffix}"), &with(&["step"]));
+        }
+    }
+    compile("project", "_playcanvas", &["playcanvas"]);
+    for color in ["luma", "chroma", "rgb"] {
+        compile(
+            "blend",
+            &format!("_{color}_playcanvas"),
+            &[color, "playcanvas"],
+        );
+    }
     kernels.write();
 }
 
@@ -112,8 +132,22 @@ impl Kernels {
         let mut compiler = Wesl::new("shaders");
         compiler.keep_all_entrypoints();
         for feature in [
-            "luma", "chroma", "rgb", "agreeing", "figures", "geometry", "step", "exposed",
-            "masked", "mip", "lazy", "half", "window11", "window7", "window5",
+            "luma",
+            "chroma",
+            "rgb",
+            "agreeing",
+            "figures",
+            "geometry",
+            "step",
+            "exposed",
+            "masked",
+            "mip",
+            "lazy",
+            "half",
+            "playcanvas",
+            "window11",
+            "window7",
+            "window5",
         ] {
             compiler.set_feature(feature, features.contains(&feature));
         }

@@ -122,6 +122,7 @@ fn trainer(gpu: &Gpu, effects: Effects) -> Result<(LumaTrainer, u64), LumaError>
         gpu,
         RasterOptions {
             antialiased: effects.antialiased,
+            ..RasterOptions::default()
         },
     );
     let mut splats = cloud(effects.sh_degree);

@@ -5,6 +5,7 @@
 import package::common::color::Color;
 import package::common::constants::{TILE_SIDE, TRANSMITTANCE_MIN};
 import package::common::numeric::linear_group;
+@if(playcanvas) import package::common::playcanvas::falloff;
 import package::common::projected::{Projected, power_cutoff, touches};
 import package::common::quad::{Quad, contributes, pixel_of, powers, quad_alpha, weighted};
 import package::common::view::View;
@@ -88,7 +89,8 @@ fn blend(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: v
                 let k = 32u * word + firstTrailingBit(left);
                 left &= left - 1u;
                 let power = powers(conic_opacities[k].xyz, center - means[k]);
-                let alpha = quad_alpha(conic_opacities[k].w * exp(-power));
+                @if(!playcanvas) let alpha = quad_alpha(conic_opacities[k].w * exp(-power));
+                @if(playcanvas) let alpha = quad_alpha(conic_opacities[k].w * falloff(power));
                 let next = transmittance * (1.0 - alpha);
                 let hit = contributes(power, alpha) & live;
                 let open = next >= vec4f(TRANSMITTANCE_MIN);

@@ -17,6 +17,8 @@ import package::common::numeric::linear_group;
 import package::common::partials::{PARTIAL_STRIDE, PARTIAL_WORDS, PartialWord};
 @if(half) import package::common::partials::packed;
 @if(geometry) import package::common::partials::{PARTIAL_COLOR, PARTIAL_PULL};
+@if(playcanvas) import package::common::partials::PARTIAL_OPACITY;
+@if(playcanvas) import package::common::playcanvas::{RESCALE, falloff};
 import package::common::projected::{Projected, power_cutoff, touches};
 import package::common::quad::{contributes, powers, quad_alpha};
 @if(geometry) import package::common::quad::Quad;
@@ -70,6 +72,8 @@ struct Share {
     @if(geometry) moments_y: vec2f,
     // Sum of the lengths of the gradients with respect to the center.
     @if(geometry) pull: f32,
+    // Sum of alpha times dL/dalpha.
+    @if(playcanvas) opacity: f32,
     // Sum of the weighted gradient.
     color: Color,
 }
@@ -84,8 +88,16 @@ struct Pixels {
 
 // The gradient of four pixels, weighted and added up.
 @if(luma) fn gathered(weight: vec4f, quad: Quad) -> Color { return dot(weight, quad); }
+@if(rgb) fn gathered(weight: vec4f, quad: Quad) -> Color { return weight * quad; }
 @if(figures) fn gathered(weight: vec4f, quad: Quad) -> Color { return quad * weight; }
 @if(luma) fn insert(quad: Quad, k: u32, color: Color) -> Quad { var q = quad; q[k] = color; return q; }
+@if(rgb) fn insert(quad: Quad, k: u32, color: Color) -> Quad {
+    var q = quad;
+    q[0][k] = color.x;
+    q[1][k] = color.y;
+    q[2][k] = color.z;
+    return q;
+}
 @if(figures) fn insert(quad: Quad, k: u32, color: Color) -> Quad { var q = quad; q[k] = color; return q; }
 
 fn load(first: vec2u) -> Pixels {
@@ -114,7 +126,8 @@ fn accumulate(
     @if(geometry) color: Color,
 ) {
     let power = powers(conic_opacity.xyz, d);
-    let raw = conic_opacity.w * exp(-power);
+    @if(!playcanvas) let raw = conic_opacity.w * exp(-power);
+    @if(playcanvas) let raw = conic_opacity.w * falloff(power);
     let alpha = quad_alpha(raw);
     let before = (*pixels).transmittance;
     let hit = contributes(power, alpha) & (vec4u(own) < (*pixels).last);
@@ -127,7 +140,9 @@ fn accumulate(
         (*pixels).remaining = behind;
         let v_alpha = before * contribution - behind / (1.0 - alpha);
         // The cap on alpha passes no gradient.
-        let v_power = select(vec4f(0.0), -alpha * v_alpha, hit & (raw < vec4f(ALPHA_MAX)));
+        @if(!playcanvas) let v_power = select(vec4f(0.0), -alpha * v_alpha, hit & (raw < vec4f(ALPHA_MAX)));
+        @if(playcanvas) let v_raw = select(vec4f(0.0), v_alpha, hit & (raw < vec4f(ALPHA_MAX)));
+        @if(playcanvas) let v_power = -conic_opacity.w * RESCALE * exp(-power) * v_raw;
         let rows = d.y + vec4f(0.0, 1.0, 2.0, 3.0);
         let sum = v_power.x + v_power.y + v_power.z + v_power.w;
         let sum_y = dot(v_power, rows);
@@ -137,6 +152,7 @@ fn accumulate(
         let slope_x = to_ndc.x * (conic_opacity.x * d.x + conic_opacity.y * rows);
         let slope_y = to_ndc.y * (conic_opacity.y * d.x + conic_opacity.z * rows);
         (*share).pull += dot(abs(v_power), sqrt(slope_x * slope_x + slope_y * slope_y));
+        @if(playcanvas) { (*share).opacity += dot(alpha, v_raw); }
     }
 }
 
@@ -238,6 +254,12 @@ fn blend_backward(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) 
                 shares[at + PARTIAL_PULL] = share.pull;
             }
             @if(luma) { shares[at + PARTIAL_COLOR] = share.color; }
+            @if(rgb) {
+                shares[at + PARTIAL_COLOR] = share.color.x;
+                shares[at + PARTIAL_COLOR + 1u] = share.color.y;
+                shares[at + PARTIAL_COLOR + 2u] = share.color.z;
+            }
+            @if(playcanvas) { shares[at + PARTIAL_OPACITY] = share.opacity; }
             @if(figures) {
                 shares[at] = share.color.x;
                 shares[at + 1u] = share.color.y;

@@ -41,8 +41,8 @@ fn cos_sin(turns: f32) -> vec2f {
     let quarter = round(4.0 * turns);
     let x = TAU * (turns - 0.25 * quarter);
     let q = x * x;
-    let c = 1.0 + q * (-0.5 + q * (1.0 / 24.0 + q * (-1.0 / 720.0 + q / 40320.0)));
-    let s = x * (1.0 + q * (-1.0 / 6.0 + q * (1.0 / 120.0 + q * (-1.0 / 5040.0 + q / 362880.0))));
+    let c = 1.0 + q * (-0.5 + q * (1.0 / 24.0 + q * (-1.0 / 720.0 + q * (1.0 / 40320.0))));
+    let s = x * (1.0 + q * (-1.0 / 6.0 + q * (1.0 / 120.0 + q * (-1.0 / 5040.0 + q * (1.0 / 362880.0)))));
     switch u32(quarter) % 4u {
         case 0u: { return vec2f(c, s); }
         case 1u: { return vec2f(-s, c); }

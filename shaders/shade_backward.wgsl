@@ -12,7 +12,7 @@ import package::common::numeric::linear_group;
 import package::common::partials::PARTIAL_STRIDE;
 @if(geometry) import package::common::partials::PARTIAL_COLOR;
 import package::common::sh::sh_term;
-@if(!geometry) import package::common::sh::SH_C0;
+@if(!luma) import package::common::sh::SH_C0;
 import package::common::view::View;
 
 @group(0) @binding(0) var<uniform> view: View;
@@ -55,20 +55,36 @@ fn plane_index(k: u32, i: u32) -> u32 {
     second_moment[k] = next.z;
 }
 
-@if(step) fn store(k: u32, i: u32, value: Color) { descend(k, i, value); }
+@if(luma && step) fn store(k: u32, i: u32, value: Color) { descend(k, i, value); }
 
-@if(geometry && !step) fn store(k: u32, i: u32, value: Color) { sh_gradient[plane_index(k, i)] = value; }
+// Most viewers keep the constant harmonic in bytes: it stays between black and white.
+@if(rgb && step) fn store(k: u32, i: u32, value: Color) {
+    for (var c = 0u; c < CHANNELS; c++) {
+        descend(k * CHANNELS + c, i, value[c]);
+        if k == 0u {
+            let at = c * view.splat_count + i;
+            sh[at] = clamp(sh[at], -0.5 / SH_C0, 0.5 / SH_C0);
+        }
+    }
+}
+
+@if(luma && !step) fn store(k: u32, i: u32, value: Color) { sh_gradient[plane_index(k, i)] = value; }
 
 @if(chroma) fn store(k: u32, i: u32, value: Color) {
     let at = plane_index(k, i);
     sh_gradient[at] += value.x;
     sh_gradient[at + view.splat_count] += value.y;
 }
-@if(rgb) fn store(k: u32, i: u32, value: Color) {
+@if(rgb && !geometry) fn store(k: u32, i: u32, value: Color) {
     let at = plane_index(k, i);
     sh_gradient[at] += value.x;
     sh_gradient[at + view.splat_count] += value.y;
     sh_gradient[at + 2u * view.splat_count] += value.z;
+}
+
+@if(rgb && geometry) fn coefficient(k: u32, i: u32) -> Color {
+    let first = plane_index(k, i);
+    return vec3f(sh[first], sh[first + view.splat_count], sh[first + 2u * view.splat_count]);
 }
 
 @if(luma) fn gradient_of(i: u32) -> Color { return gradients[i * PARTIAL_STRIDE + PARTIAL_COLOR]; }
@@ -77,7 +93,8 @@ fn plane_index(k: u32, i: u32) -> u32 {
     return vec2f(gradients[at], gradients[at + 1u]);
 }
 @if(rgb) fn gradient_of(i: u32) -> Color {
-    let at = i * PARTIAL_STRIDE;
+    @if(geometry) let at = i * PARTIAL_STRIDE + PARTIAL_COLOR;
+    @if(!geometry) let at = i * PARTIAL_STRIDE;
     return vec3f(gradients[at], gradients[at + 1u], gradients[at + 2u]);
 }
 
@@ -120,7 +137,8 @@ fn shade_backward(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) 
     @if(geometry) var v_direction = vec3f();
     for (var k = 0u; k < count; k++) {
         let term = sh_term(k, direction);
-        @if(geometry) { v_direction += term.slope * color_dot(sh[plane_index(k, i)], v_color); }
+        @if(luma) { v_direction += term.slope * color_dot(sh[plane_index(k, i)], v_color); }
+        @if(rgb && geometry) { v_direction += term.slope * color_dot(coefficient(k, i), v_color); }
         store(k, i, term.value * v_color);
     }
     @if(!geometry) { add_curvatures(i); }

@@ -5,6 +5,7 @@ import package::common::constants::{ALPHA_MIN, STATUS_INSTANCES, STATUS_VISIBLE}
 import package::common::numeric::linear_group;
 import package::common::partials::{PARTIAL_STRIDE, PARTIAL_WORDS, PartialWord};
 @if(half) import package::common::partials::unpacked;
+@if(playcanvas) import package::common::partials::PARTIAL_OPACITY;
 @if(geometry) import package::common::projected::Projected;
 
 @group(0) @binding(0) var<storage, read> order: array<u32>;
@@ -74,7 +75,8 @@ fn sum_instances(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) g
         sum[3] = m[4];
         sum[4] = 0.5 * m[5];
         // A Gaussian whose color is not finite has opacity 0 and no moments.
-        sum[5] = -m[0] / max(q.w, ALPHA_MIN);
+        @if(!playcanvas) sum[5] = -m[0] / max(q.w, ALPHA_MIN);
+        @if(playcanvas) sum[5] = m[PARTIAL_OPACITY] / max(q.w, ALPHA_MIN);
     }
     for (var c = 0u; c < PARTIAL_STRIDE; c++) {
         gradients[i * PARTIAL_STRIDE + c] = sum[c];

@@ -229,6 +229,7 @@ pub fn auto(options: &AutoOptions, tell: &mut Teller<'_>) -> Result<Results, Aut
             force: false,
             timings: false,
             checkpoints: checkpoints(options, goes_on),
+            live: None,
         };
         tell(Told::Begins(Step::Colorize, asked.stages()));
         colorize(&asked, &mut |event| tell(Told::Event(event)))?;
@@ -245,6 +246,7 @@ pub fn auto(options: &AutoOptions, tell: &mut Teller<'_>) -> Result<Results, Aut
             teacher: Some(options.teacher.clone()),
             teacher_settings: options.teacher_settings.clone(),
             output: results.colored.clone(),
+            hints: options.hints.clone(),
             teacher_alone: false,
             frame_rate: None,
         };
@@ -256,13 +258,17 @@ pub fn auto(options: &AutoOptions, tell: &mut Teller<'_>) -> Result<Results, Aut
     }
 
     if kept.due(Step::Export, &from, &[&results.scene]) {
-        tell(Told::Begins(Step::Export, Vec::new()));
-        export(&ExportOptions {
+        let asked = ExportOptions {
             run: Some(run.path().to_owned()),
             output: results.scene.clone(),
             luma: false,
             colmap_coordinates: false,
-        })?;
+            spz: None,
+            viewer: None,
+            colmap: None,
+        };
+        tell(Told::Begins(Step::Export, asked.stages()));
+        export(&asked, &mut |event| tell(Told::Event(event)))?;
         kept.done(Step::Export, &from)?;
     } else {
         tell(Told::Skips(Step::Export));

@@ -3,8 +3,8 @@
 //! Imports go down only:
 //!
 //! ```text
-//! cli → auto → tradeoff, prepare → run → eval, frames → report, doctor → luma, chroma → effects, measure → raster
-//! → capture, splats → gpu, color, sections, download, npy, oracle, compare → disk, hash, input
+//! cli → auto → tradeoff, prepare, view → run → eval, frames, viewers → report, doctor → luma, chroma → effects, measure, trajectory → raster
+//! → capture, splats → gpu, color, sections, download, npy, programs, oracle, compare → disk, hash, input
 //! ```
 //!
 //! [`doctor`] compares the kernels of [`raster`], [`luma`] and [`chroma`] with the [`oracle`],
@@ -68,6 +68,7 @@ mod npy;
 pub mod oracle;
 #[cfg(feature = "cli")]
 pub mod prepare;
+mod programs;
 pub mod raster;
 pub mod report;
 pub mod run;
@@ -75,3 +76,7 @@ mod sections;
 pub mod splats;
 #[cfg(feature = "cli")]
 pub mod tradeoff;
+pub mod trajectory;
+#[cfg(feature = "cli")]
+pub mod view;
+pub mod viewers;

@@ -1,6 +1,7 @@
 """Installs what gs-chroma needs and this machine lacks.
 
-    python3 tools/setup.py
+    python3 tools/setup.py             # what the program and its tests need
+    python3 tools/setup.py --viewers   # also what tests splat files in viewers: tools/viewers
 
 On Debian and its kin that may be a C linker, a Vulkan loader and driver, and pip, all by apt; on
 every system the shared library of ONNX Runtime, which goes into the cache folder where gs-chroma
@@ -61,10 +62,16 @@ WHEELS = {
 
 def main() -> None:
     """Installs system packages first: pip may be one of them."""
-    if packages := missing_packages():
+    viewers = "--viewers" in sys.argv[1:]
+    packages = missing_packages()
+    if viewers:
+        packages += missing_viewer_packages()
+    if packages:
         install_packages(packages)
     if runtime_is_missing():
         install_runtime()
+    if viewers:
+        install_viewers()
 
 
 def missing_packages() -> list[str]:
@@ -81,6 +88,30 @@ def missing_packages() -> list[str]:
     if runtime_is_missing() and not has_pip():
         packages.append("python3-pip")
     return packages
+
+
+def missing_viewer_packages() -> list[str]:
+    """Debian packages of a browser and of Node, where they are not there."""
+    packages: list[str] = []
+    browsers = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+    if not (os.environ.get("CHROMIUM") or any(map(shutil.which, browsers))):
+        packages.append("chromium")
+    if not shutil.which("node"):
+        packages.append("nodejs")
+    if not shutil.which("npm"):
+        packages.append("npm")
+    return packages
+
+
+def install_viewers() -> None:
+    """Installs the viewers that tools/viewers/package-lock.json names."""
+    folder = Path(__file__).parent / "viewers"
+    if not shutil.which("npm"):
+        say(f"there is no npm; install Node 20 or newer, and run npm ci in {folder}")
+        return
+    say(f"installing viewers into {folder}")
+    if not run(["npm", "ci", "--no-audit", "--no-fund", "--prefix", str(folder)]):
+        say(f"npm failed; run npm ci in {folder}")
 
 
 def has_vulkan_driver() -> bool:

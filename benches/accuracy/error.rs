@@ -117,6 +117,7 @@ pub fn measure(gpu: &Gpu, subject: &Subject) -> Fallible<Vec<Error>> {
             alpha_min: numerics.raster.alpha_min,
             transmittance_min: numerics.raster.transmittance_min,
             depth_bits: numerics.raster.depth_bits,
+            ..oracle::numerics::Numerics::DEFAULT
         };
         let view = oracle_view(camera, subject.near(), cut);
         let stage = Stage::new(&raster.computing(numerics.raster), &subject.small, &view)?;

@@ -15,6 +15,7 @@ pub const NOTHING_LEFT_OUT: oracle::numerics::Numerics = oracle::numerics::Numer
     alpha_min: 1e-12,
     transmittance_min: 0.0,
     depth_bits: 32,
+    ..oracle::numerics::Numerics::DEFAULT
 };
 
 const fn knob(key: &'static str, value: &'static str) -> Knob {

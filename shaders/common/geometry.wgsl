@@ -1,6 +1,7 @@
 // The forward projection of one Gaussian, shared by `project` and its adjoint:
 // the adjoint differentiates what was evaluated.
-import package::common::constants::{BLUR, QUAT_NORM_MIN_SQ};
+@if(!playcanvas) import package::common::constants::{BLUR, QUAT_NORM_MIN_SQ};
+@if(playcanvas) import package::common::playcanvas::BLUR;
 import package::common::rotation::rotation_from_quat;
 import package::common::view::View;
 

@@ -9,7 +9,10 @@
 // do not cancel where pixels pull apart, as they do within one large Gaussian.
 @if(geometry) const PARTIAL_PULL: u32 = 6u;
 @if(geometry) const PARTIAL_COLOR: u32 = 7u;
-@if(geometry) const PARTIAL_STRIDE: u32 = PARTIAL_COLOR + CHANNELS;
+@if(geometry && !playcanvas) const PARTIAL_STRIDE: u32 = PARTIAL_COLOR + CHANNELS;
+// Where alpha is no multiple of its slope, the opacity's gradient has a figure of its own.
+@if(geometry && playcanvas) const PARTIAL_OPACITY: u32 = PARTIAL_COLOR + CHANNELS;
+@if(geometry && playcanvas) const PARTIAL_STRIDE: u32 = PARTIAL_OPACITY + 1u;
 @if(!geometry) const PARTIAL_STRIDE: u32 = 4u;
 
 // How a list entry's record waits for its sum: a word a figure, or (`half`) a word for

@@ -14,6 +14,9 @@ const FILE: &str = "film.json";
 /// Where a capture keeps all frames of its film.
 pub const FRAMES: &str = "frames";
 
+/// Seconds of a shot at most, a day: its frames are counted.
+const LONGEST: f64 = 86_400.0;
+
 /// One shot of a film: all its frames lie in `frames/`, and some of them, under the same
 /// names, in `images/`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -32,6 +35,10 @@ pub struct Film {
     pub size: [u32; 2],
     /// Names of all frames, in order; at least one.
     pub frames: Vec<String>,
+    /// When each frame is shown, in seconds after `start`; `None` where they follow each other at
+    /// the frame rate.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub times: Option<Vec<f64>>,
 }
 
 impl Film {
@@ -69,12 +76,30 @@ impl Film {
         file.persist(&path)
     }
 
+    /// How often each frame is shown, at so many frames a second, for all to be shown when they
+    /// were: once, unless they have times of their own.
+    pub fn repeats(&self, rate: [u32; 2]) -> Vec<usize> {
+        let Some(times) = &self.times else {
+            return vec![1; self.frames.len()];
+        };
+        let rate = f64::from(rate[0]) / f64::from(rate[1]);
+        let number = |time: f64| (time * rate).round().max(0.0) as usize;
+        let ends = times.iter().skip(1).copied().chain([self.seconds]);
+        let mut shown = 0;
+        ends.map(|end| {
+            let before = shown;
+            shown = number(end).max(before);
+            shown - before
+        })
+        .collect()
+    }
+
     /// What about it cannot be, if anything.
     fn check(&self) -> Result<(), String> {
         let time = |seconds: f64| seconds.is_finite() && seconds >= 0.0;
         let plain =
             |name: &str| !(name.is_empty() || name.starts_with('.') || name.contains(['/', '\\']));
-        let wrong = if !(time(self.start) && time(self.seconds)) {
+        let wrong = if !(time(self.start) && time(self.seconds) && self.seconds <= LONGEST) {
             "start and seconds have to be times".to_owned()
         } else if self.frame_rate.contains(&0) {
             "frame_rate has to be positive".to_owned()
@@ -82,6 +107,12 @@ impl Film {
             "size has to be positive".to_owned()
         } else if self.frames.is_empty() {
             "frames is empty".to_owned()
+        } else if self.times.as_ref().is_some_and(|times| {
+            times.len() != self.frames.len()
+                || times.iter().any(|&at| !time(at) || at > LONGEST)
+                || !times.is_sorted()
+        }) {
+            "times has to be a time for each frame, in order".to_owned()
         } else if let Some(name) = self.frames.iter().find(|name| !plain(name)) {
             format!("{name:?} is no name of a frame")
         } else {
@@ -104,6 +135,7 @@ mod tests {
             audio: true,
             size: [640, 480],
             frames: vec!["000001.png".to_owned(), "000002.png".to_owned()],
+            times: None,
         }
     }
 
@@ -116,13 +148,27 @@ mod tests {
     }
 
     #[test]
+    fn frames_are_shown_as_long_as_they_were() {
+        assert_eq!(film().repeats([24, 1]), [1, 1]);
+        let film = Film {
+            seconds: 1.0,
+            frames: vec![String::new(); 4],
+            times: Some(vec![0.0, 0.4, 0.5, 0.501]),
+            ..film()
+        };
+        assert_eq!(film.repeats([10, 1]), [4, 1, 0, 5]);
+        assert_eq!(film.repeats([30000, 1001]).iter().sum::<usize>(), 30);
+    }
+
+    #[test]
     fn what_cannot_be_is_refused_by_name() {
         let dir = tempfile::tempdir().unwrap();
         type Change = (&'static str, fn(&mut Film));
-        let changes: [Change; 6] = [
+        let changes: [Change; 7] = [
             ("seconds", |f| f.seconds = -1.0),
             ("frame_rate", |f| f.frame_rate[1] = 0),
             ("size", |f| f.size[0] = 0),
+            ("times", |f| f.times = Some(vec![1.0, 0.5])),
             ("frames", |f| f.frames.clear()),
             ("../a.png", |f| f.frames[0] = "../a.png".to_owned()),
             (".png", |f| f.frames[0] = ".png".to_owned()),

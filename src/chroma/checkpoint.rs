@@ -1,10 +1,11 @@
 //! A distillation on disk: all that decides how it goes on.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, time::Duration};
 
 use serde::{Deserialize, Serialize};
 
 use super::{ChosenDegree, ChromaProgress};
+use crate::splats::ShField;
 
 /// A distillation after a round of [`IrlsSolver`](super::IrlsSolver). What goes on from it
 /// ends with the bytes of one that was never interrupted.
@@ -62,6 +63,14 @@ pub trait ChromaKeeper {
 
     /// There will be no other.
     fn end(&mut self) {}
+
+    /// Whether somebody wants to see the colors now.
+    fn looks_on(&mut self) -> bool {
+        false
+    }
+
+    /// Takes a and b of every Gaussian; reading them from the device took so long.
+    fn show(&mut self, _chroma: &ShField, _took: Duration) {}
 }
 
 /// Keeps none.

@@ -241,6 +241,10 @@ impl Distill<'_> {
         go_on(observe(ColorizeEvent::Plan(&effects)))?;
         let mut solved = |settings: &ChromaSettings, from, uncorrected| {
             let between = &mut |solver: &IrlsSolver<'_>| {
+                if keeper.looks_on() {
+                    let asked = Instant::now();
+                    keeper.show(&solver.chroma()?, asked.elapsed());
+                }
                 if !keeper.wants() {
                     return Ok(true);
                 }

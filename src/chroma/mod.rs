@@ -58,4 +58,5 @@ pub use roofline::minimum_words;
 pub use saturation::match_saturation;
 pub use settings::{ChromaSettings, SolverKind};
 pub use solve::{Solved, solve};
+pub(crate) use strokes::{at_middle_lightness, claimed_by_strokes, shaded_at};
 pub use targets::{Target, Targets, pack_ab, pack_rgb};

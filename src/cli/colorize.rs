@@ -11,6 +11,7 @@ use super::{
     next, print,
     progress::Progress,
     values::{one_of, positive, share},
+    view::ViewArguments,
 };
 use crate::chroma::{
     ChromaSettings, Degree, SolverKind,
@@ -123,6 +124,8 @@ pub struct Colorize {
     timings: bool,
     #[command(flatten)]
     checkpoints: CheckpointArguments,
+    #[command(flatten)]
+    view: ViewArguments,
     /// Print the report as JSON.
     #[arg(long)]
     json: bool,
@@ -243,9 +246,19 @@ impl Colorize {
             force: self.force,
             timings: self.timings,
             checkpoints: self.checkpoints.options(),
+            live: None,
+        };
+        let run = options.run.as_deref().unwrap_or("colorize".as_ref());
+        let live = self.view.begin(run)?;
+        let options = ColorizeOptions {
+            live: live.clone(),
+            ..options
         };
         let mut progress = Progress::through(options.stages());
-        let (output, report) = colorize(&options, &mut |event| progress.show(&event))?;
+        let (output, report) = colorize(&options, &mut |event| {
+            live.iter().for_each(|live| live.tell(&event));
+            progress.show(&event);
+        })?;
         progress.finish();
         if self.json {
             print(report.to_json())?;
@@ -262,7 +275,8 @@ impl Colorize {
             };
             let wrote = [Some(output.ply.as_path()), output.contact_sheet.as_deref()];
             let wrote: Vec<&Path> = wrote.into_iter().flatten().collect();
-            progress.close(&wrote, &next)?;
+            let run = output.contact_sheet.as_deref().and_then(Path::parent);
+            progress.close_with(run.unwrap_or(&output.ply), &wrote, &next)?;
         }
         Ok(())
     }

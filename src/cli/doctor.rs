@@ -2,7 +2,7 @@
 
 use clap::Args;
 
-use super::{CliError, bar::Bar, print};
+use super::{CliError, bar::Bar, next, print, progress::Progress};
 use crate::{
     doctor::{Diagnosis, STEPS, measured},
     gpu::Gpu,
@@ -19,6 +19,7 @@ pub struct Doctor {
 
 impl Doctor {
     pub(super) fn run(self) -> Result<(), CliError> {
+        let mut progress = Progress::default();
         let gpu = Gpu::open().map_err(RunError::from)?;
         let bar = Bar::begin("checks", None);
         let diagnosis = Diagnosis::of(&gpu, &mut |index, name| {
@@ -52,7 +53,8 @@ impl Doctor {
             ))?;
         }
         match diagnosis.failures() {
-            0 => Ok(()),
+            0 if self.json => Ok(()),
+            0 => progress.close(&[], &next::teachers()),
             failed => Err(CliError::Unsound {
                 failed,
                 checks: diagnosis.checks(),

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::remedy;
 use crate::{
     auto::AutoError, download::DownloadError, prepare::PrepareError, run::RunError,
-    tradeoff::TradeoffError,
+    tradeoff::TradeoffError, view::ViewerError,
 };
 
 /// What stopped a command; one line that names the file and the remedy.
@@ -17,6 +17,9 @@ pub enum CliError {
     /// A sweep.
     #[error("{}", remedy::of_sweep(.0))]
     Tradeoff(#[from] TradeoffError),
+    /// A scene cannot be shown.
+    #[error("{}", remedy::of_viewer(.0))]
+    Viewer(#[from] ViewerError),
     /// A film or photos could not be prepared.
     #[error("{}", remedy::of_preparing(.0))]
     Prepare(#[from] PrepareError),

@@ -4,16 +4,37 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{CliError, next, print, progress::Progress};
-use crate::run::{Event, ExportOptions, Stage, export};
+use super::{CliError, next, print, progress::Progress, values::one_of};
+use crate::{
+    run::{ExportOptions, Exported, Look, Shown, Stage, export},
+    splats::SpzVersion,
+    view::{is_html, write_html},
+    viewers::ViewerChoice,
+};
 
-/// Write a run's scene as a splat file, near the origin where COLMAP's coordinates are large.
+const VIEWERS: &[(ViewerChoice, &str)] = &[
+    (ViewerChoice::Spark, "Spark"),
+    (ViewerChoice::PlayCanvas, "PlayCanvas and SuperSplat"),
+    (ViewerChoice::Any, "The compromise of all"),
+];
+
+const SPZ_VERSIONS: &[(SpzVersion, &str)] = &[
+    (SpzVersion::V3, "One gzip stream, which more viewers read"),
+    (SpzVersion::V4, "Zstandard streams: smaller"),
+];
+
+/// Write a run's scene, or another splat file, in the format that the file's name tells: .ply,
+/// .compressed.ply, .splat, .spz, .sog, .glb or .usda.
 #[derive(Args)]
 pub struct Export {
-    /// Run folder [default: newest under runs/].
+    /// Run folder or splat file [default: newest run under runs/].
     run: Option<PathBuf>,
-    /// Splat file to write.
-    #[arg(short, long, value_name = "FILE.ply")]
+    /// Splat file to write, or a page that shows the scene in any browser.
+    #[arg(
+        short,
+        long,
+        value_name = "FILE.ply|.compressed.ply|.splat|.spz|.sog|.glb|.usda|.html"
+    )]
     output: PathBuf,
     /// Write the luminance although the scene is colored.
     #[arg(long)]
@@ -21,30 +42,103 @@ pub struct Export {
     /// Write COLMAP's coordinates even where the scene was moved to the origin.
     #[arg(long)]
     colmap_coordinates: bool,
+    /// Version of an .spz file [default: 3].
+    #[arg(long, value_name = "VERSION", value_parser = one_of(SPZ_VERSIONS))]
+    spz_version: Option<SpzVersion>,
+    /// Fit scales, opacities and colors to what this viewer draws.
+    #[arg(long, value_parser = one_of(VIEWERS))]
+    viewer: Option<ViewerChoice>,
+    /// COLMAP folder with the cameras for --viewer: of a run, when it is not where `fit` found it.
+    #[arg(long, value_name = "COLMAP_DIR", requires = "viewer")]
+    colmap: Option<PathBuf>,
+    /// Print what was written as JSON.
+    #[arg(long)]
+    json: bool,
 }
 
 impl Export {
     pub(super) fn run(self) -> Result<(), CliError> {
+        if is_html(&self.output) {
+            return self.run_html();
+        }
         let options = ExportOptions {
             run: self.run,
             output: self.output,
             luma: self.luma,
             colmap_coordinates: self.colmap_coordinates,
+            spz: self.spz_version,
+            viewer: self.viewer,
+            colmap: self.colmap,
         };
-        let mut progress = Progress::through(vec![Stage::Saving]);
-        progress.show(&Event::begins(Stage::Saving));
-        let wrote = export(&options)?;
+        let mut progress = Progress::through(options.stages());
+        let wrote = export(&options, &mut |event| progress.show(&event))?;
+        progress.finish();
+        if self.json {
+            return print(format_args!("{:#}", serde_json::json!(wrote)));
+        }
         print(format_args!(
             "wrote {} Gaussians to {}",
             wrote.splats,
             options.output.display()
         ))?;
+        print(cost(&wrote))?;
         if wrote.offset != [0.0; 3] {
             let [x, y, z] = wrote.offset;
+            let said = match wrote.tells_offset {
+                true => "as its header says",
+                false => "which its format has no place for",
+            };
             print(format_args!(
-                "its coordinates are COLMAP's less {x} {y} {z}, as its header says (--colmap-coordinates for COLMAP's own)"
+                "its coordinates are COLMAP's less {x} {y} {z}, {said} (--colmap-coordinates for COLMAP's own)"
             ))?;
         }
+        if !wrote.shown.is_empty() {
+            print(line_of(&wrote.shown))?;
+        }
         progress.close(&[], &next::view(&options.output))
+    }
+
+    /// The page with the scene in it.
+    fn run_html(self) -> Result<(), CliError> {
+        let mut progress = Progress::through(vec![Stage::Model, Stage::Rendering, Stage::Saving]);
+        let look = Look::open(self.run.as_deref(), None, &mut |event| {
+            progress.show(&event)
+        })?;
+        let observe = &mut |event| progress.show(&event);
+        let wrote = write_html(&look, self.luma, &self.output, observe)?;
+        progress.finish();
+        print(format_args!(
+            "wrote {} Gaussians to {}, {:.1} MB",
+            wrote.splats,
+            self.output.display(),
+            wrote.bytes as f64 / 1e6
+        ))?;
+        progress.close(&[], &next::look(&self.output))
+    }
+}
+
+/// What each viewer shows, and would have shown.
+fn line_of(shown: &[Shown]) -> String {
+    let each = |of: fn(&Shown) -> f64| {
+        let each = (shown.iter()).map(|s| format!("{} {:.1} dB", s.viewer.name(), of(s)));
+        each.collect::<Vec<_>>().join(", ")
+    };
+    format!(
+        "viewers show the rendered views: {}; unfitted {}",
+        each(|shown| shown.after),
+        each(|shown| shown.before)
+    )
+}
+
+/// What the format takes and costs.
+fn cost(wrote: &Exported) -> String {
+    let bytes = wrote.bytes as f64 / wrote.splats.max(1) as f64;
+    let loss = &wrote.loss;
+    match (loss.psnr, loss.delta_e) {
+        (Some(psnr), Some(delta_e)) => format!(
+            "{bytes:.1} bytes a Gaussian, {psnr:.1} dB, ΔE00 {delta_e:.2} against the scene ({} {})",
+            loss.views, loss.measured
+        ),
+        _ => format!("{bytes:.1} bytes a Gaussian, {}", loss.measured),
     }
 }

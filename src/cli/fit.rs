@@ -15,6 +15,7 @@ use super::{
     print,
     progress::Progress,
     values::{PRESETS, one_of, positive},
+    view::ViewArguments,
 };
 use crate::capture::LoadOptions;
 use crate::effects::Overrules;
@@ -66,6 +67,8 @@ pub struct Fit {
     init: Option<PathBuf>,
     #[command(flatten)]
     checkpoints: CheckpointArguments,
+    #[command(flatten)]
+    view: ViewArguments,
     /// Time every kernel, and print a table of it.
     #[arg(long)]
     timings: bool,
@@ -137,8 +140,17 @@ impl Fit {
             ..asked
         };
         let asked = options.ahead.teachers.first().cloned();
+        let run = options.output.as_ref().unwrap_or(&options.colmap_dir);
+        let live = self.view.begin(run)?;
+        let options = FitOptions {
+            live: live.clone(),
+            ..options
+        };
         let mut progress = Progress::through(options.stages());
-        let (folder, report) = fit(&options, &mut |event| progress.show(&event))?;
+        let (folder, report) = fit(&options, &mut |event| {
+            live.iter().for_each(|live| live.tell(&event));
+            progress.show(&event);
+        })?;
         progress.finish();
         if self.json {
             print(report.to_json())?;
@@ -151,7 +163,9 @@ impl Fit {
                 print(timings_table(rows))?;
             }
             let next = next::colorize(folder.path(), asked.as_deref());
-            progress.close(&[&folder.luma(), &folder.contact_sheet()], &next)?;
+            let wrote = [folder.luma(), folder.contact_sheet()];
+            let wrote = wrote.each_ref().map(PathBuf::as_path);
+            progress.close_with(folder.path(), &wrote, &next)?;
         }
         Ok(())
     }

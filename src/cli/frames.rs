@@ -4,7 +4,13 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{CliError, network::NetworkArguments, next, print, progress::Progress};
+use super::{
+    CliError,
+    network::NetworkArguments,
+    next, print,
+    progress::Progress,
+    values::{Rate, rate},
+};
 use crate::run::{Frames, FramesOptions, frames};
 
 /// Color the photos themselves: each with its own lightness at its full size, and the scene's
@@ -22,6 +28,10 @@ pub struct FramesCommand {
     teacher: Option<PathBuf>,
     #[command(flatten)]
     network: NetworkArguments,
+    /// Folder of painted hints, for what the scene does not show: a stroke on the sky colors the
+    /// sky, in the photos before and after as well [default: the run's].
+    #[arg(long, value_name = "DIR", conflicts_with = "teacher_alone")]
+    hints: Option<PathBuf>,
     /// Leave the scene out: the teacher's own pictures, to compare with.
     #[arg(long)]
     teacher_alone: bool,
@@ -37,19 +47,6 @@ pub struct FramesCommand {
     json: bool,
 }
 
-#[derive(Clone, Copy)]
-struct Rate([u32; 2]);
-
-/// Frames a second, whole or as a fraction.
-fn rate(text: &str) -> Result<Rate, String> {
-    let (frames, seconds) = text.split_once('/').unwrap_or((text, "1"));
-    let number = |text: &str| text.trim().parse().ok().filter(|&n: &u32| n > 0);
-    match (number(frames), number(seconds)) {
-        (Some(frames), Some(seconds)) => Ok(Rate([frames, seconds])),
-        _ => Err("no rate: 24, 25 or 30000/1001".to_owned()),
-    }
-}
-
 impl FramesCommand {
     pub(super) fn run(self) -> Result<(), CliError> {
         let options = FramesOptions {
@@ -58,6 +55,7 @@ impl FramesCommand {
             teacher: self.teacher,
             teacher_settings: self.network.settings(),
             output: self.output,
+            hints: self.hints,
             teacher_alone: self.teacher_alone,
             frame_rate: self.frame_rate.map(|Rate(rate)| rate),
         };
@@ -82,8 +80,12 @@ fn summary(done: &Frames, teacher_alone: bool) -> String {
         0 => String::new(),
         count => format!("; {count} without a pose take their colors from their neighbors"),
     };
+    let painted = match done.painted {
+        0 => String::new(),
+        count => format!("; {count} show strokes on what it does not cover"),
+    };
     format!(
-        "colored {} photos: the scene covers {:.0} % of the {} with a pose{carried}",
+        "colored {} photos: the scene covers {:.0} % of the {} with a pose{carried}{painted}",
         done.photos,
         100.0 * done.covered,
         done.placed,

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{CliError, print, progress::Progress};
-use crate::run::info;
+use super::{CliError, info_page, next, print, progress::Progress};
+use crate::{report::Report, run::info};
 
 /// Say what a run, a splat file or a COLMAP folder holds.
 #[derive(Args)]
@@ -20,31 +20,28 @@ pub struct Info {
 impl Info {
     pub(super) fn run(self) -> Result<(), CliError> {
         let mut progress = Progress::default();
-        let value = info(&self.path, &mut |event| progress.show(&event))?;
+        let found = info(&self.path, &mut |event| progress.show(&event))?;
         if self.json {
-            print(format_args!("{value:#}"))?;
-        } else {
-            print_lines("", &value)?;
+            return print(format_args!("{found:#}"));
         }
-        Ok(())
-    }
-}
-
-/// Prints a JSON value as `key: value` lines, nested keys joined by dots.
-fn print_lines(key: &str, value: &serde_json::Value) -> Result<(), CliError> {
-    match value {
-        serde_json::Value::Object(map) => {
-            for (name, value) in map {
-                let key = if key.is_empty() {
-                    name.clone()
-                } else {
-                    format!("{key}.{name}")
+        let path = &self.path;
+        let (page, next) = match serde_json::from_value::<Report>(found.clone()) {
+            Ok(report) => {
+                let next = match report.chroma.is_some() {
+                    true => next::frames(path),
+                    false => next::colorize(path, None),
                 };
-                print_lines(&key, value)?;
+                (info_page::of_run(path, &report), next)
             }
-            Ok(())
-        }
-        serde_json::Value::String(text) => print(format_args!("{key}: {text}")),
-        other => print(format_args!("{key}: {other}")),
+            Err(_) => {
+                let next = match found["kind"] == "COLMAP folder" {
+                    true => next::fit(path),
+                    false => next::view(path),
+                };
+                (info_page::of_found(path, &found), next)
+            }
+        };
+        print(page.trim_end())?;
+        progress.close(&[], &next)
     }
 }

@@ -2,12 +2,15 @@
 
 use std::{
     process::exit,
-    sync::{Arc, OnceLock},
+    sync::{
+        Arc, OnceLock,
+        atomic::{AtomicBool, Ordering},
+    },
 };
 
 use super::CliError;
 use crate::{
-    disk, prepare,
+    disk, programs,
     run::{Interrupt, RunError},
 };
 
@@ -16,6 +19,9 @@ const INTERRUPTED: i32 = 130;
 
 /// What a signal interrupts, where it does not end the program.
 static HEEDED: OnceLock<Arc<Interrupt>> = OnceLock::new();
+
+/// Whether a signal is how the command is meant to end.
+static ENDS_WELL: AtomicBool = AtomicBool::new(false);
 
 /// Lets signals end the program without leaving files behind that were only begun.
 ///
@@ -28,9 +34,12 @@ pub(super) fn heed_signals() -> Result<(), CliError> {
             return;
         }
         // Before their files are removed.
-        let _no_program = prepare::end_programs();
+        let _no_program = programs::end_all();
         let _nothing_new = disk::give_up();
-        exit(INTERRUPTED);
+        exit(match ENDS_WELL.load(Ordering::SeqCst) {
+            true => 0,
+            false => INTERRUPTED,
+        });
     });
     handled.map_err(|error| RunError::Signals(error.to_string()).into())
 }
@@ -38,4 +47,9 @@ pub(super) fn heed_signals() -> Result<(), CliError> {
 /// What the first signal interrupts from now on, where that can be kept.
 pub(super) fn interrupt() -> Arc<Interrupt> {
     HEEDED.get_or_init(Arc::default).clone()
+}
+
+/// From now on nothing is left to be done but to be ended by a signal.
+pub(super) fn ends_well() {
+    ENDS_WELL.store(true, Ordering::SeqCst);
 }

@@ -12,6 +12,7 @@ mod export;
 mod fit;
 mod frames;
 mod info;
+mod info_page;
 mod interrupt;
 mod luma;
 mod network;
@@ -26,6 +27,7 @@ mod render;
 mod teacher;
 mod tradeoff;
 mod values;
+mod view;
 
 use std::{
     fmt::Display,
@@ -56,6 +58,7 @@ enum Command {
     Fit(fit::Fit),
     Colorize(colorize::Colorize),
     Teacher(teacher::TeacherCommand),
+    View(view::View),
     Render(render::Render),
     Frames(frames::FramesCommand),
     Eval(eval::Eval),
@@ -85,6 +88,7 @@ impl Cli {
             Command::Fit(command) => command.run(),
             Command::Colorize(command) => command.run(),
             Command::Teacher(command) => command.run(),
+            Command::View(command) => command.run(),
             Command::Render(command) => command.run(),
             Command::Frames(command) => command.run(),
             Command::Eval(command) => command.run(),

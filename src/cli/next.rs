@@ -53,6 +53,26 @@ pub(super) fn eval(run: &Path, teacher: Option<&Path>) -> String {
     }
 }
 
+/// `frames` of a run.
+pub(super) fn frames(run: &Path) -> String {
+    line(&["frames", &run.to_string_lossy(), "-o", "colored"])
+}
+
+/// `auto` with a teacher, of photos that only the user can name.
+pub(super) fn auto(teacher: &str) -> String {
+    line(&["auto", "PHOTOS", "--teacher", teacher, "-o", "out"])
+}
+
+/// `teacher fetch` of a network.
+pub(super) fn fetch(name: &str) -> String {
+    line(&["teacher", "fetch", name])
+}
+
+/// `teacher list`.
+pub(super) fn teachers() -> String {
+    line(&["teacher", "list"])
+}
+
 /// `export` of a run, of the newest by default.
 pub(super) fn export(run: Option<&Path>) -> String {
     let run = run.map(Path::to_string_lossy);
@@ -60,6 +80,11 @@ pub(super) fn export(run: Option<&Path>) -> String {
     words.extend(run.as_deref());
     words.extend(["-o", "scene.ply"]);
     line(&words)
+}
+
+/// The page of a run or a splat file.
+pub(super) fn see(scene: &Path) -> String {
+    line(&["view", &scene.to_string_lossy()])
 }
 
 /// A page to look at.

@@ -8,7 +8,7 @@ use std::{
 use super::{
     CliError,
     bar::{Bar, WIDTH},
-    print, printable,
+    next, print, printable,
 };
 use crate::run::{Event, Stage};
 
@@ -127,12 +127,32 @@ impl Progress {
     /// # Errors
     /// [`CliError`] of standard output.
     pub fn close(&mut self, wrote: &[&Path], next: &str) -> Result<(), CliError> {
+        self.told(wrote)?;
+        print(format_args!("next: {next}"))
+    }
+
+    /// The same of a command that made `scene`, and how to look at it.
+    ///
+    /// # Errors
+    /// As [`Self::close`].
+    pub fn close_with(
+        &mut self,
+        scene: &Path,
+        wrote: &[&Path],
+        next: &str,
+    ) -> Result<(), CliError> {
+        self.told(wrote)?;
+        print(format_args!("look: {}", next::see(scene)))?;
+        print(format_args!("next: {next}"))
+    }
+
+    fn told(&mut self, wrote: &[&Path]) -> Result<(), CliError> {
         self.finish();
         print(took(self.begun.elapsed(), &self.spent))?;
         for path in wrote {
             print(format_args!("wrote {}", path.display()))?;
         }
-        print(format_args!("next: {next}"))
+        Ok(())
     }
 }
 

@@ -12,6 +12,7 @@ use crate::{
     prepare::PrepareError,
     run::RunError,
     tradeoff::TradeoffError,
+    view::ViewerError,
 };
 
 /// What the user reads of an error of a run.
@@ -43,6 +44,7 @@ pub(super) fn of_run(error: &RunError) -> String {
         RunError::Coarse { .. } => format!(
             "{error}: leave --colmap-coordinates out, and the file lies near the origin and says by how much"
         ),
+        RunError::NoSpz(_) => format!("{error}: leave --spz-version out, or name it .spz"),
         RunError::NothingToResume(_) => {
             format!("{error}; without --resume all is trained anew")
         }
@@ -50,7 +52,9 @@ pub(super) fn of_run(error: &RunError) -> String {
             format!("{error}: give the same options, or leave out --resume to train anew")
         }
         RunError::Interrupted { .. } => format!("{error} with the same command and --resume"),
-        RunError::NoProgram("ffmpeg") => format!("{error}; or write pictures: -o FOLDER"),
+        RunError::Program(program) if program.lacks_ffmpeg() => {
+            format!("{error}, or write pictures: -o FOLDER")
+        }
         RunError::NoHeldOut => format!("{error}: choose --views train or --views all"),
         RunError::NothingPainted(_) => format!("{error}, or give a --teacher as well"),
         RunError::NothingUntil { until, .. } => format!("--until {until}: {error}"),
@@ -75,10 +79,22 @@ pub(super) fn of_sweep(error: &TradeoffError) -> String {
     }
 }
 
+/// What the user reads of what keeps a scene from being shown.
+pub(super) fn of_viewer(error: &ViewerError) -> String {
+    match error {
+        ViewerError::Run(error) => of_run(error),
+        ViewerError::Port { .. } => format!("{error}: choose another --port, or leave it out"),
+        ViewerError::Nothing(_) => format!("{error}: train one with `gs-chroma fit COLMAP_DIR`"),
+    }
+}
+
 /// What the user reads of what keeps a film or photos from being prepared.
 pub(super) fn of_preparing(error: &PrepareError) -> String {
     match error {
         PrepareError::Run(error) => of_run(error),
+        PrepareError::Program(program) if program.lacks_ffmpeg() => {
+            format!("{error}, or give a folder of frames")
+        }
         _ => error.to_string(),
     }
 }

@@ -10,7 +10,7 @@ use std::{
 use clap::{Args, Subcommand};
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::{CliError, network::NetworkArguments, print};
+use super::{CliError, network::NetworkArguments, next, print, progress::Progress};
 use crate::{
     capture::decode_image,
     chroma::teacher::{Catalog, Checkup, GrayImage, KnownTeacher, TeacherError, ToldBy, check},
@@ -84,6 +84,7 @@ const PHOTO: &[u8] = include_bytes!("../../assets/demo/images/garden_05.jpg");
 
 impl Check {
     fn run(self) -> Result<(), CliError> {
+        let mut progress = Progress::default();
         let (name, bytes) = match &self.photo {
             Some(path) => {
                 let bytes = input::read(path);
@@ -115,10 +116,8 @@ impl Check {
         for line in lines(&checkup) {
             print(line)?;
         }
-        match &self.manifest {
-            Some(path) => print(format_args!("wrote {}", path.display())),
-            None => Ok(()),
-        }
+        let wrote: Vec<&Path> = self.manifest.iter().map(PathBuf::as_path).collect();
+        progress.close(&wrote, &next::auto(&self.teacher.to_string_lossy()))
     }
 }
 
@@ -200,10 +199,15 @@ impl List {
             let teachers: Vec<_> = teachers.collect();
             return print(format_args!("{:#}", serde_json::json!(teachers)));
         }
+        let mut progress = Progress::default();
         let names = catalog.teachers.iter().map(|teacher| teacher.name.len());
         let width = names.max().unwrap_or(0);
+        let is_here = |teacher: &&KnownTeacher| {
+            let path = catalog.path(teacher);
+            path.is_ok_and(|path| path.is_file())
+        };
         for teacher in &catalog.teachers {
-            let here = match catalog.path(teacher).is_ok_and(|path| path.is_file()) {
+            let here = match is_here(&teacher) {
                 true => "here",
                 false => "",
             };
@@ -212,17 +216,27 @@ impl List {
                 teacher.name, teacher.license, teacher.about
             ))?;
         }
-        Ok(())
+        let next = match catalog.teachers.iter().find(is_here) {
+            Some(teacher) => next::auto(&teacher.name),
+            None => {
+                let first = catalog.teachers.first();
+                next::fetch(first.map_or("NAME", |teacher| &teacher.name))
+            }
+        };
+        progress.close(&[], &next)
     }
 }
 
 impl Fetch {
     fn run(self) -> Result<(), CliError> {
+        let mut progress = Progress::default();
+        let next = next::auto(&self.name);
         let catalog = catalog()?;
         let teacher = catalog.find(&self.name).map_err(teacher_error)?;
         let path = catalog.path(teacher).map_err(teacher_error)?;
         if catalog.is_fetched(teacher).map_err(teacher_error)? {
-            return print(format_args!("{} is there", path.display()));
+            print(format_args!("{} is there", path.display()))?;
+            return progress.close(&[], &next);
         }
         if !self.yes && !io::stdin().is_terminal() {
             return Err(CliError::NobodyToAsk {
@@ -260,7 +274,7 @@ impl Fetch {
             },
             error,
         })?;
-        print(format_args!("wrote {}", path.display()))
+        progress.close(&[&path], &next)
     }
 
     /// Names size and license, and asks whether to go on.

@@ -67,6 +67,20 @@ where
     number.ok_or_else(|| "must be a number from 0 to 1".to_owned())
 }
 
+/// Frames a second: numerator and denominator, both positive.
+#[derive(Clone, Copy)]
+pub(super) struct Rate(pub [u32; 2]);
+
+/// Frames a second, whole or as a fraction.
+pub(super) fn rate(text: &str) -> Result<Rate, String> {
+    let (frames, seconds) = text.split_once('/').unwrap_or((text, "1"));
+    let number = |text: &str| text.trim().parse().ok().filter(|&n: &u32| n > 0);
+    match (number(frames), number(seconds)) {
+        (Some(frames), Some(seconds)) => Ok(Rate([frames, seconds])),
+        _ => Err("no rate: 24, 25 or 30000/1001".to_owned()),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -7,11 +7,15 @@ use glam::{DMat3, DVec3};
 use crate::{
     capture::Camera,
     gpu::{Buffer, GpuError, Recorder},
-    oracle::{numerics::Numerics, scene::Scene, view::View},
+    oracle::{
+        numerics::{self as oracle, Numerics},
+        scene::Scene,
+        view::View,
+    },
     raster::{
-        AdjointScratch, COLOR_FIGURES, ChromaAdjoint, ChromaSums, ColorKind, Field, Geometry,
-        Layer, Lists, LumaAdjoint, Outcome, Projected, Raster, RasterNumerics, RasterOptions,
-        Status, ViewUniform, constants::*,
+        AdjointScratch, COLOR_FIGURES, ChromaAdjoint, ChromaSums, ColorKind, Falloff, Field,
+        Geometry, Layer, Lists, LumaAdjoint, Outcome, Projected, Raster, RasterNumerics,
+        RasterOptions, Status, ViewUniform, constants::*,
     },
     splats::{ShField, Splats},
 };
@@ -106,6 +110,10 @@ impl Stage {
     ) -> Result<Self, GpuError> {
         let raster = raster.drawing(RasterOptions {
             antialiased: view.antialiased,
+            falloff: match view.numerics.falloff {
+                oracle::Falloff::Gaussian => Falloff::Gaussian,
+                oracle::Falloff::PlayCanvas => Falloff::PlayCanvas,
+            },
         });
         let raster = cutting(&raster, &view.numerics);
         let (gpu, near) = (&raster.gpu, view.near);
@@ -289,6 +297,17 @@ pub struct Gradient {
 }
 
 impl Gradient {
+    /// Of `count` Gaussians, geometry and field as planes, and no statistics.
+    pub fn of_planes(count: usize, geometry: Vec<f32>, field: Vec<f32>) -> Self {
+        Self {
+            count,
+            geometry,
+            statistics: Vec::new(),
+            field,
+            diagonal: Vec::new(),
+        }
+    }
+
     /// The groups of parameters with their names, each `[N, …]` as the oracle
     /// has it; a/b and RGB have the last one only.
     pub fn groups(&self) -> Vec<(&'static str, Vec<f64>)> {

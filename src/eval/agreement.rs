@@ -13,8 +13,9 @@ use crate::{
     capture::{Camera, Photo, in_order},
     chroma::teacher::AbImage,
     input,
-    measure::{Consistency, Flow, camera_path, decode_flo, visible},
+    measure::{Consistency, Flow, decode_flo, visible},
     report::{BetweenScore, ConsistencyScore, Method, PathConsistency, PathScore, to_image},
+    trajectory::camera_path,
 };
 
 /// Distances in frames: short range as in the literature, with 1 beside 10, and long

@@ -3,13 +3,14 @@
 //!
 //! A [`Canvas`] is a photo at working size. [`SceneDrawer`] says which colors the scene has there
 //! and how far they can be believed; [`blend`] joins them with what the teacher says of the rest
-//! and with the photo before, along the photo's edges; [`Between`] carries colors to photos
-//! without a pose; [`finish`] brings them to full size.
+//! and with the photo before, along the photo's edges; [`Strokes`] are what somebody painted on
+//! the rest; [`Between`] carries colors to photos without a pose; [`finish`] brings them to full size.
 
 mod between;
 mod blend;
 mod canvas;
 mod finish;
+mod painted;
 mod scene;
 mod window;
 
@@ -17,4 +18,5 @@ pub use between::{Between, Carried};
 pub use blend::{Believed, blend};
 pub use canvas::Canvas;
 pub use finish::{Colored, finish};
+pub use painted::Strokes;
 pub use scene::{SceneDrawer, ViewOf};

@@ -1,6 +1,6 @@
 //! A training on disk: all that decides how it goes on.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, time::Duration};
 
 use serde::{Deserialize, Serialize};
 
@@ -11,6 +11,7 @@ use crate::{
         Load, Snapshot,
         constants::{STATISTICS_PLANES, STATUS_WORDS},
     },
+    splats::Splats,
 };
 
 /// A training between two iterations. What goes on from it ends with the bytes of one that was
@@ -61,6 +62,14 @@ pub trait Keeper {
 
     /// Takes one; `false` ends the training with [`LumaError::Cancelled`](super::LumaError).
     fn keep(&mut self, checkpoint: Checkpoint) -> bool;
+
+    /// Whether somebody wants to see the Gaussians now.
+    fn looks_on(&mut self) -> bool {
+        false
+    }
+
+    /// Takes them; reading them from the device took so long.
+    fn show(&mut self, _splats: Splats, _took: Duration) {}
 }
 
 /// Keeps none.

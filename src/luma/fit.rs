@@ -1,6 +1,10 @@
 //! Stage 1 as a whole: photos in, a gray scene out.
 
-use std::{ops::ControlFlow, sync::Arc, time::Instant};
+use std::{
+    ops::ControlFlow,
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
 use super::{
     Checkpoint, CurvePoint, Demand, Goal, Keeper, LumaError, LumaProgress, LumaSettings,
@@ -335,6 +339,14 @@ impl Keeper for Planned<'_> {
     fn keep(&mut self, mut checkpoint: Checkpoint) -> bool {
         checkpoint.state.plan = Some(self.plan.clone());
         self.keeper.keep(checkpoint)
+    }
+
+    fn looks_on(&mut self) -> bool {
+        self.keeper.looks_on()
+    }
+
+    fn show(&mut self, splats: Splats, took: Duration) {
+        self.keeper.show(splats, took);
     }
 }
 

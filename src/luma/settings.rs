@@ -180,6 +180,7 @@ impl LumaSettings {
     pub fn raster_options(&self) -> RasterOptions {
         RasterOptions {
             antialiased: self.antialiased,
+            ..RasterOptions::default()
         }
     }
 }

@@ -247,6 +247,10 @@ impl LumaTrainer {
             // are few if it is noticed early.
             let early = iteration < SYNC_EVERY && iteration.is_power_of_two();
             let told = pauses || iteration.is_multiple_of(SYNC_EVERY);
+            if iteration.is_multiple_of(SYNC_EVERY) && keeper.looks_on() {
+                let asked = Instant::now();
+                keeper.show(self.splats()?, asked.elapsed());
+            }
             if !(told || early) {
                 continue;
             }

@@ -11,7 +11,6 @@ mod flo;
 mod flow;
 mod image_error;
 mod optical_flow;
-mod path;
 mod sharpness;
 mod ssim;
 mod visibility;
@@ -26,7 +25,6 @@ pub use image_error::{
     DeltaE, IDENTICAL_PSNR, ab_error, delta_e, mean_delta_e, psnr, reported_psnr,
 };
 pub use optical_flow::optical_flow;
-pub use path::{camera_path, distance};
 pub use sharpness::{laplacian, variance};
 pub use ssim::ssim;
 pub use visibility::{MASK_RULE, MIN_OPACITY, visible};

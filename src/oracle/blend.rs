@@ -59,7 +59,7 @@ pub fn blend_pixel<'a, T: Number, const C: usize>(
             continue;
         }
 
-        let mut alpha = splat.opacity * (-power).exp();
+        let mut alpha = splat.opacity * numerics.falloff.at(power);
         for threshold in [numerics.alpha_min, ALPHA_MAX] {
             pixel.margin = pixel.margin.min(relative_distance(alpha.re(), threshold));
         }

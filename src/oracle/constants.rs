@@ -4,6 +4,12 @@
 /// splat is thinner than a pixel's low-pass filter.
 pub const BLUR: f64 = 0.3;
 
+/// The same in PlayCanvas' engine.
+pub const PLAYCANVAS_BLUR: f64 = 0.075;
+
+/// What is left of a Gaussian where PlayCanvas' engine cuts it off, e⁻⁴.
+pub const PLAYCANVAS_TAIL: f64 = 0.018_315_638_888_734_18;
+
 /// The largest opacity of a splat at a pixel; keeps `1 / (1 - alpha)` bounded.
 pub const ALPHA_MAX: f64 = 0.99;
 

@@ -1,6 +1,7 @@
 //! Where the forward pass stops counting, and what else may be computed less accurately.
 
-use super::constants::{ALPHA_MIN, TRANSMITTANCE_MIN};
+use super::Number;
+use super::constants::{ALPHA_MIN, BLUR, PLAYCANVAS_BLUR, PLAYCANVAS_TAIL, TRANSMITTANCE_MIN};
 
 /// What the kernels leave out.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -12,6 +13,35 @@ pub struct Numerics {
     /// Highest bits of a depth, as `f32`, that decide the order; with all 32 depths are
     /// compared as `f64`.
     pub depth_bits: u32,
+    /// How a Gaussian ends.
+    pub falloff: Falloff,
+}
+
+/// How a Gaussian's opacity falls towards its border.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Falloff {
+    /// As a Gaussian.
+    Gaussian,
+    /// As PlayCanvas' engine has it.
+    PlayCanvas,
+}
+
+impl Falloff {
+    /// What a Gaussian shows of its opacity at a power, ½ dᵀ Σ⁻¹ d.
+    pub fn at<T: Number>(self, power: T) -> T {
+        match self {
+            Self::Gaussian => (-power).exp(),
+            Self::PlayCanvas => ((-power).exp() - PLAYCANVAS_TAIL) / (1.0 - PLAYCANVAS_TAIL),
+        }
+    }
+
+    /// Added to both variances of the screen covariance, in px².
+    pub fn blur(self) -> f64 {
+        match self {
+            Self::Gaussian => BLUR,
+            Self::PlayCanvas => PLAYCANVAS_BLUR,
+        }
+    }
 }
 
 impl Numerics {
@@ -20,6 +50,7 @@ impl Numerics {
         alpha_min: ALPHA_MIN,
         transmittance_min: TRANSMITTANCE_MIN,
         depth_bits: 32,
+        falloff: Falloff::Gaussian,
     };
 
     /// The number that a depth is sorted by.

@@ -5,7 +5,7 @@
 //! Mip-Splatting (Yu et al. 2024).
 
 use super::Number;
-use super::constants::{BLUR, FRUSTUM_MARGIN, QUAT_NORM_MIN_SQ};
+use super::constants::{FRUSTUM_MARGIN, QUAT_NORM_MIN_SQ};
 use super::linear::{apply, dot, rotation};
 use super::view::View;
 
@@ -132,16 +132,17 @@ pub fn project<T: Number>(
             }
         }
     }
-    let xx = dot(&footprint[0], &footprint[0]) + BLUR;
+    let blur = view.numerics.falloff.blur();
+    let xx = dot(&footprint[0], &footprint[0]) + blur;
     let xy = dot(&footprint[0], &footprint[1]);
-    let yy = dot(&footprint[1], &footprint[1]) + BLUR;
+    let yy = dot(&footprint[1], &footprint[1]) + blur;
 
     // xx·yy − xy², written so that nothing cancels: of a needle 10⁸ times as long as wide no digit
     // would be left. |ρ₁ × ρ₂|² is the determinant of A·Aᵀ (Lagrange's identity).
     let [[a, b, c], [d, e, f]] = footprint;
     let normal = [b * f - c * e, c * d - a * f, a * e - b * d];
     let gram = dot(&normal, &normal);
-    let determinant = gram + (xx + yy - BLUR) * BLUR;
+    let determinant = gram + (xx + yy - blur) * blur;
     if !(determinant.re() > 0.0 && determinant.re().is_finite()) {
         return Err(Cull::Covariance);
     }

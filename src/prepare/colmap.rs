@@ -8,7 +8,8 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 
-use super::{PrepareError, process::Program, pycolmap};
+use super::{PrepareError, pycolmap};
+use crate::programs::{Program, ProgramError};
 
 /// So many frames to either side of one are matched with it.
 const OVERLAP: u32 = 10;
@@ -67,11 +68,11 @@ impl Colmap {
     pub fn find(install: bool, told: &mut dyn FnMut(String)) -> Result<Self, PrepareError> {
         match Program::new("colmap").arg("help").ask() {
             Ok(said) => Ok(Self::Program(version(&said))),
-            Err(PrepareError::NoProgram { .. }) => {
+            Err(ProgramError::Missing { .. }) => {
                 let (python, version) = pycolmap::find(install, told)?;
                 Ok(Self::Python(python, version))
             }
-            Err(error) => Err(error),
+            Err(error) => Err(error.into()),
         }
     }
 
@@ -86,7 +87,7 @@ impl Colmap {
     /// Looks for features, and writes them into a new database.
     ///
     /// # Errors
-    /// [`PrepareError::Program`].
+    /// [`ProgramError`].
     pub fn features(
         &self,
         database: &Path,
@@ -114,7 +115,7 @@ impl Colmap {
     /// Matches the photos of a database.
     ///
     /// # Errors
-    /// [`PrepareError::Program`].
+    /// [`ProgramError`].
     pub fn matches(
         &self,
         database: &Path,
@@ -138,7 +139,7 @@ impl Colmap {
     /// Finds poses, and writes models into `0`, `1`, … below a folder that is there.
     ///
     /// # Errors
-    /// [`PrepareError::Program`].
+    /// [`ProgramError`].
     pub fn poses(
         &self,
         database: &Path,
@@ -184,7 +185,8 @@ impl Colmap {
             if let Some((done, total)) = progress(line) {
                 told(done, total);
             }
-        })
+        })?;
+        Ok(())
     }
 }
 

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::pycolmap::PINNED;
-use crate::run::RunError;
+use crate::{programs::ProgramError, run::RunError};
 
 /// What stopped it; one line that names the file and the remedy.
 #[derive(Debug, thiserror::Error)]
@@ -11,12 +11,9 @@ pub enum PrepareError {
     /// The photos or the file system.
     #[error(transparent)]
     Run(#[from] RunError),
-    /// A program is not installed.
-    #[error("{program} is not installed: {}", remedy(program))]
-    NoProgram {
-        /// Its name.
-        program: String,
-    },
+    /// A program of others, such as FFmpeg.
+    #[error(transparent)]
+    Program(#[from] ProgramError),
     /// There is neither COLMAP nor its Python module.
     #[error(
         "COLMAP is not installed: install it (Debian, Ubuntu: apt-get install colmap), or give --install, which puts {PINNED} into the cache"
@@ -27,14 +24,6 @@ pub enum PrepareError {
     OldFfmpeg {
         /// Its version.
         found: String,
-    },
-    /// A program failed.
-    #[error("{program} failed: {said}")]
-    Program {
-        /// Its name.
-        program: String,
-        /// What it said last, and how it ended.
-        said: String,
     },
     /// The input is no film that can be used.
     #[error("{}: {reason}", path.display())]
@@ -86,15 +75,4 @@ pub enum PrepareError {
         /// What to try.
         remedy: String,
     },
-}
-
-/// How a program is installed.
-fn remedy(program: &str) -> &'static str {
-    match program {
-        "ffmpeg" | "ffprobe" => {
-            "install FFmpeg 5.1 or newer (Debian, Ubuntu: apt-get install ffmpeg), or give a folder of frames"
-        }
-        "colmap" => "install COLMAP (Debian, Ubuntu: apt-get install colmap)",
-        _ => "install it",
-    }
 }

@@ -7,7 +7,7 @@ use std::{
 
 use super::{
     PrepareError, PrepareOptions,
-    ffmpeg::{self, Part, Scan, Source},
+    ffmpeg::{self, Part, Scan, Source, Uneven},
     photos::link_all,
     sharp,
     state::{State, Step, digest, of},
@@ -203,7 +203,11 @@ fn extract(
         });
     };
     let header = plain_header(&frames.join(first)).map_err(RunError::from)?;
-    let film = Film {
+    let varied = match scan {
+        Scan::Progressive => source.times(part, names.len())?,
+        _ => None,
+    };
+    let mut film = Film {
         source: source.path.clone(),
         // That of the first frame, where half a frame earlier was asked for.
         start: first_frame(part.start, source.rate()),
@@ -212,7 +216,20 @@ fn extract(
         audio: source.audio,
         size: header.size,
         frames: names,
+        times: None,
     };
+    if let Some(Uneven { times, rate: fast }) = varied {
+        let [first, last] = [times[0], times[times.len() - 1]];
+        observe(Event::Note(format!(
+            "the film's frames are not evenly spaced: a film made of them has {:.0} a second, some of them several times",
+            f64::from(fast[0]) / f64::from(fast[1])
+        )));
+        let end = part.seconds.map_or(source.seconds, |s| part.start + s);
+        film.start = first;
+        film.seconds = end.max(last + 1.0 / rate) - first;
+        film.frame_rate = fast;
+        film.times = Some(times.iter().map(|time| time - first).collect());
+    }
     film.write(draft.path())
         .map_err(files::at(&draft.path().join(FILM)))?;
     let made = [(frames, FRAMES), (draft.path().join(FILM), FILM)];

@@ -12,7 +12,6 @@ mod film;
 mod masks;
 mod photos;
 mod poses;
-mod process;
 mod pycolmap;
 mod sharp;
 mod shots;
@@ -29,7 +28,6 @@ use serde::{Deserialize, Serialize};
 pub use colmap::{Cameras, Matching};
 pub use error::PrepareError;
 pub use poses::Poses;
-pub(crate) use process::end_programs;
 pub(crate) use state::{digest, of as digest_of};
 
 use crate::{

@@ -18,6 +18,7 @@ use super::{
 use crate::{
     capture::Piece,
     disk,
+    programs::ProgramError,
     run::{Event, Observer, RunError, Stage, files},
 };
 
@@ -122,10 +123,10 @@ impl Task<'_> {
         })?;
         // What COLMAP makes is checked where it is used; that it made nothing, here.
         if !database.is_file() {
-            return Err(PrepareError::Program {
+            return Err(PrepareError::Program(ProgramError::Failed {
                 program: colmap.name(),
                 said: "wrote no database".to_owned(),
-            });
+            }));
         }
         state.forget(Step::Matches);
         state.place(Step::Features, from, &[(database, DATABASE)])
@@ -272,7 +273,7 @@ impl Task<'_> {
 
 /// Whether COLMAP failed for want of photos that fit together.
 fn has_no_pair(error: &PrepareError) -> bool {
-    let PrepareError::Program { said, .. } = error else {
+    let PrepareError::Program(ProgramError::Failed { said, .. }) = error else {
         return false;
     };
     [

@@ -2,8 +2,8 @@
 
 use std::{ffi::OsString, path::PathBuf};
 
-use super::{PrepareError, process::Program};
-use crate::{chroma::teacher::cache_folder, disk, run::files};
+use super::PrepareError;
+use crate::{chroma::teacher::cache_folder, disk, programs::Program, run::files};
 
 /// What does with `pycolmap` what the program's commands do.
 const SCRIPT: &str = include_str!("pycolmap.py");

@@ -2,7 +2,7 @@
 //! `shade_backward` down to the field and, for luma, `project_backward` down to the geometry.
 
 use super::{
-    ColorKind, Raster, StepBuffers, Storage,
+    ColorKind, Falloff, Raster, StepBuffers, Storage,
     constants::*,
     layer::Layer,
     lists::Lists,
@@ -25,6 +25,8 @@ pub struct AdjointScratch {
     pub partials: Buffer<u32>,
     /// The gradient record of each Gaussian on the image plane; stale where not visible.
     pub gradients: Buffer<f32>,
+    /// Whether the records have figures of the geometry.
+    trains_geometry: bool,
 }
 
 impl AdjointScratch {
@@ -59,7 +61,7 @@ impl AdjointScratch {
         4 * COLOR_FIGURES as u64 * (splats + capacity) as u64
     }
 
-    fn new(
+    pub(super) fn new(
         gpu: &Gpu,
         [words, figures]: [usize; 2],
         splats: usize,
@@ -68,21 +70,22 @@ impl AdjointScratch {
         Ok(Self {
             partials: Buffer::zeros(gpu, "instance gradients", capacity * words)?,
             gradients: Buffer::zeros(gpu, "projected gradients", splats * figures)?,
+            trains_geometry: figures > COLOR_FIGURES,
         })
     }
 }
 
 /// From the gradient of the picture to a record of each Gaussian on the image plane.
-struct BlendAdjoint {
-    scratch: AdjointScratch,
-    count: usize,
+pub(super) struct BlendAdjoint {
+    pub(super) scratch: AdjointScratch,
+    pub(super) count: usize,
     max_tiles: usize,
     blend: Bindings,
     sum: Bindings,
 }
 
 impl BlendAdjoint {
-    fn new(
+    pub(super) fn new(
         gpu: &Gpu,
         [blend, sum]: [&Kernel; 2],
         geometry: &Geometry,
@@ -108,7 +111,7 @@ impl BlendAdjoint {
             scratch.partials.raw(),
             scratch.gradients.raw(),
         ];
-        if layer.kind == ColorKind::Luma {
+        if scratch.trains_geometry {
             of_blend.extend([layer.colors.raw(), layer.image.raw()]);
             of_sum.push(lists.projected.raw());
         }
@@ -121,7 +124,7 @@ impl BlendAdjoint {
         }
     }
 
-    fn record(&self, [blend, sum]: [&Kernel; 2], recorder: &mut Recorder) {
+    pub(super) fn record(&self, [blend, sum]: [&Kernel; 2], recorder: &mut Recorder) {
         recorder.dispatch(blend, &self.blend, self.max_tiles as u32);
         recorder.dispatch(sum, &self.sum, groups_for(self.count));
     }
@@ -254,7 +257,11 @@ impl LumaAdjoint {
     }
 
     /// Records the adjoint; lists, layer and loss must have been recorded before.
+    ///
+    /// # Panics
+    /// Of a rasterizer with another falloff than a Gaussian's.
     pub fn record(&self, raster: &Raster, recorder: &mut Recorder) {
+        raster.assert_gaussian();
         let [shade, project] = raster.luma_ending(self.steps);
         let groups = groups_for(self.blend.count);
         self.blend.record(raster.blend_backward.luma(), recorder);
@@ -324,7 +331,11 @@ impl ChromaAdjoint {
     }
 
     /// Records the adjoint; lists, layer and loss must have been recorded before.
+    ///
+    /// # Panics
+    /// Of a rasterizer with another falloff than a Gaussian's.
     pub fn record(&self, raster: &Raster, recorder: &mut Recorder) {
+        raster.assert_gaussian();
         self.blend.record(raster.blend_backward.color(), recorder);
         let shade = raster.shade_backward_color(self.kind);
         recorder.dispatch(shade, &self.shade, groups_for(self.blend.count));
@@ -338,6 +349,11 @@ impl Raster {
             true => [&self.shade_step, &self.projection.step],
             false => [&self.shade_backward.luma, &self.projection.backward],
         }
+    }
+
+    /// The kernels of these adjoints know no other.
+    fn assert_gaussian(&self) {
+        assert_eq!(self.options.falloff, Falloff::Gaussian, "no adjoint");
     }
 
     fn shade_backward_color(&self, kind: ColorKind) -> &Kernel {

@@ -5,6 +5,8 @@
 pub const TILE_SIDE: u32 = 16;
 /// Variance in px² added to every projected covariance.
 pub const BLUR: f32 = 0.3;
+/// The same in PlayCanvas' engine (`shaders/common/playcanvas.wgsl`).
+pub const PLAYCANVAS_BLUR: f32 = 0.075;
 /// Cap on alpha.
 pub const ALPHA_MAX: f32 = 0.99;
 /// Alpha below which a contribution is skipped.

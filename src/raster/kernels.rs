@@ -1,7 +1,7 @@
 //! The kernels of layers, their adjoints and the projection, compiled for what is to be
 //! drawn and how accurately.
 
-use super::{AdamSteps, ColorKind, RasterNumerics, RasterOptions, Storage};
+use super::{AdamSteps, ColorKind, Falloff, RasterNumerics, RasterOptions, Storage};
 use crate::gpu::{Gpu, Kernel, shaders};
 
 #[derive(Clone)]
@@ -11,11 +11,19 @@ pub(super) struct LayerKernels {
 }
 
 impl LayerKernels {
-    pub fn new(gpu: &Gpu, kind: ColorKind, numerics: &RasterNumerics) -> Self {
-        let (shade, blend) = match kind {
-            ColorKind::Luma => (shaders::SHADE_LUMA, shaders::BLEND_LUMA),
-            ColorKind::Chroma => (shaders::SHADE_CHROMA, shaders::BLEND_CHROMA),
-            ColorKind::Rgb => (shaders::SHADE_RGB, shaders::BLEND_RGB),
+    pub fn new(gpu: &Gpu, kind: ColorKind, falloff: Falloff, numerics: &RasterNumerics) -> Self {
+        let shade = match kind {
+            ColorKind::Luma => shaders::SHADE_LUMA,
+            ColorKind::Chroma => shaders::SHADE_CHROMA,
+            ColorKind::Rgb => shaders::SHADE_RGB,
+        };
+        let blend = match (falloff, kind) {
+            (Falloff::Gaussian, ColorKind::Luma) => shaders::BLEND_LUMA,
+            (Falloff::Gaussian, ColorKind::Chroma) => shaders::BLEND_CHROMA,
+            (Falloff::Gaussian, ColorKind::Rgb) => shaders::BLEND_RGB,
+            (Falloff::PlayCanvas, ColorKind::Luma) => shaders::BLEND_LUMA_PLAYCANVAS,
+            (Falloff::PlayCanvas, ColorKind::Chroma) => shaders::BLEND_CHROMA_PLAYCANVAS,
+            (Falloff::PlayCanvas, ColorKind::Rgb) => shaders::BLEND_RGB_PLAYCANVAS,
         };
         Self {
             shade: Kernel::new(gpu, "shade", shade),
@@ -97,6 +105,10 @@ impl ProjectionKernels {
             [shaders::PROJECT_MIP, shaders::PROJECT_BACKWARD_MIP]
         } else {
             [shaders::PROJECT, shaders::PROJECT_BACKWARD]
+        };
+        let project = match options.falloff {
+            Falloff::Gaussian => project,
+            Falloff::PlayCanvas => shaders::PROJECT_PLAYCANVAS,
         };
         let step = match (options.antialiased, numerics.adam) {
             (false, AdamSteps::Exact) => shaders::PROJECT_BACKWARD_STEP,

@@ -14,6 +14,7 @@ mod lists;
 mod model;
 mod numerics;
 mod renderer;
+mod rgb_adjoint;
 mod roofline;
 pub mod scan;
 pub mod sort;
@@ -28,6 +29,7 @@ pub use lists::{Lists, Projected, Status, StatusReadback, TileListsMode};
 pub use model::{Model, Snapshot};
 pub use numerics::{AdamSteps, RasterNumerics, Storage};
 pub use renderer::{Picture, Renderer};
+pub use rgb_adjoint::{RgbAdjoint, RgbAdjointKernels};
 pub use roofline::{Load, minimum_words};
 pub use splats::{Field, Geometry};
 pub use sum_loss::{LossLog, SumLossKernel, SumLossParameters};
@@ -92,6 +94,20 @@ pub struct RasterOptions {
     /// [`BLUR`](constants::BLUR) px² spreads it (Mip-Splatting, Yu et al. 2024): its size
     /// in pixels does not change how much it shows.
     pub antialiased: bool,
+    /// How a Gaussian ends.
+    pub falloff: Falloff,
+}
+
+/// How a Gaussian's opacity falls towards its border.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Falloff {
+    /// As a Gaussian, to where it is no longer seen (Kerbl et al. 2023).
+    #[default]
+    Gaussian,
+    /// As PlayCanvas' engine has it: less than a Gaussian by e⁻⁴, divided by what is left of 1,
+    /// ended at √8 deviations, and blurred by [`PLAYCANVAS_BLUR`](constants::PLAYCANVAS_BLUR)
+    /// px² only. It is not antialiased. No adjoint but [`RgbAdjoint`] knows it.
+    PlayCanvas,
 }
 
 /// The compiled kernels of the rasterizer.
@@ -127,7 +143,7 @@ impl Raster {
             scan: ScanKernels::new(gpu),
             sort: SortKernels::new(gpu),
             lists: ListKernels::new(gpu, &numerics),
-            layers: layers(gpu, &numerics),
+            layers: layers(gpu, options.falloff, &numerics),
             blend_backward: BlendBackwardKernels::new(gpu, &numerics),
             shade_backward: ShadeBackwardKernels::new(gpu),
             projection: ProjectionKernels::new(gpu, options, &numerics),
@@ -141,8 +157,14 @@ impl Raster {
         if self.options == options {
             return self.clone();
         }
+        let layers = if self.options.falloff == options.falloff {
+            self.layers.clone()
+        } else {
+            layers(&self.gpu, options.falloff, &self.numerics)
+        };
         Arc::new(Self {
             options,
+            layers,
             projection: ProjectionKernels::new(&self.gpu, options, &self.numerics),
             ..Self::clone(self)
         })
@@ -158,7 +180,7 @@ impl Raster {
         Arc::new(Self {
             numerics,
             lists: ListKernels::new(gpu, &numerics),
-            layers: layers(gpu, &numerics),
+            layers: layers(gpu, self.options.falloff, &numerics),
             blend_backward: BlendBackwardKernels::new(gpu, &numerics),
             projection: ProjectionKernels::new(gpu, self.options, &numerics),
             shade_step: shade_step(gpu, &numerics),
@@ -191,7 +213,7 @@ impl Raster {
     }
 }
 
-fn layers(gpu: &Gpu, numerics: &RasterNumerics) -> [LayerKernels; 3] {
+fn layers(gpu: &Gpu, falloff: Falloff, numerics: &RasterNumerics) -> [LayerKernels; 3] {
     [ColorKind::Luma, ColorKind::Chroma, ColorKind::Rgb]
-        .map(|kind| LayerKernels::new(gpu, kind, numerics))
+        .map(|kind| LayerKernels::new(gpu, kind, falloff, numerics))
 }

@@ -223,6 +223,9 @@ pub struct ChromaReport {
     pub upsample: Upsample,
     /// Views with painted hints.
     pub hints: usize,
+    /// The folder of hints, absolute; `None` without hints, and where it is no UTF-8.
+    #[serde(default)]
+    pub hint_folder: Option<String>,
     /// Share of the Gaussians that hints claim by half or more; `None` where none grew.
     #[serde(default)]
     pub claimed: Option<f64>,

@@ -8,7 +8,7 @@ use crate::{
     effects::Overrules,
     gpu::Gpu,
     report::{CaptureReport, DeviceReport, LumaReport, REPORT_VERSION, Report},
-    splats::ply,
+    splats::{Format, is_splat_file},
 };
 
 /// Where the gray Gaussians come from.
@@ -23,7 +23,7 @@ pub(super) struct Source {
 impl Source {
     pub fn find(options: &ColorizeOptions) -> Result<Self, RunError> {
         match &options.run {
-            Some(path) if ply::is_splat_file(path)? => Ok(Self {
+            Some(path) if is_splat_file(path)? => Ok(Self {
                 folder: None,
                 report: None,
                 splats: path.clone(),
@@ -95,10 +95,9 @@ impl Source {
         match &self.folder {
             Some(folder) => folder.color(),
             None => {
-                let stem = self.splats.file_stem().unwrap_or_default();
-                let mut name = stem.to_owned();
-                name.push("-color.ply");
-                self.splats.with_file_name(name)
+                let mut path = Format::stem(&self.splats).into_os_string();
+                path.push("-color.ply");
+                path.into()
             }
         }
     }

@@ -6,13 +6,13 @@ use std::{
     ops::ControlFlow,
     path::{Path, PathBuf},
     sync::Arc,
-    time::Instant,
+    time::{Duration, Instant},
 };
 
 use glam::DVec3;
 
 use super::{
-    Event, Observer, Preset, RunError, RunFolder, Stage,
+    Event, Live, Observer, Preset, RunError, RunFolder, SceneKind, Stage,
     checkpoints::{CheckpointOptions, FileKeeper, Found, tell_given_up},
     color_checkpoint::{found_in, question},
     color_source::Source,
@@ -21,8 +21,9 @@ use super::{
     fit::{capture_report, open_gpu},
     foreign::drawn_like_photos,
     keeping,
+    live::Showing,
     log::with_rows,
-    scene::{Frame, comments_of_moved, read_scene, tell_not_finite},
+    scene::{Frame, read_scene, tell_not_finite, written_as},
     sound::{open_examined, open_trusted},
     teach::{Taught, TeachOptions, Teachers},
 };
@@ -36,7 +37,7 @@ use crate::{
     eval::{COLUMNS, Measured, exposures},
     raster::Raster,
     report::{ChromaReport, ChromaSeconds, EffectReport, Report, contact_sheet, kernel_reports},
-    splats::{npy, ply},
+    splats::{Format, WriteOptions, npy, write_splats},
 };
 
 /// A share of Gaussians without a colored photo that is worth a warning.
@@ -72,12 +73,14 @@ pub struct ColorizeOptions {
     pub timings: bool,
     /// How it can go on where it is interrupted, if not by Adam or without a run.
     pub checkpoints: CheckpointOptions,
+    /// Who looks on, if not with Adam.
+    pub live: Option<Arc<Live>>,
 }
 
 /// What `colorize` wrote.
 #[derive(Clone, Debug)]
 pub struct Output {
-    /// The colored splat file.
+    /// The colored splat file, of any format.
     pub ply: PathBuf,
     /// The contact sheet, when a run was colored.
     pub contact_sheet: Option<PathBuf>,
@@ -117,7 +120,7 @@ pub fn colorize(
         false => open_examined(&colmap_dir, &load, observe)?.dataset,
     };
     // From here on every photo is looked at once.
-    let dataset = dataset.caching(0);
+    let dataset = Arc::new(dataset.caching(0));
     let frame = match source.folder {
         Some(_) => Frame::Own,
         None => Frame::World(dataset.capture.offset),
@@ -138,6 +141,7 @@ pub fn colorize(
             .filter(|folder| options.output.is_none() || output_is_own(options, folder))
             .map(RunFolder::contact_sheet),
     };
+    Format::to_write(&output.ply)?;
     files::make_folder_of(&output.ply)?;
 
     let begun = Instant::now();
@@ -199,6 +203,11 @@ pub fn colorize(
         // These are other photos than those whose exposures the run knows.
         report.luma.exposures.clear();
     }
+    if let Some(live) = &options.live {
+        live.begin(&dataset);
+        live.draw(drawn);
+        live.show(SceneKind::Luma, luma.clone(), Duration::ZERO);
+    }
     let distill = Distill {
         raster: &raster,
         dataset: &dataset,
@@ -252,7 +261,12 @@ pub fn colorize(
         Some(keeper) => keeper,
         None => &mut NoChromaKeeper,
     };
-    let colored = distill.run_from(checkpoint, keeps, &settings, &mut |event| {
+    let mut showing = Showing {
+        keeper: keeps,
+        live: options.live.as_deref(),
+        luma: Some(&luma),
+    };
+    let colored = distill.run_from(checkpoint, &mut showing, &settings, &mut |event| {
         let observe = &mut *observe.borrow_mut();
         match event {
             // It has been asked already.
@@ -322,6 +336,9 @@ pub fn colorize(
     }
     drop(keeper);
     let colored = colored?;
+    if let Some(live) = &options.live {
+        live.show(SceneKind::Color, colored.splats.clone(), Duration::ZERO);
+    }
     let (observe, log) = (observe.into_inner(), log.into_inner());
     let timings = (options.timings)
         .then(|| Ok::<_, RunError>(kernel_reports(&gpu.timings()?, &colored.load)))
@@ -350,6 +367,11 @@ pub fn colorize(
         strength: options.teach.strength,
         upsample: options.teach.settings.upsample,
         hints: hinted,
+        hint_folder: options.teach.hints.as_ref().and_then(|folder| {
+            let found = folder.canonicalize();
+            let path = found.as_ref().unwrap_or(folder);
+            path.to_str().map(str::to_owned)
+        }),
         claimed: colored.claimed,
         painted_held_out: (lesson.painted_held_out(&dataset.split).iter())
             .map(|&view| dataset.capture.views[view].name.clone())
@@ -389,8 +411,17 @@ pub fn colorize(
         None if read.offset != DVec3::ZERO => (DVec3::ZERO, moved),
         None => (moved, DVec3::ZERO),
     };
-    let comments = comments_of_moved(drawn, left);
-    let write_to = |path: &Path| ply::write_ply(path, &colored.splats, added, &comments);
+    let written = WriteOptions {
+        added,
+        ..written_as(drawn, left)
+    };
+    let mut write_to = |path: &Path| -> Result<(), RunError> {
+        let doubts = write_splats(path, &colored.splats, &written)?;
+        doubts
+            .into_iter()
+            .for_each(|doubt| observe(Event::Warning(doubt)));
+        Ok(())
+    };
     match source.kept(options) {
         Some(folder) => {
             let mut commit = Commit::new(folder.path())?;

@@ -12,10 +12,10 @@ use super::{
     commit::Commit,
     files,
     fit::open_gpu,
-    flight::flight,
+    flight::Filmed,
     keeping,
     lock::RunLock,
-    scene::{Frame, comments_of_moved, open, read_splats},
+    scene::{Frame, open, read_splats, written_as},
     teach::teacher_or_photos,
 };
 use crate::{
@@ -31,7 +31,7 @@ use crate::{
         EVALUATION_VERSION, Evaluation, Figure, Method, PageRow, PeerReport, Report, Rules,
         TeacherReport, evaluation_page, to_image,
     },
-    splats::{Splats, ply},
+    splats::{Splats, is_splat_file, write_splats},
 };
 
 /// Views on the page: a browser should not have to load a thousand pictures.
@@ -78,7 +78,7 @@ pub fn eval(
     let observe = &mut keeping(&warnings, observe);
     let folder = match &options.run {
         Some(path) => {
-            ply::is_splat_file(path)?;
+            is_splat_file(path)?;
             RunFolder::at(path)
         }
         None => RunFolder::newest()?,
@@ -126,8 +126,11 @@ pub fn eval(
             ..scene.luma.clone()
         };
         let path = page.join(told.method.file_stem()).with_extension("ply");
-        let comments = comments_of_moved(drawn, scene.dataset.capture.offset);
-        ply::write_ply(&path, &splats, glam::DVec3::ZERO, &comments)?;
+        write_splats(
+            &path,
+            &splats,
+            &written_as(drawn, scene.dataset.capture.offset),
+        )?;
     }
     let mut rgb = vec![(Method::Exported, &scene.exported)];
     rgb.extend(peers.iter().map(|(field, told)| (told.method, field)));
@@ -164,9 +167,11 @@ pub fn eval(
     let mut strip = Vec::new();
     let every = options.frames.div_ceil(STRIP_FRAMES);
     let flow = options.flow.as_deref();
+    let mut filmed = Filmed::begin(&page);
     let mut keep = |frame, image| {
         let file = format!("frame-{frame:04}.png");
         files::write_png(&page.join(&file), &image)?;
+        filmed.add(&file, &image);
         if frame % every == 0 {
             strip.push(file);
         }
@@ -184,7 +189,7 @@ pub fn eval(
         )));
     }
     observe(Event::begins(Stage::Page));
-    let flight = flight(&page, &path, observe);
+    let flight = filmed.end(&page, &path, observe);
     let evaluation = Evaluation {
         version: EVALUATION_VERSION,
         program: env!("CARGO_PKG_VERSION").to_owned(),

@@ -41,8 +41,12 @@ pub enum Stage {
     Bake,
     /// Coloring a scene in another way, to compare with.
     Baseline,
+    /// Fitting the scene to a viewer.
+    Viewer,
     /// Drawing pictures.
     Rendering,
+    /// Following strokes from photo to photo.
+    Strokes,
     /// Coloring photos at full size.
     Coloring,
     /// Measuring pictures against photos.
@@ -95,7 +99,9 @@ impl fmt::Display for Stage {
             Self::Strength => "strength",
             Self::Bake => "bake",
             Self::Baseline => "baseline",
+            Self::Viewer => "viewer",
             Self::Rendering => "rendering",
+            Self::Strokes => "strokes",
             Self::Coloring => "coloring",
             Self::Measuring => "measuring",
             Self::Path => "path",

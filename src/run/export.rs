@@ -1,11 +1,23 @@
-//! `export`: a run's scene as a splat file.
+//! `export`: a run's scene, or the Gaussians of a file, as a splat file of any format.
 
-use std::path::PathBuf;
+use std::{cell::RefCell, fs, path::PathBuf, time::Instant};
 
 use glam::DVec3;
+use serde::Serialize;
 
-use super::{RunError, RunFolder, files, scene::comments_of_moved};
-use crate::splats::{Splats, ply};
+use super::{
+    Event, Loss, Observer, RunError, RunFolder, Shown, Stage,
+    export_viewer::{Cameras, fitted},
+    files, keeping,
+    loss::{Views, loss},
+    scene::{Frame, read_scene, written_as},
+};
+use crate::{
+    capture::LoadOptions,
+    raster::RasterOptions,
+    splats::{Format, Splats, SpzVersion, WriteOptions, is_splat_file, write_splats},
+    viewers::ViewerChoice,
+};
 
 /// The share of the Gaussians' size that the steps of 32-bit floats may have: shifts by half
 /// of it are not seen.
@@ -14,37 +26,136 @@ const COARSE: f64 = 0.1;
 /// What `export` is asked to do.
 #[derive(Clone, Debug)]
 pub struct ExportOptions {
-    /// Run folder; the newest run by default.
+    /// Run folder or splat file; the newest run by default.
     pub run: Option<PathBuf>,
-    /// The splat file.
+    /// The splat file, whose name tells the format.
     pub output: PathBuf,
     /// Write the luma although the scene is colored.
     pub luma: bool,
     /// Whether centers are COLMAP's even where the scene was moved to the origin.
     pub colmap_coordinates: bool,
+    /// The version of an `.spz`, where one is asked for.
+    pub spz: Option<SpzVersion>,
+    /// Whom the scene is fitted for; without, it is written as it is.
+    pub viewer: Option<ViewerChoice>,
+    /// COLMAP folder with the cameras that it is fitted before, where it is not the one that
+    /// `fit` noted.
+    pub colmap: Option<PathBuf>,
 }
 
 /// What `export` wrote.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Exported {
+    /// The file.
+    pub file: PathBuf,
     /// Gaussians.
     pub splats: usize,
+    /// Bytes of the file.
+    pub bytes: u64,
+    /// Seconds that writing took.
+    pub seconds: f64,
     /// What is subtracted from COLMAP's coordinates, in world units; zero where nothing is.
     pub offset: [f64; 3],
+    /// Whether the file says so.
+    pub tells_offset: bool,
+    /// What the format costs.
+    pub loss: Loss,
+    /// What each viewer shows of the scene, where it was fitted.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub shown: Vec<Shown>,
+    /// What is doubtful.
+    pub warnings: Vec<String>,
 }
 
-/// Writes a run's scene as a splat file. Where COLMAP's coordinates are so large that `fit`
-/// moved the scene to the origin, it stays there and a comment in the header has the offset,
-/// unless COLMAP's are asked for.
+/// The Gaussians to write.
+struct Scene {
+    splats: Splats,
+    drawn: RasterOptions,
+    /// What their centers lack of COLMAP's, in world units.
+    moved: DVec3,
+    views: Views,
+    /// Where its cameras are, if anybody knows.
+    colmap: Option<PathBuf>,
+    /// How its photos are loaded.
+    load: LoadOptions,
+}
+
+/// Writes a run's scene, or the Gaussians of a file, as a splat file, reads it back and measures
+/// what that costs. Where COLMAP's coordinates are so large that `fit` moved the scene to the
+/// origin, it stays there and the file says so if its format can, unless COLMAP's are asked for.
 ///
 /// # Errors
 /// [`RunError`]; [`RunError::Coarse`] where COLMAP's coordinates would spoil the scene.
-pub fn export(options: &ExportOptions) -> Result<Exported, RunError> {
+pub fn export(options: &ExportOptions, observe: &mut Observer<'_>) -> Result<Exported, RunError> {
+    let warnings = RefCell::default();
+    let observe = &mut keeping(&warnings, observe);
+    let output = options.output.as_path();
+    let format = Format::to_write(output)?;
+    if options.spz.is_some() && format != Format::Spz {
+        return Err(RunError::NoSpz(output.to_owned()));
+    }
+    observe(Event::begins(Stage::Model));
+    let mut scene = open(options, observe)?;
+    let mut shown = Vec::new();
+    if let Some(choice) = options.viewer {
+        let before = &Cameras {
+            of: options.run.as_deref().unwrap_or(output),
+            colmap: scene.colmap.as_deref(),
+            load: scene.load.clone(),
+            moved: scene.moved,
+        };
+        let drawn = scene.drawn;
+        (scene.splats, shown) = fitted(choice, (&scene.splats, drawn), before, observe)?;
+        // As these viewers draw it.
+        scene.drawn = RasterOptions::default();
+    }
+    let written = written(&scene, options)?;
+
+    observe(Event::begins(Stage::Saving));
+    files::make_folder_of(output)?;
+    let begun = Instant::now();
+    let doubts = write_splats(output, &scene.splats, &written)?;
+    let seconds = begun.elapsed().as_secs_f64();
+    doubts
+        .into_iter()
+        .for_each(|doubt| observe(Event::Warning(doubt)));
+    let bytes = fs::metadata(output).map_err(files::at(output))?.len();
+
+    let wrote = (output, &written);
+    let loss = loss(&scene.splats, scene.drawn, &scene.views, wrote, observe)?;
+    Ok(Exported {
+        file: output.to_owned(),
+        splats: scene.splats.len(),
+        bytes,
+        seconds,
+        offset: written.offset.to_array(),
+        tells_offset: format.tells_offset(),
+        loss,
+        shown,
+        warnings: warnings.take(),
+    })
+}
+
+/// The scene of a run or of a file.
+fn open(options: &ExportOptions, observe: &mut Observer<'_>) -> Result<Scene, RunError> {
+    if let Some(path) = options.run.as_deref().filter(|path| !path.is_dir())
+        && is_splat_file(path)?
+    {
+        let read = read_scene(path, Frame::Own, observe)?;
+        return Ok(Scene {
+            splats: match options.luma {
+                true => read.splats.to_luma(),
+                false => read.splats,
+            },
+            drawn: read.drawn,
+            moved: read.offset,
+            views: Views::MadeUp,
+            colmap: options.colmap.clone(),
+            load: LoadOptions::default(),
+        });
+    }
     let folder = match &options.run {
-        Some(path) => {
-            ply::is_splat_file(path)?;
-            RunFolder::at(path)
-        }
+        Some(path) => RunFolder::at(path),
         None => RunFolder::newest()?,
     };
     let report = folder.read_report()?;
@@ -54,13 +165,24 @@ pub fn export(options: &ExportOptions) -> Result<Exported, RunError> {
     } else {
         folder.luma()
     };
-    let splats = ply::read_ply(&file)?.splats;
-    let moved = DVec3::from(report.capture.offset);
+    let noted = PathBuf::from(&report.capture.path);
+    Ok(Scene {
+        splats: read_scene(&file, Frame::Own, observe)?.splats,
+        drawn: report.luma.settings.raster_options(),
+        moved: DVec3::from(report.capture.offset),
+        views: Views::of_run(&report.capture),
+        colmap: Some(options.colmap.clone().unwrap_or(noted)),
+        load: report.capture.load,
+    })
+}
+
+/// In which coordinates the scene is written.
+fn written(scene: &Scene, options: &ExportOptions) -> Result<WriteOptions, RunError> {
     let (added, left) = match options.colmap_coordinates {
-        true => (moved, DVec3::ZERO),
-        false => (DVec3::ZERO, moved),
+        true => (scene.moved, DVec3::ZERO),
+        false => (DVec3::ZERO, scene.moved),
     };
-    let (size, largest) = (median_size(&splats), added.abs().max_element());
+    let (size, largest) = (median_size(&scene.splats), added.abs().max_element());
     let step = step_at(largest);
     if added != DVec3::ZERO && step > COARSE * size {
         return Err(RunError::Coarse {
@@ -70,12 +192,10 @@ pub fn export(options: &ExportOptions) -> Result<Exported, RunError> {
             size,
         });
     }
-    files::make_folder_of(&options.output)?;
-    let comments = comments_of_moved(report.luma.settings.raster_options(), left);
-    ply::write_ply(&options.output, &splats, added, &comments)?;
-    Ok(Exported {
-        splats: splats.len(),
-        offset: left.to_array(),
+    Ok(WriteOptions {
+        added,
+        spz: options.spz.unwrap_or_default(),
+        ..written_as(scene.drawn, left)
     })
 }
 

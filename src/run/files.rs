@@ -101,7 +101,7 @@ pub(super) fn make_folder_of(path: &Path) -> Result<(), RunError> {
     if path.is_dir() {
         return Err(RunError::File {
             path: path.to_owned(),
-            reason: "is a folder; name a .ply file".to_owned(),
+            reason: "is a folder; name a file such as scene.ply".to_owned(),
         });
     }
     make_folder(folder_of(path))

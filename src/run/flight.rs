@@ -1,17 +1,17 @@
-//! A film of a path's frames.
+//! The film of the path on the page of `eval`.
 
-use std::{
-    fs,
-    io::ErrorKind,
-    path::Path,
-    process::{Command, Stdio},
+use std::{fs, path::Path};
+
+use image::RgbImage;
+
+use super::{
+    Event, Observer, RunError,
+    film::{FilmWriter, Purpose},
 };
-
-use super::{Event, Observer};
-use crate::report::{Flight, PathScore};
-
-/// What makes it, where it is on the PATH.
-const ENCODER: &str = "ffmpeg";
+use crate::{
+    programs::ProgramError,
+    report::{Flight, PathScore},
+};
 
 /// Frames a second: slow enough to see what changes between two of them.
 const RATE: u32 = 12;
@@ -19,62 +19,67 @@ const RATE: u32 = 12;
 /// Its file.
 const FILM: &str = "flight.mp4";
 
-/// What the page in this folder shows of a path: a film where one can be made, its frames where
-/// not.
-pub(super) fn flight(page: &Path, path: &PathScore, observe: &mut Observer<'_>) -> Flight {
-    let film = match make_film(page, FILM) {
-        Ok(made) => made.then(|| FILM.to_owned()),
-        Err(reason) => {
-            observe(Event::Warning(format!("no film of the path: {reason}")));
-            None
+/// Becomes a film where one can be made.
+pub(super) struct Filmed {
+    writer: Option<FilmWriter>,
+    /// What keeps it from being made.
+    failed: Option<String>,
+}
+
+impl Filmed {
+    /// In the folder of a page.
+    pub fn begin(page: &Path) -> Self {
+        // Where nothing makes films, the page says so.
+        let (writer, failed) = match FilmWriter::new(&page.join(FILM), [RATE, 1], Purpose::Viewing)
+        {
+            Ok(writer) => (Some(writer), None),
+            Err(ProgramError::Missing { .. }) => (None, None),
+            Err(error) => (None, Some(error.to_string())),
+        };
+        Self { writer, failed }
+    }
+
+    /// Adds a frame.
+    pub fn add(&mut self, name: &str, frame: &RgbImage) {
+        if let Some(mut writer) = self.writer.take() {
+            match writer.write(name, frame) {
+                Ok(()) => self.writer = Some(writer),
+                Err(error) => self.failed = Some(reason(error)),
+            }
         }
-    };
-    let bytes_of = |name: &str| fs::metadata(page.join(name)).map_or(0, |file| file.len());
-    let of_frames = || (0..path.frames).map(|k| bytes_of(&format!("frame-{k:04}.png")));
-    Flight {
-        frames: path.frames,
-        size: path.size,
-        rate: RATE,
-        bytes: match &film {
-            Some(film) => bytes_of(film),
-            None => of_frames().sum(),
-        },
-        film,
+    }
+
+    /// What the page in this folder shows of a path: a film where one could be made, its frames
+    /// where not.
+    pub fn end(mut self, page: &Path, path: &PathScore, observe: &mut Observer<'_>) -> Flight {
+        let made = self.writer.take().is_some_and(|writer| {
+            let ended = writer.finish();
+            self.failed = ended.err().map(reason);
+            self.failed.is_none() && page.join(FILM).is_file()
+        });
+        if let Some(reason) = self.failed {
+            observe(Event::Warning(format!("no film of the path: {reason}")));
+        }
+        let film = made.then(|| FILM.to_owned());
+        let bytes_of = |name: &str| fs::metadata(page.join(name)).map_or(0, |file| file.len());
+        let of_frames = || (0..path.frames).map(|k| bytes_of(&format!("frame-{k:04}.png")));
+        Flight {
+            frames: path.frames,
+            size: path.size,
+            rate: RATE,
+            bytes: match &film {
+                Some(film) => bytes_of(film),
+                None => of_frames().sum(),
+            },
+            film,
+        }
     }
 }
 
-/// Makes `film` of `frame-0000.png` and so on in a folder, in H.264, which browsers play; `false`
-/// where nothing makes films.
-///
-/// # Errors
-/// What the encoder says.
-fn make_film(folder: &Path, film: &str) -> Result<bool, String> {
-    let rate = RATE.to_string();
-    let made = Command::new(ENCODER)
-        .args(["-nostdin", "-loglevel", "error", "-y"])
-        .args(["-framerate", &rate, "-i", "frame-%04d.png"])
-        // Half as many a and b as pixels: both sides have to be even.
-        .args([
-            "-vf",
-            "pad=ceil(iw/2)*2:ceil(ih/2)*2",
-            "-pix_fmt",
-            "yuv420p",
-        ])
-        .args(["-c:v", "libx264", "-crf", "18", "-movflags", "+faststart"])
-        .arg(film)
-        // A folder's name may hold what it takes for a pattern.
-        .current_dir(folder)
-        .stdin(Stdio::null())
-        .output();
-    match made {
-        Ok(done) if done.status.success() && folder.join(film).is_file() => Ok(true),
-        Ok(done) => {
-            let words = String::from_utf8_lossy(&done.stderr);
-            let last = words.lines().rfind(|line| !line.trim().is_empty());
-            let last = last.map_or_else(|| done.status.to_string(), str::to_owned);
-            Err(format!("{ENCODER}: {last}"))
-        }
-        Err(error) if error.kind() == ErrorKind::NotFound => Ok(false),
-        Err(error) => Err(format!("{ENCODER}: {error}")),
+/// What went wrong, without the file that is not in its place yet.
+fn reason(error: RunError) -> String {
+    match error {
+        RunError::File { reason, .. } => reason,
+        other => other.to_string(),
     }
 }

@@ -48,6 +48,7 @@ pub(super) fn drawn_like_photos(
 ) -> Result<RasterOptions, RunError> {
     let other = RasterOptions {
         antialiased: !said.antialiased,
+        ..said
     };
     let [as_said, otherwise] = fits(gpu, dataset, luma, [said, other])?;
     if as_said.correlation.max(otherwise.correlation) < CORRELATED {

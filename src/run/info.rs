@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     capture::{Camera, Capture, Headers, LoadOptions, Loader, Normalize, Rejected},
-    splats::ply,
+    splats::read_splats,
 };
 
 /// What a run folder, a splat file or a COLMAP folder holds, and what is doubtful about the
@@ -79,7 +79,7 @@ fn colmap_info(path: &Path, observe: &mut Observer<'_>) -> Result<Value, RunErro
 
 fn splat_info(path: &Path, observe: &mut Observer<'_>) -> Result<Value, RunError> {
     let warnings = RefCell::default();
-    let read = ply::read_ply(path)?;
+    let read = read_splats(path)?;
     tell_skipped(path, &read, &mut keeping(&warnings, observe));
     let splats = &read.splats;
     let bound = |pick: fn(f32, f32) -> f32, start: f32| -> [f32; 3] {

@@ -31,6 +31,31 @@ impl RunLock {
         Ok((lock, folder.read_report()?))
     }
 
+    /// Lets nobody write into a run that is there as long as it is read, and reads its report.
+    /// Others may read it as well.
+    ///
+    /// # Errors
+    /// As [`RunFolder::read_report`] and [`RunError::InUse`].
+    pub fn to_read(folder: &RunFolder) -> Result<(Option<Self>, Report), RunError> {
+        folder.read_report()?;
+        let path = folder.path().join(LOCK);
+        let lock = match disk::open_in_place(&path) {
+            Ok(file) => match file.try_lock_shared() {
+                Err(TryLockError::WouldBlock) => {
+                    return Err(RunError::InUse {
+                        folder: folder.path().to_owned(),
+                        holder: format!("{} is writing into it", holder(&path)),
+                    });
+                }
+                // Some file systems cannot lock.
+                Ok(()) | Err(TryLockError::Error(_)) => Some(Self { _file: file }),
+            },
+            // Where nobody can write there is nothing to keep anybody from.
+            Err(_) => None,
+        };
+        Ok((lock, folder.read_report()?))
+    }
+
     /// Takes it, finishes what a process that held it has left complete, and removes what it
     /// had only begun.
     ///
@@ -42,9 +67,14 @@ impl RunLock {
         match file.try_lock() {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => {
+                // Only who writes says who it is.
+                let holder = match file.try_lock_shared() {
+                    Ok(()) => "another process is reading it".to_owned(),
+                    Err(_) => format!("{} is writing into it", holder(&path)),
+                };
                 return Err(RunError::InUse {
                     folder: folder.to_owned(),
-                    holder: holder(&path),
+                    holder,
                 });
             }
             // Some file systems cannot lock. Nobody knows then who else is there: what is
@@ -98,6 +128,22 @@ mod tests {
             assert!(error.contains(&here), "{error}");
         }
         drop(lock);
+        RunLock::take(run.path()).unwrap();
+    }
+
+    #[test]
+    fn those_who_read_keep_those_who_write_away() {
+        let run = tempfile::tempdir().unwrap();
+        let path = run.path().join(LOCK);
+        let reads = || {
+            let file = disk::open_in_place(&path).unwrap();
+            file.try_lock_shared().unwrap();
+            file
+        };
+        let readers = [reads(), reads()];
+        let error = RunLock::take(run.path()).unwrap_err().to_string();
+        assert!(error.contains("another process is reading it"), "{error}");
+        drop(readers);
         RunLock::take(run.path()).unwrap();
     }
 }

@@ -9,7 +9,9 @@ mod commit;
 mod eval;
 mod event;
 mod export;
+mod export_viewer;
 pub(crate) mod files;
+mod film;
 mod fingerprint;
 mod fit;
 mod flight;
@@ -17,8 +19,11 @@ mod folder;
 mod foreign;
 mod frames;
 mod info;
+mod live;
 mod lock;
 mod log;
+mod look;
+mod loss;
 mod picture_names;
 mod plan;
 mod preset;
@@ -37,14 +42,19 @@ pub use eval::{EvalOptions, eval};
 use event::keeping;
 pub use event::{Event, Observer, Stage};
 pub use export::{ExportOptions, Exported, export};
+pub use export_viewer::Shown;
+pub use film::is_film;
 pub use fit::{AheadOptions, FitOptions, Init, Overlay, fit};
 pub use folder::RunFolder;
 pub use frames::{Frames, FramesOptions, frames};
 pub use info::info;
+pub use live::{Live, LiveScene, LiveState};
+pub use look::{Look, SceneKind};
+pub use loss::Loss;
 pub(crate) use picture_names::picture_names;
 pub use plan::{PlanOptions, Planned, plan};
 pub use preset::Work;
-pub use render::{RenderOptions, Views, render};
+pub use render::{PathOptions, RenderOptions, Rendered, Views, Way, render, render_path};
 pub use sound::Soundness;
 pub use teach::{TeachOptions, teacher_or_photos};
 
@@ -56,7 +66,9 @@ use crate::{
     eval::EvalError,
     gpu::GpuError,
     luma::LumaError,
-    splats::ply::PlyError,
+    programs::ProgramError,
+    splats::SplatError,
+    trajectory::TrajectoryError,
 };
 
 /// What can stop a run.
@@ -76,7 +88,7 @@ pub enum RunError {
     Chroma(ChromaError),
     /// A splat file.
     #[error(transparent)]
-    Ply(#[from] PlyError),
+    Splats(#[from] SplatError),
     /// The teacher.
     #[error(transparent)]
     Teacher(#[from] TeacherError),
@@ -94,6 +106,9 @@ pub enum RunError {
     /// Measuring.
     #[error(transparent)]
     Eval(EvalError),
+    /// A camera path.
+    #[error(transparent)]
+    Trajectory(#[from] TrajectoryError),
     /// There is no run to go on with.
     #[error("no run under runs/")]
     NoRun,
@@ -106,9 +121,9 @@ pub enum RunError {
     /// A run without colors.
     #[error("{}: the run is not colored yet: run `gs-chroma colorize` first", .0.display())]
     NoColors(PathBuf),
-    /// A program that is needed is not there.
-    #[error("{0} is not installed, or not on PATH (Debian: apt-get install -y {0})")]
-    NoProgram(&'static str),
+    /// A program of others, such as FFmpeg.
+    #[error(transparent)]
+    Program(#[from] ProgramError),
     /// Coordinates that are too large for a splat file.
     #[error(
         "{}: not written: near {coordinate} 32-bit floats are {step} apart, {:.2} times the size of the Gaussians (the median of their smallest scales is {size:.4})",
@@ -124,6 +139,9 @@ pub enum RunError {
         /// The Gaussians' size in world units.
         size: f64,
     },
+    /// A version of `.spz` for a file of another format.
+    #[error("{}: not an .spz file", .0.display())]
+    NoSpz(PathBuf),
     /// All views were trained on.
     #[error("no view is held out")]
     NoHeldOut,
@@ -135,6 +153,20 @@ pub enum RunError {
         /// A photo's name.
         example: String,
     },
+    /// COLMAP gave no pose to any photo that is painted or colored.
+    #[error("{}: its images belong to {named}, and COLMAP placed none of these; it placed {placed} of {photos} photos, such as {example}: paint on one of those", folder.display())]
+    NotPlaced {
+        /// The folder of images.
+        folder: PathBuf,
+        /// A photo without a pose that one of them belongs to, and how many more.
+        named: String,
+        /// Photos with a pose.
+        placed: usize,
+        /// Photos in all.
+        photos: usize,
+        /// One with a pose.
+        example: String,
+    },
     /// There are hints, but no paint.
     #[error("{}: nothing is painted on any photo: paint on one", .0.display())]
     NothingPainted(PathBuf),
@@ -144,12 +176,12 @@ pub enum RunError {
     /// The system does not let the program hear of signals.
     #[error("signals cannot be heeded: {0}")]
     Signals(String),
-    /// Another process writes into the run.
-    #[error("{}: {holder} is writing into it: wait for it, or choose another folder with -o", folder.display())]
+    /// Another process writes into the run, or reads it.
+    #[error("{}: {holder}: wait for it, or choose another folder with -o", folder.display())]
     InUse {
         /// The run's folder.
         folder: PathBuf,
-        /// Who it is.
+        /// Who it is, and what it does.
         holder: String,
     },
     /// Photos have changed their names since they were trained on.

@@ -4,12 +4,12 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::{Event, Observer, RunError, Stage, fit::comments};
+use super::{Event, Observer, RunError, Stage};
 use crate::{
     capture::{Dataset, LoadOptions, Notice, Rejected},
     luma::TrialProgress,
     raster::RasterOptions,
-    splats::{ReadSplats, Splats, ply},
+    splats::{self, ReadSplats, Splats, WriteOptions},
 };
 
 /// Opens a COLMAP folder; nothing is decoded but what [`Dataset::open`] has to.
@@ -100,7 +100,7 @@ pub(super) fn read_scene(
     frame: Frame,
     observe: &mut Observer<'_>,
 ) -> Result<ReadScene, RunError> {
-    let read = ply::read_ply(path)?;
+    let read = splats::read_splats(path)?;
     tell_skipped(path, &read, observe);
     let mut splats = read.splats;
     if splats.is_empty() {
@@ -119,6 +119,7 @@ pub(super) fn read_scene(
         splats,
         drawn: RasterOptions {
             antialiased: read.antialiased,
+            ..RasterOptions::default()
         },
         offset: read.offset,
     })
@@ -134,11 +135,12 @@ pub(super) fn read_splats(
     Ok((scene.splats, scene.drawn))
 }
 
-/// Comments of a splat file whose centers are COLMAP's less `offset`, in world units.
-pub(super) fn comments_of_moved(drawn: RasterOptions, offset: DVec3) -> Vec<String> {
-    let mut comments = comments(drawn);
-    if offset != DVec3::ZERO {
-        comments.push(ply::offset_comment(offset));
+/// How splats are written whose centers are COLMAP's less `offset`, in world units.
+pub(super) fn written_as(drawn: RasterOptions, offset: DVec3) -> WriteOptions {
+    WriteOptions {
+        generator: format!("gs-chroma {}", env!("CARGO_PKG_VERSION")),
+        antialiased: drawn.antialiased,
+        offset,
+        ..WriteOptions::default()
     }
-    comments
 }

@@ -2,10 +2,11 @@
 //! trial, is not among them.
 
 use super::{
-    ColorizeOptions, EvalOptions, FitOptions, FramesOptions, PlanOptions, RenderOptions,
+    ColorizeOptions, EvalOptions, ExportOptions, FitOptions, FramesOptions, PathOptions,
+    PlanOptions, RenderOptions,
     Stage::{self, *},
 };
-use crate::{chroma, luma::Goal};
+use crate::{chroma, luma::Goal, splats::Format};
 
 /// A stage that is gone through only where something is asked for.
 fn only_if(asked: bool, stage: Stage) -> Option<Stage> {
@@ -96,9 +97,33 @@ impl FramesOptions {
     }
 }
 
+impl PathOptions {
+    /// The stages of [`render_path`](super::render_path).
+    pub fn stages(&self) -> Vec<Stage> {
+        vec![Model, Device, Rendering]
+    }
+}
+
 impl RenderOptions {
     /// The stages of [`render`](super::render).
     pub fn stages(&self) -> Vec<Stage> {
         vec![Model, Device, Rendering]
+    }
+}
+
+impl ExportOptions {
+    /// The stages of [`export`](super::export).
+    pub fn stages(&self) -> Vec<Stage> {
+        let measured = (Format::of(&self.output)).is_some_and(|format| format.is_read());
+        let lossy = measured && Format::of(&self.output) != Some(Format::Ply);
+        let fits = self.viewer.is_some();
+        all([
+            Some(Model),
+            only_if(fits, Device),
+            only_if(fits, Viewer),
+            Some(Saving),
+            only_if(lossy && !fits, Device),
+            only_if(lossy, Measuring),
+        ])
     }
 }

@@ -2,6 +2,7 @@
 //! pixel of that counts.
 
 use std::{
+    collections::BTreeSet,
     ops::ControlFlow,
     path::{Path, PathBuf},
 };
@@ -11,10 +12,13 @@ use super::{
     answers::{mean, scaled, with_hints, with_strokes},
 };
 use crate::{
-    capture::{Capture, Dataset, IMAGES},
+    capture::{Capture, Dataset, FRAMES, IMAGES, photos_in},
     chroma::{
         Colorizer, ColorizerError, Lesson, Wanted, teach,
-        teacher::{AbImage, GrayImage, HintFolder, HintImage, Query, Teacher, TeacherSettings},
+        teacher::{
+            AbImage, GrayImage, HintFolder, HintImage, Query, Teacher, TeacherError,
+            TeacherSettings,
+        },
     },
     hash::Hasher,
     report::TeacherReport,
@@ -257,8 +261,8 @@ impl Teachers {
     /// Asks about every view, and keeps what is wanted at so many scales.
     ///
     /// # Errors
-    /// [`RunError::Teacher`], [`RunError::TeacherCoversNothing`] where a teacher
-    /// or the hints have no image for any view that counts, and
+    /// [`RunError::Teacher`], [`RunError::NotPlaced`] or [`RunError::TeacherCoversNothing`] where
+    /// a teacher or the hints have no image for any view that counts, and
     /// [`RunError::NothingPainted`] where there are but hints, all of them empty.
     pub fn ask(
         &mut self,
@@ -318,22 +322,70 @@ impl Teachers {
     /// Whether every source has something for a view that counts; `covers` says so
     /// of each teacher and then of the hints.
     fn check(&self, covers: &[bool], dataset: &Dataset, lesson: &Lesson) -> Result<(), RunError> {
-        let teachers = self.teachers.iter().map(|member| &member.path);
-        let hints = self.hints.as_ref().map(|(path, _)| path);
-        let mut sources = teachers.chain(hints).zip(covers);
-        if let Some((path, _)) = sources.find(|(_, covers)| !**covers) {
-            return Err(RunError::TeacherCoversNothing {
-                teacher: path.clone(),
-                example: dataset.capture.views[dataset.split.train[0]].name.clone(),
+        if let Some(source) = covers.iter().position(|covers| !covers) {
+            let (path, unplaced) = match (self.teachers.get(source), &self.hints) {
+                (Some(member), _) => {
+                    let covers = |name: &str| member.teacher.covers(Query::from(name));
+                    (&member.path, unplaced(dataset, covers)?)
+                }
+                (None, Some((path, hints))) => {
+                    (path, unplaced(dataset, |name| hints.covers(name))?)
+                }
+                // Without hints there is nothing to cover.
+                (None, None) => return Ok(()),
+            };
+            let example = dataset.capture.views[dataset.split.train[0]].name.clone();
+            return Err(match unplaced {
+                Some((named, photos)) => RunError::NotPlaced {
+                    folder: path.clone(),
+                    named,
+                    placed: placed(dataset),
+                    photos,
+                    example,
+                },
+                None => RunError::TeacherCoversNothing {
+                    teacher: path.clone(),
+                    example,
+                },
             });
         }
-        match hints {
+        match self.hints.as_ref().map(|(path, _)| path) {
             Some(path) if lesson.colored_views() == 0 => {
                 Err(RunError::NothingPainted(path.clone()))
             }
             _ => Ok(()),
         }
     }
+}
+
+/// How many photos have a pose.
+fn placed(dataset: &Dataset) -> usize {
+    let photos = dataset.capture.views.iter().map(|view| &view.photo);
+    photos.collect::<BTreeSet<_>>().len()
+}
+
+/// The photos without a pose that a folder has images for, in words, and how many photos there are
+/// in all; `None` where it has none for any.
+fn unplaced(
+    dataset: &Dataset,
+    covers: impl Fn(&str) -> Result<bool, TeacherError>,
+) -> Result<Option<(String, usize)>, RunError> {
+    let root = &dataset.capture.root;
+    // All frames of a film, which are more than its photos.
+    let [frames, photos] = [FRAMES, IMAGES].map(|folder| photos_in(&root.join(folder)));
+    let all = if frames.is_empty() { photos } else { frames };
+    let mut named = Vec::new();
+    for name in &all {
+        if covers(name)? {
+            named.push(name.clone());
+        }
+    }
+    let others = match named.len() {
+        0 => return Ok(None),
+        1 => String::new(),
+        count => format!(" and {} more", count - 1),
+    };
+    Ok(Some((named.swap_remove(0) + &others, all.len())))
 }
 
 /// Whether a teacher has nothing for some of the photos that are trained on: then it is a folder

@@ -1,16 +1,30 @@
 //! The Gaussians: arrays on the host, spherical harmonics, initialization and
 //! splat files.
 
+mod axes;
 pub mod dome;
+mod error;
+mod file;
+mod format;
+mod glb;
 pub mod init;
+mod morton;
 mod neighbors;
 pub mod npy;
 pub mod ply;
+mod quantize;
 pub mod sh;
+mod sog;
+mod splat;
+mod spz;
+mod usda;
 
+pub use error::SplatError;
+pub use file::{ReadSplats, SpzVersion, WriteOptions, read_splats, write_splats};
+pub use format::{Format, is_splat_file};
 pub use init::initial_splats;
 pub use neighbors::{nearest_neighbor_distances, nearest_neighbors};
-pub use ply::{PlyError, ReadSplats, read_ply, write_ply};
+pub use ply::{PlyError, read_ply, write_ply};
 pub use sh::ShField;
 
 /// A set of `N` Gaussians with one field of spherical harmonics.
@@ -86,6 +100,12 @@ impl Splats {
         })
     }
 }
+
+#[cfg(test)]
+mod fixtures;
+#[cfg(test)]
+#[path = "format_tests.rs"]
+mod format_tests;
 
 #[cfg(test)]
 mod tests {

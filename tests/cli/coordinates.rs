@@ -72,7 +72,7 @@ fn export_gives_colmaps_coordinates_back() {
     // Where the steps of f32 do no harm they may lie where COLMAP has the cameras.
     let said = place.succeed(&["export", "--colmap-coordinates", "-o", "far.ply"]);
     assert_near(middle(&place, "far.ply"), OFFSET);
-    assert_eq!(said.lines().count(), 3, "{said}");
+    assert_eq!(said.lines().count(), 4, "{said}");
     assert!(!said.contains("COLMAP's less"), "{said}");
     assert!(offset.iter().any(|v| v.abs() > 100.0));
 }

@@ -92,25 +92,25 @@ fn what_is_wholly_opaque_is_drawn() {
 #[test]
 fn other_formats_are_named_with_the_remedy() {
     let place = place_with_run();
-    place.write("scene.splat", [0; 64]);
+    place.write("scene.ksplat", [0; 64]);
     for arguments in [
-        &["info", "scene.splat"][..],
-        &["render", "scene.splat", "--colmap", "scene", "-o", "out"],
+        &["info", "scene.ksplat"][..],
+        &["render", "scene.ksplat", "--colmap", "scene", "-o", "out"],
         &[
             "colorize",
-            "scene.splat",
+            "scene.ksplat",
             "--colmap",
             "scene",
             "--teacher",
             "photos",
         ],
-        &["export", "scene.splat", "-o", "out.ply"],
-        &[&QUICK_FIT[..], &["--init", "scene.splat"]].concat(),
+        &["export", "scene.ksplat", "-o", "out.ply"],
+        &[&QUICK_FIT[..], &["--init", "scene.ksplat"]].concat(),
     ] {
         let done = place.run(arguments);
         assert_eq!(done.code, Some(1), "{arguments:?}: {}", done.stderr);
         let line = done.stderr.lines().last().unwrap_or_default();
-        let words = ["error: scene.splat", "convert it to .ply"];
+        let words = ["error: scene.ksplat", "convert it to .ply"];
         assert!(words.iter().all(|word| line.contains(word)), "{line}");
     }
 }

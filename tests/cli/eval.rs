@@ -445,7 +445,8 @@ fn with_encoder(place: &Place, script: &str) -> super::program::Done {
 fn the_path_becomes_a_film_where_something_makes_films() {
     let place = place_with_run();
     let page = || String::from_utf8(place.read("runs/scene/eval/index.html")).expect("text");
-    let film = "#!/bin/sh\nfor last; do :; done\nprintf 12345678 > \"$last\"\n";
+    let film = "#!/bin/sh\n[ \"$1\" = -version ] && exit 0\nfor last; do :; done\n\
+                while read -r line; do :; done\nprintf 12345678 > \"$last\"\n";
     let done = with_encoder(&place, film);
     assert_eq!(done.code, Some(0), "{}", done.stderr);
     let film = page().contains("<video src=\"flight.mp4\"");
@@ -455,7 +456,7 @@ fn the_path_becomes_a_film_where_something_makes_films() {
 
     let done = with_encoder(&place, "#!/bin/sh\necho no such encoder >&2\nexit 1\n");
     assert_eq!(done.code, Some(0), "{}", done.stderr);
-    let warned = "warning: no film of the path: ffmpeg: no such encoder";
+    let warned = "warning: no film of the path: ffmpeg failed: no such encoder";
     assert!(done.stderr.contains(warned), "{}", done.stderr);
     assert!(page().contains("data-frames=\"3\"") && !page().contains("<video"));
 

@@ -165,6 +165,92 @@ fn what_it_cannot_do_it_says() {
     assert_eq!(done.code, Some(1));
 }
 
+#[test]
+fn a_stroke_on_what_the_scene_does_not_show_colors_it_there_and_in_the_photos_around() {
+    let place = place_with_run();
+    // Something came by while three photos were taken.
+    let [left, top, side] = [8, 6, 18];
+    let within =
+        |x: u32, y: u32| (left..left + side).contains(&x) && (top..top + side).contains(&y);
+    for index in 3..6 {
+        let mut photo = scene::photo(index);
+        for (x, y, pixel) in photo.enumerate_pixels_mut() {
+            if within(x, y) {
+                *pixel = image::Rgb([225 + (x % 2) as u8; 3]);
+            }
+        }
+        let path = place.path("scene/images").join(scene::name(index));
+        photo.save(path).expect("writable");
+    }
+    place.succeed(&["frames", "-o", "plain"]);
+    let mut paint = image::RgbaImage::new(scene::SIZE[0], scene::SIZE[1]);
+    for x in left + 4..left + side - 4 {
+        paint.put_pixel(x, top + 8, image::Rgba([255, 170, 150, 255]));
+        paint.put_pixel(x, top + 9, image::Rgba([255, 170, 150, 255]));
+    }
+    std::fs::create_dir(place.path("hints")).expect("writable");
+    paint
+        .save(place.path("hints").join(scene::name(4)))
+        .expect("writable");
+    let told = place.json(&["frames", "-o", "painted", "--hints", "hints", "--json"]);
+    assert!(told["painted"].as_u64() >= Some(3), "{told}");
+    for name in place.files("plain") {
+        let [plain, painted] =
+            ["plain", "painted"].map(|folder| lab(&place, &format!("{folder}/{name}")));
+        let passes = (3..6).any(|index| scene::name(index) == name);
+        let (mut inside, mut outside) = (Vec::new(), 0.0_f64);
+        for (i, (plain, painted)) in plain.iter().zip(&painted).enumerate() {
+            let (x, y) = (i as u32 % scene::SIZE[0], i as u32 / scene::SIZE[0]);
+            if passes && within(x, y) {
+                inside.push(painted[1]);
+            } else if !passes
+                || !(left - 3..left + side + 3).contains(&x)
+                || !(top - 3..top + side + 3).contains(&y)
+            {
+                let far = gs_chroma::color::ciede2000(*plain, *painted);
+                outside = outside.max(far);
+            }
+        }
+        assert!(outside < 1.0, "{name}: {outside}");
+        if passes {
+            let mean = inside.iter().sum::<f64>() / inside.len() as f64;
+            assert!(mean > 8.0, "{name}: a is {mean}");
+        }
+    }
+    // Hints for no photo are told.
+    std::fs::rename(
+        place.path("hints").join(scene::name(4)),
+        place.path("hints/other.png"),
+    )
+    .expect("a file");
+    let done = place.run(&["frames", "-o", "painted", "--hints", "hints"]);
+    assert_eq!(done.code, Some(1));
+    assert!(
+        done.stderr.contains("no image of it has the name"),
+        "{}",
+        done.stderr
+    );
+}
+
+#[test]
+fn hints_on_a_photo_without_a_pose_are_told() {
+    let place = place_with_run();
+    let path = place.path("scene/images/unplaced.png");
+    scene::photo(2).save(path).expect("writable");
+    let mut paint = image::RgbaImage::new(scene::SIZE[0], scene::SIZE[1]);
+    paint.put_pixel(9, 9, image::Rgba([255, 0, 0, 255]));
+    std::fs::create_dir(place.path("hints")).expect("writable");
+    paint
+        .save(place.path("hints/unplaced.png"))
+        .expect("writable");
+    let teacher = onnx("ddcolor_tiny.onnx");
+    let done = place.run(&["colorize", "--teacher", &teacher, "--hints", "hints"]);
+    assert_eq!(done.code, Some(1));
+    for part in ["unplaced.png", "COLMAP placed none", "10 of 11 photos"] {
+        assert!(done.stderr.contains(part), "{part}: {}", done.stderr);
+    }
+}
+
 /// A stand-in for ffmpeg that keeps what it is told and given.
 #[cfg(unix)]
 fn stand_in(place: &Place, script: &str) -> String {

@@ -20,6 +20,7 @@ mod faults;
 #[cfg(target_os = "linux")]
 mod fetch;
 mod folder;
+mod formats;
 mod frames;
 #[cfg(target_os = "linux")]
 mod host;
@@ -27,6 +28,7 @@ mod hostile;
 mod inspect;
 mod masks;
 mod names;
+mod paths;
 mod photos;
 mod picture;
 // Programs of others are stood in for by shell scripts.
@@ -49,3 +51,5 @@ mod tradeoff;
 mod train;
 mod variants;
 mod view;
+mod view_page;
+mod viewers;

@@ -19,7 +19,7 @@ use gs_chroma::{
     measure::decode_flo,
     oracle,
     run::RunFolder,
-    splats::{self, read_ply},
+    splats::{self, Format, SpzVersion, WriteOptions, read_ply, read_splats, write_splats},
 };
 use peak_alloc::PeakAlloc;
 use proptest::{
@@ -290,6 +290,30 @@ fn splat_files() {
         memory: PLAIN,
         cases: 1000,
     });
+    for (format, spz) in (Format::ALL.into_iter())
+        .filter(|format| format.is_read())
+        .map(|format| (format, SpzVersion::V3))
+        .chain([(Format::Spz, SpzVersion::V4)])
+    {
+        let path = place.path().join(format!("scene{}", format.extension()));
+        let options = WriteOptions {
+            spz,
+            ..WriteOptions::default()
+        };
+        write_splats(&path, &splats, &options).expect("writable");
+        let version = if spz == SpzVersion::V4 { "-4" } else { "" };
+        survives(&Kind {
+            name: &format!(
+                "{}{version}",
+                format.extension().trim_start_matches('.').replace('.', "-")
+            ),
+            corpus: vec![fs::read(&path).expect("a file")],
+            path,
+            read: &|path| drop(read_splats(path)),
+            memory: COMPRESSED,
+            cases: 1000,
+        });
+    }
     let path = place.path().join("chroma.npy");
     let field = splats::ShField::zeros(20, 1, 2);
     survives(&Kind {

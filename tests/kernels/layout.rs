@@ -311,9 +311,11 @@ fn constants_are_those_of_the_crate() {
 fn constants_are_those_of_the_oracle() {
     let common = include_str!("../../shaders/common/constants.wgsl");
     let harmonics = include_str!("../../shaders/common/sh.wgsl");
+    let playcanvas = include_str!("../../shaders/common/playcanvas.wgsl");
     let files = [
         ("constants", common),
         ("sh", harmonics),
+        ("playcanvas", playcanvas),
         ("luma_loss", shaders::LUMA_LOSS),
         ("luma_loss_window7", shaders::LUMA_LOSS_WINDOW7),
         ("luma_loss_window5", shaders::LUMA_LOSS_WINDOW5),
@@ -327,6 +329,13 @@ fn constants_are_those_of_the_oracle() {
     let expected = [
         ("constants", "TILE_SIDE", vec![oracle::TILE as f64]),
         ("constants", "BLUR", vec![oracle::BLUR]),
+        ("playcanvas", "BLUR", vec![oracle::PLAYCANVAS_BLUR]),
+        ("playcanvas", "TAIL", vec![oracle::PLAYCANVAS_TAIL]),
+        (
+            "playcanvas",
+            "RESCALE",
+            vec![1.0 / (1.0 - oracle::PLAYCANVAS_TAIL)],
+        ),
         ("constants", "ALPHA_MAX", vec![oracle::ALPHA_MAX]),
         ("constants", "ALPHA_MIN", vec![oracle::ALPHA_MIN]),
         ("constants", "COLOR_MAX", vec![oracle::COLOR_MAX]),

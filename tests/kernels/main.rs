@@ -35,6 +35,7 @@ mod scan;
 mod solver;
 mod sort;
 mod tiles;
+mod viewers;
 
 /// Prints, files and judges what is measured.
 #[test]

@@ -7,16 +7,16 @@ use std::{collections::BTreeSet, fs, path::Path};
 const FLOORS: [&[&str]; 12] = [
     &["cli"],
     &["auto"],
-    &["tradeoff", "prepare"],
+    &["tradeoff", "prepare", "view"],
     &["run"],
-    &["eval", "frames"],
+    &["eval", "frames", "viewers"],
     &["report", "doctor"],
     &["luma", "chroma"],
-    &["effects", "measure"],
+    &["effects", "measure", "trajectory"],
     &["raster"],
     &["capture", "splats"],
     &[
-        "gpu", "color", "sections", "download", "npy", "oracle", "compare",
+        "gpu", "color", "sections", "download", "npy", "programs", "oracle", "compare",
     ],
     &["disk", "hash", "input"],
 ];

@@ -124,6 +124,16 @@ fn only_antialiased_kernels_know_of_the_compensation() {
     }
 }
 
+/// So with the way another viewer draws.
+#[test]
+fn only_playcanvas_kernels_end_a_gaussian_early() {
+    let traces = ["falloff", "0.075", "PARTIAL_OPACITY"];
+    for (name, source) in shaders::ALL {
+        let found = traces.iter().any(|trace| source.contains(trace));
+        assert_eq!(found, name.contains("playcanvas"), "{name}");
+    }
+}
+
 /// So with what training may trade for time.
 #[test]
 fn kernels_know_of_no_numerics_but_their_own() {

@@ -9,7 +9,10 @@ mod region;
 mod shade;
 mod spread;
 
-use super::{ChromaError, FrozenViews, Lesson, Targets, Task, teacher::AbImage};
+use super::{
+    ChromaError, FrozenViews, Lesson, Targets, Task,
+    teacher::{AbImage, HintImage},
+};
 use crate::{
     capture::{Camera, Dataset, Photo},
     color::gray_to_lightness,
@@ -19,7 +22,24 @@ use crate::{
 };
 use region::{Surface, grow};
 use shade::shaded;
+pub(crate) use shade::{at_middle as at_middle_lightness, shaded as shaded_at};
 use spread::{Claim, Cloud};
+
+/// What paint on a photo claims of it, as [`grow`] has it: α a, α b, α of each pixel, a and b at
+/// the middle lightness. `lightness` is `L*`, `depth` in any unit, NaN where nobody knows.
+pub(crate) fn claimed_by_strokes(
+    size: [usize; 2],
+    lightness: &[f32],
+    depth: &[f32],
+    paint: &HintImage,
+) -> Vec<[f32; 3]> {
+    let surface = Surface {
+        size,
+        lightness,
+        depth,
+    };
+    grow(&surface, paint)
+}
 
 /// Of a pixel's opacity: from here on what is drawn there is the scene.
 const OPAQUE: f32 = 0.5;

@@ -14,14 +14,14 @@ const FOOT: f32 = 16.0;
 const DARK: f32 = 10.0;
 
 /// a and b of a surface at the middle lightness, from those at `lightness` (`L*`).
-pub(super) fn at_middle(color: [f32; 2], lightness: f32) -> [f32; 2] {
+pub(crate) fn at_middle(color: [f32; 2], lightness: f32) -> [f32; 2] {
     let factor = (MIDDLE + FOOT) / (lightness.max(DARK) + FOOT);
     color.map(|value| factor * value)
 }
 
 /// a and b at `lightness` (`L*`) of a surface that has `middle` at the middle lightness: under
 /// less or more light, and no more colorful than a display can show.
-pub(super) fn shaded(middle: [f32; 2], lightness: f32) -> [f32; 2] {
+pub(crate) fn shaded(middle: [f32; 2], lightness: f32) -> [f32; 2] {
     let factor = (lightness.max(DARK) + FOOT) / (MIDDLE + FOOT);
     let [a, b] = middle.map(|value| f64::from(factor * value));
     let [_, a, b] = srgb_to_lab(gamut_map_lab([f64::from(lightness), a, b]));

@@ -58,6 +58,19 @@ impl HintFolder {
         self.photos = photos.collect();
     }
 
+    /// Adds a photo of which there is no view.
+    pub fn know_photo(&mut self, name: &str, path: &Path) {
+        self.photos.insert(name.to_owned(), path.to_owned());
+    }
+
+    /// Whether there is an image for a photo, painted or not.
+    ///
+    /// # Errors
+    /// [`TeacherError::Ambiguous`] where nobody knows.
+    pub fn covers<'a>(&'a self, query: impl Into<Query<'a>>) -> Result<bool, TeacherError> {
+        self.images.covers(query)
+    }
+
     /// The paint on a photo, at the paint's own size or, where it is painted on the
     /// photo before its lens was taken out, at the photo's; none where there is no
     /// image. A photo may be given by its path relative to the photo folder.

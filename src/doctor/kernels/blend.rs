@@ -52,7 +52,7 @@ pub(super) fn pictures<const C: usize>(
 }
 
 /// `worst` is the largest error seen per unit of color, `brightest` the largest color.
-fn bounds(allowed: Allowance, worst: f64, brightest: f64) -> FlipBounds {
+pub(super) fn bounds(allowed: Allowance, worst: f64, brightest: f64) -> FlipBounds {
     FlipBounds {
         rest: allowed.relative(worst, brightest),
         // What a contribution at the floor of alpha shows, or of transmittance.

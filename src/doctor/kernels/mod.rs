@@ -17,6 +17,7 @@ mod scan;
 mod sort;
 mod step;
 mod view_correction;
+mod viewer;
 
 pub use chroma_loss::{ChromaInput, ChromaOutput};
 pub use scan::scan_on;
@@ -31,7 +32,7 @@ use crate::{gpu::GpuError, raster::Raster};
 type Measure = fn(&Arc<Raster>) -> Result<Vec<Row>, GpuError>;
 
 /// The topics in the order in which an iteration meets them.
-pub const TOPICS: [(&str, Measure); 16] = [
+pub const TOPICS: [(&str, Measure); 17] = [
     ("project", project::rows),
     ("scan", scan::rows),
     ("sort", sort::rows),
@@ -48,4 +49,5 @@ pub const TOPICS: [(&str, Measure); 16] = [
     ("relocation", relocation::rows),
     ("view correction", view_correction::rows),
     ("lbfgs", lbfgs::rows),
+    ("viewer", viewer::rows),
 ];

@@ -100,7 +100,10 @@ fn pull(geometry: &[f32], at: usize, count: usize) -> f64 {
 
 pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
     let mut rows = measure(raster, ["project_backward", "shade_backward"])?;
-    let antialiased = raster.drawing(RasterOptions { antialiased: true });
+    let antialiased = raster.drawing(RasterOptions {
+        antialiased: true,
+        ..RasterOptions::default()
+    });
     let names = ["project_backward, antialiased", "shade_backward"];
     // Shading is the same either way.
     rows.extend(

@@ -10,14 +10,14 @@ mod training;
 use std::{cell::RefCell, path::PathBuf, sync::Arc, time::Instant};
 
 use super::{
-    Event, Observer, Preset, RunError, RunFolder, Stage,
+    Event, Live, Observer, Preset, RunError, RunFolder, Stage,
     checkpoints::{CheckpointOptions, tell_given_up},
     commit::Commit,
     files,
     fingerprint::of_files,
     keeping,
     lock::RunLock,
-    scene::{comments_of_moved, open},
+    scene::{open, written_as},
     sound::open_examined,
 };
 use crate::{
@@ -26,9 +26,9 @@ use crate::{
     eval::GRAY_COLUMNS,
     gpu::Gpu,
     luma::{Goal, LumaSettings},
-    raster::{Raster, RasterOptions},
+    raster::Raster,
     report::{Report, contact_sheet},
-    splats::ply,
+    splats::write_splats,
 };
 use ahead::Ahead;
 pub use ahead::AheadOptions;
@@ -96,6 +96,8 @@ pub struct FitOptions {
     pub ahead: AheadOptions,
     /// How it can go on where it is interrupted.
     pub checkpoints: CheckpointOptions,
+    /// Who looks on.
+    pub live: Option<Arc<Live>>,
 }
 
 impl FitOptions {
@@ -114,6 +116,7 @@ impl FitOptions {
             timings: false,
             ahead: AheadOptions::default(),
             checkpoints: CheckpointOptions::default(),
+            live: None,
         }
     }
 }
@@ -160,6 +163,9 @@ pub fn fit(
     };
     let examined = open_examined(&options.colmap_dir, &load, observe)?;
     let (dataset, evidence) = (Arc::new(examined.dataset), examined.evidence);
+    if let Some(live) = &options.live {
+        live.begin(&dataset);
+    }
     let question = question(
         options,
         &budget,
@@ -224,10 +230,12 @@ fn write(folder: &RunFolder, trained: &Trained, report: &Report) -> Result<(), R
     }
     commit.remove_page(&folder.evaluation_page());
     let drawn = trained.scene.settings.raster_options();
-    let comments = comments_of_moved(drawn, report.capture.offset.into());
-    let origin = glam::DVec3::ZERO;
-    let luma = commit.place(&folder.luma());
-    ply::write_ply(&luma, &trained.scene.splats, origin, &comments)?;
+    let options = written_as(drawn, report.capture.offset.into());
+    write_splats(
+        &commit.place(&folder.luma()),
+        &trained.scene.splats,
+        &options,
+    )?;
     let sheet = contact_sheet(&GRAY_COLUMNS, &trained.rows);
     files::write_png(&commit.place(&folder.contact_sheet()), &sheet)?;
     files::write(&commit.place(&folder.log()), trained.log.as_bytes())?;
@@ -239,11 +247,4 @@ fn write(folder: &RunFolder, trained: &Trained, report: &Report) -> Result<(), R
 pub(super) fn open_gpu(timed: bool) -> Result<Gpu, RunError> {
     let gpu = Gpu::open()?;
     Ok(if timed { gpu.timed()? } else { gpu })
-}
-
-/// Comments in the header of every splat file; one says how it wants to be drawn.
-pub(super) fn comments(options: RasterOptions) -> Vec<String> {
-    let program = format!("gs-chroma {}", env!("CARGO_PKG_VERSION"));
-    let mode = options.antialiased.then(|| ply::ANTIALIASED.to_owned());
-    std::iter::once(program).chain(mode).collect()
 }

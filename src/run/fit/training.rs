@@ -1,13 +1,20 @@
 //! One training, from settings to measured splats.
 
-use std::{cell::RefCell, fmt::Write, ops::ControlFlow, sync::Arc, time::Instant};
+use std::{
+    cell::RefCell,
+    fmt::Write,
+    ops::ControlFlow,
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
 use serde_json::Value;
 
 use super::super::{
-    Event, Observer, RunError, RunFolder, Stage,
+    Event, Observer, RunError, RunFolder, SceneKind, Stage,
     checkpoints::FileKeeper,
     foreign::tell_unlike,
+    live::Showing,
     log::with_rows,
     scene::{Frame, read_splats, tell_trial},
 };
@@ -22,7 +29,7 @@ use crate::{
     eval::{Progress, Reference, gray_rows, mean_quality, measure_luma},
     gpu::Gpu,
     luma::{Fit, LumaEvent, LumaProgress, LumaScene},
-    raster::Raster,
+    raster::{Raster, RasterOptions},
     report::{KernelReport, LumaQuality, LumaView, PhotoReport, Row, kernel_reports},
 };
 
@@ -198,7 +205,13 @@ impl Job<'_> {
             self.begun,
         );
         let checkpoint = found.map(|found| &found.checkpoint);
-        let scene = fit.run_from(checkpoint, &mut keeper, settings, &mut |event| {
+        let live = options.live.as_deref();
+        let mut showing = Showing {
+            keeper: &mut keeper,
+            live,
+            luma: None,
+        };
+        let scene = fit.run_from(checkpoint, &mut showing, settings, &mut |event| {
             let observe = &mut *observe.borrow_mut();
             match event {
                 // Not asked for: the evidence is there.
@@ -213,6 +226,14 @@ impl Job<'_> {
                 LumaEvent::Trial(progress) => tell_trial(&progress, observe),
                 LumaEvent::Plan(plan) => {
                     observe(Event::Note(plan.to_string()));
+                    if let Some(live) = live {
+                        let antialiased = plan.has(Effect::Antialias);
+                        let drawn = RasterOptions {
+                            antialiased,
+                            ..RasterOptions::default()
+                        };
+                        live.plan(plan, drawn);
+                    }
                     if let Some((path, _, drawn)) = &init {
                         let antialiased = plan.has(Effect::Antialias);
                         if drawn.antialiased != antialiased {
@@ -232,6 +253,9 @@ impl Job<'_> {
                     None => format!("at most {fits} Gaussians fit into the adapter's bindings"),
                 })),
                 LumaEvent::Training(progress) => {
+                    if let Some(live) = live {
+                        live.note(&progress);
+                    }
                     // Writing to a string cannot fail.
                     let _ = writeln!(
                         log.borrow_mut(),
@@ -262,6 +286,9 @@ impl Job<'_> {
             None => scene?,
         };
         drop(keeper);
+        if let Some(live) = live {
+            live.show(SceneKind::Luma, scene.splats.clone(), Duration::ZERO);
+        }
         let timings = (options.timings)
             .then(|| Ok::<_, RunError>(kernel_reports(&self.gpu.timings()?, &scene.load)))
             .transpose()?;

@@ -1,29 +1,29 @@
 //! `frames`: the photos themselves in color.
 
-mod film;
+mod painted;
 mod shots;
 
-use std::{
-    cell::RefCell,
-    path::{Path, PathBuf},
-    sync::Arc,
-};
+use std::{cell::RefCell, num::NonZero, path::PathBuf, sync::Arc, thread};
 
-use film::FilmWriter;
+use painted::Painted;
 use shots::{Shot, shots_of};
 
 use super::{
     Event, Observer, RunError, RunFolder, Stage, files,
+    film::{FRAME_RATE, FilmWriter, Purpose, is_film},
     fit::open_gpu,
     keeping,
+    lock::RunLock,
     scene::{Frame, open, read_scene},
     teach::{TeachOptions, Teachers},
 };
 use crate::{
-    capture::{Dataset, Exposure, Film, LoadOptions, in_order},
+    capture::{CaptureError, Dataset, Exposure, Film, LoadOptions, Original, in_order},
     chroma::teacher::{AbImage, Query, TeacherSettings},
     eval::exposures,
-    frames::{Believed, Between, Canvas, Carried, Colored, SceneDrawer, ViewOf, blend, finish},
+    frames::{
+        Believed, Between, Canvas, Carried, Colored, SceneDrawer, Strokes, ViewOf, blend, finish,
+    },
     raster::Raster,
     report::Report,
 };
@@ -34,6 +34,10 @@ const CARRIED: f64 = 0.9;
 
 /// A share of a photo that the scene leaves open from which on the photo before is asked.
 const OPEN: f64 = 0.005;
+
+/// Pixels of photos without a pose, 2 bytes each, that wait for the next one with a pose; of more
+/// photos the files are read again.
+const KEPT: usize = 1 << 28;
 
 /// What `frames` is asked to do.
 #[derive(Clone, Debug)]
@@ -48,6 +52,8 @@ pub struct FramesOptions {
     pub teacher_settings: TeacherSettings,
     /// A folder for pictures, or a film by its extension.
     pub output: PathBuf,
+    /// A folder of painted hints, for what the scene does not cover; the run's by default.
+    pub hints: Option<PathBuf>,
     /// Whether the scene is left out: the teacher's own pictures, to compare with.
     pub teacher_alone: bool,
     /// Frames a second of a film; by default those of the film that the photos come from, or 24.
@@ -65,22 +71,14 @@ pub struct Frames {
     pub placed: usize,
     /// How many take their colors from their neighbors.
     pub carried: usize,
+    /// How many show strokes where the scene leaves them open.
+    pub painted: usize,
     /// Which share of the photos with a pose the scene covers, their mean.
     pub covered: f64,
     /// All that is doubtful, photos that cannot be read among it.
     pub warnings: Vec<String>,
     /// Seconds of the whole.
     pub seconds: f64,
-}
-
-/// Extensions of films.
-const FILMS: [&str; 4] = ["mp4", "mov", "mkv", "m4v"];
-
-/// Whether a path names a film and not a folder.
-fn is_film(path: &Path) -> bool {
-    let extension = path.extension().unwrap_or_default().to_string_lossy();
-    let known = |film: &&str| extension.eq_ignore_ascii_case(film);
-    FILMS.iter().any(known) && !path.is_dir()
 }
 
 /// Colors the photos of a run and writes them.
@@ -96,7 +94,7 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
         None => RunFolder::newest()?,
     };
     observe(Event::begins(Stage::Model));
-    let report = folder.read_report()?;
+    let (_lock, report) = RunLock::to_read(&folder)?;
     let noted = PathBuf::from(&report.capture.path);
     let colmap_dir = options.colmap.clone().unwrap_or(noted);
     let scene = read_scene(&folder.luma(), Frame::Own, observe)?;
@@ -108,7 +106,12 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
     };
     let dataset = open(&colmap_dir, &load, observe)?.caching(0);
     let film = Film::read(&colmap_dir)?;
-    let shots = shots_of(&dataset, film.as_ref(), &options.output)?;
+    // At the rate of the film that the photos come from.
+    let rate = options
+        .frame_rate
+        .or(film.as_ref().map(|film| film.frame_rate));
+    let rate = rate.unwrap_or(FRAME_RATE);
+    let shots = shots_of(&dataset, film.as_ref(), (&options.output, rate))?;
     let teachers = open_teachers(options, &report, &folder, &dataset, observe)?;
     let luma = scene.splats.to_luma();
     let drawn = report.luma.settings.raster_options();
@@ -121,12 +124,14 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
         teachers,
         side: None,
     };
-    let mut out = Out::open(options, film.as_ref(), &shots)?;
+    let mut out = Out::open(options, rate, film.as_ref(), &shots)?;
+    let painted = find_painted(options, &report, &shots, &mut painter, observe)?;
     let mut told = Frames {
         output: options.output.clone(),
         photos: 0,
         placed: 0,
         carried: 0,
+        painted: 0,
         covered: 0.0,
         warnings: Vec::new(),
         seconds: 0.0,
@@ -144,18 +149,28 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
     let mut last: Option<Known> = None;
     let mut open: Vec<Unknown<'_>> = Vec::new();
     let mut unread = Vec::new();
-    for shot in &shots {
+    let mut kept = 0;
+    for (index, shot) in shots.iter().enumerate() {
         progress(told.photos + open.len(), &shot.name);
+        let strokes = painted.on(index);
+        told.painted += usize::from(strokes.is_some());
         if shot.views.is_empty() {
             match dataset.loader().unplaced(&shot.path) {
-                Ok(original) => open.push(Unknown {
-                    shot,
-                    canvas: Canvas::of(&original, painter.side(&original)),
-                }),
+                Ok(original) => {
+                    let canvas = Canvas::of(&original, painter.side(&original));
+                    kept += original.gray.len();
+                    open.push(Unknown {
+                        shot,
+                        canvas,
+                        strokes,
+                        original: (kept <= KEPT).then_some(original),
+                    });
+                }
                 Err(error) => unread.push(error.to_string()),
             }
             continue;
         }
+        kept = 0;
         let original = dataset.loader().original(painter.view(shot))?;
         let canvas = painter.canvas(shot, &original);
         let seen = match options.teacher_alone {
@@ -174,11 +189,17 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
             }
             _ => Vec::new(),
         };
-        let before = (last.as_ref())
-            .and_then(|last| Some(last.as_carried().along(&whole(&steps)?, false, &canvas)));
+        let before = (last.as_ref()).and_then(|last| {
+            Some(
+                last.as_carried(false)
+                    .along(&whole(&steps)?, false, &canvas),
+            )
+        });
         let answer = painter.answer(&shot.name, painter.views(shot).first(), &canvas)?;
         let ab = blend(&canvas, &seen, answer.as_deref(), before.as_ref());
-        let next = Known { canvas, ab };
+        // What comes after is colored as if nothing were painted, and painted by itself.
+        let shown = strokes.map(|strokes| strokes.over(&canvas, &seen, &ab));
+        let next = Known { canvas, ab, shown };
         let ends = Ends {
             before: last.as_ref(),
             after: Some(&next),
@@ -187,7 +208,7 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
         told.photos += open.len();
         carry(&mut painter, &open, &steps, &ends, &mut out)?;
         open.clear();
-        out.write(shot, finish(&original, &next.canvas, next.ab.clone()))?;
+        out.write(shot, finish(&original, &next.canvas, next.shown().to_vec()))?;
         told.covered += seen.share();
         told.placed += 1;
         told.photos += 1;
@@ -256,6 +277,36 @@ fn open_teachers(
             Ok(None)
         }
         Err(error) => Err(error),
+    }
+}
+
+/// The strokes of the hints that are named, or of the run's where these are still there.
+fn find_painted(
+    options: &FramesOptions,
+    report: &Report,
+    shots: &[Shot],
+    painter: &mut Painter<'_>,
+    observe: &mut Observer<'_>,
+) -> Result<Painted, RunError> {
+    let of_run = report.chroma.as_ref();
+    let noted = of_run.and_then(|chroma| chroma.hint_folder.as_ref());
+    let folder = match (&options.hints, noted) {
+        (Some(folder), _) => folder.clone(),
+        (None, Some(noted)) => PathBuf::from(noted),
+        (None, None) => return Ok(Painted::default()),
+    };
+    if options.teacher_alone {
+        return Ok(Painted::default());
+    }
+    let grow = options.hints.is_some() || of_run.is_some_and(|chroma| chroma.claimed.is_some());
+    match Painted::find(&folder, grow, shots, painter, observe) {
+        Err(error) if options.hints.is_none() => {
+            observe(Event::Warning(format!(
+                "what the scene does not cover is not painted, for the run's hints cannot be read: {error}"
+            )));
+            Ok(Painted::default())
+        }
+        found => found,
     }
 }
 
@@ -340,13 +391,19 @@ impl<'a> Painter<'a> {
 struct Known {
     canvas: Canvas,
     ab: Vec<[f32; 2]>,
+    /// With strokes over them, where there are some.
+    shown: Option<Vec<[f32; 2]>>,
 }
 
 impl Known {
-    fn as_carried(&self) -> Carried<'_> {
+    fn shown(&self) -> &[[f32; 2]] {
+        self.shown.as_deref().unwrap_or(&self.ab)
+    }
+
+    fn as_carried(&self, shown: bool) -> Carried<'_> {
         Carried {
             canvas: &self.canvas,
-            ab: &self.ab,
+            ab: if shown { self.shown() } else { &self.ab },
         }
     }
 }
@@ -355,6 +412,9 @@ impl Known {
 struct Unknown<'a> {
     shot: &'a Shot,
     canvas: Canvas,
+    strokes: Option<&'a Strokes>,
+    /// None where there are too many to be kept.
+    original: Option<Original>,
 }
 
 /// What is known before and after photos without a pose.
@@ -403,29 +463,56 @@ fn carry(
     ends: &Ends<'_>,
     out: &mut Out,
 ) -> Result<(), RunError> {
-    for (i, Unknown { shot, canvas }) in open.iter().enumerate() {
-        // With nothing before, the first step leads from the first of them to the second.
-        let first = usize::from(ends.before.is_some());
-        let (before, after) = steps.split_at((i + first).min(steps.len()));
-        let of = |known: Option<&Known>, way: &[Option<Between>], backwards: bool| {
-            let way = whole(way)?;
-            Some(known?.as_carried().along(&way, backwards, canvas))
-        };
-        let nearness = (i + 1) as f32 / (open.len() + 1) as f32;
-        let seen = joined(
-            canvas.len(),
-            [
-                (of(ends.before, before, false), 1.0 - nearness),
-                (of(ends.after, after, true), nearness),
-            ],
-        );
-        let answer = match seen.share() < CARRIED {
-            true => painter.answer(&shot.name, None, canvas)?,
-            false => None,
-        };
-        let ab = blend(canvas, &seen, answer.as_deref(), None);
-        let original = painter.dataset.loader().unplaced(&shot.path)?;
-        out.write(shot, finish(&original, canvas, ab))?;
+    // Of several the slow part is done at once, and as many wait as there are threads.
+    let threads = thread::available_parallelism().map_or(1, NonZero::get);
+    for (part, some) in open.chunks(threads).enumerate() {
+        let mut known = Vec::with_capacity(some.len());
+        for (k, unknown) in some.iter().enumerate() {
+            let canvas = &unknown.canvas;
+            let i = part * threads + k;
+            // With nothing before, the first step leads from the first of them to the second.
+            let first = usize::from(ends.before.is_some());
+            let (before, after) = steps.split_at((i + first).min(steps.len()));
+            let of = |known: Option<&Known>, way: &[Option<Between>], backwards: bool| {
+                let way = whole(way)?;
+                Some(known?.as_carried(true).along(&way, backwards, canvas))
+            };
+            let nearness = (i + 1) as f32 / (open.len() + 1) as f32;
+            let seen = joined(
+                canvas.len(),
+                [
+                    (of(ends.before, before, false), 1.0 - nearness),
+                    (of(ends.after, after, true), nearness),
+                ],
+            );
+            let answer = match seen.share() < CARRIED {
+                true => painter.answer(&unknown.shot.name, None, canvas)?,
+                false => None,
+            };
+            known.push((unknown, seen, answer));
+        }
+        let loader = painter.dataset.loader();
+        in_order(
+            &known,
+            |(unknown, seen, answer)| {
+                let canvas = &unknown.canvas;
+                let ab = blend(canvas, seen, answer.as_deref(), None);
+                let ab = match unknown.strokes {
+                    Some(strokes) => strokes.over(canvas, &Believed::nothing(canvas.len()), &ab),
+                    None => ab,
+                };
+                match &unknown.original {
+                    Some(original) => Ok(finish(original, canvas, ab)),
+                    None => {
+                        let original = loader.unplaced(&unknown.shot.path)?;
+                        Ok(finish(&original, canvas, ab))
+                    }
+                }
+            },
+            |(unknown, ..), colored: Result<Colored, CaptureError>| {
+                out.write(unknown.shot, colored?)
+            },
+        )?;
     }
     Ok(())
 }
@@ -462,6 +549,7 @@ enum Out {
 impl Out {
     fn open(
         options: &FramesOptions,
+        rate: [u32; 2],
         film: Option<&Film>,
         shots: &[Shot],
     ) -> Result<Self, RunError> {
@@ -475,14 +563,16 @@ impl Out {
             return Ok(Self::Folder(options.output.clone()));
         }
         files::make_folder_of(&options.output)?;
-        let writer = FilmWriter::new(&options.output, film, options.frame_rate)?;
-        Ok(Self::Film(Box::new(writer)))
+        let writer = FilmWriter::new(&options.output, rate, Purpose::Editing)?;
+        Ok(Self::Film(Box::new(writer.sounding_like(film))))
     }
 
     fn write(&mut self, shot: &Shot, colored: Colored) -> Result<(), RunError> {
         match self {
             Self::Folder(folder) => files::write_colored(&folder.join(&shot.output), colored),
-            Self::Film(film) => film.write(&shot.name, &colored),
+            Self::Film(film) => {
+                (0..shot.repeats).try_for_each(|_| film.write_colored(&shot.name, &colored))
+            }
         }
     }
 

@@ -22,16 +22,19 @@ pub(super) struct Shot {
     pub views: Range<usize>,
     /// The path of its picture in color below a folder.
     pub output: String,
+    /// How many frames of a film show it.
+    pub repeats: usize,
 }
 
-/// The frames of the film, or else all photos by name. `output` must not be where they lie.
+/// The frames of the film, or else all photos by name. `output` must not be where they lie; a
+/// film has `rate` frames a second.
 ///
 /// # Errors
 /// [`RunError::File`] where pictures would go among the photos or a frame is missing.
 pub(super) fn shots_of(
     dataset: &Dataset,
     film: Option<&Film>,
-    output: &Path,
+    (output, rate): (&Path, [u32; 2]),
 ) -> Result<Vec<Shot>, RunError> {
     let root = &dataset.capture.root;
     let mut views = BTreeMap::<&str, Range<usize>>::new();
@@ -61,8 +64,9 @@ pub(super) fn shots_of(
     }
     let plain: Vec<&str> = names.iter().map(String::as_str).collect();
     let outputs = distinct(&plain);
-    (names.iter().zip(outputs))
-        .map(|(name, output)| {
+    let repeats = film.map_or_else(|| vec![1; names.len()], |film| film.repeats(rate));
+    (names.iter().zip(outputs).zip(repeats))
+        .map(|((name, output), repeats)| {
             let range = views.get(name.as_str()).cloned().unwrap_or_default();
             // A name may be spelled otherwise on the disk.
             let path = match dataset.capture.views.get(range.start) {
@@ -81,6 +85,7 @@ pub(super) fn shots_of(
                 path,
                 views: range,
                 output,
+                repeats,
             })
         })
         .collect()

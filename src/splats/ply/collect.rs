@@ -2,19 +2,10 @@
 
 use super::header::VertexLayout;
 use super::{CHANNELS, ReadSplats, sh_position};
+use crate::splats::file::MIN_QUATERNION_NORM;
+use crate::splats::quantize::{FLAT, OPAQUE};
 use crate::splats::sh::{C0, coefficient_count};
 use crate::splats::{ShField, Splats};
-
-/// Norm below which a quaternion has no direction.
-const MIN_QUATERNION_NORM: f64 = 1e-12;
-
-/// The logit that stands for an opacity of 1: 3e-7 below it, which is opaque, and which f32
-/// still tells from it, so that training can move it.
-pub(super) const OPAQUE: f32 = 15.0;
-
-/// The logarithm that stands for that of 0: a scale of 2e-9 is flat in any unit that a scene
-/// has, and its square is an f32.
-pub(super) const FLAT: f32 = -20.0;
 
 /// Sorts the numbers of each Gaussian into the arrays.
 pub(super) struct Collector {

@@ -22,24 +22,6 @@ pub enum PlyError {
         /// What is wrong, with the line.
         reason: String,
     },
-    /// The file has another layout than the uncompressed one.
-    #[error(
-        "{}: this is a compressed splat file; convert it to an uncompressed .ply, for example with SuperSplat", path.display()
-    )]
-    Compressed {
-        /// The splat file.
-        path: PathBuf,
-    },
-    /// The file's name is that of a format that is not read.
-    #[error(
-        "{}: {format} files are not read; convert it to .ply, for example with SuperSplat", path.display()
-    )]
-    OtherFormat {
-        /// The file.
-        path: PathBuf,
-        /// The extension.
-        format: String,
-    },
     /// The vertices are points, not Gaussians.
     #[error(
         "{}: a point cloud, not a splat file: its vertices have neither opacity nor scales; give a trained scene, or none, and training starts from COLMAP's points", path.display()

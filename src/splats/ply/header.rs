@@ -114,11 +114,6 @@ impl VertexLayout {
     /// Finds the properties of a Gaussian among those of the vertex element.
     pub fn new(path: &Path, vertex: &ElementDef) -> Result<Self, PlyError> {
         let properties = &vertex.properties;
-        if properties.contains_key("packed_position") {
-            return Err(PlyError::Compressed {
-                path: path.to_path_buf(),
-            });
-        }
         let types = properties
             .values()
             .map(|property| match &property.data_type {

@@ -10,39 +10,26 @@
 //! 8 bits, `red green blue`, in the place of `f_dc_0..2`.
 
 mod collect;
+mod compressed;
 mod error;
 mod header;
 mod read;
 mod write;
 
 pub use error::PlyError;
-pub use read::{ReadSplats, read_ply};
+pub use read::read_ply;
 pub use write::write_ply;
-
-use std::path::Path;
 
 use glam::DVec3;
 
-use super::sh::{MAX_DEGREE, coefficient_count};
+pub(super) use compressed::encode as encode_compressed;
+pub(super) use write::check;
 
-/// Extensions of splat files of other formats.
-const OTHER_FORMATS: [&str; 4] = ["splat", "ksplat", "spz", "sog"];
-
-/// Whether a path is named like a splat file that can be read.
-///
-/// # Errors
-/// [`PlyError::OtherFormat`] where it is named like one that cannot.
-pub fn is_splat_file(path: &Path) -> Result<bool, PlyError> {
-    let extension = path.extension().unwrap_or_default();
-    let other = (OTHER_FORMATS.iter()).find(|format| extension.eq_ignore_ascii_case(format));
-    match other {
-        Some(format) => Err(PlyError::OtherFormat {
-            path: path.to_path_buf(),
-            format: format!(".{format}"),
-        }),
-        None => Ok(extension.eq_ignore_ascii_case("ply")),
-    }
-}
+use super::{
+    ReadSplats,
+    file::CHANNELS,
+    sh::{MAX_DEGREE, coefficient_count},
+};
 
 /// The comment that tells readers to draw with opacities that fall by what the blur
 /// spreads: Brush's, which splat-transform reads as well.
@@ -57,9 +44,6 @@ pub fn offset_comment(offset: DVec3) -> String {
     let [x, y, z] = offset.to_array();
     format!("{OFFSET} {x} {y} {z}")
 }
-
-/// Color channels of a splat file.
-const CHANNELS: usize = 3;
 
 /// Properties before the SH: center and normal.
 const NORMALS: [&str; 3] = ["nx", "ny", "nz"];

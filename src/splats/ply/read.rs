@@ -2,9 +2,8 @@
 
 use super::collect::Collector;
 use super::header::{VertexLayout, byte_size, decode, is_antialiased, offset, read_header};
-use super::{PlyError, is_splat_file};
-use crate::{input, splats::Splats};
-use glam::DVec3;
+use super::{PlyError, ReadSplats, compressed};
+use crate::input;
 use ply_rs_bw::ply::{ElementDef, Encoding, PropertyType, ScalarType};
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, ErrorKind, Read};
@@ -13,42 +12,24 @@ use std::path::Path;
 /// Bytes of the body that are read at once.
 const CHUNK_BYTES: usize = 1 << 20;
 
-/// What a splat file holds.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct ReadSplats {
-    /// The Gaussians, with an RGB field. Quaternions are as in the file, not
-    /// necessarily of unit length.
-    pub splats: Splats,
-    /// Gaussians that were left out because a number was not finite or the
-    /// quaternion zero. An infinite opacity is not counted: it is opaque or transparent; nor is
-    /// a scale of minus infinity: it is flat.
-    pub skipped: usize,
-    /// What was subtracted from the centers, in world units, as the header says
-    /// ([`offset_comment`](super::offset_comment)); zero where it says nothing.
-    pub offset: DVec3,
-    /// Bytes behind all that the header announces: its count is likely too small.
-    pub surplus: u64,
-    /// Whether the header says that the Gaussians were trained antialiased
-    /// ([`ANTIALIASED`](super::ANTIALIASED), or Postshot's `antialiased 1`).
-    pub antialiased: bool,
-}
-
-/// Reads an uncompressed 3D Gaussian Splatting `.ply` file.
+/// Reads a 3D Gaussian Splatting `.ply` file, compressed or not.
 ///
-/// Text or binary of either byte order; properties in any order and of any
+/// Uncompressed ones are text or binary of either byte order; properties in any order and of any
 /// type; further properties and elements are ignored. Numbers are rounded to
 /// f32. Gaussians of two scales are flat; `red green blue` of 8 bits stand for `f_dc_0..2`.
 ///
 /// # Errors
-/// A [`PlyError`] where the name is that of another format, the header is damaged or longer than 64 KiB, a property
+/// A [`PlyError`] where the header is damaged or longer than 64 KiB, a property
 /// is missing, the number of `f_rest_*` fits no degree, or the file is shorter
 /// than its header says (found out before memory is taken for it).
 pub fn read_ply(path: &Path) -> Result<ReadSplats, PlyError> {
-    is_splat_file(path)?;
     let file = input::open(path).map_err(PlyError::io(path))?;
     let file_bytes = file.metadata().map_err(PlyError::io(path))?.len();
     let mut file = BufReader::with_capacity(CHUNK_BYTES, file);
     let header = read_header(path, &mut file)?;
+    if compressed::is_compressed(&header) {
+        return compressed::read(path, &header, &mut file);
+    }
     let antialiased = is_antialiased(&header.comments);
     let mut body = Body {
         path,

@@ -46,17 +46,39 @@ pub fn write_ply(
     for start in (0..splats.len()).step_by(CHUNK_ROWS) {
         values.clear();
         for index in start..(start + CHUNK_ROWS).min(splats.len()) {
-            push_row(&mut values, splats, index, offset).map_err(|bad| PlyError::BadValue {
-                path: path.to_path_buf(),
-                index,
-                property: bad.0,
-                value: bad.1,
-            })?;
+            push_row(&mut values, splats, index, offset).map_err(bad_value(path, index))?;
         }
         let little_endian: &[u8] = bytemuck::cast_slice(&values);
         file.write_all(little_endian).map_err(io_error(path))?;
     }
     file.persist(path).map_err(io_error(path))
+}
+
+/// Whether Gaussians can be written to a file of any format, `offset` added to their centers.
+///
+/// # Errors
+/// As [`write_ply`].
+pub(in crate::splats) fn check(
+    path: &Path,
+    splats: &Splats,
+    offset: DVec3,
+) -> Result<(), PlyError> {
+    check_arrays(path, splats)?;
+    let mut row = Vec::new();
+    for index in 0..splats.len() {
+        row.clear();
+        push_row(&mut row, splats, index, offset).map_err(bad_value(path, index))?;
+    }
+    Ok(())
+}
+
+fn bad_value(path: &Path, index: usize) -> impl FnOnce((&'static str, f64)) -> PlyError {
+    move |(property, value)| PlyError::BadValue {
+        path: path.to_path_buf(),
+        index,
+        property,
+        value,
+    }
 }
 
 fn check_arrays(path: &Path, splats: &Splats) -> Result<(), PlyError> {

@@ -79,6 +79,34 @@ pub(super) const CASES: &[Case] = &[
         &["runs/none/report.json", "gs-chroma fit"],
     ),
     case(
+        "no such run to look at",
+        nothing,
+        "view runs/none",
+        &["runs/none/report.json", "gs-chroma fit"],
+    ),
+    case(
+        "a cut splat file to look at",
+        cut_ply,
+        "view cut.ply",
+        &["cut.ply", "cut off"],
+    ),
+    case(
+        "a run without a scene to look at",
+        |p| {
+            for file in ["luma.ply", "color.ply"] {
+                std::fs::remove_file(p.path("runs/scene").join(file)).expect("a file");
+            }
+        },
+        "view",
+        &["scene: has no scene", "gs-chroma fit"],
+    ),
+    case(
+        "no run to send to someone",
+        no_runs,
+        "export -o out.html",
+        &["no run under runs/", "gs-chroma fit"],
+    ),
+    case(
         "no such path for info",
         nothing,
         "info runs/none",

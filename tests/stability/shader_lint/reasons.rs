@@ -211,6 +211,11 @@ pub const REASONS: &[(&str, &str, &str)] = &[
         "the divisor is at least ALPHA_MIN",
     ),
     (
+        "sum_instances",
+        "m[PARTIAL_OPACITY] / max(q.w, ALPHA_MIN)",
+        "the divisor is at least ALPHA_MIN",
+    ),
+    (
         "rgb_loss",
         "0.5 / f32(pixels)",
         "the kernel runs for images of at least one pixel",

@@ -1,19 +1,19 @@
-//! `render`: pictures from the photographed viewpoints.
+//! `render`: pictures from the photographed viewpoints, and along a path.
+
+mod path;
+mod subject;
 
 use std::{path::PathBuf, sync::Arc};
 
-use super::{
-    Event, Observer, RunError, RunFolder, Stage, files,
-    foreign::tell_unlike,
-    picture_names,
-    scene::{Frame, open, read_splats},
-};
+pub use path::{PathOptions, Rendered, Way, render_path};
+use subject::Subject;
+
+use super::{Event, Observer, RunError, Stage, files, foreign::tell_unlike, picture_names, scene};
 use crate::{
-    capture::{Capture, LoadOptions, Loader, Normalize, split},
+    capture::{LoadOptions, Loader, Normalize, split},
     gpu::Gpu,
     raster::{Raster, Renderer},
     report::to_image,
-    splats::ply,
 };
 
 /// Longer side in pixels at which a splat file is compared with the photos.
@@ -51,46 +51,11 @@ pub struct RenderOptions {
 /// # Errors
 /// [`RunError`].
 pub fn render(options: &RenderOptions, observe: &mut Observer<'_>) -> Result<usize, RunError> {
-    let (file, colmap, load, run) = match &options.run {
-        Some(path) if ply::is_splat_file(path)? => {
-            let colmap = options
-                .colmap
-                .clone()
-                .ok_or_else(|| RunError::NoCameras(path.clone()))?;
-            (path.clone(), colmap, LoadOptions::default(), None)
-        }
-        run => {
-            let folder = match run {
-                Some(path) => RunFolder::at(path),
-                None => RunFolder::newest()?,
-            };
-            let report = folder.read_report()?;
-            let (capture, drawn) = (report.capture, report.luma.settings.raster_options());
-            let colored = !options.luma && folder.color().exists();
-            let file = if colored {
-                folder.color()
-            } else {
-                folder.luma()
-            };
-            let noted = PathBuf::from(&capture.path);
-            let colmap = options.colmap.clone().unwrap_or(noted);
-            (file, colmap, capture.load, Some(drawn))
-        }
-    };
-    observe(Event::begins(Stage::Model));
-    let capture = Capture::load_with(&colmap, &load.capture())?;
-    let frame = match run {
-        Some(_) => Frame::Own,
-        None => Frame::World(capture.offset),
-    };
-    let (splats, drawn) = read_splats(&file, frame, observe)?;
-    let splats = if options.luma {
-        splats.to_luma()
-    } else {
-        splats
-    };
-    let split = split(&capture.views, load.holdout);
-    let loader = Loader::new(load);
+    let colmap = options.colmap.as_deref();
+    let subject = Subject::open(options.run.as_deref(), colmap, options.luma, observe)?;
+    let capture = subject.cameras()?;
+    let split = split(&capture.views, subject.load.holdout);
+    let loader = Loader::new(subject.load.clone());
     let chosen: Vec<usize> = match options.views {
         Some(Views::Train) => split.train,
         Some(Views::Test) => split.test,
@@ -104,19 +69,10 @@ pub fn render(options: &RenderOptions, observe: &mut Observer<'_>) -> Result<usi
     let names = picture_names(&capture.views);
     observe(Event::begins(Stage::Device));
     let gpu = Gpu::open()?;
-    if run.is_none() {
-        let load = LoadOptions {
-            max_side: Some(CHECKED_SIDE),
-            normalize: Normalize::Off,
-            ..LoadOptions::default()
-        };
-        // Pictures do not depend on what photos show: where they cannot be compared, they are not.
-        if let Ok(dataset) = open(&colmap, &load, &mut |_| {}) {
-            tell_unlike(&gpu, &dataset, (&file, &splats.to_luma()), drawn, observe)?;
-        }
-    }
-    let raster = Arc::new(Raster::with(&gpu, run.unwrap_or(drawn)));
-    let mut renderer = Renderer::of(&raster, &splats, &[&splats.sh], capture.extent())?;
+    subject.tell_unlike(&gpu, observe)?;
+    let raster = Arc::new(Raster::with(&gpu, subject.drawn));
+    let splats = &subject.splats;
+    let mut renderer = Renderer::of(&raster, splats, &[&splats.sh], capture.extent())?;
     for (done, &i) in chosen.iter().enumerate() {
         let view = &capture.views[i];
         observe(Event::Progress {
@@ -138,4 +94,24 @@ pub fn render(options: &RenderOptions, observe: &mut Observer<'_>) -> Result<usi
         )?;
     }
     Ok(chosen.len())
+}
+
+impl Subject {
+    /// Warns where a splat file of others does not show what the photos show.
+    fn tell_unlike(&self, gpu: &Gpu, observe: &mut Observer<'_>) -> Result<(), RunError> {
+        let (true, Some(capture)) = (self.foreign, &self.capture) else {
+            return Ok(());
+        };
+        let load = LoadOptions {
+            max_side: Some(CHECKED_SIDE),
+            normalize: Normalize::Off,
+            ..LoadOptions::default()
+        };
+        // Pictures do not depend on what photos show: where they cannot be compared, they are not.
+        if let Ok(dataset) = scene::open(&capture.root, &load, &mut |_| {}) {
+            let luma = self.splats.to_luma();
+            tell_unlike(gpu, &dataset, (&self.file, &luma), self.drawn, observe)?;
+        }
+        Ok(())
+    }
 }

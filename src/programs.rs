@@ -1,21 +1,24 @@
-//! Programs of others: started without a shell, listened to, and ended with this one.
+//! Programs of others, such as FFmpeg and COLMAP: started without a shell, fed, listened to, and
+//! ended with this one.
 
 use std::{
     collections::VecDeque,
     ffi::OsString,
-    io::{self, BufRead, BufReader, Read},
+    io::{self, BufRead, BufReader, Read, Write},
     path::Path,
-    process::{Child, ChildStderr, ChildStdout, Command, ExitStatus, Stdio},
+    process::{Child, ChildStdin, Command, ExitStatus, Stdio},
     sync::{
         Arc, Mutex, MutexGuard, PoisonError,
-        mpsc::{Sender, channel},
+        mpsc::{Receiver, Sender, channel},
     },
     thread,
     time::Duration,
 };
 
-use super::PrepareError;
 use crate::disk;
+
+/// What films are read and written with.
+pub(crate) const FFMPEG: &str = "ffmpeg";
 
 /// How often a program is looked after that has closed its output.
 const PATIENCE: Duration = Duration::from_millis(5);
@@ -37,9 +40,47 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
+/// What kept a program from doing its part.
+#[derive(Debug, thiserror::Error)]
+pub enum ProgramError {
+    /// It is not installed.
+    #[error("{program} is not installed, or not on PATH: {}", remedy(program))]
+    Missing {
+        /// Its name.
+        program: String,
+    },
+    /// It failed.
+    #[error("{program} failed: {said}")]
+    Failed {
+        /// Its name.
+        program: String,
+        /// What it said last, and how it ended.
+        said: String,
+    },
+}
+
+impl ProgramError {
+    /// Whether FFmpeg, or what comes with it, is not installed.
+    pub fn lacks_ffmpeg(&self) -> bool {
+        matches!(self, Self::Missing { program } if matches!(program.as_str(), "ffmpeg" | "ffprobe"))
+    }
+}
+
+/// How a program is installed.
+fn remedy(program: &str) -> &'static str {
+    match program {
+        "ffmpeg" | "ffprobe" => {
+            "install FFmpeg 5.1 or newer (Debian, Ubuntu: apt-get install ffmpeg)"
+        }
+        "colmap" => "install COLMAP (Debian, Ubuntu: apt-get install colmap)",
+        _ => "install it",
+    }
+}
+
 /// Ends all programs that were started: for a program that is told to end at once. None can be
 /// started or found to have ended as long as what is given back lives.
-pub(crate) fn end_programs() -> impl Sized {
+#[cfg(feature = "cli")]
+pub(crate) fn end_all() -> impl Sized {
     let running = locked(&RUNNING);
     for child in running.iter() {
         let mut child = locked(child);
@@ -52,15 +93,31 @@ pub(crate) fn end_programs() -> impl Sized {
 
 /// A program with its arguments.
 #[derive(Clone, Debug)]
-pub(super) struct Program {
+pub(crate) struct Program {
     /// What it is found by: a name on `PATH`, or a path.
     name: OsString,
     arguments: Vec<OsString>,
 }
 
 /// A program that runs.
+#[derive(Debug)]
 struct Running {
     child: Arc<Mutex<Child>>,
+}
+
+/// The ends of a program's pipes that are here.
+struct Pipes<Output, Error> {
+    output: Output,
+    error: Error,
+}
+
+/// A program that is given bytes. Dropped, it is ended.
+#[derive(Debug)]
+pub(crate) struct Fed {
+    program: Program,
+    running: Option<Running>,
+    input: Option<ChildStdin>,
+    lines: Receiver<(Stream, String)>,
 }
 
 impl Program {
@@ -92,24 +149,30 @@ impl Program {
     /// was said of the last [`KEPT_LINES`] lines.
     ///
     /// # Errors
-    /// [`PrepareError::NoProgram`] and [`PrepareError::Program`].
-    pub fn run(self, folder: &Path, heard: &mut dyn FnMut(&str)) -> Result<(), PrepareError> {
-        let (running, stdout, stderr) = self.start(folder)?;
-        let (sender, lines) = channel();
-        let readers = [
-            listen(stdout, sender.clone(), Stream::Output),
-            listen(stderr, sender, Stream::Error),
-        ];
+    /// [`ProgramError`].
+    pub fn run(self, folder: &Path, heard: &mut dyn FnMut(&str)) -> Result<(), ProgramError> {
+        let (running, _, pipes) = self.start(folder, Stdio::null())?;
         let mut last = Last::default();
-        for (stream, line) in lines {
+        // Until both of its pipes are closed.
+        for (stream, line) in pipes.listen() {
             heard(&line);
             last.keep(stream, line);
         }
-        for reader in readers {
-            // It has nothing to tell but its lines.
-            let _ = reader.join();
-        }
         self.judge(running.finish(), &last)
+    }
+
+    /// Starts it in the current folder, to be given bytes on its standard input.
+    ///
+    /// # Errors
+    /// As [`Self::run`].
+    pub fn feed(self) -> Result<Fed, ProgramError> {
+        let (running, input, pipes) = self.start(Path::new("."), Stdio::piped())?;
+        Ok(Fed {
+            program: self,
+            running: Some(running),
+            input,
+            lines: pipes.listen(),
+        })
     }
 
     /// Runs it in the current folder, and gives all that it says on standard output and standard
@@ -117,7 +180,7 @@ impl Program {
     ///
     /// # Errors
     /// As [`Self::run`].
-    pub fn ask(self) -> Result<String, PrepareError> {
+    pub fn ask(self) -> Result<String, ProgramError> {
         let mut said = String::new();
         self.run(Path::new("."), &mut |line| {
             said.push_str(line);
@@ -131,13 +194,18 @@ impl Program {
     ///
     /// # Errors
     /// As [`Self::run`].
+    #[cfg(feature = "cli")]
     pub fn read(
         self,
         mut take: impl FnMut(&mut dyn Read) -> io::Result<bool>,
-    ) -> Result<(), PrepareError> {
-        let (running, mut stdout, stderr) = self.start(Path::new("."))?;
+    ) -> Result<(), ProgramError> {
+        let (running, _, pipes) = self.start(Path::new("."), Stdio::null())?;
+        let Pipes {
+            output: mut stdout,
+            error,
+        } = pipes;
         let (sender, lines) = channel();
-        let reader = listen(stderr, sender, Stream::Error);
+        listen(error, sender, Stream::Error);
         let enough = loop {
             match take(&mut stdout) {
                 Ok(true) => {}
@@ -155,14 +223,24 @@ impl Program {
         for (stream, line) in lines {
             last.keep(stream, line);
         }
-        let _ = reader.join();
         match enough {
             true => running.finish().map(|_| ()).map_err(|e| self.failed(e)),
             false => self.judge(running.finish(), &last),
         }
     }
 
-    fn start(&self, folder: &Path) -> Result<(Running, ChildStdout, ChildStderr), PrepareError> {
+    fn start(
+        &self,
+        folder: &Path,
+        input: Stdio,
+    ) -> Result<
+        (
+            Running,
+            Option<ChildStdin>,
+            Pipes<impl Read + Send + use<>, impl Read + Send + use<>>,
+        ),
+        ProgramError,
+    > {
         let mut command = Command::new(&self.name);
         command
             .args(&self.arguments)
@@ -171,19 +249,20 @@ impl Program {
             .env("QT_QPA_PLATFORM", "offscreen")
             // A fault of a test is this program's own.
             .env_remove(disk::FAULT)
-            .stdin(Stdio::null())
+            .stdin(input)
             .stdout(Stdio::piped())
             .stderr(Stdio::piped());
         // Listed before anybody can end it.
         let mut running = locked(&RUNNING);
         let mut child = command.spawn().map_err(|error| self.failed(error))?;
+        let input = child.stdin.take();
         let pipes = child.stdout.take().zip(child.stderr.take());
         let child = Arc::new(Mutex::new(child));
         running.push(child.clone());
         drop(running);
         let running = Running { child };
         match pipes {
-            Some((stdout, stderr)) => Ok((running, stdout, stderr)),
+            Some((output, error)) => Ok((running, input, Pipes { output, error })),
             None => Err(self.failed(io::ErrorKind::BrokenPipe.into())),
         }
     }
@@ -194,31 +273,81 @@ impl Program {
         name.unwrap_or(&self.name).to_string_lossy().into_owned()
     }
 
-    fn failed(&self, error: io::Error) -> PrepareError {
+    fn failed(&self, error: io::Error) -> ProgramError {
         match error.kind() {
-            io::ErrorKind::NotFound => PrepareError::NoProgram {
+            io::ErrorKind::NotFound => ProgramError::Missing {
                 program: self.known_as(),
             },
-            _ => PrepareError::Program {
+            _ => ProgramError::Failed {
                 program: self.known_as(),
                 said: error.to_string(),
             },
         }
     }
 
-    fn judge(&self, ended: io::Result<ExitStatus>, last: &Last) -> Result<(), PrepareError> {
+    fn judge(&self, ended: io::Result<ExitStatus>, last: &Last) -> Result<(), ProgramError> {
         let status = ended.map_err(|error| self.failed(error))?;
         if status.success() {
             return Ok(());
         }
         let told = last.told();
-        Err(PrepareError::Program {
+        Err(ProgramError::Failed {
             program: self.known_as(),
             said: match told.is_empty() {
                 true => status.to_string(),
                 false => format!("{} ({status})", told.join(" / ")),
             },
         })
+    }
+}
+
+impl Fed {
+    /// Gives it bytes.
+    ///
+    /// # Errors
+    /// [`ProgramError::Failed`]: it has ended, and says why.
+    pub fn write(&mut self, bytes: &[u8]) -> Result<(), ProgramError> {
+        let written = match &mut self.input {
+            Some(input) => input.write_all(bytes),
+            None => Err(io::ErrorKind::BrokenPipe.into()),
+        };
+        let Err(error) = written else { return Ok(()) };
+        self.end()?;
+        Err(self.program.failed(error))
+    }
+
+    /// Lets it come to its end.
+    ///
+    /// # Errors
+    /// [`ProgramError::Failed`].
+    pub fn finish(mut self) -> Result<(), ProgramError> {
+        self.end()
+    }
+
+    fn end(&mut self) -> Result<(), ProgramError> {
+        drop(self.input.take());
+        let mut last = Last::default();
+        for (stream, line) in &self.lines {
+            last.keep(stream, line);
+        }
+        match self.running.take() {
+            Some(running) => self.program.judge(running.finish(), &last),
+            None => Ok(()),
+        }
+    }
+}
+
+impl<Output, Error> Pipes<Output, Error>
+where
+    Output: Read + Send + 'static,
+    Error: Read + Send + 'static,
+{
+    /// All lines of both, until both are closed.
+    fn listen(self) -> Receiver<(Stream, String)> {
+        let (sender, lines) = channel();
+        listen(self.output, sender.clone(), Stream::Output);
+        listen(self.error, sender, Stream::Error);
+        lines
     }
 }
 
@@ -251,11 +380,7 @@ impl Drop for Running {
 
 /// Sends the lines that a program says: programs that show how far they are end lines with a
 /// carriage return as well.
-fn listen(
-    said: impl Read + Send + 'static,
-    to: Sender<(Stream, String)>,
-    stream: Stream,
-) -> thread::JoinHandle<()> {
+fn listen(said: impl Read + Send + 'static, to: Sender<(Stream, String)>, stream: Stream) {
     thread::spawn(move || {
         let mut said = BufReader::new(said);
         let mut line = Vec::new();
@@ -281,7 +406,7 @@ fn listen(
         if !line.is_empty() {
             let _ = to.send((stream, String::from_utf8_lossy(&line).into_owned()));
         }
-    })
+    });
 }
 
 /// Where a program says something.
@@ -358,10 +483,35 @@ mod tests {
         let told = failed.unwrap_err().to_string();
         assert!(told.contains("three") && told.contains("sh"), "{told}");
         let none = Program::new("no-such-program-at-all").ask();
-        assert!(matches!(none, Err(PrepareError::NoProgram { .. })));
+        assert!(matches!(none, Err(ProgramError::Missing { .. })));
     }
 
     #[cfg(unix)]
+    #[test]
+    fn a_program_that_is_fed_hears_all_and_says_why_it_fails() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("heard");
+        let mut cat = Program::new("sh")
+            .args(["-c", "cat > \"$0\""])
+            .arg(&path)
+            .feed()
+            .unwrap();
+        for part in ["one ", "two"] {
+            cat.write(part.as_bytes()).unwrap();
+        }
+        cat.finish().unwrap();
+        assert_eq!(std::fs::read(&path).unwrap(), b"one two");
+        let script = "read first; echo no such codec >&2; exit 3";
+        let mut fails = Program::new("sh").args(["-c", script]).feed().unwrap();
+        let failed = (0..1000).find_map(|_| fails.write(b"line\n").err());
+        let told = failed
+            .or_else(|| fails.finish().err())
+            .map(|e| e.to_string());
+        let told = told.unwrap_or_default();
+        assert!(told.contains("sh failed: no such codec"), "{told}");
+    }
+
+    #[cfg(all(unix, feature = "cli"))]
     #[test]
     fn a_program_that_has_said_enough_is_ended() {
         let mut bytes = [0; 4];

@@ -139,7 +139,7 @@ fn catmull_rom([p0, p1, p2, p3]: [DVec3; 4], t: f64) -> DVec3 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::flow::tests::camera;
+    use super::super::fixtures::camera;
     use super::*;
 
     fn row(places: &[f64]) -> Vec<Camera> {

@@ -1,0 +1,98 @@
+//! `gs-chroma view`.
+
+use std::{
+    env,
+    path::{Path, PathBuf},
+    sync::Arc,
+    thread,
+};
+
+use clap::Args;
+
+use super::{CliError, interrupt, print, progress::Progress};
+use crate::{
+    run::{Live, Look, Stage},
+    view::{OfCommand, OfRun, Server, answer},
+};
+
+/// Show a scene in the browser: the splats, and the photos beside them.
+#[derive(Args)]
+pub struct View {
+    /// Run folder or splat file [default: newest run under runs/].
+    #[arg(value_name = "RUN|FILE")]
+    run: Option<PathBuf>,
+    /// COLMAP folder with cameras and photos, when it is not where `fit` found it.
+    #[arg(long, value_name = "COLMAP_DIR")]
+    colmap: Option<PathBuf>,
+    /// Port on 127.0.0.1 [default: one that is free].
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
+    port: Option<u16>,
+    /// Say where the page is, and leave the browser alone.
+    #[arg(long)]
+    no_open: bool,
+}
+
+impl View {
+    pub(super) fn run(self) -> Result<(), CliError> {
+        let mut progress = Progress::through(vec![Stage::Model]);
+        let (run, colmap) = (self.run.as_deref(), self.colmap.as_deref());
+        let look = Look::open(run, colmap, &mut |event| progress.show(&event))?;
+        let name = look.name.clone();
+        let content = OfRun::new(look, &mut |event| progress.show(&event))?;
+        let server = Server::bind(self.port)?;
+        progress.finish();
+        let url = server.url();
+        print(format_args!("{url} shows {name}; Ctrl-C ends it"))?;
+        interrupt::ends_well();
+        if !self.no_open {
+            open(&url);
+        }
+        server.serve(move |request| answer(&content, request));
+        Ok(())
+    }
+}
+
+/// What shows a scene while it is made.
+#[derive(Args)]
+pub(super) struct ViewArguments {
+    /// Show the scene in the browser as it grows; nothing in the result depends on it.
+    #[arg(long)]
+    view: bool,
+    /// Port of the page on 127.0.0.1 [default: one that is free].
+    #[arg(long, requires = "view", value_parser = clap::value_parser!(u16).range(1..))]
+    port: Option<u16>,
+}
+
+impl ViewArguments {
+    /// Opens the page of the command that makes the run `folder`, if it is wanted.
+    ///
+    /// # Errors
+    /// [`ViewerError::Port`](crate::view::ViewerError), before any work is done.
+    pub fn begin(&self, folder: &Path) -> Result<Option<Arc<Live>>, CliError> {
+        if !self.view {
+            return Ok(None);
+        }
+        let server = Server::bind(self.port)?;
+        let url = server.url();
+        eprintln!("{url} shows the scene as it grows");
+        let live = Arc::<Live>::default();
+        let content = OfCommand::new(folder, live.clone());
+        // Ends with the program.
+        thread::spawn(move || server.serve(move |request| answer(&content, request)));
+        open(&url);
+        Ok(Some(live))
+    }
+}
+
+/// Opens a page in the browser, where there is a screen.
+pub(super) fn open(url: &str) {
+    let screens = ["DISPLAY", "WAYLAND_DISPLAY", "WSL_DISTRO_NAME"];
+    let has_screen = !cfg!(target_os = "linux")
+        || screens
+            .iter()
+            .any(|&name| env::var_os(name).is_some_and(|set| !set.is_empty()));
+    // Where it cannot, the line above says what to open.
+    if has_screen {
+        let _ = open::that_detached(url);
+    }
+}

@@ -1,0 +1,303 @@
+//! Strokes on what the scene does not show: the sky, or what has moved.
+//!
+//! On the photo a stroke claims what it touches and is alike, as strokes on the scene do, and ends
+//! where the scene begins. From photo to photo the claim follows what moves, and is drawn anew
+//! along the edges there: what comes into the picture beside it belongs to it, and nothing blurs.
+
+use super::{Believed, Between, Canvas, Carried};
+use crate::{
+    chroma::{at_middle_lightness, claimed_by_strokes, shaded_at, teacher::HintImage},
+    color::gray_to_lightness,
+};
+
+/// Of a pixel: from here on it is the scene that a photo shows there.
+const COVERED: f32 = 0.5;
+
+/// Depths, in any unit, of what the scene shows and of what it does not: an edge to strokes.
+const DEPTHS: [f32; 2] = [1.0, 2.0];
+
+/// A claim that is carried belongs to the thing from this share of its strength on.
+const SURE: f32 = 0.5;
+
+/// What strokes claim of a photo at working size.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Strokes {
+    /// a and b at the middle lightness, rounded, `[height, width]`.
+    colors: Vec<[i8; 2]>,
+    /// α of each pixel in 255ths.
+    alphas: Vec<u8>,
+}
+
+impl Strokes {
+    /// What paint claims of a photo of which `seen` is the scene: nothing where the scene is
+    /// believed, and with `grow` what is alike beside a stroke.
+    pub fn of(canvas: &Canvas, seen: &Believed, paint: &HintImage, grow: bool) -> Self {
+        let paint = paint.resized(canvas.width, canvas.height);
+        let lightness = lightness(canvas);
+        let mut open = paint;
+        for (paint, &covered) in open.paint.iter_mut().zip(&seen.weight) {
+            if covered >= COVERED {
+                *paint = [0.0; 3];
+            }
+        }
+        let claims = match grow {
+            true => grown(canvas, seen, &lightness, &open),
+            false => (open.colors().zip(&lightness))
+                .map(|((color, alpha), &light)| {
+                    let [a, b] = at_middle_lightness(color, light);
+                    [alpha * a, alpha * b, alpha]
+                })
+                .collect(),
+        };
+        Self::new(&claims)
+    }
+
+    /// From α a, α b, α.
+    fn new(claims: &[[f32; 3]]) -> Self {
+        let byte = |value: f32| value.round().clamp(-128.0, 127.0) as i8;
+        Self {
+            colors: (claims.iter())
+                .map(|&[a, b, alpha]| match alpha > 0.0 {
+                    true => [byte(a / alpha), byte(b / alpha)],
+                    false => [0; 2],
+                })
+                .collect(),
+            alphas: (claims.iter())
+                .map(|claim| (255.0 * claim[2]).round().clamp(0.0, 255.0) as u8)
+                .collect(),
+        }
+    }
+
+    /// Which share of the photo is claimed.
+    pub fn share(&self) -> f64 {
+        let sum: f64 = self.alphas.iter().map(|&alpha| f64::from(alpha)).sum();
+        sum / (255.0 * self.alphas.len().max(1) as f64)
+    }
+
+    /// What they claim of the photo `to`, of which `seen` is the scene: it comes after `from`, on
+    /// which they are, by `way`, in order, or, with `backwards`, before it.
+    pub fn carried(
+        &self,
+        from: &Canvas,
+        way: &[&Between],
+        backwards: bool,
+        (to, seen): (&Canvas, &Believed),
+    ) -> Self {
+        let along = |ab: &[[f32; 2]]| Carried { canvas: from, ab }.along(way, backwards, to);
+        let colors: Vec<[f32; 2]> = self.colors.iter().map(|c| c.map(f32::from)).collect();
+        let alphas: Vec<[f32; 2]> = (self.alphas.iter())
+            .map(|&alpha| [f32::from(alpha) / 255.0, 0.0])
+            .collect();
+        let (colors, alphas) = (along(&colors), along(&alphas));
+        let strength = f32::from(self.alphas.iter().copied().max().unwrap_or(0)) / 255.0;
+        let sure: Vec<bool> = (alphas.ab.iter().zip(&alphas.weight))
+            .map(|([alpha, _], weight)| strength > 0.0 && alpha * weight >= SURE * strength)
+            .collect();
+        let lightness = lightness(to);
+        let paint = (0..to.len()).map(|i| {
+            if !inside(&sure, to.size(), i) || seen.weight[i] >= COVERED {
+                return [0.0; 3];
+            }
+            // As light as the pixel, and no less colorful: it is no color to be shown.
+            let [a, b] = colors.ab[i].map(|value| value / middle_over(lightness[i]));
+            [strength * a, strength * b, strength]
+        });
+        let paint = HintImage {
+            width: to.width,
+            height: to.height,
+            paint: paint.collect(),
+        };
+        Self::new(&grown(to, seen, &lightness, &paint))
+    }
+
+    /// The colors of a photo with strokes laid over what the scene, `seen`, leaves open.
+    pub fn over(&self, canvas: &Canvas, seen: &Believed, ab: &[[f32; 2]]) -> Vec<[f32; 2]> {
+        let lightness = lightness(canvas);
+        (0..ab.len())
+            .map(|i| {
+                let share = f32::from(self.alphas[i]) / 255.0 * (1.0 - seen.weight[i]);
+                if share <= 0.0 {
+                    return ab[i];
+                }
+                let color = shaded_at(self.colors[i].map(f32::from), lightness[i]);
+                [0, 1].map(|k: usize| ab[i][k] + share * (color[k] - ab[i][k]))
+            })
+            .collect()
+    }
+
+    /// Those of the photos before and after, of which the second counts `nearness`, 0 to 1.
+    pub fn between(before: &Self, after: &Self, nearness: f32) -> Self {
+        let pairs = (0..before.alphas.len()).map(|i| {
+            let mut sum = [0.0; 3];
+            for (side, share) in [(before, 1.0 - nearness), (after, nearness)] {
+                let weight = share * f32::from(side.alphas[i]) / 255.0;
+                let [a, b] = side.colors[i].map(f32::from);
+                for (sum, value) in sum.iter_mut().zip([a, b, 1.0]) {
+                    *sum += weight * value;
+                }
+            }
+            sum
+        });
+        Self::new(&pairs.collect::<Vec<_>>())
+    }
+}
+
+/// What paint claims of what the scene leaves open.
+fn grown(canvas: &Canvas, seen: &Believed, lightness: &[f32], paint: &HintImage) -> Vec<[f32; 3]> {
+    if paint.is_empty() {
+        return vec![[0.0; 3]; canvas.len()];
+    }
+    let depth = |&covered: &f32| DEPTHS[usize::from(covered < COVERED)];
+    let depth: Vec<f32> = seen.weight.iter().map(depth).collect();
+    claimed_by_strokes(canvas.size(), lightness, &depth, paint)
+}
+
+/// Whether all of a pixel's neighbors are, and it is.
+fn inside(all: &[bool], [width, height]: [usize; 2], i: usize) -> bool {
+    let (x, y) = (i % width, i / width);
+    let mut rows = y.saturating_sub(1)..(y + 2).min(height);
+    rows.all(|y| (x.saturating_sub(1)..(x + 2).min(width)).all(|x| all[y * width + x]))
+}
+
+/// What brings a color of this lightness to the middle one.
+fn middle_over(lightness: f32) -> f32 {
+    at_middle_lightness([1.0, 0.0], lightness)[0]
+}
+
+/// `L*` of each pixel.
+fn lightness(canvas: &Canvas) -> Vec<f32> {
+    let of_gray: [f32; 256] =
+        std::array::from_fn(|gray| gray_to_lightness(gray as f64 / 255.0) as f32);
+    let gray = canvas.gray.iter();
+    gray.map(|&gray| of_gray[usize::from(gray)]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::color::ciede2000;
+
+    const SIZE: [u32; 2] = [96, 64];
+
+    /// Rows of sky above, of which the scene shows those left of `covered` and all of the ground.
+    const SKY: u32 = 30;
+
+    /// A bright sky with soft clouds over a rough ground, seen `shift` pixels farther right.
+    fn canvas(shift: f32) -> Canvas {
+        let gray = |i: u32| {
+            let (x, y) = ((i % SIZE[0]) as f32 + shift, (i / SIZE[0]) as f32);
+            match i / SIZE[0] < SKY {
+                true => 200.0 + 6.0 * (0.12 * x + 0.2 * y).sin(),
+                false => 90.0 + 40.0 * (0.5 * x + 0.31 * y).sin() * (0.37 * y - 0.2 * x).cos(),
+            }
+        };
+        Canvas {
+            width: SIZE[0],
+            height: SIZE[1],
+            gray: (0..SIZE[0] * SIZE[1]).map(|i| gray(i) as u8).collect(),
+            mask: None,
+        }
+    }
+
+    /// The scene shows the ground and the left half of the sky, in a dull brown.
+    fn seen(shift: f32) -> Believed {
+        let mut seen = Believed::nothing((SIZE[0] * SIZE[1]) as usize);
+        for (i, weight) in seen.weight.iter_mut().enumerate() {
+            let (x, y) = (i as u32 % SIZE[0], i as u32 / SIZE[0]);
+            *weight = f32::from(y >= SKY || (x as f32) + shift < 48.0);
+        }
+        seen.ab.fill([6.0, 20.0]);
+        seen
+    }
+
+    const BLUE: [f32; 2] = [-4.0, -28.0];
+
+    /// A stroke across all of the sky: its left half lies on what the scene shows.
+    fn stroke() -> HintImage {
+        let mut paint = vec![[0.0; 3]; (SIZE[0] * SIZE[1]) as usize];
+        for x in 10..80 {
+            for y in 12..15 {
+                paint[y * SIZE[0] as usize + x] = [BLUE[0], BLUE[1], 1.0];
+            }
+        }
+        HintImage {
+            width: SIZE[0],
+            height: SIZE[1],
+            paint,
+        }
+    }
+
+    /// Mean distance in a and b to `color` over the open sky, and the largest ΔE00 by which all
+    /// that is not near it has changed.
+    fn judged(strokes: &Strokes, shift: f32) -> (f32, f64) {
+        let (canvas, seen) = (canvas(shift), seen(shift));
+        let before = vec![[6.0, 20.0]; canvas.len()];
+        let after = strokes.over(&canvas, &seen, &before);
+        let light = lightness(&canvas);
+        let (mut sum, mut count, mut most) = (0.0, 0.0, 0.0_f64);
+        for (i, &[a, b]) in after.iter().enumerate() {
+            if seen.weight[i] == 0.0 {
+                let wanted = shaded_at(at_middle_lightness(BLUE, 79.0), light[i]);
+                sum += (a - wanted[0]).hypot(b - wanted[1]);
+                count += 1.0;
+            } else {
+                let lab = |[a, b]: [f32; 2]| [light[i], a, b].map(f64::from);
+                most = most.max(ciede2000(lab([a, b]), lab(before[i])));
+            }
+        }
+        (sum / count, most)
+    }
+
+    #[test]
+    fn a_stroke_on_the_open_sky_colors_it_and_nothing_else() {
+        let strokes = Strokes::of(&canvas(0.0), &seen(0.0), &stroke(), true);
+        let (far, changed) = judged(&strokes, 0.0);
+        assert!(far < 1.5 && changed == 0.0, "{far} {changed}");
+        // Where it is painted and nowhere else.
+        let plain = Strokes::of(&canvas(0.0), &seen(0.0), &stroke(), false);
+        let painted = plain.alphas.iter().filter(|&&alpha| alpha > 0).count();
+        assert_eq!(painted, 3 * (80 - 48));
+        // On what the scene shows it colors the scene, and not the photo.
+        let mut covered = seen(0.0);
+        covered.weight.fill(1.0);
+        let none = Strokes::of(&canvas(0.0), &covered, &stroke(), true);
+        assert_eq!(none.share(), 0.0);
+    }
+
+    #[test]
+    fn it_goes_on_to_the_photos_before_and_after_and_does_not_fade() {
+        let shifts: Vec<f32> = (0..13).map(|k| 2.0 * (k as f32 - 6.0)).collect();
+        let photos: Vec<Canvas> = shifts.iter().map(|&shift| canvas(shift)).collect();
+        let steps: Vec<Between> = (photos.windows(2))
+            .map(|pair| Between::of(&pair[0], &pair[1]).expect("one size"))
+            .collect();
+        for backwards in [false, true] {
+            let mut strokes = Strokes::of(&photos[6], &seen(0.0), &stroke(), true);
+            for step in 0..6 {
+                let (from, to) = match backwards {
+                    false => (6 + step, 7 + step),
+                    true => (6 - step, 5 - step),
+                };
+                let way = &steps[from.min(to)];
+                let seen = seen(shifts[to]);
+                strokes = strokes.carried(&photos[from], &[way], backwards, (&photos[to], &seen));
+                let (far, changed) = judged(&strokes, shifts[to]);
+                assert!(
+                    far < 2.0 && changed < 1.0,
+                    "{backwards} {to}: {far} {changed}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn between_two_strokes_each_counts_by_its_nearness() {
+        let of = |color: i8, alpha: u8| Strokes {
+            colors: vec![[color, 0]],
+            alphas: vec![alpha],
+        };
+        let both = Strokes::between(&of(40, 255), &of(-40, 255), 0.25);
+        assert_eq!(both, of(20, 255));
+        assert_eq!(Strokes::between(&of(40, 255), &of(0, 0), 0.5).alphas, [128]);
+    }
+}

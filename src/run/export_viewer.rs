@@ -1,0 +1,126 @@
+//! `export --viewer`: the scene fitted to the viewer that will draw it.
+
+use std::{path::Path, sync::Arc};
+
+use glam::DVec3;
+
+use super::{Event, Observer, RunError, Stage};
+use crate::{
+    capture::{Camera, Capture, LoadOptions, Loader, split},
+    gpu::Gpu,
+    raster::{Raster, RasterOptions},
+    splats::Splats,
+    viewers::{self, FitSettings, Viewer, ViewerChoice},
+};
+
+/// Cameras that a scene is fitted before, and those that it is measured before, at most: an
+/// even choice.
+const MOST_CAMERAS: usize = 64;
+
+/// Longer side of a view in pixels where photos are not shrunk to less: a fit takes as long as
+/// it has pixels, and what it finds holds at other sizes.
+const MOST_SIDE: u32 = 640;
+
+/// What a viewer shows of the scene, compared with `gs-chroma render`: mean PSNR in dB before
+/// the cameras that were held out, or without any before all.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Shown {
+    /// Which viewer.
+    pub viewer: Viewer,
+    /// Of the scene as it is in the run.
+    pub before: f64,
+    /// Of what was written.
+    pub after: f64,
+}
+
+/// Where the cameras of a scene are.
+pub(super) struct Cameras<'a> {
+    /// The scene's file or run, for whoever has to be told that nobody knows.
+    pub of: &'a Path,
+    /// The COLMAP folder, if anybody knows.
+    pub colmap: Option<&'a Path>,
+    /// How its photos are loaded.
+    pub load: LoadOptions,
+    /// What the scene's centers lack of COLMAP's, in world units.
+    pub moved: DVec3,
+}
+
+/// A scene and how it is drawn here, moved until the viewers draw it alike; and what each
+/// shows.
+///
+/// # Errors
+/// [`RunError`] of the capture or the device.
+pub(super) fn fitted(
+    choice: ViewerChoice,
+    (splats, drawn): (&Splats, RasterOptions),
+    before: &Cameras<'_>,
+    observe: &mut Observer<'_>,
+) -> Result<(Splats, Vec<Shown>), RunError> {
+    let (train, test, extent) = before.open()?;
+    observe(Event::begins(Stage::Device));
+    let gpu = Gpu::open()?;
+    let raster = Arc::new(Raster::new(&gpu));
+    observe(Event::begins(Stage::Viewer));
+    let colored = viewers::in_rgb(splats);
+    let wanted = viewers::pictures(&raster, &colored, drawn, &train, extent)?;
+    let fitted = viewers::fit(
+        &raster,
+        choice.viewers(),
+        &viewers::start(choice.viewers(), &colored),
+        (&train, &wanted),
+        extent,
+        &FitSettings::DEFAULT,
+        &mut |done, total| {
+            observe(Event::Progress {
+                stage: Stage::Viewer,
+                done,
+                total,
+                message: String::new(),
+            });
+        },
+    )?;
+    let wanted = viewers::pictures(&raster, &colored, drawn, &test, extent)?;
+    let shown = Viewer::ALL.map(|viewer| {
+        let psnr = |splats| viewers::shown_psnr(&raster, viewer, splats, &wanted, &test, extent);
+        Ok(Shown {
+            viewer,
+            before: psnr(&colored)?,
+            after: psnr(&fitted)?,
+        })
+    });
+    let shown: Result<_, RunError> = shown.into_iter().collect();
+    Ok((fitted, shown?))
+}
+
+impl Cameras<'_> {
+    /// Cameras to fit before and to measure before, and the capture's extent in world units.
+    fn open(&self) -> Result<(Vec<Camera>, Vec<Camera>, f64), RunError> {
+        let Some(colmap) = self.colmap else {
+            return Err(RunError::NoCameras(self.of.to_owned()));
+        };
+        let capture = Capture::load_with(colmap, &self.load.capture())?;
+        let chosen = split(&capture.views, self.load.holdout);
+        let loader = Loader::new(LoadOptions {
+            max_side: Some(self.load.max_side.unwrap_or(MOST_SIDE).min(MOST_SIDE)),
+            ..self.load.clone()
+        });
+        let shift = self.moved - capture.offset;
+        let cameras = |views: &[usize]| -> Result<Vec<Camera>, RunError> {
+            let each = views
+                .iter()
+                .step_by(views.len().div_ceil(MOST_CAMERAS).max(1));
+            each.map(|&view| {
+                let mut camera = loader.camera(&capture.views[view])?;
+                camera.translation += camera.rotation * shift;
+                Ok(camera)
+            })
+            .collect()
+        };
+        let train = cameras(&chosen.train)?;
+        let test = match chosen.test.is_empty() {
+            true => train.clone(),
+            false => cameras(&chosen.test)?,
+        };
+        Ok((train, test, capture.extent()))
+    }
+}

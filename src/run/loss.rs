@@ -1,0 +1,247 @@
+//! What a splat file's format costs: the file is read back and drawn beside what was written.
+
+use std::{path::Path, sync::Arc};
+
+use glam::{DMat3, DVec3};
+use serde::Serialize;
+
+use super::{Event, Observer, RunError, Stage};
+use crate::{
+    capture::{Camera, Capture, split},
+    gpu::{Gpu, GpuError},
+    measure,
+    raster::{Picture, Raster, RasterOptions, Renderer},
+    report::CaptureReport,
+    splats::{Format, Splats, WriteOptions, read_splats},
+};
+
+/// Views that are drawn; an even choice.
+const VIEWS: usize = 8;
+
+/// Longer side of the pictures, in pixels: what is lost shows in small ones as well.
+const SIDE: u32 = 480;
+
+/// The share of the Gaussians within the sphere that made-up cameras look at; those beyond are
+/// background.
+const WITHIN: f64 = 0.8;
+
+/// How far made-up cameras are from its center, in radii: all of it is seen.
+const DISTANCE: f64 = 2.5;
+
+/// How far made-up cameras look down.
+const DOWN: f64 = 0.35;
+
+/// What a format costs.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Loss {
+    /// Peak signal-to-noise ratio of the pictures, against those of what was written, in dB;
+    /// none where nothing was measured.
+    pub psnr: Option<f64>,
+    /// Their mean ΔE00.
+    pub delta_e: Option<f64>,
+    /// Views that were drawn.
+    pub views: usize,
+    /// Which: `held-out views`, `views` where none is held out, `made-up views` of a file; or why
+    /// nothing was measured.
+    pub measured: String,
+}
+
+/// Where scenes are looked at from.
+pub(super) enum Views {
+    /// These, and what they are; with the capture's extent, in world units.
+    Of(Vec<Camera>, &'static str, f64),
+    /// Nobody knows of any.
+    MadeUp,
+}
+
+impl Views {
+    /// Those of a run: held-out ones if there are any. Made-up ones where its COLMAP folder is
+    /// gone.
+    pub fn of_run(report: &CaptureReport) -> Self {
+        let options = report.load.capture();
+        let Ok(capture) = Capture::load_with(Path::new(&report.path), &options) else {
+            return Self::MadeUp;
+        };
+        let split = split(&capture.views, report.load.holdout);
+        let (chosen, what) = match split.test.is_empty() {
+            false => (split.test, "held-out views"),
+            true => (split.train, "views"),
+        };
+        let step = chosen.len().div_ceil(VIEWS).max(1);
+        let cameras = (chosen.iter().step_by(step))
+            .map(|&view| shrunk(&capture.views[view].camera))
+            .collect();
+        Self::Of(cameras, what, capture.extent())
+    }
+}
+
+/// Reads a file back and measures what its format has made of `splats`.
+///
+/// # Errors
+/// [`RunError`] where the file cannot be read. A device that is missing or refuses is none.
+pub(super) fn loss(
+    splats: &Splats,
+    drawn: RasterOptions,
+    views: &Views,
+    (path, written): (&Path, &WriteOptions),
+    observe: &mut Observer<'_>,
+) -> Result<Loss, RunError> {
+    let none = |measured: &str| Loss {
+        psnr: None,
+        delta_e: None,
+        views: 0,
+        measured: measured.to_owned(),
+    };
+    match Format::of(path) {
+        Some(Format::Ply) if written.added == DVec3::ZERO => return Ok(none("nothing is lost")),
+        Some(format) if !format.is_read() => {
+            return Ok(none("not measured: floats, not read back"));
+        }
+        _ => {}
+    }
+    let mut read = read_splats(path)?;
+    for mean in &mut read.splats.means {
+        *mean = (DVec3::from(mean.map(f64::from)) - written.added)
+            .as_vec3()
+            .to_array();
+    }
+    let made_up;
+    let (cameras, what, extent) = match views {
+        Views::Of(cameras, what, extent) => (cameras, *what, *extent),
+        Views::MadeUp => {
+            let (cameras, radius) = around(splats);
+            made_up = cameras;
+            (&made_up, "made-up views", radius)
+        }
+    };
+    observe(Event::begins(Stage::Device));
+    let back = RasterOptions {
+        antialiased: read.antialiased,
+        ..RasterOptions::default()
+    };
+    let scenes = [(splats, drawn), (&read.splats, back)];
+    let found = compared(cameras, scenes, extent, observe);
+    Ok(match found {
+        Ok((psnr, delta_e)) => Loss {
+            psnr: Some(psnr),
+            delta_e: Some(delta_e),
+            views: cameras.len(),
+            measured: what.to_owned(),
+        },
+        Err(error) => none(&format!("not measured: {error}")),
+    })
+}
+
+/// PSNR and mean ΔE00 of the second scene's pictures against the first's.
+fn compared(
+    cameras: &[Camera],
+    scenes: [(&Splats, RasterOptions); 2],
+    extent: f64,
+    observe: &mut Observer<'_>,
+) -> Result<(f64, f64), GpuError> {
+    let gpu = Gpu::open()?;
+    let renderer = |(splats, drawn): (&Splats, RasterOptions)| {
+        let raster = Arc::new(Raster::with(&gpu, drawn));
+        Renderer::of(&raster, splats, &[&splats.sh], extent)
+    };
+    let [wrote, read] = scenes;
+    let (mut wrote, mut read) = (renderer(wrote)?, renderer(read)?);
+    let (mut ours, mut theirs) = (Vec::new(), Vec::new());
+    for (done, camera) in cameras.iter().enumerate() {
+        observe(Event::Progress {
+            stage: Stage::Measuring,
+            done,
+            total: cameras.len(),
+            message: String::new(),
+        });
+        let shown = |pictures: Vec<Picture>| pictures[0].shown();
+        ours.extend(shown(wrote.render(camera)?));
+        theirs.extend(shown(read.render(camera)?));
+    }
+    let psnr = measure::reported_psnr(theirs.as_flattened(), ours.as_flattened());
+    Ok((psnr, measure::mean_delta_e(&theirs, &ours).mean))
+}
+
+fn shrunk(camera: &Camera) -> Camera {
+    let share = f64::from(SIDE) / f64::from(camera.width.max(camera.height));
+    let side = |side: u32| ((f64::from(side) * share.min(1.0)).round() as u32).max(1);
+    camera.resized(side(camera.width), side(camera.height))
+}
+
+/// Cameras around Gaussians with y down, and the radius of the sphere that they look at.
+fn around(splats: &Splats) -> (Vec<Camera>, f64) {
+    let middle = |mut values: Vec<f64>, share: f64| {
+        let place = ((values.len() - 1) as f64 * share) as usize;
+        *values.select_nth_unstable_by(place, f64::total_cmp).1
+    };
+    let axis = |axis: usize| {
+        splats
+            .means
+            .iter()
+            .map(|mean| f64::from(mean[axis]))
+            .collect()
+    };
+    let center = DVec3::from([0, 1, 2].map(|k| middle(axis(k), 0.5)));
+    let distance = |mean: &[f32; 3]| DVec3::from(mean.map(f64::from)).distance(center);
+    let radius = middle(splats.means.iter().map(distance).collect(), WITHIN).max(1e-6);
+    let (width, height) = (SIDE, SIDE * 3 / 4);
+    let focal = f64::from(height) / 2.0 * (DISTANCE.powi(2) - 1.0).sqrt();
+    let cameras = (0..VIEWS).map(|view| {
+        let turn = std::f64::consts::TAU * view as f64 / VIEWS as f64;
+        // Rows are the camera's axes in the world: right, down, forward.
+        let rotation = DMat3::from_rotation_x(DOWN) * DMat3::from_rotation_y(turn);
+        Camera {
+            width,
+            height,
+            fx: focal,
+            fy: focal,
+            cx: f64::from(width) / 2.0,
+            cy: f64::from(height) / 2.0,
+            rotation,
+            translation: DVec3::new(0.0, 0.0, DISTANCE * radius) - rotation * center,
+        }
+    });
+    (cameras.collect(), radius)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn made_up_cameras_see_the_scene_from_above() {
+        let means = [
+            [3.0, 1.0, 0.0],
+            [5.0, 1.0, 0.0],
+            [4.0, 1.0, 1.0],
+            [4.0, 1.0, -1.0],
+            [4.0; 3],
+        ];
+        let splats = Splats {
+            means: means.to_vec(),
+            ..Splats::default()
+        };
+        let (cameras, radius) = around(&splats);
+        assert_eq!((cameras.len(), radius), (VIEWS, 1.0));
+        for camera in &cameras {
+            for mean in &means[..4] {
+                assert!(camera.pixel_of(DVec3::from(mean.map(f64::from))).is_some());
+            }
+            // Up is where y is less.
+            assert!(camera.center().y < 1.0);
+            assert!((camera.center().distance(DVec3::new(4.0, 1.0, 0.0)) - DISTANCE).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn pictures_are_no_larger_than_their_cameras() {
+        let (cameras, _) = around(&Splats {
+            means: vec![[0.0; 3]],
+            ..Splats::default()
+        });
+        let large = cameras[0].resized(4000, 3000);
+        assert_eq!((shrunk(&large).width, shrunk(&large).height), (480, 360));
+        let small = cameras[0].resized(64, 48);
+        assert_eq!(shrunk(&small), small);
+    }
+}

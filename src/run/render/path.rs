@@ -1,0 +1,297 @@
+//! Pictures along a path, as files or as a film.
+
+use std::{path::PathBuf, sync::Arc};
+
+use glam::DVec3;
+use image::{GenericImage, RgbImage};
+
+use super::subject::Subject;
+use crate::{
+    capture::{Camera, Loader, split},
+    disk::folder_of,
+    gpu::Gpu,
+    raster::{Raster, Renderer},
+    report::to_image,
+    run::{
+        Event, Observer, RunError, Stage, files,
+        film::{FRAME_RATE, FilmWriter, Purpose},
+    },
+    trajectory::{
+        Coordinates, camera_path, framed, lens, middle_of_splats, orbit_of_ball, orbit_of_cameras,
+        read_path, write_path,
+    },
+};
+
+/// Size of pictures where neither cameras nor the user say one.
+const SIZE: [u32; 2] = [1280, 720];
+
+/// Vertical field of view where no camera says one, in degrees.
+const FIELD_OF_VIEW: f64 = 50.0;
+
+/// How long a path takes where nobody says, in seconds.
+const SECONDS: f64 = 10.0;
+
+/// Where a path goes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Way {
+    /// Around what the cameras look at, or around a splat file's Gaussians.
+    Orbit,
+    /// Through the photographed viewpoints.
+    Photos,
+    /// As a file says.
+    File(PathBuf),
+}
+
+/// What `render --path` is asked to do.
+#[derive(Clone, Debug)]
+pub struct PathOptions {
+    /// Run folder or splat file; the newest run by default.
+    pub run: Option<PathBuf>,
+    /// COLMAP folder, where it is not the one that `fit` noted.
+    pub colmap: Option<PathBuf>,
+    /// Where the path goes.
+    pub way: Way,
+    /// How long it takes, in seconds, above 0; 10 by default. A file says for itself.
+    pub seconds: Option<f64>,
+    /// Frames a second, as a fraction; the file's by default, or 24.
+    pub rate: Option<[u32; 2]>,
+    /// Width and height of a picture in pixels; the file's or the photos' by default.
+    pub size: Option<[u32; 2]>,
+    /// Draw the luma although the scene is colored.
+    pub luma: bool,
+    /// Draw the luma left of the colors.
+    pub side_by_side: bool,
+    /// Folder for the pictures.
+    pub output: Option<PathBuf>,
+    /// Film.
+    pub video: Option<PathBuf>,
+    /// Where the path itself is written.
+    pub save_path: Option<PathBuf>,
+}
+
+/// What `render --path` did.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rendered {
+    /// Pictures of the path.
+    pub frames: usize,
+    /// Width and height of a picture in pixels.
+    pub size: [u32; 2],
+    /// Frames a second.
+    pub rate: f64,
+}
+
+/// Draws a scene along a path.
+///
+/// # Errors
+/// [`RunError`].
+pub fn render_path(
+    options: &PathOptions,
+    observe: &mut Observer<'_>,
+) -> Result<Rendered, RunError> {
+    let colmap = options.colmap.as_deref();
+    let subject = Subject::open(options.run.as_deref(), colmap, options.luma, observe)?;
+    let gray = options
+        .side_by_side
+        .then(|| subject.gray(observe))
+        .transpose()?;
+    let path = Path::of(options, &subject)?;
+    let rate = f64::from(path.rate[0]) / f64::from(path.rate[1]);
+    if let Some(file) = &options.save_path {
+        files::make_folder(folder_of(file))?;
+        let back = |camera: &Camera| camera.recentered(-subject.offset);
+        let world: Vec<Camera> = path.cameras.iter().map(back).collect();
+        write_path(file, &world, rate)?;
+    }
+    let mut out = Out::open(options, path.rate)?;
+    observe(Event::begins(Stage::Device));
+    let gpu = Gpu::open()?;
+    subject.tell_unlike(&gpu, observe)?;
+    let raster = Arc::new(Raster::with(&gpu, subject.drawn));
+    let scenes = gray.iter().chain([&subject.splats]);
+    let renderers = scenes.map(|splats| Renderer::of(&raster, splats, &[&splats.sh], path.extent));
+    let mut renderers = renderers.collect::<Result<Vec<_>, _>>()?;
+    let total = path.cameras.len();
+    let mut size = [0; 2];
+    for (done, camera) in path.cameras.iter().enumerate() {
+        observe(Event::Progress {
+            stage: Stage::Rendering,
+            done,
+            total,
+            message: String::new(),
+        });
+        let drawn = renderers.iter_mut().map(|renderer| {
+            let picture = renderer.render(camera)?.remove(0);
+            Ok::<_, RunError>(to_image(picture.width, picture.height, &picture.shown()))
+        });
+        let picture = beside(drawn.collect::<Result<Vec<_>, _>>()?);
+        size = [picture.width(), picture.height()];
+        out.write(&format!("frame-{done:04}.png"), &picture)?;
+    }
+    out.finish()?;
+    observe(Event::Progress {
+        stage: Stage::Rendering,
+        done: total,
+        total,
+        message: String::new(),
+    });
+    Ok(Rendered {
+        frames: total,
+        size,
+        rate,
+    })
+}
+
+/// A path in the coordinates of a scene.
+struct Path {
+    cameras: Vec<Camera>,
+    rate: [u32; 2],
+    /// The size of the scene, in world units.
+    extent: f64,
+}
+
+impl Path {
+    fn of(options: &PathOptions, subject: &Subject) -> Result<Self, RunError> {
+        let frames = |rate: [u32; 2]| {
+            let seconds = options.seconds.unwrap_or(SECONDS);
+            let frames = seconds * f64::from(rate[0]) / f64::from(rate[1]);
+            (frames.round() as usize).max(1)
+        };
+        let ball = || {
+            let sigmoid = |&logit: &f32| 1.0 / (1.0 + (-f64::from(logit)).exp());
+            let splats = &subject.splats;
+            let weights: Vec<f64> = splats.opacity_logits.iter().map(sigmoid).collect();
+            middle_of_splats(&splats.means, &weights)
+        };
+        let extent = match &subject.capture {
+            Some(capture) => capture.extent(),
+            None => ball().1,
+        };
+        let rate = options.rate.unwrap_or(FRAME_RATE);
+        let (cameras, rate) = match (&options.way, &subject.capture) {
+            (Way::File(file), _) => {
+                let read = read_path(file, options.size.unwrap_or(SIZE))?;
+                let from = match read.coordinates {
+                    Coordinates::Colmap => subject.offset,
+                    Coordinates::SplatFile => DVec3::ZERO,
+                };
+                let cameras = read.cameras.iter().map(|camera| camera.recentered(from));
+                let rate = options.rate.or(read.rate.map(fraction)).unwrap_or(rate);
+                (cameras.collect(), rate)
+            }
+            (Way::Orbit, None) => {
+                let lens = lens(options.size.unwrap_or(SIZE), FIELD_OF_VIEW);
+                (orbit_of_ball(ball(), &lens, frames(rate)), rate)
+            }
+            (Way::Photos, None) => return Err(RunError::NoCameras(subject.file.clone())),
+            (way, Some(capture)) => {
+                let loader = Loader::new(subject.load.clone());
+                let train = split(&capture.views, subject.load.holdout).train;
+                let cameras = train.iter().map(|&i| loader.camera(&capture.views[i]));
+                let cameras: Vec<Camera> = cameras.collect::<Result<_, _>>()?;
+                let cameras: Vec<&Camera> = cameras.iter().collect();
+                let path = match way {
+                    Way::Orbit => {
+                        let points = capture.points.iter().map(|point| point.position);
+                        let points: Vec<DVec3> = points.collect();
+                        orbit_of_cameras(&cameras, &points, frames(rate))
+                    }
+                    _ => camera_path(&cameras, capture.extent(), frames(rate)),
+                };
+                (path, rate)
+            }
+        };
+        let cameras: Vec<Camera> = cameras;
+        // Films have no odd sides, and all their frames one size.
+        let size = options.size.unwrap_or_else(|| {
+            let first = &cameras[0];
+            [first.width, first.height].map(|side| (side + side % 2).max(2))
+        });
+        let cameras = cameras.iter().map(|camera| framed(camera, size));
+        Ok(Self {
+            cameras: cameras.collect(),
+            rate,
+            extent,
+        })
+    }
+}
+
+/// A rate as a fraction, to the thousandth.
+fn fraction(rate: f64) -> [u32; 2] {
+    match rate.fract() == 0.0 {
+        true => [rate.max(1.0) as u32, 1],
+        false => [(1000.0 * rate).round().max(1.0) as u32, 1000],
+    }
+}
+
+/// Pictures of one height side by side.
+fn beside(pictures: Vec<RgbImage>) -> RgbImage {
+    let width = pictures.iter().map(RgbImage::width).sum();
+    let height = pictures.iter().map(RgbImage::height).max().unwrap_or(0);
+    let mut all = RgbImage::new(width, height);
+    let mut left = 0;
+    for picture in &pictures {
+        // Both sides are the sums of what is put there.
+        let _ = all.copy_from(picture, left, 0);
+        left += picture.width();
+    }
+    all
+}
+
+/// Where pictures go.
+struct Out {
+    folder: Option<PathBuf>,
+    film: Option<FilmWriter>,
+}
+
+impl Out {
+    fn open(options: &PathOptions, rate: [u32; 2]) -> Result<Self, RunError> {
+        if let Some(folder) = &options.output {
+            files::make_folder(folder)?;
+        }
+        let film = options.video.as_ref().map(|video| {
+            files::make_folder(folder_of(video))?;
+            Ok::<_, RunError>(FilmWriter::new(video, rate, Purpose::Viewing)?)
+        });
+        Ok(Self {
+            folder: options.output.clone(),
+            film: film.transpose()?,
+        })
+    }
+
+    fn write(&mut self, name: &str, picture: &RgbImage) -> Result<(), RunError> {
+        if let Some(folder) = &self.folder {
+            files::write_png(&folder.join(name), picture)?;
+        }
+        match &mut self.film {
+            Some(film) => film.write(name, picture),
+            None => Ok(()),
+        }
+    }
+
+    fn finish(self) -> Result<(), RunError> {
+        self.film.map_or(Ok(()), FilmWriter::finish)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rates_are_fractions() {
+        assert_eq!(fraction(24.0), [24, 1]);
+        assert_eq!(fraction(29.97), [29970, 1000]);
+        assert_eq!(fraction(0.5), [500, 1000]);
+    }
+
+    #[test]
+    fn pictures_stand_side_by_side() {
+        let plain = |value| RgbImage::from_pixel(3, 2, image::Rgb([value; 3]));
+        let both = beside(vec![plain(10), plain(200)]);
+        assert_eq!(both.dimensions(), (6, 2));
+        assert_eq!(
+            (both.get_pixel(2, 1).0, both.get_pixel(3, 0).0),
+            ([10; 3], [200; 3])
+        );
+    }
+}

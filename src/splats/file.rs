@@ -1,0 +1,335 @@
+//! Splat files of every format: the one way in and out.
+
+use std::{io::Write, path::Path};
+
+use glam::DVec3;
+use serde::Serialize;
+
+use super::{
+    Format, ShField, SplatError, Splats, format::is_splat_file, glb, ply, sh, sog, splat, spz, usda,
+};
+use crate::{disk, input};
+
+/// Colors in a file.
+pub(super) const CHANNELS: usize = 3;
+
+/// Norm below which a quaternion has no direction.
+pub(super) const MIN_QUATERNION_NORM: f64 = 1e-12;
+
+/// The share of the Gaussians that a format may spoil without a word.
+const TOLD: f64 = 0.01;
+
+/// Gaussians that one bit of a compressed file may stand for, at most: a file that announces
+/// more is cut off, or made to fill the memory.
+const SPLATS_PER_BYTE: u64 = 8;
+
+/// What a splat file holds.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ReadSplats {
+    /// The Gaussians, with an RGB field. Quaternions are as in the file, not
+    /// necessarily of unit length.
+    pub splats: Splats,
+    /// Gaussians that were left out because a number was not finite or the
+    /// quaternion zero. An infinite opacity is not counted: it is opaque or transparent; nor is
+    /// a scale of minus infinity: it is flat.
+    pub skipped: usize,
+    /// What was subtracted from the centers, in world units, as the file says
+    /// ([`offset_comment`](ply::offset_comment) in a `.ply`); zero where it says nothing.
+    pub offset: DVec3,
+    /// Bytes behind all that the header announces: its count is likely too small.
+    pub surplus: u64,
+    /// Whether the file says that the Gaussians were trained antialiased
+    /// ([`ANTIALIASED`](ply::ANTIALIASED), or Postshot's `antialiased 1`, in a `.ply`).
+    pub antialiased: bool,
+}
+
+/// Versions of `.spz` that are written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub enum SpzVersion {
+    /// One gzip stream, which more programs read.
+    #[default]
+    #[serde(rename = "3")]
+    V3,
+    /// Six Zstandard streams.
+    #[serde(rename = "4")]
+    V4,
+}
+
+/// How a splat file is written, and what it says of its Gaussians.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct WriteOptions {
+    /// The program that writes, as files name it.
+    pub generator: String,
+    /// Whether the Gaussians were trained antialiased.
+    pub antialiased: bool,
+    /// Added to the centers in f64 before they are rounded, in world units.
+    pub added: DVec3,
+    /// What the centers lack, as the file says, in world units.
+    pub offset: DVec3,
+    /// The version of an `.spz`.
+    pub spz: SpzVersion,
+}
+
+impl WriteOptions {
+    /// The comments of a `.ply`.
+    pub fn comments(&self) -> Vec<String> {
+        let mode = self.antialiased.then(|| ply::ANTIALIASED.to_owned());
+        let offset = (self.offset != DVec3::ZERO).then(|| ply::offset_comment(self.offset));
+        let generator = std::iter::once(self.generator.clone());
+        generator.chain(mode).chain(offset).collect()
+    }
+}
+
+/// Reads a splat file, in the format that its name tells. Gaussians are in the file's own order
+/// and axes.
+///
+/// # Errors
+/// [`SplatError`] where its format is not read or it is damaged.
+pub fn read_splats(path: &Path) -> Result<ReadSplats, SplatError> {
+    is_splat_file(path)?;
+    let bytes = || input::read(path).map_err(SplatError::io(path));
+    match Format::of(path) {
+        Some(Format::Splat) => splat::read(path, &bytes()?),
+        Some(Format::Spz) => spz::read(path, &bytes()?),
+        Some(Format::Sog) => sog::read(path, &bytes()?),
+        // Which of the two it is its header tells.
+        _ => Ok(ply::read_ply(path)?),
+    }
+}
+
+/// Writes Gaussians as a splat file, in the format that its name tells, and gives what is
+/// doubtful about the result. A field with one channel is written as gray RGB.
+///
+/// The file appears under its name when it is complete; one that was there is replaced. The same
+/// Gaussians give the same bytes.
+///
+/// # Errors
+/// [`SplatError`] where the name tells no format, a number is not finite, or the format's numbers
+/// are too coarse for the scene.
+pub fn write_splats(
+    path: &Path,
+    splats: &Splats,
+    options: &WriteOptions,
+) -> Result<Vec<String>, SplatError> {
+    let format = Format::to_write(path)?;
+    let mut doubts = Vec::new();
+    if options.antialiased && !format.tells_antialiasing() {
+        doubts.push(format!(
+            "{}: the scene is to be drawn antialiased, which a {} file cannot say: viewers will draw it too bold from afar; any other format says it",
+            path.display(),
+            format.extension()
+        ));
+    }
+    if format == Format::Ply {
+        ply::write_ply(path, splats, options.added, &options.comments())?;
+        return Ok(doubts);
+    }
+    let splats = ready(path, splats, options.added)?;
+    let mut judge = Judge {
+        path,
+        splats: &splats,
+        doubts,
+    };
+    let bytes = match format {
+        Format::Ply | Format::CompressedPly => ply::encode_compressed(&splats, options, &mut judge),
+        Format::Splat => splat::encode(&splats),
+        Format::Spz => spz::encode(&splats, options, &mut judge)?,
+        Format::Sog => sog::encode(&splats, options, &mut judge)?,
+        Format::Glb => glb::encode(path, &splats, options)?,
+        Format::Usda => usda::encode(&splats, options),
+    };
+    let doubts = judge.doubts;
+    let mut file = disk::create(path).map_err(SplatError::io(path))?;
+    file.write_all(&bytes).map_err(SplatError::io(path))?;
+    file.persist(path).map_err(SplatError::io(path))?;
+    Ok(doubts)
+}
+
+/// Gaussians that every format takes: RGB, finite numbers, unit quaternions.
+fn ready(path: &Path, splats: &Splats, added: DVec3) -> Result<Splats, SplatError> {
+    ply::check(path, splats, added)?;
+    let coefficients = match splats.sh.channels {
+        1 => (splats.sh.coefficients.iter())
+            .flat_map(|&value| [value; CHANNELS])
+            .collect(),
+        _ => splats.sh.coefficients.clone(),
+    };
+    let moved = |mean: &[f32; 3]| {
+        (DVec3::from(mean.map(f64::from)) + added)
+            .as_vec3()
+            .to_array()
+    };
+    let unit = |quaternion: &[f32; 4]| {
+        let norm = norm(quaternion);
+        quaternion.map(|value| (f64::from(value) / norm) as f32)
+    };
+    Ok(Splats {
+        means: splats.means.iter().map(moved).collect(),
+        quats: splats.quats.iter().map(unit).collect(),
+        log_scales: splats.log_scales.clone(),
+        opacity_logits: splats.opacity_logits.clone(),
+        sh: ShField {
+            degree: splats.sh.degree,
+            channels: CHANNELS,
+            coefficients,
+        },
+    })
+}
+
+fn norm(quaternion: &[f32; 4]) -> f64 {
+    let squares = quaternion.iter().map(|&q| f64::from(q).powi(2));
+    squares.sum::<f64>().sqrt()
+}
+
+/// Finds out what a format does to the Gaussians that it is given.
+pub(super) struct Judge<'a> {
+    path: &'a Path,
+    splats: &'a Splats,
+    doubts: Vec<String>,
+}
+
+impl Judge<'_> {
+    /// Judges a format whose numbers are `steps` apart at a center, in world units: a Gaussian
+    /// whose middle scale is below that would be moved by half its size or more.
+    ///
+    /// # Errors
+    /// [`SplatError::Coarse`] where that happens to most of them.
+    pub fn steps(&mut self, steps: impl Fn([f32; 3]) -> f64) -> Result<(), SplatError> {
+        let count = self.splats.len();
+        let shapes = self.splats.means.iter().zip(&self.splats.log_scales);
+        let smaller = |(mean, scales): &(&[f32; 3], &[f32; 3])| {
+            f64::from(middle(**scales)).exp() < steps(**mean)
+        };
+        let moved = shapes.filter(smaller).count();
+        if 2 * moved > count {
+            return Err(SplatError::Coarse {
+                path: self.path.to_owned(),
+                moved,
+                count,
+            });
+        }
+        self.tell(moved, "are moved by up to half their size or more");
+        Ok(())
+    }
+
+    /// Judges log-scales that are clipped to a range. What is thin does not matter beside what
+    /// is long.
+    pub fn log_scales(&mut self, [low, high]: [f32; 2]) {
+        let longest = |scales: &[f32; 3]| scales.iter().copied().fold(f32::MIN, f32::max);
+        // A tenth of the longest.
+        let matters = |scales: &&[f32; 3]| {
+            longest(scales) > high
+                || longest(scales) - std::f32::consts::LN_10 < low
+                    && scales.iter().any(|&scale| scale < low)
+        };
+        let clipped = self.splats.log_scales.iter().filter(matters).count();
+        self.tell(clipped, "have scales beyond its range, which are clipped");
+    }
+
+    /// Judges harmonics that are clipped to a range: of degree 0, or those above.
+    pub fn harmonics(&mut self, constant: bool, [low, high]: [f32; 2]) {
+        let field = &self.splats.sh;
+        let beyond = |index: &usize| {
+            let all = field.of(*index);
+            let (zero, rest) = all.split_at(CHANNELS);
+            let some = if constant { zero } else { rest };
+            some.iter().any(|&value| value < low || value > high)
+        };
+        let clipped = (0..self.splats.len()).filter(beyond).count();
+        let what = match constant {
+            true => "have colors beyond its range, which are clipped",
+            false => "have harmonics beyond its range, which are clipped",
+        };
+        self.tell(clipped, what);
+    }
+
+    fn tell(&mut self, some: usize, what: &str) {
+        if some as f64 > TOLD * self.splats.len() as f64 {
+            self.doubts.push(format!(
+                "{}: {some} of {} Gaussians {what}; a .ply keeps them, and a .compressed.ply most of it",
+                self.path.display(),
+                self.splats.len()
+            ));
+        }
+    }
+
+    /// The file that is written.
+    pub fn path(&self) -> &Path {
+        self.path
+    }
+}
+
+/// The second of three log-scales.
+pub(super) fn middle(mut scales: [f32; 3]) -> f32 {
+    scales.sort_unstable_by(f32::total_cmp);
+    scales[1]
+}
+
+/// Refuses a count that a compressed file of so many bytes cannot hold.
+pub(super) fn check_count(path: &Path, count: usize, bytes: usize) -> Result<(), SplatError> {
+    match count as u64 > SPLATS_PER_BYTE.saturating_mul(bytes as u64) {
+        true => Err(SplatError::damaged(
+            path,
+            "count",
+            format!("{count} Gaussians are more than {bytes} bytes hold; it is cut off or damaged"),
+        )),
+        false => Ok(()),
+    }
+}
+
+/// Gaussians as they are read, one after the other.
+pub(super) struct Gathered {
+    read: ReadSplats,
+}
+
+impl Gathered {
+    /// For so many, with harmonics of a degree.
+    pub fn new(count: usize, degree: u32) -> Self {
+        let terms = sh::coefficient_count(degree);
+        Self {
+            read: ReadSplats {
+                splats: Splats {
+                    means: Vec::with_capacity(count),
+                    quats: Vec::with_capacity(count),
+                    log_scales: Vec::with_capacity(count),
+                    opacity_logits: Vec::with_capacity(count),
+                    sh: ShField {
+                        degree,
+                        channels: CHANNELS,
+                        coefficients: Vec::with_capacity(count * terms * CHANNELS),
+                    },
+                },
+                ..ReadSplats::default()
+            },
+        }
+    }
+
+    /// Takes a Gaussian, unless a number of it is not finite or its quaternion is zero. `sh` is
+    /// `[(degree + 1)², 3]`.
+    pub fn push(
+        &mut self,
+        mean: [f32; 3],
+        quaternion: [f32; 4],
+        log_scales: [f32; 3],
+        opacity_logit: f32,
+        sh: &[f32],
+    ) {
+        let all = [&mean[..], &quaternion, &log_scales, &[opacity_logit], sh];
+        let finite = |values: &&[f32]| values.iter().all(|value| value.is_finite());
+        if !all.iter().all(finite) || norm(&quaternion) < MIN_QUATERNION_NORM {
+            self.read.skipped += 1;
+            return;
+        }
+        let splats = &mut self.read.splats;
+        splats.means.push(mean);
+        splats.quats.push(quaternion);
+        splats.log_scales.push(log_scales);
+        splats.opacity_logits.push(opacity_logit);
+        splats.sh.coefficients.extend(sh);
+    }
+
+    /// What was read.
+    pub fn finish(self) -> ReadSplats {
+        self.read
+    }
+}

@@ -1,0 +1,172 @@
+//! The formats of splat files, told by a file's name.
+
+use std::path::{Path, PathBuf};
+
+use super::SplatError;
+
+/// A format of splat files; docs/formats.md compares them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// The layout of the reference implementation, 32-bit floats.
+    Ply,
+    /// PlayCanvas' compressed `.ply`.
+    CompressedPly,
+    /// 32 bytes a Gaussian.
+    Splat,
+    /// Niantic's.
+    Spz,
+    /// PlayCanvas' Spatially Ordered Gaussians, in one file.
+    Sog,
+    /// glTF with `KHR_gaussian_splatting`.
+    Glb,
+    /// OpenUSD as text.
+    Usda,
+}
+
+/// Formats of others that are neither read nor written.
+const FOREIGN: [&str; 4] = ["ksplat", "usd", "usdz", "gltf"];
+
+impl Format {
+    /// All of them; of two extensions that a name may end in, the longer is before the other.
+    pub const ALL: [Self; 7] = [
+        Self::CompressedPly,
+        Self::Ply,
+        Self::Splat,
+        Self::Spz,
+        Self::Sog,
+        Self::Glb,
+        Self::Usda,
+    ];
+
+    /// What names end in, with its dot.
+    pub fn extension(self) -> &'static str {
+        match self {
+            Self::Ply => ".ply",
+            Self::CompressedPly => ".compressed.ply",
+            Self::Splat => ".splat",
+            Self::Spz => ".spz",
+            Self::Sog => ".sog",
+            Self::Glb => ".glb",
+            Self::Usda => ".usda",
+        }
+    }
+
+    /// The format that a file's name tells, whatever the case of its letters.
+    pub fn of(path: &Path) -> Option<Self> {
+        let (format, _) = Self::split(path)?;
+        Some(format)
+    }
+
+    /// The format to write a file in.
+    ///
+    /// # Errors
+    /// [`SplatError::UnknownFormat`].
+    pub fn to_write(path: &Path) -> Result<Self, SplatError> {
+        Self::of(path).ok_or_else(|| SplatError::UnknownFormat {
+            path: path.to_owned(),
+        })
+    }
+
+    /// The path of a splat file without its extension.
+    pub fn stem(path: &Path) -> PathBuf {
+        match Self::split(path) {
+            Some((_, stem)) => path.with_file_name(stem),
+            None => path.with_extension(""),
+        }
+    }
+
+    /// Whether its files are read, too.
+    pub fn is_read(self) -> bool {
+        !matches!(self, Self::Glb | Self::Usda)
+    }
+
+    /// Whether its files can say that they want to be drawn antialiased.
+    pub fn tells_antialiasing(self) -> bool {
+        self != Self::Splat
+    }
+
+    /// Whether its files can say what was subtracted from the coordinates.
+    pub fn tells_offset(self) -> bool {
+        !matches!(self, Self::Splat | Self::Spz)
+    }
+
+    /// The extensions of some, for a sentence.
+    pub(super) fn list(which: impl Fn(Self) -> bool) -> String {
+        let some = Self::ALL.into_iter().filter(|&format| which(format));
+        some.map(Self::extension).collect::<Vec<_>>().join(", ")
+    }
+
+    fn split(path: &Path) -> Option<(Self, String)> {
+        let name = path.file_name()?.to_string_lossy();
+        Self::ALL.into_iter().find_map(|format| {
+            let at = name.len().checked_sub(format.extension().len())?;
+            let (stem, end) = name.split_at_checked(at)?;
+            end.eq_ignore_ascii_case(format.extension())
+                .then(|| (format, stem.to_owned()))
+        })
+    }
+}
+
+/// Whether a path is named like a splat file that can be read.
+///
+/// # Errors
+/// [`SplatError::OtherFormat`] where it is named like one that cannot.
+pub fn is_splat_file(path: &Path) -> Result<bool, SplatError> {
+    let other = |extension: &str| SplatError::OtherFormat {
+        path: path.to_path_buf(),
+        format: extension.to_owned(),
+    };
+    if let Some(format) = Format::of(path) {
+        return match format.is_read() {
+            true => Ok(true),
+            false => Err(other(format.extension())),
+        };
+    }
+    let extension = path.extension().unwrap_or_default();
+    let foreign = (FOREIGN.iter()).find(|foreign| extension.eq_ignore_ascii_case(foreign));
+    match foreign {
+        Some(foreign) => Err(other(&format!(".{foreign}"))),
+        None => Ok(false),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_tell_formats() {
+        let of = |name: &str| Format::of(Path::new(name));
+        assert_eq!(of("a/b.ply"), Some(Format::Ply));
+        assert_eq!(of("b.Compressed.PLY"), Some(Format::CompressedPly));
+        assert_eq!(of("compressed.ply"), Some(Format::Ply));
+        assert_eq!(of("b.SPZ"), Some(Format::Spz));
+        for unknown in ["b", "ply", "b.ply.gz", "b.obj", "a.ply/b", "ü.pl"] {
+            assert_eq!(of(unknown), None, "{unknown}");
+        }
+        for format in Format::ALL {
+            let name = format!("runs/scene{}", format.extension());
+            assert_eq!(of(&name), Some(format));
+            assert_eq!(Format::stem(Path::new(&name)), Path::new("runs/scene"));
+        }
+    }
+
+    #[test]
+    fn what_is_not_read_is_refused_with_a_remedy() {
+        for name in ["scene.ksplat", "scene.GLB", "a.usda", "b.usdz"] {
+            let message = is_splat_file(Path::new(name)).unwrap_err().to_string();
+            assert!(message.starts_with(name), "{message}");
+            assert!(message.contains("convert it to .ply"), "{message}");
+        }
+        for name in ["a.PLY", "a.spz", "a.splat", "a.sog", "a.compressed.ply"] {
+            assert!(is_splat_file(Path::new(name)).unwrap(), "{name}");
+        }
+        assert!(!is_splat_file(Path::new("runs/a")).unwrap());
+        let unknown = Format::to_write(Path::new("a.obj")).unwrap_err();
+        assert!(
+            unknown
+                .to_string()
+                .contains(".compressed.ply, .ply, .splat")
+        );
+    }
+}

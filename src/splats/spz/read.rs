@@ -1,0 +1,214 @@
+//! Reading.
+
+use std::{io::Read, path::Path};
+
+use flate2::read::MultiGzDecoder;
+
+use super::*;
+use crate::splats::{
+    ReadSplats, SplatError,
+    file::{Gathered, check_count},
+    quantize::{logit, of_smallest_three},
+    sh::MAX_DEGREE,
+};
+
+/// What the header says.
+struct Header {
+    version: u32,
+    count: usize,
+    degree: u32,
+    fractional_bits: u8,
+    antialiased: bool,
+}
+
+/// Reads a file of version 1 to 4.
+///
+/// # Errors
+/// [`SplatError::Damaged`].
+pub(in crate::splats) fn read(path: &Path, bytes: &[u8]) -> Result<ReadSplats, SplatError> {
+    match bytes.starts_with(&MAGIC) {
+        true => read_streams(path, bytes),
+        false => read_gzip(path, bytes),
+    }
+}
+
+fn read_gzip(path: &Path, bytes: &[u8]) -> Result<ReadSplats, SplatError> {
+    let mut stream = MultiGzDecoder::new(bytes);
+    let mut begin = [0; HEADER];
+    stream.read_exact(&mut begin).map_err(|error| {
+        let reason = format!("neither NGSP nor a gzip stream that begins with it ({error})");
+        SplatError::damaged(path, "header", reason)
+    })?;
+    let header = Header::of(path, begin, bytes.len())?;
+    if header.version > 3 {
+        let reason = format!("version {} in a gzip stream", header.version);
+        return Err(SplatError::damaged(path, "version", reason));
+    }
+    let sizes = part_bytes(header.version, header.degree);
+    let parts = sizes.map(|size| size * header.count);
+    let wanted: usize = parts.iter().sum();
+    let mut body = Vec::new();
+    let mut limited = stream.take(wanted as u64);
+    let read = limited.read_to_end(&mut body);
+    if matches!(read, Ok(found) if found < wanted) {
+        return Err(header.cut_off(path, body.len(), wanted));
+    }
+    // The stream's end has its checksum; what stands before it are extensions.
+    let end = read.and_then(|_| limited.into_inner().read(&mut [0]));
+    end.map_err(|error| SplatError::damaged(path, "gzip stream", error.to_string()))?;
+    let mut rest = &body[..];
+    let parts = parts.map(|size| {
+        let (part, behind) = rest.split_at(size);
+        rest = behind;
+        part
+    });
+    Ok(header.gather(parts))
+}
+
+fn read_streams(path: &Path, bytes: &[u8]) -> Result<ReadSplats, SplatError> {
+    let cut_off = || SplatError::damaged(path, "header", "it is cut off");
+    let begin = *bytes.first_chunk::<HEADER>().ok_or_else(cut_off)?;
+    let header = Header::of(path, begin, bytes.len())?;
+    if header.version != 4 {
+        let reason = format!("version {} without a gzip stream", header.version);
+        return Err(SplatError::damaged(path, "version", reason));
+    }
+    let wrong = |reason: String| SplatError::damaged(path, "table of streams", reason);
+    let table = bytes.get(HEADER..HEADER + 4).ok_or_else(cut_off)?;
+    let table = u32::from_le_bytes([table[0], table[1], table[2], table[3]]) as usize;
+    let streams = usize::from(bytes[15]);
+    let expected = if header.degree == 0 { 5 } else { 6 };
+    if table < LONG_HEADER || streams != expected {
+        return Err(wrong(format!("{streams} streams at byte {table}")));
+    }
+    let mut at = table.saturating_add(streams * TABLE_ROW);
+    let rows = bytes
+        .get(table..at)
+        .ok_or_else(|| wrong("it is cut off".to_owned()))?;
+    let sizes = part_bytes(header.version, header.degree);
+    let mut parts: [Vec<u8>; 6] = Default::default();
+    for (index, row) in rows.as_chunks::<TABLE_ROW>().0.iter().enumerate() {
+        let (compressed, plain) = row.split_at(8);
+        let number = |bytes: &[u8]| bytes.try_into().map_or(0, u64::from_le_bytes) as usize;
+        let wanted = sizes[index] * header.count;
+        if number(plain) != wanted {
+            return Err(wrong(format!(
+                "stream {index} has {} bytes, not {wanted}",
+                number(plain)
+            )));
+        }
+        let end = at.saturating_add(number(compressed));
+        let stream = bytes.get(at..end).ok_or_else(|| {
+            let reason = format!("stream {index} goes beyond the end; the file is cut off");
+            SplatError::damaged(path, "streams", reason)
+        })?;
+        at = end;
+        let unpacked = zstd::Decoder::new(stream)
+            .and_then(|stream| stream.take(wanted as u64).read_to_end(&mut parts[index]));
+        let reason = match unpacked {
+            Ok(found) if found == wanted => continue,
+            Ok(found) => format!("stream {index} holds {found} bytes, not {wanted}"),
+            Err(error) => format!("stream {index}: {error}"),
+        };
+        return Err(SplatError::damaged(path, "streams", reason));
+    }
+    Ok(header.gather(parts.each_ref().map(Vec::as_slice)))
+}
+
+impl Header {
+    fn of(path: &Path, bytes: [u8; HEADER], file_bytes: usize) -> Result<Self, SplatError> {
+        let word = |at: usize| {
+            u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
+        };
+        let wrong = |field, reason: String| Err(SplatError::damaged(path, field, reason));
+        let (version, count) = (word(4), word(8) as usize);
+        if bytes[..4] != MAGIC {
+            return wrong("header", "does not begin with NGSP".to_owned());
+        }
+        if !(1..=4).contains(&version) {
+            return wrong("version", format!("{version} is not read, only 1 to 4"));
+        }
+        let [degree, fractional_bits, flags] = [bytes[12], bytes[13], bytes[14]];
+        if u32::from(degree) > MAX_DEGREE {
+            return wrong("SH degree", format!("{degree} is above {MAX_DEGREE}"));
+        }
+        if version > 1 && fractional_bits > 30 {
+            return wrong("fractional bits", format!("{fractional_bits} is above 30"));
+        }
+        check_count(path, count, file_bytes)?;
+        Ok(Self {
+            version,
+            count,
+            degree: degree.into(),
+            fractional_bits,
+            antialiased: flags & ANTIALIASED != 0,
+        })
+    }
+
+    fn cut_off(&self, path: &Path, found: usize, wanted: usize) -> SplatError {
+        let reason = format!(
+            "{found} bytes where {} Gaussians take {wanted}; it is cut off or damaged",
+            self.count
+        );
+        SplatError::damaged(path, "gzip stream", reason)
+    }
+
+    /// The Gaussians of parts that have the sizes which the header says.
+    fn gather(&self, parts: [&[u8]; 6]) -> ReadSplats {
+        let sizes = part_bytes(self.version, self.degree);
+        let mut gathered = Gathered::new(self.count, self.degree);
+        let mut coefficients = vec![0.0; coefficient_count(self.degree) * CHANNELS];
+        for index in 0..self.count {
+            let [center, opacity, color, scale, rotation, rest] =
+                [0, 1, 2, 3, 4, 5].map(|k| &parts[k][index * sizes[k]..(index + 1) * sizes[k]]);
+            let (constant, above) = coefficients.split_at_mut(CHANNELS);
+            for (value, &byte) in constant.iter_mut().zip(color) {
+                *value = ((f64::from(byte) / 255.0 - 0.5) / COLOR_SCALE) as f32;
+            }
+            for (value, &byte) in above.iter_mut().zip(rest) {
+                *value = ((f64::from(byte) - SH_LEVELS) / SH_LEVELS) as f32;
+            }
+            gathered.push(
+                [0, 1, 2].map(|axis| self.coordinate(center, axis)),
+                self.rotation(rotation),
+                [0, 1, 2].map(|k| (f64::from(scale[k]) / SCALE_STEPS + LOWEST_SCALE) as f32),
+                logit(f64::from(opacity[0]) / 255.0),
+                &coefficients,
+            );
+        }
+        ReadSplats {
+            antialiased: self.antialiased,
+            ..gathered.finish()
+        }
+    }
+
+    fn coordinate(&self, center: &[u8], axis: usize) -> f32 {
+        if self.version == 1 {
+            let half = half::f16::from_le_bytes([center[2 * axis], center[2 * axis + 1]]);
+            return half.into();
+        }
+        let [a, b, c] = [0, 1, 2].map(|k| center[3 * axis + k]);
+        // In the upper bytes, so that the sign is the number's.
+        let fixed = i32::from_le_bytes([0, a, b, c]) >> 8;
+        (f64::from(fixed) / f64::from(1_u32 << self.fractional_bits)) as f32
+    }
+
+    fn rotation(&self, bytes: &[u8]) -> [f32; 4] {
+        if self.version < 3 {
+            let [x, y, z] = [0, 1, 2].map(|k| f32::from(bytes[k]) / 127.5 - 1.0);
+            let w = (1.0 - x * x - y * y - z * z).max(0.0).sqrt();
+            return [w, x, y, z];
+        }
+        let word = u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
+        let small = [20, 10, 0].map(|shift| {
+            let level = f64::from(word >> shift & ROTATION_LEVELS) / f64::from(ROTATION_LEVELS);
+            if word >> (shift + 9) & 1 == 1 {
+                -level
+            } else {
+                level
+            }
+        });
+        let [x, y, z, w] = of_smallest_three((word >> 30) as usize, small);
+        [w, x, y, z]
+    }
+}

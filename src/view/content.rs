@@ -1,0 +1,200 @@
+//! What is served: the page's files, scenes, photos.
+
+use std::{
+    io::Cursor,
+    sync::{Arc, Mutex, PoisonError},
+};
+
+use image::{DynamicImage, GrayImage, ImageFormat, RgbImage, imageops};
+use serde_json::Value;
+
+use super::{
+    ViewerError, about, assets, overview, pack,
+    server::{Answer, Request},
+};
+use crate::{
+    capture::{Camera, Photo},
+    hash::Hasher,
+    run::{Look, Observer, RunError, SceneKind},
+};
+
+/// Longer side of the photos that the page shows, in pixels: what screens have.
+const SIDE: u32 = 2048;
+
+/// What a page shows.
+pub trait Content: Send + Sync {
+    /// All but scenes and pictures, see [`about`].
+    ///
+    /// # Errors
+    /// [`RunError`] of the scene's file.
+    fn about(&self) -> Result<Value, RunError>;
+
+    /// A scene, [packed](pack); none where there is no such one.
+    ///
+    /// # Errors
+    /// [`RunError`] of its file.
+    fn scene(&self, kind: SceneKind) -> Result<Option<Arc<Vec<u8>>>, RunError>;
+
+    /// The gray photo of a view, as it was trained on.
+    ///
+    /// # Errors
+    /// [`RunError`] of its file.
+    fn photo(&self, view: usize) -> Result<Option<GrayImage>, RunError>;
+
+    /// The photo of a view in its teacher's colors.
+    ///
+    /// # Errors
+    /// [`RunError`] of the photo or the teacher.
+    fn teacher(&self, view: usize) -> Result<Option<RgbImage>, RunError>;
+}
+
+/// The answer to a request. Paths are compared with those that there are, and never lead into a
+/// folder.
+pub fn answer(content: &dyn Content, request: &Request) -> Answer {
+    let text = |kind, body: &str| Answer::ok(kind, body.as_bytes());
+    match request.path.as_str() {
+        "/" => text("text/html; charset=utf-8", assets::PAGE),
+        "/viewer.css" => text("text/css; charset=utf-8", assets::STYLE),
+        "/viewer.js" => Answer::ok("text/javascript; charset=utf-8", assets::script()),
+        "/scene.json" => match content.about() {
+            Ok(told) => tagged(told.to_string()),
+            Err(error) => failed(&error),
+        },
+        "/scene/color" => scene(content, SceneKind::Color),
+        "/scene/luma" => scene(content, SceneKind::Luma),
+        path => {
+            let numbered = |under: &str| path.strip_prefix(under)?.parse::<usize>().ok();
+            if let Some(view) = numbered("/photo/") {
+                let photo = content.photo(view);
+                picture(photo.map(|found| found.map(DynamicImage::ImageLuma8)))
+            } else if let Some(view) = numbered("/teacher/") {
+                let photo = content.teacher(view);
+                picture(photo.map(|found| found.map(DynamicImage::ImageRgb8)))
+            } else {
+                Answer::not_found()
+            }
+        }
+    }
+}
+
+/// JSON, with a tag by which the page knows whether it is another.
+fn tagged(body: String) -> Answer {
+    let mut hash = Hasher::default();
+    hash.update(body.as_bytes());
+    Answer {
+        tag: Some(format!("\"{}\"", &hash.finish()[..16])),
+        ..Answer::ok("application/json", body)
+    }
+}
+
+fn scene(content: &dyn Content, kind: SceneKind) -> Answer {
+    match content.scene(kind) {
+        Ok(Some(body)) => Answer {
+            body,
+            ..Answer::ok("application/octet-stream", Vec::new())
+        },
+        Ok(None) => Answer::not_found(),
+        Err(error) => failed(&error),
+    }
+}
+
+/// A picture as PNG, no larger than a screen.
+fn picture(found: Result<Option<DynamicImage>, RunError>) -> Answer {
+    let image = match found {
+        Ok(Some(image)) if image.width().max(image.height()) > SIDE => {
+            image.resize(SIDE, SIDE, imageops::FilterType::Triangle)
+        }
+        Ok(Some(image)) => image,
+        Ok(None) => return Answer::not_found(),
+        Err(error) => return failed(&error),
+    };
+    let mut bytes = Cursor::new(Vec::new());
+    match image.write_to(&mut bytes, ImageFormat::Png) {
+        Ok(()) => Answer::ok("image/png", bytes.into_inner()),
+        Err(error) => Answer::refused("500 Internal Server Error", error.to_string()),
+    }
+}
+
+fn failed(error: &RunError) -> Answer {
+    Answer::refused("500 Internal Server Error", error.to_string())
+}
+
+/// A run or a splat file that stays as it is.
+pub struct OfRun {
+    look: Look,
+    /// The scenes by kind, packed when they are asked for the first time.
+    packed: [Mutex<Option<Packed>>; 2],
+}
+
+/// A scene for the page.
+#[derive(Clone)]
+struct Packed {
+    bytes: Arc<Vec<u8>>,
+    /// Where to look from without cameras, and the nearest depth.
+    overview: (Camera, f64),
+}
+
+impl OfRun {
+    /// What there is to see, with the first of its scenes read.
+    ///
+    /// # Errors
+    /// [`ViewerError::Nothing`] without a scene, and [`RunError`] of its file.
+    pub fn new(look: Look, observe: &mut Observer<'_>) -> Result<Self, ViewerError> {
+        let Some(first) = look.scenes().next() else {
+            return Err(ViewerError::Nothing(look.name));
+        };
+        let content = Self {
+            look,
+            packed: Default::default(),
+        };
+        content.packed(first, observe)?;
+        Ok(content)
+    }
+
+    fn packed(
+        &self,
+        kind: SceneKind,
+        observe: &mut Observer<'_>,
+    ) -> Result<Option<Packed>, RunError> {
+        let packed = self.packed[kind as usize].lock();
+        let mut packed = packed.unwrap_or_else(PoisonError::into_inner);
+        if packed.is_none() {
+            let read = self.look.read(kind, observe)?;
+            *packed = read.map(|(splats, drawn)| Packed {
+                bytes: Arc::new(pack(&splats, drawn)),
+                overview: overview(&splats),
+            });
+        }
+        Ok(packed.clone())
+    }
+}
+
+impl Content for OfRun {
+    fn about(&self) -> Result<Value, RunError> {
+        let start = match (&self.look.dataset, self.look.scenes().next()) {
+            (None, Some(kind)) => self
+                .packed(kind, &mut |_| {})?
+                .map(|packed| packed.overview),
+            _ => None,
+        };
+        let start = start.as_ref().map(|(camera, near)| (camera, Some(*near)));
+        Ok(about::of_look(&self.look, start))
+    }
+
+    fn scene(&self, kind: SceneKind) -> Result<Option<Arc<Vec<u8>>>, RunError> {
+        Ok(self.packed(kind, &mut |_| {})?.map(|packed| packed.bytes))
+    }
+
+    fn photo(&self, view: usize) -> Result<Option<GrayImage>, RunError> {
+        Ok(self.look.photo(view)?.and_then(|photo| gray(&photo)))
+    }
+
+    fn teacher(&self, view: usize) -> Result<Option<RgbImage>, RunError> {
+        self.look.teacher(view)
+    }
+}
+
+/// A photo's gray as an image.
+pub(super) fn gray(photo: &Photo) -> Option<GrayImage> {
+    GrayImage::from_raw(photo.width, photo.height, photo.gray.clone())
+}

@@ -1,0 +1,39 @@
+//! A page that shows a scene: served to this machine's browser, or written as one file that
+//! anybody can open. It draws with the kernel of [`crate::raster`], in WebGL 2.
+
+mod about;
+mod assets;
+mod content;
+mod html;
+mod live;
+mod overview;
+mod packed;
+mod server;
+
+pub use content::{Content, OfRun, answer};
+pub use html::{Written, is_html, write_html};
+pub use live::OfCommand;
+pub use overview::overview;
+pub use packed::pack;
+pub use server::{Answer, Request, Server};
+
+use crate::run::RunError;
+
+/// What can keep a scene from being shown.
+#[derive(Debug, thiserror::Error)]
+pub enum ViewerError {
+    /// The run or the file.
+    #[error(transparent)]
+    Run(#[from] RunError),
+    /// The port.
+    #[error("port {port} of 127.0.0.1 cannot be had ({reason})")]
+    Port {
+        /// Which.
+        port: u16,
+        /// The system's reason.
+        reason: String,
+    },
+    /// There is no such scene.
+    #[error("{0}: has no scene to show")]
+    Nothing(String),
+}

@@ -1,0 +1,323 @@
+//! A server for one page on this machine: GET and nothing else, a fixed list of places, and
+//! answers to nobody who came by another name.
+//!
+//! Every connection has a thread, a second to be heard in and an end: who is slow or says
+//! nothing keeps nobody else waiting for long, and nothing but itself.
+
+use std::{
+    io::{self, ErrorKind, Read, Write},
+    net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream},
+    sync::{
+        Arc,
+        atomic::{AtomicUsize, Ordering},
+    },
+    thread,
+    time::{Duration, Instant},
+};
+
+use super::ViewerError;
+
+/// Bytes of a request's head; a browser's has one or two thousand.
+const HEAD_BYTES: usize = 16 << 10;
+
+/// Headers of a request; a browser's has some twenty.
+const HEADERS: usize = 64;
+
+/// How long a request may take to arrive.
+const HEARD_WITHIN: Duration = Duration::from_secs(5);
+
+/// How long an answer may take to be taken, and how much longer for each MiB.
+const TAKEN_WITHIN: Duration = Duration::from_secs(10);
+const EACH_MIB: Duration = Duration::from_secs(1);
+
+/// Connections at a time; a browser opens six. Others wait until one ends.
+const CONNECTIONS: usize = 64;
+
+/// What is written at once.
+const CHUNK: usize = 256 << 10;
+
+/// What a page may do: nothing but show what this server has.
+const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; connect-src 'self'; worker-src blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+
+/// What is asked for.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Request {
+    /// The path, as it was sent.
+    pub path: String,
+    /// The tag of what is known already.
+    pub known: Option<String>,
+}
+
+/// An answer.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Answer {
+    /// HTTP's code and its words.
+    pub status: &'static str,
+    /// The body's kind.
+    pub kind: &'static str,
+    /// What tells this body from others.
+    pub tag: Option<String>,
+    /// The body.
+    pub body: Arc<Vec<u8>>,
+}
+
+impl Answer {
+    /// A body that was there.
+    pub fn ok(kind: &'static str, body: impl Into<Vec<u8>>) -> Self {
+        Self {
+            status: "200 OK",
+            kind,
+            tag: None,
+            body: Arc::new(body.into()),
+        }
+    }
+
+    /// A line that says why there is none.
+    pub fn refused(status: &'static str, why: impl Into<String>) -> Self {
+        Self {
+            status,
+            kind: "text/plain; charset=utf-8",
+            tag: None,
+            body: Arc::new(why.into().into_bytes()),
+        }
+    }
+
+    /// There is nothing at this path.
+    pub fn not_found() -> Self {
+        Self::refused("404 Not Found", "nothing lies here")
+    }
+}
+
+/// Listens on 127.0.0.1.
+#[derive(Debug)]
+pub struct Server {
+    listener: TcpListener,
+    address: SocketAddr,
+}
+
+impl Server {
+    /// Takes a port, or one that is free.
+    ///
+    /// # Errors
+    /// [`ViewerError::Port`] where it is taken.
+    pub fn bind(port: Option<u16>) -> Result<Self, ViewerError> {
+        let taken = |error: io::Error| ViewerError::Port {
+            port: port.unwrap_or(0),
+            reason: error.to_string(),
+        };
+        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port.unwrap_or(0)));
+        let listener = listener.map_err(taken)?;
+        let address = listener.local_addr().map_err(taken)?;
+        Ok(Self { listener, address })
+    }
+
+    /// Where a browser finds it.
+    pub fn url(&self) -> String {
+        format!("http://{}/", self.address)
+    }
+
+    /// Answers until the program ends.
+    pub fn serve(&self, answer: impl Fn(&Request) -> Answer + Send + Sync + 'static) {
+        let answer = Arc::new(answer);
+        let open = Arc::new(AtomicUsize::new(0));
+        let names = [
+            self.address.to_string(),
+            format!("localhost:{}", self.address.port()),
+        ];
+        for stream in self.listener.incoming() {
+            let Ok(stream) = stream else {
+                // Such as no more files: they come back.
+                thread::sleep(Duration::from_millis(50));
+                continue;
+            };
+            while open.load(Ordering::Acquire) >= CONNECTIONS {
+                thread::sleep(Duration::from_millis(10));
+            }
+            let place = Place::take(&open);
+            let (answer, names) = (answer.clone(), names.clone());
+            let handled = thread::Builder::new().name("page".to_owned());
+            // Where no thread can be had, the connection is closed.
+            let _ = handled.spawn(move || {
+                let _place = place;
+                // Whoever has left needs no answer.
+                let _ = handle(stream, &names, &*answer);
+            });
+        }
+    }
+}
+
+/// One of the connections that may be open.
+struct Place(Arc<AtomicUsize>);
+
+impl Place {
+    fn take(open: &Arc<AtomicUsize>) -> Self {
+        open.fetch_add(1, Ordering::AcqRel);
+        Self(open.clone())
+    }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        self.0.fetch_sub(1, Ordering::AcqRel);
+    }
+}
+
+fn handle(
+    mut stream: TcpStream,
+    names: &[String],
+    answer: &dyn Fn(&Request) -> Answer,
+) -> io::Result<()> {
+    let head = hear(&mut stream)?;
+    let answered = match understood(&head, names) {
+        Ok(request) => {
+            let answered = answer(&request);
+            match answered.tag.is_some() && answered.tag == request.known {
+                true => Answer {
+                    status: "304 Not Modified",
+                    body: Arc::default(),
+                    ..answered
+                },
+                false => answered,
+            }
+        }
+        Err(refused) => refused,
+    };
+    tell(&mut stream, &answered)
+}
+
+/// The head of a request, up to the empty line or to what is too much.
+fn hear(stream: &mut TcpStream) -> io::Result<Vec<u8>> {
+    let until = Instant::now() + HEARD_WITHIN;
+    let (mut head, mut part) = (Vec::new(), [0; 2048]);
+    while head.len() < HEAD_BYTES && !head.windows(4).any(|end| end == b"\r\n\r\n") {
+        stream.set_read_timeout(Some(left(until)?))?;
+        match stream.read(&mut part)? {
+            0 => return Err(ErrorKind::UnexpectedEof.into()),
+            read => head.extend(&part[..read]),
+        }
+    }
+    Ok(head)
+}
+
+/// Writes an answer and ends the connection.
+fn tell(stream: &mut TcpStream, answer: &Answer) -> io::Result<()> {
+    let mib = u32::try_from(answer.body.len() >> 20).unwrap_or(u32::MAX);
+    let until = Instant::now() + TAKEN_WITHIN + EACH_MIB.saturating_mul(mib);
+    let tag = answer.tag.as_ref();
+    let tag = tag.map_or(String::new(), |tag| format!("ETag: {tag}\r\n"));
+    let head = format!(
+        "HTTP/1.1 {}\r\nContent-Type: {}\r\nContent-Length: {}\r\n{tag}Cache-Control: no-store\r\nContent-Security-Policy: {POLICY}\r\nX-Content-Type-Options: nosniff\r\nReferrer-Policy: no-referrer\r\nCross-Origin-Resource-Policy: same-origin\r\nCross-Origin-Opener-Policy: same-origin\r\nAllow: GET\r\nConnection: close\r\n\r\n",
+        answer.status,
+        answer.kind,
+        answer.body.len(),
+    );
+    for mut left_over in [head.as_bytes(), &answer.body] {
+        while !left_over.is_empty() {
+            stream.set_write_timeout(Some(left(until)?))?;
+            match stream.write(&left_over[..left_over.len().min(CHUNK)])? {
+                0 => return Err(ErrorKind::WriteZero.into()),
+                written => left_over = &left_over[written..],
+            }
+        }
+    }
+    stream.flush()
+}
+
+/// What is left of the time.
+fn left(until: Instant) -> io::Result<Duration> {
+    let left = until.saturating_duration_since(Instant::now());
+    match left.is_zero() {
+        true => Err(ErrorKind::TimedOut.into()),
+        false => Ok(left),
+    }
+}
+
+/// What a head asks for, if it is GET and came to one of our names: a page of another site that
+/// had its name lead here is refused.
+fn understood(head: &[u8], names: &[String]) -> Result<Request, Answer> {
+    let bad = || Answer::refused("400 Bad Request", "this is no HTTP request");
+    let mut headers = [httparse::EMPTY_HEADER; HEADERS];
+    let mut request = httparse::Request::new(&mut headers);
+    match request.parse(head) {
+        Ok(httparse::Status::Complete(_)) => {}
+        Ok(httparse::Status::Partial) | Err(httparse::Error::TooManyHeaders) => {
+            let status = "431 Request Header Fields Too Large";
+            return Err(Answer::refused(status, "the request is too long"));
+        }
+        Err(_) => return Err(bad()),
+    }
+    let named = |name: &str| -> Vec<&[u8]> {
+        let headers = request.headers.iter();
+        let named = headers.filter(|header| header.name.eq_ignore_ascii_case(name));
+        named.map(|header| header.value).collect()
+    };
+    let hosts = named("host");
+    let ours = |host: &[u8]| {
+        names
+            .iter()
+            .any(|name| host.eq_ignore_ascii_case(name.as_bytes()))
+    };
+    if hosts.len() != 1 || !ours(hosts[0]) {
+        let why = format!("this page is at http://{}/ only", names[0]);
+        return Err(Answer::refused("421 Misdirected Request", why));
+    }
+    if request.method != Some("GET") {
+        return Err(Answer::refused("405 Method Not Allowed", "GET only"));
+    }
+    let known = named("if-none-match");
+    let known = known.first().and_then(|tag| std::str::from_utf8(tag).ok());
+    Ok(Request {
+        path: request.path.ok_or_else(bad)?.to_owned(),
+        known: known.map(str::to_owned),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names() -> [String; 2] {
+        ["127.0.0.1:4000".into(), "localhost:4000".into()]
+    }
+
+    fn status(head: &str) -> &'static str {
+        let refused = understood(head.as_bytes(), &names());
+        refused.map_or_else(|refused| refused.status, |_| "200 OK")
+    }
+
+    #[test]
+    fn who_may_ask_for_what() {
+        let get = |host: &str| format!("GET /a HTTP/1.1\r\nHost: {host}\r\n\r\n");
+        for host in ["127.0.0.1:4000", "localhost:4000", "LOCALHOST:4000"] {
+            assert_eq!(status(&get(host)), "200 OK", "{host}");
+        }
+        for host in [
+            "evil.example",
+            "evil.example:4000",
+            "127.0.0.1",
+            "127.0.0.1:4001",
+            "localhost:4000.evil.example",
+            "",
+        ] {
+            assert_eq!(status(&get(host)), "421 Misdirected Request", "{host}");
+        }
+        assert_eq!(status("GET / HTTP/1.1\r\n\r\n"), "421 Misdirected Request");
+        let twice = "GET / HTTP/1.1\r\nHost: localhost:4000\r\nHost: evil.example\r\n\r\n";
+        assert_eq!(status(twice), "421 Misdirected Request");
+        let post = "POST / HTTP/1.1\r\nHost: localhost:4000\r\n\r\n";
+        assert_eq!(status(post), "405 Method Not Allowed");
+        assert_eq!(status("what?\r\n\r\n"), "400 Bad Request");
+        let many = "a: b\r\n".repeat(HEADERS + 1);
+        let many = format!("GET / HTTP/1.1\r\n{many}\r\n");
+        assert_eq!(status(&many), "431 Request Header Fields Too Large");
+    }
+
+    #[test]
+    fn what_is_known_is_told() {
+        let head =
+            "GET /scene.json HTTP/1.1\r\nHost: localhost:4000\r\nIf-None-Match: \"a\"\r\n\r\n";
+        let request = understood(head.as_bytes(), &names()).unwrap();
+        assert_eq!(request.path, "/scene.json");
+        assert_eq!(request.known.as_deref(), Some("\"a\""));
+    }
+}

@@ -1,0 +1,191 @@
+//! What viewers of splat files make of a scene, and scenes fitted to them.
+//!
+//! Viewers do not draw alike: PlayCanvas' engine cuts a Gaussian's tails off and blurs it less,
+//! Spark keeps constant colors between black and white, and neither knows by itself that a
+//! scene was trained antialiased. [`fit`] moves scales, opacities and colors until a viewer's
+//! pictures are those that the scene has here. docs/viewers.md has what the viewers themselves
+//! draw, beside what [`Viewer::drawing`] says that they do.
+
+mod easel;
+mod fit;
+
+pub use fit::{FitSettings, fit, start};
+
+use std::sync::Arc;
+
+use crate::{
+    capture::Camera,
+    gpu::GpuError,
+    measure::reported_psnr,
+    raster::{Falloff, Raster, RasterOptions, Renderer},
+    splats::{Splats, sh},
+};
+
+/// A viewer that scenes are fitted to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Viewer {
+    /// Spark, set as 3D Gaussian splatting draws: every Gaussian to its end, blurred by 0.3 px².
+    Spark,
+    /// PlayCanvas' engine, which SuperSplat is built on.
+    PlayCanvas,
+}
+
+impl Viewer {
+    /// All of them.
+    pub const ALL: [Self; 2] = [Self::Spark, Self::PlayCanvas];
+
+    /// Its name in options and reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Spark => "spark",
+            Self::PlayCanvas => "playcanvas",
+        }
+    }
+
+    /// How it draws. Neither antialiases unless it is told to.
+    pub fn drawing(self) -> RasterOptions {
+        RasterOptions {
+            antialiased: false,
+            falloff: match self {
+                Self::Spark => Falloff::Gaussian,
+                Self::PlayCanvas => Falloff::PlayCanvas,
+            },
+        }
+    }
+
+    /// An RGB scene as it keeps it: Spark has a byte from black to white for each channel of a
+    /// constant color.
+    fn kept(self, splats: &Splats) -> Splats {
+        let mut kept = splats.clone();
+        if self == Self::Spark {
+            bound(&mut kept);
+        }
+        kept
+    }
+}
+
+/// Whom a file is written for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ViewerChoice {
+    /// Spark.
+    Spark,
+    /// PlayCanvas' engine.
+    PlayCanvas,
+    /// All viewers: the compromise.
+    Any,
+}
+
+impl ViewerChoice {
+    /// The viewers that are meant.
+    pub fn viewers(self) -> &'static [Viewer] {
+        match self {
+            Self::Spark => &[Viewer::Spark],
+            Self::PlayCanvas => &[Viewer::PlayCanvas],
+            Self::Any => &Viewer::ALL,
+        }
+    }
+}
+
+/// Pictures of a scene, `[cameras][height, width]`, sRGB in [0, 1].
+pub type Pictures = Vec<Vec<[f32; 3]>>;
+
+/// Draws `splats` for each camera.
+///
+/// # Errors
+/// [`GpuError`] when buffers do not fit or the device is lost.
+pub fn pictures(
+    raster: &Arc<Raster>,
+    splats: &Splats,
+    drawn: RasterOptions,
+    cameras: &[Camera],
+    extent: f64,
+) -> Result<Pictures, GpuError> {
+    let raster = raster.drawing(drawn);
+    let mut renderer = Renderer::of(&raster, splats, &[&splats.sh], extent)?;
+    let shown = cameras.iter().map(|camera| {
+        let pictures = renderer.render(camera)?;
+        Ok(pictures.first().map(|p| p.shown()).unwrap_or_default())
+    });
+    shown.collect()
+}
+
+/// How near `viewer`'s pictures of an RGB scene come to those that are wanted: the mean PSNR in
+/// dB over the cameras.
+///
+/// # Errors
+/// [`GpuError`] when buffers do not fit or the device is lost.
+pub fn shown_psnr(
+    raster: &Arc<Raster>,
+    viewer: Viewer,
+    splats: &Splats,
+    wanted: &Pictures,
+    cameras: &[Camera],
+    extent: f64,
+) -> Result<f64, GpuError> {
+    let kept = viewer.kept(splats);
+    let shown = pictures(raster, &kept, viewer.drawing(), cameras, extent)?;
+    let each = (shown.iter().zip(wanted))
+        .map(|(shown, wanted)| reported_psnr(shown.as_flattened(), wanted.as_flattened()));
+    Ok(each.sum::<f64>() / wanted.len() as f64)
+}
+
+/// The same scene with three channels, which a gray one shows alike.
+pub fn in_rgb(splats: &Splats) -> Splats {
+    let mut colored = splats.clone();
+    if splats.sh.channels == 1 {
+        let coefficients = splats.sh.coefficients.iter();
+        colored.sh.channels = 3;
+        colored.sh.coefficients = coefficients.flat_map(|&value| [value; 3]).collect();
+    }
+    colored
+}
+
+/// Keeps constant colors between black and white.
+fn bound(splats: &mut Splats) {
+    let stride = 3 * sh::coefficient_count(splats.sh.degree);
+    let end = (0.5 / sh::C0) as f32;
+    for of_splat in splats.sh.coefficients.chunks_exact_mut(stride) {
+        for constant in &mut of_splat[..3] {
+            *constant = constant.clamp(-end, end);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::splats::ShField;
+
+    fn gray(value: f32) -> Splats {
+        Splats {
+            means: vec![[0.0; 3]],
+            quats: vec![[1.0, 0.0, 0.0, 0.0]],
+            log_scales: vec![[0.0; 3]],
+            opacity_logits: vec![0.0],
+            sh: ShField {
+                degree: 0,
+                channels: 1,
+                coefficients: vec![value],
+            },
+        }
+    }
+
+    #[test]
+    fn gray_scenes_have_three_channels_alike() {
+        let colored = in_rgb(&gray(0.25));
+        assert_eq!(colored.sh.coefficients, [0.25; 3]);
+        assert_eq!(in_rgb(&colored), colored);
+    }
+
+    #[test]
+    fn spark_keeps_colors_between_black_and_white() {
+        let white = (0.5 / sh::C0) as f32;
+        for (value, kept) in [(3.0, white), (-3.0, -white), (0.5, 0.5)] {
+            let scene = in_rgb(&gray(value));
+            assert_eq!(Viewer::Spark.kept(&scene).sh.coefficients, [kept; 3]);
+            assert_eq!(Viewer::PlayCanvas.kept(&scene), scene);
+        }
+    }
+}
