@@ -19,6 +19,12 @@ const DEPTHS: [f32; 2] = [1.0, 2.0];
 /// A claim that is carried belongs to the thing from this share of its strength on.
 const SURE: f32 = 0.5;
 
+/// So many pixels from an edge fronts stop: what is around them is half another thing.
+const RIM: usize = 2;
+
+/// Neighboring pixels of one thing differ by less, in units of `L*`.
+const ALIKE: f32 = 4.0;
+
 /// What strokes claim of a photo at working size.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Strokes {
@@ -149,7 +155,41 @@ fn grown(canvas: &Canvas, seen: &Believed, lightness: &[f32], paint: &HintImage)
     }
     let depth = |&covered: &f32| DEPTHS[usize::from(covered < COVERED)];
     let depth: Vec<f32> = seen.weight.iter().map(depth).collect();
-    claimed_by_strokes(canvas.size(), lightness, &depth, paint)
+    let mut claims = claimed_by_strokes(canvas.size(), lightness, &depth, paint);
+    for _ in 0..RIM {
+        claims = widened(&claims, canvas.size(), lightness, seen);
+    }
+    claims
+}
+
+/// Claims with the open pixels beside them that are as light: how rough a thing is tells nothing
+/// at its very edge, where fronts therefore stop.
+fn widened(
+    claims: &[[f32; 3]],
+    [width, height]: [usize; 2],
+    lightness: &[f32],
+    seen: &Believed,
+) -> Vec<[f32; 3]> {
+    (claims.iter().enumerate())
+        .map(|(i, &own)| {
+            if seen.weight[i] >= COVERED {
+                return own;
+            }
+            let (x, y) = (i % width, i / width);
+            let left = (x > 0).then(|| i - 1);
+            let right = (x + 1 < width).then(|| i + 1);
+            let above = (y > 0).then(|| i - width);
+            let below = (y + 1 < height).then(|| i + width);
+            let beside = [left, right, above, below].into_iter().flatten();
+            let alike = beside.filter(|&j| (lightness[i] - lightness[j]).abs() < ALIKE);
+            alike.map(|j| claims[j]).fold(
+                own,
+                |most, claim| {
+                    if claim[2] > most[2] { claim } else { most }
+                },
+            )
+        })
+        .collect()
 }
 
 /// Whether all of a pixel's neighbors are, and it is.

@@ -169,7 +169,7 @@ fn what_it_cannot_do_it_says() {
 fn a_stroke_on_what_the_scene_does_not_show_colors_it_there_and_in_the_photos_around() {
     let place = place_with_run();
     // Something came by while three photos were taken.
-    let [left, top, side] = [8, 6, 18];
+    let [left, top, side] = [16, 8, 32];
     let within =
         |x: u32, y: u32| (left..left + side).contains(&x) && (top..top + side).contains(&y);
     for index in 3..6 {

@@ -14,6 +14,9 @@ use crate::{
     splats::{Splats, is_splat_file},
 };
 
+/// Half an 8-bit step: what no viewer shows as a color.
+const NO_COLOR: f32 = 0.5 / 255.0;
+
 /// A scene that is drawn.
 pub(super) struct Subject {
     /// The splat file.
@@ -133,7 +136,7 @@ impl Subject {
     /// [`RunError::NoColors`] where it has none, and those of the run's file.
     pub fn gray(&self, observe: &mut Observer<'_>) -> Result<Splats, RunError> {
         match &self.run {
-            _ if self.splats.sh.channels != 3 => Err(RunError::NoColors(match &self.run {
+            _ if self.splats.is_gray(NO_COLOR) => Err(RunError::NoColors(match &self.run {
                 Some(run) => run.path().to_owned(),
                 None => self.file.clone(),
             })),
