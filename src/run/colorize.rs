@@ -37,7 +37,7 @@ use crate::{
     eval::{COLUMNS, Measured, exposures},
     raster::Raster,
     report::{ChromaReport, ChromaSeconds, EffectReport, Report, contact_sheet, kernel_reports},
-    splats::{Format, WriteOptions, npy, write_splats},
+    splats::{WriteOptions, npy, write_splats},
 };
 
 /// A share of Gaussians without a colored photo that is worth a warning.
@@ -141,7 +141,7 @@ pub fn colorize(
             .filter(|folder| options.output.is_none() || output_is_own(options, folder))
             .map(RunFolder::contact_sheet),
     };
-    Format::to_write(&output.ply)?;
+    files::format_of(&output.ply)?;
     files::make_folder_of(&output.ply)?;
 
     let begun = Instant::now();

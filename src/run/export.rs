@@ -90,7 +90,7 @@ pub fn export(options: &ExportOptions, observe: &mut Observer<'_>) -> Result<Exp
     let warnings = RefCell::default();
     let observe = &mut keeping(&warnings, observe);
     let output = options.output.as_path();
-    let format = Format::to_write(output)?;
+    let format = files::format_of(output)?;
     if options.spz.is_some() && format != Format::Spz {
         return Err(RunError::NoSpz(output.to_owned()));
     }

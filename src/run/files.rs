@@ -12,6 +12,7 @@ use crate::{
     disk::{self, folder_of},
     frames::Colored,
     input,
+    splats::Format,
 };
 
 /// Turns a system error into one that names the path.
@@ -96,14 +97,25 @@ pub(crate) fn make_folder(path: &Path) -> Result<(), RunError> {
     }
 }
 
-/// Makes the folder that a file will be written to, see [`make_folder`].
-pub(super) fn make_folder_of(path: &Path) -> Result<(), RunError> {
+fn no_folder(path: &Path) -> Result<(), RunError> {
     if path.is_dir() {
         return Err(RunError::File {
             path: path.to_owned(),
             reason: "is a folder; name a file such as scene.ply".to_owned(),
         });
     }
+    Ok(())
+}
+
+/// The format that a splat file's name tells, where no folder has this name.
+pub(super) fn format_of(path: &Path) -> Result<Format, RunError> {
+    no_folder(path)?;
+    Ok(Format::to_write(path)?)
+}
+
+/// Makes the folder that a file will be written to, see [`make_folder`].
+pub(super) fn make_folder_of(path: &Path) -> Result<(), RunError> {
+    no_folder(path)?;
     make_folder(folder_of(path))
 }
 

@@ -66,12 +66,13 @@ fn views_that_would_disagree_more_are_taken_as_they_are() {
     }
     let colorize = ["colorize", "--teacher", "painted", "--correct-views"];
     let told = |switch: &str| {
-        let done = place.run(&[&colorize[..], &[switch, "-o", switch]].concat());
+        let output = format!("{switch}.ply");
+        let done = place.run(&[&colorize[..], &[switch, "-o", &output]].concat());
         assert_eq!(done.code, Some(0), "{}", done.stderr);
         done.stderr.contains("they are taken as they are")
     };
     assert!(told("on") && !told("off"));
-    assert!(place.read("on") == place.read("off"));
+    assert!(place.read("on.ply") == place.read("off.ply"));
 }
 
 #[test]

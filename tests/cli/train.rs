@@ -155,8 +155,8 @@ fn timings_name_every_kernel() {
 fn words_without_json() {
     let place = place_with_scene();
     let printed = place.succeed(&QUICK_FIT);
-    // What came of it, seconds, two files, and what to type next in two lines.
-    assert_eq!(printed.lines().count(), 6, "{printed}");
+    // What came of it, seconds, two files, how to look at it, and what to type next in two lines.
+    assert_eq!(printed.lines().count(), 7, "{printed}");
     assert!(
         printed.contains("64 Gaussians after 3 iterations"),
         "{printed}"
