@@ -164,7 +164,6 @@ COMMANDS = {
     "ply-of-others: two scales": ["info CASES/ply-of-others/two-scales.ply"],
     "ply-of-others: colors of 8 bits": ["info CASES/ply-of-others/uchar-colours.ply"],
     "ply-of-others: count too small": ["info CASES/ply-of-others/count-too-small.ply"],
-    "ply-of-others: .splat": ["render CASES/ply-of-others/scene.splat --colmap CASES/_base -o OUT/p"],
     "messages: points as --init": [f"fit CASES/_base {DRAFT} --init CASES/messages/points.ply -o OUT/points"],
     "ply-of-another-frame: render": [
         "render CASES/ply-of-another-frame/turned-and-scaled.ply --colmap CASES/_base -o OUT/frame"

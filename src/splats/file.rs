@@ -113,12 +113,16 @@ pub fn write_splats(
 ) -> Result<Vec<String>, SplatError> {
     let format = Format::to_write(path)?;
     let mut doubts = Vec::new();
+    let mut doubt = |what: &str| doubts.push(format!("{}: {what}", path.display()));
     if options.antialiased && !format.tells_antialiasing() {
-        doubts.push(format!(
-            "{}: the scene is to be drawn antialiased, which a {} file cannot say: viewers will draw it too bold from afar; any other format says it",
-            path.display(),
-            format.extension()
-        ));
+        doubt(
+            "the scene is to be drawn antialiased, which this format cannot say: viewers will draw it too bold from afar; any other format says it",
+        );
+    }
+    if splats.sh.degree > 0 && !format.has_harmonics() {
+        doubt(
+            "this format has no harmonics: colors are the same from everywhere; any other format has them",
+        );
     }
     if format == Format::Ply {
         ply::write_ply(path, splats, options.added, &options.comments())?;

@@ -85,6 +85,11 @@ impl Format {
         self != Self::Splat
     }
 
+    /// Whether its colors can depend on where they are seen from.
+    pub fn has_harmonics(self) -> bool {
+        self != Self::Splat
+    }
+
     /// Whether its files can say what was subtracted from the coordinates.
     pub fn tells_offset(self) -> bool {
         !matches!(self, Self::Splat | Self::Spz)

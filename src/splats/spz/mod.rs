@@ -26,8 +26,8 @@
 //! | rotations | 4 | from the highest bit: index 2 of the largest of x, y, z, w; the others 10 each: sign, then 511 is √½. Versions 1 and 2: x, y, z in 3 bytes, 127.5 (1 + value), w positive |
 //! | harmonics | 9, 24, 45 | 128 + 128 value, channels next to each other |
 //!
-//! Readers may round harmonics' bytes to nothing: the reference writer keeps 5 bits of degree 1
-//! and 4 of the others, which is smaller; so does this one, see docs/formats.md.
+//! The reference writer rounds harmonics to 5 bits of degree 1 and 4 of the others, which
+//! compresses better and can be seen; this one keeps all 8, see docs/decisions.md.
 //!
 //! **Axes.** The reference says right, up, back, and converts only where it is told from what.
 //! splat-transform, SuperSplat, PlayCanvas and Spark take the numbers as those of a `.ply`; this

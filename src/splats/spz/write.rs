@@ -24,9 +24,6 @@ const SMALLER: f64 = 0.1;
 /// The largest 24-bit number.
 const LARGEST: f64 = 8_388_607.0;
 
-/// Bits of a harmonic's byte that are kept, of degree 1 and of those above: the reference's.
-const SH_BITS: [u32; 2] = [5, 4];
-
 /// As the reference: slower ones save a percent or two.
 const ZSTD_LEVEL: i32 = 12;
 
@@ -80,9 +77,9 @@ pub(in crate::splats) fn encode(
             ((f64::from(value) - LOWEST_SCALE) * SCALE_STEPS).round() as u8
         }));
         parts[4].extend(rotation(splats.quats[index]).to_le_bytes());
-        parts[5].extend((above.iter().enumerate()).map(|(place, &value)| {
-            let first = place / CHANNELS < coefficient_count(1) - 1;
-            sh_byte(value, SH_BITS[usize::from(!first)])
+        parts[5].extend(above.iter().map(|&value| {
+            // Saturates.
+            (f64::from(value) * SH_LEVELS + SH_LEVELS).round() as u8
         }));
     }
 
@@ -144,11 +141,4 @@ fn rotation([w, x, y, z]: [f32; 4]) -> u32 {
         let sign = u32::from(value < 0.0);
         word << 10 | sign << 9 | level(value.abs(), ROTATION_LEVELS)
     })
-}
-
-/// A harmonic's byte, whose lowest bits are 0 so that it compresses better.
-fn sh_byte(value: f32, bits: u32) -> u8 {
-    let step = f64::from(1_u32 << (8 - bits));
-    let byte = (f64::from(value) * SH_LEVELS + SH_LEVELS) / step;
-    (byte.round() * step).clamp(0.0, 255.0) as u8
 }
