@@ -23,6 +23,7 @@ demo: setup
 	@echo "Gray scene:      runs/demo/luma.ply"
 	@echo "Colored scene:   runs/demo/color.ply"
 	@echo "Contact sheet:   runs/demo/contact-sheet.png"
+	@echo "In the browser:  target/release/gs-chroma view runs/demo"
 
 test: setup
 	@cargo fmt --version >/dev/null 2>&1 && cargo clippy --version >/dev/null 2>&1 || rustup component add rustfmt clippy

@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::{CliError, next, print, progress::Progress, values::one_of};
 use crate::{
-    run::{ExportOptions, Exported, Look, Shown, Stage, export},
+    run::{Event, ExportOptions, Exported, Look, Shown, Stage, export},
     splats::SpzVersion,
     view::{is_html, write_html},
     viewers::ViewerChoice,
@@ -101,12 +101,27 @@ impl Export {
     /// The page with the scene in it.
     fn run_html(self) -> Result<(), CliError> {
         let mut progress = Progress::through(vec![Stage::Model, Stage::Rendering, Stage::Saving]);
+        let of_files = [
+            ("--viewer", self.viewer.is_some()),
+            ("--spz-version", self.spz_version.is_some()),
+            ("--colmap-coordinates", self.colmap_coordinates),
+        ];
+        for (name, _) in of_files.into_iter().filter(|(_, asked)| *asked) {
+            let told = format!("{name} is for splat files: the page is written without");
+            progress.show(&Event::Warning(told));
+        }
         let look = Look::open(self.run.as_deref(), None, &mut |event| {
             progress.show(&event)
         })?;
         let observe = &mut |event| progress.show(&event);
         let wrote = write_html(&look, self.luma, &self.output, observe)?;
         progress.finish();
+        if self.json {
+            let wrote = serde_json::json!({
+                "file": self.output, "splats": wrote.splats, "bytes": wrote.bytes,
+            });
+            return print(format_args!("{wrote:#}"));
+        }
         print(format_args!(
             "wrote {} Gaussians to {}, {:.1} MB",
             wrote.splats,

@@ -395,6 +395,21 @@ fn looked_at(script: &Path, arguments: &[&str]) -> Value {
 const LIKE: f64 = 50.0;
 
 #[test]
+fn a_page_is_no_splat_file() {
+    let place = place_with_run();
+    let export = ["export", "runs/scene", "-o", "scene.html", "--json"];
+    let wrote = place.json(&export);
+    let bytes = place.read("scene.html").len() as u64;
+    assert_eq!(wrote["bytes"].as_u64(), Some(bytes), "{wrote}");
+    let done = place.run(&[&export[..], &["--viewer", "any", "--spz-version", "4"]].concat());
+    assert_eq!(done.code, Some(0), "{}", done.stderr);
+    for option in ["--viewer", "--spz-version"] {
+        let told = format!("warning: {option} is for splat files");
+        assert!(done.stderr.contains(&told), "{}", done.stderr);
+    }
+}
+
+#[test]
 fn the_page_draws_what_render_draws() {
     let Some(script) = browser() else { return };
     let place = place_with_run();

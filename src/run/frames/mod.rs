@@ -1,16 +1,18 @@
 //! `frames`: the photos themselves in color.
 
+mod out;
 mod painted;
 mod shots;
 
 use std::{cell::RefCell, num::NonZero, path::PathBuf, sync::Arc, thread};
 
+use out::Out;
 use painted::Painted;
 use shots::{Shot, shots_of};
 
 use super::{
-    Event, Observer, RunError, RunFolder, Stage, files,
-    film::{FRAME_RATE, FilmWriter, Purpose, is_film},
+    Event, Observer, RunError, RunFolder, Stage,
+    film::FRAME_RATE,
     fit::open_gpu,
     keeping,
     lock::RunLock,
@@ -538,48 +540,4 @@ fn joined(pixels: usize, sides: [(Option<Believed>, f32); 2]) -> Believed {
         }
     }
     all
-}
-
-/// Where colored photos go.
-enum Out {
-    Folder(PathBuf),
-    Film(Box<FilmWriter>),
-}
-
-impl Out {
-    fn open(
-        options: &FramesOptions,
-        rate: [u32; 2],
-        film: Option<&Film>,
-        shots: &[Shot],
-    ) -> Result<Self, RunError> {
-        if !is_film(&options.output) {
-            files::make_folder(&options.output)?;
-            for shot in shots {
-                if let Some(folder) = options.output.join(&shot.output).parent() {
-                    files::make_folder(folder)?;
-                }
-            }
-            return Ok(Self::Folder(options.output.clone()));
-        }
-        files::make_folder_of(&options.output)?;
-        let writer = FilmWriter::new(&options.output, rate, Purpose::Editing)?;
-        Ok(Self::Film(Box::new(writer.sounding_like(film))))
-    }
-
-    fn write(&mut self, shot: &Shot, colored: Colored) -> Result<(), RunError> {
-        match self {
-            Self::Folder(folder) => files::write_colored(&folder.join(&shot.output), colored),
-            Self::Film(film) => {
-                (0..shot.repeats).try_for_each(|_| film.write_colored(&shot.name, &colored))
-            }
-        }
-    }
-
-    fn finish(self) -> Result<(), RunError> {
-        match self {
-            Self::Folder(_) => Ok(()),
-            Self::Film(film) => film.finish(),
-        }
-    }
 }

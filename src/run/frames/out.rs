@@ -1,0 +1,57 @@
+//! Where colored photos go: a folder or a film.
+
+use std::path::PathBuf;
+
+use super::{FramesOptions, shots::Shot};
+use crate::{
+    capture::Film,
+    frames::Colored,
+    run::{
+        RunError, files,
+        film::{FilmWriter, Purpose, is_film},
+    },
+};
+
+/// Where colored photos go.
+pub(super) enum Out {
+    Folder(PathBuf),
+    Film(Box<FilmWriter>),
+}
+
+impl Out {
+    pub fn open(
+        options: &FramesOptions,
+        rate: [u32; 2],
+        film: Option<&Film>,
+        shots: &[Shot],
+    ) -> Result<Self, RunError> {
+        if !is_film(&options.output) {
+            files::make_folder(&options.output)?;
+            for shot in shots {
+                if let Some(folder) = options.output.join(&shot.output).parent() {
+                    files::make_folder(folder)?;
+                }
+            }
+            return Ok(Self::Folder(options.output.clone()));
+        }
+        files::make_folder_of(&options.output)?;
+        let writer = FilmWriter::new(&options.output, rate, Purpose::Editing)?;
+        Ok(Self::Film(Box::new(writer.sounding_like(film))))
+    }
+
+    pub fn write(&mut self, shot: &Shot, colored: Colored) -> Result<(), RunError> {
+        match self {
+            Self::Folder(folder) => files::write_colored(&folder.join(&shot.output), colored),
+            Self::Film(film) => {
+                (0..shot.repeats).try_for_each(|_| film.write_colored(&shot.name, &colored))
+            }
+        }
+    }
+
+    pub fn finish(self) -> Result<(), RunError> {
+        match self {
+            Self::Folder(_) => Ok(()),
+            Self::Film(film) => film.finish(),
+        }
+    }
+}
