@@ -288,8 +288,8 @@ fn broken_losses_and_steps_are_noticed() {
         (
             "numerics",
             "sum_instances",
-            "sum[2u * c + 1u] += figures.y",
-            "sum[2u * c + 1u] += figures.x",
+            "sum[2u * c + 1u] += one.y",
+            "sum[2u * c + 1u] += one.x",
         ),
         ("losses", "luma_loss", "0.27068214949642655", "0.28"),
         ("densify", "densify_geometry", "exp(log_scale)", "log_scale"),
