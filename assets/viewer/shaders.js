@@ -13,6 +13,8 @@ precision highp int;
 precision highp sampler2D;
 precision highp usampler2D;
 const int ROW_BITS = ${ROW_BITS};
+// The smallest opacity that is blended.
+const float ALPHA_MIN = 0.00392156862745098;
 ivec2 texel(int i) { return ivec2(i & ((1 << ROW_BITS) - 1), i >> ROW_BITS); }
 `;
 
@@ -26,8 +28,6 @@ void main() {
 export const PROJECT = `${HEAD}
 // Variance in px² added to every projected covariance.
 const float BLUR = 0.3;
-// The smallest opacity that is blended.
-const float ALPHA_MIN = 0.00392156862745098;
 
 uniform sampler2D means;
 uniform usampler2D shapes;
@@ -162,7 +162,6 @@ void main() {
 // Premultiplied, to be laid over what is behind.
 export const BLEND = `${HEAD}
 const float ALPHA_MAX = 0.99;
-const float ALPHA_MIN = 0.00392156862745098;
 uniform vec2 size;
 // 0 the scene, 1 centers, 2 ellipsoids of two standard deviations.
 uniform int drawn;

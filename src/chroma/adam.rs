@@ -7,7 +7,6 @@ use super::{
     ChromaError, ChromaObserver, ChromaProgress, ChromaSettings, FrozenViews, Recipe, Targets,
     Task,
     passes::{Ending, Judging, Passes, Space},
-    recipe::gray_rgb,
 };
 use crate::{
     capture::view_at,
@@ -82,7 +81,7 @@ impl<'a> AdamSolver<'a> {
         luma: &Splats,
         seed: u64,
     ) -> Result<Self, ChromaError> {
-        let start = gray_rgb(luma);
+        let start = luma.sh.to_rgb();
         let of_rest = match recipe.rest_share {
             Some(_) => sh::coefficient_count(start.degree) - 1,
             None => 0,

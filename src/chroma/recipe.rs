@@ -91,14 +91,3 @@ pub fn follow_recipe(
     adam.run(observe)?;
     adam.harmonics()
 }
-
-/// The gray of one channel in three.
-pub(super) fn gray_rgb(luma: &Splats) -> ShField {
-    ShField {
-        degree: luma.sh.degree,
-        channels: 3,
-        coefficients: (luma.sh.coefficients.iter())
-            .flat_map(|&value| [value; 3])
-            .collect(),
-    }
-}

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{
     ChromaError, ChromaObserver, ChromaSettings, FrozenViews, IrlsSolver, Room, Targets, Task,
-    masked_weights, recipe::gray_rgb, solve::SEEN,
+    masked_weights, solve::SEEN,
 };
 use crate::{
     capture::{Camera, Dataset},
@@ -52,7 +52,7 @@ pub fn relight(
         weighted: targets.weighted(),
     };
     let frozen = FrozenViews::new(raster, luma, dataset.extent, &cameras, 1, room)?;
-    let start = gray_rgb(luma);
+    let start = luma.sh.to_rgb();
     let mut solver = IrlsSolver::starting_at(&frozen, &settings, &targets, tasks, &start)?;
     solver.run(observe)?;
     // Three channels that want the same stay the same.

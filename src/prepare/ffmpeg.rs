@@ -27,13 +27,6 @@ const REPEATED: f64 = 0.2;
 /// Video of 30 (29.97) frames a second, which film of 24 may have become.
 const VIDEO_RATE: [f64; 2] = [29.5, 30.5];
 
-/// Frames a second of a film whose rate varies, at most.
-const FASTEST: f64 = 120.0;
-
-/// By how many frames a film may run ahead of an even rate, or behind it, and be of that rate:
-/// containers round times.
-const UNEVEN: f64 = 0.75;
-
 /// Names of frames, as FFmpeg and C write them.
 const NAMES: &str = "%06d.png";
 
@@ -43,11 +36,11 @@ pub(super) struct Source {
     /// The file, absolute.
     pub path: PathBuf,
     /// FFmpeg's number of the stream of pictures.
-    stream: u64,
+    pub(super) stream: u64,
     /// Frames a second: numerator and denominator.
     pub frame_rate: [u32; 2],
     /// The lowest rate at which all frames can be shown when they are, where FFmpeg says.
-    tick_rate: Option<[u32; 2]>,
+    pub(super) tick_rate: Option<[u32; 2]>,
     /// Seconds; 0 where the file does not say.
     pub seconds: f64,
     /// Whether there is sound.
@@ -86,14 +79,6 @@ impl Scan {
             _ => [numerator, denominator],
         }
     }
-}
-
-/// Frames that do not follow each other at one rate.
-pub(super) struct Uneven {
-    /// When each is shown, in seconds of the film.
-    pub times: Vec<f64>,
-    /// A rate at which they can be repeated to be shown so, as a fraction.
-    pub rate: [u32; 2],
 }
 
 /// A part of a film, in seconds; open at its end where that is the film's.
@@ -197,34 +182,6 @@ impl Source {
     /// Frames a second.
     pub fn rate(&self) -> f64 {
         f64::from(self.frame_rate[0]) / f64::from(self.frame_rate[1])
-    }
-
-    /// When the frames of a part are shown where these vary; `None` where they follow each other
-    /// at the frame rate, or are not as many as `count`.
-    ///
-    /// # Errors
-    /// [`ProgramError`].
-    pub fn times(&self, part: Part, count: usize) -> Result<Option<Uneven>, PrepareError> {
-        let said = Program::new("ffprobe")
-            .args(["-v", "error", "-of", "json"])
-            .option("-select_streams", self.stream.to_string())
-            .args(["-show_entries", "packet=pts_time:format=start_time", "-i"])
-            .arg(named(&self.path))
-            .ask()?;
-        let end = part.seconds.map_or(f64::INFINITY, |s| part.start + s);
-        let mut times = packet_times(&said);
-        times.retain(|time| (part.start..end).contains(time));
-        let varies = times.len() == count && varies(&times, self.rate());
-        Ok(varies.then(|| {
-            let fast = self.tick_rate.filter(|rate| {
-                let rate = f64::from(rate[0]) / f64::from(rate[1]);
-                (self.rate()..=FASTEST).contains(&rate)
-            });
-            Uneven {
-                times,
-                rate: fast.unwrap_or([FASTEST as u32, 1]),
-            }
-        }))
     }
 
     /// FFmpeg on a part of the film, up to its output.
@@ -336,38 +293,8 @@ impl Source {
     }
 }
 
-/// When packets are shown, in order, in seconds from the film's beginning, from what `ffprobe`
-/// says.
-fn packet_times(said: &str) -> Vec<f64> {
-    let json = &said[said.find('{').unwrap_or(0)..];
-    let json = serde_json::Deserializer::from_str(json).into_iter::<Value>();
-    let json = json.flatten().next().unwrap_or_default();
-    let seconds = |value: &Value| {
-        value
-            .as_str()?
-            .parse::<f64>()
-            .ok()
-            .filter(|s| s.is_finite())
-    };
-    let start = seconds(&json["format"]["start_time"]).unwrap_or(0.0);
-    let packets = json["packets"].as_array().into_iter().flatten();
-    let times = packets.filter_map(|packet| Some(seconds(&packet["pts_time"])? - start));
-    let mut times: Vec<f64> = times.collect();
-    times.sort_by(f64::total_cmp);
-    times
-}
-
-/// Whether frames are not shown at an even rate.
-fn varies(times: &[f64], rate: f64) -> bool {
-    let uneven = |(k, time): (usize, &f64)| {
-        let even = times[0] + k as f64 / rate;
-        (time - even).abs() * rate > UNEVEN
-    };
-    times.iter().enumerate().any(uneven)
-}
-
 /// A file's name that FFmpeg takes for nothing else: no option, no protocol.
-fn named(path: &Path) -> OsString {
+pub(super) fn named(path: &Path) -> OsString {
     let mut name = OsString::from("file:");
     name.push(path);
     name
@@ -491,24 +418,6 @@ and another"#;
             let error = Source::parse(path, said).unwrap_err();
             assert!(error.contains(word), "{error}");
         }
-    }
-
-    #[test]
-    fn rates_that_vary() {
-        let even: Vec<f64> = (0..100)
-            .map(|k| 3.0 + (f64::from(k) / 24.0 * 1e3).round() / 1e3)
-            .collect();
-        assert!(!varies(&even, 24.0) && !varies(&[], 24.0));
-        // Twice as fast from the middle on.
-        let fast: Vec<f64> = (0..100)
-            .map(|k: u32| f64::from(k) - 0.5 * f64::from(k.saturating_sub(50)))
-            .collect();
-        assert!(varies(&fast, 99.0 / 74.5));
-        let said = r#"a warning
-{"packets": [{"pts_time": "1.500"}, {"pts_time": "1.000"}, {}, {"pts_time": "N/A"}],
- "format": {"start_time": "1.000"}}"#;
-        assert_eq!(packet_times(said), [0.0, 0.5]);
-        assert!(packet_times("nothing").is_empty());
     }
 
     #[test]

@@ -7,7 +7,8 @@ use std::{
 
 use super::{
     PrepareError, PrepareOptions,
-    ffmpeg::{self, Part, Scan, Source, Uneven},
+    ffmpeg::{self, Part, Scan, Source},
+    frame_times::Uneven,
     photos::link_all,
     sharp,
     state::{State, Step, digest, of},

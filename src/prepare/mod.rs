@@ -9,6 +9,7 @@ mod colmap;
 mod error;
 mod ffmpeg;
 mod film;
+mod frame_times;
 mod masks;
 mod photos;
 mod poses;

@@ -4,7 +4,7 @@ use std::{
     cell::RefCell,
     fmt::Write,
     ops::ControlFlow,
-    path::{Path, PathBuf},
+    path::PathBuf,
     sync::Arc,
     time::{Duration, Instant},
 };
@@ -15,14 +15,13 @@ use super::{
     Event, Live, Observer, Preset, RunError, RunFolder, SceneKind, Stage,
     checkpoints::{CheckpointOptions, FileKeeper, Found, tell_given_up},
     color_checkpoint::{found_in, question},
+    color_files::{ColorFiles, Output},
     color_source::Source,
-    commit::Commit,
     files,
     fit::{capture_report, open_gpu},
     foreign::drawn_like_photos,
     keeping,
     live::Showing,
-    log::with_rows,
     scene::{Frame, read_scene, tell_not_finite, written_as},
     sound::{open_examined, open_trusted},
     teach::{Taught, TeachOptions, Teachers},
@@ -34,10 +33,10 @@ use crate::{
         ColorizeEvent, Degree, Distill, NoChromaKeeper, SolverKind, relight,
     },
     effects::table,
-    eval::{COLUMNS, Measured, exposures},
+    eval::{Measured, exposures},
     raster::Raster,
-    report::{ChromaReport, ChromaSeconds, EffectReport, Report, contact_sheet, kernel_reports},
-    splats::{WriteOptions, npy, write_splats},
+    report::{ChromaReport, ChromaSeconds, EffectReport, Report, kernel_reports},
+    splats::WriteOptions,
 };
 
 /// A share of Gaussians without a colored photo that is worth a warning.
@@ -75,15 +74,6 @@ pub struct ColorizeOptions {
     pub checkpoints: CheckpointOptions,
     /// Who looks on, if not with Adam.
     pub live: Option<Arc<Live>>,
-}
-
-/// What `colorize` wrote.
-#[derive(Clone, Debug)]
-pub struct Output {
-    /// The colored splat file, of any format.
-    pub ply: PathBuf,
-    /// The contact sheet, when a run was colored.
-    pub contact_sheet: Option<PathBuf>,
 }
 
 /// Colors a run or a gray splat file.
@@ -415,37 +405,14 @@ pub fn colorize(
         added,
         ..written_as(drawn, left)
     };
-    let mut write_to = |path: &Path| -> Result<(), RunError> {
-        let doubts = write_splats(path, &colored.splats, &written)?;
-        doubts
-            .into_iter()
-            .for_each(|doubt| observe(Event::Warning(doubt)));
-        Ok(())
+    let files = ColorFiles {
+        splats: &colored.splats,
+        chroma: &colored.chroma,
+        rows: &measured.rows,
+        log: &log,
+        written: &written,
     };
-    match source.kept(options) {
-        Some(folder) => {
-            let mut commit = Commit::new(folder.path())?;
-            commit.remove(&folder.color_checkpoint());
-            if output.contact_sheet.is_some() {
-                write_to(&commit.place(&output.ply))?;
-                // What was measured of other colors goes.
-                commit.remove(&folder.evaluation());
-                commit.remove_page(&folder.evaluation_page());
-                let chroma = npy::encode(&colored.chroma);
-                files::write(&commit.place(&folder.chroma()), &chroma)?;
-                let log = with_rows(&folder.log(), report.luma.iterations, &log);
-                files::write(&commit.place(&folder.log()), log.as_bytes())?;
-                let sheet = contact_sheet(&COLUMNS, &measured.rows);
-                files::write_png(&commit.place(&folder.contact_sheet()), &sheet)?;
-                files::write(&commit.place(&folder.report()), &report.to_file())?;
-            } else {
-                // The run's own files tell of the run's own colors.
-                write_to(&output.ply)?;
-            }
-            commit.finish()?;
-        }
-        None => write_to(&output.ply)?,
-    }
+    files.write(source.kept(options), &output, &report, observe)?;
     Ok((output, report))
 }
 

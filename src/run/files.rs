@@ -114,7 +114,7 @@ pub(super) fn format_of(path: &Path) -> Result<Format, RunError> {
 }
 
 /// Makes the folder that a file will be written to, see [`make_folder`].
-pub(super) fn make_folder_of(path: &Path) -> Result<(), RunError> {
+pub(crate) fn make_folder_of(path: &Path) -> Result<(), RunError> {
     no_folder(path)?;
     make_folder(folder_of(path))
 }

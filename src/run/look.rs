@@ -244,18 +244,9 @@ impl Look {
     }
 
     fn open_teachers(&self, dataset: &Dataset) -> Result<Teachers, RunError> {
-        let chroma = self
-            .report
-            .as_ref()
-            .and_then(|report| report.chroma.as_ref());
-        let teachers = chroma.into_iter().flat_map(|chroma| &chroma.teachers);
-        let options = TeachOptions {
-            teachers: teachers
-                .filter_map(|teacher| Some((PathBuf::from(teacher.path.as_ref()?), teacher.weight)))
-                .collect(),
-            strength: chroma.map_or(1.0, |chroma| chroma.strength),
-            ..TeachOptions::default()
-        };
+        let options = (self.report.as_ref())
+            .map(TeachOptions::of_run)
+            .unwrap_or_default();
         let cache = self.folder.as_ref().map(RunFolder::teacher);
         let mut teachers = Teachers::open(&options, &dataset.capture.root, cache.as_deref())?;
         teachers.know(&dataset.capture);

@@ -2,7 +2,7 @@
 
 use std::{path::Path, sync::Arc};
 
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 use serde::Serialize;
 
 use super::{Event, Observer, RunError, Stage};
@@ -13,6 +13,7 @@ use crate::{
     raster::{Picture, Raster, RasterOptions, Renderer},
     report::CaptureReport,
     splats::{Format, Splats, WriteOptions, read_splats},
+    trajectory::{ball_of_splats, lens, orbit_of_ball},
 };
 
 /// Views that are drawn; an even choice.
@@ -21,15 +22,12 @@ const VIEWS: usize = 8;
 /// Longer side of the pictures, in pixels: what is lost shows in small ones as well.
 const SIDE: u32 = 480;
 
-/// The share of the Gaussians within the sphere that made-up cameras look at; those beyond are
+/// The share of the Gaussians within the ball that made-up cameras look at; those beyond are
 /// background.
 const WITHIN: f64 = 0.8;
 
-/// How far made-up cameras are from its center, in radii: all of it is seen.
-const DISTANCE: f64 = 2.5;
-
-/// How far made-up cameras look down.
-const DOWN: f64 = 0.35;
+/// Vertical field of view of made-up cameras, in degrees.
+const FIELD_OF_VIEW: f64 = 50.0;
 
 /// What a format costs.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -168,40 +166,11 @@ fn shrunk(camera: &Camera) -> Camera {
     camera.resized(side(camera.width), side(camera.height))
 }
 
-/// Cameras around Gaussians with y down, and the radius of the sphere that they look at.
+/// Cameras around Gaussians with y down, and the radius of the ball that fills their pictures.
 fn around(splats: &Splats) -> (Vec<Camera>, f64) {
-    let middle = |mut values: Vec<f64>, share: f64| {
-        let place = ((values.len() - 1) as f64 * share) as usize;
-        *values.select_nth_unstable_by(place, f64::total_cmp).1
-    };
-    let axis = |axis: usize| {
-        splats
-            .means
-            .iter()
-            .map(|mean| f64::from(mean[axis]))
-            .collect()
-    };
-    let center = DVec3::from([0, 1, 2].map(|k| middle(axis(k), 0.5)));
-    let distance = |mean: &[f32; 3]| DVec3::from(mean.map(f64::from)).distance(center);
-    let radius = middle(splats.means.iter().map(distance).collect(), WITHIN).max(1e-6);
-    let (width, height) = (SIDE, SIDE * 3 / 4);
-    let focal = f64::from(height) / 2.0 * (DISTANCE.powi(2) - 1.0).sqrt();
-    let cameras = (0..VIEWS).map(|view| {
-        let turn = std::f64::consts::TAU * view as f64 / VIEWS as f64;
-        // Rows are the camera's axes in the world: right, down, forward.
-        let rotation = DMat3::from_rotation_x(DOWN) * DMat3::from_rotation_y(turn);
-        Camera {
-            width,
-            height,
-            fx: focal,
-            fy: focal,
-            cx: f64::from(width) / 2.0,
-            cy: f64::from(height) / 2.0,
-            rotation,
-            translation: DVec3::new(0.0, 0.0, DISTANCE * radius) - rotation * center,
-        }
-    });
-    (cameras.collect(), radius)
+    let ball = ball_of_splats(splats, WITHIN);
+    let lens = lens([SIDE, SIDE * 3 / 4], FIELD_OF_VIEW);
+    (orbit_of_ball(ball, &lens, VIEWS), ball.1)
 }
 
 #[cfg(test)]
@@ -209,39 +178,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn made_up_cameras_see_the_scene_from_above() {
-        let means = [
-            [3.0, 1.0, 0.0],
-            [5.0, 1.0, 0.0],
-            [4.0, 1.0, 1.0],
-            [4.0, 1.0, -1.0],
-            [4.0; 3],
-        ];
-        let splats = Splats {
-            means: means.to_vec(),
-            ..Splats::default()
-        };
-        let (cameras, radius) = around(&splats);
-        assert_eq!((cameras.len(), radius), (VIEWS, 1.0));
-        for camera in &cameras {
-            for mean in &means[..4] {
-                assert!(camera.pixel_of(DVec3::from(mean.map(f64::from))).is_some());
-            }
-            // Up is where y is less.
-            assert!(camera.center().y < 1.0);
-            assert!((camera.center().distance(DVec3::new(4.0, 1.0, 0.0)) - DISTANCE).abs() < 1e-9);
-        }
-    }
-
-    #[test]
     fn pictures_are_no_larger_than_their_cameras() {
-        let (cameras, _) = around(&Splats {
-            means: vec![[0.0; 3]],
-            ..Splats::default()
-        });
-        let large = cameras[0].resized(4000, 3000);
+        let large = lens([4000, 3000], 50.0);
         assert_eq!((shrunk(&large).width, shrunk(&large).height), (480, 360));
-        let small = cameras[0].resized(64, 48);
+        let small = lens([64, 48], 50.0);
         assert_eq!(shrunk(&small), small);
     }
 }

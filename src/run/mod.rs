@@ -3,6 +3,7 @@
 mod answers;
 mod checkpoints;
 mod color_checkpoint;
+mod color_files;
 mod color_source;
 mod colorize;
 mod commit;
@@ -37,7 +38,8 @@ use std::path::PathBuf;
 
 pub use answers::HINT_WEIGHT;
 pub use checkpoints::{CheckpointOptions, EVERY, Interrupt};
-pub use colorize::{ColorizeOptions, Output, colorize};
+pub use color_files::Output;
+pub use colorize::{ColorizeOptions, colorize};
 pub use eval::{EvalOptions, eval};
 use event::keeping;
 pub use event::{Event, Observer, Stage};

@@ -21,7 +21,7 @@ use crate::{
         },
     },
     hash::Hasher,
-    report::TeacherReport,
+    report::{Report, TeacherReport},
 };
 
 /// Who colors the photos.
@@ -48,6 +48,21 @@ impl Default for TeachOptions {
             strength: 1.0,
             hints: None,
             grow_hints: true,
+        }
+    }
+}
+
+impl TeachOptions {
+    /// The teachers of a run that is colored, as far as they can be asked again.
+    pub(super) fn of_run(report: &Report) -> Self {
+        let chroma = report.chroma.as_ref();
+        let teachers = chroma.into_iter().flat_map(|chroma| &chroma.teachers);
+        Self {
+            teachers: teachers
+                .filter_map(|teacher| Some((teacher.path.as_ref()?.into(), teacher.weight)))
+                .collect(),
+            strength: chroma.map_or(1.0, |chroma| chroma.strength),
+            ..Self::default()
         }
     }
 }

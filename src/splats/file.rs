@@ -5,9 +5,7 @@ use std::{io::Write, path::Path};
 use glam::DVec3;
 use serde::Serialize;
 
-use super::{
-    Format, ShField, SplatError, Splats, format::is_splat_file, glb, ply, sh, sog, splat, spz, usda,
-};
+use super::{Format, SplatError, Splats, format::is_splat_file, glb, ply, sog, splat, spz, usda};
 use crate::{disk, input};
 
 /// Colors in a file.
@@ -19,8 +17,8 @@ pub(super) const MIN_QUATERNION_NORM: f64 = 1e-12;
 /// The share of the Gaussians that a format may spoil without a word.
 const TOLD: f64 = 0.01;
 
-/// Gaussians that one bit of a compressed file may stand for, at most: a file that announces
-/// more is cut off, or made to fill the memory.
+/// Gaussians that a byte of a compressed file may stand for, at most: a file that announces more
+/// is cut off, or made to fill the memory.
 const SPLATS_PER_BYTE: u64 = 8;
 
 /// What a splat file holds.
@@ -135,6 +133,7 @@ pub fn write_splats(
         doubts,
     };
     let bytes = match format {
+        // The first is written already.
         Format::Ply | Format::CompressedPly => ply::encode_compressed(&splats, options, &mut judge),
         Format::Splat => splat::encode(&splats),
         Format::Spz => spz::encode(&splats, options, &mut judge)?,
@@ -152,12 +151,6 @@ pub fn write_splats(
 /// Gaussians that every format takes: RGB, finite numbers, unit quaternions.
 fn ready(path: &Path, splats: &Splats, added: DVec3) -> Result<Splats, SplatError> {
     ply::check(path, splats, added)?;
-    let coefficients = match splats.sh.channels {
-        1 => (splats.sh.coefficients.iter())
-            .flat_map(|&value| [value; CHANNELS])
-            .collect(),
-        _ => splats.sh.coefficients.clone(),
-    };
     let moved = |mean: &[f32; 3]| {
         (DVec3::from(mean.map(f64::from)) + added)
             .as_vec3()
@@ -172,11 +165,7 @@ fn ready(path: &Path, splats: &Splats, added: DVec3) -> Result<Splats, SplatErro
         quats: splats.quats.iter().map(unit).collect(),
         log_scales: splats.log_scales.clone(),
         opacity_logits: splats.opacity_logits.clone(),
-        sh: ShField {
-            degree: splats.sh.degree,
-            channels: CHANNELS,
-            coefficients,
-        },
+        sh: splats.sh.to_rgb(),
     })
 }
 
@@ -289,20 +278,9 @@ pub(super) struct Gathered {
 impl Gathered {
     /// For so many, with harmonics of a degree.
     pub fn new(count: usize, degree: u32) -> Self {
-        let terms = sh::coefficient_count(degree);
         Self {
             read: ReadSplats {
-                splats: Splats {
-                    means: Vec::with_capacity(count),
-                    quats: Vec::with_capacity(count),
-                    log_scales: Vec::with_capacity(count),
-                    opacity_logits: Vec::with_capacity(count),
-                    sh: ShField {
-                        degree,
-                        channels: CHANNELS,
-                        coefficients: Vec::with_capacity(count * terms * CHANNELS),
-                    },
-                },
+                splats: Splats::with_capacity(count, degree, CHANNELS),
                 ..ReadSplats::default()
             },
         }

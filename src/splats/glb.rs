@@ -54,9 +54,7 @@ pub(super) fn encode(
         .map(|scales| scales.map(f32::exp))
         .collect();
     parts.floats(name("SCALE"), "VEC3", scales.as_flattened());
-    let opacities: Vec<f32> = (splats.opacity_logits.iter())
-        .map(|&logit| (1.0 / (1.0 + (-f64::from(logit)).exp())) as f32)
-        .collect();
+    let opacities: Vec<f32> = splats.opacities().map(|opacity| opacity as f32).collect();
     parts.floats(name("OPACITY"), "SCALAR", &opacities);
     for k in 0..coefficient_count(splats.sh.degree) {
         let degree = k.isqrt();

@@ -45,6 +45,27 @@ pub struct Splats {
 }
 
 impl Splats {
+    /// None yet, with room for so many with harmonics of a degree.
+    pub(crate) fn with_capacity(count: usize, degree: u32, channels: usize) -> Self {
+        let coefficients = count * channels * sh::coefficient_count(degree);
+        Self {
+            means: Vec::with_capacity(count),
+            quats: Vec::with_capacity(count),
+            log_scales: Vec::with_capacity(count),
+            opacity_logits: Vec::with_capacity(count),
+            sh: ShField {
+                degree,
+                channels,
+                coefficients: Vec::with_capacity(coefficients),
+            },
+        }
+    }
+
+    /// Opacities, 0 to 1, `[N]`.
+    pub fn opacities(&self) -> impl Iterator<Item = f64> + '_ {
+        self.opacity_logits.iter().map(|&logit| opacity(logit))
+    }
+
     /// The number of Gaussians.
     pub fn len(&self) -> usize {
         self.means.len()
@@ -106,6 +127,11 @@ mod fixtures;
 #[cfg(test)]
 #[path = "format_tests.rs"]
 mod format_tests;
+
+/// The opacity, 0 to 1, that a logit stands for.
+pub fn opacity(logit: f32) -> f64 {
+    1.0 / (1.0 + (-f64::from(logit)).exp())
+}
 
 #[cfg(test)]
 mod tests {

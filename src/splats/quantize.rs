@@ -1,6 +1,8 @@
 //! What the formats that quantize have in common: bytes of opacities, levels between two
 //! bounds, quaternions by their smallest three components.
 
+use super::opacity;
+
 /// The logit that stands for an opacity of 1: 3e-7 below it, which is opaque, and which f32
 /// still tells from it, so that training can move it.
 pub(super) const OPAQUE: f32 = 15.0;
@@ -14,7 +16,7 @@ const LARGEST_SMALL: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 /// A logit as a byte: its opacity times 255, rounded.
 pub(super) fn opacity_byte(logit: f32) -> u8 {
-    level(1.0 / (1.0 + (-f64::from(logit)).exp()), 255) as u8
+    level(opacity(logit), 255) as u8
 }
 
 /// The logit of an opacity in [0, 1]; 0 and 1 become finite.
@@ -84,7 +86,6 @@ mod tests {
 
     #[test]
     fn opacities_are_within_half_a_level() {
-        let opacity = |logit: f32| 1.0 / (1.0 + (-f64::from(logit)).exp());
         for step in -120..=120 {
             let wanted = step as f32 / 10.0;
             let byte = opacity_byte(wanted);

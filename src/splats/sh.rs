@@ -92,6 +92,19 @@ impl ShField {
         }
     }
 
+    /// The field of a gray scene, of one channel, in three that are alike; others as they are.
+    pub fn to_rgb(&self) -> Self {
+        if self.channels != 1 {
+            return self.clone();
+        }
+        let coefficients = self.coefficients.iter();
+        Self {
+            degree: self.degree,
+            channels: 3,
+            coefficients: coefficients.flat_map(|&value| [value; 3]).collect(),
+        }
+    }
+
     /// Coefficients of one Gaussian, `[(degree + 1)², channels]`.
     pub fn of(&self, index: usize) -> &[f32] {
         let stride = coefficient_count(self.degree) * self.channels;

@@ -59,8 +59,7 @@ pub(super) fn encode(splats: &Splats, options: &WriteOptions) -> Vec<u8> {
         "float3[] scales",
         scales.map(|scales| tuple(&scales)),
     );
-    let opacities = (splats.opacity_logits.iter())
-        .map(|&logit| (1.0 / (1.0 + (-f64::from(logit)).exp())) as f32);
+    let opacities = splats.opacities().map(|opacity| opacity as f32);
     list(&mut text, "float[] opacities", opacities);
     let degree = splats.sh.degree;
     let _ = writeln!(

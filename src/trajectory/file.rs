@@ -27,7 +27,7 @@ use crate::{capture::Camera, disk, input};
 const MOVED: &str = "dataparser_transforms.json";
 
 /// A path longer than any film: what counts more is no path.
-const MOST_FRAMES: usize = 100_000;
+pub const MOST_FRAMES: usize = 100_000;
 
 /// How far axes of a pose may be from orthogonal, as the cosine between them: files have few
 /// digits, and what is worse is no pose.
@@ -38,11 +38,17 @@ const SKEW: f64 = 1e-2;
 pub enum TrajectoryError {
     /// The file system.
     #[error("{}: {source}", path.display())]
-    Read {
+    Io {
         /// The file.
         path: PathBuf,
         /// What the system says.
         source: io::Error,
+    },
+    /// It would have too many frames.
+    #[error("a path of {frames:.0} frames: {MOST_FRAMES} at most; lower --seconds or --fps")]
+    Long {
+        /// How many.
+        frames: f64,
     },
     /// It is no camera path.
     #[error("{}: {reason}", path.display())]
@@ -230,14 +236,14 @@ pub fn write_path(path: &Path, cameras: &[Camera], rate: f64) -> Result<(), Traj
         draft.write_all(&text)?;
         draft.persist(path)
     };
-    written().map_err(|source| TrajectoryError::Read {
+    written().map_err(|source| TrajectoryError::Io {
         path: path.to_owned(),
         source,
     })
 }
 
 fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, TrajectoryError> {
-    let text = input::read_to_string(path).map_err(|source| TrajectoryError::Read {
+    let text = input::read_to_string(path).map_err(|source| TrajectoryError::Io {
         path: path.to_owned(),
         source,
     })?;
@@ -454,8 +460,8 @@ impl Moved {
             return false;
         }
         let (turn, way) = self.parts();
-        let off = (turn * turn.transpose()).abs_diff_eq(DMat3::IDENTITY, SKEW);
-        off && turn.determinant() > 0.0 && way.is_finite()
+        let orthogonal = (turn * turn.transpose()).abs_diff_eq(DMat3::IDENTITY, SKEW);
+        orthogonal && turn.determinant() > 0.0 && way.is_finite()
     }
 
     fn parts(&self) -> (DMat3, DVec3) {

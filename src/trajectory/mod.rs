@@ -6,8 +6,8 @@ mod orbit;
 mod spline;
 mod supersplat;
 
-pub use file::{Coordinates, PathFile, TrajectoryError, read_path, write_path};
-pub use orbit::{middle_of_splats, orbit_of_ball, orbit_of_cameras};
+pub use file::{Coordinates, MOST_FRAMES, PathFile, TrajectoryError, read_path, write_path};
+pub use orbit::{ball_of_splats, orbit_of_ball, orbit_of_cameras};
 pub use spline::{camera_path, distance};
 
 use glam::{DMat3, DVec3};

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use glam::{DMat3, DVec3};
 
 use super::looking;
-use crate::capture::Camera;
+use crate::{capture::Camera, splats::Splats};
 
 /// How much cameras held upright count for which way is up, against cameras held level: enough
 /// to decide where these leave it open, as where all look one way.
@@ -29,6 +29,9 @@ const SWAY: [f64; 2] = [0.03, 0.25];
 
 /// How far above a ball it is looked at from, in radians: 15°.
 const RISE: f64 = TAU / 24.0;
+
+/// Gaussians that are asked where they are, at most.
+const SAMPLES: usize = 20_000;
 
 /// Rounds of inverse iteration: each brings the answer closer by the ratio of two eigenvalues.
 const ROUNDS: usize = 100;
@@ -109,23 +112,22 @@ pub fn orbit_of_cameras(cameras: &[&Camera], points: &[DVec3], frames: usize) ->
         .collect()
 }
 
-/// The middle of Gaussians, and the distance from it within which half of them lie; `weights` say
-/// how much each counts.
-///
-/// # Panics
-/// Where there are not as many weights as places.
-pub fn middle_of_splats(places: &[[f32; 3]], weights: &[f64]) -> (DVec3, f64) {
-    assert_eq!(places.len(), weights.len(), "a weight each");
-    let places = || {
-        places
-            .iter()
-            .map(|&place| DVec3::from(place.map(f64::from)))
+/// The middle of Gaussians, and the distance from it within which a `share` of them lies. Each
+/// counts by its opacity; of more than [`SAMPLES`] an even choice does.
+pub fn ball_of_splats(splats: &Splats, share: f64) -> (DVec3, f64) {
+    let step = splats.len().div_ceil(SAMPLES).max(1);
+    let counted: Vec<(DVec3, f64)> = (splats.means.iter().zip(splats.opacities()))
+        .step_by(step)
+        .map(|(&mean, opacity)| (DVec3::from(mean.map(f64::from)), opacity))
+        .collect();
+    let up_to = |share: f64, value: &dyn Fn(DVec3) -> f64| {
+        weighted_quantile(
+            counted.iter().map(|&(at, w)| (value(at), w)).collect(),
+            share,
+        )
     };
-    let weighted = |value: &dyn Fn(DVec3) -> f64| {
-        weighted_median(places().map(value).zip(weights.iter().copied()).collect())
-    };
-    let middle = DVec3::from([0, 1, 2].map(|axis| weighted(&|place| place[axis])));
-    let radius = weighted(&|place| place.distance(middle));
+    let middle = DVec3::from([0, 1, 2].map(|axis| up_to(0.5, &|place| place[axis])));
+    let radius = up_to(share, &|place| place.distance(middle));
     (middle, radius.max(f64::from(f32::MIN_POSITIVE)))
 }
 
@@ -244,19 +246,19 @@ fn gap_of(mut angles: Vec<f64>) -> (f64, f64) {
 
 /// The upper median.
 fn median(values: Vec<f64>) -> f64 {
-    weighted_median(values.into_iter().map(|value| (value, 1.0)).collect())
+    weighted_quantile(values.into_iter().map(|value| (value, 1.0)).collect(), 0.5)
 }
 
-/// The first value up to which half of the weight lies; 0 without any.
-fn weighted_median(mut values: Vec<(f64, f64)>) -> f64 {
+/// The first value up to which more than a share of the weight lies; 0 without any.
+fn weighted_quantile(mut values: Vec<(f64, f64)>, share: f64) -> f64 {
     values.sort_by(|a, b| a.0.total_cmp(&b.0));
     let total: f64 = values.iter().map(|(_, weight)| weight).sum();
     let mut sum = 0.0;
-    let half = values.iter().find(|(_, weight)| {
+    let found = values.iter().find(|(_, weight)| {
         sum += weight;
-        2.0 * sum > total
+        sum > share * total
     });
-    half.or(values.last()).map_or(0.0, |(value, _)| *value)
+    found.or(values.last()).map_or(0.0, |(value, _)| *value)
 }
 
 #[cfg(test)]
@@ -386,9 +388,15 @@ mod tests {
             })
             .chain([[1000.0, 0.0, 0.0]])
             .collect();
-        let mut weights = vec![1.0; 101];
-        weights[100] = 0.5;
-        let ball = middle_of_splats(&places, &weights);
+        // The last hardly shows.
+        let mut opacity_logits = vec![0.0; 101];
+        opacity_logits[100] = -5.0;
+        let splats = Splats {
+            means: places.clone(),
+            opacity_logits,
+            ..Splats::default()
+        };
+        let ball = ball_of_splats(&splats, 0.5);
         let path = orbit_of_ball(ball, &lens([64, 48], 50.0), 8);
         for camera in &path {
             // Above what it looks at, where y points down.

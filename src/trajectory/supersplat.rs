@@ -197,11 +197,9 @@ impl Animation {
         if keys.is_empty() {
             return Err("has no camera keys: add some to SuperSplat's timeline".to_owned());
         }
-        if loops && let [first, second, ..] = keys[..] {
+        if loops && let ([first, second, ..], [.., before, last]) = (&keys[..], &keys[..]) {
             // The end leads on to the beginning.
-            let [.., before, last] = keys[..] else {
-                return Err("has no two keys".to_owned());
-            };
+            let [first, second, before, last] = [first, second, before, last].map(|key| *key);
             keys.insert(0, (last.0 - frames, last.1));
             keys.insert(0, (before.0 - frames, before.1));
             keys.push((first.0 + frames, first.1));

@@ -72,6 +72,7 @@ pub fn write_html(
     }
     let packed = pack(&splats, drawn);
     let page = page(&told, kind.name(), &packed, &poster);
+    files::make_folder_of(path)?;
     files::write(path, page.as_bytes())?;
     Ok(Written {
         splats: splats.len(),

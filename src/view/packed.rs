@@ -7,7 +7,7 @@ use half::f16;
 
 use crate::{
     raster::RasterOptions,
-    splats::{Splats, sh},
+    splats::{Splats, opacity, sh},
 };
 
 const MAGIC: &[u8; 4] = b"GSCV";
@@ -88,8 +88,7 @@ fn is_drawn(splats: &Splats, i: usize) -> bool {
 /// Scales and opacity in 16 bits, quaternion w x y z in signed ones.
 fn shape(splats: &Splats, i: usize, low: f32, step: f32) -> [u32; 4] {
     let [x, y, z] = splats.log_scales[i].map(|scale| ((scale - low) / step).round() as u16);
-    let opacity = 1.0 / (1.0 + (-f64::from(splats.opacity_logits[i])).exp());
-    let opacity = (opacity * 65535.0).round() as u16;
+    let opacity = (opacity(splats.opacity_logits[i]) * 65535.0).round() as u16;
     let quat = splats.quats[i];
     let length = quat.iter().map(|q| q * q).sum::<f32>().sqrt();
     let [qw, qx, qy, qz] = quat.map(|q| (q / length * 32767.0).round() as i16 as u16);

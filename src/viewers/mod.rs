@@ -133,13 +133,10 @@ pub fn shown_psnr(
 
 /// The same scene with three channels, which a gray one shows alike.
 pub fn in_rgb(splats: &Splats) -> Splats {
-    let mut colored = splats.clone();
-    if splats.sh.channels == 1 {
-        let coefficients = splats.sh.coefficients.iter();
-        colored.sh.channels = 3;
-        colored.sh.coefficients = coefficients.flat_map(|&value| [value; 3]).collect();
+    Splats {
+        sh: splats.sh.to_rgb(),
+        ..splats.clone()
     }
-    colored
 }
 
 /// Keeps constant colors between black and white.

@@ -273,3 +273,87 @@ fn a_film_has_all_frames_the_rate_and_the_sound_of_its_source() {
     assert_eq!(done.code, Some(1));
     assert!(done.stderr.contains("045.png"), "{}", done.stderr);
 }
+
+/// Something came by while three photos of the bundled scene were taken, and is painted in one.
+#[test]
+fn a_stroke_on_what_the_scene_leaves_open_colors_it_there_and_in_the_photos_around() {
+    const PASSES: [usize; 3] = [5, 6, 7];
+    let demo = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/demo");
+    let teacher = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/assets/teacher/demo-teacher.onnx"
+    );
+    let place = Place::new();
+    let fit = [
+        "fit",
+        demo,
+        "-o",
+        "run",
+        "--preset",
+        "draft",
+        "--iterations",
+    ];
+    place.succeed(&[&fit[..], &["150"]].concat());
+    place.succeed(&["colorize", "run", "--teacher", teacher, "--rounds", "1"]);
+    let name = |photo: usize| format!("garden_{photo:02}");
+    let [left, top, side] = [60, 40, 70];
+    let within = |x: u32, y: u32, more: u32| {
+        let [x0, y0] = [left - more, top - more];
+        (x0..left + side + more).contains(&x) && (y0..top + side + more).contains(&y)
+    };
+    let copy = |below: &str| {
+        let from = std::path::Path::new(demo).join(below);
+        std::fs::create_dir_all(place.path("scene").join(below)).expect("a folder");
+        for file in std::fs::read_dir(from).expect("files").flatten() {
+            let to = place.path("scene").join(below).join(file.file_name());
+            std::fs::copy(file.path(), to).expect("a copy");
+        }
+    };
+    ["images", "sparse/0"].map(copy);
+    for photo in PASSES {
+        let path = place.path(&format!("scene/images/{}.jpg", name(photo)));
+        let mut image = image::open(&path).expect("a photo").into_rgb8();
+        for (x, y, pixel) in image.enumerate_pixels_mut() {
+            if within(x, y, 0) {
+                *pixel = image::Rgb([225 + (x % 2) as u8; 3]);
+            }
+        }
+        let encoder = std::fs::File::create(&path).expect("a file");
+        image::codecs::jpeg::JpegEncoder::new_with_quality(encoder, 98)
+            .encode_image(&image)
+            .expect("a photo");
+    }
+    let mut paint = image::RgbaImage::new(324, 216);
+    for x in left + 10..left + side - 10 {
+        for y in top + 30..top + 34 {
+            paint.put_pixel(x, y, image::Rgba([255, 170, 150, 255]));
+        }
+    }
+    std::fs::create_dir(place.path("hints")).expect("a folder");
+    let hint = format!("hints/{}.png", name(PASSES[1]));
+    paint.save(place.path(&hint)).expect("a hint");
+    let frames = ["frames", "run", "--colmap", "scene", "--json", "-o"];
+    place.json(&[&frames[..], &["plain"]].concat());
+    let told = place.json(&[&frames[..], &["painted", "--hints", "hints"]].concat());
+    assert_eq!(told["painted"], 3, "{told}");
+    for photo in 0..14 {
+        let [plain, painted] =
+            ["plain", "painted"].map(|folder| format!("{folder}/{}.png", name(photo)));
+        if !PASSES.contains(&photo) {
+            assert!(place.read(&plain) == place.read(&painted), "{photo}");
+            continue;
+        }
+        let [plain, painted] = [plain, painted].map(|file| lab(&place, &file));
+        let mut colored = 0;
+        for (i, (plain, painted)) in plain.iter().zip(&painted).enumerate() {
+            let (x, y) = (i as u32 % 324, i as u32 / 324);
+            let moved = gs_chroma::color::ciede2000(*plain, *painted);
+            assert!(
+                moved < 1.0 || within(x, y, 4),
+                "{photo}: {moved} at {x}, {y}"
+            );
+            colored += usize::from(within(x, y, 0) && painted[1] > 8.0);
+        }
+        assert!(colored > 3900, "{photo}: {colored} pixels of 4900");
+    }
+}

@@ -49,6 +49,19 @@ fn a_path_s_pictures_are_numbered_and_the_same_when_the_path_is_read_again() {
 }
 
 #[test]
+fn a_path_that_never_ends_is_refused() {
+    let place = place_with_run();
+    for more in [["--seconds", "1e12"], ["--fps", "4000000000"]] {
+        let render = ["render", "--path", "orbit", "-o", "pictures"];
+        let done = place.run(&[&render[..], &more].concat());
+        let told = done.stderr.lines().last().unwrap_or_default();
+        assert_eq!(done.code, Some(1), "{more:?}: {}", done.stderr);
+        assert!(told.contains("100000 at most"), "{told}");
+        assert!(!place.path("pictures").exists());
+    }
+}
+
+#[test]
 fn a_path_in_a_moved_scene_is_in_colmaps_coordinates() {
     let offset = [5000.0, -3000.0, 100.0];
     let place = Place::new();

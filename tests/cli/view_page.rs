@@ -397,9 +397,9 @@ const LIKE: f64 = 50.0;
 #[test]
 fn a_page_is_no_splat_file() {
     let place = place_with_run();
-    let export = ["export", "runs/scene", "-o", "scene.html", "--json"];
+    let export = ["export", "runs/scene", "-o", "new/scene.html", "--json"];
     let wrote = place.json(&export);
-    let bytes = place.read("scene.html").len() as u64;
+    let bytes = place.read("new/scene.html").len() as u64;
     assert_eq!(wrote["bytes"].as_u64(), Some(bytes), "{wrote}");
     let done = place.run(&[&export[..], &["--viewer", "any", "--spz-version", "4"]].concat());
     assert_eq!(done.code, Some(0), "{}", done.stderr);

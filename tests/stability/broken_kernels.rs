@@ -31,6 +31,13 @@ fn a_missing_factor_is_noticed() {
     assert!(failing.contains(&"ordinary scene"), "{failing:?}");
 }
 
+/// Records that are loaded together: of a Gaussian that has many.
+#[test]
+fn a_record_that_counts_twice_is_noticed() {
+    let failing = failing("sum_instances", "third + fourth", "third + third");
+    assert!(failing.contains(&"wider than the image"), "{failing:?}");
+}
+
 /// Nothing but the poisoned case can tell: a clamp makes a number of NaN.
 #[test]
 fn a_clamp_that_swallows_nan_is_noticed() {

@@ -2,13 +2,17 @@
 
 mod out;
 mod painted;
+mod painter;
 mod shots;
+mod unplaced;
 
-use std::{cell::RefCell, num::NonZero, path::PathBuf, sync::Arc, thread};
+use std::{cell::RefCell, path::PathBuf, sync::Arc};
 
 use out::Out;
 use painted::Painted;
+use painter::Painter;
 use shots::{Shot, shots_of};
+use unplaced::{Ends, Known, Unknown, carry, chain, way, whole};
 
 use super::{
     Event, Observer, RunError, RunFolder, Stage,
@@ -20,19 +24,13 @@ use super::{
     teach::{TeachOptions, Teachers},
 };
 use crate::{
-    capture::{CaptureError, Dataset, Exposure, Film, LoadOptions, Original, in_order},
-    chroma::teacher::{AbImage, Query, TeacherSettings},
+    capture::{Dataset, Film, LoadOptions},
+    chroma::teacher::TeacherSettings,
     eval::exposures,
-    frames::{
-        Believed, Between, Canvas, Carried, Colored, SceneDrawer, Strokes, ViewOf, blend, finish,
-    },
+    frames::{Believed, Canvas, SceneDrawer, blend, finish},
     raster::Raster,
     report::Report,
 };
-
-/// A share of a photo without a pose that has to be known from its neighbors; else the teacher
-/// is asked.
-const CARRIED: f64 = 0.9;
 
 /// A share of a photo that the scene leaves open from which on the photo before is asked.
 const OPEN: f64 = 0.005;
@@ -248,21 +246,13 @@ fn open_teachers(
     dataset: &Dataset,
     observe: &mut Observer<'_>,
 ) -> Result<Option<Teachers>, RunError> {
-    let chroma = report.chroma.as_ref();
-    let strength = chroma.map_or(1.0, |chroma| chroma.strength);
-    let of_run = || {
-        let teachers = chroma.into_iter().flat_map(|chroma| &chroma.teachers);
-        teachers.filter_map(|teacher| Some((PathBuf::from(teacher.path.as_ref()?), teacher.weight)))
-    };
-    let teach = TeachOptions {
-        teachers: match &options.teacher {
-            Some(path) => vec![(path.clone(), 1.0)],
-            None => of_run().collect(),
-        },
+    let mut teach = TeachOptions {
         settings: options.teacher_settings.clone(),
-        strength,
-        ..TeachOptions::default()
+        ..TeachOptions::of_run(report)
     };
+    if let Some(path) = &options.teacher {
+        teach.teachers = vec![(path.clone(), 1.0)];
+    }
     if teach.teachers.is_empty() {
         return Ok(None);
     }
@@ -310,234 +300,4 @@ fn find_painted(
         }
         found => found,
     }
-}
-
-/// What a photo's colors are found with.
-struct Painter<'a> {
-    drawer: SceneDrawer,
-    exposures: Vec<Exposure>,
-    dataset: &'a Dataset,
-    teachers: Option<Teachers>,
-    /// Longer side of the canvas met last, over that of its photo's.
-    side: Option<f64>,
-}
-
-impl<'a> Painter<'a> {
-    fn view(&self, shot: &Shot) -> &'a crate::capture::View {
-        &self.dataset.capture.views[shot.views.start]
-    }
-
-    fn views(&self, shot: &Shot) -> Vec<ViewOf<'a>> {
-        let dataset = self.dataset;
-        let of = |i: usize| ViewOf {
-            view: &dataset.capture.views[i],
-            camera: &dataset.cameras[i],
-            exposure: self.exposures[i],
-        };
-        shot.views.clone().map(of).collect()
-    }
-
-    /// A photo with a pose at the size at which its views were trained.
-    fn canvas(&mut self, shot: &Shot, original: &crate::capture::Original) -> Canvas {
-        let size = SceneDrawer::size(&self.views(shot));
-        let size = size.unwrap_or([original.width, original.height]);
-        let canvas = Canvas::sized(original, size);
-        let longer = |width: u32, height: u32| f64::from(width.max(height));
-        let scale = longer(canvas.width, canvas.height) / longer(original.width, original.height);
-        self.side = Some(scale);
-        canvas
-    }
-
-    /// The longer side for a photo without a pose: at the scale of the others.
-    fn side(&self, original: &crate::capture::Original) -> u32 {
-        let scale = self.side.or_else(|| self.usual_scale()).unwrap_or(1.0);
-        let longer = f64::from(original.width.max(original.height));
-        ((longer * scale).round() as u32).max(1)
-    }
-
-    /// That of the first view.
-    fn usual_scale(&self) -> Option<f64> {
-        let view = self.dataset.capture.views.first()?;
-        let seen = ViewOf {
-            view,
-            camera: &self.dataset.cameras[0],
-            exposure: Exposure::NONE,
-        };
-        let [width, height] = SceneDrawer::size(&[seen])?;
-        let size = self.dataset.loader().file_size(view).ok()?;
-        Some(f64::from(width.max(height)) / f64::from(size[0].max(size[1])))
-    }
-
-    fn seen(&mut self, shot: &Shot, canvas: &Canvas) -> Result<Believed, RunError> {
-        let views = self.views(shot);
-        Ok(self.drawer.draw(&views, canvas)?)
-    }
-
-    /// What the teachers say of a photo.
-    fn answer(
-        &mut self,
-        name: &str,
-        view: Option<&ViewOf<'_>>,
-        canvas: &Canvas,
-    ) -> Result<Option<Vec<[f32; 2]>>, RunError> {
-        let Some(teachers) = &mut self.teachers else {
-            return Ok(None);
-        };
-        let name = view.map_or(name, |seen| &seen.view.photo);
-        let answer = teachers.color(Query::from(name), canvas.gray_image())?;
-        Ok(answer.map(|AbImage { ab, .. }| ab))
-    }
-}
-
-/// A photo whose colors are known.
-struct Known {
-    canvas: Canvas,
-    ab: Vec<[f32; 2]>,
-    /// With strokes over them, where there are some.
-    shown: Option<Vec<[f32; 2]>>,
-}
-
-impl Known {
-    fn shown(&self) -> &[[f32; 2]] {
-        self.shown.as_deref().unwrap_or(&self.ab)
-    }
-
-    fn as_carried(&self, shown: bool) -> Carried<'_> {
-        Carried {
-            canvas: &self.canvas,
-            ab: if shown { self.shown() } else { &self.ab },
-        }
-    }
-}
-
-/// A photo without a pose.
-struct Unknown<'a> {
-    shot: &'a Shot,
-    canvas: Canvas,
-    strokes: Option<&'a Strokes>,
-    /// None where there are too many to be kept.
-    original: Option<Original>,
-}
-
-/// What is known before and after photos without a pose.
-struct Ends<'a> {
-    before: Option<&'a Known>,
-    after: Option<&'a Known>,
-}
-
-/// Steps from each photo to the next; `None` where their shapes differ.
-type Steps = Vec<Option<Between>>;
-
-fn way(first: &Canvas, open: &[Unknown<'_>], last: Option<&Canvas>) -> Steps {
-    let inner = open.iter().map(|unknown| &unknown.canvas);
-    chain(std::iter::once(first).chain(inner).chain(last))
-}
-
-fn chain<'a>(photos: impl Iterator<Item = &'a Canvas>) -> Steps {
-    let photos: Vec<&Canvas> = photos.collect();
-    let pairs: Vec<[&Canvas; 2]> = photos.windows(2).map(|pair| [pair[0], pair[1]]).collect();
-    let mut steps = Vec::with_capacity(pairs.len());
-    let compared: Result<(), std::convert::Infallible> = in_order(
-        &pairs,
-        |[first, second]| Between::of(first, second),
-        |_, step| {
-            steps.push(step);
-            Ok(())
-        },
-    );
-    match compared {
-        Ok(()) => steps,
-    }
-}
-
-/// All of some steps; none where one is missing, or there is none.
-fn whole(steps: &[Option<Between>]) -> Option<Vec<&Between>> {
-    let steps: Option<Vec<&Between>> = steps.iter().map(Option::as_ref).collect();
-    steps.filter(|steps| !steps.is_empty())
-}
-
-/// Colors photos without a pose by those before and after, and writes them. `steps` lead from
-/// the one before, if there is one, over all of them to the one after, if there is one.
-fn carry(
-    painter: &mut Painter<'_>,
-    open: &[Unknown<'_>],
-    steps: &Steps,
-    ends: &Ends<'_>,
-    out: &mut Out,
-) -> Result<(), RunError> {
-    // Of several the slow part is done at once, and as many wait as there are threads.
-    let threads = thread::available_parallelism().map_or(1, NonZero::get);
-    for (part, some) in open.chunks(threads).enumerate() {
-        let mut known = Vec::with_capacity(some.len());
-        for (k, unknown) in some.iter().enumerate() {
-            let canvas = &unknown.canvas;
-            let i = part * threads + k;
-            // With nothing before, the first step leads from the first of them to the second.
-            let first = usize::from(ends.before.is_some());
-            let (before, after) = steps.split_at((i + first).min(steps.len()));
-            let of = |known: Option<&Known>, way: &[Option<Between>], backwards: bool| {
-                let way = whole(way)?;
-                Some(known?.as_carried(true).along(&way, backwards, canvas))
-            };
-            let nearness = (i + 1) as f32 / (open.len() + 1) as f32;
-            let seen = joined(
-                canvas.len(),
-                [
-                    (of(ends.before, before, false), 1.0 - nearness),
-                    (of(ends.after, after, true), nearness),
-                ],
-            );
-            let answer = match seen.share() < CARRIED {
-                true => painter.answer(&unknown.shot.name, None, canvas)?,
-                false => None,
-            };
-            known.push((unknown, seen, answer));
-        }
-        let loader = painter.dataset.loader();
-        in_order(
-            &known,
-            |(unknown, seen, answer)| {
-                let canvas = &unknown.canvas;
-                let ab = blend(canvas, seen, answer.as_deref(), None);
-                let ab = match unknown.strokes {
-                    Some(strokes) => strokes.over(canvas, &Believed::nothing(canvas.len()), &ab),
-                    None => ab,
-                };
-                match &unknown.original {
-                    Some(original) => Ok(finish(original, canvas, ab)),
-                    None => {
-                        let original = loader.unplaced(&unknown.shot.path)?;
-                        Ok(finish(&original, canvas, ab))
-                    }
-                }
-            },
-            |(unknown, ..), colored: Result<Colored, CaptureError>| {
-                out.write(unknown.shot, colored?)
-            },
-        )?;
-    }
-    Ok(())
-}
-
-/// What is carried from both sides, each by its share.
-fn joined(pixels: usize, sides: [(Option<Believed>, f32); 2]) -> Believed {
-    let mut all = Believed::nothing(pixels);
-    let mut total = vec![0.0; pixels];
-    for (side, share) in sides {
-        let Some(side) = side else { continue };
-        for (i, total) in total.iter_mut().enumerate() {
-            let weight = share * side.weight[i];
-            *total += weight;
-            for k in 0..2 {
-                all.ab[i][k] += weight * side.ab[i][k];
-            }
-            all.weight[i] = all.weight[i].max(side.weight[i]);
-        }
-    }
-    for (ab, total) in all.ab.iter_mut().zip(total) {
-        if total > 0.0 {
-            *ab = ab.map(|value| value / total);
-        }
-    }
-    all
 }

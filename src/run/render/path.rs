@@ -17,8 +17,8 @@ use crate::{
         film::{FRAME_RATE, FilmWriter, Purpose},
     },
     trajectory::{
-        Coordinates, camera_path, framed, lens, middle_of_splats, orbit_of_ball, orbit_of_cameras,
-        read_path, write_path,
+        Coordinates, MOST_FRAMES, TrajectoryError, ball_of_splats, camera_path, framed, lens,
+        orbit_of_ball, orbit_of_cameras, read_path, write_path,
     },
 };
 
@@ -153,15 +153,13 @@ impl Path {
     fn of(options: &PathOptions, subject: &Subject) -> Result<Self, RunError> {
         let frames = |rate: [u32; 2]| {
             let seconds = options.seconds.unwrap_or(SECONDS);
-            let frames = seconds * f64::from(rate[0]) / f64::from(rate[1]);
-            (frames.round() as usize).max(1)
+            let frames = (seconds * f64::from(rate[0]) / f64::from(rate[1])).round();
+            match frames <= MOST_FRAMES as f64 {
+                true => Ok((frames as usize).max(1)),
+                false => Err(TrajectoryError::Long { frames }),
+            }
         };
-        let ball = || {
-            let sigmoid = |&logit: &f32| 1.0 / (1.0 + (-f64::from(logit)).exp());
-            let splats = &subject.splats;
-            let weights: Vec<f64> = splats.opacity_logits.iter().map(sigmoid).collect();
-            middle_of_splats(&splats.means, &weights)
-        };
+        let ball = || ball_of_splats(&subject.splats, 0.5);
         let extent = match &subject.capture {
             Some(capture) => capture.extent(),
             None => ball().1,
@@ -180,7 +178,7 @@ impl Path {
             }
             (Way::Orbit, None) => {
                 let lens = lens(options.size.unwrap_or(SIZE), FIELD_OF_VIEW);
-                (orbit_of_ball(ball(), &lens, frames(rate)), rate)
+                (orbit_of_ball(ball(), &lens, frames(rate)?), rate)
             }
             (Way::Photos, None) => return Err(RunError::NoCameras(subject.file.clone())),
             (way, Some(capture)) => {
@@ -193,9 +191,9 @@ impl Path {
                     Way::Orbit => {
                         let points = capture.points.iter().map(|point| point.position);
                         let points: Vec<DVec3> = points.collect();
-                        orbit_of_cameras(&cameras, &points, frames(rate))
+                        orbit_of_cameras(&cameras, &points, frames(rate)?)
                     }
-                    _ => camera_path(&cameras, capture.extent(), frames(rate)),
+                    _ => camera_path(&cameras, capture.extent(), frames(rate)?),
                 };
                 (path, rate)
             }

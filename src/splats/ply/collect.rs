@@ -2,10 +2,10 @@
 
 use super::header::VertexLayout;
 use super::{CHANNELS, ReadSplats, sh_position};
+use crate::splats::Splats;
 use crate::splats::file::MIN_QUATERNION_NORM;
 use crate::splats::quantize::{FLAT, OPAQUE};
 use crate::splats::sh::{C0, coefficient_count};
-use crate::splats::{ShField, Splats};
 
 /// Sorts the numbers of each Gaussian into the arrays.
 pub(super) struct Collector {
@@ -21,20 +21,9 @@ impl Collector {
         let sh_positions: Vec<usize> = (0..coefficient_count(degree))
             .flat_map(|k| (0..CHANNELS).map(move |channel| sh_position(degree, k, channel)))
             .collect();
-        let splats = Splats {
-            means: Vec::with_capacity(count),
-            quats: Vec::with_capacity(count),
-            log_scales: Vec::with_capacity(count),
-            opacity_logits: Vec::with_capacity(count),
-            sh: ShField {
-                degree,
-                channels: CHANNELS,
-                coefficients: Vec::with_capacity(count * sh_positions.len()),
-            },
-        };
         Self {
             read: ReadSplats {
-                splats,
+                splats: Splats::with_capacity(count, degree, CHANNELS),
                 ..ReadSplats::default()
             },
             sh_positions,

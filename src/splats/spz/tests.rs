@@ -76,7 +76,7 @@ fn version_3_is_one_gzip_stream() {
     assert_eq!(word >> 30, 0);
     assert_eq!([20, 10, 0].map(|shift| word >> shift & 0x1ff), [361; 3]);
     assert_eq!([29, 19, 9].map(|shift| word >> shift & 1), [1, 0, 0]);
-    // 128 + 128 value in steps of 8.
+    // 128 + 128 value.
     assert_eq!(bytes[36..], [192, 64, 128, 160, 96, 128, 144, 255, 0]);
 }
 

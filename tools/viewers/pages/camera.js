@@ -20,4 +20,13 @@ export function projectionMatrix({ width, height, fx, fy, cx, cy }) {
   ];
 }
 
+/** Gives a camera of three.js the place and lens of a view. */
+export function take(camera, view) {
+  camera.matrix.fromArray(worldMatrix(view));
+  camera.matrixWorld.copy(camera.matrix);
+  camera.matrixWorldInverse.copy(camera.matrixWorld).invert();
+  camera.projectionMatrix.fromArray(projectionMatrix(view));
+  camera.projectionMatrixInverse.copy(camera.projectionMatrix).invert();
+}
+
 export { NEAR, FAR };

@@ -2,7 +2,7 @@
 
 import * as THREE from 'three';
 import { SparkRenderer, SplatMesh } from '@sparkjsdev/spark';
-import { projectionMatrix, worldMatrix } from './camera.js';
+import { take } from './camera.js';
 
 // How often sorting may take another turn before it is given up.
 const TURNS = 600;
@@ -36,11 +36,7 @@ export async function openWith(kept, canvas, url, [width, height], matrix) {
   const camera = new THREE.PerspectiveCamera();
   camera.matrixAutoUpdate = false;
   return async (view) => {
-    camera.matrix.fromArray(worldMatrix(view));
-    camera.matrixWorld.copy(camera.matrix);
-    camera.matrixWorldInverse.copy(camera.matrixWorld).invert();
-    camera.projectionMatrix.fromArray(projectionMatrix(view));
-    camera.projectionMatrixInverse.copy(camera.projectionMatrix).invert();
+    take(camera, view);
     scene.updateMatrixWorld();
     for (let turn = 0; ; turn += 1) {
       await spark.update({ scene, camera });

@@ -2,7 +2,7 @@
 
 import * as THREE from 'three/webgpu';
 import { GaussianSplat } from 'three/addons/objects/GaussianSplat.js';
-import { projectionMatrix, worldMatrix } from './camera.js';
+import { take } from './camera.js';
 
 const LOADERS = {
   ply: ['GaussianSplatPLYLoader', 'three/addons/loaders/GaussianSplatPLYLoader.js'],
@@ -42,11 +42,7 @@ export async function open(canvas, url, [width, height], matrix) {
   const camera = new THREE.PerspectiveCamera();
   camera.matrixAutoUpdate = false;
   return async (view) => {
-    camera.matrix.fromArray(worldMatrix(view));
-    camera.matrixWorld.copy(camera.matrix);
-    camera.matrixWorldInverse.copy(camera.matrixWorld).invert();
-    camera.projectionMatrix.fromArray(projectionMatrix(view));
-    camera.projectionMatrixInverse.copy(camera.projectionMatrix).invert();
+    take(camera, view);
     // Twice: pipelines are made while the first is drawn.
     for (let turn = 0; turn < 2; turn += 1) {
       await renderer.renderAsync(scene, camera);

@@ -1,19 +1,22 @@
 //! Programs of others, such as FFmpeg and COLMAP: started without a shell, fed, listened to, and
 //! ended with this one.
 
+mod said;
+
 use std::{
-    collections::VecDeque,
     ffi::OsString,
-    io::{self, BufRead, BufReader, Read, Write},
+    io::{self, Read, Write},
     path::Path,
     process::{Child, ChildStdin, Command, ExitStatus, Stdio},
     sync::{
         Arc, Mutex, MutexGuard, PoisonError,
-        mpsc::{Receiver, Sender, channel},
+        mpsc::{Receiver, channel},
     },
     thread,
     time::Duration,
 };
+
+use said::{Last, Stream, listen};
 
 use crate::disk;
 
@@ -22,15 +25,6 @@ pub(crate) const FFMPEG: &str = "ffmpeg";
 
 /// How often a program is looked after that has closed its output.
 const PATIENCE: Duration = Duration::from_millis(5);
-
-/// Lines that are kept to be told if a program fails.
-const KEPT_LINES: usize = 20;
-
-/// Of these, as many of the last go into an error.
-const TOLD_LINES: usize = 2;
-
-/// A longer line is no message; the rest of it is not kept.
-const LONGEST_LINE: u64 = 4096;
 
 /// Programs that run, so that they can be ended.
 static RUNNING: Mutex<Vec<Arc<Mutex<Child>>>> = Mutex::new(Vec::new());
@@ -146,7 +140,7 @@ impl Program {
     }
 
     /// Runs it in a folder, and hands every line that it says to `heard`; at the end all that
-    /// was said of the last [`KEPT_LINES`] lines.
+    /// was said of the last [`said::KEPT_LINES`] lines.
     ///
     /// # Errors
     /// [`ProgramError`].
@@ -378,97 +372,9 @@ impl Drop for Running {
     }
 }
 
-/// Sends the lines that a program says: programs that show how far they are end lines with a
-/// carriage return as well.
-fn listen(said: impl Read + Send + 'static, to: Sender<(Stream, String)>, stream: Stream) {
-    thread::spawn(move || {
-        let mut said = BufReader::new(said);
-        let mut line = Vec::new();
-        loop {
-            let end = match said.fill_buf() {
-                Ok([]) | Err(_) => break,
-                Ok(bytes) => {
-                    let end = bytes.iter().position(|byte| matches!(byte, b'\n' | b'\r'));
-                    let room = (LONGEST_LINE as usize).saturating_sub(line.len());
-                    let part = &bytes[..end.unwrap_or(bytes.len())];
-                    line.extend_from_slice(&part[..part.len().min(room)]);
-                    let used = end.map_or(bytes.len(), |end| end + 1);
-                    said.consume(used);
-                    end
-                }
-            };
-            if end.is_some() && !line.is_empty() {
-                // Nobody may be listening any more; the program is heard to its end.
-                let _ = to.send((stream, String::from_utf8_lossy(&line).into_owned()));
-                line.clear();
-            }
-        }
-        if !line.is_empty() {
-            let _ = to.send((stream, String::from_utf8_lossy(&line).into_owned()));
-        }
-    });
-}
-
-/// Where a program says something.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Stream {
-    Output,
-    Error,
-}
-
-/// What a program said last.
-#[derive(Default)]
-struct Last(VecDeque<(Stream, String)>);
-
-impl Last {
-    fn keep(&mut self, stream: Stream, line: String) {
-        if self.0.len() == KEPT_LINES {
-            self.0.pop_front();
-        }
-        self.0.push_back((stream, line));
-    }
-
-    /// The last lines of standard error or, where there are none, of standard output.
-    fn told(&self) -> Vec<&str> {
-        let of = |stream| {
-            let said = self.0.iter().filter(|(from, _)| *from == stream);
-            let said = said
-                .map(|(_, line)| message(line))
-                .filter(|line| !line.is_empty());
-            said.collect::<Vec<_>>()
-        };
-        let mut said = of(Stream::Error);
-        if said.is_empty() {
-            said = of(Stream::Output);
-        }
-        said.split_off(said.len().saturating_sub(TOLD_LINES))
-    }
-}
-
-/// A line without what a log puts before it (`E20250101 10:00:00.000000 123 file.cc:7] `).
-fn message(line: &str) -> &str {
-    let bytes = line.as_bytes();
-    let logged = bytes.len() > 1
-        && matches!(bytes[0], b'I' | b'W' | b'E' | b'F')
-        && bytes[1].is_ascii_digit();
-    match line.split_once("] ") {
-        Some((_, message)) if logged => message.trim(),
-        _ => line.trim(),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_log_s_prefix_is_no_message() {
-        let logged = "E20250101 10:00:00.000000 123 option.cc:7] Failed to parse";
-        assert_eq!(message(logged), "Failed to parse");
-        for line in ["Error [1] no", "I am [a] person", "E", ""] {
-            assert_eq!(message(line), line);
-        }
-    }
 
     #[cfg(unix)]
     #[test]

@@ -1,0 +1,86 @@
+//! What the photos' colors are found with.
+
+use super::shots::Shot;
+use crate::{
+    capture::{Dataset, Exposure, Original, View},
+    chroma::teacher::{AbImage, Query},
+    frames::{Believed, Canvas, SceneDrawer, ViewOf},
+    run::{RunError, teach::Teachers},
+};
+
+/// What a photo's colors are found with.
+pub(super) struct Painter<'a> {
+    pub drawer: SceneDrawer,
+    pub exposures: Vec<Exposure>,
+    pub dataset: &'a Dataset,
+    pub teachers: Option<Teachers>,
+    /// Longer side of the canvas met last, over that of its photo's.
+    pub side: Option<f64>,
+}
+
+impl<'a> Painter<'a> {
+    pub fn view(&self, shot: &Shot) -> &'a View {
+        &self.dataset.capture.views[shot.views.start]
+    }
+
+    pub fn views(&self, shot: &Shot) -> Vec<ViewOf<'a>> {
+        let dataset = self.dataset;
+        let of = |i: usize| ViewOf {
+            view: &dataset.capture.views[i],
+            camera: &dataset.cameras[i],
+            exposure: self.exposures[i],
+        };
+        shot.views.clone().map(of).collect()
+    }
+
+    /// A photo with a pose at the size at which its views were trained.
+    pub fn canvas(&mut self, shot: &Shot, original: &Original) -> Canvas {
+        let size = SceneDrawer::size(&self.views(shot));
+        let size = size.unwrap_or([original.width, original.height]);
+        let canvas = Canvas::sized(original, size);
+        let longer = |width: u32, height: u32| f64::from(width.max(height));
+        let scale = longer(canvas.width, canvas.height) / longer(original.width, original.height);
+        self.side = Some(scale);
+        canvas
+    }
+
+    /// The longer side for a photo without a pose: at the scale of the others.
+    pub fn side(&self, original: &Original) -> u32 {
+        let scale = self.side.or_else(|| self.usual_scale()).unwrap_or(1.0);
+        let longer = f64::from(original.width.max(original.height));
+        ((longer * scale).round() as u32).max(1)
+    }
+
+    /// That of the first view.
+    fn usual_scale(&self) -> Option<f64> {
+        let view = self.dataset.capture.views.first()?;
+        let seen = ViewOf {
+            view,
+            camera: &self.dataset.cameras[0],
+            exposure: Exposure::NONE,
+        };
+        let [width, height] = SceneDrawer::size(&[seen])?;
+        let size = self.dataset.loader().file_size(view).ok()?;
+        Some(f64::from(width.max(height)) / f64::from(size[0].max(size[1])))
+    }
+
+    pub fn seen(&mut self, shot: &Shot, canvas: &Canvas) -> Result<Believed, RunError> {
+        let views = self.views(shot);
+        Ok(self.drawer.draw(&views, canvas)?)
+    }
+
+    /// What the teachers say of a photo.
+    pub fn answer(
+        &mut self,
+        name: &str,
+        view: Option<&ViewOf<'_>>,
+        canvas: &Canvas,
+    ) -> Result<Option<Vec<[f32; 2]>>, RunError> {
+        let Some(teachers) = &mut self.teachers else {
+            return Ok(None);
+        };
+        let name = view.map_or(name, |seen| &seen.view.photo);
+        let answer = teachers.color(Query::from(name), canvas.gray_image())?;
+        Ok(answer.map(|AbImage { ab, .. }| ab))
+    }
+}
