@@ -309,7 +309,9 @@ fn a_stroke_on_what_the_scene_leaves_open_colors_it_there_and_in_the_photos_arou
             std::fs::copy(file.path(), to).expect("a copy");
         }
     };
-    ["images", "sparse/0"].map(copy);
+    for below in ["images", "sparse/0"] {
+        copy(below);
+    }
     for photo in PASSES {
         let path = place.path(&format!("scene/images/{}.jpg", name(photo)));
         let mut image = image::open(&path).expect("a photo").into_rgb8();
