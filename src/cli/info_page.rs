@@ -101,8 +101,9 @@ fn of_scene(page: &mut Page, report: &Report) {
         || "no photo was held out to measure it on".to_owned(),
         |quality| {
             format!(
-                "held-out photos: PSNR {:.2} dB, SSIM {:.3}",
-                quality.psnr, quality.ssim
+                "held-out photos: {}, SSIM {:.3}",
+                quality.psnr_in_words(),
+                quality.ssim
             )
         },
     );

@@ -197,6 +197,8 @@ pub const CASES: &[Case] = cases! {
         with(|s, _| s.log_scales[ODD] = [-120.0; 3]), [5.68e-7, 2.91e-6];
     "wider than the image", "every tile, and a gradient from every pixel",
         with(|s, _| s.log_scales[ODD] = [1.5; 3]), [1.72e-7, 3.37e-6];
+    "over 42 tiles", "so many records that they are summed four at a time",
+        balls(straight_view(112, 96), [0.3, 0.9], [([0.1, 0.0, 2.0], 1.5), ([0.3, -0.2, 3.0], 0.4), ([0.0, 0.0, 4.0], 2.0)]), [1.7e-7, 3.4e-6];
     "determinant overflows", "infinity minus infinity",
         broken(0, |s| s.log_scales[ODD] = [35.0; 3]), [5.68e-7, 2.90e-6];
     "covariance overflows", "infinite entries",

@@ -26,8 +26,8 @@ const GAIN_MIN: f64 = 0.25;
 /// Each view's exposure, and how sure it is.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Exposures {
-    /// By view. Over the training views, or photos, the gains' logarithms and the offsets
-    /// have mean zero.
+    /// By view. Over the training views, or photos, the median gain is 1 and the median offset
+    /// 0: the scene is as bright as the typical photo shows it.
     pub views: Vec<Exposure>,
     /// How far they move what the training views show, root mean square in gray.
     pub spread: f64,
@@ -206,24 +206,20 @@ fn regress(
         .collect()
 }
 
-/// Brings the training views' mean to none: the scene is as bright as they are on
-/// average.
+/// Brings the training views' medians to none: the scene is as bright as the typical photo
+/// shows it, whatever a few others do.
 fn center(exposures: &mut [Exposure], train: &[usize]) {
-    let count = train.len().max(1) as f64;
-    let gain = (train
-        .iter()
-        .map(|&view| exposures[view].gain.ln())
-        .sum::<f64>()
-        / count)
-        .exp();
+    let median = |value: fn(&Exposure) -> f64, exposures: &[Exposure]| {
+        let mut values: Vec<f64> = train.iter().map(|&v| value(&exposures[v])).collect();
+        values.sort_by(f64::total_cmp);
+        let (low, high) = (values.len().checked_sub(1)? / 2, values.len() / 2);
+        Some((values[low] + values[high]) / 2.0)
+    };
+    let gain = median(|exposure| exposure.gain, exposures).unwrap_or(1.0);
     for exposure in exposures.iter_mut() {
         exposure.gain /= gain;
     }
-    let offset = train
-        .iter()
-        .map(|&view| exposures[view].offset)
-        .sum::<f64>()
-        / count;
+    let offset = median(|exposure| exposure.offset, exposures).unwrap_or(0.0);
     for exposure in exposures {
         exposure.offset -= offset;
     }
@@ -298,8 +294,27 @@ mod tests {
             found.spread,
             found.noise
         );
-        let mean: f64 = train.iter().map(|&v| found.views[v].gain.ln()).sum();
-        assert!(mean.abs() < 1e-12);
+        let above = |view: &&usize| found.views[**view].gain > 1.0;
+        let below = |view: &&usize| found.views[**view].gain < 1.0;
+        let count = |which: &dyn Fn(&&usize) -> bool| train.iter().filter(which).count();
+        assert_eq!(count(&above), count(&below));
+    }
+
+    /// A mean would be off by 0.06.
+    #[test]
+    fn the_scene_is_as_bright_as_the_typical_photo() {
+        let mut truth = [Exposure::NONE; 10];
+        for dark in &mut truth[..2] {
+            dark.offset = -0.2;
+        }
+        truth[4].gain = 0.5;
+        let train: Vec<usize> = (0..10).collect();
+        let found = find_exposures(&tracks(&truth, 3000, 0.01), 10, &train);
+        for typical in [2, 3, 5, 6, 7, 8, 9] {
+            let shown = found.views[typical].shown(0.5);
+            assert!((shown - 0.5).abs() < 0.005, "{shown}");
+        }
+        assert!((found.views[0].shown(0.5) - 0.3).abs() < 0.01);
     }
 
     #[test]
@@ -313,7 +328,7 @@ mod tests {
             view.photo = name.to_owned();
         }
         // The second face of `a` sees nothing that others see.
-        let of_photo = [0.04, 0.04, -0.02, -0.02, -0.01, -0.01];
+        let of_photo = [0.04, 0.04, -0.02, -0.02, 0.0, 0.0];
         let truth = of_photo.map(|offset| Exposure { gain: 1.0, offset });
         let mut tracks = tracks(&truth, 2000, 0.005);
         for track in &mut tracks {

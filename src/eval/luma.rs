@@ -10,7 +10,7 @@ use crate::{
     splats::Splats,
 };
 
-/// Gray pictures of each held-out view of `dataset` against its photo, as that was exposed.
+/// Gray pictures of each held-out view of `dataset`, as viewers show them, against its photo.
 ///
 /// # Errors
 /// [`EvalError`] of a photo or the device.
@@ -18,7 +18,6 @@ pub fn measure_luma(
     raster: &Arc<Raster>,
     dataset: &Dataset,
     splats: &Splats,
-    exposures: &[Exposure],
     observe: &mut Observer<'_>,
 ) -> Result<Vec<LumaView>, EvalError> {
     let mut renderer = Renderer::of(raster, splats, &[&splats.sh], dataset.extent)?;
@@ -33,14 +32,13 @@ pub fn measure_luma(
         done += 1;
         let reference = Reference {
             photo,
-            exposure: exposures[view],
+            exposure: Exposure::NONE,
         };
         if reference.measures() {
             let picture = renderer.render(&dataset.cameras[view])?.remove(0);
-            let shown = reference.luma_shown(&picture.pixels);
             views.push(LumaView {
                 name: dataset.capture.views[view].name.clone(),
-                quality: reference.luma_quality(&shown),
+                quality: reference.luma_quality(&picture.pixels),
             });
         }
         Ok::<_, EvalError>(())
@@ -104,6 +102,10 @@ pub fn mean_quality(views: &[LumaView]) -> Option<LumaQuality> {
     };
     (!views.is_empty()).then(|| LumaQuality {
         psnr: mean(|quality| quality.psnr),
+        corrected_psnr: (views.iter())
+            .map(|view| view.quality.corrected_psnr)
+            .sum::<Option<f64>>()
+            .map(|sum| sum / views.len() as f64),
         ssim: mean(|quality| quality.ssim),
     })
 }

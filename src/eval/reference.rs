@@ -92,12 +92,15 @@ impl<'a> Reference<'a> {
             .collect()
     }
 
-    /// Quality of a gray picture.
-    pub fn luma_quality(&self, shown: &[f32]) -> LumaQuality {
+    /// Quality of the scene's gray picture, whatever the photo's exposure.
+    pub fn luma_quality(&self, luma: &[f32]) -> LumaQuality {
         let truth = self.gray();
+        let shown: Vec<f32> = luma.iter().map(|value| value.clamp(0.0, 1.0)).collect();
+        let [ours, right] = [&shown, &truth].map(|values| self.counted(values));
         LumaQuality {
-            psnr: measure::reported_psnr(&self.counted(shown), &self.counted(&truth)),
-            ssim: self.ssim(shown, &truth),
+            psnr: measure::reported_psnr(&ours, &right),
+            corrected_psnr: Some(measure::corrected_psnr(&ours, &right)),
+            ssim: self.ssim(&shown, &truth),
         }
     }
 

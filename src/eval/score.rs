@@ -72,10 +72,11 @@ impl Scored {
         };
         show("photo", "photo", shown.clone());
         show("luma", "luma", drawn_gray.clone());
-        let quality = reference.luma_quality(&luma_shown);
+        let quality = reference.luma_quality(&drawing.gray.pixels);
         let wanted_gray = reference.gray();
         let luma = LumaScore {
             psnr: quality.psnr,
+            corrected_psnr: quality.corrected_psnr,
             ssim: quality.ssim,
             sharpness: reference.sharpness(&luma_shown),
             photo_sharpness: reference.sharpness(&wanted_gray),
@@ -231,6 +232,7 @@ pub fn mean_luma(views: &[Scored]) -> LumaScore {
     let lumas = || views.iter().map(|view| &view.score.luma);
     LumaScore {
         psnr: mean(lumas().map(|l| Some(l.psnr))).unwrap_or(f64::NAN),
+        corrected_psnr: mean(lumas().map(|l| l.corrected_psnr)),
         ssim: mean(lumas().map(|l| Some(l.ssim))).unwrap_or(f64::NAN),
         sharpness: mean(lumas().map(|l| Some(l.sharpness))).unwrap_or(f64::NAN),
         photo_sharpness: mean(lumas().map(|l| Some(l.photo_sharpness))).unwrap_or(f64::NAN),

@@ -38,6 +38,34 @@ pub fn reported_psnr(a: &[f32], b: &[f32]) -> f64 {
     }
 }
 
+/// [`reported_psnr`] of `picture` after the gain and offset that bring it closest to `truth`
+/// in the least squares, cut to [0, 1]: what others call color-corrected.
+///
+/// # Panics
+/// If the lengths differ or are zero.
+pub fn corrected_psnr(picture: &[f32], truth: &[f32]) -> f64 {
+    assert_same_size(picture.len(), truth.len());
+    let count = picture.len() as f64;
+    let mean = |values: &[f32]| values.iter().map(|&v| f64::from(v)).sum::<f64>() / count;
+    let [from, to] = [mean(picture), mean(truth)];
+    let (mut variance, mut covariance) = (0.0, 0.0);
+    for (&x, &y) in picture.iter().zip(truth) {
+        let x = f64::from(x) - from;
+        variance += x * x;
+        covariance += x * (f64::from(y) - to);
+    }
+    // An even picture says nothing about a gain.
+    let gain = if variance > 0.0 {
+        covariance / variance
+    } else {
+        1.0
+    };
+    let corrected: Vec<f32> = (picture.iter())
+        .map(|&x| (gain * (f64::from(x) - from) + to).clamp(0.0, 1.0) as f32)
+        .collect();
+    reported_psnr(&corrected, truth)
+}
+
 /// CIEDE2000 of two images.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DeltaE {
@@ -117,6 +145,24 @@ mod tests {
         let mut one = a.clone();
         one[7] = 1.0;
         assert!((psnr(&a, &one) - 10.0 * 400_f64.log10()).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_gain_and_an_offset_are_corrected_and_nothing_else() {
+        let truth = [0.2, 0.4, 0.5, 0.9];
+        let moved = truth.map(|v| 0.5 * v + 0.1);
+        assert!(corrected_psnr(&moved, &truth) > 80.0);
+        assert!(reported_psnr(&moved, &truth) < 20.0);
+        // Orthogonal to both of them: mean and covariance with the truth stay.
+        let wrong = [0.2 + 0.1, 0.4 - 0.1, 0.5 - 0.1, 0.9 + 0.1];
+        assert!(corrected_psnr(&wrong, &truth) < 24.0);
+        // Even pictures only get the right mean.
+        let even = corrected_psnr(&[0.1; 4], &truth);
+        assert!(
+            (even - reported_psnr(&[0.5; 4], &truth)).abs() < 1e-4,
+            "{even}"
+        );
+        assert_eq!(corrected_psnr(&[0.1, f32::NAN], &[0.5, 0.6]), 0.0);
     }
 
     #[test]

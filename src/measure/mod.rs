@@ -22,7 +22,7 @@ pub use diversity::color_diversity;
 pub use flo::decode_flo;
 pub use flow::Flow;
 pub use image_error::{
-    DeltaE, IDENTICAL_PSNR, ab_error, delta_e, mean_delta_e, psnr, reported_psnr,
+    DeltaE, IDENTICAL_PSNR, ab_error, corrected_psnr, delta_e, mean_delta_e, psnr, reported_psnr,
 };
 pub use optical_flow::optical_flow;
 pub use sharpness::{laplacian, variance};

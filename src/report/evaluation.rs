@@ -111,8 +111,12 @@ pub struct Evaluation {
 /// Quality of gray pictures.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LumaScore {
-    /// Peak signal-to-noise ratio in dB.
+    /// Peak signal-to-noise ratio in dB of the scene as viewers show it.
     pub psnr: f64,
+    /// The same after the gain and offset that bring the picture closest to the photo; `None` in
+    /// files that do not know it.
+    #[serde(default)]
+    pub corrected_psnr: Option<f64>,
     /// Structural similarity.
     pub ssim: f64,
     /// Variance of the picture's Laplacian, on the scale of 0 to 255.

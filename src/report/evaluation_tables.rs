@@ -27,6 +27,7 @@ impl Evaluation {
         let head = [
             "pictures",
             "PSNR",
+            "corrected",
             "SSIM",
             "ΔE00",
             "95 %",
@@ -41,6 +42,7 @@ impl Evaluation {
         let luma = [
             "luma".to_owned(),
             format!("{:.2}", self.luma.psnr),
+            figure(self.luma.corrected_psnr, 2),
             format!("{:.3}", self.luma.ssim),
             none(),
             none(),
@@ -59,6 +61,7 @@ impl Evaluation {
             [
                 score.method.to_string(),
                 figure(score.psnr, 2),
+                none(),
                 figure(score.ssim, 3),
                 figure(score.delta_e.map(|e| e.mean), 2),
                 figure(score.delta_e.map(|e| e.percentile_95), 2),
@@ -75,7 +78,7 @@ impl Evaluation {
             _ => "training",
         };
         let mut notes = vec![
-            "PSNR in dB; a/b error: root mean square in CIELAB units, lightness taken from the photo."
+            "PSNR in dB; corrected: of luma after each photo's own gain and offset; a/b error: root mean square in CIELAB units, lightness taken from the photo."
                 .to_owned(),
             "Colors: effective number of a/b squares five units wide; sharp: variance of the Laplacian of the gray picture, 0 to 255."
                 .to_owned(),

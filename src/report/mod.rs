@@ -186,10 +186,24 @@ pub struct LumaSeconds {
 /// Quality of gray pictures.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LumaQuality {
-    /// Peak signal-to-noise ratio in dB.
+    /// Peak signal-to-noise ratio in dB of the scene as viewers show it.
     pub psnr: f64,
-    /// Structural similarity.
+    /// The same after the gain and offset that bring each picture closest to its photo; `None` in
+    /// reports that do not know it.
+    #[serde(default)]
+    pub corrected_psnr: Option<f64>,
+    /// Structural similarity of the scene as viewers show it.
     pub ssim: f64,
+}
+
+impl LumaQuality {
+    /// Both kinds of PSNR, in words.
+    pub fn psnr_in_words(&self) -> String {
+        let corrected = self.corrected_psnr.map_or(String::new(), |psnr| {
+            format!(" ({psnr:.2} dB after each photo's own gain and offset)")
+        });
+        format!("PSNR {:.2} dB{corrected}", self.psnr)
+    }
 }
 
 /// How bright a photo shows the scene.
@@ -372,8 +386,9 @@ impl Report {
         let luma = &self.luma;
         let quality = luma.held_out.map_or(String::new(), |quality| {
             format!(
-                ", held-out PSNR {:.2} dB, SSIM {:.3}",
-                quality.psnr, quality.ssim
+                ", held-out {}, SSIM {:.3}",
+                quality.psnr_in_words(),
+                quality.ssim
             )
         });
         let given_up = luma.given_up.map_or(String::new(), |iteration| {

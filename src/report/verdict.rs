@@ -110,8 +110,11 @@ impl Evaluation {
             "test" => "photos that were held out",
             _ => "the photos it was trained on",
         };
+        let corrected = luma.corrected_psnr.map_or(String::new(), |psnr| {
+            format!(" ({psnr:.1} dB after each photo's own gain and offset)")
+        });
         format!(
-            "the gray scene shows {which} with {:.1} dB{sharp}",
+            "the gray scene shows {which} with {:.1} dB{corrected}{sharp}",
             luma.psnr
         )
     }

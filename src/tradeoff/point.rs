@@ -228,6 +228,7 @@ impl<'a> Bench<'a> {
                 ..Seconds::default()
             },
             psnr: luma.held_out.map(|quality| quality.psnr),
+            corrected_psnr: luma.held_out.and_then(|quality| quality.corrected_psnr),
             ssim: luma.held_out.map(|quality| quality.ssim),
             delta_e: None,
             consistency: None,

@@ -96,6 +96,7 @@ fn run(task: &Task) -> Point {
             splats: 1000,
             seconds: seconds.summed(),
             psnr: Some(24.0 + if color { 0.0 } else { quality }),
+            corrected_psnr: None,
             ssim: None,
             delta_e: color.then_some(10.0 + quality),
             consistency: None,

@@ -35,7 +35,7 @@ fn a_missing_factor_is_noticed() {
 #[test]
 fn a_record_that_counts_twice_is_noticed() {
     let failing = failing("sum_instances", "third + fourth", "third + third");
-    assert!(failing.contains(&"wider than the image"), "{failing:?}");
+    assert!(failing.contains(&"over 42 tiles"), "{failing:?}");
 }
 
 /// Nothing but the poisoned case can tell: a clamp makes a number of NaN.

@@ -75,10 +75,16 @@ impl Trained {
         mean_quality(&self.held_out_views)
     }
 
-    /// PSNR of the held-out views; of some training views where none is held out.
+    /// PSNR of the held-out views, after each photo's gain and offset where exposures are
+    /// simulated; of some training views where none is held out.
     pub fn psnr(&self) -> Option<f64> {
+        let exposed = self.scene.plan.has(Effect::Exposure);
+        let of = |quality: LumaQuality| {
+            let corrected = quality.corrected_psnr.filter(|_| exposed);
+            corrected.unwrap_or(quality.psnr)
+        };
         let watched = || self.scene.curve.last().map(|point| point.psnr);
-        self.held_out().map(|quality| quality.psnr).or_else(watched)
+        self.held_out().map(of).or_else(watched)
     }
 
     /// The error, if it does not reach so many dB.
@@ -298,7 +304,7 @@ impl Job<'_> {
         observe.borrow_mut()(Event::begins(Stage::Measuring));
         let mut told = |progress: Progress<'_>| observe.borrow_mut()(progress.into());
         let (splats, exposures) = (&scene.splats, scene.exposures());
-        let held_out_views = measure_luma(&drawn, self.judge, splats, exposures, &mut told)?;
+        let held_out_views = measure_luma(&drawn, self.judge, splats, &mut told)?;
         let rows = gray_rows(&drawn, self.judge, splats, exposures)?;
         Ok(Trained {
             rows,

@@ -5,7 +5,7 @@ use super::{Measure, Point, Tradeoff, shell_line};
 /// Column names with their units, and what is in them.
 type Column = (&'static str, fn(&Tradeoff, &Point) -> String);
 
-const COLUMNS: [Column; 25] = [
+const COLUMNS: [Column; 26] = [
     ("name", |_, point| point.name.clone()),
     ("stage", |_, point| point.stage.name().to_owned()),
     ("phase", |_, point| point.phase.name().to_owned()),
@@ -36,6 +36,7 @@ const COLUMNS: [Column; 25] = [
     ("bake_seconds", |_, p| of(p, |o| seconds(o.seconds.bake))),
     ("took_seconds", |_, p| format!("{:.3}", p.took)),
     ("psnr_db", |_, p| of(p, |o| o.psnr)),
+    ("corrected_psnr_db", |_, p| of(p, |o| o.corrected_psnr)),
     ("ssim", |_, p| of(p, |o| o.ssim)),
     ("delta_e00", |_, p| of(p, |o| o.delta_e)),
     ("consistency_lab", |_, p| of(p, |o| o.consistency)),

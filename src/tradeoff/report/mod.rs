@@ -135,8 +135,10 @@ pub struct Outcome {
     pub splats: usize,
     /// Wall seconds.
     pub seconds: Seconds,
-    /// PSNR of the gray pictures in dB.
+    /// PSNR in dB of the gray pictures as viewers show them.
     pub psnr: Option<f64>,
+    /// The same after each photo's own gain and offset.
+    pub corrected_psnr: Option<f64>,
     /// Structural similarity of the gray pictures.
     pub ssim: Option<f64>,
     /// Mean ΔE00 of the colored pictures to the photos, where these have colors.
@@ -407,6 +409,7 @@ mod tests {
                 splats: 1000,
                 seconds: seconds.summed(),
                 psnr: Some(psnr),
+                corrected_psnr: None,
                 ssim: Some(psnr / 30.0),
                 delta_e: None,
                 consistency: None,
