@@ -1,5 +1,7 @@
 //! What each effect's evidence is and what follows from it.
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 
 use super::{direction, evidence::Evidence, tracks};
@@ -12,13 +14,9 @@ const EXPOSURE_LEVELS: f64 = 2.0;
 /// And they must exceed what noise alone would make of them by this factor.
 const EXPOSURE_OVER_NOISE: f64 = 3.0;
 
-/// From here on points alone are believed. Below, they may say that exposures differ where in
-/// truth most of them lie on something that shines otherwise from every side.
-const EXPOSURE_SURE: f64 = 8.0;
-
-/// Per cent by which a short training must fit the photos better with exposures than without:
-/// real exposures of 4 levels bring 3 to 4, imagined ones of 5 between -0.5 and 0.1.
-pub(super) const TRIAL_GAIN: f64 = 1.0;
+/// dB that an effect must gain on views held back from a trial: less is within what another seed
+/// changes, and an effect that gains nothing does harm elsewhere.
+pub const TRIAL_GAIN: f64 = 0.1;
 
 /// Share of places at which one view disagrees with all others from which on photos are
 /// taken to have defects: clean photos stay below 0.3 %, 1.5 % of dust gives 1 to 3 %.
@@ -41,6 +39,12 @@ const DIRECTION_LEVELS: f64 = 5.0;
 
 /// A higher degree must explain so much more, in gray levels, to be worth its memory.
 const DEGREE_LEVELS: f64 = 1.0;
+
+/// A trial tells nothing about what only long runs learn: see [`Plan::open`].
+const TELLING_ITERATIONS: usize = 2_400;
+
+/// What trials gained: dB of corrected PSNR on views held back.
+pub type Trials = BTreeMap<Effect, f64>;
 
 /// An effect of image formation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -108,6 +112,23 @@ impl Effect {
         }
     }
 
+    /// From which evidence on it is called for, whatever a trial would say. Below, points may
+    /// mislead: most of them may lie on something that shines otherwise from every side, or the
+    /// little that is far behind may cost more Gaussians than it is worth. `None`: its evidence
+    /// is always believed, for a mistake costs next to nothing, or a trial could not tell.
+    fn sure_from(self) -> Option<f64> {
+        match self {
+            Self::Exposure => Some(8.0),
+            Self::Antialias => Some(3.0),
+            Self::Background => Some(10.0),
+            Self::LumaDegree => Some(10.0),
+            // What is far off is told from what is not learned yet in long runs only, and a
+            // wrong decision costs 0.05 dB (docs/effects.md).
+            Self::Robust => None,
+            Self::Lens | Self::Masks | Self::TeacherCorrection | Self::ChromaDegree => None,
+        }
+    }
+
     /// What it costs while it is on (docs/effects.md has the measurements).
     pub fn cost(self) -> &'static str {
         match self {
@@ -130,7 +151,7 @@ impl Effect {
 pub enum Decider {
     /// The evidence against its threshold.
     Evidence,
-    /// Two short trainings, for the evidence leaves it open.
+    /// Short trainings with it and without, for the evidence leaves it open.
     Trial,
     /// `--with` or `--without`, or an option that says the same.
     User,
@@ -151,8 +172,7 @@ pub struct Decision {
     pub threshold: f64,
     /// Who decided.
     pub decided_by: Decider,
-    /// Per cent by which a short training fitted the photos better with it than without, where
-    /// that was tried.
+    /// dB that a short training gained with it on views held back, where that was tried.
     pub trial: Option<f64>,
 }
 
@@ -170,12 +190,12 @@ impl Decision {
     }
 
     /// What follows from a trial, which is asked only where the evidence says yes.
-    fn after(self, trial: Option<f64>) -> Self {
-        match trial {
+    fn after(self, trials: &Trials) -> Self {
+        match trials.get(&self.effect).copied() {
             Some(gain) => Self {
                 on: gain >= TRIAL_GAIN,
                 decided_by: Decider::Trial,
-                trial,
+                trial: Some(gain),
                 ..self
             },
             None => self,
@@ -228,15 +248,19 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Whether two short trainings, with exposures and without, should tell what the photos
-    /// alone do not.
-    pub fn needs_trial(&self) -> bool {
-        (self.decisions.iter()).any(|decision| {
-            decision.effect == Effect::Exposure
-                && decision.on
+    /// The effects of which short trainings should tell what the photos alone do not: those
+    /// whose evidence is not overwhelming, and that a run of this room has the iterations for.
+    pub fn open(&self, room: Room) -> Vec<Effect> {
+        let doubtful = |decision: &&Decision| {
+            let sure = decision.effect.sure_from().unwrap_or(f64::NEG_INFINITY);
+            let late = decision.effect == Effect::LumaDegree;
+            decision.on
                 && decision.decided_by == Decider::Evidence
-                && (decision.evidence).is_some_and(|evidence| evidence < EXPOSURE_SURE)
-        })
+                && decision.evidence.is_some_and(|evidence| evidence < sure)
+                && !(late && room.iterations < TELLING_ITERATIONS)
+        };
+        let open = self.decisions.iter().filter(doubtful);
+        open.map(|decision| decision.effect).collect()
     }
 
     /// Whether an effect is simulated.
@@ -246,16 +270,14 @@ impl Plan {
 }
 
 impl Evidence {
-    /// The plan that follows. `trial` is what a training
-    /// [that was asked for](Plan::needs_trial) said: per cent by which it fits the photos better
-    /// with exposures than without.
-    pub fn decide(&self, room: Room, overrules: &Overrules, trial: Option<f64>) -> Plan {
+    /// The plan that follows. `trials` are what trainings [that were asked for](Plan::open) said.
+    pub fn decide(&self, room: Room, overrules: &Overrules, trials: &Trials) -> Plan {
         let mut found = self.exposures.clone();
         let exposure = {
             let evidence = (!self.samples.is_empty()).then_some(255.0 * found.spread);
             let noise = EXPOSURE_OVER_NOISE * 255.0 * found.noise;
             let decision = Decision::new(Effect::Exposure, evidence, EXPOSURE_LEVELS.max(noise));
-            overruled(decision.after(trial), overrules)
+            overruled(decision.after(trials), overrules)
         };
         if exposure.decided_by == Decider::Trial && !exposure.on {
             // What points show differently then has another reason.
@@ -277,7 +299,13 @@ impl Evidence {
         let antialias = Decision::new(Effect::Antialias, self.sampling_spread, SAMPLING_SPREAD);
         let behind = 100.0 * self.behind;
         let background = Decision::new(Effect::Background, Some(behind), 100.0 * BACKGROUND_SHARE);
-        let (degree, sh_degree) = degree(&self.samples, &found.views, room.sh_degree, overrules);
+        let (degree, sh_degree) = degree(
+            &self.samples,
+            &found.views,
+            room.sh_degree,
+            overrules,
+            trials,
+        );
         let lens = Decision::new(Effect::Lens, Some(self.distortion), IMPERCEPTIBLE);
         let masks = Decision::new(Effect::Masks, self.masked, 0.0);
         let decisions = vec![
@@ -285,8 +313,8 @@ impl Evidence {
             overruled(masks, overrules),
             exposure,
             overruled(robust, overrules),
-            overruled(antialias, overrules),
-            overruled(background, overrules),
+            overruled(antialias.after(trials), overrules),
+            overruled(background.after(trials), overrules),
             degree,
         ];
         let exposures = match decisions
@@ -324,13 +352,14 @@ fn degree(
     exposures: &[Exposure],
     room: u32,
     overrules: &Overrules,
+    trials: &Trials,
 ) -> (Decision, u32) {
     let explained = direction::left_out_errors(samples, exposures).map(|errors| {
         let [constant, ..] = errors;
         errors.map(|error| 255.0 * (constant * constant - error * error).max(0.0).sqrt())
     });
     let evidence = explained.map(|levels| levels.into_iter().fold(0.0, f64::max));
-    let decision = Decision::new(Effect::LumaDegree, evidence, DIRECTION_LEVELS);
+    let decision = Decision::new(Effect::LumaDegree, evidence, DIRECTION_LEVELS).after(trials);
     let wanted = explained.zip(evidence).map(|(levels, best)| {
         let nearly = |level: &f64| best - level <= DEGREE_LEVELS;
         match decision.on {
@@ -343,7 +372,7 @@ fn degree(
         (Some(degree), ..) => (degree, Decider::User),
         (_, Choice::On, _) => (room.max(1), Decider::User),
         (_, Choice::Off, _) => (0, Decider::User),
-        (_, Choice::Auto, Some(wanted)) if wanted <= room => (wanted, Decider::Evidence),
+        (_, Choice::Auto, Some(wanted)) if wanted <= room => (wanted, decision.decided_by),
         _ => (room, Decider::Preset),
     };
     let decision = Decision {

@@ -21,7 +21,7 @@ fn plan(sh_degree: u32, overrules: &Overrules) -> Plan {
         sh_degree,
         iterations: 700,
     };
-    evidence(&capture, &photos).decide(room, overrules, None)
+    evidence(&capture, &photos).decide(room, overrules, &Trials::new())
 }
 
 fn decided(plan: &Plan, effect: Effect) -> &Decision {
@@ -79,33 +79,51 @@ fn without_tracks_the_preset_decides_the_degree() {
 #[test]
 fn a_trial_decides_where_the_evidence_is_in_doubt() {
     let exposure = |evidence| Decision::new(Effect::Exposure, Some(evidence), 2.0);
-    let needs = |decision: Decision| {
+    let in_doubt = |decision: Decision, iterations| {
         let plan = Plan {
             decisions: vec![decision],
             exposures: Vec::new(),
             sh_degree: 0,
         };
-        plan.needs_trial()
+        let room = Room {
+            sh_degree: 2,
+            iterations,
+        };
+        !plan.open(room).is_empty()
     };
+    let needs = |decision| in_doubt(decision, 700);
     assert!(needs(exposure(5.0)));
     assert!(!needs(exposure(1.9)) && !needs(exposure(8.1)));
+    for (effect, doubtful, sure) in [
+        (Effect::Antialias, 1.6, 4.0),
+        (Effect::Background, 1.5, 20.0),
+    ] {
+        let decision = |evidence| Decision::new(effect, Some(evidence), 1.0);
+        assert!(
+            needs(decision(doubtful)) && !needs(decision(sure)),
+            "{effect:?}"
+        );
+    }
+    // A mistake about the first costs nothing, the last shows in long runs only.
+    assert!(!needs(Decision::new(Effect::Robust, Some(0.7), 0.6)));
+    let degree = Decision::new(Effect::LumaDegree, Some(5.5), 5.0);
+    assert!(!needs(degree.clone()) && in_doubt(degree, 3_500));
     let asked = Overrules {
         with: vec![Effect::Exposure],
         ..Overrules::default()
     };
     assert!(!needs(overruled(exposure(5.0), &asked)));
-    let other = Decision::new(Effect::LumaDegree, Some(5.5), 5.0);
-    assert!(!needs(other));
-
-    for (gain, on) in [(3.0, true), (0.9, false), (-2.0, false), (f64::NAN, false)] {
-        let decision = exposure(5.0).after(Some(gain));
+    let tried = |gain| Trials::from([(Effect::Exposure, gain)]);
+    for (gain, on) in [(0.3, true), (0.09, false), (-2.0, false), (f64::NAN, false)] {
+        let decision = exposure(5.0).after(&tried(gain));
         assert_eq!((decision.on, decision.decided_by), (on, Decider::Trial));
         assert!(!needs(decision));
     }
-    assert_eq!(exposure(5.0).after(None), exposure(5.0));
-    let row = exposure(5.0).after(Some(-2.0)).to_string();
+    let of_another = Trials::from([(Effect::Background, 0.3)]);
+    assert_eq!(exposure(5.0).after(&of_another), exposure(5.0));
+    let row = exposure(5.0).after(&tried(-2.0)).to_string();
     assert!(
-        row.ends_with("but a trial training fits 2 % worse with it; 1 would count"),
+        row.ends_with("but a trial loses 2 dB with it; 0.1 would count"),
         "{row}"
     );
 }
@@ -138,12 +156,18 @@ fn what_a_trial_rejects_is_not_simulated() {
         iterations: 700,
     };
     let evidence = evidence(&capture, &photos);
-    let plan = |trial| evidence.decide(room, &Overrules::default(), trial);
-    let asked = plan(None);
-    assert!(asked.needs_trial(), "{asked}");
+    let plan = |trials: &[(Effect, f64)]| {
+        evidence.decide(
+            room,
+            &Overrules::default(),
+            &trials.iter().copied().collect(),
+        )
+    };
+    let asked = plan(&[]);
+    assert_eq!(asked.open(room), [Effect::Exposure], "{asked}");
     assert!(asked.exposures.iter().any(|&e| e != Exposure::NONE));
-    assert_eq!(plan(Some(1.5)).exposures, asked.exposures);
-    let rejected = plan(Some(0.5));
+    assert_eq!(plan(&[(Effect::Exposure, 0.5)]).exposures, asked.exposures);
+    let rejected = plan(&[(Effect::Exposure, 0.05)]);
     assert!(!rejected.has(Effect::Exposure));
     assert_eq!(rejected.exposures, [Exposure::NONE; 4]);
 }

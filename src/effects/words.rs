@@ -84,15 +84,15 @@ impl fmt::Display for Decision {
     }
 }
 
-/// What a trial showed, in per cent.
+/// What a trial showed, in dB.
 fn tried(gain: f64) -> String {
     let (how, but) = match gain < TRIAL_GAIN {
-        true if gain < 0.0 => ("worse", "but"),
-        true => ("better", "but"),
-        false => ("better", "and"),
+        true if gain < 0.0 => ("loses", "but"),
+        true => ("gains", "but"),
+        false => ("gains", "and"),
     };
     let (gain, least) = (number(gain.abs()), number(TRIAL_GAIN));
-    format!(", {but} a trial training fits {gain} % {how} with it; {least} would count")
+    format!(", {but} a trial {how} {gain} dB with it; {least} would count")
 }
 
 /// The table of some decisions.

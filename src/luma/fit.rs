@@ -16,7 +16,7 @@ use super::{
 };
 use crate::{
     capture::{Dataset, Exposure},
-    effects::{Effect, Evidence, Overrules, Plan, Room, Survey},
+    effects::{Effect, Evidence, Overrules, Plan, Survey, Trials},
     gpu::{Gpu, GpuError},
     raster::{Load, Raster},
     splats::{ShField, Splats},
@@ -180,13 +180,7 @@ impl Fit<'_> {
             None => self.plan(settings, observe)?,
         };
         go_on(observe(LumaEvent::Plan(&plan)))?;
-        let mut settings = LumaSettings {
-            sh_degree: plan.sh_degree,
-            robust: plan.has(Effect::Robust),
-            antialiased: plan.has(Effect::Antialias),
-            background: plan.has(Effect::Background),
-            ..settings.clone()
-        };
+        let mut settings = settings.clone().planned(&plan);
         let demand = self.fit_memory(&mut settings, &plan, observe)?;
         go_on(observe(LumaEvent::Placing))?;
         let start = match (checkpoint, self.start) {
@@ -257,18 +251,15 @@ impl Fit<'_> {
         settings: &LumaSettings,
         observe: &mut LumaObserver<'_>,
     ) -> Result<Plan, LumaError> {
-        let room = Room {
-            iterations: settings.iterations,
-            sh_degree: settings.sh_degree,
-        };
         if !self.tries {
-            return Ok(self.evidence.decide(room, self.overrules, None));
+            let (room, untried) = (settings.room(), Trials::new());
+            return Ok(self.evidence.decide(room, self.overrules, &untried));
         }
         let mut asked = ControlFlow::Continue(());
         let plan = planned(
             self.dataset,
             self.evidence,
-            room,
+            settings,
             self.overrules,
             || Ok::<_, LumaError>(self.raster.clone()),
             &mut |progress| {

@@ -4,7 +4,10 @@
 use serde::{Deserialize, Serialize};
 
 use super::Numerics;
-use crate::raster::RasterOptions;
+use crate::{
+    effects::{Effect, Plan, Room},
+    raster::RasterOptions,
+};
 
 /// Luma iterations of ChromaDistill (WACV 2025, supplement).
 pub const PAPER_ITERATIONS: usize = 15_000;
@@ -157,6 +160,25 @@ impl LumaSettings {
             Densification::Relocate if self.iterations < SHORT_RUN => 0.1,
             Densification::Relocate => 0.05,
         };
+    }
+
+    /// What it has room for, before effects are decided.
+    pub fn room(&self) -> Room {
+        Room {
+            iterations: self.iterations,
+            sh_degree: self.sh_degree,
+        }
+    }
+
+    /// The same with the effects of a plan.
+    pub fn planned(self, plan: &Plan) -> Self {
+        Self {
+            sh_degree: plan.sh_degree,
+            robust: plan.has(Effect::Robust),
+            antialiased: plan.has(Effect::Antialias),
+            background: plan.has(Effect::Background),
+            ..self
+        }
     }
 
     /// Whether a training is possible with it.

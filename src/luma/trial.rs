@@ -1,4 +1,5 @@
-//! Short trainings that tell what the photos alone do not.
+//! Short trainings that tell what the evidence leaves open: one with none of the effects in
+//! question, and one with each of them, measured on views that were held back.
 
 use std::{ops::ControlFlow, sync::Arc};
 
@@ -6,107 +7,317 @@ use super::{
     LumaError, LumaSettings, LumaTrainer, PlannedViews, TrainingView, start::placed_splats,
 };
 use crate::{
-    capture::{Dataset, Exposure},
-    effects::{Evidence, Overrules, Plan, Room},
-    raster::Raster,
+    capture::{Camera, Dataset},
+    effects::{Effect, Evidence, Overrules, Plan, Room, TRIAL_GAIN, Trials},
+    measure,
+    raster::{Raster, Renderer},
 };
 
-/// Iterations of a trial: with 150 there is no scene yet that could fit one way or the other.
-const ITERATIONS: usize = 400;
+/// Share of the run's work that all trainings of a trial may take, by iterations times pixels.
+const WORK: f64 = 0.15;
 
-/// Its cap on Gaussians, and how large and how many its photos are at most: half the work of
-/// the least scene (`Amounts::SKETCH`), twice.
-const MAX_SPLATS: usize = 3_000;
-const MAX_SIDE: u32 = 160;
-const MAX_VIEWS: usize = 32;
+/// Iterations of a trial: with 150 there is no scene yet that could fit one way or the other, and
+/// after 1,500 no sign was seen to change (docs/effects.md).
+const ITERATIONS: [usize; 2] = [400, 1_500];
+
+/// Longer side of its photos at most and at least, where the work allows that much.
+const SIDES: [u32; 2] = [400, 80];
+
+/// Its cap on Gaussians, at least.
+const LEAST_SPLATS: usize = 1_500;
+
+/// Photos at most, so many of which are held back: both ends of the capture and some between, for
+/// wrong effects show there first.
+const MAX_VIEWS: usize = 36;
+const HELD_BACK: usize = 6;
+
+/// Rounds of a trial, each with a seed of its own; the others only where the first leaves a gain
+/// within [`NOISE`] of what counts.
+const ROUNDS: usize = 3;
+
+/// What another seed changes, in dB: twice the standard deviation of the difference of two
+/// trainings of this size on the scenes of docs/effects.md.
+const NOISE: f64 = 0.3;
 
 /// How far a trial is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TrialProgress {
-    /// Iterations done, of both trainings.
+    /// Iterations done, of all trainings.
     pub done: usize,
-    /// Iterations in all.
+    /// Iterations in all; fewer if the first seed tells.
     pub total: usize,
-    /// Whether the present training knows the exposures.
-    pub exposed: bool,
+    /// The effect that the present training has and the one it is compared with has not; `None`
+    /// in the latter.
+    pub effect: Option<Effect>,
 }
 
-/// The plan of a capture, after a trial on the device that `raster` gives where it needs one.
+/// The plan of a capture for a run with `settings`, after a trial on the device that `raster`
+/// gives where it needs one.
 ///
 /// # Errors
 /// Those of `raster`, and [`LumaError`] of a photo or of the device.
 pub fn planned<E: From<LumaError>>(
     dataset: &Arc<Dataset>,
     evidence: &Evidence,
-    room: Room,
+    settings: &LumaSettings,
     overrules: &Overrules,
     raster: impl FnOnce() -> Result<Arc<Raster>, E>,
     observe: &mut dyn FnMut(TrialProgress) -> ControlFlow<()>,
 ) -> Result<Plan, E> {
-    let plan = evidence.decide(room, overrules, None);
-    if !plan.needs_trial() {
+    let room = settings.room();
+    let plan = evidence.decide(room, overrules, &Trials::new());
+    let open = plan.open(room);
+    if open.is_empty() {
         return Ok(plan);
     }
-    let gain = exposure_gain(dataset, evidence, &raster()?, &plan, observe)?;
-    Ok(evidence.decide(room, overrules, Some(gain)))
+    let arms = arms(evidence, room, overrules, &open);
+    let Some(size) = Size::of(dataset, settings, arms.len()) else {
+        return Ok(plan);
+    };
+    let trial = Trial {
+        dataset,
+        evidence,
+        raster: raster()?,
+        size,
+        total: size.iterations * arms.len() * size.rounds,
+    };
+    let gains = trial.gains(&arms, observe)?;
+    Ok(evidence.decide(room, overrules, &gains))
 }
 
-/// Per cent by which a small scene that is trained with the plan's exposures has less loss
-/// than one trained without.
-fn exposure_gain(
-    dataset: &Arc<Dataset>,
-    evidence: &Evidence,
-    raster: &Arc<Raster>,
-    plan: &Plan,
-    observe: &mut dyn FnMut(TrialProgress) -> ControlFlow<()>,
-) -> Result<f64, LumaError> {
-    let told = |which, iteration| TrialProgress {
-        done: which * ITERATIONS + iteration,
-        total: 2 * ITERATIONS,
-        exposed: which == 0,
+/// A plan to compare: without any of the effects in question, or with one of them.
+struct Arm {
+    effect: Option<Effect>,
+    plan: Plan,
+}
+
+fn arms(evidence: &Evidence, room: Room, overrules: &Overrules, open: &[Effect]) -> Vec<Arm> {
+    let only = |effect: Option<Effect>| {
+        let others = open.iter().filter(|&&other| Some(other) != effect);
+        let mut overrules = overrules.clone();
+        overrules.without.extend(others);
+        Arm {
+            effect,
+            plan: evidence.decide(room, &overrules, &Trials::new()),
+        }
     };
-    if observe(told(0, 0)).is_break() {
-        return Err(LumaError::Cancelled);
+    let with = open.iter().map(|&effect| only(Some(effect)));
+    std::iter::once(only(None)).chain(with).collect()
+}
+
+/// How large the trainings are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Size {
+    iterations: usize,
+    /// How often photos are halved.
+    halvings: u32,
+    max_splats: usize,
+    rounds: usize,
+}
+
+impl Size {
+    /// The largest that keeps `trainings` within [`WORK`]; `None` where there are too few photos
+    /// to hold one back.
+    fn of(dataset: &Dataset, settings: &LumaSettings, trainings: usize) -> Option<Self> {
+        let train = &dataset.split.train;
+        if train.len() < 4 {
+            return None;
+        }
+        let cameras = train.iter().map(|&view| &dataset.cameras[view]);
+        let side = cameras.map(longer_side).max()?;
+        Some(Self::within(side, settings, trainings))
     }
-    let views = PlannedViews::new(dataset.clone(), evidence, plan);
-    let train = &dataset.split.train;
+
+    fn within(side: u32, settings: &LumaSettings, trainings: usize) -> Self {
+        let [least, most] = ITERATIONS;
+        let iterations = (settings.iterations / 2).clamp(least, most);
+        let work = |halvings: u32, rounds: usize| {
+            let each = iterations as f64 / settings.iterations as f64 / 4_f64.powi(halvings as i32);
+            each * (trainings * rounds) as f64
+        };
+        let [largest, smallest] = SIDES;
+        let mut halvings = 1;
+        while side >> halvings > largest
+            || (work(halvings, ROUNDS) > WORK && side >> (halvings + 1) >= smallest)
+        {
+            halvings += 1;
+        }
+        let fits = |rounds: &usize| work(halvings, *rounds) <= WORK;
+        Self {
+            iterations,
+            halvings,
+            max_splats: (settings.max_splats >> (2 * halvings)).max(LEAST_SPLATS),
+            rounds: (1..=ROUNDS).rev().find(fits).unwrap_or(1),
+        }
+    }
+}
+
+fn longer_side(camera: &Camera) -> u32 {
+    camera.width.max(camera.height)
+}
+
+/// What all trainings of a trial share.
+struct Trial<'a> {
+    dataset: &'a Arc<Dataset>,
+    evidence: &'a Evidence,
+    raster: Arc<Raster>,
+    size: Size,
+    total: usize,
+}
+
+impl Trial<'_> {
+    /// What each effect gains, in dB of corrected PSNR on the views held back, the mean over the
+    /// seeds.
+    fn gains(
+        &self,
+        arms: &[Arm],
+        observe: &mut dyn FnMut(TrialProgress) -> ControlFlow<()>,
+    ) -> Result<Trials, LumaError> {
+        let mut sums = vec![0.0; arms.len()];
+        let mut trainings = 0;
+        for round in 1..=self.size.rounds {
+            for (arm, sum) in arms.iter().zip(&mut sums) {
+                *sum += self.psnr(arm, round as u64 - 1, &mut |iteration| {
+                    observe(TrialProgress {
+                        done: trainings * self.size.iterations + iteration,
+                        total: self.total,
+                        effect: arm.effect,
+                    })
+                })?;
+                trainings += 1;
+            }
+            let gain = |sum: &f64| (sum - sums[0]) / round as f64;
+            if (sums[1..].iter()).all(|sum| (gain(sum) - TRIAL_GAIN).abs() > NOISE) {
+                sums.iter_mut().for_each(|sum| *sum /= round as f64);
+                return Ok(self.told(arms, &sums));
+            }
+        }
+        let rounds = self.size.rounds as f64;
+        sums.iter_mut().for_each(|sum| *sum /= rounds);
+        Ok(self.told(arms, &sums))
+    }
+
+    fn told(&self, arms: &[Arm], psnr: &[f64]) -> Trials {
+        let gains = arms.iter().zip(psnr);
+        gains
+            .filter_map(|(arm, value)| Some((arm.effect?, value - psnr[0])))
+            .collect()
+    }
+
+    /// Mean corrected PSNR of the views held back, of a training with an arm's effects.
+    fn psnr(
+        &self,
+        arm: &Arm,
+        seed: u64,
+        observe: &mut dyn FnMut(usize) -> ControlFlow<()>,
+    ) -> Result<f64, LumaError> {
+        if observe(0).is_break() {
+            return Err(LumaError::Cancelled);
+        }
+        let views = PlannedViews::new(self.dataset.clone(), self.evidence, &arm.plan);
+        let [trained, held_back] = chosen(&self.dataset.split.train).map(|chosen| {
+            let small = |view: usize| Ok(self.small(views.of(view)?));
+            chosen
+                .into_iter()
+                .map(small)
+                .collect::<Result<Vec<_>, LumaError>>()
+        });
+        let settings = LumaSettings {
+            max_splats: self.size.max_splats,
+            seed,
+            ..LumaSettings::new(self.size.iterations).planned(&arm.plan)
+        };
+        let extent = self.dataset.extent;
+        let start = placed_splats(self.dataset, self.evidence, &settings)?;
+        let drawn = self.raster.drawing(settings.raster_options());
+        let mut trainer =
+            LumaTrainer::new(self.raster.clone(), settings, extent, &start, trained?)?;
+        trainer.train_while(&mut |progress| observe(progress.iteration))?;
+        let splats = trainer.splats()?;
+        let mut renderer = Renderer::of(&drawn, &splats, &[&splats.sh], extent)?;
+        let (mut sum, mut count) = (0.0, 0.0);
+        for view in held_back? {
+            let picture = renderer.render(&view.camera)?.remove(0);
+            if let Some(psnr) = corrected(&view, &picture.pixels) {
+                sum += psnr;
+                count += 1.0;
+            }
+        }
+        Ok(sum / f64::max(count, 1.0))
+    }
+
+    fn small(&self, view: TrainingView) -> TrainingView {
+        (0..self.size.halvings).fold(view, |view, _| view.halved())
+    }
+}
+
+/// Which of the training views a trial trains on, and which it holds back.
+fn chosen(train: &[usize]) -> [Vec<usize>; 2] {
     let count = train.len().min(MAX_VIEWS);
-    let exposed: Vec<TrainingView> = (0..count)
-        .map(|k| views.of(train[k * train.len() / count]).map(small))
-        .collect::<Result<_, _>>()?;
-    let mut unexposed = exposed.clone();
-    for view in &mut unexposed {
-        view.exposure = Exposure::NONE;
-    }
-    let settings = LumaSettings {
-        sh_degree: 0,
-        max_splats: MAX_SPLATS,
-        ..LumaSettings::new(ITERATIONS)
-    };
-    let start = placed_splats(dataset, evidence, &settings)?;
-    let mut losses = [0.0; 2];
-    for (which, (views, loss)) in [exposed, unexposed]
-        .into_iter()
-        .zip(&mut losses)
-        .enumerate()
-    {
-        let (raster, settings) = (raster.clone(), settings.clone());
-        LumaTrainer::new(raster, settings, dataset.extent, &start, views)?.train_while(
-            &mut |progress| {
-                *loss = progress.loss;
-                observe(told(which, progress.iteration))
-            },
-        )?;
-    }
-    let [with, without] = losses;
-    Ok(100.0 * (1.0 - with / without))
+    let views: Vec<usize> = (0..count).map(|k| train[k * train.len() / count]).collect();
+    let held_back = (count / HELD_BACK).max(2);
+    let held_back: Vec<usize> = (0..held_back)
+        .map(|k| views[k * (count - 1) / (held_back - 1)])
+        .collect();
+    let trained = views.into_iter().filter(|view| !held_back.contains(view));
+    [trained.collect(), held_back]
 }
 
-/// The same photo, halved until it is small.
-fn small(view: TrainingView) -> TrainingView {
-    let mut view = view;
-    while view.camera.width.max(view.camera.height) > MAX_SIDE {
-        view = view.halved();
+/// PSNR of a picture after the photo's gain and offset, where anything counts.
+fn corrected(view: &TrainingView, picture: &[f32]) -> Option<f64> {
+    let counts = |pixel: &usize| (view.mask.as_ref()).is_none_or(|mask| mask[*pixel] >= 128);
+    let (ours, truth): (Vec<f32>, Vec<f32>) = (0..view.gray.len())
+        .filter(counts)
+        .map(|pixel| {
+            (
+                picture[pixel].clamp(0.0, 1.0),
+                f32::from(view.gray[pixel]) / 255.0,
+            )
+        })
+        .unzip();
+    (!ours.is_empty()).then(|| measure::corrected_psnr(&ours, &truth))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_trial_takes_no_more_than_its_share() {
+        for (side, iterations, splats) in [
+            (400, 700, 12_000),
+            (1_600, 3_500, 2_000_000),
+            (4_000, 15_000, 3_000_000),
+            (640, 200, 500),
+        ] {
+            for trainings in 2..=5 {
+                let settings = LumaSettings {
+                    max_splats: splats,
+                    ..LumaSettings::new(iterations)
+                };
+                let size = Size::within(side, &settings, trainings);
+                let work = (size.iterations * trainings * size.rounds) as f64
+                    / iterations as f64
+                    / 4_f64.powi(size.halvings as i32);
+                assert!(size.rounds >= 1 && side >> size.halvings >= SIDES[1]);
+                // But for the smallest there is.
+                let smallest = size.rounds == 1 && side >> (size.halvings + 1) < SIDES[1];
+                assert!(
+                    work <= WORK || smallest,
+                    "{side} {iterations} {trainings}: {size:?} {work}"
+                );
+            }
+        }
     }
-    view
+
+    #[test]
+    fn both_ends_and_some_between_are_held_back() {
+        let train: Vec<usize> = (0..100).collect();
+        let [trained, held_back] = chosen(&train);
+        assert_eq!(trained.len() + held_back.len(), MAX_VIEWS);
+        assert_eq!((held_back.len(), held_back[0]), (6, 0));
+        assert_eq!(held_back.last(), Some(&97));
+        let [trained, held_back] = chosen(&[2, 3, 5, 7]);
+        assert_eq!((trained, held_back), (vec![3, 5], vec![2, 7]));
+    }
 }

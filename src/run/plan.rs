@@ -61,7 +61,7 @@ pub fn plan(options: &PlanOptions, observe: &mut Observer<'_>) -> Result<Planned
     let plan = planned(
         &dataset,
         &evidence,
-        preset.work().room(),
+        &preset.work().settings,
         &options.overrules,
         raster,
         &mut |progress| {

@@ -2,7 +2,7 @@
 
 use crate::{
     capture::LoadOptions,
-    effects::{Effect, Overrules, Room},
+    effects::{Effect, Overrules},
     gpu::Gpu,
     luma::{LumaSettings, Preset},
 };
@@ -27,14 +27,6 @@ impl Work {
         overlay(&mut work.settings);
         work.max_side = max_side.or(work.max_side);
         work
-    }
-
-    /// What there is room for.
-    pub fn room(&self) -> Room {
-        Room {
-            sh_degree: self.settings.sh_degree,
-            iterations: self.settings.iterations,
-        }
     }
 }
 

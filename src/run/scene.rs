@@ -38,16 +38,15 @@ pub(super) fn open(
 
 /// Tells how far a trial is.
 pub(super) fn tell_trial(progress: &TrialProgress, observe: &mut Observer<'_>) {
-    let message = if progress.exposed {
-        "with exposures"
-    } else {
-        "without"
+    let message = match progress.effect {
+        Some(effect) => format!("with {}", effect.name()),
+        None => "without effects in doubt".to_owned(),
     };
     observe(Event::Progress {
         stage: Stage::Trial,
         done: progress.done,
         total: progress.total,
-        message: message.to_owned(),
+        message,
     });
 }
 
