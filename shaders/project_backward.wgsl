@@ -40,6 +40,7 @@ fn plane(index: u32, i: u32) -> f32 {
 // known leads to a gradient that is refused; if something does, it is counted, and
 // the parameter stays what it is.
 @if(step) fn descend(plane: u32, i: u32, gradient: f32) {
+    if i >= parameters.trained { return; }
     if !is_within(gradient, GRADIENT_MAX) {
         atomicAdd(&status[STATUS_REFUSED], 1u);
         return;

@@ -11,6 +11,8 @@ struct RelocationParameters {
     seed: u32,
     // World units of noise for one world unit of variance.
     noise: f32,
+    // Gaussians from this on stay as they are.
+    trained: u32,
 }
 
 // Above an opacity of 1 - 0.995 the noise falls off, a hundredth at a time.
@@ -68,7 +70,7 @@ fn plane(index: u32, i: u32) -> f32 {
 @compute @workgroup_size(256)
 fn relocation_noise(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
     let i = linear_group(group, groups) * 256u + local;
-    if i >= parameters.splat_count || status[STATUS_OVERFLOW] != 0u {
+    if i >= parameters.trained || status[STATUS_OVERFLOW] != 0u {
         return;
     }
     let quat = vec4f(plane(PLANE_QUAT, i), plane(PLANE_QUAT + 1u, i), plane(PLANE_QUAT + 2u, i), plane(PLANE_QUAT + 3u, i));

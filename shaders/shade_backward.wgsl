@@ -42,6 +42,7 @@ fn plane_index(k: u32, i: u32) -> u32 {
 // known leads to a gradient that is refused; if something does, it is counted, and
 // the parameter stays what it is.
 @if(step) fn descend(plane: u32, i: u32, gradient: f32) {
+    if i >= parameters.trained { return; }
     if !is_within(gradient, GRADIENT_MAX) {
         atomicAdd(&status[STATUS_REFUSED], 1u);
         return;

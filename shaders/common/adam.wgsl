@@ -11,6 +11,8 @@ struct AdamParameters {
     // `project_backward` looks at them.
     opacity_weight: f32,
     scale_weight: f32,
+    // Gaussians from this on stay as they are.
+    trained: u32,
     // By plane, four to a vector.
     learning_rates: array<vec4f, 12>,
 }

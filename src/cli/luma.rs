@@ -34,6 +34,10 @@ pub(super) struct LumaArguments {
     /// Share of the iterations, from the first on, that see photos at half their size [default: 0].
     #[arg(long, value_name = "0..1", value_parser = share::<f64>)]
     coarse: Option<f64>,
+    /// Leave black what no photo shows, instead of a shell around the scene in the grays that photos
+    /// show in its direction.
+    #[arg(long)]
+    no_surround: bool,
     /// Take no more of the device's memory than this; fewer Gaussians if need be.
     #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u32).range(1..))]
     memory_limit: Option<u32>,
@@ -73,6 +77,9 @@ impl LumaArguments {
 
     /// Puts what was given in the place of what is there.
     fn apply(&self, settings: &mut LumaSettings) {
+        if self.no_surround {
+            settings.surround = false;
+        }
         if let Some(iterations) = self.iterations {
             settings.iterations = iterations as usize;
             // Who says how many iterations wants them all.

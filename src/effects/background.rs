@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::shell::{self, Shell};
 use crate::{
     capture::{Camera, Capture, Photo},
     splats::{Splats, dome::dome},
@@ -44,6 +45,9 @@ pub struct Backdrop {
     /// The cameras' mean, and how far from it the background stands.
     center: DVec3,
     radius: f64,
+    /// The capture's extent, and how far from the center its points reach.
+    extent: f64,
+    farthest: f64,
 }
 
 /// The cells of one photo.
@@ -110,13 +114,16 @@ impl Backdrop {
         distances.sort_unstable_by(f64::total_cmp);
         // The last percent may be failures of the triangulation.
         let farthest = distances.get(distances.len() * 99 / 100);
-        let beyond = DOME_BEYOND_POINTS * farthest.copied().unwrap_or_default();
+        let farthest = farthest.copied().unwrap_or_default();
+        let extent = capture.extent();
         Self {
             views,
             holes: holes.collect(),
             cameras,
             center,
-            radius: (DOME_EXTENTS * capture.extent()).max(beyond),
+            radius: (DOME_EXTENTS * extent).max(DOME_BEYOND_POINTS * farthest),
+            extent,
+            farthest,
         }
     }
 
@@ -160,6 +167,14 @@ impl Backdrop {
         dome(self.center, self.radius, count, sh_degree, |_| {
             grays.next().flatten()
         })
+    }
+
+    /// A shell of at most `most` Gaussians behind the scene, and behind the dome where there is
+    /// one; the photos of [`Self::views`] are to be shown to it.
+    pub fn shell(&self, most: usize, behind_dome: bool) -> Shell {
+        let dome = behind_dome.then_some(self.radius);
+        let radius = shell::radius(self.extent, self.farthest, dome);
+        Shell::new(self.center, radius, most, (&self.views, &self.cameras))
     }
 
     /// Takes what the photo of a view, at working size, shows of `places`; of a view that is

@@ -14,6 +14,7 @@ mod look_ups;
 mod outliers;
 mod plan;
 mod sampling;
+mod shell;
 mod soundness;
 mod teacher;
 mod tracks;
@@ -25,6 +26,7 @@ pub use evidence::{Evidence, Survey};
 pub use exposure::{Exposures, find_exposures, find_photo_exposures};
 pub use plan::{Decider, Decision, Effect, Overrules, Plan, Room, TRIAL_GAIN, Trials};
 pub use sampling::sampling_spread;
+pub use shell::Shell;
 pub(crate) use soundness::listed;
 pub use soundness::{
     Agreement, Cause, Contradiction, Contradictory, FEW_POINTS, PointColors, Reprojection,

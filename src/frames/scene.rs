@@ -47,7 +47,8 @@ pub struct ViewOf<'a> {
 }
 
 impl SceneDrawer {
-    /// Of a scene with native a/b harmonics; `extent` is the capture's, in world units.
+    /// Of a scene with native a/b harmonics, whose last Gaussians are `surroundings` that no photo
+    /// shows; `extent` is the capture's, in world units.
     ///
     /// # Errors
     /// [`GpuError::TooLarge`].
@@ -55,10 +56,12 @@ impl SceneDrawer {
         raster: &Arc<Raster>,
         luma: &Splats,
         chroma: &ShField,
+        surroundings: usize,
         extent: f64,
     ) -> Result<Self, GpuError> {
         let mut whole = ShField::zeros(luma.len(), 0, 2);
-        whole.coefficients.fill((1.0 / sh::C0) as f32);
+        let scene = luma.len().saturating_sub(surroundings) * whole.channels;
+        whole.coefficients[..scene].fill((1.0 / sh::C0) as f32);
         let fields = [&luma.sh, chroma, &whole];
         Ok(Self {
             renderer: Renderer::of(raster, luma, &fields, extent)?,

@@ -48,6 +48,9 @@ pub(super) struct State {
     pub next_look: usize,
     pub curve: Vec<CurvePoint>,
     pub watched_seconds: f64,
+    /// [`Snapshot::held`] of the model and of the best set.
+    #[serde(default)]
+    pub held: [usize; 2],
     /// Iteration and PSNR of the best set.
     pub best: Option<(usize, f64)>,
     pub given_up: Option<usize>,
@@ -127,17 +130,19 @@ impl Checkpoint {
                     .collect()
             })
         };
-        let snapshot =
-            |name: &str| Snapshot::of((0..).map_while(|k| floats(&format!("{name} {k}"))));
+        let snapshot = |name: &str, held| {
+            Snapshot::of((0..).map_while(|k| floats(&format!("{name} {k}"))), held)
+        };
+        let [held, best_held] = state.held;
         let left_out = sections.iter().filter_map(|(name, bits)| {
             let photo = name.strip_prefix("left out ")?.parse().ok()?;
             Some((photo, bits.clone()))
         });
         let best = match state.best {
-            Some(_) => Some(snapshot("best")?),
+            Some(_) => Some(snapshot("best", best_held)?),
             None => None,
         };
-        let (model, statistics) = (snapshot("model")?, floats("statistics")?);
+        let (model, statistics) = (snapshot("model", held)?, floats("statistics")?);
         let fits = statistics.len() == STATISTICS_PLANES * model.len()
             && state.status.len() == STATUS_WORDS;
         fits.then_some(Self {

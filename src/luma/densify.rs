@@ -60,10 +60,36 @@ pub struct Evidence<'a> {
     pub geometry: &'a [f32],
     /// Statistics planes `[2, N]`.
     pub statistics: &'a [f32],
+    /// [`Model::held`].
+    pub held: usize,
+    /// Gaussians that are still to be added.
+    pub reserved: usize,
+}
+
+impl Evidence<'_> {
+    /// How many Gaussians that are trained there may be.
+    pub(super) fn room(&self, settings: &LumaSettings) -> usize {
+        (settings.max_splats).saturating_sub(self.held + self.reserved)
+    }
+
+    /// The held ones stay, behind all others.
+    pub(super) fn held_ones(&self) -> impl Iterator<Item = Descent> {
+        let n = self.geometry.len() / GEOMETRY_PLANES;
+        (n - self.held..n).map(survivor)
+    }
+}
+
+/// One that stays as it is.
+fn survivor(source: usize) -> Descent {
+    Descent {
+        source: source as u32,
+        survives: 1,
+        ..Descent::default()
+    }
 }
 
 /// Plans one densification: survivors in their old order, then the halves of
-/// splits. Where growth or the cap does not admit all, the Gaussians with the
+/// splits, then those that are held. Where growth or the cap does not admit all, the Gaussians with the
 /// strongest pull come first (ties by index).
 pub fn plan(settings: &LumaSettings, evidence: &Evidence<'_>) -> Vec<Descent> {
     let n = evidence.geometry.len() / GEOMETRY_PLANES;
@@ -82,7 +108,7 @@ pub fn plan(settings: &LumaSettings, evidence: &Evidence<'_>) -> Vec<Descent> {
         }
     };
 
-    let survivors: Vec<usize> = (0..n).filter(|&i| lives(i)).collect();
+    let survivors: Vec<usize> = (0..n - evidence.held).filter(|&i| lives(i)).collect();
     let mut candidates: Vec<(f64, usize)> = survivors
         .iter()
         .map(|&i| (pull(i), i))
@@ -90,7 +116,7 @@ pub fn plan(settings: &LumaSettings, evidence: &Evidence<'_>) -> Vec<Descent> {
         .collect();
     candidates.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     // A split adds one.
-    let room = settings.max_splats.saturating_sub(survivors.len());
+    let room = evidence.room(settings).saturating_sub(survivors.len());
     let growth = (survivors.len() as f64 * settings.growth).ceil() as usize;
     candidates.truncate(room.min(growth));
     let mut splits: Vec<usize> = candidates.into_iter().map(|(_, i)| i).collect();
@@ -99,16 +125,15 @@ pub fn plan(settings: &LumaSettings, evidence: &Evidence<'_>) -> Vec<Descent> {
     let mut plan: Vec<Descent> = survivors
         .iter()
         .filter(|i| splits.binary_search(i).is_err())
-        .map(|&i| Descent {
-            source: i as u32,
-            survives: 1,
-            ..Descent::default()
-        })
+        .map(|&i| survivor(i))
         .collect();
     plan.extend(splits.into_iter().flat_map(|i| {
         let log_scales = std::array::from_fn(|axis| f64::from(at(PLANE_LOG_SCALE + axis, i)));
         halves(i as u32, log_scales, f64::from(at(PLANE_OPACITY, i)))
     }));
+    if !plan.is_empty() {
+        plan.extend(evidence.held_ones());
+    }
     plan
 }
 
@@ -194,6 +219,7 @@ impl DensifyKernels {
                 count: plan.len(),
                 planes: apply(&model.geometry.planes, Target::Geometry)?,
             },
+            held: model.held,
             field: Field {
                 planes: apply(&model.field.planes, Target::Field)?,
                 ..model.field
@@ -272,6 +298,8 @@ mod tests {
         let evidence = Evidence {
             geometry: &geometry,
             statistics: &statistics,
+            held: 0,
+            reserved: 0,
         };
         plan(settings, &evidence)
     }
@@ -329,12 +357,49 @@ mod tests {
     }
 
     #[test]
+    fn held_ones_stay_behind_all_others_and_take_of_the_cap() {
+        let (geometry, statistics) = evidence(&[PULLED, CALM, FAINT, PULLED]);
+        let evidence = Evidence {
+            geometry: &geometry,
+            statistics: &statistics,
+            held: 2,
+            reserved: 0,
+        };
+        let held = [(2, 1), (3, 1)];
+        assert_eq!(
+            sources(&plan(&eager(), &evidence)),
+            [&[(1, 1), (0, 0), (0, 0)][..], &held].concat()
+        );
+        let capped = LumaSettings {
+            max_splats: 4,
+            ..eager()
+        };
+        assert_eq!(
+            sources(&plan(&capped, &evidence)),
+            [&[(0, 1), (1, 1)][..], &held].concat()
+        );
+        let reserving = Evidence {
+            held: 0,
+            reserved: 2,
+            ..evidence
+        };
+        let room = LumaSettings {
+            max_splats: 6,
+            ..eager()
+        };
+        // Three survive, one may be split.
+        assert_eq!(plan(&room, &reserving).len(), 4);
+    }
+
+    #[test]
     fn what_is_not_a_number_does_not_survive() {
         let (mut geometry, statistics) = evidence(&[CALM, CALM]);
         geometry[2 * PLANE_QUAT] = f32::NAN;
         let evidence = Evidence {
             geometry: &geometry,
             statistics: &statistics,
+            held: 0,
+            reserved: 0,
         };
         assert_eq!(sources(&plan(&eager(), &evidence)), [(1, 1)]);
     }

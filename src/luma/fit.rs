@@ -1,7 +1,7 @@
 //! Stage 1 as a whole: photos in, a gray scene out.
 
 use std::{
-    ops::ControlFlow,
+    ops::{ControlFlow, Range},
     sync::Arc,
     time::{Duration, Instant},
 };
@@ -9,10 +9,10 @@ use std::{
 use super::{
     Checkpoint, CurvePoint, Demand, Goal, Keeper, LumaError, LumaProgress, LumaSettings,
     LumaTrainer, NoKeeper, PlannedViews, TrialProgress,
-    carve::carved,
+    carve::{carved, chosen},
     planned,
     planned::WatchedViews,
-    start::{placed_splats, started},
+    start::{placed_splats, started, surroundings},
 };
 use crate::{
     capture::{Dataset, Exposure},
@@ -30,6 +30,8 @@ const WATCHED: usize = 3;
 pub struct LumaScene {
     /// Its Gaussians, one channel.
     pub splats: Splats,
+    /// How many of them, the last ones, are surroundings.
+    pub surroundings: usize,
     /// What it was trained with: what the plan and the memory decided included.
     pub settings: LumaSettings,
     /// Which effects were simulated, and why; exposures of all views.
@@ -122,6 +124,7 @@ pub fn fit(
         goal: Goal::Fixed,
         tries: true,
         start: None,
+        surroundings: 0,
         watched: None,
     }
     .run(settings, observe)
@@ -143,6 +146,8 @@ pub struct Fit<'a> {
     pub tries: bool,
     /// Gaussians to start from instead of COLMAP's points.
     pub start: Option<&'a Splats>,
+    /// How many of these, the last ones, are surroundings that stay as they are.
+    pub surroundings: usize,
     /// Views that are looked at on the way; a few of the held-out ones by default.
     pub watched: Option<(&'a Arc<Dataset>, Vec<usize>)>,
 }
@@ -183,11 +188,11 @@ impl Fit<'_> {
         let mut settings = settings.clone().planned(&plan);
         let demand = self.fit_memory(&mut settings, &plan, observe)?;
         go_on(observe(LumaEvent::Placing))?;
-        let start = match (checkpoint, self.start) {
+        let (start, surroundings) = self.start(&settings)?;
+        let start = match checkpoint {
             // Anything that can be uploaded: all will be replaced.
-            (Some(_), _) => placeholder(settings.sh_degree),
-            (None, Some(splats)) => started(splats, &settings),
-            (None, None) => placed_splats(dataset, self.evidence, &settings)?,
+            Some(_) => placeholder(settings.sh_degree),
+            None => start,
         };
         let preparing = begun.elapsed().as_secs_f64();
 
@@ -196,6 +201,10 @@ impl Fit<'_> {
         let raster = self.raster.clone();
         let gpu = raster.gpu.clone();
         let mut trainer = LumaTrainer::new(raster, settings, dataset.extent, &start, views)?;
+        match self.start {
+            Some(_) => trainer.surround_at_once(surroundings)?,
+            None => trainer.surround(surroundings),
+        }
         trainer.aim(match self.goal.seconds() {
             Some(limit) => self.goal.with_seconds(limit - preparing),
             None => self.goal,
@@ -232,6 +241,7 @@ impl Fit<'_> {
         let training = before + begun.elapsed().as_secs_f64() - watching;
         Ok(LumaScene {
             settings: trainer.settings().clone(),
+            surroundings: trainer.surroundings(),
             extent: dataset.extent,
             iterations: trainer.schedule().end,
             curve: trainer.curve().to_vec(),
@@ -244,6 +254,23 @@ impl Fit<'_> {
             plan,
             splats,
         })
+    }
+
+    /// Gaussians to train, and those around them that stay.
+    fn start(&self, settings: &LumaSettings) -> Result<(Splats, Splats), LumaError> {
+        let Some(splats) = self.start else {
+            let around = surroundings(self.dataset, self.evidence, settings)?;
+            let placed = placed_splats(self.dataset, self.evidence, settings, around.len())?;
+            return Ok((placed, around));
+        };
+        let trained = splats.len().saturating_sub(self.surroundings);
+        let some = |range: Range<usize>| chosen(splats, &range.collect::<Vec<_>>());
+        let around = started(&some(trained..splats.len()), settings);
+        let room = LumaSettings {
+            max_splats: settings.max_splats.saturating_sub(around.len()).max(1),
+            ..settings.clone()
+        };
+        Ok((started(&some(0..trained), &room), around))
     }
 
     fn plan(

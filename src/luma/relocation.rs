@@ -14,7 +14,7 @@ use super::{
 };
 use crate::{
     gpu::{Bindings, Buffer, Gpu, GpuError, Kernel, Recorder, groups_for, shaders},
-    raster::constants::*,
+    raster::{Model, constants::*},
 };
 
 /// Weight of the mean opacity in the loss, the paper's.
@@ -45,14 +45,17 @@ pub struct RelocationParameters {
     pub seed: u32,
     /// World units of noise for one world unit of variance.
     pub noise: f32,
+    /// Those that move; the others, behind them, stay.
+    pub trained: u32,
 }
 
 impl RelocationParameters {
-    /// For a step of `count` Gaussians with the means' `rate` in world units.
-    pub fn new(count: usize, seed: u64, iteration: usize, rate: f64) -> Self {
+    /// For a step of `model` with the means' `rate` in world units.
+    pub fn new(model: &Model, seed: u64, iteration: usize, rate: f64) -> Self {
         let mut random = fastrand::Rng::with_seed(seed ^ (iteration as u64).rotate_left(32));
         Self {
-            splat_count: count as u32,
+            splat_count: model.len() as u32,
+            trained: (model.len() - model.held) as u32,
             seed: random.u32(..),
             noise: (NOISE * rate) as f32,
         }
@@ -118,13 +121,14 @@ impl Relocation {
 }
 
 /// Plans one relocation: Gaussians that stay as they are in their old order, then
-/// those that share a place.
+/// those that share a place, then those that are held.
 pub fn plan(settings: &LumaSettings, evidence: &Evidence<'_>, iteration: usize) -> Vec<Descent> {
     let n = evidence.geometry.len() / GEOMETRY_PLANES;
     let at = |plane: usize, i: usize| evidence.geometry[plane * n + i];
     let opacity = |i: usize| 1.0 / (1.0 + f64::from(-at(PLANE_OPACITY, i)).exp());
     // Positively written: whatever is not a number does not live.
-    let alive: Vec<usize> = (0..n)
+    let trained = n - evidence.held;
+    let alive: Vec<usize> = (0..trained)
         .filter(|&i| {
             opacity(i) >= settings.prune_opacity
                 && (0..GEOMETRY_PLANES).all(|plane| at(plane, i).is_finite())
@@ -137,8 +141,8 @@ pub fn plan(settings: &LumaSettings, evidence: &Evidence<'_>, iteration: usize) 
             total
         })
         .collect();
-    let grown = (n as f64 * (1.0 + settings.growth)).ceil() as usize;
-    let wanted = grown.min(settings.max_splats).max(n);
+    let grown = (trained as f64 * (1.0 + settings.growth)).ceil() as usize;
+    let wanted = grown.min(evidence.room(settings)).max(trained);
     let mut random = fastrand::Rng::with_seed(settings.seed ^ iteration as u64);
     let mut copies = vec![1_usize; alive.len()];
     if !alive.is_empty() {
@@ -161,6 +165,9 @@ pub fn plan(settings: &LumaSettings, evidence: &Evidence<'_>, iteration: usize) 
             let share = share_of(i as u32, copies, f64::from(at(PLANE_OPACITY, i)));
             plan.extend(std::iter::repeat_n(share, copies));
         }
+    }
+    if !plan.is_empty() {
+        plan.extend(evidence.held_ones());
     }
     plan
 }
@@ -251,6 +258,8 @@ mod tests {
         let evidence = Evidence {
             geometry: &geometry(logits),
             statistics: &[],
+            held: 0,
+            reserved: 0,
         };
         plan(settings, &evidence, 7)
     }

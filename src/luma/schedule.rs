@@ -21,6 +21,9 @@ pub struct Schedule {
     pub settle_from: usize,
     /// Until here photos are seen at half their size: a quarter of the pixels.
     pub coarse_until: usize,
+    /// From here on the scene's surroundings are drawn.
+    #[serde(default)]
+    pub surround_at: usize,
     /// Where outliers are looked for, if they are.
     pub find_outliers_at: [usize; 2],
 }
@@ -53,6 +56,7 @@ impl Schedule {
             raise_degree_every: share(1_000).clamp(1, RAISED_BY),
             settle_from: iterations * 7 / 10,
             coarse_until: (settings.coarse * iterations as f64) as usize,
+            surround_at: (SURROUND_AT * iterations as f64) as usize,
             find_outliers_at: OUTLIERS_AT.map(|share| (share * iterations as f64) as usize),
         }
     }
@@ -72,6 +76,7 @@ impl Schedule {
             densify_until: moved(self.densify_until),
             settle_from: moved(self.settle_from),
             coarse_until: moved(self.coarse_until),
+            surround_at: moved(self.surround_at),
             find_outliers_at: self.find_outliers_at.map(moved),
             ..*self
         };
@@ -87,6 +92,7 @@ impl Schedule {
             settle_from: self.settle_from.min(now),
             // Outliers do harm to the last; there is one more chance to find them.
             find_outliers_at: self.find_outliers_at.map(|at| at.min(now + 1)),
+            surround_at: self.surround_at.min(now + 1),
             ..*self
         };
     }
@@ -129,6 +135,12 @@ const RAISED_BY: usize = 250;
 /// view at a time leave noise as large as they are.
 pub const SETTLED: f64 = 0.1;
 
+/// Share of the iterations after which surroundings are drawn. From the first on, Gaussians in
+/// front of them would stay thin and lend them their mean gray, which other views show to be
+/// wrong; the later they come, the longer have those at the border tried to show what lies
+/// beyond it (docs/decisions.md).
+const SURROUND_AT: f64 = 0.3;
+
 /// A run that is made to settle early takes so many more iterations, as a share of those
 /// before: half of what a short run's schedule spends on it, for less is left to gain.
 pub const SETTLING_SHARE: f64 = 0.2;
@@ -158,6 +170,7 @@ mod tests {
                 raise_degree_every: 250,
                 settle_from: 10_500,
                 coarse_until: 0,
+                surround_at: 4_500,
                 find_outliers_at: [6_000, 9_750],
             }
         );

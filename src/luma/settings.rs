@@ -114,6 +114,10 @@ pub struct LumaSettings {
     /// Whether some of the Gaussians stand for a background far behind the scene: how
     /// large one may be then grows with its distance.
     pub background: bool,
+    /// Whether a shell of a few hundred Gaussians is drawn far behind the scene, in the grays
+    /// that photos show in its direction: what other views see where no photo shows anything.
+    #[serde(default)]
+    pub surround: bool,
     /// Bytes that the training may take on the device; no limit when `None`.
     pub memory_limit: Option<u64>,
     /// How accurately it computes.
@@ -146,6 +150,7 @@ impl LumaSettings {
             robust: false,
             antialiased: false,
             background: false,
+            surround: true,
             memory_limit: None,
             numerics: Numerics::default(),
         }

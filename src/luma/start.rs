@@ -11,6 +11,9 @@ use crate::{
     splats::{ShField, Splats, init::initial_splats, sh},
 };
 
+/// At most one in so many Gaussians is one of the surroundings.
+const SURROUNDINGS_SHARE: usize = 16;
+
 /// What a training can start from that is there: luma of the settings' degree, and no more
 /// Gaussians than they allow.
 pub fn started(splats: &Splats, settings: &LumaSettings) -> Splats {
@@ -20,7 +23,8 @@ pub fn started(splats: &Splats, settings: &LumaSettings) -> Splats {
     splats
 }
 
-/// One at each of COLMAP's points, and a dome behind them.
+/// One at each of COLMAP's points, and a dome behind them; so many fewer than the settings allow
+/// as are `reserved`.
 ///
 /// # Errors
 /// [`CaptureError`] of a photo.
@@ -28,6 +32,7 @@ pub fn placed_splats(
     dataset: &Dataset,
     evidence: &Evidence,
     settings: &LumaSettings,
+    reserved: usize,
 ) -> Result<Splats, CaptureError> {
     let points: Vec<_> = (dataset.capture.points.iter())
         .map(|point| {
@@ -45,7 +50,7 @@ pub fn placed_splats(
         false => None,
     };
     let taken = dome.as_ref().map_or(0, Splats::len);
-    truncate(&mut splats, settings.max_splats - taken);
+    truncate(&mut splats, settings.max_splats - taken - reserved);
     dome.into_iter().for_each(|dome| splats.append(dome));
     Ok(splats)
 }
@@ -63,6 +68,28 @@ fn background(
         Ok::<_, CaptureError>(())
     })?;
     Ok(backdrop.dome(&places, settings.sh_degree))
+}
+
+/// What stands around the scene: nothing where the settings want none, or where masks say that
+/// there is nothing.
+///
+/// # Errors
+/// [`CaptureError`] of a photo.
+pub fn surroundings(
+    dataset: &Dataset,
+    evidence: &Evidence,
+    settings: &LumaSettings,
+) -> Result<Splats, CaptureError> {
+    if !settings.surround || dataset.removes_masked() {
+        return Ok(Splats::default());
+    }
+    let most = settings.max_splats / SURROUNDINGS_SHARE;
+    let mut shell = evidence.backdrop().shell(most, settings.background);
+    dataset.visit(evidence.backdrop().views(), |view, photo| {
+        shell.look(view, photo);
+        Ok::<_, CaptureError>(())
+    })?;
+    Ok(shell.splats(settings.sh_degree))
 }
 
 /// The field cut or filled up with zeros to another degree.

@@ -99,6 +99,8 @@ pub struct LumaTrainer {
     /// Iterations that a run with time left may take.
     longest: usize,
     watch: Watch,
+    /// What is to be drawn behind the scene.
+    surroundings: Option<Splats>,
     /// Sums over the reports of what [`Self::load`] averages.
     seen: Load,
     /// Reports.
@@ -185,6 +187,7 @@ impl LumaTrainer {
             pace: Pace::default(),
             longest,
             watch: Watch::default(),
+            surroundings: None,
             seen: Load::default(),
             reports: 0,
             done: (0, 0.0),
@@ -242,7 +245,8 @@ impl LumaTrainer {
             let looks = self.watch.is_due(iteration, schedule.end);
             // Its losses are told by then.
             let keeps = iteration.is_multiple_of(SYNC_EVERY) && !ends && keeper.wants(iteration);
-            let pauses = densifies || finds_outliers || looks || ends || keeps;
+            let surrounds = !self.is_surrounded() && !ends && iteration >= schedule.surround_at;
+            let pauses = surrounds || densifies || finds_outliers || looks || ends || keeps;
             // The first views say how much room is needed: those lost to an overflow
             // are few if it is noticed early.
             let early = iteration < SYNC_EVERY && iteration.is_power_of_two();
@@ -296,6 +300,9 @@ impl LumaTrainer {
             if self.schedule.densifies_after(iteration) {
                 self.densify(iteration)?;
             }
+            if surrounds {
+                self.begin_surrounding(iteration)?;
+            }
             if finds_outliers {
                 self.leave_out_outliers()?;
             }
@@ -333,7 +340,12 @@ impl LumaTrainer {
         &self.schedule
     }
 
-    /// Reads the trained Gaussians.
+    /// How many of the Gaussians, the last ones, are surroundings.
+    pub fn surroundings(&self) -> usize {
+        self.model.held
+    }
+
+    /// Reads the Gaussians.
     ///
     /// # Errors
     /// [`GpuError::Lost`].
@@ -426,7 +438,7 @@ impl LumaTrainer {
                 &self.gpu,
                 &self.kernels.relocation,
                 &mut recorder,
-                &RelocationParameters::new(self.model.len(), seed, iteration, rate),
+                &RelocationParameters::new(&self.model, seed, iteration, rate),
             );
         }
         recorder.submit();

@@ -228,7 +228,7 @@ impl Trial<'_> {
             ..LumaSettings::new(self.size.iterations).planned(&arm.plan)
         };
         let extent = self.dataset.extent;
-        let start = placed_splats(self.dataset, self.evidence, &settings)?;
+        let start = placed_splats(self.dataset, self.evidence, &settings, 0)?;
         let drawn = self.raster.drawing(settings.raster_options());
         let mut trainer =
             LumaTrainer::new(self.raster.clone(), settings, extent, &start, trained?)?;

@@ -70,10 +70,9 @@ impl Workspace {
         let (geometry, field) = (&model.geometry, &model.field);
         let lists = Lists::new(raster, geometry, max_tiles, capacity)?;
         let layer = Layer::new(raster, geometry, &lists, field, max_pixels, max_tiles)?;
-        let count = geometry.count;
-        let geometry_step = AdamStep::new(gpu, GEOMETRY_PLANES, count)?;
-        let planes = sh::coefficient_count(field.degree);
-        let field_step = AdamStep::new(gpu, planes, count)?;
+        let step = |planes| AdamStep::holding(gpu, planes, geometry.count, model.held);
+        let geometry_step = step(GEOMETRY_PLANES)?;
+        let field_step = step(sh::coefficient_count(field.degree))?;
         let outcome = Outcome::Step {
             geometry: geometry_step.of(&model.geometry_moments),
             field: field_step.of(&model.field_moments),

@@ -26,8 +26,11 @@ pub struct AdamParameters {
     pub opacity_weight: f32,
     /// Weight of each standard deviation in the loss.
     pub scale_weight: f32,
+    /// Elements of a plane that are trained; those behind them stay. The adjoints that step at
+    /// once look at it.
+    pub trained: u32,
     /// Keeps the rates aligned.
-    pub padding: [u32; 2],
+    pub padding: u32,
     /// One rate a plane.
     pub learning_rates: [f32; MAX_PLANES],
 }
@@ -69,6 +72,7 @@ pub struct AdamStep {
     parameters: Buffer<AdamParameters>,
     planes: usize,
     count: usize,
+    trained: usize,
 }
 
 impl AdamStep {
@@ -77,7 +81,17 @@ impl AdamStep {
     /// # Errors
     /// [`GpuError::TooLarge`].
     pub fn new(gpu: &Gpu, planes: usize, count: usize) -> Result<Self, GpuError> {
+        Self::holding(gpu, planes, count, 0)
+    }
+
+    /// The same for an adjoint that steps at once, where the last `held` elements of each plane
+    /// stay as they are.
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`].
+    pub fn holding(gpu: &Gpu, planes: usize, count: usize, held: usize) -> Result<Self, GpuError> {
         Ok(Self {
+            trained: count.saturating_sub(held),
             parameters: Buffer::uniform(gpu, "adam parameters", &AdamParameters::zeroed())?,
             planes,
             count,
@@ -102,7 +116,8 @@ impl AdamStep {
                 correction2: correction(BETA2),
                 opacity_weight: weights[0],
                 scale_weight: weights[1],
-                padding: [0; 2],
+                trained: self.trained as u32,
+                padding: 0,
                 learning_rates,
             }],
         );

@@ -16,6 +16,8 @@ pub struct Model {
     pub geometry_moments: AdamMoments,
     /// Of the harmonics.
     pub field_moments: AdamMoments,
+    /// So many Gaussians, the last ones, are drawn and stay as they are.
+    pub held: usize,
 }
 
 impl Model {
@@ -38,7 +40,26 @@ impl Model {
             field_moments: AdamMoments::zeros(gpu, field.planes.len())?,
             geometry,
             field,
+            held: 0,
         })
+    }
+
+    /// Adds Gaussians of the same degree behind the others, to be drawn and held as they are.
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`], [`GpuError::Lost`].
+    pub fn hold(&mut self, gpu: &Gpu, splats: &Splats) -> Result<(), GpuError> {
+        let (mut all, more) = (
+            self.snapshot(gpu)?,
+            Self::upload(gpu, splats)?.snapshot(gpu)?,
+        );
+        for (planes, behind) in all.planes.iter_mut().zip(&more.planes) {
+            let joined = (planes.chunks_exact(all.count)).zip(behind.chunks_exact(more.count));
+            *planes = joined.flat_map(|(a, b)| [a, b].concat()).collect();
+        }
+        all.count += more.count;
+        all.held += more.count;
+        self.restore(gpu, &all)
     }
 
     /// Number of Gaussians.
@@ -70,6 +91,7 @@ impl Model {
         }
         Ok(Snapshot {
             count: self.geometry.count,
+            held: self.held,
             planes,
         })
     }
@@ -80,6 +102,7 @@ impl Model {
     /// [`GpuError::TooLarge`].
     pub fn restore(&mut self, gpu: &Gpu, snapshot: &Snapshot) -> Result<(), GpuError> {
         self.geometry.count = snapshot.count;
+        self.held = snapshot.held;
         let planes = snapshot.planes.iter();
         for (buffer, planes) in self.buffers_mut().into_iter().zip(planes) {
             *buffer = Buffer::from_slice(gpu, "restored model", planes)?;
@@ -116,6 +139,8 @@ impl Model {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Snapshot {
     count: usize,
+    /// [`Model::held`].
+    pub held: usize,
     /// In the order of the model's buffers.
     pub planes: Vec<Vec<f32>>,
 }
@@ -131,18 +156,23 @@ impl Snapshot {
         self.count == 0
     }
 
-    /// A snapshot of these planes; `None` where they are those of no model.
-    pub fn of(planes: impl Iterator<Item = Vec<f32>>) -> Option<Self> {
+    /// A snapshot of these planes, whose last `held` Gaussians stay; `None` where they are those
+    /// of no model.
+    pub fn of(planes: impl Iterator<Item = Vec<f32>>, held: usize) -> Option<Self> {
         let planes: Vec<Vec<f32>> = planes.collect();
         let [geometry, field, moments @ ..] = &planes[..] else {
             return None;
         };
         let count = geometry.len() / GEOMETRY_PLANES;
-        let whole = count > 0
+        let whole = count > held
             && geometry.len() == count * GEOMETRY_PLANES
             && field.len().is_multiple_of(count);
         let sizes = [geometry.len(), geometry.len(), field.len(), field.len()];
         let fits = moments.iter().map(Vec::len).eq(sizes);
-        (whole && fits).then_some(Self { count, planes })
+        (whole && fits).then_some(Self {
+            count,
+            held,
+            planes,
+        })
     }
 }

@@ -132,6 +132,10 @@ pub struct LumaReport {
     pub given_up: Option<usize>,
     /// Gaussians at the end.
     pub splats: usize,
+    /// How many of them, the last ones in `luma.ply`, are surroundings: a shell far around the
+    /// scene, for what no photo shows.
+    #[serde(default)]
+    pub surroundings: usize,
     /// Gaussians that the last views culled for values that are not finite.
     pub poisoned: usize,
     /// Gradients refused for not being finite, since the set last changed.

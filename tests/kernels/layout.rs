@@ -122,6 +122,7 @@ fn twins() -> Vec<Twin> {
                 correction2,
                 opacity_weight,
                 scale_weight,
+                trained,
                 learning_rates
             }
         ),
@@ -129,7 +130,8 @@ fn twins() -> Vec<Twin> {
             "RelocationParameters" = RelocationParameters {
                 splat_count,
                 seed,
-                noise
+                noise,
+                trained
             }
         ),
         twin!(

@@ -14,6 +14,9 @@ use crate::{
 /// Three workgroups, the last cut short.
 const COUNT: usize = 600;
 
+/// Of these, the last, that stay.
+const HELD: usize = 20;
+
 pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
     let (gpu, allowed) = (&raster.gpu, Allowance::of(&raster.gpu));
     let mut random = Random::new(3);
@@ -31,6 +34,7 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
         splat_count: COUNT as u32,
         seed: 12_345,
         noise: 2.0,
+        trained: (COUNT - HELD) as u32,
     };
     let values = Buffer::from_slice(gpu, "geometry", &geometry)?;
     let status = Buffer::zeros(gpu, "status", STATUS_WORDS)?;
@@ -42,7 +46,7 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
 
     let at = |plane: usize, i: usize| f64::from(geometry[plane * COUNT + i]);
     let mut moved = widen(&geometry);
-    for i in 0..COUNT {
+    for i in 0..COUNT - HELD {
         let quat = std::array::from_fn(|k| at(PLANE_QUAT + k, i));
         let log_scale = std::array::from_fn(|axis| at(PLANE_LOG_SCALE + axis, i));
         let logit = at(PLANE_OPACITY, i);

@@ -36,6 +36,7 @@ impl LumaTrainer {
                 next_look: self.watch.next,
                 curve: self.watch.curve.clone(),
                 watched_seconds: self.watch.seconds,
+                held: [self.model.held, best.map_or(0, |best| best.model.held)],
                 best: best.map(|best| (best.iteration, best.psnr)),
                 given_up: self.watch.given_up,
                 seen: self.seen,

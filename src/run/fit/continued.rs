@@ -38,7 +38,11 @@ impl FitOptions {
             },
             load: report.capture.load,
             measure_side: report.luma.measured_side,
-            init: Some(Init::Run(folder, report.luma.iterations)),
+            init: Some(Init::Run {
+                folder,
+                iterations: report.luma.iterations,
+                surroundings: report.luma.surroundings,
+            }),
             ..Self::new(
                 fs::canonicalize(&report.capture.path).unwrap_or(report.capture.path.into()),
             )

@@ -45,8 +45,15 @@ pub type Overlay = Box<dyn Fn(&mut LumaSettings)>;
 pub enum Init {
     /// Those of a splat file.
     File(PathBuf),
-    /// Those of a run after so many iterations, which goes on.
-    Run(RunFolder, usize),
+    /// Those of a run that goes on.
+    Run {
+        /// The run.
+        folder: RunFolder,
+        /// Its iterations so far.
+        iterations: usize,
+        /// How many of its Gaussians, the last ones, are surroundings.
+        surroundings: usize,
+    },
 }
 
 impl Init {
@@ -54,7 +61,7 @@ impl Init {
     pub fn path(&self) -> PathBuf {
         match self {
             Self::File(path) => path.clone(),
-            Self::Run(folder, _) => folder.luma(),
+            Self::Run { folder, .. } => folder.luma(),
         }
     }
 
@@ -62,7 +69,15 @@ impl Init {
     fn iterations(&self) -> usize {
         match self {
             Self::File(_) => 0,
-            Self::Run(_, iterations) => *iterations,
+            Self::Run { iterations, .. } => *iterations,
+        }
+    }
+
+    /// How many of them are surroundings.
+    fn surroundings(&self) -> usize {
+        match self {
+            Self::File(_) => 0,
+            Self::Run { surroundings, .. } => *surroundings,
         }
     }
 }

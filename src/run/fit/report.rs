@@ -41,6 +41,7 @@ impl Job<'_> {
                 iterations: scene.iterations + options.init.as_ref().map_or(0, Init::iterations),
                 given_up: scene.given_up,
                 splats: scene.splats.len(),
+                surroundings: scene.surroundings,
                 poisoned: last.map_or(0, |progress| progress.poisoned),
                 refused: last.map_or(0, |progress| progress.refused),
                 loss: last.map_or(0.0, |progress| progress.loss),

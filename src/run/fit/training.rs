@@ -167,7 +167,7 @@ impl Job<'_> {
         let init = options.init.as_ref().map(|init| {
             let frame = match init {
                 Init::File(_) => Frame::World(dataset.capture.offset),
-                Init::Run(..) => Frame::Own,
+                Init::Run { .. } => Frame::Own,
             };
             let path = init.path();
             let (splats, drawn) = read_splats(&path, frame, observe)?;
@@ -190,13 +190,17 @@ impl Job<'_> {
             goal: limit.map_or(options.goal, |limit| options.goal.with_seconds(limit)),
             tries: seconds.is_none_or(|limit| limit >= TRIAL_FROM),
             start: init.as_ref().map(|(_, splats, _)| splats),
+            surroundings: options.init.as_ref().map_or(0, Init::surroundings),
             watched: reaches.then(|| (self.judge, self.judge.split.test.clone())),
         };
         let log = RefCell::new(match (found, &options.init) {
             (Some(found), _) => found.log(),
-            (None, Some(Init::Run(folder, iterations))) => {
-                with_rows(&folder.log(), *iterations, "")
-            }
+            (
+                None,
+                Some(Init::Run {
+                    folder, iterations, ..
+                }),
+            ) => with_rows(&folder.log(), *iterations, ""),
             (None, _) => String::from("iteration,loss,splats,seconds,poisoned\n"),
         });
         let observe = RefCell::new(observe);

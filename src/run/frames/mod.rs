@@ -118,7 +118,13 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
     observe(Event::begins(Stage::Device));
     let raster = Arc::new(Raster::with(&open_gpu(false)?, drawn));
     let mut painter = Painter {
-        drawer: SceneDrawer::new(&raster, &luma, &chroma, dataset.extent)?,
+        drawer: SceneDrawer::new(
+            &raster,
+            &luma,
+            &chroma,
+            report.luma.surroundings,
+            dataset.extent,
+        )?,
         exposures: exposures(&dataset, &report.luma.exposures),
         dataset: &dataset,
         teachers,
