@@ -38,6 +38,9 @@ pub(super) struct LumaArguments {
     /// show in its direction.
     #[arg(long)]
     no_surround: bool,
+    /// Start at COLMAP's points only, not also where photos match and it has none.
+    #[arg(long)]
+    no_fill_gaps: bool,
     /// Take no more of the device's memory than this; fewer Gaussians if need be.
     #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u32).range(1..))]
     memory_limit: Option<u32>,
@@ -77,6 +80,9 @@ impl LumaArguments {
 
     /// Puts what was given in the place of what is there.
     fn apply(&self, settings: &mut LumaSettings) {
+        if self.no_fill_gaps {
+            settings.fill_gaps = false;
+        }
         if self.no_surround {
             settings.surround = false;
         }

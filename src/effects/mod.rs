@@ -9,7 +9,7 @@ mod direction;
 mod evidence;
 mod exposure;
 #[cfg(test)]
-mod fixtures;
+pub(crate) mod fixtures;
 mod look_ups;
 mod outliers;
 mod plan;

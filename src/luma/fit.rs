@@ -188,12 +188,7 @@ impl Fit<'_> {
         let mut settings = settings.clone().planned(&plan);
         let demand = self.fit_memory(&mut settings, &plan, observe)?;
         go_on(observe(LumaEvent::Placing))?;
-        let (start, surroundings) = self.start(&settings)?;
-        let start = match checkpoint {
-            // Anything that can be uploaded: all will be replaced.
-            Some(_) => placeholder(settings.sh_degree),
-            None => start,
-        };
+        let (start, surroundings) = self.start(&settings, checkpoint.is_some())?;
         let preparing = begun.elapsed().as_secs_f64();
 
         let begun = Instant::now();
@@ -257,10 +252,14 @@ impl Fit<'_> {
     }
 
     /// Gaussians to train, and those around them that stay.
-    fn start(&self, settings: &LumaSettings) -> Result<(Splats, Splats), LumaError> {
+    fn start(&self, settings: &LumaSettings, resumes: bool) -> Result<(Splats, Splats), LumaError> {
         let Some(splats) = self.start else {
             let around = surroundings(self.dataset, self.evidence, settings)?;
-            let placed = placed_splats(self.dataset, self.evidence, settings, around.len())?;
+            let placed = match resumes {
+                // Anything that can be uploaded: all will be replaced.
+                true => placeholder(settings.sh_degree),
+                false => placed_splats(self.dataset, self.evidence, settings, around.len())?,
+            };
             return Ok((placed, around));
         };
         let trained = splats.len().saturating_sub(self.surroundings);

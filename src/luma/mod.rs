@@ -6,6 +6,7 @@ mod curve;
 pub mod densify;
 mod error;
 mod fit;
+mod gaps;
 mod goal;
 mod loss;
 mod memory;

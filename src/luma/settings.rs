@@ -118,6 +118,10 @@ pub struct LumaSettings {
     /// that photos show in its direction: what other views see where no photo shows anything.
     #[serde(default)]
     pub surround: bool,
+    /// Whether it starts with Gaussians also where photos have texture and COLMAP no points, found
+    /// by matching photos.
+    #[serde(default)]
+    pub fill_gaps: bool,
     /// Bytes that the training may take on the device; no limit when `None`.
     pub memory_limit: Option<u64>,
     /// How accurately it computes.
@@ -151,6 +155,7 @@ impl LumaSettings {
             antialiased: false,
             background: false,
             surround: true,
+            fill_gaps: true,
             memory_limit: None,
             numerics: Numerics::default(),
         }

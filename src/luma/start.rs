@@ -3,6 +3,7 @@
 use super::{
     LumaSettings,
     carve::{carved, chosen},
+    gaps::gap_points,
 };
 use crate::{
     capture::{CaptureError, Dataset},
@@ -10,6 +11,11 @@ use crate::{
     effects::Evidence,
     splats::{ShField, Splats, init::initial_splats, sh},
 };
+
+/// At most so large a share of the Gaussians starts where COLMAP has no point, as numerator and
+/// denominator: half of it gained less on the lawn of the bundled scene, more cost elsewhere
+/// (docs/decisions.md).
+const GAPS_PARTS: [usize; 2] = [3, 10];
 
 /// At most one in so many Gaussians is one of the surroundings.
 const SURROUNDINGS_SHARE: usize = 16;
@@ -23,7 +29,8 @@ pub fn started(splats: &Splats, settings: &LumaSettings) -> Splats {
     splats
 }
 
-/// One at each of COLMAP's points, and a dome behind them; so many fewer than the settings allow
+/// One at each of COLMAP's points and where photos show some that it has not, and a dome behind
+/// them; so many fewer than the settings allow
 /// as are `reserved`.
 ///
 /// # Errors
@@ -34,13 +41,20 @@ pub fn placed_splats(
     settings: &LumaSettings,
     reserved: usize,
 ) -> Result<Splats, CaptureError> {
-    let points: Vec<_> = (dataset.capture.points.iter())
+    let mut points: Vec<_> = (dataset.capture.points.iter())
         .map(|point| {
             let rgb = point.color.map(|v| f64::from(v) / 255.0);
             let position = point.position.as_vec3().to_array();
             (position, gray_from_rgb(rgb) as f32)
         })
         .collect();
+    let most = (settings.max_splats - reserved) * GAPS_PARTS[0] / GAPS_PARTS[1];
+    let found = match settings.fill_gaps {
+        true => gap_points(dataset, most)?,
+        false => Vec::new(),
+    };
+    thin(&mut points, settings.max_splats - reserved - found.len());
+    points.extend((found.iter()).map(|point| (point.position.as_vec3().to_array(), point.gray)));
     let mut splats = initial_splats(&points, dataset.extent as f32, settings.sh_degree);
     if dataset.removes_masked() {
         splats = carved(dataset, &splats)?;
@@ -106,12 +120,19 @@ fn at_degree(field: &ShField, count: usize, degree: u32) -> ShField {
 
 /// Keeps an evenly spread choice of at most `max` Gaussians: a cap is a cap.
 fn truncate(splats: &mut Splats, max: usize) {
-    let count = splats.len();
-    if count <= max {
-        return;
+    let mut kept: Vec<usize> = (0..splats.len()).collect();
+    thin(&mut kept, max);
+    if kept.len() < splats.len() {
+        *splats = chosen(splats, &kept);
     }
-    let kept: Vec<usize> = (0..max).map(|k| k * count / max).collect();
-    *splats = chosen(splats, &kept);
+}
+
+/// Keeps an evenly spread choice of at most `max`.
+fn thin<T: Copy>(values: &mut Vec<T>, max: usize) {
+    let count = values.len();
+    if count > max {
+        *values = (0..max).map(|k| values[k * count / max]).collect();
+    }
 }
 
 #[cfg(test)]

@@ -224,6 +224,8 @@ impl Trial<'_> {
         });
         let settings = LumaSettings {
             max_splats: self.size.max_splats,
+            // As long as a short training itself.
+            fill_gaps: false,
             seed,
             ..LumaSettings::new(self.size.iterations).planned(&arm.plan)
         };
