@@ -53,7 +53,6 @@ pub fn placed_splats(
         true => gap_points(dataset, most)?,
         false => Vec::new(),
     };
-    thin(&mut points, settings.max_splats - reserved - found.len());
     points.extend((found.iter()).map(|point| (point.position.as_vec3().to_array(), point.gray)));
     let mut splats = initial_splats(&points, dataset.extent as f32, settings.sh_degree);
     if dataset.removes_masked() {

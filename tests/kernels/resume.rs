@@ -105,6 +105,52 @@ fn a_set_that_is_split() {
     assert_eq!(resumes_everywhere(&of, &start), [25, 50]);
 }
 
+/// What stands around a scene comes late, stays as it is, and takes of the cap.
+#[test]
+fn with_surroundings() {
+    let [start, target] = start_and_target();
+    let around = Splats {
+        means: start
+            .means
+            .iter()
+            .map(|mean| mean.map(|x| 3.0 * x))
+            .collect(),
+        ..start.clone()
+    };
+    for densify in [Densification::Split, Densification::Relocate] {
+        let of = |from: &Splats| {
+            let mut settings = LumaSettings {
+                iterations: 100,
+                max_splats: 2 * start.len() + 10,
+                ..settings(&start)
+            };
+            settings.densify_by(densify);
+            let schedule = Schedule {
+                densify_from: 20,
+                densify_every: 30,
+                densify_until: 95,
+                surround_at: 40,
+                ..Schedule::of(&settings)
+            };
+            let mut trainer = trainer_by(settings, schedule, 4.0, from, photos(&target));
+            trainer.surround(around.clone());
+            trainer
+        };
+        assert_eq!(resumes_everywhere(&of, &start), [25, 50, 75]);
+        let mut trainer = of(&start);
+        trainer.train(&mut |_| {}).unwrap();
+        let (trained, held) = (trainer.splats().unwrap(), trainer.surroundings());
+        assert_eq!(held, around.len());
+        assert!(trained.len() <= 2 * start.len() + 10);
+        let behind = trained.len() - held;
+        assert!(trained.means[behind..] == around.means[..]);
+        assert!(trained.opacity_logits[behind..] == around.opacity_logits[..]);
+        let stride = trained.sh.coefficients.len() / trained.len();
+        assert!(trained.sh.coefficients[behind * stride..] == around.sh.coefficients[..]);
+        assert!(trained.means[..start.len().min(behind)] != start.means[..]);
+    }
+}
+
 /// Relocation, outliers, small photos at first, and views that are watched.
 #[test]
 fn with_every_effect() {

@@ -9,7 +9,7 @@ given. What is done for fairness:
 
 - All read the same photos: 8-bit gray with the L* of the colors, scaled here. Cameras and points in
   COLMAP's model are changed to match.
-- Every 8th photo by name is held out. Programs train on a folder without these photos, so that none
+- Every 8th photo by name is held out, or with --hold ends the first and the last. Programs train on a folder without these photos, so that none
   spends time on measuring. gsplat's trainer always holds some out: it gets the whole folder, leaves
   out the same ones, and does not measure.
 - Iterations, degree of spherical harmonics and cap on Gaussians are the same, though OpenSplat knows
@@ -43,7 +43,7 @@ sys.path[0] = str(Path(__file__).resolve().parents[1])
 
 from bench_peers.command import Problem  # noqa: E402
 from bench_peers.measure import Result, median, one_round  # noqa: E402
-from bench_peers.photos import copy_gray  # noqa: E402
+from bench_peers.photos import HELD, copy_gray  # noqa: E402
 from bench_peers.programs import Brush, Chroma, Gsplat, OpenSplat, Program, Task  # noqa: E402
 
 
@@ -57,15 +57,15 @@ def processor() -> str:
 
 def table(rows: dict[str, Result], ours: Result, versions: dict[str, str]) -> str:
     lines = [
-        "| program | seconds | / gs-chroma | training | Gaussians | PSNR | SSIM |",
-        "|---|---|---|---|---|---|---|",
+        "| program | seconds | / gs-chroma | training | Gaussians | PSNR | corrected | SSIM |",
+        "|---|---|---|---|---|---|---|---|",
     ]
     for name, row in rows.items():
         training = "–" if row.training is None else f"{row.training:.1f} s"
         label = f"{name} {versions[name]}".strip()
         lines.append(
             f"| {label} | {row.seconds:.1f} s | {row.seconds / ours.seconds:.2f} | {training}"
-            f" | {row.splats:.0f} | {row.psnr:.2f} dB | {row.ssim:.3f} |"
+            f" | {row.splats:.0f} | {row.psnr:.2f} dB | {row.corrected_psnr:.2f} dB | {row.ssim:.3f} |"
         )
     return "\n".join(lines)
 
@@ -75,7 +75,8 @@ def benchmark(arguments: argparse.Namespace) -> None:
     gray = output / "gray"
     if not (arguments.colmap / "images").is_dir():
         raise Problem(f"{arguments.colmap} holds no images/ folder")
-    settings = {name: getattr(arguments, name) for name in ("side", "iterations", "max_splats", "sh_degree")}
+    names = ("side", "iterations", "max_splats", "sh_degree", "held")
+    settings = {name: getattr(arguments, name) for name in names}
     task = Task(gray, **settings)
     ours = Chroma([arguments.program], task)
     programs: list[Program] = [ours]
@@ -87,11 +88,12 @@ def benchmark(arguments: argparse.Namespace) -> None:
         programs.append(OpenSplat([arguments.opensplat], task))
     versions = {program.name: program.version() for program in programs}
     shutil.rmtree(gray, ignore_errors=True)
-    held_out = copy_gray(arguments.colmap, gray, arguments.side)
+    held_out = copy_gray(arguments.colmap, gray, arguments.side, arguments.held)
 
     rounds: dict[str, list[Result]] = {program.name: [] for program in programs}
     failures: dict[str, str] = {}
     for number in range(1, arguments.rounds + 1):
+        task.seed = number - 1
         for program in programs:
             if program.name in failures:
                 continue
@@ -121,7 +123,7 @@ def benchmark(arguments: argparse.Namespace) -> None:
     print(
         f"\n{scene}, longer side {task.side} pixels, {task.iterations} iterations, at most {task.max_splats}"
         f" Gaussians, SH degree {task.sh_degree}; medians, rounds in turn: {arguments.rounds};"
-        f" held-out views: {len(held_out)}.\n"
+        f" held out: {', '.join(held_out)}; corrected: after each photo's own gain and offset.\n"
         f"{machine['processor']}, {machine['cores']} cores; {machine['device']}"
     )
     results = {
@@ -153,7 +155,8 @@ def main() -> int:
     parser.add_argument("--iterations", type=positive, default=1000)
     parser.add_argument("--max-splats", type=positive, default=10_000)
     parser.add_argument("--sh-degree", type=int, choices=range(4), default=3)
-    parser.add_argument("--rounds", type=positive, default=3)
+    parser.add_argument("--rounds", type=positive, default=3, help="each with another seed")
+    parser.add_argument("--hold", dest="held", choices=HELD, default="eighth", help="which photos are held out")
     parser.add_argument("--program", default="target/release/gs-chroma", help="gs-chroma")
     parser.add_argument("--brush", metavar="PROGRAM")
     parser.add_argument("--gsplat", metavar="COMMAND", help="Python and the path of simple_trainer.py")

@@ -26,6 +26,7 @@ class Result:
     training: float | None
     splats: float
     psnr: float
+    corrected_psnr: float
     ssim: float
 
 
@@ -51,6 +52,7 @@ def one_round(program: Program, renderer: Chroma, held_out: list[str], out: Path
         training=program.training(out),
         splats=splat_count(scene),
         psnr=statistics.mean(psnr(*pair) for pair in pairs),
+        corrected_psnr=statistics.mean(psnr(corrected(*pair), pair[1]) for pair in pairs),
         ssim=statistics.mean(ssim(*pair) for pair in pairs),
     )
 
@@ -74,6 +76,14 @@ def load(path: Path) -> np.ndarray:
 def psnr(image: np.ndarray, truth: np.ndarray) -> float:
     """In dB; 100 for pictures without a difference."""
     return -10 * float(np.log10(max(np.mean((image - truth) ** 2), 1e-10)))
+
+
+def corrected(image: np.ndarray, truth: np.ndarray) -> np.ndarray:
+    """The picture after the gain and offset that bring it closest to the photo."""
+    centered = image - image.mean()
+    variance = np.mean(centered**2)
+    gain = np.mean(centered * (truth - truth.mean())) / variance if variance > 0 else 1.0
+    return np.clip(gain * centered + truth.mean(), 0, 1)
 
 
 def ssim(image: np.ndarray, truth: np.ndarray) -> float:

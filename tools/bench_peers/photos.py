@@ -13,8 +13,12 @@ from bench_peers.colmap import Camera, Model, Shot, read_model
 from bench_peers.command import Problem
 from lab import RGB_TO_XYZ, decode, encode
 
-# Every how many photos by name one is held out: gs-chroma's habit, which `render --views test` follows.
+# Every how many photos by name one is held out: the habit of all programs.
 HOLDOUT_STEP = 8
+
+# Which photos are held out: every eighth, or the first and the last by name, the ends of an arc, beyond
+# which no photo that is trained on looks.
+HELD = ("eighth", "ends")
 
 # A photo's aspect may differ from its camera's by so much, as in gs-chroma.
 ASPECT_SLACK = 0.01
@@ -25,8 +29,13 @@ def to_gray(rgb: ArrayLike) -> np.ndarray:
     return np.rint(255 * encode(decode(np.asarray(rgb) / 255) @ RGB_TO_XYZ[1])).astype(np.uint8)
 
 
-def copy_gray(colmap: Path, gray: Path, side: int) -> list[str]:
-    """Writes the COLMAP folders `all` and `train` below `gray`; gives the held-out photos' names.
+def held_indices(count: int, held: str) -> set[int]:
+    """Which of so many photos by name are held out."""
+    return {0, count - 1} if held == "ends" else set(range(0, count, HOLDOUT_STEP))
+
+
+def copy_gray(colmap: Path, gray: Path, side: int, held: str) -> list[str]:
+    """Writes the COLMAP folders `all`, `train` and `held` below `gray`; gives the held-out photos' names.
 
     Photos are scaled to the size of their camera, and the camera before that to the longer side:
     a program that takes the camera's size for the photo's, or the other way round, is right too.
@@ -53,13 +62,15 @@ def copy_gray(colmap: Path, gray: Path, side: int) -> list[str]:
         Image.fromarray(to_gray(small)).convert("RGB").save(path)
         shots.append(shot)
 
-    held_out = [shot.name for shot in shots[::HOLDOUT_STEP]]
-    train = [shot for i, shot in enumerate(shots) if i % HOLDOUT_STEP != 0]
-    for shot in train:
-        path = gray / "train" / "images" / shot.name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(gray / "all" / "images" / shot.name, path)
+    indices = held_indices(len(shots), held)
+    held_out = [shot for i, shot in enumerate(shots) if i in indices]
+    train = [shot for i, shot in enumerate(shots) if i not in indices]
+    for name, some in (("train", train), ("held", held_out)):
+        for shot in some:
+            path = gray / name / "images" / shot.name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(gray / "all" / "images" / shot.name, path)
     colors = [(int(v),) * 3 for v in to_gray(model.colors)]
-    for name, some in (("all", shots), ("train", train)):
+    for name, some in (("all", shots), ("train", train), ("held", held_out)):
         Model(cameras, some, model.positions, colors).write(gray / name / "sparse" / "0")
-    return held_out
+    return [shot.name for shot in held_out]

@@ -26,6 +26,8 @@ class Task:
     iterations: int
     max_splats: int
     sh_degree: int
+    held: str
+    seed: int = 0
 
 
 class Program:
@@ -75,6 +77,7 @@ class Chroma(Program):
             *self.words, "fit", str(task.gray / "train"), "-o", str(out / "run"), "--no-holdout",
             "--iterations", str(task.iterations), "--max-side", str(task.side),
             "--max-splats", str(task.max_splats), "--sh-degree", str(task.sh_degree),
+            "--seed", str(task.seed),
         ]  # fmt: skip
 
     def scene(self, out: Path) -> Path:
@@ -85,8 +88,8 @@ class Chroma(Program):
 
     def render(self, scene: Path, views: Path) -> None:
         """Draws the held-out views of a splat file into a folder."""
-        whole = str(self.task.gray / "all")
-        command = [*self.words, "render", str(scene), "--colmap", whole, "--views", "test", "--luma"]
+        held = str(self.task.gray / "held")
+        command = [*self.words, "render", str(scene), "--colmap", held, "--views", "all", "--luma"]
         run([*command, "-o", str(views)], views.parent / "render")
 
     def report(self, out: Path) -> dict[str, Any]:
@@ -113,7 +116,7 @@ class Brush(Program):
             *self.words, str(task.gray / "train"), self.iterations, str(task.iterations),
             "--max-resolution", str(task.side), "--max-splats", str(task.max_splats),
             "--sh-degree", str(task.sh_degree), "--export-every", str(task.iterations),
-            "--export-path", str(out), "--export-name", "scene.ply",
+            "--export-path", str(out), "--export-name", "scene.ply", "--seed", str(task.seed),
         ]  # fmt: skip
 
     def training(self, out: Path) -> float | None:
@@ -129,6 +132,8 @@ class Gsplat(Program):
 
     def __init__(self, words: list[str], task: Task) -> None:
         super().__init__(words, task)
+        if task.held != "eighth":
+            raise Problem("gsplat's trainer holds out every eighth photo and no other")
         if not Path(words[-1]).is_file():
             raise Problem(f"{self.name}: no script {words[-1]}")
 
