@@ -17,6 +17,7 @@ mod interrupt;
 mod luma;
 mod network;
 mod next;
+mod partition;
 mod photos;
 mod plan;
 mod prepare;
@@ -55,6 +56,7 @@ enum Command {
     Auto(auto::Auto),
     Prepare(prepare::Prepare),
     Plan(plan::Plan),
+    Partition(partition::Partition),
     Fit(fit::Fit),
     Colorize(colorize::Colorize),
     Teacher(teacher::TeacherCommand),
@@ -85,6 +87,7 @@ impl Cli {
             Command::Auto(command) => command.run(),
             Command::Prepare(command) => command.run(),
             Command::Plan(command) => command.run(),
+            Command::Partition(command) => command.run(),
             Command::Fit(command) => command.run(),
             Command::Colorize(command) => command.run(),
             Command::Teacher(command) => command.run(),

@@ -12,7 +12,7 @@ mod table;
 mod timings;
 mod verdict;
 
-pub use contact_sheet::{Row, contact_sheet, to_image};
+pub use contact_sheet::{Row, contact_sheet, to_image, write_text};
 pub use effects::EffectReport;
 pub use evaluation::{
     BetweenScore, ConsistencyScore, EVALUATION_VERSION, Evaluation, LumaScore, Method,

@@ -25,6 +25,7 @@ mod lock;
 mod log;
 mod look;
 mod loss;
+mod partition;
 mod picture_names;
 mod plan;
 mod preset;
@@ -53,6 +54,7 @@ pub use info::info;
 pub use live::{Live, LiveScene, LiveState};
 pub use look::{Look, SceneKind};
 pub use loss::Loss;
+pub use partition::{PartitionOptions, partition};
 pub(crate) use picture_names::picture_names;
 pub use plan::{PlanOptions, Planned, plan};
 pub use preset::Work;
@@ -62,6 +64,7 @@ pub use teach::{TeachOptions, teacher_or_photos};
 
 pub use crate::luma::Preset;
 use crate::{
+    blocks::BlocksError,
     capture::CaptureError,
     chroma::{ChromaError, teacher::TeacherError},
     effects::Contradiction,
@@ -102,6 +105,9 @@ pub enum RunError {
         /// What is wrong with it and what to do.
         reason: String,
     },
+    /// Blocks of a scene.
+    #[error(transparent)]
+    Blocks(BlocksError),
     /// Training.
     #[error(transparent)]
     Luma(LumaError),
