@@ -23,6 +23,6 @@ pub use estimate::Estimate;
 pub use ground::Ground;
 pub use job::{Block, BlockFile, COARSE, JOB_VERSION, Job, Kind};
 pub use picture::picture;
-pub use plan::{Division, Planned, plan};
+pub use plan::{Division, FAR_PART, Planned, plan};
 pub use region::Region;
 pub use seen::Seen;

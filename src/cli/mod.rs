@@ -15,6 +15,7 @@ mod info;
 mod info_page;
 mod interrupt;
 mod luma;
+mod merge;
 mod network;
 mod next;
 mod partition;
@@ -25,6 +26,7 @@ mod printable;
 mod progress;
 mod remedy;
 mod render;
+mod seams;
 mod teacher;
 mod tradeoff;
 mod values;
@@ -58,6 +60,8 @@ enum Command {
     Plan(plan::Plan),
     Partition(partition::Partition),
     Fit(fit::Fit),
+    Merge(merge::Merge),
+    Seams(seams::SeamsCommand),
     Colorize(colorize::Colorize),
     Teacher(teacher::TeacherCommand),
     View(view::View),
@@ -89,6 +93,8 @@ impl Cli {
             Command::Plan(command) => command.run(),
             Command::Partition(command) => command.run(),
             Command::Fit(command) => command.run(),
+            Command::Merge(command) => command.run(),
+            Command::Seams(command) => command.run(),
             Command::Colorize(command) => command.run(),
             Command::Teacher(command) => command.run(),
             Command::View(command) => command.run(),

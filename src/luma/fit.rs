@@ -7,7 +7,7 @@ use std::{
 };
 
 use super::{
-    Checkpoint, CurvePoint, Demand, Goal, Keeper, LumaError, LumaProgress, LumaSettings,
+    Checkpoint, CurvePoint, Demand, Goal, Grows, Keeper, LumaError, LumaProgress, LumaSettings,
     LumaTrainer, NoKeeper, PlannedViews, TrialProgress,
     carve::carved,
     planned,
@@ -122,6 +122,8 @@ pub fn fit(
         goal: Goal::Fixed,
         tries: true,
         start: None,
+        exposures: None,
+        grows: None,
         watched: None,
     }
     .run(settings, observe)
@@ -143,6 +145,10 @@ pub struct Fit<'a> {
     pub tries: bool,
     /// Gaussians to start from instead of COLMAP's points.
     pub start: Option<&'a Splats>,
+    /// How bright all photos show the scene, where that is known and the plan simulates it.
+    pub exposures: Option<&'a [Exposure]>,
+    /// Where Gaussians may be split; everywhere by default.
+    pub grows: Option<Grows>,
     /// Views that are looked at on the way; a few of the held-out ones by default.
     pub watched: Option<(&'a Arc<Dataset>, Vec<usize>)>,
 }
@@ -179,6 +185,13 @@ impl Fit<'_> {
             Some(plan) => plan,
             None => self.plan(settings, observe)?,
         };
+        let plan = match self.exposures {
+            Some(exposures) if plan.has(Effect::Exposure) => Plan {
+                exposures: exposures.to_vec(),
+                ..plan
+            },
+            _ => plan,
+        };
         go_on(observe(LumaEvent::Plan(&plan)))?;
         let mut settings = LumaSettings {
             sh_degree: plan.sh_degree,
@@ -202,6 +215,7 @@ impl Fit<'_> {
         let raster = self.raster.clone();
         let gpu = raster.gpu.clone();
         let mut trainer = LumaTrainer::new(raster, settings, dataset.extent, &start, views)?;
+        trainer.grow_in(self.grows.clone());
         trainer.aim(match self.goal.seconds() {
             Some(limit) => self.goal.with_seconds(limit - preparing),
             None => self.goal,

@@ -3,7 +3,7 @@
 use std::{fs, path::Path};
 
 use super::super::{RunError, RunFolder};
-use super::{FitOptions, Init};
+use super::{BlockPlace, FitOptions, Init};
 use crate::effects::Overrules;
 
 impl FitOptions {
@@ -39,6 +39,7 @@ impl FitOptions {
             load: report.capture.load,
             measure_side: report.luma.measured_side,
             init: Some(Init::Run(folder, report.luma.iterations)),
+            block: BlockPlace::read(run)?,
             ..Self::new(
                 fs::canonicalize(&report.capture.path).unwrap_or(report.capture.path.into()),
             )
