@@ -80,23 +80,21 @@ pub fn partition(options: &PartitionOptions, observe: &mut Observer<'_>) -> Resu
 /// The folders of a former job's blocks, which nobody has begun to train.
 ///
 /// # Errors
-/// [`RunError::File`] where somebody has, or the folder holds something else.
+/// [`RunError::File`] where somebody has.
 fn replaceable(folder: &Path) -> Result<Vec<PathBuf>, RunError> {
-    let refused = |path: &Path, reason: &str| RunError::File {
-        path: path.to_owned(),
-        reason: format!("{reason}: choose another folder with -o, or remove it"),
-    };
     let mut blocks = Vec::new();
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let path = entry.path();
         let run = RunFolder::at(&path);
         if run.report().exists() || run.checkpoint().exists() {
-            return Err(refused(&path, "is trained, or being trained"));
+            return Err(RunError::File {
+                path,
+                reason: "is trained, or being trained: choose another folder with -o, or remove it"
+                    .to_owned(),
+            });
         }
         if BlockFile::path(&path).is_file() {
             blocks.push(path);
-        } else if ![Job::path(folder), folder.join(PICTURE)].contains(&path) {
-            return Err(refused(folder, "holds something else than a job"));
         }
     }
     Ok(blocks)
