@@ -74,3 +74,20 @@ impl LumaTrainer {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::raster::constants::{STAT_VIEWS, STATISTICS_PLANES};
+
+    #[test]
+    fn nothing_is_split_elsewhere() {
+        let mut geometry = vec![0.0; 2 * GEOMETRY_PLANES];
+        geometry[2 * PLANE_MEAN + 1] = 5.0;
+        let mut statistics = vec![3.0; 2 * STATISTICS_PLANES];
+        let grows: Grows = Arc::new(|[x, _, _]| x < 1.0);
+        calm(&geometry, &mut statistics, &grows);
+        assert_eq!(statistics[2 * STAT_PULL..][..2], [3.0, 0.0]);
+        assert_eq!(statistics[2 * STAT_VIEWS..][..2], [3.0; 2]);
+    }
+}

@@ -97,7 +97,8 @@ impl BlockPlace {
     }
 
     /// What the training starts from: points where the block is, and beyond them what the coarse
-    /// model has there, as far as the block's photos show it. None without a coarse model.
+    /// model has there, as far as the block's photos show it. None without a coarse model, which
+    /// is told.
     ///
     /// # Errors
     /// [`RunError`] of the coarse model's file.
@@ -114,10 +115,9 @@ impl BlockPlace {
             )));
             return Ok(None);
         };
-        let offset = dataset.capture.offset;
-        let (coarse, _) = read_splats(&path, Frame::World(offset), observe)?;
-        let coarse = coarse.to_luma();
-        let near = self.near(offset);
+        let frame = Frame::World(dataset.capture.offset);
+        let coarse = read_splats(&path, frame, observe)?.0.to_luma();
+        let near = self.near(dataset.capture.offset);
         let points: Vec<_> = (dataset.capture.points.iter())
             .map(|point| {
                 let rgb = point.color.map(|v| f64::from(v) / 255.0);
@@ -126,23 +126,20 @@ impl BlockPlace {
             })
             .filter(|&(position, _)| near.holds(position))
             .collect();
-        let mut start = initial_splats(&points, dataset.extent as f32, coarse.sh.degree);
+        let start = initial_splats(&points, dataset.extent as f32, coarse.sh.degree);
         let far = self.far(dataset, &coarse);
         let room = settings.max_splats / (1 + FAR_PART);
         let far = chosen(&coarse, &most_shown(dataset, &coarse, far, room));
         // Points give way, not the little that stands for all the rest.
         let room = settings.max_splats.saturating_sub(far.len()).max(1);
-        let count = start.len();
-        if count > room {
-            let kept: Vec<usize> = (0..room).map(|k| k * count / room).collect();
-            start = chosen(&start, &kept);
-        }
-        start.append(far);
+        let mut start = chosen(&start, &evenly(&start.means, room));
         observe(Event::Note(format!(
-            "starts from {} points in and around the block and {} Gaussians of the coarse model beyond",
+            "starts from {} of {} points in and around the block and {} Gaussians of the coarse model beyond",
+            start.len(),
             points.len(),
-            start.len() - count.min(room)
+            far.len()
         )));
+        start.append(far);
         Ok(Some(start))
     }
 
@@ -198,6 +195,27 @@ fn shows(camera: &Camera, middle: DVec3, deviation: f64) -> bool {
     at.z > 0.0
         && inside(camera.fx * at.x / at.z + camera.cx, camera.width)
         && inside(camera.fy * at.y / at.z + camera.cy, camera.height)
+}
+
+/// At most so many places: the same come first wherever there are more, so that blocks begin
+/// with the same Gaussians where they overlap.
+fn evenly(places: &[[f32; 3]], room: usize) -> Vec<usize> {
+    let mut order: Vec<(u64, usize)> = (places.iter().zip(0..))
+        .map(|(place, i)| {
+            let words = place.map(|c| u64::from(c.to_bits()));
+            let seed = words.iter().fold(0, |seed: u64, word| {
+                (seed ^ word)
+                    .wrapping_mul(0x9e37_79b9_7f4a_7c15)
+                    .rotate_left(29)
+            });
+            (fastrand::Rng::with_seed(seed).u64(..), i)
+        })
+        .collect();
+    order.sort_unstable();
+    order.truncate(room);
+    let mut kept: Vec<usize> = order.into_iter().map(|(_, i)| i).collect();
+    kept.sort_unstable();
+    kept
 }
 
 /// The folder of the job that a block's folder lies in.
@@ -264,5 +282,53 @@ fn decided(effects: &[EffectReport]) -> Overrules {
         with: named(true),
         without: named(false),
         sh_degree: None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DMat3;
+
+    use super::*;
+
+    #[test]
+    fn the_same_places_come_first() {
+        let mut random = fastrand::Rng::with_seed(3);
+        let places: Vec<[f32; 3]> = (0..400).map(|_| [0; 3].map(|_| random.f32())).collect();
+        let few = |all: &[[f32; 3]], room| -> Vec<[f32; 3]> {
+            evenly(all, room).into_iter().map(|i| all[i]).collect()
+        };
+        let (all, part) = (few(&places, 100), few(&places[..300], 90));
+        assert_eq!(
+            (all.len(), part.len(), few(&places, 900).len()),
+            (100, 90, 400)
+        );
+        // Of what both have, the part keeps what the whole keeps.
+        let shared: Vec<_> = all
+            .iter()
+            .filter(|place| places[..300].contains(place))
+            .collect();
+        assert!(
+            shared.len() > 60
+                && shared.iter().filter(|place| part.contains(place)).count()
+                    >= shared.len().min(90)
+        );
+    }
+
+    #[test]
+    fn a_camera_shows_the_edge_of_what_is_beside_its_picture() {
+        let camera = Camera {
+            width: 100,
+            height: 80,
+            fx: 100.0,
+            fy: 100.0,
+            cx: 50.0,
+            cy: 40.0,
+            rotation: DMat3::IDENTITY,
+            translation: DVec3::ZERO,
+        };
+        let beside = DVec3::new(6.0, 0.0, 10.0);
+        assert!(shows(&camera, beside, 0.5) && !shows(&camera, beside, 0.2));
+        assert!(!shows(&camera, -beside, 0.5));
     }
 }
