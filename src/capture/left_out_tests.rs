@@ -90,7 +90,7 @@ fn of_a_part_only_its_photos_and_what_they_show_are_read() {
         let capture = load(&part).unwrap();
         let views: Vec<&str> = capture.views.iter().map(|view| &*view.name).collect();
         assert_eq!(views, ["a.png", "left/a c.png"]);
-        // The second point is shown by the third photo alone.
+        // The second point is shown by another photo alone.
         assert_eq!(capture.points.len(), 1);
         assert_eq!(capture.points[0].track.len(), 1);
         let [missing] = &capture.rejected[..] else {

@@ -187,7 +187,7 @@ fn blocks_are_trained_and_put_together() {
         "{done:?}"
     );
     // A block goes on as any run does, with its own photos and exposures.
-    let on = fit(&place, "job/block-1");
+    let on = place.json(&["fit", "job/block-1", "--iterations", "40", "--json"]);
     assert_eq!(on["luma"]["iterations"], 80);
 }
 
