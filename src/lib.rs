@@ -3,7 +3,7 @@
 //! Imports go down only:
 //!
 //! ```text
-//! cli → auto → tradeoff, prepare, view → run → eval, frames, viewers → report, doctor → luma, chroma → effects, measure, trajectory → raster
+//! cli → auto → tradeoff, prepare, view → run → eval, frames, viewers, blocks → report, doctor → luma, chroma → effects, measure, trajectory → raster
 //! → capture, splats → gpu, color, sections, download, npy, programs, oracle, compare → disk, hash, input
 //! ```
 //!
@@ -46,6 +46,7 @@
 
 #[cfg(feature = "cli")]
 pub mod auto;
+pub mod blocks;
 pub mod capture;
 pub mod chroma;
 #[cfg(feature = "cli")]

@@ -11,7 +11,7 @@ use std::{
 
 use super::{
     Camera, Capture, CaptureError, LoadOptions, Loader, MaskSource, MaskUse, Masked, Normalize,
-    Photo, Rejected, Split, View, first_views, in_order, split,
+    Photo, Rejected, Split, View, first_views, in_order, split, split_as,
 };
 
 /// What is worth telling while a dataset is opened.
@@ -100,7 +100,10 @@ impl Dataset {
             .map(|view| loader.camera(view))
             .collect::<Result<_, _>>()?;
         Ok(Self {
-            split: split(&capture.views, options.holdout),
+            split: match &options.chosen {
+                Some(chosen) => split_as(&capture.views, chosen),
+                None => split(&capture.views, options.holdout),
+            },
             options: loader.options().clone(),
             cameras,
             masked_views: loader.masked_views(&capture.views),

@@ -1,7 +1,7 @@
 //! Photos that a capture does without, and cameras that no photo has.
 
 use super::fixtures::{Model, folder, load, load_files, write};
-use super::{Capture, CaptureOptions, Rejected};
+use super::{Capture, CaptureOptions, Chosen, Dataset, LoadOptions, Rejected};
 
 #[test]
 fn cameras_without_photos_do_not_matter() {
@@ -69,4 +69,60 @@ fn photos_that_are_not_wanted_are_left_out() {
     assert_eq!(capture.points[0].track.len(), 1);
     assert_eq!(capture.points[0].track[0].view, 0);
     assert!(capture.points[1].track.is_empty());
+}
+
+#[test]
+fn of_a_part_only_its_photos_and_what_they_show_are_read() {
+    let model = Model::example();
+    let names = |list: &[&str]| list.iter().map(|&name| name.to_owned()).collect();
+    let options = |train: &[&str], test: &[&str]| LoadOptions {
+        chosen: Some(Chosen {
+            train: names(train),
+            test: names(test),
+        }),
+        ..LoadOptions::default()
+    };
+    for (files, extension) in [(model.binary(), "bin"), (model.text(), "txt")] {
+        let dir = folder(&model);
+        write(dir.path(), "sparse/0", files, extension);
+        let load = |options: &LoadOptions| Capture::load_with(dir.path(), &options.capture());
+        let part = options(&["left/a c.png", "gone.png"], &["a.png"]);
+        let capture = load(&part).unwrap();
+        let views: Vec<&str> = capture.views.iter().map(|view| &*view.name).collect();
+        assert_eq!(views, ["a.png", "left/a c.png"]);
+        // The second point is shown by another photo alone.
+        assert_eq!(capture.points.len(), 1);
+        assert_eq!(capture.points[0].track.len(), 1);
+        let [missing] = &capture.rejected[..] else {
+            panic!("{:?}", capture.rejected)
+        };
+        assert!(missing.name == "gone.png" && missing.reason.contains("does not place"));
+        let dataset = Dataset::open(dir.path(), &part, &mut |_| {}).unwrap();
+        assert_eq!(
+            (dataset.split.train, dataset.split.test),
+            (vec![1], vec![0])
+        );
+        assert!(load(&options(&["gone.png"], &[])).is_err());
+    }
+}
+
+#[test]
+fn without_tracks_a_part_has_all_points() {
+    let mut model = Model::example();
+    model
+        .points
+        .iter_mut()
+        .for_each(|(_, _, track)| track.clear());
+    let dir = folder(&model);
+    write(dir.path(), "sparse/0", model.binary(), "bin");
+    let chosen = Chosen {
+        train: ["a.png".to_owned()].into(),
+        ..Chosen::default()
+    };
+    let options = CaptureOptions {
+        chosen: Some(chosen),
+        ..CaptureOptions::default()
+    };
+    let capture = Capture::load_with(dir.path(), &options).unwrap();
+    assert_eq!((capture.views.len(), capture.points.len()), (1, 2));
 }

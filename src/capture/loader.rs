@@ -69,7 +69,7 @@ impl Loader {
     /// If the masks that the options name are not there, a photo cannot be read, or
     /// photos whose values mean different things were to be normalized together.
     pub fn open(capture: &Capture, options: &LoadOptions) -> Result<Self, CaptureError> {
-        let masks = MaskFolder::open(capture, &options.masks)?;
+        let masks = MaskFolder::open(capture, &options.masks, options.chosen.is_some())?;
         let mut loader = Self::new(options.clone());
         let takes_alpha = masks.is_none() && options.masks != MaskSource::Off;
         let one_range = options.normalize != Normalize::Off;

@@ -37,12 +37,17 @@ pub struct Masked {
 }
 
 impl MaskFolder {
-    /// The folder that `source` names, if there is one.
+    /// The folder that `source` names, if there is one. `partial` captures may well have photos
+    /// without masks only.
     ///
     /// # Errors
     /// If a folder is named that is not there or holds the photos themselves, if
     /// it has no mask for any photo, or if nobody knows which photo a mask belongs to.
-    pub fn open(capture: &Capture, source: &MaskSource) -> Result<Option<Self>, CaptureError> {
+    pub fn open(
+        capture: &Capture,
+        source: &MaskSource,
+        partial: bool,
+    ) -> Result<Option<Self>, CaptureError> {
         let images = capture.root.join(IMAGES);
         let masks = match source {
             MaskSource::Off | MaskSource::Alpha => return Ok(None),
@@ -70,6 +75,9 @@ impl MaskFolder {
         for view in first_views(&capture.views) {
             photos += 1;
             masked += usize::from(files.of(&view.photo)?.is_some());
+        }
+        if masked == 0 && partial {
+            return Ok(None);
         }
         if same_folder(&masks, &images) || masked == 0 {
             return Err(CaptureError::NoMasks {

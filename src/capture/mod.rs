@@ -43,6 +43,7 @@ mod thumbnail_tests;
 #[cfg(test)]
 mod view_tests;
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DQuat, DVec3};
@@ -61,7 +62,7 @@ use lens::Undistortion;
 pub use loader::{Headers, Loader, Shrunk, first_views};
 pub use mask::Masked;
 pub use names::Ambiguous;
-pub use options::{Channel, Encoding, LoadOptions, MaskSource, MaskUse, Normalize};
+pub use options::{Channel, Chosen, Encoding, LoadOptions, MaskSource, MaskUse, Normalize};
 pub use order::view_at;
 pub use original::Original;
 pub use photo::Photo;
@@ -70,7 +71,7 @@ pub(crate) use plain::{
     Piece, PlainHeader, plain_header, plain_mask, plain_photo, plain_range, plain_values,
 };
 pub use resample::downscale;
-pub use split::{Split, split};
+pub use split::{Split, split, split_as};
 pub use unplaced::Unplaced;
 pub(crate) use unplaced::photos_in;
 
@@ -148,6 +149,8 @@ pub struct CaptureOptions {
     pub max_side: Option<u32>,
     /// Photos that are not to be used, and why.
     pub left_out: Vec<Rejected>,
+    /// The only photos that are to be used, where not all are.
+    pub chosen: Option<Chosen>,
 }
 
 /// A point that COLMAP triangulated.
@@ -229,7 +232,8 @@ impl Capture {
         if !photos.is_dir() {
             return Err(CaptureError::NoImagesFolder { dir: dir.into() });
         }
-        let model = colmap::read(dir)?;
+        let chosen = options.chosen.as_ref();
+        let model = colmap::read(dir, chosen)?;
         // Tracks know an image by its place in the file.
         let mut images: Vec<_> = model.images.into_iter().enumerate().collect();
         images.sort_by(|(_, a), (_, b)| a.name.cmp(&b.name));
@@ -252,7 +256,7 @@ impl Capture {
             .map(|(camera, used)| used.then(|| arranged(camera, &model.cameras_path, options)))
             .collect();
 
-        let (mut views, mut rejected) = (Vec::new(), Vec::new());
+        let (mut views, mut rejected) = (Vec::new(), not_placed(chosen, &images));
         let mut distortion: f64 = 0.0;
         // The first camera that cannot be.
         let mut impossible = None;
@@ -290,6 +294,7 @@ impl Capture {
                 Err(reason) => rejected.push(Rejected { name, reason }),
             }
         }
+        rejected.sort_by(|a, b| a.name.cmp(&b.name));
         if views.is_empty() {
             if let Some(Some(Err(error))) = impossible.map(|camera| cameras.swap_remove(camera)) {
                 return Err(error);
@@ -398,6 +403,24 @@ impl Capture {
         }
         self.offset = offset;
     }
+}
+
+/// Photos that were chosen and that the model does not place.
+fn not_placed(chosen: Option<&Chosen>, images: &[(usize, colmap::Image)]) -> Vec<Rejected> {
+    let placed: BTreeSet<&str> = images
+        .iter()
+        .map(|(_, image)| image.name.as_str())
+        .collect();
+    let wanted = chosen
+        .into_iter()
+        .flat_map(|chosen| chosen.train.union(&chosen.test));
+    let missing = wanted.filter(|name| !placed.contains(name.as_str()));
+    missing
+        .map(|name| Rejected {
+            name: name.clone(),
+            reason: "it was chosen, and the model does not place it".into(),
+        })
+        .collect()
 }
 
 /// The views that a camera's photos become.

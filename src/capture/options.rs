@@ -1,5 +1,6 @@
 //! What photos become when they are loaded.
 
+use std::collections::BTreeSet;
 use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -34,6 +35,9 @@ pub struct LoadOptions {
     /// Photos that are not used because they contradict the model, and how.
     #[serde(default)]
     pub left_out: Vec<Rejected>,
+    /// The photos of a part of the capture, where it is not all of it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub chosen: Option<Chosen>,
 }
 
 impl Default for LoadOptions {
@@ -49,6 +53,7 @@ impl Default for LoadOptions {
             masked: MaskUse::default(),
             force: false,
             left_out: Vec::new(),
+            chosen: None,
         }
     }
 }
@@ -60,7 +65,36 @@ impl LoadOptions {
             lens: self.lens,
             max_side: self.max_side,
             left_out: self.left_out.clone(),
+            chosen: self.chosen.clone(),
         }
+    }
+}
+
+/// Photos of a part of a capture, by their paths below `images/`; no other photo of it is used,
+/// and no point that none of these shows.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Chosen {
+    /// Those that are trained on.
+    pub train: BTreeSet<String>,
+    /// Those that are held out.
+    pub test: BTreeSet<String>,
+}
+
+impl Chosen {
+    /// Whether a photo is one of them.
+    pub fn has(&self, photo: &str) -> bool {
+        self.train.contains(photo) || self.test.contains(photo)
+    }
+
+    /// How many they are.
+    pub fn len(&self) -> usize {
+        self.train.len() + self.test.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
     }
 }
 
@@ -244,6 +278,7 @@ mod tests {
                 name: "a.png".into(),
                 reason: "turned".into(),
             }],
+            chosen: None,
         };
         let text = serde_json::to_string(&options).unwrap();
         assert_eq!(

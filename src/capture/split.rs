@@ -1,6 +1,6 @@
 //! Which views train and which test.
 
-use super::View;
+use super::{Chosen, View};
 
 /// Every how many views one is held out, as in the LLFF and Mip-NeRF 360 benchmarks.
 const HOLDOUT_STEP: usize = 8;
@@ -47,6 +47,13 @@ pub fn split(views: &[View], holdout: bool) -> Split {
         train: views(by_photo.train),
         test: views(by_photo.test),
     }
+}
+
+/// Splits views as it was chosen for their photos.
+pub fn split_as(views: &[View], chosen: &Chosen) -> Split {
+    let held_out = |&view: &usize| chosen.test.contains(&views[view].photo);
+    let (test, train) = (0..views.len()).partition(held_out);
+    Split { train, test }
 }
 
 fn split_photos(count: usize, holdout: bool) -> Split {

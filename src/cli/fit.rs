@@ -29,9 +29,10 @@ const CURVE_ROWS: usize = 8;
 /// Train geometry and luminance on a folder of photos with COLMAP poses.
 #[derive(Args)]
 pub struct Fit {
-    /// Folder with images/ and a COLMAP model (sparse/0, sparse or the folder itself), or a run
-    /// that is to go on: with its photos, effects and settings, for --iterations more.
-    #[arg(value_name = "COLMAP_DIR|RUN")]
+    /// Folder with images/ and a COLMAP model (sparse/0, sparse or the folder itself); a run
+    /// that is to go on, with its photos, effects and settings, for --iterations more; or a block
+    /// of a job of `partition`, or its coarse model.
+    #[arg(value_name = "COLMAP_DIR|RUN|BLOCK")]
     colmap_dir: PathBuf,
     /// Run folder to write [default: runs/<folder name>].
     #[arg(short, long, value_name = "RUN")]
@@ -118,15 +119,62 @@ impl Fit {
                     ..run
                 }
             }
-            None => FitOptions {
-                output: self.output,
-                preset: self.preset,
-                settings: overlay,
-                load,
-                overrules,
-                init: self.init.map(Init::File),
-                measure_side: self.measure_side,
-                ..FitOptions::new(self.colmap_dir)
+            None => match FitOptions::of_block(&self.colmap_dir)? {
+                Some(block) => {
+                    let photos = LoadOptions {
+                        max_side: None,
+                        ..load.clone()
+                    };
+                    let effects = Overrules {
+                        sh_degree: None,
+                        ..overrules.clone()
+                    };
+                    let asks = photos != LoadOptions::default() || effects != Overrules::default();
+                    if block.inherits() && asks {
+                        refuse(
+                            "a block has the photos' options and effects of its job's coarse model: give them to that",
+                        );
+                    }
+                    let inherited = block.inherits();
+                    FitOptions {
+                        output: self.output.or(block.output),
+                        preset: self.preset.or(block.preset),
+                        settings: Box::new(move |settings| {
+                            (block.settings)(settings);
+                            overlay(settings);
+                        }),
+                        load: match inherited {
+                            true => LoadOptions {
+                                max_side: load.max_side,
+                                ..block.load
+                            },
+                            false => LoadOptions {
+                                chosen: block.load.chosen,
+                                ..load
+                            },
+                        },
+                        overrules: match inherited {
+                            true => Overrules {
+                                sh_degree: overrules.sh_degree,
+                                ..block.overrules
+                            },
+                            false => overrules,
+                        },
+                        init: self.init.map(Init::File),
+                        measure_side: self.measure_side,
+                        ..block
+                    }
+                }
+                None => FitOptions {
+                    output: self.output,
+                    preset: self.preset,
+                    settings: overlay,
+                    load,
+                    overrules,
+                    init: self.init.map(Init::File),
+                    measure_side: self.measure_side,
+                    ..FitOptions::new(self.colmap_dir)
+                },
             },
         };
         let options = FitOptions {

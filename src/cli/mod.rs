@@ -15,8 +15,10 @@ mod info;
 mod info_page;
 mod interrupt;
 mod luma;
+mod merge;
 mod network;
 mod next;
+mod partition;
 mod photos;
 mod plan;
 mod prepare;
@@ -24,6 +26,7 @@ mod printable;
 mod progress;
 mod remedy;
 mod render;
+mod seams;
 mod teacher;
 mod tradeoff;
 mod values;
@@ -55,7 +58,10 @@ enum Command {
     Auto(auto::Auto),
     Prepare(prepare::Prepare),
     Plan(plan::Plan),
+    Partition(partition::Partition),
     Fit(fit::Fit),
+    Merge(merge::Merge),
+    Seams(seams::SeamsCommand),
     Colorize(colorize::Colorize),
     Teacher(teacher::TeacherCommand),
     View(view::View),
@@ -85,7 +91,10 @@ impl Cli {
             Command::Auto(command) => command.run(),
             Command::Prepare(command) => command.run(),
             Command::Plan(command) => command.run(),
+            Command::Partition(command) => command.run(),
             Command::Fit(command) => command.run(),
+            Command::Merge(command) => command.run(),
+            Command::Seams(command) => command.run(),
             Command::Colorize(command) => command.run(),
             Command::Teacher(command) => command.run(),
             Command::View(command) => command.run(),

@@ -7,7 +7,7 @@ use std::{
 };
 
 use super::{
-    Checkpoint, CurvePoint, Demand, Goal, Keeper, LumaError, LumaProgress, LumaSettings,
+    Checkpoint, CurvePoint, Demand, Goal, Grows, Keeper, LumaError, LumaProgress, LumaSettings,
     LumaTrainer, NoKeeper, PlannedViews, TrialProgress,
     carve::{carved, chosen},
     planned,
@@ -125,6 +125,8 @@ pub fn fit(
         tries: true,
         start: None,
         surroundings: 0,
+        exposures: None,
+        grows: None,
         watched: None,
     }
     .run(settings, observe)
@@ -148,6 +150,10 @@ pub struct Fit<'a> {
     pub start: Option<&'a Splats>,
     /// How many of these, the last ones, are surroundings that stay as they are.
     pub surroundings: usize,
+    /// How bright all photos show the scene, where that is known and the plan simulates it.
+    pub exposures: Option<&'a [Exposure]>,
+    /// Where Gaussians may be split; everywhere by default.
+    pub grows: Option<Grows>,
     /// Views that are looked at on the way; a few of the held-out ones by default.
     pub watched: Option<(&'a Arc<Dataset>, Vec<usize>)>,
 }
@@ -184,6 +190,13 @@ impl Fit<'_> {
             Some(plan) => plan,
             None => self.plan(settings, observe)?,
         };
+        let plan = match self.exposures {
+            Some(exposures) if plan.has(Effect::Exposure) => Plan {
+                exposures: exposures.to_vec(),
+                ..plan
+            },
+            _ => plan,
+        };
         go_on(observe(LumaEvent::Plan(&plan)))?;
         let mut settings = settings.clone().planned(&plan);
         let demand = self.fit_memory(&mut settings, &plan, observe)?;
@@ -200,6 +213,7 @@ impl Fit<'_> {
             Some(_) => trainer.surround_at_once(surroundings)?,
             None => trainer.surround(surroundings),
         }
+        trainer.grow_in(self.grows.clone());
         trainer.aim(match self.goal.seconds() {
             Some(limit) => self.goal.with_seconds(limit - preparing),
             None => self.goal,

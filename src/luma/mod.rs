@@ -43,6 +43,6 @@ pub use rehearsal::{frontal_camera, random_cloud, rehearse};
 pub use roofline::minimum_words;
 pub use schedule::Schedule;
 pub use settings::{Densification, LearningRates, LumaSettings, PAPER_ITERATIONS};
-pub use trainer::{Look, LumaProgress, LumaTrainer};
+pub use trainer::{Grows, Look, LumaProgress, LumaTrainer};
 pub use trial::{TrialProgress, planned};
 pub use view::{TrainingView, TrainingViews};

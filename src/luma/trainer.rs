@@ -15,6 +15,7 @@ mod rates;
 mod room;
 mod watch;
 
+pub use changes::Grows;
 pub use watch::Look;
 
 use std::{
@@ -105,6 +106,8 @@ pub struct LumaTrainer {
     seen: Load,
     /// Reports.
     reports: usize,
+    /// Where Gaussians may be split, if not everywhere.
+    grows: Option<Grows>,
     /// Iterations and seconds that an interrupted training had done.
     done: (usize, f64),
 }
@@ -190,6 +193,7 @@ impl LumaTrainer {
             surroundings: None,
             seen: Load::default(),
             reports: 0,
+            grows: None,
             done: (0, 0.0),
         })
     }
@@ -319,6 +323,12 @@ impl LumaTrainer {
     /// Trains towards `goal` instead of to the end of the schedule.
     pub fn aim(&mut self, goal: Goal) {
         self.goal = goal;
+    }
+
+    /// Splits Gaussians only where that is `true` of their centers; others are trained all the
+    /// same.
+    pub fn grow_in(&mut self, grows: Option<Grows>) {
+        self.grows = grows;
     }
 
     /// Trains by another schedule than that of its settings, with photos at half their size as

@@ -41,11 +41,11 @@ pub fn contact_sheet(headings: &[&str], rows: &[Row]) -> RgbImage {
     let mut sheet = RgbImage::from_pixel(width, height, PAPER);
     let left = |column: usize| GAP + column as u32 * (widest + GAP);
     for (column, heading) in headings.iter().enumerate() {
-        write(&mut sheet, [left(column), GAP], widest, scale, heading);
+        write_text(&mut sheet, [left(column), GAP], widest, scale, heading);
     }
     let mut y = GAP + line;
     for row in rows {
-        write(&mut sheet, [GAP, y], width - GAP, scale, &row.caption);
+        write_text(&mut sheet, [GAP, y], width - GAP, scale, &row.caption);
         y += line;
         for column in 0..headings.len() {
             let x = left(column);
@@ -57,7 +57,7 @@ pub fn contact_sheet(headings: &[&str], rows: &[Row]) -> RgbImage {
                     let empty = RgbImage::from_pixel(row.width, row.height, MISSING);
                     imageops::replace(&mut sheet, &empty, i64::from(x), i64::from(y));
                     let middle = y + row.height.saturating_sub(line) / 2;
-                    write(&mut sheet, [x + GAP, middle], row.width, scale, "none");
+                    write_text(&mut sheet, [x + GAP, middle], row.width, scale, "none");
                 }
             }
         }
@@ -67,7 +67,7 @@ pub fn contact_sheet(headings: &[&str], rows: &[Row]) -> RgbImage {
 }
 
 /// Writes a line of text from its top left corner on, as much as has room in `width` pixels.
-fn write(sheet: &mut RgbImage, [left, top]: [u32; 2], width: u32, scale: u32, text: &str) {
+pub fn write_text(sheet: &mut RgbImage, [left, top]: [u32; 2], width: u32, scale: u32, text: &str) {
     let room = (width / (CHARACTER * scale)) as usize;
     for (place, character) in (0..).zip(text.chars().take(room)) {
         let known = BASIC_LEGACY.get(character as usize);
@@ -131,7 +131,7 @@ mod tests {
         // Of what the font does not have, a question mark.
         let with = |caption: &str| {
             let mut sheet = RgbImage::from_pixel(20, 8, PAPER);
-            write(&mut sheet, [0, 0], 20, 1, caption);
+            write_text(&mut sheet, [0, 0], 20, 1, caption);
             sheet
         };
         assert_eq!(with("é1"), with("?1"));

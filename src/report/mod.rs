@@ -12,7 +12,7 @@ mod table;
 mod timings;
 mod verdict;
 
-pub use contact_sheet::{Row, contact_sheet, to_image};
+pub use contact_sheet::{Row, contact_sheet, to_image, write_text};
 pub use effects::EffectReport;
 pub use evaluation::{
     BetweenScore, ConsistencyScore, EVALUATION_VERSION, Evaluation, LumaScore, Method,
@@ -201,6 +201,11 @@ pub struct LumaQuality {
 }
 
 impl LumaQuality {
+    /// PSNR in dB whatever the photo's exposure, where that is known.
+    pub fn psnr_of_scene(&self) -> f64 {
+        self.corrected_psnr.unwrap_or(self.psnr)
+    }
+
     /// Both kinds of PSNR, in words.
     pub fn psnr_in_words(&self) -> String {
         let corrected = self.corrected_psnr.map_or(String::new(), |psnr| {

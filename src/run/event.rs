@@ -11,6 +11,8 @@ pub enum Stage {
     Device,
     /// Reading COLMAP's model, headers of photos and splat files.
     Model,
+    /// Dividing a scene into blocks.
+    Dividing,
     /// Looking at the range of the photos' values.
     Survey,
     /// Timing the device, where time is limited.
@@ -84,6 +86,7 @@ impl fmt::Display for Stage {
         f.pad(match self {
             Self::Device => "device",
             Self::Model => "model",
+            Self::Dividing => "dividing",
             Self::Survey => "survey",
             Self::Pace => "pace",
             Self::Photos => "photos",

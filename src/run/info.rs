@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use super::{
     Event, Observer, RunError, RunFolder, keeping,
     scene::tell_skipped,
-    sound::{check_model, tell_folder, tell_masks},
+    sound::{check_model, tell_headers, tell_masks, tell_unplaced},
 };
 use crate::{
     capture::{Camera, Capture, Headers, LoadOptions, Loader, Normalize, Rejected},
@@ -52,7 +52,8 @@ fn colmap_info(path: &Path, observe: &mut Observer<'_>) -> Result<Value, RunErro
     let loader = Loader::open(&capture, &options)?;
     let masked = loader.masked_views(views);
     let headers = Headers::read(views)?;
-    tell_folder(&capture, &headers, &mut observe)?;
+    tell_unplaced(&capture, &mut observe)?;
+    tell_headers(&headers, &mut observe);
     tell_masks(loader.masked(), &mut observe);
     // What size they will be worked on is the preset's to say.
     let cameras: Vec<Camera> = views.iter().map(|view| view.camera.clone()).collect();

@@ -25,11 +25,14 @@ mod lock;
 mod log;
 mod look;
 mod loss;
+mod merge;
+mod partition;
 mod picture_names;
 mod plan;
 mod preset;
 mod render;
 mod scene;
+mod seams;
 mod sound;
 mod stages;
 mod teach;
@@ -46,22 +49,26 @@ pub use event::{Event, Observer, Stage};
 pub use export::{ExportOptions, Exported, export};
 pub use export_viewer::Shown;
 pub use film::is_film;
-pub use fit::{AheadOptions, FitOptions, Init, Overlay, fit};
+pub use fit::{AheadOptions, BlockPlace, FitOptions, Init, Overlay, fit};
 pub use folder::RunFolder;
 pub use frames::{Frames, FramesOptions, frames};
 pub use info::info;
 pub use live::{Live, LiveScene, LiveState};
 pub use look::{Look, SceneKind};
 pub use loss::Loss;
+pub use merge::{MergeOptions, merge};
+pub use partition::{PartitionOptions, partition};
 pub(crate) use picture_names::picture_names;
 pub use plan::{PlanOptions, Planned, plan};
 pub use preset::Work;
 pub use render::{PathOptions, RenderOptions, Rendered, Views, Way, render, render_path};
+pub use seams::{PairMean, SeamColors, SeamViews, Seams, SeamsOptions, ViewMean, seams};
 pub use sound::Soundness;
 pub use teach::{TeachOptions, teacher_or_photos};
 
 pub use crate::luma::Preset;
 use crate::{
+    blocks::BlocksError,
     capture::CaptureError,
     chroma::{ChromaError, teacher::TeacherError},
     effects::Contradiction,
@@ -102,6 +109,9 @@ pub enum RunError {
         /// What is wrong with it and what to do.
         reason: String,
     },
+    /// Blocks of a scene.
+    #[error(transparent)]
+    Blocks(BlocksError),
     /// Training.
     #[error(transparent)]
     Luma(LumaError),

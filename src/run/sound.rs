@@ -143,8 +143,12 @@ fn open_judged(
     observe(Event::begins(Stage::Model));
     let mut dataset = scene::open(dir, options, observe)?;
     let headers = Headers::read(&dataset.capture.views)?;
-    tell_folder(&dataset.capture, &headers, observe)?;
-    tell_masks(dataset.masked(), observe);
+    tell_headers(&headers, observe);
+    // Of a part it is no news that there are more photos.
+    if dataset.options.chosen.is_none() {
+        tell_unplaced(&dataset.capture, observe)?;
+        tell_masks(dataset.masked(), observe);
+    }
     let model = check_model(&dataset.capture, &dataset.cameras, options.force, observe)?;
     model.mend(&mut dataset.capture);
     Ok((dataset, model))
@@ -327,22 +331,22 @@ fn unlike(
     }
 }
 
-/// Warns where few of the photos that are there are used, or small versions of them.
+/// Warns where few of the photos that are there are used.
 ///
 /// # Errors
 /// [`RunError::Capture`] if the model is gone.
-pub(super) fn tell_folder(
-    capture: &Capture,
-    headers: &Headers,
-    observe: &mut Observer<'_>,
-) -> Result<(), RunError> {
+pub(super) fn tell_unplaced(capture: &Capture, observe: &mut Observer<'_>) -> Result<(), RunError> {
     if let Some(unplaced) = Unplaced::of(capture)? {
         observe(Event::Warning(of_unplaced(&unplaced)));
     }
+    Ok(())
+}
+
+/// Warns where photos are small versions of what COLMAP saw.
+pub(super) fn tell_headers(headers: &Headers, observe: &mut Observer<'_>) {
     if let Some(shrunk) = &headers.shrunk {
         observe(Event::Warning(of_shrunk(shrunk)));
     }
-    Ok(())
 }
 
 /// Warns where only some of the photos have masks, or some masks no photo.

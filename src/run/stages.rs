@@ -2,8 +2,8 @@
 //! trial, is not among them.
 
 use super::{
-    ColorizeOptions, EvalOptions, ExportOptions, FitOptions, FramesOptions, PathOptions,
-    PlanOptions, RenderOptions,
+    ColorizeOptions, EvalOptions, ExportOptions, FitOptions, FramesOptions, MergeOptions,
+    PartitionOptions, PathOptions, PlanOptions, RenderOptions,
     Stage::{self, *},
 };
 use crate::{chroma, luma::Goal, splats::Format};
@@ -27,6 +27,20 @@ impl PlanOptions {
             Some(Photos),
             Some(Plan),
         ])
+    }
+}
+
+impl MergeOptions {
+    /// The stages of [`merge`](super::merge).
+    pub fn stages(&self) -> Vec<Stage> {
+        vec![Device, Model, Measuring, Saving]
+    }
+}
+
+impl PartitionOptions {
+    /// The stages of [`partition`](super::partition).
+    pub fn stages(&self) -> Vec<Stage> {
+        vec![Model, Dividing, Saving]
     }
 }
 

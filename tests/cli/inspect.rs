@@ -8,9 +8,22 @@ use super::scene;
 use super::shared::{place_with_run, place_with_scene};
 use super::splat_file::SplatFile;
 
-const COMMANDS: [&str; 12] = [
-    "auto", "prepare", "plan", "fit", "colorize", "frames", "eval", "render", "tradeoff", "export",
-    "info", "doctor",
+const COMMANDS: [&str; 15] = [
+    "auto",
+    "prepare",
+    "plan",
+    "fit",
+    "colorize",
+    "frames",
+    "eval",
+    "render",
+    "tradeoff",
+    "export",
+    "info",
+    "doctor",
+    "partition",
+    "merge",
+    "seams",
 ];
 
 #[test]

@@ -7,6 +7,7 @@ use gs_chroma::oracle;
 
 mod ahead;
 mod auto;
+mod blocks;
 mod checkup;
 mod coordinates;
 mod doctor;

@@ -9,7 +9,7 @@ const FLOORS: [&[&str]; 12] = [
     &["auto"],
     &["tradeoff", "prepare", "view"],
     &["run"],
-    &["eval", "frames", "viewers"],
+    &["eval", "frames", "viewers", "blocks"],
     &["report", "doctor"],
     &["luma", "chroma"],
     &["effects", "measure", "trajectory"],

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 
 use super::tracks::{Sighting, Sightings};
-use super::{Cameras, Image, Point, lens, relative_name};
+use super::{Cameras, Chosen, Image, Point, lens, relative_name};
 use crate::capture::error::{CaptureError, Position};
 use crate::capture::lens::{MOST_PARAMETERS, ModelName};
 use crate::input;
@@ -68,10 +68,11 @@ pub(super) fn cameras(path: &Path) -> Result<Cameras, CaptureError> {
 pub(super) fn images(
     path: &Path,
     cameras: &Cameras,
+    chosen: Option<&Chosen>,
 ) -> Result<(Vec<Image>, Sightings), CaptureError> {
     let mut records = Records::open(path, "image", SMALLEST_IMAGE)?;
     let mut images = Vec::with_capacity(records.capacity());
-    let mut sightings = Sightings::default();
+    let mut sightings = Sightings::of_all(chosen.is_none());
     while records.next_record() {
         let id = records.u32("the id")?;
         let quaternion = records.f64s("the quaternion")?;
@@ -95,6 +96,11 @@ pub(super) fn images(
                 });
             }
         }
+        if chosen.is_some_and(|chosen| !chosen.has(&name)) {
+            continue;
+        }
+        // Most 2D points may belong to none, and there are many images.
+        seen.shrink_to_fit();
         sightings.insert(id, images.len(), seen);
         images.push(Image {
             name,
@@ -109,18 +115,23 @@ pub(super) fn images(
 
 pub(super) fn points(path: &Path, sightings: &Sightings) -> Result<Vec<Point>, CaptureError> {
     let mut records = Records::open(path, "point", SMALLEST_POINT)?;
-    let mut points = Vec::with_capacity(records.capacity());
+    let mut points = Vec::new();
     while records.next_record() {
         let id = records.u64("the id")?;
         let position = DVec3::from(records.f64s::<3>("the position")?);
         let color = records.bytes("the color")?;
         records.f64("the error")?;
         let count = records.elements("the track's length", TRACK_ELEMENT, "track elements")?;
-        let mut track = Vec::new();
+        let mut track = Vec::with_capacity(sightings.room(count));
+        let mut shown = count == 0;
         for _ in 0..count {
             let image = records.u32("the track")?;
             let index = records.u32("the track")?;
+            shown |= sightings.has(image);
             track.extend(sightings.observation(id, image, index));
+        }
+        if !shown {
+            continue;
         }
         points.push(Point {
             position,

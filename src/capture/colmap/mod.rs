@@ -12,9 +12,9 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
-use super::Point;
 use super::error::CaptureError;
 use super::lens::{Lens, ModelName};
+use super::{Chosen, Point};
 
 /// What the three files of a model say.
 pub(super) struct Model {
@@ -64,17 +64,18 @@ struct Cameras {
 const MAX_SIDE: u64 = 1 << 20;
 
 /// Finds the model of a COLMAP folder and reads it: `sparse/0`, then `sparse`,
-/// then the folder itself; `.bin` before `.txt`.
-pub(super) fn read(root: &Path) -> Result<Model, CaptureError> {
+/// then the folder itself; `.bin` before `.txt`. Of images that were not chosen nothing is
+/// kept, nor of points that only these show.
+pub(super) fn read(root: &Path, chosen: Option<&Chosen>) -> Result<Model, CaptureError> {
     let (paths, extension) = find(root)?;
-    read_files(paths, extension)
+    read_files(paths, extension, chosen)
 }
 
 /// Reads the model in this very folder; none where there is no whole one.
 #[cfg(feature = "cli")]
 pub(super) fn read_in(dir: &Path) -> Result<Option<Model>, CaptureError> {
     match files_in(dir) {
-        Ok((paths, extension)) => read_files(paths, extension).map(Some),
+        Ok((paths, extension)) => read_files(paths, extension, None).map(Some),
         Err(_) => Ok(None),
     }
 }
@@ -134,14 +135,15 @@ fn files_in(dir: &Path) -> Result<Files, Option<CaptureError>> {
 fn read_files(
     [cameras_path, images_path, points_path]: [PathBuf; 3],
     extension: &str,
+    chosen: Option<&Chosen>,
 ) -> Result<Model, CaptureError> {
     let (cameras, images, points) = if extension == "bin" {
         let cameras = binary::cameras(&cameras_path)?;
-        let (images, sightings) = binary::images(&images_path, &cameras)?;
+        let (images, sightings) = binary::images(&images_path, &cameras, chosen)?;
         (cameras, images, binary::points(&points_path, &sightings)?)
     } else {
         let cameras = text::cameras(&cameras_path)?;
-        let (images, sightings) = text::images(&images_path, &cameras)?;
+        let (images, sightings) = text::images(&images_path, &cameras, chosen)?;
         (cameras, images, text::points(&points_path, &sightings)?)
     };
     Ok(Model {

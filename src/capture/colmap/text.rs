@@ -9,7 +9,7 @@ use std::str::{FromStr, SplitWhitespace};
 use glam::DVec3;
 
 use super::tracks::{Sighting, Sightings};
-use super::{Cameras, Image, Point, lens, relative_name};
+use super::{Cameras, Chosen, Image, Point, lens, relative_name};
 use crate::capture::error::{CaptureError, Position};
 use crate::capture::lens::{MOST_PARAMETERS, ModelName};
 use crate::input;
@@ -62,10 +62,11 @@ pub(super) fn cameras(path: &Path) -> Result<Cameras, CaptureError> {
 pub(super) fn images(
     path: &Path,
     cameras: &Cameras,
+    chosen: Option<&Chosen>,
 ) -> Result<(Vec<Image>, Sightings), CaptureError> {
     let mut lines = Lines::open(path, IMAGE)?;
     let mut images = Vec::new();
-    let mut sightings = Sightings::default();
+    let mut sightings = Sightings::of_all(chosen.is_none());
     while lines.next_record()? {
         let mut fields = lines.fields();
         let id = lines.field(&mut fields, "the id")?;
@@ -78,14 +79,6 @@ pub(super) fn images(
         // The name is the tenth field and may contain spaces.
         let name =
             relative_name(after_fields(&lines.line, 9)).map_err(|reason| lines.bad_name(reason))?;
-        let place = images.len();
-        images.push(Image {
-            name,
-            quaternion,
-            translation,
-            camera,
-        });
-
         // A file without the second lines would lose every other image.
         let seen = if lines.next_line()? {
             seen(&lines.line).ok_or_else(|| lines.malformed(
@@ -94,7 +87,16 @@ pub(super) fn images(
         } else {
             Vec::new()
         };
-        sightings.insert(id, place, seen);
+        if chosen.is_some_and(|chosen| !chosen.has(&name)) {
+            continue;
+        }
+        sightings.insert(id, images.len(), seen);
+        images.push(Image {
+            name,
+            quaternion,
+            translation,
+            camera,
+        });
     }
     Ok((images, sightings))
 }
@@ -144,10 +146,15 @@ pub(super) fn points(path: &Path, sightings: &Sightings) -> Result<Vec<Point>, C
         }
         lines.field::<f64>(&mut fields, "the error")?;
         let mut track = Vec::new();
+        let mut shown = fields.clone().next().is_none();
         while fields.clone().next().is_some() {
             let image = lines.field(&mut fields, "the track")?;
             let index = lines.field(&mut fields, "the track")?;
+            shown |= sightings.has(image);
             track.extend(sightings.observation(id, image, index));
+        }
+        if !shown {
+            continue;
         }
         points.push(Point {
             position,

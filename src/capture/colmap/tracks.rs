@@ -8,10 +8,11 @@ use crate::capture::Observation;
 ///
 /// Kept only while the points file is read. Most 2D points belong to none and
 /// are not held at all.
-#[derive(Default)]
 pub(super) struct Sightings {
     /// By COLMAP's id: the image's place in the file, its sightings by index.
     images: HashMap<u32, (usize, Vec<Sighting>)>,
+    /// Whether no image of the file was left out.
+    whole: bool,
 }
 
 /// A 2D point of an image that belongs to a 3D point.
@@ -25,6 +26,27 @@ pub(super) struct Sighting {
 }
 
 impl Sightings {
+    /// None yet, of the `whole` file or of a part of its images.
+    pub fn of_all(whole: bool) -> Self {
+        Self {
+            images: HashMap::new(),
+            whole,
+        }
+    }
+
+    /// Whether a point that this image shows is of use: in a whole file all are.
+    pub fn has(&self, image_id: u32) -> bool {
+        self.whole || self.images.contains_key(&image_id)
+    }
+
+    /// Observations to make room for where a track has so many elements.
+    pub fn room(&self, elements: u32) -> usize {
+        match self.whole {
+            true => elements as usize,
+            false => 0,
+        }
+    }
+
     /// Adds the image at `place` in the file; `sightings` ascend by index.
     pub fn insert(&mut self, image_id: u32, place: usize, sightings: Vec<Sighting>) {
         self.images.insert(image_id, (place, sightings));

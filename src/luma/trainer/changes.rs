@@ -1,5 +1,7 @@
 //! What changes between two iterations, beside the steps of Adam.
 
+use std::sync::Arc;
+
 use super::LumaTrainer;
 use crate::{
     gpu::{Buffer, GpuError},
@@ -9,15 +11,35 @@ use crate::{
         memory::ENTRIES_PER_SPLAT,
         outliers, relocation,
     },
+    raster::constants::{GEOMETRY_PLANES, PLANE_MEAN, STAT_PULL},
     splats::Splats,
 };
+
+/// Says of a place, in the training's coordinates, whether Gaussians may be split there.
+pub type Grows = Arc<dyn Fn([f32; 3]) -> bool + Send + Sync>;
+
+/// Lets nothing pull at Gaussians where none may be split.
+fn calm(geometry: &[f32], statistics: &mut [f32], grows: &Grows) {
+    let n = geometry.len() / GEOMETRY_PLANES;
+    for i in 0..n {
+        let place = [0, 1, 2].map(|axis| geometry[(PLANE_MEAN + axis) * n + i]);
+        if !grows(place) {
+            statistics[STAT_PULL * n + i] = 0.0;
+        }
+    }
+}
 
 impl LumaTrainer {
     /// Splits, moves and removes Gaussians.
     pub(super) fn densify(&mut self, iteration: usize) -> Result<(), GpuError> {
+        let geometry = self.model.geometry.planes.read(&self.gpu)?;
+        let mut statistics = self.workspace()?.statistics().read(&self.gpu)?;
+        if let Some(grows) = &self.grows {
+            calm(&geometry, &mut statistics, grows);
+        }
         let evidence = Evidence {
-            geometry: &self.model.geometry.planes.read(&self.gpu)?,
-            statistics: &self.workspace()?.statistics().read(&self.gpu)?,
+            geometry: &geometry,
+            statistics: &statistics,
             held: self.model.held,
             reserved: match self.is_surrounded() {
                 true => 0,
@@ -87,5 +109,22 @@ impl LumaTrainer {
         scene.masks(&*self.views, |view, mask| {
             photos.leave_out(gpu, view, &mask)
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::raster::constants::{STAT_VIEWS, STATISTICS_PLANES};
+
+    #[test]
+    fn nothing_is_split_elsewhere() {
+        let mut geometry = vec![0.0; 2 * GEOMETRY_PLANES];
+        geometry[2 * PLANE_MEAN + 1] = 5.0;
+        let mut statistics = vec![3.0; 2 * STATISTICS_PLANES];
+        let grows: Grows = Arc::new(|[x, _, _]| x < 1.0);
+        calm(&geometry, &mut statistics, &grows);
+        assert_eq!(statistics[2 * STAT_PULL..][..2], [3.0, 0.0]);
+        assert_eq!(statistics[2 * STAT_VIEWS..][..2], [3.0; 2]);
     }
 }

@@ -166,7 +166,11 @@ impl<'a> Family<'a> {
     /// # Errors
     /// [`RunError::Capture`].
     fn of(options: &'a FitOptions, max_side: Option<u32>) -> Result<Self, RunError> {
-        let capture = Capture::load_with(&options.colmap_dir, &CaptureOptions::default())?;
+        let of_photos = CaptureOptions {
+            chosen: options.load.chosen.clone(),
+            ..CaptureOptions::default()
+        };
+        let capture = Capture::load_with(&options.colmap_dir, &of_photos)?;
         let sizes = || capture.views.iter().map(|view| view.photo_size());
         let [width, height] = sizes().next().unwrap_or([1, 1]).map(f64::from);
         Ok(Self {

@@ -1,5 +1,7 @@
 //! Checkpoints of a training.
 
+use std::path::PathBuf;
+
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -88,11 +90,8 @@ pub(super) fn question(
     gpu: &Gpu,
     photos: &str,
 ) -> Result<Value, RunError> {
-    let init = options.init.as_ref().map(Init::path).map(|path| {
-        let sha256 = input::open(&path).and_then(hash::of_file);
-        sha256.map_err(files::at(&path))
-    });
-    Ok(serde_json::json!({
+    let init = options.init.as_ref().map(Init::path).map(sha256_of);
+    let mut question = serde_json::json!({
         "program": env!("CARGO_PKG_VERSION"),
         "device": gpu.describe(),
         "photos": photos,
@@ -103,7 +102,19 @@ pub(super) fn question(
         "goal": options.goal,
         "measure-side": options.measure_side,
         "init": init.transpose()?,
-    }))
+    });
+    if let Some(block) = &options.block {
+        let coarse = block.coarse().map(sha256_of).transpose()?;
+        question["block"] = serde_json::json!(block.plan());
+        question["coarse"] = serde_json::json!(coarse);
+    }
+    Ok(question)
+}
+
+/// The SHA-256 of a file.
+fn sha256_of(path: PathBuf) -> Result<String, RunError> {
+    let sha256 = input::open(&path).and_then(hash::of_file);
+    sha256.map_err(files::at(&path))
 }
 
 impl Keeper for FileKeeper<'_, Started> {

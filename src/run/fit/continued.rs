@@ -3,7 +3,7 @@
 use std::{fs, path::Path};
 
 use super::super::{RunError, RunFolder};
-use super::{FitOptions, Init};
+use super::{BlockPlace, FitOptions, Init};
 use crate::effects::Overrules;
 
 impl FitOptions {
@@ -43,6 +43,7 @@ impl FitOptions {
                 iterations: report.luma.iterations,
                 surroundings: report.luma.surroundings,
             }),
+            block: BlockPlace::read(run)?,
             ..Self::new(
                 fs::canonicalize(&report.capture.path).unwrap_or(report.capture.path.into()),
             )

@@ -1,6 +1,7 @@
 //! `fit`: photos to geometry and luma.
 
 mod ahead;
+mod block;
 mod budget;
 mod checkpoint;
 mod continued;
@@ -27,15 +28,16 @@ use crate::{
     gpu::Gpu,
     luma::{Goal, LumaSettings},
     raster::Raster,
-    report::{Report, contact_sheet},
-    splats::write_splats,
+    report::{Report, Row, contact_sheet},
+    splats::{Splats, write_splats},
 };
 use ahead::Ahead;
 pub use ahead::AheadOptions;
+pub use block::BlockPlace;
 use budget::Budget;
 use checkpoint::{found_in, question};
 pub(super) use report::capture_report;
-use training::{Job, Trained};
+use training::Job;
 
 /// Changes settings: what is asked for over what a preset or a time limit has chosen.
 pub type Overlay = Box<dyn Fn(&mut LumaSettings)>;
@@ -102,6 +104,8 @@ pub struct FitOptions {
     pub overrules: Overrules,
     /// Gaussians to start from.
     pub init: Option<Init>,
+    /// The block of a larger scene that it is.
+    pub block: Option<BlockPlace>,
     /// What is to end the run; seconds are those of all of it. A PSNR is that of the held-out
     /// views, or of some training views where none is held out.
     pub goal: Goal,
@@ -127,6 +131,7 @@ impl FitOptions {
             measure_side: None,
             overrules: Overrules::default(),
             init: None,
+            block: None,
             goal: Goal::Fixed,
             timings: false,
             ahead: AheadOptions::default(),
@@ -223,39 +228,56 @@ pub fn fit(
         ..job.report(budget.preset, &trained)
     };
     observe(Event::begins(Stage::Saving));
-    write(&folder, &trained, &report)?;
+    GrayFiles {
+        splats: &trained.scene.splats,
+        rows: &trained.rows,
+        log: &trained.log,
+        report: &report,
+    }
+    .write(&folder)?;
     match options.goal.psnr().and_then(|psnr| trained.misses(psnr)) {
         Some(error) => Err(error),
         None => Ok((folder, report)),
     }
 }
 
-/// Writes the run's files in the place of those of an earlier one.
-fn write(folder: &RunFolder, trained: &Trained, report: &Report) -> Result<(), RunError> {
-    let mut commit = Commit::new(folder.path())?;
-    // The old colors do not belong to the new geometry.
-    for stale in [
-        folder.color(),
-        folder.chroma(),
-        folder.evaluation(),
-        folder.checkpoint(),
-        folder.color_checkpoint(),
-    ] {
-        commit.remove(&stale);
+/// The files of a gray scene.
+pub(super) struct GrayFiles<'a> {
+    pub splats: &'a Splats,
+    /// Of the contact sheet.
+    pub rows: &'a [Row],
+    /// `log.csv`.
+    pub log: &'a str,
+    pub report: &'a Report,
+}
+
+impl GrayFiles<'_> {
+    /// Writes them in the place of those of an earlier run.
+    ///
+    /// # Errors
+    /// [`RunError::File`] and [`RunError::Splats`].
+    pub fn write(&self, folder: &RunFolder) -> Result<(), RunError> {
+        let mut commit = Commit::new(folder.path())?;
+        // The old colors do not belong to the new geometry.
+        for stale in [
+            folder.color(),
+            folder.chroma(),
+            folder.evaluation(),
+            folder.checkpoint(),
+            folder.color_checkpoint(),
+        ] {
+            commit.remove(&stale);
+        }
+        commit.remove_page(&folder.evaluation_page());
+        let drawn = self.report.luma.settings.raster_options();
+        let options = written_as(drawn, self.report.capture.offset.into());
+        write_splats(&commit.place(&folder.luma()), self.splats, &options)?;
+        let sheet = contact_sheet(&GRAY_COLUMNS, self.rows);
+        files::write_png(&commit.place(&folder.contact_sheet()), &sheet)?;
+        files::write(&commit.place(&folder.log()), self.log.as_bytes())?;
+        files::write(&commit.place(&folder.report()), &self.report.to_file())?;
+        commit.finish()
     }
-    commit.remove_page(&folder.evaluation_page());
-    let drawn = trained.scene.settings.raster_options();
-    let options = written_as(drawn, report.capture.offset.into());
-    write_splats(
-        &commit.place(&folder.luma()),
-        &trained.scene.splats,
-        &options,
-    )?;
-    let sheet = contact_sheet(&GRAY_COLUMNS, &trained.rows);
-    files::write_png(&commit.place(&folder.contact_sheet()), &sheet)?;
-    files::write(&commit.place(&folder.log()), trained.log.as_bytes())?;
-    files::write(&commit.place(&folder.report()), &report.to_file())?;
-    commit.finish()
 }
 
 /// The device; with `timed`, its dispatches are.

@@ -19,16 +19,16 @@ use super::super::{
     scene::{Frame, read_splats, tell_trial},
 };
 use super::{
-    FitOptions, Init,
+    BlockPlace, FitOptions, Init,
     budget::{Budget, ITERATIONS_MIN, WRITING},
     checkpoint::{FoundTraining, Started},
 };
 use crate::{
     capture::{CaptureError, Dataset, Exposure},
     effects::{Effect, Evidence},
-    eval::{Progress, Reference, gray_rows, mean_quality, measure_luma},
+    eval::{Progress, Reference, exposures, gray_rows, mean_quality, measure_luma},
     gpu::Gpu,
-    luma::{Fit, LumaEvent, LumaProgress, LumaScene},
+    luma::{Fit, Grows, LumaEvent, LumaProgress, LumaScene},
     raster::{Raster, RasterOptions},
     report::{KernelReport, LumaQuality, LumaView, PhotoReport, Row, kernel_reports},
 };
@@ -79,9 +79,9 @@ impl Trained {
     /// simulated; of some training views where none is held out.
     pub fn psnr(&self) -> Option<f64> {
         let exposed = self.scene.plan.has(Effect::Exposure);
-        let of = |quality: LumaQuality| {
-            let corrected = quality.corrected_psnr.filter(|_| exposed);
-            corrected.unwrap_or(quality.psnr)
+        let of = |quality: LumaQuality| match exposed {
+            true => quality.psnr_of_scene(),
+            false => quality.psnr,
         };
         let watched = || self.scene.curve.last().map(|point| point.psnr);
         self.held_out().map(of).or_else(watched)
@@ -178,6 +178,15 @@ impl Job<'_> {
             let splats = (path.as_path(), &splats.to_luma());
             tell_unlike(self.gpu, dataset, splats, *drawn, observe)?;
         }
+        let block = options.block.as_ref();
+        let placed = match (block, &init, found) {
+            // One that goes on has its Gaussians.
+            (Some(block), None, None) => block.start(dataset, settings, observe)?,
+            _ => None,
+        };
+        let told = block.and_then(BlockPlace::exposures);
+        let shared = told.map(|told| exposures(dataset, told));
+        let near = block.map(|block| block.near(dataset.capture.offset));
         let before = options.init.as_ref().map_or(0, Init::iterations);
         let seconds = options.goal.seconds();
         // Held-out views have to be seen as they are measured, where they are to be reached.
@@ -189,8 +198,16 @@ impl Job<'_> {
             overrules: &options.overrules,
             goal: limit.map_or(options.goal, |limit| options.goal.with_seconds(limit)),
             tries: seconds.is_none_or(|limit| limit >= TRIAL_FROM),
-            start: init.as_ref().map(|(_, splats, _)| splats),
-            surroundings: options.init.as_ref().map_or(0, Init::surroundings),
+            start: init
+                .as_ref()
+                .map(|(_, splats, _)| splats)
+                .or(placed.as_ref().map(|(splats, _)| splats)),
+            surroundings: match (&options.init, &placed) {
+                (Some(init), _) => init.surroundings(),
+                (None, placed) => placed.as_ref().map_or(0, |(_, around)| *around),
+            },
+            exposures: shared.as_deref(),
+            grows: near.map(|near| Arc::new(move |place| near.holds(place)) as Grows),
             watched: reaches.then(|| (self.judge, self.judge.split.test.clone())),
         };
         let log = RefCell::new(match (found, &options.init) {

@@ -1,0 +1,278 @@
+//! The ground cut into cells of about equal work.
+
+use std::{fmt, str::FromStr};
+
+use super::Area;
+
+/// Blocks of a job, at most.
+pub const MOST: usize = 4096;
+
+/// How many blocks there are to be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Blocks {
+    /// So many, each cut along its longer side.
+    Count(usize),
+    /// So many strips across the longer side of the ground, each cut into so many cells.
+    Grid([usize; 2]),
+}
+
+impl Blocks {
+    /// How many these are.
+    pub fn count(self) -> usize {
+        match self {
+            Self::Count(count) => count,
+            Self::Grid([strips, cells]) => strips * cells,
+        }
+    }
+}
+
+impl FromStr for Blocks {
+    type Err = String;
+
+    /// `4` or `2x3`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let number = |text: &str| text.parse().ok().filter(|n| (1..=MOST).contains(n));
+        let blocks = match text.split_once('x') {
+            None => number(text).map(Self::Count),
+            Some((strips, cells)) => number(strips)
+                .zip(number(cells))
+                .map(|(strips, cells)| Self::Grid([strips, cells])),
+        };
+        blocks
+            .filter(|blocks| blocks.count() <= MOST)
+            .ok_or_else(|| {
+                format!("must be a number such as 4 or a grid such as 2x3, at most {MOST} in all")
+            })
+    }
+}
+
+impl fmt::Display for Blocks {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Count(count) => write!(f, "{count}"),
+            Self::Grid([strips, cells]) => write!(f, "{strips}x{cells}"),
+        }
+    }
+}
+
+/// A cell, and the two that it is cut into.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Cell {
+    pub area: Area,
+    pub parts: Option<Box<[Cell; 2]>>,
+}
+
+/// What there is to do at places on the ground.
+pub(super) struct Work<'a> {
+    /// Along the two axes of the ground.
+    pub places: &'a [[f64; 2]],
+    /// How much there is at each.
+    pub weights: &'a [f32],
+}
+
+impl Work<'_> {
+    /// Cuts all of the ground.
+    pub fn cells(&self, blocks: Blocks) -> Cell {
+        let all: Vec<u32> = (0..self.places.len() as u32).collect();
+        self.cell(all, Area::EVERYWHERE, blocks)
+    }
+
+    fn cell(&self, mut here: Vec<u32>, area: Area, blocks: Blocks) -> Cell {
+        let whole = Cell { area, parts: None };
+        // Along which axis, into how many, and what becomes of the parts.
+        let (axis, count) = match blocks {
+            Blocks::Count(count) => (self.longer_side(&here), count),
+            Blocks::Grid([1, cells]) => (1, cells),
+            Blocks::Grid([strips, _]) => (0, strips),
+        };
+        if count < 2 || here.len() < 2 {
+            return whole;
+        }
+        let counts = [count / 2, count - count / 2];
+        let parts = counts.map(|part| match blocks {
+            Blocks::Count(_) => Blocks::Count(part),
+            Blocks::Grid([1, _]) => Blocks::Grid([1, part]),
+            Blocks::Grid([_, cells]) => Blocks::Grid([part, cells]),
+        });
+        let at = |i: u32| self.places[i as usize][axis];
+        here.sort_unstable_by(|&a, &b| at(a).total_cmp(&at(b)));
+        let Some(split) = self.split(&here, at, counts[0] as f64 / count as f64) else {
+            return whole;
+        };
+        let [below, above] = [at(here[split - 1]), at(here[split])];
+        let middle = 0.5 * (below + above);
+        // Two floats next to each other have none between them.
+        let edge = if middle > below { middle } else { above };
+        let rest = here.split_off(split);
+        let [low, high] = area.cut(axis, edge);
+        let cells = [
+            self.cell(here, low, parts[0]),
+            self.cell(rest, high, parts[1]),
+        ];
+        Cell {
+            area,
+            parts: Some(Box::new(cells)),
+        }
+    }
+
+    /// How many of the sorted places have a share of the work; none where all stand on one line.
+    fn split(&self, sorted: &[u32], at: impl Fn(u32) -> f64, share: f64) -> Option<usize> {
+        let weight = |&i: &u32| f64::from(self.weights[i as usize]);
+        let wanted = share * sorted.iter().map(weight).sum::<f64>();
+        let mut sum = 0.0;
+        let reached = sorted.iter().position(|i| {
+            sum += weight(i);
+            sum >= wanted
+        });
+        let reached = reached.unwrap_or(0) + 1;
+        // Equal places stay together.
+        let parts = |&k: &usize| at(sorted[k - 1]) < at(sorted[k]);
+        let after = (reached..sorted.len()).find(parts);
+        after.or_else(|| (1..reached.min(sorted.len())).rev().find(parts))
+    }
+
+    /// The axis along which places reach farther, the farthest hundredth at each end aside.
+    fn longer_side(&self, here: &[u32]) -> usize {
+        let length = |axis: usize| {
+            let mut values: Vec<f64> = (here.iter())
+                .map(|&i| self.places[i as usize][axis])
+                .collect();
+            let Some([least, most]) = ends(&mut values, 0.01) else {
+                return 0.0;
+            };
+            most - least
+        };
+        usize::from(length(1) > length(0))
+    }
+}
+
+/// Values below which, and above which, a share lies; none without values.
+pub(super) fn ends(values: &mut [f64], share: f64) -> Option<[f64; 2]> {
+    let last = values.len().checked_sub(1)?;
+    let mut at = |share: f64| {
+        let rank = (share * last as f64).round() as usize;
+        *values.select_nth_unstable_by(rank, f64::total_cmp).1
+    };
+    Some([at(share), at(1.0 - share)])
+}
+
+impl Cell {
+    /// The cells that are not cut, from the first to the last.
+    pub fn leaves(&self) -> Vec<Area> {
+        match &self.parts {
+            None => vec![self.area],
+            Some(parts) => parts.iter().flat_map(Self::leaves).collect(),
+        }
+    }
+
+    /// Joins the uncut cell that is number `leaf` with the one that it was cut from.
+    pub fn join(&mut self, leaf: usize) {
+        let Some(parts) = &mut self.parts else { return };
+        let first = parts[0].leaves().len();
+        let (part, leaf) = match leaf < first {
+            true => (0, leaf),
+            false => (1, leaf - first),
+        };
+        match parts[part].parts {
+            None => self.parts = None,
+            Some(_) => parts[part].join(leaf),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Places on a rectangle, denser on its left.
+    fn places() -> Vec<[f64; 2]> {
+        let mut random = fastrand::Rng::with_seed(4);
+        (0..4000)
+            .map(|_| [30.0 * random.f64().powi(2), 10.0 * random.f64()])
+            .collect()
+    }
+
+    fn counts(areas: &[Area], places: &[[f64; 2]]) -> Vec<usize> {
+        let held = |area: &Area| places.iter().filter(|&&p| area.holds(p)).count();
+        areas.iter().map(held).collect()
+    }
+
+    #[test]
+    fn cells_have_equal_work_and_cover_the_ground_once() {
+        let places = places();
+        let weights = vec![1.0; places.len()];
+        let work = Work {
+            places: &places,
+            weights: &weights,
+        };
+        for (text, cells) in [("1", 1), ("4", 4), ("5", 5), ("2x3", 6), ("3x1", 3)] {
+            let blocks: Blocks = text.parse().unwrap();
+            let areas = work.cells(blocks).leaves();
+            assert_eq!((areas.len(), blocks.to_string()), (cells, text.to_owned()));
+            let counts = counts(&areas, &places);
+            assert_eq!(counts.iter().sum::<usize>(), places.len());
+            let equal = places.len() / cells;
+            assert!(
+                counts.iter().all(|count| count.abs_diff(equal) <= cells),
+                "{counts:?}"
+            );
+            let far = [[-1e9, 1e9], [1e9, -1e9], [1e9, 1e9]];
+            for place in far {
+                assert_eq!(areas.iter().filter(|area| area.holds(place)).count(), 1);
+            }
+        }
+    }
+
+    #[test]
+    fn the_longer_side_is_cut_and_a_grid_is_cut_as_asked() {
+        let (places, weights) = (places(), vec![1.0; 4000]);
+        let work = Work {
+            places: &places,
+            weights: &weights,
+        };
+        let [left, right] = work.cells(Blocks::Count(2)).leaves()[..] else {
+            panic!("two");
+        };
+        assert!(left.0[0][1] == right.0[0][0] && left.0[1] == Area::EVERYWHERE.0[1]);
+        let rows = work.cells(Blocks::Grid([1, 2])).leaves();
+        assert!(rows[0].0[1][1] == rows[1].0[1][0]);
+    }
+
+    #[test]
+    fn places_in_one_spot_are_one_cell() {
+        let work = Work {
+            places: &[[1.0, 2.0]; 50],
+            weights: &[1.0; 50],
+        };
+        assert_eq!(work.cells(Blocks::Count(4)).leaves(), [Area::EVERYWHERE]);
+        let two = [[0.0, 0.0], [0.0, 0.0], [0.0, 0.0], [1.0, 0.0]];
+        let work = Work {
+            places: &two,
+            weights: &[1.0; 4],
+        };
+        assert_eq!(counts(&work.cells(Blocks::Count(2)).leaves(), &two), [3, 1]);
+    }
+
+    #[test]
+    fn a_cell_is_joined_with_its_neighbor() {
+        let (places, weights) = (places(), vec![1.0; 4000]);
+        let work = Work {
+            places: &places,
+            weights: &weights,
+        };
+        let mut cell = work.cells(Blocks::Count(4));
+        let four = cell.leaves();
+        cell.join(3);
+        let three = cell.leaves();
+        assert_eq!((three.len(), &three[..2]), (3, &four[..2]));
+        (0..3).for_each(|_| cell.join(0));
+        assert_eq!(cell.leaves(), [Area::EVERYWHERE]);
+    }
+
+    #[test]
+    fn numbers_of_blocks_are_checked() {
+        for text in ["0", "", "x", "2x", "2x0", "-1", "5000", "100x100", "2x2x2"] {
+            assert!(text.parse::<Blocks>().is_err(), "{text}");
+        }
+    }
+}

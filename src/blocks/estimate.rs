@@ -1,0 +1,41 @@
+//! What a training is expected to take.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{capture::Camera, luma::Demand};
+
+/// Of the time of an iteration, the part that does not depend on the number of Gaussians.
+/// Measured with docs/large-scenes.md's scene, in blocks and undivided.
+const FIXED: f64 = 0.5;
+
+/// What a training is expected to take.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Estimate {
+    /// Gaussians, at the end.
+    pub splats: usize,
+    /// Bytes of the device, at most.
+    pub memory: u64,
+    /// Time, against that of all photos with all Gaussians in one training of as many epochs.
+    pub time: f64,
+}
+
+impl Estimate {
+    /// For photos by these cameras, with harmonics of a degree; `share` is that of the whole
+    /// capture's photos, `whole` its Gaussians.
+    pub fn of<'a>(
+        cameras: impl Iterator<Item = &'a Camera>,
+        sh_degree: u32,
+        splats: usize,
+        share: f64,
+        whole: usize,
+    ) -> Self {
+        let demand = Demand::of(cameras, false, sh_degree, None);
+        let relative = splats as f64 / whole.max(1) as f64;
+        Self {
+            splats,
+            memory: demand.peak_bytes(splats),
+            time: share * (FIXED + (1.0 - FIXED) * relative),
+        }
+    }
+}

@@ -1,0 +1,196 @@
+//! The files of a job: `job.json` with the plan, and in each block's folder a `block.json` that
+//! makes it a folder for `fit`.
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
+
+use super::{Area, BlocksError, Estimate, Ground};
+use crate::{capture::Chosen, input};
+
+/// Version of both files' layout; raised when a key changes its meaning.
+pub const JOB_VERSION: u32 = 1;
+
+/// The folder of the coarse model.
+pub const COARSE: &str = "coarse";
+
+const JOB: &str = "job.json";
+const BLOCK: &str = "block.json";
+
+/// `job.json`: how a capture is divided.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Job {
+    /// [`JOB_VERSION`].
+    pub version: u32,
+    /// Version of the program.
+    pub program: String,
+    /// The COLMAP folder, absolute.
+    pub capture: PathBuf,
+    /// What the areas lie on.
+    pub ground: Ground,
+    /// How far blocks train beyond their own cells, as a share of a cell's length.
+    pub overlap: f64,
+    /// Photos with a pose.
+    pub photos: usize,
+    /// Those of them that are held out.
+    pub held_out: usize,
+    /// Triangulated points.
+    pub points: usize,
+    /// Where all but the farthest points lie on the ground.
+    pub bounds: Area,
+    /// The heights between which all but the farthest points lie, in world units along `up`.
+    pub heights: [f64; 2],
+    /// The whole scene in one training.
+    pub whole: Estimate,
+    /// The coarse model.
+    pub coarse: Estimate,
+    /// The blocks.
+    pub blocks: Vec<Block>,
+}
+
+/// What is planned of a block.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Block {
+    /// The name of its folder.
+    pub name: String,
+    /// The cell of which its Gaussians are kept.
+    pub core: Area,
+    /// The cell with its margin, on which it is trained.
+    pub near: Area,
+    /// Its photos.
+    pub photos: usize,
+    /// Those of them that are held out.
+    pub held_out: usize,
+    /// Points above its own cell.
+    pub points: usize,
+    /// What its training is expected to take.
+    pub estimate: Estimate,
+}
+
+/// What kind of training a folder of a job is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    /// All photos, small, with few Gaussians.
+    Coarse,
+    /// Those of a block.
+    Block,
+}
+
+/// `block.json`: what `fit` is to train on.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BlockFile {
+    /// [`JOB_VERSION`].
+    pub version: u32,
+    /// What it is for.
+    pub kind: Kind,
+    /// Its photos.
+    pub photos: Chosen,
+    /// Its Gaussians, at most, where that was asked for.
+    pub max_splats: Option<usize>,
+    /// Its iterations, where the preset's may be too few.
+    pub iterations: Option<usize>,
+}
+
+impl Job {
+    /// The file in a job's folder.
+    pub fn path(folder: &Path) -> PathBuf {
+        folder.join(JOB)
+    }
+
+    /// Reads that of a job's folder.
+    ///
+    /// # Errors
+    /// [`BlocksError::File`] where there is none, or it is damaged or of another version.
+    pub fn read(folder: &Path) -> Result<Self, BlocksError> {
+        let path = Self::path(folder);
+        if !path.is_file() {
+            return Err(BlocksError::File {
+                path: folder.to_owned(),
+                reason: "is no job: make one with `gs-chroma partition`".to_owned(),
+            });
+        }
+        let job: Self = read(&path)?;
+        let sound = !job.blocks.is_empty()
+            && (job.blocks.iter()).all(|block| {
+                let mut parts = Path::new(&block.name).components();
+                matches!(parts.next(), Some(std::path::Component::Normal(_)))
+                    && parts.next().is_none()
+            });
+        match sound {
+            true => Ok(job),
+            false => Err(damaged(&path, "its blocks have no names of folders")),
+        }
+    }
+
+    /// The bytes of the file.
+    pub fn to_file(&self) -> Vec<u8> {
+        to_file(self)
+    }
+
+    /// A block of this name.
+    pub fn block(&self, name: &str) -> Option<&Block> {
+        self.blocks.iter().find(|block| block.name == name)
+    }
+}
+
+impl BlockFile {
+    /// The file in a block's folder.
+    pub fn path(folder: &Path) -> PathBuf {
+        folder.join(BLOCK)
+    }
+
+    /// Reads that of a block's folder; none where the folder is no block's.
+    ///
+    /// # Errors
+    /// [`BlocksError::File`] where it is damaged or of another version.
+    pub fn read(folder: &Path) -> Result<Option<Self>, BlocksError> {
+        let path = Self::path(folder);
+        path.is_file().then(|| read(&path)).transpose()
+    }
+
+    /// The bytes of the file.
+    pub fn to_file(&self) -> Vec<u8> {
+        to_file(self)
+    }
+}
+
+fn to_file(value: &impl Serialize) -> Vec<u8> {
+    // Plain structs with string keys: serializing them cannot fail.
+    let text = serde_json::to_string_pretty(value).unwrap_or_default();
+    (text + "\n").into_bytes()
+}
+
+fn damaged(path: &Path, reason: &str) -> BlocksError {
+    BlocksError::File {
+        path: path.to_owned(),
+        reason: format!("damaged ({reason}): run `gs-chroma partition` again"),
+    }
+}
+
+/// What says which version the rest is of.
+#[derive(Deserialize)]
+struct Version {
+    version: u32,
+}
+
+fn read<T: DeserializeOwned>(path: &Path) -> Result<T, BlocksError> {
+    let text = input::read_to_string(path).map_err(|error| BlocksError::File {
+        path: path.to_owned(),
+        reason: error.to_string(),
+    })?;
+    let wrong = |error: serde_json::Error| damaged(path, &error.to_string());
+    let Version { version } = serde_json::from_str(&text).map_err(wrong)?;
+    if version != JOB_VERSION {
+        return Err(BlocksError::File {
+            path: path.to_owned(),
+            reason: format!(
+                "has version {version}, this program reads {JOB_VERSION}: run `gs-chroma partition` again"
+            ),
+        });
+    }
+    serde_json::from_str(&text).map_err(wrong)
+}

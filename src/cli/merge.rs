@@ -1,0 +1,41 @@
+//! `gs-chroma merge`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::{CliError, next, print, progress::Progress, seams::in_words};
+use crate::run::{MergeOptions, merge};
+
+/// Put the trained blocks of a job together, and measure the whole.
+#[derive(Args)]
+pub struct Merge {
+    /// Job folder of `partition` with trained blocks.
+    job: PathBuf,
+    /// Run folder to write [default: runs/<name of the job folder>].
+    #[arg(short, long, value_name = "RUN")]
+    output: Option<PathBuf>,
+    /// Print the report as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Merge {
+    pub(super) fn run(self) -> Result<(), CliError> {
+        let options = MergeOptions {
+            job: self.job,
+            output: self.output,
+        };
+        let mut progress = Progress::through(options.stages());
+        let (folder, report, seams) = merge(&options, &mut |event| progress.show(&event))?;
+        progress.finish();
+        if self.json {
+            return print(report.to_json());
+        }
+        print(report.luma_summary())?;
+        print(in_words(&seams))?;
+        let wrote = [folder.luma(), folder.contact_sheet()];
+        let wrote = wrote.each_ref().map(PathBuf::as_path);
+        progress.close_with(folder.path(), &wrote, &next::colorize(folder.path(), None))
+    }
+}

@@ -1,0 +1,343 @@
+//! `fit JOB/block-3`: a block of a larger scene, as its job has planned it.
+
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+
+use super::super::{
+    Event, Observer, RunError, RunFolder,
+    scene::{Frame, read_splats},
+};
+use super::FitOptions;
+use crate::{
+    blocks::{Area, Block, BlockFile, COARSE, FAR_PART, Job, Kind, Region},
+    capture::{Camera, Dataset, LoadOptions},
+    color::gray_from_rgb,
+    effects::{Effect, Overrules},
+    luma::{LumaSettings, Preset, carve::chosen},
+    report::{EffectReport, Report, ViewExposure},
+    splats::{Splats, initial_splats},
+};
+
+/// Effects that each block decides for itself: how far a lens displaces pixels depends on the
+/// photos' size, and harmonics of any degree can be put together.
+const OWN: [Effect; 2] = [Effect::Lens, Effect::LumaDegree];
+
+/// Heights above and below the scene's that still belong to it, as a share of its height.
+const HEADROOM: f64 = 0.5;
+
+/// A block and the job that it belongs to.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BlockPlace {
+    job: Job,
+    block: Block,
+    /// The coarse model, once it is trained.
+    coarse: Option<(RunFolder, Box<Report>)>,
+}
+
+impl BlockPlace {
+    /// That of a block's folder; none where it is no block's, or the coarse model's.
+    ///
+    /// # Errors
+    /// [`RunError::File`] where a file of the job is damaged.
+    pub fn read(folder: &Path) -> Result<Option<Self>, RunError> {
+        match BlockFile::read(folder)? {
+            Some(file) if file.kind == Kind::Block => {}
+            _ => return Ok(None),
+        }
+        let job = Job::read(&job_of(folder))?;
+        let name = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
+        let name = name.file_name().unwrap_or_default().to_string_lossy();
+        let Some(block) = job.block(&name).cloned() else {
+            return Err(RunError::File {
+                path: folder.to_owned(),
+                reason: "is no block of the job that it lies in: run `gs-chroma partition` again"
+                    .to_owned(),
+            });
+        };
+        let coarse = RunFolder::at(&job_of(folder).join(COARSE));
+        let coarse = match coarse.report().is_file() {
+            true => {
+                let report = Box::new(coarse.read_report()?);
+                Some((coarse, report))
+            }
+            false => None,
+        };
+        Ok(Some(Self { job, block, coarse }))
+    }
+
+    /// How bright the photos of all blocks show the scene; none where the coarse model is not
+    /// there.
+    pub(super) fn exposures(&self) -> Option<&[ViewExposure]> {
+        let (_, report) = self.coarse.as_ref()?;
+        Some(&report.luma.exposures)
+    }
+
+    /// What is planned of it.
+    pub(super) fn plan(&self) -> &Block {
+        &self.block
+    }
+
+    /// The coarse model's Gaussians.
+    pub(super) fn coarse(&self) -> Option<PathBuf> {
+        Some(self.coarse.as_ref()?.0.luma())
+    }
+
+    /// The part of the world on which the block is trained, in moved coordinates.
+    pub(super) fn near(&self, offset: DVec3) -> Region {
+        self.region(self.block.near, offset)
+    }
+
+    fn region(&self, area: Area, offset: DVec3) -> Region {
+        Region {
+            ground: self.job.ground,
+            area,
+            offset,
+        }
+    }
+
+    /// What the training starts from: points where the block is, beyond them what the coarse
+    /// model has there, as far as the block's photos show it, and its surroundings; and how many
+    /// these are. None without a coarse model, which is told.
+    ///
+    /// # Errors
+    /// [`RunError`] of the coarse model's file.
+    pub(super) fn start(
+        &self,
+        dataset: &Dataset,
+        settings: &LumaSettings,
+        observe: &mut Observer<'_>,
+    ) -> Result<Option<(Splats, usize)>, RunError> {
+        let Some((folder, report)) = &self.coarse else {
+            observe(Event::Warning(format!(
+                "{} is trained without a coarse model: background and brightness may differ between blocks; train {COARSE} first",
+                self.block.name
+            )));
+            return Ok(None);
+        };
+        let frame = Frame::World(dataset.capture.offset);
+        let coarse = read_splats(&folder.luma(), frame, observe)?.0.to_luma();
+        let inner = coarse.len().saturating_sub(report.luma.surroundings);
+        let [coarse, around] =
+            [0..inner, inner..coarse.len()].map(|some| chosen(&coarse, &some.collect::<Vec<_>>()));
+        let near = self.near(dataset.capture.offset);
+        let points: Vec<_> = (dataset.capture.points.iter())
+            .map(|point| {
+                let rgb = point.color.map(|v| f64::from(v) / 255.0);
+                let position = point.position.as_vec3().to_array();
+                (position, gray_from_rgb(rgb) as f32)
+            })
+            .filter(|&(position, _)| near.holds(position))
+            .collect();
+        let start = initial_splats(&points, dataset.extent as f32, coarse.sh.degree);
+        let far = self.far(dataset, &coarse);
+        let room = settings.max_splats / (1 + FAR_PART);
+        let far = chosen(&coarse, &most_shown(dataset, &coarse, far, room));
+        // Points give way, not the little that stands for all the rest.
+        let taken = far.len() + around.len();
+        let room = settings.max_splats.saturating_sub(taken).max(1);
+        let mut start = chosen(&start, &evenly(&start.means, room));
+        observe(Event::Note(format!(
+            "starts from {} of {} points in and around the block and {} Gaussians of the coarse model beyond",
+            start.len(),
+            points.len(),
+            far.len()
+        )));
+        start.append(far);
+        let surroundings = around.len();
+        start.append(around);
+        Ok(Some((start, surroundings)))
+    }
+
+    /// The coarse model's Gaussians beyond what the block's points stand for.
+    fn far(&self, dataset: &Dataset, coarse: &Splats) -> Vec<usize> {
+        let offset = dataset.capture.offset;
+        let (near, bounds) = (self.near(offset), self.region(self.job.bounds, offset));
+        let [lowest, highest] = self.job.heights;
+        let headroom = HEADROOM * (highest - lowest);
+        let is_far = |&i: &usize| {
+            let place = coarse.means[i];
+            let height = (self.job.ground).height(DVec3::from(place.map(f64::from)) + offset);
+            let level = (lowest - headroom..=highest + headroom).contains(&height);
+            !(level && near.holds(place) && bounds.holds(place))
+        };
+        (0..coarse.len()).filter(is_far).collect()
+    }
+}
+
+/// Those that photos of the dataset show, at most so many: the ones that show largest.
+fn most_shown(dataset: &Dataset, splats: &Splats, some: Vec<usize>, room: usize) -> Vec<usize> {
+    let opacities: Vec<f64> = splats.opacities().collect();
+    let mut shown: Vec<(f64, usize)> = (some.into_iter())
+        .map(|i| {
+            let place = DVec3::from(splats.means[i].map(f64::from));
+            let size = (splats.log_scales[i].iter()).map(|&s| f64::from(s).exp());
+            let size = size.fold(0.0, f64::max);
+            let of_views = dataset.cameras.iter().map(|camera| {
+                let depth = camera.depth(place);
+                // Its middle may lie outside of a picture that shows its edge.
+                match shows(camera, place, size) {
+                    true => opacities[i] * (camera.fx * size / depth).powi(2),
+                    false => 0.0,
+                }
+            });
+            (of_views.fold(0.0, f64::max), i)
+        })
+        .filter(|&(area, _)| area > 0.0)
+        .collect();
+    shown.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+    shown.truncate(room);
+    let mut kept: Vec<usize> = shown.into_iter().map(|(_, i)| i).collect();
+    kept.sort_unstable();
+    kept
+}
+
+/// Whether a camera shows anything of a ball: a little is shown of it up to three standard
+/// deviations from its middle.
+fn shows(camera: &Camera, middle: DVec3, deviation: f64) -> bool {
+    let at = camera.rotation * middle + camera.translation;
+    let margin = 3.0 * deviation * camera.fx.max(camera.fy) / at.z;
+    let inside = |pixel: f64, side: u32| pixel > -margin && pixel < f64::from(side) + margin;
+    at.z > 0.0
+        && inside(camera.fx * at.x / at.z + camera.cx, camera.width)
+        && inside(camera.fy * at.y / at.z + camera.cy, camera.height)
+}
+
+/// At most so many places: the same come first wherever there are more, so that blocks begin
+/// with the same Gaussians where they overlap.
+fn evenly(places: &[[f32; 3]], room: usize) -> Vec<usize> {
+    let mut order: Vec<(u64, usize)> = (places.iter().zip(0..))
+        .map(|(place, i)| {
+            let words = place.map(|c| u64::from(c.to_bits()));
+            let seed = words.iter().fold(0, |seed: u64, word| {
+                (seed ^ word)
+                    .wrapping_mul(0x9e37_79b9_7f4a_7c15)
+                    .rotate_left(29)
+            });
+            (fastrand::Rng::with_seed(seed).u64(..), i)
+        })
+        .collect();
+    order.sort_unstable();
+    order.truncate(room);
+    let mut kept: Vec<usize> = order.into_iter().map(|(_, i)| i).collect();
+    kept.sort_unstable();
+    kept
+}
+
+/// The folder of the job that a block's folder lies in.
+fn job_of(folder: &Path) -> PathBuf {
+    let folder = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
+    folder.parent().unwrap_or(&folder).to_owned()
+}
+
+impl FitOptions {
+    /// What trains a block of a job, or its coarse model, in its own folder; none where the
+    /// folder is neither. What the coarse model found out about photos, effects and exposures
+    /// holds for all blocks.
+    ///
+    /// # Errors
+    /// [`RunError::File`] where a file of the job is damaged.
+    pub fn of_block(folder: &Path) -> Result<Option<Self>, RunError> {
+        let Some(file) = BlockFile::read(folder)? else {
+            return Ok(None);
+        };
+        let job = Job::read(&job_of(folder))?;
+        let block = BlockPlace::read(folder)?;
+        let coarse = block.as_ref().and_then(|block| block.coarse.as_ref());
+        let (load, overrules) = match coarse {
+            Some((_, report)) => (report.capture.load.clone(), decided(&report.effects)),
+            None => Default::default(),
+        };
+        let (max_splats, iterations) = (file.max_splats, file.iterations);
+        // Those of the coarse model surround all blocks.
+        let surround = coarse.is_none();
+        Ok(Some(Self {
+            output: Some(folder.to_owned()),
+            preset: (file.kind == Kind::Coarse).then_some(Preset::Draft),
+            settings: Box::new(move |settings| {
+                settings.max_splats = max_splats.unwrap_or(settings.max_splats);
+                settings.surround &= surround;
+                if let Some(iterations) = iterations {
+                    settings.iterations = iterations;
+                }
+            }),
+            load: LoadOptions {
+                max_side: None,
+                chosen: Some(file.photos),
+                ..load
+            },
+            overrules,
+            block,
+            ..Self::new(job.capture)
+        }))
+    }
+
+    /// Whether photos, effects and exposures are those of a coarse model.
+    pub fn inherits(&self) -> bool {
+        (self.block.as_ref()).is_some_and(|block| block.coarse.is_some())
+    }
+}
+
+/// Effects as they were decided, those aside that are decided anew.
+fn decided(effects: &[EffectReport]) -> Overrules {
+    let named = |on| {
+        let of_kind = effects.iter().filter(|effect| effect.on == on);
+        of_kind
+            .map(|effect| effect.name)
+            .filter(|name| !OWN.contains(name))
+            .collect()
+    };
+    Overrules {
+        with: named(true),
+        without: named(false),
+        sh_degree: None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DMat3;
+
+    use super::*;
+
+    #[test]
+    fn the_same_places_come_first() {
+        let mut random = fastrand::Rng::with_seed(3);
+        let places: Vec<[f32; 3]> = (0..400).map(|_| [0; 3].map(|_| random.f32())).collect();
+        let few = |all: &[[f32; 3]], room| -> Vec<[f32; 3]> {
+            evenly(all, room).into_iter().map(|i| all[i]).collect()
+        };
+        let (all, part) = (few(&places, 100), few(&places[..300], 90));
+        assert_eq!(
+            (all.len(), part.len(), few(&places, 900).len()),
+            (100, 90, 400)
+        );
+        // Of what both have, the part keeps what the whole keeps.
+        let shared: Vec<_> = all
+            .iter()
+            .filter(|place| places[..300].contains(place))
+            .collect();
+        assert!(
+            shared.len() > 60
+                && shared.iter().filter(|place| part.contains(place)).count()
+                    >= shared.len().min(90)
+        );
+    }
+
+    #[test]
+    fn a_camera_shows_the_edge_of_what_is_beside_its_picture() {
+        let camera = Camera {
+            width: 100,
+            height: 80,
+            fx: 100.0,
+            fy: 100.0,
+            cx: 50.0,
+            cy: 40.0,
+            rotation: DMat3::IDENTITY,
+            translation: DVec3::ZERO,
+        };
+        let beside = DVec3::new(6.0, 0.0, 10.0);
+        assert!(shows(&camera, beside, 0.5) && !shows(&camera, beside, 0.2));
+        assert!(!shows(&camera, -beside, 0.5));
+    }
+}

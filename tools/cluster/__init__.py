@@ -1,0 +1,1 @@
+"""Blocks of a large scene on Ray."""
