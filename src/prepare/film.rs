@@ -272,7 +272,7 @@ fn choose_sharp(
     let film = Film::read(&state.path(".")).map_err(RunError::from)?;
     let film = film.ok_or_else(|| RunError::File {
         path: state.path(FILM),
-        reason: "is gone; begin anew with --force".to_owned(),
+        reason: "is gone; start over with --force".to_owned(),
     })?;
     let [numerator, denominator] = film.frame_rate.map(f64::from);
     let rate = numerator / denominator;
