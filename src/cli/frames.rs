@@ -82,7 +82,7 @@ fn summary(done: &Frames, teacher_alone: bool) -> String {
     }
     let carried = match done.carried {
         0 => String::new(),
-        count => format!("; {count} without a pose take their colors from their neighbors"),
+        count => format!("; {count} without a pose take colors from their neighbors"),
     };
     let painted = match done.painted {
         0 => String::new(),

@@ -108,7 +108,7 @@ impl Effect {
         }
     }
 
-    /// What it costs while it is on (docs/effects.md has the measurements).
+    /// What it costs while it is on (docs/lab/12-effects.md has the measurements).
     pub fn cost(self) -> &'static str {
         match self {
             Self::Lens => "nothing once photos are read",

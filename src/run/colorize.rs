@@ -273,7 +273,7 @@ pub fn colorize(
                 });
             }
             ColorizeEvent::Uncorrected { before, after } => observe(Event::Note(format!(
-                "brought into line, the teacher's views would disagree more ({:.0} % instead of {:.0} % of its colors' mean square): they are taken as they are",
+                "view correction is off: corrected, the teacher's views would disagree more ({:.0} % instead of {:.0} % of its colors' mean square)",
                 100.0 * after,
                 100.0 * before
             ))),

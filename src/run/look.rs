@@ -124,7 +124,7 @@ impl Look {
             Ok(dataset) => Some(dataset.caching(CACHE_BYTES)),
             Err(error) if colmap.is_none() => {
                 observe(Event::Warning(format!(
-                    "no cameras and photos: {error} (--colmap says where they are)"
+                    "no cameras and photos: {error} (name their folder with --colmap)"
                 )));
                 None
             }

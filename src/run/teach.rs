@@ -323,7 +323,7 @@ impl Teachers {
         for member in &mut self.teachers {
             if let Some(error) = member.teacher.unkept() {
                 observe(Event::Warning(format!(
-                    "the network's answers are not kept for another time: {error}"
+                    "the network's answers are not cached: {error}"
                 )));
             }
         }

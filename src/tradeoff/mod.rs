@@ -119,7 +119,7 @@ pub fn tradeoff(
     }
     if (state.sweep.points.iter()).all(|point| point.phase == Phase::Base) {
         observe(Event::Note(format!(
-            "nothing but the base fits into {:.0} minutes: the same command with a larger --budget continues from here",
+            "only the base fits into {:.0} minutes: the same command with a larger --budget continues from here",
             options.budget / 60.0
         )));
     }
