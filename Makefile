@@ -1,11 +1,12 @@
 # rustup puts cargo here, which is not on the PATH of every shell.
 export PATH := $(PATH):$(HOME)/.cargo/bin
 
-.PHONY: help setup viewers demo test
+.PHONY: help setup viewers demo test prose
 
 help:
 	@echo "make demo   install what is missing, then fit and color the bundled scene"
 	@echo "make test   install what is missing, then check format, lints and tests"
+	@echo "make prose  lint the documentation, if proselint is installed (pip install proselint)"
 	@echo "make viewers   install what make test then tests splat files with: Chromium, Node, viewers"
 
 setup:
@@ -31,3 +32,11 @@ test: setup
 	cargo clippy --release --all-targets -- -D warnings
 	cargo clippy --release --lib --no-default-features -- -D warnings
 	cargo test --release
+	@$(MAKE) --no-print-directory prose
+
+# Names and tables are no prose, nor is the style guide's list of words.
+PROSE = README.md $(shell find docs -name '*.md' -not -path 'docs/lab/*' -not -name hard-cases.md -not -name style.md)
+
+prose:
+	@if command -v proselint >/dev/null; then proselint check --config docs/proselint.json $(PROSE); \
+	else echo "proselint is not installed: prose is not linted"; fi

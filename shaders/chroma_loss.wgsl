@@ -30,7 +30,7 @@ struct ChromaLossWeights {
     teacher: f32,
     // Weight of the agreement with the coarser scale.
     agreement: f32,
-    // One over the residual at which the loss has all but levelled off; 0: never.
+    // One over the residual at which the loss has all but leveled off; 0: never.
     decline: f32,
     // Which correction is this view's.
     view_index: u32,

@@ -60,7 +60,7 @@ pub enum Step {
     Frames,
     /// A file for viewers.
     Export,
-    /// The page.
+    /// Measurements and their page.
     Eval,
 }
 

@@ -46,7 +46,7 @@ pub enum DownloadError {
     /// The connection failed or broke off, again and again.
     #[error("{host}: {reason}{}", kept(*.done))]
     Broken {
-        /// The host.
+        /// Name of the host.
         host: String,
         /// What the network said.
         reason: String,
@@ -112,7 +112,7 @@ pub enum DownloadError {
 fn kept(done: u64) -> String {
     match done {
         0 => String::new(),
-        _ => format!("; {done} bytes are kept, and the next try goes on from there"),
+        _ => format!("; {done} bytes are kept, and the next try continues from there"),
     }
 }
 

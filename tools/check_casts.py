@@ -8,7 +8,7 @@ saturation and cast of those in training, and that mean is not the truth. For ea
 (default ../shared/data) this gives the held-out photos that mean, and takes their a/b error. To what is
 expected of ours is added, as if the two were independent, what is left with the photos themselves
 as teacher; that, and what ours and RGB splats reached, is read from the table that
-check_color.py printed into RESULTS (default docs/results.md). An estimate, no bound: another method may
+check_color.py printed into RESULTS (default docs/lab/09-colors.md). An estimate, no bound: another method may
 err less on the photos themselves. Prints it beside what was reached, and draws it as a share of the teacher's own error for several strengths of the casts and
 many draws of them. No scene is trained. Needs numpy, Pillow and matplotlib.
 """
@@ -136,7 +136,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--svg", type=Path, required=True)
     parser.add_argument("--data", type=Path, default=Path("../shared/data"))
-    parser.add_argument("--results", type=Path, default=Path("docs/results.md"))
+    parser.add_argument("--results", type=Path, default=Path("docs/lab/09-colors.md"))
     parser.add_argument("--seeds", type=int, default=20)
     arguments = parser.parse_args()
     print("| scene | the mean view | expected of ours | ours | / teacher's: expected, ours (≤ 0.4) | / RGB splats': expected, ours (≤ 0.6) |")

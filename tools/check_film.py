@@ -98,7 +98,7 @@ def moved(picture: np.ndarray, place: np.ndarray) -> np.ndarray:
 
 
 def restored(program: str, film: Path, teacher: str, out: Path, flags: list[str]) -> dict:
-    """All steps of docs/guide-film.md; prints their seconds and gives what they tell."""
+    """All steps of docs/guides/old-film.md; prints their seconds and gives what they tell."""
     house, fitted = str(out / "house"), str(out / "run")
     asked = [fitted, "--teacher", teacher]
     steps = {

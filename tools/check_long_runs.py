@@ -7,7 +7,7 @@ where it was best on the way.
 
 Without `--iterations` a preset may end earlier, where its curve is flat.
 
-A training that falls far below its best was harmed by its own schedule, or has learnt its
+A training that falls far below its best was harmed by its own schedule, or has learned its
 photos instead of the scene: the loss on the photos in training, low or not, tells which.
 """
 

@@ -1,5 +1,5 @@
 """Draws the fronts of several sweeps beside each other and prints what each knob costs, and the
-combinations that lie on a front: docs/images/fronts.svg and the tables of docs/accuracy-and-time.md.
+combinations that lie on a front: docs/images/fronts.svg and the tables of docs/lab/04-presets.md.
 
     gs-chroma tradeoff SCENE -o runs/SCENE-tradeoff          # for each scene
     python3 tools/plot_fronts.py runs/*-tradeoff/tradeoff.csv -o docs/images/fronts.svg

@@ -125,7 +125,7 @@ fn check_bytes(header: Header, file: usize) -> Result<u64, String> {
 }
 
 fn png(decoder: Box<dyn ImageDecoder>) -> Result<DynamicImage, String> {
-    let unreadable = |e| format!("cannot be decoded ({e}); save it anew");
+    let unreadable = |e| format!("cannot be decoded ({e}); save it again");
     DynamicImage::from_decoder(decoder).map_err(unreadable)
 }
 
@@ -156,7 +156,7 @@ fn open(mut bytes: Box<dyn Bytes>) -> Result<(Header, Source), String> {
     };
     let decoder = ImageReader::with_format(bytes, format)
         .into_decoder()
-        .map_err(|error| format!("cannot be decoded ({error}); save it anew"))?;
+        .map_err(|error| format!("cannot be decoded ({error}); save it again"))?;
     let (width, height) = decoder.dimensions();
     let color = decoder.color_type();
     let header = Header {
@@ -222,7 +222,7 @@ fn picture_of(header: Header, samples: Samples) -> Result<DynamicImage, String> 
             return picture_of(header, Samples::Sixteen(values));
         }
     };
-    picture.ok_or_else(|| "has fewer samples than its size needs; save it anew".into())
+    picture.ok_or_else(|| "has fewer samples than its size needs; save it again".into())
 }
 
 /// The structure of a file that is a JPEG; else what is wrong with it.

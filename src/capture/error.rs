@@ -64,7 +64,7 @@ pub enum CaptureError {
     /// The operating system could not read a file.
     #[error("{path}: cannot be read: {source}")]
     Read {
-        /// The file.
+        /// File at fault.
         path: PathBuf,
         /// What the operating system says.
         source: io::Error,
@@ -72,7 +72,7 @@ pub enum CaptureError {
     /// A model file contradicts COLMAP's format.
     #[error("{path}: {record}, {position}: {reason}; export the model from COLMAP again")]
     Malformed {
-        /// The file.
+        /// File at fault.
         path: PathBuf,
         /// The record, such as `image 3 of 12`.
         record: String,
@@ -109,7 +109,7 @@ pub enum CaptureError {
     },
     /// A camera's calibration cannot be a lens's.
     #[error(
-        "{path}: camera {camera_id}, {model}: {reason}; calibrate it anew, or run COLMAP's image_undistorter and give the output folder"
+        "{path}: camera {camera_id}, {model}: {reason}; calibrate it again, or run COLMAP's image_undistorter and give the output folder"
     )]
     Lens {
         /// The cameras file.
@@ -168,7 +168,7 @@ pub enum CaptureError {
     /// A photo or a mask cannot be decoded.
     #[error("{path}: {reason}")]
     Photo {
-        /// The file.
+        /// File at fault.
         path: PathBuf,
         /// What is wrong and what helps.
         reason: String,
@@ -179,7 +179,7 @@ pub enum CaptureError {
         .photo[0], .photo[1], .camera[0], .camera[1]
     )]
     PhotoSize {
-        /// The photo.
+        /// Photo at fault.
         path: PathBuf,
         /// Its width and height.
         photo: [u32; 2],
@@ -203,7 +203,7 @@ pub enum CaptureError {
     /// The folder of masks is not there.
     #[error("{dir}: no such folder of masks")]
     NoMaskFolder {
-        /// The folder.
+        /// Folder at fault.
         dir: PathBuf,
     },
     /// No mask has the name of a photo.
@@ -220,11 +220,11 @@ pub enum CaptureError {
         .mask[0], .mask[1], .size[0], .size[1]
     )]
     MaskSize {
-        /// The mask.
+        /// Mask at fault.
         path: PathBuf,
         /// Its width and height.
         mask: [u32; 2],
-        /// The photo.
+        /// Photo at fault.
         photo: PathBuf,
         /// The photo's width and height.
         size: [u32; 2],
@@ -232,7 +232,7 @@ pub enum CaptureError {
     /// What is said of a capture's film cannot be.
     #[error("{path}: {reason}; prepare the film again")]
     Film {
-        /// The file.
+        /// File at fault.
         path: PathBuf,
         /// What is wrong.
         reason: String,
@@ -243,7 +243,7 @@ pub enum CaptureError {
     /// Nothing of a photo is left.
     #[error("{path}: {reason}; mend it, or remove the photo with COLMAP's image_deleter")]
     NothingCounts {
-        /// The photo.
+        /// Photo at fault.
         path: PathBuf,
         /// What leaves nothing of it.
         reason: String,

@@ -4,7 +4,7 @@
 /// in [0, 1], as far as black and white allow.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Exposure {
-    /// Positive.
+    /// Factor on luma, above 0.
     pub gain: f64,
     /// In gray.
     pub offset: f64,

@@ -89,7 +89,7 @@ pub(super) fn decode(file: &[u8], frame: &Frame) -> Result<DynamicImage, String>
 }
 
 fn pixels(file: &[u8], strict: bool) -> Result<DynamicImage, String> {
-    let unreadable = |error| format!("cannot be decoded ({error}); save it anew");
+    let unreadable = |error| format!("cannot be decoded ({error}); save it again");
     let options = DecoderOptions::default()
         .set_strict_mode(strict)
         .set_max_width(usize::MAX)
@@ -111,7 +111,7 @@ fn pixels(file: &[u8], strict: bool) -> Result<DynamicImage, String> {
         true => GrayImage::from_raw(width, height, values).map(DynamicImage::from),
         false => RgbImage::from_raw(width, height, values).map(DynamicImage::from),
     };
-    picture.ok_or_else(|| "has fewer pixels than its size needs; save it anew".to_owned())
+    picture.ok_or_else(|| "has fewer pixels than its size needs; save it again".to_owned())
 }
 
 #[cfg(test)]

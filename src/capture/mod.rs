@@ -89,7 +89,7 @@ const LARGEST_COORDINATE: f64 = 1e12;
 
 /// Recenter when the cameras are farther from the origin than this many
 /// extents: f32 then has less than 2⁻²⁴ · 100 ≈ 6e-6 of the extent as its step.
-const RECENTRE_EXTENTS: f64 = 100.0;
+const RECENTER_EXTENTS: f64 = 100.0;
 
 /// What 3DGS multiplies the cameras' radius by for the scene's extent.
 const EXTENT_MARGIN: f64 = 1.1;
@@ -134,7 +134,7 @@ pub enum Choice {
     Auto,
     /// Wherever it has any effect.
     On,
-    /// Never.
+    /// Distortion is kept.
     Off,
 }
 
@@ -391,7 +391,7 @@ impl Capture {
     /// to the origin while they are still f64.
     fn recenter(&mut self) {
         let center = self.center();
-        if center.length() <= RECENTRE_EXTENTS * self.extent() {
+        if center.length() <= RECENTER_EXTENTS * self.extent() {
             return;
         }
         let offset = center.round();

@@ -107,9 +107,9 @@ pub enum Channel {
     Luma,
     /// Red. Infra-red cameras with a filter leave their signal in one channel.
     R,
-    /// Green.
+    /// The green channel.
     G,
-    /// Blue.
+    /// The blue channel.
     B,
 }
 
@@ -200,7 +200,7 @@ pub enum MaskSource {
     Beside,
     /// In the photos' transparency.
     Alpha,
-    /// Nowhere.
+    /// No masks.
     Off,
     /// In this folder.
     Folder(PathBuf),

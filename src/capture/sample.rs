@@ -14,7 +14,7 @@ pub(super) enum Depth {
     Eight,
     /// Whole numbers from 0 to 65,535.
     Sixteen,
-    /// Floats.
+    /// IEEE floats.
     Float,
 }
 

@@ -119,11 +119,11 @@ pub(super) fn samples(decoder: &mut Decoder, header: Header) -> Result<Samples, 
     };
     let [width, height] = header.size.map(|side| side as usize);
     if count != width * height * header.channels {
-        return Err("has fewer samples than its size needs; save it anew".into());
+        return Err("has fewer samples than its size needs; save it again".into());
     }
     Ok(samples)
 }
 
 fn unreadable(error: tiff::TiffError) -> String {
-    format!("cannot be decoded ({error}); save it anew")
+    format!("cannot be decoded ({error}); save it again")
 }

@@ -30,7 +30,7 @@ pub struct Colored {
     pub settings: ChromaSettings,
     /// Which effects were reckoned with, and why.
     pub effects: [Decision; 2],
-    /// Views that colors were learnt from and that a teacher colored or that have strokes.
+    /// Views that colors were learned from and that a teacher colored or that have strokes.
     pub colored_views: usize,
     /// Share of the Gaussians that no colored view shows to speak of; see [`Solved`](super::Solved).
     pub unseen: Option<f64>,
@@ -57,7 +57,7 @@ pub struct Colored {
 pub enum ColorizeEvent<'a> {
     /// This view is asked about next.
     Asked {
-        /// The view.
+        /// Index of the view.
         view: usize,
         /// Views in all.
         total: usize,
@@ -75,7 +75,7 @@ pub enum ColorizeEvent<'a> {
     Chosen(&'a ChosenDegree),
     /// Which effects are reckoned with.
     Plan(&'a [Decision; 2]),
-    /// The solver.
+    /// Progress of the solver.
     Solving(ChromaProgress),
     /// What brought the views into line is taken back, and all is solved anew without, for they
     /// disagree more with it: shares of the colors' mean square about their mean.
@@ -180,8 +180,11 @@ impl Distill<'_> {
         // No photo is looked at any more.
         self.dataset.release();
         let (dataset, lesson, gpu) = (self.dataset, self.lesson, &self.raster.gpu);
-        let learnt = &lesson.views;
-        let cameras: Vec<Camera> = learnt.iter().map(|&i| dataset.cameras[i].clone()).collect();
+        let learned = &lesson.views;
+        let cameras: Vec<Camera> = learned
+            .iter()
+            .map(|&i| dataset.cameras[i].clone())
+            .collect();
         let colored_views = lesson.colored_views();
         let mut settings = settings.clone();
         let room = Room {
@@ -333,10 +336,10 @@ impl Distill<'_> {
     /// How far views disagree without and with `corrections`, where these make them disagree
     /// more.
     fn worse(&self, corrections: &[(Task, Correction)]) -> Option<[f64; 2]> {
-        let (capture, learnt) = (&self.dataset.capture, &self.lesson.views);
+        let (capture, learned) = (&self.dataset.capture, &self.lesson.views);
         let mut of_view = vec![Correction::NONE; capture.views.len()];
         for (task, correction) in corrections {
-            of_view[learnt[task.view]] = *correction;
+            of_view[learned[task.view]] = *correction;
         }
         let samples = &self.lesson.samples;
         let before = samples.disagreement(capture, |_, ab| ab)?;

@@ -26,7 +26,7 @@ pub struct CorrectionParameters {
     pub padding: u32,
 }
 
-/// The kernels.
+/// The compiled kernels of view corrections.
 pub struct CorrectionKernels {
     sums: Kernel,
     solve: Kernel,

@@ -10,7 +10,7 @@ pub type ColorizerError = Box<dyn Error + Send + Sync>;
 /// Stage 2 cannot go on.
 #[derive(Debug, thiserror::Error)]
 pub enum ChromaError {
-    /// The device.
+    /// The device failed or is missing.
     #[error(transparent)]
     Gpu(#[from] GpuError),
     /// The temporary file that wanted colors wait in.
@@ -47,7 +47,7 @@ pub enum ChromaError {
         needed >> 20, limit >> 20
     )]
     OverLimit {
-        /// Gaussians.
+        /// Number of Gaussians.
         splats: usize,
         /// Bytes needed.
         needed: u64,

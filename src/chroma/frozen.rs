@@ -127,7 +127,7 @@ impl FrozenViews {
         self.geometry.count
     }
 
-    /// The device.
+    /// The device that holds the buffers.
     pub fn gpu(&self) -> &Gpu {
         &self.raster.gpu
     }

@@ -11,7 +11,7 @@ use crate::{
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct LbfgsParameters {
-    /// Unknowns.
+    /// Number of unknowns.
     pub length: u32,
     /// Gaussians; there are as many unknowns in a plane.
     pub splats: u32,
@@ -31,7 +31,7 @@ pub struct LbfgsParameters {
     pub anchor: f32,
 }
 
-/// Twin of `MEMORY`: pairs that are remembered. Eight do no better (docs/decisions.md).
+/// Twin of `MEMORY`: pairs that are remembered. Eight do no better (docs/lab/07-chroma-solver.md).
 const MEMORY: usize = 5;
 
 /// Twin of `RHO`: scalars before those of the pairs, of which each has two.

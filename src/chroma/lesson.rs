@@ -20,7 +20,7 @@ pub struct Wanted {
     pub weights: Option<Vec<f32>>,
     /// Strokes painted on the photo, at its size, which color what they lie on in all views.
     pub strokes: Option<HintImage>,
-    /// Whether a person has painted it: colors are learnt from it even where the view is held
+    /// Whether a person has painted it: colors are learned from it even where the view is held
     /// out, and it is not measured then.
     pub by_hand: bool,
 }
@@ -68,7 +68,7 @@ pub struct Lesson {
     pub targets: Targets,
     /// Each view's place among these; `None` where nothing is known.
     pub of_view: Vec<Option<usize>>,
-    /// Views that colors are learnt from, ascending: those that are trained on, and held-out
+    /// Views that colors are learned from, ascending: those that are trained on, and held-out
     /// ones that were painted by hand.
     pub views: Vec<usize>,
     /// Strokes, as a/b and α, and each view's place among them.
@@ -83,7 +83,7 @@ pub struct Lesson {
 }
 
 impl Lesson {
-    /// Whether there are strokes on any view that colors are learnt from.
+    /// Whether there are strokes on any view that colors are learned from.
     pub fn has_strokes(&self) -> bool {
         !self.strokes.is_empty()
     }
@@ -130,7 +130,7 @@ impl Lesson {
         Ok(Some(shown))
     }
 
-    /// What is wanted of each view that colors are learnt from, by its place among them.
+    /// What is wanted of each view that colors are learned from, by its place among them.
     pub fn tasks(&self) -> Vec<Task> {
         (self.views.iter().enumerate())
             .filter_map(|(view, &i)| {
@@ -140,7 +140,7 @@ impl Lesson {
             .collect()
     }
 
-    /// Views that colors are learnt from and that are taught or have strokes.
+    /// Views that colors are learned from and that are taught or have strokes.
     pub fn colored_views(&self) -> usize {
         let colored = |&&i: &&usize| self.of_view[i].is_some() || self.strokes_of[i].is_some();
         self.views.iter().filter(colored).count()
@@ -163,7 +163,7 @@ impl Lesson {
     }
 
     /// The views to measure on, and what these are called: held-out ones that no color was
-    /// learnt from, or those that it was learnt from where there is none.
+    /// learned from, or those that it was learned from where there is none.
     pub fn measured(&self, split: &Split) -> (&'static str, Vec<usize>) {
         let unseen = |view: &&usize| !self.views.contains(view);
         let test: Vec<usize> = split.test.iter().filter(unseen).copied().collect();
@@ -191,7 +191,7 @@ pub fn teach(
     let mut samples = TeacherSamples::new(capture);
     let (mut targets, mut of_view) = (Targets::new(scales), Vec::new());
     let (mut strokes, mut strokes_of) = (Targets::new(1), vec![None; dataset.cameras.len()]);
-    let (mut learnt, mut painted) = (Vec::new(), vec![false; dataset.cameras.len()]);
+    let (mut learned, mut painted) = (Vec::new(), vec![false; dataset.cameras.len()]);
     let views: Vec<usize> = (0..dataset.cameras.len()).collect();
     dataset.visit(&views, |view, photo| {
         if observe(view).is_break() {
@@ -210,7 +210,7 @@ pub fn teach(
         painted[view] = by_hand;
         let learns = by_hand || dataset.split.train.contains(&view);
         if learns {
-            learnt.push(view);
+            learned.push(view);
         }
         let Some(wanted) = wanted else {
             of_view.push(None);
@@ -250,7 +250,7 @@ pub fn teach(
     Ok(Lesson {
         targets,
         of_view,
-        views: learnt,
+        views: learned,
         strokes,
         strokes_of,
         by_hand: painted,

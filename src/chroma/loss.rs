@@ -17,7 +17,7 @@ pub struct ChromaLossWeights {
     /// Weight of the agreement with the coarser image; 0 where there is none.
     pub agreement: f32,
     /// One over the residual, in CIELAB units, at which the loss has all but
-    /// levelled off; 0: it never does.
+    /// leveled off; 0: it never does.
     pub decline: f32,
     /// Which correction is this view's.
     pub view_index: u32,

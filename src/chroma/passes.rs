@@ -48,9 +48,9 @@ pub(super) enum Space {
 /// What follows on the loss.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Ending {
-    /// Nothing.
+    /// Draws for the loss alone.
     Loss,
-    /// The adjoint.
+    /// Draws and takes the adjoint: loss and gradient.
     Gradient,
     /// The adjoint, and the sums for the view's correction.
     GradientAndSums,

@@ -31,11 +31,11 @@ pub struct ChromaSettings {
     /// teacher colors the views differently.
     pub sh_degree: u32,
     /// Coarser scales that count for Adam beside the full one, each half as large as the
-    /// last. The paper leaves it open; see docs/decisions.md for the ablation.
+    /// last. The paper leaves it open; see docs/lab/07-chroma-solver.md for the ablation.
     pub scales: u32,
     /// Adam's weight of the agreement with the next coarser scale, the teacher's being 1.
     pub agreement: f32,
-    /// Residual in CIELAB units at which the loss has all but levelled off, so that
+    /// Residual in CIELAB units at which the loss has all but leveled off, so that
     /// what is plainly wrong in one view does not count; `None`: plain L1.
     pub robust: Option<f32>,
     /// Iterations of Adam; each takes one view through all scales, one step a scale.
@@ -74,18 +74,18 @@ pub struct ChromaSettings {
 
 /// In pixels. Less than it says, for the loss of a residual does not grow with its square as
 /// this does: a Gaussian of 30 units is held like one that a third of a pixel wants gray. A
-/// hundredth of it fits the teacher better and held-out photos worse (docs/decisions.md).
+/// hundredth of it fits the teacher better and held-out photos worse (docs/lab/07-chroma-solver.md).
 const RIDGE: f64 = 0.01;
 
 /// A twentieth: along directions in which the loss bends twenty times less than in those that are
-/// decided best, colors go half of their way (docs/decisions.md).
+/// decided best, colors go half of their way (docs/lab/07-chroma-solver.md).
 const ANCHOR: f64 = 0.05;
 
 /// By then anchored colors have come to rest: four times as many change the pictures by less than
-/// 0.1 ΔE00 (docs/decisions.md).
+/// 0.1 ΔE00 (docs/lab/07-chroma-solver.md).
 const ROUNDS: usize = 12;
 
-/// A tenth of what is just seen (docs/decisions.md).
+/// A tenth of what is just seen (docs/lab/07-chroma-solver.md).
 const SETTLED: f64 = 0.1;
 
 impl ChromaSettings {
@@ -103,7 +103,7 @@ impl ChromaSettings {
         }
     }
 
-    /// Reweighted least squares; docs/decisions.md has what each choice brings.
+    /// Reweighted least squares; docs/lab/07-chroma-solver.md has what each choice brings.
     pub fn irls() -> Self {
         Self {
             solver: SolverKind::Irls,

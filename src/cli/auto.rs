@@ -6,6 +6,7 @@ use clap::Args;
 
 use super::{
     CliError,
+    headings::{BUDGET, OUTPUT, TEACHER},
     interrupt::interrupt,
     network::NetworkArguments,
     next,
@@ -19,29 +20,34 @@ use crate::{
     run::Preset,
 };
 
-/// From a film or a folder of photos to everything: frames and poses, the gray scene, its colors,
-/// the photos in color, a file for viewers and a page. A step whose result is there is skipped, so
-/// that the same command goes on where it was interrupted.
+/// Do everything: from a film or photos to a colored scene, colored photos and a page.
+///
+/// Runs prepare, fit, colorize, frames, export and eval. Steps whose result is there are skipped,
+/// so the same command continues after an interruption.
 #[derive(Args)]
+#[command(after_long_help = "Example:
+  gs-chroma teacher fetch ddcolor-tiny
+  gs-chroma auto photos/ --teacher ddcolor-tiny -o out
+  gs-chroma auto film.mp4 --start 1:05 --seconds 20 --teacher ddcolor-tiny -o out")]
 pub struct Auto {
     #[command(flatten)]
     input: InputArguments,
     /// Folder for everything.
-    #[arg(short, long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR", help_heading = OUTPUT)]
     output: PathBuf,
-    /// Who colors the photos: a network by name or file, or a folder of colored images.
-    #[arg(long, value_name = "NAME|FILE.onnx|DIR|photos")]
+    /// Network (name or .onnx), folder of colored photos, or photos for their own colors.
+    #[arg(long, help_heading = TEACHER, value_name = "NAME|FILE.onnx|DIR|photos")]
     teacher: PathBuf,
     #[command(flatten)]
     network: NetworkArguments,
-    /// Folder of painted hints, as for `colorize`.
-    #[arg(long, value_name = "DIR")]
+    /// Folder of painted strokes, as for colorize.
+    #[arg(long, help_heading = TEACHER, value_name = "DIR")]
     hints: Option<PathBuf>,
-    /// How long is trained [default: paper on a GPU, else draft].
-    #[arg(long, value_parser = one_of(PRESETS))]
+    /// How much work to do [default: paper on a GPU, else draft].
+    #[arg(long, value_parser = one_of(PRESETS), help_heading = BUDGET)]
     preset: Option<Preset>,
-    /// Print what lies where as JSON.
-    #[arg(long)]
+    /// Print the paths of all results as JSON.
+    #[arg(long, help_heading = OUTPUT)]
     json: bool,
 }
 
@@ -100,7 +106,7 @@ fn in_words(results: &Results) -> String {
         (&results.page, "what was measured"),
         (
             &results.run,
-            "the run: `colorize`, `frames`, `eval` go on from it",
+            "the run: `colorize`, `frames`, `eval` continue from it",
         ),
         (&results.house, "frames, masks and poses"),
     ];

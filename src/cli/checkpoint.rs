@@ -2,19 +2,21 @@
 
 use clap::Args;
 
-use super::{interrupt::interrupt, values::positive};
+use super::{
+    headings::{EXPERT, OUTPUT},
+    interrupt::interrupt,
+    values::positive,
+};
 use crate::run::{CheckpointOptions, EVERY};
 
 /// How a command can go on.
 #[derive(Args)]
 pub struct CheckpointArguments {
-    /// Go on with the same work where it was interrupted, from the checkpoint in the run folder;
-    /// begins anew where there is none.
-    #[arg(long)]
+    /// Continue from the checkpoint in the run folder; without one, start anew.
+    #[arg(long, help_heading = OUTPUT)]
     resume: bool,
-    /// Minutes between two checkpoints, or `off`; it takes longer where they take more than a
-    /// fiftieth of the time.
-    #[arg(long, value_name = "MIN|off", default_value = EVERY.to_string(), value_parser = minutes)]
+    /// Minutes between checkpoints; more if they take over 2 % of the time.
+    #[arg(long, help_heading = EXPERT, hide_short_help = true, value_name = "MIN|off", default_value = EVERY.to_string(), value_parser = minutes)]
     checkpoint: Minutes,
 }
 

@@ -2,14 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::{Args, CommandFactory, ValueEnum, error::ErrorKind};
+use clap::{Args, ValueEnum, error::ErrorKind};
 
 use super::{
-    Cli, CliError,
+    CliError,
     checkpoint::CheckpointArguments,
+    headings::{BUDGET, EXPERT, INPUT, OUTPUT, QUALITY, TEACHER},
     network::NetworkArguments,
     next, print,
     progress::Progress,
+    usage::refuse,
     values::{one_of, positive, share},
     view::ViewArguments,
 };
@@ -23,112 +25,124 @@ use crate::run::{ColorizeOptions, TeachOptions, colorize};
 /// How a teacher's small picture becomes as large as the photo.
 const UPSAMPLE: &[(Upsample, &str)] = &[
     (Upsample::Guided, "Along the photo's edges"),
-    (Upsample::Bilinear, "Evenly: colors spill over edges"),
+    (Upsample::Bilinear, "Bilinearly: colors spill over edges"),
 ];
 
 /// How chroma is solved for.
 const SOLVERS: &[(SolverKind, &str)] = &[
     (
         SolverKind::Irls,
-        "Reweighted least squares over all views, sped up by L-BFGS",
+        "Iteratively reweighted least squares over all views, with L-BFGS",
     ),
     (
         SolverKind::Adam,
-        "The paper's: stochastic steps of Adam, coarse to fine",
+        "Stochastic descent, coarse to fine, as the ChromaDistill paper",
     ),
 ];
 
-/// Color a trained run with a colorization network or a folder of colored photos.
+/// Color a gray run or splat file, with a colorization network or colored photos.
 #[derive(Args)]
+#[command(after_long_help = "Example:
+  gs-chroma teacher fetch ddcolor-tiny
+  gs-chroma colorize runs/house --teacher ddcolor-tiny
+
+With photos colored by hand, and with strokes:
+  gs-chroma colorize runs/house --teacher painted/
+  gs-chroma colorize runs/house --teacher ddcolor-tiny --hints hints/
+
+Gray splats of another program:
+  gs-chroma colorize gray.ply --colmap house --teacher ddcolor-tiny")]
 pub struct Colorize {
-    /// Run folder, or a gray .ply with --colmap [default: newest under runs/].
+    /// Run folder, or a gray splat file with --colmap [default: newest under runs/].
     run: Option<PathBuf>,
-    /// A colorization network, by its name in `gs-chroma teacher list` or as an .onnx file, a
-    /// folder of colored photos named like the originals, or `photos` where these are in color
-    /// themselves; given more than once, their mean.
+    /// COLMAP folder: of a splat file, or of a run if it has moved since fit.
+    #[arg(long, value_name = "COLMAP_DIR", help_heading = INPUT)]
+    colmap: Option<PathBuf>,
+    /// Network (name or .onnx), folder of colored photos, or photos; repeat for their mean.
+    ///
+    /// Networks by name are listed by gs-chroma teacher list. Images of a folder are named like the
+    /// photos. The word photos means the photos' own colors.
     #[arg(
         long,
         value_name = "NAME|FILE.onnx|DIR|photos",
-        required_unless_present = "hints"
+        required_unless_present = "hints",
+        help_heading = TEACHER
     )]
     teacher: Vec<PathBuf>,
-    /// What each teacher counts, in their order [default: all the same].
-    #[arg(long, value_name = "N,N,…", value_delimiter = ',', value_parser = positive::<f32>, requires = "teacher")]
+    /// Weight of each --teacher, in the order given [default: equal].
+    #[arg(long, value_name = "N,N,…", value_delimiter = ',', value_parser = positive::<f32>, requires = "teacher", help_heading = TEACHER)]
     weights: Vec<f32>,
+    /// Folder of painted strokes, on transparency or on the photo, named like the photos.
+    #[arg(long, value_name = "DIR", help_heading = TEACHER)]
+    hints: Option<PathBuf>,
+    /// Whether a stroke colors the whole thing it lies on, in all views.
+    ///
+    /// off: paint counts only where it is, 50 times as much as a teacher.
+    #[arg(long, value_enum, value_name = "on|off", default_value = "on", help_heading = TEACHER, hide_short_help = true)]
+    grow_hints: Switch,
+    /// Strength of the teachers' colors; hints stay as painted.
+    #[arg(long, value_name = "0..1", default_value_t = 1.0, value_parser = share::<f32>, help_heading = TEACHER)]
+    strength: f32,
     #[command(flatten)]
     network: NetworkArguments,
-    /// How a teacher's small picture becomes as large as the photo.
-    #[arg(long, value_parser = one_of(UPSAMPLE), default_value = "guided")]
+    /// How a network's small picture is enlarged.
+    #[arg(long, value_parser = one_of(UPSAMPLE), default_value = "guided", help_heading = TEACHER, hide_short_help = true)]
     upsample: Upsample,
-    /// How strong the teachers' colors become; hints stay as painted.
-    #[arg(long, value_name = "0..1", default_value_t = 1.0, value_parser = share::<f32>)]
-    strength: f32,
-    /// A folder of hints: PNG or TIFF images named like the photos, strokes of color on
-    /// transparency or on the photo.
-    #[arg(long, value_name = "DIR")]
-    hints: Option<PathBuf>,
-    /// Whether a stroke colors what it lies on, in all views, or counts only where it is painted.
-    #[arg(long, value_enum, value_name = "on|off", default_value = "on")]
-    grow_hints: Switch,
-    /// Colored splat file to write [default: color.ply in the run folder].
-    #[arg(short, long, value_name = "FILE.ply")]
-    output: Option<PathBuf>,
-    /// How chroma is solved for.
-    #[arg(long, value_parser = one_of(SOLVERS), default_value = "irls")]
-    solver: SolverKind,
-    /// Adam's last iteration, counted from the start of `fit` [default: the preset's].
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
-    until: Option<u32>,
-    /// Rounds of least squares at most; they end when the colors hardly move any more
-    /// [default: 12].
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    /// Maximum rounds of least squares; ends sooner once colors settle [default: 12].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000), help_heading = BUDGET)]
     rounds: Option<u32>,
-    /// Difference in CIELAB units from which on a view is not believed, or `off` [default: 10
-    /// with irls, off with adam].
-    #[arg(long, value_name = "UNITS|off", value_parser = robust)]
-    robust: Option<f32>,
-    /// Bring the views' teachers, who disagree in saturation and tint, into line [default: on with irls, where they
-    /// disagree about the same points].
-    #[arg(long, value_enum, value_name = "on|off")]
-    correct_views: Option<Switch>,
-    /// Give Gaussians that no view sees well their neighbors' color [default: on with irls].
-    #[arg(long, value_enum, value_name = "on|off")]
-    fill: Option<Switch>,
-    /// Make colors as strong as the teachers', as far as views agree, where there are no hints
-    /// [default: on with irls].
-    #[arg(long, value_enum, value_name = "on|off")]
-    match_saturation: Option<Switch>,
-    /// Coarser scales that count for Adam beside the full one [default: 2].
-    #[arg(long, value_name = "0..4", value_parser = clap::value_parser!(u32).range(0..=4))]
-    scales: Option<u32>,
-    /// Degree of the chroma's dependence on the direction of view, or `auto`: what training views
-    /// that are held back prove useful.
-    #[arg(long, value_name = "0..3|auto", default_value = "0", value_parser = degree)]
-    sh_degree: Degree,
-    /// COLMAP folder with the photos, when it is not where `fit` found it.
-    #[arg(long, value_name = "COLMAP_DIR")]
-    colmap: Option<PathBuf>,
-    /// Take lightness, too, from the photos, as those of --colmap in another light show it; a run
-    /// keeps its own files.
-    #[arg(long, requires = "output")]
-    relight: bool,
-    /// Go on with all photos where they, their poses and COLMAP's points contradict each other.
-    #[arg(long)]
-    force: bool,
-    /// Device memory in MiB for solving and baking: what does not fit is brought from the host
-    /// view by view.
-    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u32).range(1..))]
+    /// Limit device memory, in MiB; views that do not fit are loaded one by one.
+    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u32).range(1..), help_heading = BUDGET)]
     memory_limit: Option<u32>,
-    /// Time every kernel, and print a table of it.
-    #[arg(long)]
-    timings: bool,
+    /// Correct each view's saturation and tint to agree with the others [default: by evidence].
+    #[arg(long, value_enum, value_name = "on|off", hide_possible_values = true, help_heading = QUALITY)]
+    correct_views: Option<Switch>,
+    /// Outlier threshold of the chroma loss, in CIELAB units; off for plain L1 [default: 10].
+    ///
+    /// With --solver adam the default is off.
+    #[arg(long, value_name = "UNITS|off", value_parser = robust, help_heading = QUALITY)]
+    robust: Option<f32>,
+    /// Color what no view shows well like its neighbors and what looks like it [default: on].
+    ///
+    /// With --solver adam the default is off.
+    #[arg(long, value_enum, value_name = "on|off", hide_possible_values = true, help_heading = QUALITY)]
+    fill: Option<Switch>,
+    /// Scale colors to the teacher's saturation, as far as views agree [default: on].
+    ///
+    /// Off where there are hints, and with --solver adam.
+    #[arg(long, value_enum, value_name = "on|off", hide_possible_values = true, help_heading = QUALITY)]
+    match_saturation: Option<Switch>,
+    /// SH degree of chroma; auto tries it on training views that are held back.
+    #[arg(long, value_name = "0..3|auto", default_value = "0", value_parser = degree, help_heading = QUALITY)]
+    sh_degree: Degree,
+    /// Take lightness, too, from the photos of --colmap in another light.
+    #[arg(long, requires = "output", help_heading = QUALITY, hide_short_help = true)]
+    relight: bool,
+    /// Colored splat file to write [default: color.ply in the run folder].
+    #[arg(short, long, value_name = "FILE.ply", help_heading = OUTPUT)]
+    output: Option<PathBuf>,
     #[command(flatten)]
     checkpoints: CheckpointArguments,
     #[command(flatten)]
     view: ViewArguments,
     /// Print the report as JSON.
-    #[arg(long)]
+    #[arg(long, help_heading = OUTPUT)]
     json: bool,
+    /// Solver: irls (reweighted least squares with L-BFGS) or adam (as the paper).
+    #[arg(long, value_parser = one_of(SOLVERS), default_value = "irls", help_heading = EXPERT, hide_short_help = true)]
+    solver: SolverKind,
+    /// Last iteration of --solver adam, counted from the start of fit [default: the preset's].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = EXPERT, hide_short_help = true)]
+    until: Option<u32>,
+    /// Coarser scales of --solver adam beside the full one [default: 2].
+    #[arg(long, value_name = "0..4", value_parser = clap::value_parser!(u32).range(0..=4), help_heading = EXPERT, hide_short_help = true)]
+    scales: Option<u32>,
+    /// Use all photos, even if they contradict their poses or COLMAP's points.
+    #[arg(long, help_heading = EXPERT, hide_short_help = true)]
+    force: bool,
+    /// Time every kernel and print a table.
+    #[arg(long, help_heading = EXPERT, hide_short_help = true)]
+    timings: bool,
 }
 
 /// A choice to be made either way, whatever the default is.
@@ -168,9 +182,7 @@ impl Colorize {
                 weights.len(),
                 teachers.len()
             );
-            Cli::command()
-                .error(ErrorKind::WrongNumberOfValues, message)
-                .exit();
+            refuse(ErrorKind::WrongNumberOfValues, message);
         }
         let weights = weights.iter().copied().chain(std::iter::repeat(1.0));
         teachers.iter().cloned().zip(weights).collect()
@@ -215,9 +227,7 @@ impl Colorize {
         };
         if let Some((option, _)) = options.iter().find(|(_, given)| *given) {
             let message = format!("{option} needs --solver {}", other.name());
-            Cli::command()
-                .error(ErrorKind::ArgumentConflict, message)
-                .exit();
+            refuse(ErrorKind::ArgumentConflict, message);
         }
     }
 

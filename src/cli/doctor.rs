@@ -9,10 +9,15 @@ use crate::{
     run::RunError,
 };
 
-/// Compare this device's kernels with an exact reference, on random scenes and on hard cases.
+/// Check this device's kernels against an exact reference.
+///
+/// Compares with f64 code on random scenes and on hard cases. Exit code 1 if any check fails.
 #[derive(Args)]
+#[command(after_long_help = "Example:
+  gs-chroma doctor
+  WGPU_ADAPTER_NAME=llvmpipe gs-chroma doctor --json")]
 pub struct Doctor {
-    /// Print JSON.
+    /// Print as JSON.
     #[arg(long)]
     json: bool,
 }

@@ -1,42 +1,38 @@
 //! Arguments that overrule the plan of effects.
 
-use clap::{
-    Args, CommandFactory,
-    error::{ContextKind, ContextValue, ErrorKind},
-};
+use clap::{Args, error::ErrorKind};
 
-use super::{Cli, values::one_of};
+use super::{headings, usage::refuse, values::one_of};
 use crate::effects::{Effect, Overrules};
 
 /// Those of stage 1.
 const EFFECTS: &[(Effect, &str)] = &[
-    (Effect::Lens, "The lens bends straight lines"),
-    (Effect::Masks, "Some pixels of the photos do not count"),
-    (Effect::Exposure, "Photos differ in exposure, or flicker"),
-    (Effect::Robust, "Photos show dust, scratches or passers-by"),
+    (Effect::Lens, "Lens distortion"),
+    (Effect::Masks, "Masks"),
+    (Effect::Exposure, "Changing exposure, flicker"),
+    (Effect::Robust, "Outliers: dust, scratches"),
     (
         Effect::Antialias,
-        "Views show the same places from near and from far",
+        "Antialiasing (Mip-Splatting), for views from near and far",
     ),
-    (
-        Effect::Background,
-        "Photos show what no point explains, such as the sky",
-    ),
-    (Effect::LumaDegree, "Luma depends on the direction of view"),
+    (Effect::Background, "A far background, such as the sky"),
+    (Effect::LumaDegree, "Luma that changes with the view (SH)"),
 ];
 
 /// What the user wants regardless of evidence.
 #[derive(Args)]
 pub struct EffectArguments {
-    /// Simulate an effect whatever the evidence; may be given several times.
-    #[arg(long, value_name = "EFFECT", value_parser = one_of(EFFECTS))]
+    /// Simulate an effect, whatever the plan decides; repeatable.
+    ///
+    /// lens: distortion. masks. exposure: changing exposure, flicker. robust: dust, scratches.
+    /// antialias: views from near and far. background: sky. luma-degree: gloss (SH).
+    #[arg(long, hide_possible_values = true, value_name = "EFFECT", value_parser = one_of(EFFECTS), help_heading = headings::EFFECTS)]
     with: Vec<Effect>,
-    /// Leave an effect out whatever the evidence; may be given several times.
-    #[arg(long, value_name = "EFFECT", value_parser = one_of(EFFECTS))]
+    /// Leave an effect out, whatever the plan decides; repeatable.
+    #[arg(long, value_name = "EFFECT", value_parser = one_of(EFFECTS), hide_possible_values = true, help_heading = headings::EFFECTS)]
     without: Vec<Effect>,
-    /// Degree of the luminance's dependence on the direction of view, at most [default: as
-    /// the evidence says, within the preset].
-    #[arg(long, value_name = "0..3", value_parser = clap::value_parser!(u32).range(0..=3))]
+    /// Maximum SH degree of luma: how far it may change with the view [default: by the plan].
+    #[arg(long, value_name = "0..3", value_parser = clap::value_parser!(u32).range(0..=3), help_heading = headings::QUALITY)]
     sh_degree: Option<u32>,
 }
 
@@ -48,11 +44,11 @@ impl EffectArguments {
             .iter()
             .find(|effect| self.without.contains(effect))
         {
-            let mut error = clap::Error::new(ErrorKind::ArgumentConflict).with_cmd(&Cli::command());
-            let argument = |name: &str| ContextValue::String(format!("--{name} {}", both.name()));
-            error.insert(ContextKind::InvalidArg, argument("with"));
-            error.insert(ContextKind::PriorArg, argument("without"));
-            error.exit();
+            let name = both.name();
+            refuse(
+                ErrorKind::ArgumentConflict,
+                format_args!("the argument '--with {name}' cannot be used with '--without {name}'"),
+            );
         }
         Overrules {
             with: self.with,

@@ -4,59 +4,71 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{CliError, network::NetworkArguments, next, print, progress::Progress, values::one_of};
+use super::{
+    CliError,
+    headings::{INPUT, OUTPUT, TEACHER},
+    network::NetworkArguments,
+    next, print,
+    progress::Progress,
+    values::one_of,
+};
 use crate::{
     eval::Peer,
     run::{EvalOptions, eval},
 };
 
+const COMPARE: &str = "Comparisons";
+const MEASURES: &str = "Measures";
+
 /// Ways of others to color a scene.
 const RECIPES: &[(Peer, &str)] = &[
     (
         Peer::ChromadistillPaper,
-        "As ChromaDistill's paper says: 15,000 iterations, all harmonics, three scales",
+        "As the paper: 15,000 iterations, SH degree 3, three scales",
     ),
     (
         Peer::ChromadistillCode,
-        "As its released code does: 3,000 iterations, constant harmonics, half size; without the content loss, which needs VGG",
+        "As the released code: 3,000 iterations, SH degree 0, half size, without its VGG loss",
     ),
 ];
 
-/// Measure a colored run: fidelity, colorfulness, and whether views agree.
+/// Measure a colored run: fidelity, colorfulness and consistency between views.
 #[derive(Args)]
+#[command(after_long_help = "Example:
+  gs-chroma eval runs/house --teacher ddcolor-tiny --baselines")]
 pub struct Eval {
     /// Run folder [default: newest under runs/].
     run: Option<PathBuf>,
-    /// The teacher, to be measured beside the scene, as for `colorize`.
-    #[arg(long, value_name = "NAME|FILE.onnx|DIR|photos")]
+    /// Measure this teacher's own pictures beside the scene, as for colorize.
+    #[arg(long, help_heading = TEACHER, value_name = "NAME|FILE.onnx|DIR|photos")]
     teacher: Option<PathBuf>,
     #[command(flatten)]
     network: NetworkArguments,
-    /// Measure other ways to color a scene as well: RGB splats fitted to the teacher's pictures,
-    /// and the teacher on each drawn gray frame.
-    #[arg(long, requires = "teacher")]
+    /// Also measure RGB splats fitted to the teacher, and coloring frame by frame.
+    #[arg(long, requires = "teacher", help_heading = COMPARE)]
     baselines: bool,
-    /// Color the scene by another's recipe as well, and measure that; may be given more than once.
-    #[arg(long, value_parser = one_of(RECIPES), requires = "teacher")]
+    /// Also color the scene by ChromaDistill's recipe and measure that; repeatable.
+    #[arg(long, help_heading = COMPARE, value_parser = one_of(RECIPES), requires = "teacher")]
     recipe: Vec<Peer>,
-    /// Device memory in MiB for fitting what is measured beside the scene.
-    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u32).range(1..), requires = "teacher")]
+    /// Limit device memory for --baselines and --recipe, in MiB.
+    #[arg(long, help_heading = COMPARE, value_name = "MIB", value_parser = clap::value_parser!(u32).range(1..), requires = "teacher")]
     memory_limit: Option<u32>,
     /// Frames of the rendered path.
-    #[arg(long, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u32).range(2..=9999))]
+    #[arg(long, help_heading = MEASURES, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u32).range(2..=9999))]
     frames: u32,
-    /// Folder of optical flow between the path's frames, 0000-0007.flo and 0007-0000.flo for
-    /// each pair [default: flow from depth and poses].
-    #[arg(long, value_name = "DIR")]
+    /// Folder of optical flow between path frames [default: from depth and poses].
+    ///
+    /// Middlebury files for each pair and direction: 0000-0007.flo, 0007-0000.flo.
+    #[arg(long, help_heading = MEASURES, value_name = "DIR")]
     flow: Option<PathBuf>,
-    /// A perceptual distance: two inputs [1,3,H,W] in [-1,1], one number out.
-    #[arg(long, value_name = "FILE.onnx")]
+    /// Perceptual distance such as LPIPS: two inputs [1,3,H,W] in [-1,1], one number out.
+    #[arg(long, help_heading = MEASURES, value_name = "FILE.onnx")]
     lpips: Option<PathBuf>,
-    /// COLMAP folder with the photos, when it is not where `fit` found it.
-    #[arg(long, value_name = "COLMAP_DIR")]
+    /// COLMAP folder, if it has moved since fit.
+    #[arg(long, help_heading = INPUT, value_name = "COLMAP_DIR")]
     colmap: Option<PathBuf>,
     /// Print eval.json.
-    #[arg(long)]
+    #[arg(long, help_heading = OUTPUT)]
     json: bool,
 }
 

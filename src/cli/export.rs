@@ -4,7 +4,13 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{CliError, next, print, progress::Progress, values::one_of};
+use super::{
+    CliError,
+    headings::{INPUT, OUTPUT, QUALITY},
+    next, print,
+    progress::Progress,
+    values::one_of,
+};
 use crate::{
     run::{Event, ExportOptions, Exported, Look, Shown, Stage, export},
     splats::SpzVersion,
@@ -15,44 +21,46 @@ use crate::{
 const VIEWERS: &[(ViewerChoice, &str)] = &[
     (ViewerChoice::Spark, "Spark"),
     (ViewerChoice::PlayCanvas, "PlayCanvas and SuperSplat"),
-    (ViewerChoice::Any, "The compromise of all"),
+    (ViewerChoice::Any, "A compromise for all viewers"),
 ];
 
 const SPZ_VERSIONS: &[(SpzVersion, &str)] = &[
-    (SpzVersion::V3, "One gzip stream, which more viewers read"),
+    (SpzVersion::V3, "One gzip stream, read by more viewers"),
     (SpzVersion::V4, "Zstandard streams: smaller"),
 ];
 
-/// Write a run's scene, or another splat file, in the format that the file's name tells: .ply,
-/// .compressed.ply, .splat, .spz, .sog, .glb or .usda.
+/// Write a scene for viewers, as a splat file or one HTML page.
+///
+/// The extension chooses the format: .ply, .compressed.ply, .splat, .spz, .sog, .glb, .usda or
+/// .html. The file is read back, and its loss reported.
 #[derive(Args)]
+#[command(after_long_help = "Example:
+  gs-chroma export runs/house -o house.sog
+  gs-chroma export house.ply -o house.spz
+  gs-chroma export runs/house -o house.html")]
 pub struct Export {
     /// Run folder or splat file [default: newest run under runs/].
     run: Option<PathBuf>,
-    /// Splat file to write, or a page that shows the scene in any browser.
-    #[arg(
-        short,
-        long,
-        value_name = "FILE.ply|.compressed.ply|.splat|.spz|.sog|.glb|.usda|.html"
-    )]
+    /// File to write: .ply, .compressed.ply, .splat, .spz, .sog, .glb, .usda or .html.
+    #[arg(short, long, value_name = "FILE", help_heading = OUTPUT)]
     output: PathBuf,
-    /// Write the luminance although the scene is colored.
-    #[arg(long)]
+    /// Write the gray scene of a colored run.
+    #[arg(long, help_heading = INPUT)]
     luma: bool,
-    /// Write COLMAP's coordinates even where the scene was moved to the origin.
-    #[arg(long)]
+    /// Write COLMAP's coordinates, even if the scene was moved to the origin.
+    #[arg(long, help_heading = OUTPUT)]
     colmap_coordinates: bool,
     /// Version of an .spz file [default: 3].
-    #[arg(long, value_name = "VERSION", value_parser = one_of(SPZ_VERSIONS))]
+    #[arg(long, help_heading = OUTPUT, value_name = "VERSION", value_parser = one_of(SPZ_VERSIONS))]
     spz_version: Option<SpzVersion>,
     /// Fit scales, opacities and colors to what this viewer draws.
-    #[arg(long, value_parser = one_of(VIEWERS))]
+    #[arg(long, help_heading = QUALITY, value_parser = one_of(VIEWERS))]
     viewer: Option<ViewerChoice>,
-    /// COLMAP folder with the cameras for --viewer: of a run, when it is not where `fit` found it.
-    #[arg(long, value_name = "COLMAP_DIR", requires = "viewer")]
+    /// COLMAP folder with cameras for --viewer, of a splat file or a moved run.
+    #[arg(long, help_heading = INPUT, value_name = "COLMAP_DIR", requires = "viewer")]
     colmap: Option<PathBuf>,
     /// Print what was written as JSON.
-    #[arg(long)]
+    #[arg(long, help_heading = OUTPUT)]
     json: bool,
 }
 

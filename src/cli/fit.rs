@@ -2,18 +2,20 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, CommandFactory, error::ErrorKind};
+use clap::{Args, error::ErrorKind};
 
 use super::{
-    Cli, CliError,
+    CliError,
     checkpoint::CheckpointArguments,
     effects::EffectArguments,
+    headings::{BUDGET, EXPERT, OUTPUT, QUALITY, TEACHER},
     luma::LumaArguments,
     network::NetworkArguments,
     next,
     photos::Photos,
     print,
     progress::Progress,
+    usage::refuse,
     values::{PRESETS, one_of, positive},
     view::ViewArguments,
 };
@@ -26,63 +28,64 @@ use crate::run::{AheadOptions, FitOptions, Init, Preset, fit};
 /// Rows of the curve that is printed.
 const CURVE_ROWS: usize = 8;
 
-/// Train geometry and luminance on a folder of photos with COLMAP poses.
+/// Train a gray scene, geometry and luminance, on photos with COLMAP poses.
 #[derive(Args)]
+#[command(after_long_help = "Example:
+  gs-chroma plan house
+  gs-chroma fit house -o runs/house --preset draft
+  gs-chroma fit house -o runs/house --preset balanced --view
+
+A finished run is trained further with its own photos and settings:
+  gs-chroma fit runs/house --iterations 5000")]
 pub struct Fit {
-    /// Folder with images/ and a COLMAP model (sparse/0, sparse or the folder itself); a run
-    /// that is to go on, with its photos, effects and settings, for --iterations more; or a block
-    /// of a job of `partition`, or its coarse model.
+    /// COLMAP folder with images/ and sparse/, a finished run to train further, or a block of a
+    /// job of `partition`.
     #[arg(value_name = "COLMAP_DIR|RUN|BLOCK")]
     colmap_dir: PathBuf,
-    /// Run folder to write [default: runs/<folder name>].
-    #[arg(short, long, value_name = "RUN")]
-    output: Option<PathBuf>,
-    /// How much work to put in [default: paper on a GPU, draft without one].
-    #[arg(long, value_parser = one_of(PRESETS))]
+    /// How much work to do [default: paper on a GPU, else draft].
+    #[arg(long, value_parser = one_of(PRESETS), help_heading = BUDGET)]
     preset: Option<Preset>,
-    #[command(flatten)]
-    photos: Photos,
+    /// Finish in this many minutes: chooses photo size, Gaussians and iterations.
+    ///
+    /// With --preset, no more work than that. Counts everything from start to end.
+    #[arg(long, value_name = "MIN", value_parser = positive::<f64>, conflicts_with = "iterations", help_heading = BUDGET)]
+    time_limit: Option<f64>,
+    /// Stop once held-out views reach this mean PSNR, in dB.
+    ///
+    /// Settles before it ends. At most the work of --preset [default: paper]; exit code 1 if the
+    /// target is out of reach.
+    #[arg(long, value_name = "DB", value_parser = positive::<f64>, conflicts_with = "iterations", help_heading = BUDGET)]
+    target_psnr: Option<f64>,
     #[command(flatten)]
     luma: LumaArguments,
-    /// Choose iterations, Gaussians and photo size so that all is done in so many minutes; with
-    /// --preset, no more work than that.
-    #[arg(long, value_name = "MIN", value_parser = positive::<f64>, conflicts_with = "iterations")]
-    time_limit: Option<f64>,
-    /// End once held-out views have this PSNR in dB, and have settled; at most with the work of
-    /// --preset [default: paper].
-    #[arg(long, value_name = "DB", value_parser = positive::<f64>, conflicts_with = "iterations")]
-    target_psnr: Option<f64>,
-    /// Measure held-out views at this longer side instead of the one that is trained on.
-    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(16..))]
+    /// Measure held-out views at this longer side, in pixels [default: size of training].
+    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(16..), help_heading = QUALITY, hide_short_help = true)]
     measure_side: Option<u32>,
     #[command(flatten)]
     effects: EffectArguments,
-    /// Ask this colorization network about the photos while luma trains, so that `colorize` need
-    /// not; may be given more than once.
-    #[arg(long, value_name = "NAME|FILE.onnx")]
+    #[command(flatten)]
+    photos: Photos,
+    /// Ask this network for colors during training, so that colorize need not; repeatable.
+    #[arg(long, value_name = "NAME|FILE.onnx", help_heading = TEACHER)]
     teacher: Vec<PathBuf>,
     #[command(flatten)]
     network: NetworkArguments,
-    /// Start from these Gaussians instead of COLMAP's points.
-    #[arg(long, value_name = "FILE.ply")]
-    init: Option<PathBuf>,
+    /// Run folder to write [default: runs/<folder name>].
+    #[arg(short, long, value_name = "RUN", help_heading = OUTPUT)]
+    output: Option<PathBuf>,
     #[command(flatten)]
     checkpoints: CheckpointArguments,
     #[command(flatten)]
     view: ViewArguments,
-    /// Time every kernel, and print a table of it.
-    #[arg(long)]
-    timings: bool,
     /// Print the report as JSON.
-    #[arg(long)]
+    #[arg(long, help_heading = OUTPUT)]
     json: bool,
-}
-
-/// Ends the program as one that was called wrongly.
-pub(super) fn refuse(reason: &str) -> ! {
-    Cli::command()
-        .error(ErrorKind::ArgumentConflict, reason)
-        .exit()
+    /// Time every kernel and print a table.
+    #[arg(long, help_heading = EXPERT, hide_short_help = true)]
+    timings: bool,
+    /// Start from the Gaussians of a splat file instead of COLMAP's points.
+    #[arg(long, value_name = "FILE.ply", help_heading = EXPERT, hide_short_help = true)]
+    init: Option<PathBuf>,
 }
 
 impl Fit {
@@ -106,7 +109,8 @@ impl Fit {
                 .contains(&true)
                 {
                     refuse(
-                        "a run goes on with its own photos, effects, preset and Gaussians: leave out the options that name others",
+                        ErrorKind::ArgumentConflict,
+                        "a run continues with its own photos, effects, preset and Gaussians: leave out the options that name others",
                     );
                 }
                 FitOptions {
@@ -132,6 +136,7 @@ impl Fit {
                     let asks = photos != LoadOptions::default() || effects != Overrules::default();
                     if block.inherits() && asks {
                         refuse(
+                            ErrorKind::ArgumentConflict,
                             "a block has the photos' options and effects of its job's coarse model: give them to that",
                         );
                     }

@@ -6,6 +6,7 @@ use clap::Args;
 
 use super::{
     CliError,
+    headings::{INPUT, OUTPUT, TEACHER},
     network::NetworkArguments,
     next, print,
     progress::Progress,
@@ -13,37 +14,40 @@ use super::{
 };
 use crate::run::{Frames, FramesOptions, frames};
 
-/// Color the photos themselves: each with its own lightness at its full size, and the scene's
-/// colors.
+/// Color the photos themselves, as pictures or as a film.
+///
+/// Each photo keeps its own lightness and full size, and takes the scene's colors.
 #[derive(Args)]
+#[command(after_long_help = "Example:
+  gs-chroma frames runs/house -o colored/
+  gs-chroma frames runs/house -o colored.mp4")]
 pub struct FramesCommand {
     /// Colored run folder [default: newest under runs/].
     run: Option<PathBuf>,
-    /// Folder for the pictures, PNG of 8 bits, or of 16 where a photo has them; or a film
-    /// (.mp4, .mov, .mkv), which ffmpeg writes.
-    #[arg(short, long, value_name = "DIR|FILM")]
+    /// Folder for PNG files, or a film (.mp4, .mov, .mkv, .m4v) by FFmpeg.
+    #[arg(short, long, help_heading = OUTPUT, value_name = "DIR|FILM")]
     output: PathBuf,
-    /// Who colors what the scene does not show (sky, what moved) [default: the run's teachers].
-    #[arg(long, value_name = "NAME|FILE.onnx|DIR|photos")]
+    /// Teacher for what the scene does not show, such as sky [default: the run's teachers].
+    #[arg(long, help_heading = TEACHER, value_name = "NAME|FILE.onnx|DIR|photos")]
     teacher: Option<PathBuf>,
     #[command(flatten)]
     network: NetworkArguments,
-    /// Folder of painted hints, for what the scene does not show: a stroke on the sky colors the
-    /// sky, in the photos before and after as well [default: the run's].
-    #[arg(long, value_name = "DIR", conflicts_with = "teacher_alone")]
+    /// Folder of strokes on what the scene does not show [default: the run's].
+    ///
+    /// A stroke on the sky colors the sky, in up to 200 photos before and after.
+    #[arg(long, help_heading = TEACHER, value_name = "DIR", conflicts_with = "teacher_alone")]
     hints: Option<PathBuf>,
-    /// Leave the scene out: the teacher's own pictures, to compare with.
-    #[arg(long)]
+    /// Write the teacher's own pictures, without the scene, for comparison.
+    #[arg(long, help_heading = TEACHER)]
     teacher_alone: bool,
-    /// Frames a second of a film: 24, or 24000/1001 [default: as the film that the photos come
-    /// from, or 24].
-    #[arg(long, value_name = "RATE", value_parser = rate)]
+    /// Frames per second of a film, such as 24000/1001 [default: the source's, or 24].
+    #[arg(long, help_heading = OUTPUT, value_name = "RATE", value_parser = rate)]
     frame_rate: Option<Rate>,
-    /// COLMAP folder with the photos, when it is not where `fit` found it.
-    #[arg(long, value_name = "COLMAP_DIR")]
+    /// COLMAP folder, if it has moved since fit.
+    #[arg(long, help_heading = INPUT, value_name = "COLMAP_DIR")]
     colmap: Option<PathBuf>,
     /// Print what was done as JSON.
-    #[arg(long)]
+    #[arg(long, help_heading = OUTPUT)]
     json: bool,
 }
 
@@ -78,7 +82,7 @@ fn summary(done: &Frames, teacher_alone: bool) -> String {
     }
     let carried = match done.carried {
         0 => String::new(),
-        count => format!("; {count} without a pose take their colors from their neighbors"),
+        count => format!("; {count} without a pose take colors from their neighbors"),
     };
     let painted = match done.painted {
         0 => String::new(),

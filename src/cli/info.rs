@@ -7,12 +7,15 @@ use clap::Args;
 use super::{CliError, info_page, next, print, progress::Progress};
 use crate::{report::Report, run::info};
 
-/// Say what a run, a splat file or a COLMAP folder holds.
+/// Describe a run, a splat file or a COLMAP folder.
 #[derive(Args)]
+#[command(after_long_help = "Example:
+  gs-chroma info house
+  gs-chroma info runs/house --json")]
 pub struct Info {
     /// Run folder, splat file or COLMAP folder.
     path: PathBuf,
-    /// Print JSON.
+    /// Print as JSON.
     #[arg(long)]
     json: bool,
 }

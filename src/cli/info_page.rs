@@ -120,7 +120,7 @@ fn of_scene(page: &mut Page, report: &Report) {
     };
     let lines = [
         format!(
-            "{} Gaussians, harmonics of degree {}",
+            "{} Gaussians, SH degree {}",
             count(luma.splats),
             luma.settings.sh_degree
         ),
@@ -169,7 +169,7 @@ fn of_colors(page: &mut Page, report: &Report) {
     });
     let lines = [
         format!(
-            "{} photos{hints}, harmonics of degree {}, {}{}{unseen}",
+            "{} photos{hints}, SH degree {}, {}{}{unseen}",
             chroma.colored_views,
             chroma.settings.sh_degree,
             duration(chroma.seconds.all),
@@ -245,7 +245,7 @@ pub(super) fn of_found(path: &Path, found: &Value) -> String {
             "Scene",
             [
                 format!(
-                    "{} Gaussians, {}, harmonics of degree {}",
+                    "{} Gaussians, {}, SH degree {}",
                     count(number("splats")),
                     if gray { "gray" } else { "in color" },
                     number("sh_degree")

@@ -4,59 +4,66 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::values::{one_of, positive, share};
+use super::{
+    headings::{BUDGET, EXPERT, QUALITY},
+    values::{one_of, positive, share},
+};
 use crate::input;
 use crate::luma::{Densification, FLAT, LumaSettings, Numerics};
 use crate::run::{Overlay, RunError};
 
-/// Ways in which Gaussians come and go.
+/// Ways of densification.
 const DENSIFY: &[(Densification, &str)] = &[
-    (Densification::Split, "3D Gaussian Splatting's way"),
+    (
+        Densification::Split,
+        "Splits Gaussians with large gradients, as 3D Gaussian Splatting",
+    ),
     (
         Densification::Relocate,
-        "The way of 3DGS as Markov chain Monte Carlo",
+        "Moves faint Gaussians to others and adds noise, as 3DGS-MCMC",
     ),
 ];
 
 /// What is asked for instead of the preset's settings.
 #[derive(Args)]
 pub(super) struct LumaArguments {
-    /// Luma iterations instead of the preset's; all of them, also where the curve is flat.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    /// Number of iterations; turns early stopping off [default: the preset's].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = BUDGET)]
     iterations: Option<u32>,
-    /// Never keep more Gaussians than this.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    /// Maximum number of Gaussians [default: the preset's].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = QUALITY)]
     max_splats: Option<u32>,
-    /// How Gaussians come and go: split where the loss pulls, or put faint ones where others are
-    /// [default: split].
-    #[arg(long, value_parser = one_of(DENSIFY))]
+    /// Densification: split (by gradients, as 3DGS) or relocate (3DGS-MCMC) [default: split].
+    #[arg(long, value_parser = one_of(DENSIFY), help_heading = QUALITY, hide_short_help = true)]
     densify: Option<Densification>,
-    /// Share of the iterations, from the first on, that see photos at half their size [default: 0].
-    #[arg(long, value_name = "0..1", value_parser = share::<f64>)]
+    /// Fraction of training spent at half resolution, from the start [default: 0].
+    #[arg(long, value_name = "0..1", value_parser = share::<f64>, help_heading = BUDGET, hide_short_help = true)]
     coarse: Option<f64>,
-    /// Leave black what no photo shows, instead of a shell around the scene in the grays that photos
-    /// show in its direction.
-    #[arg(long)]
+    /// Leave black what no photo shows, instead of surrounding the scene with a shell of gray.
+    #[arg(long, help_heading = QUALITY, hide_short_help = true)]
     no_surround: bool,
     /// Start at COLMAP's points only, not also where photos match and it has none.
-    #[arg(long)]
+    #[arg(long, help_heading = QUALITY, hide_short_help = true)]
     no_fill_gaps: bool,
-    /// Take no more of the device's memory than this; fewer Gaussians if need be.
-    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u32).range(1..))]
+    /// Limit device memory, in MiB; lowers the maximum of Gaussians if need be.
+    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u32).range(1..), help_heading = BUDGET)]
     memory_limit: Option<u32>,
-    /// End where twice the iterations would bring less than so many dB on held-out views
-    /// (0.1 if no number follows), with what was best on the way [default: 0.3 in the preset
-    /// balanced, 0.1 in paper, unless --iterations or --time-limit says how much is to be done;
-    /// else never]. With --target-psnr only where that will not be reached.
-    #[arg(long, value_name = "DB", num_args = 0..=1, require_equals = true, value_parser = positive::<f64>)]
+    /// Early stopping: roll back to the best and end when twice the iterations would gain less than
+    /// this, in dB.
+    ///
+    /// 0.1 if no number follows [default: 0.3 with the preset balanced, 0.1 with paper, never with
+    /// draft, --iterations or --time-limit]. With --target-psnr only if the target is out of reach.
+    #[arg(long, value_name = "DB", num_args = 0..=1, require_equals = true, value_parser = positive::<f64>, help_heading = BUDGET, hide_short_help = true)]
     stop_when_flat: Option<Option<f64>>,
-    /// How accurately training computes: alpha-min=0.00001..0.1, transmittance-min=0..0.5,
-    /// depth-bits=32|24|16, storage=full|half, ssim-window=11|7|5, adam=exact|lazy. What is
-    /// measured, drawn and written is always computed as viewers do.
-    #[arg(long, value_name = "KEY=VALUE[,…]")]
+    /// Trade accuracy of training for time.
+    ///
+    /// Keys: alpha-min=0.00001..0.1, transmittance-min=0..0.5, depth-bits=32|24|16,
+    /// storage=full|half, ssim-window=11|7|5, adam=exact|lazy. Measures, renders and files always
+    /// compute as viewers do.
+    #[arg(long, value_name = "KEY=VALUE[,…]", help_heading = EXPERT, hide_short_help = true)]
     numerics: Option<Numerics>,
-    /// Seed of every random choice: same seed, same bytes [default: 0].
-    #[arg(long, value_name = "N")]
+    /// Random seed: the same seed gives the same bytes on the same machine [default: 0].
+    #[arg(long, value_name = "N", help_heading = EXPERT, hide_short_help = true)]
     seed: Option<u64>,
     /// Settings to start from instead of the preset's, as `luma.settings` of a report.
     #[arg(long, value_name = "FILE.json", hide = true)]

@@ -9,6 +9,9 @@ use crate::run::{MergeOptions, merge};
 
 /// Put the trained blocks of a job together, and measure the whole.
 #[derive(Args)]
+#[command(after_long_help = "Example:
+  gs-chroma merge job -o runs/city
+  gs-chroma colorize runs/city --teacher ddcolor-tiny")]
 pub struct Merge {
     /// Job folder of `partition` with trained blocks.
     job: PathBuf,

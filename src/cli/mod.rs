@@ -11,6 +11,7 @@ mod eval;
 mod export;
 mod fit;
 mod frames;
+mod headings;
 mod info;
 mod info_page;
 mod interrupt;
@@ -27,8 +28,10 @@ mod progress;
 mod remedy;
 mod render;
 mod seams;
+mod shell;
 mod teacher;
 mod tradeoff;
+mod usage;
 mod values;
 mod view;
 
@@ -45,9 +48,17 @@ pub use error::CliError;
 
 use crate::run::RunError;
 
-/// Turns grayscale photos with COLMAP poses into a colored 3D Gaussian scene.
+/// Turns grayscale photos or films into a colored 3D Gaussian splat scene.
 #[derive(Parser)]
-#[command(version, about)]
+#[command(
+    version,
+    about,
+    after_long_help = "Example:
+  gs-chroma teacher fetch ddcolor-tiny
+  gs-chroma auto photos/ --teacher ddcolor-tiny -o out
+
+Every command has an example at the end of its --help."
+)]
 pub struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -62,6 +73,7 @@ enum Command {
     Fit(fit::Fit),
     Merge(merge::Merge),
     Seams(seams::SeamsCommand),
+    #[command(aliases = ["colorise", "colourize", "colourise"])]
     Colorize(colorize::Colorize),
     Teacher(teacher::TeacherCommand),
     View(view::View),
@@ -72,6 +84,8 @@ enum Command {
     Tradeoff(tradeoff::Tradeoff),
     Info(info::Info),
     Doctor(doctor::Doctor),
+    Completions(shell::Completions),
+    Man(shell::ManPages),
 }
 
 impl Cli {
@@ -105,14 +119,20 @@ impl Cli {
             Command::Tradeoff(command) => command.run(),
             Command::Info(command) => command.run(),
             Command::Doctor(command) => command.run(),
+            Command::Completions(command) => command.run(),
+            Command::Man(command) => command.run(),
         }
     }
 }
 
-/// Prints a line to standard output. A reader that has seen enough (`| head`) is
-/// no error.
+/// Prints a line to standard output, with what a terminal would act on escaped.
 fn print(line: impl Display) -> Result<(), CliError> {
-    match writeln!(io::stdout(), "{}", printable::printable(&line.to_string())) {
+    print_as_is(&printable::printable(&line.to_string()))
+}
+
+/// The same for text of our own. A reader that has seen enough (`| head`) is no error.
+fn print_as_is(text: &str) -> Result<(), CliError> {
+    match writeln!(io::stdout(), "{text}") {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
             Err(CliError::Run(RunError::File {
                 path: PathBuf::from("standard output"),

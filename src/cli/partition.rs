@@ -13,8 +13,12 @@ use crate::{
 
 /// Divide a large capture into blocks that are trained one by one, and put together by `merge`.
 #[derive(Args)]
+#[command(after_long_help = "Example:
+  gs-chroma partition survey -o job --blocks 4
+  gs-chroma fit job/coarse
+  gs-chroma fit job/block-1")]
 pub struct Partition {
-    /// Folder with images/ and a COLMAP model (sparse/0, sparse or the folder itself).
+    /// COLMAP folder with images/ and sparse/.
     colmap_dir: PathBuf,
     /// Job folder to write.
     #[arg(short, long, value_name = "JOB")]

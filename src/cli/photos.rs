@@ -2,73 +2,77 @@
 
 use clap::Args;
 
-use super::values::one_of;
+use super::{
+    headings::{EXPERT, MASKS, QUALITY},
+    values::one_of,
+};
 use crate::capture::{Channel, Encoding, LoadOptions, MaskSource, MaskUse, Normalize};
 
 const CHANNELS: &[(Channel, &str)] = &[
-    (Channel::Luma, "The gray with the same `L*`"),
+    (Channel::Luma, "Lightness: the gray with the same `L*`"),
     (
         Channel::R,
-        "Red. Infra-red cameras with a filter leave their signal in one channel",
+        "Red, where some infra-red cameras have their signal",
     ),
     (Channel::G, "Green"),
     (Channel::B, "Blue"),
 ];
 
 const ENCODINGS: &[(Encoding, &str)] = &[
-    (
-        Encoding::Auto,
-        "Linear light in files of floats, sRGB in all others",
-    ),
+    (Encoding::Auto, "Floats are linear light, all others sRGB"),
     (Encoding::Srgb, "Encoded for display"),
     (
         Encoding::Linear,
-        "In proportion to the light, as a sensor counts it",
+        "Linear: proportional to the light, as sensors count",
     ),
 ];
 
 const MASK_USES: &[(MaskUse, &str)] = &[
-    (MaskUse::Ignore, "Anything: the photo does not say"),
+    (MaskUse::Ignore, "They do not count; anything may be there"),
     (
         MaskUse::Remove,
-        "Nothing: what the mask leaves stands before black",
+        "They are trained as empty: the object stands alone before black",
     ),
 ];
 
 /// How photos are loaded.
 #[derive(Args)]
 pub(super) struct Photos {
-    /// Scale photos down until their longer side has this many pixels.
-    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(16..))]
+    /// Shrink photos to this longer side, in pixels [default: the preset's].
+    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(16..), help_heading = QUALITY)]
     max_side: Option<u32>,
-    /// Train on all views; by default every 8th is held out to measure with.
-    #[arg(long)]
+    /// Train on all views; by default every 8th is held out for measuring.
+    #[arg(long, help_heading = EXPERT, hide_short_help = true)]
     no_holdout: bool,
-    /// What of a color photo becomes gray: an infra-red camera may have its signal in one channel.
-    #[arg(long, value_parser = one_of(CHANNELS), default_value = "luma")]
+    /// Channel of color photos that becomes gray.
+    #[arg(long, value_parser = one_of(CHANNELS), default_value = "luma", help_heading = MASKS)]
     channel: Channel,
-    /// What the files' values are; auto: linear light in floats, sRGB in all others.
-    #[arg(long, value_parser = one_of(ENCODINGS), default_value = "auto")]
+    /// Encoding of the photos' values.
+    #[arg(long, value_parser = one_of(ENCODINGS), default_value = "auto", help_heading = MASKS, hide_short_help = true)]
     encoding: Encoding,
-    /// Which of the files' values become black and white, of all photos alike; auto: of more than
-    /// 8 bits, where the range is not used, the 0.5th and 99.5th percentile of all photos.
+    /// Values that become black and white, in the files' units.
+    ///
+    /// auto: if less than half of the range is used, or floats leave 0 to 1, the 0.5th and 99.5th
+    /// percentile of all photos.
     #[arg(
         long,
+        help_heading = MASKS,
+        hide_short_help = true,
         value_name = "auto|off|LOW,HIGH",
         default_value = "auto",
         allow_hyphen_values = true
     )]
     normalize: Normalize,
-    /// Folder of masks, b.jpg.png or b.png for the photo b.jpg, black where nothing counts; or
-    /// alpha for the photos' transparency [default: masks/ beside images/, if it is there, and
-    /// else alpha].
-    #[arg(long, value_name = "DIR|alpha|off")]
+    /// Folder of masks, black where nothing counts [default: masks/ beside images/, else alpha].
+    ///
+    /// The mask of the photo b.jpg is b.jpg.png or b.png. alpha takes the photos' transparency.
+    #[arg(long, value_name = "DIR|alpha|off", help_heading = MASKS)]
     masks: Option<String>,
-    /// What is where a mask is black: anything, or nothing.
-    #[arg(long, value_parser = one_of(MASK_USES), default_value = "ignore")]
+    /// Masked pixels: ignored, or trained as empty (black).
+    #[arg(long, value_parser = one_of(MASK_USES), default_value = "ignore", help_heading = MASKS)]
     masked: MaskUse,
-    /// Go on with all photos where they, their poses and COLMAP's points contradict each other.
-    #[arg(long)]
+    /// Use all photos, even if they contradict their poses or COLMAP's points.
+    #[arg(long, help_heading = EXPERT, hide_short_help = true)]
     force: bool,
 }
 

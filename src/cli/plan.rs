@@ -7,6 +7,7 @@ use clap::Args;
 use super::{
     CliError,
     effects::EffectArguments,
+    headings::{BUDGET, OUTPUT},
     next,
     photos::Photos,
     print,
@@ -15,20 +16,23 @@ use super::{
 };
 use crate::run::{PlanOptions, Planned, Preset, plan};
 
-/// Say which effects a capture calls for, and why, without fitting it.
+/// List the effects your photos need, with the evidence, without training.
 #[derive(Args)]
+#[command(after_long_help = "Example:
+  gs-chroma plan house
+  gs-chroma plan house --json")]
 pub struct Plan {
-    /// Folder with images/ and a COLMAP model (sparse/0, sparse or the folder itself).
+    /// COLMAP folder with images/ and sparse/.
     colmap_dir: PathBuf,
-    /// How much work `fit` would put in [default: paper on a GPU, draft without one].
-    #[arg(long, value_parser = one_of(PRESETS))]
+    /// How much work fit would do [default: paper on a GPU, else draft].
+    #[arg(long, value_parser = one_of(PRESETS), help_heading = BUDGET)]
     preset: Option<Preset>,
     #[command(flatten)]
     photos: Photos,
     #[command(flatten)]
     effects: EffectArguments,
-    /// Print JSON.
-    #[arg(long)]
+    /// Print the plan as JSON, with the cost of each effect.
+    #[arg(long, help_heading = OUTPUT)]
     json: bool,
 }
 

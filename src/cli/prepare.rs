@@ -2,31 +2,34 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, builder::PossibleValuesParser};
+use clap::{Args, builder::PossibleValuesParser, error::ErrorKind};
 
 use super::{
-    CliError, next, print,
+    CliError,
+    headings::{INPUT, MASKS, OUTPUT},
+    next, print,
     progress::Progress,
+    usage::refuse,
     values::{one_of, positive},
 };
 use crate::capture::lens::MODELS;
 use crate::prepare::{Cameras, Matching, PrepareOptions, Prepared, prepare};
 
+/// Options on cameras and their poses.
+const CAMERA: &str = "Cameras and poses";
+
 const CAMERAS: &[(Cameras, &str)] = &[
-    (Cameras::One, "One camera with one lens took all"),
-    (Cameras::Folder, "Each folder has its camera"),
+    (Cameras::One, "One camera with one lens for all"),
+    (Cameras::Folder, "One camera for each folder"),
     (
         Cameras::Photo,
-        "Each photo has its own, as where the lens zooms",
+        "A camera for each photo, such as for a zoom lens",
     ),
 ];
 
 const MATCHINGS: &[(Matching, &str)] = &[
-    (
-        Matching::Sequential,
-        "Each with its neighbors by name, and ever fewer farther away",
-    ),
-    (Matching::Exhaustive, "Each with each"),
+    (Matching::Sequential, "Each with its neighbors by name"),
+    (Matching::Exhaustive, "Each with each; slow for many photos"),
 ];
 
 /// What is prepared, and how.
@@ -35,40 +38,39 @@ pub struct InputArguments {
     /// A film, or a folder of photos.
     #[arg(value_name = "FILM|DIR")]
     input: PathBuf,
-    /// Where in the film the shot begins, in seconds or as 1:05 [default: the longest shot].
-    #[arg(long, value_name = "TIME", value_parser = time)]
+    /// Start of the shot in the film, such as 65 or 1:05 [default: the longest shot].
+    #[arg(long, help_heading = INPUT, value_name = "TIME", value_parser = time)]
     start: Option<f64>,
-    /// Where it ends [default: the next cut].
-    #[arg(long, value_name = "TIME", value_parser = time, requires = "start")]
+    /// End of the shot [default: the next cut].
+    #[arg(long, help_heading = INPUT, value_name = "TIME", value_parser = time, requires = "start")]
     end: Option<f64>,
-    /// How long it is, in place of --end.
-    #[arg(long, value_name = "SECONDS", value_parser = positive::<f64>, requires = "start", conflicts_with = "end")]
+    /// Length of the shot, instead of --end.
+    #[arg(long, help_heading = INPUT, value_name = "SECONDS", value_parser = positive::<f64>, requires = "start", conflicts_with = "end")]
     seconds: Option<f64>,
-    /// Frames a second that get a pose, each the sharpest of its time [default: 2, but 30 to 120
-    /// in all].
-    #[arg(long, value_name = "N", value_parser = positive::<f64>)]
+    /// Frames per second that get a pose, the sharpest of their time [default: 2, 30 to 120 in all].
+    #[arg(long, help_heading = INPUT, value_name = "N", value_parser = positive::<f64>)]
     per_second: Option<f64>,
-    /// A mask for all photos: white, black where nothing counts. Constant black borders are
-    /// masked by themselves.
-    #[arg(long, value_name = "FILE.png")]
+    /// One mask for all photos, black where nothing counts; black borders are masked anyway.
+    #[arg(long, value_name = "FILE.png", help_heading = MASKS)]
     mask: Option<PathBuf>,
-    /// A folder of masks for single photos: 000001.png.png, or 000001.png, for 000001.png.
-    #[arg(long, value_name = "DIR")]
+    /// Folder of masks for single photos, named like the photos.
+    ///
+    /// The mask of 000001.png is 000001.png.png or 000001.png.
+    #[arg(long, value_name = "DIR", help_heading = MASKS)]
     masks: Option<PathBuf>,
-    /// Which photos one camera took [default: one for a film, folder for photos of one size, else
-    /// photo].
-    #[arg(long, value_name = "WHICH", value_parser = one_of(CAMERAS))]
+    /// Which photos share a camera [default: by input].
+    ///
+    /// By default one for a film, folder for photos of one size, else photo.
+    #[arg(long, help_heading = CAMERA, value_name = "WHICH", value_parser = one_of(CAMERAS))]
     cameras: Option<Cameras>,
-    /// COLMAP's model of the lens: OPENCV for one with visible distortion, OPENCV_FISHEYE for a
-    /// fisheye.
-    #[arg(long, value_name = "MODEL", default_value = "SIMPLE_RADIAL", hide_possible_values = true, value_parser = PossibleValuesParser::new(MODELS.map(|model| model.name)))]
+    /// COLMAP's camera model: OPENCV for visible distortion, OPENCV_FISHEYE for a fisheye.
+    #[arg(long, help_heading = CAMERA, value_name = "MODEL", default_value = "SIMPLE_RADIAL", hide_possible_values = true, value_parser = PossibleValuesParser::new(MODELS.map(|model| model.name)))]
     lens: String,
-    /// Which photos are matched with which [default: sequential for films and for more than 200
-    /// photos].
-    #[arg(long = "match", value_name = "HOW", value_parser = one_of(MATCHINGS))]
+    /// How photos are matched [default: sequential for films and more than 200 photos].
+    #[arg(long = "match", help_heading = CAMERA, value_name = "HOW", value_parser = one_of(MATCHINGS))]
     matching: Option<Matching>,
-    /// Where there is no COLMAP, install its Python module into the cache.
-    #[arg(long)]
+    /// If COLMAP is missing, install pycolmap into the cache folder.
+    #[arg(long, help_heading = CAMERA)]
     install: bool,
 }
 
@@ -78,7 +80,10 @@ impl InputArguments {
         if let (Some(start), Some(end)) = (self.start, self.end)
             && end <= start
         {
-            super::fit::refuse("--end has to be later than --start");
+            refuse(
+                ErrorKind::ValueValidation,
+                "--end has to be later than --start",
+            );
         }
         let length = self.start.zip(self.seconds);
         PrepareOptions {
@@ -98,20 +103,26 @@ impl InputArguments {
     }
 }
 
-/// Make of a film or a folder of photos what `fit` takes: frames, masks and camera poses, with
-/// FFmpeg and COLMAP. What was made from the same before stays, so that the same command goes on.
+/// Find camera poses: from a film or photos to the COLMAP folder that fit takes.
+///
+/// Runs FFmpeg and COLMAP: frames of one shot, masks of black borders, poses. The same command
+/// continues after an interruption, and redoes only what its options or your photos have changed.
 #[derive(Args)]
+#[command(after_long_help = "Example:
+  gs-chroma prepare photos/ -o house
+  gs-chroma prepare film.mp4 -o house --start 1:05 --seconds 20
+  gs-chroma prepare photos/ -o house --lens OPENCV_FISHEYE --cameras one")]
 pub struct Prepare {
     #[command(flatten)]
     input: InputArguments,
-    /// Folder to write; one that was prepared before goes on.
-    #[arg(short, long, value_name = "DIR")]
+    /// Folder to write; continues one that was prepared before.
+    #[arg(short, long, value_name = "DIR", help_heading = OUTPUT)]
     output: PathBuf,
-    /// Make all of it anew, also from another input.
-    #[arg(long)]
+    /// Start over, also from another input.
+    #[arg(long, help_heading = OUTPUT)]
     force: bool,
-    /// Print JSON.
-    #[arg(long)]
+    /// Print the result as JSON.
+    #[arg(long, help_heading = OUTPUT)]
     json: bool,
 }
 

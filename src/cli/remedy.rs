@@ -19,9 +19,9 @@ use crate::{
 pub(super) fn of_run(error: &RunError) -> String {
     match error {
         RunError::Capture(error) => of_capture(error),
-        RunError::Unsound(error) => format!("{error}; or go on all the same with --force"),
+        RunError::Unsound(error) => format!("{error}; or continue with --force"),
         RunError::Exchanged { .. } => {
-            format!("{error}: name them as before, train anew, or go on all the same with --force")
+            format!("{error}: name them as before, train again, or continue with --force")
         }
         RunError::Gpu(error) => of_gpu(error),
         RunError::Teacher(error) => of_teacher(error),
@@ -46,10 +46,10 @@ pub(super) fn of_run(error: &RunError) -> String {
         ),
         RunError::NoSpz(_) => format!("{error}: leave --spz-version out, or name it .spz"),
         RunError::NothingToResume(_) => {
-            format!("{error}; without --resume all is trained anew")
+            format!("{error}; without --resume training starts over")
         }
         RunError::OtherCheckpoint { .. } => {
-            format!("{error}: give the same options, or leave out --resume to train anew")
+            format!("{error}: give the same options, or leave out --resume to train again")
         }
         RunError::Interrupted { .. } => format!("{error} with the same command and --resume"),
         RunError::Program(program) if program.lacks_ffmpeg() => {
@@ -104,7 +104,9 @@ pub(super) fn of_auto(error: &AutoError) -> String {
     match error {
         AutoError::Prepare(error) => of_preparing(error),
         AutoError::Run(RunError::Interrupted { iteration, .. }) => {
-            format!("interrupted after iteration {iteration}; the same command goes on from there")
+            format!(
+                "interrupted after iteration {iteration}; the same command continues from there"
+            )
         }
         AutoError::Run(error) => of_run(error),
     }

@@ -2,11 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::{Args, CommandFactory, error::ErrorKind};
+use clap::{Args, error::ErrorKind};
 
 use super::{
-    Cli, CliError, next, print,
+    CliError,
+    headings::{INPUT, OUTPUT},
+    next, print,
     progress::Progress,
+    usage::refuse,
     values::{Rate, one_of, positive, rate},
 };
 use crate::run::{PathOptions, RenderOptions, Rendered, Views, Way, is_film, render, render_path};
@@ -17,22 +20,25 @@ const VIEWS: &[(Views, &str)] = &[
     (Views::All, "All"),
 ];
 
-/// Draw a scene from the photographed viewpoints, one PNG a view, or along a path.
+/// Render a scene at the photographed viewpoints, or along a camera path.
 #[derive(Args)]
+#[command(after_long_help = "Example:
+  gs-chroma render runs/house --views test -o renders/
+  gs-chroma render runs/house --path orbit --video house.mp4")]
 pub struct Render {
-    /// Run folder, or a splat file: with --colmap, or along a path [default: newest under runs/].
+    /// Run folder, or a splat file with --colmap or --path [default: newest under runs/].
     run: Option<PathBuf>,
-    /// COLMAP folder with the cameras, when it is not where `fit` found it.
-    #[arg(long, value_name = "COLMAP_DIR")]
+    /// COLMAP folder: of a splat file, or of a run if it has moved since fit.
+    #[arg(long, help_heading = INPUT, value_name = "COLMAP_DIR")]
     colmap: Option<PathBuf>,
-    /// Which views [default: those held out, or all where none is].
-    #[arg(long, value_parser = one_of(VIEWS), conflicts_with = "path")]
+    /// Which views [default: held-out ones, or all where none is held out].
+    #[arg(long, help_heading = INPUT, value_parser = one_of(VIEWS), conflicts_with = "path")]
     views: Option<Views>,
-    /// Draw luma.ply although color.ply is there.
-    #[arg(long)]
+    /// Render the gray scene of a colored run.
+    #[arg(long, help_heading = INPUT)]
     luma: bool,
-    /// Folder to write the pictures to.
-    #[arg(short, long, value_name = "DIR", required_unless_present_any = ["video", "save_path"])]
+    /// Folder for PNG files.
+    #[arg(short, long, help_heading = OUTPUT, value_name = "DIR", required_unless_present_any = ["video", "save_path"])]
     output: Option<PathBuf>,
     #[command(flatten)]
     path: PathArguments,
@@ -41,27 +47,28 @@ pub struct Render {
 #[derive(Args)]
 #[command(next_help_heading = "Along a path")]
 struct PathArguments {
-    /// Draw along a path: around the scene, through the photos' viewpoints, or as a file says
-    /// (camera_path.json of nerfstudio, transforms.json, cameras.json of 3DGS; document.json or
-    /// settings.json of SuperSplat).
+    /// Camera path: around the scene, through the photos' viewpoints, or from a file.
+    ///
+    /// Files: nerfstudio's camera_path.json, transforms.json, 3DGS's cameras.json, SuperSplat's
+    /// document.json or settings.json.
     #[arg(long, value_name = "orbit|photos|FILE.json", value_parser = way)]
     path: Option<Way>,
-    /// Film to write (.mp4, .mov, .mkv), by ffmpeg.
+    /// Film to write (.mp4, .mov, .mkv, .m4v), by FFmpeg.
     #[arg(long, value_name = "FILM", requires = "path", value_parser = film)]
     video: Option<PathBuf>,
-    /// Frames a second: 24, or 24000/1001 [default: as the file says, or 24].
+    /// Frames per second, such as 24000/1001 [default: the path file's, or 24].
     #[arg(long, value_name = "RATE", requires = "path", value_parser = rate)]
     fps: Option<Rate>,
-    /// How long the path takes, in seconds, unless a file says it [default: 10].
+    /// Duration of the path [default: the path file's, or 10].
     #[arg(long, requires = "path", value_parser = positive::<f64>)]
     seconds: Option<f64>,
-    /// Size of a picture in pixels [default: as the file says, or the photos', or 1280x720].
+    /// Picture size in pixels [default: the path file's, the photos', or 1280x720].
     #[arg(long, value_name = "WxH", requires = "path", value_parser = size)]
     size: Option<Size>,
-    /// Draw the gray scene left of the colored one.
+    /// Show the gray scene left of the colored one.
     #[arg(long, requires = "path", conflicts_with = "luma")]
     side_by_side: bool,
-    /// Write the path itself, as nerfstudio's camera_path.json in COLMAP's coordinates.
+    /// Write the path as nerfstudio's camera_path.json, in COLMAP's coordinates.
     #[arg(long, value_name = "FILE.json", requires = "path")]
     save_path: Option<PathBuf>,
 }
@@ -135,9 +142,7 @@ impl Render {
                 "--seconds cannot be used with {}, which says it",
                 file.display()
             );
-            Cli::command()
-                .error(ErrorKind::ArgumentConflict, reason)
-                .exit()
+            refuse(ErrorKind::ArgumentConflict, reason);
         }
         let options = PathOptions {
             run: self.run,

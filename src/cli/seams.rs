@@ -10,6 +10,8 @@ use crate::run::{PairMean, SeamColors, SeamViews, SeamsOptions, ViewMean, seams}
 /// Measure whether a merged run shows the borders of its blocks: held-out views across them, and
 /// colors on both sides.
 #[derive(Args)]
+#[command(after_long_help = "Example:
+  gs-chroma seams job runs/city")]
 pub struct SeamsCommand {
     /// Job folder of `partition`.
     job: PathBuf,

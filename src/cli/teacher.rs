@@ -20,8 +20,12 @@ use crate::{
     run::RunError,
 };
 
-/// List, fetch and check colorization networks
+/// List, download and check colorization networks.
 #[derive(Args)]
+#[command(after_long_help = "Example:
+  gs-chroma teacher list
+  gs-chroma teacher fetch ddcolor-tiny
+  gs-chroma teacher check mine.onnx --manifest mine.toml")]
 pub struct TeacherCommand {
     #[command(subcommand)]
     action: Action,
@@ -34,47 +38,47 @@ enum Action {
     Check(Check),
 }
 
-/// Show the networks that are known by name, and which are on this machine
+/// Show the networks known by name, and which are on this machine.
 #[derive(Args)]
 struct List {
-    /// Print JSON.
+    /// Print as JSON.
     #[arg(long)]
     json: bool,
 }
 
-/// Fetch a network from its host and check its SHA-256
+/// Download a network from its publisher and check its SHA-256.
 ///
-/// What was cut off is taken up where it ended. Proxies are those that HTTPS_PROXY names.
+/// Resumes interrupted downloads. Uses the proxy that HTTPS_PROXY names.
 #[derive(Args)]
 struct Fetch {
-    /// Its name, as `gs-chroma teacher list` shows it.
+    /// Name, as gs-chroma teacher list shows it.
     name: String,
-    /// Fetch it without a question.
+    /// Do not ask before downloading.
     #[arg(long, short)]
     yes: bool,
-    /// Seconds for which the host may keep silent.
+    /// Seconds to wait for a silent host.
     #[arg(long, value_name = "SECONDS", default_value_t = 30, value_parser = clap::value_parser!(u16).range(1..))]
     patience: u16,
 }
 
-/// Ask a network about a ramp and a photo, and say what is understood of it
+/// Test a network on a ramp and a photo, and show how it is understood.
 ///
-/// Where nothing tells what its numbers mean, the usual ways are tried, and that whose answers
-/// make most sense is taken; `colorize` does so only if a manifest says the same.
+/// If nothing tells what its numbers mean, the usual conventions are tried and the most plausible
+/// is taken. colorize follows it only if a manifest states it.
 #[derive(Args)]
 struct Check {
-    /// An .onnx file, or a network's name in `gs-chroma teacher list`.
+    /// Name or .onnx file of the network.
     #[arg(value_name = "NAME|FILE.onnx")]
     teacher: PathBuf,
     #[command(flatten)]
     network: NetworkArguments,
-    /// The photo [default: one of the bundled garden].
+    /// Photo to try [default: one of the bundled scene].
     #[arg(long, value_name = "FILE")]
     photo: Option<PathBuf>,
-    /// Write what is understood as a manifest.
+    /// Write the conventions as a manifest.
     #[arg(long, value_name = "FILE.toml")]
     manifest: Option<PathBuf>,
-    /// Print JSON.
+    /// Print as JSON.
     #[arg(long)]
     json: bool,
 }

@@ -7,6 +7,7 @@ use clap::{Args, builder::PossibleValuesParser};
 use super::{
     CliError,
     effects::EffectArguments,
+    headings::{BUDGET, OUTPUT, TEACHER},
     luma::LumaArguments,
     next,
     photos::Photos,
@@ -17,37 +18,40 @@ use super::{
 use crate::run::{Preset, Stage};
 use crate::tradeoff::{FILES, PointStage, TradeoffOptions, front_table, knob_names, tradeoff};
 
-/// Find out what quality costs in time, on these photos and this device: runs `fit` (and
-/// `colorize`) with knobs turned around the preset, and draws quality against seconds.
+/// Measure quality against time on your own photos and device.
+///
+/// Runs fit, and colorize with --teacher, with one setting changed at a time and in combinations,
+/// and draws the Pareto front. The same command continues after an interruption.
 #[derive(Args)]
+#[command(after_long_help = "Example:
+  gs-chroma tradeoff house --budget 60
+  gs-chroma tradeoff house --teacher ddcolor-tiny --knobs iterations,max-side,rounds")]
 pub struct Tradeoff {
-    /// Folder with images/ and a COLMAP model (sparse/0, sparse or the folder itself).
+    /// COLMAP folder with images/ and sparse/.
     colmap_dir: PathBuf,
-    /// Folder for points and results; one that has some goes on [default:
-    /// runs/<folder name>-tradeoff].
-    #[arg(short, long, value_name = "DIR")]
+    /// Folder for points and results [default: runs/<folder name>-tradeoff].
+    #[arg(short, long, help_heading = OUTPUT, value_name = "DIR")]
     output: Option<PathBuf>,
-    /// A colorization network or a folder of colored photos, for points in color.
-    #[arg(long, value_name = "NAME|FILE.onnx|DIR")]
+    /// Network or folder of colored photos, for points in color.
+    #[arg(long, help_heading = TEACHER, value_name = "NAME|FILE.onnx|DIR")]
     teacher: Option<PathBuf>,
-    /// What knobs are turned around [default: paper on a GPU, draft without one].
-    #[arg(long, value_parser = one_of(PRESETS))]
+    /// Preset around which settings change [default: paper on a GPU, else draft].
+    #[arg(long, value_parser = one_of(PRESETS), help_heading = BUDGET)]
     preset: Option<Preset>,
     #[command(flatten)]
     luma: LumaArguments,
-    /// Minutes that all points may take together, earlier starts included; the base runs
-    /// anyway.
-    #[arg(long, value_name = "MINUTES", default_value_t = 30.0, value_parser = positive::<f64>)]
+    /// Minutes for all points together, earlier starts included; the base always runs.
+    #[arg(long, help_heading = BUDGET, value_name = "MINUTES", default_value_t = 30.0, value_parser = positive::<f64>)]
     budget: f64,
-    /// Knobs to turn [default: all].
-    #[arg(long, value_name = "A,B,…", value_delimiter = ',', value_parser = PossibleValuesParser::new(knob_names()))]
+    /// Settings to change [default: all].
+    #[arg(long, help_heading = BUDGET, value_name = "A,B,…", value_delimiter = ',', value_parser = PossibleValuesParser::new(knob_names()))]
     knobs: Vec<String>,
     #[command(flatten)]
     photos: Photos,
     #[command(flatten)]
     effects: EffectArguments,
     /// Print tradeoff.json.
-    #[arg(long)]
+    #[arg(long, help_heading = OUTPUT)]
     json: bool,
 }
 

@@ -9,25 +9,28 @@ use std::{
 
 use clap::Args;
 
-use super::{CliError, interrupt, print, progress::Progress};
+use super::{CliError, headings::OUTPUT, interrupt, print, progress::Progress};
 use crate::{
     run::{Live, Look, Stage},
     view::{OfCommand, OfRun, Server, answer},
 };
 
-/// Show a scene in the browser: the splats, and the photos beside them.
+/// Show a run or a splat file in the browser, beside its photos.
 #[derive(Args)]
+#[command(after_long_help = "Example:
+  gs-chroma view runs/house
+  gs-chroma view house.spz")]
 pub struct View {
     /// Run folder or splat file [default: newest run under runs/].
     #[arg(value_name = "RUN|FILE")]
     run: Option<PathBuf>,
-    /// COLMAP folder with cameras and photos, when it is not where `fit` found it.
+    /// COLMAP folder, if it has moved since fit.
     #[arg(long, value_name = "COLMAP_DIR")]
     colmap: Option<PathBuf>,
     /// Port on 127.0.0.1 [default: one that is free].
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
     port: Option<u16>,
-    /// Say where the page is, and leave the browser alone.
+    /// Print the address and open no browser.
     #[arg(long)]
     no_open: bool,
 }
@@ -55,11 +58,11 @@ impl View {
 /// What shows a scene while it is made.
 #[derive(Args)]
 pub(super) struct ViewArguments {
-    /// Show the scene in the browser as it grows; nothing in the result depends on it.
-    #[arg(long)]
+    /// Show the scene in the browser while it is made.
+    #[arg(long, help_heading = OUTPUT)]
     view: bool,
     /// Port of the page on 127.0.0.1 [default: one that is free].
-    #[arg(long, requires = "view", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, requires = "view", help_heading = OUTPUT, hide_short_help = true, value_parser = clap::value_parser!(u16).range(1..))]
     port: Option<u16>,
 }
 

@@ -16,7 +16,7 @@ pub struct Elementwise {
 pub struct ElementwiseFigures {
     /// Why nothing could be compared, if so.
     pub unfit: Option<String>,
-    /// The bound.
+    /// Bound on each element.
     pub bound: Elementwise,
     /// Index of the element that uses most of its bound.
     pub worst: usize,

@@ -34,7 +34,7 @@ pub struct Hard {
 /// One line of the table.
 #[derive(Clone, Copy, Debug)]
 pub struct Case {
-    /// Its name.
+    /// Name in tables.
     pub name: &'static str,
     /// What goes wrong where nothing is done about it.
     pub trouble: &'static str,

@@ -70,7 +70,7 @@ impl Allowance {
 /// One line of the table: the worst of its inputs, and whether all passed.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
-    /// The kernel.
+    /// Name of the kernel, as in `shaders/`.
     pub kernel: &'static str,
     /// The quantity, with its unit.
     pub what: &'static str,

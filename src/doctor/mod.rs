@@ -52,7 +52,7 @@ pub fn headroom(gpu: &Gpu) -> f64 {
 /// How a case came out.
 #[derive(Clone, Debug, Serialize)]
 pub struct Verdict {
-    /// The case.
+    /// Name of the case.
     pub name: &'static str,
     /// What goes wrong where nothing is done about it.
     pub trouble: &'static str,

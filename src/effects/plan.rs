@@ -23,7 +23,7 @@ pub const TRIAL_GAIN: f64 = 0.1;
 const OUTLIER_SHARE: f64 = 0.006;
 
 /// In a shorter run most of what is far off is only not learned yet, and leaving it out
-/// costs more than the defects do (docs/decisions.md).
+/// costs more than the defects do (docs/decisions/33-outliers.md).
 pub(super) const ROBUST_ITERATIONS: usize = 1_200;
 
 /// Ratio of the sampling rates of near and far views from which on a blur of one size
@@ -129,14 +129,14 @@ impl Effect {
         }
     }
 
-    /// What it costs while it is on (docs/effects.md has the measurements).
+    /// What it costs while it is on (docs/lab/12-effects.md has the measurements).
     pub fn cost(self) -> &'static str {
         match self {
             Self::Lens => "nothing once photos are read",
             Self::Masks => "one byte a pixel",
             Self::Exposure => "16 bytes",
             Self::Robust => "one byte a pixel, and twice three drawings of each photo",
-            Self::Antialias => "viewers that know of it",
+            Self::Antialias => "needs a viewer with Mip-Splatting support",
             Self::Background => "at most a quarter of the Gaussians",
             Self::TeacherCorrection => "a sum over each view a round",
             Self::ChromaDegree => "72, 192 or 360 bytes a Gaussian for degree 1, 2 or 3",

@@ -70,7 +70,7 @@ impl fmt::Display for Decision {
         match (self.decided_by, self.effect) {
             (Decider::Evidence, _) => Ok(()),
             (Decider::Trial, Effect::TeacherCorrection) => {
-                f.write_str(", but brought into line they would differ more")
+                f.write_str(", but corrected they would differ more")
             }
             (Decider::Trial, _) => f.write_str(&tried(self.trial.unwrap_or(0.0))),
             (Decider::User, _) => f.write_str("; you said so"),

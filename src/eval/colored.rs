@@ -30,7 +30,7 @@ pub struct Measured {
 }
 
 impl Measured {
-    /// Draws and measures the held-out views, or those that color was learnt from where none is
+    /// Draws and measures the held-out views, or those that color was learned from where none is
     /// left: `luma` with `chroma` against `baked`, and that against the photos.
     ///
     /// # Errors
@@ -146,9 +146,9 @@ impl Measured {
 fn caption(dataset: &Dataset, lesson: &Lesson, view: usize) -> String {
     let name = &dataset.capture.views[view].name;
     let role = match (lesson.is_painted(view), lesson.views.contains(&view)) {
-        (true, _) => " (painted: colors are learnt from it)",
+        (true, _) => " (painted: colors are learned from it)",
         (false, true) => "",
-        (false, false) => " (held out: no color is learnt from it)",
+        (false, false) => " (held out: no color is learned from it)",
     };
     format!("{name}{role}")
 }

@@ -51,7 +51,7 @@ pub enum GpuError {
         "{splats} Gaussians: buffer `{label}` exceeds the {limit} bytes that the adapter binds; about {fits} would fit"
     )]
     TooManySplats {
-        /// Gaussians.
+        /// Number of Gaussians.
         splats: usize,
         /// How many there is room for, roughly.
         fits: usize,
@@ -65,7 +65,7 @@ pub enum GpuError {
         "{splats} Gaussians and their tile lists need {} MiB of the device but may take {}", needed.div_ceil(1 << 20), limit >> 20
     )]
     OverLimit {
-        /// Gaussians.
+        /// Number of Gaussians.
         splats: usize,
         /// Bytes wanted.
         needed: u64,
@@ -79,7 +79,7 @@ pub enum GpuError {
     Lost(String, String),
     /// A training that had no room is asked to go on.
     #[error(
-        "the training had no room on the device and cannot go on: start it again with fewer Gaussians"
+        "the training had no room on the device and cannot continue: start it again with fewer Gaussians"
     )]
     NoWorkspace,
 }

@@ -17,7 +17,7 @@ const SPARE: u32 = QUERIES / 2;
 /// What one kernel took.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KernelTime {
-    /// Its name.
+    /// Name of the kernel, as in `shaders/`.
     pub kernel: &'static str,
     /// How often it was dispatched.
     pub dispatches: u64,

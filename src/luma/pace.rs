@@ -12,7 +12,7 @@ const RECENT_MIN: usize = 20;
 const WARM_UP: usize = 16;
 
 /// Of an iteration's cost, what goes with the number of Gaussians; the rest goes with the
-/// pixels. On a software adapter at the sizes of the presets (docs/performance.md); elsewhere
+/// pixels. On a software adapter at the sizes of the presets (docs/lab/13-performance.md); elsewhere
 /// it decides only how well the first guesses are, for they are corrected as training goes on.
 const SHARE_OF_SPLATS: f64 = 0.5;
 

@@ -42,7 +42,7 @@ impl Preset {
                 ..LumaSettings::new(700)
             },
             // Twice the Gaussians in half of the iterations are better and no slower
-            // (docs/decisions.md).
+            // (docs/lab/04-presets.md).
             Self::Balanced => LumaSettings {
                 max_splats: 2_000_000,
                 sh_degree: 2,

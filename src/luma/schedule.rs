@@ -32,7 +32,7 @@ impl Schedule {
     /// The paper's schedule is written for 15,000 iterations; a shorter run passes
     /// through the same phases in proportion. There are no opacity resets, splitting
     /// ends with four fifths of the run, and harmonics come sooner than every 1,000
-    /// iterations (measured in docs/decisions.md).
+    /// iterations (measured in docs/lab/03-densification.md).
     pub fn of(settings: &LumaSettings) -> Self {
         let iterations = settings.iterations;
         let share = |of_paper: usize| (of_paper * iterations).div_ceil(PAPER_ITERATIONS);
@@ -128,7 +128,7 @@ impl Schedule {
 }
 
 /// The next degree of harmonics waits no longer than this: a run whose curve is soon flat
-/// ends with what it has learnt by then.
+/// ends with what it has learned by then.
 const RAISED_BY: usize = 250;
 
 /// Share of its learning rates at which a run that settles ends: steps that answer to one

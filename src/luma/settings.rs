@@ -41,7 +41,7 @@ impl Default for LearningRates {
     /// Beside the 3DGS rates, which were tuned for 30,000 iterations, sizes and attitudes
     /// learn twice as fast, colors four times, opacities half as fast, and the means' rate
     /// falls by half a decade instead of two: there is little time to move in (measured in
-    /// docs/decisions.md).
+    /// docs/lab/03-densification.md).
     fn default() -> Self {
         Self {
             means: [1.6e-4, 4.8e-5],

@@ -10,7 +10,7 @@ use crate::{
 };
 
 /// Depths at which is asked how opaque everything nearer is. With 32 the median depth
-/// is within a pixel or so of COLMAP's points (docs/decisions.md); each two cost a picture.
+/// is within a pixel or so of COLMAP's points (docs/lab/01-photos.md); each two cost a picture.
 const STEPS: usize = 32;
 
 /// Fields that tell where the median depth of each pixel is.

@@ -13,7 +13,7 @@ pub struct ScreenSplat<T, const C: usize> {
     pub conic: [T; 3],
     /// Opacity at the center.
     pub opacity: T,
-    /// Color.
+    /// Blended color, channel by channel.
     pub color: [T; C],
 }
 

@@ -12,16 +12,16 @@ pub fn smooth_l1<T: Number>(residual: T) -> T {
 /// `(1 - exp(-decline · ρ)) / decline` of the smooth L1 ρ (Welsch's function, of ρ instead
 /// of its square): levels off at `1 / decline`. With a decline of 0, ρ itself.
 pub fn declining<T: Number>(residual: T, decline: f64) -> T {
-    levelled(smooth_l1(residual), decline)
+    leveled(smooth_l1(residual), decline)
 }
 
 /// [`declining`] of the distance of both residuals, `√(a² + b² + ε²) - ε`.
 pub fn declining_distance<T: Number>([a, b]: [T; 2], decline: f64) -> T {
     let squares = a * a + b * b + CHROMA_EPSILON * CHROMA_EPSILON;
-    levelled(squares.sqrt() - CHROMA_EPSILON, decline)
+    leveled(squares.sqrt() - CHROMA_EPSILON, decline)
 }
 
-fn levelled<T: Number>(length: T, decline: f64) -> T {
+fn leveled<T: Number>(length: T, decline: f64) -> T {
     if decline > 0.0 {
         (T::one() - (-length * decline).exp()) / decline
     } else {

@@ -34,7 +34,7 @@ pub fn dot<T: Number, const N: usize>(a: &[T; N], b: &[T; N]) -> T {
     a.iter().zip(b).fold(T::zero(), |sum, (&a, &b)| sum + a * b)
 }
 
-/// The transpose.
+/// The transpose of a 3 × 3 matrix.
 pub fn transpose(matrix: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
     [0, 1, 2].map(|i| matrix.map(|row| row[i]))
 }

@@ -12,7 +12,7 @@ use super::view::View;
 /// One Gaussian on the screen. Pixels; the center of the first one is (0.5, 0.5).
 #[derive(Clone, Copy, Debug)]
 pub struct Projected<T> {
-    /// Center.
+    /// Center on the image, in pixels.
     pub mean2d: [T; 2],
     /// Covariance `xx, xy, yy` with the blur, px².
     pub cov2d: [T; 3],

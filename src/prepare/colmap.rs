@@ -18,7 +18,7 @@ const OVERLAP: u32 = 10;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Cameras {
-    /// All.
+    /// One camera took all photos.
     One,
     /// Those of one folder.
     Folder,

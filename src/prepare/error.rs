@@ -28,7 +28,7 @@ pub enum PrepareError {
     /// The input is no film that can be used.
     #[error("{}: {reason}", path.display())]
     NoFilm {
-        /// The file.
+        /// File at fault.
         path: PathBuf,
         /// What is wrong.
         reason: String,
@@ -38,7 +38,7 @@ pub enum PrepareError {
         "{}: holds {found} usable photos, and depth needs two at least; name a folder of JPEG, PNG or TIFF files, or a film", input.display()
     )]
     TooFew {
-        /// The input.
+        /// Input that was given.
         input: PathBuf,
         /// Photos that can be used.
         found: usize,
@@ -46,17 +46,17 @@ pub enum PrepareError {
     /// The output folder holds what this program did not put there.
     #[error("{}: holds other things, such as {other}; name a new folder with -o", folder.display())]
     NotOurs {
-        /// The folder.
+        /// Folder at fault.
         folder: PathBuf,
         /// One of them.
         other: String,
     },
     /// The output folder belongs to another input.
     #[error(
-        "{}: was prepared from {}; name another folder with -o, or begin anew with --force", folder.display(), input.display()
+        "{}: was prepared from {}; name another folder with -o, or start over with --force", folder.display(), input.display()
     )]
     OtherInput {
-        /// The folder.
+        /// Folder at fault.
         folder: PathBuf,
         /// What it was prepared from.
         input: PathBuf,

@@ -129,7 +129,7 @@ fn choose(
     if !chosen {
         if shots.len() > 1 {
             observe(Event::Note(format!(
-                "{} shots, of which the longest is taken, {}; another with --start: {}",
+                "{} shots; using the longest, {}; choose another with --start: {}",
                 shots.len(),
                 span(*longest),
                 list(&shots)
@@ -142,7 +142,7 @@ fn choose(
             && !later.is_empty()
         {
             observe(Event::Warning(format!(
-                "the film is cut at {} within the part that is asked for, and one scene is made of one shot",
+                "the chosen part has a cut at {}; a scene needs a single shot",
                 later
                     .iter()
                     .map(|shot| clock(shot[0]))
@@ -156,10 +156,7 @@ fn choose(
         .iter()
         .find(|shot| length(shot) >= SHORTEST)
         .unwrap_or(longest);
-    observe(Event::Note(format!(
-        "the shot is taken from {}",
-        span(*first)
-    )));
+    observe(Event::Note(format!("using the shot from {}", span(*first))));
     Ok(exactly(*first))
 }
 
@@ -175,10 +172,10 @@ fn extract(
     match scan {
         Scan::Progressive => {}
         Scan::Interlaced => observe(Event::Note(
-            "the film is interlaced: fields are woven by bwdif".to_owned(),
+            "the film is interlaced: deinterlacing with bwdif".to_owned(),
         )),
         Scan::Telecined => observe(Event::Note(
-            "the film was made 30 frames a second from 24: the repeated fields are taken out"
+            "the film was converted from 24 to 30 frames a second: removing repeated fields"
                 .to_owned(),
         )),
     }
@@ -222,7 +219,7 @@ fn extract(
     if let Some(Uneven { times, rate: fast }) = varied {
         let [first, last] = [times[0], times[times.len() - 1]];
         observe(Event::Note(format!(
-            "the film's frames are not evenly spaced: a film made of them has {:.0} a second, some of them several times",
+            "the film's frames are not evenly spaced: a film made of them has {:.0} a second, with repeats",
             f64::from(fast[0]) / f64::from(fast[1])
         )));
         let end = part.seconds.map_or(source.seconds, |s| part.start + s);
@@ -272,7 +269,7 @@ fn choose_sharp(
     let film = Film::read(&state.path(".")).map_err(RunError::from)?;
     let film = film.ok_or_else(|| RunError::File {
         path: state.path(FILM),
-        reason: "is gone; begin anew with --force".to_owned(),
+        reason: "is gone; start over with --force".to_owned(),
     })?;
     let [numerator, denominator] = film.frame_rate.map(f64::from);
     let rate = numerator / denominator;
@@ -303,7 +300,7 @@ fn choose_sharp(
             .collect()
     };
     observe(Event::Note(format!(
-        "{} of {} frames are for poses, {:.1} a second",
+        "using {} of {} frames for poses, {:.1} a second",
         chosen.len(),
         film.frames.len(),
         chosen.len() as f64 / film.seconds

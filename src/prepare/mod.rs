@@ -271,7 +271,7 @@ fn link_photos(
     let photos = Photos::of(input)?;
     if let [(first, reason), ..] = &photos.others[..] {
         observe(Event::Warning(format!(
-            "{} of {} files are no photos and were left out, such as {first}: {reason}",
+            "left out {} of {} files that are no photos, such as {first}: {reason}",
             photos.others.len(),
             photos.others.len() + photos.headers.len(),
         )));
@@ -393,7 +393,7 @@ fn matching(
         None if is_film => Matching::Sequential,
         None if many => {
             observe(Event::Note(format!(
-                "more than {EXHAUSTIVE} photos: each is matched with its neighbors by name; --match exhaustive matches each with each"
+                "more than {EXHAUSTIVE} photos: matching neighbors by name; --match exhaustive matches all pairs"
             )));
             Matching::Sequential
         }

@@ -216,7 +216,7 @@ impl Task<'_> {
             .collect();
         if let [first, ..] = others {
             observe(Event::Note(format!(
-                "COLMAP found {} pieces that it could not join: the one of {} photos is taken, sparse/0; the next has {}",
+                "COLMAP found {} pieces that it could not join: using the one of {} photos, sparse/0; the next has {}",
                 pieces.len(),
                 taken.photos.len(),
                 first.photos.len()

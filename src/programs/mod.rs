@@ -40,13 +40,13 @@ pub enum ProgramError {
     /// It is not installed.
     #[error("{program} is not installed, or not on PATH: {}", remedy(program))]
     Missing {
-        /// Its name.
+        /// Name of the program, as it was started.
         program: String,
     },
     /// It failed.
     #[error("{program} failed: {said}")]
     Failed {
-        /// Its name.
+        /// Name of the program, as it was started.
         program: String,
         /// What it said last, and how it ended.
         said: String,

@@ -16,7 +16,7 @@ const MAX_PLANES: usize = 48;
 pub struct AdamParameters {
     /// Elements of a plane.
     pub splat_count: u32,
-    /// Planes.
+    /// Number of parameter planes.
     pub planes: u32,
     /// 1 / (1 - β₁ᵗ).
     pub correction1: f32,
@@ -35,11 +35,11 @@ pub struct AdamParameters {
     pub learning_rates: [f32; MAX_PLANES],
 }
 
-/// The kernel.
+/// The compiled `adam` kernel.
 pub struct AdamKernel(Kernel);
 
 impl AdamKernel {
-    /// Compiles it.
+    /// Compiles the kernel for a device.
     pub fn new(gpu: &Gpu) -> Self {
         Self(Kernel::new(gpu, "adam", shaders::ADAM))
     }

@@ -10,7 +10,7 @@ use crate::{
 pub struct Model {
     /// Means, quaternions, log-scales and opacity logits.
     pub geometry: Geometry,
-    /// Harmonics.
+    /// Spherical harmonics of luma.
     pub field: Field,
     /// Of the geometry.
     pub geometry_moments: AdamMoments,

@@ -8,7 +8,7 @@ use super::{AdamSteps, RasterNumerics, Storage};
 /// Average size of what the kernels of a stage worked on, a dispatch.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Load {
-    /// Gaussians.
+    /// Number of Gaussians.
     pub splats: f64,
     /// Gaussians in view.
     pub visible: f64,
@@ -16,9 +16,9 @@ pub struct Load {
     pub instances: f64,
     /// Entries that the tile lists have room for.
     pub capacity: f64,
-    /// Pixels.
+    /// Number of pixels of the picture.
     pub pixels: f64,
-    /// Tiles.
+    /// Number of tiles of 16 × 16 pixels.
     pub tiles: f64,
     /// Channels of the picture: 1 in stage 1, 2 in stage 2.
     pub channels: f64,

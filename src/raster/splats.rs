@@ -73,7 +73,7 @@ pub struct Field {
     pub kind: ColorKind,
     /// Degree that is stored.
     pub degree: u32,
-    /// The coefficients.
+    /// Coefficients, `[planes, N]`.
     pub planes: Buffer<f32>,
 }
 

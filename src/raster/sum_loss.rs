@@ -16,11 +16,11 @@ pub struct SumLossParameters {
     pub entry: u32,
 }
 
-/// The kernel.
+/// The compiled `sum_loss` kernel.
 pub struct SumLossKernel(Kernel);
 
 impl SumLossKernel {
-    /// Compiles it.
+    /// Compiles the kernel for a device.
     pub fn new(gpu: &Gpu) -> Self {
         Self(Kernel::new(gpu, "sum_loss", shaders::SUM_LOSS))
     }

@@ -21,7 +21,7 @@ pub struct ViewUniform {
     pub size: [u32; 2],
     /// Tiles across and down.
     pub tiles: [u32; 2],
-    /// Gaussians.
+    /// Number of Gaussians.
     pub splat_count: u32,
     /// Degree of the spherical harmonics in use.
     pub sh_degree: u32,

@@ -177,7 +177,7 @@ pub struct LumaReport {
 pub struct LumaSeconds {
     /// Reading poses and photos, placing the first Gaussians.
     pub load: f64,
-    /// Training.
+    /// Seconds of training.
     pub train: f64,
     /// Looking at views meanwhile.
     pub curve: f64,
@@ -252,11 +252,11 @@ pub struct ChromaReport {
     /// Share of the Gaussians that hints claim by half or more; `None` where none grew.
     #[serde(default)]
     pub claimed: Option<f64>,
-    /// Held-out views that were painted by hand: colors were learnt from them, and they were not
+    /// Held-out views that were painted by hand: colors were learned from them, and they were not
     /// measured.
     #[serde(default)]
     pub painted_held_out: Vec<String>,
-    /// Views that colors were learnt from and that a teacher colored or that have hints.
+    /// Views that colors were learned from and that a teacher colored or that have hints.
     pub colored_views: usize,
     /// How chroma was solved for.
     pub settings: ChromaSettings,
@@ -323,7 +323,7 @@ pub struct TeacherReport {
 pub struct ChromaSeconds {
     /// Asking the teacher.
     pub teacher: f64,
-    /// Distilling.
+    /// Seconds of solving for a/b.
     pub distill: f64,
     /// Baking to RGB.
     pub bake: f64,
@@ -401,7 +401,7 @@ impl Report {
             )
         });
         let given_up = luma.given_up.map_or(String::new(), |iteration| {
-            format!(" (gone back to where it was best after {iteration})")
+            format!(" (stopped at {iteration}, rolled back to the best)")
         });
         format!(
             "{} Gaussians after {} iterations{given_up}{quality}",

@@ -8,7 +8,7 @@ pub struct Table {
     pub title: String,
     /// Names of the columns.
     pub head: Vec<String>,
-    /// The rows.
+    /// Cells by row.
     pub rows: Vec<Vec<String>>,
     /// What has to be known to read it, a line each.
     pub notes: Vec<String>,

@@ -26,7 +26,7 @@ pub fn minimum_bytes(kernel: &str, load: &Load) -> Option<f64> {
 /// One kernel's row.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct KernelReport {
-    /// The kernel.
+    /// Name of the kernel, as in `shaders/`.
     pub kernel: String,
     /// How often it ran.
     pub dispatches: u64,

@@ -99,7 +99,7 @@ impl<S: DeserializeOwned, C> Found<S, C> {
     ) -> Result<Self, RunError> {
         let damaged = |reason: &str| RunError::File {
             path: path.to_owned(),
-            reason: format!("{reason}: remove it, and begin anew"),
+            reason: format!("{reason}: remove it, and start over"),
         };
         let bytes = input::read(path).map_err(files::at(path))?;
         let sections = sections::read(&bytes).ok_or_else(|| damaged("is damaged"))?;
@@ -253,7 +253,7 @@ impl<'a, S: Serialize> FileKeeper<'a, S> {
             Ok(size) if !self.told => {
                 self.told = true;
                 (self.tell)(Event::Note(format!(
-                    "wrote {}, {:.1} MiB: --resume goes on from there",
+                    "wrote {}, {:.1} MiB: --resume continues from there",
                     self.path.display(),
                     size as f64 / f64::from(1 << 20)
                 )));
@@ -280,7 +280,7 @@ fn wait(minutes: f64) -> Duration {
 pub(super) fn tell_given_up(path: &Path, observe: &mut Observer<'_>) {
     if path.exists() {
         observe(Event::Warning(format!(
-            "{} is left of an interrupted command, which is given up: --resume would go on with it",
+            "{} is left of an interrupted command, which is dropped: --resume would continue it",
             path.display()
         )));
     }

@@ -26,7 +26,7 @@ pub(super) fn found_in(
         Some(path) => Found::read(&path, ChromaCheckpoint::from_sections).map(Some),
         None => {
             observe(Event::Note(
-                "there is no checkpoint of a coloring: it begins anew".to_owned(),
+                "there is no checkpoint of a coloring: it starts over".to_owned(),
             ));
             Ok(None)
         }

@@ -155,11 +155,11 @@ pub fn colorize(
     let painted = lesson.painted_held_out(&dataset.split).len();
     if painted > 0 {
         observe(Event::Note(format!(
-            "colors are learnt from {painted} held-out {} painted by hand, too; measured {}",
+            "colors are learned from {painted} held-out {} painted by hand, too; measured {}",
             if painted == 1 { "photo" } else { "photos" },
             match lesson.measured(&dataset.split) {
                 ("test", views) => format!("on the other {}", views.len()),
-                _ => "on the photos that they are learnt from, for no other is left".to_owned(),
+                _ => "on the photos that they are learned from, for no other is left".to_owned(),
             }
         )));
     }
@@ -273,7 +273,7 @@ pub fn colorize(
                 });
             }
             ColorizeEvent::Uncorrected { before, after } => observe(Event::Note(format!(
-                "brought into line, the teacher's views would disagree more ({:.0} % instead of {:.0} % of its colors' mean square): they are taken as they are",
+                "view correction is off: corrected, the teacher's views would disagree more ({:.0} % instead of {:.0} % of its colors' mean square)",
                 100.0 * after,
                 100.0 * before
             ))),
@@ -428,7 +428,7 @@ fn describe(chosen: &ChosenDegree) -> String {
         .map(|(degree, loss)| format!("{degree}: {loss:.3}"))
         .collect();
     format!(
-        "chroma harmonics of degree {}, for views held back lose {}",
+        "chose SH degree {} for chroma; held-out loss by degree: {}",
         chosen.degree,
         losses.join(", ")
     )

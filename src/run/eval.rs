@@ -251,7 +251,7 @@ fn load(
     };
     let mut dataset = open(&colmap, &report.capture.load, observe)?;
     if let Some(chroma) = &report.chroma {
-        // Colors were learnt from these.
+        // Colors were learned from these.
         let names = dataset.capture.views.iter().map(|view| &view.name);
         let painted = |name: &&String| chroma.painted_held_out.contains(name);
         let of_view: Vec<bool> = names.map(|name| painted(&name)).collect();

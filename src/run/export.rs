@@ -46,9 +46,9 @@ pub struct ExportOptions {
 /// What `export` wrote.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Exported {
-    /// The file.
+    /// File that was written.
     pub file: PathBuf,
-    /// Gaussians.
+    /// Number of Gaussians.
     pub splats: usize,
     /// Bytes of the file.
     pub bytes: u64,

@@ -80,7 +80,7 @@ impl RunFolder {
         self.0.join("eval")
     }
 
-    /// The report.
+    /// Path of `report.json`.
     pub fn report(&self) -> PathBuf {
         self.0.join("report.json")
     }
@@ -95,7 +95,7 @@ impl RunFolder {
         self.0.join("checkpoint-color")
     }
 
-    /// The losses.
+    /// Path of `log.csv`.
     pub fn log(&self) -> PathBuf {
         self.0.join("log.csv")
     }

@@ -59,7 +59,7 @@ pub(super) fn drawn_like_photos(
             false => "without antialiasing",
         };
         observe(Event::Note(format!(
-            "{} is drawn {}, which meets the photos better than as the file says: {:.2} dB instead of {:.2}",
+            "drawing {} {}, which matches the photos better than what the file says: {:.2} dB instead of {:.2}",
             path.display(),
             how(other),
             otherwise.psnr,

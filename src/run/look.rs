@@ -31,14 +31,14 @@ const CACHE_BYTES: usize = 64 << 20;
 /// One of a run's scenes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SceneKind {
-    /// Colored.
+    /// `color.ply`.
     Color,
-    /// Gray.
+    /// `luma.ply`.
     Luma,
 }
 
 impl SceneKind {
-    /// Its name.
+    /// Name on the command line and in reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::Color => "color",
@@ -49,7 +49,7 @@ impl SceneKind {
 
 /// A run or a splat file that is looked at.
 pub struct Look {
-    /// Its name.
+    /// Name in titles.
     pub name: String,
     /// The run's report; none of a splat file.
     pub report: Option<Report>,
@@ -124,7 +124,7 @@ impl Look {
             Ok(dataset) => Some(dataset.caching(CACHE_BYTES)),
             Err(error) if colmap.is_none() => {
                 observe(Event::Warning(format!(
-                    "no cameras and photos: {error} (--colmap says where they are)"
+                    "no cameras and photos: {error} (name their folder with --colmap)"
                 )));
                 None
             }

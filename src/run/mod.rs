@@ -89,7 +89,7 @@ pub enum RunError {
     /// Photos, poses and points, which contradict each other.
     #[error(transparent)]
     Unsound(#[from] Contradiction),
-    /// The device.
+    /// The device failed or is missing.
     #[error(transparent)]
     Gpu(#[from] GpuError),
     /// Stage 2.
@@ -98,13 +98,13 @@ pub enum RunError {
     /// A splat file.
     #[error(transparent)]
     Splats(#[from] SplatError),
-    /// The teacher.
+    /// A teacher cannot be used.
     #[error(transparent)]
     Teacher(#[from] TeacherError),
     /// The file system.
     #[error("{}: {reason}", path.display())]
     File {
-        /// The file.
+        /// File at fault.
         path: PathBuf,
         /// What is wrong with it and what to do.
         reason: String,
@@ -112,10 +112,10 @@ pub enum RunError {
     /// Blocks of a scene.
     #[error(transparent)]
     Blocks(BlocksError),
-    /// Training.
+    /// Training failed.
     #[error(transparent)]
     Luma(LumaError),
-    /// Measuring.
+    /// Measuring failed.
     #[error(transparent)]
     Eval(EvalError),
     /// A camera path.
@@ -209,22 +209,22 @@ pub enum RunError {
         other: String,
     },
     /// There is no training that was interrupted.
-    #[error("{}: nothing to go on with: the run is finished", .0.display())]
+    #[error("{}: nothing to continue: the run is finished", .0.display())]
     NothingToResume(PathBuf),
     /// A checkpoint of another training.
     #[error("{}: belongs to another training: {differs}", path.display())]
     OtherCheckpoint {
-        /// The checkpoint.
+        /// Checkpoint at fault.
         path: PathBuf,
         /// What was otherwise.
         differs: String,
     },
     /// A training was ended from outside, and can go on.
-    #[error("interrupted after iteration {iteration}; {} goes on from there", path.display())]
+    #[error("interrupted after iteration {iteration}; {} continues from there", path.display())]
     Interrupted {
         /// Iterations done.
         iteration: usize,
-        /// The checkpoint.
+        /// Checkpoint at fault.
         path: PathBuf,
     },
     /// Nothing is left for stage 2.

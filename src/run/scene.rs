@@ -30,7 +30,7 @@ pub(super) fn open(
                 message: name.to_owned(),
             },
             Notice::Normalized([low, high]) => Event::Note(format!(
-                "photos are normalized: {low:.6} becomes black and {high:.6} white (--normalize off leaves them)"
+                "photos are normalized: {low:.6} becomes black, {high:.6} white (--normalize off turns this off)"
             )),
         });
     })?)

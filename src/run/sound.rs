@@ -116,7 +116,7 @@ pub(super) fn open_trusted(
     }
     if let [first, ..] = gone[..] {
         observe(Event::Warning(format!(
-            "{} of {} photos that were trained on are gone from {} (such as {first}): nothing is colored by them",
+            "{} of {} training photos are missing in {} (such as {first}): they are not used for color",
             gone.len(),
             trained.len(),
             dir.display()
@@ -186,7 +186,7 @@ pub(super) fn open_examined(
     let all_are_used = options.force || photos < unfit.len() + FEWEST;
     for Rejected { name, reason } in &unfit {
         observe(Event::Warning(match all_are_used {
-            true => format!("used {name} all the same: {reason}"),
+            true => format!("used {name} in spite of this: {reason}"),
             false => format!("left out {name}: {reason}"),
         }));
     }
@@ -251,11 +251,8 @@ pub(super) fn check_model(
                 return Err(error.into());
             }
             let (tracks, instead) = match cameras_are_right {
-                true => (
-                    Tracks::Misplaced,
-                    "photos are looked at where points project to",
-                ),
-                false => (Tracks::Useless, "observations are not used"),
+                true => (Tracks::Misplaced, "reprojecting the points instead"),
+                false => (Tracks::Useless, "ignoring the observations"),
             };
             observe(Event::Warning(format!("{error}; {instead}")));
             model.tracks = tracks;
@@ -361,7 +358,7 @@ pub(super) fn tell_masks(masked: Option<&Masked>, observe: &mut Observer<'_>) {
     }
     if found.masked < found.photos {
         observe(Event::Warning(format!(
-            "{} of {} photos have a mask in {dir}: all of the others counts",
+            "{} of {} photos have a mask in {dir}: the others count fully",
             found.masked, found.photos
         )));
     }

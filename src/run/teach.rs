@@ -116,7 +116,7 @@ struct Asking<'a, 'o> {
     observe: &'a mut Observer<'o>,
     /// The view that comes next.
     view: usize,
-    /// For how many views that colors are learnt from each teacher has an answer, and how many of
+    /// For how many views that colors are learned from each teacher has an answer, and how many of
     /// these are gray.
     answered: Vec<[usize; 2]>,
     /// Whether there is a hint for any view.
@@ -158,9 +158,9 @@ impl Colorizer for Asking<'_, '_> {
         let members = self.teachers.teachers.iter_mut();
         for (member, [answered, in_gray]) in members.zip(&mut self.answered) {
             if let Some(answer) = member.teacher.colorize(query, gray, hints.as_ref())? {
-                let learnt = trained || member.partial;
-                *answered += usize::from(learnt);
-                *in_gray += usize::from(learnt && is_gray(&answer));
+                let learned = trained || member.partial;
+                *answered += usize::from(learned);
+                *in_gray += usize::from(learned && is_gray(&answer));
                 by_hand |= member.partial;
                 answers.push((answer, member.weight));
             }
@@ -323,7 +323,7 @@ impl Teachers {
         for member in &mut self.teachers {
             if let Some(error) = member.teacher.unkept() {
                 observe(Event::Warning(format!(
-                    "the network's answers are not kept for another time: {error}"
+                    "the network's answers are not cached: {error}"
                 )));
             }
         }

@@ -16,7 +16,7 @@ pub enum SplatError {
     /// The file system refused.
     #[error("{}: {source}", path.display())]
     Io {
-        /// The file.
+        /// File at fault.
         path: PathBuf,
         /// The system's reason.
         source: io::Error,
@@ -26,7 +26,7 @@ pub enum SplatError {
         "{}: no format of splat files has this extension; those known are {}", path.display(), Format::list(|_| true)
     )]
     UnknownFormat {
-        /// The file.
+        /// File at fault.
         path: PathBuf,
     },
     /// The file's name is that of a format that is not read.
@@ -34,15 +34,15 @@ pub enum SplatError {
         "{}: {format} files are not read; convert it to .ply, for example with splat-transform (those read are {})", path.display(), Format::list(Format::is_read)
     )]
     OtherFormat {
-        /// The file.
+        /// File at fault.
         path: PathBuf,
-        /// The extension.
+        /// Extension of the file.
         format: String,
     },
     /// A file is not what its format says.
     #[error("{}: {field}: {reason}", path.display())]
     Damaged {
-        /// The file.
+        /// File at fault.
         path: PathBuf,
         /// The part of the file.
         field: &'static str,

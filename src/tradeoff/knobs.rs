@@ -27,7 +27,7 @@ enum Turn {
 
 /// Something that trades quality for time.
 pub(super) struct Knob {
-    /// Its name.
+    /// Name in tables and on the command line.
     pub name: &'static str,
     /// The stage whose time and quality it changes.
     pub stage: PointStage,

@@ -65,7 +65,7 @@ pub enum TradeoffError {
     /// What everything is compared with does not run.
     #[error("{point}, which all other points are compared with, failed: {reason}")]
     Base {
-        /// Its name.
+        /// Name of the point, also of its folder.
         point: String,
         /// What the program said.
         reason: String,
@@ -119,7 +119,7 @@ pub fn tradeoff(
     }
     if (state.sweep.points.iter()).all(|point| point.phase == Phase::Base) {
         observe(Event::Note(format!(
-            "nothing but the base fits into {:.0} minutes: the same command with a larger --budget goes on from here",
+            "only the base fits into {:.0} minutes: the same command with a larger --budget continues from here",
             options.budget / 60.0
         )));
     }

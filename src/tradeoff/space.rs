@@ -5,9 +5,9 @@ use super::report::{Phase, Point, PointStage, Setting};
 /// A knob's value.
 #[derive(Clone, Debug)]
 pub(super) struct Value {
-    /// The knob.
+    /// Name of the setting, as for `--knobs`.
     pub knob: &'static str,
-    /// The value.
+    /// Value of the setting, as on the command line.
     pub value: String,
     /// The stage it belongs to.
     pub stage: PointStage,
@@ -50,7 +50,7 @@ pub(super) struct Task {
     pub name: String,
     /// Its stage.
     pub stage: PointStage,
-    /// Why.
+    /// Phase of the sweep that wants it.
     pub phase: Phase,
     /// What differs from the base.
     pub settings: Vec<Setting>,

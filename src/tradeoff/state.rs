@@ -21,7 +21,7 @@ const LOCK: &str = "tradeoff.lock";
 pub(super) struct State {
     /// Keeps a second sweep away; whatever ends the process frees it.
     _lock: Option<File>,
-    /// The file.
+    /// File at fault.
     path: PathBuf,
     /// What it holds.
     pub sweep: Tradeoff,

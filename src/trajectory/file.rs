@@ -39,7 +39,7 @@ pub enum TrajectoryError {
     /// The file system.
     #[error("{}: {source}", path.display())]
     Io {
-        /// The file.
+        /// File at fault.
         path: PathBuf,
         /// What the system says.
         source: io::Error,
@@ -53,7 +53,7 @@ pub enum TrajectoryError {
     /// It is no camera path.
     #[error("{}: {reason}", path.display())]
     Bad {
-        /// The file.
+        /// File at fault.
         path: PathBuf,
         /// What is wrong with which field.
         reason: String,

@@ -27,7 +27,7 @@ const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 
 /// What was written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Written {
-    /// Gaussians.
+    /// Number of Gaussians.
     pub splats: usize,
     /// Size of the file.
     pub bytes: usize,

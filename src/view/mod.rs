@@ -25,10 +25,10 @@ pub enum ViewerError {
     /// The run or the file.
     #[error(transparent)]
     Run(#[from] RunError),
-    /// The port.
+    /// A port that is taken or not allowed.
     #[error("port {port} of 127.0.0.1 cannot be had ({reason})")]
     Port {
-        /// Which.
+        /// Port on 127.0.0.1.
         port: u16,
         /// The system's reason.
         reason: String,

@@ -57,7 +57,7 @@ pub struct Answer {
     pub kind: &'static str,
     /// What tells this body from others.
     pub tag: Option<String>,
-    /// The body.
+    /// Bytes of the answer.
     pub body: Arc<Vec<u8>>,
 }
 

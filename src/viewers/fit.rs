@@ -47,7 +47,7 @@ pub struct FitSettings {
 }
 
 impl FitSettings {
-    /// What export takes: docs/decisions.md has what was tried.
+    /// What export takes: docs/lab/15-viewers-and-files.md has what was tried.
     pub const DEFAULT: Self = Self {
         iterations: 400,
         log_scales: 1e-2,

@@ -69,7 +69,7 @@ impl Viewer {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ViewerChoice {
-    /// Spark.
+    /// Spark (three.js), colors in bytes.
     Spark,
     /// PlayCanvas' engine.
     PlayCanvas,

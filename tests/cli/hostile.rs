@@ -221,7 +221,7 @@ fn a_cache_that_cannot_be_written_is_told() {
     let colorize = ["colorize", "runs/scene", "--teacher", &network];
     let done = place.run(&[&colorize[..], &["--solver", "adam", "--until", "62"]].concat());
     assert_eq!(done.code, Some(0), "{}", done.stderr);
-    let words = "warning: the network's answers are not kept";
+    let words = "warning: the network's answers are not cached";
     assert!(done.stderr.contains(words), "{}", done.stderr);
 }
 

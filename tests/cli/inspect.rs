@@ -3,28 +3,11 @@
 use std::fs;
 use std::process::Stdio;
 
+use super::pages::COMMANDS;
 use super::program::{Done, Place};
 use super::scene;
 use super::shared::{place_with_run, place_with_scene};
 use super::splat_file::SplatFile;
-
-const COMMANDS: [&str; 15] = [
-    "auto",
-    "prepare",
-    "plan",
-    "fit",
-    "colorize",
-    "frames",
-    "eval",
-    "render",
-    "tradeoff",
-    "export",
-    "info",
-    "doctor",
-    "partition",
-    "merge",
-    "seams",
-];
 
 #[test]
 fn info_on_a_run() {
@@ -133,50 +116,6 @@ fn help_and_version() {
             .succeed(&["--version"])
             .contains(env!("CARGO_PKG_VERSION"))
     );
-    for command in COMMANDS {
-        assert!(
-            place
-                .succeed(&[command, "--help"])
-                .contains("Usage: gs-chroma")
-        );
-    }
-}
-
-#[test]
-fn options_of_the_documentation_exist() {
-    let place = Place::new();
-    let help = COMMANDS
-        .map(|command| place.succeed(&[command, "--help"]))
-        .concat();
-    let known: Vec<&str> = help.split([' ', ',', '[', '\n']).collect();
-    for page in [
-        "README.md",
-        "docs/guide.md",
-        "docs/guide-film.md",
-        "docs/guide-infrared.md",
-        "docs/guide-monochrome.md",
-    ] {
-        let path = format!("{}/{page}", env!("CARGO_MANIFEST_DIR"));
-        let text = fs::read_to_string(path).expect("a page");
-        // Command lines of the program, and first cells of tables of options; some of
-        // these lines name an option of COLMAP or cargo beside.
-        let pieces = text
-            .lines()
-            .filter_map(|line| match line.strip_prefix("| `-") {
-                Some(_) => line.split('|').nth(1),
-                None => line.contains("gs-chroma ").then_some(line),
-            });
-        let options: Vec<&str> = pieces
-            .flat_map(|piece| piece.split([' ', '`', ';', '.', ')', '=']))
-            .filter(|word| {
-                word.starts_with("--") && !["--help", "--path", "--ImageReader"].contains(word)
-            })
-            .collect();
-        assert!(options.len() > 3, "{page}: {options:?}");
-        for option in options {
-            assert!(known.contains(&option), "{page}: {option}");
-        }
-    }
 }
 
 #[test]

@@ -29,6 +29,7 @@ mod hostile;
 mod inspect;
 mod masks;
 mod names;
+mod pages;
 mod paths;
 mod photos;
 mod picture;

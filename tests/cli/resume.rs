@@ -186,7 +186,7 @@ fn what_cannot_go_on_is_refused_with_what_differs() {
     assert!(!place.path("run/checkpoint").exists());
     refused(
         &["--resume"],
-        &["run: nothing to go on with", "without --resume"],
+        &["run: nothing to continue", "without --resume"],
     );
 }
 
@@ -196,7 +196,7 @@ fn what_was_never_begun_begins() {
     let done = place.run(&[&FIT[..], &["--resume"]].concat());
     assert_eq!(done.code, Some(0), "{}", done.stderr);
     assert!(
-        done.stderr.contains("training begins anew"),
+        done.stderr.contains("training starts over"),
         "{}",
         done.stderr
     );
@@ -338,7 +338,7 @@ fn a_coloring_by_others_is_not_gone_on_with() {
     let adam = ["colorize", "runs/scene", "--teacher", "colored", "--resume"];
     let done = place.run(&[&adam[..], &["--solver", "adam", "--until", "62"]].concat());
     assert_eq!(done.code, Some(0), "{}", done.stderr);
-    assert!(done.stderr.contains("begins anew"), "{}", done.stderr);
+    assert!(done.stderr.contains("starts over"), "{}", done.stderr);
     place.write("runs/scene/checkpoint-color", kept);
     // Begun anew it says that it gives up what there is.
     let done = place.run(&COLORIZE);

@@ -254,7 +254,7 @@ fn observations_of_another_scale_are_no_evidence() {
             *pixel = pixel.map(|along| 0.25 * along);
         }
     });
-    let words = ["observations", "0.25 times", "where points project"];
+    let words = ["observations", "0.25 times", "reprojecting the points"];
     let plan = warns(&place, &PLAN, &words);
     warns(&place, &["info", "scene", "--json"], &words);
     // Where points project to they show what they show in the sound scene, but for a twentieth
@@ -347,7 +347,7 @@ fn single_photos_are_left_out_and_named() {
     let forced = warns(
         &place,
         &[&fit[..], &["--force"]].concat(),
-        &["used garden_05.jpg all the same"],
+        &["used garden_05.jpg in spite of this"],
     );
     assert_eq!(forced["capture"]["views"], 14);
 }
@@ -365,7 +365,7 @@ fn of_two_photos_none_is_left_out() {
         fs::remove_file(place.path(&photo)).expect("a photo");
     }
     change_photo(&place, 1, |photo| photo.rotate180());
-    warns(&place, &PLAN, &["used garden_01.jpg all the same"]);
+    warns(&place, &PLAN, &["used garden_01.jpg in spite of this"]);
 }
 
 #[test]

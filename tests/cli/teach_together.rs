@@ -232,7 +232,7 @@ fn help_and_guide_name_every_profile() {
     let names: Vec<_> = names.expect("a list").0.split(", ").collect();
     assert!(names.len() > 6, "{names:?}");
     let help = place.succeed(&["colorize", "--help"]);
-    let guide = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/guide.md");
+    let guide = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/guides/teachers.md");
     let guide = fs::read_to_string(guide).expect("the guide");
     for name in names {
         assert!(help.contains(name), "{name}");
@@ -244,7 +244,7 @@ fn help_and_guide_name_every_profile() {
 #[test]
 fn the_guides_manifest_is_taken() {
     let place = place_with_run();
-    let guide = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/guide.md");
+    let guide = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/guides/teachers.md");
     let guide = fs::read_to_string(guide).expect("the guide");
     let (_, manifest) = guide.split_once("```toml\n").expect("a manifest");
     let (manifest, _) = manifest.split_once("```").expect("its end");

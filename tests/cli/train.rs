@@ -382,7 +382,7 @@ fn a_flat_curve_ends_the_run() {
 #[test]
 fn what_made_it_worse_is_given_up() {
     let place = place_with_scene();
-    // Held-out photos that are black, as nothing is: the better the rest is learnt, the worse.
+    // Held-out photos that are black, as nothing is: the better the rest is learned, the worse.
     for view in [0, 8] {
         let photo = GrayImage::new(scene::SIZE[0], scene::SIZE[1]);
         let path = place.path("scene/images").join(scene::name(view));
@@ -403,7 +403,7 @@ fn what_made_it_worse_is_given_up() {
         .expect("a number");
     assert_eq!(kept, Some(best + best.div_ceil(5)));
     let words = format!(
-        "(gone back to where it was best after {})",
+        "(stopped at {}, rolled back to the best)",
         given_up.unwrap()
     );
     assert!(printed.contains(&words), "{printed}");
@@ -487,7 +487,7 @@ fn a_time_limit_is_kept_or_refused() {
     assert!(place.files("runs").is_empty());
     place.succeed(&[&fit[..], &["0.2"]].concat());
     let luma = &place.report("runs/scene")["luma"];
-    // How well it is kept shows on real scenes (docs/accuracy-and-time.md); that it is what
+    // How well it is kept shows on real scenes (docs/lab/05-goals.md); that it is what
     // ends the run, here: no preset has such a number of iterations.
     assert_eq!(luma["goal"], json!({ "kind": "within", "seconds": 12.0 }));
     assert!(![700, 3_500, 15_000].contains(&luma["iterations"].as_u64().expect("a number")));

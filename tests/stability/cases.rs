@@ -26,7 +26,7 @@ own device; bounds are the worst seen on the device below × 1.05, and × 16 on 
 
 Where f32 shows: 65,600 tiles take coordinates beyond a million
 pixels, whose step is 1/16; a needle across the pixels makes the exponent a small
-difference of large terms (docs/decisions.md).
+difference of large terms (docs/lab/02-rasterizer.md).
 
 `tests/stability` holds more: poison in every parameter of Gaussians and every number of
 COLMAP models, kernels broken on purpose, a lint of the shaders, and whole trainings

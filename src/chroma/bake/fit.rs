@@ -17,7 +17,7 @@ use crate::{
 const BAKE_VIEWS: usize = 16;
 
 /// Rounds of the bake, all at full size: pictures of half the size are blurred otherwise, and
-/// what is right for them is wrong for these (docs/decisions.md).
+/// what is right for them is wrong for these (docs/lab/08-bake.md).
 const BAKE_ROUNDS: usize = 16;
 
 /// Fits RGB harmonics, up to the degree of `settings`, to the colored pictures of `tasks`:
@@ -43,7 +43,7 @@ pub fn fit_rgb(
 pub(in crate::chroma) enum BakeStep {
     /// This view is drawn next.
     Drawing { view: usize, total: usize },
-    /// The solver.
+    /// Progress of the solver.
     Solving(ChromaProgress),
 }
 

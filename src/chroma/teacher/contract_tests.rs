@@ -305,7 +305,7 @@ fn a_manifest_beside_the_model_or_by_its_name() {
     )
     .unwrap();
     let message = refusal(&model, &settings(None, None));
-    for part in ["mine.toml", "line 6", "`means`", "guide.md"] {
+    for part in ["mine.toml", "line 6", "`means`", "teachers.md"] {
         assert!(message.contains(part), "{message}");
     }
     let message = refusal(&model, &settings(Some("missing.toml"), None));

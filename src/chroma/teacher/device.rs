@@ -15,7 +15,7 @@ pub enum TeacherDevice {
     /// The first of the others that the library at hand has and that takes the network.
     #[default]
     Auto,
-    /// The processor.
+    /// The CPU.
     Cpu,
     /// NVIDIA's GPUs.
     Cuda,

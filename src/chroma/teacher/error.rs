@@ -19,7 +19,7 @@ pub enum TeacherError {
     /// The path leads to something else.
     #[error("{}: a teacher is an .onnx file or a folder of colored images", path.display())]
     NoTeacher {
-        /// The path.
+        /// Path that was given.
         path: PathBuf,
     },
     /// The shared library of ONNX Runtime is nowhere.
@@ -38,7 +38,7 @@ pub enum TeacherError {
     /// The shared library of ONNX Runtime does not load.
     #[error("{}: not a usable ONNX Runtime library: {reason}", path.display())]
     BadRuntime {
-        /// The library.
+        /// Library that was found.
         path: PathBuf,
         /// The loader's reason.
         reason: String,
@@ -73,7 +73,7 @@ pub enum TeacherError {
     /// The model is no colorization network that is known here.
     #[error(
         "{}: no known colorization network: it has {found}; accepted: {accepted}; a .toml beside \
-         it can describe another (docs/guide.md)", path.display()
+         it can describe another (docs/guides/teachers.md)", path.display()
     )]
     NoProfile {
         /// The `.onnx` file.
@@ -113,15 +113,15 @@ pub enum TeacherError {
     /// A network that is known by name is not on this machine.
     #[error("{name}: not on this machine yet")]
     NotFetched {
-        /// Its name.
+        /// Name that the user gave.
         name: String,
     },
     /// A network that is kept under its name has other bytes.
-    #[error("{}: is not {name}, whose SHA-256 is another; delete it, and fetch it anew", path.display())]
+    #[error("{}: is not {name}, whose SHA-256 is another; delete it, and fetch it again", path.display())]
     OtherBytes {
         /// The `.onnx` file.
         path: PathBuf,
-        /// The name.
+        /// Name that the user gave.
         name: String,
     },
     /// A table of networks does not describe them.
@@ -133,7 +133,7 @@ pub enum TeacherError {
         reason: String,
     },
     /// A manifest does not describe a network.
-    #[error("{}: {reason}; docs/guide.md lists the fields of a manifest", path.display())]
+    #[error("{}: {reason}; docs/guides/teachers.md lists the fields of a manifest", path.display())]
     BadManifest {
         /// The `.toml` file.
         path: PathBuf,
@@ -157,7 +157,7 @@ pub enum TeacherError {
          whole pictures as a --teacher folder", path.display()
     )]
     NoTransparency {
-        /// The image.
+        /// Image at fault.
         path: PathBuf,
     },
     /// The network failed on a photo.
@@ -185,7 +185,7 @@ pub enum TeacherError {
     /// The folder holds no image.
     #[error("{}: holds no .png, .jpg or .tif image", path.display())]
     EmptyFolder {
-        /// The folder.
+        /// Folder at fault.
         path: PathBuf,
     },
     /// Nobody knows which image of the folder belongs to which photo.
@@ -194,7 +194,7 @@ pub enum TeacherError {
     /// An image of the folder does not decode.
     #[error("{}: not a readable image: {reason}", path.display())]
     BadImage {
-        /// The image.
+        /// Image at fault.
         path: PathBuf,
         /// The decoder's reason.
         reason: String,
@@ -209,7 +209,7 @@ pub enum TeacherError {
         }
     )]
     Aspect {
-        /// The image.
+        /// Image at fault.
         path: PathBuf,
         /// Its width and height.
         size: [u32; 2],

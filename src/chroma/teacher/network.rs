@@ -55,7 +55,7 @@ pub(super) struct Loaded {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ToldBy {
-    /// The user.
+    /// `--teacher-profile`.
     User,
     /// The manifest beside the model.
     Manifest,
@@ -327,7 +327,7 @@ fn check_size(asked: Option<u32>, profile: &Profile, fit: &Fit) -> Result<(), St
     let Some(size) = asked else { return Ok(()) };
     if let Some(fixed) = fit.fixed.into_iter().flatten().find(|&fixed| fixed != size) {
         return Err(format!(
-            "the model takes {fixed} and nothing else; leave the option out, or export the model anew"
+            "the model takes {fixed} and nothing else; leave the option out, or export the model again"
         ));
     }
     let multiple = profile.size_multiple;

@@ -16,7 +16,7 @@ const AB_LIMIT: f32 = 110.0;
 
 /// The contract of one kind of network, and the fields of a manifest.
 ///
-/// docs/guide.md explains every field to those who write one.
+/// docs/guides/teachers.md explains every field to those who write one.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Profile {

@@ -32,7 +32,7 @@ pub(super) const WRITING: f64 = 0.01;
 const SURELY: f64 = 0.9;
 
 /// The least work that makes a scene. With fewer iterations there is none yet, so time
-/// is saved on Gaussians and pixels (docs/accuracy-and-time.md).
+/// is saved on Gaussians and pixels (docs/lab/05-goals.md).
 fn sketch() -> Work {
     Work {
         settings: LumaSettings {
@@ -118,7 +118,7 @@ impl Budget {
         let Some(limit) = options.goal.seconds() else {
             if options.preset.is_none() && options.goal == Goal::Fixed && raster.gpu.is_software() {
                 observe(Event::Note(format!(
-                    "{} has no GPU behind it: preset draft (--preset paper overrules)",
+                    "{} is not a GPU: using preset draft (--preset overrules)",
                     raster.gpu.info().name
                 )));
             }

@@ -73,7 +73,7 @@ pub(super) fn found_in(
         return Err(RunError::NothingToResume(folder.path().to_owned()));
     }
     observe(Event::Note(format!(
-        "{} does not exist: training begins anew",
+        "{} does not exist: training starts over",
         path.display()
     )));
     Ok(None)

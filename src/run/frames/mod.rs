@@ -270,7 +270,7 @@ fn open_teachers(
         }
         Err(error) if options.teacher.is_none() => {
             observe(Event::Warning(format!(
-                "what the scene does not cover takes the colors around it, for the run's teacher cannot be asked: {error}"
+                "the run's teacher is not available, so what the scene does not cover takes the colors around it: {error}"
             )));
             Ok(None)
         }
@@ -300,7 +300,7 @@ fn find_painted(
     match Painted::find(&folder, grow, shots, painter, observe) {
         Err(error) if options.hints.is_none() => {
             observe(Event::Warning(format!(
-                "what the scene does not cover is not painted, for the run's hints cannot be read: {error}"
+                "the run's hints cannot be read, so they are not used on what the scene does not cover: {error}"
             )));
             Ok(Painted::default())
         }

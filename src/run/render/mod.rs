@@ -27,7 +27,7 @@ pub enum Views {
     Train,
     /// Those held out.
     Test,
-    /// All.
+    /// Views of training and held-out ones.
     All,
 }
 

@@ -63,7 +63,7 @@ pub struct PathOptions {
     pub side_by_side: bool,
     /// Folder for the pictures.
     pub output: Option<PathBuf>,
-    /// Film.
+    /// Film to write, by FFmpeg.
     pub video: Option<PathBuf>,
     /// Where the path itself is written.
     pub save_path: Option<PathBuf>,

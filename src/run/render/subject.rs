@@ -33,7 +33,7 @@ pub(super) struct Subject {
     pub foreign: bool,
     /// What was subtracted from COLMAP's coordinates, in world units.
     pub offset: DVec3,
-    /// The run.
+    /// Run folder, unless a splat file was named.
     pub run: Option<RunFolder>,
 }
 

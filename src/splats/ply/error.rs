@@ -27,7 +27,7 @@ pub enum PlyError {
         "{}: a point cloud, not a splat file: its vertices have neither opacity nor scales; give a trained scene, or none, and training starts from COLMAP's points", path.display()
     )]
     PointCloud {
-        /// The file.
+        /// File at fault.
         path: PathBuf,
     },
     /// A property that every Gaussian needs is not there.

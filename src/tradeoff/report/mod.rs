@@ -120,7 +120,7 @@ impl Phase {
 /// A knob and where it stands.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Setting {
-    /// The knob.
+    /// Name of the setting, as for `--knobs`.
     pub knob: String,
     /// Its value.
     pub value: String,
@@ -131,7 +131,7 @@ pub struct Setting {
 pub struct Outcome {
     /// Iterations of stage 1.
     pub iterations: usize,
-    /// Gaussians.
+    /// Number of Gaussians.
     pub splats: usize,
     /// Wall seconds.
     pub seconds: Seconds,
@@ -217,7 +217,7 @@ impl Measure {
         }
     }
 
-    /// Its name.
+    /// Name on the command line and in reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::Psnr => "PSNR",

@@ -230,7 +230,7 @@ pub(super) const CASES: &[Case] = &[
         "a cut photo",
         |p| cut(p, PHOTO, 200),
         FIT,
-        &["03.png", "cannot be decoded", "save it anew"],
+        &["03.png", "cannot be decoded", "save it again"],
     ),
     case("an empty photo", |p| p.write(PHOTO, ""), FIT, &["03.png"]),
     case(
@@ -249,7 +249,7 @@ pub(super) const CASES: &[Case] = &[
         "a cut TIFF",
         |p| p.write(PHOTO, b"II*\0\x08\0\0\0\x0c\0\0\x01"),
         FIT,
-        &["03.png", "cannot be decoded", "save it anew"],
+        &["03.png", "cannot be decoded", "save it again"],
     ),
     case(
         "a camera's raw file",

@@ -120,13 +120,13 @@ pub(super) const CASES: &[Case] = &[
         "a manifest with a field too many",
         |p| p.write("onnx/ddcolor_tiny.toml", "name = \"x\"\nsise = 3\n"),
         "colorize --teacher onnx/ddcolor_tiny.onnx",
-        &["ddcolor_tiny.toml", "line 2", "`sise`", "guide.md"],
+        &["ddcolor_tiny.toml", "line 2", "`sise`", "teachers.md"],
     ),
     case(
         "a manifest with a field too few",
         |p| p.write("own.toml", "name = \"x\"\n"),
         "colorize --teacher onnx/ddcolor_tiny.onnx --teacher-profile own.toml",
-        &["own.toml", "missing field `inputs`", "guide.md"],
+        &["own.toml", "missing field `inputs`", "teachers.md"],
     ),
     case(
         "hints without transparency",

@@ -183,7 +183,7 @@ fn a_part_that_is_asked_for_is_taken() {
     );
     let written = extraction(&place);
     assert!(written.contains("-ss 2.000000 -t 4.000000"), "{written}");
-    let warning = "warning: the film is cut at 0:03.50 within";
+    let warning = "warning: the chosen part has a cut at 0:03.50";
     assert!(done.stderr.contains(warning), "{done:?}");
     // Without an end, up to the cut.
     let done = succeed(&place, &[&FILM[..], &["--start", "2"]].concat());

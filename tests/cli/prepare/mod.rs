@@ -41,7 +41,8 @@ fn photos_become_what_fit_takes() {
     let next = "\nnext: gs-chroma fit house\n";
     assert!(done.stdout.ends_with(next), "{done:?}");
     assert!(
-        done.stderr.contains("warning: 1 of 11 files are no photos"),
+        done.stderr
+            .contains("warning: left out 1 of 11 files that are no photos"),
         "{done:?}"
     );
     for view in all_views() {

@@ -1,0 +1,79 @@
+//! `gs-chroma completions` and `gs-chroma man`: what shells and `man` want to know.
+
+use std::{
+    io::Write,
+    path::{Path, PathBuf},
+};
+
+use clap::{Args, Command, CommandFactory};
+use clap_complete::{Shell, generate};
+use clap_mangen::Man;
+
+use super::{Cli, CliError, print, print_as_is};
+use crate::{disk, run::RunError};
+
+/// Print a completion script for a shell.
+#[derive(Args)]
+#[command(after_long_help = "Example:
+  gs-chroma completions bash > ~/.local/share/bash-completion/completions/gs-chroma")]
+pub struct Completions {
+    /// Shell to complete in.
+    shell: Shell,
+}
+
+impl Completions {
+    pub(super) fn run(self) -> Result<(), CliError> {
+        let mut script = Vec::new();
+        generate(self.shell, &mut Cli::command(), "gs-chroma", &mut script);
+        print_as_is(String::from_utf8_lossy(&script).trim_end())
+    }
+}
+
+/// Write man pages, one for each command.
+#[derive(Args)]
+#[command(after_long_help = "Example:
+  gs-chroma man ~/.local/share/man/man1")]
+pub struct ManPages {
+    /// Folder for the pages.
+    #[arg(value_name = "DIR")]
+    folder: PathBuf,
+}
+
+impl ManPages {
+    pub(super) fn run(self) -> Result<(), CliError> {
+        let mut program = Cli::command();
+        program.build();
+        disk::make_folder(&self.folder).map_err(|error| unwritable(&self.folder, &error))?;
+        let count = write(&program, "gs-chroma", &self.folder)?;
+        print(format_args!(
+            "wrote {count} man pages to {}",
+            self.folder.display()
+        ))
+    }
+}
+
+/// Writes the page of a command and those of its subcommands; how many.
+fn write(command: &Command, name: &str, folder: &Path) -> Result<usize, CliError> {
+    let path = folder.join(format!("{name}.1"));
+    let failed = |error: std::io::Error| unwritable(&path, &error);
+    let mut page = Vec::new();
+    let named = command.clone().name(name.to_owned());
+    Man::new(named).render(&mut page).map_err(failed)?;
+    let mut file = disk::create(&path).map_err(failed)?;
+    file.write_all(&page).map_err(failed)?;
+    file.persist(&path).map_err(failed)?;
+    let others = command
+        .get_subcommands()
+        .filter(|other| other.get_name() != "help");
+    others
+        .map(|other| write(other, &format!("{name}-{}", other.get_name()), folder))
+        .sum::<Result<usize, CliError>>()
+        .map(|pages| pages + 1)
+}
+
+fn unwritable(path: &Path, error: &std::io::Error) -> CliError {
+    CliError::Run(RunError::File {
+        path: path.to_owned(),
+        reason: error.to_string(),
+    })
+}

@@ -1,0 +1,24 @@
+//! Commands that were called wrongly: exit status 2, with the usage of the command in question.
+
+use std::env;
+
+use clap::{Command, CommandFactory, error::ErrorKind};
+
+use super::Cli;
+
+/// The command that was called, as the program's first argument names it.
+pub(super) fn called() -> Command {
+    let mut program = Cli::command();
+    // Subcommands learn the program's name.
+    program.build();
+    let name = env::args().nth(1).unwrap_or_default();
+    match program.find_subcommand(&name) {
+        Some(command) => command.clone(),
+        None => program,
+    }
+}
+
+/// Ends the program because of arguments that do not go together.
+pub(super) fn refuse(kind: ErrorKind, reason: impl std::fmt::Display) -> ! {
+    called().error(kind, reason).exit()
+}
