@@ -27,7 +27,7 @@ impl Area {
     }
 
     /// What of it lies in another area.
-    pub(super) fn within(&self, other: &Self) -> Self {
+    pub fn within(&self, other: &Self) -> Self {
         Self([0, 1].map(|axis| {
             let ([a, b], [c, d]) = (self.0[axis], other.0[axis]);
             [a.max(c), b.min(d)]

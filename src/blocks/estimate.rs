@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::{capture::Camera, luma::Demand};
 
-/// Of the time of an iteration, the part that does not depend on the number of Gaussians.
-/// Measured with docs/large-scenes.md's scene, in blocks and undivided.
+/// Of the time of an iteration, the part that does not depend on the number of Gaussians. A
+/// round figure: how much it is depends on the device and the photos' size.
 const FIXED: f64 = 0.5;
 
 /// What a training is expected to take.

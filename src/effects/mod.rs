@@ -24,7 +24,7 @@ pub use background::{Backdrop, FarPlaces};
 pub use direction::left_out_errors;
 pub use evidence::{Evidence, Survey};
 pub use exposure::{Exposures, find_exposures, find_photo_exposures};
-pub use plan::{Decider, Decision, Effect, Overrules, Plan, Room, TRIAL_GAIN, Trials};
+pub use plan::{Decider, Decision, Effect, Overrules, Plan, Room, Trials};
 pub use sampling::sampling_spread;
 pub use shell::Shell;
 pub(crate) use soundness::listed;

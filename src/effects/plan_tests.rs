@@ -114,16 +114,23 @@ fn a_trial_decides_where_the_evidence_is_in_doubt() {
     };
     assert!(!needs(overruled(exposure(5.0), &asked)));
     let tried = |gain| Trials::from([(Effect::Exposure, gain)]);
-    for (gain, on) in [(0.3, true), (0.09, false), (-2.0, false), (f64::NAN, false)] {
+    for (gain, on) in [
+        (0.31, true),
+        (0.29, false),
+        (-2.0, false),
+        (f64::NAN, false),
+    ] {
         let decision = exposure(5.0).after(&tried(gain));
         assert_eq!((decision.on, decision.decided_by), (on, Decider::Trial));
         assert!(!needs(decision));
     }
+    let behind = Decision::new(Effect::Background, Some(1.5), 1.0);
+    assert!(behind.after(&Trials::from([(Effect::Background, 0.11)])).on);
     let of_another = Trials::from([(Effect::Background, 0.3)]);
     assert_eq!(exposure(5.0).after(&of_another), exposure(5.0));
     let row = exposure(5.0).after(&tried(-2.0)).to_string();
     assert!(
-        row.ends_with("but a trial loses 2 dB with it; 0.1 would count"),
+        row.ends_with("but a trial loses 2 dB with it; 0.3 would count"),
         "{row}"
     );
 }

@@ -2,10 +2,7 @@
 
 use std::fmt;
 
-use super::{
-    Decider, Decision, Effect, Plan,
-    plan::{ROBUST_ITERATIONS, TRIAL_GAIN},
-};
+use super::{Decider, Decision, Effect, Plan, plan::ROBUST_ITERATIONS};
 
 /// A figure with no more digits than it needs, two at most behind the point.
 fn number(value: f64) -> String {
@@ -72,7 +69,9 @@ impl fmt::Display for Decision {
             (Decider::Trial, Effect::TeacherCorrection) => {
                 f.write_str(", but corrected they would differ more")
             }
-            (Decider::Trial, _) => f.write_str(&tried(self.trial.unwrap_or(0.0))),
+            (Decider::Trial, _) => {
+                f.write_str(&tried(self.trial.unwrap_or(0.0), self.effect.trial_gain()))
+            }
             (Decider::User, _) => f.write_str("; you said so"),
             (Decider::Preset, Effect::Robust) => {
                 write!(f, "; a run of {ROBUST_ITERATIONS} iterations could tell")
@@ -85,13 +84,13 @@ impl fmt::Display for Decision {
 }
 
 /// What a trial showed, in dB.
-fn tried(gain: f64) -> String {
-    let (how, but) = match gain < TRIAL_GAIN {
+fn tried(gain: f64, least: f64) -> String {
+    let (how, but) = match gain < least {
         true if gain < 0.0 => ("loses", "but"),
         true => ("gains", "but"),
         false => ("gains", "and"),
     };
-    let (gain, least) = (number(gain.abs()), number(TRIAL_GAIN));
+    let (gain, least) = (number(gain.abs()), number(least));
     format!(", {but} a trial {how} {gain} dB with it; {least} would count")
 }
 

@@ -8,7 +8,7 @@ use super::{
 };
 use crate::{
     capture::{Camera, Dataset},
-    effects::{Effect, Evidence, Overrules, Plan, Room, TRIAL_GAIN, Trials},
+    effects::{Effect, Evidence, Overrules, Plan, Room, Trials},
     measure,
     raster::{Raster, Renderer},
 };
@@ -175,6 +175,7 @@ impl Trial<'_> {
     ) -> Result<Trials, LumaError> {
         let mut sums = vec![0.0; arms.len()];
         let mut trainings = 0;
+        let mut found = Trials::new();
         for round in 1..=self.size.rounds {
             for (arm, sum) in arms.iter().zip(&mut sums) {
                 *sum += self.psnr(arm, round as u64 - 1, &mut |iteration| {
@@ -186,22 +187,17 @@ impl Trial<'_> {
                 })?;
                 trainings += 1;
             }
-            let gain = |sum: &f64| (sum - sums[0]) / round as f64;
-            if (sums[1..].iter()).all(|sum| (gain(sum) - TRIAL_GAIN).abs() > NOISE) {
-                sums.iter_mut().for_each(|sum| *sum /= round as f64);
-                return Ok(self.told(arms, &sums));
+            let gains = arms.iter().zip(&sums);
+            found = gains
+                .filter_map(|(arm, sum)| Some((arm.effect?, (sum - sums[0]) / round as f64)))
+                .collect();
+            let tells =
+                |(effect, gain): (&Effect, &f64)| (gain - effect.trial_gain()).abs() > NOISE;
+            if found.iter().all(tells) {
+                break;
             }
         }
-        let rounds = self.size.rounds as f64;
-        sums.iter_mut().for_each(|sum| *sum /= rounds);
-        Ok(self.told(arms, &sums))
-    }
-
-    fn told(&self, arms: &[Arm], psnr: &[f64]) -> Trials {
-        let gains = arms.iter().zip(psnr);
-        gains
-            .filter_map(|(arm, value)| Some((arm.effect?, value - psnr[0])))
-            .collect()
+        Ok(found)
     }
 
     /// Mean corrected PSNR of the views held back, of a training with an arm's effects.

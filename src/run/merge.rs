@@ -20,10 +20,11 @@ use super::{
 use crate::{
     blocks::{Block, BlockFile, COARSE, Job, Region},
     capture::{Capture, Dataset, LoadOptions},
-    eval::{exposures, gray_rows, mean_quality, measure_luma},
+    eval::{Progress, exposures, gray_rows, mean_quality, measure_luma},
+    input,
     luma::{LumaSettings, carve::chosen, start::started},
     raster::Raster,
-    report::{LumaReport, LumaSeconds, Report, ViewExposure},
+    report::{CaptureReport, LumaReport, LumaSeconds, Report, ViewExposure},
     splats::Splats,
 };
 
@@ -59,7 +60,7 @@ pub fn merge(
     let job = Job::read(&options.job)?;
     let blocks = trained(&options.job, &job)?;
     let Some(first) = blocks.first() else {
-        return Err(RunError::NoHeldOut);
+        return Err(RunError::NoSplats(options.job.clone()));
     };
     observe(Event::begins(Stage::Device));
     let gpu = open_gpu(false)?;
@@ -87,13 +88,13 @@ pub fn merge(
     let settings = &first.report.luma.settings;
     let raster = Arc::new(Raster::with(&gpu, settings.raster_options()));
     let measuring = Instant::now();
-    let mut tell = |progress: crate::eval::Progress<'_>| observe(progress.into());
+    let mut tell = |progress: Progress<'_>| observe(progress.into());
     let views = measure_luma(&raster, &dataset, &splats, &mut tell)?;
     let rows = gray_rows(&raster, &dataset, &splats, &shown)?;
     let seams = seam_views(&dataset.capture, &job, &views, None);
 
     let report = Report {
-        capture: crate::report::CaptureReport {
+        capture: CaptureReport {
             photos: of_files(&dataset.capture)?,
             ..capture_report(&job.capture, &dataset)
         },
@@ -256,7 +257,7 @@ fn sum_of_seconds(blocks: &[Trained]) -> LumaSeconds {
 /// The header of a log, which the blocks have.
 fn log_of(blocks: &[Trained]) -> String {
     let logs = blocks.iter().map(|block| block.folder.log());
-    let read = logs.filter_map(|path| crate::input::read_to_string(&path).ok());
+    let read = logs.filter_map(|path| input::read_to_string(&path).ok());
     let header = read
         .filter_map(|log| Some(log.lines().next()?.to_owned()))
         .next();

@@ -23,6 +23,12 @@ use crate::{
 /// photos' size, and harmonics of any degree can be put together.
 const OWN: [Effect; 2] = [Effect::Lens, Effect::LumaDegree];
 
+/// Standard deviations up to which a Gaussian shows anything to speak of.
+const REACH: f64 = 3.0;
+
+/// Where a block has no margin to speak of, Gaussians are bounded as if it had this one.
+const LEAST_OVERLAP: f64 = 0.05;
+
 /// Heights above and below the scene's that still belong to it, as a share of its height.
 const HEADROOM: f64 = 0.5;
 
@@ -129,14 +135,20 @@ impl BlockPlace {
             })
             .filter(|&(position, _)| near.holds(position))
             .collect();
-        let start = initial_splats(&points, dataset.extent as f32, coarse.sh.degree);
+        let mut start = initial_splats(&points, dataset.extent as f32, coarse.sh.degree);
+        // Points far from all others would begin as a fog that covers the neighbors' cells, too,
+        // and is gone there once the block is cropped.
+        let widest = (self.margin() / REACH).ln() as f32;
+        for log_scale in start.log_scales.iter_mut().flatten() {
+            *log_scale = log_scale.min(widest);
+        }
         let far = self.far(dataset, &coarse);
         let room = settings.max_splats / (1 + FAR_PART);
         let far = chosen(&coarse, &most_shown(dataset, &coarse, far, room));
         // Points give way, not the little that stands for all the rest.
         let taken = far.len() + around.len();
         let room = settings.max_splats.saturating_sub(taken).max(1);
-        let mut start = chosen(&start, &evenly(&start.means, room));
+        start = chosen(&start, &evenly(&start.means, room));
         observe(Event::Note(format!(
             "starts from {} of {} points in and around the block and {} Gaussians of the coarse model beyond",
             start.len(),
@@ -149,6 +161,24 @@ impl BlockPlace {
         Ok(Some((start, surroundings)))
     }
 
+    /// How far the block trains beyond its own cell at least, in world units.
+    fn margin(&self) -> f64 {
+        let cell = self.block.core.within(&self.job.bounds);
+        let sides = cell.0.map(|[least, most]| most - least);
+        self.job.overlap.max(LEAST_OVERLAP) * sides[0].min(sides[1]).max(f64::MIN_POSITIVE)
+    }
+
+    /// How far over the ground a place is from the block's own cell, in world units.
+    fn distance(&self, place: [f32; 3], offset: DVec3) -> f64 {
+        let place = DVec3::from(place.map(f64::from)) + offset;
+        let at = self.job.ground.place(place);
+        let beyond = [0, 1].map(|axis| {
+            let [least, most] = self.block.core.0[axis];
+            (least - at[axis]).max(at[axis] - most).max(0.0)
+        });
+        beyond[0].hypot(beyond[1])
+    }
+
     /// The coarse model's Gaussians beyond what the block's points stand for.
     fn far(&self, dataset: &Dataset, coarse: &Splats) -> Vec<usize> {
         let offset = dataset.capture.offset;
@@ -159,7 +189,11 @@ impl BlockPlace {
             let place = coarse.means[i];
             let height = (self.job.ground).height(DVec3::from(place.map(f64::from)) + offset);
             let level = (lowest - headroom..=highest + headroom).contains(&height);
-            !(level && near.holds(place) && bounds.holds(place))
+            let size = coarse.log_scales[i].into_iter().fold(f32::MIN, f32::max);
+            // What is not the block's own but covers its cell is gone once it is cropped.
+            let beyond = self.distance(place, offset);
+            let reaches = beyond > 0.0 && beyond < REACH * f64::from(size).exp();
+            !(level && near.holds(place) && bounds.holds(place)) && !reaches
         };
         (0..coarse.len()).filter(is_far).collect()
     }
@@ -192,11 +226,10 @@ fn most_shown(dataset: &Dataset, splats: &Splats, some: Vec<usize>, room: usize)
     kept
 }
 
-/// Whether a camera shows anything of a ball: a little is shown of it up to three standard
-/// deviations from its middle.
+/// Whether a camera shows anything of a ball of a standard deviation.
 fn shows(camera: &Camera, middle: DVec3, deviation: f64) -> bool {
     let at = camera.rotation * middle + camera.translation;
-    let margin = 3.0 * deviation * camera.fx.max(camera.fy) / at.z;
+    let margin = REACH * deviation * camera.fx.max(camera.fy) / at.z;
     let inside = |pixel: f64, side: u32| pixel > -margin && pixel < f64::from(side) + margin;
     at.z > 0.0
         && inside(camera.fx * at.x / at.z + camera.cx, camera.width)
