@@ -14,6 +14,7 @@ import { chromium } from "playwright-core";
 
 const FLAGS = [
   "--no-sandbox", "--enable-unsafe-webgpu", "--use-webgpu-adapter=swiftshader", "--enable-unsafe-swiftshader",
+  "--enable-features=Vulkan", "--use-vulkan=swiftshader", "--use-angle=swiftshader",
   "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync",
 ];
 const BROWSERS = ["/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"];
@@ -67,8 +68,15 @@ async function play() {
   const buffers = [];
   const compiled = [];
   const answers = [];
+  const groups = new Map();
   let encoder = device.createCommandEncoder();
+  let pass = null;
+  const endPass = () => {
+    pass?.end();
+    pass = null;
+  };
   const submit = () => {
+    endPass();
     device.queue.submit([encoder.finish()]);
     encoder = device.createCommandEncoder();
   };
@@ -88,23 +96,30 @@ async function play() {
         compiled.push(await compile(step.source, step.name, Object.fromEntries(step.constants)));
         break;
       case "dispatch": {
-        const pass = encoder.beginComputePass();
+        pass ??= encoder.beginComputePass();
         const kernel = compiled[step.kernel];
-        const entries = step.bindings.map(([binding, k]) => ({ binding, resource: { buffer: buffers[k] } }));
+        const key = `${step.kernel}:${step.bindings}`;
+        if (!groups.has(key)) {
+          const layout = kernel.getBindGroupLayout(0);
+          const entries = step.bindings.map(([binding, k]) => ({ binding, resource: { buffer: buffers[k] } }));
+          groups.set(key, device.createBindGroup({ layout, entries }));
+        }
         pass.setPipeline(kernel);
-        pass.setBindGroup(0, device.createBindGroup({ layout: kernel.getBindGroupLayout(0), entries }));
+        pass.setBindGroup(0, groups.get(key));
         pass.dispatchWorkgroups(...step.groups);
-        pass.end();
         break;
       }
       case "copy":
+        endPass();
         encoder.copyBufferToBuffer(buffers[step.from], 0, buffers[step.to], 0, step.size);
         break;
       case "clear":
+        endPass();
         encoder.clearBuffer(buffers[step.buffer]);
         break;
       case "read": {
         const staging = device.createBuffer({ size: step.size, usage: COPY_DST | MAP_READ });
+        endPass();
         encoder.copyBufferToBuffer(buffers[step.buffer], 0, staging, 0, step.size);
         submit();
         await staging.mapAsync(GPUMapMode.READ);
