@@ -6,6 +6,7 @@ import package::common::color::Color;
 import package::common::constants::{TILE_SIDE, TRANSMITTANCE_MIN};
 import package::common::numeric::linear_group;
 @if(playcanvas) import package::common::playcanvas::falloff;
+import package::common::portion::Portion;
 import package::common::projected::{Projected, power_cutoff, touches};
 import package::common::quad::{Quad, contributes, pixel_of, powers, quad_alpha, weighted};
 import package::common::view::View;
@@ -23,6 +24,7 @@ const PART_SIZE: vec2f = vec2f(8.0, 4.0);
 @group(0) @binding(6) var<storage, read_write> image: array<Color>;
 // Instances of the tile up to and including the last that this pixel used.
 @group(0) @binding(7) var<storage, read_write> lasts: array<u32>;
+@group(0) @binding(8) var<uniform> portion: Portion;
 
 var<workgroup> means: array<vec2f, BATCH>;
 var<workgroup> conic_opacities: array<vec4f, BATCH>;
@@ -35,7 +37,7 @@ var<workgroup> uniform_drawing: u32;
 
 @compute @workgroup_size(16, 4)
 fn blend(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_id) local: vec3u, @builtin(local_invocation_index) thread: u32) {
-    let tile = linear_group(group, groups);
+    let tile = portion.first + linear_group(group, groups);
     if tile >= view.tiles.x * view.tiles.y {
         return;
     }

@@ -19,6 +19,7 @@ import package::common::partials::{PARTIAL_STRIDE, PARTIAL_WORDS, PartialWord};
 @if(geometry) import package::common::partials::{PARTIAL_COLOR, PARTIAL_PULL};
 @if(playcanvas) import package::common::partials::PARTIAL_OPACITY;
 @if(playcanvas) import package::common::playcanvas::{RESCALE, falloff};
+import package::common::portion::Portion;
 import package::common::projected::{Projected, power_cutoff, touches};
 import package::common::quad::{contributes, powers, quad_alpha};
 @if(geometry) import package::common::quad::Quad;
@@ -48,6 +49,7 @@ const SHARE: u32 = PARTIAL_STRIDE | 1u;
 @group(0) @binding(7) var<storage, read_write> partials: array<PartialWord>;
 @if(geometry) @group(0) @binding(8) var<storage, read> colors: array<Color>;
 @if(geometry) @group(0) @binding(9) var<storage, read> image: array<Color>;
+@group(0) @binding(10) var<uniform> portion: Portion;
 
 // Shares of one batch, `[instance, thread, figure]`. A figure is a sum over
 // pixels: of dL/dpower times 1, dx, dy, dx², dx·dy, dy², of the pull, then of the
@@ -178,7 +180,7 @@ fn figure_sum(member: u32, figure: u32) -> f32 {
 
 @compute @workgroup_size(THREADS)
 fn blend_backward(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) thread: u32) {
-    let tile = linear_group(group, groups);
+    let tile = portion.first + linear_group(group, groups);
     if tile >= view.tiles.x * view.tiles.y {
         return;
     }

@@ -63,7 +63,8 @@ const CHANGED: u32 = 10u;
 const RHO: u32 = 11u;
 const ALPHA: u32 = RHO + MEMORY;
 
-const UNKNOWN: f32 = 3.4028235e38;
+// The largest number, to so many digits that it is not beyond it: WGSL does not allow that.
+const UNKNOWN: f32 = 3.4028234663852886e38;
 
 // The present point is accepted: a step onward.
 const ONWARD: f32 = 0.0;

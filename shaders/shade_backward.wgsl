@@ -135,7 +135,7 @@ fn shade_backward(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) 
     // Visible Gaussians lie beyond the near plane: the distance is not zero.
     let distance = length(offset);
     let direction = offset / distance;
-    @if(geometry) var v_direction = vec3f();
+    @if(geometry) var v_direction = vec3f(0.0);
     for (var k = 0u; k < count; k++) {
         let term = sh_term(k, direction);
         @if(luma) { v_direction += term.slope * color_dot(sh[plane_index(k, i)], v_color); }

@@ -91,7 +91,7 @@ def missing_packages() -> list[str]:
 
 
 def missing_viewer_packages() -> list[str]:
-    """Debian packages of a browser and of Node, where they are not there."""
+    """Debian packages of a browser, of Node and of validators, where they are not there."""
     packages: list[str] = []
     browsers = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
     if not (os.environ.get("CHROMIUM") or any(map(shutil.which, browsers))):
@@ -100,6 +100,10 @@ def missing_viewer_packages() -> list[str]:
         packages.append("nodejs")
     if not shutil.which("npm"):
         packages.append("npm")
+    if not shutil.which("spirv-val"):
+        packages.append("spirv-tools")
+    if not shutil.which("glslangValidator"):
+        packages.append("glslang-tools")
     return packages
 
 

@@ -1,8 +1,16 @@
 //! Adapter and device.
 
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::{
+    collections::HashMap,
+    sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError},
+};
 
-use super::stopwatch::{KernelTime, Stopwatch};
+use super::{
+    Kernel,
+    kernel::Recipe,
+    stopwatch::{KernelTime, Stopwatch},
+    tape::Deck,
+};
 
 /// What can go wrong with the device.
 #[derive(Debug, thiserror::Error)]
@@ -105,8 +113,28 @@ impl GpuError {
     }
 }
 
-/// Storage buffers that a kernel binds, at most.
+/// Storage buffers that a kernel binds, at most. WebGPU promises 8, and every Metal, D3D12 and
+/// desktop Vulkan device has more; browsers offer 10.
 pub const STORAGE_BUFFERS: u32 = 9;
+
+/// Workgroup memory of a kernel in bytes, at most, each variable rounded up to 16: the shares of
+/// a batch in `blend_backward` for RGB. WebGPU promises 16,384; Metal and D3D12 have 32,768.
+pub const WORKGROUP_BYTES: u32 = 23_344;
+
+/// Threads of a workgroup, at most: what WebGPU promises.
+pub const WORKGROUP_THREADS: u32 = 256;
+
+/// Tiles that one dispatch of blending or its adjoint takes on a device of this kind, so that
+/// none comes near the two seconds after which Windows resets a GPU (docs/gpu.md has the
+/// estimate). As many as fill a large GPU; fewer on one that shares the processor's memory or
+/// that nothing is known of. Nobody watches a processor.
+pub const fn default_tiles_at_once(device: wgpu::DeviceType) -> usize {
+    match device {
+        wgpu::DeviceType::Cpu => usize::MAX,
+        wgpu::DeviceType::DiscreteGpu => 8192,
+        _ => 2048,
+    }
+}
 
 /// A device and its queue, cheap to clone.
 #[derive(Clone)]
@@ -114,6 +142,8 @@ pub struct Gpu {
     inner: Arc<Inner>,
     patch: Option<Patch>,
     stopwatch: Option<Arc<Mutex<Stopwatch>>>,
+    deck: Option<Arc<Deck>>,
+    tiles_at_once: usize,
 }
 
 /// A kernel changed on purpose.
@@ -130,6 +160,8 @@ struct Inner {
     info: wgpu::AdapterInfo,
     /// What the device has refused, such as memory that is not there.
     failed: Arc<OnceLock<String>>,
+    /// What is compiled already: drivers without a cache take up to a second for a kernel.
+    kernels: Mutex<HashMap<Recipe, Kernel>>,
 }
 
 impl Gpu {
@@ -173,7 +205,8 @@ impl Gpu {
     /// large bindings.
     ///
     /// # Errors
-    /// [`GpuError::NoDevice`] when it was made for fewer than [`STORAGE_BUFFERS`] in a kernel.
+    /// [`GpuError::NoDevice`] when it was made for less than kernels need: [`STORAGE_BUFFERS`],
+    /// [`WORKGROUP_BYTES`], [`WORKGROUP_THREADS`].
     pub fn on(
         device: wgpu::Device,
         queue: wgpu::Queue,
@@ -189,25 +222,104 @@ impl Gpu {
         info: wgpu::AdapterInfo,
         failed: Arc<OnceLock<String>>,
     ) -> Result<Self, GpuError> {
-        let binds = device.limits().max_storage_buffers_per_shader_stage;
-        if binds < STORAGE_BUFFERS {
+        let limits = device.limits();
+        let needs = [
+            (
+                "storage buffers",
+                STORAGE_BUFFERS,
+                limits.max_storage_buffers_per_shader_stage,
+            ),
+            (
+                "bytes of workgroup memory",
+                WORKGROUP_BYTES,
+                limits.max_compute_workgroup_storage_size,
+            ),
+            (
+                "threads in a workgroup",
+                WORKGROUP_THREADS,
+                limits.max_compute_invocations_per_workgroup,
+            ),
+        ];
+        let lacking = needs.into_iter().find(|(_, need, allowed)| allowed < need);
+        if let Some((what, need, allowed)) = lacking {
             return Err(GpuError::NoDevice {
                 adapter: info.name,
-                reason: format!(
-                    "kernels bind {STORAGE_BUFFERS} storage buffers, it allows {binds}"
-                ),
+                reason: format!("kernels need {need} {what}, it allows {allowed}"),
             });
         }
         Ok(Self {
+            tiles_at_once: default_tiles_at_once(info.device_type),
             inner: Arc::new(Inner {
                 device,
                 queue,
                 info,
                 failed,
+                kernels: Mutex::default(),
             }),
             patch: None,
             stopwatch: None,
+            deck: None,
         })
+    }
+
+    /// The same device with another name and driver.
+    pub(super) fn named(&self, name: &str) -> Self {
+        let Inner {
+            device,
+            queue,
+            info,
+            failed,
+            ..
+        } = &*self.inner;
+        let info = wgpu::AdapterInfo {
+            name: name.to_owned(),
+            driver: String::new(),
+            driver_info: String::new(),
+            ..info.clone()
+        };
+        Self {
+            inner: Arc::new(Inner {
+                device: device.clone(),
+                queue: queue.clone(),
+                info,
+                failed: failed.clone(),
+                kernels: Mutex::default(),
+            }),
+            ..self.clone()
+        }
+    }
+
+    pub(super) fn with_deck(&self, deck: Deck) -> Self {
+        Self {
+            deck: Some(Arc::new(deck)),
+            ..self.clone()
+        }
+    }
+
+    pub(super) fn deck(&self) -> Option<&Deck> {
+        self.deck.as_deref()
+    }
+
+    /// What is compiled already.
+    pub(super) fn kernels(&self) -> MutexGuard<'_, HashMap<Recipe, Kernel>> {
+        let kernels = self.inner.kernels.lock();
+        kernels.unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Tiles that one dispatch of blending or its adjoint takes.
+    pub fn tiles_at_once(&self) -> usize {
+        self.tiles_at_once
+    }
+
+    /// The same device, whose dispatches take so many tiles: for tests that show that it makes
+    /// no difference.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn with_tiles_at_once(&self, tiles_at_once: usize) -> Self {
+        Self {
+            tiles_at_once,
+            ..self.clone()
+        }
     }
 
     /// The same device, on which every dispatch recorded from now on is timed.

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use super::{Gpu, stopwatch::Timing};
+use super::{Gpu, stopwatch::Timing, tape::Step};
 
 /// Threads in a workgroup of the kernels that give a thread to each element.
 const LINEAR_WORKGROUP: u32 = 256;
@@ -18,14 +18,20 @@ pub fn groups_for(elements: usize) -> u32 {
 /// One compiled entry point; clones share it.
 #[derive(Clone)]
 pub struct Kernel {
-    pipeline: wgpu::ComputePipeline,
+    pub(super) pipeline: wgpu::ComputePipeline,
     layout: wgpu::BindGroupLayout,
-    name: &'static str,
+    pub(super) name: &'static str,
+    pub(super) source: &'static str,
+    pub(super) constants: Vec<(String, f64)>,
 }
 
+/// What a compiled entry point comes from: its name, its source, and the bits of its
+/// overridable constants.
+pub(super) type Recipe = (&'static str, &'static str, Vec<(String, u64)>);
+
 impl Kernel {
-    /// Compiles the entry point `name` of `source`. All bindings
-    /// are in group 0.
+    /// Compiles the entry point `name` of `source`, unless the device has it already. All
+    /// bindings are in group 0.
     pub fn new(gpu: &Gpu, name: &'static str, source: &'static str) -> Self {
         Self::with(gpu, name, source, &[])
     }
@@ -37,11 +43,32 @@ impl Kernel {
         source: &'static str,
         constants: &[(&str, f64)],
     ) -> Self {
+        if let Some(broken) = gpu.broken(name, source) {
+            return Self::compile(gpu, name, source, Some(broken), constants);
+        }
+        let bits = constants.iter();
+        let bits = bits.map(|&(name, value)| (name.to_owned(), value.to_bits()));
+        let recipe = (name, source, bits.collect());
+        if let Some(kernel) = gpu.kernels().get(&recipe) {
+            return kernel.clone();
+        }
+        let kernel = Self::compile(gpu, name, source, None, constants);
+        gpu.kernels().insert(recipe, kernel.clone());
+        kernel
+    }
+
+    fn compile(
+        gpu: &Gpu,
+        name: &'static str,
+        source: &'static str,
+        broken: Option<String>,
+        constants: &[(&str, f64)],
+    ) -> Self {
         let describe = |source| wgpu::ShaderModuleDescriptor {
             label: Some(name),
             source: wgpu::ShaderSource::Wgsl(source),
         };
-        let module = match gpu.broken(name, source) {
+        let module = match broken {
             Some(broken) => gpu.device().create_shader_module(describe(broken.into())),
             // SAFETY: without loop bounding a shader must not loop for ever, without
             // division checks it must not divide an integer by zero. The sources are
@@ -77,6 +104,10 @@ impl Kernel {
             layout: pipeline.get_bind_group_layout(0),
             pipeline,
             name,
+            source,
+            constants: (constants.iter())
+                .map(|&(name, value)| (name.to_owned(), value))
+                .collect(),
         }
     }
 
@@ -96,22 +127,37 @@ impl Kernel {
                 resource: buffer.as_entire_binding(),
             })
             .collect();
-        Bindings(gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
+        let group = gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some(self.name),
             layout: &self.layout,
             entries: &entries,
-        }))
+        });
+        let numbered = buffers.iter();
+        let numbered = numbered.map(|&(binding, buffer)| (binding, buffer.clone()));
+        Bindings {
+            group,
+            buffers: match gpu.tape() {
+                Some(_) => numbered.collect(),
+                None => Vec::new(),
+            },
+        }
     }
 }
 
 /// The buffers of one kernel.
-pub struct Bindings(wgpu::BindGroup);
+pub struct Bindings {
+    group: wgpu::BindGroup,
+    /// Their bindings and they themselves, for the tape.
+    buffers: Vec<(u32, wgpu::Buffer)>,
+}
 
 /// Records dispatches into one compute pass; wgpu orders those that share buffers.
 pub struct Recorder {
     gpu: Gpu,
     encoder: wgpu::CommandEncoder,
     pass: Option<wgpu::ComputePass<'static>>,
+    /// The same for the tape, which gets it when it is submitted.
+    noted: Vec<Step>,
 }
 
 impl Recorder {
@@ -121,6 +167,7 @@ impl Recorder {
             gpu: gpu.clone(),
             encoder: gpu.device().create_command_encoder(&Default::default()),
             pass: None,
+            noted: Vec::new(),
         }
     }
 
@@ -180,40 +227,54 @@ impl Recorder {
     }
 
     fn record(&mut self, kernel: &Kernel, bindings: &Bindings, [x, y]: [u32; 2]) {
+        if let Some(mut tape) = self.gpu.tape() {
+            let step = tape.dispatch(kernel, &bindings.buffers, [x, y]);
+            self.noted.push(step);
+        }
         let mut pass = match self.pass.take() {
             Some(pass) => pass,
             None => self.begin(None),
         };
         pass.set_pipeline(&kernel.pipeline);
-        pass.set_bind_group(0, &bindings.0, &[]);
+        pass.set_bind_group(0, &bindings.group, &[]);
         pass.dispatch_workgroups(x, y, 1);
         self.pass = Some(pass);
     }
 
     /// Copies a whole buffer onto another of the same size.
     pub fn copy(&mut self, from: &wgpu::Buffer, to: &wgpu::Buffer) {
-        self.pass = None;
-        self.encoder
-            .copy_buffer_to_buffer(from, 0, to, 0, from.size());
+        self.copy_bytes(from, to, from.size());
     }
 
     /// Copies the front of a buffer onto one that is no longer.
     pub fn copy_front(&mut self, from: &wgpu::Buffer, to: &wgpu::Buffer) {
+        self.copy_bytes(from, to, to.size());
+    }
+
+    fn copy_bytes(&mut self, from: &wgpu::Buffer, to: &wgpu::Buffer, size: u64) {
         self.pass = None;
-        self.encoder
-            .copy_buffer_to_buffer(from, 0, to, 0, to.size());
+        self.encoder.copy_buffer_to_buffer(from, 0, to, 0, size);
+        if let Some(tape) = self.gpu.tape() {
+            self.noted.push(tape.copy(from, to, size));
+        }
     }
 
     /// Fills a buffer with zeros.
     pub fn clear(&mut self, buffer: &wgpu::Buffer) {
         self.pass = None;
         self.encoder.clear_buffer(buffer, 0, None);
+        if let Some(tape) = self.gpu.tape() {
+            self.noted.push(tape.clear(buffer));
+        }
     }
 
     /// Hands the recording to the device.
     pub fn submit(mut self) {
         self.pass = None;
         self.gpu.queue().submit([self.encoder.finish()]);
+        if let Some(mut tape) = self.gpu.tape() {
+            tape.submitted(self.noted);
+        }
         if let Some(mut stopwatch) = self.gpu.stopwatch()
             && stopwatch.is_filling()
         {
@@ -230,5 +291,8 @@ impl Recorder {
             .create_command_encoder(&Default::default());
         let recorded = std::mem::replace(&mut self.encoder, next);
         self.gpu.queue().submit([recorded.finish()]);
+        if let Some(mut tape) = self.gpu.tape() {
+            tape.submitted(std::mem::take(&mut self.noted));
+        }
     }
 }

@@ -5,8 +5,12 @@ mod device;
 mod kernel;
 pub mod shaders;
 mod stopwatch;
+mod tape;
 
 pub use buffer::{Buffer, Readback};
-pub use device::{Gpu, GpuError, STORAGE_BUFFERS};
+pub use device::{
+    Gpu, GpuError, STORAGE_BUFFERS, WORKGROUP_BYTES, WORKGROUP_THREADS, default_tiles_at_once,
+};
 pub use kernel::{Bindings, Kernel, Recorder, groups_for};
 pub use stopwatch::KernelTime;
+pub use tape::{Step, Tape};

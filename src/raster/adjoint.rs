@@ -6,6 +6,7 @@ use super::{
     constants::*,
     layer::Layer,
     lists::Lists,
+    portions::TileBindings,
     splats::{Field, Geometry},
 };
 use crate::gpu::{Bindings, Buffer, Gpu, GpuError, Kernel, Recorder, groups_for};
@@ -79,8 +80,7 @@ impl AdjointScratch {
 pub(super) struct BlendAdjoint {
     pub(super) scratch: AdjointScratch,
     pub(super) count: usize,
-    max_tiles: usize,
-    blend: Bindings,
+    blend: TileBindings,
     sum: Bindings,
 }
 
@@ -95,14 +95,14 @@ impl BlendAdjoint {
         scratch: AdjointScratch,
     ) -> Self {
         let mut of_blend = vec![
-            lists.view.raw(),
-            lists.starts.raw(),
-            lists.slots().raw(),
-            lists.instance_splats.raw(),
-            lists.projected.raw(),
-            layer.lasts.raw(),
-            image_gradient.raw(),
-            scratch.partials.raw(),
+            (0, lists.view.raw()),
+            (1, lists.starts.raw()),
+            (2, lists.slots().raw()),
+            (3, lists.instance_splats.raw()),
+            (4, lists.projected.raw()),
+            (5, layer.lasts.raw()),
+            (6, image_gradient.raw()),
+            (7, scratch.partials.raw()),
         ];
         let mut of_sum = vec![
             lists.order().raw(),
@@ -112,20 +112,19 @@ impl BlendAdjoint {
             scratch.gradients.raw(),
         ];
         if scratch.trains_geometry {
-            of_blend.extend([layer.colors.raw(), layer.image.raw()]);
+            of_blend.extend([(8, layer.colors.raw()), (9, layer.image.raw())]);
             of_sum.push(lists.projected.raw());
         }
         Self {
-            blend: blend.bind(gpu, &of_blend),
+            blend: (lists.portions).bind(gpu, blend, &of_blend, 10, layer.max_tiles),
             sum: sum.bind(gpu, &of_sum),
             scratch,
             count: geometry.count,
-            max_tiles: layer.max_tiles,
         }
     }
 
     pub(super) fn record(&self, [blend, sum]: [&Kernel; 2], recorder: &mut Recorder) {
-        recorder.dispatch(blend, &self.blend, self.max_tiles as u32);
+        self.blend.record(blend, recorder);
         recorder.dispatch(sum, &self.sum, groups_for(self.count));
     }
 }

@@ -3,6 +3,7 @@
 use super::{
     ColorKind, Raster,
     lists::Lists,
+    portions::TileBindings,
     splats::{Field, Geometry},
 };
 use crate::gpu::{Bindings, Buffer, Gpu, GpuError, Recorder, groups_for};
@@ -59,7 +60,7 @@ pub struct Layer {
     count: usize,
     pub(super) max_tiles: usize,
     shade: Bindings,
-    blend: Bindings,
+    blend: TileBindings,
 }
 
 impl Layer {
@@ -107,19 +108,17 @@ impl Layer {
                 lists.status.raw(),
             ],
         );
-        let blend = kernels.blend.bind(
-            gpu,
-            &[
-                lists.view.raw(),
-                lists.starts.raw(),
-                lists.slots().raw(),
-                lists.instance_splats.raw(),
-                lists.projected.raw(),
-                colors.raw(),
-                image.raw(),
-                lasts.raw(),
-            ],
-        );
+        let of_blend = [
+            (0, lists.view.raw()),
+            (1, lists.starts.raw()),
+            (2, lists.slots().raw()),
+            (3, lists.instance_splats.raw()),
+            (4, lists.projected.raw()),
+            (5, colors.raw()),
+            (6, image.raw()),
+            (7, lasts.raw()),
+        ];
+        let blend = (lists.portions).bind(gpu, &kernels.blend, &of_blend, 8, max_tiles);
         Self {
             kind: field.kind,
             colors,
@@ -136,7 +135,7 @@ impl Layer {
     pub fn record(&self, raster: &Raster, recorder: &mut Recorder) {
         let kernels = raster.layer(self.kind);
         recorder.dispatch(&kernels.shade, &self.shade, groups_for(self.count));
-        recorder.dispatch(&kernels.blend, &self.blend, self.max_tiles as u32);
+        self.blend.record(&kernels.blend, recorder);
     }
 
     /// Reads the picture as `[pixels, channels]`.

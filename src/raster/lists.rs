@@ -4,8 +4,8 @@
 use bytemuck::{Pod, Zeroable};
 
 use super::{
-    Raster, RasterNumerics, constants::*, scan::Scan, sort::Sort, splats::Geometry,
-    view::ViewUniform,
+    Raster, RasterNumerics, constants::*, portions::Portions, scan::Scan, sort::Sort,
+    splats::Geometry, view::ViewUniform,
 };
 use crate::gpu::{
     Bindings, Buffer, Gpu, GpuError, Kernel, Readback, Recorder, groups_for, shaders,
@@ -116,6 +116,8 @@ pub struct Lists {
     pub starts: Buffer<u32>,
     /// Entries that the lists have room for.
     pub capacity: usize,
+    /// How dispatches over the tiles are cut.
+    pub(super) portions: Portions,
     count: usize,
     max_tiles: usize,
     by_depth: Sort,
@@ -257,6 +259,7 @@ impl Lists {
             instance_splats,
             starts,
             capacity,
+            portions: Portions::new(gpu, max_tiles)?,
             count: n,
             max_tiles,
             by_depth,

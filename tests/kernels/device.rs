@@ -8,18 +8,19 @@ use gs_chroma::{
         self, ChromaSettings, ColorizeEvent,
         teacher::{Teacher, TeacherSettings},
     },
-    gpu::{Buffer, Gpu, GpuError, STORAGE_BUFFERS},
+    gpu::{Buffer, Gpu, GpuError, STORAGE_BUFFERS, WORKGROUP_BYTES},
     luma::{self, LumaSettings},
     raster::Raster,
 };
 
 /// A device of the adapter of [`Gpu::open`] with other limits.
-fn brought(storage_buffers: u32) -> Result<Gpu, GpuError> {
+fn brought(storage_buffers: u32, workgroup_bytes: u32) -> Result<Gpu, GpuError> {
     let instance = wgpu::Instance::default();
     let adapter = pollster::block_on(instance.request_adapter(&Default::default())).unwrap();
     let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
         required_limits: wgpu::Limits {
             max_storage_buffers_per_shader_stage: storage_buffers,
+            max_compute_workgroup_storage_size: workgroup_bytes,
             ..wgpu::Limits::default()
         },
         ..Default::default()
@@ -29,12 +30,25 @@ fn brought(storage_buffers: u32) -> Result<Gpu, GpuError> {
 }
 
 #[test]
-fn a_device_that_is_brought_works_if_kernels_can_bind_enough() {
-    let gpu = brought(STORAGE_BUFFERS).unwrap();
+fn a_device_that_is_brought_works_if_it_has_what_kernels_need() {
+    let gpu = brought(STORAGE_BUFFERS, WORKGROUP_BYTES).unwrap();
     let buffer = Buffer::from_slice(&gpu, "numbers", &[1_u32, 2, 3]).unwrap();
     assert_eq!(buffer.read(&gpu).unwrap(), [1, 2, 3]);
-    let refused = brought(STORAGE_BUFFERS - 1);
-    assert!(matches!(refused, Err(GpuError::NoDevice { .. })));
+    for (refused, what) in [
+        (
+            brought(STORAGE_BUFFERS - 1, WORKGROUP_BYTES),
+            "storage buffers",
+        ),
+        (
+            brought(STORAGE_BUFFERS, WORKGROUP_BYTES - 16),
+            "workgroup memory",
+        ),
+    ] {
+        let Err(GpuError::NoDevice { reason, .. }) = refused else {
+            panic!("{what} are not missed");
+        };
+        assert!(reason.contains(what), "{reason}");
+    }
 }
 
 fn garden() -> Arc<Dataset> {

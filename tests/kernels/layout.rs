@@ -14,8 +14,8 @@ use gs_chroma::{
         relocation::RelocationParameters,
     },
     raster::{
-        AdamParameters, Projected, SumLossParameters, TileListsMode, ViewUniform, constants,
-        scan::ScanParameters, sort::SortParameters,
+        AdamParameters, Portion, Projected, SumLossParameters, TileListsMode, ViewUniform,
+        constants, scan::ScanParameters, sort::SortParameters,
     },
 };
 use naga::{
@@ -107,6 +107,7 @@ fn twins() -> Vec<Twin> {
             }
         ),
         twin!("TileListsMode" = TileListsMode { emit }),
+        twin!("Portion" = Portion { first }),
         twin!(
             "LumaLossParameters" = LumaLossParameters {
                 gain,

@@ -27,6 +27,7 @@ mod losses;
 mod memory;
 mod numerics;
 mod poison;
+mod portions;
 mod renderer;
 mod repeat;
 mod resume;

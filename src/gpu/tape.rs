@@ -1,0 +1,210 @@
+//! What a device was asked to do, written down so that another can do it again: WebGPU in a
+//! browser, say, whose answers [`Gpu::answering`] then puts in the place of the device's own.
+
+use std::{
+    collections::{HashMap, VecDeque},
+    sync::{Mutex, MutexGuard, PoisonError},
+};
+
+use serde::Serialize;
+
+use super::{Gpu, Kernel};
+
+/// One thing that a device was asked to do. Buffers and kernels are numbered from 0 in the
+/// order in which they are made.
+#[derive(Clone, Debug, Serialize)]
+#[serde(tag = "do", rename_all = "snake_case")]
+pub enum Step {
+    /// Make a buffer of zeros.
+    Buffer {
+        /// Bytes.
+        size: u64,
+        /// Whether it is a uniform one, not storage.
+        uniform: bool,
+    },
+    /// Write a span of [`Tape::bytes`] into a buffer.
+    Write {
+        /// The buffer.
+        buffer: usize,
+        /// Where in the buffer, in bytes.
+        offset: u64,
+        /// Where on the tape, in bytes.
+        at: usize,
+        /// Bytes.
+        size: usize,
+    },
+    /// Compile an entry point.
+    Kernel {
+        /// Its name.
+        name: &'static str,
+        /// WGSL.
+        source: &'static str,
+        /// Values of overridable constants.
+        constants: Vec<(String, f64)>,
+    },
+    /// Run a grid of workgroups.
+    Dispatch {
+        /// The kernel.
+        kernel: usize,
+        /// Bindings of group 0 and their buffers.
+        bindings: Vec<(u32, usize)>,
+        /// Workgroups along x and y.
+        groups: [u32; 2],
+    },
+    /// Copy the front of a buffer to the front of another.
+    Copy {
+        /// The one.
+        from: usize,
+        /// The other.
+        to: usize,
+        /// Bytes.
+        size: u64,
+    },
+    /// Fill a buffer with zeros.
+    Clear {
+        /// The buffer.
+        buffer: usize,
+    },
+    /// Answer with what a buffer holds.
+    Read {
+        /// The buffer.
+        buffer: usize,
+        /// Bytes.
+        size: u64,
+    },
+}
+
+/// A recording, in order.
+#[derive(Debug, Default)]
+pub struct Tape {
+    /// What was asked.
+    pub steps: Vec<Step>,
+    /// What was written into buffers, one after the other.
+    pub bytes: Vec<u8>,
+    buffers: HashMap<wgpu::Buffer, usize>,
+    kernels: HashMap<wgpu::ComputePipeline, usize>,
+}
+
+impl Tape {
+    pub(super) fn made(&mut self, buffer: &wgpu::Buffer) {
+        let uniform = buffer.usage().contains(wgpu::BufferUsages::UNIFORM);
+        let size = buffer.size();
+        self.buffers.insert(buffer.clone(), self.buffers.len());
+        self.steps.push(Step::Buffer { size, uniform });
+    }
+
+    pub(super) fn wrote(&mut self, buffer: &wgpu::Buffer, offset: u64, bytes: &[u8]) {
+        let (at, size) = (self.bytes.len(), bytes.len());
+        self.bytes.extend(bytes);
+        let buffer = self.number(buffer);
+        self.steps.push(Step::Write {
+            buffer,
+            offset,
+            at,
+            size,
+        });
+    }
+
+    pub(super) fn read(&mut self, buffer: &wgpu::Buffer) {
+        let (size, buffer) = (buffer.size(), self.number(buffer));
+        self.steps.push(Step::Read { buffer, size });
+    }
+
+    /// A dispatch, to be [`Self::submitted`] with what is recorded beside it.
+    pub(super) fn dispatch(
+        &mut self,
+        kernel: &Kernel,
+        buffers: &[(u32, wgpu::Buffer)],
+        groups: [u32; 2],
+    ) -> Step {
+        let next = self.kernels.len();
+        let kernel = match self.kernels.get(&kernel.pipeline) {
+            Some(&known) => known,
+            None => {
+                self.kernels.insert(kernel.pipeline.clone(), next);
+                self.steps.push(Step::Kernel {
+                    name: kernel.name,
+                    source: kernel.source,
+                    constants: kernel.constants.clone(),
+                });
+                next
+            }
+        };
+        let bindings = (buffers.iter()).map(|(binding, buffer)| (*binding, self.number(buffer)));
+        Step::Dispatch {
+            kernel,
+            bindings: bindings.collect(),
+            groups,
+        }
+    }
+
+    pub(super) fn copy(&self, from: &wgpu::Buffer, to: &wgpu::Buffer, size: u64) -> Step {
+        let (from, to) = (self.number(from), self.number(to));
+        Step::Copy { from, to, size }
+    }
+
+    pub(super) fn clear(&self, buffer: &wgpu::Buffer) -> Step {
+        let buffer = self.number(buffer);
+        Step::Clear { buffer }
+    }
+
+    pub(super) fn submitted(&mut self, recorded: Vec<Step>) {
+        self.steps.extend(recorded);
+    }
+
+    fn number(&self, buffer: &wgpu::Buffer) -> usize {
+        // A buffer made before the tape began would be missing; none of a taped device is.
+        self.buffers[buffer]
+    }
+}
+
+/// What a [`Gpu`] writes down, or answers in its device's place.
+#[derive(Debug)]
+pub(super) enum Deck {
+    Recording(Mutex<Tape>),
+    Answering(Mutex<VecDeque<Vec<u8>>>),
+}
+
+impl Gpu {
+    /// The same device, on which everything from now on is written down.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn taped(&self) -> Self {
+        self.with_deck(Deck::Recording(Mutex::default()))
+    }
+
+    /// What was written down so far; nothing unless the device is [`Self::taped`].
+    #[doc(hidden)]
+    pub fn take_tape(&self) -> Tape {
+        self.tape()
+            .map(|mut tape| std::mem::take(&mut *tape))
+            .unwrap_or_default()
+    }
+
+    /// The same device under another name, whose reads give `answers`, one after the other:
+    /// what another device answered to a tape of the same requests.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn answering(&self, name: &str, answers: Vec<Vec<u8>>) -> Self {
+        self.named(name)
+            .with_deck(Deck::Answering(Mutex::new(answers.into())))
+    }
+
+    pub(super) fn tape(&self) -> Option<MutexGuard<'_, Tape>> {
+        match self.deck()? {
+            Deck::Recording(tape) => Some(tape.lock().unwrap_or_else(PoisonError::into_inner)),
+            Deck::Answering(_) => None,
+        }
+    }
+
+    /// The next answer in the device's place, empty where there is none left.
+    pub(super) fn answer(&self) -> Option<Vec<u8>> {
+        match self.deck()? {
+            Deck::Recording(_) => None,
+            Deck::Answering(answers) => {
+                let mut answers = answers.lock().unwrap_or_else(PoisonError::into_inner);
+                Some(answers.pop_front().unwrap_or_default())
+            }
+        }
+    }
+}

@@ -1,0 +1,165 @@
+// Does again what a device was asked to do, by WebGPU in headless Chromium on SwiftShader.
+//
+//   node webgpu.mjs FOLDER
+//
+// FOLDER/tape.json: what to do, step by step (src/gpu/tape.rs), the limits that the device must
+// be made with, and every kernel by name; FOLDER/tape.bin: what is written into buffers. Writes
+// FOLDER/answers.bin, what the reads gave, one after the other. Prints a line of JSON: the
+// adapter, and how many entry points were compiled. Status 1 where anything went wrong.
+import { createReadStream, createWriteStream, existsSync } from "node:fs";
+import { createServer } from "node:http";
+import { join } from "node:path";
+import { pipeline } from "node:stream/promises";
+import { chromium } from "playwright-core";
+
+const FLAGS = [
+  "--no-sandbox", "--enable-unsafe-webgpu", "--use-webgpu-adapter=swiftshader", "--enable-unsafe-swiftshader",
+  "--enable-features=Vulkan", "--use-vulkan=swiftshader", "--use-angle=swiftshader",
+  "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync",
+];
+const BROWSERS = ["/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"];
+
+const [folder] = process.argv.slice(2);
+const server = createServer(async (request, response) => {
+  if (request.method === "POST") {
+    await pipeline(request, createWriteStream(join(folder, "answers.bin")));
+    response.end();
+  } else if (["/tape.json", "/tape.bin"].includes(request.url)) {
+    await pipeline(createReadStream(join(folder, request.url)), response);
+  } else {
+    response.setHeader("content-type", "text/html");
+    response.end("<title>WebGPU</title>");
+  }
+});
+await new Promise((resolve) => server.listen(0, "127.0.0.1", resolve));
+
+// In the page.
+async function play() {
+  const { limits, kernels, steps } = await (await fetch("/tape.json")).json();
+  const bytes = new Uint8Array(await (await fetch("/tape.bin")).arrayBuffer());
+  const adapter = await navigator.gpu?.requestAdapter();
+  if (!adapter) throw new Error("no WebGPU adapter");
+  const device = await adapter.requestDevice({ requiredLimits: limits });
+  const errors = [];
+  device.addEventListener("uncapturederror", ({ error }) => errors.push(error.message));
+
+  // Modules by their source, pipelines by source, entry point and constants.
+  const modules = new Map();
+  const pipelines = new Map();
+  const module = async (code) => {
+    if (!modules.has(code)) {
+      const made = device.createShaderModule({ code });
+      const { messages } = await made.getCompilationInfo();
+      errors.push(...messages.map(({ type, message }) => `${type}: ${message}`));
+      modules.set(code, made);
+    }
+    return modules.get(code);
+  };
+  const compile = async (code, entryPoint, constants) => {
+    const key = JSON.stringify([code, entryPoint, constants]);
+    if (!pipelines.has(key)) {
+      const compute = { module: await module(code), entryPoint, constants };
+      pipelines.set(key, await device.createComputePipelineAsync({ layout: "auto", compute }));
+    }
+    return pipelines.get(key);
+  };
+
+  const { STORAGE, UNIFORM, COPY_SRC, COPY_DST, MAP_READ } = GPUBufferUsage;
+  const buffers = [];
+  const compiled = [];
+  const answers = [];
+  const groups = new Map();
+  let encoder = device.createCommandEncoder();
+  let pass = null;
+  const endPass = () => {
+    pass?.end();
+    pass = null;
+  };
+  const submit = () => {
+    endPass();
+    device.queue.submit([encoder.finish()]);
+    encoder = device.createCommandEncoder();
+  };
+  for (const step of steps) {
+    switch (step.do) {
+      case "buffer": {
+        const usage = (step.uniform ? UNIFORM : STORAGE) | COPY_SRC | COPY_DST;
+        buffers.push(device.createBuffer({ size: step.size, usage }));
+        break;
+      }
+      case "write":
+        // Before what is submitted next, after what was recorded before.
+        submit();
+        device.queue.writeBuffer(buffers[step.buffer], step.offset, bytes, step.at, step.size);
+        break;
+      case "kernel":
+        compiled.push(await compile(step.source, step.name, Object.fromEntries(step.constants)));
+        break;
+      case "dispatch": {
+        pass ??= encoder.beginComputePass();
+        const kernel = compiled[step.kernel];
+        const key = `${step.kernel}:${step.bindings}`;
+        if (!groups.has(key)) {
+          const layout = kernel.getBindGroupLayout(0);
+          const entries = step.bindings.map(([binding, k]) => ({ binding, resource: { buffer: buffers[k] } }));
+          groups.set(key, device.createBindGroup({ layout, entries }));
+        }
+        pass.setPipeline(kernel);
+        pass.setBindGroup(0, groups.get(key));
+        pass.dispatchWorkgroups(...step.groups);
+        break;
+      }
+      case "copy":
+        endPass();
+        encoder.copyBufferToBuffer(buffers[step.from], 0, buffers[step.to], 0, step.size);
+        break;
+      case "clear":
+        endPass();
+        encoder.clearBuffer(buffers[step.buffer]);
+        break;
+      case "read": {
+        const staging = device.createBuffer({ size: step.size, usage: COPY_DST | MAP_READ });
+        endPass();
+        encoder.copyBufferToBuffer(buffers[step.buffer], 0, staging, 0, step.size);
+        submit();
+        await staging.mapAsync(GPUMapMode.READ);
+        answers.push(staging.getMappedRange().slice());
+        staging.destroy();
+        break;
+      }
+      default:
+        throw new Error(`no step is called ${step.do}`);
+    }
+  }
+  // And what nothing was asked of: every entry point of every kernel.
+  for (const [, code] of kernels) {
+    const names = [...code.matchAll(/@compute[^{]*?\bfn (\w+)/g)].map(([, name]) => name);
+    const used = [...pipelines.keys()].map((key) => JSON.parse(key));
+    for (const name of names) {
+      if (!used.some(([source, entry]) => source === code && entry === name)) await compile(code, name, {});
+    }
+  }
+  await fetch("/answers", { method: "POST", body: new Blob(answers) });
+  return { adapter: `${adapter.info.vendor} ${adapter.info.architecture}`, compiled: pipelines.size, errors };
+}
+
+const browser = await chromium.launch({
+  executablePath: process.env.CHROMIUM ?? BROWSERS.find(existsSync),
+  headless: true,
+  args: FLAGS,
+});
+try {
+  const page = await browser.newPage();
+  page.setDefaultTimeout(0);
+  await page.goto(`http://127.0.0.1:${server.address().port}/`);
+  const { errors, ...about } = await page.evaluate(play);
+  console.log(JSON.stringify(about));
+  for (const error of errors) console.error(error);
+  process.exitCode = errors.length > 0 ? 1 : 0;
+} catch (error) {
+  console.error(String(error));
+  process.exitCode = 1;
+} finally {
+  await browser.close();
+  server.close();
+}
