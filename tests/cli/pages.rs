@@ -236,6 +236,39 @@ fn words_are_those_of_the_style() {
     }
 }
 
+/// The source with its strings in one piece.
+fn source() -> String {
+    let mut files = vec![];
+    look(&Path::new(ROOT).join("src"), "rs", &mut files);
+    let texts = files
+        .iter()
+        .map(|file| fs::read_to_string(file).expect("a source"));
+    let text = texts.collect::<Vec<_>>().join("\n");
+    let lines = text.split("\\\n").map(str::trim_start);
+    lines.collect()
+}
+
+#[test]
+fn messages_of_the_trouble_page_exist() {
+    let source = source();
+    let page = fs::read_to_string(format!("{ROOT}/docs/troubleshooting.md")).expect("the page");
+    let (_, tables) = page.split_once("## Messages").expect("tables");
+    let mut count = 0;
+    for row in tables.lines().filter(|line| line.starts_with("| `")) {
+        let cell = row.split(" | ").next().unwrap_or_default();
+        for message in cell.split('`').skip(1).step_by(2) {
+            // What stands between the numbers and names of a case.
+            let message = message.trim_start_matches("warning: ");
+            let pieces = message.split(|c: char| c.is_ascii_digit() || "…×.%:,".contains(c));
+            let longest = pieces.map(str::trim).max_by_key(|piece| piece.len());
+            let longest = longest.unwrap_or_default();
+            assert!(source.contains(longest), "{message}: {longest}");
+            count += 1;
+        }
+    }
+    assert!(count > 60, "{count}");
+}
+
 #[test]
 fn pages_are_short() {
     for (path, text) in pages() {

@@ -185,7 +185,7 @@ fn push_points(html: &mut String, sweep: &Tradeoff, stage: PointStage, pictures:
         PointStage::Luma => ("All points of luma", &["load", "train", "measure"]),
         PointStage::Color => (
             "All points in color",
-            &["luma", "teacher", "distil", "bake and measure"],
+            &["luma", "teacher", "distill", "bake and measure"],
         ),
     };
     let _ = write!(
