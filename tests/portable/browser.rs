@@ -167,6 +167,6 @@ fn answers_are_what_is_judged() {
     let none = measure(&Arc::new(Raster::new(
         &device.answering("nobody", Vec::new()),
     )));
-    let words = none.err().expect("an error").to_string();
+    let words = none.expect_err("an error").to_string();
     assert!(words.contains("no such answer"), "{words}");
 }

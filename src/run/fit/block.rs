@@ -193,7 +193,7 @@ impl BlockPlace {
             // What is not the block's own but covers its cell is gone once it is cropped.
             let beyond = self.distance(place, offset);
             let reaches = beyond > 0.0 && beyond < REACH * f64::from(size).exp();
-            !(level && near.holds(place) && bounds.holds(place)) && !reaches
+            !(reaches || level && near.holds(place) && bounds.holds(place))
         };
         (0..coarse.len()).filter(is_far).collect()
     }
