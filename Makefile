@@ -31,8 +31,8 @@ test: setup
 	cargo fmt --check
 	cargo clippy --release --all-targets -- -D warnings
 	cargo clippy --release --lib --no-default-features -- -D warnings
-	cargo test --release
 	@$(MAKE) --no-print-directory prose
+	cargo test --release
 
 # Names and tables are no prose, nor is the style guide's list of words.
 PROSE = README.md $(shell find docs -name '*.md' -not -path 'docs/lab/*' -not -name hard-cases.md -not -name style.md)

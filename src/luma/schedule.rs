@@ -138,7 +138,7 @@ pub const SETTLED: f64 = 0.1;
 /// Share of the iterations after which surroundings are drawn. From the first on, Gaussians in
 /// front of them would stay thin and lend them their mean gray, which other views show to be
 /// wrong; the later they come, the longer have those at the border tried to show what lies
-/// beyond it (docs/decisions.md).
+/// beyond it (docs/lab/16-ends-and-gaps.md).
 const SURROUND_AT: f64 = 0.3;
 
 /// A run that is made to settle early takes so many more iterations, as a share of those

@@ -14,7 +14,7 @@ use crate::{
 
 /// At most so large a share of the Gaussians starts where COLMAP has no point, as numerator and
 /// denominator: half of it gained less on the lawn of the bundled scene, more cost elsewhere
-/// (docs/decisions.md).
+/// (docs/lab/16-ends-and-gaps.md).
 const GAPS_PARTS: [usize; 2] = [3, 10];
 
 /// At most one in so many Gaussians is one of the surroundings.

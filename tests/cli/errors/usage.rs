@@ -12,7 +12,7 @@ const fn usage(name: &'static str, command: &'static str, words: &'static [&'sta
 pub(super) const CASES: &[Case] = &[
     usage("no such command", "paint scene", &["paint"]),
     usage("no such option", "fit scene --fast", &["--fast"]),
-    usage("no folder", "fit", &["<COLMAP_DIR|RUN>"]),
+    usage("no folder", "fit", &["<COLMAP_DIR|RUN|BLOCK>"]),
     usage("no teacher", "colorize runs/scene", &["--teacher"]),
     usage("no output to render to", "render runs/scene", &["--output"]),
     usage("no output to export to", "export runs/scene", &["--output"]),

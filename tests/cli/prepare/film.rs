@@ -82,7 +82,7 @@ fn a_film_becomes_what_fit_takes() {
     let done = succeed(&place, &FILM);
     assert!(done.stderr.contains("3 shots"), "{done:?}");
     assert!(
-        done.stderr.contains("is taken, 0:01.50 to 0:05.50"),
+        done.stderr.contains("the longest, 0:01.50 to 0:05.50"),
         "{done:?}"
     );
     assert!(done.stderr.contains("0:05.50 to 0:07.50"), "{done:?}");
