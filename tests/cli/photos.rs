@@ -123,8 +123,5 @@ fn masks_beside_the_photos_are_found_and_may_be_left_alone() {
         assert_eq!(equal, same, "{options:?}");
     }
     // What is removed is no longer there, and only then.
-    assert!(
-        splats[1] < splats[0] && splats[1] < splats[2],
-        "{splats:?}"
-    );
+    assert!(splats[1] < splats[0] && splats[1] < splats[2], "{splats:?}");
 }
