@@ -8,7 +8,7 @@ use super::{LumaSettings, PAPER_ITERATIONS};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Preset {
-    /// Small photos, few Gaussians: the bundled garden in 30 s on two processor cores, 23.6 dB of
+    /// Small photos, few Gaussians: the bundled garden within a minute on two processor cores, 24.5 dB of
     /// its held-out photos.
     Draft,
     /// For a GPU; goes back to its best and ends where twice the iterations would bring less than
