@@ -48,8 +48,10 @@ pub fn placed_splats(
             (position, gray_from_rgb(rgb) as f32)
         })
         .collect();
-    let most = (settings.max_splats - reserved) * GAPS_PARTS[0] / GAPS_PARTS[1];
-    let found = match settings.fill_gaps {
+    let room = settings.max_splats - reserved;
+    // Where COLMAP has more points than there may be Gaussians, none of them is to spare.
+    let most = (room * GAPS_PARTS[0] / GAPS_PARTS[1]).min(room.saturating_sub(points.len()));
+    let found = match settings.fill_gaps && most > 0 {
         true => gap_points(dataset, most)?,
         false => Vec::new(),
     };
