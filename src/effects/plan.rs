@@ -135,7 +135,7 @@ impl Effect {
             Self::Background => Some(10.0),
             Self::LumaDegree => Some(10.0),
             // What is far off is told from what is not learned yet in long runs only, and a
-            // wrong decision costs 0.05 dB (docs/effects.md).
+            // wrong decision costs 0.05 dB (docs/lab/12-effects.md).
             Self::Robust => None,
             Self::Lens | Self::Masks | Self::TeacherCorrection | Self::ChromaDegree => None,
         }
