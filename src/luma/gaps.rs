@@ -5,7 +5,11 @@
 //! cross-correlation, as plane sweeps do (Collins 1996; the photos that are compared stay as they
 //! are, patches face the camera).
 
-use std::{num::NonZero, thread};
+use std::{
+    collections::{BTreeSet, HashMap},
+    num::NonZero,
+    thread,
+};
 
 use glam::DVec3;
 
@@ -172,9 +176,8 @@ pub(super) fn gap_points(dataset: &Dataset, most: usize) -> Result<Vec<GapPoint>
 
 fn found(capture: &Capture, photos: &[(usize, Small)], most: usize) -> Vec<GapPoint> {
     let mut found: Vec<GapPoint> = Vec::new();
-    for (number, photo) in photos {
+    for ((number, photo), points) in photos.iter().zip(seen_points(capture, photos)) {
         let neighbors = nearest_photos(photo, photos, *number);
-        let points = seen_points(capture, *number, photo);
         let more = Gaps::of(photo, &points, &found).filled(&neighbors);
         found.extend(more);
     }
@@ -203,15 +206,26 @@ fn nearest_photos<'a>(
     others
 }
 
-/// Pixel and depth of the points that a photo shows: those that it was found in, or all before it
-/// where the model does not say.
-fn seen_points(capture: &Capture, number: usize, photo: &Small) -> Vec<([f64; 2], f64)> {
+/// Of each photo, pixel and depth of the points that it shows: those that were found in it, or
+/// all before it where the model does not say.
+fn seen_points(capture: &Capture, photos: &[(usize, Small)]) -> Vec<Vec<([f64; 2], f64)>> {
     let tracked = capture.points.iter().any(|point| !point.track.is_empty());
-    let seen = capture.points.iter().filter(|point| {
-        !tracked || (point.track.iter()).any(|observation| observation.view == number)
-    });
-    seen.filter_map(|point| photo.project(point.position))
-        .collect()
+    let places: HashMap<usize, usize> = (photos.iter().zip(0..))
+        .map(|((number, _), place)| (*number, place))
+        .collect();
+    let mut seen = vec![Vec::new(); photos.len()];
+    for point in &capture.points {
+        let showing: BTreeSet<usize> = match tracked {
+            true => (point.track.iter())
+                .filter_map(|observation| places.get(&observation.view).copied())
+                .collect(),
+            false => (0..photos.len()).collect(),
+        };
+        for place in showing {
+            seen[place].extend(photos[place].1.project(point.position));
+        }
+    }
+    seen
 }
 
 /// The cells of a photo in which there is no point.
