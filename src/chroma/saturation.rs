@@ -3,8 +3,8 @@
 //! A scene that is a little blurred, and whose views want different colors of one place, shows
 //! the middle of what is wanted: paler than any of it. One factor for all colors makes up for
 //! that, as far as the teacher's strength is no contradiction: by how much its pictures are
-//! stronger than the scene's from the same views, times the share of their strength that views
-//! agree on.
+//! more colorful than the scene's from the same views, times the share of their strength that
+//! views agree on.
 
 use std::ops::ControlFlow;
 
@@ -56,14 +56,15 @@ pub fn match_saturation(
         let ab = target.ab().ab;
         let pixels = |picture: usize| pictures[picture].pixels.as_chunks::<2>().0;
         let drawn = pixels(0).iter().zip(pixels(1));
+        let (mut teachers, mut scenes) = (Moments::default(), Moments::default());
         for (i, ((own, opacity), ab)) in drawn.zip(&ab).enumerate() {
             let weight = target.weights.as_ref().map_or(1.0, |weights| weights[i]);
             let weight = f64::from(weight.min(1.0) * opacity[0]);
-            for channel in 0..2 {
-                wanted += weight * f64::from(ab[channel]).powi(2);
-                shown += weight * f64::from(own[channel]).powi(2);
-            }
+            teachers.add(weight, *ab);
+            scenes.add(weight, *own);
         }
+        wanted += teachers.colorfulness();
+        shown += scenes.colorfulness();
     }
     let factor = factor(wanted, shown, agreed);
     for coefficient in &mut chroma.coefficients {
@@ -72,10 +73,41 @@ pub fn match_saturation(
     Ok(factor)
 }
 
-/// From mean squares of what is wanted and of what is shown.
+/// Weighted sums of a picture's a and b, in CIELAB units.
+#[derive(Default)]
+struct Moments {
+    weight: f64,
+    sums: [f64; 2],
+    squares: [f64; 2],
+}
+
+impl Moments {
+    fn add(&mut self, weight: f64, ab: [f32; 2]) {
+        self.weight += weight;
+        for (channel, value) in ab.map(f64::from).into_iter().enumerate() {
+            self.sums[channel] += weight * value;
+            self.squares[channel] += weight * value * value;
+        }
+    }
+
+    /// The standard deviation over the picture and 0.37 of the mean's distance from gray: the
+    /// first measure of Hasler and Süsstrunk, "Measuring colourfulness in natural images"
+    /// (2003). A root mean square would count what all of a picture has in common alike, and
+    /// compromises keep that.
+    fn colorfulness(&self) -> f64 {
+        if self.weight <= 0.0 {
+            return 0.0;
+        }
+        let mean = self.sums.map(|sum| sum / self.weight);
+        let variance = |c: usize| (self.squares[c] / self.weight - mean[c] * mean[c]).max(0.0);
+        (variance(0) + variance(1)).sqrt() + 0.37 * mean[0].hypot(mean[1])
+    }
+}
+
+/// From the colorfulness of what is wanted and of what is shown.
 fn factor(wanted: f64, shown: f64, agreed: f64) -> f64 {
     let agreed = (agreed / STEADY).min(1.0);
-    let factor = (wanted * agreed / shown).sqrt();
+    let factor = wanted * agreed.sqrt() / shown;
     // Nothing is made of a gray scene, whatever is wanted of it.
     if shown > 0.0 && factor.is_finite() {
         factor.clamp(1.0, MOST)
@@ -91,11 +123,11 @@ mod tests {
     #[test]
     fn what_is_lacking_and_agreed_on() {
         for (wanted, shown, agreed, expected) in [
-            (1.21, 1.0, 1.0, 1.1),
-            (1.21, 1.0, 0.9, 1.1),
-            (1.21, 1.0, 0.9 / 1.21, 1.0),
-            (1.0, 1.44, 1.0, 1.0),
-            (9.0, 1.0, 1.0, MOST),
+            (1.1, 1.0, 1.0, 1.1),
+            (1.1, 1.0, 0.9, 1.1),
+            (1.1, 1.0, 0.9 / 1.21, 1.0),
+            (1.0, 1.2, 1.0, 1.0),
+            (3.0, 1.0, 1.0, MOST),
             (1.0, 0.0, 1.0, 1.0),
             (0.0, 0.0, 1.0, 1.0),
             (f64::NAN, 1.0, 1.0, 1.0),
@@ -104,5 +136,18 @@ mod tests {
             let found = factor(wanted, shown, agreed);
             assert!((found - expected).abs() < 1e-12, "{found}, not {expected}");
         }
+    }
+
+    #[test]
+    fn what_varies_counts_for_more_than_the_mean() {
+        let of = |values: [(f64, [f32; 2]); 3]| {
+            let mut moments = Moments::default();
+            values.map(|(weight, ab)| moments.add(weight, ab));
+            moments.colorfulness()
+        };
+        let nothing = (0.0, [90.0, -90.0]);
+        assert_eq!(of([nothing; 3]), 0.0);
+        assert!((of([(1.0, [3.0, 4.0]), (2.0, [3.0, 4.0]), nothing]) - 0.37 * 5.0).abs() < 1e-9);
+        assert!((of([(1.0, [3.0, 4.0]), (1.0, [-3.0, -4.0]), nothing]) - 5.0).abs() < 1e-9);
     }
 }
