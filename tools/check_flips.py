@@ -1,0 +1,152 @@
+#!/usr/bin/env python3
+"""Compares what the plan chose with each single effect flipped, and prints Markdown.
+
+    cargo build --release --bins --examples && python3 tools/check_flips.py -o target/flips
+
+The bundled scene, every variant that make_variants makes of it, and the scenes below DATA
+(default ../shared/data; skipped with a word where missing). A run as planned tells which
+effects are on; then every effect is flipped by itself, all others as planned. What a flip
+gains is the mean over the seeds of held-out PSNR after each photo's own gain and offset. A
+scene fails where a flip gains more than BOUND and more than twice its standard error. Results
+are kept in OUTPUT/flips.json: a second call goes on where the first was stopped.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shlex
+import shutil
+import statistics
+import subprocess
+import sys
+from pathlib import Path
+
+from check_effects import VARIANTS, first_line, members
+
+# Flips of `lens` and `masks` would measure other pixels.
+EFFECTS = ["exposure", "robust", "antialias", "background", "luma-degree"]
+SCENES = ["fern-llff", "brighton-drone", "banana-object", "caliterra-drone", "tiny-banana", "tiny-brighton"]
+
+# What a flip may gain, in dB.
+BOUND = 0.1
+
+
+class Failure(Exception):
+    """A command that failed, in one line."""
+
+
+def fit(options: argparse.Namespace, scene: Path, seed: int, flags: list[str]) -> dict:
+    """The report of one run."""
+    out = options.output / "run"
+    shutil.rmtree(out, ignore_errors=True)
+    command = [options.program, "fit", str(scene), "-o", str(out), "--json", "--seed", str(seed)]
+    command += [*shlex.split(options.fit), *flags]
+    done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    if done.returncode != 0:
+        raise Failure(f"{scene.name}: {first_line(done.stderr)}")
+    return json.loads(done.stdout)
+
+
+def measured(report: dict) -> float:
+    return report["luma"]["held_out"]["corrected_psnr"]
+
+
+def flags(chosen: dict[str, bool]) -> list[str]:
+    return [word for name, on in chosen.items() for word in ("--with" if on else "--without", name)]
+
+
+def scene_results(options: argparse.Namespace, scene: Path, known: dict, save) -> dict:
+    """PSNR of every seed, as planned and with every flip."""
+    if "plan" not in known:
+        report = fit(options, scene, options.seeds[0], [])
+        known["plan"] = {one["name"]: bool(one["on"]) for one in report["effects"] if one["name"] in EFFECTS}
+        known["runs"] = {}
+        save()
+    for name in ["planned", *known["plan"]]:
+        chosen = {one: on != (one == name) for one, on in known["plan"].items()}
+        for seed in map(str, options.seeds):
+            if seed not in known["runs"].setdefault(name, {}):
+                known["runs"][name][seed] = measured(fit(options, scene, int(seed), flags(chosen)))
+                save()
+    return known
+
+
+def row(options: argparse.Namespace, name: str, found: dict) -> tuple[str, list[str]]:
+    """A row of the table, and what gains more than it may."""
+    on = [effect for effect, is_on in found["plan"].items() if is_on]
+    planned = [found["runs"]["planned"][str(seed)] for seed in options.seeds]
+    cells, failures = [], []
+    for effect in EFFECTS:
+        if effect not in found["plan"]:
+            cells.append("")
+            continue
+        flipped = [found["runs"][effect][str(seed)] for seed in options.seeds]
+        gains = [f - p for f, p in zip(flipped, planned)]
+        gain = statistics.mean(gains)
+        error = statistics.stdev(gains) / len(gains) ** 0.5 if len(gains) > 1 else 0.0
+        worse = gain > BOUND and gain > 2 * error
+        word = f"{gain:+.2f}" + (f" ± {error:.2f}" if len(gains) > 1 else "")
+        cells.append(f"**{word}**" if worse else word)
+        if worse:
+            failures.append(f"{name}: flipping {effect} gains {gain:.2f} dB")
+    spread = f"{statistics.mean(planned):.2f} ({min(planned):.2f}–{max(planned):.2f})"
+    return f"| {name} | {', '.join(on) or 'none'} | {spread} | {' | '.join(cells)} |", failures
+
+
+def main() -> int:
+    """Makes, fits, prints."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--data", type=Path, default=Path("../shared/data"))
+    parser.add_argument("-o", "--output", type=Path, default=Path("target/flips"))
+    parser.add_argument("--program", default="target/release/gs-chroma")
+    parser.add_argument("--maker", default="target/release/examples/make_variants")
+    parser.add_argument("--scenes", nargs="*", help="only these names")
+    parser.add_argument("--also", nargs="*", type=Path, default=[], help="more COLMAP folders")
+    parser.add_argument("--seeds", type=int, nargs="+", default=[0, 1, 2])
+    parser.add_argument(
+        "--fit", default="--preset balanced --iterations 2400 --max-side 160 --max-splats 4000",
+        help="flags for fit, as one word",
+    )  # fmt: skip
+    options = parser.parse_args()
+    options.output.mkdir(parents=True, exist_ok=True)
+    bundled = Path("assets/demo")
+    scenes = {"bundled": bundled} | {name: options.data / name for name in SCENES}
+    scenes |= {folder.name: folder for folder in options.also}
+    made = [name for name, _ in members([name for name, _ in VARIANTS])]
+    scenes |= {name: options.output / name for name in made}
+    if options.scenes:
+        scenes = {name: folder for name, folder in scenes.items() if name in options.scenes}
+    kept = options.output / "flips.json"
+    results = json.loads(kept.read_text()) if kept.is_file() else {}
+    # Other flags measure something else.
+    if results.get("fit") != options.fit:
+        results = {"fit": options.fit, "scenes": {}}
+
+    def save() -> None:
+        kept.write_text(json.dumps(results, indent=1) + "\n")
+
+    print(f"| scene | on as planned | dB as planned | {' | '.join(EFFECTS)} |")
+    print(f"|---|---|{'--:|' * (len(EFFECTS) + 1)}")
+    failures = []
+    for name, folder in scenes.items():
+        if name in made and not folder.is_dir():
+            subprocess.run([options.maker, str(bundled), name, str(folder)], check=True)
+        if not folder.is_dir():
+            print(f"skipped: no {folder}", file=sys.stderr)
+            continue
+        try:
+            found = scene_results(options, folder, results["scenes"].setdefault(name, {}), save)
+        except Failure as failure:
+            failures.append(str(failure))
+            continue
+        line, worse = row(options, name, found)
+        failures += worse
+        print(line, flush=True)
+    for failure in failures:
+        print(failure, file=sys.stderr)
+    return int(bool(failures))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
