@@ -264,6 +264,7 @@ pub fn auto(options: &AutoOptions, tell: &mut Teller<'_>) -> Result<Results, Aut
             luma: false,
             colmap_coordinates: false,
             spz: None,
+            clean: false,
             viewer: None,
             colmap: None,
         };

@@ -32,8 +32,8 @@ pub struct Colored {
     pub effects: [Decision; 2],
     /// Views that colors were learned from and that a teacher colored or that have strokes.
     pub colored_views: usize,
-    /// Share of the Gaussians that no colored view shows to speak of; see [`Solved`](super::Solved).
-    pub unseen: Option<f64>,
+    /// In how many pixels of the colored views each Gaussian shows; see [`Solved`](super::Solved).
+    pub seen: Option<Vec<f32>>,
     /// Share of the Gaussians that strokes claim by half or more; `None` without strokes.
     pub claimed: Option<f64>,
     /// What colors were multiplied by to be as strong as the teachers'; in `chroma` and `splats`.
@@ -316,7 +316,7 @@ impl Distill<'_> {
         Ok(Colored {
             splats,
             chroma,
-            unseen: solved.unseen,
+            seen: solved.seen,
             claimed: laid.as_ref().map(|laid| laid.claimed),
             saturation,
             effects,

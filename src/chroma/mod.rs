@@ -57,6 +57,6 @@ pub use relight::relight;
 pub use roofline::minimum_words;
 pub use saturation::match_saturation;
 pub use settings::{ChromaSettings, SolverKind};
-pub use solve::{Solved, solve};
+pub use solve::{Solved, solve, unseen_share};
 pub(crate) use strokes::{at_middle_lightness, claimed_by_strokes, shaded_at};
 pub use targets::{Target, Targets, pack_ab, pack_rgb};

@@ -17,13 +17,20 @@ pub struct Solved {
     pub corrections: Vec<(Task, Correction)>,
     /// What a dispatch worked on, the mean over the passes.
     pub load: Load,
-    /// Share of the Gaussians that no view shows to speak of, whose colors come from their
-    /// neighbors if from anywhere; `None` of Adam, which does not know.
-    pub unseen: Option<f64>,
+    /// In how many pixels of all views each Gaussian shows, `[N]`; `None` of Adam, which does not
+    /// know.
+    pub seen: Option<Vec<f32>>,
 }
 
 /// Gaussians that views show in fewer pixels than this are hardly seen.
 pub(super) const SEEN: f32 = 0.5;
+
+/// Share of the Gaussians that no view shows to speak of, whose colors come from their neighbors
+/// if from anywhere; `seen` as in [`Solved`].
+pub fn unseen_share(seen: &[f32]) -> f64 {
+    let unseen = seen.iter().filter(|&&seen| seen < SEEN).count();
+    unseen as f64 / seen.len().max(1) as f64
+}
 
 /// Distills the wanted a/b of `tasks` into chroma harmonics of the frozen geometry, that of
 /// `luma`.
@@ -77,7 +84,7 @@ pub(super) fn solve_from(
                 chroma: adam.harmonics()?,
                 corrections: Vec::new(),
                 load: adam.load(),
-                unseen: None,
+                seen: None,
             })
         }
         SolverKind::Irls => {
@@ -91,7 +98,6 @@ pub(super) fn solve_from(
             if settings.fill {
                 fill_unseen(luma, &mut chroma, &seen);
             }
-            let unseen = seen.iter().filter(|&&seen| seen < SEEN).count();
             Ok(Solved {
                 chroma,
                 corrections: match settings.correct_views {
@@ -99,7 +105,7 @@ pub(super) fn solve_from(
                     false => Vec::new(),
                 },
                 load: solver.load(),
-                unseen: Some(unseen as f64 / seen.len().max(1) as f64),
+                seen: Some(seen),
             })
         }
     }

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{ArgGroup, Args};
 
 use super::{
     CliError,
@@ -34,6 +34,7 @@ const SPZ_VERSIONS: &[(SpzVersion, &str)] = &[
 /// The extension chooses the format: .ply, .compressed.ply, .splat, .spz, .sog, .glb, .usda or
 /// .html. The file is read back, and its loss reported.
 #[derive(Args)]
+#[command(group(ArgGroup::new("before cameras").multiple(true)))]
 #[command(after_long_help = "Example:
   gs-chroma export runs/house -o house.sog
   gs-chroma export house.ply -o house.spz
@@ -53,11 +54,14 @@ pub struct Export {
     /// Version of an .spz file [default: 3].
     #[arg(long, help_heading = OUTPUT, value_name = "VERSION", value_parser = one_of(SPZ_VERSIONS))]
     spz_version: Option<SpzVersion>,
+    /// Leave out Gaussians that no training view needs.
+    #[arg(long, help_heading = QUALITY, group = "before cameras")]
+    clean: bool,
     /// Fit scales, opacities and colors to what this viewer draws.
-    #[arg(long, help_heading = QUALITY, value_parser = one_of(VIEWERS))]
+    #[arg(long, help_heading = QUALITY, group = "before cameras", value_parser = one_of(VIEWERS))]
     viewer: Option<ViewerChoice>,
-    /// COLMAP folder with cameras for --viewer, of a splat file or a moved run.
-    #[arg(long, help_heading = INPUT, value_name = "COLMAP_DIR", requires = "viewer")]
+    /// COLMAP folder with cameras for --clean and --viewer, of a splat file or a moved run.
+    #[arg(long, help_heading = INPUT, value_name = "COLMAP_DIR", requires = "before cameras")]
     colmap: Option<PathBuf>,
     /// Print what was written as JSON.
     #[arg(long, help_heading = OUTPUT)]
@@ -75,6 +79,7 @@ impl Export {
             luma: self.luma,
             colmap_coordinates: self.colmap_coordinates,
             spz: self.spz_version,
+            clean: self.clean,
             viewer: self.viewer,
             colmap: self.colmap,
         };
@@ -100,6 +105,12 @@ impl Export {
                 "its coordinates are COLMAP's less {x} {y} {z}, {said} (--colmap-coordinates for COLMAP's own)"
             ))?;
         }
+        if let Some(cleaned) = &wrote.cleaned {
+            print(format_args!(
+                "left out {} Gaussians that no training view needs; {:.1} dB against the scene with them",
+                cleaned.dropped, cleaned.psnr
+            ))?;
+        }
         if !wrote.shown.is_empty() {
             print(line_of(&wrote.shown))?;
         }
@@ -110,6 +121,7 @@ impl Export {
     fn run_html(self) -> Result<(), CliError> {
         let mut progress = Progress::through(vec![Stage::Model, Stage::Rendering, Stage::Saving]);
         let of_files = [
+            ("--clean", self.clean),
             ("--viewer", self.viewer.is_some()),
             ("--spz-version", self.spz_version.is_some()),
             ("--colmap-coordinates", self.colmap_coordinates),

@@ -8,6 +8,7 @@
 mod adam;
 mod adjoint;
 pub mod constants;
+mod contributions;
 mod kernels;
 mod layer;
 mod lists;
@@ -25,6 +26,7 @@ mod view;
 
 pub use adam::{Adam, AdamKernel, AdamMoments, AdamParameters, AdamStep, StepBuffers};
 pub use adjoint::{AdjointScratch, COLOR_FIGURES, ChromaAdjoint, ChromaSums, LumaAdjoint, Outcome};
+pub use contributions::Contributions;
 pub use layer::{Canvas, Layer};
 pub use lists::{Lists, Projected, Status, StatusReadback, TileListsMode};
 pub use model::{Model, Snapshot};

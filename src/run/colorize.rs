@@ -30,7 +30,7 @@ use crate::{
     capture::LoadOptions,
     chroma::{
         ChosenDegree, ChromaCheckpoint, ChromaKeeper, ChromaProgress, ChromaSettings,
-        ColorizeEvent, Degree, Distill, NoChromaKeeper, SolverKind, relight,
+        ColorizeEvent, Degree, Distill, NoChromaKeeper, SolverKind, relight, unseen_share,
     },
     effects::table,
     eval::{Measured, exposures},
@@ -335,7 +335,10 @@ pub fn colorize(
         .transpose()?;
 
     let views = [colored.colored_views, lesson.views.len()];
-    if let Some(warning) = few_colors(colored.unseen, views) {
+    // Surroundings are what no photo shows.
+    let scene = luma.len().saturating_sub(report.luma.surroundings);
+    let unseen = (colored.seen.as_ref()).map(|seen| unseen_share(&seen[..scene]));
+    if let Some(warning) = few_colors(unseen, views) {
         observe(Event::Warning(warning));
     }
     let begun = Instant::now();
@@ -367,7 +370,7 @@ pub fn colorize(
             .map(|&view| dataset.capture.views[view].name.clone())
             .collect(),
         colored_views: colored.colored_views,
-        unseen: colored.unseen,
+        unseen,
         saturation: colored.saturation,
         iterations: steps,
         until: report.luma.iterations + steps,

@@ -43,6 +43,8 @@ pub enum Stage {
     Bake,
     /// Coloring a scene in another way, to compare with.
     Baseline,
+    /// Finding Gaussians that no training view needs.
+    Cleaning,
     /// Fitting the scene to a viewer.
     Viewer,
     /// Drawing pictures.
@@ -102,6 +104,7 @@ impl fmt::Display for Stage {
             Self::Strength => "strength",
             Self::Bake => "bake",
             Self::Baseline => "baseline",
+            Self::Cleaning => "cleaning",
             Self::Viewer => "viewer",
             Self::Rendering => "rendering",
             Self::Strokes => "strokes",

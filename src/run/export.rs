@@ -6,7 +6,8 @@ use glam::DVec3;
 use serde::Serialize;
 
 use super::{
-    Event, Loss, Observer, RunError, RunFolder, Shown, Stage,
+    Cleaned, Event, Loss, Observer, RunError, RunFolder, Shown, Stage,
+    export_clean::cleaned,
     export_viewer::{Cameras, fitted},
     files, keeping,
     loss::{Views, loss},
@@ -36,9 +37,11 @@ pub struct ExportOptions {
     pub colmap_coordinates: bool,
     /// The version of an `.spz`, where one is asked for.
     pub spz: Option<SpzVersion>,
+    /// Whether Gaussians that no training view needs are left out.
+    pub clean: bool,
     /// Whom the scene is fitted for; without, it is written as it is.
     pub viewer: Option<ViewerChoice>,
-    /// COLMAP folder with the cameras that it is fitted before, where it is not the one that
+    /// COLMAP folder with the cameras that it is cleaned and fitted before, where it is not the one that
     /// `fit` noted.
     pub colmap: Option<PathBuf>,
 }
@@ -60,6 +63,9 @@ pub struct Exported {
     pub tells_offset: bool,
     /// What the format costs.
     pub loss: Loss,
+    /// What was left out, where that was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cleaned: Option<Cleaned>,
     /// What each viewer shows of the scene, where it was fitted.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub shown: Vec<Shown>,
@@ -74,6 +80,8 @@ struct Scene {
     /// What their centers lack of COLMAP's, in world units.
     moved: DVec3,
     views: Views,
+    /// How many of the Gaussians, the last ones, surround the scene.
+    surroundings: usize,
     /// Where its cameras are, if anybody knows.
     colmap: Option<PathBuf>,
     /// How its photos are loaded.
@@ -96,15 +104,21 @@ pub fn export(options: &ExportOptions, observe: &mut Observer<'_>) -> Result<Exp
     }
     observe(Event::begins(Stage::Model));
     let mut scene = open(options, observe)?;
+    let before = &Cameras {
+        of: options.run.as_deref().unwrap_or(output),
+        colmap: scene.colmap.as_deref(),
+        load: scene.load.clone(),
+        moved: scene.moved,
+    };
+    let drawn = scene.drawn;
+    let mut left_out = None;
+    if options.clean {
+        let all = (&scene.splats, drawn, scene.surroundings);
+        let (clean, found) = cleaned(all, before, observe)?;
+        (scene.splats, left_out) = (clean, Some(found));
+    }
     let mut shown = Vec::new();
     if let Some(choice) = options.viewer {
-        let before = &Cameras {
-            of: options.run.as_deref().unwrap_or(output),
-            colmap: scene.colmap.as_deref(),
-            load: scene.load.clone(),
-            moved: scene.moved,
-        };
-        let drawn = scene.drawn;
         (scene.splats, shown) = fitted(choice, (&scene.splats, drawn), before, observe)?;
         // As these viewers draw it.
         scene.drawn = RasterOptions::default();
@@ -131,6 +145,7 @@ pub fn export(options: &ExportOptions, observe: &mut Observer<'_>) -> Result<Exp
         offset: written.offset.to_array(),
         tells_offset: format.tells_offset(),
         loss,
+        cleaned: left_out,
         shown,
         warnings: warnings.take(),
     })
@@ -150,6 +165,7 @@ fn open(options: &ExportOptions, observe: &mut Observer<'_>) -> Result<Scene, Ru
             drawn: read.drawn,
             moved: read.offset,
             views: Views::MadeUp,
+            surroundings: 0,
             colmap: options.colmap.clone(),
             load: LoadOptions::default(),
         });
@@ -171,6 +187,7 @@ fn open(options: &ExportOptions, observe: &mut Observer<'_>) -> Result<Scene, Ru
         drawn: report.luma.settings.raster_options(),
         moved: DVec3::from(report.capture.offset),
         views: Views::of_run(&report.capture),
+        surroundings: report.luma.surroundings,
         colmap: Some(options.colmap.clone().unwrap_or(noted)),
         load: report.capture.load,
     })

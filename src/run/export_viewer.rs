@@ -56,7 +56,7 @@ pub(super) fn fitted(
     before: &Cameras<'_>,
     observe: &mut Observer<'_>,
 ) -> Result<(Splats, Vec<Shown>), RunError> {
-    let (train, test, extent) = before.open()?;
+    let (train, test, extent) = before.open(MOST_CAMERAS)?;
     observe(Event::begins(Stage::Device));
     let gpu = Gpu::open()?;
     let raster = Arc::new(Raster::new(&gpu));
@@ -93,8 +93,9 @@ pub(super) fn fitted(
 }
 
 impl Cameras<'_> {
-    /// Cameras to fit before and to measure before, and the capture's extent in world units.
-    fn open(&self) -> Result<(Vec<Camera>, Vec<Camera>, f64), RunError> {
+    /// Cameras of training views and those to measure before, at most so many of each, and the
+    /// capture's extent in world units.
+    pub(super) fn open(&self, most: usize) -> Result<(Vec<Camera>, Vec<Camera>, f64), RunError> {
         let Some(colmap) = self.colmap else {
             return Err(RunError::NoCameras(self.of.to_owned()));
         };
@@ -106,9 +107,7 @@ impl Cameras<'_> {
         });
         let shift = self.moved - capture.offset;
         let cameras = |views: &[usize]| -> Result<Vec<Camera>, RunError> {
-            let each = views
-                .iter()
-                .step_by(views.len().div_ceil(MOST_CAMERAS).max(1));
+            let each = views.iter().step_by(views.len().div_ceil(most).max(1));
             each.map(|&view| {
                 let mut camera = loader.camera(&capture.views[view])?;
                 camera.translation += camera.rotation * shift;

@@ -131,12 +131,14 @@ impl ExportOptions {
         let measured = (Format::of(&self.output)).is_some_and(|format| format.is_read());
         let lossy = measured && Format::of(&self.output) != Some(Format::Ply);
         let fits = self.viewer.is_some();
+        let opened = fits || self.clean;
         all([
             Some(Model),
-            only_if(fits, Device),
+            only_if(opened, Device),
+            only_if(self.clean, Cleaning),
             only_if(fits, Viewer),
             Some(Saving),
-            only_if(lossy && !fits, Device),
+            only_if(lossy && !opened, Device),
             only_if(lossy, Measuring),
         ])
     }

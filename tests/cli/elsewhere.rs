@@ -293,3 +293,47 @@ fn a_scene_is_lit_anew() {
         done.stderr
     );
 }
+
+#[test]
+fn what_no_training_view_needs_is_left_out() {
+    // One far to the side of every camera, and one that is not opaque enough to be drawn.
+    let place = place_with_splats(|file| {
+        let opacity = file.place("opacity");
+        let [mut aside, mut faint] = [file.rows[0].clone(), file.rows[1].clone()];
+        aside[0] += 500.0;
+        faint[opacity] = -8.0;
+        let before = file.count();
+        file.rows.extend([aside, faint]);
+        for line in &mut file.header {
+            *line = line.replace(
+                &format!("vertex {before}"),
+                &format!("vertex {}", before + 2),
+            );
+        }
+    });
+    let export = ["export", "gray.ply", "-o", "clean.ply", "--clean", "--json"];
+    let done = place.run(&[&export[..], &["--colmap", "scene"]].concat());
+    assert_eq!(done.code, Some(0), "{}", done.stderr);
+    let told: Value = serde_json::from_str(&done.stdout).expect("JSON");
+    let dropped = told["cleaned"]["dropped"].as_u64().expect("a number");
+    assert!(dropped >= 2, "{told}");
+    assert!(
+        told["cleaned"]["psnr"].as_f64().expect("a number") > 60.0,
+        "{told}"
+    );
+    let [before, after] = ["gray.ply", "clean.ply"].map(|name| SplatFile::read(&place, name));
+    assert_eq!(after.count() as u64, before.count() as u64 - dropped);
+    assert!(after.rows.iter().all(|row| row[0] < 250.0));
+    // Nobody knows where a file's cameras are.
+    let done = place.run(&export);
+    assert_eq!(done.code, Some(1), "{}", done.stderr);
+    assert!(done.stderr.contains("--colmap"), "{}", done.stderr);
+    // A run knows them; its surroundings stay.
+    let done = place.run(&["export", "runs/scene", "-o", "run.ply", "--clean"]);
+    assert_eq!(done.code, Some(0), "{}", done.stderr);
+    assert!(
+        done.stdout.contains("no training view needs"),
+        "{}",
+        done.stdout
+    );
+}

@@ -14,6 +14,7 @@ use gs_chroma::{
 mod adam;
 mod antialiasing;
 mod blend;
+mod contributions;
 mod convergence;
 mod depth;
 mod device;
