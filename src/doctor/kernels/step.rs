@@ -207,7 +207,7 @@ fn measure(raster: &Arc<Raster>, kernels: [&'static str; 2]) -> Result<Vec<Row>,
         }
     }
     let bounds = [
-        allowed.relative(4.7e-8, 1.0),
+        allowed.relative(4.9e-8, 1.0),
         allowed.relative(6.0e-7, 1e-3),
         allowed.relative(5.4e-7, 1e-6),
     ];
