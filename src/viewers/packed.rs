@@ -115,8 +115,8 @@ mod tests {
         for (quat, kept) in splats.quats.iter().zip(&kept.quats) {
             let length = quat.iter().map(|v| v * v).sum::<f32>().sqrt();
             let dot: f32 = quat.iter().zip(kept).map(|(a, b)| a * b / length).sum();
-            // Within a step of the axis and of the angle.
-            assert!(dot.abs() > 0.9999, "{quat:?} {kept:?}");
+            // Within a byte of the axis and of the angle.
+            assert!(dot.abs() > 0.9995, "{quat:?} {kept:?}");
         }
         let apart = |a: &[f32], b: &[f32]| -> f32 {
             let each = a.iter().zip(b).map(|(a, b)| (a - b).abs());
