@@ -48,8 +48,16 @@ var<workgroup> sums: array<f32, 256 * SUMS>;
 
 @compute @workgroup_size(256)
 fn view_correction_sums(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
+    let pixels = view.size.x * view.size.y;
+    if group.x * 256u >= pixels {
+        // Small pictures leave most workgroups nothing to sum.
+        if local < SUMS {
+            view_sums[(parameters.view_index * SUM_GROUPS + group.x) * SUMS + local] = 0.0;
+        }
+        return;
+    }
     var own: array<f32, SUMS>;
-    for (var p = group.x * 256u + local; p < view.size.x * view.size.y; p += 256u * SUM_GROUPS) {
+    for (var p = group.x * 256u + local; p < pixels; p += 256u * SUM_GROUPS) {
         // One weight for both channels. Painted pixels are not the teacher's; of unknown
         // ones the curvature may be that of the agreement between scales; where nothing
         // is drawn, there is nothing to compare with.

@@ -197,6 +197,11 @@ impl Gpu {
         }
     }
 
+    /// Whether another device's answers stand in the place of what this one would compute.
+    pub(super) fn answers(&self) -> bool {
+        matches!(self.deck(), Some(Deck::Answering(_)))
+    }
+
     /// The next answer in the device's place, empty where there is none left.
     pub(super) fn answer(&self) -> Option<Vec<u8>> {
         match self.deck()? {

@@ -4,7 +4,7 @@ use super::{ShField, Splats, sh};
 
 /// So many Gaussians of every shape, within 4 units of the origin, of all channels' RGB, colors
 /// and harmonics within the range of every format.
-pub(super) fn scattered(count: usize, degree: u32) -> Splats {
+pub(crate) fn scattered(count: usize, degree: u32) -> Splats {
     let mut random = fastrand::Rng::with_seed(3);
     let mut within = |low: f32, high: f32| low + (high - low) * random.f32();
     let mut splats = Splats {

@@ -123,7 +123,7 @@ impl Splats {
 }
 
 #[cfg(test)]
-mod fixtures;
+pub(crate) mod fixtures;
 #[cfg(test)]
 #[path = "format_tests.rs"]
 mod format_tests;

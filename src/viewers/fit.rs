@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::{
     Pictures, Viewer, bound,
     easel::{Easel, Largest},
+    packed,
 };
 use crate::{
     capture::{Camera, view_at},
@@ -44,6 +45,9 @@ pub struct FitSettings {
     pub sh_rest: f64,
     /// Share of the rates that is left at the end; they fall by the same factor a step.
     pub settled: f64,
+    /// Share of the way after which log-scales stay at the steps that Spark keeps them in, for
+    /// opacities and colors to make up for; where nothing but Spark is fitted to.
+    pub scales_stay: f64,
 }
 
 impl FitSettings {
@@ -55,6 +59,7 @@ impl FitSettings {
         sh_constant: 1e-2,
         sh_rest: 1e-3,
         settled: 0.05,
+        scales_stay: 0.5,
     };
 
     /// Rates at a share of the way: of geometry and of harmonics of a degree, a plane each.
@@ -78,9 +83,12 @@ impl Default for FitSettings {
 }
 
 /// Where a fit to these viewers begins: constant colors between black and white, scales as much
-/// wider as they are on average.
+/// wider as they are on average; for Spark alone, centers and rotations as it keeps them.
 pub fn start(viewers: &[Viewer], splats: &Splats) -> Splats {
-    let mut start = splats.clone();
+    let mut start = match viewers {
+        [Viewer::Spark] => packed::placed(splats),
+        _ => splats.clone(),
+    };
     bound(&mut start);
     let narrow = viewers.iter().filter(|&&v| v == Viewer::PlayCanvas).count();
     let wider = PLAYCANVAS_WIDER.ln() * narrow as f32 / viewers.len().max(1) as f32;
@@ -135,10 +143,20 @@ pub fn fit(
         easels.push((easel, canvas));
     }
     let total = settings.iterations * viewers.len();
+    let stay = match viewers {
+        [Viewer::Spark] => (settings.scales_stay * total as f64) as usize,
+        _ => total,
+    };
     for iteration in 0..total {
         let turn = iteration % viewers.len();
         let view = view_at(SEED, views.len(), iteration / viewers.len());
-        let rates = settings.rates(iteration as f64 / total as f64, degree);
+        let mut rates = settings.rates(iteration as f64 / total as f64, degree);
+        if iteration == stay {
+            round_scales(gpu, &model)?;
+        }
+        if iteration >= stay {
+            rates[0][PLANE_LOG_SCALE..PLANE_OPACITY].fill(0.0);
+        }
         set(gpu, &steps, iteration, &rates);
         target.write(gpu, &words[view]);
         let (easel, canvas) = &easels[turn];
@@ -155,6 +173,17 @@ pub fn fit(
         }
     }
     model.download(gpu)
+}
+
+/// Moves log-scales to the steps that Spark keeps them in.
+fn round_scales(gpu: &Gpu, model: &Model) -> Result<(), GpuError> {
+    let buffer = &model.geometry.planes;
+    let mut planes = buffer.read(gpu)?;
+    for value in &mut planes[PLANE_LOG_SCALE * model.len()..PLANE_OPACITY * model.len()] {
+        *value = packed::log_scale(*value);
+    }
+    buffer.write(gpu, &planes);
+    Ok(())
 }
 
 /// Rates of the next step.

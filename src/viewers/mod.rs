@@ -1,13 +1,14 @@
 //! What viewers of splat files make of a scene, and scenes fitted to them.
 //!
 //! Viewers do not draw alike: PlayCanvas' engine cuts a Gaussian's tails off and blurs it less,
-//! Spark keeps constant colors between black and white, and neither knows by itself that a
-//! scene was trained antialiased. [`fit`] moves scales, opacities and colors until a viewer's
+//! Spark packs a Gaussian into 16 bytes, and neither knows by itself that a scene was trained
+//! antialiased. [`fit`] moves scales, opacities and colors until a viewer's
 //! pictures are those that the scene has here. docs/viewers.md has what the viewers themselves
 //! draw, beside what [`Viewer::drawing`] says that they do.
 
 mod easel;
 mod fit;
+mod packed;
 
 pub use fit::{FitSettings, fit, start};
 
@@ -54,14 +55,12 @@ impl Viewer {
         }
     }
 
-    /// An RGB scene as it keeps it: Spark has a byte from black to white for each channel of a
-    /// constant color.
+    /// An RGB scene as it keeps it.
     fn kept(self, splats: &Splats) -> Splats {
-        let mut kept = splats.clone();
-        if self == Self::Spark {
-            bound(&mut kept);
+        match self {
+            Self::Spark => packed::packed(splats),
+            Self::PlayCanvas => splats.clone(),
         }
-        kept
     }
 }
 
@@ -69,7 +68,7 @@ impl Viewer {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ViewerChoice {
-    /// Spark (three.js), colors in bytes.
+    /// Spark (three.js), a Gaussian in 16 bytes.
     Spark,
     /// PlayCanvas' engine.
     PlayCanvas,
@@ -174,15 +173,5 @@ mod tests {
         let colored = in_rgb(&gray(0.25));
         assert_eq!(colored.sh.coefficients, [0.25; 3]);
         assert_eq!(in_rgb(&colored), colored);
-    }
-
-    #[test]
-    fn spark_keeps_colors_between_black_and_white() {
-        let white = (0.5 / sh::C0) as f32;
-        for (value, kept) in [(3.0, white), (-3.0, -white), (0.5, 0.5)] {
-            let scene = in_rgb(&gray(value));
-            assert_eq!(Viewer::Spark.kept(&scene).sh.coefficients, [kept; 3]);
-            assert_eq!(Viewer::PlayCanvas.kept(&scene), scene);
-        }
     }
 }

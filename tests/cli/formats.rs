@@ -1,5 +1,5 @@
 //! Splat files of every format, by their names: written, read back, measured, and read by
-//! splat-transform.
+//! splat-transform and OpenUSD.
 
 use std::{
     path::{Path, PathBuf},
@@ -253,6 +253,36 @@ fn splat_transform_reads_the_same_gaussians() {
     place.succeed(&["export", "scene.ply", "-o", "ours.glb"]);
     convert("scene.ply", "theirs.glb");
     same_glb(&place.read("ours.glb"), &place.read("theirs.glb"));
+}
+
+/// OpenUSD knows the type, its attributes and every number: tools/check_usd.py.
+#[test]
+fn openusd_reads_the_same_gaussians() {
+    let python = || Command::new("python3");
+    let known = python().args(["-c", "from pxr import UsdVol"]).output();
+    if !known.is_ok_and(|done| done.status.success()) {
+        println!("skipped: python3 has no OpenUSD 26 (pip install usd-core)");
+        return;
+    }
+    let place = place_with_scattered();
+    place.succeed(&["export", "scene.ply", "-o", "scene.usda"]);
+    let tool = Path::new(env!("CARGO_MANIFEST_DIR")).join("tools/check_usd.py");
+    let compared = |usda: &str| {
+        let files = [usda, "scene.ply"].map(|name| place.path(name));
+        let done = python().arg(&tool).args(files).output().expect("it starts");
+        let said = String::from_utf8_lossy(&done.stderr).into_owned();
+        (done.status.success(), said)
+    };
+    assert_eq!(compared("scene.usda"), (true, String::new()));
+    // And it sees what is wrong.
+    let text = String::from_utf8(place.read("scene.usda")).expect("text");
+    let wrong = text.replacen("opacities = [", "opacities = [2, ", 1);
+    std::fs::write(place.path("wrong.usda"), wrong).expect("writable");
+    let (same, said) = compared("wrong.usda");
+    assert!(
+        !same && said.contains("opacities: 601 instead of 600"),
+        "{said}"
+    );
 }
 
 /// Whether two files have the same attributes with the same numbers.

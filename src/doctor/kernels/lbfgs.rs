@@ -325,4 +325,4 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
 }
 
 /// Steps after which nothing moves any more.
-const TO_THE_END: usize = 150;
+const TO_THE_END: usize = 120;
