@@ -32,7 +32,7 @@ const LEAST_OVERLAP: f64 = 0.05;
 /// Heights above and below the scene's that still belong to it, as a share of its height.
 const HEADROOM: f64 = 0.5;
 
-/// A block that goes on takes so small a part of the iterations that it had: it only has to agree
+/// A block that goes on takes so small a part of its iterations so far: it only has to agree
 /// with its neighbors.
 const AGREEING_PART: usize = 6;
 
@@ -379,7 +379,7 @@ impl FitOptions {
     }
 
     /// Goes on with a trained block among what its neighbors have in a run of `merge`, for a
-    /// sixth of its iterations.
+    /// sixth of its iterations so far.
     ///
     /// # Errors
     /// [`RunError::File`] where the run is none of the same photos, or this is no trained block.
@@ -390,8 +390,7 @@ impl FitOptions {
             path: path.to_owned(),
             reason: reason.to_owned(),
         };
-        let Some((block, Some(Init::Run { .. }))) = self.block.as_ref().zip(Some(&self.init))
-        else {
+        let (Some(block), Some(Init::Run { iterations, .. })) = (&self.block, &self.init) else {
             let path = self.output.as_ref().unwrap_or(&self.colmap_dir);
             let reason = "is no trained block of a job: --around is for these";
             return Err(refused(path, reason));
@@ -401,6 +400,7 @@ impl FitOptions {
             return Err(refused(merged, reason));
         }
         let luma = folder.luma();
+        let iterations = iterations.div_ceil(AGREEING_PART);
         Ok(Self {
             around: Some(Neighbors {
                 sha256: sha256_of(luma.clone())?,
@@ -408,7 +408,7 @@ impl FitOptions {
             }),
             settings: Box::new(move |settings| {
                 (self.settings)(settings);
-                settings.iterations = settings.iterations.div_ceil(AGREEING_PART);
+                settings.iterations = iterations;
             }),
             ..self
         })
