@@ -94,8 +94,10 @@ def settle(work: Work, name: str, tell: Tell) -> None:
     fetch_capture(capture, photos_of(job, name))
     move_capture(job, capture.local)
     around = ["--around", str(job.local / FIRST)]
+    if (job.local / name / "checkpoint").is_file():  # Without one, a finished run has nothing to resume.
+        around.append("--resume")
     with job.keeping(f"{name}/checkpoint", CHECKPOINT_SECONDS):
-        start(work, job, name, ["fit", str(job.local / name), "--resume", *around], tell)
+        start(work, job, name, ["fit", str(job.local / name), *around], tell)
     job.put_folder(name)
     job.put([f"{name}/checkpoint"])
 
