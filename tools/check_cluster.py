@@ -87,6 +87,12 @@ def kill_one(job, process, dice, longest):
     return None
 
 
+def starts(job, name):
+    """How often a block was started, in both rounds."""
+    log = job / f"logs/{name}.log"
+    return log.read_text().count("$ ") if log.is_file() else 0
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("scene", nargs="?", type=Path, default=ROOT / "assets/demo")
@@ -106,12 +112,12 @@ def main():
         training = min(row["seconds"] for name, row in rows.items() if name.startswith("block-"))
         wanted = digests(whole)
         print(f"undisturbed: {seconds:.0f} s, {len(wanted)} blocks")
-        print("| try | killed | after, s | tries of the block | seconds | same bytes |")
+        print("| try | killed | after, s | starts of the block | seconds | same bytes |")
         print("|---|---|---|---|---|---|")
         wrong = 0
         for number in range(1, arguments.tries + 1):
             job = Path(place, f"try-{number}")
-            shutil.copytree(whole, job, ignore=shutil.ignore_patterns("logs", "merged"))
+            shutil.copytree(whole, job, ignore=shutil.ignore_patterns("logs", "first", "merged"))
             for block in wanted:
                 for path in (job / block).iterdir():
                     if path.name != "block.json":
@@ -128,8 +134,7 @@ def main():
             same = code == 0 and digests(job) == wanted
             wrong += not same
             name, moment = killed or ("none", 0.0)
-            rows = json.loads((job / "logs/board.json").read_text())
-            tries = rows.get(name, {}).get("tries", 0)
+            tries = starts(job, name)
             word = "yes" if same else "NO"
             print(f"| {number} | {name} | {moment:.1f} | {tries} | {seconds:.0f} | {word} |", flush=True)
             shutil.rmtree(job)

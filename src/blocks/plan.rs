@@ -37,7 +37,7 @@ const COARSE_PART: usize = 12;
 const COARSE_LEAST: usize = 1000;
 
 /// Gaussians from the coarse model, beyond a block's margin, as a part of the block's own.
-pub const FAR_PART: usize = 8;
+pub const FAR_PART: usize = 16;
 
 /// How often the coarse model's training sees each photo at least.
 const COARSE_EPOCHS: usize = 5;

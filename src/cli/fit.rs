@@ -86,6 +86,10 @@ pub struct Fit {
     /// Start from the Gaussians of a splat file instead of COLMAP's points.
     #[arg(long, value_name = "FILE.ply", help_heading = EXPERT, hide_short_help = true)]
     init: Option<PathBuf>,
+    /// Go on with a trained block of a job, with what its neighbors have around its cell in this
+    /// run of `merge`.
+    #[arg(long, value_name = "MERGED", help_heading = EXPERT, hide_short_help = true)]
+    around: Option<PathBuf>,
 }
 
 impl Fit {
@@ -113,6 +117,10 @@ impl Fit {
                         "a run continues with its own photos, effects, preset and Gaussians: leave out the options that name others",
                     );
                 }
+                let run = match &self.around {
+                    Some(merged) => run.among(merged)?,
+                    None => run,
+                };
                 FitOptions {
                     output: self.output.or(run.output),
                     measure_side: self.measure_side.or(run.measure_side),
@@ -123,6 +131,10 @@ impl Fit {
                     ..run
                 }
             }
+            None if self.around.is_some() => refuse(
+                ErrorKind::ArgumentConflict,
+                "--around goes on with a trained block: train it first",
+            ),
             None => match FitOptions::of_block(&self.colmap_dir)? {
                 Some(block) => {
                     let photos = LoadOptions {

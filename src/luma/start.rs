@@ -3,7 +3,7 @@
 use super::{
     LumaSettings,
     carve::{carved, chosen},
-    gaps::gap_points,
+    gaps::{GapPoint, gap_points},
 };
 use crate::{
     capture::{CaptureError, Dataset},
@@ -49,13 +49,7 @@ pub fn placed_splats(
         })
         .collect();
     let room = settings.max_splats - reserved;
-    // Where COLMAP has more points than there may be Gaussians, none of them is to spare.
-    let most = (room * GAPS_PARTS[0] / GAPS_PARTS[1]).min(room.saturating_sub(points.len()));
-    let found = match settings.fill_gaps && most > 0 {
-        true => gap_points(dataset, most)?,
-        false => Vec::new(),
-    };
-    points.extend((found.iter()).map(|point| (point.position.as_vec3().to_array(), point.gray)));
+    points.extend(gap_places(dataset, settings, points.len(), room)?);
     let mut splats = initial_splats(&points, dataset.extent as f32, settings.sh_degree);
     if dataset.removes_masked() {
         splats = carved(dataset, &splats)?;
@@ -68,6 +62,27 @@ pub fn placed_splats(
     truncate(&mut splats, settings.max_splats - taken - reserved);
     dome.into_iter().for_each(|dome| splats.append(dome));
     Ok(splats)
+}
+
+/// Places and grays where photos show points that COLMAP has not, if gaps are to be filled: as
+/// many as `room` Gaussians leave beside COLMAP's points.
+///
+/// # Errors
+/// [`CaptureError`] of a photo.
+pub fn gap_places(
+    dataset: &Dataset,
+    settings: &LumaSettings,
+    points: usize,
+    room: usize,
+) -> Result<Vec<([f32; 3], f32)>, CaptureError> {
+    // Where COLMAP has more points than there may be Gaussians, none of them is to spare.
+    let most = (room * GAPS_PARTS[0] / GAPS_PARTS[1]).min(room.saturating_sub(points));
+    let found = match settings.fill_gaps && most > 0 {
+        true => gap_points(dataset, most)?,
+        false => Vec::new(),
+    };
+    let place = |point: &GapPoint| (point.position.as_vec3().to_array(), point.gray);
+    Ok(found.iter().map(place).collect())
 }
 
 /// Gaussians for what no point explains, at most a quarter of all that there may be.

@@ -136,6 +136,9 @@ pub struct LumaReport {
     /// scene, for what no photo shows.
     #[serde(default)]
     pub surroundings: usize,
+    /// SHA-256 of the merged scene among which a block went on.
+    #[serde(default)]
+    pub around: Option<String>,
     /// Gaussians that the last views culled for values that are not finite.
     pub poisoned: usize,
     /// Gradients refused for not being finite, since the set last changed.

@@ -76,7 +76,7 @@ pub fn merge(
         ..first.report.capture.load.clone()
     };
     let dataset = open_checked(&job.capture, &load, observe)?;
-    let splats = together(&blocks, &job, &dataset, observe)?;
+    let (splats, surroundings) = together(&blocks, &job, &dataset, observe)?;
     let loading = begun.elapsed().as_secs_f64();
 
     observe(Event::begins(Stage::Measuring));
@@ -106,6 +106,7 @@ pub fn merge(
                 ..settings.clone()
             },
             splats: splats.len(),
+            surroundings,
             exposures: told,
             held_out: mean_quality(&views),
             held_out_views: views,
@@ -177,13 +178,14 @@ fn trained(folder: &Path, job: &Job) -> Result<Vec<Trained>, RunError> {
     Ok(blocks)
 }
 
-/// What each block has in its own cell, in the dataset's coordinates.
+/// What each block has in its own cell, in the dataset's coordinates; and how many of these, the
+/// last ones, are surroundings.
 fn together(
     blocks: &[Trained],
     job: &Job,
     dataset: &Dataset,
     observe: &mut Observer<'_>,
-) -> Result<Splats, RunError> {
+) -> Result<(Splats, usize), RunError> {
     let offset = dataset.capture.offset;
     let degrees = blocks
         .iter()
@@ -193,7 +195,7 @@ fn together(
         max_splats: usize::MAX,
         ..LumaSettings::default()
     };
-    let mut all = Splats::with_capacity(0, settings.sh_degree, 1);
+    let [mut all, mut around] = [(); 2].map(|()| Splats::with_capacity(0, settings.sh_degree, 1));
     for block in blocks {
         let path = block.folder.luma();
         let (splats, _) = read_splats(&path, Frame::World(offset), observe)?;
@@ -202,15 +204,18 @@ fn together(
             area: block.block.core,
             offset,
         };
-        let own: Vec<usize> = (0..splats.len())
-            .filter(|&i| core.holds(splats.means[i]))
-            .collect();
-        all.append(started(&chosen(&splats, &own), &settings));
+        let inner = (splats.len()).saturating_sub(block.report.luma.surroundings);
+        for (into, range) in [(&mut all, 0..inner), (&mut around, inner..splats.len())] {
+            let own: Vec<usize> = range.filter(|&i| core.holds(splats.means[i])).collect();
+            into.append(started(&chosen(&splats, &own), &settings));
+        }
     }
-    match all.is_empty() {
-        true => Err(RunError::NoSplats(dataset.capture.root.clone())),
-        false => Ok(all),
+    if all.is_empty() {
+        return Err(RunError::NoSplats(dataset.capture.root.clone()));
     }
+    let surroundings = around.len();
+    all.append(around);
+    Ok((all, surroundings))
 }
 
 /// The exposures that the blocks found, each photo's by the first block that has it.

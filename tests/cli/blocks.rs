@@ -156,6 +156,19 @@ fn blocks_are_trained_and_put_together() {
     assert_eq!(kept.iter().sum::<usize>(), of_city);
     assert_eq!(kept, [own(&city, &blocks[0]), own(&city, &blocks[1])]);
 
+    // The coarse model's shell, which every block has, is there once and last.
+    let shell = |name: &str, report: &Value| {
+        let file = SplatFile::read(&place, &format!("{name}/luma.ply"));
+        let surroundings = report["luma"]["surroundings"].as_u64().unwrap() as usize;
+        let [x, y, z] = ["x", "y", "z"].map(|axis| file.column(axis));
+        let last = x.len() - surroundings..x.len();
+        let mut places: Vec<_> = last.map(|i| [x[i], y[i], z[i]]).collect();
+        places.sort_by(|a, b| a.partial_cmp(b).expect("numbers"));
+        places
+    };
+    let around = shell("city", &report);
+    assert!(!around.is_empty() && around == shell("job/coarse", &coarse));
+
     // It is a run like any other.
     let photos = format!("{SCENE}/images");
     place.succeed(&["colorize", "city", "--teacher", &photos, "--rounds", "3"]);
@@ -179,6 +192,28 @@ fn blocks_are_trained_and_put_together() {
         across["pairs"].as_u64() > Some(0) && across["hue"].as_f64() < Some(30.0),
         "{seams}"
     );
+
+    // A block goes on among its neighbors, for a sixth of its iterations.
+    let around = ["--around", "city", "--json"];
+    let second = place.json(&[&["fit", "job/block-2"][..], &around].concat());
+    assert_eq!(second["luma"]["iterations"], 47);
+    assert_eq!(
+        second["luma"]["around"].as_str().map(str::len),
+        Some(64),
+        "{second}"
+    );
+    place.succeed(&["merge", "job", "-o", "agreed"]);
+    for (command, code) in [
+        (&["fit", "job/block-2", "--around", "nowhere"][..], 1),
+        (&["fit", "whole", "--around", "city"], 1),
+        (&["fit", SCENE, "-o", "new", "--around", "city"], 2),
+    ] {
+        let done = place.run(command);
+        assert!(
+            done.code == Some(code) && done.stderr.starts_with("error: "),
+            "{done:?}"
+        );
+    }
 
     // A trained job is not divided anew.
     let done = place.run(&["partition", SCENE, "-o", "job"]);

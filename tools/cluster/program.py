@@ -13,6 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 PR_SET_PDEATHSIG = 1  # From Linux' prctl.h.
+COLOR = re.compile(r"\x1b\[[0-9;]*m")
 ESCAPE = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
 COLUMNS = "100"
 
@@ -76,7 +77,7 @@ def pieces(terminal: int):
             if rest:
                 yield [rest]
             return
-        text = ESCAPE.sub("\n", rest + data.decode(errors="replace"))
+        text = ESCAPE.sub("\n", COLOR.sub("", rest + data.decode(errors="replace")))
         *whole, rest = re.split(r"[\r\n]+", text)
         yield [line.rstrip() for line in whole]
 

@@ -26,7 +26,7 @@ sys.path.insert(0, str(ROOT / "tools"))
 from cluster import work as tasks  # noqa: E402
 from cluster.program import Ended  # noqa: E402
 from cluster.storage import Store  # noqa: E402
-from cluster.work import COARSE, LOGS, MERGED, Work  # noqa: E402
+from cluster.work import COARSE, FIRST, LOGS, MERGED, Work  # noqa: E402
 
 HOST_BYTES = 512 << 20  # Of a worker, beside what a block takes on the device.
 TELL_SECONDS = 1.0
@@ -66,8 +66,8 @@ def task(work: Work, stage: str, name: str, board) -> None:
             told = time.monotonic()
             board.tell.remote(name, fields)
 
-    if stage == "fit":
-        tasks.fit(work, name, tell)
+    if stage in ("fit", "settle"):
+        getattr(tasks, stage)(work, name, tell)
     else:
         getattr(tasks, stage)(work, tell)
     ray.get(board.end.remote(name))
@@ -148,18 +148,20 @@ class Driver:
         job = json.loads((store.local / "job.json").read_text())
         room = job["coarse"]["memory"] + HOST_BYTES
         failed = self.finish({COARSE: self.start("fit", COARSE, room)})
-        if failed:
-            return failed
+        failed = failed or self.blocks("fit", job)
+        if not self.arguments.one_round:
+            failed = failed or self.finish({FIRST: self.start("first", FIRST, room)})
+            failed = failed or self.blocks("settle", job)
+        return failed or self.finish({MERGED: self.start("merge", MERGED, room)})
+
+    def blocks(self, stage: str, job: dict) -> list[str]:
+        """One stage of all blocks; the names of those that failed."""
         blocks = {}
         # The longest first: the others fill what is left.
         for block in sorted(job["blocks"], key=lambda block: -block["estimate"]["time"]):
             room = block["estimate"]["memory"] + HOST_BYTES
-            blocks[block["name"]] = self.start("fit", block["name"], room)
-        failed = self.finish(dict(sorted(blocks.items())))
-        if failed:
-            return failed
-        room = job["coarse"]["memory"] + HOST_BYTES
-        return self.finish({MERGED: self.start("merge", MERGED, room)})
+            blocks[block["name"]] = self.start(stage, block["name"], room)
+        return self.finish(dict(sorted(blocks.items())))
 
 
 def parsed() -> argparse.Namespace:
@@ -170,6 +172,7 @@ def parsed() -> argparse.Namespace:
         text = "of the coarse model's `fit`" if stage == "coarse" else f"of `{stage}`"
         parser.add_argument(f"--{stage}", default="", metavar="OPTIONS", help=f"options {text}")
     parser.add_argument("--epochs", type=float, help="iterations of each block for each of its photos")
+    parser.add_argument("--one-round", action="store_true", help="do not train blocks on among their neighbors")
     parser.add_argument("--teacher", help="color the merged scene by this network or folder")
     parser.add_argument("--address", help="a running Ray, such as auto or ray://HOST:10001")
     parser.add_argument("--cpus", type=float, default=1, help="processor cores of a block")

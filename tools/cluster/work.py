@@ -13,6 +13,7 @@ from . import program
 from .storage import Store, move_capture, photos_of
 
 COARSE = "coarse"
+FIRST = "first"
 MERGED = "merged"
 LOGS = "logs"
 CHECKPOINT_SECONDS = 30.0
@@ -63,6 +64,8 @@ def fit(work: Work, name: str, tell: Tell) -> None:
     here = set(job.names(name))
     if f"{name}/report.json" in here and f"{name}/checkpoint" not in here:
         return
+    if is_merged(job, FIRST):  # A checkpoint is the second round's.
+        return
     job.fetch(["job.json", f"{name}/block.json", f"{name}/checkpoint"])
     if name != COARSE:
         job.fetch([f"{COARSE}/report.json", f"{COARSE}/luma.ply"])
@@ -80,23 +83,61 @@ def fit(work: Work, name: str, tell: Tell) -> None:
     job.put([f"{name}/checkpoint"])
 
 
+def settle(work: Work, name: str, tell: Tell) -> None:
+    """Trains a block on, with what its neighbors had in its margin after the first round."""
+    capture, job = work.stores()
+    run = [f"{name}/{file}" for file in ["report.json", "luma.ply", "log.csv"]]
+    job.fetch(["job.json", f"{name}/block.json", f"{name}/checkpoint", *run])
+    if json.loads((job.local / name / "report.json").read_text())["luma"].get("around"):
+        return
+    job.fetch(f"{folder}/{file}" for folder in [COARSE, FIRST] for file in ["report.json", "luma.ply"])
+    fetch_capture(capture, photos_of(job, name))
+    move_capture(job, capture.local)
+    around = ["--around", str(job.local / FIRST)]
+    if (job.local / name / "checkpoint").is_file():  # Without one, a finished run has nothing to resume.
+        around.append("--resume")
+    with job.keeping(f"{name}/checkpoint", CHECKPOINT_SECONDS):
+        start(work, job, name, ["fit", str(job.local / name), *around], tell)
+    job.put_folder(name)
+    job.put([f"{name}/checkpoint"])
+
+
+def first(work: Work, tell: Tell) -> None:
+    """Puts all blocks together for the second round, unless that is done."""
+    _, job = work.stores()
+    if not is_merged(job, FIRST):
+        merged(work, FIRST, tell)
+        job.put_folder(FIRST)
+
+
+def is_merged(job: Store, name: str) -> bool:
+    """Whether blocks were put together under this name."""
+    return f"{name}/report.json" in job.names(name)
+
+
 def merge(work: Work, tell: Tell) -> None:
     """Puts all blocks together, and colors the whole where there is a teacher."""
-    capture, job = work.stores()
-    job.fetch(["job.json"])
-    blocks = [block["name"] for block in json.loads((job.local / "job.json").read_text())["blocks"]]
-    for name in [COARSE, *blocks]:
-        files = ["block.json", "report.json", "luma.ply", "log.csv"]
-        job.fetch(f"{name}/{file}" for file in files)
-    fetch_capture(capture, photos_of(job, COARSE))
-    move_capture(job, capture.local)
-    run = job.local / MERGED
-    start(work, job, MERGED, ["merge", str(job.local), "-o", str(run)], tell)
+    job, run = merged(work, MERGED, tell)
     if work.teacher:
         options = ["--teacher", work.teacher, *work.options.get("colorize", [])]
         start(work, job, MERGED, ["colorize", str(run), *options], tell)
         start(work, job, MERGED, ["seams", str(job.local), str(run)], tell)
     job.put_folder(MERGED)
+
+
+def merged(work: Work, name: str, tell: Tell) -> tuple[Store, Path]:
+    """The job, and the run of all blocks."""
+    capture, job = work.stores()
+    job.fetch(["job.json"])
+    blocks = [block["name"] for block in json.loads((job.local / "job.json").read_text())["blocks"]]
+    for block in [COARSE, *blocks]:
+        files = ["block.json", "report.json", "luma.ply", "log.csv"]
+        job.fetch(f"{block}/{file}" for file in files)
+    fetch_capture(capture, photos_of(job, COARSE))
+    move_capture(job, capture.local)
+    run = job.local / name
+    start(work, job, name, ["merge", str(job.local), "-o", str(run)], tell)
+    return job, run
 
 
 def fetch_capture(capture: Store, photos: list[str]) -> None:

@@ -8,13 +8,13 @@ use super::super::{
     Event, Observer, RunError, RunFolder,
     scene::{Frame, read_splats},
 };
-use super::FitOptions;
+use super::{FitOptions, Init, checkpoint::sha256_of};
 use crate::{
     blocks::{Area, Block, BlockFile, COARSE, FAR_PART, Job, Kind, Region},
     capture::{Camera, Dataset, LoadOptions},
     color::gray_from_rgb,
     effects::{Effect, Overrules},
-    luma::{LumaSettings, Preset, carve::chosen},
+    luma::{LumaSettings, Preset, carve::chosen, start::gap_places},
     report::{EffectReport, Report, ViewExposure},
     splats::{Splats, initial_splats},
 };
@@ -31,6 +31,19 @@ const LEAST_OVERLAP: f64 = 0.05;
 
 /// Heights above and below the scene's that still belong to it, as a share of its height.
 const HEADROOM: f64 = 0.5;
+
+/// A block that goes on takes so small a part of its iterations so far: it only has to agree
+/// with its neighbors.
+const AGREEING_PART: usize = 6;
+
+/// The scene of a merged run, of which a block takes what its neighbors have in its margin.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Neighbors {
+    /// Its splat file.
+    pub luma: PathBuf,
+    /// SHA-256 of the file.
+    pub sha256: String,
+}
 
 /// A block and the job that it belongs to.
 #[derive(Clone, Debug, PartialEq)]
@@ -77,6 +90,12 @@ impl BlockPlace {
     pub(super) fn exposures(&self) -> Option<&[ViewExposure]> {
         let (_, report) = self.coarse.as_ref()?;
         Some(&report.luma.exposures)
+    }
+
+    /// The whole scene's extent in world units; none where the coarse model is not there.
+    pub(super) fn extent(&self) -> Option<f64> {
+        let (_, report) = self.coarse.as_ref()?;
+        Some(report.capture.extent)
     }
 
     /// What is planned of it.
@@ -126,8 +145,15 @@ impl BlockPlace {
         let inner = coarse.len().saturating_sub(report.luma.surroundings);
         let [coarse, around] =
             [0..inner, inner..coarse.len()].map(|some| chosen(&coarse, &some.collect::<Vec<_>>()));
-        let near = self.near(dataset.capture.offset);
-        let points: Vec<_> = (dataset.capture.points.iter())
+        let offset = dataset.capture.offset;
+        let near = self.near(offset);
+        let far = self.far(dataset, &coarse);
+        let room = settings.max_splats / (1 + FAR_PART);
+        let far = chosen(&coarse, &most_shown(dataset, &coarse, far, room));
+        // Points give way, not the little that stands for all the rest.
+        let taken = far.len() + around.len();
+        let room = settings.max_splats.saturating_sub(taken).max(1);
+        let mut points: Vec<_> = (dataset.capture.points.iter())
             .map(|point| {
                 let rgb = point.color.map(|v| f64::from(v) / 255.0);
                 let position = point.position.as_vec3().to_array();
@@ -135,19 +161,17 @@ impl BlockPlace {
             })
             .filter(|&(position, _)| near.holds(position))
             .collect();
+        let gaps = gap_places(dataset, settings, points.len(), room)?;
+        points.extend(gaps.into_iter().filter(|&(place, _)| near.holds(place)));
         let mut start = initial_splats(&points, dataset.extent as f32, coarse.sh.degree);
         // Points far from all others would begin as a fog that covers the neighbors' cells, too,
         // and is gone there once the block is cropped.
-        let widest = (self.margin() / REACH).ln() as f32;
-        for log_scale in start.log_scales.iter_mut().flatten() {
-            *log_scale = log_scale.min(widest);
+        for (log_scales, &mean) in start.log_scales.iter_mut().zip(&start.means) {
+            let widest = (self.free(mean, offset) / REACH).ln() as f32;
+            for log_scale in log_scales {
+                *log_scale = log_scale.min(widest);
+            }
         }
-        let far = self.far(dataset, &coarse);
-        let room = settings.max_splats / (1 + FAR_PART);
-        let far = chosen(&coarse, &most_shown(dataset, &coarse, far, room));
-        // Points give way, not the little that stands for all the rest.
-        let taken = far.len() + around.len();
-        let room = settings.max_splats.saturating_sub(taken).max(1);
         start = chosen(&start, &evenly(&start.means, room));
         observe(Event::Note(format!(
             "starts from {} of {} points in and around the block and {} Gaussians of the coarse model beyond",
@@ -161,6 +185,56 @@ impl BlockPlace {
         Ok(Some((start, surroundings)))
     }
 
+    /// A trained block with what its neighbors have in its margin instead of what it has there
+    /// itself; its surroundings stay last.
+    ///
+    /// # Errors
+    /// [`RunError`] of the merged scene's file.
+    pub(super) fn among(
+        &self,
+        own: &Splats,
+        surroundings: usize,
+        neighbors: &Neighbors,
+        offset: DVec3,
+        observe: &mut Observer<'_>,
+    ) -> Result<Splats, RunError> {
+        let frame = Frame::World(offset);
+        let theirs = read_splats(&neighbors.luma, frame, observe)?.0.to_luma();
+        let (near, core) = (self.near(offset), self.region(self.block.core, offset));
+        let in_margin = |place| near.holds(place) && !core.holds(place);
+        let inner = own.len().saturating_sub(surroundings);
+        let kept: Vec<usize> = (0..inner).filter(|&i| !in_margin(own.means[i])).collect();
+        let taken: Vec<usize> = (0..theirs.len())
+            .filter(|&i| in_margin(theirs.means[i]))
+            .collect();
+        observe(Event::Note(format!(
+            "goes on with {} of {} Gaussians, and {} that neighbors have in the margin",
+            kept.len(),
+            inner,
+            taken.len()
+        )));
+        let mut start = chosen(own, &kept);
+        start.append(chosen(&theirs, &taken));
+        start.append(chosen(own, &(inner..own.len()).collect::<Vec<_>>()));
+        Ok(start)
+    }
+
+    /// How far a Gaussian at a place may reach: the margin, and farther where the border of the
+    /// block's own cell is far.
+    fn free(&self, place: [f32; 3], offset: DVec3) -> f64 {
+        let at = self.at(place, offset);
+        let to_border = [0, 1].map(|axis| {
+            let [least, most] = self.block.core.0[axis];
+            (at[axis] - least).min(most - at[axis])
+        });
+        self.margin() + to_border[0].min(to_border[1]).max(0.0)
+    }
+
+    /// Where a place stands on the ground.
+    fn at(&self, place: [f32; 3], offset: DVec3) -> [f64; 2] {
+        (self.job.ground).place(DVec3::from(place.map(f64::from)) + offset)
+    }
+
     /// How far the block trains beyond its own cell at least, in world units.
     fn margin(&self) -> f64 {
         let cell = self.block.core.within(&self.job.bounds);
@@ -170,8 +244,7 @@ impl BlockPlace {
 
     /// How far over the ground a place is from the block's own cell, in world units.
     fn distance(&self, place: [f32; 3], offset: DVec3) -> f64 {
-        let place = DVec3::from(place.map(f64::from)) + offset;
-        let at = self.job.ground.place(place);
+        let at = self.at(place, offset);
         let beyond = [0, 1].map(|axis| {
             let [least, most] = self.block.core.0[axis];
             (least - at[axis]).max(at[axis] - most).max(0.0)
@@ -303,6 +376,42 @@ impl FitOptions {
             block,
             ..Self::new(job.capture)
         }))
+    }
+
+    /// Goes on with a trained block among what its neighbors have in a run of `merge`, for a
+    /// sixth of its iterations so far.
+    ///
+    /// # Errors
+    /// [`RunError::File`] where the run is none of the same photos, or this is no trained block.
+    pub fn among(self, merged: &Path) -> Result<Self, RunError> {
+        let folder = RunFolder::at(merged);
+        let report = folder.read_report()?;
+        let refused = |path: &Path, reason: &str| RunError::File {
+            path: path.to_owned(),
+            reason: reason.to_owned(),
+        };
+        let (Some(block), Some(Init::Run { iterations, .. })) = (&self.block, &self.init) else {
+            let path = self.output.as_ref().unwrap_or(&self.colmap_dir);
+            let reason = "is no trained block of a job: --around is for these";
+            return Err(refused(path, reason));
+        };
+        if Path::new(&report.capture.path) != block.job.capture {
+            let reason = "is no scene of the block's photos: give the run of `gs-chroma merge`";
+            return Err(refused(merged, reason));
+        }
+        let luma = folder.luma();
+        let iterations = iterations.div_ceil(AGREEING_PART);
+        Ok(Self {
+            around: Some(Neighbors {
+                sha256: sha256_of(luma.clone())?,
+                luma,
+            }),
+            settings: Box::new(move |settings| {
+                (self.settings)(settings);
+                settings.iterations = iterations;
+            }),
+            ..self
+        })
     }
 
     /// Whether photos, effects and exposures are those of a coarse model.

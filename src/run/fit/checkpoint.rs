@@ -108,11 +108,14 @@ pub(super) fn question(
         question["block"] = serde_json::json!(block.plan());
         question["coarse"] = serde_json::json!(coarse);
     }
+    if let Some(neighbors) = &options.around {
+        question["around"] = serde_json::json!(neighbors.sha256);
+    }
     Ok(question)
 }
 
 /// The SHA-256 of a file.
-fn sha256_of(path: PathBuf) -> Result<String, RunError> {
+pub(super) fn sha256_of(path: PathBuf) -> Result<String, RunError> {
     let sha256 = input::open(&path).and_then(hash::of_file);
     sha256.map_err(files::at(&path))
 }

@@ -33,7 +33,7 @@ use crate::{
 };
 use ahead::Ahead;
 pub use ahead::AheadOptions;
-pub use block::BlockPlace;
+pub use block::{BlockPlace, Neighbors};
 use budget::Budget;
 use checkpoint::{found_in, question};
 pub(super) use report::capture_report;
@@ -106,6 +106,8 @@ pub struct FitOptions {
     pub init: Option<Init>,
     /// The block of a larger scene that it is.
     pub block: Option<BlockPlace>,
+    /// What a trained block goes on among.
+    pub around: Option<Neighbors>,
     /// What is to end the run; seconds are those of all of it. A PSNR is that of the held-out
     /// views, or of some training views where none is held out.
     pub goal: Goal,
@@ -132,12 +134,18 @@ impl FitOptions {
             overrules: Overrules::default(),
             init: None,
             block: None,
+            around: None,
             goal: Goal::Fixed,
             timings: false,
             ahead: AheadOptions::default(),
             checkpoints: CheckpointOptions::default(),
             live: None,
         }
+    }
+
+    /// How many of the Gaussians to start from, the last ones, are surroundings.
+    fn surroundings(&self) -> usize {
+        self.init.as_ref().map_or(0, Init::surroundings)
     }
 }
 
@@ -182,7 +190,11 @@ pub fn fit(
         ..options.load.clone()
     };
     let examined = open_examined(&options.colmap_dir, &load, observe)?;
-    let (dataset, evidence) = (Arc::new(examined.dataset), examined.evidence);
+    let (mut dataset, evidence) = (examined.dataset, examined.evidence);
+    // Rates are in proportion to it.
+    let whole = options.block.as_ref().and_then(BlockPlace::extent);
+    dataset.extent = whole.unwrap_or(dataset.extent);
+    let dataset = Arc::new(dataset);
     if let Some(live) = &options.live {
         live.begin(&dataset);
     }

@@ -42,6 +42,7 @@ impl Job<'_> {
                 given_up: scene.given_up,
                 splats: scene.splats.len(),
                 surroundings: scene.surroundings,
+                around: (options.around.as_ref()).map(|neighbors| neighbors.sha256.clone()),
                 poisoned: last.map_or(0, |progress| progress.poisoned),
                 refused: last.map_or(0, |progress| progress.refused),
                 loss: last.map_or(0.0, |progress| progress.loss),

@@ -163,7 +163,7 @@ impl Job<'_> {
     ) -> Result<Trained, RunError> {
         let (options, dataset) = (self.options, self.dataset);
         let limit = self.time_for_training(budget.each, found)?;
-        let settings = &budget.work.settings;
+        let mut settings = budget.work.settings.clone();
         let init = options.init.as_ref().map(|init| {
             let frame = match init {
                 Init::File(_) => Frame::World(dataset.capture.offset),
@@ -181,9 +181,23 @@ impl Job<'_> {
         let block = options.block.as_ref();
         let placed = match (block, &init, found) {
             // One that goes on has its Gaussians.
-            (Some(block), None, None) => block.start(dataset, settings, observe)?,
+            (Some(block), None, None) => block.start(dataset, &settings, observe)?,
+            (Some(block), Some((_, own, _)), None) => match &options.around {
+                Some(neighbors) => {
+                    let (offset, around) = (dataset.capture.offset, options.surroundings());
+                    let own = own.to_luma();
+                    let splats = block.among(&own, around, neighbors, offset, observe)?;
+                    Some((splats, around))
+                }
+                None => None,
+            },
             _ => None,
         };
+        if let (Some((splats, _)), Some(_)) = (&placed, &options.around) {
+            // What neighbors have in the margin may be more than the block has there.
+            settings.max_splats = settings.max_splats.max(splats.len());
+        }
+        let settings = &settings;
         let told = block.and_then(BlockPlace::exposures);
         let shared = told.map(|told| exposures(dataset, told));
         let near = block.map(|block| block.near(dataset.capture.offset));
@@ -198,14 +212,9 @@ impl Job<'_> {
             overrules: &options.overrules,
             goal: limit.map_or(options.goal, |limit| options.goal.with_seconds(limit)),
             tries: seconds.is_none_or(|limit| limit >= TRIAL_FROM),
-            start: init
-                .as_ref()
-                .map(|(_, splats, _)| splats)
-                .or(placed.as_ref().map(|(splats, _)| splats)),
-            surroundings: match (&options.init, &placed) {
-                (Some(init), _) => init.surroundings(),
-                (None, placed) => placed.as_ref().map_or(0, |(_, around)| *around),
-            },
+            start: (placed.as_ref().map(|(splats, _)| splats))
+                .or(init.as_ref().map(|(_, splats, _)| splats)),
+            surroundings: (placed.as_ref()).map_or(options.surroundings(), |(_, around)| *around),
             exposures: shared.as_deref(),
             grows: near.map(|near| Arc::new(move |place| near.holds(place)) as Grows),
             watched: reaches.then(|| (self.judge, self.judge.split.test.clone())),
