@@ -33,6 +33,8 @@ struct LbfgsParameters {
     color: f32,
     // What an anchor's pull is of the pictures'.
     anchor: f32,
+    // How many times as dear a harmonic that is not constant is.
+    rest: f32,
 }
 
 // Pairs of displacements and changes of the gradient that are remembered.
@@ -162,7 +164,14 @@ fn total_from(first: u32, local: u32) -> f32 {
 // of a Gaussian's weights bounds its row.
 fn inverse_diagonal(k: u32) -> f32 {
     let own = of_channel(k);
-    return 1.0 / (parameters.diagonal_scale * diagonal[own] + parameters.ridge + pulls[own]);
+    let free = parameters.diagonal_scale * diagonal[own] + parameters.ridge;
+    return 1.0 / (dearness(k) * free + pulls[own]);
+}
+
+// Photos from one side do not tell a constant color from one that changes with the view: what
+// they leave open is made of constant harmonics.
+fn dearness(k: u32) -> f32 {
+    return select(parameters.rest, 1.0, k < parameters.constants);
 }
 
 // Where `diagonal` has an unknown's.
@@ -181,8 +190,9 @@ fn lbfgs_ridge(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) gro
         let x = unknowns[k];
         let off = x - anchors[k];
         let pull = pulls[of_channel(k)];
-        gradient[k] += parameters.ridge * x + pull * off;
-        own = 0.5 * (parameters.ridge * x * x + pull * off * off);
+        let ridge = dearness(k) * parameters.ridge;
+        gradient[k] += ridge * x + pull * off;
+        own = 0.5 * (ridge * x * x + pull * off * off);
     }
     leave_sum(block, local, own);
 }

@@ -189,6 +189,21 @@ impl FrozenViews {
         }
     }
 
+    /// Makes the lists that stay anew, to draw harmonics of `sh_degree`: a Gaussian whose color
+    /// could not be drawn, as a step that goes too far has them, was taken out of them.
+    pub(super) fn relist(&self, sh_degree: u32) {
+        for view in 0..self.pinned {
+            let mut recorder = Recorder::new(&self.raster.gpu);
+            for (scale, frozen) in self.views[view].iter().enumerate() {
+                self.list(view, scale, sh_degree, &mut recorder);
+                if let Some(lists) = &frozen.lists {
+                    lists.record(&self.raster, &mut recorder);
+                }
+            }
+            recorder.submit();
+        }
+    }
+
     /// Entries of the longest lists of these views.
     pub(super) fn capacity(&self, views: impl Iterator<Item = usize>) -> usize {
         let lists = views.flat_map(|view| (0..self.scales()).map(move |scale| (view, scale)));

@@ -283,6 +283,9 @@ impl<'a> IrlsSolver<'a> {
             recorder.submit();
             let mut state = State::of(&self.lbfgs.state_later(gpu).wait(gpu)?);
             let accepted = state.moved.is_some();
+            if !accepted {
+                self.passes.frozen.relist(self.passes.field.degree);
+            }
             self.correct(round, accepted);
             self.done = round + 1;
             if !self.anchored && !self.plain && accepted && self.done >= FREE_ROUNDS {
@@ -348,13 +351,17 @@ impl<'a> IrlsSolver<'a> {
     /// Judges the last step.
     fn end(&mut self) -> Result<(), ChromaError> {
         self.draw(self.robust(), Ending::Loss)?;
-        let mut recorder = Recorder::new(self.gpu());
-        self.lbfgs.end(&mut recorder);
+        let gpu = self.gpu();
+        let mut recorder = Recorder::new(gpu);
+        self.lbfgs.end(gpu, &mut recorder);
         recorder.submit();
-        if std::mem::take(&mut self.corrected) {
-            let gpu = self.gpu();
-            let state = State::of(&self.lbfgs.state_later(gpu).wait(gpu)?);
-            if state.moved.is_none() {
+        let corrected = std::mem::take(&mut self.corrected);
+        if State::of(&self.lbfgs.state_later(gpu).wait(gpu)?)
+            .moved
+            .is_none()
+        {
+            self.passes.frozen.relist(self.passes.field.degree);
+            if corrected {
                 let mut recorder = Recorder::new(gpu);
                 self.passes.corrections.undo(&mut recorder);
                 recorder.submit();
@@ -379,6 +386,7 @@ impl<'a> IrlsSolver<'a> {
         self.draw(None, Ending::Loss)?;
         self.spent = spent;
         self.lbfgs.restart(gpu);
+        self.passes.frozen.relist(self.passes.field.degree);
         Ok(mean(&self.passes.log.read_later(gpu).wait(gpu)?))
     }
 
@@ -386,8 +394,12 @@ impl<'a> IrlsSolver<'a> {
     /// whose wanted color is about met.
     ///
     /// # Errors
-    /// [`ChromaError::Gpu`] when the device is lost.
-    pub fn seen(&self) -> Result<Vec<f32>, ChromaError> {
+    /// [`ChromaError`] when the device is lost or targets cannot be read.
+    pub fn seen(&mut self) -> Result<Vec<f32>, ChromaError> {
+        if self.undone {
+            // The sums are of the step that was undone, where hardly a color was met.
+            self.draw(self.robust(), Ending::Gradient)?;
+        }
         let count = self.passes.frozen.geometry.count;
         let diagonal = self.system.diagonal.read(self.gpu())?;
         // One pixel of weight one whose residual is the typical one.

@@ -29,7 +29,14 @@ pub struct LbfgsParameters {
     pub color: f32,
     /// What an anchor's pull is of the pictures'.
     pub anchor: f32,
+    /// How many times as dear a harmonic that is not constant is.
+    pub rest: f32,
 }
+
+/// How many times a constant harmonic's the ridge and the bound of the other harmonics are. Photos
+/// see a Gaussian from one side, where many fields of degree 3 show the same: of these the one is
+/// found whose view dependence is least, weighed so (docs/lab/07-chroma-solver.md).
+pub const REST: f64 = 20.0;
 
 /// Twin of `MEMORY`: pairs that are remembered. Eight do no better (docs/lab/07-chroma-solver.md).
 const MEMORY: usize = 5;
@@ -182,9 +189,14 @@ impl State {
     }
 }
 
+/// What the majorizer's diagonal is of the sum of weights, for a constant harmonic of so many.
+pub fn diagonal_scale(harmonics: usize) -> f64 {
+    sh::C0 * (1.0 + harmonics.saturating_sub(1) as f64 / REST)
+}
+
 impl Lbfgs {
     /// Ties the kernels to `system` of `splats` Gaussians with so many channels. `ridge` is
-    /// added to the matrix's diagonal, and once the unknowns are anchored the share `anchor` of
+    /// added to the matrix's diagonal, [`REST`] times for harmonics that are not constant, and once the unknowns are anchored the share `anchor` of
     /// what pictures add to it.
     ///
     /// # Errors
@@ -198,7 +210,8 @@ impl Lbfgs {
     ) -> Result<Self, GpuError> {
         let length = system.gradient.len();
         // The adjoint multiplies by the constant harmonic once, the matrix by all harmonics
-        // twice, and the squares of those sum to as many of its own square (Unsöld 1927).
+        // twice, and the squares of those sum to as many of its own square (Unsöld 1927), each
+        // divided by how dear it is: then the bound of each is as many times the sum.
         let harmonics = length / (channels * splats).max(1);
         let blocks = groups_for(length);
         let parameters = Buffer::uniform(
@@ -210,10 +223,11 @@ impl Lbfgs {
                 diagonals: (system.diagonal.len() / splats.max(1)).max(1) as u32,
                 blocks,
                 ridge,
-                diagonal_scale: (sh::C0 * harmonics as f64) as f32,
+                diagonal_scale: diagonal_scale(harmonics) as f32,
                 constants: (channels * splats) as u32,
                 color: sh::C0 as f32,
                 anchor,
+                rest: REST as f32,
             },
         )?;
         let zeros = |label| Buffer::<f32>::zeros(gpu, label, length);
@@ -430,10 +444,11 @@ impl Lbfgs {
     }
 
     /// Records the end of what is minimized, where the loss is ready: a last step that raised
-    /// it is undone.
-    pub fn end(&mut self, recorder: &mut Recorder) {
-        self.judge(recorder);
+    /// it is undone. Nothing may have been recorded before.
+    pub fn end(&mut self, gpu: &Gpu, recorder: &mut Recorder) {
         // No gradient, no pair.
+        self.changed(gpu);
+        self.judge(recorder);
         self.compare(recorder);
     }
 

@@ -45,7 +45,9 @@ pub use fill::fill_unseen;
 pub use frozen::{FrozenViews, Room};
 pub use irls::IrlsSolver;
 pub use kernels::ChromaKernels;
-pub use lbfgs::{Lbfgs, LbfgsKernels, LbfgsParameters, State, System, UNBOUNDED};
+pub use lbfgs::{
+    Lbfgs, LbfgsKernels, LbfgsParameters, REST, State, System, UNBOUNDED, diagonal_scale,
+};
 pub use lesson::{Colorizer, Lesson, Wanted, masked_weights, teach};
 pub use loss::{ChromaLossWeights, Correction, LabLossParameters, RgbLossParameters};
 pub use passes::Task;

@@ -48,7 +48,8 @@ pub struct Lbfgs {
     /// From the accepted point before to this one.
     displacement: Vec<f64>,
     floors: Vec<f64>,
-    ridge: f64,
+    /// Of each unknown.
+    ridges: Vec<f64>,
     /// Where each unknown is drawn to, and how strongly.
     anchors: (Vec<f64>, Vec<f64>),
     /// The accepted point and its gradient.
@@ -68,9 +69,9 @@ pub struct Lbfgs {
 }
 
 impl Lbfgs {
-    /// Begins at `unknowns`, none of which may fall below its floor. `ridge / 2 · x²` is added
-    /// to the loss.
-    pub fn new(unknowns: Vec<f64>, floors: Vec<f64>, ridge: f64) -> Self {
+    /// Begins at `unknowns`, none of which may fall below its floor. Half of each one's ridge times
+    /// its square is added to the loss.
+    pub fn new(unknowns: Vec<f64>, floors: Vec<f64>, ridges: Vec<f64>) -> Self {
         Self {
             preconditioner: vec![0.0; unknowns.len()],
             direction: vec![0.0; unknowns.len()],
@@ -80,7 +81,7 @@ impl Lbfgs {
             unknowns,
             undone: 0,
             floors,
-            ridge,
+            ridges,
             loss: None,
             next: Next::Onward,
             slope: 0.0,
@@ -99,8 +100,9 @@ impl Lbfgs {
     /// One step from where loss and gradient are these, the parts of ridge and anchors left out.
     /// `diagonal` is positive and the majorizer's, the ridge included.
     pub fn step(&mut self, loss: f64, gradient: &[f64], diagonal: &[f64]) {
-        let gradient: Vec<f64> = (gradient.iter().zip(&self.unknowns).zip(self.off_anchors()))
-            .map(|((g, x), (pull, off))| g + self.ridge * x + pull * off)
+        let of_ridges = self.ridges.iter().zip(&self.unknowns).map(|(r, x)| r * x);
+        let gradient: Vec<f64> = (gradient.iter().zip(of_ridges).zip(self.off_anchors()))
+            .map(|((g, ridge), (pull, off))| g + ridge + pull * off)
             .collect();
         let paired = self.loss.is_some() && self.age >= AGE;
         let length = self.judge(loss);
@@ -226,7 +228,10 @@ impl Lbfgs {
 
     fn with_priors(&self, loss: f64) -> f64 {
         let anchored: f64 = self.off_anchors().map(|(pull, off)| pull * off * off).sum();
-        loss + 0.5 * (self.ridge * dot(&self.unknowns, &self.unknowns) + anchored)
+        let ridged: f64 = (self.ridges.iter().zip(&self.unknowns))
+            .map(|(ridge, x)| ridge * x * x)
+            .sum();
+        loss + 0.5 * (ridged + anchored)
     }
 
     /// Each anchor's pull, and how far off its unknown is.
@@ -341,7 +346,7 @@ mod tests {
     fn ends_where_the_loss_is_least() {
         let quadratic = Quadratic::random(2, 12);
         let free = vec![f64::NEG_INFINITY; 12];
-        let mut lbfgs = Lbfgs::new(vec![0.0; 12], free, 0.0);
+        let mut lbfgs = Lbfgs::new(vec![0.0; 12], free, vec![0.0; 12]);
         let mut alone = vec![0.0; 12];
         for _ in 0..40 {
             let x = lbfgs.unknowns.clone();
@@ -359,7 +364,7 @@ mod tests {
         let (found, slow) = (quadratic.loss(&lbfgs.unknowns), quadratic.loss(&alone));
         assert!(found < 1e-9 && slow > 1e-4, "{found} {slow}");
         // Nothing left to do moves nothing, and divides by no zero.
-        let mut done = Lbfgs::new(vec![1.0], vec![f64::NEG_INFINITY], 0.0);
+        let mut done = Lbfgs::new(vec![1.0], vec![f64::NEG_INFINITY], vec![0.0]);
         for _ in 0..3 {
             done.step(5.0, &[0.0], &[2.0]);
         }
@@ -374,7 +379,7 @@ mod tests {
         // A slope of -0.75 and a rise of 2.25: least after an eighth of the step. Of a loss
         // that is none, a tenth.
         for (bad, share) in [(7.25, 0.125), (f64::NAN, 0.1), (1e9, 0.1)] {
-            let mut lbfgs = Lbfgs::new(start.clone(), vec![f64::NEG_INFINITY; 2], 0.0);
+            let mut lbfgs = Lbfgs::new(start.clone(), vec![f64::NEG_INFINITY; 2], vec![0.0; 2]);
             lbfgs.step(5.0, &[1.0, -1.0], &[2.0, 4.0]);
             assert_eq!(lbfgs.unknowns, [2.5, -1.75]);
             lbfgs.step(bad, &[9.0, 9.0], &[1.0, 1.0]);
@@ -403,7 +408,7 @@ mod tests {
         let quadratic = Quadratic::random(3, 14);
         let mut random = Random::new(4);
         let floors: Vec<f64> = (0..14).map(|_| random.range(-0.5, 0.5)).collect();
-        let mut lbfgs = Lbfgs::new(floors.clone(), floors.clone(), 0.0);
+        let mut lbfgs = Lbfgs::new(floors.clone(), floors.clone(), vec![0.0; 14]);
         for _ in 0..200 {
             let x = lbfgs.unknowns.clone();
             lbfgs.step(

@@ -9,7 +9,7 @@ use gs_chroma::{
         teacher::{Teacher, TeacherSettings},
     },
     raster::Renderer,
-    splats::{ShField, initial_splats},
+    splats::{ShField, initial_splats, sh},
 };
 
 use crate::{
@@ -214,4 +214,42 @@ fn a_real_network_leads_to_one_end() {
     let ends = [few, many].map(|s| pictures(go_on(what, &mut from(&s, &gray), s.rounds)));
     let away = apart(&ends[0], &ends[1]);
     assert!(away < 0.1, "by default: {away}");
+}
+
+/// A step that goes too far has colors that cannot be drawn. What is drawn after it is whole.
+#[test]
+fn a_color_that_cannot_be_drawn_spoils_nothing_after_it() {
+    let (luma, views) = (wall(), six_views());
+    let problem = Problem::new(&luma, &views);
+    let mut solver = problem.solver(&settings());
+    solver.run(&mut |_| ControlFlow::Continue(())).unwrap();
+    let chroma = solver.chroma().unwrap();
+    let before = solver.objective(&chroma).unwrap();
+    let mut too_far = chroma.clone();
+    too_far.coefficients.iter_mut().for_each(|c| *c += 1e6);
+    let far = solver.objective(&too_far).unwrap();
+    assert!(far > 2.0 * before, "{far} {before}");
+    assert_eq!(solver.objective(&chroma).unwrap(), before);
+}
+
+/// Photos from one side leave open how a color changes with the view: it is made constant,
+/// as far as the least change of all goes.
+#[test]
+fn a_color_seen_from_one_side_is_mostly_constant() {
+    let ab = [40.0, -25.0];
+    let problem = Problem::new(&wall(), &constant_views(&[ab; 3]));
+    let settings = ChromaSettings {
+        sh_degree: 3,
+        ..settings()
+    };
+    let mut solver = problem.solver(&settings);
+    solver.run(&mut |_| ControlFlow::Continue(())).unwrap();
+    let (chroma, seen) = (solver.chroma().unwrap(), solver.seen().unwrap());
+    let mut shown = 0;
+    for (i, _) in seen.iter().enumerate().filter(|(_, seen)| **seen > 5.0) {
+        let constant = sh::C0 * f64::from(chroma.of(i)[0]) / ab[0];
+        assert!((0.5..1.1).contains(&constant), "{i}: {constant}");
+        shown += 1;
+    }
+    assert!(shown > 20, "{shown}");
 }

@@ -190,7 +190,8 @@ fn twins() -> Vec<Twin> {
                 diagonal_scale,
                 constants,
                 color,
-                anchor
+                anchor,
+                rest
             }
         ),
         twin!(

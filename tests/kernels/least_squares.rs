@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 
 use gs_chroma::{
-    chroma::ChromaSettings,
+    chroma::{ChromaSettings, REST},
     splats::{ShField, Splats},
 };
 
@@ -142,7 +142,14 @@ impl Problem {
                     }
                 }
             }
-            (0..count).for_each(|k| matrix[k][k] += ridge);
+            let harmonics = count / self.scene.len();
+            for (k, row) in matrix.iter_mut().enumerate() {
+                row[k] += if k % harmonics == 0 {
+                    ridge
+                } else {
+                    REST * ridge
+                };
+            }
             x = solve(matrix, &right);
         }
         x

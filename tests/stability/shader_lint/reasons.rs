@@ -54,7 +54,7 @@ pub const REASONS: &[(&str, &str, &str)] = &[
     ),
     (
         "inverse_diagonal",
-        "1.0 / (parameters.diagonal_scale * diagonal[own] + parameters.ridge + pulls[own])",
+        "1.0 / (dearness(k) * free + pulls[own])",
         "the ridge is positive, sums of weights and shares of them are not negative",
     ),
     (
