@@ -142,7 +142,9 @@ mod tests {
     fn what_varies_counts_for_more_than_the_mean() {
         let of = |values: [(f64, [f32; 2]); 3]| {
             let mut moments = Moments::default();
-            values.map(|(weight, ab)| moments.add(weight, ab));
+            for (weight, ab) in values {
+                moments.add(weight, ab);
+            }
             moments.colorfulness()
         };
         let nothing = (0.0, [90.0, -90.0]);
