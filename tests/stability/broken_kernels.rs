@@ -179,8 +179,14 @@ fn broken_losses_and_steps_are_noticed() {
         (
             "lbfgs",
             "lbfgs_ridge",
-            "gradient[k] += parameters.ridge * x",
-            "gradient[k] -= parameters.ridge * x",
+            "gradient[k] += ridge * x",
+            "gradient[k] -= ridge * x",
+        ),
+        (
+            "lbfgs",
+            "lbfgs_begin",
+            "select(parameters.rest, 1.0",
+            "select(1.0, 1.0",
         ),
         ("lbfgs", "lbfgs_ridge", "pull * off;", "-pull * off;"),
         (
