@@ -33,7 +33,7 @@ struct LbfgsParameters {
     color: f32,
     // What an anchor's pull is of the pictures'.
     anchor: f32,
-    // How many times as dear a harmonic that is not constant is.
+    // What ridge and bound of a harmonic that is not constant are multiplied by.
     rest: f32,
 }
 
@@ -165,12 +165,12 @@ fn total_from(first: u32, local: u32) -> f32 {
 fn inverse_diagonal(k: u32) -> f32 {
     let own = of_channel(k);
     let free = parameters.diagonal_scale * diagonal[own] + parameters.ridge;
-    return 1.0 / (dearness(k) * free + pulls[own]);
+    return 1.0 / (penalty_factor(k) * free + pulls[own]);
 }
 
 // Photos from one side do not tell a constant color from one that changes with the view: what
 // they leave open is made of constant harmonics.
-fn dearness(k: u32) -> f32 {
+fn penalty_factor(k: u32) -> f32 {
     return select(parameters.rest, 1.0, k < parameters.constants);
 }
 
@@ -190,7 +190,7 @@ fn lbfgs_ridge(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) gro
         let x = unknowns[k];
         let off = x - anchors[k];
         let pull = pulls[of_channel(k)];
-        let ridge = dearness(k) * parameters.ridge;
+        let ridge = penalty_factor(k) * parameters.ridge;
         gradient[k] += ridge * x + pull * off;
         own = 0.5 * (ridge * x * x + pull * off * off);
     }

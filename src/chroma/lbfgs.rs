@@ -29,13 +29,13 @@ pub struct LbfgsParameters {
     pub color: f32,
     /// What an anchor's pull is of the pictures'.
     pub anchor: f32,
-    /// How many times as dear a harmonic that is not constant is.
+    /// What ridge and bound of a harmonic that is not constant are multiplied by.
     pub rest: f32,
 }
 
-/// How many times a constant harmonic's the ridge and the bound of the other harmonics are. Photos
-/// see a Gaussian from one side, where many fields of degree 3 show the same: of these the one is
-/// found whose view dependence is least, weighed so (docs/lab/07-chroma-solver.md).
+/// What ridge and bound of harmonics beyond the constant one are multiplied by. Photos see a
+/// Gaussian from one side, where many fields of degree 3 show the same: of these the one is found
+/// whose view dependence, weighted so, is least (docs/lab/07-chroma-solver.md).
 pub const REST: f64 = 20.0;
 
 /// Twin of `MEMORY`: pairs that are remembered. Eight do no better (docs/lab/07-chroma-solver.md).
@@ -196,8 +196,8 @@ pub fn diagonal_scale(harmonics: usize) -> f64 {
 
 impl Lbfgs {
     /// Ties the kernels to `system` of `splats` Gaussians with so many channels. `ridge` is
-    /// added to the matrix's diagonal, [`REST`] times for harmonics that are not constant, and once the unknowns are anchored the share `anchor` of
-    /// what pictures add to it.
+    /// added to the matrix's diagonal, [`REST`] times for harmonics that are not constant, and
+    /// once the unknowns are anchored the share `anchor` of what pictures add to it.
     ///
     /// # Errors
     /// [`GpuError::TooLarge`].
@@ -211,7 +211,7 @@ impl Lbfgs {
         let length = system.gradient.len();
         // The adjoint multiplies by the constant harmonic once, the matrix by all harmonics
         // twice, and the squares of those sum to as many of its own square (Unsöld 1927), each
-        // divided by how dear it is: then the bound of each is as many times the sum.
+        // divided by its factor: then the bound of each is its factor times the sum.
         let harmonics = length / (channels * splats).max(1);
         let blocks = groups_for(length);
         let parameters = Buffer::uniform(

@@ -5,16 +5,13 @@ use std::sync::Arc;
 
 use super::{
     AdjointScratch, COLOR_FIGURES, ChromaAdjoint, ChromaSums, ColorKind, Field, Geometry, Layer,
-    Lists, Raster, ViewUniform, constants::NEAR_SHARE,
+    Lists, Raster, ViewUniform, constants::NEAR_SHARE, renderer::INSTANCES_PER_SPLAT,
 };
 use crate::{
     capture::Camera,
     gpu::{Buffer, GpuError, Recorder},
     splats::{ShField, Splats, sh},
 };
-
-/// Tile-list entries to begin with, for each Gaussian; grows on demand.
-const INSTANCES_PER_SPLAT: usize = 8;
 
 /// Weighs the Gaussians of one scene, one camera after the other.
 pub struct Contributions {
@@ -71,11 +68,15 @@ impl Contributions {
         let (pixels, tiles) = (view.pixel_count(), view.tile_count());
         let mut room = match self.room.take() {
             Some(room) if pixels <= room.max_pixels && tiles <= room.max_tiles => room,
-            _ => self.room(pixels, tiles, self.geometry.count * INSTANCES_PER_SPLAT)?,
+            Some(room) => {
+                let [pixels, tiles] = [pixels.max(room.max_pixels), tiles.max(room.max_tiles)];
+                self.room(pixels, tiles, room.lists.capacity)?
+            }
+            None => self.room(pixels, tiles, self.geometry.count * INSTANCES_PER_SPLAT)?,
         };
         loop {
-            self.gradient.write(&gpu, &vec![0.0; self.gradient.len()]);
             let mut recorder = Recorder::new(&gpu);
+            recorder.clear(self.gradient.raw());
             room.lists.set_view(&gpu, &view);
             room.lists.record(&self.raster, &mut recorder);
             room.layer.record(&self.raster, &mut recorder);
@@ -83,7 +84,9 @@ impl Contributions {
             recorder.submit();
             match room.lists.status(&gpu)?.overflow {
                 None => break,
-                Some(needed) => room = self.room(pixels, tiles, needed + needed / 4)?,
+                Some(needed) => {
+                    room = self.room(room.max_pixels, room.max_tiles, needed + needed / 4)?;
+                }
             }
         }
         self.room = Some(room);

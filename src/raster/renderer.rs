@@ -10,7 +10,7 @@ use crate::{
 };
 
 /// Tile-list entries to begin with, for each Gaussian; grows on demand.
-const INSTANCES_PER_SPLAT: usize = 8;
+pub(super) const INSTANCES_PER_SPLAT: usize = 8;
 
 /// A picture as the rasterizer gives it.
 #[derive(Clone, Debug, PartialEq)]

@@ -41,8 +41,8 @@ pub struct ExportOptions {
     pub clean: bool,
     /// Whom the scene is fitted for; without, it is written as it is.
     pub viewer: Option<ViewerChoice>,
-    /// COLMAP folder with the cameras that it is cleaned and fitted before, where it is not the one that
-    /// `fit` noted.
+    /// COLMAP folder with the cameras that it is cleaned and fitted before, where it is not the
+    /// one that `fit` noted.
     pub colmap: Option<PathBuf>,
 }
 

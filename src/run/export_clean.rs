@@ -35,7 +35,8 @@ pub(super) fn cleaned(
     before: &Cameras<'_>,
     observe: &mut Observer<'_>,
 ) -> Result<(Splats, Cleaned), RunError> {
-    let (train, test, extent) = before.open(usize::MAX)?;
+    // As large as photos were trained on: what is small in less is not in them.
+    let (train, test, extent) = before.open(usize::MAX, u32::MAX)?;
     observe(Event::begins(Stage::Device));
     let gpu = Gpu::open()?;
     let raster = Arc::new(Raster::with(&gpu, drawn));

@@ -56,7 +56,7 @@ pub(super) fn fitted(
     before: &Cameras<'_>,
     observe: &mut Observer<'_>,
 ) -> Result<(Splats, Vec<Shown>), RunError> {
-    let (train, test, extent) = before.open(MOST_CAMERAS)?;
+    let (train, test, extent) = before.open(MOST_CAMERAS, MOST_SIDE)?;
     observe(Event::begins(Stage::Device));
     let gpu = Gpu::open()?;
     let raster = Arc::new(Raster::new(&gpu));
@@ -93,16 +93,20 @@ pub(super) fn fitted(
 }
 
 impl Cameras<'_> {
-    /// Cameras of training views and those to measure before, at most so many of each, and the
-    /// capture's extent in world units.
-    pub(super) fn open(&self, most: usize) -> Result<(Vec<Camera>, Vec<Camera>, f64), RunError> {
+    /// Cameras of training views and those to measure before, at most so many of each and so
+    /// large, and the capture's extent in world units.
+    pub(super) fn open(
+        &self,
+        most: usize,
+        most_side: u32,
+    ) -> Result<(Vec<Camera>, Vec<Camera>, f64), RunError> {
         let Some(colmap) = self.colmap else {
             return Err(RunError::NoCameras(self.of.to_owned()));
         };
         let capture = Capture::load_with(colmap, &self.load.capture())?;
         let chosen = split(&capture.views, self.load.holdout);
         let loader = Loader::new(LoadOptions {
-            max_side: Some(self.load.max_side.unwrap_or(MOST_SIDE).min(MOST_SIDE)),
+            max_side: Some(self.load.max_side.unwrap_or(most_side).min(most_side)),
             ..self.load.clone()
         });
         let shift = self.moved - capture.offset;

@@ -52,7 +52,9 @@ pub fn packed(splats: &Splats) -> Splats {
 pub fn placed(splats: &Splats) -> Splats {
     let mut kept = splats.clone();
     for mean in kept.means.as_flattened_mut() {
-        *mean = f16::from_f32(*mean).to_f32();
+        // Beyond there is no half float.
+        let most = f16::MAX.to_f32();
+        *mean = f16::from_f32(mean.clamp(-most, most)).to_f32();
     }
     for quat in &mut kept.quats {
         *quat = rotation(*quat);

@@ -329,11 +329,18 @@ fn what_no_training_view_needs_is_left_out() {
     assert_eq!(done.code, Some(1), "{}", done.stderr);
     assert!(done.stderr.contains("--colmap"), "{}", done.stderr);
     // A run knows them; its surroundings stay.
-    let done = place.run(&["export", "runs/scene", "-o", "run.ply", "--clean"]);
+    let done = place.run(&["export", "runs/scene", "--luma", "-o", "run.ply", "--clean"]);
     assert_eq!(done.code, Some(0), "{}", done.stderr);
     assert!(
         done.stdout.contains("no training view needs"),
         "{}",
         done.stdout
     );
+    let around = place.report("runs/scene")["luma"]["surroundings"].as_u64();
+    let around = around.expect("a number") as usize;
+    let [before, after] = ["runs/scene/luma.ply", "run.ply"].map(|name| {
+        let rows = SplatFile::read(&place, name).rows;
+        rows[rows.len() - around..].to_vec()
+    });
+    assert!(around > 0 && before == after);
 }

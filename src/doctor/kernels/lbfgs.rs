@@ -182,8 +182,8 @@ impl Problem {
 
     /// The ridge of an unknown.
     fn ridge_of(&self, k: usize) -> f64 {
-        let dear = if k < 2 * self.splats { 1.0 } else { REST };
-        dear * self.ridge
+        let factor = if k < 2 * self.splats { 1.0 } else { REST };
+        factor * self.ridge
     }
 
     /// The oracle after so many steps, told as much more than the loss; how far the last went.

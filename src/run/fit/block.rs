@@ -43,6 +43,8 @@ pub struct Neighbors {
     pub luma: PathBuf,
     /// SHA-256 of the file.
     pub sha256: String,
+    /// How many of its Gaussians, the last ones, are surroundings.
+    pub surroundings: usize,
 }
 
 /// A block and the job that it belongs to.
@@ -204,9 +206,9 @@ impl BlockPlace {
         let in_margin = |place| near.holds(place) && !core.holds(place);
         let inner = own.len().saturating_sub(surroundings);
         let kept: Vec<usize> = (0..inner).filter(|&i| !in_margin(own.means[i])).collect();
-        let taken: Vec<usize> = (0..theirs.len())
-            .filter(|&i| in_margin(theirs.means[i]))
-            .collect();
+        // Each block has surroundings of its own.
+        let scene = theirs.len().saturating_sub(neighbors.surroundings);
+        let taken: Vec<usize> = (0..scene).filter(|&i| in_margin(theirs.means[i])).collect();
         observe(Event::Note(format!(
             "goes on with {} of {} Gaussians, and {} that neighbors have in the margin",
             kept.len(),
@@ -404,6 +406,7 @@ impl FitOptions {
         Ok(Self {
             around: Some(Neighbors {
                 sha256: sha256_of(luma.clone())?,
+                surroundings: report.luma.surroundings,
                 luma,
             }),
             settings: Box::new(move |settings| {

@@ -54,7 +54,7 @@ pub const REASONS: &[(&str, &str, &str)] = &[
     ),
     (
         "inverse_diagonal",
-        "1.0 / (dearness(k) * free + pulls[own])",
+        "1.0 / (penalty_factor(k) * free + pulls[own])",
         "the ridge is positive, sums of weights and shares of them are not negative",
     ),
     (
