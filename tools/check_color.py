@@ -132,8 +132,9 @@ def row(scene: str, teacher: str, method: str, found: dict, seconds: float) -> l
     cells.append(bounded(to_teacher, TO_TEACHER) if known else judged(to_teacher, True))
     to_rgb = ratio(ours, rgb, "ab_error")
     cells.append(bounded(to_rgb, TO_RGB_SPLATS) if known else judged(to_rgb, True))
-    colorful = ours["colorfulness"] / found["teacher_colorfulness"]
-    cells.append(judged(colorful, abs(colorful - 1) <= COLORFULNESS))
+    # Both of the held-out views, which may be less or more colorful than the others.
+    colorful = ratio(ours, pictures.get("teacher"), "colorfulness")
+    cells.append(judged(colorful, colorful is None or abs(colorful - 1) <= COLORFULNESS))
     # An unsteady teacher's whims are colorful too: what the scene has is in the photos.
     cells.append(judged(ratio(ours, pictures.get("photo"), "colorfulness"), True))
     cells.append(bounded(ratio(far.get(method), far.get("per_frame"), "error"), TO_PER_FRAME))
