@@ -1,4 +1,4 @@
-//! The ground cut into cells of about equal work.
+//! The ground cut into cells with given shares of the work.
 
 use std::{fmt, str::FromStr};
 
@@ -55,6 +55,15 @@ impl fmt::Display for Blocks {
     }
 }
 
+/// Places that decide how large cells are, at most; an even choice.
+const BALANCED_ON: usize = 100_000;
+
+/// Cells with less of the work than this part of the fullest one's grow no faster for it.
+const LEAST: f64 = 1e-3;
+
+/// How often cells' sizes are mended: by then they settle to a percent.
+const BALANCE_ROUNDS: usize = 12;
+
 /// A cell, and the two that it is cut into.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Cell {
@@ -71,13 +80,52 @@ pub(super) struct Work<'a> {
 }
 
 impl Work<'_> {
-    /// Cuts all of the ground.
-    pub fn cells(&self, blocks: Blocks) -> Cell {
-        let all: Vec<u32> = (0..self.places.len() as u32).collect();
-        self.cell(all, Area::EVERYWHERE, blocks)
+    /// Cuts all of the ground so that no cell has much more work with its margin, which `near`
+    /// tells, than another: one in the middle has margins on all sides, and is smaller.
+    pub fn balanced(&self, blocks: Blocks, near: impl Fn(&Area) -> Area) -> Cell {
+        let step = self.places.len().div_ceil(BALANCED_ON).max(1);
+        let places: Vec<[f64; 2]> = self.places.iter().step_by(step).copied().collect();
+        let weights: Vec<f32> = self.weights.iter().step_by(step).copied().collect();
+        let some = Work {
+            places: &places,
+            weights: &weights,
+        };
+        let mut shares = vec![1.0; blocks.count()];
+        let mut best = (f64::INFINITY, shares.clone());
+        for _ in 0..BALANCE_ROUNDS {
+            let cores = some.cells(blocks, &shares).leaves();
+            let found: Vec<f64> = cores.iter().map(|core| some.within(&near(core))).collect();
+            let most = found.iter().copied().fold(0.0, f64::max);
+            // Places in one spot are not divided, and nothing is to be balanced.
+            if cores.len() < shares.len() || most <= 0.0 {
+                break;
+            }
+            if most < best.0 {
+                best = (most, shares.clone());
+            }
+            for (share, found) in shares.iter_mut().zip(found) {
+                *share *= (most / found.max(LEAST * most)).sqrt();
+            }
+        }
+        self.cells(blocks, &best.1)
     }
 
-    fn cell(&self, mut here: Vec<u32>, area: Area, blocks: Blocks) -> Cell {
+    /// Cuts all of the ground; `shares` has one number for each block: what it has of the work,
+    /// against the others.
+    fn cells(&self, blocks: Blocks, shares: &[f64]) -> Cell {
+        let all: Vec<u32> = (0..self.places.len() as u32).collect();
+        self.cell(all, Area::EVERYWHERE, blocks, shares)
+    }
+
+    /// The work at places that an area holds.
+    fn within(&self, area: &Area) -> f64 {
+        (self.places.iter().zip(self.weights))
+            .filter(|&(&place, _)| area.holds(place))
+            .map(|(_, &weight)| f64::from(weight))
+            .sum()
+    }
+
+    fn cell(&self, mut here: Vec<u32>, area: Area, blocks: Blocks, shares: &[f64]) -> Cell {
         let whole = Cell { area, parts: None };
         // Along which axis, into how many, and what becomes of the parts.
         let (axis, count) = match blocks {
@@ -96,7 +144,9 @@ impl Work<'_> {
         });
         let at = |i: u32| self.places[i as usize][axis];
         here.sort_unstable_by(|&a, &b| at(a).total_cmp(&at(b)));
-        let Some(split) = self.split(&here, at, counts[0] as f64 / count as f64) else {
+        let (lower, upper) = shares.split_at(parts[0].count());
+        let share = lower.iter().sum::<f64>() / shares.iter().sum::<f64>();
+        let Some(split) = self.split(&here, at, share) else {
             return whole;
         };
         let [below, above] = [at(here[split - 1]), at(here[split])];
@@ -106,8 +156,8 @@ impl Work<'_> {
         let rest = here.split_off(split);
         let [low, high] = area.cut(axis, edge);
         let cells = [
-            self.cell(here, low, parts[0]),
-            self.cell(rest, high, parts[1]),
+            self.cell(here, low, parts[0], lower),
+            self.cell(rest, high, parts[1], upper),
         ];
         Cell {
             area,
@@ -207,7 +257,7 @@ mod tests {
         };
         for (text, cells) in [("1", 1), ("4", 4), ("5", 5), ("2x3", 6), ("3x1", 3)] {
             let blocks: Blocks = text.parse().unwrap();
-            let areas = work.cells(blocks).leaves();
+            let areas = work.cells(blocks, &vec![1.0; cells]).leaves();
             assert_eq!((areas.len(), blocks.to_string()), (cells, text.to_owned()));
             let counts = counts(&areas, &places);
             assert_eq!(counts.iter().sum::<usize>(), places.len());
@@ -224,17 +274,57 @@ mod tests {
     }
 
     #[test]
+    fn cells_have_the_work_that_is_asked() {
+        let (places, weights) = (places(), vec![1.0; 4000]);
+        let work = Work {
+            places: &places,
+            weights: &weights,
+        };
+        let shares = [1.0, 2.0, 4.0, 3.0];
+        for blocks in [Blocks::Count(4), Blocks::Grid([2, 2])] {
+            let areas = work.cells(blocks, &shares).leaves();
+            for (area, share) in areas.iter().zip(shares) {
+                let found = work.within(area);
+                assert!((found - 400.0 * share).abs() <= 3.0, "{found}, {share}");
+            }
+        }
+    }
+
+    #[test]
+    fn cells_are_balanced_with_their_margins() {
+        let (places, weights) = (places(), vec![1.0; 4000]);
+        let work = Work {
+            places: &places,
+            weights: &weights,
+        };
+        let bounds = Area([[0.0, 30.0], [0.0, 10.0]]);
+        let near = |core: &Area| core.within(&bounds).grown(0.2);
+        // How much more the fullest has than the emptiest.
+        let ratio = |cell: Cell| {
+            let cores = cell.leaves();
+            let found: Vec<f64> = cores.iter().map(|core| work.within(&near(core))).collect();
+            let [least, most] = [f64::min, f64::max].map(|f| found.iter().copied().reduce(f));
+            most.unwrap() / least.unwrap()
+        };
+        for (blocks, uneven) in [(Blocks::Grid([4, 1]), 1.15), (Blocks::Count(5), 1.1)] {
+            let equal = ratio(work.cells(blocks, &vec![1.0; blocks.count()]));
+            let balanced = ratio(work.balanced(blocks, near));
+            assert!(equal > uneven && balanced < 1.05, "{equal}, {balanced}");
+        }
+    }
+
+    #[test]
     fn the_longer_side_is_cut_and_a_grid_is_cut_as_asked() {
         let (places, weights) = (places(), vec![1.0; 4000]);
         let work = Work {
             places: &places,
             weights: &weights,
         };
-        let [left, right] = work.cells(Blocks::Count(2)).leaves()[..] else {
+        let [left, right] = work.cells(Blocks::Count(2), &[1.0; 2]).leaves()[..] else {
             panic!("two");
         };
         assert!(left.0[0][1] == right.0[0][0] && left.0[1] == Area::EVERYWHERE.0[1]);
-        let rows = work.cells(Blocks::Grid([1, 2])).leaves();
+        let rows = work.cells(Blocks::Grid([1, 2]), &[1.0; 2]).leaves();
         assert!(rows[0].0[1][1] == rows[1].0[1][0]);
     }
 
@@ -244,13 +334,17 @@ mod tests {
             places: &[[1.0, 2.0]; 50],
             weights: &[1.0; 50],
         };
-        assert_eq!(work.cells(Blocks::Count(4)).leaves(), [Area::EVERYWHERE]);
+        let cells = work.cells(Blocks::Count(4), &[1.0; 4]);
+        assert_eq!(cells.leaves(), [Area::EVERYWHERE]);
         let two = [[0.0, 0.0], [0.0, 0.0], [0.0, 0.0], [1.0, 0.0]];
         let work = Work {
             places: &two,
             weights: &[1.0; 4],
         };
-        assert_eq!(counts(&work.cells(Blocks::Count(2)).leaves(), &two), [3, 1]);
+        assert_eq!(
+            counts(&work.cells(Blocks::Count(2), &[1.0; 2]).leaves(), &two),
+            [3, 1]
+        );
     }
 
     #[test]
@@ -260,7 +354,7 @@ mod tests {
             places: &places,
             weights: &weights,
         };
-        let mut cell = work.cells(Blocks::Count(4));
+        let mut cell = work.cells(Blocks::Count(4), &[1.0; 4]);
         let four = cell.leaves();
         cell.join(3);
         let three = cell.leaves();

@@ -2,7 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{capture::Camera, luma::Demand};
+use crate::{
+    capture::Camera,
+    luma::{Demand, LumaSettings, resident_photos},
+};
 
 /// Of the time of an iteration, the part that does not depend on the number of Gaussians. A
 /// round figure: how much it is depends on the device and the photos' size.
@@ -21,16 +24,22 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// For photos by these cameras, with harmonics of a degree; `share` is that of the whole
-    /// capture's photos, `whole` its Gaussians.
+    /// For photos by these cameras and settings, of which the degree of the harmonics and where
+    /// photos are held count; `share` is that of the whole capture's photos, `whole` its
+    /// Gaussians.
     pub fn of<'a>(
         cameras: impl Iterator<Item = &'a Camera>,
-        sh_degree: u32,
+        settings: &LumaSettings,
         splats: usize,
         share: f64,
         whole: usize,
     ) -> Self {
-        let demand = Demand::of(cameras, false, sh_degree, None);
+        let demand = Demand::of(
+            cameras,
+            false,
+            settings.sh_degree,
+            resident_photos(settings),
+        );
         let relative = splats as f64 / whole.max(1) as f64;
         Self {
             splats,

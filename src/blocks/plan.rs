@@ -8,7 +8,7 @@ use super::{
 };
 use crate::{
     capture::{Camera, Capture, Chosen, split},
-    luma::Preset,
+    luma::{LumaSettings, Preset},
 };
 
 /// Photos of a block, where nobody says how many blocks there are to be: as many as a scene of
@@ -214,7 +214,7 @@ impl<'a> Scene<'a> {
             places: &self.places,
             weights: &self.weights,
         };
-        let mut cell = work.cells(blocks);
+        let mut cell = work.balanced(blocks, |core| self.near(core));
         loop {
             let cores = cell.leaves();
             let near: Vec<Area> = cores.iter().map(|core| self.near(core)).collect();
@@ -306,7 +306,7 @@ impl<'a> Scene<'a> {
                     photos: chosen.len(),
                     held_out: chosen.test.len(),
                     points,
-                    estimate: self.estimate(splats, |name| chosen.has(name)),
+                    estimate: self.estimate(splats, true, |name| chosen.has(name)),
                 };
                 (block, chosen)
             })
@@ -319,12 +319,15 @@ impl<'a> Scene<'a> {
     }
 
     /// What a training of so many Gaussians on some photos takes.
-    fn estimate(&self, splats: usize, has: impl Fn(&str) -> bool) -> Estimate {
+    fn estimate(&self, splats: usize, streams: bool, has: impl Fn(&str) -> bool) -> Estimate {
         let of_photos = (self.photos.iter().zip(&self.cameras)).filter(|(name, _)| has(name));
         let share = of_photos.clone().count() as f64 / self.photos.len() as f64;
         let cameras = of_photos.flat_map(|(_, cameras)| cameras);
-        let degree = Preset::Paper.settings().sh_degree;
-        Estimate::of(cameras, degree, splats, share, self.splats)
+        let settings = LumaSettings {
+            stream_photos: streams,
+            ..Preset::Paper.settings()
+        };
+        Estimate::of(cameras, &settings, splats, share, self.splats)
     }
 
     fn planned(
@@ -378,8 +381,8 @@ impl<'a> Scene<'a> {
                 points: self.capture.points.len(),
                 bounds: self.bounds,
                 heights: self.heights,
-                whole: self.estimate(self.splats, |_| true),
-                coarse: Estimate::of(small.iter(), draft.sh_degree, of_coarse, 1.0, self.splats),
+                whole: self.estimate(self.splats, false, |_| true),
+                coarse: Estimate::of(small.iter(), &draft, of_coarse, 1.0, self.splats),
                 blocks,
             },
             coarse,

@@ -12,6 +12,7 @@ use super::{
     carve::{carved, chosen},
     planned,
     planned::WatchedViews,
+    resident_photos,
     start::{placed_splats, started, surroundings},
 };
 use crate::{
@@ -325,8 +326,13 @@ impl Fit<'_> {
         let ignores = plan.has(Effect::Masks) || plan.has(Effect::Robust);
         let cameras = dataset.split.train.iter().map(|&i| &dataset.cameras[i]);
         let (photographed, watched) = self.watched();
-        let demand = Demand::of(cameras, ignores, settings.sh_degree, limit)
-            .watching(watched.iter().map(|&i| &photographed.cameras[i]));
+        let demand = Demand::of(
+            cameras,
+            ignores,
+            settings.sh_degree,
+            resident_photos(settings),
+        )
+        .watching(watched.iter().map(|&i| &photographed.cameras[i]));
         let binding = self.raster.gpu.binding_limit();
         let fits = demand.largest_set(limit, binding);
         if fits == 0 {

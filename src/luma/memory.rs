@@ -1,6 +1,6 @@
 //! How much room a training takes on the device, known before any is taken.
 
-use super::loss::Targets;
+use super::{LumaSettings, loss::Targets};
 use crate::{
     capture::Camera,
     gpu::GpuError,
@@ -28,6 +28,15 @@ const PHOTO_SHARE: u64 = 4;
 /// photos of a megapixel, and little beside what the Gaussians of such a capture take.
 const RESIDENT_MAX: u64 = 1 << 30;
 
+/// Bytes that photos may take to stay on the device.
+pub fn resident_photos(settings: &LumaSettings) -> u64 {
+    match settings.memory_limit {
+        _ if settings.stream_photos => 0,
+        Some(limit) => limit / PHOTO_SHARE,
+        None => RESIDENT_MAX,
+    }
+}
+
 /// What does not depend on the number of Gaussians.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Demand {
@@ -44,13 +53,13 @@ pub struct Demand {
 }
 
 impl Demand {
-    /// What photos by these cameras ask for within `limit` bytes, if there is one;
-    /// with masks, twice as much.
+    /// What photos by these cameras need; with masks, twice as much. They stay on the device
+    /// while they take at most `resident` bytes ([`resident_photos`]).
     pub fn of<'a>(
         cameras: impl Iterator<Item = &'a Camera>,
         masked: bool,
         sh_degree: u32,
-        limit: Option<u64>,
+        resident: u64,
     ) -> Self {
         let mut demand = Self {
             max_pixels: 0,
@@ -67,7 +76,7 @@ impl Demand {
         }
         let pictures = 1 + u64::from(masked);
         photos *= pictures;
-        let streams = photos > limit.map_or(RESIDENT_MAX, |limit| limit / PHOTO_SHARE);
+        let streams = photos > resident;
         if streams {
             photos = pictures * (demand.max_pixels as u64).next_multiple_of(WORD);
         }

@@ -35,7 +35,7 @@ pub use error::LumaError;
 pub use fit::{Fit, LumaEvent, LumaObserver, LumaScene, fit};
 pub use goal::Goal;
 pub use loss::{LossEffects, LumaLossParameters};
-pub use memory::Demand;
+pub use memory::{Demand, resident_photos};
 pub use numerics::{Numerics, SsimWindow};
 pub use planned::PlannedViews;
 pub use preset::{FLAT, Preset};

@@ -55,6 +55,18 @@ impl Default for LearningRates {
 }
 
 impl LearningRates {
+    /// All of them times a factor.
+    pub fn times(&self, factor: f64) -> Self {
+        Self {
+            means: self.means.map(|rate| rate * factor),
+            quats: self.quats * factor,
+            log_scales: self.log_scales * factor,
+            opacity_logits: self.opacity_logits * factor,
+            sh_constant: self.sh_constant * factor,
+            sh_rest: self.sh_rest * factor,
+        }
+    }
+
     /// That of the means in world units after a share `t` of the training.
     pub fn means_at(&self, t: f64, extent: f64) -> f64 {
         let [first, last] = self.means;
@@ -124,6 +136,9 @@ pub struct LumaSettings {
     pub fill_gaps: bool,
     /// Bytes that the training may take on the device; no limit when `None`.
     pub memory_limit: Option<u64>,
+    /// Whether photos are brought to the device one at a time, however little they take.
+    #[serde(default)]
+    pub stream_photos: bool,
     /// How accurately it computes.
     pub numerics: Numerics,
 }
@@ -157,6 +172,7 @@ impl LumaSettings {
             surround: true,
             fill_gaps: true,
             memory_limit: None,
+            stream_photos: false,
             numerics: Numerics::default(),
         }
     }

@@ -29,7 +29,7 @@ use watch::Watch;
 use super::{
     Densification, Goal, Keeper, LumaError, LumaSettings, NoKeeper, Schedule,
     loss::{self, LossEffects, Targets},
-    memory::{Demand, ENTRIES_PER_SPLAT},
+    memory::{Demand, ENTRIES_PER_SPLAT, resident_photos},
     pace::Pace,
     relocation::{self, RelocationParameters},
     settings::SYNC_EVERY,
@@ -154,7 +154,7 @@ impl LumaTrainer {
             all.map(|view| views.camera(view)).chain(&small),
             effects.masked,
             splats.sh.degree,
-            settings.memory_limit,
+            resident_photos(&settings),
         );
         let longest = ends::LONGER * settings.iterations;
         let capacity = splats.len() * ENTRIES_PER_SPLAT;

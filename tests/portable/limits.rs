@@ -15,7 +15,7 @@ const BEGIN: &str = "<!-- limits: begin -->\n";
 const END: &str = "<!-- limits: end -->\n";
 
 /// What an entry point takes of a device.
-#[derive(Clone, Copy, PartialEq, Eq)]
+#[derive(Clone, Copy)]
 struct Needs {
     threads: u32,
     workgroup_bytes: u32,
@@ -80,25 +80,26 @@ fn all() -> BTreeMap<(String, &'static str), Needs> {
     all
 }
 
-/// One row for all variants of an entry point that take the same.
+/// One row for an entry point: the most that any of its variants takes.
 fn table() -> String {
-    let mut rows: Vec<(String, Vec<&str>, Needs)> = Vec::new();
-    for ((entry, variant), needs) in all() {
-        match rows.iter_mut().find(|row| row.0 == entry && row.2 == needs) {
-            Some(row) => row.1.push(variant),
-            None => rows.push((entry, vec![variant], needs)),
-        }
+    let mut rows: BTreeMap<String, Needs> = BTreeMap::new();
+    for ((entry, _), needs) in all() {
+        let most = rows.entry(entry).or_insert(needs);
+        most.threads = most.threads.max(needs.threads);
+        most.workgroup_bytes = most.workgroup_bytes.max(needs.workgroup_bytes);
+        most.storage_buffers = most.storage_buffers.max(needs.storage_buffers);
+        most.written = most.written.max(needs.written);
+        most.uniform_buffers = most.uniform_buffers.max(needs.uniform_buffers);
     }
     let mut text = String::from(
-        "| entry point | variants | threads | workgroup memory, bytes | storage buffers | written | uniform buffers |\n\
-         |---|---|--:|--:|--:|--:|--:|\n",
+        "| entry point | threads | workgroup memory, bytes | storage buffers | written | uniform buffers |\n\
+         |---|--:|--:|--:|--:|--:|\n",
     );
-    for (entry, variants, needs) in rows {
+    for (entry, needs) in rows {
         // Writing to a string cannot fail.
         let _ = writeln!(
             text,
-            "| `{entry}` | {} | {} | {} | {} | {} | {} |",
-            variants.join(", "),
+            "| `{entry}` | {} | {} | {} | {} | {} |",
             needs.threads,
             needs.workgroup_bytes,
             needs.storage_buffers,

@@ -359,12 +359,18 @@ impl FitOptions {
         let (max_splats, iterations) = (file.max_splats, file.iterations);
         // Those of the coarse model surround all blocks.
         let surround = coarse.is_none();
+        // What is divided into blocks is larger than a device.
+        let stream = file.kind == Kind::Block;
+        let whole = (job.photos - job.held_out).max(1) as f64;
+        let haste = (whole / file.photos.train.len().max(1) as f64).sqrt();
         Ok(Some(Self {
             output: Some(folder.to_owned()),
             preset: (file.kind == Kind::Coarse).then_some(Preset::Draft),
             settings: Box::new(move |settings| {
                 settings.max_splats = max_splats.unwrap_or(settings.max_splats);
                 settings.surround &= surround;
+                settings.stream_photos |= stream;
+                settings.rates = settings.rates.times(haste);
                 if let Some(iterations) = iterations {
                     settings.iterations = iterations;
                 }
