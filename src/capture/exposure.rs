@@ -3,10 +3,11 @@
 /// A photo shows `gain · luma + offset` of the scene's luma, both as encoded gray
 /// in [0, 1], as far as black and white allow.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Exposure {
     /// Factor on luma, above 0.
     pub gain: f64,
-    /// In gray.
+    /// Added to that; 1 is white.
     pub offset: f64,
 }
 

@@ -20,24 +20,30 @@ const LONGEST: f64 = 86_400.0;
 /// One shot of a film: all its frames lie in `frames/`, and some of them, under the same
 /// names, in `images/`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Film {
     /// The film's file, absolute.
     pub source: PathBuf,
-    /// Where in the film the shot begins, in seconds.
+    /// When the first frame is shown in the film, in seconds.
     pub start: f64,
-    /// How long it is, in seconds.
+    /// How long all frames take, in seconds.
     pub seconds: f64,
-    /// Frames a second: numerator and denominator, both positive.
+    /// Frames a second: numerator and denominator.
+    ///
+    /// Both positive.
     pub frame_rate: [u32; 2],
     /// Whether the film has sound.
     pub audio: bool,
     /// Width and height of a frame, in pixels.
     pub size: [u32; 2],
-    /// Names of all frames, in order; at least one.
+    /// Names of all frames in order, below `frames/`.
+    ///
+    /// At least one.
     pub frames: Vec<String>,
     /// When each frame is shown, in seconds after `start`; `None` where they follow each other at
     /// the frame rate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(test, schemars(skip))]
     pub times: Option<Vec<f64>>,
 }
 

@@ -127,6 +127,7 @@ impl View {
 
 /// Whether something is done: where the photos call for it, always or never.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 pub enum Choice {
     /// Where its effect can be seen.
@@ -176,10 +177,11 @@ pub struct Observation {
 
 /// Something in the model that was left out.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Rejected {
-    /// The photo's name, or the points file's for points.
+    /// The photo's name, or the points file's.
     pub name: String,
-    /// Why, in words.
+    /// What is wrong with it.
     pub reason: String,
 }
 

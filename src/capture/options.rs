@@ -12,31 +12,36 @@ use super::{CaptureOptions, Choice, Rejected};
 /// How a capture's photos are loaded. `report.json` keeps it, so that every later
 /// command loads them alike.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct LoadOptions {
-    /// Longer side to which larger photos are scaled down, in pixels.
+    /// Longer side that larger photos are scaled to, in pixels.
+    ///
+    /// `None` leaves them as they are.
     pub max_side: Option<u32>,
     /// Whether every 8th view is held out.
     pub holdout: bool,
-    /// Whether the lens's distortion is taken out.
+    /// Whether lens distortion is removed; `auto`: if visible.
     pub lens: Choice,
-    /// What of a color photo becomes gray.
+    /// What of color photos becomes gray.
     pub channel: Channel,
-    /// What the files' values are.
+    /// Encoding of the files; `auto`: floats linear, others sRGB.
     pub encoding: Encoding,
-    /// Which of the files' values become black and white.
+    /// Values that become black and white, in the files' unit; `null`: the full range.
     pub normalize: Normalize,
-    /// Where masks are.
+    /// Source of masks: `beside` the photos, their `alpha`, `off`, or a folder.
     pub masks: MaskSource,
-    /// What is where a mask is black.
+    /// What becomes of masked pixels; `remove`: black.
     pub masked: MaskUse,
-    /// Whether photos are taken as they are where they and the model contradict each other.
+    /// Whether photos that contradict the model are used.
     #[serde(default)]
     pub force: bool,
-    /// Photos that are not used because they contradict the model, and how.
+    /// Photos left out because they contradict the model.
     #[serde(default)]
     pub left_out: Vec<Rejected>,
     /// The photos of a part of the capture, where it is not all of it.
+    // docs/large-scenes.md has it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(test, schemars(skip))]
     pub chosen: Option<Chosen>,
 }
 
@@ -100,6 +105,7 @@ impl Chosen {
 
 /// What of a color photo becomes gray; a gray photo is what it is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 pub enum Channel {
     /// The gray with the same `L*`.
@@ -127,6 +133,7 @@ impl Channel {
 
 /// What a file's values are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 pub enum Encoding {
     /// Linear light in files of floats, sRGB in all others.
@@ -144,6 +151,7 @@ pub enum Encoding {
 /// In JSON two numbers, or `null` for `Off`: what `Auto` comes to is known once the
 /// photos have been seen.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(into = "Option<[f64; 2]>", from = "Option<[f64; 2]>")]
 pub enum Normalize {
     /// `Off` for 8 bits and for photos that fill their range anyway, else from the
@@ -192,6 +200,7 @@ impl FromStr for Normalize {
 ///
 /// In JSON `beside`, `alpha`, `off` or the folder.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(into = "String", from = "String")]
 pub enum MaskSource {
     /// In `masks/` beside `images/`, if it is there, and else in the photos' transparency, if
@@ -236,6 +245,7 @@ impl From<String> for MaskSource {
 
 /// What is where a mask is black.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 pub enum MaskUse {
     /// Anything: the photo does not say.

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 /// How chroma is solved for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum SolverKind {
     /// Reweighted least squares over all views, sped up by L-BFGS.
@@ -24,51 +25,75 @@ impl SolverKind {
 
 /// Settings of one distillation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct ChromaSettings {
     /// Who solves.
     pub solver: SolverKind,
-    /// Degree of the chroma harmonics, 0 to 3. Degree 0 cannot memorize that a
-    /// teacher colors the views differently.
+    /// Degree of the chroma harmonics, 0 to 3.
+    ///
+    /// Degree 0 cannot memorize that a teacher colors the views differently.
     pub sh_degree: u32,
-    /// Coarser scales that count for Adam beside the full one, each half as large as the
-    /// last. The paper leaves it open; see docs/lab/07-chroma-solver.md for the ablation.
+    /// Coarser scales of Adam beside the full one.
+    ///
+    /// Each is half as large as the last. The paper leaves it open; see
+    /// docs/lab/07-chroma-solver.md for the ablation.
     pub scales: u32,
-    /// Adam's weight of the agreement with the next coarser scale, the teacher's being 1.
+    /// Weight of Adam's agreement with the next coarser scale.
+    ///
+    /// The teacher's is 1.
     pub agreement: f32,
-    /// Residual in CIELAB units at which the loss has all but leveled off, so that
-    /// what is plainly wrong in one view does not count; `None`: plain L1.
+    /// Residual at which the loss levels off, in CIELAB units; `None`: plain L1.
+    ///
+    /// What is plainly wrong in one view does not count.
     pub robust: Option<f32>,
-    /// Iterations of Adam; each takes one view through all scales, one step a scale.
+    /// Iterations of Adam.
+    ///
+    /// Each takes one view through all scales, one step a scale.
     pub iterations: usize,
-    /// Adam's rate at the first and last iteration, in CIELAB units: the first
-    /// lets a color cross the whole a/b range within some hundred steps, the
-    /// last leaves it steadier than half a unit. Exponential between.
+    /// Adam's rate at the first and last iteration, in CIELAB units.
+    ///
+    /// The first lets a color cross the whole a/b range within some hundred steps, the last leaves
+    /// it steadier than half a unit. Exponential between.
     pub rates: [f64; 2],
-    /// The rate of the terms beyond the constant one, as a share of it (3DGS).
+    /// Rate of the other harmonics, relative to the constant one's.
+    ///
+    /// As 3DGS has it.
     pub rest_share: f64,
-    /// Seeds the order of Adam's views.
+    /// Seed of the order of Adam's views.
     pub seed: u64,
-    /// Whether least squares brings each view's teacher into line with the others.
+    /// Whether views are corrected in saturation and tint.
+    ///
+    /// Least squares brings each view's teacher into line with the others.
     pub correct_views: bool,
-    /// Rounds of least squares at most: in each all views are drawn, reweighted, and a step taken.
+    /// Rounds of least squares at most.
+    ///
+    /// In each all views are drawn, reweighted, and a step taken.
     pub rounds: usize,
-    /// Rounds end when some in a row move the colors by less, in CIELAB units: the mean over
-    /// what is drawn, as the loss weighs it. 0: never.
+    /// Rounds end once three in a row move colors less, in CIELAB units.
+    ///
+    /// The mean over what is drawn, as the loss weighs it. 0: never.
     pub settled: f64,
-    /// How strongly least squares draws every Gaussian towards gray, in pixels that show it:
-    /// what depends on less stays where the others leave it.
+    /// Pull toward gray, in pixels.
+    ///
+    /// As strong as so many that show a Gaussian: what depends on fewer stays where the others
+    /// leave it.
     pub ridge: f64,
-    /// How strongly least squares holds colors where its first rounds left them, as a share of
-    /// how strongly pictures decide them: what these decide badly stays. 0: not at all.
+    /// Pull toward the first rounds' result, as a share of the pictures'.
+    ///
+    /// Of how strongly pictures decide colors: what these decide badly stays. 0: none.
     #[serde(default)]
     pub anchor: f64,
-    /// Bytes of the device that solving and baking may take; views that do not fit are brought
-    /// one at a time. `None`: all that is worth keeping, up to 2 GiB.
+    /// Most memory of the device, in bytes; `None`: up to 2 GiB.
+    ///
+    /// Solving and baking bring views that do not fit one at a time.
     pub memory_limit: Option<u64>,
-    /// Whether colors end as strong as the teachers', as far as these agree.
+    /// Whether colors are scaled to the teachers' strength.
+    ///
+    /// As far as these agree.
     pub match_saturation: bool,
-    /// Whether Gaussians that no view sees well take their neighbors' color after
-    /// least squares.
+    /// Whether what no view shows well takes its neighbors' color.
+    ///
+    /// After least squares.
     pub fill: bool,
 }
 

@@ -15,6 +15,8 @@ mod headings;
 mod info;
 mod info_page;
 mod interrupt;
+#[cfg(test)]
+mod keys_tests;
 mod luma;
 mod merge;
 mod network;

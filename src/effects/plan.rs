@@ -52,6 +52,7 @@ pub type Trials = BTreeMap<Effect, f64>;
 
 /// An effect of image formation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Effect {
     /// The lens bends straight lines.
@@ -159,6 +160,7 @@ impl Effect {
 
 /// Who decided.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Decider {
     /// The evidence against its threshold.

@@ -7,14 +7,17 @@ const POINTS_MIN: usize = 3;
 
 /// How good a scene was at one moment of its training.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct CurvePoint {
     /// Iterations done.
     pub iteration: usize,
-    /// Seconds of training, those of watching not counted.
+    /// Training by then, in seconds.
+    ///
+    /// Looking at views does not count.
     pub seconds: f64,
-    /// Gaussians.
+    /// Gaussians at that time.
     pub splats: usize,
-    /// Mean PSNR of the views that are watched, in dB.
+    /// Mean of the views that are watched, in dB.
     pub psnr: f64,
 }
 

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 /// What ends a training.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(tag = "kind", rename_all = "lowercase", deny_unknown_fields)]
 pub enum Goal {
     /// The iterations of its settings.

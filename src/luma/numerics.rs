@@ -9,17 +9,19 @@ use crate::raster::{AdamSteps, RasterNumerics, Storage};
 /// How accurately stage 1 computes while it trains. What is measured, drawn and written
 /// afterwards is computed with the default, as viewers do.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(default)]
 pub struct Numerics {
     /// Of the rasterizer and of its steps.
     #[serde(flatten)]
     pub raster: RasterNumerics,
-    /// Of SSIM in the loss.
+    /// Side of SSIM's window in the loss, in pixels.
     pub ssim_window: SsimWindow,
 }
 
 /// Pixels along a side of SSIM's window, a Gaussian of σ = 1.5 cut off there.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(into = "u32", try_from = "u32")]
 pub enum SsimWindow {
     /// As Wang et al. 2004.

@@ -6,6 +6,7 @@ use super::{LumaSettings, PAPER_ITERATIONS};
 
 /// How much work to put into a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 pub enum Preset {
     /// Small photos, few Gaussians: the bundled garden within a minute on two processor cores, 24.5 dB of

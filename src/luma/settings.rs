@@ -20,10 +20,12 @@ pub(super) const SYNC_EVERY: usize = 25;
 
 /// Learning rates of Adam.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct LearningRates {
-    /// Means at the first and the last iteration, as a share of the scene's
-    /// extent: exponential decay between.
+    /// Means at the first and last iteration, in scene extents.
+    ///
+    /// Exponential decay between.
     pub means: [f64; 2],
     /// Unnormalized quaternions.
     pub quats: f64,
@@ -31,9 +33,11 @@ pub struct LearningRates {
     pub log_scales: f64,
     /// Opacity logits.
     pub opacity_logits: f64,
-    /// Constant spherical-harmonic term.
+    /// Constant harmonic.
     pub sh_constant: f64,
-    /// The other terms: slower, for they explain less.
+    /// The other harmonics.
+    ///
+    /// Slower, for they explain less.
     pub sh_rest: f64,
 }
 
@@ -76,6 +80,7 @@ impl LearningRates {
 
 /// How the set of Gaussians changes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 pub enum Densification {
     /// Those that the loss pulls at are split, faint ones removed (`luma::densify`).
@@ -91,55 +96,65 @@ const GROWTH: f64 = 0.3;
 /// Settings of one training: what presets produce, the command line overlays and the report
 /// holds. What happens when follows from them ([`Schedule`](super::Schedule)).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct LumaSettings {
-    /// Iterations, unless the goal or a flat curve ends the training elsewhere.
+    /// Iterations, unless a goal or early stopping ends the training.
     pub iterations: usize,
-    /// Never more Gaussians than this.
+    /// Gaussians at most.
     pub max_splats: usize,
     /// Degree of the luma harmonics, 0 to 3.
     pub sh_degree: u32,
-    /// Seeds the order of the views.
+    /// Seed of every random choice.
     pub seed: u64,
-    /// Share of the iterations, from the first on, that see photos at half their size: a
-    /// quarter of the pixels.
+    /// Share of the iterations, from the first, at half resolution.
     pub coarse: f64,
-    /// Training goes back to its best, settles and ends where twice the iterations would
-    /// bring less than so many dB in the [watched](super::LumaTrainer::watch) views.
+    /// Gain of twice the iterations below which training ends, in dB.
+    ///
+    /// Of the [watched](super::LumaTrainer::watch) views: training goes back to its best, settles
+    /// and ends. `None`: it does not.
     pub stop_when_flat: Option<f64>,
     /// How the set of Gaussians changes.
     pub densify: Densification,
-    /// A densification adds at most this share of the Gaussians.
+    /// Share of Gaussians that a densification adds at most.
     pub growth: f64,
-    /// Mean pull on a center (`STAT_PULL`) from which a Gaussian is split.
+    /// Gradient of a center above which a Gaussian is split.
+    ///
+    /// Mean absolute pull (`STAT_PULL`).
     pub pull_threshold: f64,
-    /// Gaussians below this opacity are removed.
+    /// Opacity below which a Gaussian is removed.
     pub prune_opacity: f64,
-    /// Learning rates.
+    /// Learning rates of Adam.
     pub rates: LearningRates,
-    /// Whether outliers, pixels that show something else than the scene, are found on the way
-    /// (`luma::outliers`) and no longer count.
+    /// Whether outlier pixels are left out.
+    ///
+    /// They show something else than the scene and are found on the way (`luma::outliers`).
     pub robust: bool,
-    /// Whether opacities fall by what the blur of the projection spreads
-    /// ([`RasterOptions::antialiased`]); the scene must then be drawn the same way.
+    /// Whether opacities fall by what the screen blur spreads.
+    ///
+    /// The scene must then be drawn the same way ([`RasterOptions::antialiased`]).
     pub antialiased: bool,
-    /// Whether some of the Gaussians stand for a background far behind the scene: how
-    /// large one may be then grows with its distance.
+    /// Whether some Gaussians stand for a far background.
+    ///
+    /// How large one may be then grows with its distance.
     pub background: bool,
-    /// Whether a shell of a few hundred Gaussians is drawn far behind the scene, in the grays
-    /// that photos show in its direction: what other views see where no photo shows anything.
+    /// Whether a shell of gray surrounds the scene.
+    ///
+    /// A few hundred Gaussians far behind it, in the grays that photos show in their direction:
+    /// what other views see where no photo shows anything.
     #[serde(default)]
     pub surround: bool,
-    /// Whether it starts with Gaussians also where photos have texture and COLMAP no points, found
-    /// by matching photos.
+    /// Whether Gaussians also start where COLMAP has no points.
+    ///
+    /// Where photos have texture, by matching them.
     #[serde(default)]
     pub fill_gaps: bool,
-    /// Bytes that the training may take on the device; no limit when `None`.
+    /// Most memory of the device, in bytes; `None`: no limit.
     pub memory_limit: Option<u64>,
-    /// Whether photos are brought to the device one at a time, however little they take.
+    /// Whether photos stay on the host, however small, and come one at a time; set for blocks.
     #[serde(default)]
     pub stream_photos: bool,
-    /// How accurately it computes.
+    /// How accurately it computes (`--numerics`).
     pub numerics: Numerics,
 }
 

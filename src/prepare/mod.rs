@@ -90,12 +90,15 @@ pub struct PrepareOptions {
 
 /// What was prepared.
 #[derive(Clone, Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Prepared {
     /// The folder, as it was named.
     pub folder: PathBuf,
-    /// The shot, if photos are frames of a film.
+    /// What is in `film.json`; `None` where photos are no frames.
     pub film: Option<Film>,
-    /// All shots of the film, from when to when in seconds, where they were looked for.
+    /// From when to when each shot lasts, in seconds; empty if unknown.
+    ///
+    /// They are looked for in a film whose part is not named.
     pub shots: Vec<[f64; 2]>,
     /// Photos that COLMAP was given.
     pub photos: usize,

@@ -30,14 +30,17 @@ const TOLD_NAMES: usize = 6;
 
 /// What came of it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Poses {
     /// Photos with a pose.
     pub placed: usize,
-    /// Points that they see.
+    /// Points in the model.
     pub points: usize,
-    /// Names of photos without one, sorted.
+    /// Names of photos without a pose, sorted.
     pub unplaced: Vec<String>,
-    /// How many photos each piece has that COLMAP could not join; the first is taken.
+    /// Photos with a pose in each piece; the first is `sparse/0`.
+    ///
+    /// COLMAP could not join these.
     pub pieces: Vec<usize>,
 }
 

@@ -9,26 +9,32 @@ use super::constants::{ALPHA_MIN, TRANSMITTANCE_MIN};
 /// How accurately a rasterizer computes. [`DEFAULT`](Self::DEFAULT) is how viewers draw;
 /// anything else is for training alone.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(default)]
 pub struct RasterNumerics {
-    /// Alpha below which a Gaussian does not count at a pixel. Also where its tile lists
-    /// end: a Gaussian of opacity o is seen up to √(2 ln(o / alpha_min)) deviations.
+    /// Least alpha of a Gaussian that counts at a pixel.
+    ///
+    /// Also where its tile lists end: a Gaussian of opacity o is seen up to √(2 ln(o / alpha_min))
+    /// deviations.
     pub alpha_min: f64,
-    /// A pixel is finished before its transmittance falls below this.
+    /// Least transmittance that a pixel is blended to.
     pub transmittance_min: f64,
-    /// Highest bits of a depth (an `f32` above 0) that the sort looks at, a multiple of 8
-    /// up to 32; eight a pass. Gaussians that agree in all of them keep index order. Of
-    /// 16 bits, sign and exponent take nine: depths that differ by less than 1/128.
+    /// Bits of a depth that decide the order, of 32.
+    ///
+    /// The highest bits of an `f32` above 0, a multiple of 8; the sort takes eight a pass.
+    /// Gaussians that agree in all of them keep index order. Of 16 bits, sign and exponent take
+    /// nine: depths that differ by less than 1/128.
     pub depth_bits: u32,
-    /// What the gradient records of luma's list entries are stored as.
+    /// Storage of the gradients of tile-list entries.
     pub storage: Storage,
-    /// Whose parameters Adam moves.
+    /// Whose parameters Adam moves; `lazy`: of Gaussians in view.
     pub adam: AdamSteps,
 }
 
 /// How the gradient record of a list entry, eight figures, waits for its sum. Blending's
 /// adjoint writes and summing reads as many words as all else in these two together.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 pub enum Storage {
     /// As `f32`.
@@ -51,6 +57,7 @@ impl Storage {
 
 /// Whose parameters Adam moves in an iteration.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 pub enum AdamSteps {
     /// Everyone's, as Adam is defined: without a gradient moments decay, and parameters

@@ -6,23 +6,25 @@ use crate::effects::{Decider, Decision, Effect};
 
 /// What was decided about an effect, and why.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct EffectReport {
-    /// Its name on the command line.
+    /// As for `--with` and `--without`.
     pub name: Effect,
-    /// Whether it is simulated.
+    /// Whether it was simulated.
     pub on: bool,
-    /// The number that speaks for it, where the capture has one.
+    /// Figure that decides, if the capture has one.
     pub evidence: Option<f64>,
-    /// From this on it is called for.
+    /// Evidence above which it is simulated.
     pub threshold: f64,
     /// What both count.
     pub unit: String,
     /// Who decided.
     pub decided_by: Decider,
-    /// Per cent by which a short training fitted the photos better with it than without, where
-    /// that was tried.
+    /// Gain of a short training on views held back, in dB.
+    ///
+    /// `None` without a trial.
     pub trial: Option<f64>,
-    /// What it costs while it is on.
+    /// What it costs.
     pub cost: String,
 }
 

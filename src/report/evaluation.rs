@@ -13,6 +13,7 @@ pub const EVALUATION_VERSION: u32 = 1;
 
 /// Whose pictures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
     /// Luma and a/b blended apart, in CIELAB.
@@ -73,53 +74,61 @@ impl fmt::Display for Method {
 
 /// `eval.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Evaluation {
+    /// Layout of the file; raised when a key changes its meaning.
+    ///
     /// [`EVALUATION_VERSION`].
     pub version: u32,
-    /// Version of the program.
+    /// Version of gs-chroma.
     pub program: String,
-    /// The COLMAP folder's name.
+    /// Name of the COLMAP folder.
     pub scene: String,
-    /// Who colored the photos, where `--teacher` names someone.
+    /// Who colored the photos, with `--teacher`.
+    #[cfg_attr(test, schemars(with = "Option<crate::chroma::teacher::TeacherInfo>"))]
     pub teacher: Option<serde_json::Value>,
-    /// Colorfulness of the teacher's pictures, mean over all photos that it colored.
+    /// Colorfulness of all pictures of the teacher, mean.
     pub teacher_colorfulness: Option<f64>,
-    /// Views that were measured: `test`, or `train` without held-out ones.
+    /// Views measured: `test`, or `train` without held-out ones.
     pub measured_on: String,
-    /// Gray pictures, mean over these views.
+    /// Gray pictures against gray photos, mean over these views.
     pub luma: LumaScore,
-    /// ΔE00 between native and exported pictures, mean over these views.
+    /// `exported` against `native`, mean over these views.
+    ///
+    /// `None` without `chroma.npy`.
     pub bake: Option<ColorError>,
-    /// Colored pictures, mean over these views.
+    /// Colored pictures of each method, mean over these views.
     pub pictures: Vec<PictureScore>,
     /// Each of these views.
     pub views: Vec<ViewScore>,
-    /// What other ways to color the scene took.
+    /// Cost of `--baselines` and `--recipe`.
     pub peers: Vec<PeerReport>,
-    /// How the figures of consistency come about.
+    /// How consistency is computed.
     pub rules: Rules,
-    /// What was found doubtful and done all the same.
+    /// Warnings of `eval`.
     pub warnings: Vec<String>,
-    /// Along a rendered path.
+    /// Consistency along a rendered path.
     pub path: PathScore,
-    /// Between photographed views.
+    /// Consistency between photographed views.
     pub between: BetweenScore,
-    /// Wall seconds.
+    /// Wall time, in seconds.
     pub seconds: f64,
 }
 
 /// Quality of gray pictures.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct LumaScore {
-    /// Peak signal-to-noise ratio in dB of the scene as viewers show it.
+    /// PSNR of the scene as viewers show it, in dB; at most 100.
     pub psnr: f64,
-    /// The same after the gain and offset that bring the picture closest to the photo; `None` in
-    /// files that do not know it.
+    /// The same after each picture's best gain and offset, in dB.
+    ///
+    /// `None` in files that do not know it.
     #[serde(default)]
     pub corrected_psnr: Option<f64>,
-    /// Structural similarity.
+    /// Structural similarity, 1 for equal pictures.
     pub ssim: f64,
-    /// Variance of the picture's Laplacian, on the scale of 0 to 255.
+    /// Variance of the Laplacian, of grays from 0 to 255.
     pub sharpness: f64,
     /// That of the photo.
     pub photo_sharpness: f64,
@@ -129,46 +138,60 @@ pub struct LumaScore {
 
 /// What coloring the scene in another way took.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct PeerReport {
-    /// Which way.
+    /// Which way to color.
     pub method: Method,
-    /// Rounds, or iterations of Adam.
+    /// Rounds of least squares, or iterations of Adam.
     pub iterations: usize,
     /// Passes over a view at full size.
     pub passes: f64,
-    /// Seconds, the teacher's not among them.
+    /// Wall time without the teacher's, in seconds.
     pub seconds: f64,
 }
 
 /// Quality of one method's colored pictures; fidelity only where photos have colors.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct PictureScore {
     /// Whose pictures.
     pub method: Method,
-    /// Peak signal-to-noise ratio of RGB in dB.
+    /// PSNR of R, G and B together, in dB.
     pub psnr: Option<f64>,
     /// Structural similarity, mean of R, G and B.
     pub ssim: Option<f64>,
-    /// ΔE00 to the photo.
+    /// Difference to the photo.
     pub delta_e: Option<ColorError>,
-    /// Root mean square of the differences of a and b, in CIELAB units.
+    /// Root mean square difference of a and b, in CIELAB units.
+    ///
+    /// Lightness and geometry do not enter.
     pub ab_error: Option<f64>,
-    /// Colorfulness (Hasler and Süsstrunk 2003).
+    /// Hasler and Süsstrunk's, signed as they define it.
+    ///
+    /// On RGB from 0 to 255.
     pub colorfulness: f64,
-    /// Effective number of colors; see [`color_diversity`](crate::measure::color_diversity).
+    /// Effective number of colors.
+    ///
+    /// Exponential entropy over squares of five CIELAB units; see
+    /// [`color_diversity`](crate::measure::color_diversity).
     pub diversity: f64,
-    /// Peak signal-to-noise ratio in dB of the picture's lightness, as gray, to the photo's.
+    /// PSNR of the lightness, in dB.
+    ///
+    /// The picture's, as gray, to the photo's.
     pub gray_psnr: f64,
-    /// Variance of the Laplacian of that gray, on the scale of 0 to 255.
+    /// Variance of the Laplacian of the lightness.
+    ///
+    /// Of grays from 0 to 255.
     pub sharpness: f64,
-    /// Learned perceptual distance to the photo, with `--lpips`.
+    /// Learned perceptual distance, with `--lpips`.
     pub lpips: Option<f64>,
 }
 
 /// One measured view.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct ViewScore {
-    /// The photo's name.
+    /// The photo's name, or a face's.
     pub name: String,
     /// Its gray picture.
     pub luma: LumaScore,
@@ -178,6 +201,7 @@ pub struct ViewScore {
 
 /// How the figures of consistency come about, in words.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Rules {
     /// Which pixels are not compared.
     pub mask: String,
@@ -199,14 +223,15 @@ impl Default for Rules {
 
 /// Consistency along a rendered path.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct PathScore {
     /// Frames of the path.
     pub frames: usize,
-    /// Width and height of a frame in pixels.
+    /// Width and height of a frame, in pixels.
     pub size: [u32; 2],
-    /// `geometric`, or `files` with `--flow`.
+    /// `geometric` from depth and poses, or `files` with `--flow`.
     pub flow: String,
-    /// Distances in frames for which the path is too short.
+    /// Distances too long for the path, in frames.
     pub skipped: Vec<usize>,
     /// One entry a distance and method.
     pub consistency: Vec<PathConsistency>,
@@ -214,8 +239,9 @@ pub struct PathScore {
 
 /// One method's consistency at one distance.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct PathConsistency {
-    /// Distance in frames.
+    /// Distance of the two pictures, in frames.
     pub delta: usize,
     /// Whose pictures, and the figures.
     #[serde(flatten)]
@@ -224,14 +250,19 @@ pub struct PathConsistency {
 
 /// Consistency between photographed views.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct BetweenScore {
-    /// Views that were compared.
+    /// Views compared, at most 60.
+    ///
+    /// With a teacher those that it colored.
     pub views: usize,
-    /// Width and height of the first one's pictures in pixels.
+    /// Width and height of the first view's pictures, in pixels.
     pub size: [u32; 2],
     /// Share of visible pixels that makes a pair.
     pub least_overlap: f64,
-    /// By how many pixels the flow misses COLMAP's points, median over visible ones.
+    /// Median distance of the flow from COLMAP's points, in pixels.
+    ///
+    /// What the scene's depth is worth.
     pub flow_error: Option<f64>,
     /// One entry a method.
     pub consistency: Vec<ConsistencyScore>,
@@ -239,6 +270,7 @@ pub struct BetweenScore {
 
 /// One method's consistency.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct ConsistencyScore {
     /// Whose pictures.
     pub method: Method,
@@ -246,11 +278,13 @@ pub struct ConsistencyScore {
     pub pairs: u64,
     /// Share of the pixels that were compared.
     pub visible: f64,
-    /// The denominator: visible pixels × 2 channels.
+    /// The denominator: compared pixels × 2 channels.
     pub values: u64,
     /// Mean squared difference of a, b mapped to [0, 1].
+    ///
+    /// `None` where nothing is visible.
     pub error: Option<f64>,
-    /// Its root in CIELAB units.
+    /// Its root times 255, in CIELAB units.
     pub rms: Option<f64>,
 }
 

@@ -2,6 +2,7 @@
 //! finds.
 //! docs/run-folder.md describes every key.
 
+mod chroma;
 mod contact_sheet;
 mod effects;
 mod evaluation;
@@ -12,6 +13,7 @@ mod table;
 mod timings;
 mod verdict;
 
+pub use chroma::{ChromaReport, ChromaSeconds, ColorError, ColorQuality, ColorView, TeacherReport};
 pub use contact_sheet::{Row, contact_sheet, to_image, write_text};
 pub use effects::EffectReport;
 pub use evaluation::{
@@ -28,12 +30,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::{
     capture::{Exposure, LoadOptions},
-    chroma::{
-        ChromaSettings,
-        teacher::{TeacherInfo, Upsample},
-    },
     luma::{CurvePoint, Goal, LumaSettings, Preset},
-    measure::DeltaE,
 };
 
 /// Version of the report's layout; raised when a key changes its meaning.
@@ -41,25 +38,28 @@ pub const REPORT_VERSION: u32 = 2;
 
 /// `report.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Report {
+    /// Layout of the report; raised when a key changes its meaning.
+    ///
     /// [`REPORT_VERSION`].
     pub version: u32,
-    /// Version of the program.
+    /// Version of gs-chroma.
     pub program: String,
-    /// What was photographed.
+    /// The photos and their poses.
     pub capture: CaptureReport,
     /// What it ran on.
     pub device: DeviceReport,
-    /// The preset that settings come from where nothing else was asked for.
+    /// Source of settings that were not given.
     pub preset: Preset,
-    /// What was decided about each effect of image formation.
+    /// The plan: each effect of image formation.
     pub effects: Vec<EffectReport>,
-    /// What `fit` found doubtful and did all the same.
+    /// Warnings of `fit`.
     #[serde(default)]
     pub warnings: Vec<String>,
     /// Stage 1.
     pub luma: LumaReport,
-    /// Stage 2, once `colorize` has run.
+    /// Stage 2; missing before `colorize`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub chroma: Option<ChromaReport>,
 }
@@ -71,6 +71,7 @@ fn number_or_nan<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::E
 
 /// What was photographed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct CaptureReport {
     /// The COLMAP folder, absolute.
     pub path: String,
@@ -80,42 +81,51 @@ pub struct CaptureReport {
     pub train: usize,
     /// Views held out.
     pub test: usize,
-    /// Triangulated points.
+    /// Usable points of COLMAP's.
     pub points: usize,
-    /// Views or points left out, with the reason.
+    /// Photos and points left out, and why.
     pub rejected: Vec<String>,
     /// How the photos were loaded.
     #[serde(flatten)]
     pub load: LoadOptions,
-    /// Views whose photo has a mask file.
+    /// Views whose photo has a mask.
     pub masked_views: usize,
-    /// Pixels of all photos, at the files' sizes, whose values are not finite.
+    /// Pixels whose values are not finite.
+    ///
+    /// Of all photos at the files' sizes.
     pub not_finite: usize,
-    /// Radius of the cameras as 3DGS takes it, in world units.
+    /// 1.1 times the largest distance of a camera from their mean, in world units.
+    ///
+    /// Radius of the cameras as 3DGS takes it.
     pub extent: f64,
-    /// What was subtracted from the world's coordinates, in world units.
+    /// Subtracted from COLMAP's x, y and z, in world units.
     pub offset: [f64; 3],
-    /// The files of the photos, in the order of their names.
+    /// The photos' files, by which `colorize` detects changes.
+    ///
+    /// Sorted by name.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub photos: Vec<PhotoReport>,
 }
 
 /// A photo's file as `fit` read it.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct PhotoReport {
     /// Path below the folder of photos.
     pub name: String,
-    /// The first 16 hexadecimal digits of its SHA-256: it is chance that they are to stand, not
-    /// forgers.
+    /// First 16 digits of its SHA-256.
+    ///
+    /// Hexadecimal. They are to stand chance, not forgers.
     pub sha256: String,
 }
 
 /// What it ran on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct DeviceReport {
     /// Adapter and driver.
     pub name: String,
-    /// Vulkan, Metal or DX12.
+    /// `Vulkan`, `Metal` or `Dx12`.
     pub backend: String,
     /// Whether it is a software adapter.
     pub software: bool,
@@ -123,83 +133,105 @@ pub struct DeviceReport {
 
 /// Stage 1.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct LumaReport {
     /// What it was trained with.
     pub settings: LumaSettings,
-    /// Iterations that led to the set that was kept, those of a run that went on included.
+    /// Iterations that led to the splats, earlier runs included.
     pub iterations: usize,
-    /// The iteration at which training went back to an earlier one, where it was best.
+    /// Iterations done before rolling back to the best; `None`: never.
     pub given_up: Option<usize>,
     /// Gaussians at the end.
     pub splats: usize,
-    /// How many of them, the last ones in `luma.ply`, are surroundings: a shell far around the
-    /// scene, for what no photo shows.
+    /// Of these, the shell around the scene, last in `luma.ply`.
+    ///
+    /// It stands for what no photo shows.
     #[serde(default)]
     pub surroundings: usize,
     /// SHA-256 of the merged scene among which a block went on.
     #[serde(default)]
     pub around: Option<String>,
-    /// Gaussians that the last views culled for values that are not finite.
+    /// Gaussians × views culled as not finite; 0 if sound.
+    ///
+    /// Those of the last views, since the set last changed.
     pub poisoned: usize,
-    /// Gradients refused for not being finite, since the set last changed.
+    /// Gradients not applied as not finite or too large; 0 if sound.
+    ///
+    /// Since the set last changed.
     pub refused: usize,
-    /// Loss at the end.
+    /// 0.8 · L1 + 0.2 · (1 − SSIM), mean of the last iterations.
+    ///
+    /// Of grays from 0 to 1. JSON has `null` for what is not finite.
     #[serde(deserialize_with = "number_or_nan")]
     pub loss: f64,
-    /// What was to end the run; its seconds are those of all of it.
+    /// What was to end the run, by `--time-limit` or `--target-psnr`.
+    ///
+    /// Its seconds are those of all of it.
     pub goal: Goal,
-    /// Wall seconds.
+    /// Wall time.
     pub seconds: LumaSeconds,
-    /// Largest resident memory of the process in bytes, where the system tells.
+    /// Peak of the process's resident memory, in bytes.
+    ///
+    /// `None` where the system does not tell.
     pub peak_host_memory: Option<u64>,
-    /// Largest memory of the device's buffers in bytes, where the backend tells.
+    /// Peak of the device's buffers, in bytes.
+    ///
+    /// `None` where the backend does not tell.
     pub peak_device_memory: Option<u64>,
-    /// Bytes that a training of as many Gaussians as there are at the end was expected
-    /// to take on the device at most.
+    /// Upper estimate for the Gaussians at the end, in bytes.
     pub estimated_device_memory: u64,
-    /// How bright each photo shows the scene, where they differ.
+    /// Each photo's brightness: gain · luma + offset.
+    ///
+    /// Empty where they do not differ. Means of log gain and offset are 0; faces of one photo share
+    /// theirs.
     pub exposures: Vec<ViewExposure>,
-    /// What the training gained with time.
+    /// Quality during training.
+    ///
+    /// Of up to three views, or of all held-out ones where these have a PSNR to reach.
     pub curve: Vec<CurvePoint>,
-    /// Views of which up to three were looked at for it, or all held-out ones where these have
-    /// a PSNR to reach: `test`, or `train` without held-out ones.
+    /// Views of the curve: `test`, or `train` without held-out ones.
     pub curve_on: String,
-    /// Longer side at which held-out views were measured, where it is not that of training.
+    /// Longer side when measuring, in pixels; `None`: as trained.
     pub measured_side: Option<u32>,
     /// Mean over the held-out views, if any.
     pub held_out: Option<LumaQuality>,
     /// Each held-out view.
     pub held_out_views: Vec<LumaView>,
     /// Where the device's time went, with `--timings`.
+    // Its table is one of its own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(test, schemars(skip))]
     pub timings: Option<Vec<KernelReport>>,
 }
 
 /// Wall seconds of stage 1.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct LumaSeconds {
-    /// Reading poses and photos, placing the first Gaussians.
+    /// Reading photos and placing the first Gaussians, in seconds.
     pub load: f64,
-    /// Seconds of training.
+    /// Training, in seconds.
     pub train: f64,
-    /// Looking at views meanwhile.
+    /// Looking at views meanwhile, in seconds.
     pub curve: f64,
-    /// Measuring on held-out views.
+    /// Measuring on held-out views, in seconds.
     pub measure: f64,
-    /// The whole run but for writing its files.
+    /// From the start until files are written, in seconds.
     pub all: f64,
 }
 
 /// Quality of gray pictures.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct LumaQuality {
-    /// Peak signal-to-noise ratio in dB of the scene as viewers show it.
+    /// PSNR of the scene as viewers show it, in dB; at most 100.
     pub psnr: f64,
-    /// The same after the gain and offset that bring each picture closest to its photo; `None` in
-    /// reports that do not know it.
+    /// The same after each picture's best gain and offset, in dB.
+    ///
+    /// `None` in files that do not know it.
     #[serde(default)]
     pub corrected_psnr: Option<f64>,
-    /// Structural similarity of the scene as viewers show it.
+    /// Structural similarity, 1 for equal pictures.
     pub ssim: f64,
 }
 
@@ -220,8 +252,9 @@ impl LumaQuality {
 
 /// How bright a photo shows the scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct ViewExposure {
-    /// The photo's name.
+    /// The photo's name, or a face's.
     pub name: String,
     /// Its gain and offset.
     #[serde(flatten)]
@@ -230,155 +263,13 @@ pub struct ViewExposure {
 
 /// One held-out view of stage 1.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct LumaView {
-    /// The photo's name.
+    /// The photo's name, or a face's.
     pub name: String,
     /// Its quality.
     #[serde(flatten)]
     pub quality: LumaQuality,
-}
-
-/// Stage 2.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ChromaReport {
-    /// All teachers, in the order of the command line.
-    pub teachers: Vec<TeacherReport>,
-    /// What the teachers' a and b were multiplied by.
-    pub strength: f32,
-    /// How answers smaller than the photo were enlarged.
-    pub upsample: Upsample,
-    /// Views with painted hints.
-    pub hints: usize,
-    /// The folder of hints, absolute; `None` without hints, and where it is no UTF-8.
-    #[serde(default)]
-    pub hint_folder: Option<String>,
-    /// Share of the Gaussians that hints claim by half or more; `None` where none grew.
-    #[serde(default)]
-    pub claimed: Option<f64>,
-    /// Held-out views that were painted by hand: colors were learned from them, and they were not
-    /// measured.
-    #[serde(default)]
-    pub painted_held_out: Vec<String>,
-    /// Views that colors were learned from and that a teacher colored or that have hints.
-    pub colored_views: usize,
-    /// How chroma was solved for.
-    pub settings: ChromaSettings,
-    /// Share of the Gaussians that no colored view shows to speak of; `None` of Adam.
-    pub unseen: Option<f64>,
-    /// What colors were multiplied by to be as strong as the teachers'.
-    pub saturation: f64,
-    /// Iterations of Adam, or rounds of least squares that were needed.
-    pub iterations: usize,
-    /// The last of them, counted from the start of stage 1.
-    pub until: usize,
-    /// Drawings of a view with their adjoints, those of coarser scales by their share of
-    /// the pixels.
-    pub passes: f64,
-    /// How far the last round of least squares moved the colors, in CIELAB units; `None` of
-    /// Adam, and where it was undone.
-    pub moved: Option<f64>,
-    /// What was decided about each effect of stage 2.
-    pub effects: Vec<EffectReport>,
-    /// What `colorize` found doubtful and did all the same.
-    #[serde(default)]
-    pub warnings: Vec<String>,
-    /// Loss at the end, in CIELAB units.
-    #[serde(deserialize_with = "number_or_nan")]
-    pub loss: f64,
-    /// Wall seconds.
-    pub seconds: ChromaSeconds,
-    /// Largest resident memory of the process in bytes, where the system tells.
-    pub peak_host_memory: Option<u64>,
-    /// Largest memory of the device's buffers in bytes, where the backend tells.
-    pub peak_device_memory: Option<u64>,
-    /// Bytes of the device that solving and baking were expected to take at most.
-    pub estimated_device_memory: u64,
-    /// Views whose tile lists and wanted colors stayed on the device.
-    pub pinned_views: usize,
-    /// ΔE00 between the native picture and the exported file's.
-    pub bake: ColorError,
-    /// Views that the bake was measured on: `test`, or `train` without held-out ones.
-    pub measured_on: String,
-    /// Mean over those views of the exported file's pictures.
-    pub pictures: ColorQuality,
-    /// Each of them.
-    pub views: Vec<ColorView>,
-    /// Where the device's time went, with `--timings`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub timings: Option<Vec<KernelReport>>,
-}
-
-/// A teacher.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct TeacherReport {
-    /// Name, kind and identity.
-    #[serde(flatten)]
-    pub info: TeacherInfo,
-    /// Its file or folder, absolute, or its name in the catalog; `None` where that is no UTF-8.
-    #[serde(default)]
-    pub path: Option<String>,
-    /// What its answers count beside the other teachers'.
-    pub weight: f32,
-}
-
-/// Wall seconds of stage 2.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ChromaSeconds {
-    /// Asking the teacher.
-    pub teacher: f64,
-    /// Seconds of solving for a/b.
-    pub distill: f64,
-    /// Baking to RGB.
-    pub bake: f64,
-    /// Measuring, and drawing the contact sheet.
-    pub measure: f64,
-    /// From the start until files are written; 0 in reports of former versions.
-    #[serde(default)]
-    pub all: f64,
-}
-
-/// A color difference.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct ColorError {
-    /// Mean ΔE00.
-    pub mean: f64,
-    /// Mean over the views of each view's 95th percentile.
-    pub percentile_95: f64,
-}
-
-impl From<DeltaE> for ColorError {
-    fn from(
-        DeltaE {
-            mean,
-            percentile_95,
-        }: DeltaE,
-    ) -> Self {
-        Self {
-            mean,
-            percentile_95,
-        }
-    }
-}
-
-/// Quality of colored pictures.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct ColorQuality {
-    /// ΔE00 to the photo, where the photo has colors.
-    pub delta_e: Option<ColorError>,
-    /// Colorfulness (Hasler and Süsstrunk 2003).
-    pub colorfulness: f64,
-    /// Colorfulness of the teacher's picture.
-    pub teacher_colorfulness: Option<f64>,
-}
-
-/// One colored picture.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ColorView {
-    /// The photo's name.
-    pub name: String,
-    /// Its quality.
-    #[serde(flatten)]
-    pub quality: ColorQuality,
 }
 
 impl Report {

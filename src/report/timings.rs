@@ -25,16 +25,21 @@ pub fn minimum_bytes(kernel: &str, load: &Load) -> Option<f64> {
 
 /// One kernel's row.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct KernelReport {
-    /// Name of the kernel, as in `shaders/`.
+    /// Its name, as in `shaders/`.
     pub kernel: String,
     /// How often it ran.
     pub dispatches: u64,
-    /// Seconds on the device in all.
+    /// Total on the device, in seconds.
+    ///
+    /// Without timestamp queries on the host, each dispatch alone.
     pub seconds: f64,
     /// Share of all kernels' seconds.
     pub share: f64,
-    /// Bytes that one dispatch must read and write at least, each input read once.
+    /// Least that one dispatch reads and writes, in bytes.
+    ///
+    /// Each input is read once.
     pub minimum_bytes: f64,
 }
 

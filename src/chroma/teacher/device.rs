@@ -10,6 +10,7 @@ use std::path::Path;
 
 /// On which processor networks run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 pub enum TeacherDevice {
     /// The first of the others that the library at hand has and that takes the network.

@@ -87,18 +87,23 @@ impl Default for TeacherSettings {
 
 /// What a report says about a teacher.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct TeacherInfo {
-    /// Name of the file or folder.
+    /// Name of its file or folder.
     pub name: String,
-    /// The network's profile, such as `DDColor`, or `folder`.
+    /// The network's profile, a manifest's `name`, or `folder`.
     pub kind: String,
-    /// SHA-256 of the `.onnx` file in hexadecimal, and of the files of weights beside it, if it
-    /// names any.
+    /// SHA-256 of the `.onnx` file and its weight files.
+    ///
+    /// Hexadecimal; `None` for a folder.
     pub sha256: Option<String>,
-    /// Where the network runs.
+    /// Where the network ran.
+    ///
+    /// `None` for a folder.
     pub device: Option<TeacherDevice>,
-    /// Width and height at which the network sees photos; twice the shorter side
-    /// where the longer follows the photo's aspect.
+    /// Width and height that the network sees, in pixels.
+    ///
+    /// `None` for a folder. Twice the shorter side where the longer follows the photo's aspect.
     pub input_size: Option<[u32; 2]>,
 }
 

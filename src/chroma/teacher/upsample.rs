@@ -5,6 +5,7 @@ use super::{AbImage, GrayImage};
 
 /// How an answer smaller than its photo is enlarged.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 pub enum Upsample {
     /// Along the photo's edges: joint bilateral upsampling.

@@ -62,6 +62,7 @@ pub struct FramesOptions {
 
 /// What `frames` did.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Frames {
     /// The folder or film.
     pub output: PathBuf,
@@ -69,15 +70,15 @@ pub struct Frames {
     pub photos: usize,
     /// How many of them have a pose.
     pub placed: usize,
-    /// How many take their colors from their neighbors.
+    /// How many take their neighbors' colors.
     pub carried: usize,
-    /// How many show strokes where the scene leaves them open.
+    /// How many show strokes on what the scene leaves open.
     pub painted: usize,
-    /// Which share of the photos with a pose the scene covers, their mean.
+    /// Share of photos with a pose that the scene covers.
     pub covered: f64,
-    /// All that is doubtful, photos that cannot be read among it.
+    /// All that is doubtful, such as photos that cannot be read.
     pub warnings: Vec<String>,
-    /// Seconds of the whole.
+    /// Wall time, in seconds.
     pub seconds: f64,
 }
 
