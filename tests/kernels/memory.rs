@@ -8,7 +8,7 @@ use gs_chroma::{
         teacher::AbImage,
     },
     gpu::{Gpu, GpuError},
-    luma::{Demand, LumaError, LumaSettings, LumaTrainer, TrainingView},
+    luma::{Demand, LumaError, LumaSettings, LumaTrainer, TrainingView, resident_photos},
     raster::Raster,
     splats::{Splats, init::initial_splats},
 };
@@ -57,7 +57,7 @@ fn a_training_takes_what_was_estimated() {
         gpu.queue().submit([]);
         gpu.wait().unwrap();
         let taken = (gpu.allocated_bytes().unwrap() - before) as f64;
-        let demand = Demand::of([camera(&oblique_view())].iter(), false, sh_degree, None);
+        let demand = Demand::of([camera(&oblique_view())].iter(), false, sh_degree, u64::MAX);
         let expected = demand.bytes(COUNT, 4 * COUNT) as f64;
         let ratio = taken / expected;
         assert!((0.98..1.02).contains(&ratio), "degree {sh_degree}: {ratio}");
@@ -80,7 +80,8 @@ fn what_is_beyond_the_limit_is_refused_before_it_is_taken() {
     assert!(gpu.allocated_bytes().unwrap() - before < 10 << 20);
 }
 
-/// Photos that would take more than a quarter of the limit come one at a time.
+/// Photos that would take more than a quarter of the limit come one at a time, and all where
+/// settings say so.
 #[test]
 fn streamed_photos_train_alike() {
     let gpu = Gpu::open().unwrap();
@@ -94,21 +95,34 @@ fn streamed_photos_train_alike() {
         .collect();
     let cameras = || views.iter().map(|view| &view.camera);
     let start = initial_splats(&[([0.0; 3], 0.5), ([0.1, 0.2, 0.0], 0.3)], 1.0, 0);
-    let all = Demand::of(cameras(), false, 0, None);
-    let limit = 4 * all.photos - 4;
-    assert!(!all.streams && Demand::of(cameras(), false, 0, Some(limit)).streams);
+    let demand = |settings: &LumaSettings| {
+        Demand::of(
+            cameras(),
+            false,
+            settings.sh_degree,
+            resident_photos(settings),
+        )
+    };
+    let resident = LumaSettings::new(45);
+    let all = demand(&resident);
+    let limited = LumaSettings {
+        memory_limit: Some(4 * all.photos - 4),
+        ..resident.clone()
+    };
+    let streamed = LumaSettings {
+        stream_photos: true,
+        ..resident.clone()
+    };
+    assert!(!all.streams && demand(&limited).streams && demand(&streamed).streams);
     let raster = Arc::new(Raster::new(&gpu));
-    let trained = |memory_limit| {
-        let settings = LumaSettings {
-            memory_limit,
-            ..LumaSettings::new(45)
-        };
+    let trained = |settings| {
         let raster = raster.clone();
         let mut trainer = LumaTrainer::new(raster, settings, 1.0, &start, views.clone()).unwrap();
         trainer.train(&mut |_| {}).unwrap();
         trainer.splats().unwrap()
     };
-    assert!(trained(Some(limit)) == trained(None));
+    let [resident, limited, streamed] = [resident, limited, streamed].map(trained);
+    assert!(resident == limited && resident == streamed);
 }
 
 /// The most that the device holds while stage 2 solves and bakes at a degree, what it was said
