@@ -123,6 +123,12 @@ fn blocks_are_trained_and_put_together() {
         assert!(report["capture"]["chosen"]["train"].is_array());
         let most = json(&place, &format!("{block}/block.json"))["max_splats"].as_u64();
         assert!(report["luma"]["splats"].as_u64() <= most);
+        let rate = |report: &Value| report["luma"]["settings"]["rates"]["quats"].as_f64();
+        let share = report["capture"]["train"].as_f64().unwrap() / 12.0;
+        let faster = rate(&report).unwrap() / rate(&coarse).unwrap();
+        assert!((faster - share.powf(-0.5)).abs() < 1e-9, "{faster} {share}");
+        let streams = |report: &Value| report["luma"]["settings"]["stream_photos"] == true;
+        assert!(streams(&report) && !streams(&coarse));
         // What the coarse model has decided holds.
         for (ours, theirs) in (report["effects"].as_array().unwrap().iter())
             .zip(coarse["effects"].as_array().unwrap())

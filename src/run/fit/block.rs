@@ -361,7 +361,9 @@ impl FitOptions {
         let surround = coarse.is_none();
         // What is divided into blocks is larger than a device.
         let stream = file.kind == Kind::Block;
-        let whole = (job.photos - job.held_out).max(1) as f64;
+        // Adam's steps are alike whatever the gradient: a Gaussian in a share p of the photos
+        // moves by √p an iteration, and a block has fewer iterations by the share of its photos.
+        let whole = job.photos.saturating_sub(job.held_out).max(1) as f64;
         let haste = (whole / file.photos.train.len().max(1) as f64).sqrt();
         Ok(Some(Self {
             output: Some(folder.to_owned()),
