@@ -295,9 +295,11 @@ impl<'a> IrlsSolver<'a> {
                 recorder.submit();
             }
             let moves_less = |than| state.moved.is_some_and(|moved| moved < than);
-            // What is left of an undone step is short whatever remains to be done.
+            // What is left of an undone step is short whatever remains to be done, and so are
+            // steps from few pairs.
             let whole = !std::mem::replace(&mut self.undone, state.moved.is_none());
-            let settles = whole && !self.plain && moves_less(self.settings.settled);
+            let free = self.plain || self.done <= FREE_ROUNDS;
+            let settles = whole && !free && moves_less(self.settings.settled);
             self.settled = if settles { self.settled + 1 } else { 0 };
             self.ended = self.done == self.settings.rounds || self.settled == SETTLED_ROUNDS;
             let levels_off = self.plain && self.done >= PLAIN_ROUNDS && moves_less(PLAIN_MOVES);
