@@ -96,6 +96,15 @@ pub struct BlockFile {
 }
 
 impl Job {
+    /// Factor on a block's learning rates. Adam's steps are alike whatever the gradient: a
+    /// Gaussian in a share p of the photos moves by √p an iteration, and a block has fewer
+    /// iterations by the share of its photos (docs/large-scenes.md).
+    pub fn haste(&self, block: &Block) -> f64 {
+        let train = |photos: usize, held_out| photos.saturating_sub(held_out).max(1) as f64;
+        let whole = train(self.photos, self.held_out);
+        (whole / train(block.photos, block.held_out)).sqrt()
+    }
+
     /// The file in a job's folder.
     pub fn path(folder: &Path) -> PathBuf {
         folder.join(JOB)

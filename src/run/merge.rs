@@ -103,6 +103,9 @@ pub fn merge(
             settings: LumaSettings {
                 max_splats: splats.len(),
                 sh_degree: splats.sh.degree,
+                // Whoever goes on trains with all photos.
+                rates: settings.rates.times(1.0 / job.haste(&first.block)),
+                stream_photos: false,
                 ..settings.clone()
             },
             splats: splats.len(),

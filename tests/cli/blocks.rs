@@ -140,6 +140,11 @@ fn blocks_are_trained_and_put_together() {
 
     let report = place.json(&merge);
     assert_eq!(report["capture"]["test"], 2);
+    // The whole is trained on as the coarse model is, not as a block.
+    let settings = [&report, &coarse].map(|report| &report["luma"]["settings"]);
+    let [ours, theirs] = settings.map(|settings| settings["rates"]["quats"].as_f64().unwrap());
+    assert!((ours / theirs - 1.0).abs() < 1e-9, "{ours} {theirs}");
+    assert_eq!(settings[0]["stream_photos"], false);
     assert_eq!(
         report["luma"]["held_out_views"].as_array().map(Vec::len),
         Some(2)

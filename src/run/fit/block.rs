@@ -360,11 +360,8 @@ impl FitOptions {
         // Those of the coarse model surround all blocks.
         let surround = coarse.is_none();
         // What is divided into blocks is larger than a device.
-        let stream = file.kind == Kind::Block;
-        // Adam's steps are alike whatever the gradient: a Gaussian in a share p of the photos
-        // moves by √p an iteration, and a block has fewer iterations by the share of its photos.
-        let whole = job.photos.saturating_sub(job.held_out).max(1) as f64;
-        let haste = (whole / file.photos.train.len().max(1) as f64).sqrt();
+        let stream = block.is_some();
+        let haste = (block.as_ref()).map_or(1.0, |block| block.job.haste(&block.block));
         Ok(Some(Self {
             output: Some(folder.to_owned()),
             preset: (file.kind == Kind::Coarse).then_some(Preset::Draft),
