@@ -27,6 +27,9 @@ pub struct Plan {
     /// How much work fit would do [default: paper on a GPU, else draft].
     #[arg(long, value_parser = one_of(PRESETS), help_heading = BUDGET)]
     preset: Option<Preset>,
+    /// Iterations that fit would do: trials are a share of them [default: the preset's].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = BUDGET)]
+    iterations: Option<u32>,
     #[command(flatten)]
     photos: Photos,
     #[command(flatten)]
@@ -41,6 +44,7 @@ impl Plan {
         let options = PlanOptions {
             colmap_dir: self.colmap_dir,
             preset: self.preset,
+            iterations: self.iterations.map(|count| count as usize),
             load: self.photos.options(),
             overrules: self.effects.overrules(),
         };

@@ -1,9 +1,5 @@
 //! Points where photos have texture and COLMAP has none: without a Gaussian nothing is split, and
 //! a lawn stays a blur.
-//!
-//! Photos are matched at depths around those of the points nearby, by normalized
-//! cross-correlation, as plane sweeps do (Collins 1996; the photos that are compared stay as they
-//! are, patches face the camera).
 
 use std::{
     collections::{BTreeSet, HashMap},
@@ -13,11 +9,8 @@ use std::{
 
 use glam::DVec3;
 
-use super::TrainingView;
-use crate::capture::{Camera, Capture, CaptureError, Dataset, Photo};
-
-/// Longer side of the photos that are matched, at most: enough to find a depth by.
-const SIDE: u32 = 480;
+use super::matching::{SmallPhoto, slant_through};
+use crate::capture::{Capture, CaptureError, Dataset};
 
 /// Photos that are matched, at most, evenly chosen: each with so many of its nearest ones.
 const MAX_VIEWS: usize = 48;
@@ -34,22 +27,12 @@ const GAP: f64 = 2.5;
 const NEAREST: usize = 6;
 const BEYOND: [f64; 2] = [0.7, 1.4];
 
-/// Depths that are tried, evenly spaced in 1 / depth.
-const DEPTHS: usize = 24;
+/// Points nearest to a cell through which the plane goes that a patch may lie in.
+const PLANE: usize = 12;
 
-/// Steps between two of them at which the best is tried again.
-const FINER: [f64; 4] = [-0.5, -0.25, 0.25, 0.5];
-
-/// Pixels from the middle of a patch to its sides.
-const REACH: i32 = 3;
-const PATCH: usize = ((2 * REACH + 1) * (2 * REACH + 1)) as usize;
-
-/// Standard deviation of a patch, in gray levels, from which on it has texture.
-const TEXTURE: f64 = 4.0;
-
-/// Correlation with the photos nearby, the mean of the best two, from which a depth is believed:
-/// at 0.6, woods get points that other views show to be wrong (docs/lab/16-ends-and-gaps.md).
-const CORRELATED: f64 = 0.8;
+/// Correlation with the photos nearby, the mean of the best two, from which a depth is believed
+/// (docs/lab/16-ends-and-gaps.md).
+const CORRELATED: f64 = 0.7;
 
 /// A point that was found.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,104 +41,6 @@ pub(super) struct GapPoint {
     pub position: DVec3,
     /// Encoded gray, 0 to 1.
     pub gray: f32,
-}
-
-/// A small photo with its camera.
-struct Small {
-    camera: Camera,
-    gray: Vec<u8>,
-    mask: Option<Vec<u8>>,
-}
-
-impl Small {
-    fn of(camera: Camera, photo: &Photo) -> Self {
-        let mut view = TrainingView {
-            mask: photo.mask.clone(),
-            ..TrainingView::new(camera, photo.gray.clone())
-        };
-        while view.camera.width.max(view.camera.height) > SIDE {
-            view = view.halved();
-        }
-        Self {
-            camera: view.camera,
-            gray: view.gray,
-            mask: view.mask,
-        }
-    }
-
-    fn at(&self, x: i32, y: i32) -> Option<f64> {
-        let (width, height) = (self.camera.width as i32, self.camera.height as i32);
-        let inside = (0..width).contains(&x) && (0..height).contains(&y);
-        let pixel = inside.then(|| (y * width + x) as usize)?;
-        let counts = self.mask.as_ref().is_none_or(|mask| mask[pixel] >= 128);
-        counts.then(|| f64::from(self.gray[pixel]))
-    }
-
-    /// Between four pixels, whose centers are at halves.
-    fn between(&self, [x, y]: [f64; 2]) -> Option<f64> {
-        let (x, y) = (x - 0.5, y - 0.5);
-        let (left, top) = (x.floor(), y.floor());
-        let (s, t) = (x - left, y - top);
-        let at = |dx, dy| self.at(left as i32 + dx, top as i32 + dy);
-        let above = at(0, 0)? * (1.0 - s) + at(1, 0)? * s;
-        let below = at(0, 1)? * (1.0 - s) + at(1, 1)? * s;
-        Some(above * (1.0 - t) + below * t)
-    }
-
-    /// The place at a depth along the ray of a pixel.
-    fn place(&self, [x, y]: [f64; 2], depth: f64) -> DVec3 {
-        let camera = &self.camera;
-        let seen = DVec3::new(
-            (x - camera.cx) / camera.fx,
-            (y - camera.cy) / camera.fy,
-            1.0,
-        );
-        camera.rotation.transpose() * (seen * depth - camera.translation)
-    }
-
-    fn project(&self, place: DVec3) -> Option<([f64; 2], f64)> {
-        let pixel = self.camera.pixel_of(place)?;
-        let depth = (self.camera.rotation * place + self.camera.translation).z;
-        Some((pixel, depth))
-    }
-}
-
-/// A patch of zero mean and unit length, and what it was before.
-struct Patch {
-    values: [f64; PATCH],
-    mean: f64,
-    deviation: f64,
-}
-
-impl Patch {
-    fn of(mut value: impl FnMut(i32, i32) -> Option<f64>) -> Option<Self> {
-        let mut values = [0.0; PATCH];
-        let mut offsets = (-REACH..=REACH).flat_map(|y| (-REACH..=REACH).map(move |x| (x, y)));
-        for to in &mut values {
-            let (x, y) = offsets.next()?;
-            *to = value(x, y)?;
-        }
-        let mean = values.iter().sum::<f64>() / PATCH as f64;
-        let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
-        let length = squares.sqrt().max(f64::MIN_POSITIVE);
-        values
-            .iter_mut()
-            .for_each(|value| *value = (*value - mean) / length);
-        let deviation = (squares / PATCH as f64).sqrt();
-        Some(Self {
-            values,
-            mean,
-            deviation,
-        })
-    }
-
-    fn correlation(&self, other: &Self) -> f64 {
-        self.values
-            .iter()
-            .zip(&other.values)
-            .map(|(a, b)| a * b)
-            .sum()
-    }
 }
 
 /// At most `most` points where the training photos show something and the capture has none.
@@ -168,13 +53,13 @@ pub(super) fn gap_points(dataset: &Dataset, most: usize) -> Result<Vec<GapPoint>
     let views: Vec<usize> = (0..count).map(|k| train[k * train.len() / count]).collect();
     let mut photos = Vec::new();
     dataset.visit(&views, |view, photo| {
-        photos.push((view, Small::of(dataset.cameras[view].clone(), photo)));
+        photos.push((view, SmallPhoto::of(dataset.cameras[view].clone(), photo)));
         Ok::<_, CaptureError>(())
     })?;
     Ok(found(&dataset.capture, &photos, most))
 }
 
-fn found(capture: &Capture, photos: &[(usize, Small)], most: usize) -> Vec<GapPoint> {
+fn found(capture: &Capture, photos: &[(usize, SmallPhoto)], most: usize) -> Vec<GapPoint> {
     let mut found: Vec<GapPoint> = Vec::new();
     for ((number, photo), points) in photos.iter().zip(seen_points(capture, photos)) {
         let neighbors = nearest_photos(photo, photos, *number);
@@ -187,17 +72,17 @@ fn found(capture: &Capture, photos: &[(usize, Small)], most: usize) -> Vec<GapPo
 
 /// Those taken from nearest by.
 fn nearest_photos<'a>(
-    photo: &Small,
-    photos: &'a [(usize, Small)],
+    photo: &SmallPhoto,
+    photos: &'a [(usize, SmallPhoto)],
     number: usize,
-) -> Vec<&'a Small> {
-    let distance = |other: &Small| {
+) -> Vec<&'a SmallPhoto> {
+    let distance = |other: &SmallPhoto| {
         other
             .camera
             .center()
             .distance_squared(photo.camera.center())
     };
-    let mut others: Vec<&Small> = (photos.iter())
+    let mut others: Vec<&SmallPhoto> = (photos.iter())
         .filter(|(other, _)| *other != number)
         .map(|(_, other)| other)
         .collect();
@@ -208,7 +93,7 @@ fn nearest_photos<'a>(
 
 /// Of each photo, pixel and depth of the points that it shows: those that were found in it, or
 /// all before it where the model does not say.
-fn seen_points(capture: &Capture, photos: &[(usize, Small)]) -> Vec<Vec<([f64; 2], f64)>> {
+fn seen_points(capture: &Capture, photos: &[(usize, SmallPhoto)]) -> Vec<Vec<([f64; 2], f64)>> {
     let tracked = capture.points.iter().any(|point| !point.track.is_empty());
     let places: HashMap<usize, usize> = (photos.iter().zip(0..))
         .map(|((number, _), place)| (*number, place))
@@ -230,7 +115,7 @@ fn seen_points(capture: &Capture, photos: &[(usize, Small)]) -> Vec<Vec<([f64; 2
 
 /// The cells of a photo in which there is no point.
 struct Gaps<'a> {
-    photo: &'a Small,
+    photo: &'a SmallPhoto,
     points: &'a [([f64; 2], f64)],
     /// Side of a cell in pixels.
     side: f64,
@@ -239,7 +124,7 @@ struct Gaps<'a> {
 }
 
 impl<'a> Gaps<'a> {
-    fn of(photo: &'a Small, points: &'a [([f64; 2], f64)], found: &[GapPoint]) -> Self {
+    fn of(photo: &'a SmallPhoto, points: &'a [([f64; 2], f64)], found: &[GapPoint]) -> Self {
         let camera = &photo.camera;
         let side = (f64::from(camera.width.max(camera.height)) / f64::from(CELLS)).max(2.0);
         let [columns, rows] =
@@ -262,7 +147,7 @@ impl<'a> Gaps<'a> {
     }
 
     /// What the photos around show in them.
-    fn filled(&self, neighbors: &[&Small]) -> Vec<GapPoint> {
+    fn filled(&self, neighbors: &[&SmallPhoto]) -> Vec<GapPoint> {
         if self.points.len() < NEAREST || neighbors.len() < 2 {
             return Vec::new();
         }
@@ -295,83 +180,50 @@ impl<'a> Gaps<'a> {
     }
 
     /// The point on the ray of a pixel.
-    fn point_at(&self, pixel: [f64; 2], neighbors: &[&Small]) -> Option<GapPoint> {
-        let [x, y] = pixel.map(|at| at as i32);
-        let patch = Patch::of(|dx, dy| self.photo.at(x + dx, y + dy))?;
-        if patch.deviation < TEXTURE {
-            return None;
-        }
-        let [nearest, farthest] = self.depths_around(pixel)?;
-        let step = (1.0 / farthest - 1.0 / nearest) / (DEPTHS - 1) as f64;
-        let at = |steps: f64| 1.0 / (1.0 / nearest + steps * step);
-        let score = |steps: &f64| self.agreement(&patch, pixel, at(*steps), neighbors);
-        let best = |tried: &mut dyn Iterator<Item = f64>| {
-            let scored = tried.filter_map(|steps| Some((score(&steps)?, steps)));
-            scored.max_by(|(a, _), (b, _)| a.total_cmp(b))
-        };
-        let (_, coarse) = best(&mut (0..DEPTHS).map(|k| k as f64))?;
-        let finer = FINER.iter().map(|finer| coarse + finer);
-        let (score, steps) = best(&mut std::iter::once(coarse).chain(finer))?;
-        (score > CORRELATED).then(|| GapPoint {
-            position: self.photo.place(pixel, at(steps)),
-            gray: (patch.mean / 255.0) as f32,
+    fn point_at(&self, pixel: [f64; 2], neighbors: &[&SmallPhoto]) -> Option<GapPoint> {
+        let Around { depths, slant } = self.around(pixel)?;
+        // It faces the camera, or lies in the plane of the points nearby.
+        let slants: Vec<_> = std::iter::once([0.0; 2]).chain(slant).collect();
+        let found = self.photo.matched(pixel, depths, &slants, neighbors)?;
+        let believed = found.score > CORRELATED && self.photo.found_back(&found, depths, neighbors);
+        believed.then(|| GapPoint {
+            position: self.photo.place(pixel, found.surface.depth),
+            gray: (found.gray / 255.0) as f32,
         })
     }
 
-    /// The mean of a patch's best two correlations with other photos, if it is at a depth.
-    fn agreement(
-        &self,
-        patch: &Patch,
-        pixel: [f64; 2],
-        depth: f64,
-        neighbors: &[&Small],
-    ) -> Option<f64> {
-        let mut scores: Vec<f64> = (neighbors.iter())
-            .filter_map(|other| self.correlation(patch, pixel, depth, other))
+    /// What the points around a pixel say of it; `None` where one is near.
+    fn around(&self, [x, y]: [f64; 2]) -> Option<Around> {
+        let mut near: Vec<(f64, [f64; 3])> = (self.points.iter())
+            .map(|([u, v], depth)| {
+                let [u, v] = [u - x, v - y];
+                (u * u + v * v, [u, v, *depth])
+            })
             .collect();
-        scores.sort_by(|a, b| b.total_cmp(a));
-        match scores[..] {
-            [first, second, ..] => Some((first + second) / 2.0),
-            _ => None,
-        }
-    }
-
-    /// The depths between which the ray of a pixel may end; `None` where a point is near.
-    fn depths_around(&self, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
-        let mut near: Vec<(f64, f64)> = (self.points.iter())
-            .map(|([u, v], depth)| ((u - x).powi(2) + (v - y).powi(2), *depth))
-            .collect();
-        near.select_nth_unstable_by(NEAREST - 1, |a, b| a.0.total_cmp(&b.0));
-        let closest = near[..NEAREST]
-            .iter()
-            .fold(f64::INFINITY, |least, (d, _)| least.min(*d));
-        if closest.sqrt() < GAP * self.side {
+        near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+        let (closest, _) = near.first()?;
+        if near.len() < NEAREST || closest.sqrt() < GAP * self.side {
             return None;
         }
-        let depths = near[..NEAREST].iter().map(|(_, depth)| *depth);
+        let depths = near[..NEAREST].iter().map(|(_, [_, _, depth])| *depth);
         let [closer, beyond] = BEYOND;
-        Some([
-            closer * depths.clone().fold(f64::INFINITY, f64::min),
-            beyond * depths.fold(0.0, f64::max),
-        ])
+        let plane = near.iter().take(PLANE).map(|(_, point)| *point);
+        Some(Around {
+            depths: [
+                closer * depths.clone().fold(f64::INFINITY, f64::min),
+                beyond * depths.fold(0.0, f64::max),
+            ],
+            slant: slant_through(plane),
+        })
     }
+}
 
-    /// How a patch correlates with another photo if it is at a depth.
-    fn correlation(
-        &self,
-        patch: &Patch,
-        [x, y]: [f64; 2],
-        depth: f64,
-        other: &Small,
-    ) -> Option<f64> {
-        let seen = Patch::of(|dx, dy| {
-            let place = self
-                .photo
-                .place([x + f64::from(dx), y + f64::from(dy)], depth);
-            other.between(other.camera.pixel_of(place)?)
-        })?;
-        Some(patch.correlation(&seen))
-    }
+/// What points around a pixel say of it.
+struct Around {
+    /// Between which its ray may end.
+    depths: [f64; 2],
+    /// Of the plane through them, if there is one.
+    slant: Option<[f64; 2]>,
 }
 
 #[cfg(test)]
@@ -385,7 +237,7 @@ mod tests {
         (128.0 + 35.0 * wave) as u8
     }
 
-    fn photos(flat: bool) -> (Capture, Vec<(usize, Small)>) {
+    fn photos(flat: bool) -> (Capture, Vec<(usize, SmallPhoto)>) {
         let shots: Vec<_> = [-0.4, 0.0, 0.4]
             .map(|x| {
                 let camera = looking_along_z(DVec3::new(x, 0.0, 0.0), 160);
@@ -409,7 +261,7 @@ mod tests {
         });
         let capture = capture(&shots, points);
         let small = shots.into_iter().enumerate();
-        let small = small.map(|(k, (photo, camera))| (k, Small::of(camera, &photo)));
+        let small = small.map(|(k, (photo, camera))| (k, SmallPhoto::of(camera, &photo)));
         (capture, small.collect())
     }
 

@@ -9,6 +9,7 @@ mod fit;
 mod gaps;
 mod goal;
 mod loss;
+mod matching;
 mod memory;
 mod numerics;
 pub mod outliers;

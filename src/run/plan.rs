@@ -22,6 +22,8 @@ pub struct PlanOptions {
     pub colmap_dir: PathBuf,
     /// Amount of work; `paper` on a GPU and `draft` on a software adapter by default.
     pub preset: Option<Preset>,
+    /// How long the training would be: trials are a share of it.
+    pub iterations: Option<usize>,
     /// How photos are loaded; the longer side is the preset's where it is `None`.
     pub load: LoadOptions,
     /// What is on or off whatever the evidence.
@@ -57,11 +59,13 @@ pub fn plan(options: &PlanOptions, observe: &mut Observer<'_>) -> Result<Planned
         ..
     } = open_examined(&options.colmap_dir, &load, observe)?;
     let dataset = Arc::new(dataset);
+    let mut settings = preset.work().settings;
+    settings.iterations = options.iterations.unwrap_or(settings.iterations);
     let raster = || Ok(Arc::new(Raster::new(&open_gpu(false)?)));
     let plan = planned(
         &dataset,
         &evidence,
-        &preset.work().settings,
+        &settings,
         &options.overrules,
         raster,
         &mut |progress| {

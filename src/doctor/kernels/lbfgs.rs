@@ -214,7 +214,12 @@ impl Problem {
     }
 
     /// The device after so many steps.
-    fn on_device(&self, gpu: &Gpu, told: &[f64]) -> Result<(Vec<f64>, Option<f64>), GpuError> {
+    fn on_device(
+        &self,
+        gpu: &Gpu,
+        kernels: &LbfgsKernels,
+        told: &[f64],
+    ) -> Result<(Vec<f64>, Option<f64>), GpuError> {
         let buffer = |values: &[f64]| {
             let values: Vec<f32> = values.iter().map(|&v| v as f32).collect();
             Buffer::from_slice(gpu, "planes", &values)
@@ -228,7 +233,7 @@ impl Problem {
         };
         let mut lbfgs = Lbfgs::new(
             gpu,
-            &LbfgsKernels::new(gpu),
+            kernels,
             &system,
             [self.splats, 2],
             [self.ridge, ANCHOR].map(|prior| prior as f32),
@@ -289,6 +294,7 @@ fn problems() -> Vec<Problem> {
 
 pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
     let (gpu, allowed) = (&raster.gpu, Allowance::of(&raster.gpu));
+    let kernels = LbfgsKernels::new(gpu);
     let mut free = problems();
     let solved = (free.iter())
         .map(|problem| {
@@ -303,7 +309,8 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
                 .map(|(ax, g)| ax - g)
                 .collect();
             (0..length).for_each(|k| matrix[k][k] += problem.ridge_of(k));
-            let unknowns = problem.on_device(gpu, &[0.0; TO_THE_END])?.0;
+            let to_the_end = vec![0.0; steps_to_the_end(length)];
+            let unknowns = problem.on_device(gpu, &kernels, &to_the_end)?.0;
             Ok(Sample::new(unknowns, solve(matrix, &right)))
         })
         .collect::<Result<Vec<_>, GpuError>>()?;
@@ -313,7 +320,10 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
         (problems.iter())
             .map(|problem| {
                 let told: Vec<f64> = told.iter().map(|more| more * problem.offset).collect();
-                let (actual, expected) = (problem.on_device(gpu, &told)?, problem.expected(&told));
+                let (actual, expected) = (
+                    problem.on_device(gpu, &kernels, &told)?,
+                    problem.expected(&told),
+                );
                 // Undone is told as less than nothing.
                 let [far, near] = [actual.1, expected.1].map(|moved| vec![moved.unwrap_or(-1.0)]);
                 moved.push(Sample::new(far, near));
@@ -337,7 +347,10 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
             problem.start.fill(0.0);
             problem.gradient.fill(0.0);
             let zeros = vec![0.0; problem.start.len()];
-            Ok(Sample::new(problem.on_device(gpu, &[0.0; 2])?.0, zeros))
+            Ok(Sample::new(
+                problem.on_device(gpu, &kernels, &[0.0; 2])?.0,
+                zeros,
+            ))
         })
         .collect::<Result<Vec<_>, GpuError>>()?;
     // In units of the colors. Where steps go along pairs, what no pixel shows stays where it is
@@ -359,5 +372,8 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
     ])
 }
 
-/// Steps after which nothing moves any more.
-const TO_THE_END: usize = 240;
+/// Steps after which so many unknowns move no more: conjugate gradients need one for each, in
+/// exact arithmetic.
+fn steps_to_the_end(unknowns: usize) -> usize {
+    20 + 2 * unknowns
+}

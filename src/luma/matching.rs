@@ -1,0 +1,364 @@
+//! Depths by matching patches of photos.
+//!
+//! A patch is compared with other photos at depths along its ray, by normalized cross-correlation,
+//! as plane sweeps do (Collins 1996; the photos that are compared stay as they are). It faces the
+//! camera, or is slanted: ground changes its shape between photos. A depth holds where the photo
+//! that agrees best finds it as well.
+
+use glam::{DMat3, DVec3};
+
+use super::TrainingView;
+use crate::capture::{Camera, Photo};
+
+/// Longer side of the photos that are matched, at most: enough to find a depth by.
+const SIDE: u32 = 480;
+
+/// Depths that are tried, evenly spaced in 1 / depth.
+const DEPTHS: usize = 24;
+
+/// Steps between two of them at which the best is tried again.
+const FINER: [f64; 4] = [-0.5, -0.25, 0.25, 0.5];
+
+/// Pixels from the middle of a patch to its sides.
+const REACH: i32 = 3;
+const PATCH: usize = ((2 * REACH + 1) * (2 * REACH + 1)) as usize;
+
+/// Standard deviation of a patch, in gray levels, from which on it has texture.
+const TEXTURE: f64 = 4.0;
+
+/// How much 1 / depth may change within a pixel, at most, as share of itself: a steeper plane
+/// comes from points on several things.
+const STEEPEST: f64 = 0.03;
+
+/// How far, as share of a depth, the place may be that another photo finds.
+const SAME: f64 = 0.02;
+
+/// A small photo with its camera.
+pub struct SmallPhoto {
+    /// Of its size.
+    pub camera: Camera,
+    /// Encoded.
+    pub gray: Vec<u8>,
+    /// Pixels below 128 do not count.
+    pub mask: Option<Vec<u8>>,
+}
+
+impl SmallPhoto {
+    /// A photo, scaled down.
+    pub fn of(camera: Camera, photo: &Photo) -> Self {
+        let mut view = TrainingView {
+            mask: photo.mask.clone(),
+            ..TrainingView::new(camera, photo.gray.clone())
+        };
+        while view.camera.width.max(view.camera.height) > SIDE {
+            view = view.halved();
+        }
+        Self {
+            camera: view.camera,
+            gray: view.gray,
+            mask: view.mask,
+        }
+    }
+
+    /// The place at a depth along the ray of a pixel.
+    pub fn place(&self, [x, y]: [f64; 2], depth: f64) -> DVec3 {
+        let camera = &self.camera;
+        let seen = DVec3::new(
+            (x - camera.cx) / camera.fx,
+            (y - camera.cy) / camera.fy,
+            1.0,
+        );
+        camera.rotation.transpose() * (seen * depth - camera.translation)
+    }
+
+    /// Pixel and depth of a place, if it is in the photo.
+    pub fn project(&self, place: DVec3) -> Option<([f64; 2], f64)> {
+        let pixel = self.camera.pixel_of(place)?;
+        let depth = (self.camera.rotation * place + self.camera.translation).z;
+        Some((pixel, depth))
+    }
+
+    fn at(&self, x: i32, y: i32) -> Option<f64> {
+        let (width, height) = (self.camera.width as i32, self.camera.height as i32);
+        let inside = (0..width).contains(&x) && (0..height).contains(&y);
+        let pixel = inside.then(|| (y * width + x) as usize)?;
+        let counts = self.mask.as_ref().is_none_or(|mask| mask[pixel] >= 128);
+        counts.then(|| f64::from(self.gray[pixel]))
+    }
+
+    /// Between four pixels, whose centers are at halves.
+    fn between(&self, [x, y]: [f64; 2]) -> Option<f64> {
+        let (x, y) = (x - 0.5, y - 0.5);
+        let (left, top) = (x.floor(), y.floor());
+        let (s, t) = (x - left, y - top);
+        let at = |dx, dy| self.at(left as i32 + dx, top as i32 + dy);
+        let above = at(0, 0)? * (1.0 - s) + at(1, 0)? * s;
+        let below = at(0, 1)? * (1.0 - s) + at(1, 1)? * s;
+        Some(above * (1.0 - t) + below * t)
+    }
+
+    /// What is around a pixel, if it has texture.
+    fn textured(&self, [x, y]: [f64; 2]) -> Option<Patch> {
+        let patch = Patch::of(|[dx, dy]| self.between([x + dx, y + dy]))?;
+        (patch.deviation >= TEXTURE).then_some(patch)
+    }
+
+    /// Where the ray of a pixel ends between two depths: where other photos agree best, with one
+    /// of these slants. `None` where there is no texture, or fewer than two of them show the place.
+    pub fn matched(
+        &self,
+        pixel: [f64; 2],
+        depths: [f64; 2],
+        slants: &[[f64; 2]],
+        others: &[&Self],
+    ) -> Option<Match> {
+        let patch = self.textured(pixel)?;
+        let sweeps = slants.iter().filter_map(|&slant| {
+            let surface = |depth| Surface {
+                pixel,
+                depth,
+                slant,
+            };
+            let (score, surface) = self.swept(&patch, surface, depths, others)?;
+            Some(Match {
+                score,
+                surface,
+                gray: patch.mean,
+            })
+        });
+        sweeps.max_by(|a, b| a.score.total_cmp(&b.score))
+    }
+
+    /// Whether the photo that agrees best with what was found between two depths finds it too.
+    pub fn found_back(&self, found: &Match, depths: [f64; 2], others: &[&Self]) -> bool {
+        let Surface { pixel, depth, .. } = found.surface;
+        let seen = || {
+            let patch = self.textured(pixel)?;
+            let scored = others.iter().enumerate().filter_map(|(k, other)| {
+                Some((self.correlation(&patch, &found.surface, other)?, k))
+            });
+            let (_, best) = scored.max_by(|(a, _), (b, _)| a.total_cmp(b))?;
+            let seen = found.surface.seen_from(self, others[best])?;
+            let around: Vec<&Self> = std::iter::once(self)
+                .chain((0..others.len()).filter(|&k| k != best).map(|k| others[k]))
+                .collect();
+            let depths = depths.map(|bound| bound * seen.depth / depth);
+            let back = others[best].matched(seen.pixel, depths, &[seen.slant], &around)?;
+            Some(back.surface.depth / seen.depth)
+        };
+        seen().is_some_and(|ratio| (ratio - 1.0).abs() <= SAME)
+    }
+
+    fn swept(
+        &self,
+        patch: &Patch,
+        surface: impl Fn(f64) -> Surface,
+        [nearest, farthest]: [f64; 2],
+        others: &[&Self],
+    ) -> Option<(f64, Surface)> {
+        let step = (1.0 / farthest - 1.0 / nearest) / (DEPTHS - 1) as f64;
+        let at = |steps: f64| surface(1.0 / (1.0 / nearest + steps * step));
+        let best = |tried: &mut dyn Iterator<Item = f64>| {
+            let scored =
+                tried.filter_map(|steps| Some((self.agreement(patch, &at(steps), others)?, steps)));
+            scored.max_by(|(a, _), (b, _)| a.total_cmp(b))
+        };
+        let (_, coarse) = best(&mut (0..DEPTHS).map(|k| k as f64))?;
+        let finer = FINER.iter().map(|finer| coarse + finer);
+        let (score, steps) = best(&mut std::iter::once(coarse).chain(finer))?;
+        Some((score, at(steps)))
+    }
+
+    /// The mean of a patch's best two correlations with other photos, if it lies on a surface.
+    fn agreement(&self, patch: &Patch, surface: &Surface, others: &[&Self]) -> Option<f64> {
+        let mut scores: Vec<f64> = (others.iter())
+            .filter_map(|other| self.correlation(patch, surface, other))
+            .collect();
+        scores.sort_by(|a, b| b.total_cmp(a));
+        match scores[..] {
+            [first, second, ..] => Some((first + second) / 2.0),
+            _ => None,
+        }
+    }
+
+    /// How a patch correlates with another photo if it lies on a surface.
+    fn correlation(&self, patch: &Patch, surface: &Surface, other: &Self) -> Option<f64> {
+        let seen = Patch::of(|offset| {
+            let place = surface.place(self, offset);
+            other.between(other.camera.pixel_of(place)?)
+        })?;
+        Some(patch.correlation(&seen))
+    }
+}
+
+/// What was found along the ray of a pixel.
+pub struct Match {
+    /// Mean of the best two correlations, at most 1.
+    pub score: f64,
+    /// Where.
+    pub surface: Surface,
+    /// Mean of the patch, in gray levels.
+    pub gray: f64,
+}
+
+/// A plane on the ray of a pixel: 1 / depth is linear across a photo.
+#[derive(Clone, Copy)]
+pub struct Surface {
+    pixel: [f64; 2],
+    /// Along the axis of the photo.
+    pub depth: f64,
+    slant: [f64; 2],
+}
+
+impl Surface {
+    /// So many pixels beside the middle.
+    fn place(&self, photo: &SmallPhoto, [dx, dy]: [f64; 2]) -> DVec3 {
+        let ([x, y], [right, down]) = (self.pixel, self.slant);
+        let depth = self.depth / (1.0 + right * dx + down * dy);
+        photo.place([x + dx, y + dy], depth)
+    }
+
+    /// The same plane where another photo shows its middle.
+    fn seen_from(&self, photo: &SmallPhoto, other: &SmallPhoto) -> Option<Self> {
+        let reach = f64::from(REACH);
+        let shown = |offset| other.project(self.place(photo, offset));
+        let (pixel, depth) = shown([0.0, 0.0])?;
+        let beside = [shown([reach, 0.0])?, shown([0.0, reach])?];
+        let offset = |([u, v], depth): ([f64; 2], f64)| [u - pixel[0], v - pixel[1], depth];
+        let corners = [(pixel, depth)].into_iter().chain(beside).map(offset);
+        Some(Self {
+            pixel,
+            depth,
+            slant: slant_through(corners).unwrap_or_default(),
+        })
+    }
+}
+
+/// The slant at the origin of the least-squares plane through points, which are offsets in pixels
+/// and a depth: how much 1 / depth grows within a pixel to the right and down, as share of itself.
+/// `None` where there is no such plane, or it is too steep.
+pub fn slant_through(points: impl Iterator<Item = [f64; 3]>) -> Option<[f64; 2]> {
+    let (mut normal, mut right) = (DMat3::ZERO, DVec3::ZERO);
+    for [u, v, depth] in points {
+        let row = DVec3::new(1.0, u, v);
+        normal += DMat3::from_cols(row * row.x, row * row.y, row * row.z);
+        right += row / depth;
+    }
+    let plane = normal.inverse() * right;
+    let slant = [plane.y / plane.x, plane.z / plane.x];
+    let sound = plane.x > 0.0 && slant.iter().all(|slant| slant.abs() <= STEEPEST);
+    sound.then_some(slant)
+}
+
+/// A patch of zero mean and unit length, and what it was before.
+struct Patch {
+    values: [f64; PATCH],
+    mean: f64,
+    deviation: f64,
+}
+
+impl Patch {
+    /// Of a value at each offset from its middle.
+    fn of(value: impl Fn([f64; 2]) -> Option<f64>) -> Option<Self> {
+        let mut values = [0.0; PATCH];
+        let mut offsets = (-REACH..=REACH).flat_map(|y| (-REACH..=REACH).map(move |x| [x, y]));
+        for to in &mut values {
+            *to = value(offsets.next()?.map(f64::from))?;
+        }
+        let mean = values.iter().sum::<f64>() / PATCH as f64;
+        let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+        let length = squares.sqrt().max(f64::MIN_POSITIVE);
+        values
+            .iter_mut()
+            .for_each(|value| *value = (*value - mean) / length);
+        let deviation = (squares / PATCH as f64).sqrt();
+        Some(Self {
+            values,
+            mean,
+            deviation,
+        })
+    }
+
+    fn correlation(&self, other: &Self) -> f64 {
+        self.values
+            .iter()
+            .zip(&other.values)
+            .map(|(a, b)| a * b)
+            .sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::fixtures::{looking_along_z, photo};
+
+    /// Of ground that falls away: its depth is 4 and so much for each unit that y grows.
+    const GRADE: f64 = 1.5;
+
+    fn photos() -> Vec<SmallPhoto> {
+        let texture = |x: f64, y: f64| {
+            let wave = (25.0 * x).sin() + (31.0 * y + 9.0 * x).sin() + (17.0 * x - 23.0 * y).cos();
+            (128.0 + 35.0 * wave) as u8
+        };
+        let shoot = |center: DVec3| {
+            let camera = looking_along_z(center, 160);
+            let show = |u: u32, v: u32| {
+                let [right, down] = [f64::from(u) - 79.5, f64::from(v) - 79.5].map(|at| at / 160.0);
+                let depth = (4.0 + GRADE * center.y) / (1.0 - GRADE * down);
+                texture(center.x + right * depth, center.y + down * depth)
+            };
+            SmallPhoto::of(camera.clone(), &photo(&camera, show))
+        };
+        let centers = [[0.0, 0.0], [-1.0, 0.2], [1.0, -0.2]];
+        centers.map(|[x, y]| shoot(DVec3::new(x, y, 0.0))).into()
+    }
+
+    /// Of the pixel in the middle.
+    const SLANT: [f64; 2] = [0.0, -GRADE / 160.0];
+    const MIDDLE: [f64; 2] = [80.5, 80.5];
+
+    #[test]
+    fn slanted_ground_agrees_better_in_its_own_plane() {
+        let photos = photos();
+        let others = [&photos[1], &photos[2]];
+        let depths = [2.5, 6.0];
+        let matched = |slants: &[_]| photos[0].matched(MIDDLE, depths, slants, &others).unwrap();
+        let [facing, slanted] = [matched(&[[0.0; 2]]), matched(&[[0.0; 2], SLANT])];
+        assert!(slanted.score > 0.95, "{}", slanted.score);
+        assert!(slanted.score > facing.score + 0.02, "{}", facing.score);
+        let off = slanted.surface.depth / 4.0 - 1.0;
+        assert!(off.abs() < 0.02, "{off}");
+        assert!(photos[0].found_back(&slanted, depths, &others));
+    }
+
+    #[test]
+    fn a_depth_that_no_other_photo_finds_is_none() {
+        let photos = photos();
+        let others = [&photos[1], &photos[2]];
+        let depths = [2.5, 6.0];
+        let mut found = photos[0]
+            .matched(MIDDLE, depths, &[SLANT], &others)
+            .unwrap();
+        for wrong in [0.9, 1.1] {
+            let depth = found.surface.depth;
+            found.surface.depth *= wrong;
+            assert!(!photos[0].found_back(&found, depths, &others), "{wrong}");
+            found.surface.depth = depth;
+        }
+    }
+
+    #[test]
+    fn the_slant_of_points_is_their_planes() {
+        let point = |[u, v]: [f64; 2]| [u, v, 1.0 / (0.25 * (1.0 + 0.01 * u - 0.02 * v))];
+        let around = [[-3.0, 5.0], [4.0, 1.0], [-2.0, -6.0], [7.0, 3.0]];
+        let [right, down] = slant_through(around.iter().copied().map(point)).unwrap();
+        assert!((right - 0.01).abs() < 1e-12 && (down + 0.02).abs() < 1e-12);
+        // One line holds many planes.
+        let line = [1.0, 2.0, 3.0].map(|u| point([u, 0.0]));
+        assert_eq!(slant_through(line.into_iter()), None);
+        let steep = |[u, v]: [f64; 2]| [u, v, 1.0 / (1.0 + 0.1 * u)];
+        assert_eq!(slant_through(around.iter().copied().map(steep)), None);
+        assert_eq!(slant_through(std::iter::empty()), None);
+    }
+}
