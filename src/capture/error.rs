@@ -200,6 +200,21 @@ pub enum CaptureError {
         /// What its values are.
         other_depth: String,
     },
+    /// A range holds none of the values that a photo can have.
+    #[error(
+        "{path}: has {depth} a channel, values from 0 to {white}: none lies within --normalize {},{}",
+        .range[0], .range[1]
+    )]
+    RangeBeyond {
+        /// A photo.
+        path: PathBuf,
+        /// What its values are.
+        depth: String,
+        /// The greatest of them.
+        white: f64,
+        /// Lowest and highest value of the range.
+        range: [f64; 2],
+    },
     /// The folder of masks is not there.
     #[error("{dir}: no such folder of masks")]
     NoMaskFolder {

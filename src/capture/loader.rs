@@ -66,8 +66,9 @@ impl Loader {
     /// Looks at a capture's masks and at the headers of its photos.
     ///
     /// # Errors
-    /// If the masks that the options name are not there, a photo cannot be read, or
-    /// photos whose values mean different things were to be normalized together.
+    /// If the masks that the options name are not there, a photo cannot be read, photos
+    /// whose values mean different things were to be normalized together, or the range to
+    /// normalize holds none of their values.
     pub fn open(capture: &Capture, options: &LoadOptions) -> Result<Self, CaptureError> {
         let masks = MaskFolder::open(capture, &options.masks, options.chosen.is_some())?;
         let mut loader = Self::new(options.clone());
@@ -93,6 +94,17 @@ impl Loader {
                     });
                 }
                 _ => first = Some((view, depth)),
+            }
+            if let Normalize::Range(range) = options.normalize
+                && depth != Depth::Float
+                && (range[0] >= depth.white() || range[1] <= 0.0)
+            {
+                return Err(CaptureError::RangeBeyond {
+                    path: view.image_path.clone(),
+                    depth: depth.to_string(),
+                    white: depth.white(),
+                    range,
+                });
             }
         }
         loader.options.masks = match (&masks, loader.with_alpha.is_empty()) {

@@ -125,3 +125,15 @@ fn masks_beside_the_photos_are_found_and_may_be_left_alone() {
     // What is removed is no longer there, and only then.
     assert!(splats[1] < splats[0] && splats[1] < splats[2], "{splats:?}");
 }
+
+#[test]
+fn a_range_beyond_all_values_is_refused() {
+    let place = place_with_scene();
+    for range in ["13000,23000", "-9,0"] {
+        let done = place.run(&["plan", "scene", &format!("--normalize={range}")]);
+        assert_eq!(done.code, Some(1), "{}", done.stderr);
+        let said =
+            format!("8 bits a channel, values from 0 to 255: none lies within --normalize {range}");
+        assert!(done.stderr.contains(&said), "{}", done.stderr);
+    }
+}

@@ -123,6 +123,27 @@ fn the_end_does_not_depend_on_the_start() {
     }
 }
 
+/// Steps from few pairs are short, however far the end: they do not end a coloring.
+#[test]
+fn the_first_eight_rounds_never_count_as_settled() {
+    let (luma, views) = (wall(), six_views());
+    let problem = Problem::new(&luma, &views);
+    let content = ChromaSettings {
+        settled: 1e9,
+        ..patient()
+    };
+    let mut rounds = 0;
+    let mut solver = problem.solver(&content);
+    solver
+        .run_to(ROUNDS, &mut |progress| {
+            rounds = progress.iteration;
+            ControlFlow::Continue(())
+        })
+        .unwrap();
+    // And three in a row that do.
+    assert!((11..ROUNDS).contains(&rounds), "{rounds}");
+}
+
 /// The same with a real network on the bundled photos, with a Gaussian at each of COLMAP's points;
 /// and twelve rounds are as good as many.
 #[test]
