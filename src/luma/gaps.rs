@@ -181,6 +181,7 @@ impl<'a> Gaps<'a> {
 
     /// The point on the ray of a pixel.
     fn point_at(&self, pixel: [f64; 2], neighbors: &[&SmallPhoto]) -> Option<GapPoint> {
+        self.photo.textured(pixel)?;
         let Around { depths, slant } = self.around(pixel)?;
         // It faces the camera, or lies in the plane of the points nearby.
         let slants: Vec<_> = std::iter::once([0.0; 2]).chain(slant).collect();
@@ -200,14 +201,19 @@ impl<'a> Gaps<'a> {
                 (u * u + v * v, [u, v, *depth])
             })
             .collect();
-        near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+        let nearer = |a: &(f64, _), b: &(f64, _)| a.0.total_cmp(&b.0);
+        if near.len() > PLANE {
+            near.select_nth_unstable_by(PLANE - 1, nearer);
+            near.truncate(PLANE);
+        }
+        near.sort_unstable_by(nearer);
         let (closest, _) = near.first()?;
         if near.len() < NEAREST || closest.sqrt() < GAP * self.side {
             return None;
         }
         let depths = near[..NEAREST].iter().map(|(_, [_, _, depth])| *depth);
         let [closer, beyond] = BEYOND;
-        let plane = near.iter().take(PLANE).map(|(_, point)| *point);
+        let plane = near.iter().map(|(_, point)| *point);
         Some(Around {
             depths: [
                 closer * depths.clone().fold(f64::INFINITY, f64::min),

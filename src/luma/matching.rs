@@ -98,7 +98,7 @@ impl SmallPhoto {
     }
 
     /// What is around a pixel, if it has texture.
-    fn textured(&self, [x, y]: [f64; 2]) -> Option<Patch> {
+    pub fn textured(&self, [x, y]: [f64; 2]) -> Option<Patch> {
         let patch = Patch::of(|[dx, dy]| self.between([x + dx, y + dy]))?;
         (patch.deviation >= TEXTURE).then_some(patch)
     }
@@ -251,7 +251,7 @@ pub fn slant_through(points: impl Iterator<Item = [f64; 3]>) -> Option<[f64; 2]>
 }
 
 /// A patch of zero mean and unit length, and what it was before.
-struct Patch {
+pub struct Patch {
     values: [f64; PATCH],
     mean: f64,
     deviation: f64,
