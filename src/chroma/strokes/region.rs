@@ -22,13 +22,15 @@ const STROKE: f32 = 0.25;
 /// Neighboring painted pixels that differ by less, in CIELAB units, are of one stroke.
 const ONE_COLOR: f32 = 8.0;
 
-/// Share of a stroke's pixels, at either end of what lies beneath, that tell nothing: a stroke
-/// that leaves its thing by a little does not take what lies beside it.
-const STRAY: f32 = 0.05;
+/// Share of a stroke's pixels that a pixel must be like: fewer tell nothing, as a stroke that
+/// leaves its thing by a little does not take what lies beside it.
+const ALIKE: f32 = 0.05;
 
-/// How far a pixel may leave what lies beneath the stroke before a front is slowed: of its
-/// lightness, of the mean lightness around it (both in units of `L*`), and of the logarithm of
-/// the deviation around it.
+/// Pixels of a stroke that others are compared with at most, an even choice.
+const SAMPLES: usize = 128;
+
+/// How unlike two pixels may be before a front is slowed: in lightness, in the mean lightness
+/// around them (both in units of `L*`), and in the logarithm of the deviation around them.
 const TOLERANCES: [f32; 3] = [8.0, 5.0, 0.35];
 
 /// Deviation of `L*` that noise has anyway.
@@ -40,7 +42,7 @@ const FULL: f32 = 0.8;
 /// Pixels to each side that are around one.
 const AROUND: usize = 2;
 
-/// What a pixel costs that leaves the stroke's range by one tolerance: it grows with the square.
+/// What a pixel costs that is unlike the stroke by one tolerance more: it grows with the square.
 const UNLIKE: f32 = 0.3;
 
 /// Share of the picture's diagonal that a front can run where nothing slows it.
@@ -58,11 +60,11 @@ struct Stroke {
     color: [f32; 2],
     /// Its α, but for its rim.
     strength: f32,
-    /// Lowest and highest of each feature.
-    ranges: [[f32; 2]; 3],
+    /// Of pixels beneath it, in tolerances.
+    samples: Vec<Features>,
 }
 
-/// How like a stroke's surroundings a pixel is judged by.
+/// By which pixels are alike, in [`TOLERANCES`].
 type Features = [f32; 3];
 
 /// What paint on a photo claims: α a, α b, α of each pixel, `[height, width]`; a and b are
@@ -126,7 +128,8 @@ fn features(surface: &Surface<'_>) -> Vec<Features> {
             let count = ((right - left) * (bottom - top)) as f64;
             let mean = sum(0) / count;
             let deviation = (sum(1) / count - mean * mean).max(0.0).sqrt() as f32;
-            [light[i], mean as f32, (deviation + NOISE).ln()]
+            let features = [light[i], mean as f32, (deviation + NOISE).ln()];
+            std::array::from_fn(|k| features[k] / TOLERANCES[k])
         })
         .collect()
 }
@@ -195,24 +198,22 @@ impl Stroke {
         };
         let light = mean(&|i| surface.lightness[i]);
         let color = [0, 1].map(|c| mean(&|i| colors[i].0[c]));
-        let ranges = std::array::from_fn(|k| {
-            let values = || pixels.iter().map(|&i| features[i][k]);
-            [quantile(values(), STRAY), quantile(values(), 1.0 - STRAY)]
-        });
+        let count = pixels.len().min(SAMPLES);
+        let sample = |k: usize| features[pixels[k * pixels.len() / count]];
         Self {
             color: at_middle(color, light),
             strength: quantile(pixels.iter().map(|&i| colors[i].1), FULL),
-            ranges,
+            samples: (0..count).map(sample).collect(),
         }
     }
 
-    /// By how many tolerances a pixel leaves what lies beneath the stroke.
+    /// By how many tolerances a pixel is less like what lies beneath the stroke than it may be.
     fn unlike(&self, features: &Features) -> f32 {
-        let mut most = 0.0_f32;
-        for ((&value, [low, high]), tolerance) in features.iter().zip(self.ranges).zip(TOLERANCES) {
-            most = most.max((low - value).max(value - high) / tolerance);
-        }
-        most
+        let apart = |sample: &Features| {
+            let each = features.iter().zip(sample).map(|(a, b)| (a - b).abs());
+            each.fold(0.0, f32::max)
+        };
+        (quantile(self.samples.iter().map(apart), ALIKE) - 1.0).max(0.0)
     }
 }
 
@@ -271,6 +272,8 @@ fn fronts(
     let [width, height] = surface.size;
     let each = 1.0 / (REACH * (width as f32).hypot(height as f32));
     let mut costs = vec![f32::INFINITY; owner.len()];
+    // How unlike each pixel is the stroke that came to it last: all its neighbors ask.
+    let mut known = vec![(usize::MAX, 0.0); owner.len()];
     let mut queue = BinaryHeap::new();
     for (place, &owner) in owner.iter().enumerate() {
         if owner != usize::MAX {
@@ -282,14 +285,17 @@ fn fronts(
         if cost > costs[place] {
             continue;
         }
-        let stroke = &strokes[owner[place]];
+        let stroke = owner[place];
         for (other, far) in around(surface.size, place) {
-            let unlike = stroke.unlike(&features[other]);
+            if known[other].0 != stroke {
+                known[other] = (stroke, strokes[stroke].unlike(&features[other]));
+            }
+            let unlike = known[other].1;
             let edge = edge(surface.depth[place], surface.depth[other]);
             let cost = cost + far * (each + UNLIKE * unlike * unlike) + edge;
             if cost < costs[other] && cost < 1.0 {
                 costs[other] = cost;
-                owner[other] = owner[place];
+                owner[other] = stroke;
                 queue.push(Front { cost, place: other });
             }
         }
@@ -385,6 +391,43 @@ mod tests {
             let red = claim[0] > 0.0;
             assert!(claim[2] > 0.5 && red == (x <= 15), "{x}: {claim:?}");
         }
+    }
+
+    fn unlike(beneath: &[(Features, usize)], pixel: Features) -> f32 {
+        let in_tolerances = |of: Features| std::array::from_fn(|k| of[k] / TOLERANCES[k]);
+        let samples = beneath
+            .iter()
+            .flat_map(|&(of, n)| vec![in_tolerances(of); n]);
+        let stroke = Stroke {
+            color: RED,
+            strength: 1.0,
+            samples: samples.collect(),
+        };
+        stroke.unlike(&in_tolerances(pixel))
+    }
+
+    const DARK_AND_SMOOTH: Features = [20.0, 20.0, 0.7];
+    const LIGHT_AND_ROUGH: Features = [70.0, 70.0, 2.5];
+
+    #[test]
+    fn what_lies_beneath_is_not_mixed() {
+        let both = [(DARK_AND_SMOOTH, 60), (LIGHT_AND_ROUGH, 60)];
+        assert_eq!(unlike(&both, DARK_AND_SMOOTH), 0.0);
+        assert_eq!(unlike(&both, LIGHT_AND_ROUGH), 0.0);
+        assert!(unlike(&both, [70.0, 70.0, 0.7]) > 2.0);
+        assert!(unlike(&both, [45.0, 45.0, 1.6]) > 1.0);
+    }
+
+    #[test]
+    fn a_stroke_that_leaves_its_thing_by_a_little_does_not_take_what_lies_beside() {
+        let astray = |n| {
+            unlike(
+                &[(DARK_AND_SMOOTH, 100), (LIGHT_AND_ROUGH, n)],
+                LIGHT_AND_ROUGH,
+            )
+        };
+        assert!(astray(3) > 2.0);
+        assert_eq!(astray(20), 0.0);
     }
 
     #[test]
