@@ -213,14 +213,25 @@ impl Stroke {
             let each = features.iter().zip(sample).map(|(a, b)| (a - b).abs());
             each.fold(0.0, f32::max)
         };
+        // Most pixels that a front comes to are like enough of the first few.
+        let enough = place_of(ALIKE, self.samples.len()) + 1;
+        let alike = self.samples.iter().filter(|sample| apart(sample) <= 1.0);
+        if alike.take(enough).count() == enough {
+            return 0.0;
+        }
         (quantile(self.samples.iter().map(apart), ALIKE) - 1.0).max(0.0)
     }
+}
+
+/// Place of the value in `count` sorted ones below which this share of them lies.
+fn place_of(share: f32, count: usize) -> usize {
+    (share * (count - 1) as f32).round() as usize
 }
 
 /// The value below which this share of some lies; there is one at least.
 fn quantile(values: impl Iterator<Item = f32>, share: f32) -> f32 {
     let mut values: Vec<f32> = values.collect();
-    let at = (share * (values.len() - 1) as f32).round() as usize;
+    let at = place_of(share, values.len());
     *values.select_nth_unstable_by(at, f32::total_cmp).1
 }
 
