@@ -213,7 +213,7 @@ impl Stroke {
             let each = features.iter().zip(sample).map(|(a, b)| (a - b).abs());
             each.fold(0.0, f32::max)
         };
-        // Most pixels that a front comes to are like enough of the first few.
+        // Most pixels that a front comes to are found alike after a few samples.
         let enough = place_of(ALIKE, self.samples.len()) + 1;
         let alike = self.samples.iter().filter(|sample| apart(sample) <= 1.0);
         if alike.take(enough).count() == enough {
