@@ -2,12 +2,21 @@
 
 use super::program::Place;
 
+/// Its JSON is read in tests/portable.
 #[test]
 fn doctor_says_what_the_device_is_and_that_every_case_holds() {
-    let diagnosis = Place::new().json(&["doctor", "--json"]);
-    assert!(!diagnosis["adapter"].as_str().unwrap().is_empty());
-    assert!(diagnosis["max_binding_bytes"].as_u64().unwrap() >= 1 << 27);
-    let kernels = diagnosis["kernels"].as_array().unwrap();
+    let words = Place::new().succeed(&["doctor"]);
+    let first = words.lines().next().unwrap();
+    assert!(first.starts_with("adapter: "), "{first}");
+    // Two tables: kernels, then hard cases.
+    let tables: Vec<Vec<&str>> = words
+        .split("\n\n")
+        .map(|part| part.lines().filter(|line| line.starts_with("| ")).collect())
+        .filter(|rows: &Vec<&str>| !rows.is_empty())
+        .collect();
+    let [kernels, cases] = &tables[..] else {
+        panic!("{words}");
+    };
     for kernel in [
         "project",
         "sort",
@@ -16,31 +25,16 @@ fn doctor_says_what_the_device_is_and_that_every_case_holds() {
         "chroma_loss",
         "adam",
     ] {
+        let row = format!("| {kernel} | ");
         assert!(
-            kernels.iter().any(|row| row["kernel"] == kernel),
+            kernels.iter().any(|line| line.starts_with(&row)),
             "{kernel}"
         );
     }
-    for row in kernels {
-        assert!(row["failures"].as_array().unwrap().is_empty(), "{row}");
+    assert!(kernels.len() > 28 && cases.len() > 50);
+    for row in kernels[1..].iter().chain(&cases[1..]) {
+        assert!(row.ends_with(" holds |"), "{row}");
     }
-    let cases = diagnosis["cases"].as_array().unwrap();
-    assert!(cases.len() >= 50);
-    for case in cases {
-        assert!(case["failure"].is_null(), "{case}");
-        let [error, bound] = ["gradient_error", "gradient_bound"].map(|key| case[key].as_f64());
-        assert!(error.unwrap() <= bound.unwrap(), "{case}");
-    }
-}
-
-#[test]
-fn doctor_in_words() {
-    let words = Place::new().succeed(&["doctor"]);
-    let first = words.lines().next().unwrap();
-    assert!(first.starts_with("adapter: "), "{first}");
-    assert!(
-        words.contains("| needle | ") && words.contains("| sort | ") && words.contains(" holds |")
-    );
 }
 
 #[test]

@@ -5,7 +5,7 @@ use super::program::{Done, Place, files_below};
 use super::shared::{onnx, place_with_run};
 
 /// Successes in a row after which no step is left to fail.
-const ENOUGH: usize = 3;
+const ENOUGH: usize = 2;
 
 /// Runs a command with each of its steps of writing failing in turn, alone or with all that
 /// follow. Files in `kept` belong together: all are as they were, or all as a whole command
@@ -53,8 +53,8 @@ fn every_write_fails_well(arguments: &[&str], kept: &[&str], made: &[&str]) {
             if in_a_row == ENOUGH {
                 break;
             }
-            // The first steps one by one, then every third of those before.
-            step += if every { 1 } else { (step / 3).max(1) };
+            // The first steps one by one, then half as many again.
+            step += if every { 1 } else { (step / 2).max(1) };
         }
         assert!(struck > 2, "{arguments:?}: {struck}");
         println!("{arguments:?}: {struck} of {step} steps{lasts} failed");

@@ -24,7 +24,7 @@ const LAWN: [(&str, [u32; 4]); 2] = [
 fn garden(place: &Place) {
     let photos = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/demo");
     let fit = ["fit", photos, "-o", "runs/garden", "--preset", "draft"];
-    let short = ["--iterations", "250", "--max-side", "216"];
+    let short = ["--iterations", "250", "--max-side", "162"];
     place.succeed(&[&fit[..], &short].concat());
 }
 
@@ -56,7 +56,8 @@ fn colored(place: &Place, arguments: &[&str]) -> [[[f64; 2]; 2]; 2] {
         "/assets/teacher/demo-teacher.onnx"
     );
     let colorize = ["colorize", "runs/garden", "--teacher", teacher];
-    place.succeed(&[&colorize[..], arguments].concat());
+    let short = ["--rounds", "6"];
+    place.succeed(&[&colorize[..], &short, arguments].concat());
     let _ = fs::remove_dir_all(place.path("views"));
     place.succeed(&["render", "runs/garden", "--views", "all", "-o", "views"]);
     [PUMPKIN, LAWN].map(|boxes| boxes.map(|(view, area)| mean_ab(place, "views", view, area)))
