@@ -11,8 +11,8 @@ import package::common::numeric::{is_within, linear_group};
 @group(0) @binding(5) var<storage, read_write> second_moment: array<f32>;
 
 @compute @workgroup_size(256)
-fn adam(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
-    let k = linear_group(group, groups) * 256u + local;
+fn adam(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
+    let k = linear_group(group) * 256u + local;
     // After an overflow nothing moves until the host has grown the buffers and
     // repeats the iteration.
     if k >= parameters.splat_count * parameters.planes || atomicLoad(&status[STATUS_OVERFLOW]) != 0u {

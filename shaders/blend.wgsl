@@ -36,8 +36,8 @@ var<workgroup> drawing: atomic<u32>;
 var<workgroup> uniform_drawing: u32;
 
 @compute @workgroup_size(16, 4)
-fn blend(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_id) local: vec3u, @builtin(local_invocation_index) thread: u32) {
-    let tile = portion.first + linear_group(group, groups);
+fn blend(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_id) local: vec3u, @builtin(local_invocation_index) thread: u32) {
+    let tile = portion.first + linear_group(group);
     if tile >= view.tiles.x * view.tiles.y {
         return;
     }

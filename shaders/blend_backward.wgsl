@@ -179,8 +179,8 @@ fn figure_sum(member: u32, figure: u32) -> f32 {
 }
 
 @compute @workgroup_size(THREADS)
-fn blend_backward(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) thread: u32) {
-    let tile = portion.first + linear_group(group, groups);
+fn blend_backward(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) thread: u32) {
+    let tile = portion.first + linear_group(group);
     if tile >= view.tiles.x * view.tiles.y {
         return;
     }

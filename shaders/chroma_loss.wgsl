@@ -71,8 +71,8 @@ fn penalty(residual: vec2f, decline: f32, joint: bool) -> Penalty {
 }
 
 @compute @workgroup_size(256)
-fn chroma_loss(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
-    let block = linear_group(group, groups);
+fn chroma_loss(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
+    let block = linear_group(group);
     let p = block * 256u + local;
     let pixels = view.size.x * view.size.y;
     losses[local] = 0.0;

@@ -12,8 +12,8 @@ import package::common::view::View;
 @group(0) @binding(5) var<storage, read_write> values: array<u32>;
 
 @compute @workgroup_size(256)
-fn compact(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
-    let i = linear_group(group, groups) * 256u + local;
+fn compact(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
+    let i = linear_group(group) * 256u + local;
     if i >= view.splat_count {
         return;
     }

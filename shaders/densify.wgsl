@@ -30,8 +30,8 @@ struct DensifyParameters {
 
 // Geometry `[11, N]`.
 @compute @workgroup_size(256)
-fn densify_geometry(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
-    let j = linear_group(group, groups) * 256u + local;
+fn densify_geometry(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
+    let j = linear_group(group) * 256u + local;
     if j >= parameters.new_count {
         return;
     }
@@ -59,8 +59,8 @@ fn densify_geometry(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups
 
 // Spherical harmonics `[planes, N]`.
 @compute @workgroup_size(256)
-fn densify_sh(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
-    let j = linear_group(group, groups) * 256u + local;
+fn densify_sh(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
+    let j = linear_group(group) * 256u + local;
     if j >= parameters.new_count {
         return;
     }
@@ -71,8 +71,8 @@ fn densify_sh(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) grou
 
 // Moments `[planes, N]` of either.
 @compute @workgroup_size(256)
-fn densify_moments(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
-    let j = linear_group(group, groups) * 256u + local;
+fn densify_moments(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
+    let j = linear_group(group) * 256u + local;
     if j >= parameters.new_count {
         return;
     }

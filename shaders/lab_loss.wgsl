@@ -89,8 +89,8 @@ fn total_variation(p: u32) -> Distance {
 }
 
 @compute @workgroup_size(256)
-fn lab_loss(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
-    let block = linear_group(group, groups);
+fn lab_loss(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
+    let block = linear_group(group);
     let p = block * 256u + local;
     let pixels = view.size.x * view.size.y;
     losses[local] = 0.0;

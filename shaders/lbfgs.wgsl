@@ -182,8 +182,8 @@ fn of_channel(k: u32) -> u32 {
 
 // The parts of ridge and anchors in the gradient, and partial sums of theirs in the loss.
 @compute @workgroup_size(256)
-fn lbfgs_ridge(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
-    let block = linear_group(group, groups);
+fn lbfgs_ridge(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
+    let block = linear_group(group);
     let k = block * 256u + local;
     var own = 0.0;
     if k < parameters.length {
@@ -243,8 +243,8 @@ fn lbfgs_judge(@builtin(local_invocation_index) local: u32) {
 // Keeps an accepted point and how it differs from the one before; goes back to that from
 // any other.
 @compute @workgroup_size(256)
-fn lbfgs_pair(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
-    let k = linear_group(group, groups) * 256u + local;
+fn lbfgs_pair(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
+    let k = linear_group(group) * 256u + local;
     if k >= parameters.length {
         return;
     }
@@ -262,8 +262,8 @@ fn lbfgs_pair(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) grou
 // Anchors the unknowns at the accepted point, where `diagonal` is of it still. Neither the loss
 // there changes nor its gradient.
 @compute @workgroup_size(256)
-fn lbfgs_anchor(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
-    let k = linear_group(group, groups) * 256u + local;
+fn lbfgs_anchor(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
+    let k = linear_group(group) * 256u + local;
     if k < parameters.length {
         anchors[k] = accepted_unknowns[k];
         if k < parameters.diagonals * parameters.splats {
@@ -275,8 +275,8 @@ fn lbfgs_anchor(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) gr
 // Partial sums of how far the unknowns went, and of what they are weighed by: as Gaussians
 // are drawn, and as the loss weighs the pixels.
 @compute @workgroup_size(256)
-fn lbfgs_moved(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
-    let block = linear_group(group, groups);
+fn lbfgs_moved(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
+    let block = linear_group(group);
     let k = block * 256u + local;
     var moved = 0.0;
     var weight = 0.0;
@@ -305,8 +305,8 @@ fn lbfgs_mean(@builtin(local_invocation_index) local: u32) {
 
 // What is held, and the gradient of the rest as the direction to begin with.
 @compute @workgroup_size(256)
-fn lbfgs_begin(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
-    let k = linear_group(group, groups) * 256u + local;
+fn lbfgs_begin(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
+    let k = linear_group(group) * 256u + local;
     if k >= parameters.length || scalars[NEXT] == SHORTER {
         return;
     }
@@ -319,8 +319,8 @@ fn lbfgs_begin(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) gro
 
 // Partial sums of a scalar product.
 @compute @workgroup_size(256)
-fn lbfgs_dot(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
-    let block = linear_group(group, groups);
+fn lbfgs_dot(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
+    let block = linear_group(group);
     let k = block * 256u + local;
     var own = 0.0;
     if k < parameters.length {
@@ -340,8 +340,8 @@ fn lbfgs_curvature(@builtin(local_invocation_index) local: u32) {
 
 // Partial sums of change · inverse diagonal · change.
 @compute @workgroup_size(256)
-fn lbfgs_spread(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
-    let block = linear_group(group, groups);
+fn lbfgs_spread(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
+    let block = linear_group(group);
     let k = block * 256u + local;
     var own = 0.0;
     if k < parameters.length {
@@ -378,8 +378,8 @@ fn lbfgs_alpha(@builtin(local_invocation_index) local: u32) {
 
 // After `lbfgs_alpha` or `lbfgs_beta`.
 @compute @workgroup_size(256)
-fn lbfgs_add(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
-    let k = linear_group(group, groups) * 256u + local;
+fn lbfgs_add(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
+    let k = linear_group(group) * 256u + local;
     if k >= parameters.length || scalars[NEXT] == SHORTER {
         return;
     }
@@ -388,8 +388,8 @@ fn lbfgs_add(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) group
 
 // Between the two passes over the pairs.
 @compute @workgroup_size(256)
-fn lbfgs_precondition(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
-    let k = linear_group(group, groups) * 256u + local;
+fn lbfgs_precondition(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
+    let k = linear_group(group) * 256u + local;
     if k >= parameters.length || scalars[NEXT] == SHORTER {
         return;
     }
@@ -416,8 +416,8 @@ fn lbfgs_slope(@builtin(local_invocation_index) local: u32) {
 
 // The step, but for what is held.
 @compute @workgroup_size(256)
-fn lbfgs_step(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
-    let k = linear_group(group, groups) * 256u + local;
+fn lbfgs_step(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
+    let k = linear_group(group) * 256u + local;
     if k < parameters.length && preconditioner[k] > 0.0 {
         unknowns[k] = max(unknowns[k] - scalars[LENGTH] * direction[k], floors[k]);
     }

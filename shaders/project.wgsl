@@ -25,8 +25,8 @@ fn plane(index: u32, i: u32) -> f32 {
 }
 
 @compute @workgroup_size(256)
-fn project(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
-    let i = linear_group(group, groups) * 256u + local;
+fn project(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
+    let i = linear_group(group) * 256u + local;
     if i >= view.splat_count {
         return;
     }

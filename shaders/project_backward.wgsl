@@ -80,8 +80,8 @@ fn log_scales(i: u32) -> vec3f {
 }
 
 @compute @workgroup_size(256)
-fn project_backward(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
-    let i = linear_group(group, groups) * 256u + local;
+fn project_backward(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
+    let i = linear_group(group) * 256u + local;
     let n = view.splat_count;
     if i >= n {
         return;

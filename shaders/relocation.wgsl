@@ -68,8 +68,8 @@ fn plane(index: u32, i: u32) -> f32 {
 }
 
 @compute @workgroup_size(256)
-fn relocation_noise(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
-    let i = linear_group(group, groups) * 256u + local;
+fn relocation_noise(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
+    let i = linear_group(group) * 256u + local;
     if i >= parameters.trained || status[STATUS_OVERFLOW] != 0u {
         return;
     }

@@ -26,8 +26,8 @@ struct RgbLossParameters {
 var<workgroup> losses: array<f32, 256>;
 
 @compute @workgroup_size(256)
-fn rgb_loss(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
-    let block = linear_group(group, groups);
+fn rgb_loss(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
+    let block = linear_group(group);
     let p = block * 256u + local;
     let pixels = view.size.x * view.size.y;
     losses[local] = 0.0;

@@ -2,13 +2,14 @@
 // The total is checked against a limit: a list that would not fit sets the
 // overflow word, is reported with what it needs, and counts as empty from there.
 import package::common::constants::{STATUS_NEEDED, STATUS_OVERFLOW};
+import package::common::groups::{Groups, SCAN_BLOCK, groups_for_count};
 import package::common::numeric::linear_group;
 
-const SCAN_BLOCK: u32 = 1024u;
 const SCAN_PER_THREAD: u32 = 4u;
 
 struct ScanParameters {
-    length: u32,
+    // Which of `elements` counts the elements to scan.
+    which: u32,
     // Status word that receives the total; 0xffffffff: none.
     total_word: u32,
     limit: u32,
@@ -18,6 +19,9 @@ struct ScanParameters {
 @group(0) @binding(1) var<storage, read_write> values: array<u32>;
 @group(0) @binding(2) var<storage, read_write> block_sums: array<u32>;
 @group(0) @binding(3) var<storage, read_write> status: array<u32>;
+@group(0) @binding(4) var<storage, read> elements: array<Groups, 4>;
+// The workgroups for as many elements as the total says.
+@group(0) @binding(5) var<storage, read_write> total: array<Groups, 4>;
 
 var<workgroup> sums: array<u32, 256>;
 
@@ -38,22 +42,23 @@ fn exclusive_over_group(local: u32, own: u32) -> u32 {
 }
 
 @compute @workgroup_size(256)
-fn scan_reduce(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
-    let block = linear_group(group, groups);
+fn scan_reduce(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
+    let block = linear_group(group);
     let first = block * SCAN_BLOCK + local * SCAN_PER_THREAD;
     var own = 0u;
-    for (var k = first; k < min(first + SCAN_PER_THREAD, parameters.length); k++) {
+    let length = elements[parameters.which].length;
+    for (var k = first; k < min(first + SCAN_PER_THREAD, length); k++) {
         own += values[k];
     }
     let before = exclusive_over_group(local, own);
-    if local == 255u && block * SCAN_BLOCK < parameters.length {
+    if local == 255u && block * SCAN_BLOCK < length {
         block_sums[block] = before + own;
     }
 }
 
 @compute @workgroup_size(256)
 fn scan_sums(@builtin(local_invocation_index) local: u32) {
-    let blocks = (parameters.length + SCAN_BLOCK - 1u) / SCAN_BLOCK;
+    let blocks = (elements[parameters.which].length + SCAN_BLOCK - 1u) / SCAN_BLOCK;
     var carry = 0u;
     for (var first = 0u; first < blocks; first += 256u) {
         let block = first + local;
@@ -76,14 +81,15 @@ fn scan_sums(@builtin(local_invocation_index) local: u32) {
             carry = 0u;
         }
         status[parameters.total_word] = carry;
+        total = groups_for_count(carry);
     }
 }
 
 @compute @workgroup_size(256)
-fn scan_apply(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
-    let block = linear_group(group, groups);
+fn scan_apply(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
+    let block = linear_group(group);
     let first = block * SCAN_BLOCK + local * SCAN_PER_THREAD;
-    let end = min(first + SCAN_PER_THREAD, parameters.length);
+    let end = min(first + SCAN_PER_THREAD, elements[parameters.which].length);
     var own = 0u;
     for (var k = first; k < end; k++) {
         own += values[k];

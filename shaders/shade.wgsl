@@ -27,8 +27,8 @@ fn coefficient(k: u32, i: u32) -> Color {
 @if(rgb) fn drawable(c: Color) -> bool { return is_within(c.x, COLOR_MAX) && is_within(c.y, COLOR_MAX) && is_within(c.z, COLOR_MAX); }
 
 @compute @workgroup_size(256)
-fn shade(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
-    let i = linear_group(group, groups) * 256u + local;
+fn shade(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
+    let i = linear_group(group) * 256u + local;
     if i >= view.splat_count || ranks[i] == INVISIBLE {
         return;
     }

@@ -106,8 +106,8 @@ fn plane_index(k: u32, i: u32) -> u32 {
 }
 
 @compute @workgroup_size(256)
-fn shade_backward(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
-    let i = linear_group(group, groups) * 256u + local;
+fn shade_backward(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
+    let i = linear_group(group) * 256u + local;
     let n = view.splat_count;
     if i >= n {
         return;

@@ -4,21 +4,18 @@
 // A key's rank among equal digits of its round is a population count over a
 // bit mask that the workgroup sets with atomicOr: independent of the subgroup
 // size and of the order in which threads run.
+import package::common::groups::{OF_SORT, Groups, SORT_BLOCK, blocks};
 import package::common::numeric::linear_group;
 
 const SORT_ROUNDS: u32 = 8u;
-const SORT_BLOCK: u32 = 2048u;
 
 struct SortParameters {
+    // Lowest bit of this pass.
     shift: u32,
-    // Status word that holds the number of keys.
-    count_word: u32,
-    // Blocks that the histogram has room for.
-    blocks: u32,
 }
 
 @group(0) @binding(0) var<uniform> parameters: SortParameters;
-@group(0) @binding(1) var<storage, read> status: array<u32>;
+@group(0) @binding(1) var<storage, read> elements: array<Groups, 4>;
 @group(0) @binding(2) var<storage, read> keys: array<u32>;
 @group(0) @binding(3) var<storage, read> values: array<u32>;
 // `[256, blocks]`.
@@ -32,12 +29,12 @@ var<workgroup> bases: array<u32, 256>;
 var<workgroup> masks: array<atomic<u32>, 2048>;
 
 @compute @workgroup_size(256)
-fn sort_count(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
-    let block = linear_group(group, groups);
-    if block >= parameters.blocks {
+fn sort_count(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
+    let block = linear_group(group);
+    let count = elements[OF_SORT].length;
+    if block * SORT_BLOCK >= count {
         return;
     }
-    let count = status[parameters.count_word];
     atomicStore(&counts[local], 0u);
     workgroupBarrier();
     for (var round = 0u; round < SORT_ROUNDS; round++) {
@@ -47,17 +44,17 @@ fn sort_count(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) grou
         }
     }
     workgroupBarrier();
-    histogram[local * parameters.blocks + block] = atomicLoad(&counts[local]);
+    histogram[local * blocks(count, SORT_BLOCK) + block] = atomicLoad(&counts[local]);
 }
 
 @compute @workgroup_size(256)
-fn sort_scatter(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
-    let block = linear_group(group, groups);
-    let count = status[parameters.count_word];
-    if block >= parameters.blocks || block * SORT_BLOCK >= count {
+fn sort_scatter(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
+    let block = linear_group(group);
+    let count = elements[OF_SORT].length;
+    if block * SORT_BLOCK >= count {
         return;
     }
-    bases[local] = histogram[local * parameters.blocks + block];
+    bases[local] = histogram[local * blocks(count, SORT_BLOCK) + block];
     for (var word = 0u; word < 8u; word++) {
         atomicStore(&masks[word * 256u + local], 0u);
     }

@@ -24,8 +24,8 @@ const MANY: u32 = 32u;
 @if(half) fn figures(at: u32) -> vec2f { return unpacked(partials[at]); }
 
 @compute @workgroup_size(256)
-fn sum_instances(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
-    let rank = linear_group(group, groups) * 256u + local;
+fn sum_instances(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
+    let rank = linear_group(group) * 256u + local;
     if rank >= status[STATUS_VISIBLE] {
         return;
     }

@@ -30,16 +30,10 @@ fn reaches(splat: Projected, cutoff: f32, tile: vec2u) -> bool {
 }
 
 @compute @workgroup_size(256)
-fn tile_lists(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
-    let rank = linear_group(group, groups) * 256u + local;
-    if rank >= view.splat_count {
-        return;
-    }
+fn tile_lists(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
+    let rank = linear_group(group) * 256u + local;
     let emitting = mode.emit == 1u;
     if rank >= status[STATUS_VISIBLE] || (emitting && status[STATUS_INSTANCES] == 0u) {
-        if !emitting {
-            offsets[rank] = 0u;
-        }
         return;
     }
     let i = order[rank];

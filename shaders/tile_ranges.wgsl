@@ -11,8 +11,8 @@ import package::common::view::View;
 @group(0) @binding(3) var<storage, read_write> starts: array<u32>;
 
 @compute @workgroup_size(256)
-fn tile_ranges(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
-    let tile = linear_group(group, groups) * 256u + local;
+fn tile_ranges(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
+    let tile = linear_group(group) * 256u + local;
     if tile > view.tiles.x * view.tiles.y {
         return;
     }

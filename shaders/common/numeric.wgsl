@@ -22,7 +22,11 @@ fn sigmoid(x: f32) -> f32 {
     return 1.0 / (1.0 + exp(-x));
 }
 
-// The workgroup's number when a dispatch had to be folded into two dimensions.
-fn linear_group(group: vec3u, groups: vec3u) -> u32 {
-    return group.x + group.y * groups.x;
+// The most workgroups of a dispatch in one dimension (WebGPU's limit).
+const MAX_GROUPS: u32 = 65535u;
+
+// The workgroup's number: dispatches of more than a row are folded into rows of MAX_GROUPS.
+// `num_workgroups` would not do, which Direct3D 12 does not know of indirect dispatches.
+fn linear_group(group: vec3u) -> u32 {
+    return group.x + group.y * MAX_GROUPS;
 }

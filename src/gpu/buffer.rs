@@ -44,6 +44,15 @@ impl<T: Pod> Buffer<T> {
         Ok(buffer)
     }
 
+    /// A buffer of zeros that tells dispatches how many workgroups run.
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`] when the adapter cannot bind it.
+    pub fn indirect(gpu: &Gpu, label: &str, len: usize) -> Result<Self, GpuError> {
+        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT;
+        Self::with_usage(gpu, label, len, usage)
+    }
+
     /// A buffer that timestamps are resolved into.
     pub(super) fn for_queries(gpu: &Gpu, label: &str, len: usize) -> Result<Self, GpuError> {
         Self::with_usage(gpu, label, len, wgpu::BufferUsages::QUERY_RESOLVE)

@@ -171,7 +171,8 @@ impl Gpu {
     /// [`GpuError::NoAdapter`], [`GpuError::NoSuchAdapter`] or [`GpuError::NoDevice`].
     pub fn open() -> Result<Self, GpuError> {
         let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
-        // No kernel here is dispatched indirectly, and the checks cost at every submission.
+        // What is dispatched indirectly is folded below the limits by the kernel that counts it
+        // (`shaders/common/groups.wgsl`); the check would put a kernel before each dispatch.
         descriptor
             .flags
             .remove(wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL);

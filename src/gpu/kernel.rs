@@ -7,12 +7,26 @@ use super::{Gpu, stopwatch::Timing, tape::Step};
 /// Threads in a workgroup of the kernels that give a thread to each element.
 const LINEAR_WORKGROUP: u32 = 256;
 
-/// WebGPU's limit on workgroups in one dimension.
-const MAX_GROUPS: u32 = 65_535;
+/// WebGPU's limit on workgroups in one dimension; `shaders/common/numeric.wgsl` has it too.
+pub const MAX_GROUPS: u32 = 65_535;
 
 /// Workgroups that cover `elements` at one thread each.
 pub fn groups_for(elements: usize) -> u32 {
     u32::try_from(elements.div_ceil(LINEAR_WORKGROUP as usize)).unwrap_or(u32::MAX)
+}
+
+/// So many workgroups in rows of at most [`MAX_GROUPS`].
+pub fn folded(groups: u32) -> [u32; 2] {
+    [groups.min(MAX_GROUPS), groups.div_ceil(MAX_GROUPS)]
+}
+
+/// How many workgroups run.
+#[derive(Clone, Copy)]
+enum Groups<'a> {
+    /// A grid.
+    Grid([u32; 2]),
+    /// What stands in a buffer from so many bytes on.
+    Indirect(&'a wgpu::Buffer, u64),
 }
 
 /// One compiled entry point; clones share it.
@@ -174,28 +188,42 @@ impl Recorder {
     /// Runs `groups` workgroups, folded into two dimensions where one is too
     /// short; kernels see the linear number and check it against their length.
     pub fn dispatch(&mut self, kernel: &Kernel, bindings: &Bindings, groups: u32) {
-        if groups == 0 {
-            return;
+        if groups > 0 {
+            self.run(kernel, bindings, Groups::Grid(folded(groups)));
         }
-        let rows = groups.div_ceil(MAX_GROUPS);
-        self.dispatch_grid(kernel, bindings, groups.div_ceil(rows), rows);
     }
 
     /// Runs a grid of workgroups.
     pub fn dispatch_grid(&mut self, kernel: &Kernel, bindings: &Bindings, x: u32, y: u32) {
+        self.run(kernel, bindings, Groups::Grid([x, y]));
+    }
+
+    /// Runs as many workgroups as stand in `counts` from `offset` bytes on: three words, [`folded`]
+    /// and 1. The kernel may read `counts`, but not write them.
+    pub fn dispatch_indirect(
+        &mut self,
+        kernel: &Kernel,
+        bindings: &Bindings,
+        counts: &wgpu::Buffer,
+        offset: u64,
+    ) {
+        self.run(kernel, bindings, Groups::Indirect(counts, offset));
+    }
+
+    fn run(&mut self, kernel: &Kernel, bindings: &Bindings, groups: Groups<'_>) {
         let timing = match self.gpu.stopwatch() {
             Some(mut stopwatch) => stopwatch.claim(kernel.name),
             None => Timing::None,
         };
         match timing {
-            Timing::None => self.record(kernel, bindings, [x, y]),
+            Timing::None => self.record(kernel, bindings, groups),
             Timing::Device(queries, first) => {
                 self.pass = Some(self.begin(Some(wgpu::ComputePassTimestampWrites {
                     query_set: &queries,
                     beginning_of_pass_write_index: Some(first),
                     end_of_pass_write_index: Some(first + 1),
                 })));
-                self.record(kernel, bindings, [x, y]);
+                self.record(kernel, bindings, groups);
                 self.pass = None;
             }
             Timing::Host => {
@@ -203,7 +231,7 @@ impl Recorder {
                 // A lost device shows at the next read-back.
                 let _ = self.gpu.wait();
                 let begun = Instant::now();
-                self.record(kernel, bindings, [x, y]);
+                self.record(kernel, bindings, groups);
                 self.flush();
                 let _ = self.gpu.wait();
                 if let Some(mut stopwatch) = self.gpu.stopwatch() {
@@ -226,10 +254,17 @@ impl Recorder {
             .forget_lifetime()
     }
 
-    fn record(&mut self, kernel: &Kernel, bindings: &Bindings, [x, y]: [u32; 2]) {
+    fn record(&mut self, kernel: &Kernel, bindings: &Bindings, groups: Groups<'_>) {
         if let Some(mut tape) = self.gpu.tape() {
-            let step = tape.dispatch(kernel, &bindings.buffers, [x, y]);
-            self.noted.push(step);
+            let ran = tape.ran(kernel, &bindings.buffers);
+            self.noted.push(match groups {
+                Groups::Grid(groups) => Step::Dispatch { ran, groups },
+                Groups::Indirect(counts, offset) => Step::DispatchIndirect {
+                    ran,
+                    counts: tape.number(counts),
+                    offset,
+                },
+            });
         }
         let mut pass = match self.pass.take() {
             Some(pass) => pass,
@@ -237,7 +272,10 @@ impl Recorder {
         };
         pass.set_pipeline(&kernel.pipeline);
         pass.set_bind_group(0, &bindings.group, &[]);
-        pass.dispatch_workgroups(x, y, 1);
+        match groups {
+            Groups::Grid([x, y]) => pass.dispatch_workgroups(x, y, 1),
+            Groups::Indirect(counts, offset) => pass.dispatch_workgroups_indirect(counts, offset),
+        }
         self.pass = Some(pass);
     }
 

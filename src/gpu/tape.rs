@@ -44,12 +44,21 @@ pub enum Step {
     },
     /// Run a grid of workgroups.
     Dispatch {
-        /// The kernel.
-        kernel: usize,
-        /// Bindings of group 0 and their buffers.
-        bindings: Vec<(u32, usize)>,
+        /// Of what.
+        #[serde(flatten)]
+        ran: Ran,
         /// Workgroups along x and y.
         groups: [u32; 2],
+    },
+    /// Run as many workgroups as a buffer says.
+    DispatchIndirect {
+        /// Of what.
+        #[serde(flatten)]
+        ran: Ran,
+        /// The buffer.
+        counts: usize,
+        /// Where in the buffer, in bytes.
+        offset: u64,
     },
     /// Copy the front of a buffer to the front of another.
     Copy {
@@ -72,6 +81,15 @@ pub enum Step {
         /// Bytes.
         size: u64,
     },
+}
+
+/// A kernel and its buffers.
+#[derive(Clone, Debug, Serialize)]
+pub struct Ran {
+    /// The kernel.
+    pub kernel: usize,
+    /// Bindings of group 0 and their buffers.
+    pub bindings: Vec<(u32, usize)>,
 }
 
 /// A recording, in order.
@@ -110,13 +128,8 @@ impl Tape {
         self.steps.push(Step::Read { buffer, size });
     }
 
-    /// A dispatch, to be [`Self::submitted`] with what is recorded beside it.
-    pub(super) fn dispatch(
-        &mut self,
-        kernel: &Kernel,
-        buffers: &[(u32, wgpu::Buffer)],
-        groups: [u32; 2],
-    ) -> Step {
+    /// What a dispatch runs; the step is to be [`Self::submitted`] with what is recorded beside it.
+    pub(super) fn ran(&mut self, kernel: &Kernel, buffers: &[(u32, wgpu::Buffer)]) -> Ran {
         let next = self.kernels.len();
         let kernel = match self.kernels.get(&kernel.pipeline) {
             Some(&known) => known,
@@ -131,10 +144,9 @@ impl Tape {
             }
         };
         let bindings = (buffers.iter()).map(|(binding, buffer)| (*binding, self.number(buffer)));
-        Step::Dispatch {
+        Ran {
             kernel,
             bindings: bindings.collect(),
-            groups,
         }
     }
 
@@ -152,7 +164,7 @@ impl Tape {
         self.steps.extend(recorded);
     }
 
-    fn number(&self, buffer: &wgpu::Buffer) -> usize {
+    pub(super) fn number(&self, buffer: &wgpu::Buffer) -> usize {
         // A buffer made before the tape began would be missing; none of a taped device is.
         self.buffers[buffer]
     }

@@ -4,6 +4,7 @@
 use super::{
     ColorKind, Falloff, Raster, StepBuffers, Storage,
     constants::*,
+    groups::{Count, Work},
     layer::Layer,
     lists::Lists,
     portions::TileBindings,
@@ -80,6 +81,7 @@ impl AdjointScratch {
 pub(super) struct BlendAdjoint {
     pub(super) scratch: AdjointScratch,
     pub(super) count: usize,
+    visible: Count,
     blend: TileBindings,
     sum: Bindings,
 }
@@ -118,6 +120,7 @@ impl BlendAdjoint {
         Self {
             blend: (lists.portions).bind(gpu, blend, &of_blend, 10, layer.max_tiles),
             sum: sum.bind(gpu, &of_sum),
+            visible: lists.visible.clone(),
             scratch,
             count: geometry.count,
         }
@@ -125,7 +128,8 @@ impl BlendAdjoint {
 
     pub(super) fn record(&self, [blend, sum]: [&Kernel; 2], recorder: &mut Recorder) {
         self.blend.record(blend, recorder);
-        recorder.dispatch(sum, &self.sum, groups_for(self.count));
+        self.visible
+            .dispatch(Work::Thread, sum, &self.sum, recorder);
     }
 }
 

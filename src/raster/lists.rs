@@ -4,8 +4,14 @@
 use bytemuck::{Pod, Zeroable};
 
 use super::{
-    Raster, RasterNumerics, constants::*, portions::Portions, scan::Scan, sort::Sort,
-    splats::Geometry, view::ViewUniform,
+    Raster, RasterNumerics,
+    constants::*,
+    groups::{Count, Work},
+    portions::Portions,
+    scan::{Scan, Total},
+    sort::Sort,
+    splats::Geometry,
+    view::ViewUniform,
 };
 use crate::gpu::{
     Bindings, Buffer, Gpu, GpuError, Kernel, Readback, Recorder, groups_for, shaders,
@@ -108,12 +114,14 @@ pub struct Lists {
     pub ranks: Buffer<u32>,
     /// The status words.
     pub status: Buffer<u32>,
-    /// First list entry of each rank, `[N]`.
+    /// First list entry of each rank, `[N]`; stale beyond those in view.
     pub offsets: Buffer<u32>,
     /// Gaussian of each emission slot.
     pub instance_splats: Buffer<u32>,
     /// First sorted entry of each tile, `[tiles + 1]`.
     pub starts: Buffer<u32>,
+    /// Gaussians in view.
+    pub visible: Count,
     /// Entries that the lists have room for.
     pub capacity: usize,
     /// How dispatches over the tiles are cut.
@@ -163,12 +171,14 @@ impl Lists {
         let offsets = words("offsets", n)?;
         let instance_splats = words("instance splats", capacity)?;
         let starts = words("tile starts", max_tiles + 1)?;
+        let all = Count::new(gpu, n)?;
+        let (in_view, entries) = (Count::new(gpu, 0)?, Count::new(gpu, 0)?);
         let by_depth = Sort::new(
             gpu,
             &raster.sort,
             &raster.scan,
             &status,
-            STATUS_VISIBLE,
+            &in_view,
             n,
             32 - raster.numerics.depth_bits..32,
         )?;
@@ -178,7 +188,7 @@ impl Lists {
             &raster.sort,
             &raster.scan,
             &status,
-            STATUS_INSTANCES,
+            &entries,
             capacity,
             0..tile_bits,
         )?;
@@ -187,16 +197,24 @@ impl Lists {
             &raster.scan,
             &visible,
             &status,
-            Some(STATUS_VISIBLE),
-            n,
+            (&all, Work::Scan),
+            Some(Total {
+                word: STATUS_VISIBLE,
+                count: &in_view,
+                limit: n,
+            }),
         )?;
         let scan_offsets = Scan::new(
             gpu,
             &raster.scan,
             &offsets,
             &status,
-            Some(STATUS_INSTANCES),
-            capacity,
+            (&in_view, Work::Scan),
+            Some(Total {
+                word: STATUS_INSTANCES,
+                count: &entries,
+                limit: capacity,
+            }),
         )?;
         let kernels = &raster.lists;
         let project = raster.projection.project.bind(
@@ -258,6 +276,7 @@ impl Lists {
             offsets,
             instance_splats,
             starts,
+            visible: in_view,
             capacity,
             portions: Portions::new(gpu, max_tiles)?,
             count: n,
@@ -311,9 +330,12 @@ impl Lists {
         self.scan_visible.record(&raster.scan, recorder);
         recorder.dispatch(&kernels.compact, &self.compact, groups);
         self.by_depth.record(&raster.sort, &raster.scan, recorder);
-        recorder.dispatch(&kernels.tile_lists, &self.count_tiles, groups);
+        let tile_lists = |bindings, recorder: &mut Recorder| {
+            (self.visible).dispatch(Work::Thread, &kernels.tile_lists, bindings, recorder);
+        };
+        tile_lists(&self.count_tiles, recorder);
         self.scan_offsets.record(&raster.scan, recorder);
-        recorder.dispatch(&kernels.tile_lists, &self.emit_tiles, groups);
+        tile_lists(&self.emit_tiles, recorder);
         self.by_tile.record(&raster.sort, &raster.scan, recorder);
         recorder.dispatch(
             &kernels.tile_ranges,

@@ -9,6 +9,7 @@ mod adam;
 mod adjoint;
 pub mod constants;
 mod contributions;
+pub mod groups;
 mod kernels;
 mod layer;
 mod lists;

@@ -2,21 +2,29 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use super::groups::{Count, SCAN_BLOCK, Work};
 use crate::gpu::{Bindings, Buffer, Gpu, GpuError, Kernel, Recorder, shaders};
-
-/// Elements that one workgroup scans.
-const BLOCK: usize = 1024;
 
 /// Twin of `struct ScanParameters`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct ScanParameters {
-    /// Elements to scan.
-    pub length: u32,
+    /// Which [`Work`] the elements are those of.
+    pub which: u32,
     /// Status word for the total, `u32::MAX` for none.
     pub total_word: u32,
     /// Largest total that fits.
     pub limit: u32,
+}
+
+/// What becomes of a total.
+pub struct Total<'a> {
+    /// The status word that receives it.
+    pub word: usize,
+    /// Its workgroups.
+    pub count: &'a Count,
+    /// The largest that fits; a larger one is an overflow and counts as nothing.
+    pub limit: usize,
 }
 
 /// The three entry points.
@@ -40,14 +48,15 @@ impl ScanKernels {
 
 /// A scan tied to its buffer.
 pub struct Scan {
+    elements: (Count, Work),
     reduce: Bindings,
     sums: Bindings,
     apply: Bindings,
-    blocks: u32,
 }
 
 impl Scan {
-    /// Scans `values` in place; the total goes to `total_word` of `status`.
+    /// Scans the front of `values` in place: as many as `elements` say when it runs, those of
+    /// [`Work::Scan`] or of [`Work::Histogram`].
     ///
     /// # Errors
     /// [`GpuError::TooLarge`].
@@ -56,38 +65,43 @@ impl Scan {
         kernels: &ScanKernels,
         values: &Buffer<u32>,
         status: &Buffer<u32>,
-        total_word: Option<usize>,
-        limit: usize,
+        elements: (&Count, Work),
+        total: Option<Total<'_>>,
     ) -> Result<Self, GpuError> {
+        let (count, work) = elements;
+        let limit = total.as_ref().map_or(0, |total| total.limit);
         let parameters = Buffer::uniform(
             gpu,
             "scan parameters",
             &ScanParameters {
-                length: values.len() as u32,
-                total_word: total_word.map_or(u32::MAX, |word| word as u32),
+                which: work as u32,
+                total_word: (total.as_ref()).map_or(u32::MAX, |total| total.word as u32),
                 limit: u32::try_from(limit).unwrap_or(u32::MAX),
             },
         )?;
-        let blocks = values.len().div_ceil(BLOCK);
-        let block_sums = Buffer::<u32>::zeros(gpu, "scan block sums", blocks)?;
-        let [p, v, b, s] = [
-            parameters.raw(),
-            values.raw(),
-            block_sums.raw(),
-            status.raw(),
-        ];
+        let block_sums =
+            Buffer::<u32>::zeros(gpu, "scan block sums", values.len().div_ceil(SCAN_BLOCK))?;
+        // Without a total nothing is written there.
+        let of_total = match &total {
+            Some(total) => total.count.clone(),
+            None => Count::new(gpu, 0)?,
+        };
+        let [p, v, b] = [parameters.raw(), values.raw(), block_sums.raw()];
+        let [s, e, t] = [status.raw(), count.groups().raw(), of_total.groups().raw()];
+        let each = [(0, p), (1, v), (2, b), (4, e)];
         Ok(Self {
-            reduce: kernels.reduce.bind(gpu, &[p, v, b]),
-            sums: kernels.sums.bind_at(gpu, &[(0, p), (2, b), (3, s)]),
-            apply: kernels.apply.bind(gpu, &[p, v, b]),
-            blocks: blocks as u32,
+            elements: (count.clone(), work),
+            reduce: kernels.reduce.bind_at(gpu, &each),
+            sums: (kernels.sums).bind_at(gpu, &[(0, p), (2, b), (3, s), (4, e), (5, t)]),
+            apply: kernels.apply.bind_at(gpu, &each),
         })
     }
 
     /// Records the scan.
     pub fn record(&self, kernels: &ScanKernels, recorder: &mut Recorder) {
-        recorder.dispatch(&kernels.reduce, &self.reduce, self.blocks);
+        let (count, work) = &self.elements;
+        count.dispatch(*work, &kernels.reduce, &self.reduce, recorder);
         recorder.dispatch(&kernels.sums, &self.sums, 1);
-        recorder.dispatch(&kernels.apply, &self.apply, self.blocks);
+        count.dispatch(*work, &kernels.apply, &self.apply, recorder);
     }
 }

@@ -4,11 +4,11 @@ use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
 
-use super::scan::{Scan, ScanKernels};
+use super::{
+    groups::{Count, DIGITS, SORT_BLOCK, Work},
+    scan::{Scan, ScanKernels},
+};
 use crate::gpu::{Bindings, Buffer, Gpu, GpuError, Kernel, Recorder, shaders};
-
-/// Keys that one workgroup handles.
-const BLOCK: usize = 2048;
 
 /// Bits sorted in one pass.
 const DIGIT_BITS: u32 = 8;
@@ -19,10 +19,6 @@ const DIGIT_BITS: u32 = 8;
 pub struct SortParameters {
     /// Lowest bit of this pass.
     pub shift: u32,
-    /// Status word that holds the number of keys.
-    pub count_word: u32,
-    /// Blocks that the histogram has room for.
-    pub blocks: u32,
 }
 
 /// The two entry points.
@@ -52,19 +48,19 @@ pub struct Sort {
     pub keys: [Buffer<u32>; 2],
     /// Values that travel with the keys.
     pub values: [Buffer<u32>; 2],
+    count: Count,
     passes: Vec<Pass>,
     scan: Scan,
-    blocks: u32,
 }
 
 impl Sort {
     /// Bytes of a sort of so many keys: twice keys and values, and the histograms.
     pub fn bytes(capacity: usize) -> u64 {
-        4 * (4 * capacity + 256 * capacity.div_ceil(BLOCK).max(1)) as u64
+        4 * (4 * capacity + DIGITS * capacity.div_ceil(SORT_BLOCK).max(1)) as u64
     }
 
-    /// A sort of at most `capacity` keys by these `bits` of theirs, 0 the lowest; how many
-    /// there are stands in `count_word` of `status`.
+    /// A sort of as many keys as `count` says when it runs, at most `capacity`, by these `bits`
+    /// of theirs, 0 the lowest.
     ///
     /// # Errors
     /// [`GpuError::TooLarge`].
@@ -73,15 +69,15 @@ impl Sort {
         kernels: &SortKernels,
         scan_kernels: &ScanKernels,
         status: &Buffer<u32>,
-        count_word: usize,
+        count: &Count,
         capacity: usize,
         bits: Range<u32>,
     ) -> Result<Self, GpuError> {
         let buffer = |label| Buffer::<u32>::zeros(gpu, label, capacity);
         let keys = [buffer("sort keys")?, buffer("sort keys, other side")?];
         let values = [buffer("sort values")?, buffer("sort values, other side")?];
-        let blocks = capacity.div_ceil(BLOCK).max(1);
-        let histogram = Buffer::<u32>::zeros(gpu, "sort histogram", 256 * blocks)?;
+        let blocks = capacity.div_ceil(SORT_BLOCK).max(1);
+        let histogram = Buffer::<u32>::zeros(gpu, "sort histogram", DIGITS * blocks)?;
         let mut passes = Vec::new();
         let passes_needed = (bits.end - bits.start).div_ceil(DIGIT_BITS).max(1);
         for pass in 0..passes_needed {
@@ -90,21 +86,19 @@ impl Sort {
                 "sort parameters",
                 &SortParameters {
                     shift: bits.start + pass * DIGIT_BITS,
-                    count_word: count_word as u32,
-                    blocks: blocks as u32,
                 },
             )?;
             let (from, to) = ((pass % 2) as usize, ((pass + 1) % 2) as usize);
-            let [p, s, h] = [parameters.raw(), status.raw(), histogram.raw()];
+            let [p, n, h] = [parameters.raw(), count.groups().raw(), histogram.raw()];
             passes.push(Pass {
                 count: kernels
                     .count
-                    .bind_at(gpu, &[(0, p), (1, s), (2, keys[from].raw()), (4, h)]),
+                    .bind_at(gpu, &[(0, p), (1, n), (2, keys[from].raw()), (4, h)]),
                 scatter: kernels.scatter.bind(
                     gpu,
                     &[
                         p,
-                        s,
+                        n,
                         keys[from].raw(),
                         values[from].raw(),
                         h,
@@ -114,13 +108,14 @@ impl Sort {
                 ),
             });
         }
-        let scan = Scan::new(gpu, scan_kernels, &histogram, status, None, 0)?;
+        let elements = (count, Work::Histogram);
+        let scan = Scan::new(gpu, scan_kernels, &histogram, status, elements, None)?;
         Ok(Self {
             keys,
             values,
+            count: count.clone(),
             passes,
             scan,
-            blocks: blocks as u32,
         })
     }
 
@@ -142,9 +137,11 @@ impl Sort {
         recorder: &mut Recorder,
     ) {
         for pass in &self.passes {
-            recorder.dispatch(&kernels.count, &pass.count, self.blocks);
+            self.count
+                .dispatch(Work::Sort, &kernels.count, &pass.count, recorder);
             self.scan.record(scan_kernels, recorder);
-            recorder.dispatch(&kernels.scatter, &pass.scatter, self.blocks);
+            self.count
+                .dispatch(Work::Sort, &kernels.scatter, &pass.scatter, recorder);
         }
     }
 }

@@ -15,7 +15,7 @@ use gs_chroma::{
     },
     raster::{
         AdamParameters, Portion, Projected, SumLossParameters, TileListsMode, ViewUniform,
-        constants, scan::ScanParameters, sort::SortParameters,
+        constants, groups::Groups, scan::ScanParameters, sort::SortParameters,
     },
 };
 use naga::{
@@ -94,18 +94,13 @@ fn twins() -> Vec<Twin> {
         ),
         twin!(
             "ScanParameters" = ScanParameters {
-                length,
+                which,
                 total_word,
                 limit
             }
         ),
-        twin!(
-            "SortParameters" = SortParameters {
-                shift,
-                count_word,
-                blocks
-            }
-        ),
+        twin!("SortParameters" = SortParameters { shift }),
+        twin!("Groups" = Groups { counts, length }),
         twin!("TileListsMode" = TileListsMode { emit }),
         twin!("Portion" = Portion { first }),
         twin!(

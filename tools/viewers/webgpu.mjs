@@ -77,7 +77,7 @@ async function play() {
   }
   const seconds = { compiling: (performance.now() - begun) / 1000 };
 
-  const { STORAGE, UNIFORM, COPY_SRC, COPY_DST, MAP_READ } = GPUBufferUsage;
+  const { STORAGE, INDIRECT, UNIFORM, COPY_SRC, COPY_DST, MAP_READ } = GPUBufferUsage;
   const buffers = [];
   const answers = [];
   const groups = new Map();
@@ -95,7 +95,7 @@ async function play() {
   for (const step of steps) {
     switch (step.do) {
       case "buffer": {
-        const usage = (step.uniform ? UNIFORM : STORAGE) | COPY_SRC | COPY_DST;
+        const usage = (step.uniform ? UNIFORM : STORAGE | INDIRECT) | COPY_SRC | COPY_DST;
         buffers.push(device.createBuffer({ size: step.size, usage }));
         break;
       }
@@ -106,7 +106,8 @@ async function play() {
         break;
       case "kernel":
         break;
-      case "dispatch": {
+      case "dispatch":
+      case "dispatch_indirect": {
         pass ??= encoder.beginComputePass();
         const kernel = compiled[step.kernel];
         const key = `${step.kernel}:${step.bindings}`;
@@ -117,7 +118,8 @@ async function play() {
         }
         pass.setPipeline(kernel);
         pass.setBindGroup(0, groups.get(key));
-        pass.dispatchWorkgroups(...step.groups);
+        if (step.groups) pass.dispatchWorkgroups(...step.groups);
+        else pass.dispatchWorkgroupsIndirect(buffers[step.counts], step.offset);
         break;
       }
       case "copy":

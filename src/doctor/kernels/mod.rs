@@ -20,7 +20,7 @@ mod view_correction;
 mod viewer;
 
 pub use chroma_loss::{ChromaInput, ChromaOutput};
-pub use scan::scan_on;
+pub use scan::{Scanned, scan_on};
 pub use sort::sort_on;
 
 use std::sync::Arc;

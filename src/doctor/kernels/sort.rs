@@ -6,7 +6,7 @@ use crate::{
     doctor::measured::{Row, Sample},
     gpu::{Buffer, GpuError, Recorder},
     oracle::random::Random,
-    raster::{Raster, constants::*, sort::Sort},
+    raster::{Raster, constants::STATUS_WORDS, groups::Count, sort::Sort},
 };
 
 /// Makes a key of its place and a random number.
@@ -37,12 +37,10 @@ pub fn sort_on(
     bits: Range<u32>,
 ) -> Result<(Vec<u32>, Vec<u32>), GpuError> {
     let gpu = &raster.gpu;
-    let mut words = [0; STATUS_WORDS];
-    words[STATUS_VISIBLE] = count as u32;
-    let status = Buffer::from_slice(gpu, "status", &words)?;
+    let status = Buffer::zeros(gpu, "status", STATUS_WORDS)?;
     let (kernels, scan) = (raster.sort_kernels(), raster.scan_kernels());
-    let room = keys.len();
-    let sort = Sort::new(gpu, kernels, scan, &status, STATUS_VISIBLE, room, bits)?;
+    let (count_of, room) = (Count::new(gpu, count)?, keys.len());
+    let sort = Sort::new(gpu, kernels, scan, &status, &count_of, room, bits)?;
     let places: Vec<u32> = (0..room as u32).collect();
     sort.keys[0].write(gpu, keys);
     sort.values[0].write(gpu, &places);
