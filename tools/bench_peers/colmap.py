@@ -1,6 +1,7 @@
 """COLMAP's sparse models: read as binary or text, written as binary, the one form that all programs read.
 
-Format: <https://colmap.github.io/format.html>. 2D observations are left out: no trainer needs them.
+Format: <https://colmap.github.io/format.html>. Observations are kept: where points lie in photos tells
+gs-chroma which effects there are; others need none.
 """
 
 from __future__ import annotations
@@ -42,11 +43,16 @@ class Camera(NamedTuple):
 
 
 class Shot(NamedTuple):
-    """A photo's pose (quaternion and translation), the number of its camera, and its name."""
+    """A photo: pose (quaternion and translation), the number of its camera, name, and what points lie
+    where in it: x and y in pixels, and the point's number."""
 
     pose: tuple[float, ...]
     camera: int
     name: str
+    seen: tuple[tuple[float, float, int], ...]
+
+    def scaled(self, x: float, y: float) -> Shot:
+        return self._replace(seen=tuple((u * x, v * y, point) for u, v, point in self.seen))
 
 
 @dataclass
@@ -55,6 +61,8 @@ class Model:
 
     cameras: dict[int, Camera] = field(default_factory=dict)
     shots: list[Shot] = field(default_factory=list)
+    # The points' numbers, positions and colors.
+    points: list[int] = field(default_factory=list)
     positions: list[tuple[float, ...]] = field(default_factory=list)
     colors: list[tuple[int, ...]] = field(default_factory=list)
 
@@ -65,14 +73,21 @@ class Model:
             (folder / name).write_bytes(struct.pack("<Q", len(records)) + b"".join(records))
 
         save("cameras.bin", [struct.pack("<IiQQ4d", n, PINHOLE, *camera) for n, camera in self.cameras.items()])
-        nothing_seen = struct.pack("<Q", 0)
+        tracks: dict[int, list[tuple[int, int]]] = {point: [] for point in self.points}
+        for n, shot in enumerate(self.shots, 1):
+            for k, (_, _, point) in enumerate(shot.seen):
+                tracks[point].append((n, k))
+
+        def records(layout: str, values: Sequence[tuple[Any, ...]]) -> bytes:
+            return struct.pack("<Q", len(values)) + b"".join(struct.pack("<" + layout, *one) for one in values)
+
         save("images.bin", [
-            struct.pack("<I7dI", n, *shot.pose, shot.camera) + shot.name.encode() + b"\0" + nothing_seen
+            struct.pack("<I7dI", n, *shot.pose, shot.camera) + shot.name.encode() + b"\0" + records("2dQ", shot.seen)
             for n, shot in enumerate(self.shots, 1)
         ])  # fmt: skip
         save("points3D.bin", [
-            struct.pack("<Q3d3Bd", n, *position, *color, 0.0) + nothing_seen
-            for n, (position, color) in enumerate(zip(self.positions, self.colors, strict=True), 1)
+            struct.pack("<Q3d3Bd", point, *position, *color, 0.0) + records("2I", tracks[point])
+            for point, position, color in zip(self.points, self.positions, self.colors, strict=True)
         ])  # fmt: skip
 
 
@@ -125,11 +140,14 @@ def read_binary(folder: Path) -> Model:
     file = Binary(folder / "images.bin")
     for _ in range(file.count()):
         _, *pose, camera = file.take("I7dI")
-        model.shots.append(Shot(tuple(pose), camera, file.name()))
-        file.skip(24)
+        name = file.name()
+        # -1 is no point.
+        seen = [found for found in (file.take("2dq") for _ in range(file.count())) if found[2] >= 0]
+        model.shots.append(Shot(tuple(pose), camera, name, tuple(seen)))
     file = Binary(folder / "points3D.bin")
     for _ in range(file.count()):
-        _, x, y, z, red, green, blue, _ = file.take("Q3d3Bd")
+        point, x, y, z, red, green, blue, _ = file.take("Q3d3Bd")
+        model.points.append(point)
         model.positions.append((x, y, z))
         model.colors.append((red, green, blue))
         file.skip(8)
@@ -146,12 +164,19 @@ def read_text(folder: Path) -> Model:
         if (kind, len(values)) not in KINDS:
             raise Problem(f"camera {number} is no pinhole; run COLMAP's image_undistorter")
         model.cameras[int(number)] = Camera.of(int(width), int(height), [float(v) for v in values])
-    # Every second line holds the 2D observations, and may be empty.
-    for row in filter(str.strip, rows("images.txt")[::2]):
+    # Every second line holds the observations, and may be empty.
+    images = rows("images.txt")
+    for row, seen in zip(images[::2], [*images[1::2], ""]):
+        if not row.strip():
+            continue
         _, *pose, camera, name = row.split(maxsplit=9)
-        model.shots.append(Shot(tuple(float(v) for v in pose), int(camera), name.strip()))
+        values = seen.split()
+        found = ((float(x), float(y), int(point)) for x, y, point in zip(*[iter(values)] * 3, strict=True))
+        seen_points = tuple(one for one in found if one[2] >= 0)
+        model.shots.append(Shot(tuple(float(v) for v in pose), int(camera), name.strip(), seen_points))
     for row in filter(str.strip, rows("points3D.txt")):
         values = row.split()
+        model.points.append(int(values[0]))
         model.positions.append(tuple(float(v) for v in values[1:4]))
         model.colors.append(tuple(int(v) for v in values[4:7]))
     return model

@@ -53,9 +53,10 @@ def copy_gray(colmap: Path, gray: Path, side: int, held: str) -> list[str]:
         camera = model.cameras[shot.camera]
         if abs(photo.width / photo.height * camera.height / camera.width - 1) > ASPECT_SLACK:
             raise Problem(f"{shot.name} has another aspect than its camera")
-        camera = cameras.setdefault(shot.camera, camera.fitted(min(side, max(photo.size))))
-        small = photo.resize((camera.width, camera.height), Image.Resampling.LANCZOS)
+        fitted = cameras.setdefault(shot.camera, camera.fitted(min(side, max(photo.size))))
+        small = photo.resize((fitted.width, fitted.height), Image.Resampling.LANCZOS)
         shot = shot._replace(name=new_name(shot))
+        shot = shot.scaled(fitted.width / camera.width, fitted.height / camera.height)
         path = gray / "all" / "images" / shot.name
         path.parent.mkdir(parents=True, exist_ok=True)
         # Three equal channels: not every program reads a file of one.
@@ -72,5 +73,5 @@ def copy_gray(colmap: Path, gray: Path, side: int, held: str) -> list[str]:
             shutil.copyfile(gray / "all" / "images" / shot.name, path)
     colors = [(int(v),) * 3 for v in to_gray(model.colors)]
     for name, some in (("all", shots), ("train", train), ("held", held_out)):
-        Model(cameras, some, model.positions, colors).write(gray / name / "sparse" / "0")
+        Model(cameras, some, model.points, model.positions, colors).write(gray / name / "sparse" / "0")
     return [shot.name for shot in held_out]
