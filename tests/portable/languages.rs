@@ -41,6 +41,16 @@ fn kernels_need_nothing_that_webgpu_does_not_promise() {
     }
 }
 
+/// Direct3D 12 tells indirect dispatches that there are none (wgpu 30 without its validation). The
+/// luma loss alone asks, which the host dispatches.
+#[test]
+fn indirect_dispatches_do_not_ask_how_many_workgroups_there_are() {
+    for (name, source) in shaders::ALL {
+        let asks = source.contains("num_workgroups");
+        assert_eq!(asks, name.starts_with("luma_loss"), "{name}");
+    }
+}
+
 #[test]
 fn tint_reads_every_kernel() {
     let Some(tint) = program("tint", "a part of Dawn", "WGSL by Tint") else {
