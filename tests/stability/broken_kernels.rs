@@ -378,6 +378,12 @@ fn broken_scans_and_sorts_are_noticed() {
             "before += 2u * block_sums[block]",
         ],
         [
+            "scan",
+            "scan_sums",
+            "total = groups_for_count(carry)",
+            "total = groups_for_count(carry / 2u)",
+        ],
+        [
             "sort",
             "sort_scatter",
             "bases[local] += total",
