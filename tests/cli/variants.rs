@@ -29,7 +29,7 @@ fn every_variant_can_be_fitted() {
 }
 
 /// Trials are a share of the training.
-const SHORT: [&str; 2] = ["--iterations", "1000"];
+const SHORT: [&str; 2] = ["--iterations", "800"];
 
 /// The plan has an effect on for a variant, off for its control.
 fn assert_told_apart(variant: Variant, control: Variant, effect: &str, more: &[&str]) {
