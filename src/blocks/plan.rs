@@ -20,7 +20,8 @@ const FEWEST: usize = 8;
 
 /// A photo is a block's where at least this share of its observations are above the block's
 /// cell and margin. What it shows besides costs time, and what it shows of the block may be all
-/// that is known of a corner.
+/// that is known of a corner. With 0.05 the blocks of docs/large-scenes.md take 12 % more iterations
+/// for 0.01 dB across borders and inside (one seed).
 const SHARE: f64 = 0.1;
 
 /// The same for a photo that was taken above the block's own cell.
