@@ -76,6 +76,8 @@ class Model:
         tracks: dict[int, list[tuple[int, int]]] = {point: [] for point in self.points}
         for n, shot in enumerate(self.shots, 1):
             for k, (_, _, point) in enumerate(shot.seen):
+                if point not in tracks:
+                    raise Problem(f"{shot.name} observes point {point}, which the model lacks")
                 tracks[point].append((n, k))
 
         def records(layout: str, values: Sequence[tuple[Any, ...]]) -> bytes:
