@@ -2,7 +2,7 @@
 // The total is checked against a limit: a list that would not fit sets the
 // overflow word, is reported with what it needs, and counts as empty from there.
 import package::common::constants::{STATUS_NEEDED, STATUS_OVERFLOW};
-import package::common::groups::{Groups, SCAN_BLOCK, groups_for_count};
+import package::common::groups::{Groups, SCAN_BLOCK, blocks, groups_for_count};
 import package::common::numeric::linear_group;
 
 const SCAN_PER_THREAD: u32 = 4u;
@@ -58,16 +58,16 @@ fn scan_reduce(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_in
 
 @compute @workgroup_size(256)
 fn scan_sums(@builtin(local_invocation_index) local: u32) {
-    let blocks = (elements[parameters.which].length + SCAN_BLOCK - 1u) / SCAN_BLOCK;
+    let block_count = blocks(elements[parameters.which].length, SCAN_BLOCK);
     var carry = 0u;
-    for (var first = 0u; first < blocks; first += 256u) {
+    for (var first = 0u; first < block_count; first += 256u) {
         let block = first + local;
         var own = 0u;
-        if block < blocks {
+        if block < block_count {
             own = block_sums[block];
         }
         let before = exclusive_over_group(local, own);
-        if block < blocks {
+        if block < block_count {
             block_sums[block] = carry + before;
         }
         workgroupBarrier();
