@@ -5,7 +5,7 @@ use std::time::Instant;
 use super::{Gpu, stopwatch::Timing, tape::Step};
 
 /// Threads in a workgroup of the kernels that give a thread to each element.
-const LINEAR_WORKGROUP: u32 = 256;
+pub const LINEAR_WORKGROUP: u32 = 256;
 
 /// WebGPU's limit on workgroups in one dimension; `shaders/common/numeric.wgsl` has it too.
 pub const MAX_GROUPS: u32 = 65_535;

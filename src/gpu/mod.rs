@@ -11,6 +11,6 @@ pub use buffer::{Buffer, Readback};
 pub use device::{
     Gpu, GpuError, STORAGE_BUFFERS, WORKGROUP_BYTES, WORKGROUP_THREADS, default_tiles_at_once,
 };
-pub use kernel::{Bindings, Kernel, MAX_GROUPS, Recorder, folded, groups_for};
+pub use kernel::{Bindings, Kernel, LINEAR_WORKGROUP, MAX_GROUPS, Recorder, folded, groups_for};
 pub use stopwatch::KernelTime;
 pub use tape::{Ran, Step, Tape};

@@ -3,10 +3,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::gpu::{Bindings, Buffer, Gpu, GpuError, Kernel, Recorder, folded};
-
-/// Elements that a workgroup takes whose threads have one each.
-const THREADS: usize = 256;
+use crate::gpu::{Bindings, Buffer, Gpu, GpuError, Kernel, LINEAR_WORKGROUP, Recorder, folded};
 
 /// Elements that a workgroup of a scan takes.
 pub(super) const SCAN_BLOCK: usize = 1024;
@@ -53,7 +50,7 @@ impl Groups {
     pub fn for_count(count: usize) -> [Self; 4] {
         let histogram = DIGITS * count.div_ceil(SORT_BLOCK);
         [
-            Self::of(count, THREADS),
+            Self::of(count, LINEAR_WORKGROUP as usize),
             Self::of(count, SCAN_BLOCK),
             Self::of(count, SORT_BLOCK),
             Self::of(histogram, SCAN_BLOCK),
