@@ -193,6 +193,7 @@ pub fn examine_with(
 ) -> Result<Verdict, GpuError> {
     let mut hard = (case.make)();
     hard.view.numerics = numerics;
+    hard.between_sort_keys();
     let stage = Stage::new(raster, &splats(&hard.scene), &hard.view)?;
     let headroom = headroom(&raster.gpu);
     let [picture_bound, gradient_bound] = case.seen.map(|seen| (seen * headroom).max(TIGHTEST));

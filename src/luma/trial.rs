@@ -7,7 +7,7 @@ use super::{
     LumaError, LumaSettings, LumaTrainer, PlannedViews, TrainingView, start::placed_splats,
 };
 use crate::{
-    capture::{Camera, Dataset},
+    capture::Dataset,
     effects::{Effect, Evidence, Overrules, Plan, Room, Trials},
     measure,
     raster::{Raster, Renderer},
@@ -15,6 +15,11 @@ use crate::{
 
 /// Share of the run's work that all trainings of a trial may take, by iterations times pixels.
 const WORK: f64 = 0.15;
+
+/// What an iteration costs however few pixels there are, as a share of one of the run: on a GPU
+/// small dispatches wait for each other (NVIDIA H200, 10⁴ Gaussians at 320 px: 0.44 ms; 10⁵ at
+/// 1,280: 1.0; `cargo bench`).
+const LEAST_ON_A_GPU: f64 = 0.45;
 
 /// Iterations of a trial: with 150 there is no scene yet that could fit one way or the other, and
 /// more than 1,500 would keep users waiting for what few iterations tell.
@@ -67,18 +72,24 @@ pub fn planned<E: From<LumaError>>(
 ) -> Result<Plan, E> {
     let room = settings.room();
     let plan = evidence.decide(room, overrules, &Trials::new());
-    let open = plan.open(room);
+    let open = plan.open();
     if open.is_empty() {
         return Ok(plan);
     }
     let arms = arms(evidence, room, overrules, &open);
-    let Some(size) = Size::of(dataset, settings, arms.len()) else {
+    let Some(side) = longest_side(dataset) else {
         return Ok(plan);
     };
+    let raster = raster()?;
+    let least = match raster.gpu.is_software() {
+        true => 0.0,
+        false => LEAST_ON_A_GPU,
+    };
+    let size = Size::within(side, settings, arms.len(), least);
     let trial = Trial {
         dataset,
         evidence,
-        raster: raster()?,
+        raster,
         size,
         total: size.iterations * arms.len() * size.rounds,
     };
@@ -117,44 +128,45 @@ struct Size {
 }
 
 impl Size {
-    /// The largest that keeps `trainings` within [`WORK`]; `None` where there are too few photos
-    /// to hold one back.
-    fn of(dataset: &Dataset, settings: &LumaSettings, trainings: usize) -> Option<Self> {
-        let train = &dataset.split.train;
-        if train.len() < 4 {
-            return None;
-        }
-        let cameras = train.iter().map(|&view| &dataset.cameras[view]);
-        let side = cameras.map(longer_side).max()?;
-        Some(Self::within(side, settings, trainings))
-    }
-
-    fn within(side: u32, settings: &LumaSettings, trainings: usize) -> Self {
-        let [least, most] = ITERATIONS;
-        let iterations = (settings.iterations / 2).clamp(least, most);
+    /// The largest that keeps `trainings` on photos of `side` pixels within [`WORK`]. An iteration
+    /// costs at least the share `least` of one of the run.
+    fn within(side: u32, settings: &LumaSettings, trainings: usize, least: f64) -> Self {
+        let [fewest, most] = ITERATIONS;
+        let run = settings.iterations as f64;
+        let share = |halvings: u32| f64::max(0.25_f64.powi(halvings as i32), least);
+        let wanted = (settings.iterations / 2).clamp(fewest, most);
         let work = |halvings: u32, rounds: usize| {
-            let each = iterations as f64 / settings.iterations as f64 / 4_f64.powi(halvings as i32);
-            each * (trainings * rounds) as f64
+            wanted as f64 / run * share(halvings) * (trainings * rounds) as f64
         };
         let [largest, smallest] = SIDES;
         let mut halvings = 1;
         while side >> halvings > largest
-            || (work(halvings, ROUNDS) > WORK && side >> (halvings + 1) >= smallest)
+            || (work(halvings, ROUNDS) > WORK
+                && share(halvings + 1) < share(halvings)
+                && side >> (halvings + 1) >= smallest)
         {
             halvings += 1;
         }
         let fits = |rounds: &usize| work(halvings, *rounds) <= WORK;
+        let rounds = (1..=ROUNDS).rev().find(fits).unwrap_or(1);
+        let room = WORK * run / (share(halvings) * (trainings * rounds) as f64);
         Self {
-            iterations,
+            iterations: wanted.min((room as usize).max(fewest)),
             halvings,
             max_splats: (settings.max_splats >> (2 * halvings)).max(LEAST_SPLATS),
-            rounds: (1..=ROUNDS).rev().find(fits).unwrap_or(1),
+            rounds,
         }
     }
 }
 
-fn longer_side(camera: &Camera) -> u32 {
-    camera.width.max(camera.height)
+/// Of the photos to train on; `None` where they are too few to hold one back.
+fn longest_side(dataset: &Dataset) -> Option<u32> {
+    let train = &dataset.split.train;
+    let sides = train.iter().map(|&view| {
+        let camera = &dataset.cameras[view];
+        camera.width.max(camera.height)
+    });
+    sides.max().filter(|_| train.len() >= 4)
 }
 
 /// What all trainings of a trial share.
@@ -289,24 +301,34 @@ mod tests {
             (4_000, 15_000, 3_000_000),
             (640, 200, 500),
         ] {
-            for trainings in 2..=5 {
+            for (trainings, least) in (2..=5).flat_map(|k| [(k, 0.0), (k, LEAST_ON_A_GPU)]) {
                 let settings = LumaSettings {
                     max_splats: splats,
                     ..LumaSettings::new(iterations)
                 };
-                let size = Size::within(side, &settings, trainings);
-                let work = (size.iterations * trainings * size.rounds) as f64
-                    / iterations as f64
-                    / 4_f64.powi(size.halvings as i32);
+                let size = Size::within(side, &settings, trainings, least);
+                let share = f64::max(0.25_f64.powi(size.halvings as i32), least);
+                let work =
+                    (size.iterations * trainings * size.rounds) as f64 / iterations as f64 * share;
                 assert!(size.rounds >= 1 && side >> size.halvings >= SIDES[1]);
-                // But for the smallest there is.
-                let smallest = size.rounds == 1 && side >> (size.halvings + 1) < SIDES[1];
+                // But for the shortest there is.
+                let shortest = size.rounds == 1 && size.iterations == ITERATIONS[0];
                 assert!(
-                    work <= WORK || smallest,
+                    work <= WORK || shortest,
                     "{side} {iterations} {trainings}: {size:?} {work}"
                 );
             }
         }
+    }
+
+    /// Where few pixels cost as much as many, photos stay as large as they may be.
+    #[test]
+    fn photos_shrink_only_where_that_saves_time() {
+        let settings = LumaSettings::new(3_500);
+        let size = |least| Size::within(640, &settings, 2, least);
+        assert!(size(0.0).halvings > size(LEAST_ON_A_GPU).halvings);
+        assert!(size(0.0).iterations > size(LEAST_ON_A_GPU).iterations);
+        assert_eq!(size(LEAST_ON_A_GPU).halvings, 1);
     }
 
     #[test]

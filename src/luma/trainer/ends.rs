@@ -8,8 +8,9 @@ use crate::{gpu::GpuError, luma::curve::gain_of_doubling};
 pub(super) const LONGER: usize = 3;
 
 /// No curve is called flat before this share of the iterations, or [`GROWN`] if that is
-/// less: the set still grows.
-const FLAT_FROM: f64 = 0.3;
+/// less: the set still grows, and what it learned is lost for a while each time
+/// (docs/lab/04-presets.md).
+const FLAT_FROM: f64 = 0.5;
 
 /// In so many iterations a set that begins to grow after 500 grows twelve times, by 30 % each.
 const GROWN: f64 = 1_750.0;

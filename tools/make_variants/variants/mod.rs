@@ -1,5 +1,6 @@
 //! Scenes made from a scene. Tests take this module as it is.
 
+mod arc;
 mod brush;
 mod defects;
 mod depth;
@@ -23,7 +24,7 @@ use std::path::Path;
 pub use error::Error;
 use scene::Scene;
 
-/// What can be made of a scene. For each but the last three there is a control: made in
+/// What can be made of a scene. For each but the last five there is a control: made in
 /// the same way, without the effect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Variant {
@@ -70,6 +71,10 @@ pub enum Variant {
     HeavyDust,
     /// A fifth of the gains and offsets of `exposure`, whose control is this one's too
     Flicker,
+    /// Eleven photos that are turned to one side
+    Arc,
+    /// The far part of the scene is one plain gray, and its points are missing
+    Backdrop,
 }
 
 /// Makes a variant of the scene in the folder `source` and writes it to the folder `out`.
@@ -96,6 +101,8 @@ pub fn make(source: &Path, variant: Variant, out: &Path, seed: u64) -> Result<St
         Variant::Dust => defects::dust(&mut scene, defects::DUST_AREA, seed),
         Variant::HeavyDust => defects::dust(&mut scene, defects::HEAVY_DUST_AREA, seed),
         Variant::Sky => sky::open(&mut scene),
+        Variant::Arc => arc::short(&mut scene),
+        Variant::Backdrop => sky::backdrop(&mut scene),
         Variant::SkyControl => sky::thin(&mut scene, seed),
         Variant::Masked => defects::masked(&mut scene, seed),
         Variant::Gloss => gloss::polish(&mut scene, seed),

@@ -8,9 +8,22 @@ use super::scene::{Scene, View};
 /// Share of the points that go missing.
 const MISSING: f64 = 0.6;
 
+/// Gray of a plain backdrop.
+const BACKDROP: u8 = 200;
+
 /// Turns what lies beyond the nearer points into a sky: clouds that depend on nothing but
 /// the direction, as what is very far does. Its points are gone.
 pub fn open(scene: &mut Scene) -> String {
+    format!("sky {}", replace_far(scene, clouds))
+}
+
+/// Turns it into one plain gray, as of the paper behind an object in a studio.
+pub fn backdrop(scene: &mut Scene) -> String {
+    format!("a backdrop {}", replace_far(scene, |_| BACKDROP))
+}
+
+/// Paints what lies beyond the nearer points by its direction. Says where that begins.
+fn replace_far(scene: &mut Scene, gray: fn(DVec3) -> u8) -> String {
     let center = scene.center();
     scene.points.sort_by(|a, b| {
         let [a, b] = [a, b].map(|point| point.position.distance_squared(center));
@@ -20,10 +33,10 @@ pub fn open(scene: &mut Scene) -> String {
     let kept = kept(scene);
     let beyond = scene.points[kept - 1].position.distance(center);
     for (view, depths) in scene.views.iter_mut().zip(&depths) {
-        paint(view, depths, |place| place.distance(center) > beyond);
+        paint(view, depths, gray, |place| place.distance(center) > beyond);
     }
     scene.points.truncate(kept);
-    format!("sky instead of what is farther than {beyond:.3} from the cameras' mean")
+    format!("instead of what is farther than {beyond:.3} from the cameras' mean")
 }
 
 /// Drops as many points, from anywhere; the photos stay.
@@ -39,7 +52,12 @@ fn kept(scene: &Scene) -> usize {
 }
 
 /// Paints the cells of a photo whose place is far.
-fn paint(view: &mut View, depths: &[([f64; 2], f64)], is_far: impl Fn(DVec3) -> bool) {
+fn paint(
+    view: &mut View,
+    depths: &[([f64; 2], f64)],
+    gray: fn(DVec3) -> u8,
+    is_far: impl Fn(DVec3) -> bool,
+) {
     if depths.is_empty() {
         return;
     }
@@ -56,7 +74,7 @@ fn paint(view: &mut View, depths: &[([f64; 2], f64)], is_far: impl Fn(DVec3) -> 
         for y in row * CELL..((row + 1) * CELL).min(height) {
             for x in column * CELL..((column + 1) * CELL).min(width) {
                 let [u, v] = view.camera.ray([x, y].map(|k| f64::from(k) + 0.5));
-                let gray = clouds((to_world * dvec3(u, v, 1.0)).normalize());
+                let gray = gray((to_world * dvec3(u, v, 1.0)).normalize());
                 view.picture.get_pixel_mut(x, y).0 = [gray; 3];
             }
         }

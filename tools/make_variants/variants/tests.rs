@@ -10,7 +10,7 @@ use image::RgbImage;
 use super::lens::Lens;
 use super::resample::remap;
 use super::scene::{Developed, Scene, View};
-use super::{Variant, defects, depth, distances, exposure, gloss, make, sky, warp};
+use super::{Variant, arc, defects, depth, distances, exposure, gloss, make, sky, warp};
 
 fn demo() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/demo")
@@ -200,6 +200,34 @@ fn as_many_points_without_the_far_ones() {
 }
 
 #[test]
+fn behind_a_backdrop_nothing_is_left() {
+    let mut scene = read();
+    let before = scene.points.len();
+    sky::backdrop(&mut scene);
+    assert!(scene.points.len() < before / 2);
+    let plain = |view: &View| {
+        let pixels = view.picture.pixels().filter(|pixel| pixel.0 == [200; 3]);
+        pixels.count() as f64 / f64::from(view.camera.size[0] * view.camera.size[1])
+    };
+    let shares: Vec<f64> = scene.views.iter().map(plain).collect();
+    assert!(
+        shares.iter().all(|share| (0.02..0.5).contains(share)),
+        "{shares:?}"
+    );
+}
+
+#[test]
+fn an_arc_has_eleven_photos_and_what_two_of_them_see() {
+    let before = reprojection_error(&read());
+    let mut scene = read();
+    let note = arc::short(&mut scene);
+    assert_eq!(scene.views.len(), 11);
+    assert!(scene.points.iter().all(|point| point.track.len() >= 2));
+    assert!(scene.points.len() > 4000, "{note}");
+    assert!(reprojection_error(&scene) < 1.1 * before, "{note}");
+}
+
+#[test]
 fn the_same_arguments_give_the_same_files_and_the_program_reads_them() {
     let out = tempfile::tempdir().expect("a folder");
     for variant in [Variant::Dust, Variant::Masked, Variant::SkyControl] {
@@ -238,11 +266,14 @@ fn the_same_arguments_give_the_same_files_and_the_program_reads_them() {
 fn names_of_controls() {
     let name = |v: &Variant| v.to_possible_value().expect("a name").get_name().to_owned();
     let names: Vec<String> = Variant::value_variants().iter().map(name).collect();
-    let (paired, alone) = names.split_at(names.len() - 3);
+    let (paired, alone) = names.split_at(names.len() - 5);
     for pair in paired.chunks_exact(2) {
         assert_eq!(pair[1], format!("{}-control", pair[0]));
     }
     assert_eq!(paired.len() % 2, 0);
-    assert_eq!(alone, ["infrared-tiff", "heavy-dust", "flicker"]);
+    assert_eq!(
+        alone,
+        ["infrared-tiff", "heavy-dust", "flicker", "arc", "backdrop"]
+    );
     assert_eq!(Lens::Pinhole.name(), "PINHOLE");
 }
