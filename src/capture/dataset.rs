@@ -10,8 +10,8 @@ use std::{
 };
 
 use super::{
-    Camera, Capture, CaptureError, LoadOptions, Loader, MaskSource, MaskUse, Masked, Normalize,
-    Photo, Rejected, Split, View, first_views, in_order, split, split_as,
+    Camera, Capture, CaptureError, Layers, LoadOptions, Loader, MaskSource, MaskUse, Masked,
+    Normalize, Photo, Rejected, Split, View, first_views, in_order, split, split_as,
 };
 
 /// What is worth telling while a dataset is opened.
@@ -49,6 +49,7 @@ pub struct Dataset {
     /// The scene's extent in world units, see [`Capture::extent`].
     pub extent: f64,
     loader: Loader,
+    layers: Option<Layers>,
     cache: Mutex<Cache>,
     decoded: AtomicUsize,
 }
@@ -110,6 +111,7 @@ impl Dataset {
             extent: capture.extent(),
             capture,
             loader,
+            layers: None,
             cache: Mutex::new(Cache::of(Self::CACHE_BYTES)),
             decoded: AtomicUsize::new(0),
         })
@@ -119,6 +121,13 @@ impl Dataset {
     pub fn caching(mut self, bytes: usize) -> Self {
         self.cache = Mutex::new(Cache::of(bytes));
         self
+    }
+
+    /// The same with these taken off its gray photos.
+    pub fn without(mut self, layers: Layers) -> Self {
+        let most = self.cache().most;
+        self.layers = Some(layers);
+        self.caching(most)
     }
 
     /// The gray photo of a view with its mask, from the cache where it is there.
@@ -131,6 +140,9 @@ impl Dataset {
         }
         let mut photo = self.color(view)?;
         photo.rgb = None;
+        if let Some(layers) = &self.layers {
+            layers.take_off(view, &mut photo.gray)?;
+        }
         let photo = Arc::new(photo);
         self.cache().put(view, photo.clone());
         Ok(photo)

@@ -61,6 +61,14 @@ pub enum CaptureError {
         /// A file that is not.
         missing: String,
     },
+    /// The operating system could not write what photos are to be without.
+    #[error("{path}: cannot be written to: {source}")]
+    Write {
+        /// Folder at fault.
+        path: PathBuf,
+        /// What the operating system says.
+        source: io::Error,
+    },
     /// The operating system could not read a file.
     #[error("{path}: cannot be read: {source}")]
     Read {

@@ -213,7 +213,22 @@ fn blocks_are_trained_and_put_together() {
         Some(64),
         "{second}"
     );
+    // It has nothing beyond its margin, and neither have the photos that it is measured on.
+    assert!(second["luma"]["splats"].as_u64() < report["luma"]["splats"].as_u64());
+    let shown = |report: &Value, name: &str| {
+        let views = report["luma"]["held_out_views"].as_array().unwrap();
+        let view = views.iter().find(|view| view["name"] == name);
+        view.unwrap()["psnr"].as_f64().unwrap()
+    };
+    for view in second["luma"]["held_out_views"].as_array().unwrap() {
+        let name = view["name"].as_str().unwrap();
+        let [block, city] = [&second, &report].map(|report| shown(report, name));
+        assert!(block > city - 0.5, "{name}: {block} {city}");
+    }
     place.succeed(&["merge", "job", "-o", "agreed"]);
+    let alone = place.json(&["fit", "job/block-2", "--iterations", "1", "--json"]);
+    let warnings = alone["warnings"].to_string();
+    assert!(warnings.contains("go on with --around"), "{warnings}");
     for (command, code) in [
         (&["fit", "job/block-2", "--around", "nowhere"][..], 1),
         (&["fit", "whole", "--around", "city"], 1),

@@ -8,7 +8,7 @@ use super::super::{
     Event, Observer, RunError, RunFolder,
     scene::{Frame, read_splats},
 };
-use super::{FitOptions, Init, checkpoint::sha256_of};
+use super::{FitOptions, Init, Neighbors, checkpoint::sha256_of};
 use crate::{
     blocks::{Area, Block, BlockFile, COARSE, FAR_PART, Job, Kind, Region},
     capture::{Camera, Dataset, LoadOptions},
@@ -35,17 +35,6 @@ const HEADROOM: f64 = 0.5;
 /// A block that goes on takes so small a part of its iterations so far: it only has to agree
 /// with its neighbors.
 const AGREEING_PART: usize = 6;
-
-/// The scene of a merged run, of which a block takes what its neighbors have in its margin.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Neighbors {
-    /// Its splat file.
-    pub luma: PathBuf,
-    /// SHA-256 of the file.
-    pub sha256: String,
-    /// How many of its Gaussians, the last ones, are surroundings.
-    pub surroundings: usize,
-}
 
 /// A block and the job that it belongs to.
 #[derive(Clone, Debug, PartialEq)]
@@ -187,40 +176,6 @@ impl BlockPlace {
         Ok(Some((start, surroundings)))
     }
 
-    /// A trained block with what its neighbors have in its margin instead of what it has there
-    /// itself; its surroundings stay last.
-    ///
-    /// # Errors
-    /// [`RunError`] of the merged scene's file.
-    pub(super) fn among(
-        &self,
-        own: &Splats,
-        surroundings: usize,
-        neighbors: &Neighbors,
-        offset: DVec3,
-        observe: &mut Observer<'_>,
-    ) -> Result<Splats, RunError> {
-        let frame = Frame::World(offset);
-        let theirs = read_splats(&neighbors.luma, frame, observe)?.0.to_luma();
-        let (near, core) = (self.near(offset), self.region(self.block.core, offset));
-        let in_margin = |place| near.holds(place) && !core.holds(place);
-        let inner = own.len().saturating_sub(surroundings);
-        let kept: Vec<usize> = (0..inner).filter(|&i| !in_margin(own.means[i])).collect();
-        // Each block has surroundings of its own.
-        let scene = theirs.len().saturating_sub(neighbors.surroundings);
-        let taken: Vec<usize> = (0..scene).filter(|&i| in_margin(theirs.means[i])).collect();
-        observe(Event::Note(format!(
-            "goes on with {} of {} Gaussians, and {} that neighbors have in the margin",
-            kept.len(),
-            inner,
-            taken.len()
-        )));
-        let mut start = chosen(own, &kept);
-        start.append(chosen(&theirs, &taken));
-        start.append(chosen(own, &(inner..own.len()).collect::<Vec<_>>()));
-        Ok(start)
-    }
-
     /// How far a Gaussian at a place may reach: the margin, and farther where the border of the
     /// block's own cell is far.
     fn free(&self, place: [f32; 3], offset: DVec3) -> f64 {
@@ -302,7 +257,7 @@ fn most_shown(dataset: &Dataset, splats: &Splats, some: Vec<usize>, room: usize)
 }
 
 /// Whether a camera shows anything of a ball of a standard deviation.
-fn shows(camera: &Camera, middle: DVec3, deviation: f64) -> bool {
+pub(super) fn shows(camera: &Camera, middle: DVec3, deviation: f64) -> bool {
     let at = camera.rotation * middle + camera.translation;
     let margin = REACH * deviation * camera.fx.max(camera.fy) / at.z;
     let inside = |pixel: f64, side: u32| pixel > -margin && pixel < f64::from(side) + margin;
@@ -417,6 +372,8 @@ impl FitOptions {
             settings: Box::new(move |settings| {
                 (self.settings)(settings);
                 settings.iterations = iterations;
+                // What more Gaussians would learn here is what others lack beyond.
+                settings.growth = 0.0;
             }),
             ..self
         })

@@ -5,6 +5,7 @@ mod block;
 mod budget;
 mod checkpoint;
 mod continued;
+mod neighbors;
 mod report;
 mod training;
 
@@ -33,9 +34,10 @@ use crate::{
 };
 use ahead::Ahead;
 pub use ahead::AheadOptions;
-pub use block::{BlockPlace, Neighbors};
+pub use block::BlockPlace;
 use budget::Budget;
 use checkpoint::{found_in, question};
+pub use neighbors::Neighbors;
 pub(super) use report::capture_report;
 use training::Job;
 
@@ -194,6 +196,7 @@ pub fn fit(
     // Rates are in proportion to it.
     let whole = options.block.as_ref().and_then(BlockPlace::extent);
     dataset.extent = whole.unwrap_or(dataset.extent);
+    let (dataset, start) = options.among_neighbors(dataset, &raster, &folder, observe)?;
     let dataset = Arc::new(dataset);
     if let Some(live) = &options.live {
         live.begin(&dataset);
@@ -228,6 +231,7 @@ pub fn fit(
         dataset: &dataset,
         evidence: &evidence,
         photos: &of_files(&dataset.capture)?,
+        among: start,
         judge: judge.as_ref().unwrap_or(&dataset),
         begun,
         loading: opened.elapsed().as_secs_f64(),

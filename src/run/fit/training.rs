@@ -31,6 +31,7 @@ use crate::{
     luma::{Fit, Grows, LumaEvent, LumaProgress, LumaScene},
     raster::{Raster, RasterOptions},
     report::{KernelReport, LumaQuality, LumaView, PhotoReport, Row, kernel_reports},
+    splats::Splats,
 };
 
 /// Runs that may take no longer, in seconds, do without a trial: on a slow device it would
@@ -48,6 +49,8 @@ pub(super) struct Job<'a> {
     pub evidence: &'a Evidence,
     /// Their files.
     pub photos: &'a [PhotoReport],
+    /// What a block among its neighbors starts from.
+    pub among: Option<Splats>,
     /// Photos at the size that is measured at.
     pub judge: &'a Arc<Dataset>,
     /// When the run began.
@@ -174,7 +177,7 @@ impl Job<'_> {
             Ok::<_, RunError>((path, splats, drawn))
         });
         let init = init.transpose()?;
-        if let Some((path, splats, drawn)) = &init {
+        if let (Some((path, splats, drawn)), None) = (&init, &self.among) {
             let splats = (path.as_path(), &splats.to_luma());
             tell_unlike(self.gpu, dataset, splats, *drawn, observe)?;
         }
@@ -182,18 +185,13 @@ impl Job<'_> {
         let placed = match (block, &init, found) {
             // One that goes on has its Gaussians.
             (Some(block), None, None) => block.start(dataset, &settings, observe)?,
-            (Some(block), Some((_, own, _)), None) => match &options.around {
-                Some(neighbors) => {
-                    let (offset, around) = (dataset.capture.offset, options.surroundings());
-                    let own = own.to_luma();
-                    let splats = block.among(&own, around, neighbors, offset, observe)?;
-                    Some((splats, around))
-                }
-                None => None,
-            },
+            (Some(_), Some(_), None) => {
+                let around = options.surroundings();
+                self.among.clone().map(|splats| (splats, around))
+            }
             _ => None,
         };
-        if let (Some((splats, _)), Some(_)) = (&placed, &options.around) {
+        if let (Some((splats, _)), Some(_)) = (&placed, &self.among) {
             // What neighbors have in the margin may be more than the block has there.
             settings.max_splats = settings.max_splats.max(splats.len());
         }

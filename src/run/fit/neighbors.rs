@@ -1,0 +1,139 @@
+//! `fit JOB/block-3 --around RUN`: a trained block among its neighbors.
+
+use std::{path::PathBuf, sync::Arc};
+
+use glam::DVec3;
+
+use super::super::{
+    Event, Observer, RunError, RunFolder, Stage,
+    scene::{Frame, read_splats},
+};
+use super::{FitOptions, Init, block::shows};
+use crate::{
+    capture::{Dataset, Exposure, Layers},
+    eval::exposures,
+    luma::carve::chosen,
+    raster::{Raster, Renderer},
+    splats::Splats,
+};
+
+/// The scene of a merged run, of which a block takes what is in its cell and margin.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Neighbors {
+    /// Its splat file.
+    pub luma: PathBuf,
+    /// SHA-256 of the file.
+    pub sha256: String,
+    /// How many of its Gaussians, the last ones, are surroundings.
+    pub surroundings: usize,
+}
+
+impl FitOptions {
+    /// Of a block that goes on among its neighbors its photos without what they show beyond it,
+    /// for else its Gaussians would stand in for that and be wrong once blocks are put together;
+    /// and what the merged scene has in its cell and margin, to start from. Surroundings come
+    /// last. Of other trainings the photos as they are.
+    ///
+    /// The merged scene is drawn for each photo, as far as the photo shows it.
+    ///
+    /// # Errors
+    /// [`RunError`] of the splat files, of the device, and where `folder` cannot be written to.
+    pub(super) fn among_neighbors(
+        &self,
+        dataset: Dataset,
+        raster: &Arc<Raster>,
+        folder: &RunFolder,
+        observe: &mut Observer<'_>,
+    ) -> Result<(Dataset, Option<Splats>), RunError> {
+        let (Some(block), Some(init)) = (&self.block, &self.init) else {
+            return Ok((dataset, None));
+        };
+        let Some(neighbors) = &self.around else {
+            if let Init::Run { folder, .. } = init
+                && folder.read_report()?.luma.around.is_some()
+            {
+                observe(Event::Warning(format!(
+                    "{} has nothing beyond its margin any more: go on with --around, or what it shows there will be wrong",
+                    block.plan().name
+                )));
+            }
+            return Ok((dataset, None));
+        };
+        let offset = dataset.capture.offset;
+        let own = read_splats(&init.path(), Frame::Own, observe)?.0.to_luma();
+        let (merged, drawn) = read_splats(&neighbors.luma, Frame::World(offset), observe)?;
+        let merged = merged.to_luma();
+        let near = block.near(offset);
+        let scene = merged.len().saturating_sub(neighbors.surroundings);
+        let taken: Vec<usize> = (0..scene)
+            .filter(|&i| near.holds(merged.means[i]))
+            .collect();
+        // Each block has surroundings of its own.
+        let shell = own.len().saturating_sub(self.surroundings())..own.len();
+        observe(Event::Note(format!(
+            "goes on with {} of the merged scene's {scene} Gaussians; what photos show of the others is taken off them",
+            taken.len(),
+        )));
+        let mut start = chosen(&merged, &taken);
+        start.append(chosen(&own, &shell.collect::<Vec<_>>()));
+
+        let raster = raster.drawing(drawn);
+        let told = block.exposures().unwrap_or_default();
+        let beyond = Beyond {
+            raster: &raster,
+            whole: &merged,
+            part: &start,
+            exposures: &exposures(&dataset, told),
+        };
+        let layers = beyond.layers(&dataset, folder, observe)?;
+        Ok((dataset.without(layers), Some(start)))
+    }
+}
+
+/// What a scene has and a part of it has not.
+struct Beyond<'a> {
+    raster: &'a Arc<Raster>,
+    whole: &'a Splats,
+    part: &'a Splats,
+    /// Of each view.
+    exposures: &'a [Exposure],
+}
+
+impl Beyond<'_> {
+    /// What photos show of it.
+    fn layers(
+        &self,
+        dataset: &Dataset,
+        folder: &RunFolder,
+        observe: &mut Observer<'_>,
+    ) -> Result<Layers, RunError> {
+        let renderer =
+            |splats: &Splats| Renderer::of(self.raster, splats, &[&splats.sh], dataset.extent);
+        let total = dataset.cameras.len();
+        let mut layers = Layers::new(folder.path(), total)?;
+        let mut part = renderer(self.part)?;
+        for (view, camera) in dataset.cameras.iter().enumerate() {
+            observe(Event::Progress {
+                stage: Stage::Placing,
+                done: view,
+                total,
+                message: dataset.capture.views[view].name.clone(),
+            });
+            // No more of the scene has to fit onto the device than one photo shows.
+            let shown = (0..self.whole.len()).filter(|&i| {
+                let [middle, scales] = [self.whole.means[i], self.whole.log_scales[i]];
+                let widest = scales.into_iter().fold(f32::MIN, f32::max);
+                let middle = DVec3::from(middle.map(f64::from));
+                shows(camera, middle, f64::from(widest).exp())
+            });
+            let shown = chosen(self.whole, &shown.collect::<Vec<_>>());
+            let whole = renderer(&shown)?.render(camera)?.remove(0);
+            let part = part.render(camera)?.remove(0);
+            let gain = self.exposures[view].gain as f32;
+            let pixels = whole.pixels.iter().zip(&part.pixels);
+            let beyond = pixels.map(|(whole, part)| gain * (whole - part));
+            layers.put(view, &beyond.collect::<Vec<_>>())?;
+        }
+        Ok(layers)
+    }
+}
