@@ -375,7 +375,7 @@ fn a_flat_curve_ends_the_run() {
     fit[5] = "400";
     place.succeed(&[&fit[..], &["--stop-when-flat=50"]].concat());
     let luma = &place.report("runs/scene")["luma"];
-    assert_eq!(luma["iterations"], 150);
+    assert_eq!(luma["iterations"], 240);
     assert_eq!(luma["settings"]["iterations"], 400);
     assert_eq!(luma["settings"]["stop_when_flat"], 50.0);
 }
