@@ -5,7 +5,7 @@ use std::{
     collections::BTreeSet,
     env,
     fs::{self, File, OpenOptions},
-    io::{self, Write},
+    io::{self, Read, Seek, SeekFrom, Write},
     path::{Path, PathBuf},
     sync::{
         LazyLock, Mutex, MutexGuard, PoisonError,
@@ -44,6 +44,41 @@ impl Fault {
 
     fn strikes(self, step: u64) -> bool {
         step == self.step || (self.lasts && step > self.step)
+    }
+}
+
+/// A file without a name, of which nothing is left however the program ends.
+#[derive(Debug)]
+pub struct Scratch(File);
+
+impl Scratch {
+    /// An empty one in `folder`.
+    ///
+    /// # Errors
+    /// As the operating system says.
+    pub fn new(folder: &Path) -> io::Result<Self> {
+        step()?;
+        tempfile::tempfile_in(folder).map(Self)
+    }
+
+    /// Adds bytes at its end; where they begin.
+    ///
+    /// # Errors
+    /// As the operating system says.
+    pub fn append(&mut self, bytes: &[u8]) -> io::Result<u64> {
+        step()?;
+        let place = self.0.seek(SeekFrom::End(0))?;
+        self.0.write_all(bytes)?;
+        Ok(place)
+    }
+
+    /// Fills `bytes` with those that begin at `place`.
+    ///
+    /// # Errors
+    /// As the operating system says.
+    pub fn read_at(&mut self, place: u64, bytes: &mut [u8]) -> io::Result<()> {
+        self.0.seek(SeekFrom::Start(place))?;
+        self.0.read_exact(bytes)
     }
 }
 

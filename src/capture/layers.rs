@@ -1,13 +1,12 @@
 //! What photos show of something else than what is trained on.
 
 use std::{
-    fs::File,
-    io::{Read, Seek, SeekFrom, Write},
     path::{Path, PathBuf},
     sync::{Mutex, PoisonError},
 };
 
 use super::CaptureError;
+use crate::disk::Scratch;
 
 /// Steps of a gray level in which pictures are kept: those of up to twice white fit into 16 bits.
 const STEPS: f32 = 64.0;
@@ -17,8 +16,7 @@ const STEPS: f32 = 64.0;
 #[derive(Debug)]
 pub struct Layers {
     folder: PathBuf,
-    /// Without a name, so that nothing is left of it however the program ends.
-    file: Mutex<File>,
+    file: Mutex<Scratch>,
     /// Of each view, where its picture begins.
     places: Vec<Option<u64>>,
 }
@@ -35,7 +33,7 @@ impl Layers {
         };
         Ok(Self {
             folder: folder.to_owned(),
-            file: Mutex::new(tempfile::tempfile_in(folder).map_err(failed)?),
+            file: Mutex::new(Scratch::new(folder).map_err(failed)?),
             places: vec![None; views],
         })
     }
@@ -48,10 +46,7 @@ impl Layers {
         let steps = |luma: &f32| ((luma * 255.0 * STEPS).round() as i16).to_le_bytes();
         let bytes: Vec<u8> = picture.iter().flat_map(steps).collect();
         let file = self.file.get_mut().unwrap_or_else(PoisonError::into_inner);
-        let place = (file.seek(SeekFrom::End(0))).and_then(|place| {
-            file.write_all(&bytes)?;
-            Ok(place)
-        });
+        let place = file.append(&bytes);
         self.places[view] = Some(place.map_err(|source| CaptureError::Write {
             path: self.folder.clone(),
             source,
@@ -69,7 +64,7 @@ impl Layers {
         };
         let mut bytes = vec![0; 2 * gray.len()];
         let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
-        let read = (file.seek(SeekFrom::Start(place))).and_then(|_| file.read_exact(&mut bytes));
+        let read = file.read_at(place, &mut bytes);
         drop(file);
         read.map_err(|source| CaptureError::Read {
             path: self.folder.clone(),

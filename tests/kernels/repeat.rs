@@ -296,10 +296,10 @@ fn a_flat_curve_ends_a_training() {
     assert_eq!((ends, looks), ([280, 400], 15));
     // Nothing brings a hundred dB.
     let (first, [settles, end], looks) = run(Some(100.0), 20);
-    assert_eq!(([settles, end], looks), ([125, 150], 6));
+    assert_eq!(([settles, end], looks), ([200, 240], 10));
     assert!(same(&run(Some(100.0), 20).0, &first));
-    // The first look when the last harmonics have had a quarter of their 110 iterations.
-    assert_eq!(run(Some(100.0), 110).1, [150, 180]);
+    // The first look when the last harmonics have had a quarter of their 200 iterations.
+    assert_eq!(run(Some(100.0), 200).1, [250, 300]);
 }
 
 /// What is no gain is given up: the bytes are those of a training that never went beyond.
@@ -334,9 +334,9 @@ fn a_training_that_gets_worse_goes_back_to_its_best() {
         looks.map(|look| look.iteration).collect()
     };
     let [beyond, straight] = [Some(0.1), None].map(trainer);
-    assert_eq!(looks(&beyond), [25, 50, 75, 100, 125, 30]);
+    assert_eq!(looks(&beyond), [25, 50, 75, 100, 125, 150, 175, 200, 30]);
     assert!(beyond.curve()[3].splats > start.len());
-    assert_eq!(beyond.given_up(), Some(125));
+    assert_eq!(beyond.given_up(), Some(200));
     assert_eq!(
         (looks(&straight), straight.given_up()),
         (vec![25, 30], None)
@@ -438,8 +438,8 @@ fn a_time_limit_moves_the_end() {
     };
     assert!(ends(0.0, None) < 110);
     assert_eq!(ends(1e9, None), 480);
-    // The first look after 30 % of 480, and a fifth of that to settle.
-    assert_eq!(ends(1e9, Some(100.0)), 180);
+    // The first look after half of 480, and a fifth of that to settle.
+    assert_eq!(ends(1e9, Some(100.0)), 300);
 }
 
 /// Gaussians behind every camera change nothing but the room that the lists
