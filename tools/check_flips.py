@@ -24,6 +24,7 @@ import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from threading import Lock
 
 from check_effects import VARIANTS, first_line, members
 
@@ -147,8 +148,15 @@ def main() -> int:
     if results.get("fit") != options.fit:
         results = {"fit": options.fit, "scenes": {}}
 
-    def save() -> None:
-        kept.write_text(json.dumps(results, indent=1) + "\n")
+    before, lock = json.loads(json.dumps(results["scenes"])), Lock()
+
+    def save(name: str, known: dict) -> None:
+        own = json.loads(json.dumps(known))
+        beside = kept.with_suffix(".part")
+        with lock:
+            results["scenes"][name] = own
+            beside.write_text(json.dumps(results, indent=1) + "\n")
+            beside.replace(kept)
 
     def flipped(name: str, folder: Path) -> dict | Failure | None:
         """What a scene gave, or why nothing; None where it is missing."""
@@ -159,7 +167,8 @@ def main() -> int:
         if not folder.is_dir():
             return None
         try:
-            return scene_results(options, folder, results["scenes"].setdefault(name, {}), save)
+            known = dict(before.get(name, {}))
+            return scene_results(options, folder, known, lambda: save(name, known))
         except Failure as failure:
             return failure
 

@@ -44,8 +44,8 @@ const BACKGROUND_SHARE: f64 = 0.002;
 /// a pixel.
 const DIRECTION_LEVELS: f64 = 5.0;
 
-/// And in a run of as many iterations, which learns from less: on ten scenes with more than
-/// this, matt ones too, it gained 0.02 to 0.22 dB but for one, where it lost 0.01
+/// And in a run of as many iterations, which learns from less: on eight of nine scenes with more
+/// than this, matt ones too, it gained 0.02 to 0.22 dB, on one it lost 0.01
 /// (docs/lab/12-effects.md).
 const LONG_RUN: usize = 2_400;
 const DIRECTION_LEVELS_LONG: f64 = 2.0;

@@ -220,7 +220,12 @@ fn blocks_are_trained_and_put_together() {
         let view = views.iter().find(|view| view["name"] == name);
         view.unwrap()["psnr"].as_f64().unwrap()
     };
-    for view in second["luma"]["held_out_views"].as_array().unwrap() {
+    let views = second["luma"]["held_out_views"].as_array().unwrap();
+    assert!(!views.is_empty());
+    // And a later training splits as before.
+    let growth = |report: &Value| report["luma"]["settings"]["growth"].as_f64();
+    assert_eq!(growth(&second), growth(&report));
+    for view in views {
         let name = view["name"].as_str().unwrap();
         let [block, city] = [&second, &report].map(|report| shown(report, name));
         assert!(block > city - 0.5, "{name}: {block} {city}");

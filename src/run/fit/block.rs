@@ -372,9 +372,9 @@ impl FitOptions {
             settings: Box::new(move |settings| {
                 (self.settings)(settings);
                 settings.iterations = iterations;
-                // What more Gaussians would learn here is what others lack beyond.
-                settings.growth = 0.0;
             }),
+            // Only photos at the size that is trained on are without what is beyond.
+            measure_side: None,
             ..self
         })
     }

@@ -112,6 +112,11 @@ impl Beyond<'_> {
         let total = dataset.cameras.len();
         let mut layers = Layers::new(folder.path(), total)?;
         let mut part = renderer(self.part)?;
+        let widest = self.whole.log_scales.iter().map(|scales| {
+            let widest = scales.iter().copied().fold(f32::MIN, f32::max);
+            f64::from(widest).exp()
+        });
+        let widest: Vec<f64> = widest.collect();
         for (view, camera) in dataset.cameras.iter().enumerate() {
             observe(Event::Progress {
                 stage: Stage::Placing,
@@ -121,10 +126,8 @@ impl Beyond<'_> {
             });
             // No more of the scene has to fit onto the device than one photo shows.
             let shown = (0..self.whole.len()).filter(|&i| {
-                let [middle, scales] = [self.whole.means[i], self.whole.log_scales[i]];
-                let widest = scales.into_iter().fold(f32::MIN, f32::max);
-                let middle = DVec3::from(middle.map(f64::from));
-                shows(camera, middle, f64::from(widest).exp())
+                let middle = DVec3::from(self.whole.means[i].map(f64::from));
+                shows(camera, middle, widest[i])
             });
             let shown = chosen(self.whole, &shown.collect::<Vec<_>>());
             let whole = renderer(&shown)?.render(camera)?.remove(0);

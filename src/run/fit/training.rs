@@ -185,10 +185,7 @@ impl Job<'_> {
         let placed = match (block, &init, found) {
             // One that goes on has its Gaussians.
             (Some(block), None, None) => block.start(dataset, &settings, observe)?,
-            (Some(_), Some(_), None) => {
-                let around = options.surroundings();
-                self.among.clone().map(|splats| (splats, around))
-            }
+            (_, _, None) => (self.among.clone()).map(|splats| (splats, options.surroundings())),
             _ => None,
         };
         if let (Some((splats, _)), Some(_)) = (&placed, &self.among) {
@@ -214,7 +211,11 @@ impl Job<'_> {
                 .or(init.as_ref().map(|(_, splats, _)| splats)),
             surroundings: (placed.as_ref()).map_or(options.surroundings(), |(_, around)| *around),
             exposures: shared.as_deref(),
-            grows: near.map(|near| Arc::new(move |place| near.holds(place)) as Grows),
+            // More Gaussians would only learn what the others lack beyond.
+            grows: match self.among {
+                Some(_) => Some(Arc::new(|_| false) as Grows),
+                None => near.map(|near| Arc::new(move |place| near.holds(place)) as Grows),
+            },
             watched: reaches.then(|| (self.judge, self.judge.split.test.clone())),
         };
         let log = RefCell::new(match (found, &options.init) {
