@@ -11,7 +11,7 @@ use super::{
 use crate::{
     capture::view_at,
     gpu::{Gpu, Recorder},
-    raster::{Adam, Field, Load},
+    raster::{Adam, Load},
     splats::{ShField, Splats, sh},
 };
 
@@ -45,6 +45,9 @@ impl<'a> AdamSolver<'a> {
     ///
     /// # Errors
     /// As [`IrlsSolver::new`](super::IrlsSolver::new).
+    ///
+    /// # Panics
+    /// Where the Gaussians wait on the host.
     pub fn new(
         frozen: &'a FrozenViews,
         settings: ChromaSettings,
@@ -109,11 +112,11 @@ impl<'a> AdamSolver<'a> {
         tasks: Vec<Task>,
         start: &ShField,
     ) -> Result<Self, ChromaError> {
+        assert!(frozen.streamed().is_none(), "all Gaussians on the device");
         let gpu = &frozen.raster.gpu;
-        let field = Field::upload(gpu, start)?;
         let sizes = [1 + course.scales.end(), REPORT_EVERY];
         let [_, planes] = course.planes;
-        let passes = Passes::new(frozen, targets, tasks, field, planes, Space::Lab, sizes)?;
+        let passes = Passes::new(frozen, targets, tasks, start, planes, Space::Lab, sizes)?;
         let adam = Adam::new(
             gpu,
             &frozen.kernels.adam,
@@ -189,7 +192,7 @@ impl<'a> AdamSolver<'a> {
     /// # Errors
     /// [`ChromaError::Gpu`] when the device is lost.
     pub fn harmonics(&self) -> Result<ShField, ChromaError> {
-        Ok(self.passes.field.download(self.gpu())?)
+        self.passes.harmonics()
     }
 
     /// What a dispatch works on, the mean over the passes.

@@ -32,6 +32,8 @@ pub(super) struct SolverState {
     pub rounds: Rounds,
     /// What its buffers hold.
     pub buffers: BTreeMap<String, Vec<f32>>,
+    /// What it holds on the host.
+    pub doubles: BTreeMap<String, Vec<f64>>,
 }
 
 /// What the host knows of a solver.
@@ -102,6 +104,11 @@ impl ChromaCheckpoint {
             let bytes = bytemuck::cast_slice(values).to_vec();
             (format!("{BUFFER}{name}"), bytes)
         }));
+        let doubles = self.solver.doubles.iter();
+        sections.extend(doubles.map(|(name, values)| {
+            let bytes = bytemuck::cast_slice(values).to_vec();
+            (format!("{DOUBLES}{name}"), bytes)
+        }));
         sections
     }
 
@@ -116,15 +123,27 @@ impl ChromaCheckpoint {
             Some((name.to_owned(), values.collect()))
         });
         let buffers = buffers.collect();
+        let doubles = sections.iter().filter_map(|(name, bytes)| {
+            let (doubles, rest) = bytes.as_chunks::<8>();
+            let values = doubles.iter().map(|&bytes| f64::from_le_bytes(bytes));
+            let name = name.strip_prefix(DOUBLES).filter(|_| rest.is_empty())?;
+            Some((name.to_owned(), values.collect()))
+        });
+        let doubles = doubles.collect();
         Some(Self {
             state,
-            solver: SolverState { rounds, buffers },
+            solver: SolverState {
+                rounds,
+                buffers,
+                doubles,
+            },
         })
     }
 }
 
 /// How the names of buffers' sections begin.
 const BUFFER: &str = "solver ";
+const DOUBLES: &str = "solver's host ";
 
 #[cfg(test)]
 mod tests {
@@ -149,6 +168,7 @@ mod tests {
                     ..Rounds::default()
                 },
                 buffers: [("unknowns".to_owned(), vec![0.5, -0.0, f32::MAX])].into(),
+                doubles: [("rhos".to_owned(), vec![1.0 / 3.0, f64::INFINITY])].into(),
             },
         };
         let sections: BTreeMap<_, _> = checkpoint.to_sections().into_iter().collect();

@@ -4,7 +4,7 @@ use std::{cell::Cell, ops::ControlFlow, sync::Arc, time::Instant};
 
 use super::{
     ChosenDegree, ChromaError, ChromaProgress, ChromaSettings, Colorizer, Correction, Degree,
-    FrozenViews, IrlsSolver, Lesson, Room, Task,
+    FrozenViews, IrlsSolver, Lesson, Room, SolverKind, Task,
     bake::{BakeStep, bake_telling},
     checkpoint::{ChromaCheckpoint, ChromaKeeper, NoChromaKeeper, State},
     choose_degree, match_saturation, plan,
@@ -48,6 +48,8 @@ pub struct Colored {
     pub peak_device_memory: Option<u64>,
     /// Views whose lists and targets stayed on the device.
     pub pinned_views: usize,
+    /// Gaussians on the device at a time, where they waited on the host.
+    pub splats_at_a_time: Option<usize>,
     /// Seconds of solving and of the bake.
     pub seconds: [f64; 2],
 }
@@ -64,6 +66,11 @@ pub enum ColorizeEvent<'a> {
     },
     /// The Gaussians are projected before each view and listed.
     Listing,
+    /// They wait on the host, and so many come to the device at a time at most.
+    Streaming {
+        /// Gaussians on the device at a time.
+        at_a_time: usize,
+    },
     /// The solver, at a degree that is tried.
     Trying {
         /// Degree of the chroma harmonics.
@@ -194,6 +201,7 @@ impl Distill<'_> {
                 Degree::Auto => sh::MAX_DEGREE,
             },
             weighted: lesson.targets.weighted() || lesson.has_strokes(),
+            streams: settings.solver == SolverKind::Irls,
         };
         let scales = settings.target_scales();
         go_on(observe(ColorizeEvent::Listing))?;
@@ -205,6 +213,9 @@ impl Distill<'_> {
             scales,
             room,
         )?;
+        if let Some(at_a_time) = frozen.streamed() {
+            go_on(observe(ColorizeEvent::Streaming { at_a_time }))?;
+        }
         let laid = match lesson.has_strokes() {
             true => Some(lay(&frozen, dataset, lesson, self.luma)?),
             false => None,
@@ -326,6 +337,7 @@ impl Distill<'_> {
             estimated_device_memory: frozen.demand(),
             peak_device_memory: peak,
             pinned_views: frozen.pinned(),
+            splats_at_a_time: frozen.streamed(),
             seconds: [solving, begun.elapsed().as_secs_f64()],
             settings,
         })

@@ -55,6 +55,11 @@ pub struct Corrections {
 }
 
 impl Corrections {
+    /// Bytes for so many views.
+    pub fn bytes(views: usize) -> u64 {
+        (4 * views * SUM_GROUPS * SUMS + 2 * views * size_of::<Correction>()) as u64
+    }
+
     /// For so many views.
     ///
     /// # Errors

@@ -1,52 +1,59 @@
 //! The geometry before all cameras, at all scales: uploaded once, projected and listed
-//! once where the device has room, and lent to whoever solves or draws on it.
+//! once where the device has room, and lent to whoever solves or draws on it. Where it has no
+//! room for all Gaussians, they wait on the host, and those that a view may show come for it.
 
 use std::sync::Arc;
 
-use super::{ChromaError, ChromaKernels};
+use super::{
+    ChromaError, ChromaKernels,
+    room::{Demand, Least, Room},
+};
 use crate::{
     capture::Camera,
     gpu::{Gpu, GpuError, Recorder},
     raster::{
-        AdjointScratch, COLOR_FIGURES, Canvas, ColorKind, Field, Geometry, Layer, Lists, Load,
-        Picture, Raster, ViewUniform, constants::NEAR_SHARE,
+        Field, Geometry, Layer, Lists, Load, Picture, Raster, Streamed, ViewUniform,
+        constants::NEAR_SHARE,
     },
-    splats::{Splats, sh},
+    splats::{ShField, Splats, sh},
 };
-
-/// Bytes of tile lists and wanted colors that stay on the device where no limit is set:
-/// leaves room for the rest on devices of 4 GiB.
-const DEFAULT_PINS: u64 = 2 << 30;
 
 /// Counts that are on their way from the device at a time.
 const IN_FLIGHT: usize = 64;
 
-/// What the device may be asked for.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Room {
-    /// Bytes of the device that stage 2 may take; `None`: what views one at a time need,
-    /// and 2 GiB of what is worth keeping.
-    pub limit: Option<u64>,
-    /// The highest degree of harmonics that will be solved for.
-    pub sh_degree: u32,
-    /// Whether wanted pixels have weights.
-    pub weighted: bool,
-}
-
 /// One view at one scale.
-struct Frozen {
-    uniform: ViewUniform,
+pub(super) struct Frozen {
+    pub uniform: ViewUniform,
     visible: usize,
-    entries: usize,
+    /// Of its tile lists.
+    pub entries: usize,
     /// Its own tile lists, made already.
     lists: Option<Lists>,
+}
+
+/// What waits on the host.
+struct OnHost {
+    scene: Streamed,
+    /// Of each view.
+    cameras: Vec<Camera>,
+}
+
+/// Harmonics to be drawn over frozen geometry, on the device or on the host as this is.
+pub enum Colors {
+    /// Of all Gaussians, on the device.
+    Device(Field),
+    /// Of all Gaussians, on the host.
+    Host(ShField),
 }
 
 /// Frozen geometry before cameras.
 pub struct FrozenViews {
     pub(super) raster: Arc<Raster>,
     pub(super) kernels: ChromaKernels,
+    /// Of all Gaussians, or of those that the view before showed.
     pub(super) geometry: Geometry,
+    /// All Gaussians, where they wait on the host.
+    streamed: Option<OnHost>,
     /// `[views][scales]`, full size first.
     views: Vec<Vec<Frozen>>,
     /// What comes before this one stays on the device.
@@ -75,8 +82,36 @@ impl FrozenViews {
         if cameras.is_empty() {
             return Err(ChromaError::NoViews);
         }
+        let streams = room.streams && scales <= 1;
+        if !streams || Least::of(splats.len(), splats.sh.degree, room).fits(&raster.gpu, room.limit)
+        {
+            let all = Self::placed(raster, splats, extent, cameras, scales, room, None);
+            if !(streams && matches!(all, Err(ChromaError::OverLimit { .. }))) {
+                return all;
+            }
+        }
+        let streamed = OnHost {
+            scene: Streamed::new(splats, extent),
+            cameras: cameras.to_vec(),
+        };
+        Self::placed(raster, splats, extent, cameras, 1, room, Some(streamed))
+    }
+
+    /// Of all Gaussians, or of those that wait on the host.
+    fn placed(
+        raster: &Arc<Raster>,
+        splats: &Splats,
+        extent: f64,
+        cameras: &[Camera],
+        scales: usize,
+        room: Room,
+        streamed: Option<OnHost>,
+    ) -> Result<Self, ChromaError> {
         let gpu = &raster.gpu;
-        let geometry = Geometry::upload(gpu, splats)?;
+        let geometry = match &streamed {
+            None => Geometry::upload(gpu, splats)?,
+            Some(on_host) => Geometry::of_none(gpu, on_host.most_shown())?,
+        };
         let near = NEAR_SHARE * extent;
         let uniform = |camera: &Camera, scale: usize| {
             let [width, height] = [camera.width, camera.height].map(|side| (side >> scale).max(1));
@@ -85,7 +120,17 @@ impl FrozenViews {
         let uniforms: Vec<ViewUniform> = (cameras.iter())
             .flat_map(|camera| (0..scales.max(1)).map(|scale| uniform(camera, scale)))
             .collect();
-        let counted = count(raster, &geometry, &uniforms)?;
+        let counted = match &streamed {
+            None => count(raster, &geometry, &uniforms)?,
+            Some(on_host) => {
+                let one = |(view, uniform)| {
+                    geometry.put(gpu, &on_host.scene.chosen(&on_host.shown(view)));
+                    count(raster, &geometry, std::slice::from_ref(uniform))
+                };
+                let counted = uniforms.iter().enumerate().map(one);
+                counted.collect::<Result<Vec<_>, _>>()?.concat()
+            }
+        };
         let frozen = uniforms.into_iter().zip(counted);
         let mut frozen = frozen.map(|(uniform, [visible, entries])| Frozen {
             uniform,
@@ -98,7 +143,8 @@ impl FrozenViews {
             .collect();
         drop(frozen);
 
-        let demand = Demand::of(geometry.count, splats.sh.degree, &views, room);
+        let streams = streamed.is_some();
+        let demand = Demand::of(geometry.count, splats.sh.degree, &views, room, streams);
         let pinned = demand.pinned(&views, room.limit)?;
         for view in views[..pinned].iter_mut().flatten() {
             let lists = Lists::new(raster, &geometry, view.uniform.tile_count(), view.entries)?;
@@ -115,6 +161,7 @@ impl FrozenViews {
             raster: raster.clone(),
             kernels: ChromaKernels::new(gpu),
             demand: demand.bytes(&views, pinned),
+            streamed,
             geometry,
             views,
             pinned,
@@ -124,7 +171,35 @@ impl FrozenViews {
 
     /// How many Gaussians there are.
     pub fn splat_count(&self) -> usize {
-        self.geometry.count
+        match &self.streamed {
+            Some(on_host) => on_host.scene.len(),
+            None => self.geometry.count,
+        }
+    }
+
+    /// Whether they wait on the host, and how many come at a time at most.
+    pub fn streamed(&self) -> Option<usize> {
+        self.streamed.as_ref().map(|_| self.geometry.count)
+    }
+
+    /// Puts those on the device that a view may show, where they wait on the host, and tells
+    /// which they are.
+    pub(super) fn put(&self, view: usize) -> Option<Vec<usize>> {
+        let on_host = self.streamed.as_ref()?;
+        let shown = on_host.shown(view);
+        self.geometry.put(self.gpu(), &on_host.scene.chosen(&shown));
+        Some(shown)
+    }
+
+    /// Harmonics of all Gaussians, to be drawn.
+    ///
+    /// # Errors
+    /// [`ChromaError::Gpu`].
+    pub(super) fn colors(&self, field: &ShField) -> Result<Colors, ChromaError> {
+        Ok(match self.streamed {
+            Some(_) => Colors::Host(field.clone()),
+            None => Colors::Device(Field::upload(self.gpu(), field)?),
+        })
     }
 
     /// The device that holds the buffers.
@@ -228,13 +303,25 @@ impl FrozenViews {
         }
     }
 
-    /// Draws fields as a view sees them at full size.
-    pub(super) fn draw(&self, view: usize, fields: &[&Field]) -> Result<Vec<Picture>, GpuError> {
+    /// Draws harmonics as a view sees them at full size.
+    pub(super) fn draw(&self, view: usize, fields: &[&Colors]) -> Result<Vec<Picture>, GpuError> {
         let gpu = &self.raster.gpu;
         let uniform = self.uniform(view, 0);
         let (pixels, tiles) = (uniform.pixel_count(), uniform.tile_count());
+        let shown = self.put(view).unwrap_or_default();
         let mut pictures = Vec::with_capacity(fields.len());
-        for field in fields {
+        for colors in fields {
+            let chosen;
+            let field = match colors {
+                Colors::Device(field) => field,
+                Colors::Host(field) => {
+                    let mut some = field.chosen(&shown);
+                    let planes = field.channels * sh::coefficient_count(field.degree);
+                    some.coefficients.resize(planes * self.geometry.count, 0.0);
+                    chosen = Field::upload(gpu, &some)?;
+                    &chosen
+                }
+            };
             let Some(lists) = self.lists(view, 0) else {
                 continue;
             };
@@ -249,8 +336,26 @@ impl FrozenViews {
                 channels: field.kind.channels(),
                 pixels: layer.read_image(gpu, pixels)?,
             });
+            drop(layer);
+            if self.streamed.is_some() {
+                // The next one finds the room of this one.
+                gpu.wait()?;
+            }
         }
         Ok(pictures)
+    }
+}
+
+impl OnHost {
+    /// The Gaussians that a view may show, ascending.
+    fn shown(&self, view: usize) -> Vec<usize> {
+        self.scene.shown(&self.cameras[view])
+    }
+
+    /// The most that a view may show; one at least.
+    fn most_shown(&self) -> usize {
+        let shown = (0..self.cameras.len()).map(|view| self.shown(view).len());
+        shown.max().unwrap_or(0).max(1)
     }
 }
 
@@ -282,97 +387,4 @@ fn count(
         }
     }
     Ok(counted)
-}
-
-/// Bytes on the device, known before they are taken.
-struct Demand {
-    splats: usize,
-    /// Of the largest view.
-    tiles: usize,
-    /// Of the longest lists.
-    entries: usize,
-    /// What does not depend on which views stay.
-    fixed: u64,
-    /// A wanted pixel's.
-    of_pixel: u64,
-    /// One view's lists and targets, for all that take turns.
-    turns: u64,
-}
-
-impl Demand {
-    fn of(splats: usize, luma_degree: u32, views: &[Vec<Frozen>], room: Room) -> Self {
-        let all = || views.iter().flatten();
-        let most = |of: &dyn Fn(&Frozen) -> usize| all().map(of).max().unwrap_or(0);
-        let tiles = most(&|frozen| frozen.uniform.tile_count());
-        let entries = most(&|frozen| frozen.entries);
-        let pixels: Vec<usize> = (0..views[0].len())
-            .map(|scale| {
-                let sizes = views.iter().map(|view| view[scale].uniform.pixel_count());
-                sizes.max().unwrap_or(0)
-            })
-            .collect();
-        let [luma, chroma] = [luma_degree, room.sh_degree].map(sh::coefficient_count);
-        let field = |planes: usize| 4 * (planes * splats) as u64;
-        let canvas = |kind, pixels| Canvas::bytes(kind, splats, pixels);
-        let judged =
-            4 * (COLOR_FIGURES * pixels[0]) as u64 + AdjointScratch::color_bytes(splats, entries);
-        let chroma_canvases = pixels
-            .iter()
-            .map(|&pixels| canvas(ColorKind::Chroma, pixels));
-        // One after the other: a/b are solved for, then pictures are drawn for the bake to
-        // meet, then RGB's constant harmonics are solved for.
-        let solving =
-            super::lbfgs::bytes(splats, 2 * chroma) + chroma_canvases.sum::<u64>() + judged;
-        let rgb = canvas(ColorKind::Rgb, pixels[0]);
-        let drawing = field(luma + 2 * chroma + 3 * luma.max(chroma) + 3) + rgb;
-        let baking = super::lbfgs::bytes(splats, 3) + rgb + judged;
-        let of_pixel = 4 * (1 + u64::from(room.weighted));
-        Self {
-            splats,
-            tiles,
-            entries,
-            fixed: Geometry::bytes(splats) + solving.max(drawing).max(baking),
-            of_pixel,
-            turns: Lists::bytes(splats, tiles, entries) + of_pixel * pixels[0] as u64,
-        }
-    }
-
-    /// What keeping a view takes.
-    fn of_view(&self, view: &[Frozen]) -> u64 {
-        let of_scale = |frozen: &Frozen| {
-            Lists::bytes(self.splats, frozen.uniform.tile_count(), frozen.entries)
-                + self.of_pixel * frozen.uniform.pixel_count() as u64
-        };
-        view.iter().map(of_scale).sum()
-    }
-
-    fn bytes(&self, views: &[Vec<Frozen>], pinned: usize) -> u64 {
-        let turns = if pinned < views.len() { self.turns } else { 0 };
-        let kept: u64 = views[..pinned].iter().map(|view| self.of_view(view)).sum();
-        self.fixed + turns + kept
-    }
-
-    /// How many views stay on the device. The order in which views are met never changes,
-    /// so that keeping the first ones brings as few as any choice.
-    fn pinned(&self, views: &[Vec<Frozen>], limit: Option<u64>) -> Result<usize, ChromaError> {
-        let allowed = limit.unwrap_or(self.fixed + self.turns + DEFAULT_PINS);
-        if self.bytes(views, views.len()) <= allowed {
-            return Ok(views.len());
-        }
-        let needed = self.fixed + self.turns;
-        if needed > allowed {
-            return Err(ChromaError::OverLimit {
-                splats: self.splats,
-                needed,
-                limit: allowed,
-            });
-        }
-        let mut left = allowed - needed;
-        let fits = views.iter().take_while(|view| {
-            let rest = left.checked_sub(self.of_view(view));
-            left = rest.unwrap_or(left);
-            rest.is_some()
-        });
-        Ok(fits.count())
-    }
 }

@@ -21,7 +21,8 @@ impl FrozenViews {
         view: usize,
         figures: &[[f32; COLOR_FIGURES]],
     ) -> Result<Vec<[f32; COLOR_FIGURES]>, ChromaError> {
-        let (raster, count, gpu) = (&self.raster, self.splat_count(), self.gpu());
+        let (raster, count, gpu) = (&self.raster, self.geometry.count, self.gpu());
+        let shown = self.put(view);
         let uniform = self.uniform(view, 0);
         let (pixels, tiles) = (uniform.pixel_count(), uniform.tile_count());
         assert_eq!(figures.len(), pixels, "figures of each pixel");
@@ -54,6 +55,16 @@ impl FrozenViews {
         let (first, last) = (first.read(gpu)?, last.read(gpu)?);
         let over = 1.0 / sh::C0 as f32;
         let of = |i: usize| [first[i], first[count + i], last[i], last[count + i]];
-        Ok((0..count).map(|i| of(i).map(|sum| over * sum)).collect())
+        let sums = (0..count).map(|i| of(i).map(|sum| over * sum));
+        Ok(match shown {
+            None => sums.collect(),
+            Some(shown) => {
+                let mut all = vec![[0.0; COLOR_FIGURES]; self.splat_count()];
+                for (i, sums) in shown.into_iter().zip(sums) {
+                    all[i] = sums;
+                }
+                all
+            }
+        })
     }
 }

@@ -3,18 +3,19 @@
 //! least squares, whose steps L-BFGS makes longer, over all views and all of it on the
 //! device.
 
-use std::{collections::BTreeMap, time::Instant};
+use std::time::Instant;
 
 use super::{
     ChromaError, ChromaObserver, ChromaProgress, ChromaSettings, Correction, FrozenViews, Targets,
     Task,
     checkpoint::{Rounds, SolverState},
-    lbfgs::{Lbfgs, State, System, UNBOUNDED},
+    lbfgs::State,
     passes::{Ending, Judging, Passes, Space},
+    steps::{Kept, Priors, Steps},
 };
 use crate::{
-    gpu::{Buffer, Gpu, Recorder},
-    raster::{ColorKind, Field, Load},
+    gpu::{Gpu, Recorder},
+    raster::{ColorKind, Load},
     splats::{ShField, sh},
 };
 
@@ -47,8 +48,7 @@ const SETTLED_ROUNDS: usize = 3;
 /// Solves for chroma or RGB harmonics.
 pub struct IrlsSolver<'a> {
     passes: Passes<'a>,
-    system: System,
-    lbfgs: Lbfgs,
+    steps: Steps,
     settings: ChromaSettings,
     /// Of the largest view.
     pixels: usize,
@@ -83,7 +83,7 @@ impl<'a> IrlsSolver<'a> {
         targets: &'a Targets,
         tasks: Vec<Task>,
     ) -> Result<Self, ChromaError> {
-        let start = ShField::zeros(frozen.geometry.count, settings.sh_degree, 2);
+        let start = ShField::zeros(frozen.splat_count(), settings.sh_degree, 2);
         Self::starting_at(frozen, settings, targets, tasks, &start)
     }
 
@@ -99,20 +99,9 @@ impl<'a> IrlsSolver<'a> {
         tasks: Vec<Task>,
         start: &ShField,
     ) -> Result<Self, ChromaError> {
-        let gpu = &frozen.raster.gpu;
-        let field = Field::upload(gpu, start)?;
-        let channels = start.channels;
-        let planes = channels * sh::coefficient_count(settings.sh_degree.min(start.degree));
+        let planes = start.channels * sh::coefficient_count(settings.sh_degree.min(start.degree));
         let sizes = [1, tasks.len()];
-        let passes = Passes::new(frozen, targets, tasks, field, planes, Space::Rgb, sizes)?;
-        let count = frozen.geometry.count;
-        let system = System {
-            unknowns: passes.field.planes.clone(),
-            gradient: passes.gradient.clone(),
-            diagonal: passes.diagonal.clone(),
-            floors: Buffer::from_slice(gpu, "floors", &vec![UNBOUNDED; planes * count])?,
-            losses: passes.log.losses.clone(),
-        };
+        let passes = Passes::new(frozen, targets, tasks, start, planes, Space::Rgb, sizes)?;
         let views = passes.tasks.iter().map(|task| frozen.uniform(task.view, 0));
         let pixels = views.map(|view| view.pixel_count()).max().unwrap_or(1);
         let units = match passes.field.kind {
@@ -120,13 +109,13 @@ impl<'a> IrlsSolver<'a> {
             ColorKind::Chroma | ColorKind::Luma => 1.0,
         };
         let ridge = units * settings.ridge * 0.5 / pixels as f64 * sh::C0 * sh::C0;
-        let size = [count, channels];
-        let priors = [ridge, settings.anchor].map(|prior| prior as f32);
-        let lbfgs = Lbfgs::new(gpu, &frozen.kernels.lbfgs, &system, size, priors)?;
+        let priors = Priors {
+            ridge,
+            anchor: settings.anchor,
+        };
         Ok(Self {
+            steps: Steps::new(&frozen.kernels.lbfgs, &passes, priors)?,
             passes,
-            system,
-            lbfgs,
             settings: settings.clone(),
             pixels,
             spent: 0.0,
@@ -147,7 +136,7 @@ impl<'a> IrlsSolver<'a> {
 
     /// Lets no unknown fall below these, planes as the unknowns are.
     pub(super) fn set_floors(&mut self, floors: &[f32]) {
-        self.system.floors.write(self.gpu(), floors);
+        self.steps.set_floors(self.gpu(), floors);
     }
 
     /// Residual at which the loss of a and b together levels off now; without one, each has
@@ -183,28 +172,17 @@ impl<'a> IrlsSolver<'a> {
         Ok(())
     }
 
-    /// What of the system itself a checkpoint has.
-    fn of_system(&self) -> [(&'static str, &Buffer<f32>); 2] {
-        [
-            ("unknowns", &self.system.unknowns),
-            ("diagonal", &self.system.diagonal),
-        ]
-    }
-
     /// All that the next rounds go by.
     ///
     /// # Errors
     /// [`ChromaError::Gpu`] when the device is lost.
     pub(super) fn state(&self) -> Result<SolverState, ChromaError> {
         let gpu = self.gpu();
-        let (newest, kept) = self.lbfgs.kept();
-        let mut buffers = BTreeMap::new();
-        for (name, buffer) in self.of_system() {
-            buffers.insert(name.to_owned(), buffer.read(gpu)?);
-        }
-        for (name, buffer) in kept {
-            buffers.insert(name.clone(), buffer.read(gpu)?);
-        }
+        let Kept {
+            newest,
+            mut buffers,
+            doubles,
+        } = self.steps.kept(&self.passes)?;
         for (name, buffer) in self.passes.corrections.kept() {
             let values = bytemuck::cast_slice(&buffer.read(gpu)?).to_vec();
             buffers.insert(name.to_owned(), values);
@@ -220,24 +198,22 @@ impl<'a> IrlsSolver<'a> {
             newest,
             spent: self.spent,
         };
-        Ok(SolverState { rounds, buffers })
+        Ok(SolverState {
+            rounds,
+            buffers,
+            doubles,
+        })
     }
 
     /// Goes on from a state of the same problem; `false` where it is of another.
     pub(super) fn go_on_from(&mut self, state: &SolverState) -> bool {
         let gpu = self.gpu();
-        let put = |name: &str, buffer: &Buffer<f32>| {
-            let values = state.buffers.get(name);
-            let values = values.filter(|values| values.len() == buffer.len());
-            values.map(|values| buffer.write(gpu, values)).is_some()
+        let kept = Kept {
+            newest: state.rounds.newest,
+            buffers: state.buffers.clone(),
+            doubles: state.doubles.clone(),
         };
-        let mut fits = true;
-        for (name, buffer) in self.of_system() {
-            fits &= put(name, buffer);
-        }
-        for (name, buffer) in self.lbfgs.kept().1 {
-            fits &= put(name, buffer);
-        }
+        let mut fits = self.steps.go_on_from(&kept, &mut self.passes);
         for (name, buffer) in self.passes.corrections.kept() {
             let values = state.buffers.get(name).map(Vec::as_slice);
             let found: Result<&[Correction], _> =
@@ -248,7 +224,6 @@ impl<'a> IrlsSolver<'a> {
             }
         }
         let rounds = state.rounds;
-        self.lbfgs.go_on_after(rounds.newest);
         self.done = rounds.done;
         self.plain = rounds.plain;
         self.settled = rounds.settled;
@@ -279,10 +254,7 @@ impl<'a> IrlsSolver<'a> {
                 Ending::Gradient
             };
             self.draw(self.robust(), ending)?;
-            let mut recorder = Recorder::new(gpu);
-            self.lbfgs.step(&mut recorder);
-            recorder.submit();
-            let mut state = State::of(&self.lbfgs.state_later(gpu).wait(gpu)?);
+            let mut state = self.steps.step(&mut self.passes)?;
             let accepted = state.moved.is_some();
             if !accepted {
                 self.passes.frozen.relist(self.passes.field.degree);
@@ -291,9 +263,7 @@ impl<'a> IrlsSolver<'a> {
             self.done = round + 1;
             if !self.anchored && !self.plain && accepted && self.done >= FREE_ROUNDS {
                 self.anchored = true;
-                let mut recorder = Recorder::new(gpu);
-                self.lbfgs.anchor(&mut recorder);
-                recorder.submit();
+                self.steps.anchor(&self.passes);
             }
             let moves_less = |than| state.moved.is_some_and(|moved| moved < than);
             // What is left of an undone step is short whatever remains to be done, and so are
@@ -305,12 +275,11 @@ impl<'a> IrlsSolver<'a> {
             self.ended = self.done == self.settings.rounds || self.settled == SETTLED_ROUNDS;
             let levels_off = self.plain && self.done >= PLAIN_ROUNDS && moves_less(PLAIN_MOVES);
             if self.ended || levels_off {
-                self.end()?;
-                state = State::of(&self.lbfgs.state_later(gpu).wait(gpu)?);
+                state = self.end()?;
             }
             if levels_off && !self.ended {
                 self.plain = false;
-                self.lbfgs.restart(gpu);
+                self.steps.restart(gpu);
             }
             let told = observe(ChromaProgress {
                 iteration: self.done,
@@ -339,7 +308,7 @@ impl<'a> IrlsSolver<'a> {
         if accepted && self.correction_is_due(round) {
             corrections.solve(&self.passes.frozen.kernels.correction, &mut recorder);
             self.corrected = true;
-            self.lbfgs.changed(self.gpu());
+            self.steps.changed(self.passes.frozen.gpu());
         }
         recorder.submit();
     }
@@ -352,25 +321,19 @@ impl<'a> IrlsSolver<'a> {
     }
 
     /// Judges the last step.
-    fn end(&mut self) -> Result<(), ChromaError> {
+    fn end(&mut self) -> Result<State, ChromaError> {
         self.draw(self.robust(), Ending::Loss)?;
-        let gpu = self.gpu();
-        let mut recorder = Recorder::new(gpu);
-        self.lbfgs.end(gpu, &mut recorder);
-        recorder.submit();
+        let state = self.steps.end(&mut self.passes)?;
         let corrected = std::mem::take(&mut self.corrected);
-        if State::of(&self.lbfgs.state_later(gpu).wait(gpu)?)
-            .moved
-            .is_none()
-        {
+        if state.moved.is_none() {
             self.passes.frozen.relist(self.passes.field.degree);
             if corrected {
-                let mut recorder = Recorder::new(gpu);
+                let mut recorder = Recorder::new(self.gpu());
                 self.passes.corrections.undo(&mut recorder);
                 recorder.submit();
             }
         }
-        Ok(())
+        Ok(state)
     }
 
     /// The plain loss of `chroma` over all views at full size, in CIELAB units: what the
@@ -381,14 +344,11 @@ impl<'a> IrlsSolver<'a> {
     /// [`ChromaError`].
     pub fn objective(&mut self, chroma: &ShField) -> Result<f64, ChromaError> {
         let gpu = self.gpu();
-        let planes = Field::upload(gpu, chroma)?.planes;
-        let mut recorder = Recorder::new(gpu);
-        recorder.copy(planes.raw(), self.passes.field.planes.raw());
-        recorder.submit();
+        self.passes.put(chroma)?;
         let spent = self.spent;
         self.draw(None, Ending::Loss)?;
         self.spent = spent;
-        self.lbfgs.restart(gpu);
+        self.steps.restart(gpu);
         self.passes.frozen.relist(self.passes.field.degree);
         Ok(mean(&self.passes.log.read_later(gpu).wait(gpu)?))
     }
@@ -403,8 +363,8 @@ impl<'a> IrlsSolver<'a> {
             // The sums are of the step that was undone, where hardly a color was met.
             self.draw(self.robust(), Ending::Gradient)?;
         }
-        let count = self.passes.frozen.geometry.count;
-        let diagonal = self.system.diagonal.read(self.gpu())?;
+        let count = self.passes.frozen.splat_count();
+        let diagonal = self.passes.curvature()?;
         // One pixel of weight one whose residual is the typical one.
         let pixel = 0.5 / self.pixels as f64 / TYPICAL_RESIDUAL * sh::C0;
         let planes = diagonal.len() / count.max(1);
@@ -419,7 +379,7 @@ impl<'a> IrlsSolver<'a> {
     /// # Errors
     /// [`ChromaError::Gpu`] when the device is lost.
     pub fn chroma(&self) -> Result<ShField, ChromaError> {
-        Ok(self.passes.field.download(self.gpu())?)
+        self.passes.harmonics()
     }
 
     /// Each view's correction, and what was wanted there.

@@ -4,15 +4,17 @@
 
 use super::{
     ChromaError, FrozenViews, Targets,
-    correction::{CorrectionParameters, Corrections},
+    correction::Corrections,
     loss::{ChromaLossWeights, LOSS_BLOCK, LabLossParameters, RgbLossParameters},
+    on_host::OnHost,
+    seat::{Judge, Seat},
 };
 use crate::{
-    gpu::{Bindings, Buffer, Recorder},
+    gpu::{Buffer, Recorder},
     raster::{
-        AdjointScratch, COLOR_FIGURES, Canvas, ChromaAdjoint, ChromaSums, ColorKind, Field, Layer,
-        Load, LossLog, constants::STATUS_WORDS,
+        AdjointScratch, COLOR_FIGURES, Canvas, Field, Load, LossLog, constants::STATUS_WORDS,
     },
+    splats::ShField,
 };
 
 /// A view and what is wanted there.
@@ -56,43 +58,15 @@ pub(super) enum Ending {
     GradientAndSums,
 }
 
-/// A loss tied to what it judges.
-enum Judge {
-    Chroma {
-        weights: Buffer<ChromaLossWeights>,
-        loss: Bindings,
-        /// Where there is a coarser scale.
-        agreeing: Option<Bindings>,
-        parameters: Buffer<CorrectionParameters>,
-        sums: Bindings,
-    },
-    Rgb {
-        parameters: Buffer<RgbLossParameters>,
-        loss: Bindings,
-    },
-    Lab {
-        parameters: Buffer<LabLossParameters>,
-        loss: Bindings,
-        /// Where there is a coarser scale.
-        agreeing: Option<Bindings>,
-    },
-}
-
-/// Where one view at one scale is drawn and judged.
-struct Seat {
-    layer: Layer,
-    adjoint: ChromaAdjoint,
-    judge: Judge,
-    wanted: Buffer<u32>,
-    weights: Buffer<f32>,
-}
-
 /// All passes of one solve.
 pub(super) struct Passes<'a> {
     pub frozen: &'a FrozenViews,
     targets: &'a Targets,
     pub tasks: Vec<Task>,
+    /// Of all Gaussians, or of those that one view shows.
     pub field: Field,
+    /// All of them, where they wait on the host.
+    pub on_host: Option<OnHost>,
     /// Of the field's first planes: those that are solved for.
     pub gradient: Buffer<f32>,
     /// See [`ChromaSums::diagonal`].
@@ -103,19 +77,19 @@ pub(super) struct Passes<'a> {
     /// A seat for each scale of each pinned task, then one for each scale that all
     /// others take turns in.
     seats: Vec<Seat>,
-    space: Space,
+    pub space: Space,
     scales: usize,
     kept: usize,
 }
 
 impl<'a> Passes<'a> {
-    /// Passes of `field` over `tasks` at so many scales; its first `planes` planes are
+    /// Passes of `start` over `tasks` at so many scales; its first `planes` planes are
     /// solved for. The log has room for `entries` losses.
     pub fn new(
         frozen: &'a FrozenViews,
         targets: &'a Targets,
         mut tasks: Vec<Task>,
-        field: Field,
+        start: &ShField,
         planes: usize,
         space: Space,
         [scales, entries]: [usize; 2],
@@ -144,9 +118,13 @@ impl<'a> Passes<'a> {
                 views.map(|view| view.pixel_count()).max().unwrap_or(0)
             })
             .collect();
+        let on_device = ShField::zeros(splats, start.degree, start.channels);
+        let streams = frozen.streamed().is_some();
+        let field = Field::upload(gpu, if streams { &on_device } else { start })?;
         let gradient = Buffer::zeros(gpu, "gradient", planes * splats)?;
         let diagonals = COLOR_FIGURES - field.kind.channels();
         let diagonal = Buffer::zeros(gpu, "diagonal", diagonals * splats)?;
+        let on_host = streams.then(|| OnHost::new(start, planes, diagonals));
         // Frozen lists never overflow: this status stays zero.
         let status = Buffer::zeros(gpu, "status", STATUS_WORDS)?;
         let blocks = pixels[0].div_ceil(LOSS_BLOCK);
@@ -163,6 +141,7 @@ impl<'a> Passes<'a> {
             targets,
             tasks,
             field,
+            on_host,
             gradient,
             diagonal,
             log,
@@ -183,7 +162,7 @@ impl<'a> Passes<'a> {
                 let weights = Buffer::from_slice(gpu, "pixel weights", weights)?;
                 let made = (canvas, canvases.get(scale + 1));
                 let shared = (&image_gradient, &scratch);
-                let seat = passes.seat(view, scale, made, shared, wanted, weights)?;
+                let seat = Seat::new(&passes, view, scale, made, shared, wanted, weights)?;
                 passes.seats.push(seat);
             }
             // What is written waits on the host until it is there.
@@ -198,135 +177,19 @@ impl<'a> Passes<'a> {
                 let made = (canvas, canvases.get(scale + 1));
                 let shared = (&image_gradient, &scratch);
                 let (wanted, weights) = (wanted.clone(), weights.clone());
-                let seat = passes.seat(view, scale, made, shared, wanted, weights)?;
+                let seat = Seat::new(&passes, view, scale, made, shared, wanted, weights)?;
                 passes.seats.push(seat);
             }
         }
         Ok(passes)
     }
 
-    fn seat(
-        &self,
-        view: usize,
-        scale: usize,
-        (canvas, coarser): (&Canvas, Option<&Canvas>),
-        (image_gradient, scratch): (&Buffer<f32>, &AdjointScratch),
-        wanted: Buffer<u32>,
-        weights: Buffer<f32>,
-    ) -> Result<Seat, ChromaError> {
-        let Self { frozen, field, .. } = self;
-        let (raster, geometry, kernels) = (&frozen.raster, &frozen.geometry, &frozen.kernels);
-        let gpu = &raster.gpu;
-        let lists = frozen.lists(view, scale).ok_or(ChromaError::NoViews)?;
-        let layer = Layer::on(
-            raster,
-            geometry,
-            lists,
-            field,
-            canvas.clone(),
-            lists.max_tiles(),
-        );
-        let sums = ChromaSums {
-            gradient: &self.gradient,
-            diagonal: &self.diagonal,
-        };
-        let scratch = scratch.clone();
-        let adjoint = ChromaAdjoint::new(
-            raster,
-            geometry,
-            lists,
-            &layer,
-            image_gradient,
-            scratch,
-            sums,
-        );
-        let block_losses = self.log.block_losses.raw();
-        let judge = match field.kind {
-            ColorKind::Rgb if self.space == Space::Lab => {
-                let parameters =
-                    Buffer::uniform(gpu, "lab loss parameters", &LabLossParameters::default())?;
-                let mut buffers = vec![
-                    lists.view.raw(),
-                    layer.image.raw(),
-                    wanted.raw(),
-                    parameters.raw(),
-                    block_losses,
-                    image_gradient.raw(),
-                    weights.raw(),
-                ];
-                let loss = kernels.lab_loss.bind(gpu, &buffers);
-                let agreeing = coarser.map(|coarser| {
-                    buffers.push(coarser.image().raw());
-                    kernels.agreeing_lab_loss.bind(gpu, &buffers)
-                });
-                Judge::Lab {
-                    parameters,
-                    loss,
-                    agreeing,
-                }
-            }
-            ColorKind::Rgb => {
-                let parameters =
-                    Buffer::uniform(gpu, "rgb loss parameters", &RgbLossParameters::default())?;
-                let loss = kernels.rgb_loss.bind(
-                    gpu,
-                    &[
-                        lists.view.raw(),
-                        layer.image.raw(),
-                        wanted.raw(),
-                        parameters.raw(),
-                        block_losses,
-                        image_gradient.raw(),
-                        weights.raw(),
-                    ],
-                );
-                Judge::Rgb { parameters, loss }
-            }
-            ColorKind::Chroma | ColorKind::Luma => {
-                let of_loss =
-                    Buffer::uniform(gpu, "chroma loss weights", &ChromaLossWeights::default())?;
-                let mut buffers = vec![
-                    lists.view.raw(),
-                    layer.image.raw(),
-                    wanted.raw(),
-                    of_loss.raw(),
-                    block_losses,
-                    image_gradient.raw(),
-                    weights.raw(),
-                    self.corrections.corrections.raw(),
-                ];
-                let loss = kernels.chroma_loss.bind(gpu, &buffers);
-                let agreeing = coarser.map(|coarser| {
-                    buffers.push(coarser.image().raw());
-                    kernels.agreeing_loss.bind(gpu, &buffers)
-                });
-                let parameters = self.corrections.parameters(gpu, 0, false)?;
-                let inputs = [lists.view.raw(), layer.image.raw(), wanted.raw()];
-                let inputs = (inputs, image_gradient, &weights);
-                let sums = (self.corrections).bind(gpu, &kernels.correction, &parameters, inputs);
-                Judge::Chroma {
-                    weights: of_loss,
-                    loss,
-                    agreeing,
-                    parameters,
-                    sums,
-                }
-            }
-        };
-        Ok(Seat {
-            layer,
-            adjoint,
-            judge,
-            wanted,
-            weights,
-        })
-    }
-
     /// What a dispatch works on, the mean over the tasks at so many scales.
     pub fn load(&self, scales: usize) -> Load {
         let views = self.tasks.iter().map(|task| task.view);
         let channels = self.field.kind.channels() as f64;
-        let of_splat = self.field.planes.len() as f64 / self.frozen.geometry.count as f64;
+        let on_device = self.frozen.geometry.count as f64;
+        let of_splat = self.field.planes.len() as f64 / on_device;
         Load {
             channels,
             sh_planes: of_splat,
@@ -336,7 +199,10 @@ impl<'a> Passes<'a> {
 
     /// Forgets losses and, with `sums`, gradient and curvature, which is asked for after the
     /// last pass ([`IrlsSolver::seen`](super::IrlsSolver::seen)).
-    pub fn clear(&self, sums: bool) {
+    pub fn clear(&mut self, sums: bool) {
+        if let Some(on_host) = self.on_host.as_mut().filter(|_| sums) {
+            on_host.clear();
+        }
         let mut recorder = Recorder::new(&self.frozen.raster.gpu);
         recorder.clear(self.log.losses.raw());
         if sums {
@@ -346,9 +212,77 @@ impl<'a> Passes<'a> {
         recorder.submit();
     }
 
+    /// The harmonics so far.
+    ///
+    /// # Errors
+    /// [`ChromaError::Gpu`].
+    pub fn harmonics(&self) -> Result<ShField, ChromaError> {
+        match &self.on_host {
+            Some(on_host) => Ok(on_host.field()),
+            None => Ok(self.field.download(self.frozen.gpu())?),
+        }
+    }
+
+    /// See [`Passes::diagonal`], of all Gaussians.
+    ///
+    /// # Errors
+    /// [`ChromaError::Gpu`].
+    pub fn curvature(&self) -> Result<Vec<f32>, ChromaError> {
+        match &self.on_host {
+            Some(on_host) => Ok(on_host.diagonal.clone()),
+            None => Ok(self.diagonal.read(self.frozen.gpu())?),
+        }
+    }
+
+    /// Takes other harmonics, of the same degree and channels.
+    ///
+    /// # Errors
+    /// [`ChromaError::Gpu`].
+    pub fn put(&mut self, field: &ShField) -> Result<(), ChromaError> {
+        match &mut self.on_host {
+            Some(on_host) => on_host.put(field),
+            None => {
+                let gpu = self.frozen.gpu();
+                let planes = Field::upload(gpu, field)?.planes;
+                let mut recorder = Recorder::new(gpu);
+                recorder.copy(planes.raw(), self.field.planes.raw());
+                recorder.submit();
+            }
+        }
+        Ok(())
+    }
+
     /// Draws a task's view at a scale, files its loss under `entry`, and adds its gradient
     /// as `ending` says.
     pub fn draw(
+        &mut self,
+        index: usize,
+        scale: usize,
+        judging: Judging,
+        entry: usize,
+        ending: Ending,
+    ) -> Result<(), ChromaError> {
+        let shown = self.frozen.put(self.tasks[index].view);
+        if let (Some(on_host), Some(shown)) = (&self.on_host, &shown) {
+            let gpu = self.frozen.gpu();
+            on_host.send(gpu, shown, &self.field.planes);
+            let mut recorder = Recorder::new(gpu);
+            recorder.clear(self.gradient.raw());
+            recorder.clear(self.diagonal.raw());
+            recorder.submit();
+        }
+        self.draw_on_device(index, scale, judging, entry, ending)?;
+        if let (Some(on_host), Some(shown)) = (&mut self.on_host, &shown)
+            && ending != Ending::Loss
+        {
+            let found = [&self.gradient, &self.diagonal];
+            on_host.receive(self.frozen.gpu(), shown, found)?;
+        }
+        Ok(())
+    }
+
+    /// [`Passes::draw`] of what is on the device.
+    fn draw_on_device(
         &self,
         index: usize,
         scale: usize,

@@ -50,6 +50,7 @@ pub fn relight(
         limit: memory_limit,
         sh_degree: sh::MAX_DEGREE,
         weighted: targets.weighted(),
+        streams: true,
     };
     let frozen = FrozenViews::new(raster, luma, dataset.extent, &cameras, 1, room)?;
     let start = luma.sh.to_rgb();

@@ -9,10 +9,7 @@
 use std::ops::ControlFlow;
 
 use super::{ChromaError, FrozenViews, Targets, Task};
-use crate::{
-    raster::Field,
-    splats::{ShField, sh},
-};
+use crate::splats::{ShField, sh};
 
 /// Views that are looked at, at most: the factor is one number.
 const VIEWS: usize = 16;
@@ -40,10 +37,10 @@ pub fn match_saturation(
     chroma: &mut ShField,
     observe: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
 ) -> Result<f64, ChromaError> {
-    let colors = Field::upload(frozen.gpu(), chroma)?;
+    let colors = frozen.colors(chroma)?;
     let mut whole = ShField::zeros(frozen.splat_count(), 0, 2);
     whole.coefficients.fill((1.0 / sh::C0) as f32);
-    let opacity = Field::upload(frozen.gpu(), &whole)?;
+    let opacity = frozen.colors(&whole)?;
     let (mut wanted, mut shown) = (0.0, 0.0);
     let step = tasks.len().div_ceil(VIEWS).max(1);
     let total = tasks.len().div_ceil(step);

@@ -7,7 +7,7 @@ use crate::{
     capture::{Dataset, Exposure},
     chroma::{Lesson, native_rgb, teacher::AbImage},
     measure,
-    raster::{Picture, Raster, Renderer},
+    raster::{Picture, Raster, Renderer, Streamed},
     report::{ColorError, ColorQuality, ColorView, Row, to_image},
     splats::{ShField, Splats},
 };
@@ -18,6 +18,12 @@ const PAINTED_ROWS: usize = 2;
 
 /// What the contact sheet of a colored scene shows, left to right.
 pub const COLUMNS: [&str; 4] = ["photo", "gray scene", "teacher", "colored scene"];
+
+/// The scene, on the device or on the host.
+enum Sight {
+    Whole(Box<Renderer>),
+    Streamed(Streamed),
+}
 
 /// Pictures of the measured views and what they amount to.
 pub struct Measured {
@@ -40,12 +46,18 @@ impl Measured {
         dataset: &Dataset,
         exposures: &[Exposure],
         [luma, baked]: [&Splats; 2],
-        chroma: &ShField,
+        (chroma, streams): (&ShField, bool),
         lesson: &Lesson,
         observe: &mut Observer<'_>,
     ) -> Result<Self, EvalError> {
-        let mut renderer =
-            Renderer::of(raster, luma, &[&luma.sh, chroma, &baked.sh], dataset.extent)?;
+        let fields = [&luma.sh, chroma, &baked.sh];
+        let mut sight = match streams {
+            true => Sight::Streamed(Streamed::new(luma, dataset.extent)),
+            false => {
+                let renderer = Renderer::of(raster, luma, &fields, dataset.extent)?;
+                Sight::Whole(Box::new(renderer))
+            }
+        };
         let (mut errors, mut views, mut rows) = (Vec::new(), Vec::new(), Vec::new());
         let measured = lesson.measured(&dataset.split).1;
         let painted = lesson.views.iter().filter(|&&view| lesson.is_painted(view));
@@ -69,7 +81,10 @@ impl Measured {
             let (photo, camera) = (&photo, &dataset.cameras[i]);
             let exposure = exposures[i];
             let reference = Reference { photo, exposure };
-            let pictures = renderer.render(camera)?;
+            let pictures = match &mut sight {
+                Sight::Whole(renderer) => renderer.render(camera)?,
+                Sight::Streamed(scene) => scene.render(raster, &fields, camera)?,
+            };
             let native = native_rgb(&pictures[0], &pictures[1]);
             let exported = pictures[2].shown();
             let measures = measured.contains(&i);

@@ -102,6 +102,7 @@ impl Peer {
             limit: memory_limit,
             sh_degree: sh::MAX_DEGREE,
             weighted: targets.weighted(),
+            streams: false,
         };
         let (luma, extent) = (&scene.luma, dataset.extent);
         let frozen = FrozenViews::new(raster, luma, extent, &cameras, scales, room)?;

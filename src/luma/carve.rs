@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use crate::{
     capture::{CaptureError, Dataset, Photo},
-    splats::{ShField, Splats},
+    splats::Splats,
 };
 
 /// A Gaussian goes when more than this share of the views that see its center have it
@@ -48,23 +48,6 @@ pub fn carved(dataset: &Dataset, splats: &Splats) -> Result<Splats, CaptureError
     let kept: Vec<usize> = (0..splats.len()).filter(inside).collect();
     Ok(match kept.len() {
         0 => splats.clone(),
-        _ => chosen(splats, &kept),
+        _ => splats.chosen(&kept),
     })
-}
-
-/// Some of the Gaussians, in the order of `indices`.
-pub fn chosen(splats: &Splats, indices: &[usize]) -> Splats {
-    let field = &splats.sh;
-    Splats {
-        means: indices.iter().map(|&i| splats.means[i]).collect(),
-        quats: indices.iter().map(|&i| splats.quats[i]).collect(),
-        log_scales: indices.iter().map(|&i| splats.log_scales[i]).collect(),
-        opacity_logits: indices.iter().map(|&i| splats.opacity_logits[i]).collect(),
-        sh: ShField {
-            coefficients: (indices.iter())
-                .flat_map(|&i| field.of(i).to_vec())
-                .collect(),
-            ..*field
-        },
-    }
 }

@@ -9,7 +9,7 @@ use std::{
 use super::{
     Checkpoint, CurvePoint, Demand, Goal, Grows, Keeper, LumaError, LumaProgress, LumaSettings,
     LumaTrainer, NoKeeper, PlannedViews, TrialProgress,
-    carve::{carved, chosen},
+    carve::carved,
     planned,
     planned::WatchedViews,
     resident_photos,
@@ -278,7 +278,7 @@ impl Fit<'_> {
             return Ok((placed, around));
         };
         let trained = splats.len().saturating_sub(self.surroundings);
-        let some = |range: Range<usize>| chosen(splats, &range.collect::<Vec<_>>());
+        let some = |range: Range<usize>| splats.chosen(&range.collect::<Vec<_>>());
         let around = started(&some(trained..splats.len()), settings);
         let room = LumaSettings {
             max_splats: settings.max_splats.saturating_sub(around.len()).max(1),

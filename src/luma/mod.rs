@@ -1,6 +1,6 @@
 //! Stage 1: geometry and luminance from grayscale photographs.
 
-pub mod carve;
+mod carve;
 mod checkpoint;
 mod curve;
 pub mod densify;

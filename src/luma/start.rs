@@ -2,7 +2,7 @@
 
 use super::{
     LumaSettings,
-    carve::{carved, chosen},
+    carve::carved,
     gaps::{GapPoint, gap_points},
 };
 use crate::{
@@ -139,7 +139,7 @@ fn truncate(splats: &mut Splats, max: usize) {
     let mut kept: Vec<usize> = (0..splats.len()).collect();
     thin(&mut kept, max);
     if kept.len() < splats.len() {
-        *splats = chosen(splats, &kept);
+        *splats = splats.chosen(&kept);
     }
 }
 

@@ -2,7 +2,7 @@
 //! is shortened where a parabola says (3.5 there), and if that raises it too, undone for the
 //! majorizer's. With anchors, with floors (Bertsekas 1982), and elimination to compare with.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 
 /// A symmetric matrix, rows.
 pub type Matrix = Vec<Vec<f64>>;
@@ -61,6 +61,8 @@ pub struct Lbfgs {
     slope: f64,
     /// Points accepted so far.
     age: usize,
+    /// Whether what is minimized has changed a little since the accepted point.
+    changed: bool,
     /// One over the majorizer's diagonal there; zero for what is held at its floor.
     preconditioner: Vec<f64>,
     /// Newest first; nothing in the place of a pair that does not count.
@@ -86,6 +88,7 @@ impl Lbfgs {
             next: Next::Onward,
             slope: 0.0,
             age: 0,
+            changed: false,
             pairs: VecDeque::new(),
             scale: 1.0,
         }
@@ -104,7 +107,8 @@ impl Lbfgs {
         let gradient: Vec<f64> = (gradient.iter().zip(of_ridges).zip(self.off_anchors()))
             .map(|((g, ridge), (pull, off))| g + ridge + pull * off)
             .collect();
-        let paired = self.loss.is_some() && self.age >= AGE;
+        let changed = std::mem::take(&mut self.changed);
+        let paired = self.loss.is_some() && self.age >= AGE && !changed;
         let length = self.judge(loss);
         if self.next == Next::Onward {
             let before = std::mem::replace(&mut self.accepted, (self.unknowns.clone(), gradient));
@@ -141,6 +145,108 @@ impl Lbfgs {
     /// What is minimized is another function from now on.
     pub fn restart(&mut self) {
         self.loss = None;
+    }
+
+    /// What is minimized is a little different from now on: what the gradient changes by in the
+    /// next step says nothing of the curvature.
+    pub fn changed(&mut self) {
+        self.changed = true;
+    }
+
+    /// The loss at the accepted point, the parts of ridge and anchors included.
+    pub fn loss(&self) -> Option<f64> {
+        self.loss
+    }
+
+    /// All that the next step goes by, by name.
+    pub fn kept(&self) -> BTreeMap<String, Vec<f64>> {
+        let next = match self.next {
+            Next::Onward => 0.0,
+            Next::Shorter => 1.0,
+            Next::Safe => 2.0,
+        };
+        let loss = self.loss.unwrap_or(f64::INFINITY);
+        let of_steps = [loss, next, self.slope, self.scale];
+        let counted = [self.age, self.undone, usize::from(self.changed)].map(|n| n as f64);
+        let rhos = self.pairs.iter().map(|pair| match pair {
+            Some((_, _, rho)) => *rho,
+            None => f64::NAN,
+        });
+        let mut kept: BTreeMap<String, Vec<f64>> = [
+            ("unknowns", &self.unknowns),
+            ("displacement", &self.displacement),
+            ("anchors", &self.anchors.0),
+            ("pulls", &self.anchors.1),
+            ("accepted unknowns", &self.accepted.0),
+            ("accepted gradient", &self.accepted.1),
+            ("direction", &self.direction),
+            ("preconditioner", &self.preconditioner),
+            ("scalars", &[&of_steps[..], &counted].concat()),
+            ("rhos", &rhos.collect()),
+        ]
+        .map(|(name, values)| (name.to_owned(), values.clone()))
+        .into();
+        for (age, (s, y, _)) in self.pairs.iter().enumerate().filter_map(with_age) {
+            kept.insert(format!("displacement {age}"), s.clone());
+            kept.insert(format!("change {age}"), y.clone());
+        }
+        kept
+    }
+
+    /// Goes on from what another of the same problem kept; `false`, and nothing is changed, where
+    /// that is of another.
+    pub fn go_on_from(&mut self, kept: &BTreeMap<String, Vec<f64>>) -> bool {
+        self.restored(kept).map(|found| *self = found).is_some()
+    }
+
+    fn restored(&self, kept: &BTreeMap<String, Vec<f64>>) -> Option<Self> {
+        let length = self.unknowns.len();
+        let vector = |name: &str| {
+            let values = kept.get(name)?;
+            (values.len() == length).then(|| values.clone())
+        };
+        let &[loss, next, slope, scale, age, undone, changed] = &kept.get("scalars")?[..] else {
+            return None;
+        };
+        let pair = |(age, &rho): (usize, &f64)| match rho.is_nan() {
+            true => Some(None),
+            false => {
+                let s = vector(&format!("displacement {age}"))?;
+                Some(Some((s, vector(&format!("change {age}"))?, rho)))
+            }
+        };
+        Some(Self {
+            unknowns: vector("unknowns")?,
+            displacement: vector("displacement")?,
+            anchors: (vector("anchors")?, vector("pulls")?),
+            accepted: (vector("accepted unknowns")?, vector("accepted gradient")?),
+            direction: vector("direction")?,
+            preconditioner: vector("preconditioner")?,
+            pairs: kept
+                .get("rhos")?
+                .iter()
+                .enumerate()
+                .map(pair)
+                .collect::<Option<_>>()?,
+            loss: loss.is_finite().then_some(loss),
+            next: match next {
+                0.0 => Next::Onward,
+                1.0 => Next::Shorter,
+                _ => Next::Safe,
+            },
+            slope,
+            scale,
+            age: age as usize,
+            undone: undone as usize,
+            changed: changed > 0.0,
+            floors: self.floors.clone(),
+            ridges: self.ridges.clone(),
+        })
+    }
+
+    /// No unknown falls below these from now on.
+    pub fn set_floors(&mut self, floors: Vec<f64>) {
+        self.floors = floors;
     }
 
     /// The end, where the loss is this: a last step that raised it is undone.
@@ -253,6 +359,11 @@ impl Lbfgs {
     }
 }
 
+/// A pair that counts, and its place.
+fn with_age((age, pair): (usize, &Option<Pair>)) -> Option<(usize, &Pair)> {
+    Some((age, pair.as_ref()?))
+}
+
 fn rises(before: f64, loss: f64) -> bool {
     loss.is_nan() || loss > before * (1.0 + TOLERANCE)
 }
@@ -280,153 +391,5 @@ pub fn solve(mut matrix: Matrix, right: &[f64]) -> Vec<f64> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::random::Random;
-    use super::*;
-
-    /// `BᵀB + I` of random B.
-    fn random_matrix(random: &mut Random, size: usize) -> Matrix {
-        let b: Matrix = (0..size)
-            .map(|_| (0..size).map(|_| random.range(-1.0, 1.0)).collect())
-            .collect();
-        let column = |i: usize| -> Vec<f64> { b.iter().map(|row| row[i]).collect() };
-        (0..size)
-            .map(|i| {
-                (0..size)
-                    .map(|j| dot(&column(i), &column(j)) + f64::from(u8::from(i == j)))
-                    .collect()
-            })
-            .collect()
-    }
-
-    #[test]
-    fn elimination_solves() {
-        let x = solve(vec![vec![4.0, 2.0], vec![2.0, 3.0]], &[2.0, 5.0]);
-        assert!((x[0] + 0.5).abs() < 1e-15 && (x[1] - 2.0).abs() < 1e-15);
-        let mut random = Random::new(1);
-        let matrix = random_matrix(&mut random, 12);
-        let right: Vec<f64> = (0..12).map(|_| random.range(-1.0, 1.0)).collect();
-        let back = multiply(&matrix, &solve(matrix.clone(), &right));
-        assert!(back.iter().zip(&right).all(|(a, b)| (a - b).abs() < 1e-12));
-    }
-
-    /// A quadratic whose least value is none.
-    struct Quadratic {
-        matrix: Matrix,
-        least: Vec<f64>,
-        diagonal: Vec<f64>,
-    }
-
-    impl Quadratic {
-        fn random(seed: u64, size: usize) -> Self {
-            let mut random = Random::new(seed);
-            let matrix = random_matrix(&mut random, size);
-            // Sums of magnitudes bound any symmetric matrix.
-            let sum = |row: &Vec<f64>| row.iter().map(|v| v.abs()).sum();
-            Self {
-                diagonal: matrix.iter().map(sum).collect(),
-                least: (0..size).map(|_| random.range(-1.0, 1.0)).collect(),
-                matrix,
-            }
-        }
-
-        fn gradient(&self, x: &[f64]) -> Vec<f64> {
-            let off: Vec<f64> = x.iter().zip(&self.least).map(|(x, l)| x - l).collect();
-            multiply(&self.matrix, &off)
-        }
-
-        fn loss(&self, x: &[f64]) -> f64 {
-            let off: Vec<f64> = x.iter().zip(&self.least).map(|(x, l)| x - l).collect();
-            0.5 * dot(&off, &self.gradient(x))
-        }
-    }
-
-    /// Far fewer steps than the majorizer alone takes.
-    #[test]
-    fn ends_where_the_loss_is_least() {
-        let quadratic = Quadratic::random(2, 12);
-        let free = vec![f64::NEG_INFINITY; 12];
-        let mut lbfgs = Lbfgs::new(vec![0.0; 12], free, vec![0.0; 12]);
-        let mut alone = vec![0.0; 12];
-        for _ in 0..40 {
-            let x = lbfgs.unknowns.clone();
-            lbfgs.step(
-                quadratic.loss(&x),
-                &quadratic.gradient(&x),
-                &quadratic.diagonal,
-            );
-            let g = quadratic.gradient(&alone);
-            for (k, x) in alone.iter_mut().enumerate() {
-                *x -= g[k] / quadratic.diagonal[k];
-            }
-        }
-        lbfgs.end(quadratic.loss(&lbfgs.unknowns));
-        let (found, slow) = (quadratic.loss(&lbfgs.unknowns), quadratic.loss(&alone));
-        assert!(found < 1e-9 && slow > 1e-4, "{found} {slow}");
-        // Nothing left to do moves nothing, and divides by no zero.
-        let mut done = Lbfgs::new(vec![1.0], vec![f64::NEG_INFINITY], vec![0.0]);
-        for _ in 0..3 {
-            done.step(5.0, &[0.0], &[2.0]);
-        }
-        assert_eq!(done.unknowns, [1.0]);
-    }
-
-    /// A loss that rises, or is none, sends it back to where it was: first for a shorter
-    /// step, then for the majorizer's.
-    #[test]
-    fn a_step_that_raises_the_loss_is_undone() {
-        let start = vec![3.0, -2.0];
-        // A slope of -0.75 and a rise of 2.25: least after an eighth of the step. Of a loss
-        // that is none, a tenth.
-        for (bad, share) in [(7.25, 0.125), (f64::NAN, 0.1), (1e9, 0.1)] {
-            let mut lbfgs = Lbfgs::new(start.clone(), vec![f64::NEG_INFINITY; 2], vec![0.0; 2]);
-            lbfgs.step(5.0, &[1.0, -1.0], &[2.0, 4.0]);
-            assert_eq!(lbfgs.unknowns, [2.5, -1.75]);
-            lbfgs.step(bad, &[9.0, 9.0], &[1.0, 1.0]);
-            let shorter = [3.0 - 0.5 * share, -2.0 + 0.25 * share];
-            assert_eq!((lbfgs.undone, &lbfgs.unknowns[..]), (1, &shorter[..]));
-            assert_eq!(lbfgs.moved(&[1.0, 1.0], 2), None);
-            lbfgs.step(bad, &[9.0, 9.0], &[1.0, 1.0]);
-            // Once more the majorizer's step from the start, with the diagonal there.
-            assert_eq!((lbfgs.undone, &lbfgs.unknowns[..]), (2, &[2.5, -1.75][..]));
-            lbfgs.step(4.0, &[0.5, -0.5], &[1.0, 1.0]);
-            assert_eq!(lbfgs.unknowns, [2.0, -1.25]);
-            assert_eq!(lbfgs.moved(&[1.0, 3.0], 2), Some(0.3125));
-            lbfgs.end(4.1);
-            assert_eq!(lbfgs.unknowns, [2.5, -1.75]);
-            // Another function is another loss.
-            lbfgs.restart();
-            lbfgs.end(99.0);
-            assert_eq!((lbfgs.undone, &lbfgs.unknowns[..]), (3, &[2.5, -1.75][..]));
-        }
-    }
-
-    /// It comes to where no unknown can gain: the gradient is none where an unknown is above
-    /// its floor, and points below where it stands on it.
-    #[test]
-    fn ends_where_floors_allow_no_more() {
-        let quadratic = Quadratic::random(3, 14);
-        let mut random = Random::new(4);
-        let floors: Vec<f64> = (0..14).map(|_| random.range(-0.5, 0.5)).collect();
-        let mut lbfgs = Lbfgs::new(floors.clone(), floors.clone(), vec![0.0; 14]);
-        for _ in 0..200 {
-            let x = lbfgs.unknowns.clone();
-            lbfgs.step(
-                quadratic.loss(&x),
-                &quadratic.gradient(&x),
-                &quadratic.diagonal,
-            );
-        }
-        let x = lbfgs.unknowns.clone();
-        let left = quadratic.gradient(&x);
-        let on_floor = (0..14).filter(|&k| x[k] <= floors[k]).count();
-        assert!((3..12).contains(&on_floor), "{on_floor}");
-        for k in 0..14 {
-            if x[k] > floors[k] {
-                assert!(left[k].abs() < 1e-6, "{k}: {}", left[k]);
-            } else {
-                assert!(x[k] == floors[k] && left[k] >= 0.0, "{k}: {}", left[k]);
-            }
-        }
-    }
-}
+#[path = "lbfgs_tests.rs"]
+mod tests;

@@ -22,6 +22,7 @@ mod roofline;
 pub mod scan;
 pub mod sort;
 mod splats;
+mod streamed;
 mod sum_loss;
 mod view;
 
@@ -36,7 +37,8 @@ pub use portions::Portion;
 pub use renderer::{Picture, Renderer};
 pub use rgb_adjoint::{RgbAdjoint, RgbAdjointKernels};
 pub use roofline::{Load, minimum_words};
-pub use splats::{Field, Geometry};
+pub use splats::{Field, Geometry, field_of, planes_of};
+pub use streamed::{Frustum, Streamed};
 pub use sum_loss::{LossLog, SumLossKernel, SumLossParameters};
 pub use view::ViewUniform;
 

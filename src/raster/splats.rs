@@ -6,6 +6,9 @@ use crate::{
     splats::{ShField, Splats, sh},
 };
 
+/// Opacity logit of what fills up room: e^-1000 is 0.
+const UNSEEN_LOGIT: f32 = -1000.0;
+
 /// Geometry planes `[11, N]`.
 pub struct Geometry {
     /// Number of Gaussians.
@@ -25,9 +28,32 @@ impl Geometry {
     /// # Errors
     /// [`GpuError::TooLarge`].
     pub fn upload(gpu: &Gpu, splats: &Splats) -> Result<Self, GpuError> {
-        let n = splats.len();
+        let geometry = Self::of_none(gpu, splats.len())?;
+        geometry.put(gpu, splats);
+        Ok(geometry)
+    }
+
+    /// Room for so many Gaussians.
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`].
+    pub fn of_none(gpu: &Gpu, count: usize) -> Result<Self, GpuError> {
+        Ok(Self {
+            count,
+            planes: Buffer::zeros(gpu, "geometry", GEOMETRY_PLANES * count)?,
+        })
+    }
+
+    /// Takes the geometry of `splats`, of which there is room for so many. What is left of the
+    /// room is Gaussians that no camera shows.
+    ///
+    /// # Panics
+    /// Where there are more.
+    pub fn put(&self, gpu: &Gpu, splats: &Splats) {
+        let n = self.count;
+        assert!(splats.len() <= n, "{} Gaussians into {n}", splats.len());
         let mut planes = vec![0.0; GEOMETRY_PLANES * n];
-        for i in 0..n {
+        for i in 0..splats.len() {
             for axis in 0..3 {
                 planes[(PLANE_MEAN + axis) * n + i] = splats.means[i][axis];
                 planes[(PLANE_LOG_SCALE + axis) * n + i] = splats.log_scales[i][axis];
@@ -37,10 +63,10 @@ impl Geometry {
             }
             planes[PLANE_OPACITY * n + i] = splats.opacity_logits[i];
         }
-        Ok(Self {
-            count: n,
-            planes: Buffer::from_slice(gpu, "geometry", &planes)?,
-        })
+        // A direction, or they would count as poisoned.
+        planes[PLANE_QUAT * n + splats.len()..(PLANE_QUAT + 1) * n].fill(1.0);
+        planes[PLANE_OPACITY * n + splats.len()..][..n - splats.len()].fill(UNSEEN_LOGIT);
+        self.planes.write(gpu, &planes);
     }
 
     /// Reads geometry and field back into host arrays.
@@ -86,13 +112,7 @@ impl Field {
         let kind = ColorKind::of_channels(field.channels);
         let kind = kind.ok_or(GpuError::NoColor(field.channels))?;
         let stride = sh::coefficient_count(field.degree) * field.channels;
-        let n = field.coefficients.len() / stride;
-        let mut planes = vec![0.0; field.coefficients.len()];
-        for i in 0..n {
-            for k in 0..stride {
-                planes[k * n + i] = field.coefficients[i * stride + k];
-            }
-        }
+        let planes = planes_of(field, field.coefficients.len() / stride);
         Ok(Self {
             kind,
             degree: field.degree,
@@ -106,19 +126,35 @@ impl Field {
     /// [`GpuError::Lost`].
     pub fn download(&self, gpu: &Gpu) -> Result<ShField, GpuError> {
         let planes = self.planes.read(gpu)?;
-        let channels = self.kind.channels();
-        let stride = sh::coefficient_count(self.degree) * channels;
-        let n = planes.len() / stride;
-        let mut coefficients = vec![0.0; planes.len()];
-        for i in 0..n {
-            for k in 0..stride {
-                coefficients[i * stride + k] = planes[k * n + i];
-            }
+        Ok(field_of(&planes, self.degree, self.kind.channels()))
+    }
+}
+
+/// Harmonics as planes of `room` Gaussians, zeros behind those that there are.
+pub fn planes_of(field: &ShField, room: usize) -> Vec<f32> {
+    let stride = sh::coefficient_count(field.degree) * field.channels;
+    let mut planes = vec![0.0; stride * room];
+    for (i, of_splat) in field.coefficients.chunks_exact(stride).enumerate() {
+        for (k, &coefficient) in of_splat.iter().enumerate() {
+            planes[k * room + i] = coefficient;
         }
-        Ok(ShField {
-            degree: self.degree,
-            channels,
-            coefficients,
-        })
+    }
+    planes
+}
+
+/// Harmonics from planes without room.
+pub fn field_of(planes: &[f32], degree: u32, channels: usize) -> ShField {
+    let stride = sh::coefficient_count(degree) * channels;
+    let n = planes.len() / stride;
+    let mut coefficients = vec![0.0; planes.len()];
+    for i in 0..n {
+        for k in 0..stride {
+            coefficients[i * stride + k] = planes[k * n + i];
+        }
+    }
+    ShField {
+        degree,
+        channels,
+        coefficients,
     }
 }

@@ -85,6 +85,8 @@ pub struct ChromaReport {
     pub estimated_device_memory: u64,
     /// Views whose tile lists and targets stayed on the device.
     pub pinned_views: usize,
+    /// Gaussians on the device at a time, where they waited on the host.
+    pub splats_at_a_time: Option<usize>,
     /// `color.ply` against native blending, mean over the views.
     pub bake: ColorError,
     /// Views measured: `test` but for painted ones, or else `train`.

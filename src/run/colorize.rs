@@ -262,6 +262,10 @@ pub fn colorize(
             // It has been asked already.
             ColorizeEvent::Asked { .. } => {}
             ColorizeEvent::Listing => observe(Event::begins(Stage::Lists)),
+            ColorizeEvent::Streaming { at_a_time } => observe(Event::Note(format!(
+                "{} Gaussians have no room on the device: at most {at_a_time} that a photo may show come at a time",
+                luma.len()
+            ))),
             ColorizeEvent::Chosen(chosen) => observe(Event::Note(describe(chosen))),
             ColorizeEvent::Plan(effects) => {
                 observe(Event::Note(table(effects)));
@@ -348,7 +352,7 @@ pub fn colorize(
         &dataset,
         &exposures,
         [&luma, &colored.splats],
-        &colored.chroma,
+        (&colored.chroma, colored.splats_at_a_time.is_some()),
         &lesson,
         &mut |progress| observe(progress.into()),
     )?;
@@ -390,6 +394,7 @@ pub fn colorize(
         peak_device_memory: colored.peak_device_memory,
         estimated_device_memory: colored.estimated_device_memory,
         pinned_views: colored.pinned_views,
+        splats_at_a_time: colored.splats_at_a_time,
         settings: colored.settings,
         bake: measured.bake,
         measured_on: lesson.measured(&dataset.split).0.to_owned(),

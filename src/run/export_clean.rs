@@ -6,7 +6,6 @@ use super::{Event, Observer, RunError, Stage, export_viewer::Cameras};
 use crate::{
     capture::Camera,
     gpu::Gpu,
-    luma::carve::chosen,
     measure::reported_psnr,
     raster::{Contributions, Raster, RasterOptions, Renderer},
     splats::Splats,
@@ -57,7 +56,7 @@ pub(super) fn cleaned(
     let needed: Vec<usize> = (0..splats.len())
         .filter(|&i| i >= last || most[i] >= NEEDED)
         .collect();
-    let clean = chosen(splats, &needed);
+    let clean = splats.chosen(&needed);
     let psnr = changed(&raster, [splats, &clean], &test, extent)?;
     let dropped = splats.len() - clean.len();
     Ok((clean, Cleaned { dropped, psnr }))

@@ -22,7 +22,7 @@ use crate::{
     capture::{Capture, Dataset, LoadOptions},
     eval::{Progress, exposures, gray_rows, mean_quality, measure_luma},
     input,
-    luma::{LumaSettings, carve::chosen, start::started},
+    luma::{LumaSettings, start::started},
     raster::Raster,
     report::{CaptureReport, LumaReport, LumaSeconds, Report, ViewExposure},
     splats::Splats,
@@ -210,7 +210,7 @@ fn together(
         let inner = (splats.len()).saturating_sub(block.report.luma.surroundings);
         for (into, range) in [(&mut all, 0..inner), (&mut around, inner..splats.len())] {
             let own: Vec<usize> = range.filter(|&i| core.holds(splats.means[i])).collect();
-            into.append(started(&chosen(&splats, &own), &settings));
+            into.append(started(&splats.chosen(&own), &settings));
         }
     }
     if all.is_empty() {

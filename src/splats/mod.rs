@@ -71,6 +71,17 @@ impl Splats {
         self.means.len()
     }
 
+    /// Some of the Gaussians, in the order of `indices`.
+    pub fn chosen(&self, indices: &[usize]) -> Self {
+        Self {
+            means: indices.iter().map(|&i| self.means[i]).collect(),
+            quats: indices.iter().map(|&i| self.quats[i]).collect(),
+            log_scales: indices.iter().map(|&i| self.log_scales[i]).collect(),
+            opacity_logits: indices.iter().map(|&i| self.opacity_logits[i]).collect(),
+            sh: self.sh.chosen(indices),
+        }
+    }
+
     /// Puts others, with a field of the same degree and channels, behind these.
     pub fn append(&mut self, mut others: Self) {
         debug_assert_eq!(

@@ -105,6 +105,15 @@ impl ShField {
         }
     }
 
+    /// Those of some Gaussians, in the order of `indices`.
+    pub fn chosen(&self, indices: &[usize]) -> Self {
+        let coefficients = indices.iter().flat_map(|&i| self.of(i));
+        Self {
+            coefficients: coefficients.copied().collect(),
+            ..*self
+        }
+    }
+
     /// Coefficients of one Gaussian, `[(degree + 1)², channels]`.
     pub fn of(&self, index: usize) -> &[f32] {
         let stride = coefficient_count(self.degree) * self.channels;

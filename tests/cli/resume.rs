@@ -6,6 +6,8 @@ use std::{
     time::{Duration, Instant},
 };
 
+use gs_chroma::splats::{read_ply, write_ply};
+
 use super::program::{Done, Place};
 use super::scene;
 use super::shared::{place_with_run, place_with_scene};
@@ -314,6 +316,82 @@ fn a_coloring_that_is_killed_goes_on() {
         assert!(!place.path("runs/scene/checkpoint-color").exists());
     }
     assert!(interrupted >= 2, "{interrupted}");
+}
+
+/// A run that has Gaussians far above all photos, so many that a MiB holds those only that photos
+/// may show. They come for each photo; the colors are as with all of them there, and the same
+/// bytes where it is killed.
+#[test]
+fn a_coloring_of_gaussians_that_wait_on_the_host() {
+    let many = || {
+        let place = place_to_color();
+        let path = place.path("runs/scene/luma.ply");
+        let mut scene = read_ply(&path).expect("a scene").splats;
+        let mut above = scene.chosen(&vec![0; 9000]);
+        for (k, mean) in above.means.iter_mut().enumerate() {
+            *mean = [0.1 * k as f32, 1000.0, 0.0];
+        }
+        let shown = scene.len();
+        scene.append(above);
+        write_ply(&path, &scene, glam::DVec3::ZERO, &[]).expect("writable");
+        (place, shown)
+    };
+    let colorize = [
+        "colorize",
+        "runs/scene",
+        "--teacher",
+        "colored",
+        "--rounds",
+        "6",
+    ];
+    let within = [&colorize[..], &["--memory-limit", "1"]].concat();
+    let (place, shown) = many();
+    let told = place.run(&within);
+    assert_eq!(told.code, Some(0), "{}", told.stderr);
+    let chroma = place.report("runs/scene")["chroma"].clone();
+    let at_a_time = chroma["splats_at_a_time"].as_u64().unwrap_or_default();
+    assert!(
+        (1..=shown as u64).contains(&at_a_time),
+        "{at_a_time} of {shown}"
+    );
+    let line = format!("at most {at_a_time} that a photo may show come at a time");
+    assert!(told.stderr.contains(&line), "{}", told.stderr);
+    for bytes in ["estimated_device_memory", "peak_device_memory"] {
+        assert!(
+            chroma[bytes].as_u64() < Some(1 << 20),
+            "{bytes}: {}",
+            chroma[bytes]
+        );
+    }
+    let streamed = colors(&place);
+
+    let (whole, _) = many();
+    whole.succeed(&colorize);
+    let all = whole.report("runs/scene")["chroma"].clone();
+    assert_eq!(all["splats_at_a_time"], serde_json::Value::Null);
+    assert!(all["estimated_device_memory"].as_u64() > Some(1 << 20));
+    for error in ["mean", "percentile_95"] {
+        let of = |chroma: &serde_json::Value| chroma["pictures"]["delta_e"][error].as_f64();
+        let apart = of(&all)
+            .zip(of(&chroma))
+            .map(|(all, some)| (all - some).abs());
+        assert!(apart < Some(0.01), "{error}: {apart:?}");
+    }
+
+    let (killed, _) = many();
+    let mut command = killed.command(&[&within[..], &OFTEN].concat());
+    let quiet = command.stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = quiet.spawn().expect("the program starts");
+    let begun = Instant::now();
+    while !killed.path("runs/scene/checkpoint-color").exists() {
+        assert!(child.try_wait().expect("a child").is_none(), "it has ended");
+        assert!(begun.elapsed() < Duration::from_secs(120), "no checkpoint");
+        sleep(Duration::from_millis(1));
+    }
+    child.kill().expect("it is there");
+    child.wait().expect("a child");
+    killed.succeed(&[&within[..], &["--resume"]].concat());
+    assert!(colors(&killed) == streamed);
 }
 
 #[test]

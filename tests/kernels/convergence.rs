@@ -184,6 +184,7 @@ fn a_real_network_leads_to_one_end() {
         limit: None,
         sh_degree: 0,
         weighted: false,
+        streams: false,
     };
     let frozen = FrozenViews::new(&raster(), &luma, dataset.extent, &cameras, 1, room).unwrap();
     let what = "a real network";

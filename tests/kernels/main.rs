@@ -36,6 +36,7 @@ mod rgb;
 mod scan;
 mod solver;
 mod sort;
+mod streamed;
 mod tiles;
 mod viewers;
 

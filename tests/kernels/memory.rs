@@ -125,9 +125,32 @@ fn streamed_photos_train_alike() {
     assert!(resident == limited && resident == streamed);
 }
 
+/// Gaussians that wait on the host: the device holds those of one view.
+#[test]
+fn coloring_from_the_host_takes_what_was_estimated() {
+    for sh_degree in [0, 3] {
+        let Err(ChromaError::OverLimit { needed, splats, .. }) = coloring(sh_degree, Some(1), true)
+        else {
+            panic!("a byte is enough");
+        };
+        assert!(splats <= COUNT / 10, "{splats}");
+        let (taken, estimated, views) = coloring(sh_degree, Some(needed), true).unwrap();
+        assert_eq!((estimated, views), (needed, 0));
+        let ratio = taken as f64 / estimated as f64;
+        assert!(
+            (0.9..1.01).contains(&ratio),
+            "degree {sh_degree}: {ratio:.3}"
+        );
+    }
+}
+
 /// The most that the device holds while stage 2 solves and bakes at a degree, what it was said
 /// to hold, and how many views stayed there.
-fn coloring(sh_degree: u32, limit: Option<u64>) -> Result<(u64, u64, usize), ChromaError> {
+fn coloring(
+    sh_degree: u32,
+    limit: Option<u64>,
+    streams: bool,
+) -> Result<(u64, u64, usize), ChromaError> {
     let gpu = Gpu::open().unwrap();
     let luma = start(COUNT / 10, 1);
     let cameras: Vec<_> = cameras().iter().map(|c| c.resized(200, 150)).collect();
@@ -148,8 +171,11 @@ fn coloring(sh_degree: u32, limit: Option<u64>) -> Result<(u64, u64, usize), Chr
         limit,
         sh_degree,
         weighted: false,
+        streams,
     };
-    let frozen = FrozenViews::new(&raster, &luma, 1.0, &cameras, 3, room)?;
+    let scales = if streams { 1 } else { 3 };
+    let frozen = FrozenViews::new(&raster, &luma, 1.0, &cameras, scales, room)?;
+    assert_eq!(frozen.streamed().is_some(), streams && limit.is_some());
     let mut peak = 0;
     let mut look = |_| {
         peak = peak.max(gpu.allocated_bytes().unwrap() - before);
@@ -168,12 +194,12 @@ fn coloring(sh_degree: u32, limit: Option<u64>) -> Result<(u64, u64, usize), Chr
 #[test]
 fn coloring_takes_what_was_estimated() {
     for sh_degree in [0, 3] {
-        let Err(ChromaError::OverLimit { needed, .. }) = coloring(sh_degree, Some(1)) else {
+        let Err(ChromaError::OverLimit { needed, .. }) = coloring(sh_degree, Some(1), false) else {
             panic!("a byte is enough");
         };
-        let all = coloring(sh_degree, None).unwrap();
-        let half = coloring(sh_degree, Some((needed + all.1) / 2)).unwrap();
-        let one = coloring(sh_degree, Some(needed)).unwrap();
+        let all = coloring(sh_degree, None, false).unwrap();
+        let half = coloring(sh_degree, Some((needed + all.1) / 2), false).unwrap();
+        let one = coloring(sh_degree, Some(needed), false).unwrap();
         assert_eq!((all.2, one.2), (5, 0));
         assert!((1..5).contains(&half.2), "{}", half.2);
         for (taken, estimated, views) in [all, half, one] {

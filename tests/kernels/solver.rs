@@ -69,6 +69,7 @@ impl Problem {
             limit,
             sh_degree: 1,
             weighted: targets.weighted(),
+            streams: false,
         };
         let frozen = FrozenViews::new(&raster(), luma, 1.0, &cameras, 3, room)?;
         Ok(Self {

@@ -9,7 +9,6 @@ use crate::{
         ChromaError, ChromaObserver, ChromaProgress, ChromaSettings, FrozenViews, IrlsSolver,
         Targets, Task, native_rgb,
     },
-    raster::Field,
     splats::{ShField, Splats, sh},
 };
 
@@ -104,9 +103,8 @@ fn missing(
     [luma, chroma, exported, unmoved]: [&ShField; 4],
     observe: &mut dyn FnMut(BakeStep) -> ControlFlow<()>,
 ) -> Result<(Targets, Vec<Task>), ChromaError> {
-    let upload = |field| Field::upload(frozen.gpu(), field);
-    let (luma, chroma) = (upload(luma)?, upload(chroma)?);
-    let (exported, unmoved) = (upload(exported)?, upload(unmoved)?);
+    let (luma, chroma) = (frozen.colors(luma)?, frozen.colors(chroma)?);
+    let (exported, unmoved) = (frozen.colors(exported)?, frozen.colors(unmoved)?);
     let mut targets = Targets::new(1);
     let step = frozen.len().div_ceil(BAKE_VIEWS).max(1);
     let total = frozen.len().div_ceil(step);

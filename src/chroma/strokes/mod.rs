@@ -17,7 +17,7 @@ use crate::{
     capture::{Camera, Dataset, Photo},
     color::gray_to_lightness,
     measure::DepthSteps,
-    raster::{Field, Picture},
+    raster::Picture,
     splats::{ShField, Splats, sh},
 };
 use region::{Surface, grow};
@@ -154,12 +154,8 @@ pub(super) fn lay(
         region_of[view] = Some(regions.push_ab(&colors, Some(&alphas))?);
     }
     let claimed = claims.alphas.iter().filter(|&&alpha| alpha >= 0.5).count();
-    let gpu = frozen.gpu();
     let fields = claims.fields();
-    let fields = [
-        Field::upload(gpu, &fields[0])?,
-        Field::upload(gpu, &fields[1])?,
-    ];
+    let fields = [frozen.colors(&fields[0])?, frozen.colors(&fields[1])?];
     let mut targets = Targets::new(lesson.targets.scales());
     let mut tasks = Vec::new();
     let mut view = 0;
@@ -274,7 +270,7 @@ fn depth(
     let steps = DepthSteps::new(luma, camera);
     let mut pictures = Vec::with_capacity(steps.fields.len());
     for field in &steps.fields {
-        let field = Field::upload(frozen.gpu(), field)?;
+        let field = frozen.colors(field)?;
         pictures.extend(frozen.draw(view, &[&field])?);
     }
     let pixels = camera.width as usize * camera.height as usize;

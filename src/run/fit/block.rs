@@ -14,7 +14,7 @@ use crate::{
     capture::{Camera, Dataset, LoadOptions},
     color::gray_from_rgb,
     effects::{Effect, Overrules},
-    luma::{LumaSettings, Preset, carve::chosen, start::gap_places},
+    luma::{LumaSettings, Preset, start::gap_places},
     report::{EffectReport, Report, ViewExposure},
     splats::{Splats, initial_splats},
 };
@@ -135,12 +135,12 @@ impl BlockPlace {
         let coarse = read_splats(&folder.luma(), frame, observe)?.0.to_luma();
         let inner = coarse.len().saturating_sub(report.luma.surroundings);
         let [coarse, around] =
-            [0..inner, inner..coarse.len()].map(|some| chosen(&coarse, &some.collect::<Vec<_>>()));
+            [0..inner, inner..coarse.len()].map(|some| coarse.chosen(&some.collect::<Vec<_>>()));
         let offset = dataset.capture.offset;
         let near = self.near(offset);
         let far = self.far(dataset, &coarse);
         let room = settings.max_splats / (1 + FAR_PART);
-        let far = chosen(&coarse, &most_shown(dataset, &coarse, far, room));
+        let far = coarse.chosen(&most_shown(dataset, &coarse, far, room));
         // Points give way, not the little that stands for all the rest.
         let taken = far.len() + around.len();
         let room = settings.max_splats.saturating_sub(taken).max(1);
@@ -163,7 +163,7 @@ impl BlockPlace {
                 *log_scale = log_scale.min(widest);
             }
         }
-        start = chosen(&start, &evenly(&start.means, room));
+        start = start.chosen(&evenly(&start.means, room));
         observe(Event::Note(format!(
             "starts from {} of {} points in and around the block and {} Gaussians of the coarse model beyond",
             start.len(),

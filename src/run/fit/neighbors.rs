@@ -2,18 +2,15 @@
 
 use std::{path::PathBuf, sync::Arc};
 
-use glam::DVec3;
-
 use super::super::{
     Event, Observer, RunError, RunFolder, Stage,
     scene::{Frame, read_splats},
 };
-use super::{FitOptions, Init, block::shows};
+use super::{FitOptions, Init};
 use crate::{
     capture::{Dataset, Exposure, Layers},
     eval::exposures,
-    luma::carve::chosen,
-    raster::{Raster, Renderer},
+    raster::{Raster, Renderer, Streamed},
     splats::Splats,
 };
 
@@ -74,8 +71,8 @@ impl FitOptions {
             "goes on with {} of the merged scene's {scene} Gaussians; what photos show of the others is taken off them",
             taken.len(),
         )));
-        let mut start = chosen(&merged, &taken);
-        start.append(chosen(&own, &shell.collect::<Vec<_>>()));
+        let mut start = merged.chosen(&taken);
+        start.append(own.chosen(&shell.collect::<Vec<_>>()));
 
         let raster = raster.drawing(drawn);
         let told = block.exposures().unwrap_or_default();
@@ -107,16 +104,11 @@ impl Beyond<'_> {
         folder: &RunFolder,
         observe: &mut Observer<'_>,
     ) -> Result<Layers, RunError> {
-        let renderer =
-            |splats: &Splats| Renderer::of(self.raster, splats, &[&splats.sh], dataset.extent);
         let total = dataset.cameras.len();
         let mut layers = Layers::new(folder.path(), total)?;
-        let mut part = renderer(self.part)?;
-        let widest = self.whole.log_scales.iter().map(|scales| {
-            let widest = scales.iter().copied().fold(f32::MIN, f32::max);
-            f64::from(widest).exp()
-        });
-        let widest: Vec<f64> = widest.collect();
+        let mut part = Renderer::of(self.raster, self.part, &[&self.part.sh], dataset.extent)?;
+        // No more of the scene has to fit onto the device than one photo shows.
+        let whole = Streamed::new(self.whole, dataset.extent);
         for (view, camera) in dataset.cameras.iter().enumerate() {
             observe(Event::Progress {
                 stage: Stage::Placing,
@@ -124,13 +116,8 @@ impl Beyond<'_> {
                 total,
                 message: dataset.capture.views[view].name.clone(),
             });
-            // No more of the scene has to fit onto the device than one photo shows.
-            let shown = (0..self.whole.len()).filter(|&i| {
-                let middle = DVec3::from(self.whole.means[i].map(f64::from));
-                shows(camera, middle, widest[i])
-            });
-            let shown = chosen(self.whole, &shown.collect::<Vec<_>>());
-            let whole = renderer(&shown)?.render(camera)?.remove(0);
+            let fields = [&self.whole.sh];
+            let whole = whole.render(self.raster, &fields, camera)?.remove(0);
             let part = part.render(camera)?.remove(0);
             let gain = self.exposures[view].gain as f32;
             let pixels = whole.pixels.iter().zip(&part.pixels);

@@ -1,0 +1,176 @@
+//! What coloring takes of the device, reckoned before it is taken.
+
+use super::{ChromaError, correction::Corrections, frozen::Frozen};
+use crate::{
+    gpu::Gpu,
+    raster::{
+        AdjointScratch, COLOR_FIGURES, Canvas, ColorKind, Geometry, Lists,
+        constants::GEOMETRY_PLANES,
+    },
+    splats::sh,
+};
+
+/// Bytes of tile lists and wanted colors that stay on the device where no limit is set:
+/// leaves room for the rest on devices of 4 GiB.
+const DEFAULT_PINS: u64 = 2 << 30;
+
+/// What the device may be asked for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Room {
+    /// Bytes of the device that stage 2 may take; `None`: what views one at a time need,
+    /// and 2 GiB of what is worth keeping.
+    pub limit: Option<u64>,
+    /// The highest degree of harmonics that will be solved for.
+    pub sh_degree: u32,
+    /// Whether wanted pixels have weights.
+    pub weighted: bool,
+    /// Whether Gaussians may wait on the host where the limit, or what the adapter binds, leaves
+    /// no room for all of them. [`AdamSolver`](super::AdamSolver) needs them all, and coarser
+    /// scales do.
+    pub streams: bool,
+}
+
+/// What Gaussians take at least that all stay on the device, whatever the views.
+pub(super) struct Least {
+    bytes: u64,
+    /// Of the largest buffer.
+    buffer: u64,
+}
+
+impl Least {
+    pub fn of(splats: usize, luma_degree: u32, room: Room) -> Self {
+        let [luma, chroma] = [luma_degree, room.sh_degree].map(sh::coefficient_count);
+        let widest = GEOMETRY_PLANES.max(3 * luma.max(chroma));
+        Self {
+            bytes: Geometry::bytes(splats) + super::lbfgs::bytes(splats, 2 * chroma),
+            buffer: 4 * (widest * splats) as u64,
+        }
+    }
+
+    /// Whether the adapter binds so much, and the limit allows it.
+    pub fn fits(&self, gpu: &Gpu, limit: Option<u64>) -> bool {
+        self.buffer <= gpu.binding_limit() && limit.is_none_or(|limit| self.bytes <= limit)
+    }
+}
+
+/// Bytes on the device, known before they are taken.
+pub(super) struct Demand {
+    splats: usize,
+    /// Of the largest view.
+    pub tiles: usize,
+    /// Of the longest lists.
+    pub entries: usize,
+    /// What does not depend on which views stay.
+    fixed: u64,
+    /// A wanted pixel's.
+    of_pixel: u64,
+    /// One view's lists and targets, for all that take turns.
+    turns: u64,
+    /// Whether the Gaussians wait on the host.
+    streams: bool,
+}
+
+impl Demand {
+    /// Of views that show so many Gaussians each, or with `streams` at most.
+    pub fn of(
+        splats: usize,
+        luma_degree: u32,
+        views: &[Vec<Frozen>],
+        room: Room,
+        streams: bool,
+    ) -> Self {
+        let all = || views.iter().flatten();
+        let most = |of: &dyn Fn(&Frozen) -> usize| all().map(of).max().unwrap_or(0);
+        let tiles = most(&|frozen| frozen.uniform.tile_count());
+        let entries = most(&|frozen| frozen.entries);
+        let pixels: Vec<usize> = (0..views[0].len())
+            .map(|scale| {
+                let sizes = views.iter().map(|view| view[scale].uniform.pixel_count());
+                sizes.max().unwrap_or(0)
+            })
+            .collect();
+        let [luma, chroma] = [luma_degree, room.sh_degree].map(sh::coefficient_count);
+        let field = |planes: usize| 4 * (planes * splats) as u64;
+        let canvas = |kind, pixels| Canvas::bytes(kind, splats, pixels);
+        let judged =
+            4 * (COLOR_FIGURES * pixels[0]) as u64 + AdjointScratch::color_bytes(splats, entries);
+        let chroma_canvases = pixels
+            .iter()
+            .map(|&pixels| canvas(ColorKind::Chroma, pixels));
+        // One after the other: a/b are solved for, then pictures are drawn for the bake to
+        // meet, then RGB's constant harmonics are solved for.
+        let minimizing = |planes: usize| match streams {
+            // Unknowns, gradient and curvature, on their way as well; the rest is the host's.
+            true => Geometry::bytes(splats) + 2 * field(2 * planes + 2),
+            false => super::lbfgs::bytes(splats, planes),
+        };
+        let solving = minimizing(2 * chroma) + chroma_canvases.sum::<u64>() + judged;
+        let rgb = canvas(ColorKind::Rgb, pixels[0]);
+        let exported = 3 * luma.max(chroma);
+        let drawing = rgb
+            + field(match streams {
+                // One after the other, on their way as well.
+                true => GEOMETRY_PLANES + 2 * exported,
+                false => luma + 2 * chroma + exported + 3,
+            });
+        let baking = minimizing(3) + rgb + judged;
+        let of_pixel = 4 * (1 + u64::from(room.weighted));
+        // On its way as well.
+        let wanted = (1 + u64::from(streams)) * of_pixel * pixels[0] as u64;
+        Self {
+            splats,
+            tiles,
+            entries,
+            fixed: Geometry::bytes(splats)
+                + Corrections::bytes(views.len())
+                + solving.max(drawing).max(baking),
+            of_pixel,
+            streams,
+            turns: Lists::bytes(splats, tiles, entries) + wanted,
+        }
+    }
+
+    /// What keeping a view takes.
+    fn of_view(&self, view: &[Frozen]) -> u64 {
+        let of_scale = |frozen: &Frozen| {
+            Lists::bytes(self.splats, frozen.uniform.tile_count(), frozen.entries)
+                + self.of_pixel * frozen.uniform.pixel_count() as u64
+        };
+        view.iter().map(of_scale).sum()
+    }
+
+    /// With so many views kept.
+    pub fn bytes(&self, views: &[Vec<Frozen>], pinned: usize) -> u64 {
+        let turns = if pinned < views.len() { self.turns } else { 0 };
+        let kept: u64 = views[..pinned].iter().map(|view| self.of_view(view)).sum();
+        self.fixed + turns + kept
+    }
+
+    /// How many views stay on the device. The order in which views are met never changes,
+    /// so that keeping the first ones brings as few as any choice.
+    pub fn pinned(&self, views: &[Vec<Frozen>], limit: Option<u64>) -> Result<usize, ChromaError> {
+        let allowed = limit.unwrap_or(self.fixed + self.turns + DEFAULT_PINS);
+        if !self.streams && self.bytes(views, views.len()) <= allowed {
+            return Ok(views.len());
+        }
+        let needed = self.fixed + self.turns;
+        if needed > allowed {
+            return Err(ChromaError::OverLimit {
+                splats: self.splats,
+                needed,
+                limit: allowed,
+            });
+        }
+        // Lists are of what is on the device when they are made.
+        if self.streams {
+            return Ok(0);
+        }
+        let mut left = allowed - needed;
+        let fits = views.iter().take_while(|view| {
+            let rest = left.checked_sub(self.of_view(view));
+            left = rest.unwrap_or(left);
+            rest.is_some()
+        });
+        Ok(fits.count())
+    }
+}

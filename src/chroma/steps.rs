@@ -1,0 +1,310 @@
+//! The steps of L-BFGS: on the device ([`Lbfgs`]), or on the host, in f64, where the unknowns wait
+//! there.
+
+use std::collections::BTreeMap;
+
+use super::{
+    ChromaError,
+    lbfgs::{Lbfgs, LbfgsKernels, REST, State, System, UNBOUNDED, diagonal_scale},
+    passes::Passes,
+};
+use crate::{
+    gpu::{Buffer, Gpu, Recorder},
+    oracle,
+    splats::sh,
+};
+
+/// What else than the pictures decides.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Priors {
+    /// Added to the matrix's diagonal.
+    pub ridge: f64,
+    /// What an anchor's pull is of the pictures'.
+    pub anchor: f64,
+}
+
+/// Who minimizes.
+pub(super) enum Steps {
+    Device(System, Box<Lbfgs>),
+    Host(Box<OnHost>),
+}
+
+/// On the host.
+pub(super) struct OnHost {
+    lbfgs: oracle::lbfgs::Lbfgs,
+    priors: Priors,
+    splats: usize,
+    /// How many of the first unknowns are constant harmonics.
+    constants: usize,
+    diagonal_scale: f64,
+}
+
+/// What a step goes by: in f32 on the device, in f64 on the host.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Kept {
+    pub newest: usize,
+    pub buffers: BTreeMap<String, Vec<f32>>,
+    pub doubles: BTreeMap<String, Vec<f64>>,
+}
+
+impl Steps {
+    /// Begins where `passes` are.
+    ///
+    /// # Errors
+    /// [`ChromaError::Gpu`].
+    pub fn new(
+        kernels: &LbfgsKernels,
+        passes: &Passes<'_>,
+        priors: Priors,
+    ) -> Result<Self, ChromaError> {
+        let gpu = passes.frozen.gpu();
+        let channels = passes.field.kind.channels();
+        let Some(on_host) = &passes.on_host else {
+            let system = System {
+                unknowns: passes.field.planes.clone(),
+                gradient: passes.gradient.clone(),
+                diagonal: passes.diagonal.clone(),
+                floors: Buffer::from_slice(gpu, "floors", &vec![UNBOUNDED; passes.gradient.len()])?,
+                losses: passes.log.losses.clone(),
+            };
+            let size = [passes.frozen.splat_count(), channels];
+            let priors = [priors.ridge, priors.anchor].map(|prior| prior as f32);
+            let lbfgs = Lbfgs::new(gpu, kernels, &system, size, priors)?;
+            return Ok(Self::Device(system, Box::new(lbfgs)));
+        };
+        let length = on_host.gradient.len();
+        let splats = passes.frozen.splat_count();
+        let constants = channels * splats;
+        let ridge = |k: usize| factor(k, constants) * priors.ridge;
+        Ok(Self::Host(Box::new(OnHost {
+            lbfgs: oracle::lbfgs::Lbfgs::new(
+                widened(&on_host.unknowns[..length]),
+                vec![UNBOUNDED.into(); length],
+                (0..length).map(ridge).collect(),
+            ),
+            priors,
+            splats,
+            constants,
+            diagonal_scale: diagonal_scale(length / constants.max(1)),
+        })))
+    }
+
+    /// Lets no unknown fall below these, planes as the unknowns are.
+    pub fn set_floors(&mut self, gpu: &Gpu, floors: &[f32]) {
+        match self {
+            Self::Device(system, _) => system.floors.write(gpu, floors),
+            Self::Host(host) => host.lbfgs.set_floors(widened(floors)),
+        }
+    }
+
+    /// A step from where all views are drawn, and where it stands.
+    ///
+    /// # Errors
+    /// [`ChromaError::Gpu`].
+    pub fn step(&mut self, passes: &mut Passes<'_>) -> Result<State, ChromaError> {
+        match self {
+            Self::Device(_, lbfgs) => {
+                let mut recorder = Recorder::new(passes.frozen.gpu());
+                lbfgs.step(&mut recorder);
+                recorder.submit();
+                state(lbfgs, passes.frozen.gpu())
+            }
+            Self::Host(host) => host.step(passes),
+        }
+    }
+
+    /// Judges the last step, where all views are drawn for their loss.
+    ///
+    /// # Errors
+    /// [`ChromaError::Gpu`].
+    pub fn end(&mut self, passes: &mut Passes<'_>) -> Result<State, ChromaError> {
+        let gpu = passes.frozen.gpu();
+        match self {
+            Self::Device(_, lbfgs) => {
+                let mut recorder = Recorder::new(gpu);
+                lbfgs.end(gpu, &mut recorder);
+                recorder.submit();
+                state(lbfgs, gpu)
+            }
+            Self::Host(host) => host.end(passes),
+        }
+    }
+
+    /// From now on each unknown is drawn to where it was accepted: after [`Steps::step`] that
+    /// accepted it, before the curvature is another point's.
+    pub fn anchor(&mut self, passes: &Passes<'_>) {
+        match self {
+            Self::Device(_, lbfgs) => {
+                let mut recorder = Recorder::new(passes.frozen.gpu());
+                lbfgs.anchor(&mut recorder);
+                recorder.submit();
+            }
+            Self::Host(host) => host.anchor(passes),
+        }
+    }
+
+    /// See [`Lbfgs::restart`].
+    pub fn restart(&mut self, gpu: &Gpu) {
+        match self {
+            Self::Device(_, lbfgs) => lbfgs.restart(gpu),
+            Self::Host(host) => host.lbfgs.restart(),
+        }
+    }
+
+    /// See [`Lbfgs::changed`].
+    pub fn changed(&mut self, gpu: &Gpu) {
+        match self {
+            Self::Device(_, lbfgs) => lbfgs.changed(gpu),
+            Self::Host(host) => host.lbfgs.changed(),
+        }
+    }
+
+    /// All that the next step goes by.
+    ///
+    /// # Errors
+    /// [`ChromaError::Gpu`].
+    pub fn kept(&self, passes: &Passes<'_>) -> Result<Kept, ChromaError> {
+        let gpu = passes.frozen.gpu();
+        let mut kept = Kept::default();
+        match self {
+            Self::Device(system, lbfgs) => {
+                for (name, buffer) in of_system(system) {
+                    kept.buffers.insert(name.to_owned(), buffer.read(gpu)?);
+                }
+                let (newest, buffers) = lbfgs.kept();
+                kept.newest = newest;
+                for (name, buffer) in buffers {
+                    kept.buffers.insert(name.clone(), buffer.read(gpu)?);
+                }
+            }
+            Self::Host(host) => {
+                kept.doubles = host.lbfgs.kept();
+                kept.buffers
+                    .insert(DIAGONAL.to_owned(), passes.curvature()?);
+            }
+        }
+        Ok(kept)
+    }
+
+    /// Goes on from what steps of the same problem kept; `false` where it is of another.
+    pub fn go_on_from(&mut self, kept: &Kept, passes: &mut Passes<'_>) -> bool {
+        let gpu = passes.frozen.gpu();
+        match self {
+            Self::Device(system, lbfgs) => {
+                let put = |name: &str, buffer: &Buffer<f32>| {
+                    let values = kept.buffers.get(name);
+                    let values = values.filter(|values| values.len() == buffer.len());
+                    values.map(|values| buffer.write(gpu, values)).is_some()
+                };
+                let of_system = of_system(system).into_iter();
+                let fits = of_system.fold(true, |fits, (name, buffer)| fits & put(name, buffer));
+                let of_steps = lbfgs.kept().1.iter();
+                let fits = of_steps.fold(fits, |fits, (name, buffer)| fits & put(name, buffer));
+                lbfgs.go_on_after(kept.newest);
+                fits
+            }
+            Self::Host(host) => {
+                let Some(on_host) = &mut passes.on_host else {
+                    return false;
+                };
+                let diagonal = kept.buffers.get(DIAGONAL);
+                let Some(diagonal) = diagonal.filter(|d| d.len() == on_host.diagonal.len()) else {
+                    return false;
+                };
+                on_host.diagonal.clone_from(diagonal);
+                let fits = host.lbfgs.go_on_from(&kept.doubles);
+                host.show(passes);
+                fits
+            }
+        }
+    }
+}
+
+/// The curvature's name in a checkpoint.
+const DIAGONAL: &str = "diagonal";
+
+/// What of the system itself a checkpoint has.
+fn of_system(system: &System) -> [(&'static str, &Buffer<f32>); 2] {
+    [("unknowns", &system.unknowns), (DIAGONAL, &system.diagonal)]
+}
+
+fn state(lbfgs: &Lbfgs, gpu: &Gpu) -> Result<State, ChromaError> {
+    Ok(State::of(&lbfgs.state_later(gpu).wait(gpu)?))
+}
+
+fn widened(values: &[f32]) -> Vec<f64> {
+    values.iter().map(|&value| f64::from(value)).collect()
+}
+
+/// Twin of `penalty_factor`.
+fn factor(k: usize, constants: usize) -> f64 {
+    if k < constants { 1.0 } else { REST }
+}
+
+impl OnHost {
+    /// What each unknown's pixels weigh: twin of `of_channel`.
+    fn weights(&self, passes: &Passes<'_>) -> Vec<f64> {
+        let Some(on_host) = &passes.on_host else {
+            return Vec::new();
+        };
+        let (n, sums) = (self.splats, &on_host.diagonal);
+        let diagonals = sums.len() / n.max(1);
+        let of = |k: usize| f64::from(sums[(k / n) % diagonals * n + k % n]);
+        (0..on_host.gradient.len()).map(of).collect()
+    }
+
+    /// The sum of all views' losses.
+    fn loss(passes: &Passes<'_>) -> Result<f64, ChromaError> {
+        let gpu = passes.frozen.gpu();
+        let losses = passes.log.read_later(gpu).wait(gpu)?;
+        Ok(losses.iter().map(|&loss| f64::from(loss)).sum())
+    }
+
+    fn step(&mut self, passes: &mut Passes<'_>) -> Result<State, ChromaError> {
+        let loss = Self::loss(passes)?;
+        let weights = self.weights(passes);
+        let of_pictures = weights.iter().enumerate().map(|(k, weight)| {
+            factor(k, self.constants) * (self.diagonal_scale * weight + self.priors.ridge)
+        });
+        let diagonal: Vec<f64> = of_pictures.collect();
+        let gradient = passes
+            .on_host
+            .as_ref()
+            .map(|on_host| widened(&on_host.gradient));
+        self.lbfgs
+            .step(loss, &gradient.unwrap_or_default(), &diagonal);
+        self.show(passes);
+        Ok(self.state(&weights))
+    }
+
+    fn end(&mut self, passes: &mut Passes<'_>) -> Result<State, ChromaError> {
+        self.lbfgs.end(Self::loss(passes)?);
+        self.show(passes);
+        Ok(self.state(&self.weights(passes)))
+    }
+
+    fn anchor(&mut self, passes: &Passes<'_>) {
+        let pull = |weight| self.priors.anchor * sh::C0 * weight;
+        let pulls = self.weights(passes).into_iter().map(pull).collect();
+        self.lbfgs.anchor(pulls);
+    }
+
+    /// Brings the unknowns to where they are drawn from, in f32.
+    fn show(&mut self, passes: &mut Passes<'_>) {
+        let Some(on_host) = &mut passes.on_host else {
+            return;
+        };
+        for (shown, x) in on_host.unknowns.iter_mut().zip(&mut self.lbfgs.unknowns) {
+            *shown = *x as f32;
+            *x = f64::from(*shown);
+        }
+    }
+
+    fn state(&self, weights: &[f64]) -> State {
+        let moved = self.lbfgs.moved(weights, self.constants);
+        State {
+            loss: self.lbfgs.loss().unwrap_or(f64::MAX),
+            moved: moved.map(|moved| sh::C0 * moved),
+        }
+    }
+}
