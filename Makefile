@@ -30,7 +30,7 @@ test: setup
 	@cargo fmt --version >/dev/null 2>&1 && cargo clippy --version >/dev/null 2>&1 || rustup component add rustfmt clippy
 	cargo fmt --check
 	cargo clippy --release --all-targets -- -D warnings
-	cargo clippy --release --lib --no-default-features -- -D warnings
+	cargo clippy --release --lib --test fuzz --no-default-features -- -D warnings
 	@$(MAKE) --no-print-directory prose
 	cargo test --release
 

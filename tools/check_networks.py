@@ -54,9 +54,9 @@ ROUNDS_HEAD += ["ΔE00 to the most rounds, mean of all views", "held-out ΔE00"]
 
 
 def fitted(program: str, scene: Path, out: Path, flags: list[str]) -> None:
-    """Fits a scene at the draft preset, unless that was done before."""
+    """Fits a scene, unless that was done before."""
     if not (out / "luma.ply").is_file():
-        run([program, "fit", str(scene), "-o", str(out), "--preset", "draft", *flags])
+        run([program, "fit", str(scene), "-o", str(out), *flags])
 
 
 def row(scene: str, found: dict, chroma: dict) -> list[str]:
@@ -162,7 +162,7 @@ def main() -> int:
     parser.add_argument("--data", type=Path, default=Path("../shared/data"))
     parser.add_argument("--program", default="target/release/gs-chroma")
     parser.add_argument("--teacher", type=Path, help="[default: the network in DATA/teacher-places]")
-    parser.add_argument("--fit", default="--max-side 320 --seed 0", help="flags, as one word")
+    parser.add_argument("--fit", default="--preset draft --max-side 320 --seed 0", help="flags, as one word")
     parser.add_argument("--colorize", default="", help="more flags for colorize, as one word")
     parser.add_argument("--frames", type=int, default=60)
     parser.add_argument("--scenes", nargs="*", default=[BUNDLED.name, *SCENES])

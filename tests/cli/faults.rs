@@ -100,7 +100,8 @@ fn what_only_reads_a_run_fails_well() {
     every_write_fails_well(&render, &kept, &made);
     let export = ["export", "runs/scene", "-o", "far/scene.ply"];
     every_write_fails_well(&export, &kept, &["far/scene.ply"]);
-    every_write_fails_well(&["eval", "runs/scene"], &kept, &[]);
+    let eval = ["eval", "runs/scene", "--frames", "3"];
+    every_write_fails_well(&eval, &kept, &[]);
     let network = onnx("ddcolor_tiny.onnx");
     let check = ["teacher", "check", &network, "--manifest", "network.toml"];
     every_write_fails_well(&check, &kept, &["network.toml"]);

