@@ -91,7 +91,7 @@ pub struct Colorize {
     /// Maximum rounds of least squares; ends sooner once colors settle [default: 12].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000), help_heading = BUDGET)]
     rounds: Option<u32>,
-    /// Limit device memory, in MiB; views that do not fit are loaded one by one.
+    /// Limit device memory, in MiB; views and Gaussians that do not fit are loaded view by view.
     #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u32).range(1..), help_heading = BUDGET)]
     memory_limit: Option<u32>,
     /// Correct each view's saturation and tint to agree with the others [default: by evidence].
