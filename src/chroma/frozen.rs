@@ -32,7 +32,7 @@ pub(super) struct Frozen {
 }
 
 /// What waits on the host.
-struct OnHost {
+struct HostScene {
     scene: Streamed,
     /// Of each view.
     cameras: Vec<Camera>,
@@ -53,7 +53,7 @@ pub struct FrozenViews {
     /// Of all Gaussians, or of those that the view before showed.
     pub(super) geometry: Geometry,
     /// All Gaussians, where they wait on the host.
-    streamed: Option<OnHost>,
+    streamed: Option<HostScene>,
     /// `[views][scales]`, full size first.
     views: Vec<Vec<Frozen>>,
     /// What comes before this one stays on the device.
@@ -90,7 +90,7 @@ impl FrozenViews {
                 return all;
             }
         }
-        let streamed = OnHost {
+        let streamed = HostScene {
             scene: Streamed::new(splats, extent),
             cameras: cameras.to_vec(),
         };
@@ -105,7 +105,7 @@ impl FrozenViews {
         cameras: &[Camera],
         scales: usize,
         room: Room,
-        streamed: Option<OnHost>,
+        streamed: Option<HostScene>,
     ) -> Result<Self, ChromaError> {
         let gpu = &raster.gpu;
         let geometry = match &streamed {
@@ -346,7 +346,7 @@ impl FrozenViews {
     }
 }
 
-impl OnHost {
+impl HostScene {
     /// The Gaussians that a view may show, ascending.
     fn shown(&self, view: usize) -> Vec<usize> {
         self.scene.shown(&self.cameras[view])

@@ -5,8 +5,8 @@
 use super::{
     ChromaError, FrozenViews, Targets,
     correction::Corrections,
+    host_system::HostSystem,
     loss::{ChromaLossWeights, LOSS_BLOCK, LabLossParameters, RgbLossParameters},
-    on_host::OnHost,
     seat::{Judge, Seat},
 };
 use crate::{
@@ -66,7 +66,7 @@ pub(super) struct Passes<'a> {
     /// Of all Gaussians, or of those that one view shows.
     pub field: Field,
     /// All of them, where they wait on the host.
-    pub on_host: Option<OnHost>,
+    pub on_host: Option<HostSystem>,
     /// Of the field's first planes: those that are solved for.
     pub gradient: Buffer<f32>,
     /// See [`ChromaSums::diagonal`].
@@ -124,7 +124,7 @@ impl<'a> Passes<'a> {
         let gradient = Buffer::zeros(gpu, "gradient", planes * splats)?;
         let diagonals = COLOR_FIGURES - field.kind.channels();
         let diagonal = Buffer::zeros(gpu, "diagonal", diagonals * splats)?;
-        let on_host = streams.then(|| OnHost::new(start, planes, diagonals));
+        let on_host = streams.then(|| HostSystem::new(start, planes, diagonals));
         // Frozen lists never overflow: this status stays zero.
         let status = Buffer::zeros(gpu, "status", STATUS_WORDS)?;
         let blocks = pixels[0].div_ceil(LOSS_BLOCK);

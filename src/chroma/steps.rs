@@ -26,11 +26,11 @@ pub(super) struct Priors {
 /// Who minimizes.
 pub(super) enum Steps {
     Device(System, Box<Lbfgs>),
-    Host(Box<OnHost>),
+    Host(Box<HostSteps>),
 }
 
 /// On the host.
-pub(super) struct OnHost {
+pub(super) struct HostSteps {
     lbfgs: oracle::lbfgs::Lbfgs,
     priors: Priors,
     splats: usize,
@@ -76,7 +76,7 @@ impl Steps {
         let splats = passes.frozen.splat_count();
         let constants = channels * splats;
         let ridge = |k: usize| factor(k, constants) * priors.ridge;
-        Ok(Self::Host(Box::new(OnHost {
+        Ok(Self::Host(Box::new(HostSteps {
             lbfgs: oracle::lbfgs::Lbfgs::new(
                 widened(&on_host.unknowns[..length]),
                 vec![UNBOUNDED.into(); length],
@@ -241,7 +241,7 @@ fn factor(k: usize, constants: usize) -> f64 {
     if k < constants { 1.0 } else { REST }
 }
 
-impl OnHost {
+impl HostSteps {
     /// What each unknown's pixels weigh: twin of `of_channel`.
     fn weights(&self, passes: &Passes<'_>) -> Vec<f64> {
         let Some(on_host) = &passes.on_host else {

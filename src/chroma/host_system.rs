@@ -9,7 +9,7 @@ use crate::{
 };
 
 /// A system of which the device holds what one view shows.
-pub(super) struct OnHost {
+pub(super) struct HostSystem {
     degree: u32,
     channels: usize,
     count: usize,
@@ -21,7 +21,7 @@ pub(super) struct OnHost {
     pub diagonal: Vec<f32>,
 }
 
-impl OnHost {
+impl HostSystem {
     /// Begins with `start`, whose first `planes` planes are solved for.
     pub fn new(start: &ShField, planes: usize, diagonals: usize) -> Self {
         let stride = start.channels * sh::coefficient_count(start.degree);
