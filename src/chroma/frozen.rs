@@ -39,11 +39,11 @@ struct HostScene {
 }
 
 /// Harmonics to be drawn over frozen geometry, on the device or on the host as this is.
-pub enum Colors {
+pub(super) enum Colors<'a> {
     /// Of all Gaussians, on the device.
     Device(Field),
     /// Of all Gaussians, on the host.
-    Host(ShField),
+    Host(&'a ShField),
 }
 
 /// Frozen geometry before cameras.
@@ -195,9 +195,9 @@ impl FrozenViews {
     ///
     /// # Errors
     /// [`ChromaError::Gpu`].
-    pub(super) fn colors(&self, field: &ShField) -> Result<Colors, ChromaError> {
+    pub(super) fn colors<'a>(&self, field: &'a ShField) -> Result<Colors<'a>, ChromaError> {
         Ok(match self.streamed {
-            Some(_) => Colors::Host(field.clone()),
+            Some(_) => Colors::Host(field),
             None => Colors::Device(Field::upload(self.gpu(), field)?),
         })
     }
@@ -304,7 +304,11 @@ impl FrozenViews {
     }
 
     /// Draws harmonics as a view sees them at full size.
-    pub(super) fn draw(&self, view: usize, fields: &[&Colors]) -> Result<Vec<Picture>, GpuError> {
+    pub(super) fn draw(
+        &self,
+        view: usize,
+        fields: &[&Colors<'_>],
+    ) -> Result<Vec<Picture>, GpuError> {
         let gpu = &self.raster.gpu;
         let uniform = self.uniform(view, 0);
         let (pixels, tiles) = (uniform.pixel_count(), uniform.tile_count());

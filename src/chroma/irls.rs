@@ -1,7 +1,7 @@
 //! The fast solver: with the geometry frozen, colors at each pixel are linear in the
 //! unknowns, so the distillation is a robust linear regression. Iteratively reweighted
 //! least squares, whose steps L-BFGS makes longer, over all views and all of it on the
-//! device.
+//! device, where that has room for all Gaussians.
 
 use std::time::Instant;
 
@@ -208,12 +208,7 @@ impl<'a> IrlsSolver<'a> {
     /// Goes on from a state of the same problem; `false` where it is of another.
     pub(super) fn go_on_from(&mut self, state: &SolverState) -> bool {
         let gpu = self.gpu();
-        let kept = Kept {
-            newest: state.rounds.newest,
-            buffers: state.buffers.clone(),
-            doubles: state.doubles.clone(),
-        };
-        let mut fits = self.steps.go_on_from(&kept, &mut self.passes);
+        let mut fits = self.steps.go_on_from(state, &mut self.passes);
         for (name, buffer) in self.passes.corrections.kept() {
             let values = state.buffers.get(name).map(Vec::as_slice);
             let found: Result<&[Correction], _> =

@@ -46,7 +46,7 @@ pub use correction::{CorrectionKernels, CorrectionParameters, Corrections, SUM_G
 pub use degree::{ChosenDegree, LEAST_GAIN, choose_degree};
 pub use error::{ChromaError, ColorizerError};
 pub use fill::fill_unseen;
-pub use frozen::{Colors, FrozenViews};
+pub use frozen::FrozenViews;
 pub use irls::IrlsSolver;
 pub use kernels::ChromaKernels;
 pub use lbfgs::{

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 
 use super::{
     ChromaError,
+    checkpoint::SolverState,
     lbfgs::{Lbfgs, LbfgsKernels, REST, State, System, UNBOUNDED, diagonal_scale},
     passes::Passes,
 };
@@ -187,7 +188,7 @@ impl Steps {
     }
 
     /// Goes on from what steps of the same problem kept; `false` where it is of another.
-    pub fn go_on_from(&mut self, kept: &Kept, passes: &mut Passes<'_>) -> bool {
+    pub fn go_on_from(&mut self, kept: &SolverState, passes: &mut Passes<'_>) -> bool {
         let gpu = passes.frozen.gpu();
         match self {
             Self::Device(system, lbfgs) => {
@@ -200,7 +201,7 @@ impl Steps {
                 let fits = of_system.fold(true, |fits, (name, buffer)| fits & put(name, buffer));
                 let of_steps = lbfgs.kept().1.iter();
                 let fits = of_steps.fold(fits, |fits, (name, buffer)| fits & put(name, buffer));
-                lbfgs.go_on_after(kept.newest);
+                lbfgs.go_on_after(kept.rounds.newest);
                 fits
             }
             Self::Host(host) => {

@@ -72,7 +72,8 @@ impl Streamed {
         Self {
             widest: widest.collect(),
             splats: Splats {
-                sh: ShField::zeros(0, 0, 1),
+                // No channels: there is nothing to choose.
+                sh: ShField::default(),
                 means: splats.means.clone(),
                 quats: splats.quats.clone(),
                 log_scales: splats.log_scales.clone(),
@@ -104,14 +105,7 @@ impl Streamed {
 
     /// Geometry of some Gaussians, without colors.
     pub fn chosen(&self, indices: &[usize]) -> Splats {
-        let some = &self.splats;
-        Splats {
-            means: indices.iter().map(|&i| some.means[i]).collect(),
-            quats: indices.iter().map(|&i| some.quats[i]).collect(),
-            log_scales: indices.iter().map(|&i| some.log_scales[i]).collect(),
-            opacity_logits: indices.iter().map(|&i| some.opacity_logits[i]).collect(),
-            sh: ShField::zeros(0, 0, 1),
-        }
+        self.splats.chosen(indices)
     }
 
     /// Draws fields of this scene's Gaussians as a [`Renderer`] does that has them all.
