@@ -1,7 +1,7 @@
 //! Hard cases: the kernels on scenes at which rasterizers break, and whether
 //! anyone would notice if they did.
 //!
-//! `WRITE_DOCS=1 cargo test --release --test stability` makes docs/hard-cases.md
+//! `cargo test --release --test stability -- --ignored` makes docs/hard-cases.md
 //! from what it measures.
 
 mod architecture;
