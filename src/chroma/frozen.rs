@@ -309,44 +309,71 @@ impl FrozenViews {
         view: usize,
         fields: &[&Colors<'_>],
     ) -> Result<Vec<Picture>, GpuError> {
+        let Some(lists) = self.lists(view, 0) else {
+            return Ok(Vec::new());
+        };
+        let shown = self.put(view).unwrap_or_default();
+        let drawn = (fields.iter()).map(|colors| self.picture(view, lists, colors, &shown));
+        drawn.collect()
+    }
+
+    /// The same of harmonics of all Gaussians, which are on the device one after the other.
+    pub(super) fn draw_in_turn(
+        &self,
+        view: usize,
+        fields: &[ShField],
+    ) -> Result<Vec<Picture>, ChromaError> {
+        let Some(lists) = self.lists(view, 0) else {
+            return Ok(Vec::new());
+        };
+        let shown = self.put(view).unwrap_or_default();
+        let drawn = fields.iter().map(|field| {
+            let colors = self.colors(field)?;
+            Ok(self.picture(view, lists, &colors, &shown)?)
+        });
+        drawn.collect()
+    }
+
+    /// What a view shows of harmonics, `shown` being on the device where Gaussians wait on the
+    /// host.
+    fn picture(
+        &self,
+        view: usize,
+        lists: &Lists,
+        colors: &Colors<'_>,
+        shown: &[usize],
+    ) -> Result<Picture, GpuError> {
         let gpu = &self.raster.gpu;
         let uniform = self.uniform(view, 0);
         let (pixels, tiles) = (uniform.pixel_count(), uniform.tile_count());
-        let shown = self.put(view).unwrap_or_default();
-        let mut pictures = Vec::with_capacity(fields.len());
-        for colors in fields {
-            let chosen;
-            let field = match colors {
-                Colors::Device(field) => field,
-                Colors::Host(field) => {
-                    let mut some = field.chosen(&shown);
-                    let planes = field.channels * sh::coefficient_count(field.degree);
-                    some.coefficients.resize(planes * self.geometry.count, 0.0);
-                    chosen = Field::upload(gpu, &some)?;
-                    &chosen
-                }
-            };
-            let Some(lists) = self.lists(view, 0) else {
-                continue;
-            };
-            let layer = Layer::new(&self.raster, &self.geometry, lists, field, pixels, tiles)?;
-            let mut recorder = Recorder::new(gpu);
-            self.list(view, 0, field.degree, &mut recorder);
-            layer.record(&self.raster, &mut recorder);
-            recorder.submit();
-            pictures.push(Picture {
-                width: uniform.size[0],
-                height: uniform.size[1],
-                channels: field.kind.channels(),
-                pixels: layer.read_image(gpu, pixels)?,
-            });
-            drop(layer);
-            if self.streamed.is_some() {
-                // The next one finds the room of this one.
-                gpu.wait()?;
+        let chosen;
+        let field = match colors {
+            Colors::Device(field) => field,
+            Colors::Host(field) => {
+                let mut some = field.chosen(shown);
+                let planes = field.channels * sh::coefficient_count(field.degree);
+                some.coefficients.resize(planes * self.geometry.count, 0.0);
+                chosen = Field::upload(gpu, &some)?;
+                &chosen
             }
+        };
+        let layer = Layer::new(&self.raster, &self.geometry, lists, field, pixels, tiles)?;
+        let mut recorder = Recorder::new(gpu);
+        self.list(view, 0, field.degree, &mut recorder);
+        layer.record(&self.raster, &mut recorder);
+        recorder.submit();
+        let picture = Picture {
+            width: uniform.size[0],
+            height: uniform.size[1],
+            channels: field.kind.channels(),
+            pixels: layer.read_image(gpu, pixels)?,
+        };
+        drop(layer);
+        if self.streamed.is_some() {
+            // The next one finds the room of this one.
+            gpu.wait()?;
         }
-        Ok(pictures)
+        Ok(picture)
     }
 }
 

@@ -334,6 +334,14 @@ fn a_coloring_of_gaussians_that_wait_on_the_host() {
         let shown = scene.len();
         scene.append(above);
         write_ply(&path, &scene, glam::DVec3::ZERO, &[]).expect("writable");
+        let [width, height] = scene::SIZE;
+        let stroke = image::RgbaImage::from_fn(width, height, |x, y| {
+            let inside = x.abs_diff(width / 2) < 6 && y.abs_diff(height / 2) < 3;
+            image::Rgba([200, 60, 60, if inside { 255 } else { 0 }])
+        });
+        std::fs::create_dir(place.path("strokes")).expect("writable");
+        let path = place.path("strokes").join(scene::name(2));
+        stroke.save(path.with_extension("png")).expect("writable");
         (place, shown)
     };
     let colorize = [
@@ -341,6 +349,8 @@ fn a_coloring_of_gaussians_that_wait_on_the_host() {
         "runs/scene",
         "--teacher",
         "colored",
+        "--hints",
+        "strokes",
         "--rounds",
         "6",
     ];
@@ -370,6 +380,9 @@ fn a_coloring_of_gaussians_that_wait_on_the_host() {
     let all = whole.report("runs/scene")["chroma"].clone();
     assert_eq!(all["splats_at_a_time"], serde_json::Value::Null);
     assert!(all["estimated_device_memory"].as_u64() > Some(1 << 20));
+    // A stroke claims the same, by depths of what came for its photo.
+    assert!(all["claimed"].as_f64() > Some(0.0), "{all}");
+    assert_eq!(all["claimed"], chroma["claimed"]);
     for error in ["mean", "percentile_95"] {
         let of = |chroma: &serde_json::Value| chroma["pictures"]["delta_e"][error].as_f64();
         let apart = of(&all)

@@ -268,11 +268,7 @@ fn depth(
     camera: &Camera,
 ) -> Result<Vec<f32>, ChromaError> {
     let steps = DepthSteps::new(luma, camera);
-    let mut pictures = Vec::with_capacity(steps.fields.len());
-    for field in &steps.fields {
-        let field = frozen.colors(field)?;
-        pictures.extend(frozen.draw(view, &[&field])?);
-    }
+    let pictures = frozen.draw_in_turn(view, &steps.fields)?;
     let pixels = camera.width as usize * camera.height as usize;
     Ok(steps.median(&pictures, pixels))
 }
