@@ -1,0 +1,85 @@
+#!/usr/bin/env python3
+"""What an effect gains on every photo of a scene, each held out once, and prints Markdown.
+
+    cargo build --release && python3 tools/check_folds.py ../shared/data/tiny-brighton background
+
+`fit` holds out every eighth photo by name: of twelve photos two, which say little. Here names are
+turned around eight times, so that every photo is held out, and the scene is fitted with the
+effect and without it, otherwise as planned. Gains are of PSNR after the photo's own gain and
+offset. Copies of the scene are written below OUTPUT and removed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shlex
+import shutil
+import statistics
+import subprocess
+from pathlib import Path
+
+# `fit` holds out every eighth.
+FOLDS = 8
+
+
+def turned(scene: Path, copy: Path, first: int) -> None:
+    """A copy of a scene whose names sort with this photo first; names keep their length."""
+    shutil.rmtree(copy, ignore_errors=True)
+    shutil.copytree(scene, copy)
+    names = sorted(photo.name for photo in (scene / "images").iterdir())
+    renamed = {name: ("AB"[i < first]) + name[1:] for i, name in enumerate(names)}
+    if len(set(renamed.values())) < len(names):
+        raise SystemExit(f"{scene}: photos whose names differ in the first letter only")
+    for old, new in renamed.items():
+        (copy / "images" / old).rename(copy / "images" / new)
+    for model in [*copy.rglob("images.bin"), *copy.rglob("images.txt")]:
+        listed = model.read_bytes()
+        for old, new in renamed.items():
+            listed = listed.replace(old.encode(), new.encode())
+        model.write_bytes(listed)
+
+
+def held_out(program: str, scene: Path, flags: list[str]) -> dict[str, float]:
+    """PSNR of the photos held out, by the rest of their names."""
+    out = scene.with_name("run")
+    shutil.rmtree(out, ignore_errors=True)
+    command = [program, "fit", str(scene), "-o", str(out), "--json", *flags]
+    done = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True)
+    return {view["name"][1:]: view["corrected_psnr"] for view in json.loads(done.stdout)["luma"]["held_out_views"]}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("scene", type=Path)
+    parser.add_argument("effect")
+    parser.add_argument("--program", default="target/release/gs-chroma")
+    parser.add_argument("-o", "--output", type=Path, default=Path("target/folds"))
+    parser.add_argument("--seeds", type=int, nargs="+", default=[0])
+    parser.add_argument(
+        "--fit", default="--preset balanced --iterations 2400 --max-side 160 --max-splats 4000",
+        help="flags for fit, as one word",
+    )  # fmt: skip
+    options = parser.parse_args()
+    if not options.scene.is_dir():
+        print(f"skipped: no {options.scene}")
+        return
+    gains: dict[str, list[float]] = {}
+    copy = options.output / options.scene.name
+    for fold in range(FOLDS):
+        turned(options.scene, copy, fold)
+        for seed in options.seeds:
+            flags = [*shlex.split(options.fit), "--seed", str(seed)]
+            on, off = (held_out(options.program, copy, [*flags, way, options.effect]) for way in ("--with", "--without"))
+            for name in on:
+                gains.setdefault(name, []).append(on[name] - off[name])
+    shutil.rmtree(options.output)
+    print("| photo, first letter left out | gain, dB |\n|---|--:|")
+    for name, each in sorted(gains.items()):
+        print(f"| {name} | {statistics.mean(each):+.2f} |")
+    means = [statistics.mean(each) for each in gains.values()]
+    print(f"| mean | {statistics.mean(means):+.2f} ± {statistics.stdev(means) / len(means) ** 0.5:.2f} |")
+
+
+if __name__ == "__main__":
+    main()
