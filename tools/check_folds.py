@@ -6,17 +6,19 @@
 `fit` holds out every eighth photo by name: of twelve photos two, which say little. Here names are
 turned around eight times, so that every photo is held out, and the scene is fitted with the
 effect and without it, otherwise as planned. Gains are of PSNR after the photo's own gain and
-offset. Copies of the scene are written below OUTPUT and removed.
+offset. Copies of the scene are written to a temporary folder.
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 import shlex
 import shutil
 import statistics
 import subprocess
+import tempfile
 from pathlib import Path
 
 # `fit` holds out every eighth.
@@ -54,7 +56,6 @@ def main() -> None:
     parser.add_argument("scene", type=Path)
     parser.add_argument("effect")
     parser.add_argument("--program", default="target/release/gs-chroma")
-    parser.add_argument("-o", "--output", type=Path, default=Path("target/folds"))
     parser.add_argument("--seeds", type=int, nargs="+", default=[0])
     parser.add_argument(
         "--fit", default="--preset balanced --iterations 2400 --max-side 160 --max-splats 4000",
@@ -65,15 +66,14 @@ def main() -> None:
         print(f"skipped: no {options.scene}")
         return
     gains: dict[str, list[float]] = {}
-    copy = options.output / options.scene.name
-    for fold in range(FOLDS):
-        turned(options.scene, copy, fold)
-        for seed in options.seeds:
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(folder) / options.scene.name
+        for fold, seed in itertools.product(range(FOLDS), options.seeds):
+            turned(options.scene, copy, fold)
             flags = [*shlex.split(options.fit), "--seed", str(seed)]
             on, off = (held_out(options.program, copy, [*flags, way, options.effect]) for way in ("--with", "--without"))
             for name in on:
                 gains.setdefault(name, []).append(on[name] - off[name])
-    shutil.rmtree(options.output)
     print("| photo, first letter left out | gain, dB |\n|---|--:|")
     for name, each in sorted(gains.items()):
         print(f"| {name} | {statistics.mean(each):+.2f} |")

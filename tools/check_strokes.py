@@ -4,7 +4,7 @@
     cargo build --release && python3 tools/check_strokes.py -o target/strokes
 
 The scene is a COLMAP folder of color photos below DATA (default ../shared/data), fitted with
-`--fit` unless `--run` names a fitted run, and colored by a real network four times: without strokes, with
+`--fit` unless `--run` names a fitted run, and colored four times: by a real network without strokes, with
 strokes that count where they are painted (`--grow-hints off`), with strokes that grow, and by
 the photos themselves. All strokes are on one photo; their color is the mean of the true ones
 beneath. The things' outlines are drawn by hand in three photos, one of them the painted one, the

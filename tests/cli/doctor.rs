@@ -1,6 +1,6 @@
 //! `doctor` as a user meets it; that a broken device fails is in tests/stability.
 
-use super::program::Place;
+use super::{hard_cases, program::Place};
 
 /// Its JSON is read in tests/portable.
 #[test]
@@ -34,6 +34,9 @@ fn doctor_says_what_the_device_is_and_that_every_case_holds() {
     assert!(kernels.len() > 28 && cases.len() > 50);
     for row in kernels[1..].iter().chain(&cases[1..]) {
         assert!(row.ends_with(" holds |"), "{row}");
+    }
+    if std::env::var_os("WRITE_DOCS").is_some() {
+        hard_cases::write();
     }
 }
 

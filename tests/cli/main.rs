@@ -24,6 +24,7 @@ mod folder;
 mod formats;
 mod frames;
 #[cfg(target_os = "linux")]
+mod hard_cases;
 mod host;
 mod hostile;
 mod inspect;

@@ -1,8 +1,5 @@
 //! Hard cases: the kernels on scenes at which rasterizers break, and whether
 //! anyone would notice if they did.
-//!
-//! `cargo test --release --test stability -- --ignored` makes docs/hard-cases.md
-//! from what it measures.
 
 mod architecture;
 mod broken_kernels;
