@@ -22,7 +22,7 @@ use gs_chroma::{
         teacher::{GrayImage, Teacher, TeacherSettings},
     },
     gpu::Gpu,
-    raster::Raster,
+    raster::{ColorKind, Raster},
     splats::ply,
 };
 
@@ -78,7 +78,14 @@ fn load(run: &Path, teacher: &Path) -> Fallible<Problem> {
     }
     let raster = Arc::new(Raster::new(&Gpu::open()?));
     let luma = ply::read_ply(&run.join("luma.ply"))?.splats.to_luma();
-    let (extent, room) = (capture.extent(), Room::default());
+    let extent = capture.extent();
+    let room = Room {
+        limit: None,
+        color: ColorKind::Chroma,
+        sh_degree: 0,
+        weighted: false,
+        streams: false,
+    };
     Ok(Problem {
         frozen: FrozenViews::new(&raster, &luma, extent, &cameras, SCALES, room)?,
         targets,

@@ -15,7 +15,7 @@ use super::{
 use crate::{
     capture::{Camera, Dataset},
     effects::{Decider, Decision},
-    raster::{Load, Raster},
+    raster::{ColorKind, Load, Raster},
     splats::{ShField, Splats, sh},
 };
 
@@ -196,6 +196,7 @@ impl Distill<'_> {
         let mut settings = settings.clone();
         let room = Room {
             limit: settings.memory_limit,
+            color: ColorKind::Chroma,
             sh_degree: match self.sh_degree {
                 Degree::Fixed(degree) => degree,
                 Degree::Auto => sh::MAX_DEGREE,

@@ -8,7 +8,7 @@ use super::{
 };
 use crate::{
     capture::{Camera, Dataset},
-    raster::Raster,
+    raster::{ColorKind, Raster},
     splats::{Splats, sh},
 };
 
@@ -48,7 +48,8 @@ pub fn relight(
     };
     let room = Room {
         limit: memory_limit,
-        sh_degree: sh::MAX_DEGREE,
+        color: ColorKind::Rgb,
+        sh_degree: luma.sh.degree,
         weighted: targets.weighted(),
         streams: true,
     };

@@ -15,11 +15,13 @@ use crate::{
 const DEFAULT_PINS: u64 = 2 << 30;
 
 /// What the device may be asked for.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Room {
     /// Bytes of the device that stage 2 may take; `None`: what views one at a time need,
     /// and 2 GiB of what is worth keeping.
     pub limit: Option<u64>,
+    /// What will be solved for: a and b, or all of RGB.
+    pub color: ColorKind,
     /// The highest degree of harmonics that will be solved for.
     pub sh_degree: u32,
     /// Whether wanted pixels have weights.
@@ -39,10 +41,11 @@ pub(super) struct Least {
 
 impl Least {
     pub fn of(splats: usize, luma_degree: u32, room: Room) -> Self {
-        let [luma, chroma] = [luma_degree, room.sh_degree].map(sh::coefficient_count);
-        let widest = GEOMETRY_PLANES.max(3 * luma.max(chroma));
+        let [luma, solved] = [luma_degree, room.sh_degree].map(sh::coefficient_count);
+        let widest = GEOMETRY_PLANES.max(3 * luma.max(solved));
+        let unknowns = room.color.channels() * solved;
         Self {
-            bytes: Geometry::bytes(splats) + super::lbfgs::bytes(splats, 2 * chroma),
+            bytes: Geometry::bytes(splats) + super::lbfgs::bytes(splats, unknowns),
             buffer: 4 * (widest * splats) as u64,
         }
     }
@@ -89,29 +92,28 @@ impl Demand {
                 sizes.max().unwrap_or(0)
             })
             .collect();
-        let [luma, chroma] = [luma_degree, room.sh_degree].map(sh::coefficient_count);
+        let [luma, solved] = [luma_degree, room.sh_degree].map(sh::coefficient_count);
+        let unknowns = room.color.channels() * solved;
         let field = |planes: usize| 4 * (planes * splats) as u64;
         let canvas = |kind, pixels| Canvas::bytes(kind, splats, pixels);
         let judged =
             4 * (COLOR_FIGURES * pixels[0]) as u64 + AdjointScratch::color_bytes(splats, entries);
-        let chroma_canvases = pixels
-            .iter()
-            .map(|&pixels| canvas(ColorKind::Chroma, pixels));
-        // One after the other: a/b are solved for, then pictures are drawn for the bake to
-        // meet, then RGB's constant harmonics are solved for.
+        let canvases = pixels.iter().map(|&pixels| canvas(room.color, pixels));
+        // One after the other: colors are solved for, then, where they are a/b, pictures are
+        // drawn for the bake to meet, then RGB's constant harmonics are solved for.
         let minimizing = |planes: usize| match streams {
             // Unknowns, gradient and curvature, on their way as well; the rest is the host's.
             true => Geometry::bytes(splats) + 2 * field(2 * planes + 2),
             false => super::lbfgs::bytes(splats, planes),
         };
-        let solving = minimizing(2 * chroma) + chroma_canvases.sum::<u64>() + judged;
+        let solving = minimizing(unknowns) + canvases.sum::<u64>() + judged;
         let rgb = canvas(ColorKind::Rgb, pixels[0]);
-        let exported = 3 * luma.max(chroma);
+        let exported = 3 * luma.max(solved);
         let drawing = rgb
             + field(match streams {
                 // One after the other, on their way as well.
                 true => GEOMETRY_PLANES + 2 * exported,
-                false => luma + 2 * chroma + exported + 3,
+                false => luma + unknowns + exported + 3,
             });
         let baking = minimizing(3) + rgb + judged;
         let of_pixel = 4 * (1 + u64::from(room.weighted));

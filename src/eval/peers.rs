@@ -13,7 +13,7 @@ use crate::{
         ChromaProgress, ChromaSettings, FrozenViews, Recipe, Room, Targets, Task, fit_rgb,
         follow_recipe, masked_weights, native_rgb,
     },
-    raster::Raster,
+    raster::{ColorKind, Raster},
     report::{Method, PeerReport},
     splats::{ShField, sh},
 };
@@ -100,6 +100,7 @@ impl Peer {
         let begun = Instant::now();
         let room = Room {
             limit: memory_limit,
+            color: ColorKind::Rgb,
             sh_degree: sh::MAX_DEGREE,
             weighted: targets.weighted(),
             streams: false,

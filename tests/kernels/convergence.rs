@@ -8,7 +8,7 @@ use gs_chroma::{
         ChromaSettings, FrozenViews, IrlsSolver, Room, Task, teach,
         teacher::{Teacher, TeacherSettings},
     },
-    raster::Renderer,
+    raster::{ColorKind, Renderer},
     splats::{ShField, initial_splats, sh},
 };
 
@@ -182,6 +182,7 @@ fn a_real_network_leads_to_one_end() {
         .collect();
     let room = Room {
         limit: None,
+        color: ColorKind::Chroma,
         sh_degree: 0,
         weighted: false,
         streams: false,

@@ -8,7 +8,7 @@ use gs_chroma::{
         ChromaSettings, FrozenViews, Recipe, Room, Targets, Task, bake, bake_rgb, fit_rgb,
         follow_recipe, native_rgb,
     },
-    raster::{Field, Geometry, Picture, Renderer, constants::NEAR_SHARE},
+    raster::{ColorKind, Field, Geometry, Picture, Renderer, constants::NEAR_SHARE},
     splats::{ShField, Splats, sh},
 };
 
@@ -60,7 +60,14 @@ fn colorful() -> Splats {
 }
 
 fn frozen(splats: &Splats) -> FrozenViews {
-    FrozenViews::new(&raster(), splats, EXTENT, &cameras(), 3, Room::default()).unwrap()
+    let room = Room {
+        limit: None,
+        color: ColorKind::Rgb,
+        sh_degree: 0,
+        weighted: false,
+        streams: false,
+    };
+    FrozenViews::new(&raster(), splats, EXTENT, &cameras(), 3, room).unwrap()
 }
 
 fn settings() -> ChromaSettings {

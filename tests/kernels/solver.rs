@@ -9,7 +9,7 @@ use gs_chroma::{
         ChromaError, ChromaSettings, FrozenViews, IrlsSolver, Room, Targets, Task, bake,
         match_saturation, solve, teacher::AbImage,
     },
-    raster::{Field, Geometry, Renderer},
+    raster::{ColorKind, Field, Geometry, Renderer},
     splats::{ShField, Splats, sh},
 };
 
@@ -67,6 +67,7 @@ impl Problem {
         let cameras: Vec<Camera> = views.iter().map(|view| view.camera.clone()).collect();
         let room = Room {
             limit,
+            color: ColorKind::Chroma,
             sh_degree: 1,
             weighted: targets.weighted(),
             streams: false,

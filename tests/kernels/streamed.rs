@@ -9,7 +9,7 @@ use gs_chroma::{
         ChromaError, ChromaSettings, FrozenViews, IrlsSolver, Room, Targets, Task, bake, solve,
         teacher::AbImage,
     },
-    raster::{Renderer, Streamed},
+    raster::{ColorKind, Renderer, Streamed},
     splats::{ShField, Splats, sh},
 };
 
@@ -66,6 +66,7 @@ fn problem(
     }
     let room = Room {
         limit,
+        color: ColorKind::Chroma,
         sh_degree,
         weighted: targets.weighted(),
         streams: true,
