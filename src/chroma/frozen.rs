@@ -91,7 +91,7 @@ impl FrozenViews {
             }
         }
         let streamed = HostScene {
-            scene: Streamed::new(splats, extent),
+            scene: Streamed::new(splats, NEAR_SHARE * extent),
             cameras: cameras.to_vec(),
         };
         Self::placed(raster, splats, extent, cameras, 1, room, Some(streamed))

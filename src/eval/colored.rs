@@ -7,7 +7,7 @@ use crate::{
     capture::{Dataset, Exposure},
     chroma::{Lesson, native_rgb, teacher::AbImage},
     measure,
-    raster::{Picture, Raster, Renderer, Streamed},
+    raster::{Picture, Raster, SceneRenderer, constants::NEAR_SHARE},
     report::{ColorError, ColorQuality, ColorView, Row, to_image},
     splats::{ShField, Splats},
 };
@@ -18,12 +18,6 @@ const PAINTED_ROWS: usize = 2;
 
 /// What the contact sheet of a colored scene shows, left to right.
 pub const COLUMNS: [&str; 4] = ["photo", "gray scene", "teacher", "colored scene"];
-
-/// The scene, on the device or on the host.
-enum Sight {
-    Whole(Box<Renderer>),
-    Streamed(Streamed),
-}
 
 /// Pictures of the measured views and what they amount to.
 pub struct Measured {
@@ -51,12 +45,10 @@ impl Measured {
         observe: &mut Observer<'_>,
     ) -> Result<Self, EvalError> {
         let fields = [&luma.sh, chroma, &baked.sh];
-        let mut sight = match streams {
-            true => Sight::Streamed(Streamed::new(luma, dataset.extent)),
-            false => {
-                let renderer = Renderer::of(raster, luma, &fields, dataset.extent)?;
-                Sight::Whole(Box::new(renderer))
-            }
+        let near = NEAR_SHARE * dataset.extent;
+        let mut renderer = match streams {
+            true => SceneRenderer::on_host(raster, luma, &fields, near),
+            false => SceneRenderer::new(raster, luma, &fields, near)?,
         };
         let (mut errors, mut views, mut rows) = (Vec::new(), Vec::new(), Vec::new());
         let measured = lesson.measured(&dataset.split).1;
@@ -81,10 +73,7 @@ impl Measured {
             let (photo, camera) = (&photo, &dataset.cameras[i]);
             let exposure = exposures[i];
             let reference = Reference { photo, exposure };
-            let pictures = match &mut sight {
-                Sight::Whole(renderer) => renderer.render(camera)?,
-                Sight::Streamed(scene) => scene.render(raster, &fields, camera)?,
-            };
+            let pictures = renderer.render(camera)?;
             let native = native_rgb(&pictures[0], &pictures[1]);
             let exported = pictures[2].shown();
             let measures = measured.contains(&i);

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::{EvalError, Observer, Progress, Reference, Task};
 use crate::{
     capture::{Dataset, Exposure},
-    raster::{Raster, Renderer},
+    raster::{Raster, SceneRenderer},
     report::{LumaQuality, LumaView, Row, to_image},
     splats::Splats,
 };
@@ -20,7 +20,7 @@ pub fn measure_luma(
     splats: &Splats,
     observe: &mut Observer<'_>,
 ) -> Result<Vec<LumaView>, EvalError> {
-    let mut renderer = Renderer::of(raster, splats, &[&splats.sh], dataset.extent)?;
+    let mut renderer = SceneRenderer::of(raster, splats, &[&splats.sh], dataset.extent)?;
     let (mut views, mut done) = (Vec::new(), 0);
     dataset.visit(&dataset.split.test, |view, photo| {
         observe(Progress {
@@ -63,7 +63,7 @@ pub fn gray_rows(
     splats: &Splats,
     exposures: &[Exposure],
 ) -> Result<Vec<Row>, EvalError> {
-    let mut renderer = Renderer::of(raster, splats, &[&splats.sh], dataset.extent)?;
+    let mut renderer = SceneRenderer::of(raster, splats, &[&splats.sh], dataset.extent)?;
     let (_, measured) = dataset.measured();
     let step = measured.len().div_ceil(SHEET_ROWS).max(1);
     let views: Vec<usize> = measured.iter().step_by(step).copied().collect();

@@ -10,7 +10,7 @@ use crate::{
     capture::Camera,
     chroma::{native_rgb, teacher::AbImage},
     measure::DepthSteps,
-    raster::{Picture, Raster, Renderer},
+    raster::{Picture, Raster, SceneRenderer},
     report::Method,
     splats::ShField,
 };
@@ -19,7 +19,7 @@ use crate::{
 pub struct Painter<'a> {
     raster: Arc<Raster>,
     scene: &'a ColoredScene,
-    renderer: Renderer,
+    renderer: SceneRenderer<'a>,
     has_native: bool,
     /// Methods that are RGB splats, in the order of their fields.
     rgb: Vec<Method>,
@@ -53,17 +53,17 @@ impl<'a> Painter<'a> {
     pub fn new(
         raster: &Arc<Raster>,
         scene: &'a ColoredScene,
-        rgb: &[(Method, &ShField)],
+        rgb: &[(Method, &'a ShField)],
         teacher: Option<&'a mut MeasuredTeacher>,
     ) -> Result<Self, EvalError> {
         let dataset = &scene.dataset;
         let mut fields = vec![&scene.luma.sh];
-        fields.extend(rgb.iter().map(|(_, field)| field));
+        fields.extend(rgb.iter().map(|&(_, field)| field));
         fields.extend(&scene.chroma);
         Ok(Self {
             raster: raster.clone(),
             scene,
-            renderer: Renderer::of(raster, &scene.luma, &fields, dataset.extent)?,
+            renderer: SceneRenderer::of(raster, &scene.luma, &fields, dataset.extent)?,
             has_native: scene.chroma.is_some(),
             rgb: rgb.iter().map(|(method, _)| *method).collect(),
             teacher,
@@ -107,7 +107,7 @@ impl<'a> Painter<'a> {
         let fields: Vec<&ShField> = steps.fields.iter().collect();
         let luma = &self.scene.luma;
         let extent = self.scene.dataset.extent;
-        let renderer = Renderer::of(&self.raster, luma, &fields, extent)?;
+        let renderer = SceneRenderer::of(&self.raster, luma, &fields, extent)?;
         // Zeros and ones can be drawn.
         let mut renderer = renderer.with_one_list();
         let pixels = camera.width as usize * camera.height as usize;

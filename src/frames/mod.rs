@@ -19,4 +19,4 @@ pub use blend::{Believed, blend};
 pub use canvas::Canvas;
 pub use finish::{Colored, finish};
 pub use painted::Strokes;
-pub use scene::{SceneDrawer, ViewOf};
+pub use scene::{SceneDrawer, ViewOf, believable};

@@ -6,7 +6,7 @@ use super::{Believed, Canvas, canvas::working_size, window};
 use crate::{
     capture::{Camera, Exposure, View, lens::Undistortion},
     gpu::GpuError,
-    raster::{Picture, Raster, Renderer},
+    raster::{Picture, Raster, SceneRenderer},
     splats::{ShField, Splats, sh},
 };
 
@@ -22,8 +22,8 @@ const UNLIKE: [f32; 2] = [12.0, 4.0];
 const REACH: usize = 3;
 
 /// Draws a colored scene as photos show it.
-pub struct SceneDrawer {
-    renderer: Renderer,
+pub struct SceneDrawer<'a> {
+    renderer: SceneRenderer<'a>,
     /// Where views show the pixels of a photo, for the lenses met last.
     lenses: Vec<Lens>,
 }
@@ -46,25 +46,30 @@ pub struct ViewOf<'a> {
     pub exposure: Exposure,
 }
 
-impl SceneDrawer {
-    /// Of a scene with native a/b harmonics, whose last Gaussians are `surroundings` that no photo
-    /// shows; `extent` is the capture's, in world units.
+/// The field that is one where a scene of so many Gaussians can be believed: not where the last
+/// `surroundings` of them show, which no photo does.
+pub fn believable(splats: usize, surroundings: usize) -> ShField {
+    let mut field = ShField::zeros(splats, 0, 2);
+    let scene = splats.saturating_sub(surroundings) * field.channels;
+    field.coefficients[..scene].fill((1.0 / sh::C0) as f32);
+    field
+}
+
+impl<'a> SceneDrawer<'a> {
+    /// Of a scene with native a/b harmonics; `believed` is where it may be believed
+    /// ([`believable`]), `extent` the capture's, in world units.
     ///
     /// # Errors
-    /// [`GpuError::TooLarge`].
+    /// [`GpuError::NoColor`].
     pub fn new(
         raster: &Arc<Raster>,
-        luma: &Splats,
-        chroma: &ShField,
-        surroundings: usize,
+        luma: &'a Splats,
+        [chroma, believed]: [&'a ShField; 2],
         extent: f64,
     ) -> Result<Self, GpuError> {
-        let mut whole = ShField::zeros(luma.len(), 0, 2);
-        let scene = luma.len().saturating_sub(surroundings) * whole.channels;
-        whole.coefficients[..scene].fill((1.0 / sh::C0) as f32);
-        let fields = [&luma.sh, chroma, &whole];
+        let fields = [&luma.sh, chroma, believed];
         Ok(Self {
-            renderer: Renderer::of(raster, luma, &fields, extent)?,
+            renderer: SceneRenderer::of(raster, luma, &fields, extent)?,
             lenses: Vec::new(),
         })
     }

@@ -144,6 +144,7 @@ pub struct Gpu {
     stopwatch: Option<Arc<Mutex<Stopwatch>>>,
     deck: Option<Arc<Deck>>,
     tiles_at_once: usize,
+    most_bound: u64,
 }
 
 /// A kernel changed on purpose.
@@ -250,6 +251,7 @@ impl Gpu {
         }
         Ok(Self {
             tiles_at_once: default_tiles_at_once(info.device_type),
+            most_bound: u64::MAX,
             inner: Arc::new(Inner {
                 device,
                 queue,
@@ -319,6 +321,16 @@ impl Gpu {
     pub fn with_tiles_at_once(&self, tiles_at_once: usize) -> Self {
         Self {
             tiles_at_once,
+            ..self.clone()
+        }
+    }
+
+    /// The same device as if it bound no more than so many bytes: for tests of what is larger.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn with_binding_limit(&self, most_bound: u64) -> Self {
+        Self {
+            most_bound,
             ..self.clone()
         }
     }
@@ -429,6 +441,7 @@ impl Gpu {
         limits
             .max_storage_buffer_binding_size
             .min(limits.max_buffer_size)
+            .min(self.most_bound)
     }
 
     /// Bytes that live buffers take on the device at present, where the backend tells.

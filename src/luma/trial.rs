@@ -10,7 +10,7 @@ use crate::{
     capture::Dataset,
     effects::{Effect, Evidence, Overrules, Plan, Room, Trials},
     measure,
-    raster::{Raster, Renderer},
+    raster::{Raster, SceneRenderer},
 };
 
 /// Share of the run's work that all trainings of a trial may take, by iterations times pixels.
@@ -245,7 +245,7 @@ impl Trial<'_> {
             LumaTrainer::new(self.raster.clone(), settings, extent, &start, trained?)?;
         trainer.train_while(&mut |progress| observe(progress.iteration))?;
         let splats = trainer.splats()?;
-        let mut renderer = Renderer::of(&drawn, &splats, &[&splats.sh], extent)?;
+        let mut renderer = SceneRenderer::of(&drawn, &splats, &[&splats.sh], extent)?;
         let (mut sum, mut count) = (0.0, 0.0);
         for view in held_back? {
             let picture = renderer.render(&view.camera)?.remove(0);

@@ -1,12 +1,11 @@
-//! Pictures of a finished scene, one camera after the other.
+//! Pictures of a scene on the device, one camera after the other.
 
 use std::sync::Arc;
 
-use super::{Field, Geometry, Layer, Lists, Raster, ViewUniform, constants::NEAR_SHARE};
+use super::{Field, Geometry, Layer, Lists, Raster, ViewUniform};
 use crate::{
     capture::Camera,
     gpu::{GpuError, Recorder},
-    splats::{ShField, Splats},
 };
 
 /// Tile-list entries to begin with, for each Gaussian; grows on demand.
@@ -50,24 +49,6 @@ impl Picture {
 }
 
 impl Renderer {
-    /// A renderer of `fields` over the geometry of `splats` that shows nothing nearer to a
-    /// camera than [`NEAR_SHARE`] of the capture's `extent`, in world units.
-    ///
-    /// # Errors
-    /// [`GpuError::TooLarge`].
-    pub fn of(
-        raster: &Arc<Raster>,
-        splats: &Splats,
-        fields: &[&ShField],
-        extent: f64,
-    ) -> Result<Self, GpuError> {
-        let gpu = &raster.gpu;
-        let fields = fields.iter().map(|field| Field::upload(gpu, field));
-        let fields = fields.collect::<Result<_, _>>()?;
-        let geometry = Geometry::upload(gpu, splats)?;
-        Self::new(raster.clone(), geometry, fields, NEAR_SHARE * extent)
-    }
-
     /// A renderer of `fields` over `geometry` that shows nothing nearer to a
     /// camera than `near` world units.
     ///

@@ -6,12 +6,12 @@ use glam::DVec3;
 
 use super::{
     Field, Geometry, Picture, Raster, Renderer,
-    constants::{ALPHA_MIN, BLUR, FRUSTUM_MARGIN, NEAR_SHARE},
+    constants::{ALPHA_MIN, BLUR, FRUSTUM_MARGIN, TRANSMITTANCE_MIN},
 };
 use crate::{
     capture::Camera,
     gpu::GpuError,
-    splats::{ShField, Splats},
+    splats::{ShField, Splats, sh},
 };
 
 /// How far rounding on the device may be off: a share of depths and extents, and pixels.
@@ -56,15 +56,19 @@ impl<'a> Frustum<'a> {
 
 /// A scene on the host.
 pub struct Streamed {
+    /// Without harmonics.
     splats: Splats,
     /// Largest standard deviation of each Gaussian.
     widest: Vec<f64>,
     near: f64,
+    /// Gaussians that a picture's parts are drawn from, at most.
+    at_once: usize,
 }
 
 impl Streamed {
-    /// The geometry of `splats`, of a capture of this `extent` in world units.
-    pub fn new(splats: &Splats, extent: f64) -> Self {
+    /// The geometry of `splats`, of which nothing is shown that is nearer to a camera than `near`
+    /// world units.
+    pub fn new(splats: &Splats, near: f64) -> Self {
         let widest = splats.log_scales.iter().map(|scales| {
             let widest = scales.iter().copied().fold(f32::MIN, f32::max);
             f64::from(widest).exp()
@@ -79,7 +83,8 @@ impl Streamed {
                 log_scales: splats.log_scales.clone(),
                 opacity_logits: splats.opacity_logits.clone(),
             },
-            near: NEAR_SHARE * extent,
+            near,
+            at_once: usize::MAX,
         }
     }
 
@@ -108,22 +113,97 @@ impl Streamed {
         self.splats.chosen(indices)
     }
 
-    /// Draws fields of this scene's Gaussians as a [`Renderer`] does that has them all.
+    /// Draws fields of this scene's Gaussians as a [`Renderer`] does that has them all. Where
+    /// those that the camera may show have no room, they are drawn in parts, front to back. A
+    /// part may draw the Gaussian that closes a pixel, which a [`Renderer`] leaves out: up to
+    /// 1 % of its color more, in few pixels.
     ///
     /// # Errors
     /// [`GpuError`] when buffers do not fit or the device is lost.
     pub fn render(
-        &self,
+        &mut self,
         raster: &Arc<Raster>,
         fields: &[&ShField],
         camera: &Camera,
     ) -> Result<Vec<Picture>, GpuError> {
-        let (shown, gpu) = (self.shown(camera), &raster.gpu);
-        let fields = fields
-            .iter()
-            .map(|field| Field::upload(gpu, &field.chosen(&shown)));
-        let fields = fields.collect::<Result<_, _>>()?;
-        let geometry = Geometry::upload(gpu, &self.chosen(&shown))?;
+        let mut shown = self.shown(camera);
+        loop {
+            match self.in_parts(raster, fields, &mut shown, camera) {
+                Err(GpuError::TooLarge { .. }) if self.at_once.min(shown.len()) > 1 => {
+                    self.at_once = self.at_once.min(shown.len()).div_ceil(2);
+                }
+                done => return done,
+            }
+        }
+    }
+
+    fn in_parts(
+        &self,
+        raster: &Arc<Raster>,
+        fields: &[&ShField],
+        shown: &mut [usize],
+        camera: &Camera,
+    ) -> Result<Vec<Picture>, GpuError> {
+        if shown.len() <= self.at_once {
+            return self.part(raster, fields, shown, camera, false);
+        }
+        let depth = |i: usize| camera.depth(DVec3::from(self.splats.means[i].map(f64::from)));
+        shown.sort_by(|&a, &b| depth(a).total_cmp(&depth(b)));
+        let mut drawn = Vec::new();
+        for part in shown.chunks_mut(self.at_once) {
+            // Of equal depths the first comes first.
+            part.sort_unstable();
+            let behind = self.part(raster, fields, part, camera, true)?;
+            if drawn.is_empty() {
+                drawn = behind;
+            } else if !show_through(&mut drawn, &behind) {
+                break;
+            }
+        }
+        drawn.pop();
+        Ok(drawn)
+    }
+
+    /// Pictures of some Gaussians, and with `opacity` how opaque they are.
+    fn part(
+        &self,
+        raster: &Arc<Raster>,
+        fields: &[&ShField],
+        shown: &[usize],
+        camera: &Camera,
+        opacity: bool,
+    ) -> Result<Vec<Picture>, GpuError> {
+        let gpu = &raster.gpu;
+        let chosen = fields.iter().map(|field| field.chosen(shown));
+        let white = opacity.then(|| ShField {
+            degree: 0,
+            channels: 1,
+            coefficients: vec![(0.5 / sh::C0) as f32; shown.len()],
+        });
+        let fields = chosen
+            .chain(white)
+            .map(|field| Field::upload(gpu, &field))
+            .collect::<Result<_, _>>()?;
+        let geometry = Geometry::upload(gpu, &self.chosen(shown))?;
         Renderer::new(raster.clone(), geometry, fields, self.near)?.render(camera)
     }
+}
+
+/// Puts pictures behind others where these let light through. The last of each is opacity.
+/// Whether there is light left: what the rasterizer ignores is none.
+fn show_through(front: &mut [Picture], behind: &[Picture]) -> bool {
+    let Some(opacity) = front.last() else {
+        return false;
+    };
+    let left: Vec<f32> = opacity.pixels.iter().map(|opacity| 1.0 - opacity).collect();
+    for (front, behind) in front.iter_mut().zip(behind) {
+        let channels = front.channels;
+        for (i, (front, behind)) in front.pixels.iter_mut().zip(&behind.pixels).enumerate() {
+            *front += left[i / channels] * behind;
+        }
+    }
+    let opacity = front.last().map_or(&[][..], |opacity| &opacity.pixels);
+    opacity
+        .iter()
+        .any(|opacity| 1.0 - opacity >= TRANSMITTANCE_MIN)
 }

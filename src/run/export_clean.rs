@@ -7,7 +7,7 @@ use crate::{
     capture::Camera,
     gpu::Gpu,
     measure::reported_psnr,
-    raster::{Contributions, Raster, RasterOptions, Renderer},
+    raster::{Contributions, Raster, RasterOptions, SceneRenderer},
     splats::Splats,
 };
 
@@ -69,9 +69,9 @@ fn changed(
     cameras: &[Camera],
     extent: f64,
 ) -> Result<f64, RunError> {
-    let renderer = |splats: &Splats| Renderer::of(raster, splats, &[&splats.sh], extent);
-    let [before, after] = scenes;
-    let (mut before, mut after) = (renderer(before)?, renderer(after)?);
+    let [before, after] =
+        scenes.map(|splats| SceneRenderer::of(raster, splats, &[&splats.sh], extent));
+    let (mut before, mut after) = (before?, after?);
     let mut sum = 0.0;
     for camera in cameras {
         let [before, after] = [before.render(camera)?, after.render(camera)?]

@@ -8,7 +8,7 @@ use crate::{
     capture::Dataset,
     eval::EvalError,
     gpu::Gpu,
-    raster::{Raster, RasterOptions, Renderer},
+    raster::{Raster, RasterOptions, SceneRenderer},
     splats::Splats,
 };
 
@@ -109,7 +109,7 @@ fn fits<const N: usize>(
     let mut found = [Fit::default(); N];
     for (fit, way) in found.iter_mut().zip(ways) {
         let raster = Arc::new(Raster::with(gpu, way));
-        let mut renderer = Renderer::of(&raster, luma, &[&luma.sh], dataset.extent)?;
+        let mut renderer = SceneRenderer::of(&raster, luma, &[&luma.sh], dataset.extent)?;
         let (mut correlations, mut squares, mut pixels) = (Vec::new(), 0.0, 0.0);
         dataset.visit(&chosen, |view, photo| {
             let picture = renderer.render(&dataset.cameras[view])?.remove(0);

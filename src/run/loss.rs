@@ -10,7 +10,7 @@ use crate::{
     capture::{Camera, Capture, split},
     gpu::{Gpu, GpuError},
     measure,
-    raster::{Picture, Raster, RasterOptions, Renderer},
+    raster::{Picture, Raster, RasterOptions, SceneRenderer},
     report::CaptureReport,
     splats::{Format, Splats, WriteOptions, read_splats},
     trajectory::{ball_of_splats, lens, orbit_of_ball},
@@ -138,12 +138,11 @@ fn compared(
     observe: &mut Observer<'_>,
 ) -> Result<(f64, f64), GpuError> {
     let gpu = Gpu::open()?;
-    let renderer = |(splats, drawn): (&Splats, RasterOptions)| {
+    let [wrote, read] = scenes.map(|(splats, drawn)| {
         let raster = Arc::new(Raster::with(&gpu, drawn));
-        Renderer::of(&raster, splats, &[&splats.sh], extent)
-    };
-    let [wrote, read] = scenes;
-    let (mut wrote, mut read) = (renderer(wrote)?, renderer(read)?);
+        SceneRenderer::of(&raster, splats, &[&splats.sh], extent)
+    });
+    let (mut wrote, mut read) = (wrote?, read?);
     let (mut ours, mut theirs) = (Vec::new(), Vec::new());
     for (done, camera) in cameras.iter().enumerate() {
         observe(Event::Progress {

@@ -11,7 +11,7 @@ use super::{ViewerError, about, assets, overview, pack};
 use crate::{
     capture::Camera,
     gpu::{Gpu, GpuError},
-    raster::{Field, Geometry, Picture, Raster, RasterOptions, Renderer},
+    raster::{Picture, Raster, RasterOptions, SceneRenderer},
     report::to_image,
     run::{Event, Look, Observer, RunError, SceneKind, Stage, files},
     splats::Splats,
@@ -93,11 +93,7 @@ fn poster(
     let gpu = Gpu::open().map_err(RunError::from)?;
     let drawing = || -> Result<Picture, GpuError> {
         let raster = Arc::new(Raster::with(&gpu, drawn));
-        let (geometry, field) = (
-            Geometry::upload(&gpu, splats)?,
-            Field::upload(&gpu, &splats.sh)?,
-        );
-        let mut renderer = Renderer::new(raster, geometry, vec![field], near)?;
+        let mut renderer = SceneRenderer::new(&raster, splats, &[&splats.sh], near)?;
         Ok(renderer.render(&camera)?.remove(0))
     };
     let picture = drawing().map_err(RunError::from)?;

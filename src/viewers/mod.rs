@@ -18,7 +18,7 @@ use crate::{
     capture::Camera,
     gpu::GpuError,
     measure::reported_psnr,
-    raster::{Falloff, Raster, RasterOptions, Renderer},
+    raster::{Falloff, Raster, RasterOptions, SceneRenderer},
     splats::{Splats, sh},
 };
 
@@ -102,7 +102,7 @@ pub fn pictures(
     extent: f64,
 ) -> Result<Pictures, GpuError> {
     let raster = raster.drawing(drawn);
-    let mut renderer = Renderer::of(&raster, splats, &[&splats.sh], extent)?;
+    let mut renderer = SceneRenderer::of(&raster, splats, &[&splats.sh], extent)?;
     let shown = cameras.iter().map(|camera| {
         let pictures = renderer.render(camera)?;
         Ok(pictures.first().map(|p| p.shown()).unwrap_or_default())

@@ -8,7 +8,7 @@ use gs_chroma::{
         ChromaSettings, FrozenViews, IrlsSolver, Room, Task, teach,
         teacher::{Teacher, TeacherSettings},
     },
-    raster::{ColorKind, Renderer},
+    raster::{ColorKind, SceneRenderer},
     splats::{ShField, initial_splats, sh},
 };
 
@@ -194,7 +194,7 @@ fn a_real_network_leads_to_one_end() {
         IrlsSolver::starting_at(&frozen, settings, targets, tasks, start).unwrap()
     };
     let pictures = |chroma: ShField| -> Vec<f32> {
-        let mut renderer = Renderer::of(&raster(), &luma, &[&chroma], dataset.extent).unwrap();
+        let mut renderer = SceneRenderer::of(&raster(), &luma, &[&chroma], dataset.extent).unwrap();
         let pictures = cameras
             .iter()
             .map(|camera| renderer.render(camera).unwrap());

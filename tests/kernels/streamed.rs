@@ -1,6 +1,6 @@
 //! Scenes that wait on the host: pictures and colors as if all of them were on the device.
 
-use std::ops::ControlFlow;
+use std::{ops::ControlFlow, sync::Arc};
 
 use glam::DVec3;
 use gs_chroma::{
@@ -9,7 +9,10 @@ use gs_chroma::{
         ChromaError, ChromaSettings, FrozenViews, IrlsSolver, Room, Targets, Task, bake, solve,
         teacher::AbImage,
     },
-    raster::{ColorKind, Renderer, Streamed},
+    gpu::GpuError,
+    raster::{
+        ColorKind, Geometry, Picture, Raster, SceneRenderer, Streamed, constants::NEAR_SHARE,
+    },
     splats::{ShField, Splats, sh},
 };
 
@@ -86,8 +89,8 @@ fn tight(sh_degree: u32) -> Option<u64> {
 #[test]
 fn what_a_view_may_show_draws_its_picture() {
     let luma = splats(&random_scene::<1>(7, 900, 2).0);
-    let scene = Streamed::new(&luma, EXTENT);
-    let mut whole = Renderer::of(&raster(), &luma, &[&luma.sh], EXTENT).unwrap();
+    let mut scene = Streamed::new(&luma, NEAR_SHARE * EXTENT);
+    let mut whole = SceneRenderer::of(&raster(), &luma, &[&luma.sh], EXTENT).unwrap();
     let view = camera(&oblique_view());
     let mut fewer = false;
     for k in 0..24 {
@@ -114,7 +117,7 @@ fn what_a_view_may_show_draws_its_picture() {
         if let Some(&missing) = middle {
             let others: Vec<usize> = (0..luma.len()).filter(|&i| i != missing).collect();
             let others = luma.chosen(&others);
-            let without = Renderer::of(&raster(), &others, &[&others.sh], EXTENT)
+            let without = SceneRenderer::of(&raster(), &others, &[&others.sh], EXTENT)
                 .unwrap()
                 .render(&camera)
                 .unwrap();
@@ -125,6 +128,51 @@ fn what_a_view_may_show_draws_its_picture() {
         }
     }
     assert!(fewer, "no camera shows less than half");
+}
+
+/// Where not even what a view shows has room, it is drawn in parts.
+#[test]
+fn what_the_adapter_cannot_bind_draws_its_picture() {
+    let luma = splats(&random_scene::<1>(7, 900, 2).0);
+    let rgb = splats(&random_scene::<3>(8, 900, 3).0).sh;
+    let fields = [&luma.sh, &rgb];
+    let mut whole = SceneRenderer::of(&raster(), &luma, &fields, EXTENT).unwrap();
+    // Of the 900 a buffer holds a hundred's RGB harmonics, or 450's geometry.
+    let gpu = raster().gpu.with_binding_limit(100 * 3 * 16 * 4);
+    let refused = Geometry::upload(&gpu, &luma);
+    assert!(matches!(refused, Err(GpuError::TooLarge { .. })));
+    let small = Arc::new(Raster::new(&gpu));
+    let mut found = SceneRenderer::of(&small, &luma, &fields, EXTENT).unwrap();
+    let fewer = luma.chosen(&(0..800).collect::<Vec<_>>());
+    let fewer_rgb = rgb.chosen(&(0..800).collect::<Vec<_>>());
+    let fields = [&fewer.sh, &fewer_rgb];
+    let mut wrong = SceneRenderer::of(&raster(), &fewer, &fields, EXTENT).unwrap();
+    let view = camera(&oblique_view());
+    for k in 0..8 {
+        let step = 0.75 * f64::from(k);
+        let camera = Camera {
+            translation: view.translation + DVec3::new(0.3 * step.sin(), 0.0, 1.0 - 0.25 * step),
+            ..view.resized(32 + k, 24)
+        };
+        let expected = whole.render(&camera).unwrap();
+        let pixels = |pictures: &[Picture]| -> Vec<f32> {
+            let each = pictures.iter().flat_map(|picture| &picture.pixels);
+            each.copied().collect()
+        };
+        let expected = pixels(&expected);
+        let brightest = expected
+            .iter()
+            .fold(1.0_f32, |most, value| most.max(*value));
+        let apart = |renderer: &mut SceneRenderer<'_>| {
+            let pixels = pixels(&renderer.render(&camera).unwrap());
+            let each = pixels.iter().zip(&expected).map(|(a, b)| (a - b).abs());
+            let mean = each.clone().sum::<f32>() / pixels.len() as f32;
+            [each.fold(0.0, f32::max) / brightest, mean / brightest]
+        };
+        let [[most, mean], wrong] = [&mut found, &mut wrong].map(apart);
+        assert!(most < 1e-2 && mean < 1e-5, "camera {k}: {most} {mean}");
+        assert!(wrong[0] > 1e-2 && wrong[1] > 1e-4, "camera {k}: {wrong:?}");
+    }
 }
 
 /// The largest difference of a harmonic that shows, in CIELAB units or gray levels.

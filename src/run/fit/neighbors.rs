@@ -10,7 +10,7 @@ use super::{FitOptions, Init};
 use crate::{
     capture::{Dataset, Exposure, Layers},
     eval::exposures,
-    raster::{Raster, Renderer, Streamed},
+    raster::{Raster, SceneRenderer, constants::NEAR_SHARE},
     splats::Splats,
 };
 
@@ -106,9 +106,11 @@ impl Beyond<'_> {
     ) -> Result<Layers, RunError> {
         let total = dataset.cameras.len();
         let mut layers = Layers::new(folder.path(), total)?;
-        let mut part = Renderer::of(self.raster, self.part, &[&self.part.sh], dataset.extent)?;
+        let mut part = SceneRenderer::of(self.raster, self.part, &[&self.part.sh], dataset.extent)?;
         // No more of the scene has to fit onto the device than one photo shows.
-        let whole = Streamed::new(self.whole, dataset.extent);
+        let fields = [&self.whole.sh];
+        let near = NEAR_SHARE * dataset.extent;
+        let mut whole = SceneRenderer::on_host(self.raster, self.whole, &fields, near);
         for (view, camera) in dataset.cameras.iter().enumerate() {
             observe(Event::Progress {
                 stage: Stage::Placing,
@@ -116,8 +118,7 @@ impl Beyond<'_> {
                 total,
                 message: dataset.capture.views[view].name.clone(),
             });
-            let fields = [&self.whole.sh];
-            let whole = whole.render(self.raster, &fields, camera)?.remove(0);
+            let whole = whole.render(camera)?.remove(0);
             let part = part.render(camera)?.remove(0);
             let gain = self.exposures[view].gain as f32;
             let pixels = whole.pixels.iter().zip(&part.pixels);

@@ -27,7 +27,7 @@ use crate::{
     capture::{Dataset, Film, LoadOptions},
     chroma::teacher::TeacherSettings,
     eval::exposures,
-    frames::{Believed, Canvas, SceneDrawer, blend, finish},
+    frames::{Believed, Canvas, SceneDrawer, believable, blend, finish},
     raster::Raster,
     report::Report,
 };
@@ -118,14 +118,9 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
     let drawn = report.luma.settings.raster_options();
     observe(Event::begins(Stage::Device));
     let raster = Arc::new(Raster::with(&open_gpu(false)?, drawn));
+    let believed = believable(luma.len(), report.luma.surroundings);
     let mut painter = Painter {
-        drawer: SceneDrawer::new(
-            &raster,
-            &luma,
-            &chroma,
-            report.luma.surroundings,
-            dataset.extent,
-        )?,
+        drawer: SceneDrawer::new(&raster, &luma, [&chroma, &believed], dataset.extent)?,
         exposures: exposures(&dataset, &report.luma.exposures),
         dataset: &dataset,
         teachers,

@@ -10,7 +10,7 @@ use crate::{
 
 /// What a photo's colors are found with.
 pub(super) struct Painter<'a> {
-    pub drawer: SceneDrawer,
+    pub drawer: SceneDrawer<'a>,
     pub exposures: Vec<Exposure>,
     pub dataset: &'a Dataset,
     pub teachers: Option<Teachers>,

@@ -12,7 +12,7 @@ use super::{Event, Observer, RunError, Stage, files, foreign::tell_unlike, pictu
 use crate::{
     capture::{LoadOptions, Loader, Normalize, split},
     gpu::Gpu,
-    raster::{Raster, Renderer},
+    raster::{Raster, SceneRenderer},
     report::to_image,
 };
 
@@ -72,7 +72,7 @@ pub fn render(options: &RenderOptions, observe: &mut Observer<'_>) -> Result<usi
     subject.tell_unlike(&gpu, observe)?;
     let raster = Arc::new(Raster::with(&gpu, subject.drawn));
     let splats = &subject.splats;
-    let mut renderer = Renderer::of(&raster, splats, &[&splats.sh], capture.extent())?;
+    let mut renderer = SceneRenderer::of(&raster, splats, &[&splats.sh], capture.extent())?;
     for (done, &i) in chosen.iter().enumerate() {
         let view = &capture.views[i];
         observe(Event::Progress {

@@ -10,7 +10,7 @@ use crate::{
     capture::{Camera, Loader, split},
     disk::folder_of,
     gpu::Gpu,
-    raster::{Raster, Renderer},
+    raster::{Raster, SceneRenderer},
     report::to_image,
     run::{
         Event, Observer, RunError, Stage, files,
@@ -108,7 +108,8 @@ pub fn render_path(
     subject.tell_unlike(&gpu, observe)?;
     let raster = Arc::new(Raster::with(&gpu, subject.drawn));
     let scenes = gray.iter().chain([&subject.splats]);
-    let renderers = scenes.map(|splats| Renderer::of(&raster, splats, &[&splats.sh], path.extent));
+    let renderers =
+        scenes.map(|splats| SceneRenderer::of(&raster, splats, &[&splats.sh], path.extent));
     let mut renderers = renderers.collect::<Result<Vec<_>, _>>()?;
     let total = path.cameras.len();
     let mut size = [0; 2];

@@ -1,0 +1,127 @@
+//! Pictures of a scene that may be larger than what the device has room for.
+
+use std::sync::Arc;
+
+use super::{Field, Geometry, Picture, Raster, Renderer, Streamed, constants::NEAR_SHARE};
+use crate::{
+    capture::Camera,
+    gpu::GpuError,
+    splats::{ShField, Splats},
+};
+
+/// Draws fields over the geometry of one scene: from the device where the adapter binds as much,
+/// else from the host ([`Streamed`]).
+pub struct SceneRenderer<'a> {
+    raster: Arc<Raster>,
+    splats: &'a Splats,
+    fields: Vec<&'a ShField>,
+    near: f64,
+    place: Place,
+}
+
+/// Where the scene is.
+enum Place {
+    Device(Box<Renderer>),
+    Host(Streamed),
+}
+
+impl<'a> SceneRenderer<'a> {
+    /// A renderer of `fields` over the geometry of `splats` that shows nothing nearer to a
+    /// camera than [`NEAR_SHARE`] of the capture's `extent`, in world units.
+    ///
+    /// # Errors
+    /// [`GpuError::NoColor`].
+    pub fn of(
+        raster: &Arc<Raster>,
+        splats: &'a Splats,
+        fields: &[&'a ShField],
+        extent: f64,
+    ) -> Result<Self, GpuError> {
+        Self::new(raster, splats, fields, NEAR_SHARE * extent)
+    }
+
+    /// The same, nearest depth shown `near` world units.
+    ///
+    /// # Errors
+    /// [`GpuError::NoColor`].
+    pub fn new(
+        raster: &Arc<Raster>,
+        splats: &'a Splats,
+        fields: &[&'a ShField],
+        near: f64,
+    ) -> Result<Self, GpuError> {
+        let whole = || {
+            let gpu = &raster.gpu;
+            let geometry = Geometry::upload(gpu, splats)?;
+            let uploaded = fields.iter().map(|field| Field::upload(gpu, field));
+            Renderer::new(
+                raster.clone(),
+                geometry,
+                uploaded.collect::<Result<_, _>>()?,
+                near,
+            )
+        };
+        let place = match whole() {
+            Ok(renderer) => Place::Device(Box::new(renderer)),
+            Err(GpuError::TooLarge { .. }) => Place::Host(Streamed::new(splats, near)),
+            Err(other) => return Err(other),
+        };
+        Ok(Self::at(place, raster, splats, fields, near))
+    }
+
+    /// A renderer that takes no more of the device than one view needs.
+    pub fn on_host(
+        raster: &Arc<Raster>,
+        splats: &'a Splats,
+        fields: &[&'a ShField],
+        near: f64,
+    ) -> Self {
+        let place = Place::Host(Streamed::new(splats, near));
+        Self::at(place, raster, splats, fields, near)
+    }
+
+    fn at(
+        place: Place,
+        raster: &Arc<Raster>,
+        splats: &'a Splats,
+        fields: &[&'a ShField],
+        near: f64,
+    ) -> Self {
+        Self {
+            raster: raster.clone(),
+            splats,
+            fields: fields.to_vec(),
+            near,
+            place,
+        }
+    }
+
+    /// As [`Renderer::with_one_list`]; of a scene on the host each field has its own.
+    #[must_use]
+    pub fn with_one_list(self) -> Self {
+        let place = match self.place {
+            Place::Device(renderer) => Place::Device(Box::new(renderer.with_one_list())),
+            host @ Place::Host(_) => host,
+        };
+        Self { place, ..self }
+    }
+
+    /// Draws all fields as `camera` sees them.
+    ///
+    /// # Errors
+    /// [`GpuError`] when buffers do not fit or the device is lost.
+    pub fn render(&mut self, camera: &Camera) -> Result<Vec<Picture>, GpuError> {
+        loop {
+            match &mut self.place {
+                Place::Host(scene) => return scene.render(&self.raster, &self.fields, camera),
+                Place::Device(renderer) => match renderer.render(camera) {
+                    // Of the view's tile lists.
+                    Err(GpuError::TooLarge { .. }) => {
+                        self.place = Place::Host(Streamed::new(self.splats, self.near));
+                    }
+                    done => return done,
+                },
+            }
+        }
+    }
+}
