@@ -20,7 +20,7 @@ from pathlib import Path
 from bench_peers.measure import load, psnr
 from bench_peers.photos import HELD, copy_gray
 
-SCENES = ["fern-llff", "brighton-drone", "banana-object", "caliterra-drone"]
+SCENES = ["fern-llff", "brighton-drone", "banana-object", "caliterra-drone", "tiny-brighton", "tiny-banana"]
 WAYS = [["--no-surround", "--no-fill-gaps"], ["--no-fill-gaps"], []]
 SIDE = 240
 FIT = ["--preset", "draft", "--max-side", str(SIDE), "--max-splats", "12000", "--iterations", "1000"]
@@ -49,6 +49,7 @@ def main() -> None:
     parser.add_argument("-o", "--output", type=Path, default=Path("target/ends"))
     parser.add_argument("--data", type=Path, default=Path("../shared/data"))
     parser.add_argument("--scenes", nargs="*", default=SCENES)
+    parser.add_argument("--hold", nargs="+", choices=HELD, default=HELD[::-1], help="which photos are held out")
     parser.add_argument("--seeds", type=int, default=2)
     arguments = parser.parse_args()
     print("| scene | held out | nothing | shell | shell and gaps |")
@@ -57,7 +58,7 @@ def main() -> None:
         if not (arguments.data / scene).is_dir():
             print(f"{arguments.data / scene} is not there: skipped", file=sys.stderr)
             continue
-        for held in reversed(HELD):
+        for held in arguments.hold:
             folder = arguments.output / f"{scene}-{held}"
             names = copy_gray(arguments.data / scene, folder, SIDE, held)
             cells = []

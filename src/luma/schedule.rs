@@ -125,6 +125,13 @@ impl Schedule {
             && iteration < self.densify_until
             && iteration.is_multiple_of(self.densify_every)
     }
+
+    /// How often the set changes.
+    pub fn densifications(&self) -> usize {
+        (1..self.densify_until)
+            .filter(|&iteration| self.densifies_after(iteration))
+            .count()
+    }
 }
 
 /// The next degree of harmonics waits no longer than this: a run whose curve is soon flat

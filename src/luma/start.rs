@@ -1,7 +1,7 @@
 //! The Gaussians that a training starts from.
 
 use super::{
-    LumaSettings,
+    LumaSettings, Schedule,
     carve::carved,
     gaps::{GapPoint, gap_points},
 };
@@ -11,6 +11,10 @@ use crate::{
     effects::Evidence,
     splats::{ShField, Splats, init::initial_splats, sh},
 };
+
+/// At most so large a share of the Gaussians is there from the start: growth sees where photos
+/// are not met, and places the others better (docs/lab/03-densification.md).
+const FIRST_SHARE: f64 = 0.75;
 
 /// At most so large a share of the Gaussians starts where COLMAP has no point, as numerator and
 /// denominator: half of it gained less on the lawn of the bundled scene, more cost elsewhere
@@ -29,9 +33,9 @@ pub fn started(splats: &Splats, settings: &LumaSettings) -> Splats {
     splats
 }
 
-/// One at each of COLMAP's points and where photos show some that it has not, and a dome behind
-/// them; so many fewer than the settings allow
-/// as are `reserved`.
+/// One at each of COLMAP's points and where photos show some that it has not, as many as
+/// [`room_at_first`] says, and a dome behind them; so many fewer than the settings allow as are
+/// `reserved`.
 ///
 /// # Errors
 /// [`CaptureError`] of a photo.
@@ -59,9 +63,22 @@ pub fn placed_splats(
         false => None,
     };
     let taken = dome.as_ref().map_or(0, Splats::len);
-    truncate(&mut splats, settings.max_splats - taken - reserved);
+    truncate(
+        &mut splats,
+        room_at_first(settings, settings.max_splats - taken - reserved),
+    );
     dome.into_iter().for_each(|dome| splats.append(dome));
     Ok(splats)
+}
+
+/// How many Gaussians a training starts with at most that may have so many: some are left to
+/// growth, unless it is too short for them.
+pub fn room_at_first(settings: &LumaSettings, splats: usize) -> usize {
+    let densifications = Schedule::of(settings).densifications() as f64;
+    match FIRST_SHARE * (1.0 + settings.growth).powf(densifications) < 1.0 {
+        true => splats,
+        false => (FIRST_SHARE * splats as f64).ceil() as usize,
+    }
 }
 
 /// Places and grays where photos show points that COLMAP has not, if gaps are to be filled: as
@@ -179,6 +196,14 @@ mod tests {
         let before = splats.clone();
         truncate(&mut splats, 4);
         assert_eq!(splats, before);
+    }
+
+    #[test]
+    fn a_quarter_is_left_to_growth_where_there_is_any() {
+        let [long, short] = [1_000, 3].map(LumaSettings::new);
+        let room = |settings| [0, 1, 2, 4, 10_000].map(|splats| room_at_first(settings, splats));
+        assert_eq!(room(&long), [0, 1, 2, 3, 7_500]);
+        assert_eq!(room(&short), [0, 1, 2, 4, 10_000]);
     }
 
     #[test]

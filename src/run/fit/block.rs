@@ -14,7 +14,10 @@ use crate::{
     capture::{Camera, Dataset, LoadOptions},
     color::gray_from_rgb,
     effects::{Effect, Overrules},
-    luma::{LumaSettings, Preset, start::gap_places},
+    luma::{
+        LumaSettings, Preset,
+        start::{gap_places, room_at_first},
+    },
     report::{EffectReport, Report, ViewExposure},
     splats::{Splats, initial_splats},
 };
@@ -163,7 +166,7 @@ impl BlockPlace {
                 *log_scale = log_scale.min(widest);
             }
         }
-        start = start.chosen(&evenly(&start.means, room));
+        start = start.chosen(&evenly(&start.means, room_at_first(settings, room)));
         observe(Event::Note(format!(
             "starts from {} of {} points in and around the block and {} Gaussians of the coarse model beyond",
             start.len(),
