@@ -78,14 +78,7 @@ fn load(run: &Path, teacher: &Path) -> Fallible<Problem> {
     }
     let raster = Arc::new(Raster::new(&Gpu::open()?));
     let luma = ply::read_ply(&run.join("luma.ply"))?.splats.to_luma();
-    let extent = capture.extent();
-    let room = Room {
-        limit: None,
-        color: ColorKind::Chroma,
-        sh_degree: 0,
-        weighted: false,
-        streams: false,
-    };
+    let (extent, room) = (capture.extent(), Room::of(ColorKind::Chroma, 0));
     Ok(Problem {
         frozen: FrozenViews::new(&raster, &luma, extent, &cameras, SCALES, room)?,
         targets,

@@ -32,6 +32,20 @@ pub struct Room {
     pub streams: bool,
 }
 
+impl Room {
+    /// Without a limit, for pixels that all weigh the same and Gaussians that all stay on the
+    /// device.
+    pub fn of(color: ColorKind, sh_degree: u32) -> Self {
+        Self {
+            limit: None,
+            color,
+            sh_degree,
+            weighted: false,
+            streams: false,
+        }
+    }
+}
+
 /// What Gaussians take at least that all stay on the device, whatever the views.
 pub(super) struct Least {
     bytes: u64,

@@ -7,7 +7,7 @@ use crate::{
     capture::{Dataset, Exposure},
     chroma::{Lesson, native_rgb, teacher::AbImage},
     measure,
-    raster::{Picture, Raster, SceneRenderer, constants::NEAR_SHARE},
+    raster::{Picture, Raster, SceneRenderer},
     report::{ColorError, ColorQuality, ColorView, Row, to_image},
     splats::{ShField, Splats},
 };
@@ -45,10 +45,9 @@ impl Measured {
         observe: &mut Observer<'_>,
     ) -> Result<Self, EvalError> {
         let fields = [&luma.sh, chroma, &baked.sh];
-        let near = NEAR_SHARE * dataset.extent;
         let mut renderer = match streams {
-            true => SceneRenderer::on_host(raster, luma, &fields, near),
-            false => SceneRenderer::new(raster, luma, &fields, near)?,
+            true => SceneRenderer::on_host(raster, luma, &fields, dataset.extent),
+            false => SceneRenderer::of(raster, luma, &fields, dataset.extent)?,
         };
         let (mut errors, mut views, mut rows) = (Vec::new(), Vec::new(), Vec::new());
         let measured = lesson.measured(&dataset.split).1;

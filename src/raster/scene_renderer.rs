@@ -66,33 +66,29 @@ impl<'a> SceneRenderer<'a> {
             Err(GpuError::TooLarge { .. }) => Place::Host(Streamed::new(splats, near)),
             Err(other) => return Err(other),
         };
-        Ok(Self::at(place, raster, splats, fields, near))
-    }
-
-    /// A renderer that takes no more of the device than one view needs.
-    pub fn on_host(
-        raster: &Arc<Raster>,
-        splats: &'a Splats,
-        fields: &[&'a ShField],
-        near: f64,
-    ) -> Self {
-        let place = Place::Host(Streamed::new(splats, near));
-        Self::at(place, raster, splats, fields, near)
-    }
-
-    fn at(
-        place: Place,
-        raster: &Arc<Raster>,
-        splats: &'a Splats,
-        fields: &[&'a ShField],
-        near: f64,
-    ) -> Self {
-        Self {
+        Ok(Self {
             raster: raster.clone(),
             splats,
             fields: fields.to_vec(),
             near,
             place,
+        })
+    }
+
+    /// As [`Self::of`], but one that takes no more of the device than one view needs.
+    pub fn on_host(
+        raster: &Arc<Raster>,
+        splats: &'a Splats,
+        fields: &[&'a ShField],
+        extent: f64,
+    ) -> Self {
+        let near = NEAR_SHARE * extent;
+        Self {
+            place: Place::Host(Streamed::new(splats, near)),
+            raster: raster.clone(),
+            splats,
+            fields: fields.to_vec(),
+            near,
         }
     }
 

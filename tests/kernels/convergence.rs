@@ -14,7 +14,7 @@ use gs_chroma::{
 
 use crate::{
     harness::raster,
-    solver::{
+    wall::{
         ChromaView, Problem, cameras, chroma_view, constant_views, drawn, farthest, pictured,
         settings, six_views, wall,
     },
@@ -180,13 +180,7 @@ fn a_real_network_leads_to_one_end() {
             Some(Task { view, target })
         })
         .collect();
-    let room = Room {
-        limit: None,
-        color: ColorKind::Chroma,
-        sh_degree: 0,
-        weighted: false,
-        streams: false,
-    };
+    let room = Room::of(ColorKind::Chroma, 0);
     let frozen = FrozenViews::new(&raster(), &luma, dataset.extent, &cameras, 1, room).unwrap();
     let what = "a real network";
     let from = |settings: &ChromaSettings, start: &ShField| {

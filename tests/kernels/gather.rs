@@ -2,7 +2,7 @@
 
 use gs_chroma::splats::{ShField, sh};
 
-use crate::solver::{PIXELS, Problem, cameras, chroma_view, drawn, wall};
+use crate::wall::{PIXELS, Problem, cameras, chroma_view, drawn, wall};
 
 /// For any colors x of the Gaussians and any figures y of the pixels, y times the picture of x is
 /// x times what is gathered of y.

@@ -19,7 +19,7 @@ use crate::{
         shade::Shading,
         view::View,
     },
-    solver::{self, ChromaView, HEIGHT, PIXELS, WIDTH, chroma_view},
+    wall::{self, ChromaView, HEIGHT, PIXELS, WIDTH, chroma_view},
 };
 
 /// Two views of a random scene.
@@ -189,7 +189,7 @@ fn the_least_loss_is_reached() {
                 rounds,
                 ..ChromaSettings::exact()
             };
-            let on_device = solver::Problem::new(&problem.luma(), &views);
+            let on_device = wall::Problem::new(&problem.luma(), &views);
             let mut solver = on_device.solver(&settings);
             solver.run(&mut |_| ControlFlow::Continue(())).unwrap();
             let chroma = solver.chroma().unwrap();

@@ -39,6 +39,7 @@ mod sort;
 mod streamed;
 mod tiles;
 mod viewers;
+mod wall;
 
 /// Prints, files and judges what is measured.
 #[test]

@@ -60,13 +60,7 @@ fn colorful() -> Splats {
 }
 
 fn frozen(splats: &Splats) -> FrozenViews {
-    let room = Room {
-        limit: None,
-        color: ColorKind::Rgb,
-        sh_degree: 0,
-        weighted: false,
-        streams: false,
-    };
+    let room = Room::of(ColorKind::Rgb, 0);
     FrozenViews::new(&raster(), splats, EXTENT, &cameras(), 3, room).unwrap()
 }
 

@@ -19,7 +19,7 @@ use gs_chroma::{
 use crate::{
     harness::{bits, camera, raster, splats},
     oracle::random::{oblique_view, random_scene},
-    solver::{HEIGHT, PIXELS, WIDTH, cameras, chroma_view, pictured},
+    wall::{HEIGHT, PIXELS, WIDTH, cameras, chroma_view, pictured},
 };
 
 const EXTENT: f64 = 1.0;
@@ -154,6 +154,13 @@ fn what_the_adapter_cannot_bind_draws_its_picture() {
             translation: view.translation + DVec3::new(0.3 * step.sin(), 0.0, 1.0 - 0.25 * step),
             ..view.resized(32 + k, 24)
         };
+        // More than a buffer's RGB harmonics.
+        assert!(
+            Streamed::new(&luma, NEAR_SHARE * EXTENT)
+                .shown(&camera)
+                .len()
+                > 100
+        );
         let expected = whole.render(&camera).unwrap();
         let pixels = |pictures: &[Picture]| -> Vec<f32> {
             let each = pictures.iter().flat_map(|picture| &picture.pixels);

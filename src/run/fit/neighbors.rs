@@ -10,7 +10,7 @@ use super::{FitOptions, Init};
 use crate::{
     capture::{Dataset, Exposure, Layers},
     eval::exposures,
-    raster::{Raster, SceneRenderer, constants::NEAR_SHARE},
+    raster::{Raster, SceneRenderer},
     splats::Splats,
 };
 
@@ -109,8 +109,7 @@ impl Beyond<'_> {
         let mut part = SceneRenderer::of(self.raster, self.part, &[&self.part.sh], dataset.extent)?;
         // No more of the scene has to fit onto the device than one photo shows.
         let fields = [&self.whole.sh];
-        let near = NEAR_SHARE * dataset.extent;
-        let mut whole = SceneRenderer::on_host(self.raster, self.whole, &fields, near);
+        let mut whole = SceneRenderer::on_host(self.raster, self.whole, &fields, dataset.extent);
         for (view, camera) in dataset.cameras.iter().enumerate() {
             observe(Event::Progress {
                 stage: Stage::Placing,
