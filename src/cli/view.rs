@@ -45,8 +45,9 @@ impl View {
         let server = Server::bind(self.port)?;
         progress.finish();
         let url = server.url();
-        print(format_args!("{url} shows {name}; Ctrl-C ends it"))?;
+        // Who reads the line may act on it at once.
         interrupt::ends_well();
+        print(format_args!("{url} shows {name}; Ctrl-C ends it"))?;
         if !self.no_open {
             open(&url);
         }
