@@ -13,26 +13,27 @@ offset. A scene that is not there is skipped with a word. Needs numpy and Pillow
 from __future__ import annotations
 
 import argparse
+import shutil
 import statistics
 import subprocess
 import sys
 from pathlib import Path
+from typing import NamedTuple
 
 from bench_peers.measure import corrected, load, psnr
 from bench_peers.photos import HELD, copy_gray
 
 SCENES = ["fern-llff", "brighton-drone", "banana-object", "caliterra-drone", "tiny-brighton", "tiny-banana"]
-PROGRAM = "target/release/gs-chroma"
 SIDE = 240
 FIT = ["--preset", "draft", "--max-side", str(SIDE), "--max-splats", "12000", "--iterations", "1000"]
-FIT += ["--no-holdout", "--force"]
+FIT += ["--no-holdout"]
 
-# Of this build, one part after the other.
+# One part after the other.
 EFFECTS_OFF = ["--without", "background", "--without", "exposure"]
 WAYS = {
-    "nothing": (PROGRAM, [*EFFECTS_OFF, "--no-surround", "--no-fill-gaps"]),
-    "shell": (PROGRAM, [*EFFECTS_OFF, "--no-fill-gaps"]),
-    "shell and gaps": (PROGRAM, EFFECTS_OFF),
+    "nothing": [*EFFECTS_OFF, "--no-surround", "--no-fill-gaps"],
+    "shell": [*EFFECTS_OFF, "--no-fill-gaps"],
+    "shell and gaps": EFFECTS_OFF,
 }
 
 
@@ -44,15 +45,22 @@ def quietly(*command: object) -> None:
         sys.exit(f"{' '.join(words)}: {ran.stderr.strip().splitlines()[-1]}")
 
 
-def measured(folder: Path, held: list[str], seed: int, program: str, flags: list[str]) -> tuple[float, float]:
-    """Mean PSNR of the held-out photos, as shown and after each photo's own gain and offset."""
-    run, views = folder / "run", folder / "views"
-    quietly(program, "fit", folder / "train", "-o", run, "--seed", seed, *FIT, *flags)
-    scene = ["--colmap", folder / "held", "--views", "all", "--luma", "-o", views]
-    quietly(PROGRAM, "render", run / "luma.ply", *scene)
-    pairs = [(load(views / name), load(folder / "all/images" / name)) for name in held]
-    shown = statistics.mean(psnr(*pair) for pair in pairs)
-    return shown, statistics.mean(psnr(corrected(*pair), pair[1]) for pair in pairs)
+class Place(NamedTuple):
+    """A copy of a scene without the photos that are held out."""
+
+    folder: Path
+    held: list[str]
+
+    def measured(self, program: str, flags: list[str], seed: int) -> tuple[float, float]:
+        """Mean PSNR of the held-out photos, as shown and after each photo's own gain and offset."""
+        run, views = self.folder / "run", self.folder / "views"
+        shutil.rmtree(run, ignore_errors=True)
+        quietly(program, "fit", self.folder / "train", "-o", run, "--seed", seed, *FIT, *flags)
+        scene = ["--colmap", self.folder / "held", "--views", "all", "--luma", "-o", views]
+        quietly(program, "render", run / "luma.ply", *scene)
+        pairs = [(load(views / name), load(self.folder / "all/images" / name)) for name in self.held]
+        shown = statistics.mean(psnr(*pair) for pair in pairs)
+        return shown, statistics.mean(psnr(corrected(*pair), pair[1]) for pair in pairs)
 
 
 def main() -> None:
@@ -62,10 +70,12 @@ def main() -> None:
     parser.add_argument("--scenes", nargs="*", default=SCENES)
     parser.add_argument("--hold", nargs="+", choices=HELD, default=HELD[::-1], help="which photos are held out")
     parser.add_argument("--seeds", type=int, default=2)
+    parser.add_argument("--program", default="target/release/gs-chroma")
     parser.add_argument("--against", metavar="PROGRAM", help="another build to compare with")
     arguments = parser.parse_args()
-    other = arguments.against
-    ways = {other: (other, []), "this build": (PROGRAM, [])} if other else WAYS
+    ways = {name: (arguments.program, flags) for name, flags in WAYS.items()}
+    if arguments.against:
+        ways = {program: (program, []) for program in (arguments.against, arguments.program)}
     print(f"| scene | held out | {' | '.join(ways)} |")
     print(f"|---|---|{'---|' * len(ways)}")
     for scene in arguments.scenes:
@@ -74,12 +84,13 @@ def main() -> None:
             continue
         for held in arguments.hold:
             folder = arguments.output / f"{scene}-{held}"
-            names = copy_gray(arguments.data / scene, folder, SIDE, held)
+            shutil.rmtree(folder, ignore_errors=True)
+            place = Place(folder, copy_gray(arguments.data / scene, folder, SIDE, held))
             cells = []
             for program, flags in ways.values():
-                found = [measured(folder, names, seed, program, flags) for seed in range(arguments.seeds)]
+                found = [place.measured(program, flags, seed) for seed in range(arguments.seeds)]
                 shown, after = (", ".join(f"{value:.2f}" for value in values) for values in zip(*found, strict=True))
-                cells.append(f"{shown}; {after}" if other else shown)
+                cells.append(f"{shown}; {after}" if arguments.against else shown)
             print(f"| {scene} | {held} | {' | '.join(cells)} |", flush=True)
 
 

@@ -151,21 +151,46 @@ fn at_degree(field: &ShField, count: usize, degree: u32) -> ShField {
     out
 }
 
-/// Keeps an evenly spread choice of at most `max` Gaussians: a cap is a cap.
+/// Keeps at most `max` Gaussians: a cap is a cap. Small ones stand close together and for each
+/// other, so the chance to stay goes with the root of the size, which is their geometric mean
+/// (docs/lab/03-densification.md).
 fn truncate(splats: &mut Splats, max: usize) {
-    let mut kept: Vec<usize> = (0..splats.len()).collect();
-    thin(&mut kept, max);
-    if kept.len() < splats.len() {
-        *splats = splats.chosen(&kept);
+    if splats.len() > max {
+        let root = |axes: &[f32; 3]| {
+            let mean = axes.iter().copied().map(f64::from).sum::<f64>() / 3.0;
+            // Sums of what a file may hold stay finite.
+            (mean / 2.0).clamp(-300.0, 300.0).exp()
+        };
+        let weights: Vec<f64> = splats.log_scales.iter().map(root).collect();
+        *splats = splats.chosen(&sampled(&weights, max));
     }
 }
 
-/// Keeps an evenly spread choice of at most `max`.
-fn thin<T: Copy>(values: &mut Vec<T>, max: usize) {
-    let count = values.len();
-    if count > max {
-        *values = (0..max).map(|k| values[k * count / max]).collect();
-    }
+/// Systematic sampling (Madow 1949): `count` of the indices, ascending and evenly spread, each
+/// with a chance in proportion to its positive weight, but at most 1.
+fn sampled(weights: &[f64], count: usize) -> Vec<usize> {
+    let mut sorted = weights.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let sums: Vec<f64> = (sorted.iter())
+        .scan(0.0, |sum, weight| {
+            *sum += weight;
+            Some(*sum)
+        })
+        .collect();
+    // The heaviest stay for sure while their share of what is left exceeds one.
+    let last = weights.len() - 1;
+    let sure = (0..count)
+        .take_while(|&sure| sorted[last - sure] * (count - sure) as f64 > sums[last - sure])
+        .count();
+    let chance = (count - sure) as f64 / sums[last - sure];
+    let mut sum = 0.5;
+    (0..weights.len())
+        .filter(|&index| {
+            let before = f64::floor(sum);
+            sum += (weights[index] * chance).min(1.0);
+            sum.floor() > before
+        })
+        .collect()
 }
 
 #[cfg(test)]
@@ -189,13 +214,45 @@ mod tests {
     #[test]
     fn a_cap_is_a_cap_for_the_first_gaussians_too() {
         let mut splats = numbered(10, 1);
+        splats.log_scales.fill([-3.0; 3]);
         truncate(&mut splats, 4);
-        assert_eq!(splats.opacity_logits, [0.0, 2.0, 5.0, 7.0]);
-        assert_eq!(splats.means[3], [7.0; 3]);
-        assert_eq!(splats.sh.of(2), [20.0, 21.0, 22.0, 23.0]);
+        assert_eq!(splats.opacity_logits, [1.0, 3.0, 6.0, 8.0]);
+        assert_eq!(splats.means[3], [8.0; 3]);
+        assert_eq!(splats.sh.of(2), [24.0, 25.0, 26.0, 27.0]);
         let before = splats.clone();
         truncate(&mut splats, 4);
         assert_eq!(splats, before);
+        truncate(&mut splats, 0);
+        assert_eq!(splats.len(), 0);
+    }
+
+    #[test]
+    fn where_gaussians_are_small_fewer_stay() {
+        let mut splats = numbered(1_000, 0);
+        // A clump of nine hundred, a hundredth as large as the others: a tenth of their chance.
+        splats.log_scales.fill([0.0; 3]);
+        splats.log_scales[..900].fill([-100.0_f32.ln(); 3]);
+        let stayed = |count| {
+            let mut splats = splats.clone();
+            truncate(&mut splats, count);
+            assert_eq!(splats.len(), count);
+            let large = splats.log_scales.iter().filter(|axes| axes[0] == 0.0);
+            large.count()
+        };
+        assert_eq!([19, 95, 190, 999].map(stayed), [10, 50, 100, 100]);
+    }
+
+    #[test]
+    fn sizes_beyond_all_bounds_are_chosen_from() {
+        let mut splats = numbered(6, 0);
+        splats.log_scales = [f32::MIN, f32::MAX, 0.0, f32::MIN, f32::MAX, 0.0]
+            .map(|size| [size; 3])
+            .into();
+        for count in 0..6 {
+            let mut some = splats.clone();
+            truncate(&mut some, count);
+            assert_eq!(some.len(), count);
+        }
     }
 
     #[test]
