@@ -6,8 +6,8 @@
 Of COLMAP folders below DATA (default ../shared/data) the first and the last photo are held out, or
 every eighth, in a copy without them. Drafts at 240 px without shell and gaps, with the shell, with
 both; held-out PSNR as viewers show the scene. With `--against`, drafts as planned by another build
-of the program and by this one; PSNR as viewers show the scene, and after each photo's own gain and
-offset. A scene that is not there is skipped with a word. Needs numpy and Pillow.
+of the program and by this one; PSNR as viewers show the scene, after each photo's own gain and
+offset, and SSIM. A scene that is not there is skipped with a word. Needs numpy and Pillow.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import sys
 from pathlib import Path
 from typing import NamedTuple
 
-from bench_peers.measure import corrected, load, psnr
+from bench_peers.measure import corrected, load, psnr, ssim
 from bench_peers.photos import HELD, copy_gray
 
 SCENES = ["fern-llff", "brighton-drone", "banana-object", "caliterra-drone", "tiny-brighton", "tiny-banana"]
@@ -51,16 +51,17 @@ class Place(NamedTuple):
     folder: Path
     held: list[str]
 
-    def measured(self, program: str, flags: list[str], seed: int) -> tuple[float, float]:
-        """Mean PSNR of the held-out photos, as shown and after each photo's own gain and offset."""
+    def measured(self, program: str, flags: list[str], seed: int) -> list[str]:
+        """Of the held-out photos: mean PSNR as shown and after each one's own gain and offset, and SSIM."""
         run, views = self.folder / "run", self.folder / "views"
         shutil.rmtree(run, ignore_errors=True)
         quietly(program, "fit", self.folder / "train", "-o", run, "--seed", seed, *FIT, *flags)
         scene = ["--colmap", self.folder / "held", "--views", "all", "--luma", "-o", views]
         quietly(program, "render", run / "luma.ply", *scene)
         pairs = [(load(views / name), load(self.folder / "all/images" / name)) for name in self.held]
-        shown = statistics.mean(psnr(*pair) for pair in pairs)
-        return shown, statistics.mean(psnr(corrected(*pair), pair[1]) for pair in pairs)
+        after = [(corrected(*pair), pair[1]) for pair in pairs]
+        decibels = [f"{statistics.mean(psnr(*pair) for pair in some):.2f}" for some in (pairs, after)]
+        return [*decibels, f"{statistics.mean(ssim(*pair) for pair in pairs):.3f}"]
 
 
 def main() -> None:
@@ -89,8 +90,8 @@ def main() -> None:
             cells = []
             for program, flags in ways.values():
                 found = [place.measured(program, flags, seed) for seed in range(arguments.seeds)]
-                shown, after = (", ".join(f"{value:.2f}" for value in values) for values in zip(*found, strict=True))
-                cells.append(f"{shown}; {after}" if arguments.against else shown)
+                measures = [", ".join(values) for values in zip(*found, strict=True)]
+                cells.append("; ".join(measures) if arguments.against else measures[0])
             print(f"| {scene} | {held} | {' | '.join(cells)} |", flush=True)
 
 
