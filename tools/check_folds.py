@@ -5,7 +5,8 @@
 
 `fit` holds out every eighth photo by name: of twelve photos two, which say little. Here names are
 turned around eight times, so that every photo is held out, and the scene is fitted with the
-effect and without it, otherwise as planned. Gains are of PSNR after the photo's own gain and
+effect and without it, otherwise as planned. Instead of an effect, `--without=FLAG` asks what the
+scene loses by a flag of `fit`, such as `--without=--no-fill-gaps`. Gains are of PSNR after the photo's own gain and
 offset. Copies of the scene are written to a temporary folder.
 """
 
@@ -54,7 +55,8 @@ def held_out(program: str, scene: Path, flags: list[str]) -> dict[str, float]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("scene", type=Path)
-    parser.add_argument("effect")
+    parser.add_argument("effect", nargs="?")
+    parser.add_argument("--without", metavar="FLAG", help="instead of an effect: a flag that leaves something out")
     parser.add_argument("--program", default="target/release/gs-chroma")
     parser.add_argument("--seeds", type=int, nargs="+", default=[0])
     parser.add_argument(
@@ -62,6 +64,11 @@ def main() -> None:
         help="flags for fit, as one word",
     )  # fmt: skip
     options = parser.parse_args()
+    if (options.effect is None) == (options.without is None):
+        parser.error("an effect or --without")
+    ways = [["--with", options.effect], ["--without", options.effect]]
+    if options.without:
+        ways = [[], [options.without]]
     if not options.scene.is_dir():
         print(f"skipped: no {options.scene}")
         return
@@ -71,7 +78,7 @@ def main() -> None:
         for fold, seed in itertools.product(range(FOLDS), options.seeds):
             turned(options.scene, copy, fold)
             flags = [*shlex.split(options.fit), "--seed", str(seed)]
-            on, off = (held_out(options.program, copy, [*flags, way, options.effect]) for way in ("--with", "--without"))
+            on, off = (held_out(options.program, copy, [*flags, *way]) for way in ways)
             for name in on:
                 gains.setdefault(name, []).append(on[name] - off[name])
     print("| photo, first letter left out | gain, dB |\n|---|--:|")
