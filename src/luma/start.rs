@@ -9,7 +9,7 @@ use crate::{
     capture::{CaptureError, Dataset},
     color::gray_from_rgb,
     effects::Evidence,
-    splats::{ShField, Splats, init::initial_splats, sh},
+    splats::{ShField, Splats, init::initial_splats, morton, sh},
 };
 
 /// At most so large a share of the Gaussians is there from the start: growth sees where photos
@@ -152,8 +152,8 @@ fn at_degree(field: &ShField, count: usize, degree: u32) -> ShField {
 }
 
 /// Keeps at most `max` Gaussians: a cap is a cap. Small ones stand close together and for each
-/// other, so the chance to stay goes with the root of the size, which is their geometric mean
-/// (docs/lab/03-densification.md).
+/// other, so the chance to stay goes with the root of the size, the geometric mean of the axes,
+/// and the choice is even along a Z-order curve (docs/lab/03-densification.md).
 fn truncate(splats: &mut Splats, max: usize) {
     if splats.len() > max {
         let root = |axes: &[f32; 3]| {
@@ -161,8 +161,15 @@ fn truncate(splats: &mut Splats, max: usize) {
             // Sums of what a file may hold stay finite.
             (mean / 2.0).clamp(-300.0, 300.0).exp()
         };
-        let weights: Vec<f64> = splats.log_scales.iter().map(root).collect();
-        *splats = splats.chosen(&sampled(&weights, max));
+        let along = morton::order(&splats.means);
+        let weights: Vec<f64> = (along.iter())
+            .map(|&index| root(&splats.log_scales[index as usize]))
+            .collect();
+        let mut kept: Vec<usize> = (sampled(&weights, max).into_iter())
+            .map(|place| along[place] as usize)
+            .collect();
+        kept.sort_unstable();
+        *splats = splats.chosen(&kept);
     }
 }
 

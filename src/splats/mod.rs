@@ -8,7 +8,7 @@ mod file;
 mod format;
 mod glb;
 pub mod init;
-mod morton;
+pub(crate) mod morton;
 mod neighbors;
 pub mod npy;
 pub mod ply;

@@ -5,7 +5,7 @@ const BITS: u32 = 21;
 
 /// The Gaussians along a Z-order curve through the box of their centers, `[N]`; those of one
 /// place stay in order.
-pub(super) fn order(means: &[[f32; 3]]) -> Vec<u32> {
+pub fn order(means: &[[f32; 3]]) -> Vec<u32> {
     let mut low = [f32::INFINITY; 3];
     let mut high = [f32::NEG_INFINITY; 3];
     for mean in means {
