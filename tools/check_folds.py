@@ -6,8 +6,8 @@
 `fit` holds out every eighth photo by name: of twelve photos two, which say little. Here names are
 turned around eight times, so that every photo is held out, and the scene is fitted with the
 effect and without it, otherwise as planned. Instead of an effect, `--without=FLAG` asks what the
-scene loses by a flag of `fit`, such as `--without=--no-fill-gaps`. Gains are of PSNR after the photo's own gain and
-offset. Copies of the scene are written to a temporary folder.
+scene loses by a flag of `fit`, such as `--without=--no-fill-gaps`. Gains are of PSNR after the
+photo's own gain and offset. Copies of the scene are written to a temporary folder.
 """
 
 from __future__ import annotations
