@@ -41,6 +41,8 @@ pub(super) struct GapPoint {
     pub position: DVec3,
     /// Encoded gray, 0 to 1.
     pub gray: f32,
+    /// Width of the cell that it fills, in world units.
+    pub width: f64,
 }
 
 /// At most `most` points where the training photos show something and the capture has none.
@@ -67,7 +69,15 @@ fn found(capture: &Capture, photos: &[(usize, SmallPhoto)], most: usize) -> Vec<
         found.extend(more);
     }
     let kept = found.len().min(most);
-    (0..kept).map(|k| found[k * found.len() / kept]).collect()
+    // Each then stands for more of the photo.
+    let wider = (found.len() as f64 / kept.max(1) as f64).sqrt();
+    let chosen = (0..kept).map(|k| found[k * found.len() / kept]);
+    chosen
+        .map(|point| GapPoint {
+            width: wider * point.width,
+            ..point
+        })
+        .collect()
 }
 
 /// Those taken from nearest by.
@@ -190,6 +200,7 @@ impl<'a> Gaps<'a> {
         believed.then(|| GapPoint {
             position: self.photo.place(pixel, found.surface.depth),
             gray: (found.gray / 255.0) as f32,
+            width: found.surface.depth * self.side / self.photo.camera.fx,
         })
     }
 
@@ -287,7 +298,20 @@ mod tests {
         assert!(below.iter().all(|point| (point.gray - 0.5).abs() < 0.3));
         // However many threads there are, and evenly chosen.
         assert_eq!(points, found(&capture, &photos, 100_000));
-        assert_eq!(found(&capture, &photos, 50).len(), 50);
+        let few = found(&capture, &photos, 50);
+        assert_eq!(few.len(), 50);
+        // A cell of two pixels at a depth of 4; wider where fewer stand for as much.
+        let width = |points: &[GapPoint]| {
+            points.iter().map(|point| point.width).sum::<f64>() / points.len() as f64
+        };
+        let cell = 4.0 * 2.0 / photos[0].1.camera.fx;
+        assert!(
+            (width(&points) / cell - 1.0).abs() < 0.1,
+            "{}",
+            width(&points) / cell
+        );
+        let wider = (points.len() as f64 / 50.0).sqrt();
+        assert!((width(&few) / cell / wider - 1.0).abs() < 0.1);
     }
 
     #[test]

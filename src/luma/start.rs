@@ -9,7 +9,7 @@ use crate::{
     capture::{CaptureError, Dataset},
     color::gray_from_rgb,
     effects::Evidence,
-    splats::{ShField, Splats, init::initial_splats, morton, sh},
+    splats::{InitialPoint, ShField, Splats, initial_splats, morton, sh},
 };
 
 /// At most so large a share of the Gaussians is there from the start: growth sees where photos
@@ -45,15 +45,8 @@ pub fn placed_splats(
     settings: &LumaSettings,
     reserved: usize,
 ) -> Result<Splats, CaptureError> {
-    let mut points: Vec<_> = (dataset.capture.points.iter())
-        .map(|point| {
-            let rgb = point.color.map(|v| f64::from(v) / 255.0);
-            let position = point.position.as_vec3().to_array();
-            (position, gray_from_rgb(rgb) as f32)
-        })
-        .collect();
     let room = settings.max_splats - reserved;
-    points.extend(gap_places(dataset, settings, points.len(), room)?);
+    let points = first_points(dataset, settings, room, |_| true)?;
     let mut splats = initial_splats(&points, dataset.extent as f32, settings.sh_degree);
     if dataset.removes_masked() {
         splats = carved(dataset, &splats)?;
@@ -81,25 +74,41 @@ pub fn room_at_first(settings: &LumaSettings, splats: usize) -> usize {
     }
 }
 
-/// Places and grays where photos show points that COLMAP has not, if gaps are to be filled: as
-/// many as `room` Gaussians leave beside COLMAP's points.
+/// COLMAP's points and, if gaps are to be filled, some where photos show what it has no point
+/// of: as many as `room` Gaussians leave. Only those are returned whose positions are `wanted`.
 ///
 /// # Errors
 /// [`CaptureError`] of a photo.
-pub fn gap_places(
+pub fn first_points(
     dataset: &Dataset,
     settings: &LumaSettings,
-    points: usize,
     room: usize,
-) -> Result<Vec<([f32; 3], f32)>, CaptureError> {
+    wanted: impl Fn([f32; 3]) -> bool,
+) -> Result<Vec<InitialPoint>, CaptureError> {
+    let mut points: Vec<InitialPoint> = (dataset.capture.points.iter())
+        .map(|point| {
+            let rgb = point.color.map(|v| f64::from(v) / 255.0);
+            let position = point.position.as_vec3().to_array();
+            (position, gray_from_rgb(rgb) as f32).into()
+        })
+        .filter(|point: &InitialPoint| wanted(point.position))
+        .collect();
     // Where COLMAP has more points than there may be Gaussians, none of them is to spare.
-    let most = (room * GAPS_PARTS[0] / GAPS_PARTS[1]).min(room.saturating_sub(points));
+    let most = (room * GAPS_PARTS[0] / GAPS_PARTS[1]).min(room.saturating_sub(points.len()));
     let found = match settings.fill_gaps && most > 0 {
         true => gap_points(dataset, most)?,
         false => Vec::new(),
     };
-    let place = |point: &GapPoint| (point.position.as_vec3().to_array(), point.gray);
-    Ok(found.iter().map(place).collect())
+    let started = |point: &GapPoint| InitialPoint {
+        position: point.position.as_vec3().to_array(),
+        gray: point.gray,
+        // Not the distance to its neighbors: what stands alone may be wrong, and would be wide
+        // (docs/lab/16-ends-and-gaps.md).
+        spacing: Some(point.width as f32),
+    };
+    let found = found.iter().map(started);
+    points.extend(found.filter(|point| wanted(point.position)));
+    Ok(points)
 }
 
 /// Gaussians for what no point explains, at most a quarter of all that there may be.

@@ -18,32 +18,62 @@ const INITIAL_OPACITY: f64 = 0.5;
 /// squared distance at 1e-7 in scenes a few units wide, about the same.
 const MIN_RELATIVE_SCALE: f32 = 1e-4;
 
-/// One isotropic Gaussian a point: its standard deviation is half the root
-/// mean square distance to the three nearest other points, its opacity 0.5, its
-/// constant color the point's gray value.
+/// A point to start a Gaussian from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct InitialPoint {
+    /// World coordinates.
+    pub position: [f32; 3],
+    /// sRGB-encoded, `0..=1`.
+    pub gray: f32,
+    /// Distance to its neighbors in world units; `None`: the root mean square
+    /// of those to the three nearest other points.
+    pub spacing: Option<f32>,
+}
+
+impl From<([f32; 3], f32)> for InitialPoint {
+    /// Of a position and a gray.
+    fn from((position, gray): ([f32; 3], f32)) -> Self {
+        Self {
+            position,
+            gray,
+            spacing: None,
+        }
+    }
+}
+
+/// One isotropic Gaussian a point: its standard deviation is half its spacing,
+/// its opacity 0.5, its constant color the point's gray value.
 ///
-/// `points` are `(position, gray)` in world units and sRGB-encoded `0..=1`;
-/// points that are not finite are left out. `extent` is the scene's size in
+/// Points that are not finite are left out. `extent` is the scene's size in
 /// world units, which bounds the standard deviations from below. The field has
 /// one channel of degree `sh_degree` (at most [`sh::MAX_DEGREE`]).
-pub fn initial_splats(points: &[([f32; 3], f32)], extent: f32, sh_degree: u32) -> Splats {
+pub fn initial_splats<P: Copy + Into<InitialPoint>>(
+    points: &[P],
+    extent: f32,
+    sh_degree: u32,
+) -> Splats {
     let degree = sh_degree.min(sh::MAX_DEGREE);
-    let finite = |(position, gray): &&([f32; 3], f32)| {
-        gray.is_finite() && position.iter().all(|x| x.is_finite())
+    let finite = |point: &InitialPoint| {
+        point.gray.is_finite() && point.position.iter().all(|x| x.is_finite())
     };
-    let (means, grays): (Vec<[f32; 3]>, Vec<f32>) = points.iter().filter(finite).copied().unzip();
+    let points: Vec<InitialPoint> = (points.iter().copied().map(P::into))
+        .filter(finite)
+        .collect();
+    let means: Vec<[f32; 3]> = points.iter().map(|point| point.position).collect();
     let count = means.len();
 
     let min_scale = (extent * MIN_RELATIVE_SCALE).max(f32::MIN_POSITIVE);
     let log_scales = nearest_neighbor_distances(&means, NEIGHBORS)
         .into_iter()
+        .zip(&points)
+        .map(|(distance, point)| point.spacing.unwrap_or(distance))
         .map(|distance| [(INITIAL_WIDTH * distance).max(min_scale).min(f32::MAX).ln(); 3])
         .collect();
 
     let mut field = ShField::zeros(count, degree, 1);
     let stride = sh::coefficient_count(degree);
-    for (coefficients, gray) in field.coefficients.chunks_exact_mut(stride).zip(grays) {
-        coefficients[0] = ((f64::from(gray) - 0.5) / sh::C0) as f32;
+    for (coefficients, point) in field.coefficients.chunks_exact_mut(stride).zip(&points) {
+        coefficients[0] = ((f64::from(point.gray) - 0.5) / sh::C0) as f32;
     }
     Splats {
         means,
@@ -78,6 +108,15 @@ mod tests {
             assert!((0.5 + sh::C0 as f32 * coefficients[0] - gray).abs() < 1e-6);
             assert_eq!(coefficients[1..], [0.0; 15]);
         }
+    }
+
+    #[test]
+    fn a_spacing_that_is_known_counts() {
+        let mut points: [InitialPoint; 2] =
+            [([0.0; 3], 0.5), ([2.0, 0.0, 0.0], 0.5)].map(InitialPoint::from);
+        points[1].spacing = Some(6.0);
+        let splats = initial_splats(&points, 10.0, 0);
+        assert_eq!(splats.log_scales, [[1f32.ln(); 3], [3f32.ln(); 3]]);
     }
 
     #[test]

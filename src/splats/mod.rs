@@ -22,7 +22,7 @@ mod usda;
 pub use error::SplatError;
 pub use file::{ReadSplats, SpzVersion, WriteOptions, read_splats, write_splats};
 pub use format::{Format, is_splat_file};
-pub use init::initial_splats;
+pub use init::{InitialPoint, initial_splats};
 pub use neighbors::{nearest_neighbor_distances, nearest_neighbors};
 pub use ply::{PlyError, read_ply, write_ply};
 pub use sh::ShField;

@@ -12,11 +12,10 @@ use super::{FitOptions, Init, Neighbors, checkpoint::sha256_of};
 use crate::{
     blocks::{Area, Block, BlockFile, COARSE, FAR_PART, Job, Kind, Region},
     capture::{Camera, Dataset, LoadOptions},
-    color::gray_from_rgb,
     effects::{Effect, Overrules},
     luma::{
         LumaSettings, Preset,
-        start::{gap_places, room_at_first},
+        start::{first_points, room_at_first},
     },
     report::{EffectReport, Report, ViewExposure},
     splats::{Splats, initial_splats},
@@ -147,16 +146,7 @@ impl BlockPlace {
         // Points give way, not the little that stands for all the rest.
         let taken = far.len() + around.len();
         let room = settings.max_splats.saturating_sub(taken).max(1);
-        let mut points: Vec<_> = (dataset.capture.points.iter())
-            .map(|point| {
-                let rgb = point.color.map(|v| f64::from(v) / 255.0);
-                let position = point.position.as_vec3().to_array();
-                (position, gray_from_rgb(rgb) as f32)
-            })
-            .filter(|&(position, _)| near.holds(position))
-            .collect();
-        let gaps = gap_places(dataset, settings, points.len(), room)?;
-        points.extend(gaps.into_iter().filter(|&(place, _)| near.holds(place)));
+        let points = first_points(dataset, settings, room, |place| near.holds(place))?;
         let mut start = initial_splats(&points, dataset.extent as f32, coarse.sh.degree);
         // Points far from all others would begin as a fog that covers the neighbors' cells, too,
         // and is gone there once the block is cropped.
