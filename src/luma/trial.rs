@@ -1,16 +1,22 @@
 //! Short trainings that tell what the evidence leaves open: one with none of the effects in
 //! question, and one with each of them, measured on views that were held back.
 
-use std::{ops::ControlFlow, sync::Arc};
+use std::{
+    collections::{HashMap, hash_map::Entry},
+    ops::ControlFlow,
+    sync::Arc,
+};
 
 use super::{
-    LumaError, LumaSettings, LumaTrainer, PlannedViews, TrainingView, start::placed_splats,
+    LumaError, LumaSettings, LumaTrainer, PlannedViews, TrainingView,
+    start::{placed_splats, surroundings},
 };
 use crate::{
     capture::Dataset,
     effects::{Effect, Evidence, Overrules, Plan, Room, Trials},
     measure,
     raster::{Raster, SceneRenderer},
+    splats::Splats,
 };
 
 /// Share of the run's work that all trainings of a trial may take, by iterations times pixels.
@@ -91,6 +97,7 @@ pub fn planned<E: From<LumaError>>(
         evidence,
         raster,
         size,
+        surround: settings.surround,
         total: size.iterations * arms.len() * size.rounds,
     };
     let gains = trial.gains(&arms, observe)?;
@@ -175,6 +182,8 @@ struct Trial<'a> {
     evidence: &'a Evidence,
     raster: Arc<Raster>,
     size: Size,
+    /// Whether a shell surrounds the scene.
+    surround: bool,
     total: usize,
 }
 
@@ -186,12 +195,22 @@ impl Trial<'_> {
         arms: &[Arm],
         observe: &mut dyn FnMut(TrialProgress) -> ControlFlow<()>,
     ) -> Result<Trials, LumaError> {
+        // Shells differ by whether there is a background behind; all photos tell of one.
+        let mut shells = HashMap::new();
+        for arm in arms {
+            let settings = self.settings(arm, 0);
+            if let Entry::Vacant(none) = shells.entry(settings.background) {
+                none.insert(surroundings(self.dataset, self.evidence, &settings)?);
+            }
+        }
         let mut sums = vec![0.0; arms.len()];
         let mut trainings = 0;
         let mut found = Trials::new();
         for round in 1..=self.size.rounds {
             for (arm, sum) in arms.iter().zip(&mut sums) {
-                *sum += self.psnr(arm, round as u64 - 1, &mut |iteration| {
+                let settings = self.settings(arm, round as u64 - 1);
+                let shell = &shells[&settings.background];
+                *sum += self.psnr(arm, settings, shell, &mut |iteration| {
                     observe(TrialProgress {
                         done: trainings * self.size.iterations + iteration,
                         total: self.total,
@@ -213,11 +232,25 @@ impl Trial<'_> {
         Ok(found)
     }
 
-    /// Mean corrected PSNR of the views held back, of a training with an arm's effects.
+    /// Those of a training with an arm's effects.
+    fn settings(&self, arm: &Arm, seed: u64) -> LumaSettings {
+        LumaSettings {
+            max_splats: self.size.max_splats,
+            // As long as a short training itself.
+            fill_gaps: false,
+            surround: self.surround,
+            seed,
+            ..LumaSettings::new(self.size.iterations).planned(&arm.plan)
+        }
+    }
+
+    /// Mean corrected PSNR of the views held back, of a training with an arm's effects and a shell
+    /// around the scene.
     fn psnr(
         &self,
         arm: &Arm,
-        seed: u64,
+        settings: LumaSettings,
+        shell: &Splats,
         observe: &mut dyn FnMut(usize) -> ControlFlow<()>,
     ) -> Result<f64, LumaError> {
         if observe(0).is_break() {
@@ -231,18 +264,12 @@ impl Trial<'_> {
                 .map(small)
                 .collect::<Result<Vec<_>, LumaError>>()
         });
-        let settings = LumaSettings {
-            max_splats: self.size.max_splats,
-            // As long as a short training itself.
-            fill_gaps: false,
-            seed,
-            ..LumaSettings::new(self.size.iterations).planned(&arm.plan)
-        };
         let extent = self.dataset.extent;
-        let start = placed_splats(self.dataset, self.evidence, &settings, 0)?;
+        let start = placed_splats(self.dataset, self.evidence, &settings, shell.len())?;
         let drawn = self.raster.drawing(settings.raster_options());
         let mut trainer =
             LumaTrainer::new(self.raster.clone(), settings, extent, &start, trained?)?;
+        trainer.surround(shell.clone());
         trainer.train_while(&mut |progress| observe(progress.iteration))?;
         let splats = trainer.splats()?;
         let mut renderer = SceneRenderer::of(&drawn, &splats, &[&splats.sh], extent)?;
