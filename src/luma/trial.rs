@@ -195,7 +195,7 @@ impl Trial<'_> {
         arms: &[Arm],
         observe: &mut dyn FnMut(TrialProgress) -> ControlFlow<()>,
     ) -> Result<Trials, LumaError> {
-        // Shells differ by whether there is a background behind; all photos tell of one.
+        // The same in every round: one look at the photos without a background, one with it.
         let mut shells = HashMap::new();
         for arm in arms {
             let settings = self.settings(arm, 0);
