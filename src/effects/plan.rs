@@ -336,7 +336,7 @@ impl Evidence {
             .iter()
             .any(|d| d.effect == Effect::Exposure && d.on)
         {
-            true => found.views,
+            true => found.local,
             false => vec![Exposure::NONE; self.exposures.views.len()],
         };
         Plan {
