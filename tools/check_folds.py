@@ -6,7 +6,8 @@
 `fit` holds out every eighth photo by name: of twelve photos two, which say little. Here names are
 turned around eight times, so that every photo is held out, and the scene is fitted with the
 effect and without it, otherwise as planned. Instead of an effect, `--without=FLAG` asks what the
-scene loses by a flag of `fit`, such as `--without=--no-fill-gaps`. Gains are of PSNR after the
+scene loses by a flag of `fit`, such as `--without=--no-fill-gaps`, and `--against` what this build
+of the program gains over another. Gains are of PSNR as viewers show the scene, and after the
 photo's own gain and offset. Copies of the scene are written to a temporary folder.
 """
 
@@ -43,13 +44,19 @@ def turned(scene: Path, copy: Path, first: int) -> None:
         model.write_bytes(listed)
 
 
-def held_out(program: str, scene: Path, flags: list[str]) -> dict[str, float]:
-    """PSNR of the photos held out, by the rest of their names."""
+def held_out(program: str, scene: Path, flags: list[str]) -> dict[str, list[float]]:
+    """PSNR of the photos held out, as shown and corrected, by the rest of their names."""
     out = scene.with_name("run")
     shutil.rmtree(out, ignore_errors=True)
     command = [program, "fit", str(scene), "-o", str(out), "--json", *flags]
     done = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True)
-    return {view["name"][1:]: view["corrected_psnr"] for view in json.loads(done.stdout)["luma"]["held_out_views"]}
+    views = json.loads(done.stdout)["luma"]["held_out_views"]
+    return {view["name"][1:]: [view["psnr"], view["corrected_psnr"]] for view in views}
+
+
+def mean_gain(gains: list[list[float]]) -> list[float]:
+    """The mean of both PSNRs' gains."""
+    return [statistics.mean(each) for each in zip(*gains, strict=True)]
 
 
 def main() -> None:
@@ -57,6 +64,7 @@ def main() -> None:
     parser.add_argument("scene", type=Path)
     parser.add_argument("effect", nargs="?")
     parser.add_argument("--without", metavar="FLAG", help="instead of an effect: a flag that leaves something out")
+    parser.add_argument("--against", metavar="PROGRAM", help="instead of an effect: another build of the program")
     parser.add_argument("--program", default="target/release/gs-chroma")
     parser.add_argument("--seeds", type=int, nargs="+", default=[0])
     parser.add_argument(
@@ -64,28 +72,32 @@ def main() -> None:
         help="flags for fit, as one word",
     )  # fmt: skip
     options = parser.parse_args()
-    if (options.effect is None) == (options.without is None):
-        parser.error("an effect or --without")
-    ways = [["--with", options.effect], ["--without", options.effect]]
+    if sum(asked is not None for asked in (options.effect, options.without, options.against)) != 1:
+        parser.error("an effect, --without or --against")
+    ways = [(options.program, flags) for flags in (["--with", options.effect], ["--without", options.effect])]
     if options.without:
-        ways = [[], [options.without]]
+        ways = [(options.program, []), (options.program, [options.without])]
+    if options.against:
+        ways = [(options.program, []), (options.against, [])]
     if not options.scene.is_dir():
         print(f"skipped: no {options.scene}")
         return
-    gains: dict[str, list[float]] = {}
+    gains: dict[str, list[list[float]]] = {}
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / options.scene.name
         for fold, seed in itertools.product(range(FOLDS), options.seeds):
             turned(options.scene, copy, fold)
             flags = [*shlex.split(options.fit), "--seed", str(seed)]
-            on, off = (held_out(options.program, copy, [*flags, *way]) for way in ways)
+            on, off = (held_out(program, copy, [*flags, *way]) for program, way in ways)
             for name in on:
-                gains.setdefault(name, []).append(on[name] - off[name])
-    print("| photo, first letter left out | gain, dB |\n|---|--:|")
+                gains.setdefault(name, []).append([a - b for a, b in zip(on[name], off[name], strict=True)])
+    print("| photo, first letter left out | as shown, dB | corrected |\n|---|--:|--:|")
     for name, each in sorted(gains.items()):
-        print(f"| {name} | {statistics.mean(each):+.2f} |")
-    means = [statistics.mean(each) for each in gains.values()]
-    print(f"| mean | {statistics.mean(means):+.2f} ± {statistics.stdev(means) / len(means) ** 0.5:.2f} |")
+        shown, corrected = mean_gain(each)
+        print(f"| {name} | {shown:+.2f} | {corrected:+.2f} |")
+    means = zip(*map(mean_gain, gains.values()), strict=True)
+    cells = [f"{statistics.mean(each):+.2f} ± {statistics.stdev(each) / len(each) ** 0.5:.2f}" for each in means]
+    print(f"| mean | {' | '.join(cells)} |")
 
 
 if __name__ == "__main__":
