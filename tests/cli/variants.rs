@@ -86,6 +86,25 @@ fn the_plan_notices_a_sky() {
     assert_told_apart(Variant::Sky, Variant::SkyControl, "background", &SHORT);
 }
 
+/// Without it a background would win by standing in the shell's place.
+#[test]
+fn a_trial_has_the_shell_that_the_run_has() {
+    let place = Place::new();
+    let demo = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/demo");
+    let sky = make(&place, demo, Variant::Sky);
+    let gain = |more: &[&str]| {
+        let fit = ["fit", &sky, "-o", "run", "--json", "--preset", "draft"];
+        let short = ["--iterations", "3", "--max-side", "100"];
+        let report = place.json(&[&fit[..], &short, more].concat());
+        let effects = report["effects"].as_array().expect("effects");
+        let found = effects.iter().find(|found| found["name"] == "background");
+        found.expect("background")["trial"]
+            .as_f64()
+            .expect("a trial")
+    };
+    assert_ne!(gain(&[]), gain(&["--no-surround"]));
+}
+
 #[test]
 fn the_plan_notices_gloss() {
     // Patches that brighten look like exposures at the points: a trial would tell.
