@@ -12,7 +12,7 @@ const ROUNDS: usize = 40;
 
 /// Exposures drift where photos that see the same points differ by less than this share of what
 /// any two photos differ by: Geary's C, which is 1 on average for exposures that have nothing to do
-/// with places (Geary, "The contiguity ratio and statistical mapping", 1954). Three drone flights
+/// with places (Geary, "The contiguity ratio and statistical mapping", 1954). Three drone scenes
 /// have 0.64 to 0.83, random gains on the bundled scene 1.11.
 const DRIFT: f64 = 0.9;
 
