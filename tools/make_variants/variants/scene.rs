@@ -132,6 +132,20 @@ impl Scene {
         sum / self.views.len() as f64
     }
 
+    /// The point with the least squares of distances from the optical axes.
+    pub fn aim(&self) -> DVec3 {
+        let mut across = DMat3::ZERO;
+        let mut sum = DVec3::ZERO;
+        for view in &self.views {
+            let axis = view.rotation.row(2);
+            let projection =
+                DMat3::IDENTITY - DMat3::from_cols(axis * axis.x, axis * axis.y, axis * axis.z);
+            across += projection;
+            sum += projection * view.center();
+        }
+        across.inverse() * sum
+    }
+
     /// The views that are trained on, with their indices.
     pub fn training(&mut self) -> impl Iterator<Item = (usize, &mut View)> {
         let views = self.views.iter_mut().enumerate();
