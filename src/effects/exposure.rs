@@ -40,6 +40,9 @@ pub struct Exposures {
     /// where exposures drift along the capture, each place is as bright as the photos that see it
     /// show it on average.
     pub local: Vec<Exposure>,
+    /// Whether photos that see the same points are exposed more alike than any two. What changes
+    /// with the place may be the light on a surface; what changes from photo to photo is not.
+    pub drifts: bool,
     /// How far they move what the training views show, root mean square in gray.
     pub spread: f64,
     /// How large that would be by chance, from the noise of the samples.
@@ -66,7 +69,8 @@ pub fn find_exposures(tracks: &[Vec<Sample>], views: usize, train: &[usize]) -> 
             local.clone_from(&exposures);
         }
     }
-    if !drifts(tracks, &lumas, &exposures, train) {
+    let drifts = drifts(tracks, &lumas, &exposures, train);
+    if !drifts {
         local.clone_from(&exposures);
     }
     // Of each view its samples, and the squares of how far they are moved.
@@ -99,6 +103,7 @@ pub fn find_exposures(tracks: &[Vec<Sample>], views: usize, train: &[usize]) -> 
     Exposures {
         views: exposures,
         local,
+        drifts,
         spread: mean_root(moved),
         noise: mean_root(expected),
     }
@@ -342,6 +347,7 @@ mod tests {
         );
         // Neighbors differ as much as any two.
         assert_eq!(found.local, found.views);
+        assert!(!found.drifts);
     }
 
     /// A flight along which it gets darker: views next to each other see the same points.
@@ -369,7 +375,9 @@ mod tests {
         assert!(between.fold(0.0, f64::max) < 0.005);
         // One photo that differs from the others does so still; a fourth of each mean is its own.
         truth[10].offset += 0.1;
-        let shown = away(&found(&truth).local, 10);
+        let one_off = found(&truth);
+        assert!(along.drifts && one_off.drifts);
+        let shown = away(&one_off.local, 10);
         assert!((0.05..0.08).contains(&shown), "{shown}");
     }
 

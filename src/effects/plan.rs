@@ -271,17 +271,16 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// The effects of which short trainings should tell what the photos alone do not: those
-    /// whose evidence is not overwhelming.
-    pub fn open(&self) -> Vec<Effect> {
+    /// The effects that are on by evidence that is not overwhelming.
+    fn in_doubt(&self) -> Vec<Effect> {
         let doubtful = |decision: &&Decision| {
             let sure = decision.effect.sure_from().unwrap_or(f64::NEG_INFINITY);
             decision.on
                 && decision.decided_by == Decider::Evidence
                 && decision.evidence.is_some_and(|evidence| evidence < sure)
         };
-        let open = self.decisions.iter().filter(doubtful);
-        open.map(|decision| decision.effect).collect()
+        let doubtful = self.decisions.iter().filter(doubtful);
+        doubtful.map(|decision| decision.effect).collect()
     }
 
     /// Whether an effect is simulated.
@@ -291,7 +290,16 @@ impl Plan {
 }
 
 impl Evidence {
-    /// The plan that follows. `trials` are what trainings [that were asked for](Plan::open) said.
+    /// The effects of a plan of which short trainings should tell what the photos alone do not.
+    /// Exposures that differ from photo to photo are none: what points pretend changes with the
+    /// place from which they are seen.
+    pub fn open(&self, plan: &Plan) -> Vec<Effect> {
+        let mut open = plan.in_doubt();
+        open.retain(|&effect| effect != Effect::Exposure || self.exposures.drifts);
+        open
+    }
+
+    /// The plan that follows. `trials` are what trainings [that were asked for](Self::open) said.
     pub fn decide(&self, room: Room, overrules: &Overrules, trials: &Trials) -> Plan {
         let mut found = self.exposures.clone();
         let exposure = {

@@ -85,7 +85,7 @@ fn a_trial_decides_where_the_evidence_is_in_doubt() {
             exposures: Vec::new(),
             sh_degree: 0,
         };
-        !plan.open().is_empty()
+        !plan.in_doubt().is_empty()
     };
     assert!(needs(exposure(5.0)));
     assert!(!needs(exposure(1.9)) && !needs(exposure(8.1)));
@@ -155,6 +155,10 @@ fn what_a_trial_rejects_is_not_simulated() {
         offset: -0.25,
     };
     evidence.exposures.local.fill(local);
+    evidence.exposures.drifts = false;
+    let sure = evidence.decide(room, &Overrules::default(), &Trials::new());
+    assert!(sure.has(Effect::Exposure) && evidence.open(&sure).is_empty());
+    evidence.exposures.drifts = true;
     let plan = |trials: &[(Effect, f64)]| {
         evidence.decide(
             room,
@@ -163,7 +167,7 @@ fn what_a_trial_rejects_is_not_simulated() {
         )
     };
     let asked = plan(&[]);
-    assert_eq!(asked.open(), [Effect::Exposure], "{asked}");
+    assert_eq!(evidence.open(&asked), [Effect::Exposure], "{asked}");
     assert_eq!(asked.exposures, [local; 4]);
     assert_eq!(plan(&[(Effect::Exposure, 0.5)]).exposures, asked.exposures);
     let rejected = plan(&[(Effect::Exposure, 0.05)]);

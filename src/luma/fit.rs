@@ -17,7 +17,7 @@ use super::{
 };
 use crate::{
     capture::{Dataset, Exposure},
-    effects::{Effect, Evidence, Overrules, Plan, Survey, Trials},
+    effects::{Decider, Decision, Effect, Evidence, Overrules, Plan, Survey, Trials},
     gpu::{Gpu, GpuError},
     raster::{Load, Raster},
     splats::{ShField, Splats},
@@ -53,8 +53,8 @@ pub struct LumaScene {
     pub estimated_device_memory: u64,
     /// Bytes that it took there at most, where the backend tells.
     pub peak_device_memory: Option<u64>,
-    /// Seconds of deciding and placing, of training and of looking at watched views.
-    pub seconds: [f64; 3],
+    /// Seconds of trials, of all before the training, of it and of looking at watched views.
+    pub seconds: [f64; 4],
 }
 
 impl LumaScene {
@@ -191,6 +191,11 @@ impl Fit<'_> {
             Some(plan) => plan,
             None => self.plan(settings, observe)?,
         };
+        let tried = |decision: &Decision| decision.decided_by == Decider::Trial;
+        let trying = match plan.decisions.iter().any(tried) {
+            true => begun.elapsed().as_secs_f64(),
+            false => 0.0,
+        };
         let plan = match self.exposures {
             Some(exposures) if plan.has(Effect::Exposure) => Plan {
                 exposures: exposures.to_vec(),
@@ -260,7 +265,7 @@ impl Fit<'_> {
             load: trainer.load(),
             estimated_device_memory: demand.peak_bytes(splats.len()),
             peak_device_memory,
-            seconds: [preparing, training, watching],
+            seconds: [trying, preparing, training, watching],
             plan,
             splats,
         })

@@ -19,17 +19,20 @@ use crate::{
     splats::Splats,
 };
 
-/// Share of the run's work that all trainings of a trial may take, by iterations times pixels.
-const WORK: f64 = 0.15;
+/// Share of the run's time that all trainings of a trial may take.
+const SHARE: f64 = 0.15;
 
-/// What an iteration costs however few pixels there are, as a share of one of the run: on a GPU
-/// small dispatches wait for each other (NVIDIA H200, 10⁴ Gaussians at 320 px: 0.44 ms; 10⁵ at
-/// 1,280: 1.0; `cargo bench`).
-const LEAST_ON_A_GPU: f64 = 0.45;
+/// What an iteration costs beside its pixels, in pixels: small dispatches wait for each other
+/// (docs/lab/12-effects.md has the measurements).
+const BESIDE_PIXELS_ON_A_CPU: f64 = 9_000.0;
+const BESIDE_PIXELS_ON_A_GPU: f64 = 730_000.0;
 
-/// Iterations of a trial: with 150 there is no scene yet that could fit one way or the other, and
+/// Photos are halved further where that takes no more than this share of the time.
+const WORTH_HALVING: f64 = 0.75;
+
+/// Iterations of a trial: with 250 there is no scene yet that could fit one way or the other, and
 /// more than 1,500 would keep users waiting for what few iterations tell.
-const ITERATIONS: [usize; 2] = [400, 1_500];
+const ITERATIONS: [usize; 2] = [300, 1_500];
 
 /// Longer side of its photos at most and at least, where the work allows that much.
 const SIDES: [u32; 2] = [400, 80];
@@ -78,20 +81,27 @@ pub fn planned<E: From<LumaError>>(
 ) -> Result<Plan, E> {
     let room = settings.room();
     let plan = evidence.decide(room, overrules, &Trials::new());
-    let open = plan.open();
+    let open = evidence.open(&plan);
     if open.is_empty() {
         return Ok(plan);
     }
-    let arms = arms(evidence, room, overrules, &open);
-    let Some(side) = longest_side(dataset) else {
+    let Some(photo) = largest_photo(dataset) else {
         return Ok(plan);
     };
     let raster = raster()?;
-    let least = match raster.gpu.is_software() {
-        true => 0.0,
-        false => LEAST_ON_A_GPU,
+    let beside = match raster.gpu.is_software() {
+        true => BESIDE_PIXELS_ON_A_CPU,
+        false => BESIDE_PIXELS_ON_A_GPU,
     };
-    let size = Size::within(side, settings, arms.len(), least);
+    // Of as many as there is time for; the evidence decides about the others.
+    let sized = (1..=open.len()).rev().find_map(|asked| {
+        let size = Size::within(photo, settings, 1 + asked, beside)?;
+        Some((&open[..asked], size))
+    });
+    let Some((asked, size)) = sized else {
+        return Ok(plan);
+    };
+    let arms = arms(evidence, room, overrules, asked);
     let trial = Trial {
         dataset,
         evidence,
@@ -135,45 +145,61 @@ struct Size {
 }
 
 impl Size {
-    /// The largest that keeps `trainings` on photos of `side` pixels within [`WORK`]. An iteration
-    /// costs at least the share `least` of one of the run.
-    fn within(side: u32, settings: &LumaSettings, trainings: usize, least: f64) -> Self {
+    /// The largest that keeps `trainings` on photos of such width and height within [`SHARE`];
+    /// `None` where even the shortest take longer. An iteration costs as much as its pixels and
+    /// `beside` more.
+    fn within(
+        photo: [u32; 2],
+        settings: &LumaSettings,
+        trainings: usize,
+        beside: f64,
+    ) -> Option<Self> {
         let [fewest, most] = ITERATIONS;
         let run = settings.iterations as f64;
-        let share = |halvings: u32| f64::max(0.25_f64.powi(halvings as i32), least);
         let wanted = (settings.iterations / 2).clamp(fewest, most);
-        let work = |halvings: u32, rounds: usize| {
+        let share = |halvings: u32| share(photo, halvings, beside);
+        let time = |halvings: u32, rounds: usize| {
             wanted as f64 / run * share(halvings) * (trainings * rounds) as f64
         };
+        let side = photo[0].max(photo[1]);
         let [largest, smallest] = SIDES;
         let mut halvings = 1;
         while side >> halvings > largest
-            || (work(halvings, ROUNDS) > WORK
-                && share(halvings + 1) < share(halvings)
+            || (time(halvings, ROUNDS) > SHARE
+                && share(halvings + 1) <= WORTH_HALVING * share(halvings)
                 && side >> (halvings + 1) >= smallest)
         {
             halvings += 1;
         }
-        let fits = |rounds: &usize| work(halvings, *rounds) <= WORK;
+        let fits = |rounds: &usize| time(halvings, *rounds) <= SHARE;
         let rounds = (1..=ROUNDS).rev().find(fits).unwrap_or(1);
-        let room = WORK * run / (share(halvings) * (trainings * rounds) as f64);
-        Self {
-            iterations: wanted.min((room as usize).max(fewest)),
+        let room = SHARE * run / (share(halvings) * (trainings * rounds) as f64);
+        (room >= fewest as f64).then(|| Self {
+            iterations: wanted.min(room as usize),
             halvings,
             max_splats: (settings.max_splats >> (2 * halvings)).max(LEAST_SPLATS),
             rounds,
-        }
+        })
     }
 }
 
-/// Of the photos to train on; `None` where they are too few to hold one back.
-fn longest_side(dataset: &Dataset) -> Option<u32> {
+/// What an iteration on photos halved so often takes of one of the run.
+fn share([width, height]: [u32; 2], halvings: u32, beside: f64) -> f64 {
+    let pixels = f64::from(width) * f64::from(height);
+    (pixels * 0.25_f64.powi(halvings as i32) + beside) / (pixels + beside)
+}
+
+/// Width and height of the largest photo to train on; `None` where they are too few to hold one
+/// back.
+fn largest_photo(dataset: &Dataset) -> Option<[u32; 2]> {
     let train = &dataset.split.train;
-    let sides = train.iter().map(|&view| {
+    let sizes = train.iter().map(|&view| {
         let camera = &dataset.cameras[view];
-        camera.width.max(camera.height)
+        [camera.width, camera.height]
     });
-    sides.max().filter(|_| train.len() >= 4)
+    sizes
+        .max_by_key(|size| size.map(u64::from).iter().product::<u64>())
+        .filter(|_| train.len() >= 4)
 }
 
 /// What all trainings of a trial share.
@@ -320,42 +346,53 @@ fn corrected(view: &TrainingView, picture: &[f32]) -> Option<f64> {
 mod tests {
     use super::*;
 
+    const CPU: f64 = BESIDE_PIXELS_ON_A_CPU;
+    const GPU: f64 = BESIDE_PIXELS_ON_A_GPU;
+
     #[test]
     fn a_trial_takes_no_more_than_its_share() {
-        for (side, iterations, splats) in [
-            (400, 700, 12_000),
-            (1_600, 3_500, 2_000_000),
-            (4_000, 15_000, 3_000_000),
-            (640, 200, 500),
-        ] {
-            for (trainings, least) in (2..=5).flat_map(|k| [(k, 0.0), (k, LEAST_ON_A_GPU)]) {
-                let settings = LumaSettings {
-                    max_splats: splats,
-                    ..LumaSettings::new(iterations)
+        let runs = [
+            ([400, 267], 700, 12_000),
+            ([1_600, 1_200], 3_500, 2_000_000),
+            ([4_000, 3_000], 15_000, 3_000_000),
+            ([640, 480], 200, 500),
+        ];
+        for (photo, iterations, splats) in runs {
+            let settings = LumaSettings {
+                max_splats: splats,
+                ..LumaSettings::new(iterations)
+            };
+            for (trainings, beside) in (2..=5).flat_map(|k| [(k, CPU), (k, GPU)]) {
+                let Some(size) = Size::within(photo, &settings, trainings, beside) else {
+                    continue;
                 };
-                let size = Size::within(side, &settings, trainings, least);
-                let share = f64::max(0.25_f64.powi(size.halvings as i32), least);
-                let work =
+                let share = share(photo, size.halvings, beside);
+                let time =
                     (size.iterations * trainings * size.rounds) as f64 / iterations as f64 * share;
-                assert!(size.rounds >= 1 && side >> size.halvings >= SIDES[1]);
-                // But for the shortest there is.
-                let shortest = size.rounds == 1 && size.iterations == ITERATIONS[0];
-                assert!(
-                    work <= WORK || shortest,
-                    "{side} {iterations} {trainings}: {size:?} {work}"
-                );
+                assert!(time <= SHARE, "{photo:?} {trainings}: {size:?} {time}");
+                assert!(size.rounds >= 1 && size.iterations >= ITERATIONS[0]);
+                assert!(photo[0] >> size.halvings >= SIDES[1]);
             }
         }
+    }
+
+    #[test]
+    fn presets_have_time_for_a_trial_and_the_shortest_runs_have_not() {
+        let time = |photo, iterations, beside| {
+            Size::within(photo, &LumaSettings::new(iterations), 2, beside).is_some()
+        };
+        assert!(time([400, 267], 700, CPU) && time([640, 480], 3_500, GPU));
+        assert!(!time([200, 150], 500, CPU) && !time([320, 240], 1_500, GPU));
     }
 
     /// Where few pixels cost as much as many, photos stay as large as they may be.
     #[test]
     fn photos_shrink_only_where_that_saves_time() {
         let settings = LumaSettings::new(3_500);
-        let size = |least| Size::within(640, &settings, 2, least);
-        assert!(size(0.0).halvings > size(LEAST_ON_A_GPU).halvings);
-        assert!(size(0.0).iterations > size(LEAST_ON_A_GPU).iterations);
-        assert_eq!(size(LEAST_ON_A_GPU).halvings, 1);
+        let size = |beside| Size::within([640, 480], &settings, 2, beside).expect("time");
+        assert!(size(CPU).halvings > size(GPU).halvings);
+        assert!(size(CPU).iterations > size(GPU).iterations);
+        assert_eq!(size(GPU).halvings, 1);
     }
 
     #[test]

@@ -210,6 +210,11 @@ pub struct LumaReport {
 pub struct LumaSeconds {
     /// Reading photos and placing the first Gaussians, in seconds.
     pub load: f64,
+    /// Of these, trials, in seconds.
+    ///
+    /// 0 in reports of former versions.
+    #[serde(default)]
+    pub trial: f64,
     /// Training, in seconds.
     pub train: f64,
     /// Looking at views meanwhile, in seconds.

@@ -93,11 +93,14 @@ fn a_trial_has_the_shell_that_the_run_has() {
     let demo = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/demo");
     let sky = make(&place, demo, Variant::Sky);
     let gain = |more: &[&str]| {
-        let fit = ["fit", &sky, "-o", "run", "--json", "--preset", "draft"];
-        let short = ["--iterations", "3", "--max-side", "100"];
-        let report = place.json(&[&fit[..], &short, more].concat());
+        let fit = ["fit", &sky, "-o", "run", "--json", "--preset", "balanced"];
+        // Long enough for a trial, and done once it is over.
+        let small = ["--max-splats", "4000", "--max-side", "100"];
+        let short = ["--target-psnr", "1"];
+        let report = place.json(&[&fit[..], &small, &short, more].concat());
         let effects = report["effects"].as_array().expect("effects");
         let found = effects.iter().find(|found| found["name"] == "background");
+        assert!(report["luma"]["seconds"]["trial"].as_f64() > Some(0.0));
         found.expect("background")["trial"]
             .as_f64()
             .expect("a trial")

@@ -20,7 +20,7 @@ impl Job<'_> {
     /// The report of a training by a preset.
     pub fn report(&self, preset: Preset, trained: &Trained) -> Report {
         let (options, scene) = (self.options, &trained.scene);
-        let (last, [preparing, train, curve]) = (scene.last, scene.seconds);
+        let (last, [trial, preparing, train, curve]) = (scene.last, scene.seconds);
         Report {
             version: REPORT_VERSION,
             program: env!("CARGO_PKG_VERSION").to_owned(),
@@ -49,6 +49,7 @@ impl Job<'_> {
                 goal: options.goal,
                 seconds: LumaSeconds {
                     load: self.loading + preparing,
+                    trial,
                     train,
                     curve,
                     measure: trained.measuring,
