@@ -283,6 +283,18 @@ impl Plan {
         doubtful.map(|decision| decision.effect).collect()
     }
 
+    /// The same without an effect.
+    pub fn without(mut self, effect: Effect) -> Self {
+        let named = self.decisions.iter_mut().filter(|d| d.effect == effect);
+        named.for_each(|decision| decision.on = false);
+        match effect {
+            Effect::Exposure => self.exposures.fill(Exposure::NONE),
+            Effect::LumaDegree => self.sh_degree = 0,
+            _ => {}
+        }
+        self
+    }
+
     /// Whether an effect is simulated.
     pub fn has(&self, effect: Effect) -> bool {
         (self.decisions.iter()).any(|decision| decision.effect == effect && decision.on)

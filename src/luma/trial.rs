@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{
     capture::Dataset,
-    effects::{Effect, Evidence, Overrules, Plan, Room, Trials},
+    effects::{Effect, Evidence, Overrules, Plan, Trials},
     measure,
     raster::{Raster, SceneRenderer},
     splats::Splats,
@@ -101,7 +101,7 @@ pub fn planned<E: From<LumaError>>(
     let Some((asked, size)) = sized else {
         return Ok(plan);
     };
-    let arms = arms(evidence, room, overrules, asked);
+    let arms = arms(&plan, asked);
     let trial = Trial {
         dataset,
         evidence,
@@ -120,17 +120,16 @@ struct Arm {
     plan: Plan,
 }
 
-fn arms(evidence: &Evidence, room: Room, overrules: &Overrules, open: &[Effect]) -> Vec<Arm> {
+/// `asked` of the effects of a plan, none and one at a time; all else as planned.
+fn arms(plan: &Plan, asked: &[Effect]) -> Vec<Arm> {
     let only = |effect: Option<Effect>| {
-        let others = open.iter().filter(|&&other| Some(other) != effect);
-        let mut overrules = overrules.clone();
-        overrules.without.extend(others);
+        let others = asked.iter().filter(|&&other| Some(other) != effect);
         Arm {
             effect,
-            plan: evidence.decide(room, &overrules, &Trials::new()),
+            plan: others.fold(plan.clone(), |plan, &other| plan.without(other)),
         }
     };
-    let with = open.iter().map(|&effect| only(Some(effect)));
+    let with = asked.iter().map(|&effect| only(Some(effect)));
     std::iter::once(only(None)).chain(with).collect()
 }
 
