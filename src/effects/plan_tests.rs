@@ -169,6 +169,16 @@ fn what_a_trial_rejects_is_not_simulated() {
     let asked = plan(&[]);
     assert_eq!(evidence.open(&asked), [Effect::Exposure], "{asked}");
     assert_eq!(asked.exposures, [local; 4]);
+    // As if the user had said so.
+    let overrules = Overrules {
+        without: vec![Effect::Exposure],
+        ..Overrules::default()
+    };
+    let said = evidence.decide(room, &overrules, &Trials::new());
+    let without = asked.clone().without(Effect::Exposure);
+    assert!(!without.has(Effect::Exposure));
+    assert_eq!(without.exposures, said.exposures);
+    assert_eq!(without.sh_degree, said.sh_degree);
     assert_eq!(plan(&[(Effect::Exposure, 0.5)]).exposures, asked.exposures);
     let rejected = plan(&[(Effect::Exposure, 0.05)]);
     assert!(!rejected.has(Effect::Exposure));
