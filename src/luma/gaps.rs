@@ -196,7 +196,9 @@ impl<'a> Gaps<'a> {
         // It faces the camera, or lies in the plane of the points nearby.
         let slants: Vec<_> = std::iter::once([0.0; 2]).chain(slant).collect();
         let found = self.photo.matched(pixel, depths, &slants, neighbors)?;
-        let believed = found.score > CORRELATED && self.photo.found_back(&found, depths, neighbors);
+        let believed = found.score > CORRELATED
+            && !self.photo.denied(&found, neighbors)
+            && self.photo.found_back(&found, depths, neighbors);
         believed.then(|| GapPoint {
             position: self.photo.place(pixel, found.surface.depth),
             gray: (found.gray / 255.0) as f32,

@@ -26,6 +26,10 @@ const PATCH: usize = ((2 * REACH + 1) * (2 * REACH + 1)) as usize;
 /// Standard deviation of a patch, in gray levels, from which on it has texture.
 const TEXTURE: f64 = 4.0;
 
+/// A photo denies a match where its patch has less than this share of the texture: a third drops
+/// most wrong ones along silhouettes, few on a lawn (docs/lab/16-ends-and-gaps.md).
+const PLAIN: f64 = 1.0 / 3.0;
+
 /// How much 1 / depth may change within a pixel, at most, as share of itself: a steeper plane
 /// comes from points on several things.
 const STEEPEST: f64 = 0.03;
@@ -124,6 +128,7 @@ impl SmallPhoto {
                 score,
                 surface,
                 gray: patch.mean,
+                deviation: patch.deviation,
             })
         });
         sweeps.max_by(|a, b| a.score.total_cmp(&b.score))
@@ -147,6 +152,16 @@ impl SmallPhoto {
             Some(back.surface.depth / seen.depth)
         };
         seen().is_some_and(|ratio| (ratio - 1.0).abs() <= SAME)
+    }
+
+    /// Whether one of the others shows something plain where a match is. Along a silhouette before
+    /// a plain backdrop two photos may agree at any depth; a third then sees through it.
+    pub fn denied(&self, found: &Match, others: &[&Self]) -> bool {
+        let plain = |patch: &Patch| patch.deviation < PLAIN * found.deviation;
+        let mut seen = others
+            .iter()
+            .filter_map(|other| self.patch_in(&found.surface, other));
+        seen.any(|patch| plain(&patch))
     }
 
     fn swept(
@@ -183,11 +198,15 @@ impl SmallPhoto {
 
     /// How a patch correlates with another photo if it lies on a surface.
     fn correlation(&self, patch: &Patch, surface: &Surface, other: &Self) -> Option<f64> {
-        let seen = Patch::of(|offset| {
+        Some(patch.correlation(&self.patch_in(surface, other)?))
+    }
+
+    /// What another photo shows where a patch lies on a surface.
+    fn patch_in(&self, surface: &Surface, other: &Self) -> Option<Patch> {
+        Patch::of(|offset| {
             let place = surface.place(self, offset);
             other.between(other.camera.pixel_of(place)?)
-        })?;
-        Some(patch.correlation(&seen))
+        })
     }
 }
 
@@ -199,6 +218,8 @@ pub struct Match {
     pub surface: Surface,
     /// Mean of the patch, in gray levels.
     pub gray: f64,
+    /// Its standard deviation.
+    deviation: f64,
 }
 
 /// A plane on the ray of a pixel: 1 / depth is linear across a photo.
@@ -346,6 +367,36 @@ mod tests {
             assert!(!photos[0].found_back(&found, depths, &others), "{wrong}");
             found.surface.depth = depth;
         }
+    }
+
+    #[test]
+    fn a_photo_that_shows_something_plain_denies_a_match() {
+        let mut photos = photos();
+        let third = photos[0].camera.clone();
+        let matched = |photos: &[SmallPhoto]| {
+            let others = [&photos[1], &photos[2]];
+            photos[0].matched(MIDDLE, [2.5, 6.0], &[SLANT], &others)
+        };
+        let found = matched(&photos).unwrap();
+        assert!(!photos[0].denied(&found, &[&photos[1], &photos[2]]));
+        // Half of the contrast is a dull photo, a fifth something else.
+        for (share, denied) in [(0.5, false), (0.2, true)] {
+            let gray = photos[0].gray.iter();
+            photos.push(SmallPhoto {
+                camera: third.clone(),
+                gray: gray
+                    .map(|&gray| (128.0 + share * (f64::from(gray) - 128.0)) as u8)
+                    .collect(),
+                mask: None,
+            });
+            let others: Vec<&SmallPhoto> = photos[1..].iter().collect();
+            assert_eq!(photos[0].denied(&found, &others), denied, "{share}");
+        }
+        // What is masked says nothing.
+        let dull = photos.last_mut().unwrap();
+        dull.mask = Some(vec![0; dull.gray.len()]);
+        let others: Vec<&SmallPhoto> = photos[1..].iter().collect();
+        assert!(!photos[0].denied(&found, &others));
     }
 
     #[test]
