@@ -7,7 +7,8 @@
 turned around eight times, so that every photo is held out, and the scene is fitted with the
 effect and without it, otherwise as planned. Instead of an effect, `--without=FLAG` asks what the
 scene loses by a flag of `fit`, such as `--without=--no-fill-gaps`, and `--against` what this build
-of the program gains over another. Gains are of PSNR as viewers show the scene, and after the
+of the program gains over another. `--variant` makes a variant of each copy: one that leaves held-out
+photos clean, such as dust, leaves each photo clean once. Gains are of PSNR as viewers show the scene, and after the
 photo's own gain and offset. Copies of the scene are written to a temporary folder.
 """
 
@@ -65,6 +66,8 @@ def main() -> None:
     parser.add_argument("effect", nargs="?")
     parser.add_argument("--without", metavar="FLAG", help="instead of an effect: a flag that leaves something out")
     parser.add_argument("--against", metavar="PROGRAM", help="instead of an effect: another build of the program")
+    parser.add_argument("--variant", help="of make_variants, made of each copy")
+    parser.add_argument("--maker", default="target/release/examples/make_variants")
     parser.add_argument("--program", default="target/release/gs-chroma")
     parser.add_argument("--seeds", type=int, nargs="+", default=[0])
     parser.add_argument(
@@ -87,8 +90,13 @@ def main() -> None:
         copy = Path(folder) / options.scene.name
         for fold, seed in itertools.product(range(FOLDS), options.seeds):
             turned(options.scene, copy, fold)
+            scene = copy
+            if options.variant:
+                scene = copy.with_name(options.variant)
+                shutil.rmtree(scene, ignore_errors=True)
+                subprocess.run([options.maker, copy, options.variant, scene], check=True, stdout=subprocess.DEVNULL)
             flags = [*shlex.split(options.fit), "--seed", str(seed)]
-            on, off = (held_out(program, copy, [*flags, *way]) for program, way in ways)
+            on, off = (held_out(program, scene, [*flags, *way]) for program, way in ways)
             for name in on:
                 gains.setdefault(name, []).append([a - b for a, b in zip(on[name], off[name], strict=True)])
     print("| photo, first letter left out | as shown, dB | corrected |\n|---|--:|--:|")
