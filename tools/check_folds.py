@@ -7,9 +7,10 @@
 turned around eight times, so that every photo is held out, and the scene is fitted with the
 effect and without it, otherwise as planned. Instead of an effect, `--without=FLAG` asks what the
 scene loses by a flag of `fit`, such as `--without=--no-fill-gaps`, and `--against` what this build
-of the program gains over another. `--variant` makes a variant of each copy: one that leaves held-out
-photos clean, such as dust, leaves each photo clean once. Gains are of PSNR as viewers show the scene, and after the
-photo's own gain and offset. Copies of the scene are written to a temporary folder.
+of the program gains over another. `--variant` makes a variant of each copy: one that leaves
+held-out photos clean, such as dust, leaves each photo clean once. Gains are of PSNR as viewers show
+the scene, and after the photo's own gain and offset. Copies of the scene are written to a
+temporary folder.
 """
 
 from __future__ import annotations
