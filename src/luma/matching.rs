@@ -21,7 +21,7 @@ const FINER: [f64; 4] = [-0.5, -0.25, 0.25, 0.5];
 
 /// Pixels from the middle of a patch to its sides.
 const REACH: i32 = 3;
-const PATCH: usize = ((2 * REACH + 1) * (2 * REACH + 1)) as usize;
+const SPAN: usize = 2 * REACH as usize + 1;
 
 /// Standard deviation of a patch, in gray levels, from which on it has texture.
 const TEXTURE: f64 = 4.0;
@@ -82,23 +82,28 @@ impl SmallPhoto {
         Some((pixel, depth))
     }
 
-    fn at(&self, x: i32, y: i32) -> Option<f64> {
-        let (width, height) = (self.camera.width as i32, self.camera.height as i32);
-        let inside = (0..width).contains(&x) && (0..height).contains(&y);
-        let pixel = inside.then(|| (y * width + x) as usize)?;
-        let counts = self.mask.as_ref().is_none_or(|mask| mask[pixel] >= 128);
-        counts.then(|| f64::from(self.gray[pixel]))
-    }
-
-    /// Between four pixels, whose centers are at halves.
+    /// Between four pixels that all count, whose centers are at halves.
     fn between(&self, [x, y]: [f64; 2]) -> Option<f64> {
         let (x, y) = (x - 0.5, y - 0.5);
-        let (left, top) = (x.floor(), y.floor());
-        let (s, t) = (x - left, y - top);
-        let at = |dx, dy| self.at(left as i32 + dx, top as i32 + dy);
-        let above = at(0, 0)? * (1.0 - s) + at(1, 0)? * s;
-        let below = at(0, 1)? * (1.0 - s) + at(1, 1)? * s;
-        Some(above * (1.0 - t) + below * t)
+        let (width, height) = (self.camera.width, self.camera.height);
+        let inside = |at: f64, side: u32| at >= 0.0 && at < f64::from(side) - 1.0;
+        if !(inside(x, width) && inside(y, height)) {
+            return None;
+        }
+        // Rounded down, as they are not negative; 32 bits convert fastest.
+        let (left, top) = (x as i32, y as i32);
+        let (s, t) = (x - f64::from(left), y - f64::from(top));
+        let first = top as usize * width as usize + left as usize;
+        let pixels = [0, 1, width as usize, width as usize + 1].map(|step| first + step);
+        if let Some(mask) = &self.mask
+            && pixels.iter().any(|&pixel| mask[pixel] < 128)
+        {
+            return None;
+        }
+        let [a, b, c, d] = pixels.map(|pixel| f64::from(self.gray[pixel]));
+        // Exact where all are the same: rounding must not look like texture.
+        let (above, below) = (a + (b - a) * s, c + (d - c) * s);
+        Some(above + (below - above) * t)
     }
 
     /// What is around a pixel, if it has texture.
@@ -201,9 +206,11 @@ impl SmallPhoto {
 
     /// What another photo shows where a patch lies on a surface.
     fn patch_in(&self, surface: &Surface, other: &Self) -> Option<Patch> {
-        Patch::of(|offset| {
-            let place = surface.place(self, offset);
-            other.between(other.camera.pixel_of(place)?)
+        let homography = surface.homography(&self.camera, &other.camera);
+        Patch::of(|[dx, dy]| {
+            let seen = homography * DVec3::new(dx, dy, 1.0);
+            let scale = 1.0 / seen.z;
+            (seen.z > 0.0).then(|| other.between([seen.x * scale, seen.y * scale]))?
         })
     }
 }
@@ -235,6 +242,31 @@ impl Surface {
         let ([x, y], [right, down]) = (self.pixel, self.slant);
         let depth = self.depth / (1.0 + right * dx + down * dy);
         photo.place([x + dx, y + dy], depth)
+    }
+
+    /// Takes an offset from the middle, `(dx, dy, 1)`, to a pixel of another camera, homogeneous:
+    /// between two views of a plane pixels move by a homography (Hartley and Zisserman 2004,
+    /// section 13.1).
+    fn homography(&self, camera: &Camera, other: &Camera) -> DMat3 {
+        let ([x, y], [right, down]) = (self.pixel, self.slant);
+        let turn = other.rotation * camera.rotation.transpose();
+        let shift = (other.translation - turn * camera.translation) / self.depth;
+        let ray = DVec3::new(
+            (x - camera.cx) / camera.fx,
+            (y - camera.cy) / camera.fy,
+            1.0,
+        );
+        let seen = DMat3::from_cols(
+            turn.x_axis / camera.fx + shift * right,
+            turn.y_axis / camera.fy + shift * down,
+            turn * ray + shift,
+        );
+        let intrinsics = DMat3::from_cols(
+            DVec3::new(other.fx, 0.0, 0.0),
+            DVec3::new(0.0, other.fy, 0.0),
+            DVec3::new(other.cx, other.cy, 1.0),
+        );
+        intrinsics * seen
     }
 
     /// The same plane where another photo shows its middle.
@@ -269,9 +301,12 @@ pub fn slant_through(points: impl Iterator<Item = [f64; 3]>) -> Option<[f64; 2]>
     sound.then_some(slant)
 }
 
-/// A patch of zero mean and unit length, and what it was before.
+/// The values of a patch, row by row.
+type Grid = [[f64; SPAN]; SPAN];
+
+/// A patch of zero mean and unit length, or of zeros if it is plain, and what it was before.
 pub struct Patch {
-    values: [f64; PATCH],
+    values: Grid,
     mean: f64,
     deviation: f64,
 }
@@ -279,32 +314,41 @@ pub struct Patch {
 impl Patch {
     /// Of a value at each offset from its middle.
     fn of(value: impl Fn([f64; 2]) -> Option<f64>) -> Option<Self> {
-        let mut values = [0.0; PATCH];
-        let mut offsets = (-REACH..=REACH).flat_map(|y| (-REACH..=REACH).map(move |x| [x, y]));
-        for to in &mut values {
-            *to = value(offsets.next()?.map(f64::from))?;
+        let mut values = Grid::default();
+        for (row, y) in values.iter_mut().zip(-REACH..) {
+            for (to, x) in row.iter_mut().zip(-REACH..) {
+                *to = value([x, y].map(f64::from))?;
+            }
         }
-        let mean = values.iter().sum::<f64>() / PATCH as f64;
-        let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
-        let length = squares.sqrt().max(f64::MIN_POSITIVE);
-        values
-            .iter_mut()
-            .for_each(|value| *value = (*value - mean) / length);
-        let deviation = (squares / PATCH as f64).sqrt();
+        let count = (SPAN * SPAN) as f64;
+        let mean = dot(&values, &[[1.0; SPAN]; SPAN]) / count;
+        let mut values = values.map(|row| row.map(|value| value - mean));
+        let squares = dot(&values, &values);
+        // A plain patch stays zero: it correlates with nothing.
+        let scale = 1.0 / squares.sqrt().max(f64::MIN_POSITIVE);
+        values = values.map(|row| row.map(|value| value * scale));
         Some(Self {
             values,
             mean,
-            deviation,
+            deviation: (squares / count).sqrt(),
         })
     }
 
     fn correlation(&self, other: &Self) -> f64 {
-        self.values
-            .iter()
-            .zip(&other.values)
-            .map(|(a, b)| a * b)
-            .sum()
+        dot(&self.values, &other.values)
     }
+}
+
+/// The sum of all products: one for each column first, for sums that wait for each other take
+/// longer than what is summed.
+fn dot(a: &Grid, b: &Grid) -> f64 {
+    let mut columns = [0.0; SPAN];
+    for (a, b) in a.iter().zip(b) {
+        for ((sum, a), b) in columns.iter_mut().zip(a).zip(b) {
+            *sum += a * b;
+        }
+    }
+    columns.iter().sum()
 }
 
 #[cfg(test)]
@@ -388,6 +432,40 @@ mod tests {
         assert!(denied(0.2, None) && denied(0.2, Some(255)));
         // What is masked says nothing.
         assert!(!denied(0.2, Some(0)));
+    }
+
+    #[test]
+    fn a_homography_takes_pixels_where_their_places_are_seen() {
+        let photos = photos();
+        let surface = Surface {
+            pixel: [60.5, 90.5],
+            depth: 4.5,
+            slant: [0.01, -0.02],
+        };
+        let mut turned = photos[1].camera.clone();
+        turned.rotation = DMat3::from_rotation_y(0.1) * turned.rotation;
+        turned.fy *= 1.1;
+        let homography = surface.homography(&photos[0].camera, &turned);
+        for [dx, dy] in [[0.0, 0.0], [-3.0, 2.0], [1.5, 3.0]] {
+            let seen = turned
+                .pixel_of(surface.place(&photos[0], [dx, dy]))
+                .unwrap();
+            let moved = homography * DVec3::new(dx, dy, 1.0);
+            let off = [moved.x / moved.z - seen[0], moved.y / moved.z - seen[1]];
+            assert!(off.iter().all(|off| off.abs() < 1e-9), "{off:?}");
+        }
+    }
+
+    #[test]
+    fn nothing_agrees_with_a_plain_patch() {
+        let mut photos = photos();
+        let textured = photos[0].textured(MIDDLE).unwrap();
+        photos[1].gray.fill(77);
+        let plain = Patch::of(|[x, y]| photos[1].between([80.3 + 0.9 * x, 80.7 + 1.1 * y]));
+        let plain = plain.unwrap();
+        assert_eq!((plain.mean, plain.deviation), (77.0, 0.0));
+        assert_eq!(textured.correlation(&plain), 0.0);
+        assert!((textured.correlation(&textured) - 1.0).abs() < 1e-12);
     }
 
     #[test]

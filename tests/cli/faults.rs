@@ -2,7 +2,7 @@
 //! command finds everything as it was. With `GS_CHROMA_EVERY_FAULT` set no step is passed over.
 
 use super::program::{Done, Place, files_below};
-use super::shared::{onnx, place_with_run};
+use super::shared::{QUICK_FIT, onnx, place_with_run};
 
 /// Successes in a row after which no step is left to fail.
 const ENOUGH: usize = 2;
@@ -70,13 +70,7 @@ fn failing(place: &Place, arguments: &[&str], fault: &str) -> Done {
 
 #[test]
 fn fit_fails_well() {
-    let fit = ["fit", "scene", "--preset", "draft", "--iterations", "3"];
-    let kept = ["runs/scene/luma.ply"];
-    every_write_fails_well(
-        &[&fit[..], &["--without", "background"]].concat(),
-        &kept,
-        &[],
-    );
+    every_write_fails_well(&QUICK_FIT, &["runs/scene/luma.ply"], &[]);
 }
 
 #[test]

@@ -12,8 +12,8 @@ use super::program::{Done, Place};
 use super::scene;
 use super::shared::{place_with_run, place_with_scene};
 
-/// A training of a few seconds.
-const FIT: [&str; 10] = [
+/// A training of a few seconds, from the few points of a scene.
+const FIT: [&str; 11] = [
     "fit",
     "scene",
     "--preset",
@@ -22,6 +22,7 @@ const FIT: [&str; 10] = [
     "600",
     "--without",
     "background",
+    "--no-fill-gaps",
     "-o",
     "run",
 ];
