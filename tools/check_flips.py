@@ -10,8 +10,10 @@ effect is flipped by itself, all others as planned. What a flip gains is the mea
 of held-out PSNR after each photo's own gain and offset. Flips that lose with the first seed are
 not tried with the others. Those that gain more than BOUND are tried with the seeds of `--again`,
 too, and all count: the best of five flips by three seeds flatters. A scene fails where a flip
-gains more than BOUND and more than twice its standard error. Results are kept in
-OUTPUT/flips.json: a second call goes on where the first was stopped.
+gains more than BOUND and more than twice its standard error. The last row is the mean over the
+scenes on which the plan leaves an effect off, ± its error over scenes, of the first seed alone:
+every flip has it. Results are kept in OUTPUT/flips.json: a second call goes on where the first was
+stopped.
 """
 
 from __future__ import annotations
@@ -129,6 +131,18 @@ def row(options: argparse.Namespace, name: str, found: dict) -> tuple[str, list[
     return f"| {name} | {', '.join(on) or 'none'} | {spread} | {' | '.join(cells)} |", failures
 
 
+def mean_row(options: argparse.Namespace, found: list[dict]) -> str:
+    """What adding an effect gains on an average scene."""
+    first = str(options.seeds[0])
+    cells = []
+    for effect in EFFECTS:
+        off = [one["runs"] for one in found if not one["plan"].get(effect, True)]
+        each = [runs[effect][first] - runs["planned"][first] for runs in off]
+        error = statistics.stdev(each) / len(each) ** 0.5 if len(each) > 1 else 0.0
+        cells.append(f"{statistics.mean(each):+.2f} ± {error:.2f} ({len(each)})" if len(each) > 1 else "")
+    return f"| mean where off, seed {first} | | | {' | '.join(cells)} |"
+
+
 def main() -> int:
     """Makes, fits, prints."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -187,7 +201,7 @@ def main() -> int:
 
     print(f"| scene | on as planned | dB as planned | {' | '.join(EFFECTS)} |")
     print(f"|---|---|{'--:|' * (len(EFFECTS) + 1)}")
-    failures = []
+    failures, rows = [], []
     with ThreadPoolExecutor(options.jobs) as pool:
         for name, found in zip(scenes, pool.map(flipped, scenes, scenes.values())):
             if found is None:
@@ -197,7 +211,9 @@ def main() -> int:
             else:
                 line, worse = row(options, name, found)
                 failures += worse
+                rows.append(found)
                 print(line, flush=True)
+    print(mean_row(options, rows))
     for failure in failures:
         print(failure, file=sys.stderr)
     return int(bool(failures))
