@@ -26,13 +26,16 @@ demo: setup
 	@echo "Contact sheet:   runs/demo/contact-sheet.png"
 	@echo "In the browser:  target/release/gs-chroma view runs/demo"
 
+# One more than there are cores, for tests wait for programs and devices.
+TEST_THREADS = $(shell echo $$(($$(getconf _NPROCESSORS_ONLN) + 1)))
+
 test: setup
 	@cargo fmt --version >/dev/null 2>&1 && cargo clippy --version >/dev/null 2>&1 || rustup component add rustfmt clippy
 	cargo fmt --check
 	cargo clippy --release --all-targets -- -D warnings
 	cargo clippy --release --lib --test fuzz --no-default-features -- -D warnings
 	@$(MAKE) --no-print-directory prose
-	cargo test --release
+	RUST_TEST_THREADS=$(TEST_THREADS) cargo test --release
 
 # Names and tables are no prose, nor is the style guide's list of words.
 PROSE = README.md $(shell find docs -name '*.md' -not -path 'docs/lab/*' -not -name hard-cases.md -not -name style.md)

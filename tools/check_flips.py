@@ -213,7 +213,8 @@ def main() -> int:
                 failures += worse
                 rows.append(found)
                 print(line, flush=True)
-    print(mean_row(options, rows))
+    if len(rows) > 1:
+        print(mean_row(options, rows))
     for failure in failures:
         print(failure, file=sys.stderr)
     return int(bool(failures))
