@@ -205,7 +205,8 @@ fn coloring(
     };
     let settings = ChromaSettings {
         sh_degree,
-        rounds: 2,
+        // What comes and goes is met by looking more often.
+        rounds: if streams { 2 } else { 1 },
         ..ChromaSettings::irls()
     };
     if color == ColorKind::Rgb {

@@ -1,7 +1,7 @@
 //! A training that goes on from a checkpoint ends with the bytes of one that was never
 //! interrupted.
 
-use std::{collections::BTreeMap, ops::ControlFlow};
+use std::{cell::RefCell, collections::BTreeMap, ops::ControlFlow};
 
 use gs_chroma::{
     luma::{
@@ -13,26 +13,42 @@ use gs_chroma::{
 
 use crate::repeat::{photos, same, settings, start_and_target, trainer, trainer_by};
 
-/// Wants a checkpoint wherever one can be, and ends after so many.
-struct EndsAfter {
-    left: usize,
-    kept: Vec<Checkpoint>,
+/// Keeps a checkpoint wherever one can be, and how much had been reported by then.
+struct KeepsAll<'a> {
+    reports: &'a RefCell<Vec<Told>>,
+    kept: Vec<(usize, Checkpoint)>,
 }
 
-impl Keeper for EndsAfter {
+impl Keeper for KeepsAll<'_> {
     fn wants(&mut self, _: usize) -> bool {
         true
     }
 
     fn keep(&mut self, checkpoint: Checkpoint) -> bool {
-        self.kept.push(checkpoint);
-        self.left -= 1;
-        self.left > 0
+        self.kept.push((self.reports.borrow().len(), checkpoint));
+        true
     }
 }
 
+/// Ends the training at the first checkpoint.
+struct Ends(Option<Checkpoint>);
+
+impl Keeper for Ends {
+    fn wants(&mut self, _: usize) -> bool {
+        true
+    }
+
+    fn keep(&mut self, checkpoint: Checkpoint) -> bool {
+        self.0 = Some(checkpoint);
+        false
+    }
+}
+
+/// Iteration, loss, Gaussians, poisoned ones and PSNR where it was looked.
+type Told = (usize, u64, usize, usize, Option<u64>);
+
 /// What is reported but for times.
-fn told(progress: &LumaProgress) -> (usize, u64, usize, usize, Option<u64>) {
+fn told(progress: &LumaProgress) -> Told {
     let looked = progress.looked.map(|look| look.psnr.to_bits());
     let loss = progress.loss.to_bits();
     (
@@ -44,8 +60,8 @@ fn told(progress: &LumaProgress) -> (usize, u64, usize, usize, Option<u64>) {
     )
 }
 
-/// Trains to the end, and then once for each place where a checkpoint can be: to there, and on
-/// in another trainer. Gives these places.
+/// Trains to the end, keeps a checkpoint at each place where one can be, and goes on from each in
+/// another trainer. Gives these places.
 fn resumes_everywhere(of: &dyn Fn(&Splats) -> LumaTrainer, start: &Splats) -> Vec<usize> {
     let mut whole = of(start);
     let mut reports = Vec::new();
@@ -53,49 +69,44 @@ fn resumes_everywhere(of: &dyn Fn(&Splats) -> LumaTrainer, start: &Splats) -> Ve
         .train(&mut |progress| reports.push(told(&progress)))
         .unwrap();
     let expected = whole.splats().unwrap();
+    let seen = RefCell::new(Vec::new());
+    let mut keeper = KeepsAll {
+        reports: &seen,
+        kept: Vec::new(),
+    };
+    let mut keeping = of(start);
+    keeping
+        .train_keeping(&mut keeper, &mut |progress| {
+            seen.borrow_mut().push(told(&progress));
+            ControlFlow::Continue(())
+        })
+        .unwrap();
+    let kept = keeper.kept;
+    // Asking for checkpoints changes nothing.
+    assert!(same(&keeping.splats().unwrap(), &expected) && *seen.borrow() == reports);
     // All that the settings say of a start is its number of harmonics.
     let mut elsewhere = start.clone();
     elsewhere.sh = ShField {
         coefficients: vec![0.7; start.sh.coefficients.len()],
         ..elsewhere.sh
     };
-    let mut places = Vec::new();
-    for stop in 1.. {
-        let mut keeper = EndsAfter {
-            left: stop,
-            kept: Vec::new(),
-        };
-        let mut seen = Vec::new();
-        let mut first = of(start);
-        let ended = first.train_keeping(&mut keeper, &mut |progress| {
-            seen.push(told(&progress));
-            ControlFlow::Continue(())
-        });
-        if ended.is_ok() {
-            // There are no more places; asking for checkpoints changed nothing.
-            assert!(same(&first.splats().unwrap(), &expected) && seen == reports);
-            return places;
-        }
-        assert!(matches!(ended, Err(LumaError::Cancelled)));
-        let kept = keeper.kept.pop().unwrap();
+    let resumes = |(reported, kept): (usize, Checkpoint)| {
+        let from = kept.iteration();
         let sections: BTreeMap<_, _> = kept.to_sections().into_iter().collect();
         let read = Checkpoint::from_sections(&sections).unwrap();
         assert!(read == kept);
         let mut second = of(&elsewhere);
         second.resume(&read).unwrap();
+        let mut seen = Vec::new();
         second
             .train(&mut |progress| seen.push(told(&progress)))
             .unwrap();
-        assert!(
-            same(&second.splats().unwrap(), &expected),
-            "from {}",
-            kept.iteration()
-        );
-        assert_eq!(seen, reports, "from {}", kept.iteration());
+        assert!(same(&second.splats().unwrap(), &expected), "from {from}");
+        assert_eq!(seen, reports[reported..], "from {from}");
         assert!(second.curve().len() == whole.curve().len());
-        places.push(kept.iteration());
-    }
-    places
+        from
+    };
+    kept.into_iter().map(resumes).collect()
 }
 
 #[test]
@@ -218,14 +229,11 @@ fn what_is_no_checkpoint_is_refused() {
     let [start, target] = start_and_target();
     let settings = settings(&start);
     let schedule = Schedule::of(&settings);
-    let mut keeper = EndsAfter {
-        left: 1,
-        kept: Vec::new(),
-    };
+    let mut keeper = Ends(None);
     let mut trainer = trainer_by(settings, schedule, 4.0, &start, photos(&target));
     let ended = trainer.train_keeping(&mut keeper, &mut |_| ControlFlow::Continue(()));
-    assert!(ended.is_err());
-    let sections: BTreeMap<_, _> = keeper.kept[0].to_sections().into_iter().collect();
+    assert!(matches!(ended, Err(LumaError::Cancelled)));
+    let sections: BTreeMap<_, _> = keeper.0.unwrap().to_sections().into_iter().collect();
     for name in sections.keys() {
         let mut other = sections.clone();
         other.remove(name);
