@@ -264,6 +264,8 @@ fn a_scene_is_lit_anew() {
         "evening",
         "--teacher",
         "photos",
+        "--rounds",
+        "4",
     ];
     let error = |more: &[&str], output: &str| -> f64 {
         let output = ["-o", output, "--json"];

@@ -185,7 +185,18 @@ fn a_sound_scene_gives_no_warning() {
         &["info", "scene", "--json"][..],
         &["info", DEMO, "--json"],
         &PLAN,
-        &[&fit[..], &["--preset", "draft", "--iterations", "3"]].concat(),
+        &[
+            &fit[..],
+            &[
+                "--preset",
+                "draft",
+                "--iterations",
+                "3",
+                "--max-splats",
+                "600",
+            ],
+        ]
+        .concat(),
         &colorize,
         &eval,
     ] {
@@ -297,7 +308,7 @@ fn photos_of_another_model_are_refused() {
         "--preset",
         "draft",
     ];
-    place.succeed(&[&fit[..], &["--iterations", "3"]].concat());
+    place.succeed(&[&fit[..], &["--iterations", "3", "--max-splats", "600"]].concat());
     let teacher = format!("{DEMO}/images");
     let colorize = [
         "colorize",
@@ -322,7 +333,18 @@ fn single_photos_are_left_out_and_named() {
     change_photo(&place, 5, |photo| photo.rotate180());
     let words = ["left out garden_05.jpg", "does not show what COLMAP saw"];
     let fit = ["fit", "scene", "--json", "-o", "run", "--max-side", "96"];
-    let fit = [&fit[..], &["--preset", "draft", "--iterations", "3"]].concat();
+    let fit = [
+        &fit[..],
+        &[
+            "--preset",
+            "draft",
+            "--iterations",
+            "3",
+            "--max-splats",
+            "600",
+        ],
+    ]
+    .concat();
     let report = warns(&place, &fit, &words);
     let capture = &report["capture"];
     assert_eq!(capture["views"], 13);

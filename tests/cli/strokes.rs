@@ -56,7 +56,7 @@ fn colored(place: &Place, arguments: &[&str]) -> [[[f64; 2]; 2]; 2] {
         "/assets/teacher/demo-teacher.onnx"
     );
     let colorize = ["colorize", "runs/garden", "--teacher", teacher];
-    let short = ["--rounds", "6"];
+    let short = ["--rounds", "4"];
     place.succeed(&[&colorize[..], &short, arguments].concat());
     let _ = fs::remove_dir_all(place.path("views"));
     place.succeed(&["render", "runs/garden", "--views", "all", "-o", "views"]);

@@ -99,6 +99,8 @@ fn every_stage_of_every_command_is_seen() {
         "30",
         "--max-side",
         "64",
+        "--max-splats",
+        "600",
     ];
     let fit = ["fit", &scene, "-o", "runs/scene"];
     is_watched(

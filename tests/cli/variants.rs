@@ -139,7 +139,15 @@ fn a_teacher_is_corrected_where_its_views_disagree() {
     let place = Place::new();
     let demo = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/demo");
     let fit = ["fit", demo, "-o", "run", "--max-side", "120"];
-    place.succeed(&[&fit[..], &["--preset", "draft", "--iterations", "3"]].concat());
+    let short = [
+        "--preset",
+        "draft",
+        "--iterations",
+        "3",
+        "--max-splats",
+        "600",
+    ];
+    place.succeed(&[&fit[..], &short].concat());
     for (name, tint, on) in [("steady", 0.0, false), ("tinted", 0.25, true)] {
         let teacher = teacher(&place, name, tint);
         place.succeed(&["colorize", "run", "--teacher", &teacher, "--rounds", "1"]);

@@ -227,11 +227,16 @@ fn coloring_takes_what_was_estimated() {
             panic!("a byte is enough");
         };
         let all = of_limit(None).unwrap();
-        let half = of_limit(Some((needed + all.1) / 2)).unwrap();
         let one = of_limit(Some(needed)).unwrap();
         assert_eq!((all.2, one.2), (5, 0));
-        assert!((1..5).contains(&half.2), "{}", half.2);
-        for (taken, estimated, views) in [all, half, one] {
+        let mut found = vec![all, one];
+        // How many views stay does not depend on what is solved for, and RGB takes least time.
+        if color == ColorKind::Rgb {
+            let half = of_limit(Some((needed + all.1) / 2)).unwrap();
+            assert!((1..5).contains(&half.2), "{}", half.2);
+            found.push(half);
+        }
+        for (taken, estimated, views) in found {
             let ratio = taken as f64 / estimated as f64;
             let what = format!("{color:?}, degree {sh_degree}, {views} views: {ratio:.3}");
             assert!((0.97..1.01).contains(&ratio), "{what}");
