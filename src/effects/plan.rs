@@ -23,8 +23,8 @@ const TRIAL_GAIN: f64 = 0.1;
 const TRIAL_GAIN_OF_EXPOSURES: f64 = 0.3;
 
 /// Share of places at which one view disagrees with all others from which on photos are
-/// taken to have defects: clean photos stay below 0.13 %, 1.5 % of dust gives 0.24 to 3 %, so do
-/// silhouettes before a sky, 0.4 to 0.6 %, where it costs little (docs/decisions/33-outliers.md).
+/// taken to have defects: clean photos stay below 0.13 %, 1.5 % of dust gives 0.24 to 3 %
+/// (docs/decisions/33-outliers.md).
 const OUTLIER_SHARE: f64 = 0.002;
 
 /// In a shorter run most of what is far off is only not learned yet, and leaving it out
