@@ -24,13 +24,7 @@ from PIL import Image
 
 RAYS = 2  # A pixel's, along each side: silhouettes are soft.
 JPEG_QUALITY = 95
-
-
-def wall_objects() -> set[str]:
-    """Names of the wall, its mortar and its ivy, which are built one after the other."""
-    names = [item.name for item in bpy.context.collection.objects]
-    bricks = next(k for k, name in enumerate(names) if name.startswith("brick"))
-    return set(names[bricks : bricks + 3])
+WALL = {"brick", "mortar", "ivy"}  # Objects are named after their material.
 
 
 def clouds(direction: Array) -> Array:
@@ -52,14 +46,14 @@ def directions(camera: Camera, width: int, height: int) -> Array:
     return rays / np.linalg.norm(rays, axis=-1, keepdims=True)
 
 
-def share_of_wall(camera: Camera, rays: Array, wall: set[str]) -> Array:
+def share_of_wall(camera: Camera, rays: Array) -> Array:
     """How much of each pixel shows the wall, `[height, width]`."""
     scene, graph = bpy.context.scene, bpy.context.evaluated_depsgraph_get()
     origin = Vector(camera.center)
     hits = np.zeros(rays.shape[:-1])
     for place in np.ndindex(hits.shape):
         hit, _, _, _, item, _ = scene.ray_cast(graph, origin, Vector(rays[place]))
-        hits[place] = hit and item.name in wall
+        hits[place] = hit and item.name.split(".")[0] in WALL
     return hits.mean(axis=-1)
 
 
@@ -73,13 +67,12 @@ def main() -> None:
     for folder in (images, model):
         folder.mkdir(parents=True, exist_ok=True)
     stage.build(layout.demo_layout())
-    wall = wall_objects()
     shares = {}
     for camera in cameras.demo_cameras():
         name = f"{camera.name}.jpg"
         photo = np.asarray(Image.open(options.demo / "images" / name).convert("RGB"))
         rays = directions(camera, photo.shape[1], photo.shape[0])
-        share = share_of_wall(camera, rays, wall)
+        share = share_of_wall(camera, rays)
         sky = np.repeat(clouds(rays).mean(axis=-1)[..., None], 3, axis=-1)
         shares[name] = share
         painted = share[..., None] * sky + (1 - share[..., None]) * photo

@@ -14,19 +14,23 @@ use super::scene;
 use super::shared::{place_with_run, place_with_scene};
 
 /// A training of a few seconds, from the few points of a scene.
-const FIT: [&str; 11] = [
-    "fit",
-    "scene",
-    "--preset",
-    "draft",
-    "--iterations",
-    "600",
-    "--without",
-    "background",
-    "--no-fill-gaps",
-    "-o",
-    "run",
-];
+const FIT: [&str; 11] = of_length("600");
+
+const fn of_length(iterations: &str) -> [&str; 11] {
+    [
+        "fit",
+        "scene",
+        "--preset",
+        "draft",
+        "--iterations",
+        iterations,
+        "--without",
+        "background",
+        "--no-fill-gaps",
+        "-o",
+        "run",
+    ]
+}
 
 /// Checkpoints as often as they are cheap.
 const OFTEN: [&str; 2] = ["--checkpoint", "0.0001"];
@@ -214,7 +218,7 @@ fn a_finished_run_goes_on() {
     for offset in [[0.0; 3], [4e5, -5e6, 100.0]] {
         let place = Place::new();
         scene::write_moved(&place.path("scene"), offset);
-        place.succeed(&FIT.map(|word| if word == "600" { "300" } else { word }));
+        place.succeed(&of_length("300"));
         let psnr = |run: &str| {
             let report = place.report(run);
             report["luma"]["held_out"]["psnr"].as_f64().expect("a PSNR")

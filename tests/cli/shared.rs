@@ -27,6 +27,17 @@ pub const QUICK_FIT: [&str; 9] = [
     "--no-fill-gaps",
 ];
 
+/// Makes a `fit` of the bundled photos quick. Points stay large and thin, so pictures of all of
+/// them blend thousands.
+pub const FEW: [&str; 6] = [
+    "--preset",
+    "draft",
+    "--iterations",
+    "3",
+    "--max-splats",
+    "600",
+];
+
 /// The tests' networks.
 pub fn onnx(name: &str) -> String {
     format!("{}/tests/fixtures/onnx/{name}", env!("CARGO_MANIFEST_DIR"))

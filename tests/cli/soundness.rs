@@ -9,6 +9,7 @@ use gs_chroma::capture::{Camera, Capture, Point};
 use serde_json::{Value, json};
 
 use super::program::{Done, Place};
+use super::shared::FEW;
 
 const DEMO: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/demo");
 
@@ -185,18 +186,7 @@ fn a_sound_scene_gives_no_warning() {
         &["info", "scene", "--json"][..],
         &["info", DEMO, "--json"],
         &PLAN,
-        &[
-            &fit[..],
-            &[
-                "--preset",
-                "draft",
-                "--iterations",
-                "3",
-                "--max-splats",
-                "600",
-            ],
-        ]
-        .concat(),
+        &[&fit[..], &FEW].concat(),
         &colorize,
         &eval,
     ] {
@@ -298,17 +288,8 @@ fn photos_of_another_model_are_refused() {
         json!([])
     );
     // A splat file's photos are looked at before they are colored.
-    let fit = [
-        "fit",
-        DEMO,
-        "-o",
-        "run",
-        "--max-side",
-        "96",
-        "--preset",
-        "draft",
-    ];
-    place.succeed(&[&fit[..], &["--iterations", "3", "--max-splats", "600"]].concat());
+    let fit = ["fit", DEMO, "-o", "run", "--max-side", "96"];
+    place.succeed(&[&fit[..], &FEW].concat());
     let teacher = format!("{DEMO}/images");
     let colorize = [
         "colorize",
@@ -333,18 +314,7 @@ fn single_photos_are_left_out_and_named() {
     change_photo(&place, 5, |photo| photo.rotate180());
     let words = ["left out garden_05.jpg", "does not show what COLMAP saw"];
     let fit = ["fit", "scene", "--json", "-o", "run", "--max-side", "96"];
-    let fit = [
-        &fit[..],
-        &[
-            "--preset",
-            "draft",
-            "--iterations",
-            "3",
-            "--max-splats",
-            "600",
-        ],
-    ]
-    .concat();
+    let fit = [&fit[..], &FEW].concat();
     let report = warns(&place, &fit, &words);
     let capture = &report["capture"];
     assert_eq!(capture["views"], 13);

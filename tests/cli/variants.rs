@@ -8,6 +8,7 @@ use made::Variant;
 
 use super::program::Place;
 use super::scene;
+use super::shared::FEW;
 
 /// Makes a variant in `place` and says in which folder.
 fn make(place: &Place, source: &str, variant: Variant) -> String {
@@ -139,15 +140,7 @@ fn a_teacher_is_corrected_where_its_views_disagree() {
     let place = Place::new();
     let demo = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/demo");
     let fit = ["fit", demo, "-o", "run", "--max-side", "120"];
-    let short = [
-        "--preset",
-        "draft",
-        "--iterations",
-        "3",
-        "--max-splats",
-        "600",
-    ];
-    place.succeed(&[&fit[..], &short].concat());
+    place.succeed(&[&fit[..], &FEW].concat());
     for (name, tint, on) in [("steady", 0.0, false), ("tinted", 0.25, true)] {
         let teacher = teacher(&place, name, tint);
         place.succeed(&["colorize", "run", "--teacher", &teacher, "--rounds", "1"]);
