@@ -29,6 +29,8 @@ demo: setup
 # One more than there are cores, for tests wait for programs and devices.
 TEST_THREADS = $(shell echo $$(($$(getconf _NPROCESSORS_ONLN) + 1)))
 
+# Programs that tests give another cache folder share what Mesa compiled for the others.
+test: export MESA_SHADER_CACHE_DIR := $(CURDIR)/target/mesa
 test: setup
 	@cargo fmt --version >/dev/null 2>&1 && cargo clippy --version >/dev/null 2>&1 || rustup component add rustfmt clippy
 	cargo fmt --check
