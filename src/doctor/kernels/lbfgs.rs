@@ -323,39 +323,40 @@ fn row(allowed: &Allowance, what: &'static str, worst: f64, samples: &[Sample]) 
     Row::elementwise("lbfgs", what, allowed.relative(worst, 100.0), samples)
 }
 
-/// Single steps.
+/// Problems on the device and by the oracle: the unknowns after as many steps as are told of, and
+/// how far the last went.
+fn after(
+    gpu: &Gpu,
+    kernels: &LbfgsKernels,
+    problems: &[Problem],
+    told: &[f64],
+) -> Result<(Vec<Sample>, Vec<Sample>), GpuError> {
+    let sampled = problems.iter().map(|problem| {
+        let told: Vec<f64> = told.iter().map(|more| more * problem.offset).collect();
+        let (actual, expected) = (
+            problem.on_device(gpu, kernels, &told)?,
+            problem.expected(&told),
+        );
+        // Undone is told as less than nothing.
+        let [far, near] = [actual.1, expected.1].map(|moved| vec![moved.unwrap_or(-1.0)]);
+        Ok((Sample::new(actual.0, expected.0), Sample::new(far, near)))
+    });
+    sampled.collect()
+}
+
+/// Problems in which unknowns are free, and one of many.
+fn free() -> Vec<Problem> {
+    let mut free = problems();
+    free.push(Problem::long(40_001));
+    free
+}
+
+/// Steps that are good.
 pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
     let (gpu, allowed) = (&raster.gpu, Allowance::of(&raster.gpu));
     let kernels = LbfgsKernels::new(gpu);
-    let mut free = problems();
-    free.push(Problem::long(40_001));
-    let mut moved = Vec::new();
-    let mut after = |problems: &[Problem], told: &[f64]| {
-        (problems.iter())
-            .map(|problem| {
-                let told: Vec<f64> = told.iter().map(|more| more * problem.offset).collect();
-                let (actual, expected) = (
-                    problem.on_device(gpu, &kernels, &told)?,
-                    problem.expected(&told),
-                );
-                // Undone is told as less than nothing.
-                let [far, near] = [actual.1, expected.1].map(|moved| vec![moved.unwrap_or(-1.0)]);
-                moved.push(Sample::new(far, near));
-                Ok(Sample::new(actual.0, expected.0))
-            })
-            .collect::<Result<Vec<_>, GpuError>>()
-    };
-    let rows_after = [after(&free, &[0.0])?, after(&free, &[0.0; 5])?];
-    // The second is told to have done some harm: a parabola says how much shorter. Then the
-    // third and its shorter step are told to have done much.
-    let shortened = after(&free, &[0.0, 0.02, 0.0])?;
-    let undone = after(&free, &[0.0, 0.0, 0.0, 9.0, 9.0, 0.0])?;
-    let bounded: Vec<Problem> = problems().into_iter().map(Problem::bounded).collect();
-    let above_floors = after(&bounded, &[0.0; 5])?;
-    let anchored: Vec<Problem> = problems().into_iter().map(|p| p.anchored(3)).collect();
-    let drawn_to_anchors = after(&anchored, &[0.0; 6])?;
-    let judged: Vec<Problem> = problems().into_iter().map(|p| p.judged(3)).collect();
-    let after_judged = after(&judged, &[0.0; 6])?;
+    let free = free();
+    let [one, five] = [1, 5].map(|steps| after(gpu, &kernels, &free, &vec![0.0; steps]));
     let still = (free.into_iter())
         .map(|mut problem| {
             problem.start.fill(0.0);
@@ -367,17 +368,51 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
             ))
         })
         .collect::<Result<Vec<_>, GpuError>>()?;
+    Ok(vec![
+        row(&allowed, "unknowns after 1 step", 7e-8, &one?.0),
+        row(&allowed, "unknowns after 5 steps", 1.85e-5, &five?.0),
+        Row::exact("lbfgs", "nothing to do", &still),
+    ])
+}
+
+/// Steps that are bounded or pulled.
+pub(super) fn held_rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
+    let (gpu, allowed) = (&raster.gpu, Allowance::of(&raster.gpu));
+    let kernels = LbfgsKernels::new(gpu);
+    let bounded: Vec<Problem> = problems().into_iter().map(Problem::bounded).collect();
+    let above_floors = after(gpu, &kernels, &bounded, &[0.0; 5])?.0;
+    let anchored: Vec<Problem> = problems().into_iter().map(|p| p.anchored(3)).collect();
+    let drawn_to_anchors = after(gpu, &kernels, &anchored, &[0.0; 6])?.0;
+    Ok(vec![
+        row(&allowed, "unknowns with floors", 4.38e-5, &above_floors),
+        row(
+            &allowed,
+            "unknowns with anchors",
+            1.21e-5,
+            &drawn_to_anchors,
+        ),
+    ])
+}
+
+/// Steps that are judged.
+pub(super) fn judged_rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
+    let (gpu, allowed) = (&raster.gpu, Allowance::of(&raster.gpu));
+    let kernels = LbfgsKernels::new(gpu);
+    let free = free();
+    // The second is told to have done some harm: a parabola says how much shorter. Then the
+    // third and its shorter step are told to have done much.
+    let (shortened, mut moved) = after(gpu, &kernels, &free, &[0.0, 0.02, 0.0])?;
+    let (undone, far) = after(gpu, &kernels, &free, &[0.0, 0.0, 0.0, 9.0, 9.0, 0.0])?;
+    moved.extend(far);
+    let judged: Vec<Problem> = problems().into_iter().map(|p| p.judged(3)).collect();
+    let (after_judged, far) = after(gpu, &kernels, &judged, &[0.0; 6])?;
+    moved.extend(far);
     let row = |what, worst, samples: &[Sample]| row(&allowed, what, worst, samples);
     Ok(vec![
-        row("unknowns after 1 step", 7e-8, &rows_after[0]),
-        row("unknowns after 5 steps", 1.85e-5, &rows_after[1]),
-        row("unknowns with floors", 4.38e-5, &above_floors),
-        row("unknowns with anchors", 1.21e-5, &drawn_to_anchors),
         row("unknowns after a step judged alone", 2.4e-6, &after_judged),
         row("unknowns after a shorter step", 1.39e-5, &shortened),
         row("unknowns after two steps undone", 1.01e-6, &undone),
         row("how far the last step went", 1.97e-6, &moved),
-        Row::exact("lbfgs", "nothing to do", &still),
     ])
 }
 

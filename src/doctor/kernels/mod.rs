@@ -32,7 +32,7 @@ use crate::{gpu::GpuError, raster::Raster};
 type Measure = fn(&Arc<Raster>) -> Result<Vec<Row>, GpuError>;
 
 /// The topics in the order in which an iteration meets them.
-pub const TOPICS: [(&str, Measure); 18] = [
+pub const TOPICS: [(&str, Measure); 20] = [
     ("project", project::rows),
     ("scan", scan::rows),
     ("sort", sort::rows),
@@ -49,6 +49,8 @@ pub const TOPICS: [(&str, Measure); 18] = [
     ("relocation", relocation::rows),
     ("view correction", view_correction::rows),
     ("lbfgs", lbfgs::rows),
+    ("lbfgs held", lbfgs::held_rows),
+    ("lbfgs judged", lbfgs::judged_rows),
     ("lbfgs to the end", lbfgs::end_rows),
     ("viewer", viewer::rows),
 ];
