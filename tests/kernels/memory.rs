@@ -198,6 +198,8 @@ fn coloring(
     };
     let frozen = FrozenViews::new(&raster, &luma, 1.0, &cameras, scales, room)?;
     assert_eq!(frozen.streamed().is_some(), streams && limit.is_some());
+    // What comes and goes is met by looking more often.
+    let rounds = if streams { 2 } else { 1 };
     let mut peak = 0;
     let mut look = |_| {
         peak = peak.max(gpu.allocated_bytes().unwrap() - before);
@@ -205,8 +207,7 @@ fn coloring(
     };
     let settings = ChromaSettings {
         sh_degree,
-        // What comes and goes is met by looking more often.
-        rounds: if streams { 2 } else { 1 },
+        rounds,
         ..ChromaSettings::irls()
     };
     if color == ColorKind::Rgb {
@@ -214,7 +215,16 @@ fn coloring(
         IrlsSolver::starting_at(&frozen, &settings, &targets, tasks, &start)?.run(&mut look)?;
     } else {
         let solved = solve(&frozen, &settings, &targets, tasks, &luma, &mut look)?;
-        bake(&frozen, &luma, &solved.chroma, &mut look)?;
+        // Rounds of the bake take the same, one after the other.
+        let baked = bake(&frozen, &luma, &solved.chroma, &mut |progress| {
+            let looked = look(progress);
+            if progress.iteration < rounds {
+                looked
+            } else {
+                ControlFlow::Break(())
+            }
+        });
+        assert!(matches!(baked, Err(ChromaError::Cancelled)));
     }
     Ok((peak, frozen.demand(), frozen.pinned()))
 }

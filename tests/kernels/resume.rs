@@ -1,7 +1,11 @@
 //! A training that goes on from a checkpoint ends with the bytes of one that was never
 //! interrupted.
 
-use std::{cell::RefCell, collections::BTreeMap, ops::ControlFlow};
+use std::{
+    cell::RefCell,
+    collections::{BTreeMap, BTreeSet},
+    ops::ControlFlow,
+};
 
 use gs_chroma::{
     luma::{
@@ -60,9 +64,13 @@ fn told(progress: &LumaProgress) -> Told {
     )
 }
 
-/// Trains to the end, keeps a checkpoint at each place where one can be, and goes on from each in
-/// another trainer. Gives these places.
-fn resumes_everywhere(of: &dyn Fn(&Splats) -> LumaTrainer, start: &Splats) -> Vec<usize> {
+/// Trains to the end, keeps a checkpoint at each place where one can be, and goes on from the
+/// first, the middle and the last in another trainer. Gives all places, and the trainer that nothing
+/// interrupted.
+fn resumes_everywhere(
+    of: &dyn Fn(&Splats) -> LumaTrainer,
+    start: &Splats,
+) -> (Vec<usize>, LumaTrainer) {
     let mut whole = of(start);
     let mut reports = Vec::new();
     whole
@@ -90,11 +98,11 @@ fn resumes_everywhere(of: &dyn Fn(&Splats) -> LumaTrainer, start: &Splats) -> Ve
         coefficients: vec![0.7; start.sh.coefficients.len()],
         ..elsewhere.sh
     };
-    let resumes = |(reported, kept): (usize, Checkpoint)| {
+    let resumes = |(reported, kept): &(usize, Checkpoint)| {
         let from = kept.iteration();
         let sections: BTreeMap<_, _> = kept.to_sections().into_iter().collect();
         let read = Checkpoint::from_sections(&sections).unwrap();
-        assert!(read == kept);
+        assert!(read == *kept);
         let mut second = of(&elsewhere);
         second.resume(&read).unwrap();
         let mut seen = Vec::new();
@@ -102,18 +110,22 @@ fn resumes_everywhere(of: &dyn Fn(&Splats) -> LumaTrainer, start: &Splats) -> Ve
             .train(&mut |progress| seen.push(told(&progress)))
             .unwrap();
         assert!(same(&second.splats().unwrap(), &expected), "from {from}");
-        assert_eq!(seen, reports[reported..], "from {from}");
+        assert_eq!(seen, reports[*reported..], "from {from}");
         assert!(second.curve().len() == whole.curve().len());
-        from
     };
-    kept.into_iter().map(resumes).collect()
+    let last = kept.len() - 1;
+    for place in BTreeSet::from([0, last / 2, last]) {
+        resumes(&kept[place]);
+    }
+    let places = kept.iter().map(|(_, kept)| kept.iteration()).collect();
+    (places, whole)
 }
 
 #[test]
 fn a_set_that_is_split() {
     let [start, target] = start_and_target();
     let of = |from: &Splats| trainer(from, &target);
-    assert_eq!(resumes_everywhere(&of, &start), [25, 50]);
+    assert_eq!(resumes_everywhere(&of, &start).0, [25, 50]);
 }
 
 /// What stands around a scene comes late, stays as it is, and takes of the cap.
@@ -147,9 +159,8 @@ fn with_surroundings() {
             trainer.surround(around.clone());
             trainer
         };
-        assert_eq!(resumes_everywhere(&of, &start), [25, 50, 75]);
-        let mut trainer = of(&start);
-        trainer.train(&mut |_| {}).unwrap();
+        let (kept, trainer) = resumes_everywhere(&of, &start);
+        assert_eq!(kept, [25, 50, 75]);
         let (trained, held) = (trainer.splats().unwrap(), trainer.surroundings());
         assert_eq!(held, around.len());
         assert!(trained.len() <= 2 * start.len() + 10);
@@ -193,7 +204,7 @@ fn with_every_effect() {
         trainer.watch(photos).unwrap();
         trainer
     };
-    assert_eq!(resumes_everywhere(&of, &start), [25, 50, 75, 100, 125]);
+    assert_eq!(resumes_everywhere(&of, &start).0, [25, 50, 75, 100, 125]);
 }
 
 /// What it goes back to was kept.
@@ -217,10 +228,8 @@ fn a_training_that_goes_back_to_its_best() {
         trainer.watch(photos(&start)).unwrap();
         trainer
     };
-    let kept = [25, 50, 75, 100, 125, 150, 175];
-    assert_eq!(resumes_everywhere(&of, &start), kept);
-    let mut trainer = of(&start);
-    trainer.train(&mut |_| {}).unwrap();
+    let (kept, trainer) = resumes_everywhere(&of, &start);
+    assert_eq!(kept, [25, 50, 75, 100, 125, 150, 175]);
     assert_eq!(trainer.given_up(), Some(200));
 }
 
