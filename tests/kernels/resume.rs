@@ -67,7 +67,7 @@ fn told(progress: &LumaProgress) -> Told {
 /// Trains to the end, keeps a checkpoint at each place where one can be, and goes on from the
 /// first, the middle and the last in another trainer. Gives all places, and the trainer that nothing
 /// interrupted.
-fn resumes_everywhere(
+fn keeps_and_resumes(
     of: &dyn Fn(&Splats) -> LumaTrainer,
     start: &Splats,
 ) -> (Vec<usize>, LumaTrainer) {
@@ -125,7 +125,7 @@ fn resumes_everywhere(
 fn a_set_that_is_split() {
     let [start, target] = start_and_target();
     let of = |from: &Splats| trainer(from, &target);
-    assert_eq!(resumes_everywhere(&of, &start).0, [25, 50]);
+    assert_eq!(keeps_and_resumes(&of, &start).0, [25, 50]);
 }
 
 /// What stands around a scene comes late, stays as it is, and takes of the cap.
@@ -159,7 +159,7 @@ fn with_surroundings() {
             trainer.surround(around.clone());
             trainer
         };
-        let (kept, trainer) = resumes_everywhere(&of, &start);
+        let (kept, trainer) = keeps_and_resumes(&of, &start);
         assert_eq!(kept, [25, 50, 75]);
         let (trained, held) = (trainer.splats().unwrap(), trainer.surroundings());
         assert_eq!(held, around.len());
@@ -204,7 +204,7 @@ fn with_every_effect() {
         trainer.watch(photos).unwrap();
         trainer
     };
-    assert_eq!(resumes_everywhere(&of, &start).0, [25, 50, 75, 100, 125]);
+    assert_eq!(keeps_and_resumes(&of, &start).0, [25, 50, 75, 100, 125]);
 }
 
 /// What it goes back to was kept.
@@ -228,7 +228,7 @@ fn a_training_that_goes_back_to_its_best() {
         trainer.watch(photos(&start)).unwrap();
         trainer
     };
-    let (kept, trainer) = resumes_everywhere(&of, &start);
+    let (kept, trainer) = keeps_and_resumes(&of, &start);
     assert_eq!(kept, [25, 50, 75, 100, 125, 150, 175]);
     assert_eq!(trainer.given_up(), Some(200));
 }
