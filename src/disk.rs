@@ -1,6 +1,8 @@
 //! All that is written. Output files are whole or not there: they are written beside and
 //! renamed. Every step can be made to fail, so that tests see what is left then.
 
+pub(crate) mod trust;
+
 use std::{
     collections::BTreeSet,
     env,
@@ -162,8 +164,10 @@ pub(crate) struct Draft {
 /// An empty file beside `path`, which [`Draft::persist`] puts there once it is complete.
 ///
 /// # Errors
-/// The system's, when the folder is missing or cannot be written to.
+/// The system's, when the folder is missing or cannot be written to; where `path` is an
+/// [original](trust::Originals).
 pub(crate) fn create(path: &Path) -> io::Result<Draft> {
+    trust::check_no_original(path)?;
     step()?;
     let mut builder = Builder::new();
     #[cfg(unix)]
@@ -262,11 +266,13 @@ pub(crate) fn scratch() -> io::Result<File> {
     tempfile::tempfile().map_err(plain)
 }
 
-/// A file that is changed in place, made where it is missing.
+/// A file that is changed in place, made where it is missing. It is nobody else's: neither a
+/// link nor one that has another name.
 ///
 /// # Errors
-/// The system's.
+/// The system's, and [`io::ErrorKind::InvalidInput`] for such a file.
 pub(crate) fn open_in_place(path: &Path) -> io::Result<File> {
+    trust::check_own(path)?;
     step()?;
     let mut options = OpenOptions::new();
     options.read(true).write(true).create(true).truncate(false);

@@ -23,6 +23,12 @@ pub(super) fn of_run(error: &RunError) -> String {
         RunError::Exchanged { .. } => {
             format!("{error}: name them as before, train again, or continue with --force")
         }
+        RunError::OtherModel { .. } => {
+            format!("{error}: put the model back that `fit` has read, or run `fit` with this one")
+        }
+        RunError::OtherFile(_) => format!(
+            "{error}: put its own back, run `fit` or `colorize` again, or name the splat file in place of the run"
+        ),
         RunError::Gpu(error) => of_gpu(error),
         RunError::Teacher(error) => of_teacher(error),
         RunError::Chroma(ChromaError::OverLimit { .. }) => format!(

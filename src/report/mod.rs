@@ -57,6 +57,9 @@ pub struct Report {
     /// Warnings of `fit`.
     #[serde(default)]
     pub warnings: Vec<String>,
+    /// The run's scenes, by which commands detect files of another run.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub files: Vec<FileReport>,
     /// Stage 1.
     pub luma: LumaReport,
     /// Stage 2; missing before `colorize`.
@@ -100,15 +103,31 @@ pub struct CaptureReport {
     pub extent: f64,
     /// Subtracted from COLMAP's x, y and z, in world units.
     pub offset: [f64; 3],
-    /// The photos' files, by which `colorize` detects changes.
+    /// The photos, by which commands detect changes.
     ///
     /// Sorted by name.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub photos: Vec<PhotoReport>,
 }
 
-/// A photo's file as `fit` read it.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+/// A file of a run as it was written.
+#[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct FileReport {
+    /// Name in the run's folder.
+    pub name: String,
+    /// First 16 digits of its SHA-256.
+    ///
+    /// Hexadecimal.
+    pub sha256: String,
+    /// Size, time of change and number of the file.
+    ///
+    /// As long as they are the same, it is not hashed again.
+    pub stamp: String,
+}
+
+/// A photo as `fit` read it.
+#[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct PhotoReport {
     /// Path below the folder of photos.
@@ -117,6 +136,16 @@ pub struct PhotoReport {
     ///
     /// Hexadecimal. They are to stand chance, not forgers.
     pub sha256: String,
+    /// Size, time of change and number of the file.
+    ///
+    /// As long as they are the same, it is not hashed again.
+    #[serde(default)]
+    pub stamp: String,
+    /// First 16 digits of a SHA-256 of its camera and pose.
+    ///
+    /// Hexadecimal; empty in reports of former versions.
+    #[serde(default)]
+    pub pose: String,
 }
 
 /// What it ran on.

@@ -164,7 +164,8 @@ fn differences(name: &str, before: &Value, now: &Value, found: &mut Vec<String>)
         }
         _ if before == now => {}
         // A sum says nothing to anybody.
-        _ if ["photos", "init", "luma", "taught"].contains(&name) => found.push(name.to_owned()),
+        _ if name == "photos" => found.push("photos or poses".to_owned()),
+        _ if ["init", "luma", "taught"].contains(&name) => found.push(name.to_owned()),
         _ => found.push(format!("{name} ({before}, now {now})")),
     }
 }
@@ -309,7 +310,7 @@ mod tests {
         let now = of(6, Value::Null, "cd");
         let expected = [
             "load.max_side (320, now null)",
-            "photos",
+            "photos or poses",
             "settings.max_splats (5, now 6)",
         ];
         assert_eq!(found(&now), expected);

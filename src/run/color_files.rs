@@ -2,7 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{Event, Observer, RunError, RunFolder, commit::Commit, files, log::with_rows};
+use super::{
+    Event, Observer, RunError, RunFolder, commit::Commit, files, fingerprint::of_file,
+    log::with_rows,
+};
 use crate::{
     eval::COLUMNS,
     report::{Report, Row, contact_sheet},
@@ -42,7 +45,7 @@ impl ColorFiles<'_> {
         &self,
         folder: Option<&RunFolder>,
         output: &Output,
-        report: &Report,
+        report: &mut Report,
         observe: &mut Observer<'_>,
     ) -> Result<(), RunError> {
         let Some(folder) = folder else {
@@ -51,10 +54,18 @@ impl ColorFiles<'_> {
         let mut commit = Commit::new(folder.path())?;
         commit.remove(&folder.color_checkpoint());
         if output.contact_sheet.is_some() {
-            self.write_scene(&commit.place(&output.ply), observe)?;
+            let (color, chroma) = (folder.color(), folder.chroma());
+            let [color, chroma] = [color, chroma].map(|path| commit.place(&path));
+            self.write_scene(&color, observe)?;
+            files::write(&chroma, &npy::encode(self.chroma))?;
+            let luma = report
+                .files
+                .iter()
+                .find(|file| folder.luma().ends_with(&file.name));
+            let luma = luma.cloned().map_or_else(|| of_file(&folder.luma()), Ok)?;
+            report.files = vec![luma, of_file(&color)?, of_file(&chroma)?];
             commit.remove(&folder.evaluation());
             commit.remove_page(&folder.evaluation_page());
-            files::write(&commit.place(&folder.chroma()), &npy::encode(self.chroma))?;
             let log = with_rows(&folder.log(), report.luma.iterations, self.log);
             files::write(&commit.place(&folder.log()), log.as_bytes())?;
             let sheet = contact_sheet(&COLUMNS, self.rows);

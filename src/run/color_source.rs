@@ -1,8 +1,8 @@
 //! What `colorize` colors.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use super::{ColorizeOptions, Preset, RunError, RunFolder, lock::RunLock};
+use super::{ColorizeOptions, Preset, RunError, RunFolder, lock::RunLock, originals::Kept};
 use crate::{
     capture::LoadOptions,
     effects::Overrules,
@@ -30,11 +30,9 @@ impl Source {
                 _lock: None,
             }),
             run => {
-                let folder = match run {
-                    Some(path) => RunFolder::at(path),
-                    None => RunFolder::newest()?,
-                };
+                let folder = RunFolder::find(run.as_deref())?;
                 let (lock, report) = RunLock::of_run(&folder)?;
+                folder.check_files(&report, &[folder.luma()])?;
                 Ok(Self {
                     report: Some(report),
                     _lock: Some(lock),
@@ -48,6 +46,24 @@ impl Source {
     /// The run folder, where what is found is to be kept there.
     pub fn kept(&self, options: &ColorizeOptions) -> Option<&RunFolder> {
         self.folder.as_ref().filter(|_| !options.relight)
+    }
+
+    /// Files that are not written over.
+    pub fn kept_files(&self, options: &ColorizeOptions, colmap_dir: &Path) -> Kept {
+        let teach = &options.teach;
+        let named = teach
+            .teachers
+            .iter()
+            .map(|(path, _)| path)
+            .chain(&teach.hints);
+        let kept = Kept::default()
+            .with_all(named, "a file of a teacher or a hint")
+            .with_capture(colmap_dir, None)
+            .with(&self.splats, "the gray scene");
+        match (&self.folder, &self.report) {
+            (Some(folder), Some(report)) => kept.with_run(folder, report),
+            _ => kept,
+        }
     }
 
     pub fn colmap_dir(&self, options: &ColorizeOptions) -> Result<PathBuf, RunError> {
@@ -86,6 +102,7 @@ impl Source {
             preset,
             effects: Vec::new(),
             warnings: Vec::new(),
+            files: Vec::new(),
             luma: LumaReport::default(),
             chroma: None,
         })

@@ -18,12 +18,13 @@ use super::{
     color_files::{ColorFiles, Output},
     color_source::Source,
     files,
+    fingerprint::check_poses,
     fit::{capture_report, open_gpu},
     foreign::drawn_like_photos,
     keeping,
     live::Showing,
     scene::{Frame, read_scene, tell_not_finite, written_as},
-    sound::{open_examined, open_trusted},
+    sound::{open_checked, open_examined, open_trusted},
     teach::{Taught, TeachOptions, Teachers},
 };
 use crate::{
@@ -90,6 +91,7 @@ pub fn colorize(
     let source = Source::find(options)?;
     let cache = source.folder.as_ref().map(RunFolder::teacher);
     let colmap_dir = source.colmap_dir(options)?;
+    let _kept = source.kept_files(options, &colmap_dir).keep();
     let mut teachers = Teachers::open(&options.teach, &colmap_dir, cache.as_deref())?;
     observe(Event::begins(Stage::Device));
     let gpu = open_gpu(options.timings)?;
@@ -101,14 +103,13 @@ pub fn colorize(
     // `fit` has compared a run's photos with their model; in another light they may well show
     // something else.
     let trusted = options.relight || (source.report.is_some() && options.colmap.is_none());
-    let trained = match options.relight {
-        true => &[][..],
-        false => &report.capture.photos,
-    };
+    let trained = &report.capture.photos;
     let dataset = match trusted {
+        true if options.relight => open_checked(&colmap_dir, &load, observe)?,
         true => open_trusted(&colmap_dir, &load, trained, observe)?,
         false => open_examined(&colmap_dir, &load, observe)?.dataset,
     };
+    check_poses(&dataset.capture, trained)?;
     // From here on every photo is looked at once.
     let dataset = Arc::new(dataset.caching(0));
     let frame = match source.folder {
@@ -131,8 +132,11 @@ pub fn colorize(
             .filter(|folder| options.output.is_none() || output_is_own(options, folder))
             .map(RunFolder::contact_sheet),
     };
-    files::format_of(&output.ply)?;
-    files::make_folder_of(&output.ply)?;
+    // Its own is replaced together with the run's other files.
+    if output.contact_sheet.is_none() {
+        files::format_of(&output.ply)?;
+        files::make_folder_of(&output.ply)?;
+    }
 
     let begun = Instant::now();
     let settings = ChromaSettings {
@@ -420,7 +424,7 @@ pub fn colorize(
         log: &log,
         written: &written,
     };
-    files.write(source.kept(options), &output, &report, observe)?;
+    files.write(source.kept(options), &output, &mut report, observe)?;
     Ok((output, report))
 }
 

@@ -8,7 +8,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::{RunError, files};
+use super::{RunError, files, folder::ENTRIES};
 use crate::{
     disk::{self, DraftFolder},
     input,
@@ -78,23 +78,21 @@ impl Commit {
 /// Puts in its place what a process that ended too early has left complete.
 ///
 /// # Errors
-/// [`RunError::File`].
+/// As [`left`], and [`RunError::File`].
 pub(super) fn finish(folder: &Path) -> Result<(), RunError> {
-    let complete = folder.join(COMPLETE);
-    let list = match input::read_to_string(&complete.join(REMOVED)) {
-        Ok(list) => list,
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
-        Err(error) => return Err(files::at(&complete)(error)),
+    let Some(Left {
+        complete,
+        removed,
+        made,
+    }) = left(folder)?
+    else {
+        return Ok(());
     };
-    for name in list.lines() {
+    for name in removed {
         remove(&folder.join(name))?;
     }
-    for entry in fs::read_dir(&complete).map_err(files::at(&complete))? {
-        let made = entry.map_err(files::at(&complete))?.path();
-        if made.file_name() == Some(OsStr::new(REMOVED)) {
-            continue;
-        }
-        let place = folder.join(name(&made));
+    for name in made {
+        let (made, place) = (complete.join(name), folder.join(name));
         if made.is_dir() {
             remove(&place)?;
         }
@@ -105,9 +103,63 @@ pub(super) fn finish(folder: &Path) -> Result<(), RunError> {
     remove(&complete)
 }
 
-/// Whether there is something to finish.
-pub(super) fn is_left(folder: &Path) -> bool {
-    folder.join(COMPLETE).join(REMOVED).exists()
+/// A complete commit that is not in its place yet.
+pub(super) struct Left {
+    complete: PathBuf,
+    /// Names of entries of the run that have to go.
+    removed: Vec<&'static str>,
+    /// Names of entries that take their place in the run.
+    made: Vec<&'static str>,
+}
+
+/// A commit that a process has left complete, if any. Nobody is trusted to have written it: it
+/// may only name what commits of this program hold.
+///
+/// # Errors
+/// [`RunError::File`] where it names or holds anything else.
+pub(super) fn left(folder: &Path) -> Result<Option<Left>, RunError> {
+    let complete = folder.join(COMPLETE);
+    let there = match complete.symlink_metadata() {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+        there => there.map_err(files::at(&complete))?,
+    };
+    let refused = |what: &str| RunError::File {
+        path: complete.clone(),
+        reason: format!("was not left by this program: it {what}; look at it and remove it"),
+    };
+    if !there.is_dir() {
+        return Err(refused("is no folder"));
+    }
+    let list = match input::read_to_string(&complete.join(REMOVED)) {
+        Ok(list) => list,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+        Err(error) => return Err(files::at(&complete)(error)),
+    };
+    let known = |name: &str| {
+        let mut all = ENTRIES.into_iter();
+        all.find(|known| *known == name)
+            .ok_or_else(|| refused(&format!("names {name:?}, which is no file of a run")))
+    };
+    let removed = list.lines().map(known).collect::<Result<_, _>>()?;
+    let mut made = Vec::new();
+    for entry in fs::read_dir(&complete).map_err(files::at(&complete))? {
+        let entry = entry.map_err(files::at(&complete))?;
+        let name = entry.file_name();
+        if name == REMOVED {
+            continue;
+        }
+        let name = known(&name.to_string_lossy())?;
+        let kind = entry.file_type().map_err(files::at(&complete))?;
+        if !(kind.is_file() || kind.is_dir()) {
+            return Err(refused(&format!("holds {name}, a link or a device")));
+        }
+        made.push(name);
+    }
+    Ok(Some(Left {
+        complete,
+        removed,
+        made,
+    }))
 }
 
 /// Removes what processes that ended too early have begun. Nobody may be writing.
@@ -115,7 +167,7 @@ pub(super) fn clean(folder: &Path) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let name = entry.file_name();
         let name = name.to_string_lossy();
-        let emptied = name == COMPLETE && !is_left(folder);
+        let emptied = name == COMPLETE && left(folder).is_ok_and(|left| left.is_none());
         // `.tmp` and six letters is what a file is called before it has a name.
         let begun = [BEGUN, ".tmp"].iter().any(|prefix| {
             let rest = name.strip_prefix(prefix);
@@ -143,22 +195,26 @@ mod tests {
 
     fn run() -> TempDir {
         let run = tempfile::tempdir().unwrap();
-        for (name, text) in [("a", "old a"), ("b", "old b"), ("c", "old c")] {
+        for (name, text) in [
+            ("luma.ply", "old a"),
+            ("color.ply", "old b"),
+            ("log.csv", "old c"),
+        ] {
             fs::write(run.path().join(name), text).unwrap();
         }
-        fs::create_dir(run.path().join("page")).unwrap();
-        fs::write(run.path().join("page/old"), "old").unwrap();
+        fs::create_dir(run.path().join("eval")).unwrap();
+        fs::write(run.path().join("eval/old"), "old").unwrap();
         run
     }
 
     fn filled(run: &Path) -> Commit {
         let mut commit = Commit::new(run).unwrap();
-        fs::write(commit.place(&run.join("a")), "new a").unwrap();
-        fs::write(commit.place(&run.join("d")), "new d").unwrap();
-        fs::create_dir(commit.place(&run.join("page"))).unwrap();
-        fs::write(commit.place(&run.join("page")).join("new"), "new").unwrap();
-        commit.remove(&run.join("b"));
-        commit.remove(&run.join("nowhere"));
+        fs::write(commit.place(&run.join("luma.ply")), "new a").unwrap();
+        fs::write(commit.place(&run.join("chroma.npy")), "new d").unwrap();
+        fs::create_dir(commit.place(&run.join("eval"))).unwrap();
+        fs::write(commit.place(&run.join("eval")).join("new"), "new").unwrap();
+        commit.remove(&run.join("color.ply"));
+        commit.remove(&run.join("eval.json"));
         commit
     }
 
@@ -172,17 +228,20 @@ mod tests {
     }
 
     fn is_new(run: &Path) {
-        assert_eq!(names(run), ["a", "c", "d", "page"]);
-        assert_eq!(fs::read_to_string(run.join("a")).unwrap(), "new a");
-        assert_eq!(fs::read_to_string(run.join("c")).unwrap(), "old c");
-        assert_eq!(names(&run.join("page")), ["new"]);
+        assert_eq!(names(run), ["chroma.npy", "eval", "log.csv", "luma.ply"]);
+        assert_eq!(fs::read_to_string(run.join("luma.ply")).unwrap(), "new a");
+        assert_eq!(fs::read_to_string(run.join("log.csv")).unwrap(), "old c");
+        assert_eq!(names(&run.join("eval")), ["new"]);
     }
 
     #[test]
     fn files_appear_together() {
         let run = run();
         let commit = filled(run.path());
-        assert_eq!(fs::read_to_string(run.path().join("a")).unwrap(), "old a");
+        assert_eq!(
+            fs::read_to_string(run.path().join("luma.ply")).unwrap(),
+            "old a"
+        );
         commit.finish().unwrap();
         is_new(run.path());
     }
@@ -191,8 +250,11 @@ mod tests {
     fn what_is_dropped_changes_nothing() {
         let run = run();
         drop(filled(run.path()));
-        assert_eq!(names(run.path()), ["a", "b", "c", "page"]);
-        assert_eq!(names(&run.path().join("page")), ["old"]);
+        assert_eq!(
+            names(run.path()),
+            ["color.ply", "eval", "log.csv", "luma.ply"]
+        );
+        assert_eq!(names(&run.path().join("eval")), ["old"]);
     }
 
     /// Whoever dies after so many of its steps.
@@ -201,13 +263,13 @@ mod tests {
         let run_out_at = |steps: usize| {
             let run = run();
             let commit = filled(run.path());
-            files::write(&commit.made.path().join(REMOVED), b"b\nnowhere").unwrap();
+            files::write(&commit.made.path().join(REMOVED), b"color.ply\neval.json").unwrap();
             let complete = run.path().join(COMPLETE);
             commit.made.persist(&complete).unwrap();
             let done: [&dyn Fn(); 3] = [
-                &|| fs::remove_file(run.path().join("b")).unwrap(),
-                &|| fs::rename(complete.join("a"), run.path().join("a")).unwrap(),
-                &|| fs::remove_dir_all(run.path().join("page")).unwrap(),
+                &|| fs::remove_file(run.path().join("color.ply")).unwrap(),
+                &|| fs::rename(complete.join("luma.ply"), run.path().join("luma.ply")).unwrap(),
+                &|| fs::remove_dir_all(run.path().join("eval")).unwrap(),
             ];
             done[..steps].iter().for_each(|step| step());
             finish(run.path()).unwrap();
@@ -229,6 +291,48 @@ mod tests {
         fs::create_dir(run.path().join(COMPLETE)).unwrap();
         finish(run.path()).unwrap();
         clean(run.path());
-        assert_eq!(names(run.path()), [".tmp-notes", "a", "b", "c", "page"]);
+        assert_eq!(
+            names(run.path()),
+            [".tmp-notes", "color.ply", "eval", "log.csv", "luma.ply"]
+        );
+    }
+
+    #[test]
+    fn a_commit_of_somebody_else_moves_and_removes_nothing() {
+        let place = tempfile::tempdir().unwrap();
+        fs::write(place.path().join("victim"), "precious").unwrap();
+        let above = place.path().to_str().unwrap().to_owned();
+        for name in [
+            "../victim",
+            "..",
+            "",
+            ".",
+            "notes.txt",
+            &above,
+            "eval/../..",
+        ] {
+            let run = run();
+            fs::create_dir(run.path().join(COMPLETE)).unwrap();
+            fs::write(run.path().join(COMPLETE).join(REMOVED), format!("{name}\n")).unwrap();
+            let error = finish(run.path()).unwrap_err().to_string();
+            assert!(error.contains("no file of a run"), "{name}: {error}");
+            clean(run.path());
+            assert!(run.path().join(COMPLETE).exists());
+        }
+        assert!(place.path().join("victim").exists());
+        let run = run();
+        fs::create_dir(run.path().join(COMPLETE)).unwrap();
+        fs::write(run.path().join(COMPLETE).join(REMOVED), "").unwrap();
+        fs::write(run.path().join(COMPLETE).join("notes.txt"), "").unwrap();
+        assert!(finish(run.path()).is_err());
+        #[cfg(unix)]
+        {
+            let run = self::run();
+            fs::write(place.path().join(REMOVED), "").unwrap();
+            std::os::unix::fs::symlink(place.path(), run.path().join(COMPLETE)).unwrap();
+            let error = finish(run.path()).err().unwrap().to_string();
+            assert!(error.contains("no folder"), "{error}");
+            assert!(place.path().join("victim").exists());
+        }
     }
 }

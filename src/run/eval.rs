@@ -15,7 +15,8 @@ use super::{
     flight::Filmed,
     keeping,
     lock::RunLock,
-    scene::{Frame, open, read_splats, written_as},
+    scene::{Frame, read_splats, written_as},
+    sound::open_same,
     teach::teacher_or_photos,
 };
 use crate::{
@@ -76,13 +77,10 @@ pub fn eval(
     let begun = Instant::now();
     let warnings = RefCell::default();
     let observe = &mut keeping(&warnings, observe);
-    let folder = match &options.run {
-        Some(path) => {
-            is_splat_file(path)?;
-            RunFolder::at(path)
-        }
-        None => RunFolder::newest()?,
-    };
+    if let Some(path) = &options.run {
+        is_splat_file(path)?;
+    }
+    let folder = RunFolder::find(options.run.as_deref())?;
     let (_lock, report) = RunLock::of_run(&folder)?;
     observe(Event::begins(Stage::Model));
     let scene = load(&folder, &report, options, observe)?;
@@ -231,6 +229,7 @@ fn load(
     if !color.exists() {
         return Err(refused(color, "the run is not colored yet"));
     }
+    folder.check_files(report, &[folder.luma(), folder.color(), folder.chroma()])?;
     let luma = read_splats(&folder.luma(), Frame::Own, observe)?
         .0
         .to_luma();
@@ -249,7 +248,7 @@ fn load(
         Some(path) => path.clone(),
         None => PathBuf::from(&report.capture.path),
     };
-    let mut dataset = open(&colmap, &report.capture.load, observe)?;
+    let mut dataset = open_same(&colmap, &report.capture.load, &report.capture, observe)?;
     if let Some(chroma) = &report.chroma {
         // Colors were learned from these.
         let names = dataset.capture.views.iter().map(|view| &view.name);

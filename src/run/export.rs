@@ -11,11 +11,14 @@ use super::{
     export_viewer::{Cameras, fitted},
     files, keeping,
     loss::{Views, loss},
+    originals::Kept,
     scene::{Frame, read_scene, written_as},
 };
 use crate::{
     capture::LoadOptions,
+    disk::trust::Originals,
     raster::RasterOptions,
+    report::PhotoReport,
     splats::{Format, Splats, SpzVersion, WriteOptions, is_splat_file, write_splats},
     viewers::ViewerChoice,
 };
@@ -86,6 +89,10 @@ struct Scene {
     colmap: Option<PathBuf>,
     /// How its photos are loaded.
     load: LoadOptions,
+    /// The photos and poses that it was trained with.
+    photos: Vec<PhotoReport>,
+    /// Files that are not written over.
+    _kept: Originals,
 }
 
 /// Writes a run's scene, or the Gaussians of a file, as a splat file, reads it back and measures
@@ -104,10 +111,12 @@ pub fn export(options: &ExportOptions, observe: &mut Observer<'_>) -> Result<Exp
     }
     observe(Event::begins(Stage::Model));
     let mut scene = open(options, observe)?;
+    files::make_folder_of(output)?;
     let before = &Cameras {
         of: options.run.as_deref().unwrap_or(output),
         colmap: scene.colmap.as_deref(),
         load: scene.load.clone(),
+        photos: &scene.photos,
         moved: scene.moved,
     };
     let drawn = scene.drawn;
@@ -126,7 +135,6 @@ pub fn export(options: &ExportOptions, observe: &mut Observer<'_>) -> Result<Exp
     let written = written(&scene, options)?;
 
     observe(Event::begins(Stage::Saving));
-    files::make_folder_of(output)?;
     let begun = Instant::now();
     let doubts = write_splats(output, &scene.splats, &written)?;
     let seconds = begun.elapsed().as_secs_f64();
@@ -168,19 +176,20 @@ fn open(options: &ExportOptions, observe: &mut Observer<'_>) -> Result<Scene, Ru
             surroundings: 0,
             colmap: options.colmap.clone(),
             load: LoadOptions::default(),
+            photos: Vec::new(),
+            _kept: Kept::default().with(path, "the splat file").keep(),
         });
     }
-    let folder = match &options.run {
-        Some(path) => RunFolder::at(path),
-        None => RunFolder::newest()?,
-    };
+    let folder = RunFolder::find(options.run.as_deref())?;
     let report = folder.read_report()?;
+    let kept = Kept::default().with_run(&folder, &report);
     let colored = !options.luma && folder.color().exists();
     let file = if colored {
         folder.color()
     } else {
         folder.luma()
     };
+    folder.check_files(&report, &[file.clone()])?;
     let noted = PathBuf::from(&report.capture.path);
     Ok(Scene {
         splats: read_scene(&file, Frame::Own, observe)?.splats,
@@ -190,6 +199,8 @@ fn open(options: &ExportOptions, observe: &mut Observer<'_>) -> Result<Scene, Ru
         surroundings: report.luma.surroundings,
         colmap: Some(options.colmap.clone().unwrap_or(noted)),
         load: report.capture.load,
+        photos: report.capture.photos,
+        _kept: kept.keep(),
     })
 }
 

@@ -4,11 +4,12 @@ use std::{path::Path, sync::Arc};
 
 use glam::DVec3;
 
-use super::{Event, Observer, RunError, Stage};
+use super::{Event, Observer, RunError, Stage, fingerprint::check_poses};
 use crate::{
     capture::{Camera, Capture, LoadOptions, Loader, split},
     gpu::Gpu,
     raster::{Raster, RasterOptions},
+    report::PhotoReport,
     splats::Splats,
     viewers::{self, FitSettings, Viewer, ViewerChoice},
 };
@@ -41,6 +42,8 @@ pub(super) struct Cameras<'a> {
     pub colmap: Option<&'a Path>,
     /// How its photos are loaded.
     pub load: LoadOptions,
+    /// The photos and poses that the scene was trained with; none where nobody knows.
+    pub photos: &'a [PhotoReport],
     /// What the scene's centers lack of COLMAP's, in world units.
     pub moved: DVec3,
 }
@@ -104,6 +107,7 @@ impl Cameras<'_> {
             return Err(RunError::NoCameras(self.of.to_owned()));
         };
         let capture = Capture::load_with(colmap, &self.load.capture())?;
+        check_poses(&capture, self.photos)?;
         let chosen = split(&capture.views, self.load.holdout);
         let loader = Loader::new(LoadOptions {
             max_side: Some(self.load.max_side.unwrap_or(most_side).min(most_side)),

@@ -1,15 +1,16 @@
 //! Files that are whole or not there.
 
 use std::{
-    io::{self, BufWriter, Write},
-    path::Path,
+    fs,
+    io::{self, BufWriter, Read, Write},
+    path::{Path, PathBuf},
 };
 
 use image::{DynamicImage, ImageBuffer, RgbImage};
 
-use super::RunError;
+use super::{RunError, RunFolder};
 use crate::{
-    disk::{self, folder_of},
+    disk::{self, folder_of, trust},
     frames::Colored,
     input,
     splats::Format,
@@ -55,7 +56,7 @@ pub(super) fn write_png(path: &Path, image: &RgbImage) -> Result<(), RunError> {
             path: path.to_owned(),
             reason: error.to_string(),
         })?;
-    write(path, bytes.get_ref())
+    write(path, &marked(bytes.into_inner()))
 }
 
 /// Writes a photo in color as a PNG of its depth, beside and renamed.
@@ -75,7 +76,99 @@ pub(super) fn write_colored(path: &Path, colored: Colored) -> Result<(), RunErro
     image
         .write_to(&mut bytes, image::ImageFormat::Png)
         .map_err(|error| failed(error.to_string()))?;
-    write(path, bytes.get_ref())
+    write(path, &marked(bytes.into_inner()))
+}
+
+/// PNG: the signature and the header, which come before all else.
+const PNG_HEADER: usize = 8 + 25;
+
+/// PNG's keyword for the program that made a picture, and its value, as text chunks have them.
+const MADE_HERE: &[u8] = b"tEXtSoftware\0gs-chroma";
+
+/// A PNG that says which program made it.
+fn marked(mut png: Vec<u8>) -> Vec<u8> {
+    let length = (MADE_HERE.len() - 4) as u32;
+    let mut sum = flate2::Crc::new();
+    sum.update(MADE_HERE);
+    let chunk = [
+        &length.to_be_bytes()[..],
+        MADE_HERE,
+        &sum.sum().to_be_bytes(),
+    ]
+    .concat();
+    png.splice(PNG_HEADER..PNG_HEADER, chunk);
+    png
+}
+
+/// Whether this program made a picture.
+fn is_ours(path: &Path) -> bool {
+    let mut begin = [0; PNG_HEADER + 4 + MADE_HERE.len()];
+    let read = input::open(path).and_then(|mut file| file.read_exact(&mut begin));
+    read.is_ok() && begin.ends_with(MADE_HERE)
+}
+
+/// Files that systems put into folders by themselves.
+const OF_SYSTEMS: [&str; 3] = [".DS_Store", "Thumbs.db", "desktop.ini"];
+
+/// Makes a folder for pictures, see [`make_folder`]. It may hold earlier ones of this program.
+///
+/// # Errors
+/// [`RunError::File`] where it holds anything else, which pictures would be mixed with or
+/// replace.
+pub(super) fn make_pictures_folder(path: &Path) -> Result<(), RunError> {
+    if let Some(other) = other_file(path) {
+        return Err(not_empty(path, &other));
+    }
+    make_folder(path)
+}
+
+/// A file in a folder or below it that this program has not made as a picture.
+fn other_file(folder: &Path) -> Option<PathBuf> {
+    let mut folders = vec![folder.to_owned()];
+    while let Some(current) = folders.pop() {
+        for entry in fs::read_dir(&current).into_iter().flatten().flatten() {
+            let (path, name) = (entry.path(), entry.file_name());
+            if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
+                folders.push(path);
+            } else if !(OF_SYSTEMS.iter().any(|known| name == *known) || is_ours(&path)) {
+                return Some(path);
+            }
+        }
+    }
+    None
+}
+
+/// Makes a run's folder, see [`make_folder`]. It is a run already, or prepared for one, or empty
+/// but for what runs may hold.
+///
+/// # Errors
+/// [`RunError::File`] where it holds something else.
+pub(super) fn make_run_folder(folder: &RunFolder) -> Result<(), RunError> {
+    let path = folder.path();
+    let known = |name: &str| name.starts_with('.') || OF_RUNS.contains(&name);
+    let entries = || fs::read_dir(path).into_iter().flatten().flatten();
+    let begun = || entries().any(|entry| BEGUN.iter().any(|begun| entry.file_name() == *begun));
+    let other = entries().find(|entry| !known(&entry.file_name().to_string_lossy()));
+    match other {
+        Some(other) if !begun() => Err(not_empty(path, &other.path())),
+        _ => make_folder(path),
+    }
+}
+
+/// Files by which a folder is a run, or is to become one.
+const BEGUN: [&str; 4] = [".lock", "report.json", "checkpoint", "block.json"];
+
+/// Folders and files that may be there before a run is, beside hidden ones.
+const OF_RUNS: [&str; 4] = ["teacher", "settings.json", "stderr.txt", "desktop.ini"];
+
+fn not_empty(folder: &Path, other: &Path) -> RunError {
+    RunError::File {
+        path: folder.to_owned(),
+        reason: format!(
+            "holds files that this command did not write, such as {}; name a new or an empty folder with -o",
+            other.strip_prefix(folder).unwrap_or(other).display()
+        ),
+    }
 }
 
 /// Makes a folder and those above it, and tries whether it can be written to:
@@ -110,13 +203,20 @@ fn no_folder(path: &Path) -> Result<(), RunError> {
 /// The format that a splat file's name tells, where no folder has this name.
 pub(super) fn format_of(path: &Path) -> Result<Format, RunError> {
     no_folder(path)?;
+    check_no_original(path)?;
     Ok(Format::to_write(path)?)
 }
 
 /// Makes the folder that a file will be written to, see [`make_folder`].
 pub(crate) fn make_folder_of(path: &Path) -> Result<(), RunError> {
     no_folder(path)?;
+    check_no_original(path)?;
     make_folder(folder_of(path))
+}
+
+/// Refuses a file for a command's output that is one of its originals.
+fn check_no_original(path: &Path) -> Result<(), RunError> {
+    trust::check_no_original(path).map_err(at(path))
 }
 
 /// What makes a folder a page that may be replaced.

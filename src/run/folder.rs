@@ -6,15 +6,36 @@ use std::{
     time::SystemTime,
 };
 
-use super::{RunError, files, lock::finish_what_is_left};
+use super::{RunError, files, fingerprint::hashed, lock::finish_what_is_left};
 use crate::{
+    disk::trust,
     input,
     report::Report,
     splats::{ShField, npy},
 };
 
+/// The run in a folder of `auto`'s results.
+pub(crate) const OF_AUTO: &str = "run";
+
 /// Where runs go unless told otherwise.
 const RUNS: &str = "runs";
+
+/// Files and folders of a run that commands write together.
+pub(super) const ENTRIES: [&str; 10] = [
+    "luma.ply",
+    "color.ply",
+    "chroma.npy",
+    "report.json",
+    "log.csv",
+    "contact-sheet.png",
+    "eval.json",
+    "eval",
+    "checkpoint",
+    "checkpoint-color",
+];
+
+/// The folder of the teacher's answers.
+const TEACHER: &str = "teacher";
 
 /// The folder of one run; docs/run-folder.md lists what lies in it.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -31,6 +52,19 @@ impl RunFolder {
         let resolved = fs::canonicalize(colmap_dir).unwrap_or_else(|_| colmap_dir.to_owned());
         let name = resolved.file_name().unwrap_or("scene".as_ref());
         Self(Path::new(RUNS).join(name))
+    }
+
+    /// The run at `path`, or that of `auto`'s results there; the newest where none is named.
+    ///
+    /// # Errors
+    /// [`RunError::NoRun`].
+    pub fn find(path: Option<&Path>) -> Result<Self, RunError> {
+        let Some(path) = path else {
+            return Self::newest();
+        };
+        let (named, below) = (Self::at(path), Self::at(&path.join(OF_AUTO)));
+        let is_below = !named.report().exists() && below.report().is_file();
+        Ok(if is_below { below } else { named })
     }
 
     /// The run under `runs/` whose report is newest.
@@ -102,7 +136,7 @@ impl RunFolder {
 
     /// The teacher's cached answers.
     pub fn teacher(&self) -> PathBuf {
-        self.0.join("teacher")
+        self.0.join(TEACHER)
     }
 
     /// Photo, luma, teacher and color side by side.
@@ -110,12 +144,25 @@ impl RunFolder {
         self.0.join("contact-sheet.png")
     }
 
+    /// Refuses a run whose files are elsewhere: a folder may come from somebody else.
+    ///
+    /// # Errors
+    /// [`RunError::File`].
+    pub(super) fn check_links(&self) -> Result<(), RunError> {
+        for name in ENTRIES.into_iter().chain([TEACHER]) {
+            let path = self.0.join(name);
+            trust::check_inside(&self.0, &path).map_err(files::at(&path))?;
+        }
+        Ok(())
+    }
+
     /// Reads the report.
     ///
     /// # Errors
-    /// [`RunError::File`] when there is none or it is damaged.
+    /// [`RunError::File`] when there is none or it is damaged, and as [`Self::check_links`].
     pub fn read_report(&self) -> Result<Report, RunError> {
-        finish_what_is_left(&self.0);
+        self.check_links()?;
+        finish_what_is_left(&self.0)?;
         let path = self.report();
         let text = input::read_to_string(&path).map_err(|error| RunError::File {
             path: path.clone(),
@@ -125,6 +172,26 @@ impl RunFolder {
             path,
             reason: format!("damaged ({error}): run `gs-chroma fit` again"),
         })
+    }
+
+    /// Refuses files of the run that its report does not describe: those of another run.
+    ///
+    /// # Errors
+    /// [`RunError::OtherFile`], and [`RunError::File`] where one cannot be read.
+    pub(super) fn check_files(&self, report: &Report, paths: &[PathBuf]) -> Result<(), RunError> {
+        // Reports of former versions describe none.
+        if report.files.is_empty() {
+            return Ok(());
+        }
+        for path in paths.iter().filter(|path| path.exists()) {
+            let known = report.files.iter().find(|file| path.ends_with(&file.name));
+            let known = known.ok_or_else(|| RunError::OtherFile(path.clone()))?;
+            let now = hashed(path, Some([&known.stamp, &known.sha256])).map_err(files::at(path))?;
+            if now[1] != known.sha256 {
+                return Err(RunError::OtherFile(path.clone()));
+            }
+        }
+        Ok(())
     }
 
     /// Reads the native chroma of `count` Gaussians, CIELAB a and b; none where

@@ -23,9 +23,13 @@ pub fn info(path: &Path, observe: &mut Observer<'_>) -> Result<Value, RunError> 
     if path.is_file() {
         return splat_info(path, observe);
     }
-    let folder = RunFolder::at(path);
+    let folder = RunFolder::find(Some(path))?;
     if folder.report().is_file() {
         let report = folder.read_report()?;
+        let all = [folder.luma(), folder.color(), folder.chroma()];
+        if let Err(error) = folder.check_files(&report, &all) {
+            observe(Event::Warning(error.to_string()));
+        }
         return Ok(serde_json::to_value(report).unwrap_or_default());
     }
     colmap_info(path, observe)

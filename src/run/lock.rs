@@ -2,7 +2,7 @@
 
 use std::{
     fs::{File, TryLockError},
-    io::Write,
+    io::{self, Write},
     path::Path,
 };
 
@@ -50,6 +50,9 @@ impl RunLock {
                 // Some file systems cannot lock.
                 Ok(()) | Err(TryLockError::Error(_)) => Some(Self { _file: file }),
             },
+            Err(error) if error.kind() == io::ErrorKind::InvalidInput => {
+                return Err(files::at(&path)(error));
+            }
             // Where nobody can write there is nothing to keep anybody from.
             Err(_) => None,
         };
@@ -62,6 +65,7 @@ impl RunLock {
     /// # Errors
     /// [`RunError::InUse`], [`RunError::File`].
     pub fn take(folder: &Path) -> Result<Self, RunError> {
+        RunFolder::at(folder).check_links()?;
         let path = folder.join(LOCK);
         let mut file = disk::open_in_place(&path).map_err(files::at(&path))?;
         match file.try_lock() {
@@ -107,11 +111,15 @@ fn holder(path: &Path) -> String {
 }
 
 /// Finishes what a process has left complete, unless somebody is about to.
-pub(super) fn finish_what_is_left(folder: &Path) {
-    if commit::is_left(folder) {
+///
+/// # Errors
+/// [`RunError::File`] where no process of this program has left it.
+pub(super) fn finish_what_is_left(folder: &Path) -> Result<(), RunError> {
+    if commit::left(folder)?.is_some() {
         // Whoever holds the lock does it.
         let _: Result<RunLock, RunError> = RunLock::take(folder);
     }
+    Ok(())
 }
 
 #[cfg(test)]

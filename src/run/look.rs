@@ -10,6 +10,8 @@ use image::RgbImage;
 
 use super::{
     Event, Observer, RunError, RunFolder, Stage,
+    fingerprint::check_poses,
+    originals::Kept,
     scene::{Frame, open, read_scene},
     teach::{TeachOptions, Teachers},
 };
@@ -19,6 +21,7 @@ use crate::{
         native_rgb,
         teacher::{GrayImage, Query},
     },
+    disk::trust::Originals,
     input,
     raster::{Picture, RasterOptions, constants::NEAR_SHARE},
     report::{Report, to_image},
@@ -60,6 +63,8 @@ pub struct Look {
     scenes: Vec<(SceneKind, PathBuf)>,
     frame: Frame,
     teachers: Mutex<Asked>,
+    /// Files that are not written over.
+    _kept: Originals,
 }
 
 /// The run's teachers, opened when they are asked for the first time.
@@ -84,8 +89,7 @@ impl Look {
         observe(Event::begins(Stage::Model));
         match run {
             Some(path) if is_splat_file(path)? => Self::of_file(path, colmap, observe),
-            Some(path) => Self::of_run(RunFolder::at(path), colmap, observe),
-            None => Self::of_run(RunFolder::newest()?, colmap, observe),
+            run => Self::of_run(RunFolder::find(run)?, colmap, observe),
         }
     }
 
@@ -106,6 +110,7 @@ impl Look {
             frame: (dataset.as_ref()).map_or(Frame::Own, |d| Frame::World(d.capture.offset)),
             dataset,
             teachers: Mutex::new(Asked::NotYet),
+            _kept: Kept::default().with(path, "the splat file").keep(),
         })
     }
 
@@ -120,7 +125,11 @@ impl Look {
             ..report.capture.load.clone()
         };
         let noted = PathBuf::from(&report.capture.path);
-        let dataset = match open(colmap.unwrap_or(&noted), &load, &mut |_| {}) {
+        let opened = open(colmap.unwrap_or(&noted), &load, &mut |_| {}).and_then(|dataset| {
+            check_poses(&dataset.capture, &report.capture.photos)?;
+            Ok(dataset)
+        });
+        let dataset = match opened {
             Ok(dataset) => Some(dataset.caching(CACHE_BYTES)),
             Err(error) if colmap.is_none() => {
                 observe(Event::Warning(format!(
@@ -139,6 +148,7 @@ impl Look {
         let name = here.file_name().unwrap_or(here.as_os_str());
         Ok(Self {
             name: name.to_string_lossy().into_owned(),
+            _kept: Kept::default().with_run(&folder, &report).keep(),
             report: Some(report),
             dataset,
             scenes: all.into_iter().filter(|(_, path)| path.exists()).collect(),
@@ -166,6 +176,9 @@ impl Look {
         let Some((_, path)) = path else {
             return Ok(None);
         };
+        if let (Some(folder), Some(report)) = (&self.folder, &self.report) {
+            folder.check_files(report, std::slice::from_ref(path))?;
+        }
         let scene = read_scene(path, self.frame, observe)?;
         let drawn = (self.report.as_ref())
             .map_or(scene.drawn, |report| report.luma.settings.raster_options());

@@ -9,7 +9,7 @@ use std::{
 
 use super::{
     Event, Observer, RunError, RunFolder, Stage, files,
-    fingerprint::of_files,
+    fingerprint::of_photos,
     fit::{GrayFiles, capture_report, open_gpu},
     keeping,
     lock::RunLock,
@@ -68,7 +68,7 @@ pub fn merge(
         Some(path) => RunFolder::at(path),
         None => RunFolder::for_capture(&options.job),
     };
-    files::make_folder(folder.path())?;
+    files::make_run_folder(&folder)?;
     let _lock = RunLock::take(folder.path())?;
     let coarse = options.job.join(COARSE);
     let load = LoadOptions {
@@ -93,9 +93,9 @@ pub fn merge(
     let rows = gray_rows(&raster, &dataset, &splats, &shown)?;
     let seams = seam_views(&dataset.capture, &job, &views, None);
 
-    let report = Report {
+    let mut report = Report {
         capture: CaptureReport {
-            photos: of_files(&dataset.capture)?,
+            photos: of_photos(&dataset.capture, &[])?,
             ..capture_report(&job.capture, &dataset)
         },
         warnings: warnings.take(),
@@ -130,7 +130,7 @@ pub fn merge(
         splats: &splats,
         rows: &rows,
         log: &log,
-        report: &report,
+        report: &mut report,
     }
     .write(&folder)?;
     Ok((folder, report, seams))
@@ -157,6 +157,7 @@ fn trained(folder: &Path, job: &Job) -> Result<Vec<Trained>, RunError> {
             )));
         }
         let report = run.read_report()?;
+        run.check_files(&report, &[run.luma()])?;
         if let Some(first) = blocks.first() {
             let alike = |report: &Report| {
                 (

@@ -27,6 +27,7 @@ mod log;
 mod look;
 mod loss;
 mod merge;
+mod originals;
 mod partition;
 mod picture_names;
 mod plan;
@@ -210,6 +211,23 @@ pub enum RunError {
         /// Its name then.
         other: String,
     },
+    /// Photos have other poses than when they were trained on.
+    #[error(
+        "{}: {moved} of {photos} photos have another pose or camera than when the scene was trained, such as {photo}", folder.display()
+    )]
+    OtherModel {
+        /// The COLMAP folder.
+        folder: PathBuf,
+        /// One of these photos.
+        photo: String,
+        /// How many there are.
+        moved: usize,
+        /// Photos in all.
+        photos: usize,
+    },
+    /// A run's file is not the one that its report describes.
+    #[error("{}: is not the file that this run wrote", .0.display())]
+    OtherFile(PathBuf),
     /// There is no training that was interrupted.
     #[error("{}: nothing to continue: the run is finished", .0.display())]
     NothingToResume(PathBuf),

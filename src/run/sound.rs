@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::{
     Event, Observer, RunError, Stage,
-    fingerprint::{Changes, Fingerprint, of_files},
+    fingerprint::{Changes, Fingerprint, of_photos},
     scene,
 };
 use crate::{
@@ -18,7 +18,7 @@ use crate::{
         Agreement, Cause, Contradiction, Contradictory, Evidence, FEW_POINTS, PointColors,
         Reprojection, Survey, Unseeing, listed, observe_where_projected,
     },
-    report::PhotoReport,
+    report::{CaptureReport, PhotoReport},
 };
 
 /// Fewer photos make no scene: before as few are left, all are used.
@@ -89,7 +89,7 @@ pub(super) fn open_checked(
 ///
 /// # Errors
 /// As [`open_checked`], and as [`open_examined`] where photos have changed;
-/// [`RunError::Exchanged`].
+/// [`RunError::OtherModel`], [`RunError::Exchanged`].
 pub(super) fn open_trusted(
     dir: &Path,
     options: &LoadOptions,
@@ -97,41 +97,73 @@ pub(super) fn open_trusted(
     observe: &mut Observer<'_>,
 ) -> Result<Dataset, RunError> {
     let dataset = open_checked(dir, options, observe)?;
-    // Runs of former versions say nothing, and other light is another file.
-    if trained.is_empty() {
-        return Ok(dataset);
+    match tell_changes(&dataset.capture, trained, options.force, observe)? {
+        true => Ok(open_examined(dir, options, observe)?.dataset),
+        false => Ok(dataset),
     }
-    let now = of_files(&dataset.capture)?;
-    let Changes {
-        changed,
-        gone,
-        exchanged,
-    } = Changes::between(trained, &now);
-    if let Some([photo, other]) = exchanged.filter(|_| !options.force) {
+}
+
+/// The same without a word about the model, for commands that do not learn from photos.
+///
+/// # Errors
+/// As [`open_trusted`].
+pub(super) fn open_same(
+    dir: &Path,
+    options: &LoadOptions,
+    trained: &CaptureReport,
+    observe: &mut Observer<'_>,
+) -> Result<Dataset, RunError> {
+    let dataset = scene::open(dir, options, observe)?;
+    let force = trained.load.force;
+    match tell_changes(&dataset.capture, &trained.photos, force, observe)? {
+        true => {
+            let options = LoadOptions {
+                force,
+                ..options.clone()
+            };
+            Ok(open_examined(dir, &options, observe)?.dataset)
+        }
+        false => Ok(dataset),
+    }
+}
+
+/// Compares photos and poses with those that were trained on, and tells what differs; whether
+/// photos have changed.
+fn tell_changes(
+    capture: &Capture,
+    trained: &[PhotoReport],
+    force: bool,
+    observe: &mut Observer<'_>,
+) -> Result<bool, RunError> {
+    // Runs of former versions say nothing.
+    if trained.is_empty() {
+        return Ok(false);
+    }
+    let found = Changes::between(trained, &of_photos(capture, trained)?);
+    found.check_poses(&capture.root)?;
+    if let Some([photo, other]) = found.exchanged.filter(|_| !force) {
         return Err(RunError::Exchanged {
-            folder: dataset.capture.root.clone(),
-            photo: photo.to_owned(),
-            other: other.to_owned(),
+            folder: capture.root.clone(),
+            photo,
+            other,
         });
     }
-    if let [first, ..] = gone[..] {
+    let folder = capture.root.display();
+    if let Some(first) = found.gone.first() {
         observe(Event::Warning(format!(
-            "{} of {} training photos are missing in {} (such as {first}): they are not used for color",
-            gone.len(),
+            "{} of {} training photos are missing in {folder} (such as {first}): they are not used for color",
+            found.gone.len(),
             trained.len(),
-            dir.display()
         )));
     }
-    let [first, ..] = changed[..] else {
-        return Ok(dataset);
-    };
-    observe(Event::Warning(format!(
-        "{} of {} photos in {} are not what was trained on (such as {first})",
-        changed.len(),
-        now.len(),
-        dir.display()
-    )));
-    Ok(open_examined(dir, options, observe)?.dataset)
+    if let Some(first) = found.changed.first() {
+        observe(Event::Warning(format!(
+            "{} of {} photos in {folder} are not what was trained on (such as {first})",
+            found.changed.len(),
+            found.photos,
+        )));
+    }
+    Ok(!found.changed.is_empty())
 }
 
 /// Opens a COLMAP folder, judges the model and leaves of its observations what is of use.

@@ -14,11 +14,12 @@ impl FitOptions {
     /// # Errors
     /// [`RunError::File`] where the run's report is damaged.
     pub fn continuing(run: &Path) -> Result<Option<Self>, RunError> {
-        let folder = RunFolder::at(run);
+        let folder = RunFolder::find(Some(run))?;
         if !(folder.report().exists() && folder.luma().exists()) {
             return Ok(None);
         }
         let report = folder.read_report()?;
+        folder.check_files(&report, &[folder.luma()])?;
         let named = |on| {
             let of_kind = report.effects.iter().filter(move |effect| effect.on == on);
             of_kind.map(|effect| effect.name).collect()
@@ -28,7 +29,7 @@ impl FitOptions {
         let [_, last] = settings.rates.means;
         settings.rates.means = [last; 2];
         Ok(Some(Self {
-            output: Some(run.to_owned()),
+            output: Some(folder.path().to_owned()),
             preset: Some(report.preset),
             settings: Box::new(move |asked| asked.clone_from(&settings)),
             overrules: Overrules {
@@ -38,12 +39,12 @@ impl FitOptions {
             },
             load: report.capture.load,
             measure_side: report.luma.measured_side,
+            block: BlockPlace::read(folder.path())?,
             init: Some(Init::Run {
                 folder,
                 iterations: report.luma.iterations,
                 surroundings: report.luma.surroundings,
             }),
-            block: BlockPlace::read(run)?,
             ..Self::new(
                 fs::canonicalize(&report.capture.path).unwrap_or(report.capture.path.into()),
             )

@@ -16,7 +16,7 @@ use super::{
     checkpoints::{CheckpointOptions, tell_given_up},
     commit::Commit,
     files,
-    fingerprint::of_files,
+    fingerprint::{check_poses, of_file, of_photos},
     keeping,
     lock::RunLock,
     scene::{open, written_as},
@@ -171,7 +171,7 @@ pub fn fit(
         Some(path) => RunFolder::at(path),
         None => RunFolder::for_capture(&options.colmap_dir),
     };
-    files::make_folder(folder.path())?;
+    files::make_run_folder(&folder)?;
     let _lock = RunLock::take(folder.path())?;
     let ahead = Ahead::open(&options.ahead, &folder)?;
     let found = match options.checkpoints.resume {
@@ -193,6 +193,9 @@ pub fn fit(
     };
     let examined = open_examined(&options.colmap_dir, &load, observe)?;
     let (mut dataset, evidence) = (examined.dataset, examined.evidence);
+    if let Some(Init::Run { folder, .. }) = &options.init {
+        check_poses(&dataset.capture, &folder.read_report()?.capture.photos)?;
+    }
     // Rates are in proportion to it.
     let whole = options.block.as_ref().and_then(BlockPlace::extent);
     dataset.extent = whole.unwrap_or(dataset.extent);
@@ -230,7 +233,7 @@ pub fn fit(
         raster: &raster,
         dataset: &dataset,
         evidence: &evidence,
-        photos: &of_files(&dataset.capture)?,
+        photos: &of_photos(&dataset.capture, &[])?,
         among: start,
         judge: judge.as_ref().unwrap_or(&dataset),
         begun,
@@ -239,7 +242,7 @@ pub fn fit(
     let trained = ahead.meanwhile(&dataset, observe, |observe| {
         job.train(&budget, &folder, question, found.as_ref(), observe)
     })?;
-    let report = Report {
+    let mut report = Report {
         warnings: warnings.take(),
         ..job.report(budget.preset, &trained)
     };
@@ -248,7 +251,7 @@ pub fn fit(
         splats: &trained.scene.splats,
         rows: &trained.rows,
         log: &trained.log,
-        report: &report,
+        report: &mut report,
     }
     .write(&folder)?;
     match options.goal.psnr().and_then(|psnr| trained.misses(psnr)) {
@@ -264,7 +267,8 @@ pub(super) struct GrayFiles<'a> {
     pub rows: &'a [Row],
     /// `log.csv`.
     pub log: &'a str,
-    pub report: &'a Report,
+    /// Told of the file with the scene.
+    pub report: &'a mut Report,
 }
 
 impl GrayFiles<'_> {
@@ -272,7 +276,7 @@ impl GrayFiles<'_> {
     ///
     /// # Errors
     /// [`RunError::File`] and [`RunError::Splats`].
-    pub fn write(&self, folder: &RunFolder) -> Result<(), RunError> {
+    pub fn write(self, folder: &RunFolder) -> Result<(), RunError> {
         let mut commit = Commit::new(folder.path())?;
         // The old colors do not belong to the new geometry.
         for stale in [
@@ -287,7 +291,9 @@ impl GrayFiles<'_> {
         commit.remove_page(&folder.evaluation_page());
         let drawn = self.report.luma.settings.raster_options();
         let options = written_as(drawn, self.report.capture.offset.into());
-        write_splats(&commit.place(&folder.luma()), self.splats, &options)?;
+        let luma = commit.place(&folder.luma());
+        write_splats(&luma, self.splats, &options)?;
+        self.report.files = vec![of_file(&luma)?];
         let sheet = contact_sheet(&GRAY_COLUMNS, self.rows);
         files::write_png(&commit.place(&folder.contact_sheet()), &sheet)?;
         files::write(&commit.place(&folder.log()), self.log.as_bytes())?;

@@ -36,6 +36,7 @@ impl Job<'_> {
             preset,
             effects: EffectReport::of(&scene.plan.decisions),
             warnings: Vec::new(),
+            files: Vec::new(),
             luma: LumaReport {
                 settings: scene.settings.clone(),
                 iterations: scene.iterations + options.init.as_ref().map_or(0, Init::iterations),

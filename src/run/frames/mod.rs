@@ -20,7 +20,9 @@ use super::{
     fit::open_gpu,
     keeping,
     lock::RunLock,
-    scene::{Frame, open, read_scene},
+    originals::Kept,
+    scene::{Frame, read_scene},
+    sound::open_same,
     teach::{TeachOptions, Teachers},
 };
 use crate::{
@@ -90,14 +92,16 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
     let begun = std::time::Instant::now();
     let warnings = RefCell::default();
     let observe = &mut keeping(&warnings, observe);
-    let folder = match &options.run {
-        Some(path) => RunFolder::at(path),
-        None => RunFolder::newest()?,
-    };
+    let folder = RunFolder::find(options.run.as_deref())?;
     observe(Event::begins(Stage::Model));
     let (_lock, report) = RunLock::to_read(&folder)?;
+    let named = options.teacher.iter().chain(&options.hints);
+    let named = Kept::default().with_all(named, "a file of a teacher or a hint");
+    let kept = named.with_all(&options.colmap, "a file of the COLMAP folder");
+    let _kept = kept.with_run(&folder, &report).keep();
     let noted = PathBuf::from(&report.capture.path);
     let colmap_dir = options.colmap.clone().unwrap_or(noted);
+    folder.check_files(&report, &[folder.luma(), folder.chroma()])?;
     let scene = read_scene(&folder.luma(), Frame::Own, observe)?;
     let chroma = folder.read_chroma(scene.splats.len())?;
     let chroma = chroma.ok_or_else(|| RunError::NoColors(folder.path().to_owned()))?;
@@ -105,7 +109,7 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
         force: true,
         ..report.capture.load.clone()
     };
-    let dataset = open(&colmap_dir, &load, observe)?.caching(0);
+    let dataset = open_same(&colmap_dir, &load, &report.capture, observe)?.caching(0);
     let film = Film::read(&colmap_dir)?;
     // At the rate of the film that the photos come from.
     let rate = options

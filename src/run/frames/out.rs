@@ -26,7 +26,7 @@ impl Out {
         shots: &[Shot],
     ) -> Result<Self, RunError> {
         if !is_film(&options.output) {
-            files::make_folder(&options.output)?;
+            files::make_pictures_folder(&options.output)?;
             for shot in shots {
                 if let Some(folder) = options.output.join(&shot.output).parent() {
                     files::make_folder(folder)?;

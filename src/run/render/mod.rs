@@ -65,7 +65,7 @@ pub fn render(options: &RenderOptions, observe: &mut Observer<'_>) -> Result<usi
     if chosen.is_empty() {
         return Err(RunError::NoHeldOut);
     }
-    files::make_folder(&options.output)?;
+    files::make_pictures_folder(&options.output)?;
     let names = picture_names(&capture.views);
     observe(Event::begins(Stage::Device));
     let gpu = Gpu::open()?;

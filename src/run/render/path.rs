@@ -8,7 +8,6 @@ use image::{GenericImage, RgbImage};
 use super::subject::Subject;
 use crate::{
     capture::{Camera, Loader, split},
-    disk::folder_of,
     gpu::Gpu,
     raster::{Raster, SceneRenderer},
     report::to_image,
@@ -97,7 +96,7 @@ pub fn render_path(
     let path = Path::of(options, &subject)?;
     let rate = f64::from(path.rate[0]) / f64::from(path.rate[1]);
     if let Some(file) = &options.save_path {
-        files::make_folder(folder_of(file))?;
+        files::make_folder_of(file)?;
         let back = |camera: &Camera| camera.recentered(-subject.offset);
         let world: Vec<Camera> = path.cameras.iter().map(back).collect();
         write_path(file, &world, rate)?;
@@ -245,10 +244,10 @@ struct Out {
 impl Out {
     fn open(options: &PathOptions, rate: [u32; 2]) -> Result<Self, RunError> {
         if let Some(folder) = &options.output {
-            files::make_folder(folder)?;
+            files::make_pictures_folder(folder)?;
         }
         let film = options.video.as_ref().map(|video| {
-            files::make_folder(folder_of(video))?;
+            files::make_folder_of(video)?;
             Ok::<_, RunError>(FilmWriter::new(video, rate, Purpose::Viewing)?)
         });
         Ok(Self {

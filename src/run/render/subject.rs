@@ -6,9 +6,12 @@ use glam::DVec3;
 
 use crate::{
     capture::{Capture, LoadOptions},
+    disk::trust::Originals,
     raster::RasterOptions,
     run::{
         Event, Observer, RunError, RunFolder, Stage,
+        fingerprint::check_poses,
+        originals::Kept,
         scene::{Frame, read_scene},
     },
     splats::{Splats, is_splat_file},
@@ -35,6 +38,8 @@ pub(super) struct Subject {
     pub offset: DVec3,
     /// Run folder, unless a splat file was named.
     pub run: Option<RunFolder>,
+    /// Files that are not written over.
+    _kept: Originals,
 }
 
 impl Subject {
@@ -69,6 +74,7 @@ impl Subject {
         let load = LoadOptions::default();
         let load_capture = |dir| Capture::load_with(dir, &load.capture());
         let capture = colmap.map(load_capture).transpose()?;
+        let kept = colmap.map_or_else(Kept::default, |dir| Kept::default().with_capture(dir, None));
         let frame = match &capture {
             Some(capture) => Frame::World(capture.offset),
             None => Frame::Own,
@@ -85,6 +91,7 @@ impl Subject {
             load,
             foreign: true,
             run: None,
+            _kept: kept.with(path, "the splat file").keep(),
         })
     }
 
@@ -94,10 +101,7 @@ impl Subject {
         luma: bool,
         observe: &mut Observer<'_>,
     ) -> Result<Self, RunError> {
-        let folder = match path {
-            Some(path) => RunFolder::at(path),
-            None => RunFolder::newest()?,
-        };
+        let folder = RunFolder::find(path)?;
         let report = folder.read_report()?;
         let colored = !luma && folder.color().exists();
         let file = match colored {
@@ -105,9 +109,12 @@ impl Subject {
             false => folder.luma(),
         };
         observe(Event::begins(Stage::Model));
+        let kept = Kept::default().with_run(&folder, &report);
+        folder.check_files(&report, &[file.clone(), folder.luma()])?;
         let load = report.capture.load;
         let noted = PathBuf::from(&report.capture.path);
         let capture = Capture::load_with(colmap.unwrap_or(&noted), &load.capture())?;
+        check_poses(&capture, &report.capture.photos)?;
         let scene = read_scene(&file, Frame::Own, observe)?;
         Ok(Self {
             file,
@@ -117,6 +124,7 @@ impl Subject {
             capture: Some(capture),
             load,
             foreign: false,
+            _kept: kept.keep(),
             run: Some(folder),
         })
     }

@@ -1,0 +1,98 @@
+//! Files that no command writes over: photos, masks, hints, films, scenes that were named, and a
+//! run's own files, which commands replace together or not at all.
+
+use std::{
+    collections::HashMap,
+    path::{Path, PathBuf},
+};
+
+use serde_json::Value;
+
+use super::{RunFolder, folder::ENTRIES};
+use crate::{
+    capture::{FRAMES, Film, IMAGES, MaskSource, names::visit_files},
+    disk::trust::{FileId, Originals},
+    input,
+    report::Report,
+};
+
+/// Originals of a command, each by its file.
+#[derive(Default)]
+pub(crate) struct Kept(HashMap<FileId, &'static str>);
+
+impl Kept {
+    /// Adds a file, or every file below a folder. What is not there needs no keeping.
+    pub fn with(mut self, path: &Path, kind: &'static str) -> Self {
+        let mut add = |file: &Path| {
+            if let Some(id) = FileId::of(file) {
+                self.0.entry(id).or_insert(kind);
+            }
+        };
+        match path.is_dir() {
+            // A folder that cannot be read cannot be written over either.
+            true => drop(visit_files(path, &mut |_, file| add(&file))),
+            false => add(path),
+        }
+        self
+    }
+
+    /// Adds several, see [`Self::with`].
+    pub fn with_all<'a>(
+        self,
+        paths: impl IntoIterator<Item = &'a PathBuf>,
+        kind: &'static str,
+    ) -> Self {
+        paths
+            .into_iter()
+            .fold(self, |kept, path| kept.with(path, kind))
+    }
+
+    /// Adds photos, masks, model and film of a COLMAP folder, and what it was prepared from.
+    pub fn with_capture(self, root: &Path, masks: Option<&MaskSource>) -> Self {
+        let mut kept = self
+            .with(&root.join(IMAGES), "a photo")
+            .with(&root.join(FRAMES), "a frame of the film")
+            .with(&root.join("masks"), "a mask")
+            .with(&root.join("sparse"), "a file of the COLMAP model");
+        if let Some(MaskSource::Folder(folder)) = masks {
+            kept = kept.with(folder, "a mask");
+        }
+        if let Ok(Some(film)) = Film::read(root) {
+            kept = kept.with(&film.source, "the film that the photos come from");
+        }
+        let record = root.join("prepare.json");
+        let record = input::read(&record).ok();
+        let record = record.and_then(|text| serde_json::from_slice::<Value>(&text).ok());
+        let source = record.as_ref().and_then(|record| record["input"].as_str());
+        match source {
+            Some(source) => kept.with(Path::new(source), "an original"),
+            None => kept,
+        }
+    }
+
+    /// Adds what a run was made from, its teachers and hints, and its own files.
+    pub fn with_run(self, folder: &RunFolder, report: &Report) -> Self {
+        let root = Path::new(&report.capture.path);
+        let mut kept = self.with_capture(root, Some(&report.capture.load.masks));
+        if let Some(chroma) = &report.chroma {
+            let teachers = chroma.teachers.iter();
+            let teachers = teachers.filter_map(|teacher| teacher.path.as_ref());
+            let others = chroma.hint_folder.iter().chain(teachers);
+            for path in others {
+                kept = kept.with(Path::new(path), "a file of a teacher or a hint");
+            }
+        }
+        // Checkpoints are written where they are.
+        let own = ENTRIES
+            .into_iter()
+            .filter(|name| !name.starts_with("checkpoint"));
+        own.fold(kept, |kept, name| {
+            kept.with(&folder.path().join(name), "a file of the run")
+        })
+    }
+
+    /// Keeps them as long as what is given back lives.
+    pub fn keep(self) -> Originals {
+        Originals::keep(self.0)
+    }
+}
