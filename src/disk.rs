@@ -169,7 +169,9 @@ pub(crate) struct Draft {
 pub(crate) fn create(path: &Path) -> io::Result<Draft> {
     trust::check_no_original(path)?;
     step()?;
+    let suffix = draft_suffix(path);
     let mut builder = Builder::new();
+    builder.prefix(DRAFT).suffix(&suffix);
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
@@ -179,7 +181,57 @@ pub(crate) fn create(path: &Path) -> io::Result<Draft> {
     }
     let make = || builder.tempfile_in(folder_of(path)).map_err(plain);
     let (file, _listed) = Unfinished::made(make, NamedTempFile::path)?;
+    // So that others see that somebody is writing it; some file systems cannot lock. Where locks
+    // bind, FFmpeg could not fill it.
+    if cfg!(unix) {
+        let _ = file.as_file().try_lock();
+    }
     Ok(Draft { file, _listed })
+}
+
+/// Names of files that are not in their place yet begin so, go on with six letters and digits,
+/// and end in their later names.
+const DRAFT: &str = ".tmp";
+
+/// Bytes of a later name that a draft's has: longer names are not allowed everywhere.
+const LONGEST_SUFFIX: usize = 120;
+
+fn draft_suffix(path: &Path) -> String {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let end = name.floor_char_boundary(LONGEST_SUFFIX);
+    format!("-{}", &name[..end])
+}
+
+/// Whether a file of this name is or was a draft of `path`, or without one of any file.
+pub(crate) fn is_draft(name: &str, path: Option<&Path>) -> bool {
+    let Some((random, suffix)) = name
+        .strip_prefix(DRAFT)
+        .and_then(|rest| rest.split_at_checked(6))
+    else {
+        return false;
+    };
+    let ends = match path {
+        Some(path) => suffix == draft_suffix(path),
+        None => suffix.is_empty() || suffix.starts_with('-'),
+    };
+    ends && random.chars().all(char::is_alphanumeric)
+}
+
+/// Removes what processes that were killed have left of a file to be, or without one of any file
+/// in `folder`; what a process is writing stays.
+pub(crate) fn remove_drafts(folder: &Path, path: Option<&Path>) {
+    // Elsewhere nobody knows who is writing.
+    let entries = cfg!(unix).then(|| fs::read_dir(folder)).into_iter().flatten();
+    for entry in entries.flatten().flatten() {
+        let name = entry.file_name();
+        if is_draft(&name.to_string_lossy(), path)
+            && trust::check_own(&entry.path()).is_ok()
+            && File::open(entry.path()).is_ok_and(|file| file.try_lock().is_ok())
+        {
+            // It may have been renamed by now.
+            let _ = fs::remove_file(entry.path());
+        }
+    }
 }
 
 impl Draft {
@@ -370,6 +422,23 @@ mod tests {
         assert_eq!(fs::read(&path).unwrap(), b"whole");
         drop(create(&path).unwrap());
         assert_eq!(fs::read_dir(place.path()).unwrap().count(), 1);
+        // As killed processes leave them, and one that writes.
+        let writing = create(&path).unwrap();
+        for name in [
+            ".tmpAb12Cd-out",
+            ".tmpAb12Cd-other",
+            ".tmp-out",
+            ".tmpAb12Cd",
+        ] {
+            fs::write(place.path().join(name), "half").unwrap();
+        }
+        let left = fs::read_dir(place.path()).unwrap().count();
+        remove_drafts(place.path(), Some(&path));
+        let removed = usize::from(cfg!(unix));
+        assert_eq!(fs::read_dir(place.path()).unwrap().count(), left - removed);
+        remove_drafts(place.path(), None);
+        assert_eq!(fs::read_dir(place.path()).unwrap().count(), left - 3 * removed);
+        drop(writing);
         assert!(create(&place.path().join("no folder/out")).is_err());
     }
 

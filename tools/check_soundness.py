@@ -183,7 +183,54 @@ COMMANDS = {
         "render OUT/utm.ply --colmap CASES/export-georeferenced/scene -o OUT/utm-pictures",
     ],
     "export-georeferenced: COLMAP's": ["export OUT/utm --colmap-coordinates -o OUT/coarse.ply"],
+    "half-float-ply": ["info CASES/half-float-ply/half.ply"],
+    "ply-filter-3d": ["render CASES/ply-filter-3d/filter3d.ply --colmap CASES/_base --views test -o OUT/filtered"],
+    "spz-axes-extension": ["render CASES/spz-axes-extension/rub.spz --colmap CASES/_base --views test -o OUT/rub"],
+    "other-splat-formats: .lcc": ["info CASES/other-splat-formats/a.lcc"],
+    "other-splat-formats: .rad": ["export CASES/other-splat-formats/a.rad -o OUT/a.ply"],
+    "other-splat-formats: lod-meta.json": ["render CASES/other-splat-formats/lod-meta.json -o OUT/lod"],
+    "other-splat-formats: missing file": ["info CASES/other-splat-formats/nothere.ply"],
+    "rig-poses-stale: half a degree": ["info CASES/rig-poses-stale/half-degree"],
+    "external-weights-cache": [
+        f"fit CASES/_base {DRAFT} -o OUT/base",
+        "colorize OUT/base --rounds 1 --teacher CASES/external-weights-cache/a/net.onnx",
+        "colorize OUT/base --rounds 1 --teacher CASES/external-weights-cache/b/net.onnx",
+    ],
+    "teacher-ab-unit-range": ["colorize OUT/base --rounds 1 --teacher CASES/teacher-ab-unit-range/gan.onnx"],
+    "colored-images-in-wide-gamut: sRGB": [
+        "colorize OUT/base --rounds 2 --teacher CASES/colored-images-in-wide-gamut/srgb"
+    ],
+    "colored-images-in-wide-gamut: Adobe RGB": [
+        "colorize OUT/base --rounds 2 --teacher CASES/colored-images-in-wide-gamut/adobe"
+    ],
+    "frames-other-extension": ["frames OUT/base -o OUT/colored.avi"],
+    "frames-orientation": [
+        f"fit CASES/frames-orientation/capture {DRAFT} -o OUT/turned",
+        "colorize OUT/turned --rounds 1 --teacher assets/teacher/demo-teacher.onnx",
+        "frames OUT/turned -o OUT/turned-frames",
+    ],
 }
+
+# Cases of films, which need FFmpeg and COLMAP; FILM stands for the film's prepared folder.
+FILMS = {
+    "apac-sound": ("phone.mov", "frames OUT/film -o OUT/out.mp4"),
+    "sound-before-pictures": ("late.mkv", "frames OUT/film -o OUT/out.mp4"),
+    "frames-other-rate": ("../sound-before-pictures/late.mkv", "frames OUT/film -o OUT/out.mp4 --frame-rate 10"),
+    "hdr-film": ("pq.mp4", None),
+    "mpegts-first-frames: .mts": ("camcorder.mts", None),
+    "mpegts-first-frames: .ts": ("recording.ts", None),
+    "film-360": ("pano360.mp4", None),
+}
+for _name, (_film, _frames) in FILMS.items():
+    _folder = f"OUT/{_name.replace(':', '').replace(' ', '-')}"
+    _commands = [f"prepare CASES/{_name.split(':')[0]}/{_film} -o {_folder}"]
+    if _frames:
+        _commands += [
+            f"fit {_folder} {DRAFT} -o OUT/film",
+            "colorize OUT/film --rounds 1 --teacher assets/teacher/demo-teacher.onnx",
+            _frames,
+        ]
+    COMMANDS[_name] = _commands
 
 
 def both(*edits: Callable[[Path], None]) -> Callable[[Path], None]:

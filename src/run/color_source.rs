@@ -32,7 +32,6 @@ impl Source {
             run => {
                 let folder = RunFolder::find(run.as_deref())?;
                 let (lock, report) = RunLock::of_run(&folder)?;
-                folder.check_files(&report, &[folder.luma()])?;
                 Ok(Self {
                     report: Some(report),
                     _lock: Some(lock),

@@ -164,15 +164,14 @@ pub(super) fn left(folder: &Path) -> Result<Option<Left>, RunError> {
 
 /// Removes what processes that ended too early have begun. Nobody may be writing.
 pub(super) fn clean(folder: &Path) {
+    disk::remove_drafts(folder, None);
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let name = entry.file_name();
         let name = name.to_string_lossy();
         let emptied = name == COMPLETE && left(folder).is_ok_and(|left| left.is_none());
-        // `.tmp` and six letters is what a file is called before it has a name.
-        let begun = [BEGUN, ".tmp"].iter().any(|prefix| {
-            let rest = name.strip_prefix(prefix);
-            rest.is_some_and(|rest| rest.len() == 6 && rest.chars().all(char::is_alphanumeric))
-        });
+        let begun = name
+            .strip_prefix(BEGUN)
+            .is_some_and(|rest| rest.len() == 6 && rest.chars().all(char::is_alphanumeric));
         if emptied || begun {
             let _ = remove(&entry.path());
         }

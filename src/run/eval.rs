@@ -229,7 +229,6 @@ fn load(
     if !color.exists() {
         return Err(refused(color, "the run is not colored yet"));
     }
-    folder.check_files(report, &[folder.luma(), folder.color(), folder.chroma()])?;
     let luma = read_splats(&folder.luma(), Frame::Own, observe)?
         .0
         .to_luma();

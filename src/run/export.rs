@@ -189,7 +189,6 @@ fn open(options: &ExportOptions, observe: &mut Observer<'_>) -> Result<Scene, Ru
     } else {
         folder.luma()
     };
-    folder.check_files(&report, &[file.clone()])?;
     let noted = PathBuf::from(&report.capture.path);
     Ok(Scene {
         splats: read_scene(&file, Frame::Own, observe)?.splats,

@@ -119,6 +119,7 @@ pub(super) fn make_pictures_folder(path: &Path) -> Result<(), RunError> {
     if let Some(other) = other_file(path) {
         return Err(not_empty(path, &other));
     }
+    disk::remove_drafts(path, None);
     make_folder(path)
 }
 
@@ -130,7 +131,10 @@ fn other_file(folder: &Path) -> Option<PathBuf> {
             let (path, name) = (entry.path(), entry.file_name());
             if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
                 folders.push(path);
-            } else if !(OF_SYSTEMS.iter().any(|known| name == *known) || is_ours(&path)) {
+            } else if !(OF_SYSTEMS.iter().any(|known| name == *known)
+                || disk::is_draft(&name.to_string_lossy(), None)
+                || is_ours(&path))
+            {
                 return Some(path);
             }
         }
@@ -138,28 +142,37 @@ fn other_file(folder: &Path) -> Option<PathBuf> {
     None
 }
 
-/// Makes a run's folder, see [`make_folder`]. It is a run already, or prepared for one, or empty
-/// but for what runs may hold.
+/// Makes a folder for files of several kinds, see [`make_folder`]. It is new or empty but for what
+/// `may` be there before; or this program has begun it, which `begun` tell: names of its files.
 ///
 /// # Errors
 /// [`RunError::File`] where it holds something else.
-pub(super) fn make_run_folder(folder: &RunFolder) -> Result<(), RunError> {
-    let path = folder.path();
-    let known = |name: &str| name.starts_with('.') || OF_RUNS.contains(&name);
-    let entries = || fs::read_dir(path).into_iter().flatten().flatten();
-    let begun = || entries().any(|entry| BEGUN.iter().any(|begun| entry.file_name() == *begun));
-    let other = entries().find(|entry| !known(&entry.file_name().to_string_lossy()));
-    match other {
-        Some(other) if !begun() => Err(not_empty(path, &other.path())),
+pub(crate) fn make_own_folder(path: &Path, begun: &[&str], may: &[&str]) -> Result<(), RunError> {
+    let entries = fs::read_dir(path).into_iter().flatten().flatten();
+    let names: Vec<String> = entries
+        .map(|entry| entry.file_name().to_string_lossy().into_owned())
+        .collect();
+    let is_known = |name: &&String| {
+        name.starts_with('.') || may.contains(&&***name) || OF_SYSTEMS.contains(&&***name)
+    };
+    match names.iter().find(|name| !is_known(name)) {
+        Some(other) if !names.iter().any(|name| begun.contains(&&**name)) => {
+            Err(not_empty(path, &path.join(other)))
+        }
         _ => make_folder(path),
     }
 }
 
-/// Files by which a folder is a run, or is to become one.
-const BEGUN: [&str; 4] = [".lock", "report.json", "checkpoint", "block.json"];
-
-/// Folders and files that may be there before a run is, beside hidden ones.
-const OF_RUNS: [&str; 4] = ["teacher", "settings.json", "stderr.txt", "desktop.ini"];
+/// Makes a run's folder, see [`make_own_folder`].
+///
+/// # Errors
+/// [`RunError::File`] where it holds what belongs to no run.
+pub(super) fn make_run_folder(folder: &RunFolder) -> Result<(), RunError> {
+    let begun = [".lock", "report.json", "checkpoint", "block.json"];
+    // Who colors meanwhile may have begun before; a sweep's point has the others.
+    let may = ["teacher", "settings.json", "stderr.txt"];
+    make_own_folder(folder.path(), &begun, &may)
+}
 
 fn not_empty(folder: &Path, other: &Path) -> RunError {
     RunError::File {
@@ -211,7 +224,9 @@ pub(super) fn format_of(path: &Path) -> Result<Format, RunError> {
 pub(crate) fn make_folder_of(path: &Path) -> Result<(), RunError> {
     no_folder(path)?;
     check_no_original(path)?;
-    make_folder(folder_of(path))
+    make_folder(folder_of(path))?;
+    disk::remove_drafts(folder_of(path), Some(path));
+    Ok(())
 }
 
 /// Refuses a file for a command's output that is one of its originals.

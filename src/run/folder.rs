@@ -6,7 +6,7 @@ use std::{
     time::SystemTime,
 };
 
-use super::{RunError, files, fingerprint::hashed, lock::finish_what_is_left};
+use super::{RunError, commit, files, fingerprint::hashed, lock::finish_what_is_left};
 use crate::{
     disk::trust,
     input,
@@ -156,11 +156,21 @@ impl RunFolder {
         Ok(())
     }
 
-    /// Reads the report.
+    /// Reads the report of a run whose files it describes.
+    ///
+    /// # Errors
+    /// As [`Self::parse_report`] and [`Self::check_files`].
+    pub fn read_report(&self) -> Result<Report, RunError> {
+        let report = self.parse_report()?;
+        self.check_files(&report)?;
+        Ok(report)
+    }
+
+    /// Reads the report, whatever lies beside it.
     ///
     /// # Errors
     /// [`RunError::File`] when there is none or it is damaged, and as [`Self::check_links`].
-    pub fn read_report(&self) -> Result<Report, RunError> {
+    pub(super) fn parse_report(&self) -> Result<Report, RunError> {
         self.check_links()?;
         finish_what_is_left(&self.0)?;
         let path = self.report();
@@ -174,21 +184,36 @@ impl RunFolder {
         })
     }
 
-    /// Refuses files of the run that its report does not describe: those of another run.
+    /// Refuses scenes of another run in this one: those that its report does not describe.
     ///
     /// # Errors
-    /// [`RunError::OtherFile`], and [`RunError::File`] where one cannot be read.
-    pub(super) fn check_files(&self, report: &Report, paths: &[PathBuf]) -> Result<(), RunError> {
+    /// [`RunError::OtherFile`], [`RunError::InUse`], and [`RunError::File`] where one cannot be
+    /// read.
+    pub(super) fn check_files(&self, report: &Report) -> Result<(), RunError> {
         // Reports of former versions describe none.
         if report.files.is_empty() {
             return Ok(());
         }
-        for path in paths.iter().filter(|path| path.exists()) {
+        let all = [self.luma(), self.color(), self.chroma()];
+        for path in all.into_iter().filter(|path| path.exists()) {
             let known = report.files.iter().find(|file| path.ends_with(&file.name));
-            let known = known.ok_or_else(|| RunError::OtherFile(path.clone()))?;
-            let now = hashed(path, Some([&known.stamp, &known.sha256])).map_err(files::at(path))?;
-            if now[1] != known.sha256 {
-                return Err(RunError::OtherFile(path.clone()));
+            let is_same = match known {
+                None => false,
+                Some(known) => {
+                    let now = hashed(&path, Some([&known.stamp, &known.sha256]));
+                    now.map_err(files::at(&path))?[1] == known.sha256
+                }
+            };
+            match is_same {
+                true => {}
+                // Somebody is replacing them.
+                false if commit::left(&self.0)?.is_some() => {
+                    return Err(RunError::InUse {
+                        folder: self.0.clone(),
+                        holder: "another process is writing into it".to_owned(),
+                    });
+                }
+                false => return Err(RunError::OtherFile(path)),
             }
         }
         Ok(())

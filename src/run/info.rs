@@ -25,9 +25,8 @@ pub fn info(path: &Path, observe: &mut Observer<'_>) -> Result<Value, RunError> 
     }
     let folder = RunFolder::find(Some(path))?;
     if folder.report().is_file() {
-        let report = folder.read_report()?;
-        let all = [folder.luma(), folder.color(), folder.chroma()];
-        if let Err(error) = folder.check_files(&report, &all) {
+        let report = folder.parse_report()?;
+        if let Err(error) = folder.check_files(&report) {
             observe(Event::Warning(error.to_string()));
         }
         return Ok(serde_json::to_value(report).unwrap_or_default());

@@ -176,9 +176,6 @@ impl Look {
         let Some((_, path)) = path else {
             return Ok(None);
         };
-        if let (Some(folder), Some(report)) = (&self.folder, &self.report) {
-            folder.check_files(report, std::slice::from_ref(path))?;
-        }
         let scene = read_scene(path, self.frame, observe)?;
         let drawn = (self.report.as_ref())
             .map_or(scene.drawn, |report| report.luma.settings.raster_options());

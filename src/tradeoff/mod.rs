@@ -75,6 +75,9 @@ pub enum TradeoffError {
 /// What `tradeoff` writes, beside the points' folders.
 pub const FILES: [&str; 3] = ["tradeoff.csv", "tradeoff.json", "tradeoff.html"];
 
+/// The folder of the points' folders.
+const POINTS: &str = "points";
+
 /// Runs the points that are missing in the folder and gives the folder and all of
 /// them. The files are written anew after every point.
 ///
@@ -99,7 +102,7 @@ pub fn tradeoff(
     }
     let sides = capture.views.iter().flat_map(|view| view.photo_size());
     let largest_side = sides.max().unwrap_or(0);
-    files::make_folder(&folder)?;
+    files::make_own_folder(&folder, &["tradeoff.lock", FILES[1]], &[])?;
     let bench = Bench::new(options, &folder, preset, largest_side)?;
     let mut state = State::open(&folder, bench.subject()?, options.budget)?;
     let mut album = Album::new(&folder, capture);

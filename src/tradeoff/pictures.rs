@@ -39,7 +39,7 @@ impl Album {
     /// Of the sweep in `folder`.
     pub fn new(folder: &Path, capture: Capture) -> Self {
         Self {
-            points: folder.join("points"),
+            points: folder.join(super::POINTS),
             capture,
             pictures: Pictures::default(),
             file: String::new(),

@@ -69,7 +69,7 @@ impl<'a> Bench<'a> {
         let teacher = teacher.map(|teacher| teacher_or_photos(teacher, &options.colmap_dir));
         let teacher = teacher.as_deref().map(located).transpose()?;
         Ok(Self {
-            points: absolute(folder)?.join("points"),
+            points: absolute(folder)?.join(super::POINTS),
             scene: absolute(&options.colmap_dir)?,
             teacher: teacher.as_deref().map(absolute).transpose()?,
             preset,

@@ -2,15 +2,17 @@
 
 use std::{
     fs::{File, TryLockError},
+    io,
     path::{Path, PathBuf},
 };
 
 use super::{
-    FILES,
+    FILES, POINTS,
     report::{Phase, Point, Subject, TRADEOFF_VERSION, Tradeoff},
 };
 use crate::{
-    disk, input,
+    disk::{self, trust},
+    input,
     run::{RunError, files},
 };
 
@@ -33,6 +35,8 @@ impl State {
     /// # Errors
     /// [`RunError::File`] when the folder holds a sweep of something else, or one that runs.
     pub fn open(folder: &Path, subject: Subject, budget: f64) -> Result<Self, RunError> {
+        let points = folder.join(POINTS);
+        trust::check_inside(folder, &points).map_err(files::at(&points))?;
         let lock = lock(&folder.join(LOCK))?;
         let path = folder.join(FILES[1]);
         let mut sweep = match input::read_to_string(&path) {
@@ -73,8 +77,12 @@ impl State {
 
 /// Locks a file; there is no lock where the file system knows none.
 fn lock(path: &Path) -> Result<Option<File>, RunError> {
-    let Ok(file) = disk::open_in_place(path) else {
-        return Ok(None);
+    let file = match disk::open_in_place(path) {
+        Ok(file) => file,
+        Err(error) if error.kind() == io::ErrorKind::InvalidInput => {
+            return Err(files::at(path)(error));
+        }
+        Err(_) => return Ok(None),
     };
     match file.try_lock() {
         Ok(()) => Ok(Some(file)),
@@ -92,6 +100,12 @@ fn read(text: &str, subject: &Subject) -> Result<Tradeoff, String> {
     const REMEDY: &str = "choose another folder with -o, or remove this one";
     let sweep: Tradeoff =
         serde_json::from_str(text).map_err(|error| format!("damaged ({error}): {REMEDY}"))?;
+    if let Some(odd) = (sweep.points.iter()).find(|point| !trust::is_entry(&point.name)) {
+        return Err(format!(
+            "damaged (a point is called {:?}): {REMEDY}",
+            odd.name
+        ));
+    }
     let there = &sweep.subject;
     let differs = [
         ("scene", there.scene != subject.scene),

@@ -25,6 +25,7 @@ mod formats;
 mod frames;
 #[cfg(target_os = "linux")]
 mod hard_cases;
+mod harm;
 mod host;
 mod hostile;
 mod inspect;

@@ -19,7 +19,6 @@ impl FitOptions {
             return Ok(None);
         }
         let report = folder.read_report()?;
-        folder.check_files(&report, &[folder.luma()])?;
         let named = |on| {
             let of_kind = report.effects.iter().filter(move |effect| effect.on == on);
             of_kind.map(|effect| effect.name).collect()

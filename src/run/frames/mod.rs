@@ -101,7 +101,6 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
     let _kept = kept.with_run(&folder, &report).keep();
     let noted = PathBuf::from(&report.capture.path);
     let colmap_dir = options.colmap.clone().unwrap_or(noted);
-    folder.check_files(&report, &[folder.luma(), folder.chroma()])?;
     let scene = read_scene(&folder.luma(), Frame::Own, observe)?;
     let chroma = folder.read_chroma(scene.splats.len())?;
     let chroma = chroma.ok_or_else(|| RunError::NoColors(folder.path().to_owned()))?;

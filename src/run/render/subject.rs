@@ -110,7 +110,6 @@ impl Subject {
         };
         observe(Event::begins(Stage::Model));
         let kept = Kept::default().with_run(&folder, &report);
-        folder.check_files(&report, &[file.clone(), folder.luma()])?;
         let load = report.capture.load;
         let noted = PathBuf::from(&report.capture.path);
         let capture = Capture::load_with(colmap.unwrap_or(&noted), &load.capture())?;
