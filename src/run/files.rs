@@ -116,11 +116,12 @@ const OF_SYSTEMS: [&str; 3] = [".DS_Store", "Thumbs.db", "desktop.ini"];
 /// [`RunError::File`] where it holds anything else, which pictures would be mixed with or
 /// replace.
 pub(super) fn make_pictures_folder(path: &Path) -> Result<(), RunError> {
+    make_folder(path)?;
     if let Some(other) = other_file(path) {
         return Err(not_empty(path, &other));
     }
     disk::remove_drafts(path, None);
-    make_folder(path)
+    Ok(())
 }
 
 /// A file in a folder or below it that this program has not made as a picture.
@@ -148,6 +149,7 @@ fn other_file(folder: &Path) -> Option<PathBuf> {
 /// # Errors
 /// [`RunError::File`] where it holds something else.
 pub(crate) fn make_own_folder(path: &Path, begun: &[&str], may: &[&str]) -> Result<(), RunError> {
+    make_folder(path)?;
     let entries = fs::read_dir(path).into_iter().flatten().flatten();
     let names: Vec<String> = entries
         .map(|entry| entry.file_name().to_string_lossy().into_owned())
@@ -159,7 +161,7 @@ pub(crate) fn make_own_folder(path: &Path, begun: &[&str], may: &[&str]) -> Resu
         Some(other) if !names.iter().any(|name| begun.contains(&&**name)) => {
             Err(not_empty(path, &path.join(other)))
         }
-        _ => make_folder(path),
+        _ => Ok(()),
     }
 }
 
