@@ -221,7 +221,10 @@ pub(crate) fn is_draft(name: &str, path: Option<&Path>) -> bool {
 /// in `folder`; what a process is writing stays.
 pub(crate) fn remove_drafts(folder: &Path, path: Option<&Path>) {
     // Elsewhere nobody knows who is writing.
-    let entries = cfg!(unix).then(|| fs::read_dir(folder)).into_iter().flatten();
+    let entries = cfg!(unix)
+        .then(|| fs::read_dir(folder))
+        .into_iter()
+        .flatten();
     for entry in entries.flatten().flatten() {
         let name = entry.file_name();
         if is_draft(&name.to_string_lossy(), path)
@@ -437,7 +440,10 @@ mod tests {
         let removed = usize::from(cfg!(unix));
         assert_eq!(fs::read_dir(place.path()).unwrap().count(), left - removed);
         remove_drafts(place.path(), None);
-        assert_eq!(fs::read_dir(place.path()).unwrap().count(), left - 3 * removed);
+        assert_eq!(
+            fs::read_dir(place.path()).unwrap().count(),
+            left - 3 * removed
+        );
         drop(writing);
         assert!(create(&place.path().join("no folder/out")).is_err());
     }
