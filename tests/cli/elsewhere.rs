@@ -293,10 +293,7 @@ fn a_scene_is_lit_anew() {
     above.means.fill([0.0, 1000.0, 0.0]);
     scene.append(above);
     write_ply(&path, &scene, glam::DVec3::ZERO, &[]).expect("writable");
-    // As in runs of former versions, nothing tells that it is another file.
-    let mut report = place.report("runs/scene");
-    report.as_object_mut().expect("a report").remove("files");
-    place.write("runs/scene/report.json", report.to_string());
+    place.forget_files("runs/scene");
     let again = ["--relight", "--memory-limit", "1", "-o", "again.ply"];
     let told = place.run(&[&colorize[..], &again].concat()).stderr;
     assert!(!told.contains("warning"), "{told}");

@@ -343,6 +343,7 @@ fn a_coloring_of_gaussians_that_wait_on_the_host() {
         let shown = scene.len();
         scene.append(above);
         write_ply(&path, &scene, glam::DVec3::ZERO, &[]).expect("writable");
+        place.forget_files("runs/scene");
         let [width, height] = scene::SIZE;
         let stroke = image::RgbaImage::from_fn(width, height, |x, y| {
             let inside = x.abs_diff(width / 2) < 6 && y.abs_diff(height / 2) < 3;
