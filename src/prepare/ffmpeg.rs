@@ -1,10 +1,7 @@
 //! What FFmpeg is asked: what a film is, where it is cut, whether it is interlaced; and all frames
 //! of a shot.
 
-use std::{
-    ffi::OsString,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
@@ -129,8 +126,7 @@ impl Source {
                 "-show_streams",
                 "-show_format",
             ])
-            .arg("-i")
-            .arg(named(path))
+            .film(path)
             .ask();
         let said = said.map_err(|error| match error {
             ProgramError::Failed { said, .. } => PrepareError::NoFilm {
@@ -193,8 +189,7 @@ impl Source {
             ffmpeg = ffmpeg.option("-t", seconds(length));
         }
         ffmpeg
-            .arg("-i")
-            .arg(named(&self.path))
+            .film(&self.path)
             .option("-map", format!("0:{}", self.stream))
     }
 
@@ -291,13 +286,6 @@ impl Source {
             })?;
         Ok(())
     }
-}
-
-/// A file's name that FFmpeg takes for nothing else: no option, no protocol.
-pub(super) fn named(path: &Path) -> OsString {
-    let mut name = OsString::from("file:");
-    name.push(path);
-    name
 }
 
 /// A time as FFmpeg reads it, to the microsecond.

@@ -4,7 +4,7 @@ use serde_json::Value;
 
 use super::{
     PrepareError,
-    ffmpeg::{Part, Source, named},
+    ffmpeg::{Part, Source},
 };
 use crate::programs::Program;
 
@@ -33,8 +33,8 @@ impl Source {
         let said = Program::new("ffprobe")
             .args(["-v", "error", "-of", "json"])
             .option("-select_streams", self.stream.to_string())
-            .args(["-show_entries", "packet=pts_time:format=start_time", "-i"])
-            .arg(named(&self.path))
+            .args(["-show_entries", "packet=pts_time:format=start_time"])
+            .film(&self.path)
             .ask()?;
         let end = part.seconds.map_or(f64::INFINITY, |s| part.start + s);
         let mut times = packet_times(&said);

@@ -1,6 +1,7 @@
 //! Programs of others, such as FFmpeg and COLMAP: started without a shell, fed, listened to, and
 //! ended with this one.
 
+mod film;
 mod said;
 
 use std::{
