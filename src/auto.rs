@@ -251,7 +251,13 @@ pub fn auto(options: &AutoOptions, tell: &mut Teller<'_>) -> Result<Results, Aut
             frame_rate: None,
         };
         tell(Told::Begins(Step::Frames, asked.stages()));
-        frames(&asked, &mut |event| tell(Told::Event(event)))?;
+        let done = frames(&asked, &mut |event| tell(Told::Event(event)))?;
+        if done.carried > 0 {
+            tell(Told::Event(Event::Note(format!(
+                "{} of {} photos have no pose: they take colors from their neighbors, or from the teacher alone",
+                done.carried, done.photos
+            ))));
+        }
         kept.done(Step::Frames, &from)?;
     } else {
         tell(Told::Skips(Step::Frames));

@@ -1,5 +1,6 @@
 //! Names of photos, and which file of another folder belongs to which photo.
 
+use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -40,6 +41,32 @@ pub(super) fn composed(name: &str) -> String {
         .filter(|part| !matches!(*part, "" | "."))
         .collect();
     parts.join("/").nfc().collect()
+}
+
+/// The order of names in which digits count as numbers, `IMG_2` before `IMG_10`: that in which
+/// photos were taken. Of those with the same numbers, the plain order.
+pub fn by_number(a: &str, b: &str) -> Ordering {
+    let digits = |text: &[u8]| text.iter().take_while(|byte| byte.is_ascii_digit()).count();
+    let (mut x, mut y) = (a.as_bytes(), b.as_bytes());
+    while let ([p, ..], [q, ..]) = (x, y) {
+        let (m, n) = (digits(x), digits(y));
+        let order = if m > 0 && n > 0 {
+            let number = |run: &[u8]| {
+                run.iter()
+                    .position(|&digit| digit != b'0')
+                    .unwrap_or(run.len())
+            };
+            let [u, v] = [&x[number(&x[..m])..m], &y[number(&y[..n])..n]];
+            (u.len(), u).cmp(&(v.len(), v))
+        } else {
+            p.cmp(q)
+        };
+        if order.is_ne() {
+            return order;
+        }
+        (x, y) = (&x[m.max(1)..], &y[n.max(1)..]);
+    }
+    x.len().cmp(&y.len()).then(a.cmp(b))
 }
 
 /// Hands every file below a folder to `found`: its path below the folder, with `/` between
@@ -253,6 +280,29 @@ mod tests {
             ("", ""),
         ] {
             assert_eq!(stem(name), expected);
+        }
+    }
+
+    #[test]
+    fn digits_count_as_numbers() {
+        let long = format!("a{}", "9".repeat(60));
+        let sorted = [
+            "IMG_1.png",
+            "IMG_002.png",
+            "IMG_2.png",
+            "IMG_10.png",
+            "IMG_10b.png",
+            "a9/2",
+            "a10/1",
+            &long,
+            "b",
+            "b0",
+            "bc",
+        ];
+        for (i, a) in sorted.iter().enumerate() {
+            for (j, b) in sorted.iter().enumerate() {
+                assert_eq!(by_number(a, b), i.cmp(&j), "{a} {b}");
+            }
         }
     }
 

@@ -108,6 +108,11 @@ pub(super) fn of_preparing(error: &PrepareError) -> String {
 /// What the user reads of an error of a step of the whole.
 pub(super) fn of_auto(error: &AutoError) -> String {
     match error {
+        AutoError::Prepare(PrepareError::OtherInput { folder, input }) => format!(
+            "{}: was prepared from {}; name another folder with -o, or remove this one",
+            folder.display(),
+            input.display()
+        ),
         AutoError::Prepare(error) => of_preparing(error),
         AutoError::Run(RunError::Interrupted { iteration, .. }) => {
             format!(

@@ -9,7 +9,26 @@ use std::{
 use serde::{Deserialize, Serialize};
 
 use super::{PrepareError, pycolmap};
-use crate::programs::{Program, ProgramError};
+use crate::{
+    disk,
+    programs::{Program, ProgramError},
+    run::files,
+};
+
+/// Camera models that every version knows.
+const KNOWN_TO_ALL: [&str; 11] = [
+    "SIMPLE_PINHOLE",
+    "PINHOLE",
+    "SIMPLE_RADIAL",
+    "RADIAL",
+    "OPENCV",
+    "FULL_OPENCV",
+    "SIMPLE_RADIAL_FISHEYE",
+    "RADIAL_FISHEYE",
+    "OPENCV_FISHEYE",
+    "FOV",
+    "THIN_PRISM_FISHEYE",
+];
 
 /// So many frames to either side of one are matched with it.
 const OVERLAP: u32 = 10;
@@ -60,20 +79,67 @@ pub(super) enum Colmap {
 }
 
 impl Colmap {
-    /// The program on `PATH`, else a Python that can import `pycolmap`; with `install` one is
-    /// made where there is none.
+    /// The program on `PATH`, else a Python that can import `pycolmap`, whichever knows the lens;
+    /// with `install` one is made where there is none.
     ///
     /// # Errors
-    /// [`PrepareError::NoColmap`] where there is neither.
-    pub fn find(install: bool, told: &mut dyn FnMut(String)) -> Result<Self, PrepareError> {
-        match Program::new("colmap").arg("help").ask() {
-            Ok(said) => Ok(Self::Program(version(&said))),
-            Err(ProgramError::Missing { .. }) => {
-                let (python, version) = pycolmap::find(install, told)?;
-                Ok(Self::Python(python, version))
-            }
-            Err(error) => Err(error.into()),
+    /// [`PrepareError::NoColmap`] where there is neither, [`PrepareError::UnknownLens`].
+    pub fn find(
+        lens: &str,
+        install: bool,
+        told: &mut dyn FnMut(String),
+    ) -> Result<Self, PrepareError> {
+        let program = match Program::new("colmap").arg("help").ask() {
+            Ok(said) => Some(Self::Program(version(&said))),
+            Err(ProgramError::Missing { .. }) => None,
+            Err(error) => return Err(error.into()),
+        };
+        if let Some(program) = &program
+            && program.knows(lens)?
+        {
+            return Ok(program.clone());
         }
+        let module = pycolmap::find(install, told);
+        let module = module.map(|(python, version)| Self::Python(python, version));
+        match (program, module) {
+            (_, Ok(module)) if module.knows(lens)? => Ok(module),
+            (None, Err(error)) => Err(error),
+            (Some(program), Err(PrepareError::NoColmap)) => Err(program.without(lens)),
+            (Some(_), Err(error)) => Err(error),
+            (_, Ok(module)) => Err(module.without(lens)),
+        }
+    }
+
+    fn without(&self, lens: &str) -> PrepareError {
+        PrepareError::UnknownLens {
+            lens: lens.to_owned(),
+            colmap: self.name(),
+        }
+    }
+
+    /// Whether there is a camera model of this name.
+    fn knows(&self, lens: &str) -> Result<bool, PrepareError> {
+        if KNOWN_TO_ALL.contains(&lens) {
+            return Ok(true);
+        }
+        let Self::Python(python, _) = self else {
+            let none = disk::create_folder("gs-chroma-", &std::env::temp_dir());
+            let none = none.map_err(files::at(&std::env::temp_dir()))?;
+            let mut unknown = false;
+            let features = Program::new("colmap")
+                .arg("feature_extractor")
+                .option("--database_path", none.path().join("database.db"))
+                .option("--image_path", none.path())
+                .option("--ImageReader.camera_model", lens);
+            // That there is no photo may be an error of its own.
+            let _ = features.run(none.path(), &mut |line| {
+                let line = line.to_lowercase();
+                unknown |= line.contains("camera model does not exist")
+                    || line.contains("existscameramodelwithname");
+            });
+            return Ok(!unknown);
+        };
+        Ok(pycolmap::knows(python, lens))
     }
 
     /// In words.
@@ -112,21 +178,27 @@ impl Colmap {
         self.run("feature_extractor", arguments, told)
     }
 
-    /// Matches the photos of a database.
+    /// Matches the photos of a database; those of `pairs`, a file of [`pairs`], where there is
+    /// one.
     ///
     /// # Errors
     /// [`ProgramError`].
     pub fn matches(
         &self,
         database: &Path,
-        matching: Matching,
+        (matching, pairs): (Matching, Option<&Path>),
         told: &mut Told,
     ) -> Result<(), PrepareError> {
         let mut arguments = vec![Argument::path("database_path", database)];
         arguments.extend(without_gpu(["SiftMatching", "FeatureMatching"]));
-        let command = match matching {
-            Matching::Exhaustive => "exhaustive_matcher",
-            Matching::Sequential => {
+        let command = match (matching, pairs) {
+            (Matching::Exhaustive, _) => "exhaustive_matcher",
+            (Matching::Sequential, Some(pairs)) => {
+                arguments.push(Argument::path("match_list_path", pairs));
+                arguments.push(Argument::new("match_type", "pairs"));
+                "matches_importer"
+            }
+            (Matching::Sequential, None) => {
                 let overlap = OVERLAP.to_string();
                 arguments.push(Argument::new("SequentialMatching.overlap", overlap));
                 arguments.push(Argument::new("SequentialMatching.quadratic_overlap", "1"));
@@ -297,6 +369,28 @@ fn progress(line: &str) -> Option<(usize, Option<usize>)> {
         .find(|c: char| !c.is_ascii_digit())
         .unwrap_or(digits.len());
     Some((digits[..end].parse().ok()?, None))
+}
+
+/// The pairs of photos, in an order of theirs, that a sequential matcher looks at, a line each.
+/// `None` where a name cannot stand there.
+pub(super) fn pairs(names: &[&str]) -> Option<String> {
+    let odd = |name: &&str| name.starts_with('#') || name.contains(char::is_whitespace);
+    if names.iter().any(odd) {
+        return None;
+    }
+    let mut lines = String::new();
+    for (at, name) in names.iter().enumerate() {
+        let near = 1..=OVERLAP as usize;
+        let far = (0..OVERLAP)
+            .map(|step| 1 << step)
+            .filter(|step| !near.contains(step));
+        let others = near
+            .clone()
+            .chain(far)
+            .filter_map(|step| names.get(at + step));
+        others.for_each(|other| lines += &format!("{name} {other}\n"));
+    }
+    Some(lines)
 }
 
 /// The folders `0`, `1`, … that a mapper wrote, in order.

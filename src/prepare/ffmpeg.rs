@@ -7,6 +7,8 @@ use serde_json::Value;
 
 use super::{
     PrepareError,
+    frame_times::stamps,
+    looks::Looks,
     shots::{self, Cutter},
 };
 use crate::programs::{FFMPEG, Program, ProgramError};
@@ -23,6 +25,12 @@ const REPEATED: f64 = 0.2;
 
 /// Video of 30 (29.97) frames a second, which film of 24 may have become.
 const VIDEO_RATE: [f64; 2] = [29.5, 30.5];
+
+/// Containers in which seeking leads to any picture; in others it loses the first ones.
+const INDEXED: [&str; 5] = ["mov", "matroska", "avi", "mxf", "dv"];
+
+/// The first picture of a stream is looked for in so many seconds.
+const FIRST_WITHIN: &str = "%+15";
 
 /// Names of frames, as FFmpeg and C write them.
 const NAMES: &str = "%06d.png";
@@ -42,6 +50,16 @@ pub(super) struct Source {
     pub seconds: f64,
     /// Whether there is sound.
     pub audio: bool,
+    /// How many other streams of pictures there are.
+    pub others: usize,
+    /// FFmpeg's name of the container, the first of several.
+    pub(super) container: String,
+    /// The time stamp from which times of parts count, in seconds.
+    pub(super) zero: f64,
+    /// By how many seconds that is later than the beginning of the file, with its sound.
+    pub late: f64,
+    /// Its colors and its projection.
+    pub looks: Looks,
     /// Whether pixels are square.
     square: bool,
     /// Whether it has more than 8 bits a channel.
@@ -131,14 +149,52 @@ impl Source {
         let said = said.map_err(|error| match error {
             ProgramError::Failed { said, .. } => PrepareError::NoFilm {
                 path: path.into(),
-                reason: format!("cannot be read as a film ({said})"),
+                reason: match unlisted(&said) {
+                    Some(format) => format!(
+                        "is no film by itself, but {format}, which may lead to other files; make one file of it, such as .mp4 or .mkv"
+                    ),
+                    None => format!("cannot be read as a film ({said})"),
+                },
             },
             other => other.into(),
         })?;
-        Self::parse(path, &said).map_err(|reason| PrepareError::NoFilm {
+        let source = Self::parse(path, &said);
+        let mut source = source.map_err(|reason| PrepareError::NoFilm {
             path: path.into(),
             reason,
-        })
+        })?;
+        if !source.is_indexed() {
+            // A recording may begin with pictures that cannot be decoded.
+            let first = ["-read_intervals", FIRST_WITHIN];
+            if let Some(first) = source
+                .stamps(&first, "frame=best_effort_timestamp_time")?
+                .first()
+            {
+                source.late += first - source.zero;
+                source.zero = *first;
+            }
+        }
+        Ok(source)
+    }
+
+    /// What `ffprobe` says of packets or frames: their time stamps, in seconds.
+    ///
+    /// # Errors
+    /// [`ProgramError`].
+    pub(super) fn stamps(&self, options: &[&str], entries: &str) -> Result<Vec<f64>, PrepareError> {
+        let said = Program::new("ffprobe")
+            .args(["-v", "error", "-of", "json"])
+            .option("-select_streams", self.stream.to_string())
+            .args(options)
+            .option("-show_entries", entries)
+            .film(&self.path)
+            .ask()?;
+        Ok(stamps(&said))
+    }
+
+    /// Whether seeking leads to any picture.
+    fn is_indexed(&self) -> bool {
+        INDEXED.contains(&&*self.container)
     }
 
     fn parse(path: &Path, said: &str) -> Result<Self, String> {
@@ -150,17 +206,25 @@ impl Source {
             .and_then(Result::ok)
             .ok_or("cannot be read as a film: ffprobe says nothing of it")?;
         let streams = json["streams"].as_array().map_or(&[][..], Vec::as_slice);
-        let pictures = streams.iter().find(|stream| {
-            // The picture of a cover is no film.
-            stream["codec_type"] == "video" && stream["disposition"]["attached_pic"] != 1
+        // The picture of a cover is no film.
+        let still = ["attached_pic", "timed_thumbnails", "still_image"];
+        let is = |stream: &Value, what: &str| stream["disposition"][what] == 1;
+        let moving = streams.iter().filter(|stream| {
+            stream["codec_type"] == "video" && !still.iter().any(|what| is(stream, what))
         });
-        let pictures = pictures.ok_or("holds no moving pictures")?;
+        let moving: Vec<&Value> = moving.collect();
+        let pictures = moving.iter().find(|stream| is(stream, "default"));
+        let pictures = *pictures
+            .or(moving.first())
+            .ok_or("holds no moving pictures")?;
         let rates = ["avg_frame_rate", "r_frame_rate"];
         let frame_rate = rates
             .into_iter()
             .find_map(|key| ratio(pictures[key].as_str()?));
-        let seconds = |value: &Value| value.as_str()?.parse::<f64>().ok();
-        let seconds = seconds(&pictures["duration"]).or(seconds(&json["format"]["duration"]));
+        let seconds = stamp(&pictures["duration"]).or(stamp(&json["format"]["duration"]));
+        let names = json["format"]["format_name"].as_str().unwrap_or_default();
+        let begins = |of: &Value| stamp(&of["start_time"]);
+        let begin = begins(&json["format"]).unwrap_or(0.0);
         let format = pictures["pix_fmt"].as_str().unwrap_or_default();
         let aspect = pictures["sample_aspect_ratio"].as_str().unwrap_or("1:1");
         Ok(Self {
@@ -168,8 +232,13 @@ impl Source {
             stream: pictures["index"].as_u64().unwrap_or(0),
             tick_rate: pictures["r_frame_rate"].as_str().and_then(ratio),
             frame_rate: frame_rate.ok_or("does not say how many frames a second it has")?,
-            seconds: seconds.filter(|s| s.is_finite() && *s > 0.0).unwrap_or(0.0),
+            seconds: seconds.filter(|s| *s > 0.0).unwrap_or(0.0),
             audio: streams.iter().any(|stream| stream["codec_type"] == "audio"),
+            others: moving.len() - 1,
+            container: names.split(',').next().unwrap_or_default().to_owned(),
+            zero: begin,
+            late: 0.0,
+            looks: Looks::of(pictures),
             square: matches!(aspect, "1:1" | "0:1"),
             deep: is_deep(format),
         })
@@ -180,17 +249,35 @@ impl Source {
         f64::from(self.frame_rate[0]) / f64::from(self.frame_rate[1])
     }
 
-    /// FFmpeg on a part of the film, up to its output.
-    fn part(&self, part: Part, level: &str) -> Program {
-        let mut ffmpeg = Program::new(FFMPEG)
-            .args(["-hide_banner", "-nostdin", "-nostats", "-v", level])
-            .option("-ss", seconds(part.start));
-        if let Some(length) = part.seconds {
-            ffmpeg = ffmpeg.option("-t", seconds(length));
+    /// FFmpeg on a part of the film with filters, up to its output.
+    fn part(&self, part: Part, level: &str, filters: &[&str]) -> Program {
+        let mut ffmpeg =
+            Program::new(FFMPEG).args(["-hide_banner", "-nostdin", "-nostats", "-v", level]);
+        let mut chain = Vec::new();
+        if self.is_indexed() {
+            if part.start > 0.0 {
+                ffmpeg = ffmpeg.option("-ss", seconds(part.start));
+            }
+            if let Some(length) = part.seconds {
+                ffmpeg = ffmpeg.option("-t", seconds(length));
+            }
+        } else {
+            // All that comes before is decoded, and cut off by its time stamps.
+            let start = seconds(part.start);
+            let end = part.seconds.map_or(String::new(), |length| {
+                format!(":end={}", seconds(part.start + length))
+            });
+            chain.push("setpts=PTS-STARTPTS".to_owned());
+            chain.push(format!("trim=start={start}{end},setpts=PTS-{start}/TB"));
+        }
+        chain.extend(filters.iter().map(|&filter| filter.to_owned()));
+        let mut ffmpeg = ffmpeg
+            .film(&self.path)
+            .option("-map", format!("0:{}", self.stream));
+        if !chain.is_empty() {
+            ffmpeg = ffmpeg.option("-vf", chain.join(","));
         }
         ffmpeg
-            .film(&self.path)
-            .option("-map", format!("0:{}", self.stream))
     }
 
     /// The shots of a part of the film, as ranges of seconds of the film; only the first where
@@ -208,11 +295,8 @@ impl Source {
         let [numerator, denominator] = self.frame_rate;
         let mut cutter = Cutter::default();
         let mut frame = vec![0; width * height];
-        self.part(part, "error")
-            .option(
-                "-vf",
-                format!("scale={width}:{height}:flags=area,format=gray"),
-            )
+        let tiny = format!("scale={width}:{height}:flags=area,format=gray");
+        self.part(part, "error", &[&tiny])
             // So that a frame's number is its time, also where the film's rate varies.
             .option("-r", format!("{numerator}/{denominator}"))
             .args(["-fps_mode", "cfr", "-f", "rawvideo", "-"])
@@ -244,8 +328,8 @@ impl Source {
             ..part
         };
         let said = self
-            .part(looked_at, "info")
-            .args(["-vf", "idet", "-f", "null", "-"])
+            .part(looked_at, "info", &["idet"])
+            .args(["-f", "null", "-"])
             .ask()?;
         Ok(scan(&said, self.rate()))
     }
@@ -269,11 +353,8 @@ impl Source {
                 "scale=w=if(gt(sar\\,1)\\,trunc(iw*sar+0.5)\\,iw):h=if(gt(sar\\,1)\\,ih\\,trunc(ih/sar+0.5)),setsar=1",
             );
         }
-        let mut ffmpeg = self.part(part, "error");
-        if !filters.is_empty() {
-            ffmpeg = ffmpeg.option("-vf", filters.join(","));
-        }
-        ffmpeg
+        filters.extend(self.looks.filters());
+        self.part(part, "error", &filters)
             .args(["-fps_mode", "passthrough", "-pix_fmt"])
             .arg(if self.deep { "gray16be" } else { "gray" })
             .args(["-progress", "pipe:1", "-f", "image2"])
@@ -286,6 +367,18 @@ impl Source {
             })?;
         Ok(())
     }
+}
+
+/// The format that FFmpeg did not open as it may lead to other files, if it says so.
+fn unlisted(said: &str) -> Option<&str> {
+    let (before, _) = said.split_once("] Format not on whitelist")?;
+    before.rsplit('[').next()?.split(' ').next()
+}
+
+/// A time that `ffprobe` tells, in seconds.
+pub(super) fn stamp(value: &Value) -> Option<f64> {
+    let seconds = value.as_str()?.parse::<f64>().ok();
+    seconds.filter(|seconds| seconds.is_finite())
 }
 
 /// A time as FFmpeg reads it, to the microsecond.
@@ -373,7 +466,7 @@ mod tests {
      "sample_aspect_ratio": "16:15", "avg_frame_rate": "0/0", "r_frame_rate": "24000/1001",
      "disposition": {"attached_pic": 0}}
   ],
-  "format": {"duration": "12.500000"}
+  "format": {"duration": "12.500000", "format_name": "matroska,webm", "start_time": "-0.5"}
 }
 and another"#;
 
@@ -388,6 +481,11 @@ and another"#;
             tick_rate: Some([24000, 1001]),
             seconds: 12.5,
             audio: true,
+            others: 0,
+            container: "matroska".to_owned(),
+            zero: -0.5,
+            late: 0.0,
+            looks: Looks::default(),
             square: false,
             deep: true,
         };

@@ -8,7 +8,6 @@ use std::{
 use super::{
     PrepareError, PrepareOptions,
     ffmpeg::{self, Part, Scan, Source},
-    frame_times::Uneven,
     photos::link_all,
     sharp,
     state::{State, Step, digest, of},
@@ -21,7 +20,7 @@ use crate::{
 };
 
 /// The file that says which film it is.
-const FILM: &str = "film.json";
+pub(super) const FILM: &str = "film.json";
 
 /// Shots that are told in one line.
 const TOLD_SHOTS: usize = 12;
@@ -168,6 +167,19 @@ fn extract(
     from: &str,
     observe: &mut Observer<'_>,
 ) -> Result<(), PrepareError> {
+    let mut source = source.clone();
+    match source.looks.settle()? {
+        Some(Ok(note)) => observe(Event::Note(note)),
+        Some(Err(warning)) => observe(Event::Warning(warning)),
+        None => {}
+    }
+    if source.others > 0 {
+        observe(Event::Note(format!(
+            "the film holds {} streams of pictures: using stream {}",
+            source.others + 1,
+            source.stream
+        )));
+    }
     let scan = source.scan(part)?;
     match scan {
         Scan::Progressive => {}
@@ -201,14 +213,28 @@ fn extract(
         });
     };
     let header = plain_header(&frames.join(first)).map_err(RunError::from)?;
+    let times = match scan {
+        // Other frames than the file has.
+        Scan::Telecined => Vec::new(),
+        _ => source.times(part, names.len())?,
+    };
+    if times.len() > names.len() {
+        observe(Event::Warning(format!(
+            "only {} of {} frames could be read; copy the film into another container first (ffmpeg -i FILM -c copy copy.mkv)",
+            names.len(),
+            times.len()
+        )));
+    }
+    // That of the first frame, where half a frame earlier was asked for.
+    let first = times.first().copied();
+    let first = first.unwrap_or_else(|| first_frame(part.start, source.rate()));
     let varied = match scan {
-        Scan::Progressive => source.times(part, names.len())?,
+        Scan::Progressive if times.len() == names.len() => source.uneven(&times),
         _ => None,
     };
     let mut film = Film {
         source: source.path.clone(),
-        // That of the first frame, where half a frame earlier was asked for.
-        start: first_frame(part.start, source.rate()),
+        start: ((source.late + first) * 1e6).round().max(0.0) / 1e6,
         seconds: names.len() as f64 / rate,
         frame_rate,
         audio: source.audio,
@@ -216,14 +242,12 @@ fn extract(
         frames: names,
         times: None,
     };
-    if let Some(Uneven { times, rate: fast }) = varied {
-        let [first, last] = [times[0], times[times.len() - 1]];
+    if let (Some(fast), Some(last)) = (varied, times.last()) {
         observe(Event::Note(format!(
             "the film's frames are not evenly spaced: a film made of them has {:.0} a second, with repeats",
             f64::from(fast[0]) / f64::from(fast[1])
         )));
         let end = part.seconds.map_or(source.seconds, |s| part.start + s);
-        film.start = first;
         film.seconds = end.max(last + 1.0 / rate) - first;
         film.frame_rate = fast;
         film.times = Some(times.iter().map(|time| time - first).collect());

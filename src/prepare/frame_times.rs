@@ -4,9 +4,8 @@ use serde_json::Value;
 
 use super::{
     PrepareError,
-    ffmpeg::{Part, Source},
+    ffmpeg::{Part, Source, stamp},
 };
-use crate::programs::Program;
 
 /// Frames a second of a film whose rate varies, at most.
 const FASTEST: f64 = 120.0;
@@ -15,63 +14,70 @@ const FASTEST: f64 = 120.0;
 /// containers round times.
 const UNEVEN: f64 = 0.75;
 
-/// Frames that do not follow each other at one rate.
-pub(super) struct Uneven {
-    /// When each is shown, in seconds of the film.
-    pub times: Vec<f64>,
-    /// A rate at which they can be repeated to be shown so, as a fraction.
-    pub rate: [u32; 2],
-}
-
 impl Source {
-    /// When the frames of a part are shown where these vary; `None` where they follow each other
-    /// at the frame rate, or are not as many as `count`.
+    /// When the frames of a part are shown, in seconds from the film's zero, in order: from its
+    /// packets where these are `count`, else from what the decoder makes of them.
     ///
     /// # Errors
     /// [`ProgramError`].
-    pub fn times(&self, part: Part, count: usize) -> Result<Option<Uneven>, PrepareError> {
-        let said = Program::new("ffprobe")
-            .args(["-v", "error", "-of", "json"])
-            .option("-select_streams", self.stream.to_string())
-            .args(["-show_entries", "packet=pts_time:format=start_time"])
-            .film(&self.path)
-            .ask()?;
+    pub fn times(&self, part: Part, count: usize) -> Result<Vec<f64>, PrepareError> {
         let end = part.seconds.map_or(f64::INFINITY, |s| part.start + s);
-        let mut times = packet_times(&said);
-        times.retain(|time| (part.start..end).contains(time));
-        let varies = times.len() == count && varies(&times, self.rate());
-        Ok(varies.then(|| {
-            let fast = self.tick_rate.filter(|rate| {
-                let rate = f64::from(rate[0]) / f64::from(rate[1]);
-                (self.rate()..=FASTEST).contains(&rate)
-            });
-            Uneven {
-                times,
-                rate: fast.unwrap_or([FASTEST as u32, 1]),
-            }
-        }))
+        let of_part = |stamps: Vec<f64>, zero: f64| {
+            // To the microsecond, as they are told.
+            let times = stamps
+                .iter()
+                .map(|stamp| ((stamp - zero) * 1e6).round() / 1e6);
+            let mut times: Vec<f64> = times
+                .filter(|time| (part.start..end).contains(time))
+                .collect();
+            times.sort_by(f64::total_cmp);
+            times
+        };
+        let until = match part.seconds {
+            // Frames are not stored in the order in which they are shown.
+            Some(_) => format!("%{:.3}", self.zero + end + 5.0),
+            None => "%".to_owned(),
+        };
+        let within = ["-read_intervals", &until];
+        let packets = self.stamps(&within, "packet=pts_time,flags")?;
+        let packets = of_part(packets, self.zero);
+        if packets.len() == count {
+            return Ok(packets);
+        }
+        let frames = self.stamps(&within, "frame=best_effort_timestamp_time")?;
+        // AVI knows no such time: FFmpeg counts from where it begins to decode.
+        let zero = match (&*self.container, frames.first()) {
+            ("avi", Some(first)) => *first,
+            _ => self.zero,
+        };
+        Ok(of_part(frames, zero))
+    }
+
+    /// A rate at which frames shown at these times can be repeated to be shown so, as a
+    /// fraction; `None` where they follow each other at the frame rate.
+    pub fn uneven(&self, times: &[f64]) -> Option<[u32; 2]> {
+        let fast = self.tick_rate.filter(|rate| {
+            let rate = f64::from(rate[0]) / f64::from(rate[1]);
+            (self.rate()..=FASTEST).contains(&rate)
+        });
+        varies(times, self.rate()).then(|| fast.unwrap_or([FASTEST as u32, 1]))
     }
 }
 
-/// When packets are shown, in order, in seconds from the film's beginning, from what `ffprobe`
-/// says.
-fn packet_times(said: &str) -> Vec<f64> {
+/// The time stamps of packets that are shown, or of frames, from what `ffprobe` says.
+pub(super) fn stamps(said: &str) -> Vec<f64> {
     let json = &said[said.find('{').unwrap_or(0)..];
     let json = serde_json::Deserializer::from_str(json).into_iter::<Value>();
     let json = json.flatten().next().unwrap_or_default();
-    let seconds = |value: &Value| {
-        value
-            .as_str()?
-            .parse::<f64>()
-            .ok()
-            .filter(|s| s.is_finite())
-    };
-    let start = seconds(&json["format"]["start_time"]).unwrap_or(0.0);
-    let packets = json["packets"].as_array().into_iter().flatten();
-    let times = packets.filter_map(|packet| Some(seconds(&packet["pts_time"])? - start));
-    let mut times: Vec<f64> = times.collect();
-    times.sort_by(f64::total_cmp);
-    times
+    let all = json["packets"].as_array().or(json["frames"].as_array());
+    let shown = all.into_iter().flatten().filter(|one| {
+        let flags = one["flags"].as_str().unwrap_or_default();
+        // What an edit list leaves out is decoded and discarded.
+        !flags.contains('D')
+    });
+    shown
+        .filter_map(|one| stamp(&one["pts_time"]).or(stamp(&one["best_effort_timestamp_time"])))
+        .collect()
 }
 
 /// Whether frames are not shown at an even rate.
@@ -99,9 +105,11 @@ mod tests {
             .collect();
         assert!(varies(&fast, 99.0 / 74.5));
         let said = r#"a warning
-{"packets": [{"pts_time": "1.500"}, {"pts_time": "1.000"}, {}, {"pts_time": "N/A"}],
- "format": {"start_time": "1.000"}}"#;
-        assert_eq!(packet_times(said), [0.0, 0.5]);
-        assert!(packet_times("nothing").is_empty());
+{"packets": [{"pts_time": "1.500"}, {"pts_time": "1.000"}, {}, {"pts_time": "N/A"},
+  {"pts_time": "0.900", "flags": "KD_"}]}"#;
+        assert_eq!(stamps(said), [1.5, 1.0]);
+        let frames = r#"{"frames": [{"best_effort_timestamp_time": "1.5"}]}"#;
+        assert_eq!(stamps(frames), [1.5]);
+        assert!(stamps("nothing").is_empty());
     }
 }

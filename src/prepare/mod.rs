@@ -10,6 +10,7 @@ mod error;
 mod ffmpeg;
 mod film;
 mod frame_times;
+mod looks;
 mod masks;
 mod photos;
 mod poses;
@@ -36,6 +37,7 @@ use crate::{
     run::{Event, Observer, RunError, Stage, files},
 };
 use colmap::Colmap;
+use ffmpeg::Source;
 use masks::Sources;
 use photos::Photos;
 use state::{State, Step, of};
@@ -136,16 +138,47 @@ pub fn prepare(
         check_film_options(options)?;
     }
     check_masks(options)?;
-    let colmap = Colmap::find(options.install, &mut |line| observe(Event::Note(line)))?;
     let source = match is_film {
         true => Some(film::probe(&input)?),
         false => None,
     };
+    let lens = lens(options, source.as_ref(), observe)?;
+    let colmap = Colmap::find(&lens, options.install, &mut |line| {
+        observe(Event::Note(line));
+    })?;
     let mut state = State::open(&output, &input, options)?;
+    let made = make(
+        &mut state,
+        options,
+        source.as_ref(),
+        (&lens, &colmap),
+        observe,
+    );
+    let mut prepared = match made {
+        Ok(prepared) => prepared,
+        Err(error) => {
+            // The error is what is told.
+            let _ = state.fail();
+            return Err(error);
+        }
+    };
+    prepared.warnings = warnings.take();
+    Ok(prepared)
+}
+
+/// Does every step whose result is not there.
+fn make(
+    state: &mut State,
+    options: &PrepareOptions,
+    source: Option<&Source>,
+    (lens, colmap): (&str, &Colmap),
+    observe: &mut Observer<'_>,
+) -> Result<Prepared, PrepareError> {
+    let is_film = source.is_some();
     let mut shots = Vec::new();
-    match &source {
-        Some(source) => shots = film::frames(&mut state, options, source, observe)?,
-        None => link_photos(&mut state, &input, observe)?,
+    match source {
+        Some(source) => shots = film::frames(state, options, source, observe)?,
+        None => link_photos(state, options, observe)?,
     }
     let images = state.path(IMAGES);
     let photos = Photos::of(&images)?;
@@ -155,29 +188,49 @@ pub fn prepare(
             found: photos.headers.len(),
         });
     }
-    let masked = make_masks(&mut state, options, &photos, observe)?;
-    let seen = stretch(&mut state, &photos, observe)?;
+    let masked = make_masks(state, options, &photos, observe)?;
+    let seen = stretch(state, &photos, observe)?;
     let matching = matching(options, is_film, &photos, observe);
     let task = poses::Task {
         photos: &photos,
         seen: &seen,
         masks: (masked > 0).then(|| state.path(MASKS)),
         cameras: cameras(options, is_film, &photos),
-        lens: &options.lens,
+        lens,
         matching,
         is_film,
     };
-    let poses = task.find(&mut state, &colmap, observe)?;
+    let poses = task.find(state, colmap, observe)?;
     Ok(Prepared {
         folder: options.output.clone(),
-        film: Film::read(&output).map_err(RunError::from)?,
+        film: Film::read(&state.path(".")).map_err(RunError::from)?,
         shots,
         photos: photos.headers.len(),
         masked,
         colmap: colmap.name(),
         poses,
-        warnings: warnings.take(),
+        warnings: Vec::new(),
     })
+}
+
+/// COLMAP's camera model.
+fn lens(
+    options: &PrepareOptions,
+    source: Option<&Source>,
+    observe: &mut Observer<'_>,
+) -> Result<String, PrepareError> {
+    let Some(source) = source else {
+        return Ok(options.lens.clone());
+    };
+    let chosen = source.looks.lens(options);
+    let (lens, note) = chosen.map_err(|reason| PrepareError::NoFilm {
+        path: options.input.clone(),
+        reason,
+    })?;
+    if let Some(note) = note {
+        observe(Event::Note(note));
+    }
+    Ok(lens)
 }
 
 /// Whether the input is a film; else it is a folder.
@@ -263,9 +316,10 @@ fn tell(observe: &mut Observer<'_>, stage: Stage, done: usize, total: usize) {
 /// Puts a folder's photos into `images/`.
 fn link_photos(
     state: &mut State,
-    input: &Path,
+    options: &PrepareOptions,
     observe: &mut Observer<'_>,
 ) -> Result<(), PrepareError> {
+    let input = &fs::canonicalize(&options.input).map_err(files::at(&options.input))?;
     let from = of(&["photos", &digest(input)?]);
     if state.is_done(Step::Images, &from) {
         return Ok(());

@@ -16,7 +16,7 @@ use super::{
     tell,
 };
 use crate::{
-    capture::Piece,
+    capture::{Piece, names::by_number},
     disk,
     programs::ProgramError,
     run::{Event, Observer, RunError, Stage, files},
@@ -76,7 +76,12 @@ impl Task<'_> {
             self.lens,
             &colmap.name(),
         ]);
-        let matches = of(&["matches", &features, &format!("{:?}", self.matching)]);
+        let by_number = match self.by_number() {
+            Some(_) => " by number",
+            None => "",
+        };
+        let matching = format!("{:?}{by_number}", self.matching);
+        let matches = of(&["matches", &features, &matching]);
         let poses = of(&["poses", &matches]);
         let done = [
             state.is_done(Step::Features, &features),
@@ -97,6 +102,15 @@ impl Task<'_> {
             self.place(state, colmap, &poses, observe)?;
         }
         self.judge(state, observe)
+    }
+
+    /// Names in the order of their numbers, where photos are matched one after the other and
+    /// COLMAP, which sorts plainly, would take another.
+    fn by_number(&self) -> Option<Vec<&str>> {
+        let mut names: Vec<&str> = self.photos.headers.keys().map(String::as_str).collect();
+        names.sort_by(|a, b| by_number(a, b));
+        let other = self.matching == Matching::Sequential && !names.is_sorted();
+        other.then_some(names)
     }
 
     fn look_for_features(
@@ -147,8 +161,21 @@ impl Task<'_> {
         let database = draft.path().join(DATABASE);
         disk::copy(&state.path(DATABASE), &database).map_err(files::at(&database))?;
         let photos = self.photos.headers.len();
+        let pairs = draft.path().join("pairs.txt");
+        let list = match self.by_number() {
+            Some(names) => colmap::pairs(&names),
+            None => None,
+        };
+        match &list {
+            Some(list) => files::write(&pairs, list.as_bytes())?,
+            None if self.by_number().is_some() => observe(Event::Warning(
+                "photos are matched by name, IMG 10 before IMG 2: rename them without spaces or with leading zeros, or give --match exhaustive".to_owned(),
+            )),
+            None => {}
+        }
+        let pairs = list.is_some().then_some(&*pairs);
         tell(observe, Stage::Matches, 0, photos);
-        colmap.matches(&database, self.matching, &mut |done, total| {
+        colmap.matches(&database, (self.matching, pairs), &mut |done, total| {
             tell(observe, Stage::Matches, done, total.unwrap_or(photos));
         })?;
         state.place(Step::Matches, from, &[(database, DATABASE)])

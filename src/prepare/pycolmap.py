@@ -35,6 +35,14 @@ def sequential_matcher(options):
     )
 
 
+def matches_importer(options):
+    pairing = pycolmap.ImportedPairingOptions()
+    pairing.match_list_path = options["match_list_path"]
+    pycolmap.match_image_pairs(
+        options["database_path"], pairing_options=pairing, device=pycolmap.Device.cpu
+    )
+
+
 def exhaustive_matcher(options):
     pycolmap.match_exhaustive(options["database_path"], device=pycolmap.Device.cpu)
 
@@ -48,7 +56,8 @@ def mapper(options):
 def main(command, *words):
     options = dict(zip(words[::2], words[1::2]))
     pycolmap.set_random_seed(int(options["random_seed"]))
-    commands = [feature_extractor, sequential_matcher, exhaustive_matcher, mapper]
+    matchers = [sequential_matcher, matches_importer, exhaustive_matcher]
+    commands = [feature_extractor, *matchers, mapper]
     {known.__name__: known for known in commands}[command](options)
 
 

@@ -11,9 +11,9 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 
-use super::{PrepareError, PrepareOptions};
+use super::{DATABASE, MASKS, PrepareError, PrepareOptions, SPARSE, STRETCHED, film::FILM};
 use crate::{
-    capture::names::visit_files,
+    capture::{FRAMES, IMAGES, names::visit_files},
     disk,
     hash::Hasher,
     input,
@@ -32,6 +32,9 @@ const DRAFT: &str = ".prepare-";
 /// Files that systems put into folders by themselves.
 const SYSTEM: [&str; 3] = [".DS_Store", "Thumbs.db", "desktop.ini"];
 
+/// All that a step can have made: what else the file names is none of it.
+const RESULTS: [&str; 7] = [FRAMES, FILM, IMAGES, MASKS, STRETCHED, DATABASE, SPARSE];
+
 const VERSION: u32 = 1;
 
 /// What one wants to know when it is there again.
@@ -48,6 +51,20 @@ struct Record {
     steps: BTreeMap<Step, Done>,
     /// The shots of the whole film, in seconds, and what they were found in.
     shots: Option<(String, Vec<[f64; 2]>)>,
+    /// Whether the last time ended with an error, not by an interrupt.
+    #[serde(default)]
+    failed: bool,
+}
+
+impl Record {
+    /// What of it cannot be, if anything.
+    fn check(self) -> Result<Self, String> {
+        let mut names = self.steps.values().flat_map(|done| done.results.keys());
+        match names.find(|name| !RESULTS.contains(&name.as_str())) {
+            Some(name) => Err(format!("{name:?} is nothing that a step makes")),
+            None => Ok(self),
+        }
+    }
 }
 
 /// A step that was done, or is about to be.
@@ -94,16 +111,17 @@ impl State {
         let path = folder.join(FILE);
         let record = match input::read_to_string(&path) {
             Ok(text) => {
-                Some(
-                    serde_json::from_str::<Record>(&text).map_err(|error| RunError::File {
-                        path: path.clone(),
-                        reason: format!("damaged ({error}); choose another folder with -o"),
-                    })?,
-                )
+                let record = serde_json::from_str::<Record>(&text).map_err(|e| e.to_string());
+                let record = record.and_then(Record::check);
+                Some(record.map_err(|error| RunError::File {
+                    path: path.clone(),
+                    reason: format!("damaged ({error}); choose another folder with -o"),
+                })?)
             }
             Err(error) if error.kind() == io::ErrorKind::NotFound => None,
             Err(error) => return Err(files::at(&path)(error).into()),
         };
+        let other = record.as_ref().is_some_and(|record| record.input != input);
         match &record {
             None => check_empty(folder, input)?,
             Some(record) if record.version != VERSION => {
@@ -116,7 +134,8 @@ impl State {
                 }
                 .into());
             }
-            Some(record) if record.input != input && !options.force => {
+            // What failed is worth nothing for another input.
+            Some(record) if other && !(options.force || record.failed) => {
                 return Err(PrepareError::OtherInput {
                     folder: folder.into(),
                     input: record.input.clone(),
@@ -135,6 +154,7 @@ impl State {
                 options: options.clone(),
                 steps: BTreeMap::new(),
                 shots: None,
+                failed: false,
             },
             _lock: lock,
         };
@@ -143,7 +163,7 @@ impl State {
             state.record.steps = record.steps;
             state.record.shots = record.shots;
         }
-        if options.force {
+        if options.force || other {
             state.begin_anew()?;
         }
         state.write()?;
@@ -159,7 +179,7 @@ impl State {
     pub fn is_done(&self, step: Step, from: &str) -> bool {
         self.record.steps.get(&step).is_some_and(|done| {
             let mut results = done.results.keys();
-            done.from == from && results.all(|result| self.path(result).exists())
+            done.from == from && results.all(|result| is_there(&self.path(result)))
         })
     }
 
@@ -218,8 +238,9 @@ impl State {
         let path = self.path(result);
         let mut steps = self.record.steps.values();
         let own = steps.find_map(|done| done.results.get(result));
-        let is_own = own.is_some_and(|own| digest(&path).is_ok_and(|now| now == *own));
-        match path.exists() && !is_own {
+        let is_own =
+            |own: &String| !path.is_symlink() && digest(&path).is_ok_and(|now| now == *own);
+        match path.symlink_metadata().is_ok() && !own.is_some_and(is_own) {
             true => Err(PrepareError::Changed { path }),
             false => Ok(()),
         }
@@ -230,7 +251,7 @@ impl State {
         for result in results {
             self.check_own(&result)?;
             let path = self.path(&result);
-            if path.exists() {
+            if is_there(&path) {
                 // In one step, so that nothing is left of it that looks whole.
                 let aside = disk::create_folder(DRAFT, &self.folder).map_err(files::at(&path))?;
                 disk::rename(&path, &aside.path().join("old")).map_err(files::at(&path))?;
@@ -263,6 +284,15 @@ impl State {
     /// The system's.
     pub fn draft(&self) -> Result<disk::DraftFolder, PrepareError> {
         Ok(disk::create_folder(DRAFT, &self.folder).map_err(files::at(&self.folder))?)
+    }
+
+    /// Keeps in mind that it ended with an error.
+    ///
+    /// # Errors
+    /// The system's.
+    pub fn fail(&mut self) -> Result<(), PrepareError> {
+        self.record.failed = true;
+        self.write()
     }
 
     /// The shots of the whole film, if they were found in the same film.
@@ -299,6 +329,11 @@ impl State {
         }
         Ok(())
     }
+}
+
+/// Whether a result is there itself, and no link to something else.
+fn is_there(path: &Path) -> bool {
+    path.exists() && !path.is_symlink()
 }
 
 /// Refuses a folder that holds more than the input itself.

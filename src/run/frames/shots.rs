@@ -7,7 +7,7 @@ use std::{
 };
 
 use crate::{
-    capture::{CaptureError, Dataset, FRAMES, Film, IMAGES, photos_in},
+    capture::{CaptureError, Dataset, FRAMES, Film, IMAGES, names::by_number, photos_in},
     run::{RunError, picture_names::distinct},
 };
 
@@ -26,7 +26,7 @@ pub(super) struct Shot {
     pub repeats: usize,
 }
 
-/// The frames of the film, or else all photos by name. `output` must not be where they lie; a
+/// The frames of the film, or else all photos by name, numbers in order. `output` must not be where they lie; a
 /// film has `rate` frames a second.
 ///
 /// # Errors
@@ -47,7 +47,7 @@ pub(super) fn shots_of(
         None => {
             let mut names = photos_in(&root.join(IMAGES));
             names.extend(views.keys().map(|&name| name.to_owned()));
-            names.sort();
+            names.sort_by(|a, b| by_number(a, b));
             names.dedup();
             (root.join(IMAGES), names)
         }
