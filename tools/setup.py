@@ -171,7 +171,7 @@ def install_runtime() -> None:
         work = Path(temporary)
         requirements = work / "requirements.txt"
         requirements.write_text(f"onnxruntime=={ONNXRUNTIME} --hash=sha256:{wheel.sha256}\n")
-        pip = [sys.executable, "-m", "pip", "--quiet", "--disable-pip-version-check", "download"]
+        pip = [sys.executable, "-I", "-m", "pip", "--quiet", "--disable-pip-version-check", "download"]
         pip += ["--require-hashes", "--requirement", str(requirements), "--dest", str(work)]
         pip += ["--no-deps", "--only-binary=:all:", "--platform", wheel.platform]
         pip += ["--implementation", "cp", "--python-version", "3.12", "--abi", "cp312"]

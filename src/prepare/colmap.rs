@@ -2,33 +2,23 @@
 
 use std::{
     collections::BTreeSet,
+    env,
     ffi::OsString,
     path::{Path, PathBuf},
 };
 
 use serde::{Deserialize, Serialize};
 
-use super::{PrepareError, pycolmap};
+use super::{DATABASE, PrepareError, pycolmap};
 use crate::{
+    capture::lens::MODELS,
     disk,
     programs::{Program, ProgramError},
     run::files,
 };
 
-/// Camera models that every version knows.
-const KNOWN_TO_ALL: [&str; 11] = [
-    "SIMPLE_PINHOLE",
-    "PINHOLE",
-    "SIMPLE_RADIAL",
-    "RADIAL",
-    "OPENCV",
-    "FULL_OPENCV",
-    "SIMPLE_RADIAL_FISHEYE",
-    "RADIAL_FISHEYE",
-    "OPENCV_FISHEYE",
-    "FOV",
-    "THIN_PRISM_FISHEYE",
-];
+/// As many camera models, the first of [`MODELS`], every version knows.
+const KNOWN_TO_ALL: usize = 11;
 
 /// So many frames to either side of one are matched with it.
 const OVERLAP: u32 = 10;
@@ -89,57 +79,22 @@ impl Colmap {
         install: bool,
         told: &mut dyn FnMut(String),
     ) -> Result<Self, PrepareError> {
-        let program = match Program::new("colmap").arg("help").ask() {
-            Ok(said) => Some(Self::Program(version(&said))),
+        let version = match Program::new("colmap").arg("help").ask() {
+            Ok(said) => Some(version(&said)),
             Err(ProgramError::Missing { .. }) => None,
             Err(error) => return Err(error.into()),
         };
-        if let Some(program) = &program
-            && program.knows(lens)?
-        {
-            return Ok(program.clone());
+        match version {
+            Some(version) if knows(lens)? => Ok(Self::Program(version)),
+            version => match (pycolmap::find(lens, install, told), version) {
+                (Ok((python, version)), _) => Ok(Self::Python(python, version)),
+                (Err(PrepareError::NoColmap), Some(version)) => Err(PrepareError::UnknownLens {
+                    lens: lens.to_owned(),
+                    version,
+                }),
+                (Err(error), _) => Err(error),
+            },
         }
-        let module = pycolmap::find(install, told);
-        let module = module.map(|(python, version)| Self::Python(python, version));
-        match (program, module) {
-            (_, Ok(module)) if module.knows(lens)? => Ok(module),
-            (None, Err(error)) => Err(error),
-            (Some(program), Err(PrepareError::NoColmap)) => Err(program.without(lens)),
-            (Some(_), Err(error)) => Err(error),
-            (_, Ok(module)) => Err(module.without(lens)),
-        }
-    }
-
-    fn without(&self, lens: &str) -> PrepareError {
-        PrepareError::UnknownLens {
-            lens: lens.to_owned(),
-            colmap: self.name(),
-        }
-    }
-
-    /// Whether there is a camera model of this name.
-    fn knows(&self, lens: &str) -> Result<bool, PrepareError> {
-        if KNOWN_TO_ALL.contains(&lens) {
-            return Ok(true);
-        }
-        let Self::Python(python, _) = self else {
-            let none = disk::create_folder("gs-chroma-", &std::env::temp_dir());
-            let none = none.map_err(files::at(&std::env::temp_dir()))?;
-            let mut unknown = false;
-            let features = Program::new("colmap")
-                .arg("feature_extractor")
-                .option("--database_path", none.path().join("database.db"))
-                .option("--image_path", none.path())
-                .option("--ImageReader.camera_model", lens);
-            // That there is no photo may be an error of its own.
-            let _ = features.run(none.path(), &mut |line| {
-                let line = line.to_lowercase();
-                unknown |= line.contains("camera model does not exist")
-                    || line.contains("existscameramodelwithname");
-            });
-            return Ok(!unknown);
-        };
-        Ok(pycolmap::knows(python, lens))
     }
 
     /// In words.
@@ -320,6 +275,31 @@ fn options(said: &str) -> BTreeSet<String> {
         .filter_map(|word| word.strip_prefix("--"))
         .map(str::to_owned)
         .collect()
+}
+
+/// Whether the program has a camera model of this name.
+fn knows(lens: &str) -> Result<bool, PrepareError> {
+    if MODELS[..KNOWN_TO_ALL]
+        .iter()
+        .any(|model| model.name == lens)
+    {
+        return Ok(true);
+    }
+    let none = disk::create_folder("gs-chroma-", &env::temp_dir());
+    let none = none.map_err(files::at(&env::temp_dir()))?;
+    let mut unknown = false;
+    let features = Program::new("colmap")
+        .arg("feature_extractor")
+        .option("--database_path", none.path().join(DATABASE))
+        .option("--image_path", none.path())
+        .option("--ImageReader.camera_model", lens);
+    // That there is no photo may be an error of its own.
+    let _ = features.run(none.path(), &mut |line| {
+        unknown |= ["Camera model does not exist", "ExistsCameraModel"]
+            .iter()
+            .any(|words| line.contains(words));
+    });
+    Ok(!unknown)
 }
 
 /// The version in what `colmap help` says.

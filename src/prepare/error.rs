@@ -19,25 +19,15 @@ pub enum PrepareError {
         "COLMAP is not installed: install it (Debian, Ubuntu: apt-get install colmap), or give --install, which puts {PINNED} into the cache"
     )]
     NoColmap,
-    /// Nothing was pinned for this Python.
-    #[error(
-        "{PINNED} comes for Python 3.10 to 3.14 on Linux (x86-64), macOS 14 (Apple silicon) and Windows (x86-64), not for this python3; install COLMAP instead"
-    )]
-    NoWheel,
-    /// Python cannot make a place for it.
-    #[error(
-        "python3 has no venv module with pip: install it (Debian, Ubuntu: apt-get install python3-venv), or COLMAP"
-    )]
-    NoVenv,
     /// COLMAP knows no such camera model.
     #[error(
-        "{colmap} does not know the lens {lens}: install a newer COLMAP, give --install, which puts {PINNED} into the cache, or choose another --lens"
+        "COLMAP {version} does not know the lens {lens}: install a newer one, or give --install, which puts {PINNED} into the cache"
     )]
     UnknownLens {
         /// COLMAP's name of the camera model.
         lens: String,
-        /// COLMAP with its version.
-        colmap: String,
+        /// COLMAP's version.
+        version: String,
     },
     /// FFmpeg is too old.
     #[error("ffmpeg {found} is too old: install 5.1 or newer")]

@@ -7,8 +7,9 @@ use std::{
 
 use super::{
     PrepareError, PrepareOptions,
-    ffmpeg::{self, Part, Scan, Source},
+    ffmpeg::{self, Part, Source},
     photos::link_all,
+    scan::Scan,
     sharp,
     state::{State, Step, digest, of},
     tell,
@@ -167,19 +168,7 @@ fn extract(
     from: &str,
     observe: &mut Observer<'_>,
 ) -> Result<(), PrepareError> {
-    let mut source = source.clone();
-    match source.looks.settle()? {
-        Some(Ok(note)) => observe(Event::Note(note)),
-        Some(Err(warning)) => observe(Event::Warning(warning)),
-        None => {}
-    }
-    if source.others > 0 {
-        observe(Event::Note(format!(
-            "the film holds {} streams of pictures: using stream {}",
-            source.others + 1,
-            source.stream
-        )));
-    }
+    let colors = source.looks.filters(observe)?;
     let scan = source.scan(part)?;
     match scan {
         Scan::Progressive => {}
@@ -197,7 +186,7 @@ fn extract(
     let draft = state.draft()?;
     let frames = draft.path().join(FRAMES);
     disk::make_folder(&frames).map_err(files::at(&frames))?;
-    source.extract(part, scan, &frames, &mut |written| {
+    source.extract(part, (scan, &colors), &frames, &mut |written| {
         tell(
             observe,
             Stage::Frames,

@@ -15,6 +15,7 @@ mod masks;
 mod photos;
 mod poses;
 mod pycolmap;
+mod scan;
 mod sharp;
 mod shots;
 mod state;
@@ -142,7 +143,10 @@ pub fn prepare(
         true => Some(film::probe(&input)?),
         false => None,
     };
-    let lens = lens(options, source.as_ref(), observe)?;
+    let lens = match &source {
+        Some(source) => source.looks.lens(&options.lens, observe),
+        None => options.lens.clone(),
+    };
     let colmap = Colmap::find(&lens, options.install, &mut |line| {
         observe(Event::Note(line));
     })?;
@@ -154,16 +158,14 @@ pub fn prepare(
         (&lens, &colmap),
         observe,
     );
-    let mut prepared = match made {
-        Ok(prepared) => prepared,
-        Err(error) => {
-            // The error is what is told.
-            let _ = state.fail();
-            return Err(error);
-        }
-    };
-    prepared.warnings = warnings.take();
-    Ok(prepared)
+    if made.is_err() {
+        // The error is what is told.
+        let _ = state.fail();
+    }
+    made.map(|made| Prepared {
+        warnings: warnings.take(),
+        ..made
+    })
 }
 
 /// Does every step whose result is not there.
@@ -211,26 +213,6 @@ fn make(
         poses,
         warnings: Vec::new(),
     })
-}
-
-/// COLMAP's camera model.
-fn lens(
-    options: &PrepareOptions,
-    source: Option<&Source>,
-    observe: &mut Observer<'_>,
-) -> Result<String, PrepareError> {
-    let Some(source) = source else {
-        return Ok(options.lens.clone());
-    };
-    let chosen = source.looks.lens(options);
-    let (lens, note) = chosen.map_err(|reason| PrepareError::NoFilm {
-        path: options.input.clone(),
-        reason,
-    })?;
-    if let Some(note) = note {
-        observe(Event::Note(note));
-    }
-    Ok(lens)
 }
 
 /// Whether the input is a film; else it is a folder.

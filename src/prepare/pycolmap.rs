@@ -1,6 +1,9 @@
 //! COLMAP as a module of Python, where the program is not installed.
 
-use std::{ffi::OsString, path::PathBuf};
+use std::{
+    ffi::OsString,
+    path::{Path, PathBuf},
+};
 
 use super::PrepareError;
 use crate::{
@@ -19,27 +22,30 @@ pub(super) const PINNED: &str = "pycolmap==4.2.1";
 /// The same, and all that it needs, with the SHA-256 of each wheel.
 const REQUIREMENTS: &str = include_str!("pycolmap.txt");
 
-/// What fails where the camera model of this name is not known.
-const LENS: &str = "import pycolmap, sys; pycolmap.CameraModelId.__members__[sys.argv[1]]";
+/// What is wrong where Python makes no environment, or has no wheel.
+const NO_PIP: &str = "it has no venv module with pip; install it (Debian, Ubuntu: apt-get install python3-venv), or COLMAP";
+const NO_WHEEL: &str = "pycolmap is pinned for Python 3.10 to 3.14 on Linux (x86-64), macOS 14 (Apple silicon) and Windows (x86-64), not for this one; install COLMAP";
 
-/// What says which version there is; of those before 3.13, whose functions are called
-/// otherwise, nothing.
-const VERSION: &str =
-    "import pycolmap; pycolmap.SequentialPairingOptions; print('pycolmap', pycolmap.__version__)";
+/// What says which version there is; it fails for those before 3.13, whose functions are called
+/// otherwise, and where the camera model of this name is not known.
+const VERSION: &str = "import pycolmap, sys
+pycolmap.SequentialPairingOptions, pycolmap.CameraModelId.__members__[sys.argv[1]]
+print('pycolmap', pycolmap.__version__)";
 
-/// A Python that has `pycolmap`, and its version: the one on `PATH`, else that of the cache,
-/// which `install` makes.
+/// A Python that has `pycolmap`, which knows a camera model, and its version: the one on `PATH`,
+/// else that of the cache, which `install` makes.
 ///
 /// # Errors
 /// [`PrepareError::NoColmap`] where there is none, and whatever keeps one from being made.
 pub(super) fn find(
+    lens: &str,
     install: bool,
     told: &mut dyn FnMut(String),
 ) -> Result<(OsString, String), PrepareError> {
     let own = environment().map(|environment| environment.join(interpreter()));
     let known = [Some("python3".into()), own.clone().map(OsString::from)];
     for python in known.into_iter().flatten() {
-        if let Ok(Some(version)) = version(&python) {
+        if let Ok(version) = version(&python, lens) {
             return Ok((python, version));
         }
     }
@@ -50,14 +56,8 @@ pub(super) fn find(
     disk::make_folder(&folder).map_err(files::at(&folder))?;
     let requirements = folder.join("requirements.txt");
     files::write(&requirements, REQUIREMENTS.as_bytes())?;
-    let mut without = false;
-    let made = python("python3")
-        .args(["-m", "venv", "."])
-        .run(&folder, &mut |line| without |= line.contains("ensurepip"));
-    made.map_err(|error| match without {
-        true => PrepareError::NoVenv,
-        false => error.into(),
-    })?;
+    let make = python("python3").args(["-m", "venv", "."]);
+    run(make, &folder, ("ensurepip", NO_PIP))?;
     let pip = [
         "-m",
         "pip",
@@ -65,23 +65,28 @@ pub(super) fn find(
         "--quiet",
         "--disable-pip-version-check",
     ];
-    let pinned = ["--require-hashes", "--only-binary", ":all:", "-r"];
-    let mut unlisted = false;
-    let installed = python(&own)
+    let pip = python(&own)
         .args(pip)
-        .args(pinned)
-        .arg(requirements)
-        .run(&folder, &mut |line| {
-            unlisted |= line.contains("No matching distribution")
-        });
-    installed.map_err(|error| match unlisted {
-        true => PrepareError::NoWheel,
-        false => error.into(),
-    })?;
-    Ok((
-        own.clone().into(),
-        version(own)?.ok_or(PrepareError::NoColmap)?,
-    ))
+        .args(["--require-hashes", "--only-binary", ":all:", "-r"]);
+    run(
+        pip.arg(requirements),
+        &folder,
+        ("No matching distribution", NO_WHEEL),
+    )?;
+    Ok((own.clone().into(), version(own, lens)?))
+}
+
+/// Runs a Python in a folder; where it fails with some words, this is why.
+fn run(python: Program, folder: &Path, (words, why): (&str, &str)) -> Result<(), ProgramError> {
+    let mut heard = false;
+    let ended = python.run(folder, &mut |line| heard |= line.contains(words));
+    ended.map_err(|error| match heard {
+        true => ProgramError::Failed {
+            program: "python3".to_owned(),
+            said: why.to_owned(),
+        },
+        false => error,
+    })
 }
 
 /// Python on a command of COLMAP's; options follow as names and values.
@@ -94,17 +99,12 @@ fn python(interpreter: impl Into<OsString>) -> Program {
     Program::new(interpreter).arg("-I")
 }
 
-/// Its version of `pycolmap`; `None` where that is too old.
-fn version(interpreter: impl Into<OsString>) -> Result<Option<String>, ProgramError> {
-    let said = python(interpreter).args(["-c", VERSION]).ask()?;
-    let version = said.lines().find_map(|line| line.strip_prefix("pycolmap "));
-    Ok(version.map(|version| version.trim().to_owned()))
-}
-
-/// Whether it knows a camera model of this name.
-pub(super) fn knows(interpreter: &OsString, lens: &str) -> bool {
-    let asked = python(interpreter).args(["-c", LENS, lens]);
-    asked.ask().is_ok()
+/// Its version of `pycolmap`.
+fn version(interpreter: impl Into<OsString>, lens: &str) -> Result<String, ProgramError> {
+    let said = python(interpreter).args(["-c", VERSION, lens]).ask()?;
+    let mut lines = said.lines();
+    let version = lines.find_map(|line| line.strip_prefix("pycolmap "));
+    Ok(version.unwrap_or_default().trim().to_owned())
 }
 
 /// Where it is installed.

@@ -25,6 +25,12 @@ while [ $# -gt 0 ]; do
   case ${1#--} in
     database_path) database=$2 ;;
     output_path) output=$2 ;;
+    ImageReader.camera_model)
+      case "$2 $(/bin/cat "$FAKE/version")" in EQUI*\ 3*)
+        echo "[reader.cc:41] Check failed: ExistsCameraModelWithName(camera_model)" >&2
+        exit 1 ;;
+      esac ;;
+    match_list_path) /bin/cp "$2" "$FAKE/pairs" ;;
     ImageReader.mask_path) /bin/cp -r "$2" "$FAKE/seen-masks" ;;
   esac
   shift 2
@@ -41,13 +47,20 @@ if [ -f "$FAKE/wait-$command" ]; then
 fi
 case $command in
   feature_extractor) echo "Processed file [1/2]"; echo features > "$database" ;;
-  *_matcher) echo "Matching image [1/2] in 0.1s"; echo matches >> "$database" ;;
+  *_matcher|matches_importer) echo "Matching image [1/2] in 0.1s"; echo matches >> "$database" ;;
   mapper) echo "Registering image #1 (3)"; /bin/cp -r "$FAKE/models/." "$output" ;;
 esac
 "#;
 
 const PYTHON: &str = r#"#!/bin/sh
-case $2 in
+[ "$1" = -I ] || { echo "the current folder is heeded" >&2; exit 1; }
+shift
+case "$1 $2" in
+  "-m venv") /bin/mkdir -p bin; /bin/cp "$0" bin/python3; exit 0 ;;
+  "-m pip")
+    echo "$*" >> "$FAKE/log"
+    if [ -f "$FAKE/pip-fails" ]; then /bin/cat "$FAKE/pip-fails" >&2; exit 1; fi
+    echo 4.2.1 > "$FAKE/pycolmap"; exit 0 ;;
   *"print('pycolmap'"*) [ -f "$FAKE/pycolmap" ] || exit 1; echo "pycolmap $(/bin/cat "$FAKE/pycolmap")"; exit 0 ;;
 esac
 shift 2
@@ -57,6 +70,7 @@ exec "$FAKE/colmap" "$@"
 const FFMPEG: &str = r#"#!/bin/sh
 echo "ffmpeg $*" >> "$FAKE/log"
 case "$*" in
+  *-filters) /bin/cat "$FAKE/filters" ;;
   -version) echo "ffmpeg version $(/bin/cat "$FAKE/ffmpeg-version") Copyright" ;;
   *rawvideo*) /bin/cat "$FAKE/tiny" ;;
   *idet*)

@@ -63,7 +63,7 @@ fn probe(place: &Place, change: fn(&mut Value)) {
              "sample_aspect_ratio": "1:1", "avg_frame_rate": format!("{RATE}/1")},
             {"index": 1, "codec_type": "audio"},
         ],
-        "format": {"duration": "12.0"},
+        "format": {"duration": "12.0", "format_name": "mov,mp4,m4a"},
     });
     change(&mut said);
     place.write("fake/probe", said.to_string());
@@ -93,7 +93,7 @@ fn a_film_becomes_what_fit_takes() {
         .expect("frames");
     // Half a frame earlier, so that rounding decides nothing.
     assert!(
-        written.contains("-ss 1.450000 -t 4.000000 -i file:/"),
+        written.contains("-ss 1.450000 -t 4.000000 -protocol_whitelist file -format_whitelist mov"),
         "{written}"
     );
     assert!(written.contains("-pix_fmt gray "), "{written}");
@@ -206,6 +206,80 @@ fn films_are_made_progressive_and_square() {
     let written = extraction(&place);
     assert!(written.contains("-vf bwdif=send_frame,scale="), "{written}");
     assert!(written.contains("-pix_fmt gray16be"), "{written}");
+}
+
+/// Seeking loses pictures where there is no index: nothing is sought, and time stamps cut.
+#[test]
+fn recordings_are_decoded_from_their_beginning() {
+    let place = place_with_film(&[40]);
+    probe(&place, |said| {
+        said["format"]["format_name"] = json!("mpegts");
+        said["format"]["start_time"] = json!("1.400000");
+        // What the same fake says of packets: two more than there are frames.
+        let at = |k: i32| json!({"pts_time": format!("{:.6}", 2.0 + 0.1 * f64::from(k))});
+        said["packets"] = Value::Array((0..42).map(at).collect());
+    });
+    let done = succeed(&place, &FILM);
+    let warning = "warning: only 40 of 42 frames could be read";
+    assert!(done.stderr.contains(warning), "{done:?}");
+    let film: Value = serde_json::from_slice(&place.read("house/film.json")).expect("JSON");
+    assert_eq!(film["start"], json!(0.6));
+    super::calls(&place);
+    succeed(
+        &place,
+        &[&FILM[..], &["--start", "2", "--end", "4"]].concat(),
+    );
+    let written = extraction(&place);
+    let cut = "-vf setpts=PTS-STARTPTS,trim=start=2.000000:end=4.000000,setpts=PTS-2.000000/TB ";
+    assert!(
+        written.contains(cut) && !written.contains("-ss"),
+        "{written}"
+    );
+}
+
+#[test]
+fn hdr_becomes_sdr_or_is_told() {
+    let place = place_with_film(&[40]);
+    place.write("fake/filters", " ... zscale V->V\n .S. tonemap V->V\n");
+    probe(&place, |said| {
+        said["streams"][0]["color_transfer"] = json!("arib-std-b67")
+    });
+    let done = succeed(&place, &FILM);
+    assert!(done.stderr.contains("HDR (arib-std-b67)"), "{done:?}");
+    assert!(!done.stderr.contains("warning: "), "{done:?}");
+    let written = extraction(&place);
+    assert!(
+        written.contains("zscale=t=linear") && written.contains("tonemap="),
+        "{written}"
+    );
+    place.write("fake/filters", " ... scale V->V\n");
+    let done = succeed(&place, &[&FILM[..], &["--force"]].concat());
+    assert!(
+        done.stderr
+            .contains("warning: the film is HDR (arib-std-b67)"),
+        "{done:?}"
+    );
+    assert!(!extraction(&place).contains("tonemap="));
+}
+
+#[test]
+fn a_sphere_has_its_lens_or_is_refused_before_any_work() {
+    let place = place_with_film(&[40]);
+    probe(&place, |said| {
+        said["streams"][0]["side_data_list"] = json!([{"projection": "equirectangular"}]);
+    });
+    refused(
+        &place,
+        &FILM,
+        &["COLMAP 3.8", "EQUIRECTANGULAR", "--install"],
+    );
+    assert!(!place.path("house").exists());
+    version(&place, "4.1.0");
+    let done = succeed(&place, &FILM);
+    assert!(
+        done.stderr.contains("using --lens EQUIRECTANGULAR"),
+        "{done:?}"
+    );
 }
 
 #[test]

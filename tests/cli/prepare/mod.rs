@@ -321,6 +321,127 @@ fn without_colmap_its_module_serves() {
     refused(&place_with(&[]), &PHOTOS, &words);
 }
 
+/// No file of the current folder is imported (the fake refuses), and every wheel is pinned.
+#[test]
+fn the_module_is_installed_by_its_digits() {
+    let place = place_with(&["python3"]);
+    let install = with(&["--install"]);
+    place.write(
+        "fake/pip-fails",
+        "ERROR: No matching distribution found for pycolmap\n",
+    );
+    refused(
+        &place,
+        &install,
+        &["pinned for Python 3.10", "install COLMAP"],
+    );
+    place.write("fake/pip-fails", "ERROR: \u{1b}[31mno network\n");
+    refused(
+        &place,
+        &install,
+        &["python3 failed", "\\u{1b}[31mno network"],
+    );
+    fs::remove_file(place.path("fake/pip-fails")).expect("a file");
+    calls(&place);
+    let done = succeed(&place, &install);
+    assert!(done.stdout.contains("pycolmap 4.2.1"), "{done:?}");
+    let pip = &calls(&place)[0];
+    assert!(
+        pip.contains("--require-hashes --only-binary :all: -r "),
+        "{pip}"
+    );
+}
+
+/// As cameras number photos; COLMAP's own matcher sorts plainly.
+#[test]
+fn photos_one_after_the_other_are_matched_by_number() {
+    let place = place_with(&["colmap"]);
+    let names: Vec<String> = (1..=scene::VIEWS).map(|k| format!("IMG_{k}.png")).collect();
+    for (view, name) in names.iter().enumerate() {
+        let from = place.path(&format!("photos/{}", scene::name(view)));
+        fs::rename(from, place.path(&format!("photos/{name}"))).expect("writable");
+    }
+    piece(&place, 0, &names);
+    let sequential = with(&["--match", "sequential"]);
+    succeed(&place, &sequential);
+    assert_eq!(commands(&place)[1], "matches_importer");
+    let pairs = String::from_utf8(place.read("fake/pairs")).expect("text");
+    let lines: Vec<&str> = pairs.lines().collect();
+    assert_eq!(lines[0], "IMG_1.png IMG_2.png");
+    assert!(lines.contains(&"IMG_9.png IMG_10.png"), "{lines:?}");
+    assert_eq!(lines.len(), 45);
+    // Its file of pairs parts names at spaces.
+    fs::rename(
+        place.path("photos/IMG_3.png"),
+        place.path("photos/IMG 3.png"),
+    )
+    .expect("writable");
+    piece(&place, 0, &names[3..]);
+    let done = succeed(&place, &sequential);
+    assert!(
+        done.stderr.contains("warning: photos are matched by name"),
+        "{done:?}"
+    );
+    assert_eq!(commands(&place)[1], "sequential_matcher");
+}
+
+/// A folder that came from elsewhere may name anything.
+#[test]
+fn what_is_named_outside_of_the_folder_is_left_alone() {
+    let place = place_with(&["colmap"]);
+    succeed(&place, &PHOTOS);
+    place.write("victim/letter.txt", "dear");
+    let kept = String::from_utf8(place.read("house/prepare.json")).expect("text");
+    for name in ["../victim", "/etc", "images/..", "letter.txt"] {
+        let named = kept.replace("\"sparse\"", &format!("{name:?}"));
+        place.write("house/prepare.json", named);
+        refused(&place, &with(&["--force"]), &["prepare.json", name]);
+    }
+    assert!(place.path("victim/letter.txt").is_file());
+    // A link in a result's place is somebody else's.
+    place.write("house/prepare.json", kept);
+    fs::rename(place.path("house/sparse"), place.path("elsewhere")).expect("writable");
+    std::os::unix::fs::symlink(place.path("elsewhere"), place.path("house/sparse"))
+        .expect("writable");
+    refused(
+        &place,
+        &with(&["--force"]),
+        &["house/sparse", "was changed"],
+    );
+    assert!(place.path("elsewhere/0/images.txt").is_file());
+}
+
+#[test]
+fn what_failed_does_not_keep_another_input_away() {
+    let place = place_with(&["colmap"]);
+    place.write("fake/fail-mapper", "");
+    place.write("wrong/notes.txt", "notes");
+    for view in 0..2 {
+        let path = place.path(&format!("wrong/{view}.png"));
+        scene::photo(view).save(path).expect("writable");
+    }
+    refused(
+        &place,
+        &["prepare", "wrong", "-o", "house"],
+        &["colmap failed"],
+    );
+    fs::remove_file(place.path("fake/fail-mapper")).expect("a file");
+    let done = succeed(&place, &PHOTOS);
+    assert!(done.stdout.starts_with("10 of 10"), "{done:?}");
+    refused(
+        &place,
+        &["prepare", "wrong", "-o", "house"],
+        &["was prepared from"],
+    );
+    let auto = ["auto", "wrong", "-o", "out", "--teacher", "photos"];
+    place.write("out/house/prepare.json", place.read("house/prepare.json"));
+    let done = run(&place, &auto);
+    assert!(
+        done.stderr.contains("remove this one") && !done.stderr.contains("--force"),
+        "{done:?}"
+    );
+}
+
 #[test]
 fn names_are_no_options_and_no_patterns() {
     let place = place_with(&["colmap"]);

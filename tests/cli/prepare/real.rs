@@ -6,6 +6,7 @@ use std::process::{Command, Stdio};
 
 use serde_json::Value;
 
+use super::fakes::{piece, place_with, refused, succeed};
 use crate::program::Place;
 
 /// The bundled scene's photos.
@@ -48,6 +49,76 @@ fn film(place: &Place) {
         .arg(place.path("garden.mp4"))
         .status();
     assert!(made.expect("ffmpeg").success());
+}
+
+/// FFmpeg alone, on a film of 14 frames that begins 0.6 s later than its sound.
+#[cfg(unix)]
+#[test]
+fn no_frame_of_a_recording_is_lost_and_lists_lead_nowhere() {
+    if !(is_there("ffmpeg", "-version") && is_there("ffprobe", "-version")) {
+        return;
+    }
+    let place = place_with(&["colmap"]);
+    for program in ["ffmpeg", "ffprobe"] {
+        let path = std::env::var_os("PATH").unwrap_or_default();
+        let mut found = std::env::split_paths(&path).map(|folder| folder.join(program));
+        let found = found.find(|path| path.is_file()).expect("a program");
+        std::os::unix::fs::symlink(found, place.path(&format!("bin/{program}"))).expect("writable");
+    }
+    let film = |name: &str, options: &[&str]| {
+        let made = Command::new("ffmpeg")
+            .args([
+                "-v",
+                "error",
+                "-f",
+                "lavfi",
+                "-i",
+                "sine=d=1.2",
+                "-itsoffset",
+                "0.6",
+            ])
+            .args([
+                "-f",
+                "lavfi",
+                "-i",
+                "mandelbrot=s=160x120:r=25",
+                "-frames:v",
+                "14",
+            ])
+            .args(["-map", "0", "-map", "1", "-fps_mode", "passthrough"])
+            .args(options)
+            .arg(place.path(name))
+            .status();
+        assert!(made.expect("ffmpeg").success(), "{name}");
+    };
+    film("a.ts", &["-c:v", "mpeg2video", "-bf", "2", "-c:a", "mp2"]);
+    film("a.mpg", &["-c:v", "mpeg2video", "-bf", "2", "-c:a", "mp2"]);
+    film("a.mkv", &["-c:v", "mpeg4", "-c:a", "aac"]);
+    let names: Vec<String> = (1..=14).map(|k| format!("{k:06}.png")).collect();
+    piece(&place, 0, &names);
+    for name in ["a.ts", "a.mpg", "a.mkv"] {
+        let done = succeed(&place, &["prepare", name, "-o", &format!("{name} out")]);
+        assert!(!done.stderr.contains("warning"), "{done:?}");
+        let film: Value =
+            serde_json::from_slice(&place.read(&format!("{name} out/film.json"))).expect("JSON");
+        assert_eq!(film["frames"].as_array().map(Vec::len), Some(14), "{name}");
+        let start = film["start"].as_f64().expect("a number");
+        // Sound begins earlier by what its codec needs to start.
+        assert!((0.55..0.7).contains(&start), "{name}: {start}");
+    }
+    let list = format!(
+        "#EXTM3U\n#EXT-X-TARGETDURATION:1\n#EXTINF:1,\n{}\n#EXT-X-ENDLIST\n",
+        place.path("a.ts").display()
+    );
+    place.write("list.m3u8", &list);
+    place.write("list.mp4", &list);
+    for name in ["list.m3u8", "list.mp4"] {
+        refused(
+            &place,
+            &["prepare", name, "-o", "house"],
+            &[name, "hls", "other files"],
+        );
+    }
 }
 
 #[test]
