@@ -13,7 +13,7 @@ use super::{
     prepare::InputArguments,
     print,
     progress::Progress,
-    values::{PRESETS, one_of},
+    values::{PRESETS, folder, one_of},
 };
 use crate::{
     auto::{AutoOptions, Results, Step, Told, auto},
@@ -33,7 +33,7 @@ pub struct Auto {
     #[command(flatten)]
     input: InputArguments,
     /// Folder for everything.
-    #[arg(short, long, value_name = "DIR", help_heading = OUTPUT)]
+    #[arg(short, long, value_name = "DIR", value_parser = folder(), help_heading = OUTPUT)]
     output: PathBuf,
     /// Network (name or .onnx), folder of colored photos, or photos for their own colors.
     #[arg(long, help_heading = TEACHER, value_name = "NAME|FILE.onnx|DIR|photos")]

@@ -16,7 +16,7 @@ use super::{
     print,
     progress::Progress,
     usage::refuse,
-    values::{PRESETS, one_of, positive},
+    values::{PRESETS, folder, one_of, positive},
     view::ViewArguments,
 };
 use crate::capture::LoadOptions;
@@ -71,7 +71,7 @@ pub struct Fit {
     #[command(flatten)]
     network: NetworkArguments,
     /// Run folder to write [default: runs/<folder name>].
-    #[arg(short, long, value_name = "RUN", help_heading = OUTPUT)]
+    #[arg(short, long, value_name = "RUN", value_parser = folder(), help_heading = OUTPUT)]
     output: Option<PathBuf>,
     #[command(flatten)]
     checkpoints: CheckpointArguments,

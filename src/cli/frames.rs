@@ -10,7 +10,7 @@ use super::{
     network::NetworkArguments,
     next, print,
     progress::Progress,
-    values::{Rate, rate},
+    values::{Rate, folder_or_film, rate},
 };
 use crate::run::{Frames, FramesOptions, frames};
 
@@ -25,7 +25,7 @@ pub struct FramesCommand {
     /// Colored run folder [default: newest under runs/].
     run: Option<PathBuf>,
     /// Folder for PNG files, or a film (.mp4, .mov, .mkv, .m4v) by FFmpeg.
-    #[arg(short, long, help_heading = OUTPUT, value_name = "DIR|FILM")]
+    #[arg(short, long, help_heading = OUTPUT, value_name = "DIR|FILM", value_parser = folder_or_film())]
     output: PathBuf,
     /// Teacher for what the scene does not show, such as sky [default: the run's teachers].
     #[arg(long, help_heading = TEACHER, value_name = "NAME|FILE.onnx|DIR|photos")]

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{CliError, next, print, progress::Progress, seams::in_words};
+use super::{CliError, next, print, progress::Progress, seams::in_words, values::folder};
 use crate::run::{MergeOptions, merge};
 
 /// Put the trained blocks of a job together, and measure the whole.
@@ -16,7 +16,7 @@ pub struct Merge {
     /// Job folder of `partition` with trained blocks.
     job: PathBuf,
     /// Run folder to write [default: runs/<name of the job folder>].
-    #[arg(short, long, value_name = "RUN")]
+    #[arg(short, long, value_name = "RUN", value_parser = folder())]
     output: Option<PathBuf>,
     /// Print the report as JSON.
     #[arg(long)]

@@ -4,7 +4,11 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{CliError, next, print, progress::Progress, values::share};
+use super::{
+    CliError, next, print,
+    progress::Progress,
+    values::{folder, share},
+};
 use crate::{
     blocks::{Blocks, Division, Estimate, Job},
     report::Table,
@@ -21,7 +25,7 @@ pub struct Partition {
     /// COLMAP folder with images/ and sparse/.
     colmap_dir: PathBuf,
     /// Job folder to write.
-    #[arg(short, long, value_name = "JOB")]
+    #[arg(short, long, value_name = "JOB", value_parser = folder())]
     output: PathBuf,
     /// Number of blocks, or a grid of them [default: one for every 400 photos, or as many as
     /// --memory-limit asks for].

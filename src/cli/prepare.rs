@@ -10,7 +10,7 @@ use super::{
     next, print,
     progress::Progress,
     usage::refuse,
-    values::{one_of, positive},
+    values::{folder, one_of, positive},
 };
 use crate::capture::lens::MODELS;
 use crate::prepare::{Cameras, Matching, PrepareOptions, Prepared, prepare};
@@ -116,7 +116,7 @@ pub struct Prepare {
     #[command(flatten)]
     input: InputArguments,
     /// Folder to write; continues one that was prepared before.
-    #[arg(short, long, value_name = "DIR", help_heading = OUTPUT)]
+    #[arg(short, long, value_name = "DIR", value_parser = folder(), help_heading = OUTPUT)]
     output: PathBuf,
     /// Start over, also from another input.
     #[arg(long, help_heading = OUTPUT)]

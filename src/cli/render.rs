@@ -10,7 +10,7 @@ use super::{
     next, print,
     progress::Progress,
     usage::refuse,
-    values::{Rate, one_of, positive, rate},
+    values::{Rate, folder, one_of, positive, rate},
 };
 use crate::run::{PathOptions, RenderOptions, Rendered, Views, Way, is_film, render, render_path};
 
@@ -38,7 +38,7 @@ pub struct Render {
     #[arg(long, help_heading = INPUT)]
     luma: bool,
     /// Folder for PNG files.
-    #[arg(short, long, help_heading = OUTPUT, value_name = "DIR", required_unless_present_any = ["video", "save_path"])]
+    #[arg(short, long, help_heading = OUTPUT, value_name = "DIR", value_parser = folder(), required_unless_present_any = ["video", "save_path"])]
     output: Option<PathBuf>,
     #[command(flatten)]
     path: PathArguments,

@@ -13,7 +13,7 @@ use super::{
     photos::Photos,
     print,
     progress::Progress,
-    values::{PRESETS, one_of, positive},
+    values::{PRESETS, folder, one_of, positive},
 };
 use crate::run::{Preset, Stage};
 use crate::tradeoff::{FILES, PointStage, TradeoffOptions, front_table, knob_names, tradeoff};
@@ -30,7 +30,7 @@ pub struct Tradeoff {
     /// COLMAP folder with images/ and sparse/.
     colmap_dir: PathBuf,
     /// Folder for points and results [default: runs/<folder name>-tradeoff].
-    #[arg(short, long, help_heading = OUTPUT, value_name = "DIR")]
+    #[arg(short, long, help_heading = OUTPUT, value_name = "DIR", value_parser = folder())]
     output: Option<PathBuf>,
     /// Network or folder of colored photos, for points in color.
     #[arg(long, help_heading = TEACHER, value_name = "NAME|FILE.onnx|DIR")]

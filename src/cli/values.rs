@@ -1,11 +1,14 @@
 //! How the values of options are read.
 
-use std::str::FromStr;
+use std::{
+    path::{Path, PathBuf},
+    str::FromStr,
+};
 
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::builder::{PathBufValueParser, PossibleValue, PossibleValuesParser, TypedValueParser};
 use serde::Serialize;
 
-use crate::run::Preset;
+use crate::run::{Preset, is_film};
 
 /// The presets with their help.
 pub(super) const PRESETS: &[(Preset, &str)] = &[
@@ -47,6 +50,40 @@ fn name(value: &impl Serialize) -> String {
     }
 }
 
+/// Extensions of films, pictures, archives, splats and other files, which are no part of a
+/// folder's name.
+const FILES: &str = " 3gp 7z asf avi avif bmp bz2 csv divx dng dpx dv exr flac flv gif glb gltf gz \
+    heic heif html j2k jp2 jpeg jpg json jxl ksplat m2ts m2v m4v mkv mov mp3 mp4 mpeg mpg mts mxf \
+    npy npz obj ogg ogv onnx pdf pgm ply png pnm ppm psd rar sog splat spz svg tar tga tgz tif \
+    tiff toml ts txt usda usdz vob wav webm webp wmv xz y4m zip zst ";
+
+/// A folder to write, which may be there; not what is named like a file.
+pub(super) fn folder() -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().try_map(|path| match is_named_like_a_file(&path) {
+        true => Err("named like a file: name a folder"),
+        false => Ok(path),
+    })
+}
+
+/// A folder to write, as [`folder`] has it, or a film.
+pub(super) fn folder_or_film() -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().try_map(
+        |path| match is_named_like_a_file(&path) && !is_film(&path) {
+            true => Err("no film: name it .mp4, .mov, .m4v or .mkv, or name a folder"),
+            false => Ok(path),
+        },
+    )
+}
+
+fn is_named_like_a_file(path: &Path) -> bool {
+    let extension = path.extension().unwrap_or_default().to_string_lossy();
+    let extension = extension.to_ascii_lowercase();
+    FILES
+        .split(' ')
+        .any(|known| !known.is_empty() && known == extension)
+        && !path.is_dir()
+}
+
 /// A finite number above 0.
 pub(super) fn positive<T>(text: &str) -> Result<T, String>
 where
@@ -84,6 +121,38 @@ pub(super) fn rate(text: &str) -> Result<Rate, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn folders_are_not_named_like_files() {
+        for name in [
+            "a.avi",
+            "a/b.WEBM",
+            "pictures.zip",
+            "a.tif",
+            "house.ply",
+            "a.mp4",
+        ] {
+            assert!(is_named_like_a_file(Path::new(name)), "{name}");
+        }
+        for name in [
+            "house.v2",
+            "runs/house",
+            "2024.05.01",
+            ".",
+            "..",
+            "zip",
+            ".png",
+            "a.zip/b",
+        ] {
+            assert!(!is_named_like_a_file(Path::new(name)), "{name}");
+        }
+        // A folder that is there is one.
+        let place = tempfile::tempdir().expect("a folder");
+        let folder = place.path().join("colored.avi");
+        assert!(is_named_like_a_file(&folder));
+        std::fs::create_dir(&folder).expect("a folder");
+        assert!(!is_named_like_a_file(&folder));
+    }
 
     #[test]
     fn numbers_have_bounds() {
