@@ -83,21 +83,32 @@ impl Film {
     }
 
     /// How often each frame is shown, at so many frames a second, for all to be shown when they
-    /// were: once, unless they have times of their own.
+    /// were: once, unless they have times of their own, or the film has sound and another rate.
     pub fn repeats(&self, rate: [u32; 2]) -> Vec<usize> {
-        let Some(times) = &self.times else {
-            return vec![1; self.frames.len()];
+        let per_second = |[frames, seconds]: [u32; 2]| f64::from(frames) / f64::from(seconds);
+        let own = per_second(self.frame_rate);
+        let rate = per_second(rate);
+        let times = match &self.times {
+            Some(times) => times.clone(),
+            None if self.audio && rate != own => {
+                (0..self.frames.len()).map(|i| i as f64 / own).collect()
+            }
+            None => return vec![1; self.frames.len()],
         };
-        let rate = f64::from(rate[0]) / f64::from(rate[1]);
         let number = |time: f64| (time * rate).round().max(0.0) as usize;
         let ends = times.iter().skip(1).copied().chain([self.seconds]);
         let mut shown = 0;
-        ends.map(|end| {
+        let repeats = ends.map(|end| {
             let before = shown;
             shown = number(end).max(before);
             shown - before
-        })
-        .collect()
+        });
+        let mut repeats: Vec<usize> = repeats.collect();
+        // A film that is shorter than half a frame has one.
+        if let (Some(first), 0) = (repeats.first_mut(), shown) {
+            *first = 1;
+        }
+        repeats
     }
 
     /// What about it cannot be, if anything.
@@ -155,7 +166,22 @@ mod tests {
 
     #[test]
     fn frames_are_shown_as_long_as_they_were() {
-        assert_eq!(film().repeats([24, 1]), [1, 1]);
+        assert_eq!(film().repeats([24000, 1001]), [1, 1]);
+        let silent = Film {
+            audio: false,
+            ..film()
+        };
+        assert_eq!(silent.repeats([48, 1]), [1, 1]);
+        // What has sound keeps the time at any rate.
+        let even = Film {
+            seconds: 0.8,
+            frame_rate: [5, 1],
+            frames: vec![String::new(); 4],
+            ..film()
+        };
+        assert_eq!(even.repeats([10, 1]), [2; 4]);
+        assert_eq!(even.repeats([25, 10]), [1, 0, 1, 0]);
+        assert_eq!(even.repeats([1, 10]), [1, 0, 0, 0]);
         let film = Film {
             seconds: 1.0,
             frames: vec![String::new(); 4],

@@ -204,16 +204,26 @@ impl Loader {
         })
     }
 
+    /// The least and the greatest value of a photo's file, in its unit; none of one of 8 bits.
+    ///
+    /// # Errors
+    /// If it cannot be read or decoded.
+    pub fn extremes(&self, path: &Path) -> Result<Option<[f64; 2]>, CaptureError> {
+        let picture = decode::decode(path, |_| Ok(()))?;
+        let deep = picture.header.depth > Depth::Eight;
+        Ok(tone::extremes(&picture, self.options.channel).filter(|_| deep))
+    }
+
     /// The photo of a view at its file's size and depth, with its lens's distortion, and what
-    /// masks leave of it.
+    /// masks leave of it; of more than 8 bits in a range of its own.
     ///
     /// # Errors
     /// As [`Self::load`], but a photo of which no pixel counts is none.
-    pub fn original(&self, view: &View) -> Result<Original, CaptureError> {
+    pub fn original(&self, view: &View, range: Normalize) -> Result<Original, CaptureError> {
         let picture = decode::decode(&view.image_path, |size| check_size(view, size))?;
         let mask = self.mask(view, picture.header.size)?;
         let alpha = self.alpha(view, &picture);
-        let mut original = self.made_gray(picture);
+        let mut original = self.made_gray(&picture, range);
         for mask in [mask, alpha].into_iter().flatten() {
             original.mask = Some(match original.mask {
                 Some(own) => (own.iter().zip(&mask)).map(|(a, b)| *a.min(b)).collect(),
@@ -223,24 +233,39 @@ impl Loader {
         Ok(original)
     }
 
-    /// A photo that no view shows, at its file's size and depth.
+    /// A photo that no view shows, as [`Self::original`] has it.
     ///
     /// # Errors
     /// If it cannot be read or decoded.
-    pub fn unplaced(&self, path: &Path) -> Result<Original, CaptureError> {
-        Ok(self.made_gray(decode::decode(path, |_| Ok(()))?))
+    pub fn unplaced(&self, path: &Path, range: Normalize) -> Result<Original, CaptureError> {
+        Ok(self.made_gray(&decode::decode(path, |_| Ok(()))?, range))
     }
 
-    fn made_gray(&self, picture: decode::Picture) -> Original {
+    fn made_gray(&self, picture: &decode::Picture, range: Normalize) -> Original {
         let [width, height] = picture.header.size;
-        let deep = picture.header.depth > Depth::Eight;
-        let (gray, mask) = tone::gray(picture, &self.options);
+        let depth = picture.header.depth;
+        let deep = depth > Depth::Eight;
+        let own = if deep { range } else { Normalize::Off };
+        // What has another depth than the scene's photos is in no range of theirs.
+        let scene = match self.depth {
+            Some(scene) if scene != depth => own,
+            _ => self.options.normalize,
+        };
+        let byte = |gray: u16| ((u32::from(gray) + 128) / 257) as u8;
         Original {
             width,
             height,
-            gray,
+            gray: tone::gray(picture, own, &self.options),
+            in_scene: (scene != own).then(|| {
+                let gray = tone::gray(picture, scene, &self.options);
+                gray.into_iter().map(byte).collect()
+            }),
             deep,
-            mask,
+            mask: tone::finite(
+                &picture.samples,
+                picture.header.channels,
+                self.options.channel,
+            ),
         }
     }
 

@@ -12,6 +12,9 @@ pub struct Original {
     /// Gray with the photo's `L*`, encoded sRGB in 65,535ths, `[height, width]`; of a gray photo
     /// of 8 bits multiples of 257.
     pub gray: Vec<u16>,
+    /// The same in 255ths in the range that the scene's photos are normalized to, where that is
+    /// another.
+    pub in_scene: Option<Vec<u8>>,
     /// Whether the file tells more than 256 levels apart.
     pub deep: bool,
     /// As [`Photo::mask`](super::Photo::mask).
@@ -19,8 +22,11 @@ pub struct Original {
 }
 
 impl Original {
-    /// Gray in 255ths, `[height, width]`.
+    /// Gray in 255ths as the scene has it, `[height, width]`.
     pub fn bytes(&self) -> Vec<u8> {
+        if let Some(bytes) = &self.in_scene {
+            return bytes.clone();
+        }
         let byte = |&gray: &u16| ((u32::from(gray) + 128) / 257) as u8;
         self.gray.iter().map(byte).collect()
     }
@@ -53,6 +59,7 @@ mod tests {
             width: 16,
             height: 16,
             gray: (0..=255).map(|v| v * 257).collect(),
+            in_scene: None,
             deep: false,
             mask: Some((0..=255).collect()),
         };

@@ -15,7 +15,7 @@ pub(super) fn develop(picture: Picture, options: &LoadOptions) -> Pixels {
         header, samples, ..
     } = picture;
     let mask = finite(&samples, header.channels, options.channel);
-    let levels = Tone::of(header.depth, options).levels(samples);
+    let levels = Tone::of(header.depth, options.normalize, options).levels(samples);
     let rgb = |step| levels.chunks_exact(step).map(|p| [p[0], p[1], p[2]]);
     let values = match (header.channels, options.channel) {
         (1, _) => Values::Gray(levels.as_chunks().0.to_vec()),
@@ -39,17 +39,16 @@ pub(super) fn develop(picture: Picture, options: &LoadOptions) -> Pixels {
     }
 }
 
-/// A photo's gray in 65,535ths of white, encoded sRGB, and what each pixel counts, as
-/// [`develop`] has it.
-pub(super) fn gray(picture: Picture, options: &LoadOptions) -> (Vec<u16>, Option<Vec<u8>>) {
+/// A photo's gray in 65,535ths of white, encoded sRGB, as [`develop`] has it, but with its own
+/// range.
+pub(super) fn gray(picture: &Picture, range: Normalize, options: &LoadOptions) -> Vec<u16> {
     let Picture {
         header, samples, ..
     } = picture;
-    let mask = finite(&samples, header.channels, options.channel);
-    let shares = Tone::of(header.depth, options).shares(samples);
+    let shares = Tone::of(header.depth, range, options).shares(samples);
     let level = |share: f64| (f64::from(u16::MAX) * share).round() as u16;
     let pixels = shares.chunks_exact(header.channels);
-    let gray = match (header.channels, options.channel) {
+    match (header.channels, options.channel) {
         (1 | 2, _) => pixels.map(|pixel| level(pixel[0].into())).collect(),
         (_, Channel::Luma) => pixels
             .map(|pixel| match *pixel {
@@ -62,12 +61,27 @@ pub(super) fn gray(picture: Picture, options: &LoadOptions) -> (Vec<u16>, Option
             let at = channel.samples().start;
             pixels.map(|pixel| level(pixel[at].into())).collect()
         }
-    };
-    (gray, mask)
+    }
+}
+
+/// The least and the greatest value in use that is finite, in the file's unit; `None` where there
+/// is but one.
+pub(super) fn extremes(picture: &Picture, channel: Channel) -> Option<[f64; 2]> {
+    let Header { size, channels, .. } = picture.header;
+    let pixels = 0..size[0] as usize * size[1] as usize;
+    let used = used(channels, channel);
+    let [low, high] = pixels
+        .flat_map(|pixel| used.clone().map(move |c| pixel * channels + c))
+        .map(|i| value(&picture.samples, i))
+        .filter(|v| v.is_finite())
+        .fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], v| {
+            [low.min(v), high.max(v)]
+        });
+    (low < high).then(|| [low, high].map(f64::from))
 }
 
 /// 255 where all values in use are finite, else 0; `None` where they are everywhere.
-fn finite(samples: &Samples, channels: usize, channel: Channel) -> Option<Vec<u8>> {
+pub(super) fn finite(samples: &Samples, channels: usize, channel: Channel) -> Option<Vec<u8>> {
     let Samples::Float(values) = samples else {
         return None;
     };
@@ -131,11 +145,6 @@ pub(super) fn sample(
     let (width, height) = (width as usize, height as usize);
     let step = (((width * height) as f64 / most as f64).sqrt().ceil() as usize).max(1);
     let used = used(channels, channel);
-    let value = |i: usize| match &picture.samples {
-        Samples::Eight(values) => f32::from(values[i]),
-        Samples::Sixteen(values) => f32::from(values[i]),
-        Samples::Float(values) => values[i],
-    };
     // From the middle of the steps, so that no border is preferred; small photos have no middle.
     let along = |length: usize| (step / 2).min(length.saturating_sub(1));
     (along(height)..height)
@@ -147,9 +156,18 @@ pub(super) fn sample(
         })
         .filter(|&pixel| mask.is_none_or(|mask| mask[pixel] > 0))
         .flat_map(|pixel| used.clone().map(move |c| pixel * channels + c))
-        .map(value)
+        .map(|i| value(&picture.samples, i))
         .filter(|v| v.is_finite())
         .collect()
+}
+
+/// A sample in the file's unit.
+fn value(samples: &Samples, i: usize) -> f32 {
+    match samples {
+        Samples::Eight(values) => f32::from(values[i]),
+        Samples::Sixteen(values) => f32::from(values[i]),
+        Samples::Float(values) => values[i],
+    }
 }
 
 /// What a value becomes.
@@ -160,8 +178,8 @@ struct Tone {
 }
 
 impl Tone {
-    fn of(depth: Depth, options: &LoadOptions) -> Self {
-        let [low, high] = match options.normalize {
+    fn of(depth: Depth, range: Normalize, options: &LoadOptions) -> Self {
+        let [low, high] = match range {
             Normalize::Range(range) => range,
             Normalize::Auto | Normalize::Off => [0.0, depth.white()],
         };
@@ -192,7 +210,7 @@ impl Tone {
     }
 
     /// [`Self::share`] of every sample, 0 for NaN.
-    fn shares(&self, samples: Samples) -> Vec<f32> {
+    fn shares(&self, samples: &Samples) -> Vec<f32> {
         let share = |value: f64| {
             let share = self.share(value) as f32;
             if share.is_nan() { 0.0 } else { share }

@@ -24,6 +24,7 @@ pub struct Colored {
 
 /// The photo with `ab`, CIELAB a and b of each pixel of its canvas, brought to its size along its
 /// edges. Each pixel keeps its `L*`; where no display shows such a color its chroma is reduced.
+/// Where the scene's photos are in another range, chroma grows and shrinks with the light.
 ///
 /// # Panics
 /// When `ab` has not the canvas's size.
@@ -40,7 +41,17 @@ pub fn finish(original: &Original, canvas: &Canvas, ab: Vec<[f32; 2]>) -> Colore
         height: original.height,
         pixels: &bytes,
     };
-    let large = answer.upsampled(photo, Upsample::Guided);
+    let mut large = answer.upsampled(photo, Upsample::Guided);
+    if let Some(in_scene) = &original.in_scene {
+        // CIELAB's a and b go with L* + 16 as the light does.
+        let light = |share: f64| (gray_to_lightness(share) + 16.0) as f32;
+        let pixels = original.gray.iter().zip(in_scene);
+        for (ab, (&gray, &scene)) in large.ab.iter_mut().zip(pixels) {
+            let own = light(f64::from(gray) / f64::from(u16::MAX));
+            let by = own / light(f64::from(scene) / f64::from(u8::MAX));
+            *ab = ab.map(|value| by * value);
+        }
+    }
     let lightness: Vec<f64> = match original.deep {
         false => (0..=u8::MAX)
             .map(|gray| gray_to_lightness(f64::from(gray) / f64::from(u8::MAX)))
@@ -95,6 +106,7 @@ mod tests {
             width,
             height: gray.len() as u32 / width,
             gray,
+            in_scene: None,
             deep,
             mask: None,
         }

@@ -1,10 +1,13 @@
 //! A film of pictures, by ffmpeg.
 
+mod sound;
+
 use std::path::{Path, PathBuf};
 
 use image::RgbImage;
+use sound::Sound;
 
-use super::{RunError, files};
+use super::{Event, Observer, RunError, files};
 use crate::{
     capture::Film,
     disk::{self, Draft},
@@ -53,8 +56,7 @@ pub(super) struct FilmWriter {
     path: PathBuf,
     rate: [u32; 2],
     purpose: Purpose,
-    /// The film that sound is taken from, where it begins and how long it is, in seconds.
-    sound: Option<(PathBuf, f64, f64)>,
+    sound: Option<Sound>,
     started: Option<Started>,
 }
 
@@ -83,10 +85,10 @@ impl FilmWriter {
         })
     }
 
-    /// The same with the sound of another film, where it has some and is there.
-    pub fn sounding_like(mut self, film: Option<&Film>) -> Self {
-        let sounding = film.filter(|film| film.audio && film.source.is_file());
-        self.sound = sounding.map(|film| (film.source.clone(), film.start, film.seconds));
+    /// The same with the sound of another film; what is missing of it is told.
+    pub fn sounding_like(mut self, film: Option<&Film>, observe: &mut Observer<'_>) -> Self {
+        let mut tell = |line| observe(Event::Warning(line));
+        self.sound = film.and_then(|film| Sound::of(film, self.container(), &mut tell));
         self
     }
 
@@ -137,16 +139,33 @@ impl FilmWriter {
         written.map_err(|error| self.failed(&error))
     }
 
-    /// Ends the film and puts it in its place.
+    /// Ends the film and puts it in its place, with its sound as far as that can be had.
     ///
     /// # Errors
-    /// [`RunError::File`] where ffmpeg fails.
-    pub fn finish(mut self) -> Result<(), RunError> {
+    /// [`RunError::File`] where ffmpeg fails on the pictures.
+    pub fn finish(mut self, observe: &mut Observer<'_>) -> Result<(), RunError> {
         let Some(Started { encoder, draft, .. }) = self.started.take() else {
             return Ok(());
         };
         encoder.finish().map_err(|error| self.failed(&error))?;
-        draft.persist(&self.path).map_err(files::at(&self.path))
+        // The pictures are there by now, whatever becomes of the sound.
+        let sounding = self.sound.as_ref().and_then(|sound| {
+            let another = || disk::create(&self.path).map_err(|error| error.to_string());
+            let mut tell = |line| observe(Event::Warning(line));
+            sound.under(draft.path(), self.container(), &another, &mut tell)
+        });
+        let whole = sounding.unwrap_or(draft);
+        whole.persist(&self.path).map_err(files::at(&self.path))
+    }
+
+    /// FFmpeg's name of what the film's path promises.
+    fn container(&self) -> &'static str {
+        let extension = self.path.extension().unwrap_or_default().to_string_lossy();
+        match extension.to_ascii_lowercase().as_str() {
+            "mkv" => "matroska",
+            "mov" => "mov",
+            _ => "mp4",
+        }
     }
 
     fn failed(&self, error: &ProgramError) -> RunError {
@@ -158,12 +177,7 @@ impl FilmWriter {
 
     fn start(&self, [width, height]: [u32; 2], deep: bool) -> Result<Started, RunError> {
         let draft = disk::create(&self.path).map_err(files::at(&self.path))?;
-        let extension = self.path.extension().unwrap_or_default().to_string_lossy();
-        let container = match extension.to_ascii_lowercase().as_str() {
-            "mkv" => "matroska",
-            "mov" => "mov",
-            _ => "mp4",
-        };
+        let container = self.container();
         let mut ffmpeg = Program::new(FFMPEG)
             .args(["-hide_banner", "-nostats", "-loglevel", "error", "-y"])
             .args(["-f", "rawvideo"])
@@ -171,14 +185,6 @@ impl FilmWriter {
             .option("-video_size", format!("{width}x{height}"))
             .option("-framerate", format!("{}/{}", self.rate[0], self.rate[1]))
             .args(["-i", "pipe:0"]);
-        if let Some((source, start, seconds)) = &self.sound {
-            ffmpeg = ffmpeg
-                .option("-ss", start.to_string())
-                .option("-t", seconds.to_string())
-                .arg("-i")
-                .arg(source)
-                .args(["-map", "0:v", "-map", "1:a?", "-c:a", "aac", "-b:a", "256k"]);
-        }
         // Chroma at half size needs even sides.
         let odd = width % 2 + height % 2 > 0;
         let (pad, pixels) = match (odd, self.purpose) {
@@ -192,12 +198,8 @@ impl FilmWriter {
             .args(["-pix_fmt", pixels, "-x264-params", CHROMA])
             .option("-vf", filters)
             .args(["-colorspace", "bt709", "-color_primaries", "bt709"])
-            .args(["-color_trc", "bt709"]);
-        if container != "matroska" {
-            // A page shows it before all of it is there.
-            ffmpeg = ffmpeg.args(["-movflags", "+faststart"]);
-        }
-        let ffmpeg = ffmpeg.args(["-f", container]).arg(draft.path());
+            .args(["-color_trc", "bt709", "-color_range", "tv"]);
+        let ffmpeg = in_container(ffmpeg, container).arg(draft.path());
         Ok(Started {
             encoder: ffmpeg.feed()?,
             draft,
@@ -205,4 +207,13 @@ impl FilmWriter {
             deep,
         })
     }
+}
+
+/// FFmpeg with a container for its output.
+fn in_container(mut ffmpeg: Program, container: &str) -> Program {
+    if container != "matroska" {
+        // A page shows it before all of it is there.
+        ffmpeg = ffmpeg.args(["-movflags", "+faststart"]);
+    }
+    ffmpeg.args(["-f", container])
 }

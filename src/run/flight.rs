@@ -53,7 +53,7 @@ impl Filmed {
     /// where not.
     pub fn end(mut self, page: &Path, path: &PathScore, observe: &mut Observer<'_>) -> Flight {
         let made = self.writer.take().is_some_and(|writer| {
-            let ended = writer.finish();
+            let ended = writer.finish(observe);
             self.failed = ended.err().map(reason);
             self.failed.is_none() && page.join(FILM).is_file()
         });

@@ -70,6 +70,9 @@ fn a_photo_without_a_pose_takes_its_colors_from_its_neighbors() {
         .expect("writable");
     let told = place.json(&["frames", "-o", "out", "--json"]);
     assert_eq!((&told["placed"], &told["carried"]), (&10.into(), &1.into()));
+    let neighbors = "colored by their neighbors, without a pose: 035.png";
+    let done = place.run(&["frames", "-o", "out"]);
+    assert!(done.stderr.contains(neighbors), "{}", done.stderr);
     let [carried, own] = ["out/035.png", "out/03.png"].map(|name| lab(&place, name));
     let gray: Vec<[f64; 3]> = own.iter().map(|lab| [lab[0], 0.0, 0.0]).collect();
     let (to_own, to_gray) = (apart(&carried, &own), apart(&gray, &own));
@@ -126,6 +129,65 @@ fn sixteen_bits_stay_sixteen() {
     }
 }
 
+/// A monochrome camera's files use little of their 16 bits, and some pixels are brighter than what
+/// the scene is normalized to.
+#[test]
+fn nothing_is_clipped_that_the_file_tells_apart() {
+    const BLACK: u16 = 178;
+    let place = place_with_scene();
+    let value = |x: u32, y: u32, gray: u8| match (x, y) {
+        (x, 7) if x < 12 => 3900 + 10 * x as u16,
+        _ => BLACK + 14 * u16::from(gray),
+    };
+    let photos: Vec<_> = (0..scene::VIEWS)
+        .map(|index| {
+            let gray = DynamicImage::ImageRgb8(scene::photo(index)).into_luma8();
+            let deep = ImageBuffer::from_fn(gray.width(), gray.height(), |x, y| {
+                Luma([value(x, y, gray.get_pixel(x, y).0[0])])
+            });
+            let path = place.path("scene/images").join(scene::name(index));
+            DynamicImage::ImageLuma16(deep.clone())
+                .save(path)
+                .expect("writable");
+            deep
+        })
+        .collect();
+    place.succeed(&QUICK_FIT);
+    let [_, high]: [f64; 2] =
+        serde_json::from_value(place.report("runs/scene")["capture"]["normalize"].clone())
+            .expect("a range");
+    assert!(high < 3900.0, "{high}");
+    place.succeed(&[
+        "colorize",
+        "--teacher",
+        &onnx("ddcolor_tiny.onnx"),
+        "--rounds",
+        "1",
+    ]);
+    let done = place.run(&["frames", "-o", "out"]);
+    assert!(
+        done.stderr.contains("nothing is clipped"),
+        "{}",
+        done.stderr
+    );
+    let values = || {
+        photos
+            .iter()
+            .flat_map(|photo| photo.pixels())
+            .map(|pixel| f64::from(pixel.0[0]))
+    };
+    let low = values().fold(f64::INFINITY, f64::min);
+    for (index, photo) in photos.iter().enumerate() {
+        let colored = lab(&place, &format!("out/{}", scene::name(index)));
+        for (lab, gray) in colored.iter().zip(photo.pixels()) {
+            // One line from the least to the greatest of all photos.
+            let share = (f64::from(gray.0[0]) - low) / (4010.0 - low);
+            let own = gs_chroma::color::srgb_to_lab([share; 3])[0];
+            assert!((lab[0] - own).abs() < 0.01, "{index}: {} {own}", lab[0]);
+        }
+    }
+}
+
 #[test]
 fn what_it_cannot_do_it_says() {
     let place = place_with_scene();
@@ -141,6 +203,15 @@ fn what_it_cannot_do_it_says() {
     let done = place.run(&["frames", "-o", "scene/images"]);
     assert_eq!(done.code, Some(1));
     assert!(done.stderr.contains("photos themselves"), "{}", done.stderr);
+    for (output, word) in [
+        ("out.avi", ".mp4, .mov, .m4v or .mkv"),
+        ("out.zip", "name a folder"),
+    ] {
+        let done = place.run(&["frames", "-o", output]);
+        assert_eq!(done.code, Some(2), "{output}");
+        assert!(done.stderr.contains(word), "{output}: {}", done.stderr);
+        assert!(!place.path(output).exists(), "{output}");
+    }
     for rate in ["0", "25/0", "film"] {
         let done = place.run(&["frames", "-o", "out.mp4", "--frame-rate", rate]);
         assert_eq!(done.code, Some(2), "{rate}");
@@ -184,18 +255,38 @@ fn hints_on_a_photo_without_a_pose_are_told() {
     }
 }
 
-/// A stand-in for ffmpeg that keeps what it is told and given.
+/// A stand-in for ffmpeg that keeps what it is told and given, and one for ffprobe.
 #[cfg(unix)]
 fn stand_in(place: &Place, script: &str) -> String {
     use std::os::unix::fs::PermissionsExt;
-    place.write(
-        "bin/ffmpeg",
-        format!("#!/bin/sh\n[ \"$1\" = -version ] && exit 0\n{script}\n"),
-    );
-    let path = place.path("bin/ffmpeg");
-    std::fs::set_permissions(path, std::fs::Permissions::from_mode(0o755)).expect("writable");
+    const PROBED: &str = r#"{"streams": [
+        {"index": 0, "codec_type": "video", "width": 64, "height": 48},
+        {"index": 1, "codec_type": "data"},
+        {"index": 2, "codec_type": "audio", "codec_name": "mp3", "channels": 2},
+        {"index": 3, "codec_type": "audio", "codec_tag_string": "apac", "channels": 4}
+      ], "format": {"duration": "70.0"}}"#;
+    for (name, script) in [
+        (
+            "bin/ffmpeg",
+            format!("[ \"$1\" = -version ] && exit 0\n{script}"),
+        ),
+        ("bin/ffprobe", format!("echo '{PROBED}'")),
+    ] {
+        place.write(name, format!("#!/bin/sh\n{script}\n"));
+        let path = place.path(name);
+        std::fs::set_permissions(path, std::fs::Permissions::from_mode(0o755)).expect("writable");
+    }
     format!("{}:/usr/bin:/bin", place.path("bin").display())
 }
+
+/// Keeps pictures as they come, and what is laid under them.
+#[cfg(unix)]
+const ENCODER: &str = r#"case "$*" in
+  *pipe:0*) echo "$@" > told.txt; for last; do :; done; cat > "$last" ;;
+  *) echo "$@" > laid.txt; [ -e silent ] && exit 3
+     while [ $# -gt 1 ]; do [ "$1" = -i ] && : "${first:=${2#file:}}"; shift; done
+     cat "$first" > "$1" ;;
+esac"#;
 
 #[cfg(unix)]
 #[test]
@@ -218,14 +309,11 @@ fn a_film_has_all_frames_the_rate_and_the_sound_of_its_source() {
     frames.insert(5, "045.png".to_owned());
     place.write("street.mp4", "a film");
     let film = serde_json::json!({
-        "source": place.path("street.mp4"), "start": 65.0, "seconds": 1.5,
+        "source": place.path("street.mp4"), "start": 65.0, "seconds": 0.375,
         "frame_rate": [24000, 1001], "audio": true, "size": scene::SIZE, "frames": frames,
     });
     place.write("scene/film.json", film.to_string());
-    let path = stand_in(
-        &place,
-        "echo \"$@\" > told.txt; for last; do :; done; cat > \"$last\"",
-    );
+    let path = stand_in(&place, ENCODER);
     let run = |arguments: &[&str], path: &str| {
         Done::of(place.command(arguments).env("PATH", path).output())
     };
@@ -237,16 +325,22 @@ fn a_film_has_all_frames_the_rate_and_the_sound_of_its_source() {
         9 * 3 * (scene::SIZE[0] * scene::SIZE[1]) as usize
     );
     assert_eq!(place.files("films"), ["out.mp4"]);
-    let told = String::from_utf8(place.read("told.txt")).expect("text");
-    for words in [
-        "-framerate 24000/1001",
-        "-ss 65 -t 1.5",
-        "street.mp4",
-        "-map 1:a?",
-        "64x48",
-    ] {
+    let text = |name: &str| String::from_utf8(place.read(name)).expect("text");
+    let (told, laid) = (text("told.txt"), text("laid.txt"));
+    for words in ["-framerate 24000/1001", "64x48"] {
         assert!(told.contains(words), "{words}: {told}");
     }
+    // What can be decoded of the sound, and a word about the rest.
+    for words in [
+        "-ss 65.000000 -t 0.375000",
+        "street.mp4",
+        "-map 1:2 -c:a:0 aac",
+    ] {
+        assert!(laid.contains(words), "{words}: {laid}");
+    }
+    assert!(!laid.contains("-map 1:3"), "{laid}");
+    let left_out = "stream 3 of sound (apac) is left out";
+    assert!(done.stderr.contains(left_out), "{}", done.stderr);
     // The same frames as in a folder.
     place.succeed(&["frames", "-o", "out"]);
     let first = image::open(place.path("out/00.png"))
@@ -258,8 +352,37 @@ fn a_film_has_all_frames_the_rate_and_the_sound_of_its_source() {
         &path,
     );
     assert_eq!(done.code, Some(0), "{}", done.stderr);
-    let told = String::from_utf8(place.read("told.txt")).expect("text");
-    assert!(told.contains("-framerate 25/1 "), "{told}");
+    assert!(text("told.txt").contains("-framerate 25/1 "));
+    // At another rate frames are repeated: the sound does not run any slower.
+    let done = run(
+        &[
+            "frames",
+            "-o",
+            "films/fast.mp4",
+            "--frame-rate",
+            "48000/1001",
+        ],
+        &path,
+    );
+    assert_eq!(done.code, Some(0), "{}", done.stderr);
+    assert_eq!(place.read("films/fast.mp4").len(), 2 * bytes.len());
+    // Sound that fails takes no picture with it, and a film that is gone is told.
+    let silent = |word: &str| {
+        let done = run(&["frames", "-o", "films/fast.mp4"], &path);
+        assert_eq!(done.code, Some(0), "{}", done.stderr);
+        let warned = done
+            .stderr
+            .lines()
+            .any(|line| line.starts_with("warning:") && line.contains(word));
+        assert!(warned, "{word}: {}", done.stderr);
+        assert!(place.read("films/fast.mp4") == bytes, "{word}");
+    };
+    place.write("silent", "");
+    silent("stream 2 of sound (mp3) is left out");
+    std::fs::remove_file(place.path("street.mp4")).expect("a film");
+    place.write("bin/ffprobe", "#!/bin/sh\nexit 1\n");
+    silent("street.mp4 is gone");
+    std::fs::remove_file(place.path("films/fast.mp4")).expect("a film");
     // What fails leaves the film that was there.
     let path = stand_in(&place, "echo warned >&2; echo 'no such codec' >&2; exit 3");
     let done = run(&["frames", "-o", "films/out.mp4"], &path);

@@ -3,6 +3,7 @@
 mod out;
 mod painted;
 mod painter;
+mod range;
 mod shots;
 mod unplaced;
 
@@ -11,12 +12,13 @@ use std::{cell::RefCell, path::PathBuf, sync::Arc};
 use out::Out;
 use painted::Painted;
 use painter::Painter;
+use range::own_range;
 use shots::{Shot, shots_of};
-use unplaced::{Ends, Known, Unknown, carry, chain, way, whole};
+use unplaced::{Ends, Known, Unknown, carry, chain, tell, way, whole};
 
 use super::{
     Event, Observer, RunError, RunFolder, Stage,
-    film::FRAME_RATE,
+    film::{FRAME_RATE, is_film},
     fit::open_gpu,
     keeping,
     lock::RunLock,
@@ -116,6 +118,12 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
         .or(film.as_ref().map(|film| film.frame_rate));
     let rate = rate.unwrap_or(FRAME_RATE);
     let shots = shots_of(&dataset, film.as_ref(), (&options.output, rate))?;
+    let in_step = |film: &Film| film.times.is_none() && is_film(&options.output);
+    if film.as_ref().is_some_and(in_step) && shots.iter().any(|shot| shot.repeats != 1) {
+        observe(Event::Note(
+            "at another frame rate some frames are repeated or left out, so that the sound stays in step".to_owned(),
+        ));
+    }
     let teachers = open_teachers(options, &report, &folder, &dataset, observe)?;
     let luma = scene.splats.to_luma();
     let drawn = report.luma.settings.raster_options();
@@ -127,9 +135,10 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
         exposures: exposures(&dataset, &report.luma.exposures),
         dataset: &dataset,
         teachers,
+        range: own_range(&dataset, film.as_ref(), &shots, observe),
         side: None,
     };
-    let mut out = Out::open(options, rate, film.as_ref(), &shots)?;
+    let mut out = Out::open(options, rate, film.as_ref(), &shots, observe)?;
     let painted = find_painted(options, &report, &shots, &mut painter, observe)?;
     let mut told = Frames {
         output: options.output.clone(),
@@ -153,18 +162,19 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
     // The last photo with a pose, and those without one since.
     let mut last: Option<Known> = None;
     let mut open: Vec<Unknown<'_>> = Vec::new();
-    let mut unread = Vec::new();
+    let (mut unplaced, mut unread) = (Vec::new(), Vec::new());
     let mut kept = 0;
     for (index, shot) in shots.iter().enumerate() {
         progress(told.photos + open.len(), &shot.name);
         let strokes = painted.on(index);
         told.painted += usize::from(strokes.is_some());
         if shot.views.is_empty() {
-            match dataset.loader().unplaced(&shot.path) {
+            match painter.original(shot) {
                 Ok(original) => {
                     let canvas = Canvas::of(&original, painter.side(&original));
                     kept += original.gray.len();
                     open.push(Unknown {
+                        index,
                         shot,
                         canvas,
                         strokes,
@@ -176,7 +186,7 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
             continue;
         }
         kept = 0;
-        let original = dataset.loader().original(painter.view(shot))?;
+        let original = painter.original(shot)?;
         let canvas = painter.canvas(shot, &original);
         let seen = match options.teacher_alone {
             true => Believed::nothing(canvas.len()),
@@ -211,7 +221,7 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
         };
         told.carried += open.len();
         told.photos += open.len();
-        carry(&mut painter, &open, &steps, &ends, &mut out)?;
+        unplaced.extend(carry(&mut painter, &open, &steps, &ends, &mut out)?);
         open.clear();
         out.write(shot, finish(&original, &next.canvas, next.shown().to_vec()))?;
         told.covered += seen.share();
@@ -230,10 +240,13 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
         };
         told.carried += open.len();
         told.photos += open.len();
-        carry(&mut painter, &open, &steps, &ends, &mut out)?;
+        unplaced.extend(carry(&mut painter, &open, &steps, &ends, &mut out)?);
     }
-    out.finish()?;
     progress(shots.len(), "");
+    out.finish(observe)?;
+    if !options.teacher_alone {
+        tell(&unplaced, &shots, observe);
+    }
     for line in unread {
         observe(Event::Warning(format!("left out: {line}")));
     }

@@ -7,7 +7,7 @@ use crate::{
     capture::Film,
     frames::Colored,
     run::{
-        RunError, files,
+        Observer, RunError, files,
         film::{FilmWriter, Purpose, is_film},
     },
 };
@@ -24,6 +24,7 @@ impl Out {
         rate: [u32; 2],
         film: Option<&Film>,
         shots: &[Shot],
+        observe: &mut Observer<'_>,
     ) -> Result<Self, RunError> {
         if !is_film(&options.output) {
             files::make_pictures_folder(&options.output)?;
@@ -36,7 +37,7 @@ impl Out {
         }
         files::make_folder_of(&options.output)?;
         let writer = FilmWriter::new(&options.output, rate, Purpose::Editing)?;
-        Ok(Self::Film(Box::new(writer.sounding_like(film))))
+        Ok(Self::Film(Box::new(writer.sounding_like(film, observe))))
     }
 
     pub fn write(&mut self, shot: &Shot, colored: Colored) -> Result<(), RunError> {
@@ -48,10 +49,10 @@ impl Out {
         }
     }
 
-    pub fn finish(self) -> Result<(), RunError> {
+    pub fn finish(self, observe: &mut Observer<'_>) -> Result<(), RunError> {
         match self {
             Self::Folder(_) => Ok(()),
-            Self::Film(film) => film.finish(),
+            Self::Film(film) => film.finish(observe),
         }
     }
 }

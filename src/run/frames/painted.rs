@@ -127,14 +127,12 @@ impl Painted {
 
 impl Seen {
     fn of(shot: &Shot, painter: &mut Painter<'_>) -> Result<Self, RunError> {
-        let loader = painter.dataset.loader();
+        let original = painter.original(shot)?;
         if shot.views.is_empty() {
-            let original = loader.unplaced(&shot.path)?;
             let canvas = Canvas::of(&original, painter.side(&original));
             let believed = Believed::nothing(canvas.len());
             return Ok(Self { canvas, believed });
         }
-        let original = loader.original(painter.view(shot))?;
         let canvas = painter.canvas(shot, &original);
         let believed = painter.seen(shot, &canvas)?;
         Ok(Self { canvas, believed })

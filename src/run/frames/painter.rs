@@ -2,7 +2,7 @@
 
 use super::shots::Shot;
 use crate::{
-    capture::{Dataset, Exposure, Original, View},
+    capture::{CaptureError, Dataset, Exposure, Normalize, Original, View},
     chroma::teacher::{AbImage, Query},
     frames::{Believed, Canvas, SceneDrawer, ViewOf},
     run::{RunError, teach::Teachers},
@@ -14,6 +14,8 @@ pub(super) struct Painter<'a> {
     pub exposures: Vec<Exposure>,
     pub dataset: &'a Dataset,
     pub teachers: Option<Teachers>,
+    /// What becomes black and white in the pictures of photos of more than 8 bits.
+    pub range: Normalize,
     /// Longer side of the canvas met last, over that of its photo's.
     pub side: Option<f64>,
 }
@@ -21,6 +23,15 @@ pub(super) struct Painter<'a> {
 impl<'a> Painter<'a> {
     pub fn view(&self, shot: &Shot) -> &'a View {
         &self.dataset.capture.views[shot.views.start]
+    }
+
+    /// A photo at its file's size and depth.
+    pub fn original(&self, shot: &Shot) -> Result<Original, CaptureError> {
+        let loader = self.dataset.loader();
+        match shot.views.is_empty() {
+            true => loader.unplaced(&shot.path, self.range),
+            false => loader.original(self.view(shot), self.range),
+        }
     }
 
     pub fn views(&self, shot: &Shot) -> Vec<ViewOf<'a>> {

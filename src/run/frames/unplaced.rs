@@ -6,12 +6,18 @@ use super::{Out, Painter, shots::Shot};
 use crate::{
     capture::{CaptureError, Original, in_order},
     frames::{Believed, Between, Canvas, Carried, Colored, Strokes, blend, finish},
-    run::RunError,
+    run::{Event, Observer, RunError},
 };
 
 /// A share of a photo without a pose that has to be known from its neighbors; else the teacher
 /// is asked.
 const CARRIED: f64 = 0.9;
+
+/// Ranges of photos that are named.
+const TOLD_RANGES: usize = 12;
+
+/// Of a photo that is known to less, most of the colors are the teacher's.
+const LITTLE: f64 = 0.5;
 
 /// A photo whose colors are known.
 pub(super) struct Known {
@@ -36,6 +42,8 @@ impl Known {
 
 /// A photo without a pose.
 pub(super) struct Unknown<'a> {
+    /// Its place among all.
+    pub index: usize,
     pub shot: &'a Shot,
     pub canvas: Canvas,
     pub strokes: Option<&'a Strokes>,
@@ -81,14 +89,16 @@ pub(super) fn whole(steps: &[Option<Between>]) -> Option<Vec<&Between>> {
 }
 
 /// Colors photos without a pose by those before and after, and writes them. `steps` lead from
-/// the one before, if there is one, over all of them to the one after, if there is one.
+/// the one before, if there is one, over all of them to the one after, if there is one. Of each
+/// its place is given, and whether its colors are more the teacher's than its neighbors'.
 pub(super) fn carry(
     painter: &mut Painter<'_>,
     open: &[Unknown<'_>],
     steps: &Steps,
     ends: &Ends<'_>,
     out: &mut Out,
-) -> Result<(), RunError> {
+) -> Result<Vec<(usize, bool)>, RunError> {
+    let mut taught = Vec::with_capacity(open.len());
     // Of several the slow part is done at once, and as many wait as there are threads.
     let threads = thread::available_parallelism().map_or(1, NonZero::get);
     for (part, some) in open.chunks(threads).enumerate() {
@@ -115,9 +125,11 @@ pub(super) fn carry(
                 true => painter.answer(&unknown.shot.name, None, canvas)?,
                 false => None,
             };
+            let little = answer.is_some() && seen.share() < LITTLE;
+            taught.push((unknown.index, little));
             known.push((unknown, seen, answer));
         }
-        let loader = painter.dataset.loader();
+        let painter = &*painter;
         in_order(
             &known,
             |(unknown, seen, answer)| {
@@ -130,7 +142,7 @@ pub(super) fn carry(
                 match &unknown.original {
                     Some(original) => Ok(finish(original, canvas, ab)),
                     None => {
-                        let original = loader.unplaced(&unknown.shot.path)?;
+                        let original = painter.original(unknown.shot)?;
                         Ok(finish(&original, canvas, ab))
                     }
                 }
@@ -140,7 +152,44 @@ pub(super) fn carry(
             },
         )?;
     }
-    Ok(())
+    Ok(taught)
+}
+
+/// Tells which photos without a pose have whose colors, as [`carry`] gives them.
+pub(super) fn tell(carried: &[(usize, bool)], shots: &[Shot], observe: &mut Observer<'_>) {
+    for by_teacher in [false, true] {
+        let chosen = carried.iter().filter(|(_, taught)| *taught == by_teacher);
+        let photos: Vec<usize> = chosen.map(|(index, _)| *index).collect();
+        if photos.is_empty() {
+            continue;
+        }
+        let photos = in_ranges(&photos, shots);
+        observe(match by_teacher {
+            false => Event::Note(format!(
+                "colored by their neighbors, without a pose: {photos}"
+            )),
+            true => Event::Warning(format!(
+                "colored by the teacher alone, without a pose and unlike their neighbors: {photos}"
+            )),
+        });
+    }
+}
+
+/// Photos in words: those that follow each other as one range.
+fn in_ranges(photos: &[usize], shots: &[Shot]) -> String {
+    let ranges: Vec<&[usize]> = photos.chunk_by(|a, b| a + 1 == *b).collect();
+    let words = ranges.iter().take(TOLD_RANGES).map(|range| {
+        let [first, last] = [range[0], range[range.len() - 1]].map(|i| &shots[i].name);
+        match range.len() {
+            1 => first.clone(),
+            count => format!("{first} to {last} ({count})"),
+        }
+    });
+    let mut words: Vec<String> = words.collect();
+    if ranges.len() > TOLD_RANGES {
+        words.push(format!("{} more", ranges.len() - TOLD_RANGES));
+    }
+    words.join(", ")
 }
 
 /// What is carried from both sides, each by its share.

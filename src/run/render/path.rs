@@ -127,7 +127,7 @@ pub fn render_path(
         size = [picture.width(), picture.height()];
         out.write(&format!("frame-{done:04}.png"), &picture)?;
     }
-    out.finish()?;
+    out.finish(observe)?;
     observe(Event::Progress {
         stage: Stage::Rendering,
         done: total,
@@ -266,8 +266,8 @@ impl Out {
         }
     }
 
-    fn finish(self) -> Result<(), RunError> {
-        self.film.map_or(Ok(()), FilmWriter::finish)
+    fn finish(self, observe: &mut Observer<'_>) -> Result<(), RunError> {
+        self.film.map_or(Ok(()), |film| film.finish(observe))
     }
 }
 
