@@ -29,8 +29,8 @@ pub use sampling::sampling_spread;
 pub use shell::Shell;
 pub(crate) use soundness::listed;
 pub use soundness::{
-    Agreement, Cause, Contradiction, Contradictory, FEW_POINTS, PointColors, Reprojection,
-    Unseeing, observe_where_projected,
+    Agreement, Cause, Contradiction, Contradictory, FEW_POINTS, Levels, PointColors, Reprojection,
+    Unseeing, doubts, observe_where_projected,
 };
 pub use teacher::{TeacherSamples, TeacherSpread};
 pub use tracks::Sample;

@@ -15,8 +15,8 @@ use crate::{
         Shrunk, Unplaced, first_views,
     },
     effects::{
-        Agreement, Cause, Contradiction, Contradictory, Evidence, FEW_POINTS, PointColors,
-        Reprojection, Survey, Unseeing, listed, observe_where_projected,
+        Agreement, Cause, Contradiction, Contradictory, Evidence, FEW_POINTS, Levels, PointColors,
+        Reprojection, Survey, Unseeing, doubts, listed, observe_where_projected,
     },
     report::{CaptureReport, PhotoReport},
 };
@@ -198,6 +198,9 @@ pub(super) fn open_examined(
     observe: &mut Observer<'_>,
 ) -> Result<Examined, RunError> {
     let (mut dataset, model) = open_judged(dir, options, observe)?;
+    for doubt in doubts(&dataset.capture, &dataset.cameras) {
+        observe(Event::Warning(doubt));
+    }
     let (evidence, agreement, fingerprint) = examine(&dataset, observe)?;
     let transparent = dataset.settle_transparency();
     if transparent > 0 && options.masks != MaskSource::Alpha {
@@ -320,9 +323,11 @@ fn examine(
     observe(Event::begins(Stage::Photos));
     let mut colors = PointColors::of(&dataset.capture, &dataset.cameras, channel);
     let mut survey = Survey::new(&dataset.capture, &dataset.cameras, &dataset.split);
+    let mut levels = Levels::default();
     let all: Vec<usize> = (0..dataset.cameras.len()).collect();
     dataset.visit(&all, |view, photo| {
         survey.look(view, photo);
+        levels.look(photo);
         colors.look(view, photo);
         fingerprint.look(dataset, view, photo);
         observe(Event::Progress {
@@ -334,6 +339,9 @@ fn examine(
         Ok::<_, CaptureError>(())
     })?;
     scene::tell_not_finite(dataset, observe);
+    if let Some(doubt) = levels.doubt() {
+        observe(Event::Warning(doubt));
+    }
     observe(Event::begins(Stage::Plan));
     let agreement = colors.finish(&dataset.capture);
     let fingerprint = fingerprint.finish(&dataset.capture);

@@ -7,6 +7,7 @@
 mod cause;
 mod colors;
 mod coverage;
+mod doubts;
 mod reprojection;
 
 use std::{collections::BTreeSet, path::PathBuf};
@@ -14,6 +15,7 @@ use std::{collections::BTreeSet, path::PathBuf};
 pub use cause::Cause;
 pub use colors::{Agreement, PointColors};
 pub use coverage::{FEW_POINTS, Unseeing};
+pub use doubts::{Levels, doubts};
 pub use reprojection::{Reprojection, observe_where_projected};
 
 use crate::capture::{Capture, Rejected};
