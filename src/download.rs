@@ -6,7 +6,7 @@ use std::{
     io::{self, Read, Seek, SeekFrom, Write},
     ops::ControlFlow,
     path::{Path, PathBuf},
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 use crate::{disk, hash};
@@ -16,8 +16,18 @@ use ureq::{
     tls::{RootCerts, TlsConfig},
 };
 
-/// How often a transfer that breaks off is taken up again without a byte more.
+/// How often a transfer that breaks off is taken up again without bringing much.
 const TRIES: usize = 3;
+
+/// Bytes of a file whose length the table does not name.
+const MOST: u64 = 4 << 30;
+
+/// Bytes that a transfer is to bring while it is judged, and how long that is: a modem is faster.
+const LEAST: u64 = 64 << 10;
+const JUDGED: Duration = Duration::from_secs(30);
+
+/// No transfer takes longer.
+const LONGEST: Duration = Duration::from_secs(24 * 60 * 60);
 
 /// More redirects than any host of files needs.
 const MAX_REDIRECTS: usize = 5;
@@ -192,7 +202,10 @@ fn fill(
             Err(error) => return Err(error),
         };
         let there = part.metadata().map_err(failed)?.len();
-        in_vain = if there > furthest { 0 } else { in_vain + 1 };
+        in_vain = match there >= furthest + LEAST {
+            true => 0,
+            false => in_vain + 1,
+        };
         if in_vain == TRIES {
             return Err(error);
         }
@@ -251,6 +264,8 @@ fn transfer(
     }
     let mut body = response.body_mut().as_reader();
     let mut block = vec![0; BLOCK];
+    let most = total.unwrap_or(MOST).min(source.bytes.unwrap_or(MOST));
+    let mut judged = (Instant::now(), done);
     loop {
         if observe(done, total).is_break() {
             return Err(DownloadError::Canceled);
@@ -260,6 +275,12 @@ fn transfer(
             reason,
             done,
         };
+        if !keeps_pace(&mut judged, Instant::now(), done) {
+            return Err(broken(format!(
+                "it sends fewer than {LEAST} bytes in {} s",
+                JUDGED.as_secs()
+            )));
+        }
         match body.read(&mut block) {
             Ok(0) if total.is_some_and(|total| done < total) => {
                 return Err(broken("the transfer was cut off".to_owned()));
@@ -273,14 +294,24 @@ fn transfer(
             Err(error) => return Err(broken(error.to_string())),
         }
         // A length that nobody told is no reason to fill the disk.
-        if let Some(most) = total.filter(|&total| done > total) {
+        if done > most || total > Some(most) {
             return Err(DownloadError::Length {
                 url: source.url.to_owned(),
-                found: done,
+                found: total.unwrap_or(0).max(done),
                 expected: most,
             });
         }
     }
+}
+
+/// Whether enough has come since a transfer was judged, where that is long ago.
+fn keeps_pace(judged: &mut (Instant, u64), now: Instant, bytes: u64) -> bool {
+    let (since, before) = *judged;
+    if now.duration_since(since) < JUDGED {
+        return true;
+    }
+    *judged = (now, bytes);
+    bytes >= before + LEAST
 }
 
 /// The answer to a request for the bytes from `done` on, after redirects, and who gave it.
@@ -356,6 +387,7 @@ fn agent(patience: Duration) -> Agent {
         .timeout_connect(Some(patience))
         .timeout_recv_response(Some(patience))
         .timeout_per_read(Some(patience))
+        .timeout_recv_body(Some(LONGEST))
         .build()
         .new_agent()
 }
@@ -374,6 +406,17 @@ mod tests {
             patience: Duration::from_secs(1),
         };
         allowed(url, &source).ok()
+    }
+
+    #[test]
+    fn a_drip_is_no_transfer() {
+        let begun = Instant::now();
+        let keeps = |rate: u64| {
+            let mut judged = (begun, 0);
+            let at = |second| begun + Duration::from_secs(second);
+            (0..100).all(|second| keeps_pace(&mut judged, at(second), second * rate))
+        };
+        assert!(keeps(5000) && !keeps(2));
     }
 
     #[test]

@@ -145,7 +145,8 @@ fn a_silent_host_is_given_up_and_what_came_is_kept() {
     let host = host(&place, vec![silent(64), silent(0)]);
     assert_refused(&place, &host, &["localhost", "64 bytes are kept"]);
     let from: Vec<_> = host.asked().iter().map(|(_, from)| *from).collect();
-    assert_eq!(from, [0, 64, 64, 64]);
+    // What little it brings does not count.
+    assert_eq!(from, [0, 64, 64]);
     assert_eq!(place.read(&format!("{KEPT}.part")), &network()[..64]);
 }
 
