@@ -1,9 +1,10 @@
 //! SIGINT and SIGTERM.
 
 use std::{
+    fmt,
     process::exit,
     sync::{
-        Arc, OnceLock,
+        Arc, LazyLock, OnceLock,
         atomic::{AtomicBool, Ordering},
     },
 };
@@ -14,8 +15,13 @@ use crate::{
     run::{Interrupt, RunError},
 };
 
-/// The status with which a shell expects a program that was interrupted to end.
+/// The statuses with which a shell expects a program to end that was interrupted, and one that was
+/// told to end.
 const INTERRUPTED: i32 = 130;
+const TERMINATED: i32 = 143;
+
+/// Whether the signal was SIGTERM.
+static TOLD_TO_END: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
 
 /// What a signal interrupts, where it does not end the program.
 static HEEDED: OnceLock<Arc<Interrupt>> = OnceLock::new();
@@ -38,10 +44,21 @@ pub(super) fn heed_signals() -> Result<(), CliError> {
         let _nothing_new = disk::give_up();
         exit(match ENDS_WELL.load(Ordering::SeqCst) {
             true => 0,
+            false if TOLD_TO_END.load(Ordering::SeqCst) => TERMINATED,
             false => INTERRUPTED,
         });
     });
-    handled.map_err(|error| RunError::Signals(error.to_string()).into())
+    let failed = |error: &dyn fmt::Display| RunError::Signals(error.to_string());
+    handled.map_err(|error| failed(&error))?;
+    #[cfg(unix)]
+    {
+        use signal_hook::{consts, flag::register};
+        // The handler above is called as before.
+        register(consts::SIGTERM, TOLD_TO_END.clone()).map_err(|error| failed(&error))?;
+        // Whoever writes too large a file is told so, and does not die of it.
+        register(consts::SIGXFSZ, Arc::default()).map_err(|error| failed(&error))?;
+    }
+    Ok(())
 }
 
 /// What the first signal interrupts from now on, where that can be kept.

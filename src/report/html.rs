@@ -7,6 +7,9 @@ use super::table::Table;
 /// The look of every page.
 const STYLE: &str = include_str!("style.css");
 
+/// What a page may do: show itself, and the pictures and films beside it.
+const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src 'self' file: data:; media-src 'self' file:; base-uri 'none'; form-action 'none'";
+
 /// The end of every page.
 pub(crate) const TAIL: &str = "</main></body></html>\n";
 
@@ -17,6 +20,7 @@ pub(crate) fn head(title: &str) -> String {
 <html lang="en">
 <head>
 <meta charset="utf-8">
+<meta http-equiv="Content-Security-Policy" content="{POLICY}">
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <title>{}</title>
 <style>
@@ -70,5 +74,6 @@ mod tests {
     fn names_cannot_break_the_page() {
         assert_eq!(escaped("<a \"&\">"), "&lt;a &quot;&amp;&quot;&gt;");
         assert!(head("<b>").contains("<title>&lt;b&gt;</title>"));
+        assert!(head("").contains("default-src 'none'"));
     }
 }

@@ -31,7 +31,7 @@ const TAKEN_WITHIN: Duration = Duration::from_secs(10);
 const EACH_MIB: Duration = Duration::from_secs(1);
 
 /// Connections at a time; a browser opens six. Others wait until one ends.
-const CONNECTIONS: usize = 64;
+const CONNECTIONS: usize = 512;
 
 /// What is written at once.
 const CHUNK: usize = 256 << 10;
@@ -120,10 +120,7 @@ impl Server {
     pub fn serve(&self, answer: impl Fn(&Request) -> Answer + Send + Sync + 'static) {
         let answer = Arc::new(answer);
         let open = Arc::new(AtomicUsize::new(0));
-        let names = [
-            self.address.to_string(),
-            format!("localhost:{}", self.address.port()),
-        ];
+        let names = names(self.address);
         for stream in self.listener.incoming() {
             let Ok(stream) = stream else {
                 // Such as no more files: they come back.
@@ -144,6 +141,16 @@ impl Server {
             });
         }
     }
+}
+
+/// The hosts that a browser may name; it leaves out the port that is HTTP's own.
+fn names(address: SocketAddr) -> Vec<String> {
+    let port = address.port();
+    let mut names = vec![address.to_string(), format!("localhost:{port}")];
+    if port == 80 {
+        names.extend([address.ip().to_string(), "localhost".to_owned()]);
+    }
+    names
 }
 
 /// One of the connections that may be open.
@@ -276,12 +283,12 @@ fn understood(head: &[u8], names: &[String]) -> Result<Request, Answer> {
 mod tests {
     use super::*;
 
-    fn names() -> [String; 2] {
-        ["127.0.0.1:4000".into(), "localhost:4000".into()]
+    fn status(head: &str) -> &'static str {
+        status_at(4000, head)
     }
 
-    fn status(head: &str) -> &'static str {
-        let refused = understood(head.as_bytes(), &names());
+    fn status_at(port: u16, head: &str) -> &'static str {
+        let refused = understood(head.as_bytes(), &names((Ipv4Addr::LOCALHOST, port).into()));
         refused.map_or_else(|refused| refused.status, |_| "200 OK")
     }
 
@@ -301,6 +308,9 @@ mod tests {
         ] {
             assert_eq!(status(&get(host)), "421 Misdirected Request", "{host}");
         }
+        for host in ["127.0.0.1", "localhost", "localhost:80"] {
+            assert_eq!(status_at(80, &get(host)), "200 OK", "{host}");
+        }
         assert_eq!(status("GET / HTTP/1.1\r\n\r\n"), "421 Misdirected Request");
         let twice = "GET / HTTP/1.1\r\nHost: localhost:4000\r\nHost: evil.example\r\n\r\n";
         assert_eq!(status(twice), "421 Misdirected Request");
@@ -316,7 +326,7 @@ mod tests {
     fn what_is_known_is_told() {
         let head =
             "GET /scene.json HTTP/1.1\r\nHost: localhost:4000\r\nIf-None-Match: \"a\"\r\n\r\n";
-        let request = understood(head.as_bytes(), &names()).unwrap();
+        let request = understood(head.as_bytes(), &names(([127, 0, 0, 1], 4000).into())).unwrap();
         assert_eq!(request.path, "/scene.json");
         assert_eq!(request.known.as_deref(), Some("\"a\""));
     }
