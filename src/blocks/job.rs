@@ -1,12 +1,15 @@
 //! The files of a job: `job.json` with the plan, and in each block's folder a `block.json` that
 //! makes it a folder for `fit`.
 
-use std::path::{Path, PathBuf};
+use std::{
+    collections::BTreeSet,
+    path::{Component, Path, PathBuf},
+};
 
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use super::{Area, BlocksError, Estimate, Ground};
-use crate::{capture::Chosen, input};
+use crate::{capture::Chosen, hash::Hasher, input};
 
 /// Version of both files' layout; raised when a key changes its meaning.
 pub const JOB_VERSION: u32 = 1;
@@ -25,8 +28,11 @@ pub struct Job {
     pub version: u32,
     /// Version of the program.
     pub program: String,
-    /// The COLMAP folder, absolute.
+    /// The COLMAP folder, absolute; one that is not is seen from the job's folder.
     pub capture: PathBuf,
+    /// The same, seen from the job's folder: both may be moved together.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub nearby: Option<PathBuf>,
     /// What the areas lie on.
     pub ground: Ground,
     /// How far blocks train beyond their own cells, as a share of a cell's length.
@@ -122,16 +128,56 @@ impl Job {
                 reason: "is no job: make one with `gs-chroma partition`".to_owned(),
             });
         }
-        let job: Self = read(&path)?;
-        let sound = !job.blocks.is_empty()
-            && (job.blocks.iter()).all(|block| {
-                let mut parts = Path::new(&block.name).components();
-                matches!(parts.next(), Some(std::path::Component::Normal(_)))
-                    && parts.next().is_none()
+        let mut job: Self = read(&path)?;
+        let names: BTreeSet<&str> = job.blocks.iter().map(|block| &*block.name).collect();
+        let is_name = |name: &&str| {
+            let mut parts = Path::new(name).components();
+            matches!(parts.next(), Some(Component::Normal(_)))
+                && parts.next().is_none()
+                && *name != COARSE
+        };
+        if names.is_empty() || names.len() != job.blocks.len() || !names.iter().all(is_name) {
+            let reason = "its blocks have no names of folders, or not each its own";
+            return Err(damaged(&path, reason));
+        }
+        for name in names.into_iter().chain([COARSE]) {
+            refuse_link(&folder.join(name))?;
+        }
+        let places = [Some(&job.capture), job.nearby.as_ref()].map(|place| {
+            let place = folder.join(place?);
+            place.is_dir().then_some(place)
+        });
+        let Some(found) = places.into_iter().flatten().next() else {
+            return Err(BlocksError::File {
+                path,
+                reason: format!(
+                    "its photos are not at {}: put the COLMAP folder there, or write where it is at \"capture\"",
+                    job.capture.display()
+                ),
             });
-        match sound {
-            true => Ok(job),
-            false => Err(damaged(&path, "its blocks have no names of folders")),
+        };
+        job.capture = found.canonicalize().unwrap_or(found);
+        Ok(job)
+    }
+
+    /// SHA-256 of what is planned of a block: where it lies, and its photos.
+    pub fn plan_of(&self, block: &Block, file: &BlockFile) -> String {
+        let mut hash = Hasher::default();
+        hash.update(&to_file(&(self.ground, block.core, block.near)));
+        hash.update(&to_file(&file.photos));
+        hash.finish()
+    }
+
+    /// Notes where the COLMAP folder lies, seen from the job's; both are absolute.
+    pub fn note_nearby(&mut self, folder: &Path) {
+        let (mut up, mut from) = (PathBuf::new(), Some(folder));
+        while let Some(above) = from {
+            if let Ok(down) = self.capture.strip_prefix(above) {
+                self.nearby = Some(up.join(down));
+                return;
+            }
+            up.push("..");
+            from = above.parent();
         }
     }
 
@@ -164,6 +210,20 @@ impl BlockFile {
     /// The bytes of the file.
     pub fn to_file(&self) -> Vec<u8> {
         to_file(self)
+    }
+}
+
+/// Refuses a folder of a job that lies elsewhere.
+///
+/// # Errors
+/// [`BlocksError::File`].
+pub fn refuse_link(folder: &Path) -> Result<(), BlocksError> {
+    match folder.is_symlink() {
+        true => Err(BlocksError::File {
+            path: folder.to_owned(),
+            reason: "is a link: put the folder itself there".to_owned(),
+        }),
+        false => Ok(()),
     }
 }
 

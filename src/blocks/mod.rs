@@ -21,7 +21,7 @@ pub use cells::Blocks;
 pub use error::BlocksError;
 pub use estimate::Estimate;
 pub use ground::Ground;
-pub use job::{Block, BlockFile, COARSE, JOB_VERSION, Job, Kind};
+pub use job::{Block, BlockFile, COARSE, JOB_VERSION, Job, Kind, refuse_link};
 pub use picture::picture;
 pub use plan::{Division, FAR_PART, Planned, plan};
 pub use region::Region;

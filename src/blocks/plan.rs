@@ -375,6 +375,7 @@ impl<'a> Scene<'a> {
                 version: JOB_VERSION,
                 program: env!("CARGO_PKG_VERSION").to_owned(),
                 capture: root,
+                nearby: None,
                 ground: self.ground,
                 overlap: self.division.overlap,
                 photos: self.photos.len(),

@@ -180,6 +180,9 @@ pub struct LumaReport {
     /// SHA-256 of the merged scene among which a block went on.
     #[serde(default)]
     pub around: Option<String>,
+    /// SHA-256 of what a job has planned of the block that was trained.
+    #[serde(default)]
+    pub plan: Option<String>,
     /// Gaussians × views culled as not finite; 0 if sound.
     ///
     /// Those of the last views, since the set last changed.

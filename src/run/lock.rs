@@ -10,7 +10,7 @@ use super::{RunError, RunFolder, commit, files};
 use crate::{disk, input, report::Report};
 
 /// The file that is locked; it says who holds it.
-const LOCK: &str = ".lock";
+pub(super) const LOCK: &str = ".lock";
 
 /// The right to write into a run's folder. The system takes it back when the process ends,
 /// however it does.

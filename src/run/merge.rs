@@ -41,6 +41,8 @@ pub struct MergeOptions {
 struct Trained {
     block: Block,
     folder: RunFolder,
+    /// Nobody trains it meanwhile.
+    _lock: Option<RunLock>,
     report: Report,
 }
 
@@ -58,7 +60,7 @@ pub fn merge(
     let warnings = RefCell::default();
     let observe = &mut keeping(&warnings, observe);
     let job = Job::read(&options.job)?;
-    let blocks = trained(&options.job, &job)?;
+    let blocks = trained(&options.job, &job, observe)?;
     let Some(first) = blocks.first() else {
         return Err(RunError::NoSplats(options.job.clone()));
     };
@@ -139,9 +141,9 @@ pub fn merge(
 /// The blocks' runs.
 ///
 /// # Errors
-/// [`RunError::File`] where one is not there, or is drawn or was loaded otherwise than the
-/// first.
-fn trained(folder: &Path, job: &Job) -> Result<Vec<Trained>, RunError> {
+/// [`RunError::File`] where one is not there, was trained for another plan, or is drawn or was
+/// loaded otherwise than the first; [`RunError::InUse`].
+fn trained(folder: &Path, job: &Job, observe: &mut Observer<'_>) -> Result<Vec<Trained>, RunError> {
     let mut blocks: Vec<Trained> = Vec::new();
     for block in &job.blocks {
         let path = folder.join(&block.name);
@@ -156,7 +158,23 @@ fn trained(folder: &Path, job: &Job) -> Result<Vec<Trained>, RunError> {
                 path.display()
             )));
         }
-        let report = run.read_report()?;
+        let (lock, report) = RunLock::to_read(&run)?;
+        let file = BlockFile::read(&path)?;
+        let plan = file.map(|file| job.plan_of(block, &file));
+        match &report.luma.plan {
+            None => observe(Event::Warning(format!(
+                "{}: its report does not tell which plan it was trained for",
+                path.display()
+            ))),
+            trained if *trained != plan => {
+                return Err(refused(format!(
+                    "was trained for another plan than {}: run `gs-chroma fit {}` again",
+                    Job::path(folder).display(),
+                    path.display()
+                )));
+            }
+            Some(_) => {}
+        }
         if let Some(first) = blocks.first() {
             let alike = |report: &Report| {
                 (
@@ -175,6 +193,7 @@ fn trained(folder: &Path, job: &Job) -> Result<Vec<Trained>, RunError> {
         blocks.push(Trained {
             block: block.clone(),
             folder: run,
+            _lock: lock,
             report,
         });
     }

@@ -5,6 +5,7 @@ use std::{collections::BTreeSet, fs};
 use serde_json::Value;
 
 use super::program::Place;
+use super::shared::place_with_scene;
 use super::splat_file::SplatFile;
 
 /// The bundled scene, and how it is trained in seconds.
@@ -246,6 +247,21 @@ fn blocks_are_trained_and_put_together() {
         );
     }
 
+    // A block of another plan is not put together with these.
+    let text = String::from_utf8(place.read("job/job.json")).unwrap();
+    let mut other = job.clone();
+    other["blocks"][0]["near"][0][0] = (-7.0).into();
+    place.write("job/job.json", other.to_string());
+    let done = place.run(&merge);
+    assert!(
+        done.code == Some(1)
+            && done
+                .stderr
+                .contains("block-1: was trained for another plan"),
+        "{done:?}"
+    );
+    place.write("job/job.json", text);
+
     // A trained job is not divided anew.
     let done = place.run(&["partition", SCENE, "-o", "job"]);
     assert!(
@@ -315,5 +331,44 @@ fn what_is_wrong_with_a_job_is_told() {
         (&["partition", SCENE, "-o", "x", "--overlap", "1.5"], 2),
     ] {
         assert_eq!(place.run(command).code, Some(code), "{command:?}");
+    }
+}
+
+#[test]
+fn a_job_is_moved_with_its_photos_and_leads_nowhere_else() {
+    let place = place_with_scene();
+    place.succeed(&["partition", "scene", "-o", "job", "--blocks", "1"]);
+    fs::create_dir(place.path("moved")).expect("a folder");
+    let moves = |name: &str| {
+        let to = place.path(&format!("moved/{name}"));
+        fs::rename(place.path(name), to).expect("a folder");
+    };
+    let refused = |job: &str, part: &str| {
+        let done = place.run(&["merge", job]);
+        assert!(
+            done.code == Some(1) && done.stderr.contains(part) && done.stderr.lines().count() == 1,
+            "{done:?}"
+        );
+    };
+    moves("scene");
+    refused("job", "its photos are not at");
+    moves("job");
+    refused("moved/job", "is not trained yet");
+    let text = String::from_utf8(place.read("moved/job/job.json")).expect("text");
+    for name in ["..", "../block-1", "/tmp", "a/b", "", "coarse"] {
+        let named = text.replace("\"block-1\"", &format!("{name:?}"));
+        place.write("moved/job/job.json", named);
+        refused("moved/job", "no names of folders");
+    }
+    place.write("moved/job/job.json", text);
+    #[cfg(unix)]
+    {
+        let block = place.path("moved/job/block-1");
+        fs::rename(&block, place.path("elsewhere")).expect("a folder");
+        std::os::unix::fs::symlink("../../elsewhere", &block).expect("a link");
+        refused("moved/job", "is a link");
+        let again = place.run(&["partition", "moved/scene", "-o", "moved/job"]);
+        assert!(again.code == Some(1) && again.stderr.contains("is a link"));
+        assert_eq!(place.files("elsewhere"), [".lock", "block.json"]);
     }
 }

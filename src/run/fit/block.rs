@@ -43,6 +43,8 @@ const AGREEING_PART: usize = 6;
 pub struct BlockPlace {
     job: Job,
     block: Block,
+    /// See [`Job::plan_of`].
+    plan: String,
     /// The coarse model, once it is trained.
     coarse: Option<(RunFolder, Box<Report>)>,
 }
@@ -53,10 +55,10 @@ impl BlockPlace {
     /// # Errors
     /// [`RunError::File`] where a file of the job is damaged.
     pub fn read(folder: &Path) -> Result<Option<Self>, RunError> {
-        match BlockFile::read(folder)? {
-            Some(file) if file.kind == Kind::Block => {}
+        let file = match BlockFile::read(folder)? {
+            Some(file) if file.kind == Kind::Block => file,
             _ => return Ok(None),
-        }
+        };
         let job = Job::read(&job_of(folder))?;
         let name = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
         let name = name.file_name().unwrap_or_default().to_string_lossy();
@@ -75,7 +77,12 @@ impl BlockPlace {
             }
             false => None,
         };
-        Ok(Some(Self { job, block, coarse }))
+        Ok(Some(Self {
+            plan: job.plan_of(&block, &file),
+            job,
+            block,
+            coarse,
+        }))
     }
 
     /// How bright the photos of all blocks show the scene; none where the coarse model is not
@@ -94,6 +101,11 @@ impl BlockPlace {
     /// What is planned of it.
     pub(super) fn plan(&self) -> &Block {
         &self.block
+    }
+
+    /// SHA-256 of that.
+    pub(super) fn plan_sha256(&self) -> &str {
+        &self.plan
     }
 
     /// The coarse model's Gaussians.

@@ -44,6 +44,7 @@ impl Job<'_> {
                 splats: scene.splats.len(),
                 surroundings: scene.surroundings,
                 around: (options.around.as_ref()).map(|neighbors| neighbors.sha256.clone()),
+                plan: (options.block.as_ref()).map(|block| block.plan_sha256().to_owned()),
                 poisoned: last.map_or(0, |progress| progress.poisoned),
                 refused: last.map_or(0, |progress| progress.refused),
                 loss: last.map_or(0.0, |progress| progress.loss),
