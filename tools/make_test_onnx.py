@@ -83,6 +83,17 @@ def siggraph17_tiny(path: Path) -> None:
     )  # fmt: skip
 
 
+def unit_tiny(path: Path) -> None:
+    """x = L / 50 - 1 in, a / 110 and b / 110 out: tanh(x / 4 + 0.1) and tanh(0.15 - x / 5)."""
+    save(
+        path,
+        [helper.make_node("Conv", ["input", "weights", "bias"], ["plain"]),
+         helper.make_node("Tanh", ["plain"], ["output"])],
+        {"input": [1, 1, SIDE, SIDE]}, {"output": [1, 2, SIDE, SIDE]},
+        convolution(1, 2, [0.25, -0.2], [0.1, 0.15]),
+    )  # fmt: skip
+
+
 def siggraph17_full_tiny(path: Path) -> None:
     """Lightness, hints and mask in: a = L / 5 + hint a / 2 + 10 mask, b = hint b - 5 mask - L / 10."""
     save(
@@ -312,7 +323,8 @@ def main() -> None:
     folder = parser.parse_args().out
     folder.mkdir(parents=True, exist_ok=True)
     for make in (
-        ddcolor_tiny, siggraph17_tiny, siggraph17_full_tiny, caffe_v2_tiny, bigcolor_tiny,
+        ddcolor_tiny, siggraph17_tiny, unit_tiny, siggraph17_full_tiny, caffe_v2_tiny,
+        bigcolor_tiny,
         deoldify_tiny, deoldify_browser_tiny, half_tiny, int8_tiny, old_tiny, new_tiny,
         outside_tiny, pixels_tiny, two_answers_tiny, endless_tiny, wrong_rank, wrong_channels, two_inputs,
     ):  # fmt: skip

@@ -164,6 +164,9 @@ fn of_teacher(error: &TeacherError) -> String {
             "{}: several kinds of networks have its inputs and outputs, and only you can know which it is: give --teacher-profile {profiles} (`gs-chroma teacher check` tries them)",
             path.display()
         ),
+        TeacherError::Senseless { .. } => format!(
+            "{error}: give --teacher-profile, or another one (`gs-chroma teacher check` tries the usual ones)"
+        ),
         TeacherError::UnknownTeacher { .. } => {
             format!("{error} (`gs-chroma teacher list` says more)")
         }

@@ -252,8 +252,5 @@ pub(super) fn check_page(folder: &Path) -> Result<(), RunError> {
 
 /// The largest resident memory of this process so far, in bytes.
 pub(super) fn peak_host_memory() -> Option<u64> {
-    let status = input::read_to_string(Path::new("/proc/self/status")).ok()?;
-    let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
-    let kib: u64 = line.split_whitespace().nth(1)?.parse().ok()?;
-    Some(kib * 1024)
+    Some(input::kib(Path::new("/proc/self/status"), "VmHWM:")? * 1024)
 }

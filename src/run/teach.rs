@@ -117,7 +117,7 @@ struct Asking<'a, 'o> {
     /// The view that comes next.
     view: usize,
     /// For how many views that colors are learned from each teacher has an answer, and how many of
-    /// these are gray.
+    /// these are gray, or a network's of one color.
     answered: Vec<[usize; 2]>,
     /// Whether there is a hint for any view.
     hints_cover: bool,
@@ -160,7 +160,11 @@ impl Colorizer for Asking<'_, '_> {
             if let Some(answer) = member.teacher.colorize(query, gray, hints.as_ref())? {
                 let learned = trained || member.partial;
                 *answered += usize::from(learned);
-                *in_gray += usize::from(learned && is_gray(&answer));
+                let dull = match member.teacher.is_network() {
+                    true => is_plain(&answer),
+                    false => is_gray(&answer),
+                };
+                *in_gray += usize::from(learned && dull);
                 by_hand |= member.partial;
                 answers.push((answer, member.weight));
             }
@@ -416,17 +420,27 @@ fn is_partial(teacher: &Teacher, dataset: &Dataset) -> Result<bool, RunError> {
     Ok(false)
 }
 
-/// What to say of a folder whose images are gray: they would make gray what they show. Where the
+/// What to say of a folder whose images are gray: they would make gray what they show; and of a
+/// network that tells nothing apart. Where the
 /// photos themselves are the teacher and all are gray, there is nothing to color by.
 fn gray_images(
     member: &Member,
     [answered, in_gray]: [usize; 2],
     dataset: &Dataset,
 ) -> Result<Option<String>, RunError> {
-    if in_gray == 0 || member.teacher.is_network() {
+    let path = &member.path;
+    if member.teacher.is_network() {
+        // Single photos may show nothing that has any color.
+        return Ok((in_gray > 0 && in_gray == answered).then(|| {
+            format!(
+                "{} gives each photo one color, gray or another: `gs-chroma teacher check` tells how it answers",
+                path.display()
+            )
+        }));
+    }
+    if in_gray == 0 {
         return Ok(None);
     }
-    let path = &member.path;
     if in_gray == answered && *path == dataset.capture.root.join(IMAGES) {
         return Err(RunError::GrayPhotos(path.clone()));
     }
@@ -440,6 +454,13 @@ fn gray_images(
 fn is_gray(answer: &AbImage) -> bool {
     let gray = |ab: &[f32; 2]| ab.iter().all(|value| value.abs() < GRAY);
     answer.ab.iter().all(gray)
+}
+
+/// Whether a picture has one color, gray or another.
+fn is_plain(answer: &AbImage) -> bool {
+    let first = answer.ab.first().copied().unwrap_or_default();
+    let near = |ab: &[f32; 2]| (0..2).all(|c| (ab[c] - first[c]).abs() < GRAY);
+    answer.ab.iter().all(near)
 }
 
 /// Sizes of a and b, in CIELAB units, that no picture in color stays below.

@@ -1,7 +1,7 @@
 //! `teacher check`.
 
 use super::program::Place;
-use super::shared::{QUICK_FIT, onnx, place_with_scene};
+use super::shared::{QUICK_FIT, onnx, place_with_run, place_with_scene};
 
 #[test]
 fn a_network_that_its_shapes_describe() {
@@ -30,6 +30,7 @@ fn a_network_that_nobody_describes_is_tried() {
             "gray 0 to 1 in, RGB 0 to 1 out",
         ),
         ("pixels_tiny.onnx", "gray 0 to 255 in, RGB 0 to 255 out"),
+        ("unit_tiny.onnx", "gray 0 to 1 in, a, b / 110 out"),
         ("two_answers_tiny.onnx", "gray 0 to 1 in, a, b out"),
     ] {
         let words = Place::new().succeed(&["teacher", "check", &onnx(name)]);
@@ -65,6 +66,25 @@ fn what_is_understood_becomes_a_manifest_that_colorize_takes() {
     let teacher = &report["chroma"]["teachers"][0];
     assert_eq!(teacher["kind"], "gray 0 to 255 in, RGB 0 to 255 out");
     assert_eq!(teacher["device"], "cpu");
+}
+
+#[test]
+fn a_network_that_answers_gray_is_told_of() {
+    let place = place_with_run();
+    let network = onnx("ddcolor_tiny.onnx");
+    place.succeed(&["teacher", "check", &network, "--manifest", "mine.toml"]);
+    let manifest = String::from_utf8(place.read("mine.toml")).expect("text");
+    let [range, far] = ["-110.0, 110.0", "-1e5, 1e5"];
+    assert!(manifest.contains(range), "{manifest}");
+    place.write("mine.toml", manifest.replace(range, far));
+    let warned = |more: &[&str]| {
+        let colorize = ["colorize", "--teacher", &network, "--rounds", "1"];
+        let done = place.run(&[&colorize[..], more].concat());
+        assert_eq!(done.code, Some(0), "{}", done.stderr);
+        done.stderr.contains("gives each photo one color")
+    };
+    assert!(!warned(&[]));
+    assert!(warned(&["--teacher-profile", "mine.toml"]));
 }
 
 #[test]

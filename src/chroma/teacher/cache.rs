@@ -1,5 +1,6 @@
 //! Answers of a network on disk, so that each photo is colored once.
 
+use super::profile::AB_MOST;
 use super::{AbImage, GrayImage, TeacherError};
 use crate::{disk, hash::Hasher, input, npy};
 use std::io::{self, Write};
@@ -99,8 +100,9 @@ fn decode(bytes: &[u8]) -> Option<AbImage> {
         height: u32::try_from(height).ok()?,
         ab: a.iter().zip(b).map(|(&a, &b)| [a, b]).collect(),
     };
-    let finite = values.iter().all(|value| value.is_finite());
-    (!values.is_empty() && finite).then_some(image)
+    // Not-a-numbers are not.
+    let possible = values.iter().all(|value| value.abs() <= AB_MOST);
+    (!values.is_empty() && possible).then_some(image)
 }
 
 #[cfg(test)]
@@ -150,9 +152,11 @@ mod tests {
         let mut longer = good.clone();
         longer.push(0);
         assert_eq!(decode(&longer), None);
-        let mut infinite = good.clone();
-        infinite[header..header + 4].copy_from_slice(&f32::INFINITY.to_le_bytes());
-        assert_eq!(decode(&infinite), None);
+        for impossible in [f32::INFINITY, f32::NAN, -257.0, 1e30] {
+            let mut bad = good.clone();
+            bad[header..header + 4].copy_from_slice(&impossible.to_le_bytes());
+            assert_eq!(decode(&bad), None);
+        }
         let lie =
             String::from_utf8_lossy(&good[..header]).replace("2, 3", "4294967295, 4294967295");
         assert_eq!(decode(lie.as_bytes()), None);

@@ -10,9 +10,6 @@ use std::time::Instant;
 
 pub use trial::Trial;
 
-/// Width and height of a picture whose gray rises from left to right.
-const RAMP: [u32; 2] = [256, 64];
-
 /// What a look at a network tells.
 #[derive(Clone, Debug, Serialize)]
 pub struct Checkup {
@@ -63,28 +60,32 @@ pub fn check(
     let loaded = Loaded::open(&path, settings, &catalog)?;
     let known_as = loaded.known.as_ref().map(|(name, _)| name.clone());
     let ports = loaded.ports.describe();
+    let tried = |loaded| {
+        let (teacher, trials) = trial::guess(loaded, settings, &[(name, photo)])?;
+        Ok::<_, TeacherError>((teacher, ToldBy::Trial, trials))
+    };
     let (mut teacher, told_by, trials) = match loaded.contract(settings) {
         Ok((profile, fit, by)) => {
-            let teacher = NetworkTeacher::following(loaded, profile, fit, settings)?;
-            (teacher, by, Vec::new())
+            let mut teacher = NetworkTeacher::following(loaded, profile, fit, settings)?;
+            teacher.supposed = by == ToldBy::Shapes;
+            let asked = teacher
+                .supposed
+                .then(|| teacher.colorize(name, photo, None));
+            match asked.transpose() {
+                Ok(_) => (teacher, by, Vec::new()),
+                Err(TeacherError::Senseless { .. }) => tried(teacher.loaded)?,
+                Err(error) => return Err(error),
+            }
         }
         Err(TeacherError::SeveralProfiles { .. } | TeacherError::NoProfile { .. })
             if settings.profile.is_none() =>
         {
-            let (teacher, trials) = trial::guess(loaded, settings, &[(name, photo)])?;
-            (teacher, ToldBy::Trial, trials)
+            tried(loaded)?
         }
         Err(error) => return Err(error),
     };
-    let pixels: Vec<u8> = (0..RAMP[0] * RAMP[1])
-        .map(|i| (i % RAMP[0] * 255 / (RAMP[0] - 1)) as u8)
-        .collect();
-    let ramp = GrayImage {
-        width: RAMP[0],
-        height: RAMP[1],
-        pixels: &pixels,
-    };
-    let answers: Result<_, _> = [("ramp", ramp), (name, photo)]
+    let ramp = trial::ramp();
+    let answers: Result<_, _> = [("ramp", trial::as_image(&ramp)), (name, photo)]
         .into_iter()
         .map(|(name, picture)| answered(&mut teacher, name, picture))
         .collect();

@@ -229,6 +229,49 @@ fn where_two_contracts_fit_only_the_user_knows() {
 }
 
 #[test]
+fn what_is_no_a_and_b_is_no_answer_of_a_network_that_shapes_tell() {
+    let ask = |name: &str, profile: Option<&str>, pixels: &[u8]| {
+        let mut teacher = open_with(&fixture(name), None, &settings(profile, None)).unwrap();
+        let asked = teacher.colorize("v.png", gray(4, 1, pixels), None);
+        asked.map(drop).map_err(|error| error.to_string())
+    };
+    let message = ask("unit_tiny.onnx", None, &[0, 80, 160, 255]).unwrap_err();
+    for part in ["unit_tiny.onnx", "v.png", "-1.0 to 1.0", "ECCV16"] {
+        assert!(message.contains(part), "{message}");
+    }
+    assert_eq!(
+        ask("unit_tiny.onnx", Some("eccv16"), &[0, 255, 9, 9]),
+        Ok(())
+    );
+    // A photo that happens to be all but gray: L = 20, a = b = 0.
+    assert_eq!(ask("siggraph17_tiny.onnx", None, &[48; 4]), Ok(()));
+}
+
+#[test]
+fn colors_that_cannot_be_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, manifest) in [
+        ("ddcolor_tiny", profile::named("ddcolor").unwrap()),
+        ("deoldify_tiny", profile::named("deoldify").unwrap()),
+    ] {
+        let path = folder.path().join("mine.toml");
+        let mut manifest = manifest;
+        manifest.output_range = manifest.output_range.map(|end| end / 200.0);
+        fs::write(&path, manifest.to_toml()).unwrap();
+        let asked = settings(path.to_str(), Some(32));
+        let model = fixture(&format!("{name}.onnx"));
+        let mut teacher = open_with(&model, Some(folder.path()), &asked).unwrap();
+        let asked = teacher.colorize("v.png", gray(2, 1, &[0, 255]), None);
+        let message = asked.unwrap_err().to_string();
+        for part in [name, "v.png", "no colors", &manifest.name] {
+            assert!(message.contains(part), "{message}");
+        }
+        let kept = fs::read_dir(folder.path()).unwrap().count();
+        assert_eq!(kept, 1, "{name}");
+    }
+}
+
+#[test]
 fn sizes_that_cannot_be() {
     for (name, profile, size, expected) in [
         ("ddcolor_tiny.onnx", None, 64, "takes 32 and nothing else"),

@@ -1,12 +1,14 @@
 //! On which processor a network runs: ONNX Runtime's execution providers.
 
-use super::TeacherError;
+use super::bounded::bounded;
 use super::error::first_line;
+use super::{TeacherError, TeacherSettings};
 use ort::environment::Environment;
 use ort::ep::{CUDA, CoreML, DirectML, ExecutionProvider, ExecutionProviderDispatch};
 use ort::session::{Session, builder::GraphOptimizationLevel};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
+use std::time::Duration;
 
 /// On which processor networks run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -25,6 +27,9 @@ pub enum TeacherDevice {
     /// Apple's.
     CoreMl,
 }
+
+/// How long loading may take where an answer may take less.
+const LOADING: Duration = Duration::from_secs(60);
 
 /// What `Auto` tries, in this order.
 const TRIED: [TeacherDevice; 4] = [
@@ -81,22 +86,28 @@ pub(super) struct Placed<T> {
 pub(super) fn load(
     path: &Path,
     environment: &Environment,
-    device: TeacherDevice,
+    settings: &TeacherSettings,
 ) -> Result<Placed<Session>, TeacherError> {
     let on = |device: TeacherDevice| {
         let provider = device.provider().map_err(|device| TeacherError::NoDevice {
             path: path.to_path_buf(),
             device,
         })?;
-        let session = session(path, environment, provider);
-        session.map_err(|error| TeacherError::BadModel {
-            path: path.to_path_buf(),
-            reason: first_line(error),
-        })
+        let (own, environment) = (path.to_owned(), environment.clone());
+        // What is constant in a network is computed at once.
+        let load = move || session(&own, &environment, provider).map_err(first_line);
+        let loaded = bounded(settings.time_limit.max(LOADING), || (), load);
+        loaded
+            .map_err(|(excess, _)| excess)
+            .flatten()
+            .map_err(|reason| TeacherError::BadModel {
+                path: path.to_path_buf(),
+                reason,
+            })
     };
-    let tried = match device {
+    let tried = match settings.device {
         TeacherDevice::Auto => &TRIED[..],
-        _ => &[device],
+        _ => &[settings.device],
     };
     first_that_takes(tried, on)
 }

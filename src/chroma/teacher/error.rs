@@ -94,6 +94,21 @@ pub enum TeacherError {
         /// Names of the profiles.
         profiles: String,
     },
+    /// Answers are no colors if numbers mean what they are taken for.
+    #[error(
+        "{}: its answers for photo {photo}, {:?} to {:?}, are no colors of {kind}; only you can \
+         know what its numbers mean", path.display(), range[0], range[1]
+    )]
+    Senseless {
+        /// The `.onnx` file.
+        path: PathBuf,
+        /// The photo's name.
+        photo: String,
+        /// Name of the profile.
+        kind: String,
+        /// Least and largest of its numbers.
+        range: [f32; 2],
+    },
     /// No built-in profile has this name.
     #[error("{name}: no such profile; there are {known}, or name a .toml manifest")]
     UnknownProfile {

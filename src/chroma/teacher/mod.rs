@@ -4,6 +4,7 @@
 //! that somebody or something else has colored. Both answer with CIELAB a, b
 //! for a whole photo; lightness always stays the photo's.
 
+mod bounded;
 mod cache;
 mod catalog;
 mod checkup;
@@ -204,7 +205,7 @@ impl Teacher {
     ///
     /// # Errors
     /// A [`TeacherError`] that names the photo where the network fails or
-    /// answers with numbers that are not finite, or where the folder's image is
+    /// answers with numbers that are not finite or no colors, or where the folder's image is
     /// damaged or has another aspect than the photo.
     pub fn colorize<'a>(
         &mut self,

@@ -1,5 +1,6 @@
 //! A colorization network as a teacher.
 
+use super::bounded::bounded;
 use super::cache::{Cache, Question, key};
 use super::error::first_line;
 use super::images::resample;
@@ -7,15 +8,14 @@ use super::model::{Fit, Port, Ports};
 use super::profile::{self, OutputKind, Profile, Role};
 use super::tensor::{self, Picture};
 use super::{AbImage, GrayImage, HintImage};
-use super::{Catalog, device, file_name, runtime, weights};
+use super::{Catalog, device, file_name, runtime, trial, weights};
 use super::{TeacherDevice, TeacherError, TeacherInfo, TeacherSettings};
 use crate::color::srgb_to_lab;
-use ort::session::{RunOptions, Session, SessionInputValue, SessionOutputs};
+use ort::session::{RunOptions, Session, SessionInputValue};
 use serde::Serialize;
 use std::f32::consts::TAU;
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::{self, RecvTimeoutError};
-use std::thread;
+use std::sync::Arc;
 use std::time::Duration;
 
 /// A network is told of paint that covers at least this share of one of its
@@ -34,6 +34,8 @@ pub struct NetworkTeacher {
     size: u32,
     time_limit: Duration,
     cache: Option<Cache>,
+    /// Whether shapes alone say what its numbers mean, and no answer has borne that out yet.
+    pub(super) supposed: bool,
     /// Why answers are not kept, where they were to be.
     pub(super) unkept: Option<TeacherError>,
 }
@@ -42,7 +44,8 @@ pub struct NetworkTeacher {
 pub(super) struct Loaded {
     pub path: PathBuf,
     pub ports: Ports,
-    session: Session,
+    /// None once it has not ended in time.
+    session: Option<Session>,
     device: TeacherDevice,
     /// See [`device::Placed`].
     refused: Vec<(TeacherDevice, String)>,
@@ -77,11 +80,11 @@ impl Loaded {
         let known = catalog.identify(path, &sha256)?;
         let known = known.map(|known| Ok((known.name.clone(), known.contract()?)));
         let environment = runtime::environment()?;
-        let placed = device::load(path, &environment, settings.device)?;
+        let placed = device::load(path, &environment, settings)?;
         Ok(Self {
             path: path.to_path_buf(),
             ports: Ports::of(&placed.made),
-            session: placed.made,
+            session: Some(placed.made),
             device: placed.device,
             refused: placed.refused,
             sha256,
@@ -121,8 +124,9 @@ impl NetworkTeacher {
         catalog: &Catalog,
     ) -> Result<Self, TeacherError> {
         let loaded = Loaded::open(path, settings, catalog)?;
-        let (profile, fit, _) = loaded.contract(settings)?;
+        let (profile, fit, by) = loaded.contract(settings)?;
         let mut teacher = Self::following(loaded, profile, fit, settings)?;
+        teacher.supposed = by == ToldBy::Shapes;
         match cache_dir.map(Cache::open).transpose() {
             Ok(cache) => teacher.cache = cache,
             Err(error) => teacher.unkept = Some(error),
@@ -153,6 +157,7 @@ impl NetworkTeacher {
             size,
             time_limit: settings.time_limit,
             cache: None,
+            supposed: false,
             unkept: None,
         })
     }
@@ -199,15 +204,16 @@ impl NetworkTeacher {
             input,
             hints: hints.as_ref().map(|hints| &hints.paint[..]),
         });
-        if let Some(answer) = self.cache.as_ref().and_then(|cache| cache.load(&key)) {
+        let kept = self.cache.as_ref().and_then(|cache| cache.load(&key));
+        let is_kept = kept.is_some();
+        let answer = match kept {
+            Some(answer) => answer,
+            None => self.ask(name, &photo, input, hints.as_ref())?,
+        };
+        self.make_sure(name, &answer, &photo)?;
+        if is_kept {
             return Ok(answer);
         }
-        let answer = self.ask(&photo, input, hints.as_ref());
-        let answer = answer.map_err(|reason| TeacherError::Network {
-            path: self.loaded.path.clone(),
-            photo: name.to_string(),
-            reason,
-        })?;
         if let Some(Err(error)) = (self.cache.as_ref()).map(|cache| cache.store(&key, &answer)) {
             // It was the last: a disk that is full takes no other.
             self.cache = None;
@@ -216,16 +222,73 @@ impl NetworkTeacher {
         Ok(answer)
     }
 
-    /// Runs the network on an input of this width and height: its answer at its
-    /// own resolution, or what went wrong.
+    /// Runs the network on an input of this width and height: its answer at its own resolution.
+    ///
+    /// # Errors
+    /// [`TeacherError::Network`], [`TeacherError::Senseless`] for colors that cannot be.
     fn ask(
         &mut self,
+        name: &str,
         photo: &GrayImage<'_>,
         size: [u32; 2],
         hints: Option<&HintImage>,
-    ) -> Result<AbImage, String> {
-        let (shape, values) = self.numbers(photo, size, hints)?;
-        answer(&self.profile, &shape, &values)
+    ) -> Result<AbImage, TeacherError> {
+        let asked = self.numbers(photo, size, hints);
+        let asked = asked.and_then(|(shape, values)| {
+            let answer = answer(&self.profile, &shape, &values)?;
+            Ok((answer, values))
+        });
+        let (answer, values) = asked.map_err(|reason| self.failed(name, reason))?;
+        match values.iter().all(|&value| self.profile.can_be(value)) {
+            true => Ok(answer),
+            false => Err(self.senseless(name, values.into_iter())),
+        }
+    }
+
+    /// Refuses what only shapes tell the contract of, where neither this answer nor that for a
+    /// ramp bears it out.
+    fn make_sure(
+        &mut self,
+        name: &str,
+        answer: &AbImage,
+        photo: &GrayImage<'_>,
+    ) -> Result<(), TeacherError> {
+        if self.supposed && self.profile.output == OutputKind::Ab && !trial::is_ab(answer, photo) {
+            let pixels = trial::ramp();
+            let ramp = trial::as_image(&pixels);
+            let size = [ramp.width, ramp.height];
+            let size = self.profile.input_size(size, self.fit.fixed, self.size);
+            let is_ab = match self.ask("a ramp", &ramp, size, None) {
+                Ok(of_ramp) => trial::is_ab(&of_ramp, &ramp),
+                // Whoever fails on black may well color a photo without.
+                Err(error) => !matches!(error, TeacherError::Senseless { .. }),
+            };
+            if !is_ab {
+                return Err(self.senseless(name, answer.ab.iter().copied().flatten()));
+            }
+        }
+        self.supposed = false;
+        Ok(())
+    }
+
+    fn failed(&self, photo: &str, reason: String) -> TeacherError {
+        TeacherError::Network {
+            path: self.loaded.path.clone(),
+            photo: photo.to_owned(),
+            reason,
+        }
+    }
+
+    fn senseless(&self, photo: &str, values: impl Iterator<Item = f32>) -> TeacherError {
+        let range = values.fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], value| {
+            [low.min(value), high.max(value)]
+        });
+        TeacherError::Senseless {
+            path: self.loaded.path.clone(),
+            photo: photo.to_owned(),
+            kind: self.profile.name.clone(),
+            range,
+        }
     }
 
     /// The same, before anything is made of it: the answer's sides and numbers.
@@ -251,14 +314,27 @@ impl NetworkTeacher {
                 Role::Class | Role::Noise | Role::Zeros => other(&self.profile, role, port),
             })
             .collect();
-        let options = RunOptions::new().map_err(first_line)?;
-        let outputs = run_within(
-            self.time_limit,
-            &mut self.loaded.session,
-            &inputs?,
-            &options,
-        )?;
-        tensor::read(&outputs[self.fit.answer])
+        let (inputs, output) = (inputs?, self.fit.answer);
+        let options = Arc::new(RunOptions::new().map_err(first_line)?);
+        let stop = options.clone();
+        let session = self.loaded.session.take();
+        let mut session = session.ok_or("was given up before")?;
+        let work = move || {
+            let outputs = session.run_with_options(&*inputs, &*options);
+            let outputs = outputs.map_err(first_line);
+            let read = outputs.and_then(|outputs| tensor::read(&outputs[output]));
+            (session, read)
+        };
+        match bounded(self.time_limit, move || drop(stop.terminate()), work) {
+            Ok((session, read)) => {
+                self.loaded.session = Some(session);
+                read
+            }
+            Err((excess, late)) => {
+                self.loaded.session = late.map(|(session, _)| session);
+                Err(excess)
+            }
+        }
     }
 
     /// Asks about a picture without hints: the numbers as they come.
@@ -280,38 +356,8 @@ impl NetworkTeacher {
                 values,
             })
         });
-        looked.map_err(|reason| TeacherError::Network {
-            path: self.loaded.path.clone(),
-            photo: name.to_owned(),
-            reason,
-        })
+        looked.map_err(|reason| self.failed(name, reason))
     }
-}
-
-/// Runs a network, and stops it where it takes longer than `limit`: a loop in one may never end.
-fn run_within<'s>(
-    limit: Duration,
-    session: &'s mut Session,
-    inputs: &[SessionInputValue<'_>],
-    options: &'s RunOptions,
-) -> Result<SessionOutputs<'s>, String> {
-    let (done, running) = mpsc::channel::<()>();
-    thread::scope(|scope| {
-        let watch = scope.spawn(move || {
-            let late = running.recv_timeout(limit) == Err(RecvTimeoutError::Timeout);
-            late && options.terminate().is_ok()
-        });
-        let outputs = session.run_with_options(inputs, options);
-        drop(done);
-        match (outputs, watch.join()) {
-            (Ok(outputs), _) => Ok(outputs),
-            (Err(_), Ok(true)) => Err(format!(
-                "gave no answer within {} s: ask it at a smaller --teacher-size, or allow more with --teacher-timeout",
-                limit.as_secs_f64()
-            )),
-            (Err(error), _) => Err(first_line(error)),
-        }
-    })
 }
 
 /// An answer before anything is made of it.

@@ -6,12 +6,12 @@ use super::images::{Filter, resample};
 use super::model::Fit;
 use super::network::{Loaded, NetworkTeacher, Numbers};
 use super::profile::{ImageKind, Layout, OutputKind, Profile, Resize};
-use super::{GrayImage, TeacherError, TeacherSettings};
+use super::{AbImage, GrayImage, TeacherError, TeacherSettings};
 use crate::color::{gray_to_lightness, lab_to_srgb, srgb_to_lab};
 use serde::Serialize;
 
 /// An answer whose a and b spread by less over a photo says the same of everything, which
-/// counts as being so far off.
+/// counts as being so far off, as does one near to gray.
 const LEAST_SPREAD: f64 = 0.5;
 const FLAT: f64 = 50.0;
 
@@ -30,6 +30,64 @@ const SIDE: u32 = 256;
 
 /// What open sides are multiples of: networks halve their input five times at most.
 const MULTIPLE: u32 = 32;
+
+/// Answers that stay as near to gray as this are none in CIELAB units, but those of networks that
+/// answer from -1 to 1 or from 0 to 1, or a little beyond.
+const UNIT: f32 = 2.0;
+
+/// Answers that are so far from colors that exist, in CIELAB units, are no a and b, but such as
+/// bytes with gray at 128.
+const NO_COLORS: f64 = 60.0;
+
+/// Width and height of a picture whose gray rises from left to right.
+const RAMP: [u32; 2] = [256, 64];
+
+/// The grays of that picture.
+pub(super) fn ramp() -> Vec<u8> {
+    (0..RAMP[0] * RAMP[1])
+        .map(|i| (i % RAMP[0] * 255 / (RAMP[0] - 1)) as u8)
+        .collect()
+}
+
+/// That picture, of its grays.
+pub(super) fn as_image(ramp: &[u8]) -> GrayImage<'_> {
+    GrayImage {
+        width: RAMP[0],
+        height: RAMP[1],
+        pixels: ramp,
+    }
+}
+
+/// Whether an answer for a photo can be CIELAB a and b.
+pub(super) fn is_ab(answer: &AbImage, photo: &GrayImage<'_>) -> bool {
+    let gray = lightness(photo, [answer.width, answer.height]);
+    let units = answer.ab.iter().flatten().all(is_unit);
+    let pixels = answer.ab.iter().zip(&gray);
+    let off = pixels.map(|(&[a, b], &own)| beyond_colors([own, a.into(), b.into()]));
+    !units && off.sum::<f64>() / (gray.len() as f64) < NO_COLORS
+}
+
+fn is_unit(value: &f32) -> bool {
+    value.abs() <= UNIT
+}
+
+/// How far a color of CIELAB is from one that sRGB has.
+fn beyond_colors(said: [f64; 3]) -> f64 {
+    let shown = lab_to_srgb(said).map(|value| value.clamp(0.0, 1.0));
+    let shown = srgb_to_lab(shown);
+    (said[1] - shown[1]).hypot(said[2] - shown[2])
+}
+
+/// The lightness of a photo's pixels at another size.
+fn lightness(photo: &GrayImage<'_>, size: [u32; 2]) -> Vec<f64> {
+    let gray: Vec<[f32; 1]> = (photo.pixels.iter())
+        .map(|&gray| [f32::from(gray) / 255.0])
+        .collect();
+    let gray = resample(&gray, [photo.width, photo.height], size, Filter::Average);
+    gray.into_iter()
+        .map(|[gray]| gray_to_lightness(gray.into()))
+        .collect()
+}
 
 /// A candidate that was tried.
 #[derive(Clone, Debug, Serialize)]
@@ -98,6 +156,7 @@ const AB: &[(&str, [f32; 2])] = &[
     ("a, b", [-110.0, 110.0]),
     ("a, b / 110", [-1.0, 1.0]),
     ("a, b 0 to 1", [0.0, 1.0]),
+    ("a, b + 128", [18.0, 238.0]),
 ];
 
 /// Tries what a model may take and give on photos; the candidate whose answers make most sense
@@ -140,7 +199,7 @@ pub(super) fn guess(
         let answers = match answers {
             Ok(answers) => answers,
             Err(error) => {
-                refused = Some(error);
+                refused.get_or_insert(error);
                 continue;
             }
         };
@@ -203,12 +262,7 @@ fn off(profile: &Profile, numbers: &Numbers, photo: &GrayImage<'_>) -> f64 {
     let channels = profile.output.channels();
     let at = |c: usize, i: usize| numbers.values[profile.layout.index(c, i, [channels, pixels])];
     let mean = |of: &dyn Fn(usize) -> f64| (0..pixels).map(of).sum::<f64>() / pixels as f64;
-    let gray: Vec<[f32; 1]> = (photo.pixels.iter())
-        .map(|&gray| [f32::from(gray) / 255.0])
-        .collect();
-    let own = [photo.width, photo.height];
-    let gray = resample(&gray, own, numbers.size, Filter::Average);
-    let lightness = |i: usize| gray_to_lightness(gray[i][0].into());
+    let lightness = lightness(photo, numbers.size);
     let off = match profile.output {
         OutputKind::Rgb => {
             let [black, white] = profile.output_range;
@@ -220,7 +274,7 @@ fn off(profile: &Profile, numbers: &Numbers, photo: &GrayImage<'_>) -> f64 {
                 let rgb = [0, 1, 2].map(|c| at(c, i));
                 let [own, ..] = srgb_to_lab(rgb.map(|value| profile.rgb(value).into()));
                 let beyond = rgb.into_iter().map(outside).fold(0.0, f64::max);
-                (own - lightness(i)).abs() + OUTSIDE * beyond
+                (own - lightness[i]).abs() + OUTSIDE * beyond
             })
         }
         OutputKind::Ab => {
@@ -230,17 +284,12 @@ fn off(profile: &Profile, numbers: &Numbers, photo: &GrayImage<'_>) -> f64 {
                 let from = [0, 1].map(|c| ab(c, i) - middle[c]);
                 from[0] * from[0] + from[1] * from[1]
             });
-            let flat = if spread.sqrt() < LEAST_SPREAD {
-                FLAT
-            } else {
-                0.0
+            let mut all = (0..pixels).flat_map(|i| [0, 1].map(|c| profile.ab(at(c, i))));
+            let flat = match spread.sqrt() < LEAST_SPREAD || all.all(|value| is_unit(&value)) {
+                true => FLAT,
+                false => 0.0,
             };
-            flat + mean(&|i| {
-                let said = [lightness(i), ab(0, i), ab(1, i)];
-                let shown = lab_to_srgb(said).map(|value| value.clamp(0.0, 1.0));
-                let shown = srgb_to_lab(shown);
-                (said[1] - shown[1]).hypot(said[2] - shown[2])
-            })
+            flat + mean(&|i| beyond_colors([lightness[i], ab(0, i), ab(1, i)]))
         }
     };
     // Of values beyond all bounds nothing else can be said.
