@@ -19,7 +19,7 @@ use crate::{
     run::{
         CheckpointOptions, ColorizeOptions, EvalOptions, Event, ExportOptions, FitOptions,
         FramesOptions, Interrupt, Preset, RunError, RunFolder, Stage, TeachOptions, colorize, eval,
-        export, files, fit, frames,
+        export, files, fit, folder::OF_AUTO, frames, originals,
     },
 };
 
@@ -98,6 +98,15 @@ pub enum Told {
     Event(Event),
 }
 
+/// The film in color.
+const FILM: &str = "colored.mp4";
+
+/// The folder of photos in color.
+const PICTURES: &str = "colored";
+
+/// The scene for viewers.
+const SCENE: &str = "scene.ply";
+
 /// What lies where.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct Results {
@@ -147,6 +156,13 @@ pub fn auto(options: &AutoOptions, tell: &mut Teller<'_>) -> Result<Results, Aut
     // A folder that COLMAP has been through needs nothing.
     let prepared = input.join(IMAGES).is_dir() && input.join("sparse").is_dir();
     files::make_folder(&options.output)?;
+    let _originals = originals::Kept::default().with(input, "an original").keep();
+    for result in [FILM, SCENE] {
+        files::check_no_original(&options.output.join(result))?;
+    }
+    if input.is_dir() && options.output.join(PICTURES).is_dir() {
+        files::make_pictures_folder(&options.output.join(PICTURES))?;
+    }
     let mut kept = Kept::read(&options.output)?;
     let house = match prepared {
         true => input.clone(),
@@ -164,13 +180,13 @@ pub fn auto(options: &AutoOptions, tell: &mut Teller<'_>) -> Result<Results, Aut
         prepare(&asked, &mut |event| tell(Told::Event(event)))?;
     }
     let film = Film::read(&house).map_err(RunError::from)?;
-    let run = RunFolder::at(&options.output.join("run"));
+    let run = RunFolder::at(&options.output.join(OF_AUTO));
     let results = Results {
         colored: options.output.join(match film {
-            Some(_) => "colored.mp4",
-            None => "colored",
+            Some(_) => FILM,
+            None => PICTURES,
         }),
-        scene: options.output.join("scene.ply"),
+        scene: options.output.join(SCENE),
         page: run.evaluation_page().join(files::PAGE),
         contact_sheet: run.contact_sheet(),
         house: house.clone(),

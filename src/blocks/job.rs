@@ -3,13 +3,13 @@
 
 use std::{
     collections::BTreeSet,
-    path::{Component, Path, PathBuf},
+    path::{Path, PathBuf},
 };
 
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use super::{Area, BlocksError, Estimate, Ground};
-use crate::{capture::Chosen, hash::Hasher, input};
+use crate::{capture::Chosen, disk::trust, hash::Hasher, input};
 
 /// Version of both files' layout; raised when a key changes its meaning.
 pub const JOB_VERSION: u32 = 1;
@@ -130,12 +130,7 @@ impl Job {
         }
         let mut job: Self = read(&path)?;
         let names: BTreeSet<&str> = job.blocks.iter().map(|block| &*block.name).collect();
-        let is_name = |name: &&str| {
-            let mut parts = Path::new(name).components();
-            matches!(parts.next(), Some(Component::Normal(_)))
-                && parts.next().is_none()
-                && *name != COARSE
-        };
+        let is_name = |name: &&str| trust::is_entry(name) && *name != COARSE;
         if names.is_empty() || names.len() != job.blocks.len() || !names.iter().all(is_name) {
             let reason = "its blocks have no names of folders, or not each its own";
             return Err(damaged(&path, reason));

@@ -14,10 +14,9 @@ use super::{CliError, network::NetworkArguments, next, print, progress::Progress
 use crate::{
     capture::decode_image,
     chroma::teacher::{Catalog, Checkup, GrayImage, KnownTeacher, TeacherError, ToldBy, check},
-    disk,
     download::{DownloadError, Source, download},
     input,
-    run::RunError,
+    run::{RunError, files, originals::Kept},
 };
 
 /// List, download and check colorization networks.
@@ -108,11 +107,9 @@ impl Check {
         let checkup = check(&self.teacher, &self.network.settings(), (&name, gray));
         let checkup = checkup.map_err(teacher_error)?;
         if let Some(path) = &self.manifest {
-            let mut file = disk::create(path).map_err(|error| unreadable(path, &error))?;
-            file.write_all(checkup.manifest.as_bytes())
-                .map_err(|error| unreadable(path, &error))?;
-            file.persist(path)
-                .map_err(|error| unreadable(path, &error))?;
+            let read = [&self.teacher].into_iter().chain(&self.photo);
+            let _kept = Kept::default().with_all(read, "an input").keep();
+            files::write(path, checkup.manifest.as_bytes())?;
         }
         if self.json {
             return print(format_args!("{:#}", serde_json::json!(checkup)));

@@ -29,9 +29,6 @@ const LOCK: &str = "prepare.lock";
 /// What folders begin with whose content is not whole yet.
 const DRAFT: &str = ".prepare-";
 
-/// Files that systems put into folders by themselves.
-const SYSTEM: [&str; 3] = [".DS_Store", "Thumbs.db", "desktop.ini"];
-
 /// All that a step can have made: what else the file names is none of it.
 const RESULTS: [&str; 7] = [FRAMES, FILM, IMAGES, MASKS, STRETCHED, DATABASE, SPARSE];
 
@@ -345,7 +342,7 @@ fn check_empty(folder: &Path, input: &Path) -> Result<(), PrepareError> {
     for entry in entries.flatten() {
         let name = entry.file_name().to_string_lossy().into_owned();
         let begun = name.starts_with(DRAFT) || name.starts_with(".tmp");
-        let known = SYSTEM.contains(&&*name) || name == LOCK || begun;
+        let known = files::OF_SYSTEMS.contains(&&*name) || name == LOCK || begun;
         if !(known || input.starts_with(entry.path())) {
             return Err(PrepareError::NotOurs {
                 folder: folder.into(),

@@ -108,14 +108,14 @@ fn is_ours(path: &Path) -> bool {
 }
 
 /// Files that systems put into folders by themselves.
-const OF_SYSTEMS: [&str; 3] = [".DS_Store", "Thumbs.db", "desktop.ini"];
+pub(crate) const OF_SYSTEMS: [&str; 3] = [".DS_Store", "Thumbs.db", "desktop.ini"];
 
 /// Makes a folder for pictures, see [`make_folder`]. It may hold earlier ones of this program.
 ///
 /// # Errors
 /// [`RunError::File`] where it holds anything else, which pictures would be mixed with or
 /// replace.
-pub(super) fn make_pictures_folder(path: &Path) -> Result<(), RunError> {
+pub(crate) fn make_pictures_folder(path: &Path) -> Result<(), RunError> {
     make_folder(path)?;
     if let Some(other) = other_file(path) {
         return Err(not_empty(path, &other));
@@ -232,7 +232,7 @@ pub(crate) fn make_folder_of(path: &Path) -> Result<(), RunError> {
 }
 
 /// Refuses a file for a command's output that is one of its originals.
-fn check_no_original(path: &Path) -> Result<(), RunError> {
+pub(crate) fn check_no_original(path: &Path) -> Result<(), RunError> {
     trust::check_no_original(path).map_err(at(path))
 }
 

@@ -36,6 +36,9 @@ pub struct PartitionOptions {
 /// [`RunError`]; a job whose blocks are trained, or are being trained, is not replaced.
 pub fn partition(options: &PartitionOptions, observe: &mut Observer<'_>) -> Result<Job, RunError> {
     let folder = &options.output;
+    if folder.is_dir() {
+        files::make_own_folder(folder, &["job.json", COARSE], &[])?;
+    }
     let mut lock = (folder.is_dir().then(|| RunLock::take(folder))).transpose()?;
     let mut held = replaceable(folder)?;
     observe(Event::begins(Stage::Model));

@@ -117,7 +117,7 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
         .frame_rate
         .or(film.as_ref().map(|film| film.frame_rate));
     let rate = rate.unwrap_or(FRAME_RATE);
-    let shots = shots_of(&dataset, film.as_ref(), (&options.output, rate))?;
+    let shots = shots_of(&dataset, film.as_ref(), rate)?;
     let in_step = |film: &Film| film.times.is_none() && is_film(&options.output);
     if film.as_ref().is_some_and(in_step) && shots.iter().any(|shot| shot.repeats != 1) {
         observe(Event::Note(

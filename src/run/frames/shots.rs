@@ -1,10 +1,6 @@
 //! All photos of a capture in order, with a pose or without.
 
-use std::{
-    collections::BTreeMap,
-    ops::Range,
-    path::{Path, PathBuf},
-};
+use std::{collections::BTreeMap, ops::Range, path::PathBuf};
 
 use crate::{
     capture::{CaptureError, Dataset, FRAMES, Film, IMAGES, names::by_number, photos_in},
@@ -26,15 +22,15 @@ pub(super) struct Shot {
     pub repeats: usize,
 }
 
-/// The frames of the film, or else all photos by name, numbers in order. `output` must not be where they lie; a
-/// film has `rate` frames a second.
+/// The frames of the film, or else all photos by name, numbers in order. A film has `rate` frames
+/// a second.
 ///
 /// # Errors
-/// [`RunError::File`] where pictures would go among the photos or a frame is missing.
+/// [`RunError::File`] where a frame is missing.
 pub(super) fn shots_of(
     dataset: &Dataset,
     film: Option<&Film>,
-    (output, rate): (&Path, [u32; 2]),
+    rate: [u32; 2],
 ) -> Result<Vec<Shot>, RunError> {
     let root = &dataset.capture.root;
     let mut views = BTreeMap::<&str, Range<usize>>::new();
@@ -52,16 +48,6 @@ pub(super) fn shots_of(
             (root.join(IMAGES), names)
         }
     };
-    for photos in [&folder, &root.join(IMAGES)] {
-        if let (Ok(photos), Ok(output)) = (photos.canonicalize(), output.canonicalize())
-            && output == photos
-        {
-            return Err(RunError::File {
-                path: output,
-                reason: "holds the photos themselves: name another folder".to_owned(),
-            });
-        }
-    }
     let plain: Vec<&str> = names.iter().map(String::as_str).collect();
     let outputs = distinct(&plain);
     let repeats = film.map_or_else(|| vec![1; names.len()], |film| film.repeats(rate));
