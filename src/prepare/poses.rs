@@ -161,19 +161,17 @@ impl Task<'_> {
         let database = draft.path().join(DATABASE);
         disk::copy(&state.path(DATABASE), &database).map_err(files::at(&database))?;
         let photos = self.photos.headers.len();
-        let pairs = draft.path().join("pairs.txt");
-        let list = match self.by_number() {
-            Some(names) => colmap::pairs(&names),
-            None => None,
-        };
-        match &list {
-            Some(list) => files::write(&pairs, list.as_bytes())?,
-            None if self.by_number().is_some() => observe(Event::Warning(
+        let path = draft.path().join("pairs.txt");
+        let names = self.by_number();
+        let list = names.as_deref().and_then(colmap::pairs);
+        if let Some(list) = &list {
+            files::write(&path, list.as_bytes())?;
+        } else if names.is_some() {
+            observe(Event::Warning(
                 "photos are matched by name, IMG 10 before IMG 2: rename them without spaces or with leading zeros, or give --match exhaustive".to_owned(),
-            )),
-            None => {}
+            ));
         }
-        let pairs = list.is_some().then_some(&*pairs);
+        let pairs = list.is_some().then_some(&*path);
         tell(observe, Stage::Matches, 0, photos);
         colmap.matches(&database, (self.matching, pairs), &mut |done, total| {
             tell(observe, Stage::Matches, done, total.unwrap_or(photos));

@@ -131,8 +131,12 @@ impl State {
                 }
                 .into());
             }
-            // What failed is worth nothing for another input.
-            Some(record) if other && !(options.force || record.failed) => {
+            // What failed before it had poses is worth nothing for another input.
+            Some(record)
+                if other
+                    && !options.force
+                    && !(record.failed && !record.steps.contains_key(&Step::Poses)) =>
+            {
                 return Err(PrepareError::OtherInput {
                     folder: folder.into(),
                     input: record.input.clone(),

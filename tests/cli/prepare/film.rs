@@ -215,12 +215,12 @@ fn recordings_are_decoded_from_their_beginning() {
     probe(&place, |said| {
         said["format"]["format_name"] = json!("mpegts");
         said["format"]["start_time"] = json!("1.400000");
-        // What the same fake says of packets: two more than there are frames.
-        let at = |k: i32| json!({"pts_time": format!("{:.6}", 2.0 + 0.1 * f64::from(k))});
-        said["packets"] = Value::Array((0..42).map(at).collect());
+        // What the same fake says of packets: four more in the part than there are frames.
+        let at = |k: i32| json!({"pts_time": format!("{:.6}", 2.0 + 0.09 * f64::from(k))});
+        said["packets"] = Value::Array((0..50).map(at).collect());
     });
     let done = succeed(&place, &FILM);
-    let warning = "warning: only 40 of 42 frames could be read";
+    let warning = "warning: only 40 of 44 frames could be read";
     assert!(done.stderr.contains(warning), "{done:?}");
     let film: Value = serde_json::from_slice(&place.read("house/film.json")).expect("JSON");
     assert_eq!(film["start"], json!(0.6));

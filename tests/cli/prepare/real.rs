@@ -77,14 +77,7 @@ fn no_frame_of_a_recording_is_lost_and_lists_lead_nowhere() {
                 "-itsoffset",
                 "0.6",
             ])
-            .args([
-                "-f",
-                "lavfi",
-                "-i",
-                "mandelbrot=s=160x120:r=25",
-                "-frames:v",
-                "14",
-            ])
+            .args(["-f", "lavfi", "-i", "testsrc2=s=160x120:r=25:d=0.56"])
             .args(["-map", "0", "-map", "1", "-fps_mode", "passthrough"])
             .args(options)
             .arg(place.path(name))
