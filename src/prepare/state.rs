@@ -54,6 +54,11 @@ struct Record {
 }
 
 impl Record {
+    /// Whether there are poses, or there may be if it goes on.
+    fn has_worth(&self) -> bool {
+        !self.failed || self.steps.contains_key(&Step::Poses)
+    }
+
     /// What of it cannot be, if anything.
     fn check(self) -> Result<Self, String> {
         let mut names = self.steps.values().flat_map(|done| done.results.keys());
@@ -132,11 +137,7 @@ impl State {
                 .into());
             }
             // What failed before it had poses is worth nothing for another input.
-            Some(record)
-                if other
-                    && !options.force
-                    && !(record.failed && !record.steps.contains_key(&Step::Poses)) =>
-            {
+            Some(record) if other && !options.force && record.has_worth() => {
                 return Err(PrepareError::OtherInput {
                     folder: folder.into(),
                     input: record.input.clone(),
