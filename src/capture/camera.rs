@@ -2,6 +2,8 @@
 
 use glam::{DMat3, DVec3};
 
+use super::Orientation;
+
 /// A pinhole camera with its pose, as COLMAP defines them.
 ///
 /// Camera axes: x right, y down, z forward. A world point `X` lies at
@@ -27,6 +29,9 @@ pub struct Camera {
     /// World-to-camera translation, in world units.
     pub translation: DVec3,
 }
+
+/// From a camera's axes to those of one whose picture is turned clockwise by 90°.
+const QUARTER: DMat3 = DMat3::from_cols(DVec3::Y, DVec3::NEG_X, DVec3::Z);
 
 impl Camera {
     /// The camera's center in world space: `-Rᵀ·t`.
@@ -66,6 +71,24 @@ impl Camera {
             cy: self.cy * sy,
             ..self.clone()
         }
+    }
+
+    /// The camera of the same picture turned; as it is where that would mirror the picture.
+    pub fn turned(&self, orientation: Orientation) -> Self {
+        let Some(turns) = orientation.quarter_turns() else {
+            return self.clone();
+        };
+        let once = |camera: Self| Self {
+            width: camera.height,
+            height: camera.width,
+            fx: camera.fy,
+            fy: camera.fx,
+            cx: f64::from(camera.height) - camera.cy,
+            cy: camera.cx,
+            rotation: QUARTER * camera.rotation,
+            translation: QUARTER * camera.translation,
+        };
+        (0..turns).fold(self.clone(), |camera, _| once(camera))
     }
 
     /// The same view with the world's origin moved to `offset`: a point that
@@ -124,6 +147,25 @@ mod tests {
         let [us, vs] = project(&resized, point);
         assert!((us - 0.5 * u).abs() < 1e-12 && (vs - 0.25 * v).abs() < 1e-12);
         assert_eq!((resized.width, resized.height), (320, 120));
+    }
+
+    #[test]
+    fn turned_cameras_see_the_same_where_the_turned_picture_has_it() {
+        let (point, [width, height]) = (DVec3::new(0.2, 0.7, 1.0), [640.0, 480.0]);
+        let [u, v] = project(&camera(), point);
+        for (tag, [wanted_u, wanted_v]) in [
+            (1, [u, v]),
+            (2, [u, v]),
+            (3, [width - u, height - v]),
+            (6, [height - v, u]),
+            (8, [v, width - u]),
+        ] {
+            let turned = camera().turned(Orientation::of_tag(tag));
+            let [found_u, found_v] = project(&turned, point);
+            assert!((found_u - wanted_u).abs() < 1e-9, "{tag}");
+            assert!((found_v - wanted_v).abs() < 1e-9, "{tag}");
+            assert!(turned.center().distance(camera().center()) < 1e-12);
+        }
     }
 
     #[test]

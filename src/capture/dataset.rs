@@ -69,7 +69,7 @@ impl Dataset {
         options: &LoadOptions,
         tell: &mut dyn FnMut(Notice<'_>),
     ) -> Result<Self, CaptureError> {
-        let capture = Capture::load_with(dir, &options.capture())?;
+        let mut capture = Capture::load_with(dir, &options.capture())?;
         for rejected in &capture.rejected {
             tell(Notice::LeftOut(rejected));
         }
@@ -97,9 +97,12 @@ impl Dataset {
                 tell(Notice::Normalized(range));
             }
         }
-        let cameras = (capture.views.iter())
-            .map(|view| loader.camera(view))
-            .collect::<Result<_, _>>()?;
+        let mut cameras = Vec::new();
+        for view in &mut capture.views {
+            let (camera, stance) = loader.standing(view)?;
+            view.stance = stance;
+            cameras.push(camera);
+        }
         Ok(Self {
             split: match &options.chosen {
                 Some(chosen) => split_as(&capture.views, chosen),

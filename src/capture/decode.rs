@@ -4,12 +4,14 @@ use std::io::{BufReader, Cursor, Read};
 use std::path::Path;
 use std::sync::Arc;
 
-use image::{ColorType, DynamicImage, ImageBuffer, ImageDecoder, ImageFormat, ImageReader};
+use image::{DynamicImage, ImageBuffer, ImageDecoder, ImageFormat, ImageReader};
 
+use super::beside::{self, Beside};
 use super::error::CaptureError;
+use super::orientation::{Orientation, Way};
 use super::room::{self, Held};
 use super::sample::{Bytes, Depth, Header, LARGEST_FILE, Samples};
-use super::{jpeg, tiff};
+use super::{colors, jpeg, tiff};
 use crate::input;
 
 /// How TIFF files begin that may be larger than 4 GiB, in either byte order.
@@ -23,7 +25,32 @@ pub(super) struct Picture {
     pub header: Header,
     /// `[height, width, channels]`.
     pub samples: Samples,
+    /// EXIF for the same picture with its pixels upright, where the file has some.
+    pub exif: Option<Vec<u8>>,
     _held: Option<Held>,
+}
+
+impl Picture {
+    /// The same with its pixels turned.
+    pub fn turned(self, orientation: Orientation) -> Self {
+        let (size, channels) = (self.header.size, self.header.channels);
+        let header = Header {
+            size: orientation.size(size),
+            ..self.header
+        };
+        let samples = match self.samples {
+            Samples::Eight(values) => Samples::Eight(orientation.turned(values, channels, size)),
+            Samples::Sixteen(values) => {
+                Samples::Sixteen(orientation.turned(values, channels, size))
+            }
+            Samples::Float(values) => Samples::Float(orientation.turned(values, channels, size)),
+        };
+        Self {
+            header,
+            samples,
+            ..self
+        }
+    }
 }
 
 /// The most samples that a byte of a file can stand for: DEFLATE makes at most 1032 bytes of
@@ -34,7 +61,7 @@ const SAMPLES_PER_BYTE: u64 = 8 * 1032;
 /// Reads what a file announces, and of TIFF and PNG files nothing else.
 pub(super) fn header(path: &Path) -> Result<Header, CaptureError> {
     let file = input::open(path).map_err(unread(path))?;
-    let opened = open(Box::new(BufReader::new(file)));
+    let opened = open(Box::new(BufReader::new(file)), false);
     if opened.is_err() {
         // The decoder's words about what it does not read help nobody.
         check_jpeg(&input::read(path).map_err(unread(path))?).map_err(failure(path))?;
@@ -42,14 +69,14 @@ pub(super) fn header(path: &Path) -> Result<Header, CaptureError> {
     Ok(opened.map_err(failure(path))?.0)
 }
 
-/// Decodes a file once `check` has agreed to its size: before any pixel is
-/// allocated, since what a file announces may be a lie.
+/// Decodes a file once `check` has agreed to what it announces: before any pixel is
+/// allocated, since that may be a lie.
 ///
 /// Waits until there is room for it; whoever holds a picture must not wait, see
 /// [`decode_beside`].
 pub(super) fn decode(
     path: &Path,
-    check: impl FnOnce([u32; 2]) -> Result<(), CaptureError>,
+    check: impl FnOnce(&Header) -> Result<(), CaptureError>,
 ) -> Result<Picture, CaptureError> {
     decode_with(path, check, |bytes| Some(room::wait_for(bytes)))
 }
@@ -57,48 +84,69 @@ pub(super) fn decode(
 /// [`decode`] for a picture that belongs to one that is held.
 pub(super) fn decode_beside(
     path: &Path,
-    check: impl FnOnce([u32; 2]) -> Result<(), CaptureError>,
+    check: impl FnOnce(&Header) -> Result<(), CaptureError>,
 ) -> Result<Picture, CaptureError> {
     decode_with(path, check, |_| None)
 }
 
 fn decode_with(
     path: &Path,
-    check: impl FnOnce([u32; 2]) -> Result<(), CaptureError>,
+    check: impl FnOnce(&Header) -> Result<(), CaptureError>,
     hold: impl FnOnce(u64) -> Option<Held>,
 ) -> Result<Picture, CaptureError> {
     let file: Arc<[u8]> = input::read(path).map_err(unread(path))?.into();
     let frame = check_jpeg(&file).map_err(failure(path))?;
-    let (header, source) = open(Box::new(Cursor::new(file.clone()))).map_err(failure(path))?;
-    check(header.size)?;
+    let bytes = Box::new(Cursor::new(file.clone()));
+    let (header, mut beside, mut source) = open(bytes, false).map_err(failure(path))?;
+    check(&header)?;
     let bytes = check_bytes(header, file.len()).map_err(failure(path))?;
     let held = hold(bytes);
-    let samples = match (source, frame) {
-        (Source::Tiff(mut decoder), _) => tiff::samples(&mut decoder, header),
-        (Source::Image(_), Some(frame)) => jpeg::decode(&file, &frame).and_then(samples_of),
-        (Source::Image(decoder), None) => png(decoder).and_then(samples_of),
-    };
+    if let Source::Tiff(decoder) = &mut source {
+        beside = Beside::of_tiff(decoder);
+    }
+    let samples = source.samples(header, &file, frame);
     Ok(Picture {
         header,
         samples: samples.map_err(failure(path))?,
+        exif: beside.exif.and_then(beside::for_upright),
         _held: held,
     })
 }
 
+/// A picture that somebody has made of a photo.
+pub(crate) struct Painting {
+    /// As its file has it, but in sRGB.
+    pub image: DynamicImage,
+    /// How it stands upright.
+    pub orientation: Orientation,
+    /// What its file says of its colors where that cannot be heeded: they are taken for sRGB.
+    pub unheeded: Option<String>,
+}
+
+impl Painting {
+    /// The picture upright.
+    #[cfg(feature = "cli")]
+    pub fn upright(self) -> DynamicImage {
+        Way::from(self.orientation).image(self.image)
+    }
+}
+
 /// Decodes the bytes of a PNG, JPEG or TIFF file. Errors are what is wrong and what helps.
-pub(crate) fn decode_image(file: Vec<u8>) -> Result<DynamicImage, String> {
+pub(crate) fn decode_image(file: Vec<u8>) -> Result<Painting, String> {
     let file: Arc<[u8]> = file.into();
     let frame = check_jpeg(&file)?;
-    let (header, source) = open(Box::new(Cursor::new(file.clone())))?;
+    let (header, mut beside, mut source) = open(Box::new(Cursor::new(file.clone())), true)?;
     check_bytes(header, file.len())?;
-    match (source, frame) {
-        (Source::Tiff(mut decoder), _) => {
-            let samples = tiff::samples(&mut decoder, header)?;
-            picture_of(header, samples)
-        }
-        (Source::Image(_), Some(frame)) => jpeg::decode(&file, &frame),
-        (Source::Image(decoder), None) => png(decoder),
+    if let Source::Tiff(decoder) = &mut source {
+        beside = Beside::of_tiff(decoder);
     }
+    let samples = source.samples(header, &file, frame)?;
+    let (image, unheeded) = colors::in_srgb(picture_of(header, samples)?, &beside);
+    Ok(Painting {
+        image,
+        orientation: header.orientation,
+        unheeded,
+    })
 }
 
 /// The bytes of a decoded picture; refuses what would take more than there is or than the file
@@ -124,18 +172,49 @@ fn check_bytes(header: Header, file: usize) -> Result<u64, String> {
     Ok(samples * bytes)
 }
 
-fn png(decoder: Box<dyn ImageDecoder>) -> Result<DynamicImage, String> {
-    let unreadable = |e| format!("cannot be decoded ({e}); save it again");
-    DynamicImage::from_decoder(decoder).map_err(unreadable)
-}
-
 /// A file whose header has been read.
 enum Source {
-    Image(Box<dyn ImageDecoder>),
+    Jpeg,
+    Png(Box<png::Reader<Box<dyn Bytes>>>),
     Tiff(tiff::Decoder),
 }
 
-fn open(mut bytes: Box<dyn Bytes>) -> Result<(Header, Source), String> {
+impl Source {
+    /// `frame` is that of a JPEG file.
+    fn samples(
+        self,
+        header: Header,
+        file: &[u8],
+        frame: Option<jpeg::Frame>,
+    ) -> Result<Samples, String> {
+        match (self, frame) {
+            (Self::Tiff(mut decoder), _) => tiff::samples(&mut decoder, header),
+            (Self::Png(mut decoder), _) => {
+                let size = decoder.output_buffer_size().unwrap_or_default();
+                let mut values = vec![0; size];
+                decoder.next_frame(&mut values).map_err(undecodable)?;
+                Ok(match header.depth {
+                    Depth::Eight => Samples::Eight(values),
+                    _ => {
+                        let values = values.as_chunks().0.iter();
+                        Samples::Sixteen(values.map(|&bytes| u16::from_be_bytes(bytes)).collect())
+                    }
+                })
+            }
+            (Self::Jpeg, Some(frame)) => samples_of(jpeg::decode(file, &frame)?),
+            // `open` has seen that it is one.
+            (Self::Jpeg, None) => Err("is damaged; copy it again".into()),
+        }
+    }
+}
+
+fn undecodable(error: impl std::fmt::Display) -> String {
+    format!("cannot be decoded ({error}); save it again")
+}
+
+/// Reads a header; of what a JPEG or PNG file holds beside its pixels that of its colors only
+/// where they are wanted, and of a TIFF file nothing.
+fn open(mut bytes: Box<dyn Bytes>, colors: bool) -> Result<(Header, Beside, Source), String> {
     let mut magic = Vec::new();
     (&mut bytes)
         .take(MAGIC)
@@ -149,40 +228,51 @@ fn open(mut bytes: Box<dyn Bytes>) -> Result<(Header, Source), String> {
     let format = match format {
         Ok(ImageFormat::Tiff) => {
             let (header, decoder) = tiff::open(bytes)?;
-            return Ok((header, Source::Tiff(decoder)));
+            return Ok((header, Beside::default(), Source::Tiff(decoder)));
         }
         Ok(format @ (ImageFormat::Jpeg | ImageFormat::Png)) => format,
         _ => return Err("is neither JPEG, PNG nor TIFF; convert it (its name may stay)".into()),
     };
-    let decoder = ImageReader::with_format(bytes, format)
-        .into_decoder()
-        .map_err(|error| format!("cannot be decoded ({error}); save it again"))?;
-    let (width, height) = decoder.dimensions();
-    let color = decoder.color_type();
+    let beside = Beside::read(&mut bytes, format, colors).map_err(|error| error.to_string())?;
+    let exif = beside.exif.as_deref();
+    let orientation = exif.map(Orientation::of_exif).unwrap_or_default();
+    if format == ImageFormat::Jpeg {
+        let decoder = ImageReader::with_format(bytes, format).into_decoder();
+        let decoder = decoder.map_err(undecodable)?;
+        let header = Header {
+            size: decoder.dimensions().into(),
+            depth: Depth::Eight,
+            channels: decoder.color_type().channel_count().into(),
+            indexed: false,
+            orientation,
+        };
+        return Ok((header, beside, Source::Jpeg));
+    }
+    let mut decoder = png::Decoder::new(bytes);
+    // What is in them is not used, and a few bytes may become many.
+    decoder.set_ignore_text_chunk(true);
+    decoder.set_ignore_iccp_chunk(true);
+    decoder.set_transformations(png::Transformations::EXPAND);
+    let decoder = decoder.read_info().map_err(undecodable)?;
+    let (color, depth) = decoder.output_color_type();
     let header = Header {
-        size: [width, height],
-        depth: match color {
-            ColorType::L16 | ColorType::La16 | ColorType::Rgb16 | ColorType::Rgba16 => {
-                Depth::Sixteen
-            }
+        size: decoder.info().size().into(),
+        depth: match depth {
+            png::BitDepth::Sixteen => Depth::Sixteen,
             _ => Depth::Eight,
         },
-        channels: color.channel_count().into(),
+        channels: color.samples(),
+        indexed: decoder.info().color_type == png::ColorType::Indexed,
+        orientation,
     };
-    Ok((header, Source::Image(Box::new(decoder))))
+    Ok((header, beside, Source::Png(Box::new(decoder))))
 }
 
-/// The values of what PNG and JPEG files can hold.
+/// The values of what JPEG files can hold.
 fn samples_of(picture: DynamicImage) -> Result<Samples, String> {
     Ok(match picture {
         DynamicImage::ImageLuma8(p) => Samples::Eight(p.into_raw()),
-        DynamicImage::ImageLumaA8(p) => Samples::Eight(p.into_raw()),
         DynamicImage::ImageRgb8(p) => Samples::Eight(p.into_raw()),
-        DynamicImage::ImageRgba8(p) => Samples::Eight(p.into_raw()),
-        DynamicImage::ImageLuma16(p) => Samples::Sixteen(p.into_raw()),
-        DynamicImage::ImageLumaA16(p) => Samples::Sixteen(p.into_raw()),
-        DynamicImage::ImageRgb16(p) => Samples::Sixteen(p.into_raw()),
-        DynamicImage::ImageRgba16(p) => Samples::Sixteen(p.into_raw()),
         _ => return Err("holds neither gray nor RGB; convert it to 8 or 16 bits".into()),
     })
 }

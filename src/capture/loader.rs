@@ -2,14 +2,18 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{
+    Mutex, MutexGuard, PoisonError,
+    atomic::{AtomicBool, Ordering},
+};
 
 use super::decode;
 use super::error::CaptureError;
 use super::mask::{self, MaskFolder, Masked};
 use super::options::{LoadOptions, MaskSource, Normalize};
+use super::orientation::Stance;
 use super::original::Original;
-use super::photo::{Photo, check_size, working_size};
+use super::photo::{Photo, stance, working_size};
 use super::sample::Depth;
 use super::tone;
 use super::{Camera, Capture, View};
@@ -40,6 +44,8 @@ pub struct Loader {
     with_alpha: BTreeSet<String>,
     /// Of those loaded, the ones that are transparent anywhere.
     transparent: Mutex<BTreeSet<String>>,
+    /// Whether COLMAP saw any photo turned by its EXIF orientation.
+    turned: AtomicBool,
 }
 
 impl Loader {
@@ -60,6 +66,7 @@ impl Loader {
             not_finite: Mutex::default(),
             with_alpha: BTreeSet::new(),
             transparent: Mutex::default(),
+            turned: AtomicBool::new(false),
         }
     }
 
@@ -130,10 +137,10 @@ impl Loader {
     /// # Errors
     /// As [`Self::load`].
     pub fn sample(&self, view: &View) -> Result<Vec<f32>, CaptureError> {
-        let picture = decode::decode(&view.image_path, |size| check_size(view, size))?;
+        let (picture, stance) = decoded(view)?;
         let mask = match self.alpha(view, &picture) {
             Some(alpha) => Some(alpha),
-            None => self.mask(view, picture.header.size)?,
+            None => self.mask(view, picture.header.size, stance)?,
         };
         let channel = self.options.channel;
         Ok(tone::sample(
@@ -158,9 +165,11 @@ impl Loader {
     /// the view says so, and resizes its camera to it.
     ///
     /// Reads JPEG, PNG and TIFF: 8 or 16 bits a channel or floats, gray or RGB.
-    /// Transparency is its mask where the options say so; color profiles and the EXIF
-    /// orientation are ignored, the latter because COLMAP ignores it. A photo whose longer side exceeds `max_side` is
-    /// downscaled to it by area averaging of the encoded values, at its aspect ratio.
+    /// Transparency is its mask where the options say so; color profiles are ignored. Pixels stay
+    /// as the file has them, whatever its EXIF orientation says, because COLMAP ignores that; they
+    /// are turned where only then they have the camera's shape. A photo whose longer side exceeds
+    /// `max_side` is downscaled to it by area averaging of the encoded values, at its aspect
+    /// ratio.
     ///
     /// # Errors
     /// If the photo or its mask cannot be read or decoded, is of another kind, is cut
@@ -168,8 +177,8 @@ impl Loader {
     /// to within a pixel a side nor its aspect ratio to within 1 %, or the mask not the
     /// photo's; or if no pixel counts.
     pub fn load(&self, view: &View) -> Result<(Photo, Camera), CaptureError> {
-        let picture = decode::decode(&view.image_path, |size| check_size(view, size))?;
-        let mask = self.mask(view, picture.header.size)?;
+        let (picture, stance) = decoded(view)?;
+        let mask = self.mask(view, picture.header.size, stance)?;
         let alpha = self.alpha(view, &picture);
         let transparent = alpha.is_some();
         let mut pixels = tone::develop(picture, &self.options);
@@ -220,10 +229,11 @@ impl Loader {
     /// # Errors
     /// As [`Self::load`], but a photo of which no pixel counts is none.
     pub fn original(&self, view: &View, range: Normalize) -> Result<Original, CaptureError> {
-        let picture = decode::decode(&view.image_path, |size| check_size(view, size))?;
-        let mask = self.mask(view, picture.header.size)?;
+        let (mut picture, stance) = decoded(view)?;
+        let mask = self.mask(view, picture.header.size, stance)?;
         let alpha = self.alpha(view, &picture);
-        let mut original = self.made_gray(&picture, range);
+        let exif = picture.exif.take();
+        let mut original = self.made_gray(&picture, range, stance, exif);
         for mask in [mask, alpha].into_iter().flatten() {
             original.mask = Some(match original.mask {
                 Some(own) => (own.iter().zip(&mask)).map(|(a, b)| *a.min(b)).collect(),
@@ -233,15 +243,25 @@ impl Loader {
         Ok(original)
     }
 
-    /// A photo that no view shows, as [`Self::original`] has it.
+    /// A photo that no view shows, as [`Self::original`] has it; turned where others were.
     ///
     /// # Errors
     /// If it cannot be read or decoded.
     pub fn unplaced(&self, path: &Path, range: Normalize) -> Result<Original, CaptureError> {
-        Ok(self.made_gray(&decode::decode(path, |_| Ok(()))?, range))
+        let mut picture = decode::decode(path, |_| Ok(()))?;
+        let turned = self.turned.load(Ordering::Relaxed);
+        let stance = Stance::new(picture.header.orientation, turned);
+        let exif = picture.exif.take();
+        Ok(self.made_gray(&picture.turned(stance.from_file), range, stance, exif))
     }
 
-    fn made_gray(&self, picture: &decode::Picture, range: Normalize) -> Original {
+    fn made_gray(
+        &self,
+        picture: &decode::Picture,
+        range: Normalize,
+        stance: Stance,
+        exif: Option<Vec<u8>>,
+    ) -> Original {
         let [width, height] = picture.header.size;
         let depth = picture.header.depth;
         let deep = depth > Depth::Eight;
@@ -266,6 +286,8 @@ impl Loader {
                 picture.header.channels,
                 self.options.channel,
             ),
+            stance,
+            exif,
         }
     }
 
@@ -277,12 +299,12 @@ impl Loader {
         }
     }
 
-    /// Width and height of the photo of a view in its file.
+    /// Width and height of the photo of a view in its file, turned as COLMAP saw it.
     ///
     /// # Errors
-    /// If the header cannot be read.
+    /// If the header cannot be read, or as for [`Self::camera`].
     pub fn file_size(&self, view: &View) -> Result<[u32; 2], CaptureError> {
-        Ok(decode::header(&view.image_path)?.size)
+        Ok(self.seen(view)?.0)
     }
 
     /// The camera that [`Self::load`] gives, from the photo's header alone.
@@ -290,13 +312,30 @@ impl Loader {
     /// # Errors
     /// If the header cannot be read or announces another shape than the camera's.
     pub fn camera(&self, view: &View) -> Result<Camera, CaptureError> {
-        let size = decode::header(&view.image_path)?.size;
-        check_size(view, size)?;
+        Ok(self.standing(view)?.0)
+    }
+
+    /// [`Self::camera`], and how the photo stands.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn standing(&self, view: &View) -> Result<(Camera, Stance), CaptureError> {
+        let (size, stance) = self.seen(view)?;
         let size = working_size(size, self.photo_side(view));
-        Ok(match &view.undistortion {
+        let camera = match &view.undistortion {
             Some(lens) => lens.camera(size, &view.camera, self.options.max_side),
             None => view.camera.resized(size[0], size[1]),
-        })
+        };
+        Ok((camera, stance))
+    }
+
+    fn seen(&self, view: &View) -> Result<([u32; 2], Stance), CaptureError> {
+        let header = decode::header(&view.image_path)?;
+        let stance = stance(view, &header)?;
+        if !stance.from_file.is_none() {
+            self.turned.store(true, Ordering::Relaxed);
+        }
+        Ok((stance.from_file.size(header.size), stance))
     }
 
     /// The options with what `Auto` came to, as the report keeps them.
@@ -337,9 +376,14 @@ impl Loader {
             .unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn mask(&self, view: &View, size: [u32; 2]) -> Result<Option<Vec<u8>>, CaptureError> {
+    fn mask(
+        &self,
+        view: &View,
+        size: [u32; 2],
+        stance: Stance,
+    ) -> Result<Option<Vec<u8>>, CaptureError> {
         let path = self.masks.as_ref().and_then(|masks| masks.of(view));
-        path.map(|path| mask::read(path, &view.image_path, size))
+        path.map(|path| mask::read(path, &view.image_path, size, stance))
             .transpose()
     }
 
@@ -353,6 +397,16 @@ impl Loader {
         known.insert(view.photo.clone());
         Some(alpha)
     }
+}
+
+/// The photo of a view as COLMAP saw it.
+fn decoded(view: &View) -> Result<(decode::Picture, Stance), CaptureError> {
+    let mut found = Stance::default();
+    let picture = decode::decode(&view.image_path, |header| {
+        found = stance(view, header)?;
+        Ok(())
+    })?;
+    Ok((picture.turned(found.from_file), found))
 }
 
 /// The first view of each photo; all views of a photo are neighbors.
@@ -398,7 +452,9 @@ impl Headers {
             let color = color[header.channels.clamp(1, 4) - 1];
             let kind = format!("{color}, {}", header.depth);
             *read.kinds.entry(kind).or_default() += 1;
-            let (photo, camera) = (header.size, view.photo_size());
+            let camera = view.photo_size();
+            let photo = stance(view, &header)
+                .map_or(header.size, |stance| stance.from_file.size(header.size));
             if (0..2).all(|side| 2 * u64::from(photo[side]) < u64::from(camera[side])) {
                 let shrunk = read.shrunk.get_or_insert_with(|| Shrunk {
                     count: 0,

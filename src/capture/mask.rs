@@ -6,9 +6,10 @@ use super::decode::{self, Picture};
 use super::error::CaptureError;
 use super::names::{self, NamedFiles, composed, is_one_of, visit_files};
 use super::options::MaskSource;
+use super::orientation::{Stance, Way};
 use super::photo::same_shape;
 use super::resample::downscale;
-use super::sample::{Depth, Samples};
+use super::sample::{Depth, Header, Samples};
 use super::unplaced::photos_in;
 use super::{Capture, IMAGES, View, first_views};
 
@@ -119,45 +120,131 @@ fn same_folder(a: &Path, b: &Path) -> bool {
     matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }
 
-/// Reads the mask of a photo of `size` pixels: what each pixel counts, `[height,
-/// width]`. Of a color mask the lightest channel counts, alpha never. A mask of
-/// nothing but 0 and 1 is one of numbers, not of grays, and 1 counts fully.
+/// Values up to this are numbers and not grays, where there are no others.
+const NUMBERS: u8 = 20;
+
+/// Fewer different values than this are no soft edge.
+const FEW: usize = 20;
+
+/// Color channels differ by so much of the greatest where the color is another, and below this
+/// level nothing tells.
+const ANOTHER_COLOR: f32 = 0.1;
+const DARK: u8 = 64;
+
+/// Reads the mask of a photo that COLMAP saw with `size` pixels and that has this stance: what
+/// each pixel counts, `[height, width]`. Of a color mask the lightest channel counts, alpha never.
+/// Where there is but one value beside 0, and that is small or of a palette, it counts fully.
 ///
 /// # Errors
-/// If the file cannot be read or decoded, is not of 8 bits, or has another shape.
-pub(super) fn read(path: &Path, photo: &Path, size: [u32; 2]) -> Result<Vec<u8>, CaptureError> {
+/// If the file cannot be read or decoded, is not of 8 bits, has another shape, or if its values
+/// are labels of several things.
+pub(super) fn read(
+    path: &Path,
+    photo: &Path,
+    size: [u32; 2],
+    stance: Stance,
+) -> Result<Vec<u8>, CaptureError> {
+    let mut way = Way::default();
     let Picture {
         header, samples, ..
     } = decode::decode_beside(path, |mask| {
-        if same_shape(mask, size) {
-            return Ok(());
-        }
-        Err(CaptureError::MaskSize {
+        let ways = || stance.ways(mask.orientation);
+        let exact = ways().find(|way| way.size(mask.size) == size);
+        let near = || ways().find(|way| same_shape(way.size(mask.size), size));
+        way = exact.or_else(near).ok_or_else(|| CaptureError::MaskSize {
             path: path.into(),
-            mask,
+            mask: mask.size,
             photo: photo.into(),
             size,
-        })
+        })?;
+        Ok(())
     })?;
+    let failed = |reason| CaptureError::Photo {
+        path: path.into(),
+        reason,
+    };
     let Samples::Eight(values) = samples else {
         debug_assert_ne!(header.depth, Depth::Eight);
-        return Err(CaptureError::Photo {
-            path: path.into(),
-            reason: format!(
-                "is a mask of {} a channel; save it with 8 bits or 1 bit",
-                header.depth
-            ),
-        });
+        return Err(failed(format!(
+            "is a mask of {} a channel; save it with 8 bits or 1 bit",
+            header.depth
+        )));
     };
+    if let Some(reason) = several_things(&values, &header) {
+        return Err(failed(reason));
+    }
     let colors = if header.channels < 3 { 1 } else { 3 };
     let mut mask: Vec<u8> = values
         .chunks_exact(header.channels)
         .map(|pixel| pixel[..colors].iter().copied().max().unwrap_or_default())
         .collect();
-    if mask.iter().all(|&value| value <= 1) {
-        mask.iter_mut().for_each(|value| *value *= u8::MAX);
+    let most = mask.iter().copied().max().unwrap_or_default();
+    let two = mask.iter().all(|&value| value == 0 || value == most);
+    if two && (most <= NUMBERS || header.indexed) {
+        let counts = |value: u8| if value > 0 { u8::MAX } else { 0 };
+        mask.iter_mut().for_each(|value| *value = counts(*value));
     }
-    Ok(resized(mask, header.size, size))
+    let mask = way.turned(mask, 1, header.size);
+    Ok(resized(mask, way.size(header.size), size))
+}
+
+/// Why a mask does not tell what counts and what does not, where it does not: its values are
+/// numbers or colors of several things, or only its transparency tells.
+fn several_things(values: &[u8], header: &Header) -> Option<String> {
+    let colors = if header.channels < 3 { 1 } else { 3 };
+    let mut known = [false; 256];
+    let mut hues: Vec<[u8; 3]> = Vec::new();
+    let (mut alike, mut opaque) = (true, true);
+    for pixel in values.chunks_exact(header.channels) {
+        let most = pixel[..colors].iter().copied().max().unwrap_or_default();
+        known[usize::from(most)] = true;
+        alike &= pixel[..colors] == values[..colors];
+        opaque &= !header.has_alpha() || pixel[colors] == u8::MAX;
+        if let &[r, g, b, ..] = pixel
+            && most >= DARK
+            && hues.len() <= FEW
+        {
+            let share = |value: u8| f32::from(value) / f32::from(most);
+            let (hue, of) = ([r, g, b].map(share), f32::from(u8::MAX));
+            let another = |known: &[u8; 3]| {
+                let known = known.map(|value| f32::from(value) / of);
+                (0..3).any(|k| (known[k] - hue[k]).abs() > ANOTHER_COLOR)
+            };
+            if hues.iter().all(another) {
+                hues.push(hue.map(|share| (of * share).round() as u8));
+            }
+        }
+    }
+    let found: Vec<u8> = (0..=u8::MAX).filter(|&v| known[usize::from(v)]).collect();
+    let remedy = "black where it does not count, white where it does";
+    if alike && !opaque && header.has_alpha() && found != [0] {
+        return Some(format!(
+            "is a mask by its transparency alone; save it without, {remedy}"
+        ));
+    }
+    if (2..=FEW).contains(&hues.len()) {
+        return Some(format!(
+            "is a mask of {} colors, which are labels; make it {remedy}",
+            hues.len()
+        ));
+    }
+    // 255 often stands for what has no label.
+    let labels: Vec<u8> = found.iter().copied().filter(|&v| v < u8::MAX).collect();
+    let numbers = labels.iter().all(|&v| v <= NUMBERS) && labels.iter().any(|&v| v > 0);
+    let dim = labels.len() == found.len() && found.len() <= FEW;
+    if numbers && found.iter().filter(|&&v| v > 0).count() > 1 || dim && found.len() > 2 {
+        let named: Vec<String> = found.iter().take(6).map(u8::to_string).collect();
+        let more = if found.len() > named.len() {
+            ", …"
+        } else {
+            ""
+        };
+        return Some(format!(
+            "is a mask of the values {}{more}, which are labels; make it {remedy}",
+            named.join(", ")
+        ));
+    }
+    None
 }
 
 /// The mask at the photo's size: area means, or where it is the smaller one, the

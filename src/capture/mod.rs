@@ -1,8 +1,10 @@
 //! What was photographed: COLMAP models, pinhole cameras, photos and splits.
 
 mod arrangement;
+mod beside;
 pub mod camera;
 mod colmap;
+mod colors;
 mod dataset;
 mod decode;
 mod error;
@@ -17,6 +19,7 @@ mod mask;
 pub(crate) mod names;
 mod options;
 mod order;
+mod orientation;
 mod original;
 mod photo;
 #[cfg(feature = "cli")]
@@ -66,6 +69,8 @@ pub use mask::Masked;
 pub use names::Ambiguous;
 pub use options::{Channel, Chosen, Encoding, LoadOptions, MaskSource, MaskUse, Normalize};
 pub use order::view_at;
+pub(crate) use orientation::Way;
+pub use orientation::{Orientation, Stance};
 pub use original::Original;
 pub use photo::Photo;
 #[cfg(feature = "cli")]
@@ -115,6 +120,8 @@ pub struct View {
     pub camera: Camera,
     /// How the view's picture comes from its photo; none where it is the photo.
     pub undistortion: Option<Undistortion>,
+    /// How the photo stands; known once a [`Dataset`] has read its header.
+    pub stance: Stance,
 }
 
 impl View {

@@ -1,6 +1,6 @@
 //! A photo's lightness as the file has it: its size, its depth, its lens.
 
-use super::resample::downscale;
+use super::{Stance, resample::downscale};
 
 /// A photo before anything is done to it but being made gray.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -19,6 +19,10 @@ pub struct Original {
     pub deep: bool,
     /// As [`Photo::mask`](super::Photo::mask).
     pub mask: Option<Vec<u8>>,
+    /// How it stands.
+    pub stance: Stance,
+    /// The file's EXIF, as it is for the same picture upright.
+    pub exif: Option<Vec<u8>>,
 }
 
 impl Original {
@@ -62,6 +66,8 @@ mod tests {
             in_scene: None,
             deep: false,
             mask: Some((0..=255).collect()),
+            stance: Stance::default(),
+            exif: None,
         };
         let bytes: Vec<u8> = (0..=255).collect();
         assert_eq!(original.bytes(), bytes);

@@ -3,7 +3,9 @@
 use super::View;
 use super::error::CaptureError;
 use super::options::MaskUse;
+use super::orientation::Stance;
 use super::resample::{downscale, downscale_masked};
+use super::sample::Header;
 use crate::color::GrayTable;
 
 /// A photo may differ from its camera by so many pixels a side: undistortion
@@ -151,17 +153,25 @@ pub(super) fn working_size(size: [u32; 2], max_side: Option<u32>) -> [u32; 2] {
     })
 }
 
-/// Refuses a photo that cannot be the view's camera's.
-pub(super) fn check_size(view: &View, photo: [u32; 2]) -> Result<(), CaptureError> {
-    let camera = view.photo_size();
-    if same_shape(photo, camera) {
-        return Ok(());
+/// How a photo stands to what COLMAP saw, which the sides of the view's camera tell; refuses one
+/// that cannot be that camera's.
+pub(super) fn stance(view: &View, header: &Header) -> Result<Stance, CaptureError> {
+    let (camera, photo) = (view.photo_size(), header.size);
+    let turned = header.orientation.size(photo);
+    // Nearly square photos have about the camera's shape either way.
+    let is_turned = match (photo == camera, turned == camera) {
+        (true, _) => false,
+        (_, true) => true,
+        _ => !same_shape(photo, camera),
+    };
+    if is_turned && !same_shape(turned, camera) {
+        return Err(CaptureError::PhotoSize {
+            path: view.image_path.clone(),
+            photo,
+            camera,
+        });
     }
-    Err(CaptureError::PhotoSize {
-        path: view.image_path.clone(),
-        photo,
-        camera,
-    })
+    Ok(Stance::new(header.orientation, is_turned))
 }
 
 /// Whether two pictures can be of one shape: they differ by rounding, or in scale.

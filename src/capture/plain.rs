@@ -5,6 +5,7 @@ use std::path::Path;
 use super::error::CaptureError;
 use super::loader::percentiles;
 use super::options::{LoadOptions, MaskUse, Normalize};
+use super::orientation::Stance;
 use super::photo::Photo;
 use super::sample::Depth;
 use super::{colmap, decode, mask, tone};
@@ -73,7 +74,7 @@ pub(crate) fn plain_mask(
     photo: &Path,
     size: [u32; 2],
 ) -> Result<Vec<u8>, CaptureError> {
-    mask::read(path, photo, size)
+    mask::read(path, photo, size, Stance::default())
 }
 
 /// What a folder with one model of COLMAP's places.

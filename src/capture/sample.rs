@@ -3,6 +3,8 @@
 use std::fmt;
 use std::io::{BufRead, Seek};
 
+use super::orientation::Orientation;
+
 /// The most a decoded file may take, in bytes: 178 million 8-bit RGB pixels, more
 /// than any camera's, and little enough to fail with words instead of by force.
 pub(super) const LARGEST_FILE: u64 = 512 << 20;
@@ -47,6 +49,10 @@ pub(super) struct Header {
     pub depth: Depth,
     /// 1 gray, 2 gray and alpha, 3 RGB, 4 RGB and alpha.
     pub channels: usize,
+    /// Whether pixels are places in a palette, of which the colors are read.
+    pub indexed: bool,
+    /// How it stands upright.
+    pub orientation: Orientation,
 }
 
 impl Header {

@@ -4,6 +4,7 @@ use tiff::ColorType;
 use tiff::decoder::{DecodingResult, DecodingSampleType, Limits};
 use tiff::tags::Tag;
 
+use super::orientation::Orientation;
 use super::sample::{Bytes, Depth, Header, LARGEST_FILE, Samples};
 
 /// A TIFF file whose header has been read.
@@ -68,11 +69,15 @@ pub(super) fn open(bytes: Box<dyn Bytes>) -> Result<(Header, Decoder), String> {
     limits.decoding_buffer_size = bytes.min(2 * LARGEST_FILE) as usize;
     limits.intermediate_buffer_size = 2 * limits.decoding_buffer_size;
     let size = [width, height];
+    // A value of another kind says nothing.
+    let orientation = decoder.find_tag_unsigned(Tag::Orientation).ok().flatten();
     Ok((
         Header {
             size,
             depth,
             channels,
+            indexed: false,
+            orientation: Orientation::of_tag(orientation.unwrap_or_default()),
         },
         Box::new(decoder.with_limits(limits)),
     ))

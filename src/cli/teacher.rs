@@ -98,7 +98,8 @@ impl Check {
         };
         let photo = decode_image(bytes)
             .map_err(|error| unreadable(Path::new(&name), &error))?
-            .to_luma8();
+            .upright()
+            .into_luma8();
         let gray = GrayImage {
             width: photo.width(),
             height: photo.height(),

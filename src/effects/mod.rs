@@ -27,11 +27,11 @@ pub use exposure::{Exposures, find_exposures, find_photo_exposures};
 pub use plan::{Decider, Decision, Effect, Overrules, Plan, Room, Trials};
 pub use sampling::sampling_spread;
 pub use shell::Shell;
-pub(crate) use soundness::listed;
 pub use soundness::{
     Agreement, Cause, Contradiction, Contradictory, FEW_POINTS, Levels, PointColors, Reprojection,
     Unseeing, doubts, observe_where_projected,
 };
+pub(crate) use soundness::{correlation, listed};
 pub use teacher::{TeacherSamples, TeacherSpread};
 pub use tracks::Sample;
 pub use words::table;

@@ -97,7 +97,7 @@ impl Measured {
             if on_sheet.contains(&i) {
                 let (width, height) = (camera.width, camera.height);
                 let bytes = |pixels: &Vec<[f32; 3]>| to_image(width, height, pixels);
-                rows.push(Row {
+                let row = Row {
                     width,
                     height,
                     caption: caption(dataset, lesson, i),
@@ -107,7 +107,8 @@ impl Measured {
                         taught.as_ref().map(bytes),
                         Some(bytes(&exported)),
                     ],
-                });
+                };
+                rows.push(row.turned(dataset.capture.views[i].stance.upright));
             }
             Ok::<_, EvalError>(())
         })?;

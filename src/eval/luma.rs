@@ -81,7 +81,7 @@ pub fn gray_rows(
         };
         let name = &dataset.capture.views[view].name;
         let held_out = dataset.split.test.contains(&view);
-        rows.push(Row {
+        let row = Row {
             width,
             height,
             caption: format!("{name}{}", if held_out { " (held out)" } else { "" }),
@@ -89,7 +89,8 @@ pub fn gray_rows(
                 gray(reference.gray()),
                 gray(reference.luma_shown(&picture.pixels)),
             ],
-        });
+        };
+        rows.push(row.turned(dataset.capture.views[view].stance.upright));
         Ok::<_, EvalError>(())
     })?;
     Ok(rows)

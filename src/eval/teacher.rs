@@ -58,6 +58,7 @@ impl MeasuredTeacher {
         if answers.is_empty() {
             return Err(EvalError::NothingTaught);
         }
+        teacher.check_images()?;
         Ok(Self {
             info: serde_json::to_value(info).unwrap_or_default(),
             answers,

@@ -199,6 +199,7 @@ mod tests {
             height: SIZE[1],
             gray: (0..SIZE[0] * SIZE[1]).map(gray).collect(),
             mask: None,
+            stance: Default::default(),
         }
     }
 
@@ -261,6 +262,7 @@ mod tests {
             height: 64,
             gray: vec![0; 32 * 64],
             mask: None,
+            stance: Default::default(),
         };
         assert_eq!(Between::of(&first, &other), None);
         assert_eq!(known.along(&[], false, &second).share(), 0.0);

@@ -59,6 +59,7 @@ fn beside_the_scene_the_teacher_is_moved_in_line_with_it_and_keeps_its_detail() 
         height,
         gray: vec![128; (width * height) as usize],
         mask: None,
+        stance: Default::default(),
     };
     // The teacher is 12 units too red everywhere, and has a stripe of its own on the right.
     let stripe = |i: usize| if i % 40 >= 30 { 15.0 } else { 0.0 };
@@ -142,6 +143,7 @@ fn where_the_teacher_is_plainly_wrong_nothing_of_it_is_left_and_a_cast_costs_no_
         height,
         gray: vec![128; (width * height) as usize],
         mask: None,
+        stance: Default::default(),
     };
     let at = |i: usize| (i % 60, i / 60);
     // Stripes that blurred geometry has lost; a cast of 9 units; a patch of another color.

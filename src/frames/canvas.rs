@@ -1,8 +1,8 @@
 //! A photo at the size at which its colors are found.
 
 use crate::{
-    capture::{Original, View, downscale},
-    chroma::teacher::GrayImage,
+    capture::{Original, Stance, View, downscale},
+    chroma::teacher::{GrayImage, Query},
 };
 
 /// A photo at working size, its lens's distortion in it.
@@ -16,6 +16,8 @@ pub struct Canvas {
     pub gray: Vec<u8>,
     /// What each pixel counts by the photo's mask, 0 to 255; `None` where all count.
     pub mask: Option<Vec<u8>>,
+    /// How the photo stands.
+    pub stance: Stance,
 }
 
 impl Canvas {
@@ -36,7 +38,13 @@ impl Canvas {
             height,
             gray: original.shrunk([width, height]),
             mask: original.shrunk_mask([width, height]),
+            stance: original.stance,
         }
+    }
+
+    /// The photo of this name, as a teacher is asked about it.
+    pub fn query<'a>(&self, name: &'a str) -> Query<'a> {
+        Query::of(name, self.stance)
     }
 
     /// As a teacher is asked about it.

@@ -20,11 +20,13 @@ pub struct Colored {
     pub rgb: Vec<[u16; 3]>,
     /// Whether the photo told more than 256 levels apart.
     pub deep: bool,
+    /// The photo's EXIF, as it is for the upright picture.
+    pub exif: Option<Vec<u8>>,
 }
 
 /// The photo with `ab`, CIELAB a and b of each pixel of its canvas, brought to its size along its
-/// edges. Each pixel keeps its `L*`; where no display shows such a color its chroma is reduced.
-/// Where the scene's photos are in another range, chroma grows and shrinks with the light.
+/// edges, and upright. Each pixel keeps its `L*`; where no display shows such a color its chroma is
+/// reduced. Where the scene's photos are in another range, chroma grows and shrinks with the light.
 ///
 /// # Panics
 /// When `ab` has not the canvas's size.
@@ -80,11 +82,14 @@ pub fn finish(original: &Original, canvas: &Canvas, ab: Vec<[f32; 2]>) -> Colore
             });
         }
     });
+    let (upright, size) = (original.stance.upright, [original.width, original.height]);
+    let [width, height] = upright.size(size);
     Colored {
-        width: original.width,
-        height: original.height,
-        rgb,
+        width,
+        height,
+        rgb: upright.turned(rgb, 1, size),
         deep: original.deep,
+        exif: original.exif.clone(),
     }
 }
 
@@ -109,6 +114,8 @@ mod tests {
             in_scene: None,
             deep,
             mask: None,
+            stance: Default::default(),
+            exif: None,
         }
     }
 

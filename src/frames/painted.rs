@@ -236,6 +236,7 @@ mod tests {
             height: SIZE[1],
             gray: (0..SIZE[0] * SIZE[1]).map(|i| gray(i) as u8).collect(),
             mask: None,
+            stance: Default::default(),
         }
     }
 

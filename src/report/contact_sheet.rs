@@ -3,6 +3,8 @@
 use font8x8::legacy::BASIC_LEGACY;
 use image::{Rgb, RgbImage, imageops};
 
+use crate::capture::Orientation;
+
 /// Pixels between pictures.
 const GAP: u32 = 4;
 
@@ -28,6 +30,21 @@ pub struct Row {
     pub caption: String,
     /// Left to right, as many as headings.
     pub pictures: Vec<Option<RgbImage>>,
+}
+
+impl Row {
+    /// The same with its pictures turned.
+    pub fn turned(self, orientation: Orientation) -> Self {
+        let [width, height] = orientation.size([self.width, self.height]);
+        let turned = |picture| orientation.image(picture);
+        let pictures = self.pictures.into_iter();
+        Self {
+            width,
+            height,
+            caption: self.caption,
+            pictures: pictures.map(|picture| picture.map(turned)).collect(),
+        }
+    }
 }
 
 /// Lays rows out on white, below the columns' `headings` and their own captions. What is missing

@@ -20,7 +20,7 @@ use super::{
     teach::teacher_or_photos,
 };
 use crate::{
-    capture::Dataset,
+    capture::{Dataset, Orientation},
     chroma::teacher::{Teacher, TeacherSettings},
     eval::{
         ColoredScene, EvalError, Lpips, MeasuredTeacher, Painter, Peer, Progress, Scored,
@@ -157,7 +157,8 @@ pub fn eval(
         let answer = painter.answer(i)?;
         let scored = Scored::of(name, reference, &drawing, answer.as_ref(), lpips.as_mut())?;
         if rows.len() < MAX_ROWS {
-            rows.push(page_row(&page, rows.len(), &scored)?);
+            let upright = scene.dataset.capture.views[i].stance.upright;
+            rows.push(page_row(&page, rows.len(), &scored, upright)?);
         }
         views.push(scored);
         Ok::<_, RunError>(())
@@ -312,13 +313,18 @@ fn covers_nothing(path: &Path, dataset: &Dataset) -> impl FnOnce(EvalError) -> R
     }
 }
 
-/// Writes a view's pictures beside the page.
-fn page_row(folder: &Path, index: usize, scored: &Scored) -> Result<PageRow, RunError> {
+/// Writes a view's pictures beside the page, upright.
+fn page_row(
+    folder: &Path,
+    index: usize,
+    scored: &Scored,
+    upright: Orientation,
+) -> Result<PageRow, RunError> {
     let [width, height] = scored.size;
     let mut figures = Vec::new();
     for shot in &scored.shots {
         let file = format!("view-{index:02}-{}.png", shot.file);
-        let image = to_image(width, height, &shot.pixels);
+        let image = upright.image(to_image(width, height, &shot.pixels));
         files::write_png(&folder.join(&file), &image)?;
         figures.push(Figure {
             caption: shot.caption.to_owned(),

@@ -6,7 +6,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use image::{DynamicImage, ImageBuffer, RgbImage};
+use image::{DynamicImage, ImageBuffer, ImageEncoder, RgbImage, codecs::png::PngEncoder};
 
 use super::{RunError, RunFolder};
 use crate::{
@@ -59,24 +59,27 @@ pub(super) fn write_png(path: &Path, image: &RgbImage) -> Result<(), RunError> {
     write(path, &marked(bytes.into_inner()))
 }
 
-/// Writes a photo in color as a PNG of its depth, beside and renamed.
-pub(super) fn write_colored(path: &Path, colored: Colored) -> Result<(), RunError> {
+/// Writes a photo in color as a PNG of its depth with the photo's EXIF, beside and renamed.
+pub(super) fn write_colored(path: &Path, mut colored: Colored) -> Result<(), RunError> {
     let [width, height] = [colored.width, colored.height];
     let failed = |reason: String| RunError::File {
         path: path.to_owned(),
         reason,
     };
+    let exif = colored.exif.take();
     let image = match colored.deep {
         true => ImageBuffer::from_raw(width, height, colored.rgb.into_flattened())
             .map(DynamicImage::ImageRgb16),
         false => RgbImage::from_raw(width, height, colored.bytes()).map(DynamicImage::ImageRgb8),
     };
     let image = image.ok_or_else(|| failed("its pixels do not fill it".to_owned()))?;
-    let mut bytes = std::io::Cursor::new(Vec::new());
-    image
-        .write_to(&mut bytes, image::ImageFormat::Png)
-        .map_err(|error| failed(error.to_string()))?;
-    write(path, &marked(bytes.into_inner()))
+    let mut bytes = Vec::new();
+    let mut encoder = PngEncoder::new(&mut bytes);
+    let kept = exif.map_or(Ok(()), |exif| encoder.set_exif_metadata(exif));
+    kept.map_err(|error| failed(error.to_string()))?;
+    let written = image.write_with_encoder(encoder);
+    written.map_err(|error| failed(error.to_string()))?;
+    write(path, &marked(bytes))
 }
 
 /// PNG: the signature and the header, which come before all else.

@@ -319,6 +319,15 @@ impl Teachers {
         let mut covers: Vec<bool> = answered.iter().map(|[count, _]| *count > 0).collect();
         covers.push(asking.hints_cover);
         self.check(&covers, dataset, &lesson)?;
+        for member in &self.teachers {
+            member.teacher.check_images()?;
+            let doubts = member.teacher.doubts().into_iter();
+            doubts.for_each(|line| observe(Event::Warning(line)));
+        }
+        if let Some((_, hints)) = &self.hints {
+            let doubts = hints.doubts().into_iter();
+            doubts.for_each(|line| observe(Event::Warning(line)));
+        }
         for (member, counts) in self.teachers.iter().zip(answered) {
             if let Some(warning) = gray_images(member, counts, dataset)? {
                 observe(Event::Warning(warning));

@@ -82,18 +82,19 @@ impl Album {
 
     fn picture(&self, name: &str) -> Option<Vec<u8>> {
         let file = self.points.join(name).join(FOLDER).join(&self.file);
-        small(decode_image(input::read(&file).ok()?).ok()?)
+        small(decode_image(input::read(&file).ok()?).ok()?.image)
     }
 }
 
 fn photo(loader: &Loader, view: &View) -> Option<Vec<u8>> {
     let (photo, _) = loader.load(view).ok()?;
+    let (_, stance) = loader.standing(view).ok()?;
     let bytes = match &photo.rgb {
         Some(rgb) => rgb.concat(),
         None => photo.gray.iter().flat_map(|&gray| [gray; 3]).collect(),
     };
     let image = RgbImage::from_raw(photo.width, photo.height, bytes)?;
-    small(DynamicImage::ImageRgb8(image))
+    small(DynamicImage::ImageRgb8(stance.upright.image(image)))
 }
 
 /// A small JPEG.

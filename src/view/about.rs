@@ -55,7 +55,8 @@ pub fn cameras(dataset: &Dataset, report: Option<&Report>) -> Vec<Value> {
     let views = dataset.capture.views.iter().zip(&dataset.cameras);
     let of = |(k, (view, camera)): (usize, (&View, &Camera))| {
         let held_out = dataset.split.test.binary_search(&k).is_ok();
-        let mut told = pose(camera);
+        // As the photo stands upright beside it.
+        let mut told = pose(&camera.turned(view.stance.upright));
         told["name"] = json!(view.name);
         told["split"] = json!(if held_out { "test" } else { "train" });
         told["psnr"] = json!(psnr.get(view.name.as_str()));

@@ -13,7 +13,7 @@ use super::{
     server::{Answer, Request},
 };
 use crate::{
-    capture::{Camera, Photo},
+    capture::{Camera, Dataset, Orientation, Photo},
     hash::Hasher,
     run::{Look, Observer, RunError, SceneKind},
 };
@@ -186,15 +186,27 @@ impl Content for OfRun {
     }
 
     fn photo(&self, view: usize) -> Result<Option<GrayImage>, RunError> {
-        Ok(self.look.photo(view)?.and_then(|photo| gray(&photo)))
+        let photo = self.look.photo(view)?;
+        Ok(photo.and_then(|photo| gray(&photo, upright(self.look.dataset.as_ref(), view))))
     }
 
     fn teacher(&self, view: usize) -> Result<Option<RgbImage>, RunError> {
-        self.look.teacher(view)
+        let picture = self.look.teacher(view)?;
+        let upright = upright(self.look.dataset.as_ref(), view);
+        Ok(picture.map(|picture| upright.image(picture)))
     }
 }
 
-/// A photo's gray as an image.
-pub(super) fn gray(photo: &Photo) -> Option<GrayImage> {
-    GrayImage::from_raw(photo.width, photo.height, photo.gray.clone())
+/// How the pictures of a view are turned, as its camera is.
+pub(super) fn upright(dataset: Option<&Dataset>, view: usize) -> Orientation {
+    let view = dataset.and_then(|dataset| dataset.capture.views.get(view));
+    let upright = view.map(|view| view.stance.upright.without_mirrors());
+    upright.unwrap_or_default()
+}
+
+/// A photo's gray as an image, turned.
+pub(super) fn gray(photo: &Photo, upright: Orientation) -> Option<GrayImage> {
+    let size = [photo.width, photo.height];
+    let [width, height] = upright.size(size);
+    GrayImage::from_raw(width, height, upright.turned(photo.gray.clone(), 1, size))
 }

@@ -57,7 +57,11 @@ pub fn write_html(
     let (splats, drawn) = read.ok_or_else(|| ViewerError::Nothing(look.name.clone()))?;
     observe(Event::begins(Stage::Rendering));
     let (start, near) = match &look.dataset {
-        Some(dataset) => (dataset.cameras[about::first(dataset)].clone(), look.near()),
+        Some(dataset) => {
+            let first = about::first(dataset);
+            let upright = dataset.capture.views[first].stance.upright;
+            (dataset.cameras[first].turned(upright), look.near())
+        }
         None => {
             let (camera, near) = overview(&splats);
             (camera, Some(near))

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use super::{
     about,
-    content::{Content, gray},
+    content::{Content, gray, upright},
     pack,
 };
 use crate::{
@@ -67,7 +67,11 @@ impl Content for OfCommand {
     }
 
     fn photo(&self, view: usize) -> Result<Option<GrayImage>, RunError> {
-        Ok(self.live.photo(view)?.and_then(|photo| gray(&photo)))
+        let upright = upright(self.live.ask().dataset.as_deref(), view);
+        Ok(self
+            .live
+            .photo(view)?
+            .and_then(|photo| gray(&photo, upright)))
     }
 
     fn teacher(&self, _: usize) -> Result<Option<RgbImage>, RunError> {

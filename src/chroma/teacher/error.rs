@@ -214,6 +214,21 @@ pub enum TeacherError {
         /// The decoder's reason.
         reason: String,
     },
+    /// Images of the folder have the names of other photos than those that they show.
+    #[error(
+        "{}: {count} of {images} images show other photos than those they are named after ({shown}): \
+         rename them", path.display()
+    )]
+    OtherPhotos {
+        /// The folder.
+        path: PathBuf,
+        /// How many.
+        count: usize,
+        /// Images that were asked for.
+        images: usize,
+        /// The first of them, and what they show.
+        shown: String,
+    },
     /// An image of the folder shows another cut of the photo.
     #[error(
         "{}: {} x {} has another aspect than photo {photo}, which is used at {} x {}; {}",

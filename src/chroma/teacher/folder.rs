@@ -1,9 +1,12 @@
 //! A folder of colored images as a teacher.
 
 use super::named_images::NamedImages;
+use super::shown::Shown;
 use super::{AbImage, GrayImage, Query, TeacherError, TeacherInfo, file_name};
-use crate::capture::Capture;
+use crate::capture::{Capture, IMAGES};
 use crate::color::srgb_to_lab;
+use image::{DynamicImage, Rgb, Rgb32FImage};
+use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
 /// Images that were colored elsewhere, for any subset of the photos.
@@ -14,7 +17,22 @@ use std::path::{Path, PathBuf};
 pub struct FolderTeacher {
     folder: PathBuf,
     images: NamedImages,
+    /// Whether the images are the photos themselves.
+    of_photos: bool,
+    shown: RefCell<Shown>,
 }
+
+/// Share of an image that may be transparent without a word.
+const TRANSPARENT: f64 = 0.01;
+
+/// Share of an image that is gray and not black or white from which on it is doubtful. Walls and
+/// clouds are gray in part in photos, too; an image colored in one half is in more than this.
+const GRAY: f64 = 0.4;
+
+/// Tones that are neither black nor white, where whatever is colored is gray, and how far
+/// channels of a gray are apart: of 1.
+const TONES: std::ops::RangeInclusive<f32> = 0.01..=0.99;
+const SAME: f32 = 1e-3;
 
 impl FolderTeacher {
     /// Looks for images in `folder` and its subfolders.
@@ -26,12 +44,17 @@ impl FolderTeacher {
         Ok(Self {
             folder: folder.to_path_buf(),
             images: NamedImages::open(folder)?,
+            of_photos: false,
+            shown: RefCell::default(),
         })
     }
 
     /// Says which photos there are, so that an image of one is not taken for another's.
     pub fn know(&mut self, capture: &Capture) {
         self.images.know(capture);
+        let [own, photos] =
+            [&self.folder, &capture.root.join(IMAGES)].map(|dir| dir.canonicalize());
+        self.of_photos = matches!((own, photos), (Ok(own), Ok(photos)) if own == photos);
     }
 
     /// Whether there is an image for a photo, which may be given by its path below the photo
@@ -53,6 +76,29 @@ impl FolderTeacher {
         }
     }
 
+    /// What is doubtful of the images so far, a line each.
+    pub(super) fn doubts(&self) -> Vec<String> {
+        let images = self.images.doubts().into_iter();
+        images.chain(self.shown.borrow().doubt()).collect()
+    }
+
+    fn doubt(&self, path: &Path, transparent: f64, gray: f64) {
+        if transparent >= TRANSPARENT {
+            let doubt = "are transparent in part, and teach the colors that are hidden there: where only a part is painted, give them as --hints";
+            self.images.doubt(path, Some(transparent), doubt.to_owned());
+        }
+        // Whole ones are told of elsewhere.
+        if gray >= GRAY && gray < 1.0 {
+            let doubt = "are gray in large part, and what they show there becomes gray: where only a part is colored, give them as --hints";
+            self.images.doubt(path, Some(gray), doubt.to_owned());
+        }
+    }
+
+    /// Refuses images that show other photos than those whose names they have.
+    pub(super) fn check(&self) -> Result<(), TeacherError> {
+        self.shown.borrow().check(&self.folder)
+    }
+
     /// Colors of the photo's image at the image's size, or at the photo's where the
     /// image is of the photo before its lens was taken out; none where there is no
     /// image.
@@ -61,11 +107,25 @@ impl FolderTeacher {
         query: impl Into<Query<'a>>,
         photo: GrayImage<'_>,
     ) -> Result<Option<AbImage>, TeacherError> {
-        let Some(found) = self.images.load(query.into(), photo)? else {
+        let query = query.into();
+        let mut shown = self.shown.borrow_mut();
+        shown.look(query.name, photo);
+        let Some(found) = self.images.load(query, photo)? else {
             return Ok(None);
         };
         let size = [found.image.width(), found.image.height()];
+        // A face is but a part of its photo.
+        let faces = found
+            .original
+            .is_some_and(|original| original.name != query.name);
+        if !faces {
+            shown.look_at(&file_name(found.path), &found.image);
+        }
+        let transparent = transparent(&found.image);
         let rgb = found.image.into_rgb32f();
+        if !self.of_photos {
+            self.doubt(found.path, transparent, gray(&rgb));
+        }
         let ab = rgb.pixels().map(|rgb| {
             let [_, a, b] = srgb_to_lab(rgb.0.map(f64::from));
             [a as f32, b as f32]
@@ -81,13 +141,38 @@ impl FolderTeacher {
     }
 }
 
+/// Share of an image that is transparent at least in part.
+fn transparent(image: &DynamicImage) -> f64 {
+    if !image.color().has_alpha() {
+        return 0.0;
+    }
+    let alphas = image.to_luma_alpha8();
+    let clear = alphas.pixels().filter(|pixel| pixel.0[1] < u8::MAX);
+    clear.count() as f64 / alphas.pixels().len() as f64
+}
+
+/// Share of what is neither black nor white in an image that is gray; 0 where that is little.
+fn gray(image: &Rgb32FImage) -> f64 {
+    let (mut gray, mut all) = (0, 0);
+    for &Rgb([r, g, b]) in image.pixels() {
+        if TONES.contains(&g) {
+            all += 1;
+            gray += usize::from((r - g).abs() < SAME && (b - g).abs() < SAME);
+        }
+    }
+    match 10 * all < image.pixels().len() {
+        true => 0.0,
+        false => f64::from(gray as u32) / f64::from(all as u32),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::Upsample;
     use super::*;
     use crate::capture::lens::{ModelName, Undistortion};
     use crate::capture::{Camera, View};
-    use image::{Rgb, RgbImage};
+    use image::RgbImage;
     use std::fs;
     use std::sync::Arc;
     use tempfile::TempDir;
@@ -275,6 +360,7 @@ mod tests {
                 lens: lens.clone(),
                 rotation: cut.rotation,
             }),
+            stance: Default::default(),
         }
     }
 

@@ -3,7 +3,7 @@
 use super::images::{Filter, resample};
 use super::named_images::NamedImages;
 use super::{GrayImage, Query, TeacherError};
-use crate::capture::{Capture, decode_image};
+use crate::capture::{Capture, Orientation, Stance, decode_image};
 use crate::color::srgb_to_lab;
 use crate::input;
 use image::Rgba32FImage;
@@ -15,8 +15,8 @@ use std::path::{Path, PathBuf};
 /// itself, of which what is as it was says nothing.
 pub struct HintFolder {
     images: NamedImages,
-    /// Where the photos lie, by the names of their views.
-    photos: BTreeMap<String, PathBuf>,
+    /// Where the photos lie, by name, and how they are turned to what COLMAP saw.
+    photos: BTreeMap<String, (PathBuf, Orientation)>,
 }
 
 /// Levels, of 255, by which saving a photo anew may change a channel of it, and from which on a
@@ -54,13 +54,22 @@ impl HintFolder {
     pub fn know(&mut self, capture: &Capture) {
         self.images.know(capture);
         let photos = capture.views.iter();
-        let photos = photos.map(|view| (view.photo.clone(), view.image_path.clone()));
+        let photos = photos.map(|view| {
+            let file = (view.image_path.clone(), view.stance.from_file);
+            (view.photo.clone(), file)
+        });
         self.photos = photos.collect();
     }
 
-    /// Adds a photo of which there is no view.
-    pub fn know_photo(&mut self, name: &str, path: &Path) {
-        self.photos.insert(name.to_owned(), path.to_owned());
+    /// Adds a photo of which there is no view, and that stands like this.
+    pub fn know_photo(&mut self, name: &str, path: &Path, stance: Stance) {
+        let file = (path.to_owned(), stance.from_file);
+        self.photos.insert(name.to_owned(), file);
+    }
+
+    /// What is doubtful of the images so far, a line each.
+    pub fn doubts(&self) -> Vec<String> {
+        self.images.doubts()
     }
 
     /// Whether there is an image for a photo, painted or not.
@@ -145,7 +154,7 @@ impl HintFolder {
         name: &str,
         picture: &Rgba32FImage,
     ) -> Result<Option<Vec<f32>>, TeacherError> {
-        let Some(path) = self.photos.get(name) else {
+        let Some((path, from_file)) = self.photos.get(name) else {
             return Ok(None);
         };
         let file = input::read(path).map_err(TeacherError::io(path))?;
@@ -154,8 +163,11 @@ impl HintFolder {
             reason,
         })?;
         let [width, height] = [picture.width(), picture.height()];
+        let photo = photo.image.into_rgb32f();
         let size = [photo.width(), photo.height()];
-        let photo: Vec<[f32; 3]> = photo.into_rgb32f().pixels().map(|pixel| pixel.0).collect();
+        let photo = photo.pixels().map(|pixel| pixel.0).collect();
+        let photo = from_file.turned(photo, 1, size);
+        let size = from_file.size(size);
         let photo = resample(&photo, size, [width, height], Filter::Average);
         let apart: Vec<f32> = (picture.pixels().zip(&photo))
             .map(|(picture, photo)| {
@@ -194,6 +206,17 @@ impl HintImage {
     /// Whether nothing is painted.
     pub fn is_empty(&self) -> bool {
         self.paint.iter().all(|paint| paint[2] == 0.0)
+    }
+
+    /// The same paint turned.
+    pub(super) fn turned(&self, orientation: Orientation) -> Self {
+        let size = [self.width, self.height];
+        let [width, height] = orientation.size(size);
+        Self {
+            width,
+            height,
+            paint: orientation.turned(self.paint.clone(), 1, size),
+        }
     }
 
     /// The same paint at another size (at least 1 × 1); paint mixes by its α.

@@ -1,6 +1,7 @@
 //! Images in and out of a teacher, and their change of size.
 
 use super::TeacherError;
+use crate::capture::Orientation;
 use serde::{Deserialize, Serialize};
 
 /// A gray photo that is to be colored.
@@ -26,6 +27,11 @@ pub struct AbImage {
 }
 
 impl GrayImage<'_> {
+    /// The pixels turned; an image of them is of [`Orientation::size`].
+    pub(super) fn turned(&self, orientation: Orientation) -> Vec<u8> {
+        orientation.turned(self.pixels.to_vec(), 1, [self.width, self.height])
+    }
+
     /// Refuses an image whose pixels do not fill its size.
     pub(super) fn check(&self, name: &str) -> Result<(), TeacherError> {
         let expected = u64::from(self.width) * u64::from(self.height);
@@ -42,6 +48,17 @@ impl GrayImage<'_> {
 }
 
 impl AbImage {
+    /// The same image turned.
+    pub fn turned(self, orientation: Orientation) -> Self {
+        let size = [self.width, self.height];
+        let [width, height] = orientation.size(size);
+        Self {
+            width,
+            height,
+            ab: orientation.turned(self.ab, 1, size),
+        }
+    }
+
     /// The same image at another size (at least 1 × 1).
     ///
     /// Enlarging is bilinear interpolation with half-pixel centers. Where an

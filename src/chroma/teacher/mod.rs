@@ -21,6 +21,7 @@ mod places;
 mod profile;
 mod query;
 pub(crate) mod runtime;
+mod shown;
 mod tensor;
 mod trial;
 mod upsample;
@@ -197,6 +198,25 @@ impl Teacher {
         }
     }
 
+    /// What is doubtful of the images that a folder has answered with so far, a line each.
+    pub fn doubts(&self) -> Vec<String> {
+        match &self.source {
+            Source::Network(_) => Vec::new(),
+            Source::Folder(folder) => folder.doubts(),
+        }
+    }
+
+    /// Refuses a folder whose images so far show other photos than those whose names they have.
+    ///
+    /// # Errors
+    /// [`TeacherError::OtherPhotos`].
+    pub fn check_images(&self) -> Result<(), TeacherError> {
+        match &self.source {
+            Source::Network(_) => Ok(()),
+            Source::Folder(folder) => folder.check(),
+        }
+    }
+
     /// Colors one photo, which may be given by its path relative to the photo folder;
     /// `hints` are told to a network that takes hints.
     ///
@@ -216,7 +236,7 @@ impl Teacher {
         let query = query.into();
         photo.check(query.name)?;
         let answer = match &mut self.source {
-            Source::Network(network) => Some(network.colorize(query.name, photo, hints)?),
+            Source::Network(network) => Some(asked(network, query, photo, hints)?),
             Source::Folder(folder) => folder.colorize(query, photo)?,
         };
         Ok(answer.map(|answer| answer.upsampled(photo, self.upsample)))
@@ -227,12 +247,12 @@ impl Teacher {
     ///
     /// # Errors
     /// As for [`Self::colorize`], and where the answer is not kept.
-    pub fn prepare(&mut self, name: &str, photo: GrayImage<'_>) -> Result<(), TeacherError> {
-        photo.check(name)?;
+    pub fn prepare(&mut self, query: Query<'_>, photo: GrayImage<'_>) -> Result<(), TeacherError> {
+        photo.check(query.name)?;
         match &mut self.source {
             Source::Network(network) => {
                 if network.unkept.is_none() {
-                    network.colorize(name, photo, None)?;
+                    asked(network, query, photo, None)?;
                 }
                 // What is not kept would be asked for again.
                 network.unkept.take().map_or(Ok(()), Err)
@@ -240,6 +260,29 @@ impl Teacher {
             Source::Folder(_) => Ok(()),
         }
     }
+}
+
+/// What a network says of a photo, which is shown to it upright.
+fn asked(
+    network: &mut NetworkTeacher,
+    query: Query<'_>,
+    photo: GrayImage<'_>,
+    hints: Option<&HintImage>,
+) -> Result<AbImage, TeacherError> {
+    let upright = query.stance.upright;
+    if upright.is_none() {
+        return network.colorize(query.name, photo, hints);
+    }
+    let pixels = photo.turned(upright);
+    let [width, height] = upright.size([photo.width, photo.height]);
+    let standing = GrayImage {
+        width,
+        height,
+        pixels: &pixels,
+    };
+    let hints = hints.map(|hints| hints.turned(upright));
+    let answer = network.colorize(query.name, standing, hints.as_ref())?;
+    Ok(answer.turned(upright.inverse()))
 }
 
 /// The file or folder that a user means by what is given as a teacher: what is at this path, or

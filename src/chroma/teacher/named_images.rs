@@ -1,13 +1,17 @@
 //! A folder of images that belong to photos by name.
 
 use super::query::Original;
-use super::{GrayImage, Query, TeacherError};
+use super::shown::stands;
+use super::{GrayImage, Query, TeacherError, file_name};
 use crate::capture::names::{NamedFiles, known, stem, visit_files};
-use crate::capture::{Capture, decode_image};
+use crate::capture::{Capture, Way, decode_image};
+use crate::effects::listed;
 use crate::input;
 use image::{DynamicImage, ImageFormat};
+use std::cell::RefCell;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::Read;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// How far the aspects of photo and image may differ: rounding to whole pixels
 /// in a tool that works at a small size, not another cut of the photo.
@@ -19,13 +23,17 @@ const ASPECT_TOLERANCE: f64 = 0.02;
 /// picture behind it or without; where there is none, to the only photo whose path differs in
 /// nothing but the extension. Symbolic links to folders are not followed.
 pub(super) struct NamedImages {
+    folder: PathBuf,
     images: NamedFiles,
+    /// What is doubtful of images read so far, and of which.
+    doubts: RefCell<BTreeMap<String, BTreeSet<String>>>,
 }
 
 /// An image that belongs to a photo.
 pub(super) struct Found<'a> {
     /// Where it lies.
     pub path: &'a Path,
+    /// In sRGB, and turned as the photo that COLMAP saw.
     pub image: DynamicImage,
     /// Set where the image is of the photo before its lens was taken out.
     pub original: Option<Original<'a>>,
@@ -50,7 +58,34 @@ impl NamedImages {
                 path: folder.to_path_buf(),
             });
         }
-        Ok(Self { images })
+        Ok(Self {
+            folder: folder.to_path_buf(),
+            images,
+            doubts: RefCell::default(),
+        })
+    }
+
+    /// What is doubtful of the images read so far, a line each.
+    pub fn doubts(&self) -> Vec<String> {
+        let line = |(doubt, names): (&String, &BTreeSet<String>)| {
+            let listed = listed(names.iter().map(String::as_str));
+            let (count, folder) = (names.len(), self.folder.display());
+            format!("{count} images in {folder} ({listed}) {doubt}")
+        };
+        self.doubts.borrow().iter().map(line).collect()
+    }
+
+    /// Keeps a doubt about an image, and the share of it that is concerned.
+    pub fn doubt(&self, path: &Path, share: Option<f64>, doubt: String) {
+        let mut name = file_name(path);
+        if let Some(share) = share {
+            name += &format!(" {:.0} %", 100.0 * share);
+        }
+        self.doubts
+            .borrow_mut()
+            .entry(doubt)
+            .or_default()
+            .insert(name);
     }
 
     /// Says which photos there are, so that an image of one is not taken for another's.
@@ -109,24 +144,50 @@ impl NamedImages {
         let name = original.map_or(query.name, |original| original.name);
         let photo_size = original.map_or([photo.width, photo.height], |original| original.size());
         let file = input::read(path).map_err(TeacherError::io(path))?;
-        let image = decode_image(file).map_err(|reason| TeacherError::BadImage {
+        let painting = decode_image(file).map_err(|reason| TeacherError::BadImage {
             path: path.to_path_buf(),
             reason,
         })?;
-        let (width, height) = (image.width(), image.height());
-        let aspect = f64::from(width) * f64::from(photo_size[1])
-            / (f64::from(height) * f64::from(photo_size[0]));
-        if (aspect - 1.0).abs() > ASPECT_TOLERANCE {
-            return Err(TeacherError::Aspect {
-                path: path.to_path_buf(),
-                size: [width, height],
-                photo: name.to_string(),
-                photo_size,
-            });
+        if let Some(unheeded) = &painting.unheeded {
+            self.doubt(path, None, format!(
+                "say of their colors what cannot be heeded ({unheeded}), which are taken for sRGB: convert them to sRGB"
+            ));
         }
+        let size = [painting.image.width(), painting.image.height()];
+        let fits = |way: &Way| {
+            let [width, height] = way.size(size).map(f64::from);
+            let aspect = width * f64::from(photo_size[1]) / (height * f64::from(photo_size[0]));
+            (aspect - 1.0).abs() <= ASPECT_TOLERANCE
+        };
+        let ways: Vec<Way> = query
+            .stance
+            .ways(painting.orientation)
+            .filter(fits)
+            .collect();
+        let way = match ways[..] {
+            [] => {
+                return Err(TeacherError::Aspect {
+                    path: path.to_path_buf(),
+                    size,
+                    photo: name.to_string(),
+                    photo_size,
+                });
+            }
+            // What its file says holds.
+            [way, ..] if !painting.orientation.is_none() => way,
+            // Sides that are not swapped, or alike, do not tell.
+            [lying, standing]
+                if lying != standing
+                    && original.is_none()
+                    && stands(&painting.image, photo, [lying, standing]) =>
+            {
+                standing
+            }
+            [way, ..] => way,
+        };
         Ok(Some(Found {
             path,
-            image,
+            image: way.image(painting.image),
             original,
         }))
     }

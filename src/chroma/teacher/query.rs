@@ -1,7 +1,7 @@
 //! Which photo a teacher is asked about.
 
 use super::images::{Filter, resample};
-use crate::capture::{Camera, View, lens::Undistortion};
+use crate::capture::{Camera, Stance, View, lens::Undistortion};
 
 /// The photo that a teacher is asked about.
 ///
@@ -12,6 +12,8 @@ pub struct Query<'a> {
     /// The view's name: a path below the photo folder.
     pub name: &'a str,
     pub(super) original: Option<Original<'a>>,
+    /// How the photo stands.
+    pub(super) stance: Stance,
 }
 
 /// A photo of which a view is a resampled part.
@@ -26,14 +28,20 @@ pub(super) struct Original<'a> {
 
 impl<'a> From<&'a str> for Query<'a> {
     fn from(name: &'a str) -> Self {
-        Self {
-            name,
-            original: None,
-        }
+        Self::of(name, Stance::default())
     }
 }
 
 impl<'a> Query<'a> {
+    /// A photo as its file has it, or as it was turned for COLMAP.
+    pub fn of(name: &'a str, stance: Stance) -> Self {
+        Self {
+            name,
+            original: None,
+            stance,
+        }
+    }
+
     /// A view as `camera` shows it, which is the view's at working size.
     pub fn view(view: &'a View, camera: &'a Camera) -> Self {
         let original = view.undistortion.as_ref().map(|undistortion| Original {
@@ -44,6 +52,7 @@ impl<'a> Query<'a> {
         Self {
             name: &view.name,
             original,
+            stance: view.stance,
         }
     }
 }

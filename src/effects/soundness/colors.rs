@@ -127,7 +127,7 @@ impl Agreement {
 
 /// Pearson's correlation of pairs of a point's gray and a photo's. `None` where there are too
 /// few, or points are too much alike; 0 of a photo that is the same everywhere.
-fn correlation(pairs: &[[f64; 2]]) -> Option<f64> {
+pub(crate) fn correlation(pairs: &[[f64; 2]]) -> Option<f64> {
     if pairs.len() < ENOUGH {
         return None;
     }

@@ -13,6 +13,7 @@ mod reprojection;
 use std::{collections::BTreeSet, path::PathBuf};
 
 pub use cause::Cause;
+pub(crate) use colors::correlation;
 pub use colors::{Agreement, PointColors};
 pub use coverage::{FEW_POINTS, Unseeing};
 pub use doubts::{Levels, doubts};

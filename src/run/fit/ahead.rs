@@ -9,7 +9,7 @@ use std::{
 use super::super::{Event, Observer, RunError, RunFolder, Stage};
 use crate::{
     capture::Dataset,
-    chroma::teacher::{GrayImage, Teacher, TeacherSettings},
+    chroma::teacher::{GrayImage, Query, Teacher, TeacherSettings},
 };
 
 /// Teachers that are asked while luma trains; may be none.
@@ -103,7 +103,7 @@ fn ask(teachers: &mut [Teacher], dataset: &Dataset, stop: &AtomicBool) -> Came {
             if stop.load(Ordering::Relaxed) {
                 return came;
             }
-            match teacher.prepare(&view.name, gray) {
+            match teacher.prepare(Query::view(view, &dataset.cameras[index]), gray) {
                 Ok(()) => came.answers += 1,
                 Err(error) => {
                     came.failure = Some(error.to_string());

@@ -4,7 +4,7 @@ use std::{collections::BTreeMap, path::Path};
 
 use super::{Painter, shots::Shot};
 use crate::{
-    chroma::teacher::{HintFolder, Query},
+    chroma::teacher::HintFolder,
     frames::{Believed, Between, Canvas, Strokes},
     run::{Event, Observer, RunError, Stage},
 };
@@ -40,9 +40,6 @@ impl Painted {
     ) -> Result<Self, RunError> {
         let mut hints = HintFolder::open(folder)?;
         hints.know(&painter.dataset.capture);
-        for shot in shots.iter().filter(|shot| shot.views.is_empty()) {
-            hints.know_photo(&shot.name, &shot.path);
-        }
         let mut own = BTreeMap::new();
         let mut done = 0;
         let mut tell = |done: usize, name: &str| {
@@ -54,14 +51,17 @@ impl Painted {
             });
         };
         for (i, shot) in shots.iter().enumerate() {
-            let query = || Query::from(shot.name.as_str());
-            if !hints.covers(query())? {
+            if !hints.covers(shot.name.as_str())? {
                 continue;
             }
             tell(done, &shot.name);
             done += 1;
             let seen = Seen::of(shot, painter)?;
-            if let Some(paint) = hints.load(query(), seen.canvas.gray_image())? {
+            if shot.views.is_empty() {
+                hints.know_photo(&shot.name, &shot.path, seen.canvas.stance);
+            }
+            let query = seen.canvas.query(&shot.name);
+            if let Some(paint) = hints.load(query, seen.canvas.gray_image())? {
                 let strokes = Strokes::of(&seen.canvas, &seen.believed, &paint, grow);
                 if strokes.share() > 0.0 {
                     own.insert(i, (seen, strokes));

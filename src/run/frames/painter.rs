@@ -3,7 +3,7 @@
 use super::shots::Shot;
 use crate::{
     capture::{CaptureError, Dataset, Exposure, Normalize, Original, View},
-    chroma::teacher::{AbImage, Query},
+    chroma::teacher::AbImage,
     frames::{Believed, Canvas, SceneDrawer, ViewOf},
     run::{RunError, teach::Teachers},
 };
@@ -91,7 +91,7 @@ impl<'a> Painter<'a> {
             return Ok(None);
         };
         let name = view.map_or(name, |seen| &seen.view.photo);
-        let answer = teachers.color(Query::from(name), canvas.gray_image())?;
+        let answer = teachers.color(canvas.query(name), canvas.gray_image())?;
         Ok(answer.map(|AbImage { ab, .. }| ab))
     }
 }

@@ -82,16 +82,14 @@ pub fn render(options: &RenderOptions, observe: &mut Observer<'_>) -> Result<usi
             message: view.name.clone(),
         });
         // The photo decides the size, which the model's camera may miss by a pixel.
-        let camera = loader.camera(view)?;
+        let (camera, stance) = loader.standing(view)?;
         let picture = renderer.render(&camera)?.remove(0);
         let path = options.output.join(&names[i]);
         if let Some(folder) = path.parent() {
             files::make_folder(folder)?;
         }
-        files::write_png(
-            &path,
-            &to_image(picture.width, picture.height, &picture.shown()),
-        )?;
+        let image = to_image(picture.width, picture.height, &picture.shown());
+        files::write_png(&path, &stance.upright.image(image))?;
     }
     Ok(chosen.len())
 }

@@ -1,0 +1,131 @@
+//! What the colors of a picture mean: pictures of other color spaces become sRGB.
+
+use image::{DynamicImage, Rgb32FImage, Rgba32FImage};
+use moxcms::{
+    CicpColorPrimaries, CicpProfile, ColorProfile, Layout, MatrixCoefficients, ProfileText,
+    TransferCharacteristics, TransformF32Executor, TransformOptions,
+};
+
+use super::beside::Beside;
+
+/// How far each channel may be off for a color space to be sRGB, in 1.
+const SAME: f32 = 1.5 / 255.0;
+
+/// How far a gamma may be off for it to be sRGB's, in 100,000.
+const SAME_GAMMA: u32 = 2_000;
+
+/// 100,000 times the gamma that stands for sRGB.
+const SRGB_GAMMA: u32 = 45_455;
+
+/// The code points of the transfer functions of high dynamic range: PQ and HLG.
+const HIGH_DYNAMIC_RANGE: [u8; 2] = [16, 18];
+
+/// A picture in sRGB by what its file says of its colors, and what is not heeded of that.
+pub(super) fn in_srgb(image: DynamicImage, beside: &Beside) -> (DynamicImage, Option<String>) {
+    // Without a color there is none to become another.
+    if !image.color().has_color() {
+        return (image, None);
+    }
+    let (profile, name) = match beside {
+        Beside {
+            code_points: Some([primaries, transfer]),
+            ..
+        } => (
+            by_code_points(*primaries, *transfer),
+            format!("cICP {primaries}, {transfer}"),
+        ),
+        Beside {
+            profile: Some(profile),
+            ..
+        } => {
+            let profile = ColorProfile::new_from_slice(profile).ok();
+            let name = profile.as_ref().and_then(name).unwrap_or_default();
+            (profile, name)
+        }
+        Beside {
+            gamma: Some(gamma), ..
+        } if gamma.abs_diff(SRGB_GAMMA) > SAME_GAMMA => {
+            (None, format!("gAMA {}", f64::from(*gamma) / 1e5))
+        }
+        _ => return (image, None),
+    };
+    let layout = match image.color().has_alpha() {
+        true => Layout::Rgba,
+        false => Layout::Rgb,
+    };
+    let srgb = ColorProfile::new_srgb();
+    let options = TransformOptions::default();
+    let transform = profile.and_then(|profile| {
+        let transform = profile.create_transform_f32(layout, &srgb, layout, options);
+        transform.ok()
+    });
+    match transform {
+        None => (image, Some(name)),
+        Some(transform) if is_srgb(&*transform, layout) => (image, None),
+        Some(transform) => match transformed(image, &*transform) {
+            Ok(image) => (image, None),
+            Err(image) => (image, Some(name)),
+        },
+    }
+}
+
+fn by_code_points(primaries: u8, transfer: u8) -> Option<ColorProfile> {
+    if HIGH_DYNAMIC_RANGE.contains(&transfer) {
+        return None;
+    }
+    let profile = CicpProfile {
+        color_primaries: CicpColorPrimaries::try_from(primaries).ok()?,
+        transfer_characteristics: TransferCharacteristics::try_from(transfer).ok()?,
+        matrix_coefficients: MatrixCoefficients::Identity,
+        full_range: true,
+    };
+    let profile = ColorProfile::new_from_cicp(profile);
+    profile.red_trc.is_some().then_some(profile)
+}
+
+/// What a profile calls itself.
+fn name(profile: &ColorProfile) -> Option<String> {
+    Some(match profile.description.as_ref()? {
+        ProfileText::PlainString(name) => name.clone(),
+        ProfileText::Localizable(names) => names.first()?.value.clone(),
+        ProfileText::Description(name) => name.ascii_string.clone(),
+    })
+}
+
+/// Whether it changes next to nothing.
+fn is_srgb(transform: &TransformF32Executor, layout: Layout) -> bool {
+    let levels = [0.0, 0.25, 0.5, 0.75, 1.0];
+    let colors: Vec<f32> = (0..125)
+        .flat_map(|i| {
+            let color = [levels[i % 5], levels[i / 5 % 5], levels[i / 25], 1.0];
+            color.into_iter().take(layout.channels())
+        })
+        .collect();
+    let mut shown = vec![0.0; colors.len()];
+    let done = transform.transform(&colors, &mut shown).is_ok();
+    let near = |(a, b): (&f32, &f32)| (a - b.clamp(0.0, 1.0)).abs() <= SAME;
+    done && colors.iter().zip(&shown).all(near)
+}
+
+/// The picture, or as it was where it cannot be transformed.
+fn transformed(
+    image: DynamicImage,
+    transform: &TransformF32Executor,
+) -> Result<DynamicImage, DynamicImage> {
+    let [width, height] = [image.width(), image.height()];
+    let has_alpha = image.color().has_alpha();
+    let values = match has_alpha {
+        true => image.to_rgba32f().into_raw(),
+        false => image.to_rgb32f().into_raw(),
+    };
+    let mut shown = vec![0.0; values.len()];
+    if transform.transform(&values, &mut shown).is_err() {
+        return Err(image);
+    }
+    shown.iter_mut().for_each(|v| *v = v.clamp(0.0, 1.0));
+    let shown = match has_alpha {
+        true => Rgba32FImage::from_raw(width, height, shown).map(DynamicImage::from),
+        false => Rgb32FImage::from_raw(width, height, shown).map(DynamicImage::from),
+    };
+    shown.ok_or(image)
+}

@@ -1,0 +1,137 @@
+//! What the images of a folder show: the photos that they are named after, or others.
+
+use std::path::Path;
+
+use image::DynamicImage;
+
+use super::images::{Filter, resample};
+use super::{GrayImage, TeacherError};
+use crate::capture::Way;
+use crate::color::gray_from_rgb;
+use crate::effects::{correlation, listed};
+
+/// Sides at which pictures are compared, in pixels: grain, strokes and small shifts are gone.
+const SIDE: u32 = 24;
+
+/// An image whose lightness correlates this well with its photo's is of that photo.
+const LIKE: f64 = 0.9;
+
+/// One that correlates this well with another photo's, and by [`CLEARLY`] more than with its own,
+/// is of that one. Other tones, grain and stains lower both; neighbors in a film correlate with
+/// the wrong photo nearly as well as with the right one, and do little harm.
+const LIKE_ANOTHER: f64 = 0.8;
+const CLEARLY: f64 = 0.15;
+
+/// Below this an image is like no photo. The lowest that a photo with other tones has is above
+/// 0.6.
+const UNLIKE: f64 = 0.2;
+
+/// Names that are told.
+const TOLD: usize = 3;
+
+/// Photos that were asked about, and the images that answered, small.
+#[derive(Default)]
+pub(super) struct Shown {
+    /// Name and gray of each photo.
+    photos: Vec<(String, Vec<f32>)>,
+    /// Of each image its name, its photo and its gray.
+    images: Vec<(String, usize, Vec<f32>)>,
+}
+
+impl Shown {
+    /// Takes a photo.
+    pub fn look(&mut self, name: &str, photo: GrayImage<'_>) {
+        self.photos.push((name.to_owned(), small(photo)));
+    }
+
+    /// Takes the image for the photo taken last, turned like it.
+    pub fn look_at(&mut self, name: &str, image: &DynamicImage) {
+        let photo = self.photos.len().saturating_sub(1);
+        self.images.push((name.to_owned(), photo, thumbnail(image)));
+    }
+
+    /// Refuses images that show other photos than their own.
+    pub fn check(&self, folder: &Path) -> Result<(), TeacherError> {
+        let found = self.images.iter().filter_map(|(name, own, image)| {
+            let photo = self.stranger(*own, image)?;
+            Some(format!("{name} shows {photo}, not {}", self.photos[*own].0))
+        });
+        let found: Vec<String> = found.collect();
+        match found.is_empty() {
+            true => Ok(()),
+            false => Err(TeacherError::OtherPhotos {
+                path: folder.to_owned(),
+                count: found.len(),
+                images: self.images.len(),
+                shown: found[..found.len().min(TOLD)].join("; "),
+            }),
+        }
+    }
+
+    /// Images that are like no photo, in a line.
+    pub fn doubt(&self) -> Option<String> {
+        let unlike = self.images.iter().filter(|(_, own, image)| {
+            let own = likeness(image, &self.photos[*own].1);
+            own.is_some_and(|own| own < UNLIKE)
+        });
+        let names: Vec<&str> = unlike.map(|(name, ..)| name.as_str()).collect();
+        (!names.is_empty()).then(|| {
+            format!(
+                "{} of {} images ({}) do not look like their photos, in lightness: check their names and whether they are turned or cropped",
+                names.len(),
+                self.images.len(),
+                listed(names.iter().copied())
+            )
+        })
+    }
+
+    /// The photo that an image shows, where that is plainly another than its own.
+    fn stranger(&self, own: usize, image: &[f32]) -> Option<&str> {
+        let with_own = likeness(image, &self.photos[own].1).filter(|&found| found < LIKE)?;
+        let others = self.photos.iter().filter_map(|(name, photo)| {
+            let found = likeness(image, photo)?;
+            (found >= LIKE_ANOTHER.max(with_own + CLEARLY)).then_some((found, name.as_str()))
+        });
+        others
+            .max_by(|a, b| a.0.total_cmp(&b.0))
+            .map(|(_, name)| name)
+    }
+}
+
+/// Whether an image matches a photo better turned in the second way than in the first.
+pub(super) fn stands(
+    image: &DynamicImage,
+    photo: GrayImage<'_>,
+    [lying, standing]: [Way; 2],
+) -> bool {
+    let (image, photo) = (thumbnail(image), small(photo));
+    // Squares keep their sides.
+    let turned = |way: Way| likeness(&way.turned(image.clone(), 1, [SIDE; 2]), &photo);
+    matches!((turned(lying), turned(standing)), (Some(lying), Some(standing)) if standing > lying)
+}
+
+fn small(photo: GrayImage<'_>) -> Vec<f32> {
+    let gray: Vec<[f32; 1]> = photo
+        .pixels
+        .iter()
+        .map(|&v| [f32::from(v) / 255.0])
+        .collect();
+    let size = [photo.width, photo.height];
+    resample(&gray, size, [SIDE; 2], Filter::Average).into_flattened()
+}
+
+fn thumbnail(image: &DynamicImage) -> Vec<f32> {
+    let rgb = image.thumbnail_exact(SIDE, SIDE).into_rgb32f();
+    let gray = rgb
+        .pixels()
+        .map(|rgb| gray_from_rgb(rgb.0.map(f64::from)) as f32);
+    gray.collect()
+}
+
+/// The correlation of two small pictures; none where one is the same everywhere.
+fn likeness(image: &[f32], photo: &[f32]) -> Option<f64> {
+    let pairs = || image.iter().zip(photo);
+    let there: Vec<[f64; 2]> = pairs().map(|(&a, &b)| [a.into(), b.into()]).collect();
+    let back: Vec<[f64; 2]> = pairs().map(|(&a, &b)| [b.into(), a.into()]).collect();
+    correlation(&back).and_then(|_| correlation(&there))
+}
