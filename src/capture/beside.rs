@@ -1,16 +1,13 @@
 //! What a photo's file holds beside its pixels: EXIF, and what its colors mean.
 
-use std::io::{self, Read, SeekFrom};
+use std::io::{self, SeekFrom};
 
-use flate2::{Crc, read::ZlibDecoder};
-use image::{ImageFormat, metadata::Orientation};
+use flate2::Crc;
+use image::{ImageDecoder, metadata::Orientation};
 use tiff::{encoder::TiffEncoder, tags::ByteOrder, tags::Tag, tags::Type, tags::ValueBuffer};
 
 use super::sample::Bytes;
 use super::tiff::Decoder;
-
-/// The most of a color profile that is read, in bytes: printers' take some million.
-const LARGEST_PROFILE: u64 = 4 << 20;
 
 /// The most EXIF that is read, in bytes: what a JPEG file has room for.
 const LARGEST_EXIF: usize = 1 << 16;
@@ -22,7 +19,7 @@ const TOLD: [u16; 7] = [270, 271, 272, 305, 306, 315, 33_432];
 const LEADING_AWAY: [u16; 2] = [37_500, 40_965];
 
 /// What a file holds beside its pixels.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Beside {
     /// EXIF from its TIFF header on.
     pub exif: Option<Vec<u8>>,
@@ -30,103 +27,46 @@ pub(super) struct Beside {
     pub profile: Option<Vec<u8>>,
     /// Of a PNG file the code points of its primaries and of its transfer function (ITU-T H.273).
     pub code_points: Option<[u8; 2]>,
-    /// Of a PNG file whose colors nothing else explains, 100,000 times its gamma.
-    pub gamma: Option<u32>,
+    /// Of a PNG file whose colors nothing else explains, its gamma.
+    pub gamma: Option<f32>,
 }
 
 impl Beside {
-    /// Reads what a JPEG or PNG file holds, of colors only where they are `wanted`, and comes back
-    /// to its beginning. What is damaged is not there.
-    ///
-    /// # Errors
-    /// If it cannot be read.
-    pub fn read(bytes: &mut dyn Bytes, format: ImageFormat, colors: bool) -> io::Result<Self> {
-        let mut found = Self::default();
-        let read = match format {
-            ImageFormat::Jpeg => found.read_jpeg(bytes, colors),
-            _ => found.read_png(bytes, colors),
+    /// What the header of a PNG file holds, and what is read of it at its end.
+    pub fn of_png(info: &png::Info<'_>, exif_at_the_end: Option<Vec<u8>>) -> Self {
+        let exif = info.exif_metadata.as_deref().map(without_prefix);
+        let points = info.coding_independent_code_points;
+        let unexplained = info.srgb.is_none() && info.icc_profile.is_none();
+        Self {
+            exif: exif.or(exif_at_the_end),
+            profile: info.icc_profile.as_deref().map(<[u8]>::to_vec),
+            code_points: points.map(|found| [found.color_primaries, found.transfer_function]),
+            gamma: info
+                .gama_chunk
+                .filter(|_| unexplained)
+                .map(|found| found.into_value()),
+        }
+    }
+
+    /// What a JPEG file holds, of colors only where they are `wanted`.
+    pub fn of_jpeg(decoder: &mut impl ImageDecoder, wanted: bool) -> Self {
+        let profile = if wanted {
+            decoder.icc_profile()
+        } else {
+            Ok(None)
         };
-        if let Err(error) = read
-            && error.kind() != io::ErrorKind::UnexpectedEof
-        {
-            return Err(error);
+        Self {
+            exif: decoder.exif_metadata().ok().flatten(),
+            profile: profile.ok().flatten(),
+            ..Self::default()
         }
-        bytes.rewind()?;
-        found.exif.take_if(|exif| exif.len() > LARGEST_EXIF);
-        Ok(found)
-    }
-
-    fn read_jpeg(&mut self, bytes: &mut dyn Bytes, colors: bool) -> io::Result<()> {
-        let mut pieces: Vec<(u8, Vec<u8>)> = Vec::new();
-        bytes.seek_relative(2)?;
-        loop {
-            let mut marker = [0; 2];
-            bytes.read_exact(&mut marker)?;
-            while marker[1] == 0xff {
-                bytes.read_exact(&mut marker[1..])?;
-            }
-            if marker[0] != 0xff || matches!(marker[1], 0xd9 | 0xda) {
-                break;
-            }
-            let [high, low] = number(bytes)?;
-            let length = u16::from_be_bytes([high, low]).saturating_sub(2);
-            if !(marker[1] == 0xe1 || colors && marker[1] == 0xe2) {
-                bytes.seek_relative(length.into())?;
-                continue;
-            }
-            let segment = taken(bytes, length.into())?;
-            if let Some(exif) = segment.strip_prefix(b"Exif\0\0") {
-                self.exif.get_or_insert_with(|| exif.to_vec());
-            } else if let Some([place, _, piece @ ..]) = segment.strip_prefix(b"ICC_PROFILE\0") {
-                pieces.push((*place, piece.to_vec()));
-            }
-        }
-        pieces.sort_by_key(|(place, _)| *place);
-        let profile: Vec<u8> = pieces.into_iter().flat_map(|(_, piece)| piece).collect();
-        self.profile = Some(profile).filter(|profile| !profile.is_empty());
-        Ok(())
-    }
-
-    fn read_png(&mut self, bytes: &mut dyn Bytes, colors: bool) -> io::Result<()> {
-        let mut explained = false;
-        bytes.seek_relative(8)?;
-        loop {
-            let length = u32::from_be_bytes(number(bytes)?);
-            let kind = number(bytes)?;
-            if matches!(&kind, b"IDAT" | b"IEND") {
-                break;
-            }
-            let of_colors = matches!(&kind, b"iCCP" | b"cICP" | b"sRGB" | b"gAMA");
-            let wanted = &kind == b"eXIf" || colors && of_colors;
-            if !wanted || u64::from(length) > LARGEST_PROFILE {
-                bytes.seek_relative(i64::from(length) + 4)?;
-                continue;
-            }
-            let chunk = taken(bytes, length.into())?;
-            let _checksum: [u8; 4] = number(bytes)?;
-            explained |= matches!(&kind, b"iCCP" | b"cICP" | b"sRGB");
-            match (&kind, chunk.as_slice()) {
-                (b"eXIf", _) => self.exif = Some(without_prefix(&chunk)),
-                (b"iCCP", _) => self.profile = inflated(&chunk),
-                (b"cICP", &[primaries, transfer, ..]) => {
-                    self.code_points = Some([primaries, transfer]);
-                }
-                (b"gAMA", &[a, b, c, d]) => self.gamma = Some(u32::from_be_bytes([a, b, c, d])),
-                _ => {}
-            }
-        }
-        self.gamma.take_if(|_| explained);
-        if self.exif.is_none() {
-            self.exif = exif_at_the_end(bytes)?;
-        }
-        Ok(())
     }
 
     /// What a TIFF file holds.
     pub fn of_tiff(decoder: &mut Decoder) -> Self {
         let profile = decoder.get_tag_u8_vec(Tag::IccProfile).ok();
         Self {
-            exif: exif_of_tiff(decoder).filter(|exif| exif.len() <= LARGEST_EXIF),
+            exif: exif_of_tiff(decoder),
             profile,
             ..Self::default()
         }
@@ -136,6 +76,9 @@ impl Beside {
 /// EXIF for the same picture with its pixels upright and without a thumbnail; none where nothing
 /// can be made of it.
 pub(super) fn for_upright(mut exif: Vec<u8>) -> Option<Vec<u8>> {
+    if exif.len() > LARGEST_EXIF {
+        return None;
+    }
     let big = match exif.get(..4)? {
         b"II*\0" => false,
         b"MM\0*" => true,
@@ -157,31 +100,9 @@ pub(super) fn for_upright(mut exif: Vec<u8>) -> Option<Vec<u8>> {
     Some(exif)
 }
 
-fn number<const N: usize>(bytes: &mut dyn Bytes) -> io::Result<[u8; N]> {
-    let mut number = [0; N];
-    bytes.read_exact(&mut number)?;
-    Ok(number)
-}
-
-/// So many bytes, which may be fewer at the end of a file.
-fn taken(bytes: &mut dyn Bytes, length: u64) -> io::Result<Vec<u8>> {
-    let mut taken = Vec::new();
-    bytes.take(length).read_to_end(&mut taken)?;
-    Ok(taken)
-}
-
 /// EXIF as some write it into PNG files: as in JPEG files.
 fn without_prefix(exif: &[u8]) -> Vec<u8> {
     exif.strip_prefix(b"Exif\0\0").unwrap_or(exif).to_vec()
-}
-
-/// The profile of an `iCCP` chunk: a name, 0, the method 0 and a zlib stream.
-fn inflated(chunk: &[u8]) -> Option<Vec<u8>> {
-    let name = chunk.iter().position(|&byte| byte == 0)?;
-    let mut profile = Vec::new();
-    let stream = ZlibDecoder::new(chunk.get(name + 2..)?);
-    let read = stream.take(LARGEST_PROFILE).read_to_end(&mut profile);
-    read.ok().map(|_| profile)
 }
 
 /// The `eXIf` chunk behind a PNG file's pixels, where some programs write it: looked for from the
@@ -242,4 +163,77 @@ fn exif_of_tiff(decoder: &mut Decoder) -> Option<Vec<u8>> {
     }
     told.finish().ok()?;
     any.then(|| file.into_inner())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An EXIF block of one tag, an orientation of 6, with the offset of a thumbnail.
+    fn exif(big: bool) -> Vec<u8> {
+        match big {
+            false => b"II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0\x06\0\0\0\x1a\0\0\0".to_vec(),
+            true => b"MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\x1a".to_vec(),
+        }
+    }
+
+    #[test]
+    fn exif_of_upright_pictures_has_neither_orientation_nor_thumbnail() {
+        for big in [false, true] {
+            let mut wanted = exif(big);
+            wanted[if big { 19 } else { 18 }] = 1;
+            wanted[22..].fill(0);
+            assert_eq!(for_upright(exif(big)), Some(wanted));
+            for end in 0..exif(big).len() {
+                assert_eq!(for_upright(exif(big)[..end].to_vec()), None);
+            }
+        }
+        assert_eq!(for_upright(b"II*\0\xff\xff\xff\xff".to_vec()), None);
+    }
+
+    #[test]
+    fn exif_behind_the_pixels_is_found() {
+        let chunk = |data: &[u8]| {
+            let mut crc = Crc::new();
+            crc.update(b"eXIf");
+            crc.update(data);
+            let length = (data.len() as u32).to_be_bytes();
+            [&length, b"eXIf", data, &crc.sum().to_be_bytes()].concat()
+        };
+        let found = |file: Vec<u8>| exif_at_the_end(&mut io::Cursor::new(file)).unwrap();
+        let file = [b"pixels", &*chunk(&exif(true)), b"\0\0\0\0IEND"].concat();
+        assert_eq!(found(file.clone()), Some(exif(true)));
+        let mut damaged = file;
+        damaged[20] ^= 1;
+        assert_eq!(found(damaged), None);
+        assert_eq!(found(b"eXIf".to_vec()), None);
+    }
+
+    #[test]
+    fn tiff_files_tell_who_took_the_photo_and_when() {
+        let mut file = io::Cursor::new(Vec::new());
+        let mut encoder = TiffEncoder::new(&mut file).unwrap();
+        let mut told = encoder.extra_directory().unwrap();
+        told.write_tag(Tag::from_u16_exhaustive(36_867), "1931:05:01 10:00:00")
+            .unwrap();
+        let told = told.finish_with_offsets().unwrap().offset;
+        let mut picture = encoder
+            .new_image::<tiff::encoder::colortype::Gray8>(2, 1)
+            .unwrap();
+        let tags = picture.encoder();
+        tags.write_tag(Tag::Make, "Maker").unwrap();
+        tags.write_tag(Tag::Orientation, 6_u16).unwrap();
+        tags.write_tag(Tag::ExifDirectory, told).unwrap();
+        picture.write_data(&[1, 2]).unwrap();
+        file.set_position(0);
+        let (header, mut decoder) = super::super::tiff::open(Box::new(file)).unwrap();
+        assert_eq!(header.orientation.size(header.size), [1, 2]);
+        let exif = Beside::of_tiff(&mut decoder)
+            .exif
+            .and_then(for_upright)
+            .unwrap();
+        let says = |words: &[u8]| exif.windows(words.len()).any(|found| found == words);
+        assert!(says(b"Maker\0") && says(b"1931:05:01 10:00:00\0"));
+        assert!(Orientation::from_exif_chunk(&exif).is_none());
+    }
 }

@@ -11,11 +11,9 @@ use super::beside::Beside;
 /// How far each channel may be off for a color space to be sRGB, in 1.
 const SAME: f32 = 1.5 / 255.0;
 
-/// How far a gamma may be off for it to be sRGB's, in 100,000.
-const SAME_GAMMA: u32 = 2_000;
-
-/// 100,000 times the gamma that stands for sRGB.
-const SRGB_GAMMA: u32 = 45_455;
+/// The gamma that stands for sRGB, and how far one may be off to be it.
+const SRGB_GAMMA: f32 = 0.45455;
+const SAME_GAMMA: f32 = 0.02;
 
 /// The code points of the transfer functions of high dynamic range: PQ and HLG.
 const HIGH_DYNAMIC_RANGE: [u8; 2] = [16, 18];
@@ -44,9 +42,7 @@ pub(super) fn in_srgb(image: DynamicImage, beside: &Beside) -> (DynamicImage, Op
         }
         Beside {
             gamma: Some(gamma), ..
-        } if gamma.abs_diff(SRGB_GAMMA) > SAME_GAMMA => {
-            (None, format!("gAMA {}", f64::from(*gamma) / 1e5))
-        }
+        } if (gamma - SRGB_GAMMA).abs() > SAME_GAMMA => (None, format!("gAMA {gamma}")),
         _ => return (image, None),
     };
     let layout = match image.color().has_alpha() {
@@ -128,4 +124,95 @@ fn transformed(
         false => Rgb32FImage::from_raw(width, height, shown).map(DynamicImage::from),
     };
     shown.ok_or(image)
+}
+
+#[cfg(test)]
+mod tests {
+    use image::{Rgb, RgbImage};
+
+    use super::*;
+
+    /// Colors that all of these spaces have.
+    fn picture() -> RgbImage {
+        RgbImage::from_fn(16, 16, |x, y| {
+            Rgb([60 + 8 * x as u8, 60 + 8 * y as u8, 120])
+        })
+    }
+
+    /// The picture as a color space has it.
+    fn saved_in(space: &ColorProfile) -> DynamicImage {
+        let (srgb, rgb) = (ColorProfile::new_srgb(), Layout::Rgb);
+        let options = TransformOptions::default();
+        let transform = srgb
+            .create_transform_8bit(rgb, space, rgb, options)
+            .unwrap();
+        let mut saved = picture();
+        transform.transform(&picture(), &mut saved).unwrap();
+        saved.into()
+    }
+
+    fn beside(space: &ColorProfile) -> Beside {
+        Beside {
+            profile: Some(space.encode().unwrap()),
+            ..Beside::default()
+        }
+    }
+
+    #[test]
+    fn pictures_of_other_color_spaces_become_srgb() {
+        let p3 = ColorProfile::new_display_p3();
+        let by_points = Beside {
+            code_points: Some([12, 13]),
+            ..Beside::default()
+        };
+        let adobe = ColorProfile::new_adobe_rgb();
+        let wide = ColorProfile::new_pro_photo_rgb();
+        for (space, beside) in [
+            (&adobe, beside(&adobe)),
+            (&wide, beside(&wide)),
+            (&p3, beside(&p3)),
+            (&p3, by_points),
+        ] {
+            let saved = saved_in(space);
+            let far = |a: &RgbImage| {
+                let channels = a.iter().zip(picture().into_raw());
+                channels.map(|(a, b)| a.abs_diff(b)).max().unwrap()
+            };
+            assert!(far(&saved.to_rgb8()) > 6);
+            let (shown, unheeded) = in_srgb(saved, &beside);
+            assert_eq!(unheeded, None);
+            assert!(far(&shown.to_rgb8()) <= 2, "{}", far(&shown.to_rgb8()));
+        }
+        // Nothing is lost of what is sRGB anyway.
+        let srgb = beside(&ColorProfile::new_srgb());
+        let same = in_srgb(picture().into(), &srgb);
+        assert_eq!(same, (picture().into(), None));
+    }
+
+    #[test]
+    fn what_cannot_be_heeded_is_named() {
+        let gray = beside(&ColorProfile::new_gray_with_gamma(1.8));
+        let of = |beside: &Beside| in_srgb(picture().into(), beside);
+        assert!(of(&gray).1.is_some());
+        let damaged = Beside {
+            profile: Some(vec![7; 200]),
+            ..Beside::default()
+        };
+        let gamma = |gamma| Beside {
+            gamma: Some(gamma),
+            ..Beside::default()
+        };
+        let bright = Beside {
+            code_points: Some([9, 16]),
+            ..Beside::default()
+        };
+        for beside in [damaged, gamma(1.0), bright] {
+            let (picture_shown, unheeded) = of(&beside);
+            assert!(unheeded.is_some() && picture_shown == picture().into());
+        }
+        assert_eq!(of(&gamma(0.45455)).1, None);
+        // Gray has no colors that could be others.
+        let luma = DynamicImage::from(picture()).into_luma8();
+        assert_eq!(in_srgb(luma.into(), &gray).1, None);
+    }
 }

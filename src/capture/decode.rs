@@ -4,11 +4,11 @@ use std::io::{BufReader, Cursor, Read};
 use std::path::Path;
 use std::sync::Arc;
 
-use image::{DynamicImage, ImageBuffer, ImageDecoder, ImageFormat, ImageReader};
+use image::{DynamicImage, ImageBuffer, ImageDecoder, ImageFormat, codecs::jpeg::JpegDecoder};
 
 use super::beside::{self, Beside};
 use super::error::CaptureError;
-use super::orientation::{Orientation, Way};
+use super::orientation::Orientation;
 use super::room::{self, Held};
 use super::sample::{Bytes, Depth, Header, LARGEST_FILE, Samples};
 use super::{colors, jpeg, tiff};
@@ -127,7 +127,7 @@ impl Painting {
     /// The picture upright.
     #[cfg(feature = "cli")]
     pub fn upright(self) -> DynamicImage {
-        Way::from(self.orientation).image(self.image)
+        self.orientation.image(self.image)
     }
 }
 
@@ -233,28 +233,27 @@ fn open(mut bytes: Box<dyn Bytes>, colors: bool) -> Result<(Header, Beside, Sour
         Ok(format @ (ImageFormat::Jpeg | ImageFormat::Png)) => format,
         _ => return Err("is neither JPEG, PNG nor TIFF; convert it (its name may stay)".into()),
     };
-    let beside = Beside::read(&mut bytes, format, colors).map_err(|error| error.to_string())?;
-    let exif = beside.exif.as_deref();
-    let orientation = exif.map(Orientation::of_exif).unwrap_or_default();
     if format == ImageFormat::Jpeg {
-        let decoder = ImageReader::with_format(bytes, format).into_decoder();
-        let decoder = decoder.map_err(undecodable)?;
+        let mut decoder = JpegDecoder::new(bytes).map_err(undecodable)?;
+        let beside = Beside::of_jpeg(&mut decoder, colors);
         let header = Header {
             size: decoder.dimensions().into(),
             depth: Depth::Eight,
             channels: decoder.color_type().channel_count().into(),
             indexed: false,
-            orientation,
+            orientation: Orientation::of_exif(beside.exif.as_deref()),
         };
         return Ok((header, beside, Source::Jpeg));
     }
+    let at_the_end = beside::exif_at_the_end(&mut bytes).map_err(|error| error.to_string())?;
     let mut decoder = png::Decoder::new(bytes);
-    // What is in them is not used, and a few bytes may become many.
+    // A few bytes of these may become many.
     decoder.set_ignore_text_chunk(true);
-    decoder.set_ignore_iccp_chunk(true);
+    decoder.set_ignore_iccp_chunk(!colors);
     decoder.set_transformations(png::Transformations::EXPAND);
     let decoder = decoder.read_info().map_err(undecodable)?;
     let (color, depth) = decoder.output_color_type();
+    let beside = Beside::of_png(decoder.info(), at_the_end);
     let header = Header {
         size: decoder.info().size().into(),
         depth: match depth {
@@ -263,7 +262,7 @@ fn open(mut bytes: Box<dyn Bytes>, colors: bool) -> Result<(Header, Beside, Sour
         },
         channels: color.samples(),
         indexed: decoder.info().color_type == png::ColorType::Indexed,
-        orientation,
+        orientation: Orientation::of_exif(beside.exif.as_deref()),
     };
     Ok((header, beside, Source::Png(Box::new(decoder))))
 }

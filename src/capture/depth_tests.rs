@@ -35,6 +35,7 @@ fn view(image_path: PathBuf) -> View {
         name: "photo".into(),
         photo: "photo".into(),
         undistortion: None,
+        stance: Default::default(),
         image_path,
         camera: Camera {
             width,

@@ -6,7 +6,7 @@ use super::decode::{self, Picture};
 use super::error::CaptureError;
 use super::names::{self, NamedFiles, composed, is_one_of, visit_files};
 use super::options::MaskSource;
-use super::orientation::{Stance, Way};
+use super::orientation::{Orientation, Stance};
 use super::photo::same_shape;
 use super::resample::downscale;
 use super::sample::{Depth, Header, Samples};
@@ -144,7 +144,7 @@ pub(super) fn read(
     size: [u32; 2],
     stance: Stance,
 ) -> Result<Vec<u8>, CaptureError> {
-    let mut way = Way::default();
+    let mut way = Orientation::default();
     let Picture {
         header, samples, ..
     } = decode::decode_beside(path, |mask| {

@@ -238,6 +238,42 @@ fn every_kind_of_mask_says_the_same() {
 }
 
 #[test]
+fn labels_of_several_things_are_no_mask() {
+    let of =
+        |values: [u8; 3]| GrayImage::from_fn(SIZE.0, SIZE.1, |x, _| Luma([values[x as usize % 3]]));
+    let colors = [[0, 0, 0, 255], [128, 0, 0, 255], [0, 128, 0, 255]];
+    let colors = RgbaImage::from_fn(SIZE.0, SIZE.1, |x, _| Rgba(colors[x as usize % 3]));
+    let cut = RgbaImage::from_fn(SIZE.0, SIZE.1, |x, _| {
+        Rgba([255, 255, 255, (x % 2 * 255) as u8])
+    });
+    let kinds: [(DynamicImage, &str); 6] = [
+        (of([0, 1, 2]).into(), "values 0, 1, 2,"),
+        (of([0, 1, 255]).into(), "values 0, 1, 255,"),
+        (of([1, 2, 2]).into(), "values 1, 2,"),
+        (of([0, 50, 100]).into(), "values 0, 50, 100,"),
+        (colors.into(), "2 colors"),
+        (cut.into(), "transparency alone"),
+    ];
+    for (mask, words) in kinds {
+        let (_dir, capture) = capture();
+        put(&capture, "a.png", mask);
+        assert_fails(&capture, MaskSource::Beside, &["masks/a.png", words]);
+    }
+    // One label, void, and gray edges.
+    for (values, expected) in [
+        ([0, 7, 0], [0, 255, 0]),
+        ([0, 255, 0], [0, 255, 0]),
+        ([0, 128, 255], [0, 128, 255]),
+        ([255, 2, 253], [255, 2, 253]),
+    ] {
+        let (_dir, capture) = capture();
+        put(&capture, "a.png", of(values));
+        let mask = load(&capture, &LoadOptions::default(), 0).mask.unwrap();
+        assert_eq!(mask[..3], expected);
+    }
+}
+
+#[test]
 fn masks_of_another_scale_are_resized() {
     let expected: Vec<u8> = half(SIZE.0, SIZE.1, 255).into_raw();
     for (width, height) in [(4, 3), (16, 12), (80, 60), (2, 2)] {

@@ -69,7 +69,6 @@ pub use mask::Masked;
 pub use names::Ambiguous;
 pub use options::{Channel, Chosen, Encoding, LoadOptions, MaskSource, MaskUse, Normalize};
 pub use order::view_at;
-pub(crate) use orientation::Way;
 pub use orientation::{Orientation, Stance};
 pub use original::Original;
 pub use photo::Photo;

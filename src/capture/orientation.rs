@@ -1,6 +1,6 @@
 //! How pictures stand: EXIF's orientation, and which of its sides COLMAP saw.
 
-use image::{DynamicImage, RgbImage, metadata::Orientation as Exif};
+use image::{DynamicImage, metadata::Orientation as Exif};
 
 /// How pixels are turned or mirrored to stand upright.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -14,8 +14,9 @@ impl Default for Orientation {
 
 impl Orientation {
     /// That of an EXIF block; what says nothing sensible leaves pixels as they are.
-    pub(super) fn of_exif(exif: &[u8]) -> Self {
-        Exif::from_exif_chunk(exif).map_or_else(Self::default, Self)
+    pub(super) fn of_exif(exif: Option<&[u8]>) -> Self {
+        let told = exif.and_then(Exif::from_exif_chunk);
+        told.map_or_else(Self::default, Self)
     }
 
     /// That of the value of EXIF's tag, 1 to 8.
@@ -94,10 +95,20 @@ impl Orientation {
     }
 
     /// An image turned.
-    pub fn image(self, image: RgbImage) -> RgbImage {
-        let mut image = DynamicImage::from(image);
+    pub fn image(self, mut image: DynamicImage) -> DynamicImage {
         image.apply_orientation(self.0);
-        image.into_rgb8()
+        image
+    }
+
+    /// This one, and another after it.
+    fn then(self, after: Self) -> Self {
+        let size = [2, 3];
+        let turned = |by: Self| (by.size(size), by.turned(vec![0, 1, 2, 3, 4, 5], 1, size));
+        let (between, picture) = turned(self);
+        let wanted = (after.size(between), after.turned(picture, 1, between));
+        let mut all = (1..=8).map(Self::of_tag);
+        // There are no others.
+        all.find(|&by| turned(by) == wanted).unwrap_or_default()
     }
 }
 
@@ -131,61 +142,17 @@ impl Stance {
 
     /// How another picture of the photo, such as its mask, may be turned to what COLMAP saw, the
     /// likeliest first: `own` is the orientation that its file tells.
-    pub(crate) fn ways(self, own: Orientation) -> impl Iterator<Item = Way> {
+    pub(crate) fn ways(self, own: Orientation) -> impl Iterator<Item = Orientation> {
         let from_upright = self.upright.inverse();
-        let lies_like_the_photo = Way {
-            first: Orientation::default(),
-            then: self.from_file,
-        };
-        let stands_by_its_tag = Way {
-            first: own,
-            then: from_upright,
-        };
-        let stands = Way {
-            first: Orientation::default(),
-            then: from_upright,
-        };
-        let tagged = (!own.is_none()).then_some(stands_by_its_tag);
-        tagged.into_iter().chain([lies_like_the_photo, stands])
-    }
-}
-
-/// One orientation after the other.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Way {
-    first: Orientation,
-    then: Orientation,
-}
-
-impl From<Orientation> for Way {
-    fn from(first: Orientation) -> Self {
-        let then = Orientation::default();
-        Self { first, then }
-    }
-}
-
-impl Way {
-    /// Width and height afterwards.
-    pub fn size(self, size: [u32; 2]) -> [u32; 2] {
-        self.then.size(self.first.size(size))
-    }
-
-    /// As [`Orientation::turned`].
-    pub fn turned<T: Copy>(self, picture: Vec<T>, channels: usize, size: [u32; 2]) -> Vec<T> {
-        let once = self.first.turned(picture, channels, size);
-        self.then.turned(once, channels, self.first.size(size))
-    }
-
-    /// An image turned.
-    pub fn image(self, mut image: DynamicImage) -> DynamicImage {
-        image.apply_orientation(self.first.0);
-        image.apply_orientation(self.then.0);
-        image
+        let by_its_tag = (!own.is_none()).then(|| own.then(from_upright));
+        by_its_tag.into_iter().chain([self.from_file, from_upright])
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use image::RgbImage;
+
     use super::*;
 
     #[test]
@@ -194,12 +161,13 @@ mod tests {
         let image = RgbImage::from_raw(3, 2, pixels.clone()).unwrap();
         for tag in 0..=9 {
             let ours = Orientation::of_tag(tag);
-            let turned = ours.image(image.clone());
+            let turned = ours.image(image.clone().into()).into_rgb8();
             let by_hand = ours.turned(pixels.clone(), 3, [3, 2]);
             assert_eq!(turned.as_raw(), &by_hand, "{tag}");
             assert_eq!(<[u32; 2]>::from(turned.dimensions()), ours.size([3, 2]));
-            let back = ours.inverse().image(turned);
-            assert_eq!(back, image, "{tag}");
+            let back = ours.inverse().image(turned.into());
+            assert_eq!(back, image.clone().into(), "{tag}");
+            assert!(ours.then(ours.inverse()).is_none());
             assert_eq!(ours.is_none(), !(2..=8).contains(&tag));
         }
     }

@@ -14,6 +14,7 @@ fn view(path: &Path, width: u32, height: u32) -> View {
         name: "photo".into(),
         photo: "photo".into(),
         undistortion: None,
+        stance: Default::default(),
         image_path: path.into(),
         camera: Camera {
             width,

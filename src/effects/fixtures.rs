@@ -42,6 +42,7 @@ pub fn capture(photos: &[(Photo, Camera)], points: impl IntoIterator<Item = DVec
         image_path: format!("{i}.png").into(),
         camera: camera.clone(),
         undistortion: None,
+        stance: Default::default(),
     });
     Capture {
         root: ".".into(),

@@ -36,7 +36,7 @@ impl Row {
     /// The same with its pictures turned.
     pub fn turned(self, orientation: Orientation) -> Self {
         let [width, height] = orientation.size([self.width, self.height]);
-        let turned = |picture| orientation.image(picture);
+        let turned = |picture: RgbImage| orientation.image(picture.into()).into_rgb8();
         let pictures = self.pictures.into_iter();
         Self {
             width,

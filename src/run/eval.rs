@@ -324,8 +324,8 @@ fn page_row(
     let mut figures = Vec::new();
     for shot in &scored.shots {
         let file = format!("view-{index:02}-{}.png", shot.file);
-        let image = upright.image(to_image(width, height, &shot.pixels));
-        files::write_png(&folder.join(&file), &image)?;
+        let image = to_image(width, height, &shot.pixels).into();
+        files::write_png(&folder.join(&file), &upright.image(image).into_rgb8())?;
         figures.push(Figure {
             caption: shot.caption.to_owned(),
             file,

@@ -94,7 +94,7 @@ fn photo(loader: &Loader, view: &View) -> Option<Vec<u8>> {
         None => photo.gray.iter().flat_map(|&gray| [gray; 3]).collect(),
     };
     let image = RgbImage::from_raw(photo.width, photo.height, bytes)?;
-    small(DynamicImage::ImageRgb8(stance.upright.image(image)))
+    small(stance.upright.image(image.into()))
 }
 
 /// A small JPEG.

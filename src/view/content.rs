@@ -193,7 +193,7 @@ impl Content for OfRun {
     fn teacher(&self, view: usize) -> Result<Option<RgbImage>, RunError> {
         let picture = self.look.teacher(view)?;
         let upright = upright(self.look.dataset.as_ref(), view);
-        Ok(picture.map(|picture| upright.image(picture)))
+        Ok(picture.map(|picture| upright.image(picture.into()).into_rgb8()))
     }
 }
 

@@ -53,6 +53,7 @@ mod teach_together;
 mod terminal;
 mod tradeoff;
 mod train;
+mod turned;
 mod variants;
 mod view;
 mod view_page;

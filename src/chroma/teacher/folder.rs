@@ -288,6 +288,36 @@ mod tests {
     }
 
     #[test]
+    fn images_that_are_gray_or_transparent_in_part_are_doubtful() {
+        let folder = tempfile::tempdir().unwrap();
+        let half = |x: u32, y: u32| {
+            if x < 4 {
+                [90; 3]
+            } else {
+                [90, 20 + y as u8, 30]
+            }
+        };
+        let image = RgbImage::from_fn(8, 8, |x, y| Rgb(half(x, y)));
+        image.save(folder.path().join("half.png")).unwrap();
+        let mut clear = DynamicImage::from(image).into_rgba8();
+        clear
+            .pixels_mut()
+            .take(16)
+            .for_each(|pixel| pixel.0 = [200, 9, 9, 0]);
+        clear.save(folder.path().join("clear.png")).unwrap();
+        save(&folder, "weak.png", 8, 8, [90, 91, 90]);
+        save(&folder, "white.png", 8, 8, [255; 3]);
+        let teacher = teacher_of(&folder);
+        for name in ["half.jpg", "clear.jpg", "weak.jpg", "white.jpg"] {
+            teacher.colorize(name, photo(8, 8)).unwrap();
+        }
+        let doubts = teacher.doubts();
+        assert!(doubts[0].contains("2 images") && doubts[0].contains("half.png 50 %"));
+        assert!(doubts[1].contains("(clear.png 25 %) are transparent in part"));
+        assert_eq!(doubts.len(), 2, "{doubts:?}");
+    }
+
+    #[test]
     fn another_aspect_is_refused() {
         let folder = tempfile::tempdir().unwrap();
         save(&folder, "wide.png", 103, 100, [10, 20, 30]);

@@ -310,6 +310,7 @@ mod tests {
                 image_path: path,
                 camera,
                 undistortion: None,
+                stance: Default::default(),
             }],
             points: Vec::new(),
             offset: glam::DVec3::ZERO,

@@ -4,7 +4,7 @@ use super::query::Original;
 use super::shown::stands;
 use super::{GrayImage, Query, TeacherError, file_name};
 use crate::capture::names::{NamedFiles, known, stem, visit_files};
-use crate::capture::{Capture, Way, decode_image};
+use crate::capture::{Capture, Orientation, decode_image};
 use crate::effects::listed;
 use crate::input;
 use image::{DynamicImage, ImageFormat};
@@ -154,12 +154,12 @@ impl NamedImages {
             ));
         }
         let size = [painting.image.width(), painting.image.height()];
-        let fits = |way: &Way| {
+        let fits = |way: &Orientation| {
             let [width, height] = way.size(size).map(f64::from);
             let aspect = width * f64::from(photo_size[1]) / (height * f64::from(photo_size[0]));
             (aspect - 1.0).abs() <= ASPECT_TOLERANCE
         };
-        let ways: Vec<Way> = query
+        let ways: Vec<Orientation> = query
             .stance
             .ways(painting.orientation)
             .filter(fits)

@@ -6,7 +6,7 @@ use image::DynamicImage;
 
 use super::images::{Filter, resample};
 use super::{GrayImage, TeacherError};
-use crate::capture::Way;
+use crate::capture::Orientation;
 use crate::color::gray_from_rgb;
 use crate::effects::{correlation, listed};
 
@@ -102,11 +102,11 @@ impl Shown {
 pub(super) fn stands(
     image: &DynamicImage,
     photo: GrayImage<'_>,
-    [lying, standing]: [Way; 2],
+    [lying, standing]: [Orientation; 2],
 ) -> bool {
     let (image, photo) = (thumbnail(image), small(photo));
     // Squares keep their sides.
-    let turned = |way: Way| likeness(&way.turned(image.clone(), 1, [SIDE; 2]), &photo);
+    let turned = |way: Orientation| likeness(&way.turned(image.clone(), 1, [SIDE; 2]), &photo);
     matches!((turned(lying), turned(standing)), (Some(lying), Some(standing)) if standing > lying)
 }
 
@@ -134,4 +134,71 @@ fn likeness(image: &[f32], photo: &[f32]) -> Option<f64> {
     let there: Vec<[f64; 2]> = pairs().map(|(&a, &b)| [a.into(), b.into()]).collect();
     let back: Vec<[f64; 2]> = pairs().map(|(&a, &b)| [b.into(), a.into()]).collect();
     correlation(&back).and_then(|_| correlation(&there))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::GrayImage;
+
+    /// Blobs and a slope, others for each photo.
+    fn photo(number: u32) -> GrayImage {
+        GrayImage::from_fn(90, 60, |x, y| {
+            let hash = (x / 15 + 7 * (y / 15) + 31 * number).wrapping_mul(2_654_435_761);
+            image::Luma([40 + (hash >> 25) as u8 + x as u8 / 3])
+        })
+    }
+
+    fn shown(images: &[GrayImage]) -> Shown {
+        let mut shown = Shown::default();
+        for (number, image) in (0..).zip(images) {
+            let photo = photo(number);
+            shown.look(&format!("{number}.jpg"), gray_image(&photo));
+            shown.look_at(&format!("{number}.png"), &image.clone().into());
+        }
+        shown
+    }
+
+    fn gray_image(photo: &GrayImage) -> super::super::GrayImage<'_> {
+        super::super::GrayImage {
+            width: photo.width(),
+            height: photo.height(),
+            pixels: photo.as_raw(),
+        }
+    }
+
+    #[test]
+    fn images_of_other_photos_are_refused_and_other_tones_are_not() {
+        let moved: Vec<_> = (0..6).map(|number| photo((number + 1) % 6)).collect();
+        let error = shown(&moved)
+            .check(Path::new("colored"))
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.contains("6 of 6") && error.contains("0.png shows 1.jpg"),
+            "{error}"
+        );
+        let alike = |tone: &dyn Fn(u32, f64) -> f64| {
+            let images = (0..6).map(|number| {
+                let mut image = photo(number);
+                for (i, pixel) in (0..).zip(image.pixels_mut()) {
+                    let value = tone(i, f64::from(pixel.0[0]));
+                    pixel.0[0] = value.clamp(0.0, 255.0) as u8;
+                }
+                image
+            });
+            let shown = shown(&images.collect::<Vec<_>>());
+            shown.check(Path::new("colored")).unwrap();
+            shown.doubt()
+        };
+        assert_eq!(alike(&|_, v| v), None);
+        assert_eq!(alike(&|_, v| v * v / 255.0), None);
+        assert_eq!(alike(&|_, v| 3.0 * (v - 80.0)), None);
+        let grain = |i: u32| f64::from(i.wrapping_mul(2_654_435_761) >> 24) - 128.0;
+        assert_eq!(alike(&|i, v| v + grain(i)), None);
+        // Without lightness nothing is known of them.
+        assert_eq!(alike(&|_, _| 90.0), None);
+        let doubt = alike(&|_, v| 255.0 - v).unwrap();
+        assert!(doubt.contains("6 of 6 images (0.png, 1.png"), "{doubt}");
+    }
 }

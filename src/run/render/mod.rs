@@ -89,7 +89,7 @@ pub fn render(options: &RenderOptions, observe: &mut Observer<'_>) -> Result<usi
             files::make_folder(folder)?;
         }
         let image = to_image(picture.width, picture.height, &picture.shown());
-        files::write_png(&path, &stance.upright.image(image))?;
+        files::write_png(&path, &stance.upright.image(image.into()).into_rgb8())?;
     }
     Ok(chosen.len())
 }
