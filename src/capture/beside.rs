@@ -106,13 +106,15 @@ fn without_prefix(exif: &[u8]) -> Vec<u8> {
 }
 
 /// The `eXIf` chunk behind a PNG file's pixels, where some programs write it: looked for from the
-/// end, since the pixels may be many chunks.
-fn exif_at_the_end(bytes: &mut dyn Bytes) -> io::Result<Option<Vec<u8>>> {
+/// end, since the pixels may be many chunks. Comes back to the file's beginning.
+pub(super) fn exif_at_the_end(bytes: &mut dyn Bytes) -> io::Result<Option<Vec<u8>>> {
     let length = bytes.seek(SeekFrom::End(0))?;
     bytes.seek(SeekFrom::Start(
         length.saturating_sub(2 * LARGEST_EXIF as u64),
     ))?;
-    let tail = taken(bytes, length)?;
+    let mut tail = Vec::new();
+    bytes.read_to_end(&mut tail)?;
+    bytes.rewind()?;
     let found = || {
         let at = tail.windows(4).rposition(|kind| kind == b"eXIf")?;
         let length = tail[..at].last_chunk().copied().map(u32::from_be_bytes)?;

@@ -9,6 +9,7 @@ fn halves(width: u32, height: u32, edge: u32) -> Canvas {
             .map(|i| if i % width < edge { 60 } else { 190 })
             .collect(),
         mask: None,
+        stance: Default::default(),
     }
 }
 
