@@ -14,7 +14,6 @@ const PLAIN: &[&str] = &[
     "lab_loss",
     "lbfgs",
     "project",
-    "relocation",
     "rgb_loss",
     "scan",
     "sort",

@@ -9,7 +9,7 @@ import package::common::constants::{INVISIBLE, PLANE_LOG_SCALE, PLANE_MEAN, PLAN
 import package::common::geometry::footprint;
 import package::common::numeric::linear_group;
 @if(step) import package::common::numeric::is_within;
-@if(step || mip) import package::common::numeric::sigmoid;
+@if(mip) import package::common::numeric::sigmoid;
 import package::common::partials::{PARTIAL_PULL, PARTIAL_STRIDE};
 import package::common::projected::Projected;
 import package::common::rotation::{quat_gradient, rotation_from_quat};
@@ -60,21 +60,6 @@ fn plane(index: u32, i: u32) -> f32 {
     geometry_gradient[index * view.splat_count + i] = value;
 }
 
-// What relocation adds to the gradients of opacity logit and log-scales: its loss
-// counts opacities and standard deviations (Kheradmand et al. 2024, equation 10).
-// Without weights not even a poisoned value may leave a gradient.
-@if(step) fn opacity_pull(logit: f32) -> f32 {
-    if parameters.opacity_weight == 0.0 { return 0.0; }
-    let opacity = sigmoid(logit);
-    return parameters.opacity_weight * opacity * (1.0 - opacity);
-}
-@if(step) fn scale_pull(scale: vec3f) -> vec3f {
-    if parameters.scale_weight == 0.0 { return vec3f(); }
-    return parameters.scale_weight * scale;
-}
-@if(!step) fn opacity_pull(logit: f32) -> f32 { return 0.0; }
-@if(!step) fn scale_pull(scale: vec3f) -> vec3f { return vec3f(); }
-
 fn log_scales(i: u32) -> vec3f {
     return vec3f(plane(PLANE_LOG_SCALE, i), plane(PLANE_LOG_SCALE + 1u, i), plane(PLANE_LOG_SCALE + 2u, i));
 }
@@ -91,17 +76,10 @@ fn project_backward(@builtin(workgroup_id) group: vec3u, @builtin(local_invocati
     let overflow = atomicLoad(&status[STATUS_OVERFLOW]) != 0u;
     @if(step) { if overflow { return; } }
     @if(lazy) { if ranks[i] == INVISIBLE { return; } }
-    let scale = exp(log_scales(i));
-    let pull_on_scale = scale_pull(scale);
-    let pull_on_opacity = opacity_pull(plane(PLANE_OPACITY, i));
     @if(!lazy) if ranks[i] == INVISIBLE {
-        for (var index = PLANE_MEAN; index < PLANE_LOG_SCALE; index++) {
+        for (var index = PLANE_MEAN; index <= PLANE_OPACITY; index++) {
             store(index, i, 0.0);
         }
-        for (var axis = 0u; axis < 3u; axis++) {
-            store(PLANE_LOG_SCALE + axis, i, pull_on_scale[axis]);
-        }
-        store(PLANE_OPACITY, i, pull_on_opacity);
         return;
     }
     let at = i * PARTIAL_STRIDE;
@@ -113,6 +91,7 @@ fn project_backward(@builtin(workgroup_id) group: vec3u, @builtin(local_invocati
     let quat = vec4f(plane(PLANE_QUAT, i), plane(PLANE_QUAT + 1u, i), plane(PLANE_QUAT + 2u, i), plane(PLANE_QUAT + 3u, i));
     let inverse_norm = inverseSqrt(dot(quat, quat));
     let unit = quat * inverse_norm;
+    let scale = exp(log_scales(i));
     let f = footprint(view, mean, unit, scale);
 
     // Conic Q = Σ⁻¹: dΣ = -Q dQ Q, with dQ symmetric.
@@ -168,14 +147,14 @@ fn project_backward(@builtin(workgroup_id) group: vec3u, @builtin(local_invocati
 
     for (var axis = 0u; axis < 3u; axis++) {
         store(PLANE_MEAN + axis, i, mean_gradient[axis * n + i] + v_mean[axis]);
-        store(PLANE_LOG_SCALE + axis, i, v_log_scale[axis] + pull_on_scale[axis]);
+        store(PLANE_LOG_SCALE + axis, i, v_log_scale[axis]);
     }
     for (var k = 0u; k < 4u; k++) {
         store(PLANE_QUAT + k, i, v_quat[k]);
     }
     @if(!mip) let stored_opacity = q.w;
     @if(mip) let stored_opacity = sigmoid(plane(PLANE_OPACITY, i));
-    store(PLANE_OPACITY, i, v_opacity * q.w * (1.0 - stored_opacity) + pull_on_opacity);
+    store(PLANE_OPACITY, i, v_opacity * q.w * (1.0 - stored_opacity));
 
     if overflow {
         return;

@@ -7,10 +7,6 @@ struct AdamParameters {
     // 1/(1 - β₁ᵗ) and 1/(1 - β₂ᵗ).
     correction1: f32,
     correction2: f32,
-    // Weights of each opacity and each standard deviation in the loss; only
-    // `project_backward` looks at them.
-    opacity_weight: f32,
-    scale_weight: f32,
     // Gaussians from this on stay as they are.
     trained: u32,
     // By plane, four to a vector.

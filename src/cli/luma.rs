@@ -6,23 +6,11 @@ use clap::Args;
 
 use super::{
     headings::{BUDGET, EXPERT, QUALITY},
-    values::{one_of, positive, share},
+    values::{positive, share},
 };
 use crate::input;
-use crate::luma::{Densification, FLAT, LumaSettings, Numerics};
+use crate::luma::{FLAT, LumaSettings, Numerics};
 use crate::run::{Overlay, RunError};
-
-/// Ways of densification.
-const DENSIFY: &[(Densification, &str)] = &[
-    (
-        Densification::Split,
-        "Splits Gaussians with large gradients, as 3D Gaussian Splatting",
-    ),
-    (
-        Densification::Relocate,
-        "Moves faint Gaussians to others and adds noise, as 3DGS-MCMC",
-    ),
-];
 
 /// What is asked for instead of the preset's settings.
 #[derive(Args)]
@@ -33,9 +21,6 @@ pub(super) struct LumaArguments {
     /// Maximum number of Gaussians [default: the preset's].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = QUALITY)]
     max_splats: Option<u32>,
-    /// Densification: split (by gradients, as 3DGS) or relocate (3DGS-MCMC) [default: split].
-    #[arg(long, value_parser = one_of(DENSIFY), help_heading = QUALITY, hide_short_help = true)]
-    densify: Option<Densification>,
     /// Fraction of training spent at half resolution, from the start [default: 0].
     #[arg(long, value_name = "0..1", value_parser = share::<f64>, help_heading = BUDGET, hide_short_help = true)]
     coarse: Option<f64>,
@@ -100,9 +85,6 @@ impl LumaArguments {
         }
         if let Some(max_splats) = self.max_splats {
             settings.max_splats = max_splats as usize;
-        }
-        if let Some(densify) = self.densify {
-            settings.densify_by(densify);
         }
         if let Some(coarse) = self.coarse {
             settings.coarse = coarse;
@@ -174,10 +156,10 @@ mod tests {
 
     #[test]
     fn every_option_has_its_place() {
-        let words = "--iterations 70 --max-splats 9 --densify relocate --coarse 0.5 \
+        let words = "--iterations 70 --max-splats 9 --coarse 0.5 \
             --memory-limit 3 --numerics storage=half --seed 4";
         let words: Vec<&str> = words.split_whitespace().collect();
-        let mut wanted = LumaSettings {
+        let wanted = LumaSettings {
             iterations: 70,
             max_splats: 9,
             coarse: 0.5,
@@ -186,7 +168,6 @@ mod tests {
             seed: 4,
             ..Preset::Draft.settings()
         };
-        wanted.densify_by(Densification::Relocate);
         assert_eq!(overlaid(Preset::Draft, &words), wanted);
     }
 }

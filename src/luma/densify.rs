@@ -66,19 +66,6 @@ pub struct Evidence<'a> {
     pub reserved: usize,
 }
 
-impl Evidence<'_> {
-    /// How many Gaussians that are trained there may be.
-    pub(super) fn room(&self, settings: &LumaSettings) -> usize {
-        (settings.max_splats).saturating_sub(self.held + self.reserved)
-    }
-
-    /// The held ones stay, behind all others.
-    pub(super) fn held_ones(&self) -> impl Iterator<Item = Descent> {
-        let n = self.geometry.len() / GEOMETRY_PLANES;
-        (n - self.held..n).map(survivor)
-    }
-}
-
 /// One that stays as it is.
 fn survivor(source: usize) -> Descent {
     Descent {
@@ -116,7 +103,8 @@ pub fn plan(settings: &LumaSettings, evidence: &Evidence<'_>) -> Vec<Descent> {
         .collect();
     candidates.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     // A split adds one.
-    let room = evidence.room(settings).saturating_sub(survivors.len());
+    let taken = evidence.held + evidence.reserved + survivors.len();
+    let room = settings.max_splats.saturating_sub(taken);
     let growth = (survivors.len() as f64 * settings.growth).ceil() as usize;
     candidates.truncate(room.min(growth));
     let mut splits: Vec<usize> = candidates.into_iter().map(|(_, i)| i).collect();
@@ -132,7 +120,7 @@ pub fn plan(settings: &LumaSettings, evidence: &Evidence<'_>) -> Vec<Descent> {
         halves(i as u32, log_scales, f64::from(at(PLANE_OPACITY, i)))
     }));
     if !plan.is_empty() {
-        plan.extend(evidence.held_ones());
+        plan.extend((n - evidence.held..n).map(survivor));
     }
     plan
 }

@@ -22,8 +22,6 @@ pub fn minimum_words(kernel: &str, load: &Load) -> Option<f64> {
         "densify_sh" => 2.0 * sh_planes * splats,
         // The average of those of geometry and harmonics.
         "densify_moments" => (GEOMETRY + sh_planes) * splats,
-        // All but the means is read; the means are read and written.
-        "relocation_noise" => (GEOMETRY + 3.0) * splats,
         _ => return None,
     })
 }

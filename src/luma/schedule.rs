@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Densification, LumaSettings, PAPER_ITERATIONS, settings::SHORT_RUN};
+use super::{LumaSettings, PAPER_ITERATIONS, settings::SHORT_RUN};
 
 /// When things happen in a training, in iterations.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -47,11 +47,11 @@ impl Schedule {
             },
             // A run needs time to settle after the last split.
             densify_until: share(12_000).min(PAPER_ITERATIONS),
-            densify_every: match settings.densify {
-                _ if iterations >= SHORT_RUN => 100,
-                // Some five looks at the pulls, each over enough iterations to be worth one.
-                Densification::Split => (iterations / 5).clamp(50, 200),
-                Densification::Relocate => (iterations / 20).clamp(25, 100),
+            // Some five looks at the pulls, each over enough iterations to be worth one.
+            densify_every: if iterations < SHORT_RUN {
+                (iterations / 5).clamp(50, 200)
+            } else {
+                100
             },
             raise_degree_every: share(1_000).clamp(1, RAISED_BY),
             settle_from: iterations * 7 / 10,
@@ -190,13 +190,9 @@ mod tests {
     }
 
     #[test]
-    fn short_runs_relocate_more_often() {
-        let every = |iterations| {
-            let mut settings = LumaSettings::new(iterations);
-            settings.densify_by(Densification::Relocate);
-            Schedule::of(&settings).densify_every
-        };
-        assert_eq!([700, SHORT_RUN].map(every), [35, 100]);
+    fn short_runs_look_five_times() {
+        let every = |iterations| of(iterations).densify_every;
+        assert_eq!([100, 700, 2_999, SHORT_RUN].map(every), [50, 140, 200, 100]);
     }
 
     #[test]

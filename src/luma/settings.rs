@@ -1,7 +1,7 @@
 //! The settings of stage 1. Rates are of the 3DGS paper (Kerbl et al. 2023) unless another
 //! reason is given.
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, de::IgnoredAny};
 
 use super::Numerics;
 use crate::{
@@ -78,21 +78,6 @@ impl LearningRates {
     }
 }
 
-/// How the set of Gaussians changes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[cfg_attr(test, derive(schemars::JsonSchema))]
-#[serde(rename_all = "lowercase")]
-pub enum Densification {
-    /// Those that the loss pulls at are split, faint ones removed (`luma::densify`).
-    #[default]
-    Split,
-    /// Faint ones are put where others are (`luma::relocation`).
-    Relocate,
-}
-
-/// Growth by splitting.
-const GROWTH: f64 = 0.3;
-
 /// Settings of one training: what presets produce, the command line overlays and the report
 /// holds. What happens when follows from them ([`Schedule`](super::Schedule)).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -114,8 +99,10 @@ pub struct LumaSettings {
     /// Of the [watched](super::LumaTrainer::watch) views: training goes back to its best, settles
     /// and ends. `None`: it does not.
     pub stop_when_flat: Option<f64>,
-    /// How the set of Gaussians changes.
-    pub densify: Densification,
+    /// A choice that earlier versions had, and their reports have.
+    #[serde(default, skip_serializing)]
+    #[cfg_attr(test, schemars(skip))]
+    pub densify: IgnoredAny,
     /// Share of Gaussians that a densification adds at most.
     pub growth: f64,
     /// Gradient of a center above which a Gaussian is split.
@@ -175,8 +162,8 @@ impl LumaSettings {
             seed: 0,
             coarse: 0.0,
             stop_when_flat: None,
-            densify: Densification::Split,
-            growth: GROWTH,
+            densify: IgnoredAny,
+            growth: 0.3,
             // gsplat's advice for absolute gradients.
             pull_threshold: 8e-4,
             prune_opacity: 0.005,
@@ -190,17 +177,6 @@ impl LumaSettings {
             stream_photos: false,
             numerics: Numerics::default(),
         }
-    }
-
-    /// Densifies so, with as much growth as goes with it: by relocation 5 % a time as in the
-    /// paper; 10 % in a short training, which also densifies more often.
-    pub fn densify_by(&mut self, densify: Densification) {
-        self.densify = densify;
-        self.growth = match densify {
-            Densification::Split => GROWTH,
-            Densification::Relocate if self.iterations < SHORT_RUN => 0.1,
-            Densification::Relocate => 0.05,
-        };
     }
 
     /// What it has room for, before effects are decided.
@@ -267,10 +243,14 @@ mod tests {
             memory_limit: Some(1 << 30),
             ..LumaSettings::new(700)
         };
-        settings.densify_by(Densification::Relocate);
         let text = serde_json::to_string(&settings).unwrap();
         assert_eq!(
             serde_json::from_str::<LumaSettings>(&text).unwrap(),
+            settings
+        );
+        let earlier = text.replacen('{', "{\"densify\":\"split\",", 1);
+        assert_eq!(
+            serde_json::from_str::<LumaSettings>(&earlier).unwrap(),
             settings
         );
         assert_eq!(settings.check(), Ok(()));

@@ -27,11 +27,10 @@ use std::{
 use watch::Watch;
 
 use super::{
-    Densification, Goal, Keeper, LumaError, LumaSettings, NoKeeper, Schedule,
+    Goal, Keeper, LumaError, LumaSettings, NoKeeper, Schedule,
     loss::{self, LossEffects, Targets},
     memory::{Demand, ENTRIES_PER_SPLAT, resident_photos},
     pace::Pace,
-    relocation::{self, RelocationParameters},
     settings::SYNC_EVERY,
     view::{TrainingViews, halved},
     workspace::{Kernels, Workspace},
@@ -164,7 +163,6 @@ impl LumaTrainer {
         let workspace = Workspace::new(
             &raster,
             &kernels,
-            &settings,
             &model,
             &targets,
             [max_pixels, max_tiles],
@@ -432,25 +430,11 @@ impl LumaTrainer {
             iteration,
         );
         let step = u32::try_from(iteration + 1).unwrap_or(u32::MAX);
-        let weights = match self.settings.densify {
-            Densification::Split => [0.0; 2],
-            Densification::Relocate => relocation::weights(self.model.len(), self.extent),
-        };
         let rates = self.geometry_rates(iteration);
         let (geometry, field) = (&workspace.geometry_step, &workspace.field_step);
-        geometry.set(&self.gpu, step, &rates, weights);
-        field.set(&self.gpu, step, &self.field_rates(iteration), [0.0; 2]);
+        geometry.set(&self.gpu, step, &rates);
+        field.set(&self.gpu, step, &self.field_rates(iteration));
         workspace.adjoint.record(&self.raster, &mut recorder);
-        if let Some(relocation) = &workspace.relocation {
-            let rate = self.schedule.settling(iteration) * self.means_rate(iteration);
-            let seed = self.settings.seed;
-            relocation.record(
-                &self.gpu,
-                &self.kernels.relocation,
-                &mut recorder,
-                &RelocationParameters::new(&self.model, seed, iteration, rate),
-            );
-        }
         recorder.submit();
         Ok(())
     }

@@ -2,11 +2,10 @@
 //! the room of the tile lists.
 
 use super::{
-    LumaSettings, SsimWindow,
+    SsimWindow,
     densify::DensifyKernels,
     loss::{Loss, LossEffects, LossKernels, Targets},
-    relocation::{Relocation, RelocationKernel},
-    settings::{Densification, SYNC_EVERY},
+    settings::SYNC_EVERY,
 };
 use crate::{
     gpu::{Buffer, Gpu, GpuError},
@@ -22,7 +21,6 @@ pub struct Kernels {
     pub sum_loss: SumLossKernel,
     pub loss: LossKernels,
     pub densify: DensifyKernels,
-    pub relocation: RelocationKernel,
 }
 
 impl Kernels {
@@ -32,7 +30,6 @@ impl Kernels {
             sum_loss: SumLossKernel::new(gpu),
             loss: LossKernels::new(gpu, effects, window),
             densify: DensifyKernels::new(gpu),
-            relocation: RelocationKernel::new(gpu),
         }
     }
 }
@@ -48,8 +45,6 @@ pub struct Workspace {
     pub field_step: AdamStep,
     pub log: LossLog,
     pub losses: Vec<Loss>,
-    /// When the set changes by relocation.
-    pub relocation: Option<Relocation>,
 }
 
 impl Workspace {
@@ -60,7 +55,6 @@ impl Workspace {
     pub fn new(
         raster: &Raster,
         kernels: &Kernels,
-        settings: &LumaSettings,
         model: &Model,
         targets: &Targets,
         [max_pixels, max_tiles]: [usize; 2],
@@ -80,12 +74,6 @@ impl Workspace {
         let adjoint = LumaAdjoint::new(raster, geometry, &lists, field, &layer, &outcome)?;
         let log = LossLog::new(gpu, &kernels.sum_loss, &lists.status, max_tiles, SYNC_EVERY)?;
         let losses = Loss::all(gpu, &kernels.loss, &lists, &layer, &adjoint, &log, targets);
-        let relocation = (settings.densify == Densification::Relocate)
-            .then(|| {
-                let kernels = &kernels.relocation;
-                Relocation::new(gpu, kernels, &lists.status, &geometry.planes)
-            })
-            .transpose()?;
         Ok(Self {
             lists,
             layer,
@@ -94,7 +82,6 @@ impl Workspace {
             field_step,
             log,
             losses,
-            relocation,
         })
     }
 

@@ -2,7 +2,7 @@
 //!
 //! One file a kernel, under the kernel's own name: [`project`], [`shade`],
 //! [`tiles`], [`blend`], [`luma_loss`], [`chroma_loss`], [`lab_loss`], [`lbfgs`],
-//! [`view_correction`], [`adam`], [`relocation`]. [`render`] chains the first four
+//! [`view_correction`], [`adam`]. [`render`] chains the first four
 //! without tiles; [`gradient`] differentiates the chain
 //! with dual numbers, so no derivative in here was worked out by hand.
 //!
@@ -26,7 +26,6 @@ pub mod project;
 #[cfg(test)]
 mod project_tests;
 pub mod random;
-pub mod relocation;
 pub mod render;
 pub mod rgb_loss;
 pub mod scene;

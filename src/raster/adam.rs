@@ -22,15 +22,11 @@ pub struct AdamParameters {
     pub correction1: f32,
     /// 1 / (1 - β₂ᵗ).
     pub correction2: f32,
-    /// Weight of each opacity in the loss.
-    pub opacity_weight: f32,
-    /// Weight of each standard deviation in the loss.
-    pub scale_weight: f32,
     /// Elements of a plane that are trained; those behind them stay. The adjoints that step at
     /// once look at it.
     pub trained: u32,
     /// Keeps the rates aligned.
-    pub padding: u32,
+    pub padding: [u32; 3],
     /// One rate a plane.
     pub learning_rates: [f32; MAX_PLANES],
 }
@@ -99,9 +95,8 @@ impl AdamStep {
     }
 
     /// Chooses a learning rate for each plane for what is submitted next; a plane without
-    /// one stays. `step` counts from 1 and sets the bias correction. `weights` are those of
-    /// each opacity and each standard deviation in the loss.
-    pub fn set(&self, gpu: &Gpu, step: u32, rates: &[f32], weights: [f32; 2]) {
+    /// one stays. `step` counts from 1 and sets the bias correction.
+    pub fn set(&self, gpu: &Gpu, step: u32, rates: &[f32]) {
         let mut learning_rates = [0.0; MAX_PLANES];
         for (to, &rate) in learning_rates.iter_mut().zip(rates).take(self.planes) {
             *to = rate;
@@ -114,10 +109,8 @@ impl AdamStep {
                 planes: self.planes as u32,
                 correction1: correction(BETA1),
                 correction2: correction(BETA2),
-                opacity_weight: weights[0],
-                scale_weight: weights[1],
                 trained: self.trained as u32,
-                padding: 0,
+                padding: [0; 3],
                 learning_rates,
             }],
         );
@@ -192,7 +185,7 @@ impl Adam {
         step: u32,
         rates: &[f32],
     ) {
-        self.step.set(gpu, step, rates, [0.0; 2]);
+        self.step.set(gpu, step, rates);
         let elements = self.step.count * self.step.planes;
         recorder.dispatch(&kernel.0, &self.bindings, groups_for(elements));
     }

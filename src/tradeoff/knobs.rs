@@ -7,10 +7,7 @@ use super::{
     report::{PointStage, Setting},
     space::Value,
 };
-use crate::{
-    luma::{Densification, LumaSettings},
-    run::Preset,
-};
+use crate::{luma::LumaSettings, run::Preset};
 
 /// An option of `fit` or `colorize` and its value.
 pub(super) type Given = (&'static str, Option<String>);
@@ -124,14 +121,6 @@ const KNOBS: &[Knob] = &[
         values: |_| owned(&["0.25", "0.5"]),
         turn: Turn::Luma(|settings, value| settings.coarse = number(value)),
         time: |_, value| 1.0 - 0.4 * number(value),
-        conflicts: &[],
-    },
-    Knob {
-        name: "densify",
-        stage: PointStage::Luma,
-        values: |_| owned(&["relocate"]),
-        turn: Turn::Luma(|settings, _| settings.densify_by(Densification::Relocate)),
-        time: |_, _| 1.0,
         conflicts: &[],
     },
     Knob {

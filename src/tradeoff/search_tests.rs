@@ -13,7 +13,7 @@ const LUMA: [Effect; 5] = [
     // Half the time for a tenth of the quality that half the iterations cost.
     ("max-splats", "500", 0.5, -0.1),
     // Worth more than the time it takes.
-    ("densify", "relocate", 1.1, 0.8),
+    ("ssim-window", "7", 1.1, 0.8),
     // Worth nothing.
     ("sh-degree", "3", 2.0, -0.5),
 ];
@@ -137,7 +137,7 @@ fn the_base_comes_first_and_single_knobs_cheapest_first() {
         "max-splats-500",
         "rounds-2",
         "scales-1",
-        "densify-relocate",
+        "ssim-window-7",
         "chroma-degree-1",
         "iterations-1400",
         "sh-degree-3",
@@ -152,11 +152,11 @@ fn what_proved_itself_is_combined_at_few_iterations_first() {
     let names = names(&points);
     // Two proved themselves: each alone and both, halved at each rung.
     for name in [
-        "max-splats-500+densify-relocate+iterations-175",
-        "densify-relocate+iterations-175",
-        "max-splats-500+densify-relocate+iterations-350",
-        "max-splats-500+densify-relocate",
-        "max-splats-500+densify-relocate+iterations-1400",
+        "max-splats-500+ssim-window-7+iterations-175",
+        "ssim-window-7+iterations-175",
+        "max-splats-500+ssim-window-7+iterations-350",
+        "max-splats-500+ssim-window-7",
+        "max-splats-500+ssim-window-7+iterations-1400",
     ] {
         assert!(names.contains(&name), "{name}: {names:?}");
     }
@@ -237,7 +237,7 @@ fn what_failed_is_not_asked_again_nor_combined() {
         if task
             .settings
             .iter()
-            .any(|setting| setting.knob == "densify")
+            .any(|setting| setting.knob == "ssim-window")
         {
             (point.outcome, point.failed) = (None, Some("no memory".to_owned()));
         }

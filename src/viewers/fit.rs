@@ -190,6 +190,6 @@ fn round_scales(gpu: &Gpu, model: &Model) -> Result<(), GpuError> {
 fn set(gpu: &Gpu, steps: &[AdamStep; 2], iteration: usize, rates: &[Vec<f32>; 2]) {
     let number = u32::try_from(iteration + 1).unwrap_or(u32::MAX);
     for (step, rates) in steps.iter().zip(rates) {
-        step.set(gpu, number, rates, [0.0; 2]);
+        step.set(gpu, number, rates);
     }
 }

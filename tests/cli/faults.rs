@@ -107,7 +107,7 @@ fn a_sweep_fails_well() {
     let place = place_with_run();
     let sweep = ["tradeoff", "scene", "-o", "out", "--preset", "draft"];
     let short = ["--iterations", "3", "--without", "background"];
-    let knobs = ["--knobs", "densify", "--budget", "0.2"];
+    let knobs = ["--knobs", "coarse", "--budget", "0.2"];
     let sweep = [&sweep[..], &short, &knobs].concat();
     let mut struck = 0;
     for step in [1, 2, 3, 5, 8, 12] {

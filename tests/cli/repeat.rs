@@ -43,37 +43,14 @@ fn same_seed_same_bytes_other_seed_other_bytes() {
 }
 
 #[test]
-fn densified_runs_repeat_too() {
+fn densified_and_coarse_runs_repeat_too() {
     let place = place_with_scene();
-    let fit = ["scene", "--iterations", "240"];
+    let fit = ["scene", "--iterations", "240", "--coarse", "0.25"];
     let first = fitted(&place, "first", &fit, "7");
     assert!(first == fitted(&place, "second", &fit, "7"));
     let report = place.report("first");
     let (points, splats) = (&report["capture"]["points"], &report["luma"]["splats"]);
     assert_ne!(points, splats, "the set of Gaussians changes");
-}
-
-/// Relocation draws lots and adds noise; the first sixty iterations are coarse.
-#[test]
-fn relocated_and_coarse_runs_repeat_too() {
-    let place = place_with_scene();
-    let fit = [
-        "scene",
-        "--iterations",
-        "240",
-        "--densify",
-        "relocate",
-        "--coarse",
-        "0.25",
-        "--max-splats",
-        "320",
-    ];
-    let first = fitted(&place, "first", &fit, "7");
-    assert!(first == fitted(&place, "second", &fit, "7"));
-    assert!(first != fitted(&place, "other", &fit, "8"));
-    let luma = &place.report("first")["luma"];
-    assert!(luma["splats"].as_u64() <= Some(320), "{luma}");
-    assert_ne!(luma["splats"], place.report("first")["capture"]["points"]);
 }
 
 #[test]

@@ -45,12 +45,12 @@ fn names(sweep: &Value) -> Vec<&str> {
 fn a_sweep_in_gray_and_color() {
     let place = place_with_scene();
     let teacher = onnx("ddcolor_tiny.onnx");
-    let knobs = ["--knobs", "densify,teacher-size,correct-views", "--json"];
+    let knobs = ["--knobs", "coarse,teacher-size,correct-views", "--json"];
     let sweep = place.json(&[&QUICK[..], &["--teacher", &teacher], &knobs].concat());
     assert_eq!(sweep, sweep_in(&place));
     let names = names(&sweep);
     assert_eq!(names[..2], ["base", "color"]);
-    for name in ["densify-relocate", "teacher-size-16", "teacher-size-48"] {
+    for name in ["coarse-0.5", "teacher-size-16", "teacher-size-48"] {
         assert!(names.contains(&name), "{names:?}");
     }
     assert_eq!(names.iter().collect::<BTreeSet<_>>().len(), names.len());

@@ -11,7 +11,6 @@ use gs_chroma::{
     luma::{
         LumaLossParameters,
         densify::{DensifyParameters, Descent},
-        relocation::RelocationParameters,
     },
     raster::{
         AdamParameters, Portion, Projected, SumLossParameters, TileListsMode, ViewUniform,
@@ -116,18 +115,8 @@ fn twins() -> Vec<Twin> {
                 planes,
                 correction1,
                 correction2,
-                opacity_weight,
-                scale_weight,
                 trained,
                 learning_rates
-            }
-        ),
-        twin!(
-            "RelocationParameters" = RelocationParameters {
-                splat_count,
-                seed,
-                noise,
-                trained
             }
         ),
         twin!(

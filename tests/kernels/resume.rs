@@ -8,10 +8,7 @@ use std::{
 };
 
 use gs_chroma::{
-    luma::{
-        Checkpoint, Densification, Keeper, LumaError, LumaProgress, LumaSettings, LumaTrainer,
-        Schedule,
-    },
+    luma::{Checkpoint, Keeper, LumaError, LumaProgress, LumaSettings, LumaTrainer, Schedule},
     splats::{ShField, Splats},
 };
 
@@ -140,40 +137,37 @@ fn with_surroundings() {
             .collect(),
         ..start.clone()
     };
-    for densify in [Densification::Split, Densification::Relocate] {
-        let of = |from: &Splats| {
-            let mut settings = LumaSettings {
-                iterations: 100,
-                max_splats: 2 * start.len() + 10,
-                ..settings(&start)
-            };
-            settings.densify_by(densify);
-            let schedule = Schedule {
-                densify_from: 20,
-                densify_every: 30,
-                densify_until: 95,
-                surround_at: 40,
-                ..Schedule::of(&settings)
-            };
-            let mut trainer = trainer_by(settings, schedule, 4.0, from, photos(&target));
-            trainer.surround(around.clone());
-            trainer
+    let of = |from: &Splats| {
+        let settings = LumaSettings {
+            iterations: 100,
+            max_splats: 2 * start.len() + 10,
+            ..settings(&start)
         };
-        let (kept, trainer) = keeps_and_resumes(&of, &start);
-        assert_eq!(kept, [25, 50, 75]);
-        let (trained, held) = (trainer.splats().unwrap(), trainer.surroundings());
-        assert_eq!(held, around.len());
-        assert!(trained.len() <= 2 * start.len() + 10);
-        let behind = trained.len() - held;
-        assert!(trained.means[behind..] == around.means[..]);
-        assert!(trained.opacity_logits[behind..] == around.opacity_logits[..]);
-        let stride = trained.sh.coefficients.len() / trained.len();
-        assert!(trained.sh.coefficients[behind * stride..] == around.sh.coefficients[..]);
-        assert!(trained.means[..start.len().min(behind)] != start.means[..]);
-    }
+        let schedule = Schedule {
+            densify_from: 20,
+            densify_every: 30,
+            densify_until: 95,
+            surround_at: 40,
+            ..Schedule::of(&settings)
+        };
+        let mut trainer = trainer_by(settings, schedule, 4.0, from, photos(&target));
+        trainer.surround(around.clone());
+        trainer
+    };
+    let (kept, trainer) = keeps_and_resumes(&of, &start);
+    assert_eq!(kept, [25, 50, 75]);
+    let (trained, held) = (trainer.splats().unwrap(), trainer.surroundings());
+    assert_eq!(held, around.len());
+    assert!(trained.len() <= 2 * start.len() + 10);
+    let behind = trained.len() - held;
+    assert!(trained.means[behind..] == around.means[..]);
+    assert!(trained.opacity_logits[behind..] == around.opacity_logits[..]);
+    let stride = trained.sh.coefficients.len() / trained.len();
+    assert!(trained.sh.coefficients[behind * stride..] == around.sh.coefficients[..]);
+    assert!(trained.means[..start.len().min(behind)] != start.means[..]);
 }
 
-/// Relocation, outliers, small photos at first, and views that are watched.
+/// Outliers, small photos at first, and views that are watched.
 #[test]
 fn with_every_effect() {
     let [start, target] = start_and_target();
@@ -183,7 +177,6 @@ fn with_every_effect() {
             robust: true,
             ..settings(&start)
         };
-        settings.densify_by(Densification::Relocate);
         settings.coarse = 0.3;
         let schedule = Schedule {
             densify_from: 20,

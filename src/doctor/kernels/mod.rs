@@ -11,7 +11,6 @@ mod lbfgs;
 mod losses;
 pub mod numerics;
 mod project;
-mod relocation;
 mod rgb_loss;
 mod scan;
 mod sort;
@@ -32,7 +31,7 @@ use crate::{gpu::GpuError, raster::Raster};
 type Measure = fn(&Arc<Raster>) -> Result<Vec<Row>, GpuError>;
 
 /// The topics in the order in which an iteration meets them.
-pub const TOPICS: [(&str, Measure); 20] = [
+pub const TOPICS: [(&str, Measure); 19] = [
     ("project", project::rows),
     ("scan", scan::rows),
     ("sort", sort::rows),
@@ -46,7 +45,6 @@ pub const TOPICS: [(&str, Measure); 20] = [
     ("step", step::rows),
     ("adam", adam::rows),
     ("densify", densify::rows),
-    ("relocation", relocation::rows),
     ("view correction", view_correction::rows),
     ("lbfgs", lbfgs::rows),
     ("lbfgs held", lbfgs::held_rows),

@@ -13,7 +13,6 @@ use crate::{
     oracle::{
         adam::{Moments, adam},
         random::{Random, random_scene_before, random_view},
-        relocation::relocation_pull,
         view::View,
     },
     raster::{
@@ -25,9 +24,6 @@ use crate::{
 
 /// The step, which the corrections of the moments depend on.
 const STEP: u32 = 3;
-
-/// Weights of opacity and standard deviation in the loss.
-const WEIGHTS: [f32; 2] = [0.25, 0.5];
 
 /// Rate of plane `plane`.
 fn rate(plane: usize) -> f32 {
@@ -54,7 +50,7 @@ fn stepped(
         let planes = first.len() / splats.len();
         let step = AdamStep::holding(gpu, planes, splats.len(), HELD)?;
         let rates: Vec<f32> = (0..planes).map(rate).collect();
-        step.set(gpu, STEP, &rates, WEIGHTS);
+        step.set(gpu, STEP, &rates);
         Ok::<_, GpuError>(step)
     };
     let geometry_step = step(&mut model.geometry_moments, &moments[0])?;
@@ -85,17 +81,6 @@ fn stepped(
         planes(&geometry.planes, &model.geometry_moments)?,
         planes(&field.planes, &model.field_moments)?,
     ])
-}
-
-/// What relocation adds to the gradient of element `at` of the geometry.
-fn pull(geometry: &[f32], at: usize, count: usize) -> f64 {
-    let (plane, value) = (at / count, f64::from(geometry[at]));
-    let weights = WEIGHTS.map(f64::from);
-    match plane {
-        PLANE_LOG_SCALE..PLANE_OPACITY => relocation_pull(0.0, [value; 3], weights).1[0],
-        PLANE_OPACITY => relocation_pull(value, [0.0; 3], weights).0,
-        _ => 0.0,
-    }
 }
 
 pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
@@ -189,10 +174,7 @@ fn measure(raster: &Arc<Raster>, kernels: [&'static str; 2]) -> Result<Vec<Row>,
                     first: f64::from(moments[which][0][at]),
                     second: f64::from(moments[which][1][at]),
                 };
-                let mut slope = f64::from(gradients[which][at]);
-                if which == 0 {
-                    slope += pull(&starts[0], at, splats.len());
-                }
+                let slope = f64::from(gradients[which][at]);
                 let rate = f64::from(rate(at / splats.len()));
                 if !still[at % splats.len()] {
                     adam(&mut value, &mut moment, slope, rate, STEP as i32);

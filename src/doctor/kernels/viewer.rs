@@ -81,7 +81,7 @@ fn gradient_of(
         AdamStep::new(gpu, planes[1], splats.len())?,
     ];
     for step in &steps {
-        step.set(gpu, 1, &[], [0.0; 2]);
+        step.set(gpu, 1, &[]);
     }
     let kernels = RgbAdjointKernels::new(&raster);
     let stepping = [

@@ -6,10 +6,10 @@ use super::LumaTrainer;
 use crate::{
     gpu::{Buffer, GpuError},
     luma::{
-        Densification, LumaError,
+        LumaError,
         densify::{self, Evidence},
         memory::ENTRIES_PER_SPLAT,
-        outliers, relocation,
+        outliers,
     },
     raster::constants::{GEOMETRY_PLANES, PLANE_MEAN, STAT_PULL},
     splats::Splats,
@@ -30,7 +30,7 @@ fn calm(geometry: &[f32], statistics: &mut [f32], grows: &Grows) {
 }
 
 impl LumaTrainer {
-    /// Splits, moves and removes Gaussians.
+    /// Splits and removes Gaussians.
     pub(super) fn densify(&mut self, iteration: usize) -> Result<(), GpuError> {
         let geometry = self.model.geometry.planes.read(&self.gpu)?;
         let mut statistics = self.workspace()?.statistics().read(&self.gpu)?;
@@ -46,10 +46,7 @@ impl LumaTrainer {
                 false => self.surroundings.as_ref().map_or(0, Splats::len),
             },
         };
-        let plan = match self.settings.densify {
-            Densification::Split => densify::plan(&self.settings, &evidence),
-            Densification::Relocate => relocation::plan(&self.settings, &evidence, iteration),
-        };
+        let plan = densify::plan(&self.settings, &evidence);
         if plan.is_empty() {
             // Nothing would be left: keep what there is and go on.
             return Ok(());

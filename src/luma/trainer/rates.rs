@@ -5,7 +5,7 @@ use crate::{raster::constants::*, splats::sh};
 
 impl LumaTrainer {
     /// Learning rate of the means at `iteration`, in world units.
-    pub(super) fn means_rate(&self, iteration: usize) -> f64 {
+    fn means_rate(&self, iteration: usize) -> f64 {
         let rates = &self.settings.rates;
         rates.means_at(self.schedule.share_over(iteration), self.extent)
     }

@@ -38,7 +38,6 @@ impl LumaTrainer {
         let workspace = Workspace::new(
             &self.raster,
             &self.kernels,
-            &self.settings,
             &self.model,
             &self.targets,
             [self.max_pixels, self.max_tiles],

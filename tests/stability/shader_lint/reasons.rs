@@ -308,22 +308,6 @@ pub const REASONS: &[(&str, &str, &str)] = &[
         "(splat.mean - splat.extent) / side",
         "a constant divisor",
     ),
-    ("normal3", "log", "of a number above 0"),
-    (
-        "normal3",
-        "sqrt",
-        "the logarithm of at most 1 is not positive",
-    ),
-    (
-        "relocation_noise",
-        "inverseSqrt",
-        "of at least QUAT_NORM_MIN_SQ",
-    ),
-    (
-        "uniform_above_zero",
-        "(f32(bits >> 8u) + 1.0) / 16777216.0",
-        "a constant divisor",
-    ),
     (
         "gathered",
         "vec2f(sums[1024], sums[1280]) / sum",
