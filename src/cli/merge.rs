@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{CliError, next, print, progress::Progress, seams::in_words, values::folder};
-use crate::run::{MergeOptions, merge};
+use super::{CliError, next, print, progress::Progress, values::folder};
+use crate::run::{MergeOptions, SeamViews, ViewMean, merge};
 
 /// Put the trained blocks of a job together, and measure the whole.
 #[derive(Args)]
@@ -41,4 +41,17 @@ impl Merge {
         let wrote = wrote.each_ref().map(PathBuf::as_path);
         progress.close_with(folder.path(), &wrote, &next::colorize(folder.path(), None))
     }
+}
+
+/// Views that show a border, and others.
+fn in_words(views: &SeamViews) -> String {
+    let of = |mean: &ViewMean| {
+        let psnr = mean.psnr.map(|psnr| format!(", {psnr:.2} dB"));
+        format!("{}{}", mean.views, psnr.unwrap_or_default())
+    };
+    format!(
+        "held-out views across borders: {}; inside one block: {}",
+        of(&views.across),
+        of(&views.inside)
+    )
 }

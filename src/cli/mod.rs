@@ -29,7 +29,6 @@ mod printable;
 mod progress;
 mod remedy;
 mod render;
-mod seams;
 mod shell;
 mod teacher;
 mod tradeoff;
@@ -74,7 +73,6 @@ enum Command {
     Partition(partition::Partition),
     Fit(fit::Fit),
     Merge(merge::Merge),
-    Seams(seams::SeamsCommand),
     #[command(aliases = ["colorise", "colourize", "colourise"])]
     Colorize(colorize::Colorize),
     Teacher(teacher::TeacherCommand),
@@ -110,7 +108,6 @@ impl Cli {
             Command::Partition(command) => command.run(),
             Command::Fit(command) => command.run(),
             Command::Merge(command) => command.run(),
-            Command::Seams(command) => command.run(),
             Command::Colorize(command) => command.run(),
             Command::Teacher(command) => command.run(),
             Command::View(command) => command.run(),

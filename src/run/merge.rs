@@ -19,7 +19,7 @@ use super::{
 };
 use crate::{
     blocks::{Block, BlockFile, COARSE, Job, Region},
-    capture::{Capture, Dataset, LoadOptions},
+    capture::{Dataset, LoadOptions},
     eval::{Progress, exposures, gray_rows, mean_quality, measure_luma},
     input,
     luma::{LumaSettings, start::started},
@@ -93,7 +93,7 @@ pub fn merge(
     let mut tell = |progress: Progress<'_>| observe(progress.into());
     let views = measure_luma(&raster, &dataset, &splats, &mut tell)?;
     let rows = gray_rows(&raster, &dataset, &splats, &shown)?;
-    let seams = seam_views(&dataset.capture, &job, &views, None);
+    let seams = seam_views(&dataset.capture, &job, &views);
 
     let mut report = Report {
         capture: CaptureReport {
@@ -289,9 +289,4 @@ fn log_of(blocks: &[Trained]) -> String {
         .filter_map(|log| Some(log.lines().next()?.to_owned()))
         .next();
     header.unwrap_or_default() + "\n"
-}
-
-/// The capture of a job's photos alone, for who measures nothing on photos.
-pub(super) fn capture_of(job: &Job, load: &LoadOptions) -> Result<Capture, RunError> {
-    Ok(Capture::load_with(&job.capture, &load.capture())?)
 }

@@ -65,7 +65,7 @@ pub(crate) use picture_names::picture_names;
 pub use plan::{PlanOptions, Planned, plan};
 pub use preset::Work;
 pub use render::{PathOptions, RenderOptions, Rendered, Views, Way, render, render_path};
-pub use seams::{PairMean, SeamColors, SeamViews, Seams, SeamsOptions, ViewMean, seams};
+pub use seams::{SeamViews, ViewMean};
 pub use sound::Soundness;
 pub use teach::{TeachOptions, teacher_or_photos};
 

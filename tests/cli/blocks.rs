@@ -1,4 +1,4 @@
-//! `partition`, `fit` of blocks, `merge` and `seams`: a scene in parts.
+//! `partition`, `fit` of blocks and `merge`: a scene in parts.
 
 use std::{collections::BTreeSet, fs};
 
@@ -184,26 +184,6 @@ fn blocks_are_trained_and_put_together() {
     // It is a run like any other.
     let photos = format!("{SCENE}/images");
     place.succeed(&["colorize", "city", "--teacher", &photos, "--rounds", "3"]);
-    place.succeed(&[
-        "fit",
-        SCENE,
-        "-o",
-        "whole",
-        "--max-side",
-        "64",
-        "--iterations",
-        "40",
-        "--preset",
-        "draft",
-    ]);
-    let seams = place.json(&["seams", "job", "city", "--against", "whole", "--json"]);
-    let counts = ["across", "inside"].map(|kind| seams["views"][kind]["views"].as_u64().unwrap());
-    assert_eq!(counts.iter().sum::<u64>(), 2);
-    let across = &seams["colors"]["across"];
-    assert!(
-        across["pairs"].as_u64() > Some(0) && across["hue"].as_f64() < Some(30.0),
-        "{seams}"
-    );
 
     // A block goes on among its neighbors, for a sixth of its iterations.
     let around = ["--around", "city", "--json"];
@@ -231,13 +211,17 @@ fn blocks_are_trained_and_put_together() {
         let [block, city] = [&second, &report].map(|report| shown(report, name));
         assert!(block > city - 0.5, "{name}: {block} {city}");
     }
-    place.succeed(&["merge", "job", "-o", "agreed"]);
+    let printed = place.succeed(&["merge", "job", "-o", "agreed"]);
+    assert!(
+        printed.contains("held-out views across borders: "),
+        "{printed}"
+    );
     let alone = place.json(&["fit", "job/block-2", "--iterations", "1", "--json"]);
     let warnings = alone["warnings"].to_string();
     assert!(warnings.contains("go on with --around"), "{warnings}");
     for (command, code) in [
         (&["fit", "job/block-2", "--around", "nowhere"][..], 1),
-        (&["fit", "whole", "--around", "city"], 1),
+        (&["fit", "agreed", "--around", "city"], 1),
         (&["fit", SCENE, "-o", "new", "--around", "city"], 2),
     ] {
         let done = place.run(command);
@@ -303,7 +287,6 @@ fn what_is_wrong_with_a_job_is_told() {
         &["merge", "nowhere"],
         &["nowhere", "is no job", "partition"],
     );
-    fails(&["seams", "job", "nowhere"], &["nowhere", "fit"]);
     fails(
         &["partition", SCENE, "-o", "other", "--memory-limit", "1"],
         &["1 MiB", "smallest"],

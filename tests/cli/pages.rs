@@ -10,14 +10,13 @@ use std::{
 use super::program::Place;
 
 /// All commands.
-pub const COMMANDS: [&str; 19] = [
+pub const COMMANDS: [&str; 18] = [
     "auto",
     "prepare",
     "plan",
     "partition",
     "fit",
     "merge",
-    "seams",
     "colorize",
     "teacher",
     "view",

@@ -121,7 +121,6 @@ def merge(work: Work, tell: Tell) -> None:
     if work.teacher:
         options = ["--teacher", work.teacher, *work.options.get("colorize", [])]
         start(work, job, MERGED, ["colorize", str(run), *options], tell)
-        start(work, job, MERGED, ["seams", str(job.local), str(run)], tell)
     job.put_folder(MERGED)
 
 
