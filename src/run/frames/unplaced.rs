@@ -129,7 +129,7 @@ pub(super) fn carry(
             taught.push((unknown.index, little));
             known.push((unknown, seen, answer));
         }
-        let painter = &*painter;
+        let (loader, range) = (painter.dataset.loader(), painter.range);
         in_order(
             &known,
             |(unknown, seen, answer)| {
@@ -142,7 +142,7 @@ pub(super) fn carry(
                 match &unknown.original {
                     Some(original) => Ok(finish(original, canvas, ab)),
                     None => {
-                        let original = painter.original(unknown.shot)?;
+                        let original = loader.unplaced(&unknown.shot.path, range)?;
                         Ok(finish(&original, canvas, ab))
                     }
                 }
