@@ -17,7 +17,7 @@ use crate::{
     },
     raster::{
         AdamMoments, AdamStep, AdamSteps, Field, Geometry, Layer, Lists, LumaAdjoint, Model,
-        Outcome, Raster, RasterNumerics, RasterOptions, constants::*,
+        Outcome, Raster, RasterNumerics, RasterOptions,
     },
     splats::Splats,
 };
