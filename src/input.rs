@@ -1,6 +1,7 @@
 //! Files that are read. They are regular ones: a pipe may never end, and a device never does.
 
 use std::{
+    borrow::Cow,
     fs::{self, File},
     io::{self, Read},
     path::Path,
@@ -53,9 +54,27 @@ pub(crate) fn kib(path: &Path, key: &str) -> Option<u64> {
     line.split_whitespace().next()?.parse().ok()
 }
 
+/// Text of a file as a message quotes it: its beginning where it is long.
+pub(crate) fn excerpt(text: &str) -> Cow<'_, str> {
+    /// Characters.
+    const LONGEST: usize = 120;
+    match text.char_indices().nth(LONGEST) {
+        Some((end, _)) => format!("{}…", &text[..end]).into(),
+        None => text.into(),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn long_text_is_cut_between_characters() {
+        assert_eq!(excerpt("short"), "short");
+        let cut = excerpt(&"ü".repeat(75_000)).into_owned();
+        assert_eq!(cut.chars().count(), 121);
+        assert!(cut.ends_with("ü…"));
+    }
 
     #[test]
     fn files_are_read_and_nothing_else() {

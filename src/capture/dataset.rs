@@ -17,6 +17,8 @@ use super::{
 /// What is worth telling while a dataset is opened.
 #[derive(Clone, Copy, Debug)]
 pub enum Notice<'a> {
+    /// What is doubtful about the model's files.
+    Doubt(&'a str),
     /// A view or points that are not used.
     LeftOut(&'a Rejected),
     /// Another photo has been looked at for the range of all.
@@ -70,6 +72,9 @@ impl Dataset {
         tell: &mut dyn FnMut(Notice<'_>),
     ) -> Result<Self, CaptureError> {
         let mut capture = Capture::load_with(dir, &options.capture())?;
+        for doubt in &capture.doubts {
+            tell(Notice::Doubt(doubt));
+        }
         for rejected in &capture.rejected {
             tell(Notice::LeftOut(rejected));
         }

@@ -61,6 +61,16 @@ pub enum CaptureError {
         /// A file that is not.
         missing: String,
     },
+    /// Of the files of rigs and frames one is there.
+    #[error(
+        "{path}: there is no {missing} beside it; COLMAP writes both: export the model again, or remove this file if the poses of images are right"
+    )]
+    IncompleteRigs {
+        /// The file that is there.
+        path: PathBuf,
+        /// The one that is not.
+        missing: String,
+    },
     /// The operating system could not write what photos are to be without.
     #[error("{path}: cannot be written to: {source}")]
     Write {

@@ -41,6 +41,8 @@ mod left_out_tests;
 #[cfg(test)]
 mod name_tests;
 #[cfg(test)]
+mod rig_tests;
+#[cfg(test)]
 mod tests;
 #[cfg(test)]
 mod thumbnail_tests;
@@ -208,6 +210,8 @@ pub struct Capture {
     /// Photos without a usable pose or camera and those that were not to be used, sorted by
     /// name, and one entry for all points without a usable position.
     pub rejected: Vec<Rejected>,
+    /// What is doubtful about the model's files, in words.
+    pub doubts: Vec<String>,
     /// The farthest that a camera's lens displaces a pixel from where its pinhole
     /// would show it, over all cameras that a photo has, in pixels at working size; whether that is
     /// taken out or not.
@@ -274,6 +278,7 @@ impl Capture {
         let mut view_at = vec![None; images.len()];
         for (place, image) in images {
             let colmap::Image {
+                id: _,
                 name,
                 quaternion,
                 translation,
@@ -355,6 +360,7 @@ impl Capture {
             points,
             offset: DVec3::ZERO,
             rejected,
+            doubts: model.doubts,
             distortion,
         };
         capture.recenter();

@@ -69,8 +69,8 @@ fn models_are_found_in_all_three_places_and_binary_is_preferred() {
             [b"x".to_vec(), b"x".to_vec(), b"x".to_vec()],
             "txt",
         );
-        fs::write(dir.path().join(below).join("rigs.bin"), b"x").unwrap();
-        fs::write(dir.path().join(below).join("frames.bin"), b"x").unwrap();
+        fs::write(dir.path().join(below).join("rigs.txt"), b"x").unwrap();
+        fs::write(dir.path().join(below).join("frames.txt"), b"x").unwrap();
         assert_eq!(Capture::load(dir.path()).unwrap().views.len(), 3, "{below}");
     }
 }

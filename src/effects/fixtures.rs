@@ -56,6 +56,7 @@ pub fn capture(photos: &[(Photo, Camera)], points: impl IntoIterator<Item = DVec
             .collect(),
         offset: DVec3::ZERO,
         rejected: Vec::new(),
+        doubts: Vec::new(),
         distortion: 0.0,
     }
 }

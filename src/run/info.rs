@@ -39,6 +39,9 @@ fn colmap_info(path: &Path, observe: &mut Observer<'_>) -> Result<Value, RunErro
     let warnings = RefCell::default();
     let mut observe = keeping(&warnings, observe);
     let capture = Capture::load(path)?;
+    for doubt in &capture.doubts {
+        observe(Event::Warning(doubt.clone()));
+    }
     for Rejected { name, reason } in &capture.rejected {
         observe(Event::Warning(format!("left out {name}: {reason}")));
     }

@@ -49,6 +49,9 @@ pub fn partition(options: &PartitionOptions, observe: &mut Observer<'_>) -> Resu
             ..CaptureOptions::default()
         },
     )?;
+    for doubt in &capture.doubts {
+        observe(Event::Warning(doubt.clone()));
+    }
     for Rejected { name, reason } in &capture.rejected {
         observe(Event::Warning(format!("left out {name}: {reason}")));
     }

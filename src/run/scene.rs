@@ -20,6 +20,7 @@ pub(super) fn open(
 ) -> Result<Dataset, RunError> {
     Ok(Dataset::open(colmap_dir, options, &mut |notice| {
         observe(match notice {
+            Notice::Doubt(doubt) => Event::Warning(doubt.to_owned()),
             Notice::LeftOut(Rejected { name, reason }) => {
                 Event::Warning(format!("left out {name}: {reason}"))
             }

@@ -6,11 +6,12 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
+use super::rigs::{self, Poses, Source};
 use super::tracks::{Sighting, Sightings};
-use super::{Cameras, Chosen, Image, Point, lens, relative_name};
+use super::{Cameras, Chosen, Image, LONGEST_NAME, Point, lens, relative_name};
 use crate::capture::error::{CaptureError, Position};
 use crate::capture::lens::{MOST_PARAMETERS, ModelName};
-use crate::input;
+use crate::input::{self, excerpt};
 
 /// Id, model, width, height and the 2 parameters of EQUIRECTANGULAR.
 const SMALLEST_CAMERA: u64 = 4 + 4 + 8 + 8 + 2 * 8;
@@ -24,8 +25,10 @@ const OBSERVATION: u64 = 8 + 8 + 8;
 const TRACK_ELEMENT: u64 = 4 + 4;
 /// The point's id of a 2D point that belongs to none.
 const NO_POINT: u64 = u64::MAX;
-/// Linux's longest path; a name that goes on beyond it never ends.
-const LONGEST_NAME: u64 = 4096;
+/// Id and number of sensors.
+const SMALLEST_RIG: u64 = 4 + 4;
+/// Id, rig, quaternion, translation, number of data.
+const SMALLEST_FRAME: u64 = 4 + 4 + 4 * 8 + 3 * 8 + 4;
 
 /// How many images a file announces, if it is long enough for them.
 pub(super) fn count_images(path: &Path) -> Option<u64> {
@@ -61,7 +64,7 @@ pub(super) fn cameras(path: &Path) -> Result<Cameras, CaptureError> {
         let lens = lens.map_err(|reason| records.malformed(reason));
         (cameras.insert(id, lens)).map_err(|reason| records.malformed(reason))?;
     }
-    records.finish()?;
+    records.check_end()?;
     Ok(cameras)
 }
 
@@ -103,13 +106,14 @@ pub(super) fn images(
         seen.shrink_to_fit();
         sightings.insert(id, images.len(), seen);
         images.push(Image {
+            id,
             name,
             quaternion,
             translation,
             camera,
         });
     }
-    records.finish()?;
+    records.check_end()?;
     Ok((images, sightings))
 }
 
@@ -139,8 +143,45 @@ pub(super) fn points(path: &Path, sightings: &Sightings) -> Result<Vec<Point>, C
             track,
         });
     }
-    records.finish()?;
+    records.check_end()?;
     Ok(points)
+}
+
+/// The poses of images, from the files of rigs and frames.
+pub(super) fn poses([of_rigs, of_frames]: [PathBuf; 2]) -> Result<Poses, CaptureError> {
+    rigs::read(
+        Records::open(&of_rigs, "rig", SMALLEST_RIG)?,
+        Records::open(&of_frames, "frame", SMALLEST_FRAME)?,
+    )
+}
+
+impl Source for Records {
+    fn next(&mut self) -> Result<bool, CaptureError> {
+        match self.next_record() {
+            true => Ok(true),
+            false => self.check_end().map(|()| false),
+        }
+    }
+
+    fn integer(&mut self, bytes: usize, field: &str) -> Result<u64, CaptureError> {
+        match bytes {
+            1 => self.bytes(field).map(|[byte]| byte.into()),
+            4 => self.u32(field).map(u64::from),
+            _ => self.u64(field),
+        }
+    }
+
+    fn is_camera(&mut self) -> Result<bool, CaptureError> {
+        Ok(self.i32("the sensor's kind")? == 0)
+    }
+
+    fn float(&mut self, field: &str) -> Result<f64, CaptureError> {
+        self.f64(field)
+    }
+
+    fn wrong(&self, reason: String) -> CaptureError {
+        self.malformed(reason)
+    }
 }
 
 /// A binary file as a sequence of records. Every read is checked against what
@@ -205,7 +246,7 @@ impl Records {
     }
 
     /// Checks that nothing follows the last record.
-    fn finish(mut self) -> Result<(), CaptureError> {
+    fn check_end(&mut self) -> Result<(), CaptureError> {
         self.field = self.offset;
         match self.remaining() {
             0 => Ok(()),
@@ -262,7 +303,11 @@ impl Records {
         self.field = self.offset;
         let mut name = Vec::new();
         (&mut self.reader)
-            .take(self.length.saturating_sub(self.offset).min(LONGEST_NAME))
+            .take(
+                self.length
+                    .saturating_sub(self.offset)
+                    .min(LONGEST_NAME as u64),
+            )
             .read_until(0, &mut name)
             .map_err(|source| CaptureError::Read {
                 path: self.path.clone(),
@@ -274,7 +319,7 @@ impl Records {
         }
         let name = String::from_utf8(name).map_err(|error| {
             let name = String::from_utf8_lossy(error.as_bytes());
-            self.bad_name(format!("the name {name:?} is not UTF-8 text"))
+            self.bad_name(format!("the name {:?} is not UTF-8 text", excerpt(&name)))
         })?;
         self.offset += length;
         Ok(name)

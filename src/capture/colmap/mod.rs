@@ -1,9 +1,10 @@
 //! COLMAP's sparse models, as binary files and as text.
 //!
-//! Format: <https://colmap.github.io/format.html>. Only cameras, images and
-//! points3D are read; rigs and frames are of no use here.
+//! Format: <https://colmap.github.io/format.html>. Where there are rigs and frames, poses are
+//! composed of them.
 
 mod binary;
+mod rigs;
 mod text;
 mod tracks;
 
@@ -15,6 +16,7 @@ use glam::DVec3;
 use super::error::CaptureError;
 use super::lens::{Lens, ModelName};
 use super::{Chosen, Point};
+use crate::input::excerpt;
 
 /// What the three files of a model say.
 pub(super) struct Model {
@@ -25,6 +27,8 @@ pub(super) struct Model {
     /// Points in the order of the file; their positions may be anything. The views
     /// of their tracks are indices into `images`.
     pub points: Vec<Point>,
+    /// What is doubtful about it, in words.
+    pub doubts: Vec<String>,
     /// The cameras file, for errors.
     pub cameras_path: PathBuf,
     /// The images file, for errors.
@@ -35,6 +39,8 @@ pub(super) struct Model {
 
 /// A registered image; its pose may be anything.
 pub(super) struct Image {
+    /// COLMAP's id.
+    pub id: u32,
     /// Path below `images/`, `/` between folders, never leaving it.
     pub name: String,
     /// World-to-camera rotation, w x y z.
@@ -62,6 +68,9 @@ struct Cameras {
 
 /// Images no camera makes; beyond this a size is taken for a damaged field.
 const MAX_SIDE: u64 = 1 << 20;
+
+/// Linux's longest path, in bytes.
+const LONGEST_NAME: usize = 4096;
 
 /// Finds the model of a COLMAP folder and reads it: `sparse/0`, then `sparse`,
 /// then the folder itself; `.bin` before `.txt`. Of images that were not chosen nothing is
@@ -137,23 +146,55 @@ fn read_files(
     extension: &str,
     chosen: Option<&Chosen>,
 ) -> Result<Model, CaptureError> {
-    let (cameras, images, points) = if extension == "bin" {
+    let rigs = rigs_beside(&images_path)?;
+    let (cameras, mut images, points, poses) = if extension == "bin" {
         let cameras = binary::cameras(&cameras_path)?;
         let (images, sightings) = binary::images(&images_path, &cameras, chosen)?;
-        (cameras, images, binary::points(&points_path, &sightings)?)
+        let points = binary::points(&points_path, &sightings)?;
+        (cameras, images, points, rigs.map(binary::poses))
     } else {
         let cameras = text::cameras(&cameras_path)?;
         let (images, sightings) = text::images(&images_path, &cameras, chosen)?;
-        (cameras, images, text::points(&points_path, &sightings)?)
+        let points = text::points(&points_path, &sightings)?;
+        (cameras, images, points, rigs.map(text::poses))
     };
+    let doubts = match poses.transpose()? {
+        Some(poses) => rigs::place(&mut images, &poses),
+        None => Vec::new(),
+    };
+    let folder = images_path.parent().unwrap_or(&images_path).display();
+    let doubts = doubts
+        .iter()
+        .map(|doubt| format!("{folder}: {doubt}"))
+        .collect();
     Ok(Model {
         cameras: cameras.cameras,
         images,
         points,
+        doubts,
         cameras_path,
         images_path,
         points_path,
     })
+}
+
+/// The files of rigs and frames beside the images file; none where there are none.
+fn rigs_beside(images: &Path) -> Result<Option<[PathBuf; 2]>, CaptureError> {
+    let extension = images.extension().unwrap_or_default();
+    let paths =
+        ["rigs", "frames"].map(|stem| images.with_file_name(stem).with_extension(extension));
+    let incomplete = |there: &Path, not: &Path| {
+        Err(CaptureError::IncompleteRigs {
+            path: there.into(),
+            missing: file_name(not),
+        })
+    };
+    match paths.each_ref().map(|path| path.exists()) {
+        [true, true] => Ok(Some(paths)),
+        [false, false] => Ok(None),
+        [true, false] => incomplete(&paths[0], &paths[1]),
+        [false, true] => incomplete(&paths[1], &paths[0]),
+    }
 }
 
 /// The last part of a path.
@@ -185,10 +226,11 @@ fn relative_name(name: &str) -> Result<String, String> {
         .filter(|part| !matches!(*part, "" | "."))
         .collect();
     if name.starts_with('/') || drive || parts.contains(&"..") {
+        let name = excerpt(&name);
         return Err(format!("the name {name:?} leads out of the images/ folder"));
     }
-    if parts.is_empty() {
-        return Err(format!("the name {name:?} names no file"));
+    if parts.is_empty() || name.len() > LONGEST_NAME {
+        return Err(format!("the name {:?} names no file", excerpt(&name)));
     }
     Ok(parts.join("/"))
 }

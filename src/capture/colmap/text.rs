@@ -8,11 +8,12 @@ use std::str::{FromStr, SplitWhitespace};
 
 use glam::DVec3;
 
+use super::rigs::{self, Poses, Source};
 use super::tracks::{Sighting, Sightings};
 use super::{Cameras, Chosen, Image, Point, lens, relative_name};
 use crate::capture::error::{CaptureError, Position};
 use crate::capture::lens::{MOST_PARAMETERS, ModelName};
-use crate::input;
+use crate::input::{self, excerpt};
 
 /// What some editors write before the text.
 const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
@@ -32,7 +33,7 @@ pub(super) fn cameras(path: &Path) -> Result<Cameras, CaptureError> {
             let unknown = CaptureError::CameraModel {
                 path: path.into(),
                 camera_id: id,
-                model: name,
+                model: excerpt(&name).into_owned(),
             };
             (cameras.insert(id, Err(unknown))).map_err(|reason| lines.malformed(reason))?;
             continue;
@@ -92,6 +93,7 @@ pub(super) fn images(
         }
         sightings.insert(id, images.len(), seen);
         images.push(Image {
+            id,
             name,
             quaternion,
             translation,
@@ -173,6 +175,57 @@ fn after_fields(line: &str, count: usize) -> &str {
     })
 }
 
+/// The poses of images, from the files of rigs and frames.
+pub(super) fn poses([of_rigs, of_frames]: [PathBuf; 2]) -> Result<Poses, CaptureError> {
+    let words = |path: &Path, kind| Lines::open(path, kind).map(|lines| Words { lines, at: 0 });
+    rigs::read(words(&of_rigs, "rig")?, words(&of_frames, "frame")?)
+}
+
+/// The fields of lines, one after the other.
+struct Words {
+    lines: Lines,
+    /// The first byte of the line that was not read.
+    at: usize,
+}
+
+impl Words {
+    fn field<T: FromStr>(&mut self, name: &str) -> Result<T, CaptureError> {
+        let line = &self.lines.line;
+        let rest = line[self.at..].trim_start();
+        let end = rest.find(char::is_whitespace).unwrap_or(rest.len());
+        self.at = line.len() - rest.len() + end;
+        self.lines.field(&mut rest[..end].split_whitespace(), name)
+    }
+}
+
+impl Source for Words {
+    fn next(&mut self) -> Result<bool, CaptureError> {
+        let rest = self.lines.line.get(self.at..).unwrap_or_default();
+        if self.lines.current > 0 && !rest.trim().is_empty() {
+            let reason = format!("{:?} follows what the line announces", excerpt(rest.trim()));
+            return Err(self.lines.malformed(reason));
+        }
+        self.at = 0;
+        self.lines.next_record()
+    }
+
+    fn integer(&mut self, _: usize, field: &str) -> Result<u64, CaptureError> {
+        self.field(field)
+    }
+
+    fn is_camera(&mut self) -> Result<bool, CaptureError> {
+        Ok(self.field::<String>("the sensor's kind")? == "CAMERA")
+    }
+
+    fn float(&mut self, field: &str) -> Result<f64, CaptureError> {
+        self.field(field)
+    }
+
+    fn wrong(&self, reason: String) -> CaptureError {
+        self.lines.malformed(reason)
+    }
+}
+
 /// A text file, line by line.
 struct Lines {
     path: PathBuf,
@@ -229,7 +282,7 @@ impl Lines {
         }
         let name = after_fields(&self.line, 9);
         if self.kind == IMAGE && !name.is_empty() {
-            let reason = format!("the name {name:?} is not UTF-8 text");
+            let reason = format!("the name {:?} is not UTF-8 text", excerpt(name));
             // The record that this line begins.
             self.current += 1;
             return Err(self.bad_name(reason));
@@ -264,7 +317,7 @@ impl Lines {
             .ok_or_else(|| self.malformed(format!("the line ends before {name}")))?;
         field
             .parse()
-            .map_err(|_| self.malformed(format!("{field:?} cannot be {name}")))
+            .map_err(|_| self.malformed(format!("{:?} cannot be {name}", excerpt(field))))
     }
 
     fn numbers<const N: usize>(

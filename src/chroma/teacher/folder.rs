@@ -246,6 +246,7 @@ mod tests {
             points: Vec::new(),
             offset: glam::DVec3::ZERO,
             rejected: Vec::new(),
+            doubts: Vec::new(),
             distortion: 0.0,
         };
         let mut teacher = teacher_of(&folder);

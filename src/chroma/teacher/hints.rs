@@ -315,6 +315,7 @@ mod tests {
             points: Vec::new(),
             offset: glam::DVec3::ZERO,
             rejected: Vec::new(),
+            doubts: Vec::new(),
             distortion: 0.0,
         }
     }
