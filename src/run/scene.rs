@@ -60,9 +60,15 @@ pub(super) fn tell_not_finite(dataset: &Dataset, observe: &mut Observer<'_>) {
     }
 }
 
-/// Warns of Gaussians of a splat file that are not used.
+/// Tells what was done to a splat file on reading, and what of it is not used.
 pub(super) fn tell_skipped(path: &Path, read: &ReadSplats, observe: &mut Observer<'_>) {
     let (path, skipped, surplus) = (path.display(), read.skipped, read.surplus);
+    for note in &read.notes {
+        observe(Event::Note(format!("{path}: {note}")));
+    }
+    for doubt in &read.doubts {
+        observe(Event::Warning(format!("{path}: {doubt}")));
+    }
     if skipped > 0 {
         observe(Event::Warning(format!(
             "{path}: skipped {skipped} Gaussians with values that are not finite or no rotation"

@@ -5,7 +5,10 @@ use std::{io::Write, path::Path};
 use glam::DVec3;
 use serde::Serialize;
 
-use super::{Format, SplatError, Splats, format::is_splat_file, glb, ply, sog, splat, spz, usda};
+use super::{
+    Format, SplatError, Splats, format::is_splat_file, glb, ply, sh::coefficient_count, sog, splat,
+    spz, usda,
+};
 use crate::{disk, input};
 
 /// Colors in a file.
@@ -17,9 +20,9 @@ pub(super) const MIN_QUATERNION_NORM: f64 = 1e-12;
 /// The share of the Gaussians that a format may spoil without a word.
 const TOLD: f64 = 0.01;
 
-/// Gaussians that a byte of a compressed file may stand for, at most: a file that announces more
-/// is cut off, or made to fill the memory.
-const SPLATS_PER_BYTE: u64 = 8;
+/// Bytes of memory that Gaussians may take however small their file is, and for each byte of a
+/// compressed one: a file that announces more is cut off, or made to fill the memory.
+const MEMORY: [usize; 2] = [8 << 20, 56];
 
 /// What a splat file holds.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -39,6 +42,10 @@ pub struct ReadSplats {
     /// Whether the file says that the Gaussians were trained antialiased
     /// ([`ANTIALIASED`](ply::ANTIALIASED), or Postshot's `antialiased 1`, in a `.ply`).
     pub antialiased: bool,
+    /// What was done to the numbers on reading, in words.
+    pub notes: Vec<String>,
+    /// What the file says and is not read, in words.
+    pub doubts: Vec<String>,
 }
 
 /// Versions of `.spz` that are written.
@@ -258,9 +265,22 @@ pub(super) fn middle(mut scales: [f32; 3]) -> f32 {
     scales[1]
 }
 
-/// Refuses a count that a compressed file of so many bytes cannot hold.
-pub(super) fn check_count(path: &Path, count: usize, bytes: usize) -> Result<(), SplatError> {
-    match count as u64 > SPLATS_PER_BYTE.saturating_mul(bytes as u64) {
+/// Bytes of memory that a Gaussian with harmonics of a degree takes.
+pub(super) fn memory(degree: u32) -> usize {
+    size_of::<f32>() * (11 + CHANNELS * coefficient_count(degree))
+}
+
+/// Refuses a count of Gaussians that take `each` bytes to read, which a compressed file of so many
+/// bytes cannot hold.
+pub(super) fn check_count(
+    path: &Path,
+    count: usize,
+    each: usize,
+    bytes: usize,
+) -> Result<(), SplatError> {
+    let [least, more] = MEMORY;
+    let most = least.saturating_add(more.saturating_mul(bytes));
+    match count.saturating_mul(each) > most {
         true => Err(SplatError::damaged(
             path,
             "count",

@@ -40,7 +40,7 @@ pub(super) fn encode(
     splats: &Splats,
     options: &WriteOptions,
 ) -> Result<Vec<u8>, SplatError> {
-    let splats = axes::y_up(splats.clone());
+    let splats = axes::turned(splats.clone(), axes::Y_UP);
     let mut parts = Parts::default();
     parts.floats("POSITION".to_owned(), "VEC3", splats.means.as_flattened());
     parts.bound(&splats.means);

@@ -20,7 +20,7 @@ const SEEN: f32 = 3.0;
 
 /// The text of a file.
 pub(super) fn encode(splats: &Splats, options: &WriteOptions) -> Vec<u8> {
-    let splats = axes::y_up(splats.clone());
+    let splats = axes::turned(splats.clone(), axes::Y_UP);
     let quoted = |text: &str| text.replace(['"', '\\', '\n', '\r'], " ");
     let mut told = String::new();
     // Writing to a string cannot fail.
@@ -153,7 +153,7 @@ mod tests {
             let words = words.filter(|word| !word.is_empty());
             words.map(|word| word.parse().expect("a number")).collect()
         };
-        let turned = axes::y_up(splats.clone());
+        let turned = axes::turned(splats.clone(), axes::Y_UP);
         assert_eq!(values("point3f[] positions"), turned.means.as_flattened());
         assert_eq!(values("quatf[] orientations"), turned.quats.as_flattened());
         let coefficients = values("float3[] radiance:sphericalHarmonicsCoefficients");

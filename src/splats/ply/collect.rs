@@ -1,11 +1,11 @@
 //! From the numbers of a vertex to a Gaussian.
 
 use super::header::VertexLayout;
-use super::{CHANNELS, ReadSplats, sh_position};
-use crate::splats::Splats;
+use super::{CHANNELS, FILTER, ReadSplats, SHAPE, sh_position};
 use crate::splats::file::MIN_QUATERNION_NORM;
-use crate::splats::quantize::{FLAT, OPAQUE};
+use crate::splats::quantize::{FLAT, OPAQUE, logit};
 use crate::splats::sh::{C0, coefficient_count};
+use crate::splats::{Splats, opacity};
 
 /// Sorts the numbers of each Gaussian into the arrays.
 pub(super) struct Collector {
@@ -13,6 +13,8 @@ pub(super) struct Collector {
     /// For each coefficient of the field its place among the SH properties.
     sh_positions: Vec<usize>,
     byte_colors: bool,
+    /// Scales of a Gaussian that a filter widens.
+    axes: usize,
 }
 
 impl Collector {
@@ -24,17 +26,24 @@ impl Collector {
         Self {
             read: ReadSplats {
                 splats: Splats::with_capacity(count, degree, CHANNELS),
+                notes: (layout.filtered())
+                    .then(|| format!("{FILTER} is put into scales and opacities"))
+                    .into_iter()
+                    .collect(),
                 ..ReadSplats::default()
             },
             sh_positions,
             byte_colors: layout.byte_colors,
+            axes: if layout.columns.contains(&None) { 2 } else { 3 },
         }
     }
 
-    /// `values` hold center, SH and shape in this order; those that mean a limit become finite.
+    /// `values` hold center, SH, shape and the filter, if any, in this order; those that mean a
+    /// limit become finite.
     pub fn push(&mut self, values: &mut [f32]) {
         let (center, rest) = values.split_at_mut(3);
-        let (sh, shape) = rest.split_at_mut(self.sh_positions.len());
+        let (sh, rest) = rest.split_at_mut(self.sh_positions.len());
+        let (shape, filter) = rest.split_at_mut(SHAPE.len());
         if shape[0].is_infinite() {
             shape[0] = OPAQUE.copysign(shape[0]);
         }
@@ -42,6 +51,9 @@ impl Collector {
             if *scale == f32::NEG_INFINITY {
                 *scale = FLAT;
             }
+        }
+        if let [filter] = filter {
+            widen(&mut shape[..=self.axes], *filter);
         }
         if self.byte_colors {
             for color in &mut sh[..CHANNELS] {
@@ -71,4 +83,21 @@ impl Collector {
     pub fn finish(self) -> ReadSplats {
         self.read
     }
+}
+
+/// Adds a filter's variance to a Gaussian's, as Mip-Splatting does on drawing: `shape` holds the
+/// logit of its opacity, which falls as the Gaussian grows, and its log-scales.
+fn widen(shape: &mut [f32], filter: f32) {
+    if filter == 0.0 {
+        return;
+    }
+    let mut share = 1.0;
+    for scale in &mut shape[1..] {
+        let before = (2.0 * f64::from(*scale)).exp();
+        // Not finite where the filter is not.
+        let after = before + f64::from(filter).powi(2);
+        share *= before / after;
+        *scale = (0.5 * after.ln()) as f32;
+    }
+    shape[0] = logit(opacity(shape[0]) * share.sqrt());
 }

@@ -22,6 +22,7 @@ use super::{
     header::{byte_size, decode, is_antialiased, offset},
     rest_count, sh_position,
 };
+use crate::input::excerpt;
 use crate::splats::{
     Splats, WriteOptions,
     file::{Gathered, Judge},
@@ -209,7 +210,7 @@ impl<'a> Table<'a> {
         let mut stride = 0;
         for property in element.properties.values() {
             let PropertyType::Scalar(kind) = &property.data_type else {
-                let name = &property.name;
+                let name = excerpt(&property.name);
                 return Err(header(format!("property \"{name}\" is a list")));
             };
             stride += byte_size(kind);
@@ -231,7 +232,7 @@ impl<'a> Table<'a> {
     fn truncated(&self) -> PlyError {
         PlyError::Truncated {
             path: self.path.to_owned(),
-            element: self.element.name.clone(),
+            element: excerpt(&self.element.name).into_owned(),
             announced: self.element.count,
         }
     }

@@ -38,6 +38,16 @@ pub enum PlyError {
         /// The property's name.
         property: String,
     },
+    /// A number of a Gaussian is an integer.
+    #[error(
+        "{}: vertex property \"{property}\" has an integer type, which holds no logarithm, quaternion or harmonic; write it as float, or all as ushort, for floats of 16 bits in a binary file", path.display()
+    )]
+    Integer {
+        /// The splat file.
+        path: PathBuf,
+        /// The property's name.
+        property: String,
+    },
     /// The spherical harmonics have no known degree.
     #[error(
         "{}: {count} properties f_rest_* where 0, 9, 24 or 45 (SH degree 0 to 3) are expected", path.display()

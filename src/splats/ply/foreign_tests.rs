@@ -45,6 +45,93 @@ fn discs_have_two_scales() {
 }
 
 #[test]
+fn integers_are_floats_of_sixteen_bits_or_refused() {
+    let names = names();
+    let of = |kind| -> Vec<_> { names.iter().map(|name| (kind, name.as_str())).collect() };
+    let values = [
+        1.5, -2.0, 3.0, 4.0, 5.0, 6.0, 7.0, -8.0, -9.0, -10.0, 0.5, 0.5, 0.5, 0.5,
+    ];
+    let text = String::from_utf8(text_file(&of("ushort"), &[])).unwrap();
+    let mut half = (text.replace("ascii", "binary_little_endian"))
+        .replace("vertex 0", "vertex 1")
+        .into_bytes();
+    half.extend(
+        values
+            .iter()
+            .flat_map(|&v| half::f16::from_f32(v).to_le_bytes()),
+    );
+    let read = read_bytes(&half).unwrap().splats;
+    assert_eq!(read.means, [[1.5, -2.0, 3.0]]);
+    assert_eq!(read.log_scales, [[-8.0, -9.0, -10.0]]);
+    assert_eq!(read.quats, [[0.5; 4]]);
+    for (place, name) in [(0, "x"), (6, "opacity"), (13, "rot_3")] {
+        let mut properties = of("float");
+        properties[place].0 = "ushort";
+        let message = message(&text_file(&properties, &["1 2 3 4 5 6 7 8 9 10 1 0 0 0"]));
+        assert!(
+            message.contains(&format!("\"{name}\" has an integer type")),
+            "{message}"
+        );
+    }
+}
+
+#[test]
+fn filters_are_put_into_scales_and_opacities() {
+    let names = names();
+    let mut properties: Vec<_> = names.iter().map(|name| ("float", name.as_str())).collect();
+    properties.push(("float", FILTER));
+    // Scales 1, 2 and 3, opacity 0.5.
+    let shape = "1 2 3 4 5 6 0 0 0.6931472 1.0986123 1 0 0 0";
+    let rows = [2.0, -2.0, 0.0, f32::NAN, f32::INFINITY].map(|filter| format!("{shape} {filter}"));
+    let rows: Vec<&str> = rows.iter().map(String::as_str).collect();
+    let read = read_bytes(&text_file(&properties, &rows)).unwrap();
+    assert_eq!((read.skipped, read.notes.len()), (2, 1));
+    assert!(read.doubts.is_empty());
+    let splats = &read.splats;
+    let expected = [5.0_f32, 8.0, 13.0].map(|square| 0.5 * square.ln());
+    let thinned = 0.5 * (1.0 * 4.0 * 9.0_f64 / (5.0 * 8.0 * 13.0)).sqrt();
+    for (scales, opacity) in splats.log_scales.iter().zip(splats.opacities()).take(2) {
+        for (found, wanted) in scales.iter().zip(expected) {
+            assert!((found - wanted).abs() < 1e-6);
+        }
+        assert!((opacity - thinned).abs() < 1e-6);
+    }
+    assert_eq!(splats.log_scales[2][0], 0.0);
+    assert_eq!(splats.opacity_logits[2], 0.0);
+    // A disc has no volume to grow along its normal.
+    let at = names.iter().position(|name| *name == THIRD_SCALE).unwrap();
+    properties.remove(at);
+    let disc = "1 2 3 4 5 6 0 0 0.6931472 1 0 0 0 2";
+    let read = read_bytes(&text_file(&properties, &[disc])).unwrap().splats;
+    let thinned = 0.5 * (4.0_f64 / (5.0 * 8.0)).sqrt();
+    assert!((read.opacities().next().unwrap() - thinned).abs() < 1e-6);
+    assert_eq!(read.log_scales[0][2], crate::splats::quantize::FLAT);
+}
+
+#[test]
+fn what_is_not_read_is_named_unless_it_is_harmless() {
+    let names = names();
+    let mut properties: Vec<_> = names.iter().map(|name| ("float", name.as_str())).collect();
+    properties.extend(["nx", "obj_dc_0", "label"].map(|name| ("float", name)));
+    let row = "1 2 3 4 5 6 7 8 9 10 1 0 0 0 1 1 1";
+    assert!(
+        read_bytes(&text_file(&properties, &[row]))
+            .unwrap()
+            .doubts
+            .is_empty()
+    );
+    properties.extend(["beta", "sb_params_0", "sb_params_1", "t"].map(|name| ("float", name)));
+    let read = read_bytes(&text_file(&properties, &[&format!("{row} 1 1 1 1")])).unwrap();
+    let [doubt] = &read.doubts[..] else {
+        panic!("{:?}", read.doubts);
+    };
+    assert!(
+        doubt.contains("beta, sb_params_0, sb_params_1 and 1 more"),
+        "{doubt}"
+    );
+}
+
+#[test]
 fn colors_of_eight_bits() {
     let mut properties = Vec::new();
     let names = names();

@@ -1,9 +1,10 @@
 //! The header of a PLY file and where its numbers lie.
 
-use super::{CENTER, OFFSET, PlyError, SHAPE, THIRD_SCALE, degree_of_rest_count, sh_names};
+use super::{CENTER, FILTER, OFFSET, PlyError, SHAPE, THIRD_SCALE, degree_of_rest_count, sh_names};
+use crate::input::excerpt;
 use glam::DVec3;
 use ply_rs_bw::parser::{Parser, Reader};
-use ply_rs_bw::ply::{DefaultElement, ElementDef, Header, PropertyType, ScalarType};
+use ply_rs_bw::ply::{DefaultElement, ElementDef, Encoding, Header, PropertyType, ScalarType};
 use std::io::{BufRead, Read};
 use std::path::Path;
 
@@ -14,15 +15,25 @@ const MAX_HEADER_BYTES: u64 = 64 * 1024;
 /// Colors that some programs write instead of `f_dc_0..2`.
 const BYTE_COLORS: [&str; 3] = ["red", "green", "blue"];
 
+/// Properties of others that change no picture, or all that begin so with `_`: normals, colors
+/// beside harmonics, labels, features.
+const HARMLESS: &str = "nx ny nz red green blue alpha f_rest_ obj_dc_ ins_feat_ semantic_ \
+    language_feature_ label segment class instance object_id cluster_id id ids confidence";
+
+/// Names that a sentence lists.
+const LISTED: usize = 3;
+
 /// Which numbers of a vertex make a Gaussian.
 pub(super) struct VertexLayout {
     /// SH degree.
     pub degree: u32,
-    /// For each needed number, in the order center, SH, shape: the place among
-    /// the vertex's properties; none for the third scale of a disc.
+    /// For each needed number, in the order center, SH, shape, filter if there is one: the place
+    /// among the vertex's properties; none for the third scale of a disc.
     pub columns: Vec<Option<usize>>,
     /// Whether the first three SH are colors of 8 bits.
     pub byte_colors: bool,
+    /// Whether those that are `ushort` are floats of 16 bits.
+    pub half: bool,
     /// Types of all properties of a vertex, in file order.
     pub types: Vec<ScalarType>,
 }
@@ -64,9 +75,9 @@ pub(super) fn read_header(path: &Path, file: &mut impl BufRead) -> Result<Header
             wrong(match error.line() {
                 Some(number) => {
                     let line = text.lines().nth(number - 1).unwrap_or_default();
-                    format!("line {number}: \"{}\"", line.trim())
+                    format!("line {number}: \"{}\"", excerpt(line.trim()))
                 }
-                None => error.to_string(),
+                None => excerpt(&error.to_string()).into_owned(),
             })
         })?;
 
@@ -112,7 +123,7 @@ pub(super) fn offset(comments: &[String]) -> DVec3 {
 
 impl VertexLayout {
     /// Finds the properties of a Gaussian among those of the vertex element.
-    pub fn new(path: &Path, vertex: &ElementDef) -> Result<Self, PlyError> {
+    pub fn new(path: &Path, vertex: &ElementDef, encoding: Encoding) -> Result<Self, PlyError> {
         let properties = &vertex.properties;
         let types = properties
             .values()
@@ -120,10 +131,10 @@ impl VertexLayout {
                 PropertyType::Scalar(scalar) => Ok(scalar.clone()),
                 PropertyType::List(..) => Err(PlyError::Header {
                     path: path.to_path_buf(),
-                    reason: format!("vertex property \"{}\" is a list", property.name),
+                    reason: format!("vertex property \"{}\" is a list", excerpt(&property.name)),
                 }),
             });
-        let types = types.collect::<Result<_, _>>()?;
+        let types: Vec<_> = types.collect::<Result<_, _>>()?;
 
         let is_rest = |name: &&String| name.starts_with("f_rest_");
         let count = properties.keys().filter(is_rest).count();
@@ -151,6 +162,7 @@ impl VertexLayout {
             }
         }));
         let names = names.chain(SHAPE.into_iter().map(String::from));
+        let names = names.chain(has(FILTER).then(|| FILTER.to_owned()));
         let columns = names.map(|property| match properties.get_index_of(&property) {
             None if property != THIRD_SCALE => Err(PlyError::MissingProperty {
                 path: path.to_path_buf(),
@@ -158,12 +170,57 @@ impl VertexLayout {
             }),
             column => Ok(column),
         });
+        let columns: Vec<Option<usize>> = columns.collect::<Result<_, _>>()?;
+        let colors = CENTER.len()..CENTER.len() + BYTE_COLORS.len();
+        let floats = (columns.iter().enumerate())
+            .filter(|(place, _)| !(byte_colors && colors.contains(place)))
+            .filter_map(|(place, column)| Some((place, (*column)?)));
+        let half = encoding != Encoding::Ascii
+            && floats
+                .clone()
+                .all(|(_, column)| types[column] == ScalarType::UShort);
+        let is_float = |kind: &ScalarType| matches!(kind, ScalarType::Float | ScalarType::Double);
+        // Centers may be whole numbers.
+        let mut integers = floats.filter(|&(place, column)| {
+            let kind = &types[column];
+            !is_float(kind) && (place >= CENTER.len() || *kind == ScalarType::UShort)
+        });
+        if let Some((_, column)) = integers.next().filter(|_| !half) {
+            return Err(PlyError::Integer {
+                path: path.to_path_buf(),
+                property: properties[column].name.clone(),
+            });
+        }
         Ok(Self {
             degree,
-            columns: columns.collect::<Result<_, _>>()?,
+            columns,
             byte_colors,
+            half,
             types,
         })
+    }
+
+    /// Whether each Gaussian has a filter that widens it.
+    pub fn filtered(&self) -> bool {
+        self.columns.len() > CENTER.len() + sh_names(self.degree).count() + SHAPE.len()
+    }
+
+    /// Names properties that are not read, if there are any that may change the picture.
+    pub fn unread(&self, vertex: &ElementDef) -> Option<String> {
+        let harmless = |name: &str| {
+            let is = |known: &str| name == known || known.ends_with('_') && name.starts_with(known);
+            HARMLESS.split_ascii_whitespace().any(is)
+        };
+        let names: Vec<_> = (vertex.properties.keys().enumerate())
+            .filter(|(column, name)| !(self.columns.contains(&Some(*column)) || harmless(name)))
+            .map(|(_, name)| excerpt(name))
+            .collect();
+        let listed = names[..names.len().min(LISTED)].join(", ");
+        let more = match names.len().saturating_sub(LISTED) {
+            0 => String::new(),
+            more => format!(" and {more} more"),
+        };
+        (!names.is_empty()).then(|| format!("vertex properties {listed}{more} are not read: if they move, reshape or color Gaussians, pictures differ from the trainer's"))
     }
 }
 

@@ -7,7 +7,8 @@
 //! written as zeros because some readers expect them.
 //!
 //! Files of other programs may have two scales (discs, as 2DGS trains them) and colors of
-//! 8 bits, `red green blue`, in the place of `f_dc_0..2`.
+//! 8 bits, `red green blue`, in the place of `f_dc_0..2`. Where all properties are `ushort` these
+//! are floats of 16 bits, as Babylon.js has them. `filter_3D` is put into scales and opacities.
 
 mod collect;
 mod compressed;
@@ -53,6 +54,10 @@ const CENTER: [&str; 3] = ["x", "y", "z"];
 const SHAPE: [&str; 8] = [
     "opacity", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3",
 ];
+
+/// The standard deviation of the filter that Mip-Splatting and its kin keep beside scales and
+/// opacities, which are without it.
+const FILTER: &str = "filter_3D";
 
 /// The scale that discs do not have.
 const THIRD_SCALE: &str = "scale_2";

@@ -3,7 +3,7 @@
 use super::collect::Collector;
 use super::header::{VertexLayout, byte_size, decode, is_antialiased, offset, read_header};
 use super::{PlyError, ReadSplats, compressed};
-use crate::input;
+use crate::input::{self, excerpt};
 use ply_rs_bw::ply::{ElementDef, Encoding, PropertyType, ScalarType};
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, ErrorKind, Read};
@@ -44,7 +44,7 @@ pub fn read_ply(path: &Path) -> Result<ReadSplats, PlyError> {
             body.skip(element)?;
             continue;
         }
-        let layout = VertexLayout::new(path, element)?;
+        let layout = VertexLayout::new(path, element, header.encoding)?;
         let sizes = layout.types.iter().map(byte_size);
         let min_row_bytes = match header.encoding {
             // A digit and a separator each.
@@ -60,6 +60,7 @@ pub fn read_ply(path: &Path) -> Result<ReadSplats, PlyError> {
             antialiased,
             offset: offset(&header.comments),
             surplus: body.surplus(elements)?,
+            doubts: layout.unread(element).into_iter().collect(),
             ..read
         });
     }
@@ -81,7 +82,7 @@ impl Body<'_> {
     fn truncated(&self, element: &ElementDef) -> PlyError {
         PlyError::Truncated {
             path: self.path.to_path_buf(),
-            element: element.name.clone(),
+            element: excerpt(&element.name).into_owned(),
             announced: element.count,
         }
     }
@@ -110,7 +111,7 @@ impl Body<'_> {
     fn bad_row(&self, element: &ElementDef, index: usize) -> PlyError {
         PlyError::Row {
             path: self.path.to_path_buf(),
-            element: element.name.clone(),
+            element: excerpt(&element.name).into_owned(),
             index,
         }
     }
@@ -226,6 +227,10 @@ impl Body<'_> {
             for row in chunk.chunks_exact(stride) {
                 for (value, place) in needed.iter_mut().zip(&places) {
                     *value = match place {
+                        Some((offset, ScalarType::UShort)) if layout.half => {
+                            let bits = decode(&ScalarType::UShort, big_endian, &row[*offset..]);
+                            half::f16::from_bits(bits as u16).to_f32()
+                        }
                         Some((offset, kind)) => decode(kind, big_endian, &row[*offset..]) as f32,
                         // A disc has no extent along its normal.
                         None => f32::NEG_INFINITY,

@@ -9,15 +9,19 @@ use glam::DVec3;
 use zip::ZipArchive;
 
 use super::{texture::Texture, *};
+use crate::input::excerpt;
 use crate::splats::{
     ReadSplats, SplatError,
-    file::{Gathered, check_count},
+    file::{Gathered, check_count, memory},
     quantize::{between, logit, of_smallest_three},
     sh::MAX_DEGREE,
 };
 
 /// Longest `meta.json` that is read: codebooks take some 20 KiB.
 const MOST_META: usize = 1 << 20;
+
+/// Bytes of a Gaussian's pixels in all textures.
+const TEXTURES: usize = 6 * 4;
 
 /// Entries of a codebook.
 const ENTRIES: usize = 256;
@@ -36,12 +40,14 @@ pub(in crate::splats) fn read(path: &Path, bytes: &[u8]) -> Result<ReadSplats, S
     let mut source = Source { path, archive };
     let meta = source.file(META, META, MOST_META)?;
     let meta: Meta = serde_json::from_slice(&meta)
-        .map_err(|error| SplatError::damaged(path, META, error.to_string()))?;
+        .map_err(|error| SplatError::damaged(path, META, excerpt(&error.to_string())))?;
     if meta.version != VERSION {
         let reason = format!("version {} is not read, only {VERSION}", meta.version);
         return Err(SplatError::damaged(path, META, reason));
     }
-    check_count(path, meta.count, bytes.len())?;
+    let bands = meta.sh_n.as_ref().map_or(0, |harmonics| harmonics.bands);
+    let each = memory(bands.min(MAX_DEGREE)) + TEXTURES * SPARE[0];
+    check_count(path, meta.count, each, bytes.len())?;
     for book in [&meta.scales.codebook, &meta.sh0.codebook] {
         check_book(path, book)?;
     }
@@ -134,6 +140,8 @@ impl Source<'_> {
     fn file(&mut self, part: &'static str, name: &str, most: usize) -> Result<Vec<u8>, SplatError> {
         let path = self.path;
         let wrong = |reason: String| SplatError::damaged(path, part, reason);
+        // No name that is in use is so long.
+        let name = &*excerpt(name);
         let file =
             (self.archive.by_name(name)).map_err(|error| wrong(format!("{name}: {error}")))?;
         let mut bytes = Vec::new();

@@ -10,7 +10,7 @@
 //! | 8–11 | Gaussians, u32 |
 //! | 12 | degree of the harmonics, 0 to 3 (4 is not read) |
 //! | 13 | fractional bits of the centers |
-//! | 14 | flags: 1 antialiased |
+//! | 14 | flags: 1 antialiased, 2 extensions |
 //! | 15 | 0; in version 4 the number of streams |
 //! | 16–31 | version 4 only: offset of the table of streams, u32; 12 zeros |
 //!
@@ -31,7 +31,11 @@
 //!
 //! **Axes.** The reference says right, up, back, and converts only where it is told from what.
 //! splat-transform, SuperSplat, PlayCanvas and Spark take the numbers as those of a `.ply`; this
-//! writer and reader do the same, so that a scene stands as its `.ply` does.
+//! writer and reader do the same, so that a scene stands as its `.ply` does. Only where an
+//! extension says which axes they are is a scene turned.
+//!
+//! **Extensions** stand behind the header of version 4, and in older ones behind the last part.
+//! Each is a u32 that tells which, a u32 with its bytes, and these.
 //!
 //! Source: <https://github.com/nianticlabs/spz>, README and `load-spz.cc`.
 
@@ -57,6 +61,21 @@ const TABLE_ROW: usize = 16;
 
 /// The flag of scenes trained antialiased.
 const ANTIALIASED: u8 = 1;
+
+/// The flag of files with extensions.
+const EXTENDED: u8 = 2;
+
+/// The extension with the axes: a u32, one more than the place in [`SYSTEMS`]; 0 says nothing.
+const AXES: u32 = 0xADBE_0003;
+
+/// The extension with what a viewer's camera may do, which changes no picture.
+const ORBIT: u32 = 0xADBE_0002;
+
+/// Which way x, y and z look: left or right, up or down, back or front.
+const SYSTEMS: [&str; 16] = [
+    "LDB", "RDB", "LUB", "RUB", "LDF", "RDF", "LUF", "RUF", "LFD", "RFD", "LFU", "RFU", "LBD",
+    "RBD", "LBU", "RBU",
+];
 
 /// What a unit of the constant coefficient is of a color's range.
 const COLOR_SCALE: f64 = 0.15;

@@ -7,10 +7,14 @@ use flate2::read::MultiGzDecoder;
 use super::*;
 use crate::splats::{
     ReadSplats, SplatError,
-    file::{Gathered, check_count},
+    axes::{Turn, turned},
+    file::{Gathered, check_count, memory},
     quantize::{logit, of_smallest_three},
     sh::MAX_DEGREE,
 };
+
+/// Longest extensions that are read, in bytes.
+const MOST_EXTENSIONS: u64 = 1 << 16;
 
 /// What the header says.
 struct Header {
@@ -18,7 +22,7 @@ struct Header {
     count: usize,
     degree: u32,
     fractional_bits: u8,
-    antialiased: bool,
+    flags: u8,
 }
 
 /// Reads a file of version 1 to 4.
@@ -53,8 +57,13 @@ fn read_gzip(path: &Path, bytes: &[u8]) -> Result<ReadSplats, SplatError> {
     if matches!(read, Ok(found) if found < wanted) {
         return Err(header.cut_off(path, body.len(), wanted));
     }
-    // The stream's end has its checksum; what stands before it are extensions.
-    let end = read.and_then(|_| limited.into_inner().read(&mut [0]));
+    // The stream's end has its checksum.
+    let mut extensions = Vec::new();
+    let end = read.and_then(|_| {
+        let mut limited = limited.into_inner().take(MOST_EXTENSIONS);
+        limited.read_to_end(&mut extensions)?;
+        limited.into_inner().read(&mut [0])
+    });
     end.map_err(|error| SplatError::damaged(path, "gzip stream", error.to_string()))?;
     let mut rest = &body[..];
     let parts = parts.map(|size| {
@@ -62,7 +71,7 @@ fn read_gzip(path: &Path, bytes: &[u8]) -> Result<ReadSplats, SplatError> {
         rest = behind;
         part
     });
-    Ok(header.gather(parts))
+    header.extended(path, header.gather(parts), &extensions)
 }
 
 fn read_streams(path: &Path, bytes: &[u8]) -> Result<ReadSplats, SplatError> {
@@ -75,7 +84,7 @@ fn read_streams(path: &Path, bytes: &[u8]) -> Result<ReadSplats, SplatError> {
     }
     let wrong = |reason: String| SplatError::damaged(path, "table of streams", reason);
     let table = bytes.get(HEADER..HEADER + 4).ok_or_else(cut_off)?;
-    let table = u32::from_le_bytes([table[0], table[1], table[2], table[3]]) as usize;
+    let table = word(table, 0) as usize;
     let streams = usize::from(bytes[15]);
     let expected = if header.degree == 0 { 5 } else { 6 };
     if table < LONG_HEADER || streams != expected {
@@ -112,16 +121,34 @@ fn read_streams(path: &Path, bytes: &[u8]) -> Result<ReadSplats, SplatError> {
         };
         return Err(SplatError::damaged(path, "streams", reason));
     }
-    Ok(header.gather(parts.each_ref().map(Vec::as_slice)))
+    let read = header.gather(parts.each_ref().map(Vec::as_slice));
+    header.extended(
+        path,
+        read,
+        bytes.get(LONG_HEADER..table).unwrap_or_default(),
+    )
+}
+
+/// From the axes of a system to right, down, front.
+fn to_ply(system: &str) -> Turn {
+    [['R', 'L'], ['D', 'U'], ['F', 'B']].map(|[along, against]| {
+        match (system.find(along), system.find(against)) {
+            (Some(place), _) => (place, 1.0),
+            // One of the two is there.
+            (None, place) => (place.unwrap_or(0), -1.0),
+        }
+    })
+}
+
+/// Four bytes of some as a number.
+fn word(bytes: &[u8], at: usize) -> u32 {
+    u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
 }
 
 impl Header {
     fn of(path: &Path, bytes: [u8; HEADER], file_bytes: usize) -> Result<Self, SplatError> {
-        let word = |at: usize| {
-            u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
-        };
         let wrong = |field, reason: String| Err(SplatError::damaged(path, field, reason));
-        let (version, count) = (word(4), word(8) as usize);
+        let (version, count) = (word(&bytes, 4), word(&bytes, 8) as usize);
         if bytes[..4] != MAGIC {
             return wrong("header", "does not begin with NGSP".to_owned());
         }
@@ -135,13 +162,15 @@ impl Header {
         if version > 1 && fractional_bits > 30 {
             return wrong("fractional bits", format!("{fractional_bits} is above 30"));
         }
-        check_count(path, count, file_bytes)?;
+        let packed: usize = part_bytes(version, degree.into()).iter().sum();
+        let each = memory(degree.into()) + packed;
+        check_count(path, count, each, file_bytes)?;
         Ok(Self {
             version,
             count,
             degree: degree.into(),
             fractional_bits,
-            antialiased: flags & ANTIALIASED != 0,
+            flags,
         })
     }
 
@@ -177,9 +206,52 @@ impl Header {
             );
         }
         ReadSplats {
-            antialiased: self.antialiased,
+            antialiased: self.flags & ANTIALIASED != 0,
             ..gathered.finish()
         }
+    }
+
+    /// Does to the Gaussians what extensions say.
+    fn extended(
+        &self,
+        path: &Path,
+        mut read: ReadSplats,
+        mut extensions: &[u8],
+    ) -> Result<ReadSplats, SplatError> {
+        let unknown = self.flags & !(ANTIALIASED | EXTENDED);
+        if unknown != 0 {
+            (read.doubts).push(format!("flags {unknown:#x} of the header are not known"));
+        }
+        if self.flags & EXTENDED == 0 {
+            return Ok(read);
+        }
+        let (mut axes, mut other) = (0, None);
+        while !extensions.is_empty() {
+            let cut_off = || SplatError::damaged(path, "extensions", "they are cut off");
+            let (begin, rest) = extensions.split_first_chunk::<8>().ok_or_else(cut_off)?;
+            let [which, length] = [0, 4].map(|at| word(begin, at));
+            let (payload, rest) = (rest.split_at_checked(length as usize)).ok_or_else(cut_off)?;
+            extensions = rest;
+            match which {
+                AXES if payload.len() == 4 => axes = word(payload, 0),
+                ORBIT => {}
+                _ => other = Some(which),
+            }
+        }
+        if let Some(other) = other {
+            (read.doubts).push(format!("extension {other:#x} is not read"));
+        }
+        match (axes as usize).checked_sub(1).map(|at| SYSTEMS.get(at)) {
+            None | Some(Some(&"RDF")) => {}
+            Some(Some(system)) => {
+                read.splats = turned(read.splats, to_ply(system));
+                (read.notes).push(format!("axes {system}, as it says, are turned to RDF"));
+            }
+            Some(None) => (read.doubts).push(format!(
+                "axes {axes} are not known: they are taken for those of a .ply, RDF"
+            )),
+        }
+        Ok(read)
     }
 
     fn coordinate(&self, center: &[u8], axis: usize) -> f32 {
@@ -199,7 +271,7 @@ impl Header {
             let w = (1.0 - x * x - y * y - z * z).max(0.0).sqrt();
             return [w, x, y, z];
         }
-        let word = u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
+        let word = word(bytes, 0);
         let small = [20, 10, 0].map(|shift| {
             let level = f64::from(word >> shift & ROTATION_LEVELS) / f64::from(ROTATION_LEVELS);
             if word >> (shift + 9) & 1 == 1 {

@@ -155,18 +155,88 @@ fn headers_that_are_refused() {
     );
 }
 
-/// A small file that announces what would fill the memory.
+/// A small file that announces what would fill the memory, or holds it.
 #[test]
 fn bombs_do_not_go_off() {
-    let mut bytes = b"NGSP\x03\0\0\0".to_vec();
-    bytes.extend(100_000_000_u32.to_le_bytes());
-    bytes.extend([3, 12, 0, 0]);
-    bytes.resize(20_000_000, 0);
-    let mut stream = GzEncoder::new(Vec::new(), Compression::best());
-    stream.write_all(&bytes).unwrap();
-    let message = read_one(&stream.finish().unwrap()).unwrap_err().to_string();
-    assert!(
-        message.contains("100000000 Gaussians are more than"),
-        "{message}"
-    );
+    for (count, degree) in [(100_000_000_u32, 3), (1_000_000, 0)] {
+        let mut bytes = b"NGSP\x03\0\0\0".to_vec();
+        bytes.extend(count.to_le_bytes());
+        bytes.extend([degree, 12, 0, 0]);
+        bytes.resize(20_000_016, 0);
+        let mut stream = GzEncoder::new(Vec::new(), Compression::fast());
+        stream.write_all(&bytes).unwrap();
+        let message = read_one(&stream.finish().unwrap()).unwrap_err().to_string();
+        assert!(
+            message.contains(&format!("{count} Gaussians are more than")),
+            "{message}"
+        );
+    }
+}
+
+/// A file of version 4 with extensions: which, and the bytes of each.
+fn extended(extensions: &[(u32, &[u8])]) -> Vec<u8> {
+    let mut bytes = file(SpzVersion::V4, false);
+    let all: Vec<u8> = (extensions.iter())
+        .flat_map(|(which, payload)| {
+            let begin = [which.to_le_bytes(), (payload.len() as u32).to_le_bytes()];
+            [&begin.concat(), *payload].concat()
+        })
+        .collect();
+    bytes[14] |= EXTENDED;
+    bytes[16] += all.len() as u8;
+    bytes.splice(LONG_HEADER..LONG_HEADER, all);
+    bytes
+}
+
+#[test]
+fn axes_that_a_file_declares_are_turned() {
+    let plain = one().means[0];
+    for (place, system) in SYSTEMS.iter().enumerate() {
+        let number = (place as u32 + 1).to_le_bytes();
+        let read = read_one(&extended(&[(ORBIT, &[0; 12]), (AXES, &number)])).unwrap();
+        let mut expected = [0.0; 3];
+        for (value, letter) in plain.iter().zip(system.chars()) {
+            let (axis, sign) = match letter {
+                'R' => (0, 1.0),
+                'L' => (0, -1.0),
+                'D' => (1, 1.0),
+                'U' => (1, -1.0),
+                'F' => (2, 1.0),
+                _ => (2, -1.0),
+            };
+            expected[axis] = sign * value;
+        }
+        assert_eq!(read.splats.means, [expected], "{system}");
+        assert_eq!(read.notes.is_empty(), *system == "RDF");
+        assert!(read.doubts.is_empty());
+    }
+    let plain = read_one(&file(SpzVersion::V4, false)).unwrap();
+    let nothing = extended(&[(AXES, &[0; 4])]);
+    assert_eq!(read_one(&nothing).unwrap(), plain);
+    for (which, payload, words) in [
+        (AXES, &[17, 0, 0, 0], "axes 17 are not known"),
+        (7, &[1, 2, 3, 4], "extension 0x7 is not read"),
+    ] {
+        let read = read_one(&extended(&[(which, payload)])).unwrap();
+        assert!(read.doubts[0].contains(words), "{:?}", read.doubts);
+        assert_eq!(read.splats, plain.splats);
+    }
+    let mut cut = extended(&[(AXES, &[4, 0, 0, 0])]);
+    cut[LONG_HEADER + 4] = 5;
+    assert!(read_one(&cut).unwrap_err().to_string().contains("cut off"));
+}
+
+#[test]
+fn older_versions_declare_axes_behind_their_last_part() {
+    let bytes = [0; 20];
+    let mut stream = b"NGSP\x03\0\0\0\x01\0\0\0\0\x0c\x02\0".to_vec();
+    stream.extend(bytes);
+    stream[16] = 16;
+    stream.extend([AXES.to_le_bytes(), 4_u32.to_le_bytes(), 3_u32.to_le_bytes()].concat());
+    let mut packed = GzEncoder::new(Vec::new(), Compression::fast());
+    packed.write_all(&stream).unwrap();
+    let read = read_one(&packed.finish().unwrap()).unwrap();
+    // LUB.
+    assert_eq!(read.splats.means, [[-16.0 / 4096.0, 0.0, 0.0]]);
+    assert_eq!(read.notes.len(), 1);
 }
