@@ -174,6 +174,12 @@ impl RunFolder {
         self.check_links()?;
         finish_what_is_left(&self.0)?;
         let path = self.report();
+        if self.0.is_file() {
+            return Err(RunError::File {
+                path: self.0.clone(),
+                reason: "is a file; name a run folder, as `gs-chroma fit` makes them".to_owned(),
+            });
+        }
         let text = input::read_to_string(&path).map_err(|error| RunError::File {
             path: path.clone(),
             reason: format!("{error}: a run folder has a report; make one with `gs-chroma fit`"),

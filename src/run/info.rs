@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     capture::{Camera, Capture, Headers, LoadOptions, Loader, Normalize, Rejected},
-    splats::read_splats,
+    splats::{is_splat_file, read_splats},
 };
 
 /// What a run folder, a splat file or a COLMAP folder holds, and what is doubtful about the
@@ -20,11 +20,18 @@ use crate::{
 /// # Errors
 /// [`RunError`] when it is none of them or damaged.
 pub fn info(path: &Path, observe: &mut Observer<'_>) -> Result<Value, RunError> {
-    if path.is_file() {
+    if is_splat_file(path)? {
         return splat_info(path, observe);
     }
+    // Without an extension it is meant for a folder.
+    if path.extension().is_some() && !path.exists() {
+        return Err(RunError::File {
+            path: path.to_owned(),
+            reason: "no such file or folder".to_owned(),
+        });
+    }
     let folder = RunFolder::find(Some(path))?;
-    if folder.report().is_file() {
+    if folder.report().exists() {
         let report = folder.parse_report()?;
         if let Err(error) = folder.check_files(&report) {
             observe(Event::Warning(error.to_string()));
@@ -89,6 +96,9 @@ fn splat_info(path: &Path, observe: &mut Observer<'_>) -> Result<Value, RunError
     let read = read_splats(path)?;
     tell_skipped(path, &read, &mut keeping(&warnings, observe));
     let splats = &read.splats;
+    if splats.is_empty() {
+        return Err(RunError::NoSplats(path.to_owned()));
+    }
     let bound = |pick: fn(f32, f32) -> f32, start: f32| -> [f32; 3] {
         std::array::from_fn(|axis| {
             splats

@@ -31,13 +31,15 @@ pub enum SplatError {
     },
     /// The file's name is that of a format that is not read.
     #[error(
-        "{}: {format} files are not read; convert it to .ply, for example with splat-transform (those read are {})", path.display(), Format::list(Format::is_read)
+        "{}: {format} files are not read; {remedy} (those read are {})", path.display(), Format::list(Format::is_read)
     )]
     OtherFormat {
         /// File at fault.
         path: PathBuf,
         /// Extension of the file.
         format: String,
+        /// A way to one that is read.
+        remedy: &'static str,
     },
     /// A file is not what its format says.
     #[error("{}: {field}: {reason}", path.display())]

@@ -140,6 +140,80 @@ fn every_command_reads_them() {
 }
 
 #[test]
+fn files_of_others_are_named_with_a_remedy() {
+    let place = Place::new();
+    for name in [
+        "a.rad",
+        "a.lcc",
+        "lod-meta.json",
+        "a.las",
+        "a.ckpt",
+        "a.what",
+        "plain",
+    ] {
+        place.write(name, b"RAD0 of others");
+    }
+    place.write("empty.splat", b"");
+    let header = "ply\nformat ascii 1.0\nelement vertex 0\nend_header\n";
+    let floats = [
+        "x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2", "opacity", "scale_0", "scale_1",
+    ];
+    let floats = floats
+        .into_iter()
+        .chain(["scale_2", "rot_0", "rot_1", "rot_2", "rot_3"]);
+    let floats: String = floats
+        .map(|name| format!("property float {name}\n"))
+        .collect();
+    place.write(
+        "empty.ply",
+        header.replace("end_", &format!("{floats}end_")).as_bytes(),
+    );
+    place.write("named-otherwise", place_with_scattered().read("scene.ply"));
+    for (name, words) in [
+        ("a.rad", ".rad files are not read; convert it to .ply"),
+        ("a.lcc", ".lcc files are not read; convert it to .ply"),
+        (
+            "lod-meta.json",
+            ".json files are not read; convert it to .ply",
+        ),
+        ("a.las", "a point cloud or mesh has no Gaussians"),
+        ("a.ckpt", "with the program that trained it"),
+        ("a.what", ".what files are not read; convert it to .ply"),
+        ("plain", "such files are not read; convert it to .ply"),
+        ("nowhere.ply", "No such file"),
+        ("nowhere.usdz", "convert it to .ply"),
+        ("empty.splat", "holds no Gaussians"),
+        ("empty.ply", "holds no Gaussians"),
+    ] {
+        for arguments in [&["info", name][..], &["export", name, "-o", "out.ply"]] {
+            let done = place.run(arguments);
+            assert_eq!(done.code, Some(1), "{arguments:?}: {}", done.stderr);
+            let line = done.stderr.lines().last().unwrap_or_default();
+            assert!(
+                line.contains(name) && line.contains(words),
+                "{arguments:?}: {line}"
+            );
+        }
+    }
+    assert!(
+        place
+            .run(&["info", "nowhere.xyzw"])
+            .stderr
+            .contains("no such file")
+    );
+    assert!(
+        place
+            .run(&["eval", "named-otherwise"])
+            .stderr
+            .contains("is a file")
+    );
+    assert_eq!(
+        place.json(&["info", "named-otherwise", "--json"])["splats"],
+        600
+    );
+}
+
+#[test]
 fn names_that_tell_no_format_are_refused() {
     let place = place_with_run();
     for (arguments, words) in [

@@ -52,10 +52,11 @@ fn pipes_and_devices_are_no_input() {
     let colorize = ["colorize", "runs/scene", "--teacher", &network];
     let fit = ["plan", "scene"];
     let render = ["render", "runs/scene", "-o", "pictures"];
-    let cases: [(&str, &[&str]); 5] = [
+    let cases: [(&str, &[&str]); 6] = [
         ("scene/images/03.png", &fit),
         ("scene/sparse/0/cameras.bin", &fit),
         ("runs/scene/report.json", &render),
+        ("runs/scene/report.json", &["info", "runs/scene"]),
         ("runs/scene/luma.ply", &colorize),
         ("runs/scene/color.ply", &render),
     ];

@@ -152,7 +152,7 @@ pub(super) const CASES: &[Case] = &[
         "no splat file",
         nothing,
         "info onnx/truncated.onnx",
-        &["truncated.onnx", "not a readable PLY header"],
+        &["truncated.onnx", ".onnx files are not read; convert it to .ply"],
     ),
     case(
         "colorize without cameras",
