@@ -152,7 +152,10 @@ pub(super) const CASES: &[Case] = &[
         "no splat file",
         nothing,
         "info onnx/truncated.onnx",
-        &["truncated.onnx", ".onnx files are not read; convert it to .ply"],
+        &[
+            "truncated.onnx",
+            ".onnx files are not read; convert it to .ply",
+        ],
     ),
     case(
         "colorize without cameras",
