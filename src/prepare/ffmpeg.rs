@@ -406,7 +406,7 @@ and another"#;
             container: "matroska".to_owned(),
             zero: -0.5,
             late: 0.0,
-            looks: Looks::default(),
+            looks: Looks::of(&Value::Null),
             square: false,
             deep: true,
         };

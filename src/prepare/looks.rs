@@ -17,7 +17,7 @@ const SPHERE: &str = "EQUIRECTANGULAR";
 const USUAL: &str = "SIMPLE_RADIAL";
 
 /// What a stream's tags say; what is not tagged passes for what is usual.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Looks {
     transfer: String,
     /// Whether its primaries are those of wide gamut.
