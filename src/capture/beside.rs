@@ -4,7 +4,12 @@ use std::io::{self, SeekFrom};
 
 use flate2::Crc;
 use image::{ImageDecoder, metadata::Orientation};
-use tiff::{encoder::TiffEncoder, tags::ByteOrder, tags::Tag, tags::Type, tags::ValueBuffer};
+use tiff::{
+    TiffResult,
+    decoder::IfdDecoder,
+    encoder::TiffEncoder,
+    tags::{ByteOrder, Tag, Type, ValueBuffer},
+};
 
 use super::sample::Bytes;
 use super::tiff::Decoder;
@@ -64,7 +69,11 @@ impl Beside {
 
     /// What a TIFF file holds.
     pub fn of_tiff(decoder: &mut Decoder) -> Self {
-        let profile = decoder.get_tag_u8_vec(Tag::IccProfile).ok();
+        let profile = match value(decoder.image_ifd(), Tag::IccProfile) {
+            Ok(found) => found.map(|value| value.as_bytes().to_vec()),
+            // There is one, and it cannot be heeded.
+            Err(_) => Some(Vec::new()),
+        };
         Self {
             exif: exif_of_tiff(decoder),
             profile,
@@ -128,6 +137,14 @@ pub(super) fn exif_at_the_end(bytes: &mut dyn Bytes) -> io::Result<Option<Vec<u8
     Ok(found())
 }
 
+/// The value of a tag, in this machine's byte order.
+fn value(mut directory: IfdDecoder<'_>, tag: Tag) -> TiffResult<Option<ValueBuffer>> {
+    let mut value = ValueBuffer::empty(Type::BYTE);
+    let found = directory.find_tag_buf(tag, &mut value)?;
+    value.set_byte_order(ByteOrder::native());
+    Ok(found.map(|_| value))
+}
+
 /// An EXIF block with what a TIFF file tells.
 fn exif_of_tiff(decoder: &mut Decoder) -> Option<Vec<u8>> {
     let mut file = io::Cursor::new(Vec::new());
@@ -141,10 +158,8 @@ fn exif_of_tiff(decoder: &mut Decoder) -> Option<Vec<u8>> {
         let mut told = encoder.extra_directory().ok()?;
         let tags = directory.iter().map(|(tag, _)| tag);
         for tag in tags.filter(|tag| !LEADING_AWAY.contains(&tag.to_u16())) {
-            let mut value = ValueBuffer::empty(Type::BYTE);
-            let mut known = decoder.read_directory_tags(&directory);
-            if let Ok(Some(_)) = known.find_tag_buf(tag, &mut value) {
-                value.set_byte_order(ByteOrder::native());
+            let known = decoder.read_directory_tags(&directory);
+            if let Ok(Some(value)) = value(known, tag) {
                 told.write_tag_buf(tag, &value).ok()?;
             }
         }
@@ -153,9 +168,7 @@ fn exif_of_tiff(decoder: &mut Decoder) -> Option<Vec<u8>> {
     let mut told = encoder.image_directory().ok()?;
     let mut any = !parts.is_empty();
     for tag in TOLD.map(Tag::from_u16_exhaustive) {
-        let mut value = ValueBuffer::empty(Type::BYTE);
-        if let Ok(Some(_)) = decoder.image_ifd().find_tag_buf(tag, &mut value) {
-            value.set_byte_order(ByteOrder::native());
+        if let Ok(Some(value)) = value(decoder.image_ifd(), tag) {
             told.write_tag_buf(tag, &value).ok()?;
             any = true;
         }
@@ -220,16 +233,16 @@ mod tests {
             .unwrap();
         let told = told.finish_with_offsets().unwrap().offset;
         let mut picture = encoder
-            .new_image::<tiff::encoder::colortype::Gray8>(2, 1)
+            .new_image::<tiff::encoder::colortype::Gray8>(9, 7)
             .unwrap();
         let tags = picture.encoder();
         tags.write_tag(Tag::Make, "Maker").unwrap();
         tags.write_tag(Tag::Orientation, 6_u16).unwrap();
         tags.write_tag(Tag::ExifDirectory, told).unwrap();
-        picture.write_data(&[1, 2]).unwrap();
+        picture.write_data(&[1; 63]).unwrap();
         file.set_position(0);
         let (header, mut decoder) = super::super::tiff::open(Box::new(file)).unwrap();
-        assert_eq!(header.orientation.size(header.size), [1, 2]);
+        assert_eq!(header.orientation.size(header.size), [7, 9]);
         let exif = Beside::of_tiff(&mut decoder)
             .exif
             .and_then(for_upright)

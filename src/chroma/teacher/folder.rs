@@ -313,7 +313,7 @@ mod tests {
             teacher.colorize(name, photo(8, 8)).unwrap();
         }
         let doubts = teacher.doubts();
-        assert!(doubts[0].contains("2 images") && doubts[0].contains("half.png 50 %"));
+        assert!(doubts[0].contains("(half.png 50 %) are gray in large part"));
         assert!(doubts[1].contains("(clear.png 25 %) are transparent in part"));
         assert_eq!(doubts.len(), 2, "{doubts:?}");
     }
