@@ -57,7 +57,7 @@ const FILES: &str = " 3gp 7z asf avi avif bmp bz2 csv divx dng dpx dv exr flac f
     npy npz obj ogg ogv onnx pdf pgm ply png pnm ppm psd rar sog splat spz svg tar tga tgz tif \
     tiff toml ts txt usda usdz vob wav webm webp wmv xz y4m zip zst ";
 
-/// A folder to write, which may be there; not what is named like a file.
+/// A folder to write, which may be there; a new one is not named like a file.
 pub(super) fn folder() -> impl TypedValueParser<Value = PathBuf> {
     PathBufValueParser::new().try_map(|path| match is_named_like_a_file(&path) {
         true => Err("named like a file: name a folder"),
@@ -81,7 +81,7 @@ fn is_named_like_a_file(path: &Path) -> bool {
     FILES
         .split(' ')
         .any(|known| !known.is_empty() && known == extension)
-        && !path.is_dir()
+        && !path.exists()
 }
 
 /// A finite number above 0.

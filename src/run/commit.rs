@@ -120,7 +120,15 @@ pub(super) struct Left {
 pub(super) fn left(folder: &Path) -> Result<Option<Left>, RunError> {
     let complete = folder.join(COMPLETE);
     let there = match complete.symlink_metadata() {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+        // Of a run that is no folder the report says it.
+        Err(error)
+            if matches!(
+                error.kind(),
+                io::ErrorKind::NotFound | io::ErrorKind::NotADirectory
+            ) =>
+        {
+            return Ok(None);
+        }
         there => there.map_err(files::at(&complete))?,
     };
     let refused = |what: &str| RunError::File {

@@ -202,7 +202,7 @@ fn what_it_cannot_do_it_says() {
     place.succeed(&["colorize", "--teacher", &onnx("ddcolor_tiny.onnx")]);
     let done = place.run(&["frames", "-o", "scene/images"]);
     assert_eq!(done.code, Some(1));
-    assert!(done.stderr.contains("photos themselves"), "{}", done.stderr);
+    assert!(done.stderr.contains("did not write"), "{}", done.stderr);
     for (output, word) in [
         ("out.avi", ".mp4, .mov, .m4v or .mkv"),
         ("out.zip", "name a folder"),

@@ -248,7 +248,7 @@ fn the_guides_manifest_is_taken() {
     let guide = fs::read_to_string(guide).expect("the guide");
     let (_, manifest) = guide.split_once("```toml\n").expect("a manifest");
     let (manifest, _) = manifest.split_once("```").expect("its end");
-    let network = fs::read(onnx("siggraph17_tiny.onnx")).expect("a fixture");
+    let network = fs::read(onnx("unit_tiny.onnx")).expect("a fixture");
     place.write("mine.onnx", network);
     place.write("mine.toml", manifest);
     let chroma = colorize(&place, &["--teacher", "mine.onnx"]);
