@@ -88,7 +88,7 @@ impl FolderTeacher {
             self.images.doubt(path, Some(transparent), doubt.to_owned());
         }
         // Whole ones are told of elsewhere.
-        if gray >= GRAY && gray < 1.0 {
+        if (GRAY..1.0).contains(&gray) {
             let doubt = "are gray in large part, and what they show there becomes gray: where only a part is colored, give them as --hints";
             self.images.doubt(path, Some(gray), doubt.to_owned());
         }

@@ -53,7 +53,7 @@ pub struct Teacher {
 
 enum Source {
     Network(Box<NetworkTeacher>),
-    Folder(FolderTeacher),
+    Folder(Box<FolderTeacher>),
 }
 
 /// How a teacher is to be asked.
@@ -135,7 +135,7 @@ impl Teacher {
             .extension()
             .is_some_and(|e| e.eq_ignore_ascii_case("onnx"));
         let source = if metadata.is_dir() {
-            Source::Folder(FolderTeacher::open(path)?)
+            Source::Folder(Box::new(FolderTeacher::open(path)?))
         } else if is_onnx {
             Source::Network(Box::new(NetworkTeacher::open(
                 path, cache_dir, settings, &catalog,
