@@ -202,7 +202,7 @@ fn draft_suffix(path: &Path) -> String {
     format!("-{}", &name[..end])
 }
 
-/// Whether a file of this name is or was a draft of `path`, or without one of any file.
+/// True if the name is that of a draft of `path`, or, without a path, of any file.
 pub(crate) fn is_draft(name: &str, path: Option<&Path>) -> bool {
     let Some((random, suffix)) = name
         .strip_prefix(DRAFT)

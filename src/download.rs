@@ -304,7 +304,7 @@ fn transfer(
     }
 }
 
-/// Whether enough has come since a transfer was judged, where that is long ago.
+/// True unless a transfer has brought fewer than [`LEAST`] bytes in [`JUDGED`] or longer.
 fn keeps_pace(judged: &mut (Instant, u64), now: Instant, bytes: u64) -> bool {
     let (since, before) = *judged;
     if now.duration_since(since) < JUDGED {

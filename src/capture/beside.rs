@@ -17,27 +17,27 @@ use super::tiff::Decoder;
 /// The most EXIF that is read, in bytes: what a JPEG file has room for.
 const LARGEST_EXIF: usize = 1 << 16;
 
-/// What a TIFF file tells of a photo: its texts, who took it with what and when.
+/// TIFF tags that describe a photo: description, make, model, software, date, artist, copyright.
 const TOLD: [u16; 7] = [270, 271, 272, 305, 306, 315, 33_432];
 
 /// Tags that lead elsewhere in the file: a maker's own notes, and what they can be used for.
 const LEADING_AWAY: [u16; 2] = [37_500, 40_965];
 
-/// What a file holds beside its pixels.
+/// Metadata of an image file: EXIF and color space.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Beside {
     /// EXIF from its TIFF header on.
     pub exif: Option<Vec<u8>>,
     /// An ICC profile.
     pub profile: Option<Vec<u8>>,
-    /// Of a PNG file the code points of its primaries and of its transfer function (ITU-T H.273).
+    /// Code points of a PNG file's primaries and transfer function (ITU-T H.273).
     pub code_points: Option<[u8; 2]>,
-    /// Of a PNG file whose colors nothing else explains, its gamma.
+    /// Gamma of a PNG file that has neither an ICC profile nor an sRGB chunk.
     pub gamma: Option<f32>,
 }
 
 impl Beside {
-    /// What the header of a PNG file holds, and what is read of it at its end.
+    /// Metadata of a PNG file, from its header; EXIF also from the end of the file.
     pub fn of_png(info: &png::Info<'_>, exif_at_the_end: Option<Vec<u8>>) -> Self {
         let exif = info.exif_metadata.as_deref().map(without_prefix);
         let points = info.coding_independent_code_points;
@@ -53,7 +53,7 @@ impl Beside {
         }
     }
 
-    /// What a JPEG file holds, of colors only where they are `wanted`.
+    /// Metadata of a JPEG file, with its ICC profile only if `wanted`.
     pub fn of_jpeg(decoder: &mut impl ImageDecoder, wanted: bool) -> Self {
         let profile = if wanted {
             decoder.icc_profile()
@@ -67,7 +67,7 @@ impl Beside {
         }
     }
 
-    /// What a TIFF file holds.
+    /// Metadata of a TIFF file.
     pub fn of_tiff(decoder: &mut Decoder) -> Self {
         let profile = match value(decoder.image_ifd(), Tag::IccProfile) {
             Ok(found) => found.map(|value| value.as_bytes().to_vec()),

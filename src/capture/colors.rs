@@ -79,7 +79,7 @@ fn by_code_points(primaries: u8, transfer: u8) -> Option<ColorProfile> {
     profile.red_trc.is_some().then_some(profile)
 }
 
-/// What a profile calls itself.
+/// Description of an ICC profile.
 fn name(profile: &ColorProfile) -> Option<String> {
     Some(match profile.description.as_ref()? {
         ProfileText::PlainString(name) => name.clone(),
@@ -88,7 +88,7 @@ fn name(profile: &ColorProfile) -> Option<String> {
     })
 }
 
-/// Whether it changes next to nothing.
+/// True if the profile changes no channel by more than 1.5 levels of 255.
 fn is_srgb(transform: &TransformF32Executor, layout: Layout) -> bool {
     let levels = [0.0, 0.25, 0.5, 0.75, 1.0];
     let colors: Vec<f32> = (0..125)

@@ -17,7 +17,7 @@ use super::{
 /// What is worth telling while a dataset is opened.
 #[derive(Clone, Copy, Debug)]
 pub enum Notice<'a> {
-    /// What is doubtful about the model's files.
+    /// A warning about the model's files.
     Doubt(&'a str),
     /// A view or points that are not used.
     LeftOut(&'a Rejected),

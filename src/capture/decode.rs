@@ -119,7 +119,7 @@ pub(crate) struct Painting {
     pub image: DynamicImage,
     /// How it stands upright.
     pub orientation: Orientation,
-    /// What its file says of its colors where that cannot be heeded: they are taken for sRGB.
+    /// Color space of the file if it is not supported; the colors are then taken for sRGB.
     pub unheeded: Option<String>,
 }
 

@@ -61,7 +61,7 @@ pub enum CaptureError {
         /// A file that is not.
         missing: String,
     },
-    /// Of the files of rigs and frames one is there.
+    /// Only one of the two files `rigs` and `frames` is there.
     #[error(
         "{path}: there is no {missing} beside it; COLMAP writes both: export the model again, or remove this file if the poses of images are right"
     )]

@@ -44,7 +44,7 @@ pub struct Loader {
     with_alpha: BTreeSet<String>,
     /// Of those loaded, the ones that are transparent anywhere.
     transparent: Mutex<BTreeSet<String>>,
-    /// Whether COLMAP saw any photo turned by its EXIF orientation.
+    /// True if COLMAP saw any photo rotated by its EXIF orientation.
     turned: AtomicBool,
 }
 

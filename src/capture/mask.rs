@@ -131,9 +131,9 @@ const FEW: usize = 20;
 const ANOTHER_COLOR: f32 = 0.1;
 const DARK: u8 = 64;
 
-/// Reads the mask of a photo that COLMAP saw with `size` pixels and that has this stance: what
-/// each pixel counts, `[height, width]`. Of a color mask the lightest channel counts, alpha never.
-/// Where there is but one value beside 0, and that is small or of a palette, it counts fully.
+/// Reads the mask of a photo that COLMAP saw with `size` pixels and that has this stance: weights
+/// from 0 to 255, `[height, width]`, the largest color channel of each pixel, never its alpha.
+/// A single nonzero value that is small or a palette color becomes 255.
 ///
 /// # Errors
 /// If the file cannot be read or decoded, is not of 8 bits, has another shape, or if its values

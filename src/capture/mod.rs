@@ -210,7 +210,7 @@ pub struct Capture {
     /// Photos without a usable pose or camera and those that were not to be used, sorted by
     /// name, and one entry for all points without a usable position.
     pub rejected: Vec<Rejected>,
-    /// What is doubtful about the model's files, in words.
+    /// Warnings about the model's files, a line each.
     pub doubts: Vec<String>,
     /// The farthest that a camera's lens displaces a pixel from where its pinhole
     /// would show it, over all cameras that a photo has, in pixels at working size; whether that is

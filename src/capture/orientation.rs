@@ -25,7 +25,7 @@ impl Orientation {
         known.map_or_else(Self::default, Self)
     }
 
-    /// Whether pixels stay where they are.
+    /// True for the identity, which moves no pixel.
     pub fn is_none(self) -> bool {
         self == Self::default()
     }
@@ -58,7 +58,7 @@ impl Orientation {
         }
     }
 
-    /// What undoes it.
+    /// Inverse orientation.
     pub fn inverse(self) -> Self {
         Self(match self.0 {
             Exif::Rotate90 => Exif::Rotate270,

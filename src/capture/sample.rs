@@ -49,7 +49,7 @@ pub(super) struct Header {
     pub depth: Depth,
     /// 1 gray, 2 gray and alpha, 3 RGB, 4 RGB and alpha.
     pub channels: usize,
-    /// Whether pixels are places in a palette, of which the colors are read.
+    /// True if the file stores palette indices; the palette's colors are read.
     pub indexed: bool,
     /// How it stands upright.
     pub orientation: Orientation,

@@ -20,7 +20,7 @@ use crate::{
 const INTERRUPTED: i32 = 130;
 const TERMINATED: i32 = 143;
 
-/// Whether the signal was SIGTERM.
+/// True if the signal was SIGTERM.
 static TOLD_TO_END: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
 
 /// What a signal interrupts, where it does not end the program.

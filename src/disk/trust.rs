@@ -9,8 +9,7 @@ use std::{
     sync::{Mutex, MutexGuard, PoisonError},
 };
 
-/// Whether a name that was read from a file is that of an entry of one folder: no path, no
-/// parent, no drive.
+/// True if a name read from a file is that of a folder entry: no path, no parent, no drive.
 pub(crate) fn is_entry(name: &str) -> bool {
     let mut parts = Path::new(name).components();
     let normal = matches!(parts.next(), Some(Component::Normal(part)) if part == name);
@@ -60,8 +59,8 @@ pub(crate) fn check_inside(folder: &Path, path: &Path) -> io::Result<()> {
     }
 }
 
-/// What identifies a file whatever its path: device and number, or, where the system has none,
-/// its resolved path.
+/// Identity of a file regardless of its path: device and inode numbers, or, where the system has
+/// none, its resolved path.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct FileId(#[cfg(unix)] [u64; 2], #[cfg(not(unix))] std::path::PathBuf);
 

@@ -277,7 +277,7 @@ fn options(said: &str) -> BTreeSet<String> {
         .collect()
 }
 
-/// Whether the program has a camera model of this name.
+/// True if the program has a camera model of this name.
 fn knows(lens: &str) -> Result<bool, PrepareError> {
     if MODELS[..KNOWN_TO_ALL]
         .iter()

@@ -139,7 +139,7 @@ impl Source {
         Ok(source)
     }
 
-    /// What `ffprobe` says of packets or frames: their time stamps, in seconds.
+    /// Time stamps of packets or frames by `ffprobe`, in seconds.
     ///
     /// # Errors
     /// [`ProgramError`].
@@ -154,7 +154,7 @@ impl Source {
         Ok(stamps(&said))
     }
 
-    /// Whether seeking leads to any picture.
+    /// True if seeking can reach any frame.
     fn is_indexed(&self) -> bool {
         INDEXED.contains(&&*self.container)
     }

@@ -16,19 +16,19 @@ const ODD: [&str; 5] = ["linear", "log", "log100", "log316", "smpte428"];
 const SPHERE: &str = "EQUIRECTANGULAR";
 const USUAL: &str = "SIMPLE_RADIAL";
 
-/// What a stream's tags say; what is not tagged passes for what is usual.
+/// Color and projection by a stream's tags; missing tags stand for the usual values.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Looks {
     transfer: String,
-    /// Whether its primaries are those of wide gamut.
+    /// True if its primaries are wide-gamut (BT.2020).
     wide: bool,
-    /// Whether it tells its primaries and its matrix.
+    /// True if it has tags for both its primaries and its matrix.
     told: bool,
     projection: Option<String>,
 }
 
 impl Looks {
-    /// Of a stream, as `ffprobe` describes it.
+    /// Reads the tags of a stream, as `ffprobe` describes it.
     pub fn of(stream: &Value) -> Self {
         let tag = |name: &str| stream[name].as_str().unwrap_or("unknown");
         let mut beside = stream["side_data_list"].as_array().into_iter().flatten();

@@ -22,12 +22,12 @@ pub(super) const PINNED: &str = "pycolmap==4.2.1";
 /// The same, and all that it needs, with the SHA-256 of each wheel.
 const REQUIREMENTS: &str = include_str!("pycolmap.txt");
 
-/// What is wrong where Python makes no environment, or has no wheel.
+/// Reasons given if Python cannot make an environment, or if there is no wheel for it.
 const NO_PIP: &str = "it has no venv module with pip; install it (Debian, Ubuntu: apt-get install python3-venv), or COLMAP";
 const NO_WHEEL: &str = "pycolmap is pinned for Python 3.10 to 3.14 on Linux (x86-64), macOS 14 (Apple silicon) and Windows (x86-64), not for this one; install COLMAP";
 
-/// What says which version there is; it fails for those before 3.13, whose functions are called
-/// otherwise, and where the camera model of this name is not known.
+/// Python code that prints the version; it fails before 3.13, whose functions have other names,
+/// and if the camera model of this name is not known.
 const VERSION: &str = "import pycolmap, sys
 pycolmap.SequentialPairingOptions, pycolmap.CameraModelId.__members__[sys.argv[1]]
 print('pycolmap', pycolmap.__version__)";

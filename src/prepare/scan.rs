@@ -1,7 +1,7 @@
 //! Interlaced and telecined films: how they are told, and made progressive.
 
-/// Of the frames of which more than one in so many repeats a field, film of 24 frames was made
-/// video of 30: two of five frames do.
+/// Share of frames with a repeated field above which 30 fps video is telecined 24 fps film; 3:2
+/// pulldown repeats a field in two of five frames.
 const REPEATED: f64 = 0.2;
 
 /// Video of 30 (29.97) frames a second, which film of 24 may have become.
@@ -37,7 +37,7 @@ impl Scan {
     }
 }
 
-/// What FFmpeg's `idet` says.
+/// Scan type by the output of FFmpeg's `idet`; `rate` in frames per second.
 pub(super) fn scan(said: &str, rate: f64) -> Scan {
     let counts = |title: &str, names: [&str; 3]| -> [f64; 3] {
         let line = said.lines().rev().find(|line| line.contains(title));

@@ -48,18 +48,18 @@ struct Record {
     steps: BTreeMap<Step, Done>,
     /// The shots of the whole film, in seconds, and what they were found in.
     shots: Option<(String, Vec<[f64; 2]>)>,
-    /// Whether the last time ended with an error, not by an interrupt.
+    /// True if the last run ended with an error, not by an interrupt.
     #[serde(default)]
     failed: bool,
 }
 
 impl Record {
-    /// Whether there are poses, or there may be if it goes on.
+    /// True if there are poses, or may be once it goes on.
     fn has_worth(&self) -> bool {
         !self.failed || self.steps.contains_key(&Step::Poses)
     }
 
-    /// What of it cannot be, if anything.
+    /// Refuses results that no step makes.
     fn check(self) -> Result<Self, String> {
         let mut names = self.steps.values().flat_map(|done| done.results.keys());
         match names.find(|name| !RESULTS.contains(&name.as_str())) {
@@ -333,7 +333,7 @@ impl State {
     }
 }
 
-/// Whether a result is there itself, and no link to something else.
+/// True if a result exists and is no symbolic link.
 fn is_there(path: &Path) -> bool {
     path.exists() && !path.is_symlink()
 }

@@ -103,7 +103,7 @@ fn marked(mut png: Vec<u8>) -> Vec<u8> {
     png
 }
 
-/// Whether this program made a picture.
+/// True if this program made the picture.
 fn is_ours(path: &Path) -> bool {
     let mut begin = [0; PNG_HEADER + 4 + MADE_HERE.len()];
     let read = input::open(path).and_then(|mut file| file.read_exact(&mut begin));

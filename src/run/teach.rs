@@ -429,9 +429,9 @@ fn is_partial(teacher: &Teacher, dataset: &Dataset) -> Result<bool, RunError> {
     Ok(false)
 }
 
-/// What to say of a folder whose images are gray: they would make gray what they show; and of a
-/// network that tells nothing apart. Where the
-/// photos themselves are the teacher and all are gray, there is nothing to color by.
+/// A warning about a folder whose images are gray, which would make the scene gray, or about a
+/// network that gives each photo a single color. An error if the photos themselves are the
+/// teacher and all are gray.
 fn gray_images(
     member: &Member,
     [answered, in_gray]: [usize; 2],
@@ -465,7 +465,7 @@ fn is_gray(answer: &AbImage) -> bool {
     answer.ab.iter().all(gray)
 }
 
-/// Whether a picture has one color, gray or another.
+/// True if a picture has a single color, gray or another.
 fn is_plain(answer: &AbImage) -> bool {
     let first = answer.ab.first().copied().unwrap_or_default();
     let near = |ab: &[f32; 2]| (0..2).all(|c| (ab[c] - first[c]).abs() < GRAY);

@@ -5,7 +5,7 @@ use glam::{DMat3, DQuat, DVec3};
 
 use super::{Splats, sh};
 
-/// Of each new axis the old one and the sign of its numbers.
+/// Old axis and sign of each new axis.
 pub(super) type Turn = [(usize, f32); 3];
 
 /// To y up: half a turn about z. splat-transform turns a `.ply` by the same for glTF.
@@ -78,7 +78,7 @@ mod tests {
     use super::*;
     use crate::splats::fixtures::scattered;
 
-    /// What a Gaussian shows in a direction, and its covariance.
+    /// Color of a Gaussian in a direction, and its covariance.
     fn shown(splats: &Splats, direction: DVec3) -> (f64, DMat3) {
         let basis = sh::basis(3, direction.to_array());
         let coefficients = splats.sh.of(0).iter().step_by(3);

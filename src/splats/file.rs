@@ -42,9 +42,9 @@ pub struct ReadSplats {
     /// Whether the file says that the Gaussians were trained antialiased
     /// ([`ANTIALIASED`](ply::ANTIALIASED), or Postshot's `antialiased 1`, in a `.ply`).
     pub antialiased: bool,
-    /// What was done to the numbers on reading, in words.
+    /// Conversions applied on reading, a line each.
     pub notes: Vec<String>,
-    /// What the file says and is not read, in words.
+    /// Warnings about content of the file that is not read, a line each.
     pub doubts: Vec<String>,
 }
 

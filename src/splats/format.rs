@@ -130,8 +130,7 @@ impl Format {
     }
 }
 
-/// Whether a path is that of a splat file that can be read: named like one, or a `.ply` of
-/// another name.
+/// True if a path is that of a readable splat file: named like one, or a `.ply` of another name.
 ///
 /// # Errors
 /// [`SplatError::OtherFormat`] where it is named like one that cannot, or is another file.

@@ -27,7 +27,7 @@ pub(super) struct Model {
     /// Points in the order of the file; their positions may be anything. The views
     /// of their tracks are indices into `images`.
     pub points: Vec<Point>,
-    /// What is doubtful about it, in words.
+    /// Warnings about the model's files, a line each.
     pub doubts: Vec<String>,
     /// The cameras file, for errors.
     pub cameras_path: PathBuf,

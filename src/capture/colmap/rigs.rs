@@ -11,7 +11,7 @@ use crate::capture::error::CaptureError;
 /// Poses that differ by less are one: radians, and shares of the longest translation.
 const SAME: f64 = 1e-9;
 
-/// What rounding to six digits explains, in the same units.
+/// Largest difference that rounding to six digits causes, in the same units.
 const ROUNDED: f64 = 1e-5;
 
 /// A file of records, binary or text.
@@ -20,7 +20,7 @@ pub(super) trait Source {
     fn next(&mut self) -> Result<bool, CaptureError>;
     /// An integer, of so many bytes in a binary file.
     fn integer(&mut self, bytes: usize, field: &str) -> Result<u64, CaptureError>;
-    /// Whether a sensor is a camera: others are of no use here.
+    /// Reads a sensor's type; true if it is a camera. Other sensors are ignored.
     fn is_camera(&mut self) -> Result<bool, CaptureError>;
     fn float(&mut self, field: &str) -> Result<f64, CaptureError>;
     fn wrong(&self, reason: String) -> CaptureError;
@@ -46,10 +46,10 @@ pub(super) trait Source {
 /// A rotation, of about unit length, and a translation.
 type Pose = (DQuat, DVec3);
 
-/// Of each rig by its id, of each camera by its id: its pose in the rig, where it is known.
+/// Camera poses relative to the rig, by rig id and camera id; `None` if unknown.
 type Rigs = HashMap<u32, HashMap<u32, Option<Pose>>>;
 
-/// Of each image by its id: its pose in the world, where it is known.
+/// World-to-camera poses by image id; `None` if unknown.
 pub(super) type Poses = HashMap<u32, Option<Pose>>;
 
 /// `RIG_ID`, the number of sensors, the first one (kind and id), which is the rig's origin, and of

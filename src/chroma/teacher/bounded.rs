@@ -17,14 +17,14 @@ const GRACE: Duration = Duration::from_secs(2);
 /// largest that are known take 4 GiB.
 const ROOM: u64 = 8 << 20;
 
-/// What the main thread has: networks are trees of any depth.
+/// Stack size in bytes, that of the main thread: networks are trees of any depth.
 const STACK: usize = 8 << 20;
 
 /// Does `work` on a thread of its own; `stop` tells it to end before it has. What does not end
 /// even then is left behind, with all that it has.
 ///
 /// # Errors
-/// What it took too much of, and what to do; with the result that came all the same.
+/// The limit exceeded and the remedy, with the result if it still came.
 pub(super) fn bounded<T: Send + 'static>(
     limit: Duration,
     stop: impl FnOnce(),

@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 pub struct FolderTeacher {
     folder: PathBuf,
     images: NamedImages,
-    /// Whether the images are the photos themselves.
+    /// True if the images are the photos themselves.
     of_photos: bool,
     shown: RefCell<Shown>,
 }
@@ -76,7 +76,7 @@ impl FolderTeacher {
         }
     }
 
-    /// What is doubtful of the images so far, a line each.
+    /// Warnings about the images so far, a line each.
     pub(super) fn doubts(&self) -> Vec<String> {
         let images = self.images.doubts().into_iter();
         images.chain(self.shown.borrow().doubt()).collect()

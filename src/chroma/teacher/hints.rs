@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 /// itself, of which what is as it was says nothing.
 pub struct HintFolder {
     images: NamedImages,
-    /// Where the photos lie, by name, and how they are turned to what COLMAP saw.
+    /// Paths of the photos by name, each with the orientation from its file to what COLMAP saw.
     photos: BTreeMap<String, (PathBuf, Orientation)>,
 }
 
@@ -67,7 +67,7 @@ impl HintFolder {
         self.photos.insert(name.to_owned(), file);
     }
 
-    /// What is doubtful of the images so far, a line each.
+    /// Warnings about the images so far, a line each.
     pub fn doubts(&self) -> Vec<String> {
         self.images.doubts()
     }

@@ -198,7 +198,7 @@ impl Teacher {
         }
     }
 
-    /// What is doubtful of the images that a folder has answered with so far, a line each.
+    /// Warnings about the images that a folder has answered with so far, a line each.
     pub fn doubts(&self) -> Vec<String> {
         match &self.source {
             Source::Network(_) => Vec::new(),
@@ -262,7 +262,7 @@ impl Teacher {
     }
 }
 
-/// What a network says of a photo, which is shown to it upright.
+/// Answer of a network for a photo, which is shown to it upright.
 fn asked(
     network: &mut NetworkTeacher,
     query: Query<'_>,

@@ -25,7 +25,7 @@ const ASPECT_TOLERANCE: f64 = 0.02;
 pub(super) struct NamedImages {
     folder: PathBuf,
     images: NamedFiles,
-    /// What is doubtful of images read so far, and of which.
+    /// Warnings about the images read so far, each with the names of its images.
     doubts: RefCell<BTreeMap<String, BTreeSet<String>>>,
 }
 
@@ -65,7 +65,7 @@ impl NamedImages {
         })
     }
 
-    /// What is doubtful of the images read so far, a line each.
+    /// Warnings about the images read so far, a line each.
     pub fn doubts(&self) -> Vec<String> {
         let line = |(doubt, names): (&String, &BTreeSet<String>)| {
             let listed = listed(names.iter().map(String::as_str));

@@ -34,7 +34,7 @@ pub struct NetworkTeacher {
     size: u32,
     time_limit: Duration,
     cache: Option<Cache>,
-    /// Whether shapes alone say what its numbers mean, and no answer has borne that out yet.
+    /// True while the profile is guessed from tensor shapes and no answer has confirmed it.
     pub(super) supposed: bool,
     /// Why answers are not kept, where they were to be.
     pub(super) unkept: Option<TeacherError>,

@@ -256,8 +256,8 @@ impl Profile {
         (value - (low + high) / 2.0) * (2.0 * AB_LIMIT / (high - low))
     }
 
-    /// Whether a value of the output can be one: a and b that some color has, RGB no farther
-    /// outside of its range than the range is wide.
+    /// True if an output value is plausible: a or b of some color, or RGB at most one range width
+    /// outside of its range.
     pub fn can_be(&self, value: f32) -> bool {
         let [black, white] = self.output_range;
         match self.output {

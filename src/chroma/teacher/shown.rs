@@ -34,7 +34,7 @@ const TOLD: usize = 3;
 pub(super) struct Shown {
     /// Name and gray of each photo.
     photos: Vec<(String, Vec<f32>)>,
-    /// Of each image its name, its photo and its gray.
+    /// Name, index of the photo, and gray of each image.
     images: Vec<(String, usize, Vec<f32>)>,
 }
 
@@ -98,7 +98,7 @@ impl Shown {
     }
 }
 
-/// Whether an image matches a photo better turned in the second way than in the first.
+/// True if an image matches a photo better in the second orientation than in the first.
 pub(super) fn stands(
     image: &DynamicImage,
     photo: GrayImage<'_>,

@@ -58,7 +58,7 @@ pub(super) fn as_image(ramp: &[u8]) -> GrayImage<'_> {
     }
 }
 
-/// Whether an answer for a photo can be CIELAB a and b.
+/// True if an answer for a photo can be CIELAB a and b.
 pub(super) fn is_ab(answer: &AbImage, photo: &GrayImage<'_>) -> bool {
     let gray = lightness(photo, [answer.width, answer.height]);
     let units = answer.ab.iter().flatten().all(is_unit);

@@ -19,7 +19,7 @@ const FOCAL: [f64; 2] = [0.05, 200.0];
 const FEW_LEVELS: usize = 3;
 const EXTREMES: f64 = 5e-4;
 
-/// What is doubtful of a capture; `cameras` are those of its views at working size.
+/// Warnings about a capture, a line each; `cameras` are those of its views at working size.
 pub fn doubts(capture: &Capture, cameras: &[Camera]) -> Vec<String> {
     let mut doubts = Vec::new();
     let count = photos(capture).0.len();
@@ -65,7 +65,7 @@ impl Levels {
         }
     }
 
-    /// What is doubtful of all photos together.
+    /// A warning if all photos together are of one gray.
     pub fn doubt(&self) -> Option<String> {
         let few = (self.0.iter().sum::<usize>() as f64 * EXTREMES) as usize;
         let is_end = |beyond: &mut usize, level: usize| {

@@ -54,7 +54,7 @@ struct Way {
     codec: String,
     /// FFmpeg's filters, if any.
     filters: String,
-    /// What is lost, in words.
+    /// Loss in the sound, for a message; empty if there is none.
     lost: String,
 }
 

@@ -14,7 +14,7 @@ pub(super) struct Painter<'a> {
     pub exposures: Vec<Exposure>,
     pub dataset: &'a Dataset,
     pub teachers: Option<Teachers>,
-    /// What becomes black and white in the pictures of photos of more than 8 bits.
+    /// Values that become black and white in pictures of photos with more than 8 bits.
     pub range: Normalize,
     /// Longer side of the canvas met last, over that of its photo's.
     pub side: Option<f64>,

@@ -6,9 +6,9 @@ use crate::{
     run::{Event, Observer, Stage},
 };
 
-/// What becomes black and white in pictures: the file's own, or, where the scene's photos are
-/// normalized because they use little of it, the least and the greatest value of all, so that
-/// nothing is clipped and nothing flickers. A film's frames stay as they are.
+/// Values that become black and white in pictures: the file's own, or, if the scene's photos are
+/// normalized because they use little of the range, the minimum and maximum over all photos, so
+/// that nothing is clipped and nothing flickers. A film's frames stay as they are.
 pub(super) fn own_range(
     dataset: &Dataset,
     film: Option<&Film>,

@@ -16,7 +16,7 @@ const CARRIED: f64 = 0.9;
 /// Ranges of photos that are named.
 const TOLD_RANGES: usize = 12;
 
-/// Of a photo that is known to less, most of the colors are the teacher's.
+/// Known share of a photo below which most of its colors are the teacher's.
 const LITTLE: f64 = 0.5;
 
 /// A photo whose colors are known.

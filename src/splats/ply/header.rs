@@ -32,7 +32,7 @@ pub(super) struct VertexLayout {
     pub columns: Vec<Option<usize>>,
     /// Whether the first three SH are colors of 8 bits.
     pub byte_colors: bool,
-    /// Whether those that are `ushort` are floats of 16 bits.
+    /// True if `ushort` columns hold half-precision floats.
     pub half: bool,
     /// Types of all properties of a vertex, in file order.
     pub types: Vec<ScalarType>,
@@ -200,7 +200,7 @@ impl VertexLayout {
         })
     }
 
-    /// Whether each Gaussian has a filter that widens it.
+    /// True if each Gaussian has a 3D smoothing filter (Mip-Splatting).
     pub fn filtered(&self) -> bool {
         self.columns.len() > CENTER.len() + sh_names(self.degree).count() + SHAPE.len()
     }
