@@ -222,7 +222,7 @@ FILMS = {
     "film-360": ("pano360.mp4", None),
 }
 for _name, (_film, _frames) in FILMS.items():
-    _folder = f"OUT/{_name.replace(':', '').replace(' ', '-')}"
+    _folder = f"OUT/{_name.replace(': .', '-')}"
     _commands = [f"prepare CASES/{_name.split(':')[0]}/{_film} -o {_folder}"]
     if _frames:
         _commands += [
