@@ -3,6 +3,7 @@
 
 use std::{
     collections::HashMap,
+    fs,
     path::{Path, PathBuf},
 };
 
@@ -10,28 +11,36 @@ use serde_json::Value;
 
 use super::{RunFolder, folder::ENTRIES};
 use crate::{
-    capture::{FRAMES, Film, IMAGES, MaskSource, names::visit_files},
+    capture::{FRAMES, Film, IMAGES, MaskSource},
     disk::trust::{FileId, Originals},
     input,
     report::Report,
 };
+
+/// Files and folders that are looked at for one path: a record of somebody else may name the
+/// root of all.
+const MOST: usize = 100_000;
 
 /// Originals of a command, each by its file.
 #[derive(Default)]
 pub(crate) struct Kept(HashMap<FileId, &'static str>);
 
 impl Kept {
-    /// Adds a file, or every file below a folder. What is not there needs no keeping.
+    /// Adds a file, or the files below a folder, at most [`MOST`] in all. Missing paths add
+    /// nothing, nor do folders that cannot be read.
     pub fn with(mut self, path: &Path, kind: &'static str) -> Self {
-        let mut add = |file: &Path| {
-            if let Some(id) = FileId::of(file) {
+        let mut waiting = vec![path.to_owned()];
+        let mut left = MOST;
+        while let (Some(path), 1..) = (waiting.pop(), left) {
+            left -= 1;
+            if path.is_dir() {
+                let entries = fs::read_dir(&path).into_iter().flatten().flatten();
+                // A linked folder may lead in a circle.
+                let entries = entries.map(|entry| entry.path());
+                waiting.extend(entries.filter(|path| !(path.is_symlink() && path.is_dir())));
+            } else if let Some(id) = FileId::of(&path) {
                 self.0.entry(id).or_insert(kind);
             }
-        };
-        match path.is_dir() {
-            // A folder that cannot be read cannot be written over either.
-            true => drop(visit_files(path, &mut |_, file| add(&file))),
-            false => add(path),
         }
         self
     }
