@@ -1,6 +1,6 @@
 //! Answers of a network on disk, so that each photo is colored once.
 
-use super::profile::AB_MOST;
+use super::plausible::AB_MOST;
 use super::{AbImage, GrayImage, TeacherError};
 use crate::{disk, hash::Hasher, input, npy};
 use std::io::{self, Write};

@@ -18,6 +18,7 @@ mod model;
 mod named_images;
 mod network;
 mod places;
+mod plausible;
 mod profile;
 mod query;
 pub(crate) mod runtime;

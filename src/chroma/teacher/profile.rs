@@ -14,9 +14,6 @@ pub(super) const MAX_SIDE: u32 = 8192;
 /// SIGGRAPH17's tanh, which no sRGB color exceeds.
 const AB_LIMIT: f32 = 110.0;
 
-/// Beyond this no CIELAB a or b is: those of monochromatic light stay below 200.
-pub(super) const AB_MOST: f32 = 256.0;
-
 /// The contract of one kind of network, and the fields of a manifest.
 ///
 /// docs/guides/teachers.md explains every field to those who write one.
@@ -254,16 +251,6 @@ impl Profile {
     pub fn ab(&self, value: f32) -> f32 {
         let [low, high] = self.output_range;
         (value - (low + high) / 2.0) * (2.0 * AB_LIMIT / (high - low))
-    }
-
-    /// True if an output value is plausible: a or b of some color, or RGB at most one range width
-    /// outside of its range.
-    pub fn can_be(&self, value: f32) -> bool {
-        let [black, white] = self.output_range;
-        match self.output {
-            OutputKind::Ab => self.ab(value).abs() <= AB_MOST,
-            OutputKind::Rgb => (-1.0..=2.0).contains(&((value - black) / (white - black))),
-        }
     }
 
     /// Encoded sRGB from 0 to 1 of a value of the output.
