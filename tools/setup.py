@@ -1,7 +1,7 @@
 """Installs what gs-chroma needs and this machine lacks.
 
     python3 tools/setup.py             # what the program and its tests need
-    python3 tools/setup.py --viewers   # also what tests splat files in viewers: tools/viewers
+    python3 tools/setup.py --all       # also what `make test-all` needs
 
 On Debian and its kin that may be a C linker, a Vulkan loader and driver, and pip, all by apt; on
 every system the shared library of ONNX Runtime, which goes into the cache folder where gs-chroma
@@ -62,16 +62,17 @@ WHEELS = {
 
 def main() -> None:
     """Installs system packages first: pip may be one of them."""
-    viewers = "--viewers" in sys.argv[1:]
+    everything = "--all" in sys.argv[1:]
     packages = missing_packages()
-    if viewers:
-        packages += missing_viewer_packages()
+    if everything:
+        packages += missing_packages_of_all_tests()
     if packages:
         install_packages(packages)
     if runtime_is_missing():
         install_runtime()
-    if viewers:
+    if everything:
         install_viewers()
+        install_tools_of_all_tests()
 
 
 def missing_packages() -> list[str]:
@@ -90,21 +91,41 @@ def missing_packages() -> list[str]:
     return packages
 
 
-def missing_viewer_packages() -> list[str]:
-    """Debian packages of a browser, of Node and of validators, where they are not there."""
-    packages: list[str] = []
+# Programs that `make test-all` starts, and their Debian packages.
+PROGRAMS = {
+    "ffmpeg": "ffmpeg",
+    "colmap": "colmap",
+    "node": "nodejs",
+    "npm": "npm",
+    "spirv-val": "spirv-tools",
+    "glslangValidator": "glslang-tools",
+    "debootstrap": "debootstrap",
+}
+
+
+def missing_packages_of_all_tests() -> list[str]:
+    """Debian packages of the programs of `make test-all` that are not there."""
+    packages = [package for program, package in PROGRAMS.items() if not shutil.which(program)]
     browsers = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
     if not (os.environ.get("CHROMIUM") or any(map(shutil.which, browsers))):
         packages.append("chromium")
-    if not shutil.which("node"):
-        packages.append("nodejs")
-    if not shutil.which("npm"):
-        packages.append("npm")
-    if not shutil.which("spirv-val"):
-        packages.append("spirv-tools")
-    if not shutil.which("glslangValidator"):
-        packages.append("glslang-tools")
+    if not importlib.util.find_spec("ensurepip"):
+        packages.append("python3-venv")
     return packages
+
+
+def install_tools_of_all_tests() -> None:
+    """Installs OpenUSD for Python and naga into target/test-all, where the Makefile looks."""
+    folder = Path(__file__).parent.parent / "target" / "test-all"
+    python = folder / "bin" / "python"
+    if not python.exists() and not run([sys.executable, "-m", "venv", str(folder)]):
+        say("there is no OpenUSD: venv failed")
+    elif not run([str(python), "-m", "pip", "--quiet", "install", "usd-core==26.11"]):
+        say(f"there is no OpenUSD: pip failed in {folder}")
+    if not shutil.which("naga") and not (folder / "bin" / "naga").exists():
+        cargo = ["cargo", "install", "--quiet", "--locked", "naga-cli@30", "--root", str(folder)]
+        if not run(cargo):
+            say("there is no naga: cargo install naga-cli failed")
 
 
 def install_viewers() -> None:

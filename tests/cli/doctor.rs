@@ -1,8 +1,7 @@
-//! `doctor` as a user meets it; that a broken device fails is in tests/stability.
+//! `doctor` as a user meets it; that a broken device fails is in tests/device/stability.
 
 use super::{hard_cases, program::Place};
 
-/// Its JSON is read in tests/portable.
 #[test]
 fn doctor_says_what_the_device_is_and_that_every_case_holds() {
     let words = Place::new().succeed(&["doctor"]);

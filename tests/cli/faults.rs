@@ -1,5 +1,5 @@
 //! Writes that fail, each in turn: nothing is half-written, one line says so, and the next
-//! command finds everything as it was. With `GS_CHROMA_EVERY_FAULT` set no step is passed over.
+//! command finds everything as it was.
 
 use super::program::{Done, Place, files_below};
 use super::shared::{QUICK_FIT, onnx, place_with_run};
@@ -7,10 +7,19 @@ use super::shared::{QUICK_FIT, onnx, place_with_run};
 /// Successes in a row after which no step is left to fail.
 const ENOUGH: usize = 2;
 
-/// Runs a command with each of its steps of writing failing in turn, alone or with all that
-/// follow. Files in `kept` belong together: all are as they were, or all as a whole command
-/// leaves them. Other files are those of `made`, or none.
-fn every_write_fails_well(arguments: &[&str], kept: &[&str], made: &[&str]) {
+/// Steps that fail.
+#[derive(Clone, Copy, PartialEq)]
+enum Steps {
+    /// Each, alone and with all that follow.
+    Each,
+    /// The first three, then half as many again, with all that follow.
+    Some,
+}
+
+/// Runs a command with its steps of writing failing in turn. Files in `kept` belong together:
+/// all are as they were, or all as a whole command leaves them. Other files are those of `made`,
+/// or none.
+fn writes_fail_well(steps: Steps, arguments: &[&str], kept: &[&str], made: &[&str]) {
     let whole = place_with_run();
     let before: Vec<_> = kept.iter().map(|name| whole.read(name)).collect();
     let files_before = whole.files("");
@@ -18,8 +27,8 @@ fn every_write_fails_well(arguments: &[&str], kept: &[&str], made: &[&str]) {
     let after: Vec<_> = kept.iter().map(|name| whole.read(name)).collect();
     let files_after = whole.files("");
     let made: Vec<_> = made.iter().map(|name| (*name, whole.read(name))).collect();
-    let every = std::env::var_os("GS_CHROMA_EVERY_FAULT").is_some();
-    for lasts in ["", "-"] {
+    let lasting: &[&str] = if steps == Steps::Each { &["", "-"] } else { &["-"] };
+    for lasts in lasting {
         let place = place_with_run();
         let (mut struck, mut in_a_row) = (0, 0);
         let mut step = 1_u64;
@@ -53,8 +62,10 @@ fn every_write_fails_well(arguments: &[&str], kept: &[&str], made: &[&str]) {
             if in_a_row == ENOUGH {
                 break;
             }
-            // The first steps one by one, then half as many again.
-            step += if every { 1 } else { (step / 2).max(1) };
+            step += match steps {
+                Steps::Each => 1,
+                Steps::Some => (step / 2).max(1),
+            };
         }
         assert!(struck > 2, "{arguments:?}: {struck}");
         println!("{arguments:?}: {struck} of {step} steps{lasts} failed");
@@ -68,22 +79,19 @@ fn failing(place: &Place, arguments: &[&str], fault: &str) -> Done {
     Done::of(command.env("GS_CHROMA_TEST_FAULT", fault).output())
 }
 
-#[test]
-fn fit_fails_well() {
-    every_write_fails_well(&QUICK_FIT, &["runs/scene/luma.ply"], &[]);
+fn fit_fails_well(steps: Steps) {
+    writes_fail_well(steps, &QUICK_FIT, &["runs/scene/luma.ply"], &[]);
 }
 
-#[test]
-fn colorize_fails_well() {
+fn colorize_fails_well(steps: Steps) {
     let teacher = onnx("ddcolor_tiny.onnx");
     let colorize = ["colorize", "runs/scene", "--teacher", &teacher];
     let short = ["--rounds", "1", "--sh-degree", "0", "--teacher-size", "32"];
     let kept = ["runs/scene/color.ply", "runs/scene/chroma.npy"];
-    every_write_fails_well(&[&colorize[..], &short].concat(), &kept, &[]);
+    writes_fail_well(steps, &[&colorize[..], &short].concat(), &kept, &[]);
 }
 
-#[test]
-fn what_only_reads_a_run_fails_well() {
+fn render_and_eval_fail_well(steps: Steps) {
     let kept = ["runs/scene/luma.ply", "runs/scene/color.ply"];
     let render = ["render", "runs/scene", "-o", "pictures"];
     let place = place_with_run();
@@ -91,14 +99,33 @@ fn what_only_reads_a_run_fails_well() {
     let pictures = place.files("pictures");
     let pictures: Vec<_> = pictures.iter().map(|n| format!("pictures/{n}")).collect();
     let made: Vec<&str> = pictures.iter().map(String::as_str).collect();
-    every_write_fails_well(&render, &kept, &made);
-    let export = ["export", "runs/scene", "-o", "far/scene.ply"];
-    every_write_fails_well(&export, &kept, &["far/scene.ply"]);
+    writes_fail_well(steps, &render, &kept, &made);
     let eval = ["eval", "runs/scene", "--frames", "3"];
-    every_write_fails_well(&eval, &kept, &[]);
+    writes_fail_well(steps, &eval, &kept, &[]);
+}
+
+#[test]
+fn some_writes_of_a_run_fail_well() {
+    fit_fails_well(Steps::Some);
+    colorize_fails_well(Steps::Some);
+}
+
+#[test]
+#[ignore = "hundreds of trainings: make test-all"]
+fn every_write_of_a_run_fails_well() {
+    fit_fails_well(Steps::Each);
+    colorize_fails_well(Steps::Each);
+    render_and_eval_fail_well(Steps::Each);
+}
+
+#[test]
+fn every_write_of_one_file_fails_well() {
+    let kept = ["runs/scene/luma.ply", "runs/scene/color.ply"];
+    let export = ["export", "runs/scene", "-o", "far/scene.ply"];
+    writes_fail_well(Steps::Each, &export, &kept, &["far/scene.ply"]);
     let network = onnx("ddcolor_tiny.onnx");
     let check = ["teacher", "check", &network, "--manifest", "network.toml"];
-    every_write_fails_well(&check, &kept, &["network.toml"]);
+    writes_fail_well(Steps::Each, &check, &kept, &["network.toml"]);
 }
 
 /// A sweep goes on where its own files could not be written.
@@ -110,7 +137,7 @@ fn a_sweep_fails_well() {
     let knobs = ["--knobs", "coarse", "--budget", "0.2"];
     let sweep = [&sweep[..], &short, &knobs].concat();
     let mut struck = 0;
-    for step in [1, 2, 3, 5, 8, 12] {
+    for step in [1, 3, 8] {
         let done = failing(&place, &sweep, &step.to_string());
         if done.code == Some(1) {
             struck += 1;
@@ -123,6 +150,6 @@ fn a_sweep_fails_well() {
             assert!(kept.is_ok(), "{step}");
         }
     }
-    assert!(struck > 2, "{struck}");
+    assert!(struck > 1, "{struck}");
     place.succeed(&sweep);
 }

@@ -6,6 +6,8 @@ use std::{
     time::{Duration, Instant},
 };
 
+#[cfg(unix)]
+use super::program::{Signal, send};
 use super::shared::{place_with_run, place_with_scene};
 
 #[test]
@@ -64,7 +66,7 @@ fn what_a_dead_process_left_is_finished_or_removed() {
 fn a_program_that_is_told_to_end_leaves_nothing_behind() {
     let place = place_with_run();
     let before = place.files("runs/scene");
-    for signal in ["-INT", "-TERM"] {
+    for (signal, ended) in [(Signal::SIGINT, 130), (Signal::SIGTERM, 143)] {
         let mut command = place.command(&["eval", "runs/scene"]);
         let quiet = command.stdout(Stdio::piped()).stderr(Stdio::piped());
         let mut child = quiet.spawn().expect("the program starts");
@@ -76,11 +78,7 @@ fn a_program_that_is_told_to_end_leaves_nothing_behind() {
             );
             sleep(Duration::from_millis(2));
         }
-        let sent = std::process::Command::new("kill")
-            .args([signal, &child.id().to_string()])
-            .status();
-        assert!(sent.expect("kill").success());
-        let ended = if signal == "-INT" { 130 } else { 143 };
+        send(signal, child.id());
         assert_eq!(child.wait().expect("a child").code(), Some(ended));
         assert_eq!(place.files("runs/scene"), before);
     }

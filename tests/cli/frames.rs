@@ -416,8 +416,8 @@ fn a_stroke_on_what_the_scene_leaves_open_colors_it_there_and_in_the_photos_arou
         "draft",
         "--iterations",
     ];
-    let small = ["150", "--max-side", "162", "--max-splats", "2000"];
-    place.succeed(&[&fit[..], &small].concat());
+    let small = ["80", "--max-side", "162", "--max-splats", "2000"];
+    place.succeed(&[&fit[..], &small, &["--no-fill-gaps"]].concat());
     place.succeed(&["colorize", "run", "--teacher", teacher, "--rounds", "1"]);
     let name = |photo: usize| format!("garden_{photo:02}");
     let [left, top, side] = [60, 40, 70];

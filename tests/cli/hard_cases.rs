@@ -23,7 +23,7 @@ f32 shows in 65,600 tiles, whose coordinates go beyond a million pixels in steps
 and in a needle across the pixels, where the exponent is a small difference of large terms
 ([lab](lab/02-rasterizer.md)).
 
-`tests/stability` also poisons every parameter of Gaussians and every number of COLMAP
+`tests/device/stability` also poisons every parameter of Gaussians and every number of COLMAP
 models, breaks kernels on purpose, lints the shaders, and trains some hundred iterations
 each of worlds a thousandth and ten thousand times as large, turned, shifted; one photo;
 three points; flat, doubled and collapsed clouds; a camera inside a Gaussian; black, white

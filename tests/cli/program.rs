@@ -5,6 +5,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
+#[cfg(unix)]
+pub use nix::sys::signal::Signal;
+#[cfg(unix)]
+use nix::{sys::signal::kill, unistd::Pid};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -102,6 +106,18 @@ impl Done {
             stderr: String::from_utf8_lossy(&output.stderr).into_owned(),
         }
     }
+}
+
+/// Sends a signal to a process, which has to be there.
+#[cfg(unix)]
+pub fn send(signal: Signal, process: u32) {
+    kill(Pid::from_raw(process as i32), signal).expect("a process");
+}
+
+/// Whether a process is there.
+#[cfg(unix)]
+pub fn is_running(process: u32) -> bool {
+    kill(Pid::from_raw(process as i32), None).is_ok()
 }
 
 /// Every file below a folder with its bytes, sorted by path; `/` between parts.

@@ -1,6 +1,7 @@
 //! `fit --resume`: what is interrupted goes on, and ends with the same bytes.
 
 use std::{
+    io::{BufRead, BufReader, Read},
     process::{Child, Stdio},
     sync::LazyLock,
     thread::sleep,
@@ -9,7 +10,9 @@ use std::{
 
 use gs_chroma::splats::{read_ply, write_ply};
 
-use super::program::{Done, Place};
+use super::program::Place;
+#[cfg(unix)]
+use super::program::{Signal, send};
 use super::scene;
 use super::shared::{place_with_run, place_with_scene};
 
@@ -45,17 +48,14 @@ fn started(place: &Place, more: &[&'static str]) -> Child {
     quiet.spawn().expect("the program starts")
 }
 
-/// Waits until there is a checkpoint; `false` where the training ended before.
-fn has_checkpoint(place: &Place, child: &mut Child) -> bool {
+/// Waits for a checkpoint of a program that has not ended.
+fn wait_for_checkpoint(place: &Place, child: &mut Child, name: &str) {
     let begun = Instant::now();
-    while !place.path("run/checkpoint").exists() {
-        if child.try_wait().expect("a child").is_some() {
-            return false;
-        }
+    while !place.path(name).exists() {
+        assert!(child.try_wait().expect("a child").is_none(), "it has ended");
         assert!(begun.elapsed() < Duration::from_secs(120), "no checkpoint");
-        sleep(Duration::from_millis(10));
+        sleep(Duration::from_millis(1));
     }
-    true
 }
 
 /// The log but for its times.
@@ -83,68 +83,54 @@ static WHOLE: LazyLock<(Vec<u8>, Vec<String>)> = LazyLock::new(|| {
 #[test]
 fn a_training_that_is_killed_goes_on() {
     let whole = &*WHOLE;
-    let mut interrupted = 0;
-    for pause in [0, 300, 900] {
-        let place = place_with_scene();
-        // Killed again on its way from the first checkpoint.
-        for more in [&[][..], &["--resume"]] {
-            let mut child = started(&place, more);
-            if has_checkpoint(&place, &mut child) {
-                sleep(Duration::from_millis(pause));
-                interrupted += usize::from(child.try_wait().expect("a child").is_none());
-            }
-            child.kill().expect("it is there or gone");
-            child.wait().expect("a child");
-        }
-        if place.path("run/checkpoint").exists() {
-            place.succeed(&fit(&["--resume"]));
-        }
-        assert!(place.read("run/luma.ply") == whole.0, "after {pause} ms");
-        assert_eq!(log(&place), whole.1, "after {pause} ms");
-        assert!(!place.path("run/checkpoint").exists());
+    let place = place_with_scene();
+    // Killed again on its way from the first checkpoint.
+    for more in [&[][..], &["--resume"]] {
+        let mut child = started(&place, more);
+        wait_for_checkpoint(&place, &mut child, "run/checkpoint");
+        child.kill().expect("it is there");
+        child.wait().expect("a child");
     }
-    assert!(interrupted >= 3, "{interrupted}");
+    place.succeed(&fit(&["--resume"]));
+    assert!(place.read("run/luma.ply") == whole.0);
+    assert_eq!(log(&place), whole.1);
+    assert!(!place.path("run/checkpoint").exists());
 }
 
 #[cfg(unix)]
 #[test]
 fn a_signal_is_heeded_and_says_how_to_go_on() {
     let whole = &*WHOLE;
-    for signal in ["-INT", "-TERM"] {
-        let place = place_with_scene();
+    let place = place_with_scene();
+    for (signal, more) in [
+        (Signal::SIGINT, &[][..]),
+        (Signal::SIGTERM, &["--resume"][..]),
+    ] {
         // None but when it is interrupted.
-        let mut command = place.command(&[&FIT[..], &["--checkpoint", "off"]].concat());
+        let off = ["--checkpoint", "off"];
+        let mut command = place.command(&[&FIT[..], &off, more].concat());
         let child = command.stdout(Stdio::piped()).stderr(Stdio::piped());
-        let child = child.spawn().expect("the program starts");
-        // It trains once it has asked what kind of scene this is.
-        sleep(Duration::from_millis(1500));
-        let sent = std::process::Command::new("kill")
-            .args([signal, &child.id().to_string()])
-            .status();
-        assert!(sent.expect("kill").success());
-        let done = Done::of(child.wait_with_output());
-        if matches!(done.code, Some(130 | 143)) {
-            // It was not training yet, and ended at once.
-            continue;
+        let mut child = child.spawn().expect("the program starts");
+        let mut stderr = BufReader::new(child.stderr.take().expect("a pipe"));
+        let mut told = String::new();
+        // The last of the plan's effects: it trains next.
+        while !told.contains("luma-degree ") {
+            assert!(stderr.read_line(&mut told).expect("text") > 0, "{told}");
         }
-        assert_eq!(done.code, Some(1), "{}", done.stderr);
-        assert!(
-            done.stderr.contains("writing a checkpoint"),
-            "{}",
-            done.stderr
-        );
-        let last = done.stderr.lines().last().unwrap_or_default();
+        sleep(Duration::from_millis(300));
+        send(signal, child.id());
+        stderr.read_to_string(&mut told).expect("text");
+        assert_eq!(child.wait().expect("a child").code(), Some(1), "{told}");
+        assert!(told.contains("writing a checkpoint"), "{told}");
+        let last = told.lines().last().unwrap_or_default();
         assert!(
             last.starts_with("error: interrupted after iteration")
                 && last.ends_with("with the same command and --resume"),
             "{last}"
         );
-        // Both end it the same way.
-        if signal == "-INT" {
-            place.succeed(&fit(&["--resume"]));
-            assert!(place.read("run/luma.ply") == whole.0 && log(&place) == whole.1);
-        }
     }
+    place.succeed(&fit(&["--resume"]));
+    assert!(place.read("run/luma.ply") == whole.0 && log(&place) == whole.1);
 }
 
 #[test]
@@ -163,7 +149,7 @@ fn what_cannot_go_on_is_refused_with_what_differs() {
         }
     };
     let mut child = started(&place, &[]);
-    assert!(has_checkpoint(&place, &mut child));
+    wait_for_checkpoint(&place, &mut child, "run/checkpoint");
     child.kill().expect("it is there");
     child.wait().expect("a child");
     let kept = place.read("run/checkpoint");
@@ -217,29 +203,27 @@ fn what_was_never_begun_begins() {
 
 #[test]
 fn a_finished_run_goes_on() {
-    // Also where coordinates are large, and the run has moved them.
-    for offset in [[0.0; 3], [4e5, -5e6, 100.0]] {
-        let place = Place::new();
-        scene::write_moved(&place.path("scene"), offset);
-        place.succeed(&of_length("300"));
-        let psnr = |run: &str| {
-            let report = place.report(run);
-            report["luma"]["held_out"]["psnr"].as_f64().expect("a PSNR")
-        };
-        let before = psnr("run");
-        let more = ["fit", "run", "--iterations", "100"];
-        place.succeed(&[&more[..], &["-o", "more"]].concat());
-        place.succeed(&more);
-        let report = place.report("run");
-        assert_eq!(report["luma"]["iterations"], 400);
-        assert_eq!(report["luma"]["settings"]["iterations"], 100);
-        let rows = log(&place);
-        assert!(rows.iter().any(|row| row.starts_with("400,")), "{rows:?}");
-        assert!(rows.iter().any(|row| row.starts_with("300,")), "{rows:?}");
-        // It goes on from where it was, and repeats: a scene of ten small photos gains nothing more.
-        assert!(psnr("run") > before - 0.5, "{} {before}", psnr("run"));
-        assert!(place.read("run/luma.ply") == place.read("more/luma.ply"));
-    }
+    let place = Place::new();
+    // Coordinates are large, and the run has moved them.
+    scene::write_moved(&place.path("scene"), [4e5, -5e6, 100.0]);
+    place.succeed(&of_length("100"));
+    let psnr = |run: &str| {
+        let report = place.report(run);
+        report["luma"]["held_out"]["psnr"].as_f64().expect("a PSNR")
+    };
+    let before = psnr("run");
+    let more = ["fit", "run", "--iterations", "50"];
+    place.succeed(&[&more[..], &["-o", "more"]].concat());
+    place.succeed(&more);
+    let report = place.report("run");
+    assert_eq!(report["luma"]["iterations"], 150);
+    assert_eq!(report["luma"]["settings"]["iterations"], 50);
+    let rows = log(&place);
+    assert!(rows.iter().any(|row| row.starts_with("150,")), "{rows:?}");
+    assert!(rows.iter().any(|row| row.starts_with("100,")), "{rows:?}");
+    // It goes on from where it was, and repeats.
+    assert!(psnr("run") > before - 0.5, "{} {before}", psnr("run"));
+    assert!(place.read("run/luma.ply") == place.read("more/luma.ply"));
     let place = place_with_run();
     for other in [["--preset", "draft"], ["--max-side", "32"]] {
         let done = place.run(&[&["fit", "runs/scene"][..], &other].concat());
@@ -281,50 +265,38 @@ fn colors(place: &Place) -> [Vec<u8>; 2] {
     ["color.ply", "chroma.npy"].map(|name| place.read(&format!("runs/scene/{name}")))
 }
 
+/// Kills a coloring once it has a checkpoint.
+fn killed(place: &Place, colorize: &[&str]) {
+    let mut command = place.command(&[colorize, &OFTEN].concat());
+    let quiet = command.stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = quiet.spawn().expect("the program starts");
+    wait_for_checkpoint(place, &mut child, "runs/scene/checkpoint-color");
+    child.kill().expect("it is there");
+    child.wait().expect("a child");
+}
+
 #[test]
 fn a_coloring_that_is_killed_goes_on() {
     let whole = place_to_color();
     whole.succeed(&COLORIZE);
     let chroma = whole.report("runs/scene")["chroma"].clone();
     let whole = colors(&whole);
-    let mut interrupted = 0;
-    for pause in [0, 10, 160] {
-        let place = place_to_color();
-        let mut child = {
-            let mut command = place.command(&[&COLORIZE[..], &OFTEN].concat());
-            let quiet = command.stdout(Stdio::piped()).stderr(Stdio::piped());
-            quiet.spawn().expect("the program starts")
-        };
-        let begun = Instant::now();
-        while !place.path("runs/scene/checkpoint-color").exists()
-            && child.try_wait().expect("a child").is_none()
-        {
-            assert!(begun.elapsed() < Duration::from_secs(120), "no checkpoint");
-            sleep(Duration::from_millis(1));
-        }
-        sleep(Duration::from_millis(pause));
-        child.kill().expect("it is there or gone");
-        child.wait().expect("a child");
-        if !place.path("runs/scene/checkpoint-color").exists() {
-            continue;
-        }
-        interrupted += 1;
-        place.succeed(&[&COLORIZE[..], &["--resume"]].concat());
-        assert!(colors(&place) == whole, "after {pause} ms");
-        let now = place.report("runs/scene")["chroma"].clone();
-        for key in [
-            "loss",
-            "iterations",
-            "moved",
-            "passes",
-            "effects",
-            "saturation",
-        ] {
-            assert_eq!(now[key], chroma[key], "{key}");
-        }
-        assert!(!place.path("runs/scene/checkpoint-color").exists());
+    let place = place_to_color();
+    killed(&place, &COLORIZE);
+    place.succeed(&[&COLORIZE[..], &["--resume"]].concat());
+    assert!(colors(&place) == whole);
+    let now = place.report("runs/scene")["chroma"].clone();
+    for key in [
+        "loss",
+        "iterations",
+        "moved",
+        "passes",
+        "effects",
+        "saturation",
+    ] {
+        assert_eq!(now[key], chroma[key], "{key}");
     }
-    assert!(interrupted >= 2, "{interrupted}");
+    assert!(!place.path("runs/scene/checkpoint-color").exists());
 }
 
 /// A run that has Gaussians far above all photos, so many that a MiB holds those only that photos
@@ -362,7 +334,7 @@ fn a_coloring_of_gaussians_that_wait_on_the_host() {
         "--hints",
         "strokes",
         "--rounds",
-        "6",
+        "4",
     ];
     let within = [&colorize[..], &["--memory-limit", "1"]].concat();
     let (place, shown) = many();
@@ -401,35 +373,16 @@ fn a_coloring_of_gaussians_that_wait_on_the_host() {
         assert!(apart < Some(0.01), "{error}: {apart:?}");
     }
 
-    let (killed, _) = many();
-    let mut command = killed.command(&[&within[..], &OFTEN].concat());
-    let quiet = command.stdout(Stdio::piped()).stderr(Stdio::piped());
-    let mut child = quiet.spawn().expect("the program starts");
-    let begun = Instant::now();
-    while !killed.path("runs/scene/checkpoint-color").exists() {
-        assert!(child.try_wait().expect("a child").is_none(), "it has ended");
-        assert!(begun.elapsed() < Duration::from_secs(120), "no checkpoint");
-        sleep(Duration::from_millis(1));
-    }
-    child.kill().expect("it is there");
-    child.wait().expect("a child");
-    killed.succeed(&[&within[..], &["--resume"]].concat());
-    assert!(colors(&killed) == streamed);
+    let (place, _) = many();
+    killed(&place, &within);
+    place.succeed(&[&within[..], &["--resume"]].concat());
+    assert!(colors(&place) == streamed);
 }
 
 #[test]
 fn a_coloring_by_others_is_not_gone_on_with() {
     let place = place_to_color();
-    let mut command = place.command(&[&COLORIZE[..], &OFTEN].concat());
-    let quiet = command.stdout(Stdio::piped()).stderr(Stdio::piped());
-    let mut child = quiet.spawn().expect("the program starts");
-    let begun = Instant::now();
-    while !place.path("runs/scene/checkpoint-color").exists() {
-        assert!(begun.elapsed() < Duration::from_secs(120), "no checkpoint");
-        sleep(Duration::from_millis(1));
-    }
-    child.kill().expect("it is there or gone");
-    child.wait().expect("a child");
+    killed(&place, &COLORIZE);
     std::fs::copy(place.path("colored/00.png"), place.path("colored/03.png")).expect("copied");
     let done = place.run(&[&COLORIZE[..], &["--resume"]].concat());
     assert_eq!(done.code, Some(1), "{}", done.stderr);
@@ -442,7 +395,7 @@ fn a_coloring_by_others_is_not_gone_on_with() {
     assert!(done.stderr.contains("starts over"), "{}", done.stderr);
     place.write("runs/scene/checkpoint-color", kept);
     // Begun anew it says that it gives up what there is.
-    let done = place.run(&COLORIZE);
+    let done = place.run(&[&COLORIZE[..4], &["--rounds", "1", "--sh-degree", "0"]].concat());
     assert_eq!(done.code, Some(0), "{}", done.stderr);
     assert!(
         done.stderr.contains("checkpoint-color is left of"),
@@ -454,6 +407,7 @@ fn a_coloring_by_others_is_not_gone_on_with() {
 
 /// What a training with a time limit took before it was killed counts.
 #[test]
+#[ignore = "takes the 12 seconds of its limit: make test-all"]
 fn a_time_limit_goes_on_where_it_was() {
     let place = place_with_scene();
     let fit = ["fit", "scene", "--time-limit", "0.2", "-o", "run"];
@@ -461,11 +415,10 @@ fn a_time_limit_goes_on_where_it_was() {
     let mut command = place.command(&fit);
     let quiet = command.stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = quiet.spawn().expect("the program starts");
-    let has_checkpoint = has_checkpoint(&place, &mut child);
+    wait_for_checkpoint(&place, &mut child, "run/checkpoint");
     sleep(Duration::from_secs(2));
-    child.kill().expect("it is there or gone");
+    child.kill().expect("it is there");
     child.wait().expect("a child");
-    assert!(has_checkpoint && place.path("run/checkpoint").exists());
     let begun = Instant::now();
     place.succeed(&[&fit[..], &["--resume"]].concat());
     let report = place.report("run");

@@ -92,7 +92,7 @@ fn a_memory_limit_changes_no_byte() {
     let teacher = onnx("ddcolor_tiny.onnx");
     let with = |rest: &[&'static str]| [&QUICK[..], &[&teacher], rest].concat();
     place.succeed(&with(&["-o", "all.ply"]));
-    // Budgets that hold some views or one are tests/kernels': this scene is too small for them.
+    // Budgets that hold some views or one are tests/device/kernels': this scene is too small for them.
     let report = place.json(&with(&["--memory-limit", "1", "-o", "few.ply"]));
     let estimated = report["chroma"]["estimated_device_memory"].as_u64();
     assert!(

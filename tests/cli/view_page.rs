@@ -1,16 +1,17 @@
-//! `gs-chroma view`, scene.html and `fit --view`: what the server answers to whom, and, where a
-//! browser is there, what the page draws.
+//! `gs-chroma view`, scene.html and `fit --view`: what the server answers to whom, and what the
+//! page draws.
 
 use std::{
     io::{BufRead, BufReader, Read, Write},
     net::TcpStream,
-    path::{Path, PathBuf},
     process::{Child, Command, Stdio},
     time::{Duration, Instant},
 };
 
 use serde_json::Value;
 
+#[cfg(unix)]
+use super::program::{Signal, send};
 use super::{
     program::Place,
     shared::{onnx, place_with_run, place_with_scene},
@@ -257,12 +258,9 @@ fn a_port_that_is_taken_is_named() {
 fn ctrl_c_is_how_it_ends() {
     let place = place_with_run();
     // Its first line may be answered at once: it heeds the signal by then, in every try.
-    for _ in 0..20 {
+    for _ in 0..5 {
         let mut page = Page::of(&place, &["runs/scene"]);
-        let interrupted = Command::new("kill")
-            .args(["-INT", &page.program.id().to_string()])
-            .status();
-        assert!(interrupted.expect("kill").success());
+        send(Signal::SIGINT, page.program.id());
         let status = page.program.wait().expect("it ends");
         assert_eq!(status.code(), Some(0));
     }
@@ -364,25 +362,13 @@ fn strip(value: &mut Value) {
     }
 }
 
-/// Node's script that opens pages, where it, its packages and a browser are there.
-fn browser() -> Option<PathBuf> {
-    let tools = Path::new(env!("CARGO_MANIFEST_DIR")).join("tools/viewers");
-    let runs = |program: &str| {
-        let asked = Command::new(program).arg("--version").output();
-        asked.is_ok_and(|done| done.status.success())
-    };
-    let there =
-        tools.join("node_modules/playwright-core").is_dir() && runs("node") && runs("chromium");
-    if !there {
-        eprintln!("skipped: needs node, chromium and `npm ci` in tools/viewers");
-    }
-    there.then(|| tools.join("page.mjs"))
-}
+/// Node's script that opens pages.
+const SCRIPT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tools/viewers/page.mjs");
 
 /// What the browser found at a page.
-fn looked_at(script: &Path, arguments: &[&str]) -> Value {
+fn looked_at(arguments: &[&str]) -> Value {
     let done = Command::new("node")
-        .arg(script)
+        .arg(SCRIPT)
         .args(arguments)
         .output()
         .expect("node");
@@ -414,20 +400,17 @@ fn a_page_is_no_splat_file() {
 }
 
 #[test]
+#[ignore = "needs Chromium, Node and its packages: make test-all"]
 fn the_page_draws_what_render_draws() {
-    let Some(script) = browser() else { return };
     let place = place_with_run();
     place.succeed(&["render", "runs/scene", "--views", "all", "-o", "pictures"]);
     let pictures = place.path("pictures");
     let pictures = pictures.to_str().expect("a path");
     let page = Page::of(&place, &["runs/scene"]);
-    let found = looked_at(
-        &script,
-        &[&page.url(), "--reference", pictures, "--turn", "2"],
-    );
+    let found = looked_at(&[&page.url(), "--reference", pictures, "--turn", "2"]);
     place.succeed(&["export", "runs/scene", "-o", "scene.html"]);
     let url = format!("file://{}", place.path("scene.html").display());
-    let sent = looked_at(&script, &[&url, "--reference", pictures]);
+    let sent = looked_at(&[&url, "--reference", pictures]);
     let count = page.about()["cameras"].as_array().map_or(0, Vec::len);
     for found in [found, sent] {
         let psnr = found["psnr"].as_object().expect("pictures");

@@ -7,12 +7,14 @@ mod real;
 mod restored;
 
 use std::fs;
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
+#[cfg(unix)]
+use super::program::{Signal, is_running, send};
 use super::program::{Place, files_below};
 use super::scene;
 use fakes::{
@@ -194,12 +196,13 @@ fn a_failure_is_told_and_gone_on_from() {
     assert_eq!(commands(&place), ["mapper"]);
 }
 
+#[cfg(unix)]
 #[test]
 fn an_interrupt_ends_the_program_that_runs() {
     let place = place_with(&["colmap"]);
-    for (signal, step) in [
-        ("-INT", "feature_extractor"),
-        ("-TERM", "exhaustive_matcher"),
+    for (signal, ended, step) in [
+        (Signal::SIGINT, 130, "feature_extractor"),
+        (Signal::SIGTERM, 143, "exhaustive_matcher"),
     ] {
         let wait = format!("fake/wait-{step}");
         place.write(&wait, "");
@@ -210,7 +213,7 @@ fn an_interrupt_ends_the_program_that_runs() {
         let waiting = loop {
             let told = fs::read_to_string(place.path("fake/waiting")).unwrap_or_default();
             if told.ends_with('\n') {
-                break told.trim().to_owned();
+                break told.trim().parse().expect("a process");
             }
             assert!(
                 begun.elapsed() < Duration::from_secs(60),
@@ -218,10 +221,9 @@ fn an_interrupt_ends_the_program_that_runs() {
             );
             sleep(Duration::from_millis(5));
         };
-        kill(signal, &child.id().to_string());
-        let ended = if signal == "-INT" { 130 } else { 143 };
+        send(signal, child.id());
         assert_eq!(child.wait().expect("a child").code(), Some(ended));
-        assert!(!is_running(&waiting), "{step} goes on");
+        assert!(!is_running(waiting), "{step} goes on");
         let kept = place.files("house");
         assert!(
             !kept.iter().any(|name| name.contains(".prepare-")),
@@ -245,19 +247,6 @@ fn what_a_dead_process_left_is_removed() {
     place.write("house/.tmpx1", "half");
     succeed(&place, &PHOTOS);
     assert!(!place.path("house/.prepare-x1").exists());
-}
-
-fn kill(signal: &str, process: &str) {
-    let sent = Command::new("kill").args([signal, process]).status();
-    assert!(sent.expect("kill").success());
-}
-
-fn is_running(process: &str) -> bool {
-    let asked = Command::new("kill")
-        .args(["-0", process])
-        .stderr(Stdio::null())
-        .status();
-    asked.expect("kill").success()
 }
 
 #[test]
