@@ -12,7 +12,7 @@ const ENOUGH: usize = 2;
 enum Steps {
     /// Each, alone and with all that follow.
     Each,
-    /// The first three, then half as many again, with all that follow.
+    /// The first, then twice as many, with all that follow.
     Some,
 }
 
@@ -27,7 +27,11 @@ fn writes_fail_well(steps: Steps, arguments: &[&str], kept: &[&str], made: &[&st
     let after: Vec<_> = kept.iter().map(|name| whole.read(name)).collect();
     let files_after = whole.files("");
     let made: Vec<_> = made.iter().map(|name| (*name, whole.read(name))).collect();
-    let lasting: &[&str] = if steps == Steps::Each { &["", "-"] } else { &["-"] };
+    let lasting: &[&str] = if steps == Steps::Each {
+        &["", "-"]
+    } else {
+        &["-"]
+    };
     for lasts in lasting {
         let place = place_with_run();
         let (mut struck, mut in_a_row) = (0, 0);
@@ -64,7 +68,7 @@ fn writes_fail_well(steps: Steps, arguments: &[&str], kept: &[&str], made: &[&st
             }
             step += match steps {
                 Steps::Each => 1,
-                Steps::Some => (step / 2).max(1),
+                Steps::Some => step,
             };
         }
         assert!(struck > 2, "{arguments:?}: {struck}");

@@ -296,7 +296,10 @@ fn the_readmes_way_to_colors() {
     let mut child = spawned.expect("the program starts");
     let told = BufReader::new(child.stderr.take().expect("a pipe")).lines();
     let begun = |line: &String| line.starts_with("step ") && line.ends_with(", fit");
-    assert!(told.map(|line| line.expect("text")).any(|line| begun(&line)));
+    assert!(
+        told.map(|line| line.expect("text"))
+            .any(|line| begun(&line))
+    );
     child.kill().expect("it is there");
     child.wait().expect("a child");
 

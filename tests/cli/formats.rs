@@ -1,10 +1,7 @@
 //! Splat files of every format, by their names: written, read back, measured, and read by
 //! splat-transform and OpenUSD.
 
-use std::{
-    path::Path,
-    process::Command,
-};
+use std::{path::Path, process::Command};
 
 use gs_chroma::splats::{ShField, Splats, read_ply, write_ply};
 

@@ -21,10 +21,10 @@ fn colored(place: &Place, run: &str, until: &str) -> Vec<u8> {
 #[test]
 fn same_seed_same_bytes_other_seed_other_bytes() {
     let place = place_with_scene();
-    let fit = ["scene", "--iterations", "240"];
+    let fit = ["scene", "--iterations", "120"];
     let outcome = |run: &str, seed: &str| {
         let luma = fitted(&place, run, &fit, seed);
-        [luma, colored(&place, run, "255")]
+        [luma, colored(&place, run, "130")]
     };
     let first = outcome("first", "7");
     let report = place.report("first");

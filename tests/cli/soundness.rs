@@ -302,7 +302,8 @@ fn photos_of_another_model_are_refused() {
     let done = place.run(&colorize);
     assert_eq!(done.code, Some(1), "{}", done.stderr);
     assert!(done.stderr.contains("14 of 14 photos"), "{}", done.stderr);
-    let forced = [&colorize[..], &["--force", "--rounds", "1"]].concat();
+    let short = ["--rounds", "1", "--sh-degree", "0"];
+    let forced = [&colorize[..], &["--force"], &short].concat();
     let told = place.run(&forced);
     assert_eq!(told.code, Some(0), "{}", told.stderr);
     assert!(warnings(&told)[0].contains("14 of 14 photos"), "{told:?}");

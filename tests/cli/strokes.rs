@@ -24,8 +24,9 @@ const LAWN: [(&str, [u32; 4]); 2] = [
 fn garden(place: &Place) {
     let photos = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/demo");
     let fit = ["fit", photos, "-o", "runs/garden", "--preset", "draft"];
-    let short = ["--iterations", "120", "--max-side", "162"];
-    place.succeed(&[&fit[..], &short].concat());
+    let short = ["--iterations", "100", "--max-side", "162"];
+    let few = ["--max-splats", "4000", "--no-fill-gaps"];
+    place.succeed(&[&fit[..], &short, &few].concat());
 }
 
 /// Mean a and b in a box of a picture of a view; the box is in pixels of the photo.
@@ -56,7 +57,7 @@ fn colored(place: &Place, arguments: &[&str]) -> [[[f64; 2]; 2]; 2] {
         "/assets/teacher/demo-teacher.onnx"
     );
     let colorize = ["colorize", "runs/garden", "--teacher", teacher];
-    let short = ["--rounds", "4"];
+    let short = ["--rounds", "3", "--sh-degree", "0"];
     place.succeed(&[&colorize[..], &short, arguments].concat());
     let _ = fs::remove_dir_all(place.path("views"));
     place.succeed(&["render", "runs/garden", "--views", "all", "-o", "views"]);

@@ -75,11 +75,13 @@ fn a_memory_limit_lowers_the_cap() {
     );
     let luma = &place.report("runs/scene")["luma"];
     assert!(
-        luma["estimated_device_memory"].as_u64() <= Some(1 << 20),
+        luma["estimated_device_memory"]
+            .as_u64()
+            .is_some_and(|bytes| bytes <= 1 << 20),
         "{luma}"
     );
     let cap = &luma["settings"]["max_splats"];
-    assert!(cap.as_u64() < Some(12_000), "{luma}");
+    assert!(cap.as_u64().is_some_and(|cap| cap < 12_000), "{luma}");
 }
 
 /// What training computes with is in the report and changes what it makes.
@@ -194,7 +196,7 @@ fn no_holdout_trains_on_all_views() {
 fn max_splats_is_a_cap() {
     let place = place_with_scene();
     // Below the number of COLMAP's points, and where densification would exceed it.
-    for (cap, iterations) in [(1, "3"), (40, "240"), (80, "240")] {
+    for (cap, iterations) in [(1, "3"), (40, "160"), (80, "160")] {
         let max = cap.to_string();
         let options = ["--iterations", iterations, "--max-splats", &max];
         place.succeed(&[&["fit", "scene", "--preset", "draft"][..], &options].concat());
@@ -255,7 +257,7 @@ fn presets_and_what_overrules_them() {
         assert_eq!(report["preset"], preset);
         let cap = report["luma"]["settings"]["max_splats"].as_u64();
         // Or as many as the device has room for.
-        assert!(cap == Some(max_splats) || preset != "draft" && cap < Some(max_splats));
+        assert!(cap.is_some_and(|cap| cap == max_splats || preset != "draft" && cap < max_splats));
         assert_eq!(report["luma"]["settings"]["sh_degree"], degree);
         assert_eq!(report["capture"]["max_side"], max_side);
     }
@@ -455,7 +457,10 @@ fn a_target_is_reached_or_said_to_be_missed() {
     let goal = json!({ "kind": "reach", "psnr": 8.0, "within": null });
     assert_eq!(luma["goal"], goal);
     assert!(luma["held_out"]["psnr"].as_f64() >= Some(8.0), "{luma}");
-    assert!(luma["iterations"].as_u64() < Some(700), "{luma}");
+    assert!(
+        luma["iterations"].as_u64().is_some_and(|done| done < 700),
+        "{luma}"
+    );
 
     let done = place.run(&[&fit[..], &["--target-psnr", "70"]].concat());
     assert_eq!(done.code, Some(1), "{}", done.stderr);
@@ -476,7 +481,7 @@ fn a_target_is_reached_or_said_to_be_missed() {
 }
 
 #[test]
-fn a_time_limit_is_kept_or_refused() {
+fn a_time_limit_too_short_is_refused() {
     let place = place_with_scene();
     let fit = ["fit", "scene", "--without", "background", "--time-limit"];
     let done = place.run(&[&fit[..], &["0.0005"]].concat());
@@ -487,10 +492,17 @@ fn a_time_limit_is_kept_or_refused() {
         done.stderr
     );
     assert!(place.files("runs").is_empty());
-    place.succeed(&[&fit[..], &["0.1"]].concat());
+}
+
+#[test]
+#[ignore = "takes the 12 seconds of its limit: make test-all"]
+fn a_time_limit_ends_the_training() {
+    let place = place_with_scene();
+    let fit = ["fit", "scene", "--without", "background"];
+    place.succeed(&[&fit[..], &["--time-limit", "0.2"]].concat());
     let luma = &place.report("runs/scene")["luma"];
     // How well it is kept shows on real scenes (docs/lab/05-goals.md); that it is what
     // ends the run, here: no preset has such a number of iterations.
-    assert_eq!(luma["goal"], json!({ "kind": "within", "seconds": 6.0 }));
+    assert_eq!(luma["goal"], json!({ "kind": "within", "seconds": 12.0 }));
     assert!(![700, 3_500, 15_000].contains(&luma["iterations"].as_u64().expect("a number")));
 }

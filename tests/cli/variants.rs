@@ -96,7 +96,7 @@ fn a_trial_has_the_shell_that_the_run_has() {
     let gain = |more: &[&str]| {
         let fit = ["fit", &sky, "-o", "run", "--json", "--preset", "balanced"];
         // Long enough for a trial, and done once it is over.
-        let small = ["--max-splats", "4000", "--max-side", "100"];
+        let small = ["--max-splats", "1500", "--max-side", "80"];
         let short = ["--target-psnr", "1"];
         let report = place.json(&[&fit[..], &small, &short, more].concat());
         let effects = report["effects"].as_array().expect("effects");

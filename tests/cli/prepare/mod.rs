@@ -13,9 +13,9 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
+use super::program::{Place, files_below};
 #[cfg(unix)]
 use super::program::{Signal, is_running, send};
-use super::program::{Place, files_below};
 use super::scene;
 use fakes::{
     all_views, calls, command, commands, piece, place_with, refused, run, succeed, version,

@@ -43,10 +43,6 @@ fn chroma_slopes_at_rest_and_far_away() {
             assert!((f64::from(pair[0]) * 90.0 - slope).abs() < 1e-5, "{pair:?}");
             assert_eq!(pair[1], 0.0);
         }
-        // The variant with the curvature gives the same bits.
-        let curved = plain.run(gpu()).unwrap();
-        assert_eq!(curved.loss.to_bits(), loss.to_bits());
-        assert_eq!(curved.gradient, output.gradient);
     }
 }
 
