@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::{
     headings::{BUDGET, EXPERT, QUALITY},
-    values::{positive, share},
+    values::positive,
 };
 use crate::input;
 use crate::luma::{FLAT, LumaSettings, Numerics};
@@ -21,9 +21,6 @@ pub(super) struct LumaArguments {
     /// Maximum number of Gaussians [default: the preset's].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = QUALITY)]
     max_splats: Option<u32>,
-    /// Fraction of training spent at half resolution, from the start [default: 0].
-    #[arg(long, value_name = "0..1", value_parser = share::<f64>, help_heading = BUDGET, hide_short_help = true)]
-    coarse: Option<f64>,
     /// Leave black what no photo shows, instead of surrounding the scene with a shell of gray.
     #[arg(long, help_heading = QUALITY, hide_short_help = true)]
     no_surround: bool,
@@ -85,9 +82,6 @@ impl LumaArguments {
         }
         if let Some(max_splats) = self.max_splats {
             settings.max_splats = max_splats as usize;
-        }
-        if let Some(coarse) = self.coarse {
-            settings.coarse = coarse;
         }
         if let Some(mib) = self.memory_limit {
             settings.memory_limit = Some(u64::from(mib) << 20);
@@ -156,13 +150,12 @@ mod tests {
 
     #[test]
     fn every_option_has_its_place() {
-        let words = "--iterations 70 --max-splats 9 --coarse 0.5 \
+        let words = "--iterations 70 --max-splats 9 \
             --memory-limit 3 --numerics storage=half --seed 4";
         let words: Vec<&str> = words.split_whitespace().collect();
         let wanted = LumaSettings {
             iterations: 70,
             max_splats: 9,
-            coarse: 0.5,
             memory_limit: Some(3 << 20),
             numerics: "storage=half".parse().unwrap(),
             seed: 4,

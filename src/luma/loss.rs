@@ -105,8 +105,7 @@ impl Targets {
         4 * 3 * max_pixels as u64
     }
 
-    /// The photos of `views`, of at most `max_pixels` pixels, and if it is `coarse` at half
-    /// the size as well; where `streamed`, one at a time.
+    /// The photos of `views`, of at most `max_pixels` pixels; where `streamed`, one at a time.
     ///
     /// # Errors
     /// [`LumaError`].
@@ -115,13 +114,12 @@ impl Targets {
         effects: LossEffects,
         views: &Arc<dyn TrainingViews>,
         max_pixels: usize,
-        coarse: bool,
         streamed: bool,
     ) -> Result<Self, LumaError> {
         let slopes = || Buffer::zeros(gpu, "slopes", max_pixels);
         let unset = LumaLossParameters::zeroed();
         Ok(Self {
-            photos: Photos::new(gpu, views, coarse, effects.masked, streamed)?,
+            photos: Photos::new(gpu, views, effects.masked, streamed)?,
             parameters: (effects.exposed)
                 .then(|| Buffer::uniform(gpu, "loss parameters", &unset))
                 .transpose()?,

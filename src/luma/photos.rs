@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, sync::Arc};
 use super::{
     LumaError, TrainingView, TrainingViews,
     prefetch::Prefetch,
-    view::{self, halved},
+    view,
 };
 use crate::{
     capture::in_order,
@@ -20,8 +20,7 @@ pub struct Picture {
     pub mask: Option<Buffer<u32>>,
 }
 
-/// Photos by number; behind those of the views come, where training begins coarse, the same
-/// at half the size.
+/// Photos by number.
 pub struct Photos {
     /// One for each photo, or one in which they take turns.
     pictures: Vec<Picture>,
@@ -39,7 +38,6 @@ impl Photos {
     pub fn new(
         gpu: &Gpu,
         views: &Arc<dyn TrainingViews>,
-        coarse: bool,
         masked: bool,
         streamed: bool,
     ) -> Result<Self, LumaError> {
@@ -62,21 +60,12 @@ impl Photos {
         for photo in 0..count {
             pictures.push(Picture::zeros(gpu, pixels(photo).div_ceil(4), masked)?);
         }
-        for photo in (0..count).filter(|_| coarse) {
-            let camera = halved(views.camera(photo));
-            let pixels = camera.width as usize * camera.height as usize;
-            pictures.push(Picture::zeros(gpu, pixels.div_ceil(4), masked)?);
-        }
         let all: Vec<usize> = (0..count).collect();
         in_order(
             &all,
             |&photo| view::load(&**views, photo),
             |&photo, view| {
-                let view = view?;
-                if coarse {
-                    pictures[count + photo].write(gpu, view.halved());
-                }
-                pictures[photo].write(gpu, view);
+                pictures[photo].write(gpu, view?);
                 Ok::<_, LumaError>(())
             },
         )?;

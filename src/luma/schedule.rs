@@ -19,8 +19,6 @@ pub struct Schedule {
     pub raise_degree_every: usize,
     /// From here on all learning rates fall, to [`SETTLED`] at the end.
     pub settle_from: usize,
-    /// Until here photos are seen at half their size: a quarter of the pixels.
-    pub coarse_until: usize,
     /// From here on the scene's surroundings are drawn.
     #[serde(default)]
     pub surround_at: usize,
@@ -55,7 +53,6 @@ impl Schedule {
             },
             raise_degree_every: share(1_000).clamp(1, RAISED_BY),
             settle_from: iterations * 7 / 10,
-            coarse_until: (settings.coarse * iterations as f64) as usize,
             surround_at: (SURROUND_AT * iterations as f64) as usize,
             find_outliers_at: OUTLIERS_AT.map(|share| (share * iterations as f64) as usize),
         }
@@ -75,7 +72,6 @@ impl Schedule {
             densify_from: moved(self.densify_from),
             densify_until: moved(self.densify_until),
             settle_from: moved(self.settle_from),
-            coarse_until: moved(self.coarse_until),
             surround_at: moved(self.surround_at),
             find_outliers_at: self.find_outliers_at.map(moved),
             ..*self
@@ -176,7 +172,6 @@ mod tests {
                 densify_every: 100,
                 raise_degree_every: 250,
                 settle_from: 10_500,
-                coarse_until: 0,
                 surround_at: 4_500,
                 find_outliers_at: [6_000, 9_750],
             }

@@ -92,17 +92,19 @@ pub struct LumaSettings {
     pub sh_degree: u32,
     /// Seed of every random choice.
     pub seed: u64,
-    /// Share of the iterations, from the first, at half resolution.
-    pub coarse: f64,
     /// Gain of twice the iterations below which training ends, in dB.
     ///
     /// Of the [watched](super::LumaTrainer::watch) views: training goes back to its best, settles
     /// and ends. `None`: it does not.
     pub stop_when_flat: Option<f64>,
-    /// A choice that earlier versions had, and their reports have.
+    /// Choices that earlier versions had, and their reports have.
     #[serde(default, skip_serializing)]
     #[cfg_attr(test, schemars(skip))]
     pub densify: IgnoredAny,
+    /// As `densify`.
+    #[serde(default, skip_serializing)]
+    #[cfg_attr(test, schemars(skip))]
+    pub coarse: IgnoredAny,
     /// Share of Gaussians that a densification adds at most.
     pub growth: f64,
     /// Gradient of a center above which a Gaussian is split.
@@ -160,9 +162,9 @@ impl LumaSettings {
             max_splats: 1_000_000,
             sh_degree: 3,
             seed: 0,
-            coarse: 0.0,
             stop_when_flat: None,
             densify: IgnoredAny,
+            coarse: IgnoredAny,
             growth: 0.3,
             // gsplat's advice for absolute gradients.
             pull_threshold: 8e-4,
@@ -207,7 +209,6 @@ impl LumaSettings {
             ("iterations", self.iterations >= 1, "1 or more"),
             ("max_splats", self.max_splats >= 1, "1 or more"),
             ("sh_degree", self.sh_degree <= 3, "0 to 3"),
-            ("coarse", (0.0..=1.0).contains(&self.coarse), "0 to 1"),
         ];
         match ranges.iter().find(|(_, holds, _)| !holds) {
             Some((name, _, range)) => Err(format!("{name}: must be {range}")),
@@ -248,7 +249,7 @@ mod tests {
             serde_json::from_str::<LumaSettings>(&text).unwrap(),
             settings
         );
-        let earlier = text.replacen('{', "{\"densify\":\"split\",", 1);
+        let earlier = text.replacen('{', "{\"densify\":\"split\",\"coarse\":0.0,", 1);
         assert_eq!(
             serde_json::from_str::<LumaSettings>(&earlier).unwrap(),
             settings

@@ -32,11 +32,11 @@ use super::{
     memory::{Demand, ENTRIES_PER_SPLAT, resident_photos},
     pace::Pace,
     settings::SYNC_EVERY,
-    view::{TrainingViews, halved},
+    view::TrainingViews,
     workspace::{Kernels, Workspace},
 };
 use crate::{
-    capture::{Camera, Exposure, view_at},
+    capture::{Exposure, view_at},
     gpu::{Gpu, GpuError, Readback, Recorder},
     raster::{Load, Model, Raster, StatusReadback, ViewUniform, constants::*},
     splats::{Splats, sh},
@@ -145,12 +145,8 @@ impl LumaTrainer {
             max_tiles = max_tiles.max(uniform.tile_count());
         }
         let schedule = Schedule::of(&settings);
-        let coarse = schedule.coarse_until > 0;
-        let small: Vec<Camera> = (all.clone().filter(|_| coarse))
-            .map(|view| halved(views.camera(view)))
-            .collect();
         let demand = Demand::of(
-            all.map(|view| views.camera(view)).chain(&small),
+            all.map(|view| views.camera(view)),
             effects.masked,
             splats.sh.degree,
             resident_photos(&settings),
@@ -158,7 +154,7 @@ impl LumaTrainer {
         let longest = ends::LONGER * settings.iterations;
         let capacity = splats.len() * ENTRIES_PER_SPLAT;
         demand.check(settings.memory_limit, splats.len(), capacity)?;
-        let targets = Targets::new(&gpu, effects, &views, max_pixels, coarse, demand.streams)?;
+        let targets = Targets::new(&gpu, effects, &views, max_pixels, demand.streams)?;
         let model = Model::upload(&gpu, splats)?;
         let workspace = Workspace::new(
             &raster,
@@ -329,13 +325,9 @@ impl LumaTrainer {
         self.grows = grows;
     }
 
-    /// Trains by another schedule than that of its settings, with photos at half their size as
-    /// long as it has them.
+    /// Trains by another schedule than that of its settings.
     pub fn follow(&mut self, schedule: Schedule) {
-        self.schedule = Schedule {
-            coarse_until: self.schedule.coarse_until,
-            ..schedule
-        };
+        self.schedule = schedule;
     }
 
     /// What it trains with.
@@ -391,26 +383,15 @@ impl LumaTrainer {
     /// Records and submits one iteration.
     fn step(&mut self, iteration: usize) -> Result<(), LumaError> {
         let views = self.views.count();
-        // Behind the photos of all views come the same at half the size.
-        let (seed, coarse_until) = (self.settings.seed, self.schedule.coarse_until);
-        let photo_at = |iteration| {
-            let view = view_at(seed, views, iteration);
-            if iteration < coarse_until {
-                views + view
-            } else {
-                view
-            }
-        };
+        let seed = self.settings.seed;
+        let photo_at = |iteration| view_at(seed, views, iteration);
         let photo = photo_at(iteration);
-        let index = photo % views;
-        let exposure = self.views.exposure(index);
+        let exposure = self.views.exposure(photo);
         let next = (iteration + 1..self.schedule.end).map(photo_at);
         let picture = self.targets.show(&self.gpu, photo, exposure, next)?;
-        let camera = self.views.camera(index);
-        let small = (photo >= views).then(|| halved(camera));
         let workspace = self.workspace()?;
         let view = ViewUniform::new(
-            small.as_ref().unwrap_or(camera),
+            self.views.camera(photo),
             self.near,
             self.model.len(),
             self.degree_at(iteration),

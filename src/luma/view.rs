@@ -30,7 +30,8 @@ impl TrainingView {
 
     /// The same at half the size, each side rounded up.
     pub fn halved(&self) -> Self {
-        let camera = halved(&self.camera);
+        let half = [self.camera.width, self.camera.height].map(|side| side.div_ceil(2));
+        let camera = self.camera.resized(half[0], half[1]);
         let as_size = |camera: &Camera| [camera.width, camera.height].map(|side| side as usize);
         let halve = |values: &[u8]| {
             let pixels: Vec<[u8; 1]> = values.iter().map(|&v| [v]).collect();
@@ -49,12 +50,6 @@ impl TrainingView {
         let pixels = self.gray.len();
         self.mask.take().unwrap_or_else(|| vec![255; pixels])
     }
-}
-
-/// The camera of a photo at half its size, each side rounded up.
-pub(super) fn halved(camera: &Camera) -> Camera {
-    let half = [camera.width, camera.height].map(|side| side.div_ceil(2));
-    camera.resized(half[0], half[1])
 }
 
 /// The views of a training. Photos are loaded when they are needed, by several threads; a
@@ -101,28 +96,22 @@ impl TrainingViews for Vec<TrainingView> {
     }
 }
 
-/// A view with its photo, at half its size if `view` is not below their number: coarse
-/// views come behind the others.
+/// A view with its photo.
 ///
 /// # Errors
 /// [`LumaError`] of a photo that cannot be loaded or has not its camera's size.
 pub(super) fn load(views: &dyn TrainingViews, view: usize) -> Result<TrainingView, LumaError> {
-    let count = views.count();
-    let loaded = views.load(view % count)?;
+    let loaded = views.load(view)?;
     let expected = loaded.camera.width as usize * loaded.camera.height as usize;
     let masked = loaded.mask.as_ref().map_or(expected, Vec::len);
     for pixels in [loaded.gray.len(), masked] {
         if pixels != expected {
             return Err(LumaError::Size {
-                view: view % count,
+                view,
                 pixels,
                 expected,
             });
         }
     }
-    Ok(if view < count {
-        loaded
-    } else {
-        loaded.halved()
-    })
+    Ok(loaded)
 }

@@ -116,14 +116,6 @@ const KNOBS: &[Knob] = &[
         conflicts: &[],
     },
     Knob {
-        name: "coarse",
-        stage: PointStage::Luma,
-        values: |_| owned(&["0.25", "0.5"]),
-        turn: Turn::Luma(|settings, value| settings.coarse = number(value)),
-        time: |_, value| 1.0 - 0.4 * number(value),
-        conflicts: &[],
-    },
-    Knob {
         name: "solver",
         stage: PointStage::Color,
         values: |around| around.of_color(|_| owned(&["adam"])),

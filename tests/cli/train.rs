@@ -412,16 +412,6 @@ fn what_made_it_worse_is_given_up() {
     assert!(printed.contains(&words), "{printed}");
 }
 
-#[test]
-fn no_curve_is_flat_while_photos_are_small() {
-    let place = place_with_scene();
-    let mut fit = QUICK_FIT;
-    fit[5] = "400";
-    place.succeed(&[&fit[..], &["--stop-when-flat=50", "--coarse=0.5"]].concat());
-    // Looks come every 25 iterations; three at the photos as they are make a slope.
-    assert_eq!(place.report("runs/scene")["luma"]["iterations"], 330);
-}
-
 /// Held-out views can be measured at a size that is not trained at.
 #[test]
 fn runs_at_different_sizes_are_measured_at_one() {

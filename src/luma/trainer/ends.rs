@@ -43,8 +43,7 @@ impl LumaTrainer {
     pub(super) fn settle_when_reached(&mut self, iteration: usize) {
         let wanted = self.goal.psnr().unwrap_or(f64::INFINITY);
         let reached = self.watch.last().is_some_and(|look| look.psnr >= wanted);
-        // What ends while photos are small would have seen nothing else.
-        if reached && iteration > self.schedule.coarse_until {
+        if reached {
             self.schedule.settle_at(iteration);
             self.longest = self.schedule.end;
         }
@@ -67,20 +66,16 @@ impl LumaTrainer {
             return Ok(None);
         };
         let schedule = self.schedule.clone();
-        // What small photos and few harmonics have taught says nothing about what more will.
+        // What few harmonics have taught says nothing about what more will.
         let degrees = schedule.degree_from(self.settings.sh_degree);
-        let whole = schedule.coarse_until.max(degrees);
-        if iteration <= whole || iteration >= schedule.settle_from {
+        if iteration <= degrees || iteration >= schedule.settle_from {
             return Ok(None);
         }
         self.keep_best(iteration)?;
         let grown = (FLAT_FROM * schedule.end as f64).min(GROWN);
         let early = grown.max(HARMONICS_SHOW * degrees as f64);
-        let curve = self.curve();
-        // Nothing would be gained while photos are small, and much by the first look after it;
-        // harmonics that are yet to come only make a curve steeper.
-        let counts = curve.partition_point(|look| look.iteration <= schedule.coarse_until);
-        let flat = gain_of_doubling(&curve[counts..])
+        // Harmonics that are yet to come only make a curve steeper.
+        let flat = gain_of_doubling(&self.curve())
             .is_some_and(|gain| gain < threshold && !self.will_reach(iteration, gain));
         if !flat || (iteration as f64) < early {
             return Ok(None);

@@ -8,8 +8,8 @@ use crate::effects::Overrules;
 
 impl FitOptions {
     /// What goes on with a run that is finished, as it was asked for: the same photos, effects
-    /// and settings, from its Gaussians, with the rates that it ended with and photos at full
-    /// size, for as many iterations again; none where the folder is no run.
+    /// and settings, from its Gaussians, with the rates that it ended with, for as many
+    /// iterations again; none where the folder is no run.
     ///
     /// # Errors
     /// [`RunError::File`] where the run's report is damaged.
@@ -24,7 +24,6 @@ impl FitOptions {
             of_kind.map(|effect| effect.name).collect()
         };
         let mut settings = report.luma.settings.clone();
-        settings.coarse = 0.0;
         let [_, last] = settings.rates.means;
         settings.rates.means = [last; 2];
         Ok(Some(Self {

@@ -167,17 +167,16 @@ fn with_surroundings() {
     assert!(trained.means[..start.len().min(behind)] != start.means[..]);
 }
 
-/// Outliers, small photos at first, and views that are watched.
+/// Outliers, and views that are watched.
 #[test]
 fn with_every_effect() {
     let [start, target] = start_and_target();
     let of = |from: &Splats| {
-        let mut settings = LumaSettings {
+        let settings = LumaSettings {
             iterations: 150,
             robust: true,
             ..settings(&start)
         };
-        settings.coarse = 0.3;
         let schedule = Schedule {
             densify_from: 20,
             densify_every: 30,
