@@ -101,7 +101,7 @@ impl Fit {
             (None, None) => Goal::Fixed,
         };
         let (load, overrules) = (self.photos.options(), self.effects.overrules());
-        let overlay = self.luma.overlay()?;
+        let overlay = self.luma.overlay();
         let asked = match FitOptions::continuing(&self.colmap_dir)? {
             Some(run) => {
                 if [

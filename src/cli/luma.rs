@@ -1,16 +1,13 @@
 //! Options that overlay the settings of stage 1.
 
-use std::path::{Path, PathBuf};
-
 use clap::Args;
 
 use super::{
     headings::{BUDGET, EXPERT, QUALITY},
     values::positive,
 };
-use crate::input;
 use crate::luma::{FLAT, LumaSettings, Numerics};
-use crate::run::{Overlay, RunError};
+use crate::run::Overlay;
 
 /// What is asked for instead of the preset's settings.
 #[derive(Args)]
@@ -47,24 +44,12 @@ pub(super) struct LumaArguments {
     /// Random seed: the same seed gives the same bytes on the same machine [default: 0].
     #[arg(long, value_name = "N", help_heading = EXPERT, hide_short_help = true)]
     seed: Option<u64>,
-    /// Settings to start from instead of the preset's, as `luma.settings` of a report.
-    #[arg(long, value_name = "FILE.json", hide = true)]
-    settings: Option<PathBuf>,
 }
 
 impl LumaArguments {
     /// What changes the preset's settings.
-    ///
-    /// # Errors
-    /// [`RunError::File`] when there is a file of settings that holds none.
-    pub(super) fn overlay(self) -> Result<Overlay, RunError> {
-        let file = self.settings.as_deref().map(read).transpose()?;
-        Ok(Box::new(move |settings| {
-            if let Some(file) = &file {
-                settings.clone_from(file);
-            }
-            self.apply(settings);
-        }))
+    pub(super) fn overlay(self) -> Overlay {
+        Box::new(move |settings| self.apply(settings))
     }
 
     /// Puts what was given in the place of what is there.
@@ -96,19 +81,6 @@ impl LumaArguments {
             settings.seed = seed;
         }
     }
-}
-
-/// The settings in a file.
-fn read(path: &Path) -> Result<LumaSettings, RunError> {
-    let file = |reason| RunError::File {
-        path: path.to_owned(),
-        reason,
-    };
-    let text = input::read_to_string(path).map_err(|error| file(error.to_string()))?;
-    let settings: LumaSettings = serde_json::from_str(&text)
-        .map_err(|error| file(format!("no settings of luma: {error}")))?;
-    settings.check().map_err(file)?;
-    Ok(settings)
 }
 
 #[cfg(test)]

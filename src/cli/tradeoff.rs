@@ -2,16 +2,12 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, builder::PossibleValuesParser};
+use clap::{Args, Parser, builder::PossibleValuesParser};
 
 use super::{
-    CliError,
-    effects::EffectArguments,
+    Cli, CliError,
     headings::{BUDGET, OUTPUT, TEACHER},
-    luma::LumaArguments,
-    next,
-    photos::Photos,
-    print,
+    next, print,
     progress::Progress,
     values::{PRESETS, folder, one_of, positive},
 };
@@ -20,11 +16,12 @@ use crate::tradeoff::{FILES, PointStage, TradeoffOptions, front_table, knob_name
 
 /// Measure quality against time on your own photos and device.
 ///
-/// Runs fit, and colorize with --teacher, with one setting changed at a time and in combinations,
-/// and draws the Pareto front. The same command continues after an interruption.
+/// Runs fit, and colorize with --teacher, with one setting changed at a time, then with pairs, and
+/// draws the Pareto front. The same command continues after an interruption.
 #[derive(Args)]
 #[command(after_long_help = "Example:
   gs-chroma tradeoff house --budget 60
+  gs-chroma tradeoff house --preset balanced -- --max-side 800 --masks off
   gs-chroma tradeoff house --teacher ddcolor-tiny --knobs iterations,max-side,rounds")]
 pub struct Tradeoff {
     /// COLMAP folder with images/ and sparse/.
@@ -38,33 +35,33 @@ pub struct Tradeoff {
     /// Preset around which settings change [default: paper on a GPU, else draft].
     #[arg(long, value_parser = one_of(PRESETS), help_heading = BUDGET)]
     preset: Option<Preset>,
-    #[command(flatten)]
-    luma: LumaArguments,
     /// Minutes for all points together, earlier starts included; the base always runs.
     #[arg(long, help_heading = BUDGET, value_name = "MINUTES", default_value_t = 30.0, value_parser = positive::<f64>)]
     budget: f64,
     /// Settings to change [default: all].
     #[arg(long, help_heading = BUDGET, value_name = "A,B,…", value_delimiter = ',', value_parser = PossibleValuesParser::new(knob_names()))]
     knobs: Vec<String>,
-    #[command(flatten)]
-    photos: Photos,
-    #[command(flatten)]
-    effects: EffectArguments,
     /// Print tradeoff.json.
     #[arg(long, help_heading = OUTPUT)]
     json: bool,
+    /// Options of every fit, after `--`.
+    #[arg(last = true, value_name = "OPTIONS OF FIT")]
+    fit: Vec<String>,
 }
 
 impl Tradeoff {
     pub(super) fn run(self) -> Result<(), CliError> {
+        let preset = (self.preset.iter()).flat_map(|preset| ["--preset", preset.name()]);
+        let fit: Vec<String> = preset.map(str::to_owned).chain(self.fit).collect();
+        let words = ["gs-chroma", "fit", "scene", "-o", "point"].map(str::to_owned);
+        if let Err(error) = Cli::try_parse_from(words.iter().chain(&fit)) {
+            error.exit();
+        }
         let mut progress = Progress::through(vec![Stage::Sweep]);
         let options = TradeoffOptions {
             colmap_dir: self.colmap_dir,
             output: self.output,
-            preset: self.preset,
-            settings: self.luma.overlay()?,
-            load: self.photos.options(),
-            overrules: self.effects.overrules(),
+            fit,
             teacher: self.teacher,
             budget: 60.0 * self.budget,
             knobs: self.knobs,
@@ -74,7 +71,7 @@ impl Tradeoff {
         if self.json {
             return print(sweep.to_json());
         }
-        for stage in [PointStage::Luma, PointStage::Color] {
+        for stage in PointStage::ALL {
             if let Some(table) = front_table(&sweep, stage) {
                 print(format_args!("{table}\n"))?;
             }

@@ -2,11 +2,7 @@
 
 use std::{collections::BTreeMap, sync::Arc};
 
-use super::{
-    LumaError, TrainingView, TrainingViews,
-    prefetch::Prefetch,
-    view,
-};
+use super::{LumaError, TrainingView, TrainingViews, prefetch::Prefetch, view};
 use crate::{
     capture::in_order,
     gpu::{Buffer, Gpu, GpuError},

@@ -200,22 +200,6 @@ impl LumaSettings {
         }
     }
 
-    /// Whether a training is possible with it.
-    ///
-    /// # Errors
-    /// What is out of its range.
-    pub fn check(&self) -> Result<(), String> {
-        let ranges = [
-            ("iterations", self.iterations >= 1, "1 or more"),
-            ("max_splats", self.max_splats >= 1, "1 or more"),
-            ("sh_degree", self.sh_degree <= 3, "0 to 3"),
-        ];
-        match ranges.iter().find(|(_, holds, _)| !holds) {
-            Some((name, _, range)) => Err(format!("{name}: must be {range}")),
-            None => Ok(()),
-        }
-    }
-
     /// How the scene is drawn.
     pub fn raster_options(&self) -> RasterOptions {
         RasterOptions {
@@ -239,7 +223,7 @@ mod tests {
 
     #[test]
     fn what_is_written_is_read_again() {
-        let mut settings = LumaSettings {
+        let settings = LumaSettings {
             stop_when_flat: Some(0.3),
             memory_limit: Some(1 << 30),
             ..LumaSettings::new(700)
@@ -254,9 +238,6 @@ mod tests {
             serde_json::from_str::<LumaSettings>(&earlier).unwrap(),
             settings
         );
-        assert_eq!(settings.check(), Ok(()));
-        settings.sh_degree = 4;
-        assert!(settings.check().unwrap_err().contains("sh_degree"));
         let unknown = text.replacen("\"seed\"", "\"sede\"", 1);
         let error = serde_json::from_str::<LumaSettings>(&unknown).unwrap_err();
         assert!(error.to_string().contains("sede"), "{error}");

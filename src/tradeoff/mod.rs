@@ -1,50 +1,38 @@
 //! `tradeoff`: what quality costs in time, on the user's scene and device.
 
-mod around;
 mod child;
 mod knobs;
-mod pictures;
+mod plot;
 mod point;
 mod report;
 mod search;
-#[cfg(test)]
-mod search_tests;
-mod space;
 mod state;
+mod sweep;
 
 use std::path::{Path, PathBuf};
 
 pub use child::end_with_parent;
 pub use knobs::knob_names;
-pub use report::{PointStage, Tradeoff, front_table, shell_line};
+pub use report::{front_table, shell_line};
+pub use sweep::{PointStage, Tradeoff};
 
 use crate::{
-    capture::{Capture, LoadOptions, split},
-    effects::Overrules,
-    gpu::Gpu,
-    run::{Event, Observer, Overlay, Preset, RunError, RunFolder, Stage, Work, files},
+    capture::Capture,
+    run::{Event, Observer, RunError, RunFolder, Stage, files},
 };
-use around::Around;
-use pictures::Album;
 use point::Bench;
-use report::{Measure, Phase, Point, csv, page};
-use space::{Space, Task, base_name, find};
+use search::Task;
 use state::State;
+use sweep::{Phase, Point};
 
-/// What `tradeoff` is asked to do; `None` leaves it to the preset.
+/// What `tradeoff` is asked to do.
 pub struct TradeoffOptions {
     /// The COLMAP folder.
     pub colmap_dir: PathBuf,
     /// Folder for the points and the results; `runs/<folder name>-tradeoff` by default.
     pub output: Option<PathBuf>,
-    /// The base; `paper` on a GPU and `draft` on a software adapter by default.
-    pub preset: Option<Preset>,
-    /// What is asked of the base instead of its preset's settings.
-    pub settings: Overlay,
-    /// How photos are loaded; some have to be held out.
-    pub load: LoadOptions,
-    /// Effects that are on or off in every point.
-    pub overrules: Overrules,
+    /// Options of every `fit`, as words of a command line: they make the base.
+    pub fit: Vec<String>,
     /// The teacher, for points in color.
     pub teacher: Option<PathBuf>,
     /// Wall seconds that all points may take together.
@@ -88,31 +76,27 @@ pub fn tradeoff(
     options: &TradeoffOptions,
     observe: &mut Observer<'_>,
 ) -> Result<(PathBuf, Tradeoff), TradeoffError> {
-    let preset = match options.preset {
-        Some(preset) => preset,
-        None => Preset::for_device(&Gpu::open().map_err(RunError::from)?),
-    };
     let folder = options
         .output
         .clone()
         .unwrap_or_else(|| default_folder(&options.colmap_dir));
     let capture = Capture::load(&options.colmap_dir).map_err(RunError::from)?;
-    if split(&capture.views, options.load.holdout).test.is_empty() {
+    if options.fit.iter().any(|word| word == "--no-holdout") {
         return Err(TradeoffError::NothingToMeasure(options.colmap_dir.clone()));
     }
     let sides = capture.views.iter().flat_map(|view| view.photo_size());
     let largest_side = sides.max().unwrap_or(0);
     files::make_own_folder(&folder, &["tradeoff.lock", FILES[1]], &[])?;
-    let bench = Bench::new(options, &folder, preset, largest_side)?;
-    let mut state = State::open(&folder, bench.subject()?, options.budget)?;
-    let mut album = Album::new(&folder, capture);
+    let bench = Bench::new(options, &folder, largest_side)?;
+    let mut state = State::open(&folder, bench.subject.clone(), options.budget)?;
 
-    while let Some(task) = next(options, &bench, &state.sweep, preset, largest_side)? {
+    while let Some(task) = next(options, &bench, &state.sweep)? {
         let point = run(&bench, &task, &state.sweep, observe)?;
         observe(Event::Note(in_words(&point)));
         let failed = point.failed.clone();
-        state.add(point, bench.device(&task));
-        write(&folder, &state, &mut album)?;
+        let report = bench.folder(&task.name).read_report();
+        state.add(point, report.ok().map(|report| report.device.name));
+        write(&folder, &state)?;
         if let (None, Some(reason)) = (task.expected, failed) {
             return Err(TradeoffError::Base {
                 point: task.name,
@@ -127,7 +111,7 @@ pub fn tradeoff(
         )));
     }
     // An earlier start may have been stopped between its files.
-    write(&folder, &state, &mut album)?;
+    write(&folder, &state)?;
     Ok((folder, state.sweep))
 }
 
@@ -144,37 +128,24 @@ fn default_folder(colmap_dir: &Path) -> PathBuf {
 /// The next point: what there is to try follows from the bases' reports.
 fn next(
     options: &TradeoffOptions,
-    bench: &Bench<'_>,
+    bench: &Bench,
     sweep: &Tradeoff,
-    preset: Preset,
-    largest_side: u32,
-) -> Result<Option<Task>, TradeoffError> {
-    let done = |stage| find(&sweep.points, base_name(stage)).is_some();
-    let report = |stage| bench.folder(base_name(stage)).read_report();
-    let mut space = Space {
-        color: options.teacher.is_some(),
-        ..Space::default()
+) -> Result<Option<Task>, RunError> {
+    // The last base that ran knows most.
+    let ran = PointStage::ALL.into_iter().rfind(|&stage| {
+        let base = sweep.base(stage);
+        base.is_some_and(|base| base.outcome.is_some())
+    });
+    let values = match ran {
+        Some(stage) => knobs::values(&bench.base(stage)?, &options.knobs),
+        None => Vec::new(),
     };
-    if done(PointStage::Luma) {
-        let adam = preset.adam_iterations();
-        let mut around = Around::new(&report(PointStage::Luma)?, largest_side, adam);
-        let asked = |preset: Preset| Work::asked(preset, &options.settings, options.load.max_side);
-        let others = Preset::ALL.into_iter().filter(|&other| other != preset);
-        around.presets = others
-            .map(|other| (other.name(), around.work(&asked(other), &asked(preset))))
-            .collect();
-        if done(PointStage::Color) {
-            around = around.colored(&report(PointStage::Color)?);
-        }
-        space.iterations = around.iterations;
-        space.values = knobs::values(&around, &options.knobs);
-    }
-    Ok(search::next(&space, &sweep.points, options.budget))
+    Ok(search::next(&values, sweep, options.teacher.is_some()))
 }
 
 /// Runs a point, and tells how far the budget is spent.
 fn run(
-    bench: &Bench<'_>,
+    bench: &Bench,
     task: &Task,
     sweep: &Tradeoff,
     observe: &mut Observer<'_>,
@@ -183,7 +154,7 @@ fn run(
     let expected = task
         .expected
         .map_or(String::new(), |seconds| format!(", about {seconds:.0} s"));
-    bench.run(task, &sweep.points, &mut |seconds| {
+    bench.run(task, sweep, &mut |seconds| {
         observe(Event::Progress {
             stage: Stage::Sweep,
             done: (spent + seconds) as usize,
@@ -195,29 +166,27 @@ fn run(
 
 /// A finished point on one line.
 fn in_words(point: &Point) -> String {
-    match (&point.outcome, &point.failed) {
-        (Some(outcome), _) => {
-            let mut line = format!("{}: {:.1} s", point.name, outcome.seconds.total);
-            for &measure in Measure::of(point.stage) {
-                if let Some(value) = measure.value(outcome) {
-                    line += &format!(", {}", measure.in_words(value));
-                }
-            }
-            line
-        }
-        (None, reason) => format!(
-            "{}: failed: {}",
-            point.name,
-            reason.as_deref().unwrap_or_default()
-        ),
-    }
+    let Some(outcome) = &point.outcome else {
+        let reason = point.failed.as_deref().unwrap_or_default();
+        return format!("{}: failed: {reason}", point.name);
+    };
+    let figures = sweep::MEASURES.iter().filter(|m| m.stage == point.stage);
+    let figures: Vec<String> = figures
+        .filter(|measure| (measure.value)(outcome).is_some())
+        .map(|measure| format!("; {} {}", measure.title, measure.figure(outcome)))
+        .collect();
+    format!(
+        "{}: {:.1} s{}",
+        point.name,
+        outcome.seconds,
+        figures.concat()
+    )
 }
 
 /// Writes the three files; the one that a sweep goes on from last.
-fn write(folder: &Path, state: &State, album: &mut Album) -> Result<(), RunError> {
+fn write(folder: &Path, state: &State) -> Result<(), RunError> {
     let [table, _, html] = FILES.map(|name| folder.join(name));
-    let pictures = album.of(&state.sweep);
-    files::write(&table, csv(&state.sweep).as_bytes())?;
-    files::write(&html, page(&state.sweep, pictures).as_bytes())?;
+    files::write(&table, report::csv(&state.sweep).as_bytes())?;
+    files::write(&html, report::page(&state.sweep).as_bytes())?;
     state.write()
 }

@@ -2,27 +2,21 @@
 
 use std::{
     fs,
-    path::{self, Path, PathBuf},
+    path::{Path, PathBuf},
     time::Instant,
 };
 
-use serde::Serialize;
-
 use super::{
     TradeoffError, TradeoffOptions, child,
-    knobs::{self, Given},
-    report::{Outcome, Point, PointStage, Seconds, Setting, Subject},
-    space::{Task, base_name, find},
+    knobs::{self, Base},
+    search::{Task, base_name},
+    sweep::{Outcome, Phase, Point, PointStage, Subject, Tradeoff},
 };
 use crate::{
-    capture::{LoadOptions, MaskSource, Normalize},
     chroma::teacher::located,
-    disk,
-    effects::Overrules,
-    input,
-    luma::LumaSettings,
+    disk, input,
     report::{Evaluation, Method},
-    run::{Overlay, Preset, RunError, RunFolder, files, teacher_or_photos},
+    run::{RunError, RunFolder, files, teacher_or_photos},
 };
 
 /// The option of `fit` for the longer side at which held-out views are measured: only
@@ -32,78 +26,40 @@ const MEASURE_SIDE: &str = "--measure-side";
 /// Frames of `eval`'s path, of which nothing is used: as few as it takes.
 const FRAMES: &str = "2";
 
-/// The settings of luma of a point, in its folder.
-const SETTINGS: &str = "settings.json";
-
 /// Where points run.
-pub(super) struct Bench<'a> {
+pub(super) struct Bench {
     /// `points/` of the sweep, absolute.
     points: PathBuf,
-    /// The COLMAP folder, absolute.
-    scene: PathBuf,
-    /// The teacher, absolute.
-    teacher: Option<PathBuf>,
-    preset: Preset,
-    /// What the base has of luma's settings instead of its preset's.
-    overlay: &'a Overlay,
-    /// Options of every `fit` but for what a setting overrules.
-    options: Vec<Given>,
-    /// Longer side at which the base sees photos.
-    side: u32,
+    /// Their scene, teacher and options.
+    pub subject: Subject,
+    /// Longer side of the largest photo, in pixels.
+    largest_side: u32,
 }
 
-impl<'a> Bench<'a> {
+impl Bench {
     /// The bench of a sweep in `folder`.
     ///
     /// # Errors
     /// [`RunError::File`] when a file is missing.
     pub fn new(
-        options: &'a TradeoffOptions,
+        options: &TradeoffOptions,
         folder: &Path,
-        preset: Preset,
         largest_side: u32,
     ) -> Result<Self, RunError> {
         let absolute = |path: &Path| fs::canonicalize(path).map_err(files::at(path));
-        let load = preset.load_options(&options.load, &options.overrules);
         let teacher = options.teacher.as_deref();
         let teacher = teacher.map(|teacher| teacher_or_photos(teacher, &options.colmap_dir));
         let teacher = teacher.as_deref().map(located).transpose()?;
+        let teacher = teacher.map(|teacher| text(&absolute(&teacher)?));
         Ok(Self {
             points: absolute(folder)?.join(super::POINTS),
-            scene: absolute(&options.colmap_dir)?,
-            teacher: teacher.as_deref().map(absolute).transpose()?,
-            preset,
-            overlay: &options.settings,
-            options: [
-                vec![("--preset", Some(preset.name().to_owned()))],
-                load_options(&options.load)?,
-                overruled(&options.overrules),
-            ]
-            .concat(),
-            side: load
-                .max_side
-                .map_or(largest_side, |side| side.min(largest_side)),
+            subject: Subject {
+                scene: text(&absolute(&options.colmap_dir)?)?,
+                teacher: teacher.transpose()?,
+                options: options.fit.clone(),
+            },
+            largest_side,
         })
-    }
-
-    /// What is swept.
-    pub fn subject(&self) -> Result<Subject, RunError> {
-        Ok(Subject {
-            scene: text(&self.scene)?,
-            preset: self.preset.name().to_owned(),
-            teacher: self.teacher.as_deref().map(text).transpose()?,
-            luma: self.luma(&[]),
-            options: spelled(&self.options),
-        })
-    }
-
-    /// The settings of luma of a point.
-    fn luma(&self, settings: &[Setting]) -> LumaSettings {
-        let preset = knobs::preset(settings).unwrap_or(self.preset);
-        let mut luma = preset.settings();
-        (self.overlay)(&mut luma);
-        knobs::turn(&mut luma, settings);
-        luma
     }
 
     /// A point's run folder.
@@ -111,10 +67,12 @@ impl<'a> Bench<'a> {
         RunFolder::at(&self.points.join(name))
     }
 
-    /// What a point ran on.
-    pub fn device(&self, task: &Task) -> Option<String> {
-        let report = self.folder(&task.name).read_report();
-        report.ok().map(|report| report.device.name)
+    /// The base of a stage that has run.
+    pub fn base(&self, stage: PointStage) -> Result<Base, RunError> {
+        Ok(Base {
+            report: self.folder(base_name(stage)).read_report()?,
+            largest_side: self.largest_side,
+        })
     }
 
     /// Runs a point in an empty folder and reads what its reports say; `tell` hears now
@@ -126,7 +84,7 @@ impl<'a> Bench<'a> {
     pub fn run(
         &self,
         task: &Task,
-        points: &[Point],
+        sweep: &Tradeoff,
         tell: &mut dyn FnMut(f64),
     ) -> Result<Point, RunError> {
         let begun = Instant::now();
@@ -134,13 +92,8 @@ impl<'a> Bench<'a> {
         // Of a sweep that was stopped in the middle of this point.
         disk::remove(folder.path()).map_err(files::at(folder.path()))?;
         files::make_folder(folder.path())?;
-        match task.stage {
-            PointStage::Color => self.begin_from_base(&task.name)?,
-            PointStage::Luma => {
-                let luma = serde_json::to_vec_pretty(&self.luma(&task.settings));
-                // Plain structs with string keys: serializing them cannot fail.
-                files::write(&folder.path().join(SETTINGS), &luma.unwrap_or_default())?;
-            }
+        if task.stage == PointStage::Color {
+            self.begin_from_base(&task.name)?;
         }
         let commands = self.commands(task)?;
         let log = folder.path().join("stderr.txt");
@@ -148,7 +101,7 @@ impl<'a> Bench<'a> {
             child::run(arguments, &log, &mut || tell(begun.elapsed().as_secs_f64()))
         });
         let outcome = ran.and_then(|()| {
-            let outcome = self.outcome(task, points);
+            let outcome = self.outcome(task, sweep);
             outcome.map_err(|error| error.to_string())
         });
         Ok(Point {
@@ -185,84 +138,67 @@ impl<'a> Bench<'a> {
     fn commands(&self, task: &Task) -> Result<Vec<Vec<String>>, RunError> {
         let folder = text(self.folder(&task.name).path())?;
         let owned = |words: &[&str]| words.iter().map(|&w| w.to_owned()).collect::<Vec<_>>();
-        let turned = knobs::options(&task.settings);
-        let pictures = text(&self.pictures(&task.name))?;
-        let render = owned(&["render", &folder, "-o", &pictures]);
-        Ok(match (task.stage, &self.teacher) {
+        let turned: Vec<[&str; 2]> = knobs::options(&task.settings).collect();
+        let turned_words = owned(turned.as_flattened());
+        Ok(match (task.stage, &self.subject.teacher) {
             (PointStage::Color, Some(teacher)) => {
-                let colorize = owned(&["colorize", &folder, "--teacher", &text(teacher)?]);
+                let colorize = owned(&["colorize", &folder, "--teacher", teacher]);
                 let eval = owned(&["eval", &folder, "--frames", FRAMES]);
-                vec![[colorize, spelled(&turned)].concat(), eval, render]
+                vec![[colorize, turned_words].concat(), eval]
             }
             _ => {
-                let overruled = |option: &str| turned.iter().any(|(other, _)| *other == option);
-                let mut options = self.options.clone();
-                options.retain(|(option, _)| !overruled(option));
-                options.extend(turned.clone());
-                options.push((MEASURE_SIDE, Some(self.side.to_string())));
-                let settings = text(&self.folder(&task.name).path().join(SETTINGS))?;
-                let scene = text(&self.scene)?;
-                let fit = owned(&["fit", &scene, "-o", &folder, "--settings", &settings]);
-                vec![[fit, spelled(&options)].concat(), render]
+                let fit = owned(&["fit", &self.subject.scene, "-o", &folder]);
+                let mut options = self.subject.options.clone();
+                for [option, _] in turned {
+                    options = without(options, option);
+                }
+                options.extend(turned_words);
+                if task.phase != Phase::Base && !options.iter().any(|o| o.starts_with(MEASURE_SIDE))
+                {
+                    let side = self.base(PointStage::Luma)?.side();
+                    options.extend([MEASURE_SIDE.to_owned(), side.to_string()]);
+                }
+                vec![[fit, options].concat()]
             }
         })
     }
 
-    /// Where a point's pictures of the held-out views are.
-    pub fn pictures(&self, name: &str) -> PathBuf {
-        self.folder(name).path().join(super::pictures::FOLDER)
-    }
-
     /// What the reports of a point say.
-    fn outcome(&self, task: &Task, points: &[Point]) -> Result<Outcome, TradeoffError> {
+    fn outcome(&self, task: &Task, sweep: &Tradeoff) -> Result<Outcome, TradeoffError> {
         let folder = self.folder(&task.name);
         let report = folder.read_report()?;
         let luma = &report.luma;
         let mut outcome = Outcome {
             iterations: luma.iterations,
             splats: luma.splats,
-            seconds: Seconds {
-                load: luma.seconds.load,
-                train: luma.seconds.train,
-                measure: luma.seconds.measure,
-                ..Seconds::default()
-            },
+            seconds: luma.seconds.load + luma.seconds.train + luma.seconds.measure,
             psnr: luma.held_out.map(|quality| quality.psnr),
-            corrected_psnr: luma.held_out.and_then(|quality| quality.corrected_psnr),
             ssim: luma.held_out.map(|quality| quality.ssim),
-            delta_e: None,
-            consistency: None,
-            colorfulness: None,
-            teacher_colorfulness: None,
             peak_host_memory: luma.peak_host_memory,
             peak_device_memory: luma.peak_device_memory,
+            ..Outcome::default()
         };
+        if outcome.psnr.is_none() {
+            let scene = self.subject.scene.clone().into();
+            return Err(TradeoffError::NothingToMeasure(scene));
+        }
         if let Some(chroma) = &report.chroma {
-            let own = chroma.seconds.teacher;
-            outcome.seconds.teacher = asked_elsewhere(task, points).unwrap_or(own);
-            outcome.seconds.distill = chroma.seconds.distill;
-            outcome.seconds.bake = chroma.seconds.bake + chroma.seconds.measure;
+            // One that asks at another size finds no answers.
+            let asks = task.settings.iter().any(|s| s.knob == "teacher-size");
+            let base = sweep.base(PointStage::Color).filter(|_| !asks);
+            let asked = base.and_then(|base| base.outcome.as_ref());
+            let seconds = &chroma.seconds;
+            outcome.teacher_seconds = asked.map_or(seconds.teacher, |base| base.teacher_seconds);
+            outcome.seconds +=
+                outcome.teacher_seconds + seconds.distill + seconds.bake + seconds.measure;
             outcome.delta_e = chroma.pictures.delta_e.map(|error| error.mean);
             outcome.consistency = consistency(&folder)?;
             outcome.colorfulness = Some(chroma.pictures.colorfulness);
-            outcome.teacher_colorfulness = chroma.pictures.teacher_colorfulness;
             outcome.peak_host_memory = chroma.peak_host_memory;
             outcome.peak_device_memory = chroma.peak_device_memory;
         }
-        outcome.seconds = outcome.seconds.summed();
-        match outcome.psnr {
-            Some(_) => Ok(outcome),
-            None => Err(TradeoffError::NothingToMeasure(self.scene.clone())),
-        }
+        Ok(outcome)
     }
-}
-
-/// The seconds of the point whose answers of the teacher this one took. One that asks at
-/// another size finds none.
-fn asked_elsewhere(task: &Task, points: &[Point]) -> Option<f64> {
-    let asks = task.settings.iter().any(|s| s.knob == "teacher-size");
-    let base = find(points, base_name(PointStage::Color)).filter(|_| !asks)?;
-    Some(base.outcome.as_ref()?.seconds.teacher)
 }
 
 /// How far the exported pictures of photographed views are apart.
@@ -278,66 +214,18 @@ fn consistency(folder: &RunFolder) -> Result<Option<f64>, RunError> {
     Ok(exported.and_then(|score| score.rms))
 }
 
-/// The options of `fit` that say how photos are loaded.
-fn load_options(load: &LoadOptions) -> Result<Vec<Given>, RunError> {
-    let plain = LoadOptions::default();
-    let masks = match &load.masks {
-        MaskSource::Beside => None,
-        MaskSource::Alpha => Some("alpha".to_owned()),
-        MaskSource::Off => Some("off".to_owned()),
-        MaskSource::Folder(path) => Some(text(&path::absolute(path).map_err(files::at(path))?)?),
-    };
-    let normalize = match load.normalize {
-        Normalize::Auto => None,
-        Normalize::Off => Some("off".to_owned()),
-        Normalize::Range([low, high]) => Some(format!("{low},{high}")),
-    };
-    Ok([
-        given(load.max_side, "--max-side"),
-        given(chosen(load.channel, plain.channel), "--channel"),
-        given(chosen(load.encoding, plain.encoding), "--encoding"),
-        given(normalize, "--normalize"),
-        given(masks, "--masks"),
-        given(chosen(load.masked, plain.masked), "--masked"),
-        load.force
-            .then_some(("--force", None))
-            .into_iter()
-            .collect(),
-    ]
-    .concat())
-}
-
-/// The options of `fit` that overrule the plan of effects.
-fn overruled(overrules: &Overrules) -> Vec<Given> {
-    let named =
-        |option| move |effect: &crate::effects::Effect| (option, Some(effect.name().to_owned()));
-    let with = overrules.with.iter().map(named("--with"));
-    let without = overrules.without.iter().map(named("--without"));
-    let degree = given(overrules.sh_degree, "--sh-degree");
-    with.chain(without).chain(degree).collect()
-}
-
-/// An option, if there is a value for it.
-fn given(value: Option<impl ToString>, option: &'static str) -> Vec<Given> {
-    let value = value.map(|value| (option, Some(value.to_string())));
-    value.into_iter().collect()
-}
-
-/// The name of a choice, unless it is the default.
-fn chosen<T: Serialize + PartialEq>(choice: T, default: T) -> Option<String> {
-    let name = serde_json::to_value(&choice).ok()?.as_str()?.to_owned();
-    (choice != default).then_some(name)
-}
-
-/// Options as words of a command line. A value that begins with a dash is no option only
-/// behind `=`.
-fn spelled(options: &[Given]) -> Vec<String> {
-    let words = options.iter().flat_map(|(option, value)| match value {
-        Some(value) if value.starts_with('-') => vec![format!("{option}={value}")],
-        Some(value) => vec![(*option).to_owned(), value.clone()],
-        None => vec![(*option).to_owned()],
-    });
-    words.collect()
+/// Words of a command line without an option, which has one value.
+fn without(words: Vec<String>, option: &str) -> Vec<String> {
+    let joined = format!("{option}=");
+    let (mut kept, mut words) = (Vec::new(), words.into_iter());
+    while let Some(word) = words.next() {
+        if word == option {
+            words.next();
+        } else if !word.starts_with(&joined) {
+            kept.push(word);
+        }
+    }
+    kept
 }
 
 /// A path as an argument that JSON can hold.
@@ -357,33 +245,21 @@ fn link(from: &Path, to: &Path) -> Result<(), RunError> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::sweep::{Setting, tests::sweep};
     use super::*;
-    use crate::{capture::Channel, effects::Effect, tradeoff::report::Phase};
 
-    fn bench(overlay: &Overlay) -> Bench<'_> {
-        let load = LoadOptions {
-            max_side: Some(64),
-            channel: Channel::R,
-            normalize: Normalize::Range([-1.0, 2.0]),
-            ..LoadOptions::default()
-        };
-        let overrules = Overrules {
-            without: vec![Effect::Background],
-            ..Overrules::default()
-        };
-        Bench {
+    fn commands(stage: PointStage, knob: &str, value: &str) -> Vec<String> {
+        let options = "--preset draft --max-side=64 --measure-side 50 --max-splats 70";
+        let bench = Bench {
             points: PathBuf::from("/out/points"),
-            scene: PathBuf::from("/my scene"),
-            teacher: Some(PathBuf::from("/t.onnx")),
-            preset: Preset::Draft,
-            overlay,
-            options: [load_options(&load).expect("paths"), overruled(&overrules)].concat(),
-            side: 64,
-        }
-    }
-
-    fn task(stage: PointStage, knob: &str, value: &str) -> Task {
-        Task {
+            subject: Subject {
+                scene: "/my scene".to_owned(),
+                teacher: Some("/t.onnx".to_owned()),
+                options: options.split(' ').map(str::to_owned).collect(),
+            },
+            largest_side: 64,
+        };
+        let task = Task {
             name: "here".to_owned(),
             stage,
             phase: Phase::One,
@@ -392,43 +268,36 @@ mod tests {
                 value: value.to_owned(),
             }],
             expected: None,
-        }
+        };
+        assert!(bench.outcome(&task, &sweep(Vec::new())).is_err(), "no run");
+        let commands = bench.commands(&task).expect("names");
+        commands.iter().map(|words| words.join(" ")).collect()
     }
 
     #[test]
     fn a_setting_takes_the_place_of_the_bases_option() {
-        let overlay: Overlay = Box::new(|_| {});
-        let commands = bench(&overlay).commands(&task(PointStage::Luma, "max-side", "48"));
-        let commands = commands.expect("paths");
         assert_eq!(
-            commands[0].join(" "),
-            "fit /my scene -o /out/points/here --settings /out/points/here/settings.json --channel r --normalize=-1,2 \
-             --without background --max-side 48 --measure-side 64"
+            commands(PointStage::Luma, "max-side", "48"),
+            [
+                "fit /my scene -o /out/points/here --preset draft --measure-side 50 --max-splats 70 --max-side 48"
+            ]
         );
-        assert_eq!(commands[1][0], "render");
-        assert_eq!(commands.len(), 2);
-    }
-
-    #[test]
-    fn luma_is_the_presets_overlaid_and_turned() {
-        let overlay: Overlay = Box::new(|settings| settings.max_splats = 70);
-        let bench = bench(&overlay);
-        let turned = task(PointStage::Luma, "iterations", "9").settings;
-        let luma = bench.luma(&turned);
-        assert_eq!((luma.iterations, luma.max_splats), (9, 70));
-        let paper = bench.luma(&task(PointStage::Luma, "preset", "paper").settings);
-        assert_eq!((paper.sh_degree, paper.max_splats), (3, 70));
+        assert_eq!(
+            commands(PointStage::Luma, "max-splats", "35"),
+            [
+                "fit /my scene -o /out/points/here --preset draft --max-side=64 --measure-side 50 --max-splats 35"
+            ]
+        );
     }
 
     #[test]
     fn a_point_in_color_is_colored_and_measured() {
-        let overlay: Overlay = Box::new(|_| {});
-        let commands = bench(&overlay).commands(&task(PointStage::Color, "until", "900"));
-        let commands = commands.expect("paths");
         assert_eq!(
-            commands[0].join(" "),
-            "colorize /out/points/here --teacher /t.onnx --solver adam --until 900"
+            commands(PointStage::Color, "chroma-degree", "1"),
+            [
+                "colorize /out/points/here --teacher /t.onnx --sh-degree 1",
+                "eval /out/points/here --frames 2"
+            ]
         );
-        assert_eq!(commands[1].join(" "), "eval /out/points/here --frames 2");
     }
 }

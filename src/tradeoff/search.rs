@@ -1,229 +1,306 @@
-//! Which point comes next: first every knob alone, then combinations of what proved
-//! itself, by successive halving (Jamieson and Talwalkar, AISTATS 2016).
+//! Which point comes next: the bases, every setting alone, then pairs of settings that alone
+//! are on the front, the cheapest first.
 //!
 //! Everything follows from the points that are there and the seconds that are left, so
 //! that a sweep that goes on asks for what one without a break would have asked for.
 
-use super::report::{Measure, Phase, Point, PointStage, Setting};
-use super::{
-    knobs::{BASELINE_OF_COLOR, BASELINE_OF_LUMA, PRESET},
-    space::{Space, Task, Value, base_name, expected, find, name},
-};
+use super::knobs::{PRESET, Value};
+use super::sweep::{Phase, PointStage, Setting, Tradeoff};
 
-/// Share of the budget that bases and single knobs may take before combinations have had
-/// their turn.
-const SHARE_OF_SINGLES: f64 = 0.6;
+/// A point to run.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Task {
+    /// Its name, which the settings determine.
+    pub name: String,
+    /// Its stage.
+    pub stage: PointStage,
+    /// Phase of the sweep that wants it.
+    pub phase: Phase,
+    /// What differs from the base.
+    pub settings: Vec<Setting>,
+    /// Wall seconds that it should take; `None` for a base, which runs anyway.
+    pub expected: Option<f64>,
+}
 
-/// Iterations of a combination's runs, over the base's: with half as many left at each
-/// rung, all rungs take the same time.
-const RUNGS: [f64; 4] = [0.25, 0.5, 1.0, 2.0];
+/// The base's name in each stage.
+pub(super) fn base_name(stage: PointStage) -> &'static str {
+    match stage {
+        PointStage::Luma => "base",
+        PointStage::Color => "color",
+    }
+}
 
-/// Combinations on the first rung.
-const FIRST_RUNG: usize = 8;
-
-/// Values that are combined: the best of those that proved themselves.
-const COMBINED: usize = 5;
-
-/// Knobs turned at once.
-const AT_ONCE: usize = 3;
-
-/// The next point of a sweep whose points may take `budget` wall seconds together; none
-/// when all is done or nothing that is left fits.
-pub(super) fn next(space: &Space, points: &[Point], budget: f64) -> Option<Task> {
-    let stages = match space.color {
-        true => &[PointStage::Luma, PointStage::Color][..],
-        false => &[PointStage::Luma],
-    };
+/// The next point of a sweep, with a teacher in color too; none when all is done or nothing
+/// that is left fits into its budget.
+pub(super) fn next(values: &[Value], sweep: &Tradeoff, color: bool) -> Option<Task> {
+    let stages = &PointStage::ALL[..1 + usize::from(color)];
     for &stage in stages {
-        match find(points, base_name(stage)) {
-            None => return Some(task(space, points, stage, Phase::Base, &[])),
-            // Neither the other stage nor any knob has anything to start from.
-            Some(base) if base.outcome.is_none() => return None,
-            Some(_) => {}
-        }
-    }
-    let spent = |counts: fn(&Point) -> bool| -> f64 {
-        (points.iter().filter(|point| counts(point)))
-            .map(|point| point.took)
-            .sum()
-    };
-    let left = budget - spent(|_| true);
-    let fits = |task: &Task| task.expected.is_some_and(|seconds| seconds <= left);
-    let for_singles = SHARE_OF_SINGLES * budget - spent(|point| point.phase != Phase::Front);
-    let single = cheapest_single(space, points).filter(fits);
-    if let Some(task) = &single
-        && task.expected <= Some(for_singles)
-    {
-        return single;
-    }
-    let combined = stages.iter().find_map(|&stage| match stage {
-        PointStage::Luma => halving(space, points, &fits),
-        PointStage::Color => combinations(space, points, stage, 2)
-            .into_iter()
-            .filter_map(|settings| new(space, points, stage, &settings))
-            .find(fits),
-    });
-    combined.or(single)
-}
-
-/// The single knob's value that has not been tried and should take least.
-fn cheapest_single(space: &Space, points: &[Point]) -> Option<Task> {
-    let tasks = space.values.iter().filter_map(|value| {
-        let settings = [value.setting()];
-        let known = find(points, &name(value.stage, &settings)).is_some();
-        (!known).then(|| task(space, points, value.stage, Phase::One, &settings))
-    });
-    // Of several that take the same, `min_by` keeps the first; without a base of its stage
-    // a value has nothing to be compared with.
-    let tasks = tasks.filter(|task| task.expected.is_some());
-    tasks.min_by(|a, b| {
-        let seconds = |task: &Task| task.expected.unwrap_or(0.0);
-        seconds(a).total_cmp(&seconds(b))
-    })
-}
-
-/// The next run of the halving of luma's combinations.
-fn halving(space: &Space, points: &[Point], fits: &dyn Fn(&Task) -> bool) -> Option<Task> {
-    let stage = PointStage::Luma;
-    let mut candidates = combinations(space, points, stage, 1);
-    for (rung, share) in RUNGS.into_iter().enumerate() {
-        let iterations = ((space.iterations as f64 * share).round() as usize).max(1);
-        let at_rung = |settings: &[Setting]| -> Vec<Setting> {
-            let mut settings = settings.to_vec();
-            if iterations != space.iterations {
-                let knob = BASELINE_OF_LUMA.to_owned();
-                let value = iterations.to_string();
-                settings.push(Setting { knob, value });
+        match sweep.base(stage) {
+            None => {
+                return Some(Task {
+                    name: base_name(stage).to_owned(),
+                    stage,
+                    phase: Phase::Base,
+                    settings: Vec::new(),
+                    expected: None,
+                });
             }
-            settings
+            // Neither the other stage nor any knob has anything to start from.
+            Some(base) => base.outcome.as_ref()?,
         };
-        candidates.truncate((FIRST_RUNG >> rung).max(1));
-        let open = (candidates.iter())
-            .filter_map(|settings| new(space, points, stage, &at_rung(settings)));
-        if let Some(task) = open.into_iter().find(fits) {
-            return Some(task);
-        }
-        // What failed or did not fit is out; the others are ranked by this rung.
-        let mut ranked: Vec<(f64, Vec<Setting>)> = (candidates.into_iter())
-            .filter_map(|settings| {
-                let point = find(points, &name(stage, &at_rung(&settings)))?;
-                Some((gain(points, point)?, settings))
-            })
-            .collect();
-        ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
-        candidates = ranked.into_iter().map(|(_, settings)| settings).collect();
     }
-    None
+    let singles = values
+        .iter()
+        .map(|value| (value.stage, vec![&value.setting]));
+    let pairs = stages.iter().flat_map(|&stage| pairs(values, sweep, stage));
+    cheapest(values, sweep, Phase::One, singles)
+        .or_else(|| cheapest(values, sweep, Phase::Front, pairs))
 }
 
-/// The combinations of at least so many values that proved themselves alone, the most
-/// promising first.
-fn combinations(
-    space: &Space,
-    points: &[Point],
-    stage: PointStage,
-    at_least: usize,
-) -> Vec<Vec<Setting>> {
-    let mut proven: Vec<(f64, &Value)> = (space.values.iter())
-        .filter(|value| value.stage == stage && ![baseline(stage), PRESET].contains(&value.knob))
-        .filter_map(|value| {
-            let point = find(points, &name(stage, &[value.setting()]))?;
-            let gain = gain(points, point)?;
-            (gain > -near(stage)).then_some((gain, value))
-        })
-        .collect();
-    proven.sort_by(|a, b| b.0.total_cmp(&a.0));
-    proven.truncate(COMBINED);
-    // In the table's order, which is the names'.
-    let place = |value: &Value| (space.values.iter()).position(|v| std::ptr::eq(v, value));
-    proven.sort_by_key(|(_, value)| place(value));
-    let mut found: Vec<(f64, Vec<Setting>)> = (1_u32..1 << proven.len())
-        .filter(|set| (at_least..=AT_ONCE).contains(&(set.count_ones() as usize)))
-        .filter_map(|set| {
-            let chosen: Vec<_> = (proven.iter().enumerate())
-                .filter(|(bit, _)| set >> bit & 1 == 1)
-                .map(|(_, proven)| proven)
-                .collect();
-            let clash = chosen.iter().enumerate().any(|(i, (_, value))| {
-                (chosen[..i].iter()).any(|(_, other)| !value.goes_with(other))
-            });
-            let gain = chosen.iter().map(|(gain, _)| gain).sum();
-            let settings = chosen.iter().map(|(_, value)| value.setting()).collect();
-            (!clash).then_some((gain, settings))
-        })
-        .collect();
-    found.sort_by(|a, b| b.0.total_cmp(&a.0));
-    found.truncate(FIRST_RUNG);
-    found.into_iter().map(|(_, settings)| settings).collect()
-}
-
-/// How much better a point is than what the same seconds buy by turning the stage's
-/// baseline alone, in dB of PSNR or in ΔE00.
-fn gain(points: &[Point], point: &Point) -> Option<f64> {
-    let measure = decisive(point.stage);
-    let mut curve: Vec<[f64; 2]> = (points.iter())
-        .filter(|p| p.stage == point.stage)
-        .filter(|p| p.settings.iter().all(|s| s.knob == baseline(p.stage)))
-        .filter_map(|p| Some([p.seconds()?.ln(), p.merit(measure)?]))
-        .collect();
-    curve.sort_by(|a, b| a[0].total_cmp(&b[0]));
-    Some(point.merit(measure)? - on_curve(&curve, point.seconds()?.ln())?)
-}
-
-/// A value between places in ascending order; beyond the first along the first piece,
-/// since less time is never for free, and beyond the last the last.
-fn on_curve(curve: &[[f64; 2]], x: f64) -> Option<f64> {
-    let last = curve.last()?;
-    let piece = curve.windows(2).find(|pair| x < pair[1][0]);
-    Some(match piece {
-        Some([a, b]) => a[1] + (x - a[0]) * (b[1] - a[1]) / (b[0] - a[0]).max(1e-9),
-        _ => last[1],
-    })
-}
-
-/// What decides about a stage's points while it is searched. Where photos are gray,
-/// nothing does for colors, and single knobs are all that is tried.
-fn decisive(stage: PointStage) -> Measure {
-    Measure::of(stage)[0]
-}
-
-fn baseline(stage: PointStage) -> &'static str {
-    match stage {
-        PointStage::Luma => BASELINE_OF_LUMA,
-        PointStage::Color => BASELINE_OF_COLOR,
-    }
-}
-
-/// A value that lies so little below the baseline's curve may still help others: below
-/// what anybody sees, in dB and in ΔE00.
-fn near(stage: PointStage) -> f64 {
-    match stage {
-        PointStage::Luma => 0.1,
-        PointStage::Color => 0.05,
-    }
-}
-
-/// A point of phase 2, unless it is there already.
-fn new(space: &Space, points: &[Point], stage: PointStage, settings: &[Setting]) -> Option<Task> {
-    let known = find(points, &name(stage, settings)).is_some();
-    (!known).then(|| task(space, points, stage, Phase::Front, settings))
-}
-
-fn task(
-    space: &Space,
-    points: &[Point],
-    stage: PointStage,
+/// Of choices that have not been tried the one that should take least, if it fits.
+fn cheapest<'a>(
+    values: &[Value],
+    sweep: &Tradeoff,
     phase: Phase,
-    settings: &[Setting],
-) -> Task {
-    let base = phase == Phase::Base;
-    Task {
-        name: name(stage, settings),
-        stage,
-        phase,
-        settings: settings.to_vec(),
-        expected: (!base)
-            .then(|| expected(space, points, stage, settings))
-            .flatten(),
+    choices: impl Iterator<Item = (PointStage, Vec<&'a Setting>)>,
+) -> Option<Task> {
+    let left = sweep.budget - sweep.spent();
+    let tasks = choices.filter_map(|(stage, settings)| {
+        let seconds = expected(values, sweep, stage, &settings)?;
+        let name = name(&settings);
+        let fits = seconds <= left && sweep.find(&name).is_none();
+        fits.then(|| Task {
+            name,
+            stage,
+            phase,
+            settings: settings.into_iter().cloned().collect(),
+            expected: Some(seconds),
+        })
+    });
+    // Of several that take the same, `min_by` keeps the first.
+    let seconds = |task: &Task| task.expected.unwrap_or(0.0);
+    tasks.min_by(|a, b| seconds(a).total_cmp(&seconds(b)))
+}
+
+/// Pairs of settings that alone are on a stage's front.
+fn pairs<'a>(
+    values: &'a [Value],
+    sweep: &Tradeoff,
+    stage: PointStage,
+) -> Vec<(PointStage, Vec<&'a Setting>)> {
+    let front = sweep.best(stage);
+    let on_front = |setting: &&Setting| {
+        let name = name(&[*setting]);
+        setting.knob != PRESET && front.iter().any(|point| point.name == name)
+    };
+    // In the table's order, which is the names'.
+    let proven = values.iter().filter(|value| value.stage == stage);
+    let proven: Vec<&Setting> = proven
+        .map(|value| &value.setting)
+        .filter(on_front)
+        .collect();
+    let mut pairs = Vec::new();
+    for (place, &second) in proven.iter().enumerate() {
+        let firsts = proven[..place].iter();
+        for &first in firsts.filter(|first| first.knob != second.knob) {
+            pairs.push((stage, vec![first, second]));
+        }
+    }
+    pairs
+}
+
+/// The name of these settings: a folder's name on any system.
+fn name(settings: &[&Setting]) -> String {
+    let words: Vec<String> = (settings.iter())
+        .map(|setting| format!("{}-{}", setting.knob, setting.value))
+        .collect();
+    words.join("+")
+}
+
+/// Wall seconds that a point with these settings should take: what the base took times the
+/// factor of each, which is what it made of the time alone, or a guess before that is known.
+fn expected(
+    values: &[Value],
+    sweep: &Tradeoff,
+    stage: PointStage,
+    settings: &[&Setting],
+) -> Option<f64> {
+    let base = sweep.base(stage)?;
+    // Only the base, and whoever sees photos at another size, asks the teacher.
+    let asks = settings
+        .iter()
+        .any(|setting| setting.knob == "teacher-size");
+    let asking = base
+        .outcome
+        .as_ref()
+        .map_or(0.0, |outcome| outcome.teacher_seconds);
+    let took = base.took - if asks { 0.0 } else { asking };
+    let factors = settings.iter().map(|&setting| {
+        let alone = sweep.find(&name(&[setting]));
+        let alone = alone.filter(|point| point.outcome.is_some());
+        let guess = values.iter().find(|value| value.setting == *setting);
+        let guess = guess.map_or(1.0, |value| value.time);
+        alone.map_or(guess, |point| point.took / took.max(1e-9))
+    });
+    Some(took * factors.product::<f64>())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::sweep::{Outcome, Point, tests};
+    use super::*;
+
+    /// A value with what it changes: the stage's time, and quality in dB or ΔE00.
+    type Effect = (PointStage, &'static str, &'static str, f64, f64);
+
+    const EFFECTS: [Effect; 8] = [
+        (PointStage::Luma, "iterations", "350", 0.5, -1.0),
+        (PointStage::Luma, "iterations", "1400", 2.0, 1.0),
+        (PointStage::Luma, "preset", "paper", 1.9, 0.9),
+        (PointStage::Luma, "max-splats", "500", 0.6, -0.1),
+        (PointStage::Luma, "sh-degree", "3", 2.5, -0.5),
+        (PointStage::Color, "rounds", "2", 0.5, 0.5),
+        (PointStage::Color, "chroma-degree", "1", 1.2, -0.2),
+        (PointStage::Color, "teacher-size", "128", 0.8, 0.4),
+    ];
+
+    fn values() -> Vec<Value> {
+        let value = |&(stage, knob, value, time, _): &Effect| Value {
+            stage,
+            time,
+            setting: Setting {
+                knob: knob.to_owned(),
+                value: value.to_owned(),
+            },
+        };
+        EFFECTS.iter().map(value).collect()
+    }
+
+    /// What running a task comes to.
+    fn run(task: &Task) -> Point {
+        let (mut seconds, mut quality) = (40.0, 0.0);
+        for setting in &task.settings {
+            let known = EFFECTS
+                .iter()
+                .find(|e| e.1 == setting.knob && e.2 == setting.value);
+            let (_, _, _, time, change) = known.expect("a value");
+            (seconds, quality) = (seconds * time, quality + change);
+        }
+        let color = task.stage == PointStage::Color;
+        Point {
+            name: task.name.clone(),
+            stage: task.stage,
+            phase: task.phase,
+            settings: task.settings.clone(),
+            took: seconds,
+            failed: None,
+            outcome: Some(Outcome {
+                seconds,
+                psnr: (!color).then_some(24.0 + quality),
+                delta_e: color.then_some(10.0 + quality),
+                ..Outcome::default()
+            }),
+            ..tests::failed("", "")
+        }
+    }
+
+    /// A whole sweep from points that are there.
+    fn swept(points: Vec<Point>, budget: f64) -> Tradeoff {
+        let mut sweep = tests::sweep(points);
+        sweep.budget = budget;
+        while let Some(task) = next(&values(), &sweep, true) {
+            assert!(sweep.find(&task.name).is_none(), "{task:?} again");
+            sweep.points.push(run(&task));
+        }
+        sweep
+    }
+
+    fn names(sweep: &Tradeoff) -> Vec<&str> {
+        sweep.points.iter().map(|point| &point.name[..]).collect()
+    }
+
+    const PLENTY: f64 = 1e5;
+
+    #[test]
+    fn bases_singles_then_pairs_of_the_front_each_cheapest_first() {
+        assert_eq!(
+            names(&swept(Vec::new(), PLENTY)),
+            [
+                "base",
+                "color",
+                "iterations-350",
+                "rounds-2",
+                "max-splats-500",
+                "teacher-size-128",
+                "chroma-degree-1",
+                "preset-paper",
+                "iterations-1400",
+                "sh-degree-3",
+                "iterations-350+max-splats-500",
+                "rounds-2+teacher-size-128",
+                "rounds-2+chroma-degree-1",
+                "chroma-degree-1+teacher-size-128",
+                "iterations-1400+max-splats-500",
+            ]
+        );
+    }
+
+    #[test]
+    fn the_budget_is_kept_and_the_bases_run_anyway() {
+        for budget in [1.0, 100.0, 200.0, 450.0, 2000.0] {
+            let sweep = swept(Vec::new(), budget);
+            assert!(
+                sweep.spent() <= budget.max(80.0),
+                "{} of {budget}",
+                sweep.spent()
+            );
+            // The model's times are as expected, so that what is left is less than the
+            // cheapest point.
+            assert!(sweep.points.len() > 2 || budget < 100.0);
+        }
+    }
+
+    /// Stopped after any point, a sweep asks for the same points as without a break.
+    #[test]
+    fn a_sweep_that_goes_on_asks_for_the_same() {
+        let whole = swept(Vec::new(), 600.0);
+        for stop in 0..whole.points.len() {
+            let resumed = swept(whole.points[..stop].to_vec(), 600.0);
+            assert_eq!(names(&resumed), names(&whole), "after {stop}");
+        }
+    }
+
+    #[test]
+    fn what_failed_is_not_asked_again_and_nothing_follows_a_base_that_did() {
+        let mut sweep = swept(Vec::new(), PLENTY);
+        let count = sweep.points.len();
+        for point in &mut sweep.points[2..] {
+            point.outcome = None;
+        }
+        assert_eq!(next(&values(), &sweep, true), None);
+        assert_eq!(sweep.points.len(), count);
+        sweep.points.truncate(1);
+        sweep.points[0].outcome = None;
+        assert_eq!(next(&values(), &sweep, true), None);
+    }
+
+    /// Times that were measured replace guesses; the teacher's answers are there.
+    #[test]
+    fn expectations_learn() {
+        let mut sweep = swept(Vec::new(), 150.0);
+        if let Some(outcome) = &mut sweep.points[1].outcome {
+            outcome.teacher_seconds = 10.0;
+        }
+        let values = values();
+        let seconds = |sweep: &Tradeoff, at: usize| {
+            let value = &values[at];
+            expected(&values, sweep, value.stage, &[&value.setting]).expect("a base")
+        };
+        assert_eq!(seconds(&sweep, 1), 80.0);
+        assert_eq!([seconds(&sweep, 6), seconds(&sweep, 7)], [36.0, 32.0]);
+        sweep
+            .points
+            .push(tests::luma("iterations-1400", 60.0, 25.0));
+        assert!((seconds(&sweep, 1) - 60.0).abs() < 1e-9);
     }
 }

@@ -8,7 +8,7 @@ use std::{
 
 use super::{
     FILES, POINTS,
-    report::{Phase, Point, Subject, TRADEOFF_VERSION, Tradeoff},
+    sweep::{Phase, Point, Subject, TRADEOFF_VERSION, Tradeoff},
 };
 use crate::{
     disk::{self, trust},
@@ -109,9 +109,7 @@ fn read(text: &str, subject: &Subject) -> Result<Tradeoff, String> {
     let there = &sweep.subject;
     let differs = [
         ("scene", there.scene != subject.scene),
-        ("preset", there.preset != subject.preset),
         ("teacher", there.teacher != subject.teacher),
-        ("settings of luma", there.luma != subject.luma),
         ("set of options of fit", there.options != subject.options),
     ];
     match differs.iter().find(|(_, differs)| *differs) {
@@ -126,80 +124,48 @@ fn read(text: &str, subject: &Subject) -> Result<Tradeoff, String> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::sweep::tests::{failed, luma, sweep};
     use super::*;
-    use crate::{luma::LumaSettings, tradeoff::report::PointStage};
-
-    fn subject() -> Subject {
-        Subject {
-            scene: "/garden".to_owned(),
-            preset: "draft".to_owned(),
-            teacher: None,
-            luma: LumaSettings::new(9),
-            options: vec!["--channel".to_owned(), "r".to_owned()],
-        }
-    }
-
-    fn point(name: &str, phase: Phase, failed: bool) -> Point {
-        Point {
-            name: name.to_owned(),
-            stage: PointStage::Luma,
-            phase,
-            settings: Vec::new(),
-            commands: Vec::new(),
-            took: 2.0,
-            failed: failed.then(|| "no memory".to_owned()),
-            outcome: None,
-        }
-    }
 
     #[test]
     fn a_sweep_goes_on_where_it_was() {
+        let subject = sweep(Vec::new()).subject;
         let folder = tempfile::tempdir().expect("a folder");
-        let mut state = State::open(folder.path(), subject(), 60.0).expect("new");
-        state.add(
-            point("base", Phase::Base, false),
-            Some("llvmpipe".to_owned()),
-        );
-        state.add(point("coarse-0.5", Phase::One, true), None);
+        let open = |budget| State::open(folder.path(), subject.clone(), budget);
+        let mut state = open(60.0).expect("new");
+        state.add(luma("base", 3.0, 24.0), Some("llvmpipe".to_owned()));
+        state.add(failed("sh-degree-3", "no memory"), None);
         state.write().expect("written");
-        let second = State::open(folder.path(), subject(), 90.0).err();
-        let refusal = second.expect("refused").to_string();
+        let refusal = open(90.0).err().expect("refused").to_string();
         assert!(refusal.contains("another sweep runs"), "{refusal}");
         let before = state.sweep.points.clone();
         drop(state);
-        let again = State::open(folder.path(), subject(), 90.0).expect("the same");
+        let mut again = open(90.0).expect("the same");
         assert_eq!(again.sweep.points, before);
         assert_eq!(again.sweep.device.as_deref(), Some("llvmpipe"));
         assert_eq!((again.sweep.budget, again.sweep.spent()), (90.0, 4.0));
-    }
-
-    #[test]
-    fn a_base_that_failed_is_tried_again() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let mut state = State::open(folder.path(), subject(), 60.0).expect("new");
-        state.add(point("base", Phase::Base, true), None);
-        state.write().expect("written");
-        drop(state);
-        let again = State::open(folder.path(), subject(), 60.0).expect("the same");
-        assert!(again.sweep.points.is_empty());
+        // A base that failed is tried again.
+        again.sweep.points[0].failed = Some("no memory".to_owned());
+        again.write().expect("written");
+        drop(again);
+        assert_eq!(open(90.0).expect("the same").sweep.points, before[1..]);
     }
 
     #[test]
     fn another_subject_is_refused_with_a_remedy() {
+        let subject = sweep(Vec::new()).subject;
         let folder = tempfile::tempdir().expect("a folder");
-        State::open(folder.path(), subject(), 60.0)
+        State::open(folder.path(), subject.clone(), 60.0)
             .and_then(|state| state.write())
             .expect("written");
         type Change = (&'static str, fn(&mut Subject));
-        let changes: [Change; 5] = [
+        let changes: [Change; 3] = [
             ("scene", |s| s.scene.push('2')),
-            ("preset", |s| s.preset = "paper".to_owned()),
             ("teacher", |s| s.teacher = Some("/t".to_owned())),
-            ("settings", |s| s.luma.iterations += 1),
             ("options", |s| s.options.clear()),
         ];
         for (what, change) in changes {
-            let mut other = subject();
+            let mut other = subject.clone();
             change(&mut other);
             let error = State::open(folder.path(), other, 60.0)
                 .err()
@@ -208,7 +174,7 @@ mod tests {
             assert!(error.contains(what) && error.contains("-o"), "{error}");
         }
         std::fs::write(folder.path().join(FILES[1]), "{").expect("written");
-        let error = State::open(folder.path(), subject(), 60.0)
+        let error = State::open(folder.path(), subject, 60.0)
             .err()
             .expect("refused");
         assert!(error.to_string().contains("damaged"), "{error}");

@@ -137,9 +137,9 @@ fn every_write_of_one_file_fails_well() {
 fn a_sweep_fails_well() {
     let place = place_with_run();
     let sweep = ["tradeoff", "scene", "-o", "out", "--preset", "draft"];
+    let knobs = ["--knobs", "iterations", "--budget", "0.2", "--"];
     let short = ["--iterations", "3", "--without", "background"];
-    let knobs = ["--knobs", "coarse", "--budget", "0.2"];
-    let sweep = [&sweep[..], &short, &knobs].concat();
+    let sweep = [&sweep[..], &knobs, &short].concat();
     let mut struck = 0;
     for step in [1, 3, 8] {
         let done = failing(&place, &sweep, &step.to_string());

@@ -150,8 +150,18 @@ pub(super) const CASES: &[Case] = &[
     ),
     usage(
         "no such knob",
-        "tradeoff scene --knobs coarse,speed",
-        &["speed", "--knobs", "max-side", "correct-views"],
+        "tradeoff scene --knobs rounds,speed",
+        &["speed", "--knobs", "max-side", "chroma-degree"],
+    ),
+    usage(
+        "no option of fit",
+        "tradeoff scene -- --max-side 200 --colour",
+        &["--colour"],
+    ),
+    usage(
+        "two folders for a point",
+        "tradeoff scene -- -o out",
+        &["--output", "multiple"],
     ),
     usage(
         "no time at all",

@@ -1,0 +1,291 @@
+//! The sweep for people: `tradeoff.csv`, `tradeoff.html` and the table that is printed.
+//! docs/tradeoff.md describes every column.
+
+use std::fmt::Write;
+
+use super::{
+    plot::{group, plot},
+    sweep::{Measure, Outcome, Point, PointStage, Tradeoff},
+};
+use crate::report::{
+    Table,
+    html::{TAIL, escaped, head, push_table},
+};
+
+/// The columns of the table.
+const COLUMNS: &str = "name,stage,phase,settings,on_front,iterations,splats,seconds,teacher_seconds,took_seconds,psnr_db,ssim,delta_e00,consistency_lab,colorfulness,peak_host_bytes,peak_device_bytes,failed,commands";
+
+/// A row a point as RFC 4180 has it, but for the ends of lines.
+pub(super) fn csv(sweep: &Tradeoff) -> String {
+    let mut text = COLUMNS.to_owned() + "\n";
+    for point in &sweep.points {
+        let settings = point.settings.iter();
+        let settings: Vec<String> = settings
+            .map(|setting| format!("{}={}", setting.knob, setting.value))
+            .collect();
+        let on_front = sweep.measures(point.stage).any(|measure| {
+            let front = sweep.front(point.stage, measure);
+            front.iter().any(|found| found.name == point.name)
+        });
+        let commands: Vec<String> = point.commands.iter().map(|c| shell_line(c)).collect();
+        let cells = [
+            point.name.clone(),
+            point.stage.name().to_owned(),
+            point.phase.name().to_owned(),
+            settings.join(" "),
+            on_front.to_string(),
+            cell(point, |o| Some(o.iterations)),
+            cell(point, |o| Some(o.splats)),
+            cell(point, |o| Some(format!("{:.3}", o.seconds))),
+            cell(point, |o| Some(format!("{:.3}", o.teacher_seconds))),
+            format!("{:.3}", point.took),
+            cell(point, |o| o.psnr),
+            cell(point, |o| o.ssim),
+            cell(point, |o| o.delta_e),
+            cell(point, |o| o.consistency),
+            cell(point, |o| o.colorfulness),
+            cell(point, |o| o.peak_host_memory),
+            cell(point, |o| o.peak_device_memory),
+            point.failed.clone().unwrap_or_default(),
+            commands.join(" && "),
+        ];
+        text += &cells.map(quoted).join(",");
+        text.push('\n');
+    }
+    text
+}
+
+/// A figure of the outcome; empty without.
+fn cell<T: ToString>(point: &Point, value: fn(&Outcome) -> Option<T>) -> String {
+    let value = point.outcome.as_ref().and_then(value);
+    value.map_or(String::new(), |value| value.to_string())
+}
+
+fn quoted(cell: String) -> String {
+    match cell.contains([',', '"', '\n', '\r']) {
+        true => format!("\"{}\"", cell.replace('"', "\"\"")),
+        false => cell,
+    }
+}
+
+/// The front of a stage; `None` without points.
+pub fn front_table(sweep: &Tradeoff, stage: PointStage) -> Option<Table> {
+    let front = sweep.best(stage);
+    let title = match stage {
+        PointStage::Luma => "Luma: the best that each time buys",
+        PointStage::Color => "Color: the best that each time buys",
+    };
+    (!front.is_empty()).then(|| table(sweep, stage, title, &front))
+}
+
+/// Points in figures, a failure as its reason.
+fn table(sweep: &Tradeoff, stage: PointStage, title: &str, points: &[&Point]) -> Table {
+    let measures: Vec<&Measure> = sweep.measures(stage).collect();
+    let base = sweep.base(stage).and_then(|base| base.outcome.as_ref());
+    let row = |point: &&Point| {
+        let mut row = vec![point.label()];
+        match &point.outcome {
+            Some(outcome) => {
+                row.push(format!("{:.1}", outcome.seconds));
+                row.push(base.map_or(String::new(), |base| {
+                    format!("{:.2}", outcome.seconds / base.seconds.max(1e-9))
+                }));
+                row.extend(measures.iter().map(|measure| measure.figure(outcome)));
+                row.push(outcome.splats.to_string());
+                for memory in [outcome.peak_device_memory, outcome.peak_host_memory] {
+                    row.push(memory.map_or(String::new(), |bytes| (bytes >> 20).to_string()));
+                }
+            }
+            None => {
+                let reason = point.failed.as_deref().unwrap_or_default();
+                row[0] += &format!(" failed: {reason}");
+                row.resize(6 + measures.len(), String::new());
+            }
+        }
+        row
+    };
+    let titles = measures.iter().map(|measure| measure.title);
+    let head = ["point", "seconds", "× base"].into_iter().chain(titles);
+    let head = head.chain(["Gaussians", "device MiB", "host MiB"]);
+    Table {
+        title: title.to_owned(),
+        head: head.map(str::to_owned).collect(),
+        rows: points.iter().map(row).collect(),
+        notes: vec!["Measured on held-out views.".to_owned()],
+    }
+}
+
+/// What this page needs besides the style of all.
+const STYLE: &str = "<style>
+.plots { display: grid; grid-template-columns: repeat(auto-fit, minmax(380px, 1fr)); gap: 1rem; }
+.plots svg { display: block; color: var(--ink); fill: var(--quiet); background: var(--card); }
+.legend i { display: inline-block; width: .7rem; height: .7rem; border-radius: 50%; margin: 0 .35rem 0 1rem; color: var(--ink); }
+pre { white-space: pre-wrap; overflow-wrap: anywhere; font-size: .78rem; }
+</style>
+";
+
+/// `tradeoff.html`; pictures are those in the points' folders.
+pub(super) fn page(sweep: &Tradeoff) -> String {
+    let mut html = head("gs-chroma trade-off") + STYLE;
+    let subject = &sweep.subject;
+    let scene = subject.scene.rsplit(['/', '\\']).next().unwrap_or_default();
+    let teacher = subject.teacher.as_ref();
+    // Writing to a string cannot fail.
+    let _ = writeln!(
+        html,
+        "<h1>{}: what quality costs in time</h1>\n<p class=\"note\">gs-chroma {}; {}{}{}; {} points in {:.1} of {:.1} minutes.</p>",
+        escaped(scene),
+        escaped(&sweep.program),
+        escaped(&shell_line(
+            &[&["fit".to_owned()], &subject.options[..]].concat()
+        )),
+        teacher.map_or(String::new(), |path| format!("; teacher {}", escaped(path))),
+        (sweep.device.as_ref()).map_or(String::new(), |name| format!("; {}", escaped(name))),
+        sweep.points.len(),
+        sweep.spent() / 60.0,
+        sweep.budget / 60.0,
+    );
+    for stage in PointStage::ALL {
+        push_stage(&mut html, sweep, stage);
+    }
+    html.push_str("<h2>Commands</h2>\n<pre>");
+    for command in sweep.points.iter().flat_map(|point| &point.commands) {
+        let _ = writeln!(html, "{}", escaped(&shell_line(command)));
+    }
+    html + "</pre>\n" + TAIL
+}
+
+/// A stage's plots, its front in pictures and figures, and all of its points.
+fn push_stage(html: &mut String, sweep: &Tradeoff, stage: PointStage) {
+    let Some(front) = front_table(sweep, stage) else {
+        return;
+    };
+    let mut legend: Vec<(&str, &str)> = Vec::new();
+    html.push_str("<p class=\"legend\">");
+    for group in sweep.of(stage).map(group) {
+        if !legend.contains(&group) {
+            let (name, color) = group;
+            let _ = write!(
+                html,
+                "<i style=\"background:{color}\"></i>{}",
+                escaped(name)
+            );
+            legend.push(group);
+        }
+    }
+    html.push_str("</p>\n<div class=\"plots\">\n");
+    for measure in sweep.measures(stage) {
+        html.push_str(&plot(sweep, stage, measure));
+    }
+    html.push_str("</div>\n");
+    push_table(html, &front);
+    html.push_str("<div class=\"row\">\n");
+    for point in sweep.best(stage) {
+        // A name is letters, digits, `.`, `+` and `-`.
+        let sheet = format!(
+            "{}/{}/contact-sheet.png",
+            super::POINTS,
+            escaped(&point.name)
+        );
+        let _ = writeln!(
+            html,
+            "<figure><a href=\"{sheet}\"><img src=\"{sheet}\" alt=\"\" loading=\"lazy\"></a><figcaption>{}</figcaption></figure>",
+            escaped(&point.label())
+        );
+    }
+    html.push_str("</div>\n");
+    let all: Vec<&Point> = sweep.of(stage).collect();
+    push_table(html, &table(sweep, stage, "All points", &all));
+}
+
+/// The program with these arguments, quoted for a POSIX shell.
+pub fn shell_line(arguments: &[String]) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:+@%".contains(c);
+    let mut line = String::from("gs-chroma");
+    for argument in arguments {
+        // In single quotes where the shell would see more than a word.
+        line += &match !argument.is_empty() && argument.chars().all(plain) {
+            true => format!(" {argument}"),
+            false => format!(" '{}'", argument.replace('\'', r"'\''")),
+        };
+    }
+    line
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::sweep::tests::{failed, luma, sweep};
+    use super::*;
+
+    #[test]
+    fn a_row_a_point_and_quotes_where_needed() {
+        let mut odd = failed("odd", "no \"room\", none\nat all");
+        odd.commands = vec![vec!["fit".into(), "/a,b".into()], vec!["eval".into()]];
+        let text = csv(&sweep(vec![luma("base", 10.0, 24.5), odd]));
+        let (header, rows) = text.split_once('\n').expect("a header");
+        let (base, odd) = rows.split_once('\n').expect("two rows");
+        assert_eq!(base.split(',').count(), header.split(',').count());
+        let begins = "base,luma,base,,true,700,1000,10.000,0.000,10.000,24.5,";
+        assert!(base.starts_with(begins), "{base}");
+        let end = "\"no \"\"room\"\", none\nat all\",\"gs-chroma fit /a,b && gs-chroma eval\"\n";
+        assert!(odd.starts_with("odd,luma,one,,false,,,,"), "{odd}");
+        assert!(odd.ends_with(end), "{odd}");
+    }
+
+    #[test]
+    fn everything_is_on_the_page_and_nothing_breaks_it() {
+        let mut odd = failed("sh-degree-3", "no <memory> & more");
+        odd.commands = vec![vec!["fit".into(), "/my <scene>".into()]];
+        let sweep = sweep(vec![
+            luma("base", 10.0, 24.0),
+            luma("max-splats-500", 8.0, 23.0),
+            odd,
+        ]);
+        let table = front_table(&sweep, PointStage::Luma).expect("points");
+        let rows: Vec<String> = table.rows.iter().map(|row| row[..4].join(" ")).collect();
+        assert_eq!(
+            rows,
+            ["max-splats 500 8.0 0.80 23.00", "base 10.0 1.00 24.00"]
+        );
+        assert!(front_table(&sweep, PointStage::Color).is_none());
+        let html = page(&sweep);
+        for piece in [
+            "&lt;garden&gt;: what quality costs",
+            "gs-chroma fit --channel r;",
+            "src=\"points/max-splats-500/contact-sheet.png\"",
+            "no &lt;memory&gt; &amp; more",
+            "gs-chroma fit '/my &lt;scene&gt;'",
+        ] {
+            assert!(html.contains(piece), "{piece}");
+        }
+        for piece in ["<garden>", "<memory>", "<scene>", "<script"] {
+            assert!(!html.contains(piece), "{piece}");
+        }
+        assert_eq!(html.matches("<svg").count(), 2);
+    }
+
+    /// What the shell itself makes of it.
+    #[cfg(unix)]
+    #[test]
+    fn a_shell_reads_the_same_arguments() {
+        let words = [
+            "fit",
+            "/a b/ü",
+            "it's",
+            "\"$HOME\" `id`",
+            "\\",
+            "a\nb",
+            "",
+            "*",
+        ];
+        let words = words.map(str::to_owned);
+        let line = shell_line(&words).replacen("gs-chroma", r"printf '%s|'", 1);
+        let done = std::process::Command::new("sh")
+            .arg("-c")
+            .arg(line)
+            .output();
+        let printed = String::from_utf8(done.expect("a shell").stdout).expect("text");
+        assert_eq!(printed, words.map(|word| word + "|").concat());
+        assert_eq!(shell_line(&["--a=1,2".to_owned()]), "gs-chroma --a=1,2");
+    }
+}

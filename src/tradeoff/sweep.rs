@@ -1,0 +1,380 @@
+//! A sweep as `tradeoff.json` holds it, and what its points are judged by.
+//! docs/tradeoff.md describes every key.
+
+use serde::{Deserialize, Serialize};
+
+/// Version of the file's layout; raised when a key changes its meaning.
+pub const TRADEOFF_VERSION: u32 = 3;
+
+/// `tradeoff.json`: a sweep, finished or not.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Tradeoff {
+    /// [`TRADEOFF_VERSION`].
+    pub version: u32,
+    /// Version of the program.
+    pub program: String,
+    /// What is swept.
+    pub subject: Subject,
+    /// Adapter and driver, once the first point has run.
+    pub device: Option<String>,
+    /// Wall seconds that the points may take together.
+    pub budget: f64,
+    /// Every point that ran, in the order in which they did.
+    pub points: Vec<Point>,
+}
+
+/// What is swept; a folder holds points of one subject only.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Subject {
+    /// The COLMAP folder, absolute.
+    pub scene: String,
+    /// The teacher's file or folder, absolute.
+    pub teacher: Option<String>,
+    /// Options of every `fit`.
+    pub options: Vec<String>,
+}
+
+/// One choice of settings, and what came of it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Point {
+    /// Name of its run folder under `points/`.
+    pub name: String,
+    /// What it says something about.
+    pub stage: PointStage,
+    /// Why it was asked for.
+    pub phase: Phase,
+    /// What differs from the base; empty for the base itself.
+    pub settings: Vec<Setting>,
+    /// The program's arguments, one list for each time it was called.
+    pub commands: Vec<Vec<String>>,
+    /// Wall seconds of all these calls, measuring among them.
+    pub took: f64,
+    /// Why there is no outcome.
+    pub failed: Option<String>,
+    /// What was measured.
+    pub outcome: Option<Outcome>,
+}
+
+/// What a point says something about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum PointStage {
+    /// Geometry and luma.
+    Luma,
+    /// Color, on the base's luma.
+    Color,
+}
+
+impl PointStage {
+    /// Both, in the order in which they run.
+    pub const ALL: [Self; 2] = [Self::Luma, Self::Color];
+
+    /// As in the files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Luma => "luma",
+            Self::Color => "color",
+        }
+    }
+}
+
+/// Why a point was asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Phase {
+    /// Everything as the preset has it.
+    Base,
+    /// One setting changed.
+    One,
+    /// Two settings that alone are on the front.
+    Front,
+}
+
+impl Phase {
+    /// As in the files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Base => "base",
+            Self::One => "one",
+            Self::Front => "front",
+        }
+    }
+}
+
+/// A knob and where it stands.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Setting {
+    /// Name of the setting, as for `--knobs`.
+    pub knob: String,
+    /// Its value.
+    pub value: String,
+}
+
+/// What a point's reports say. Means are over the held-out views.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Outcome {
+    /// Iterations of stage 1.
+    pub iterations: usize,
+    /// Number of Gaussians.
+    pub splats: usize,
+    /// Wall seconds of all stages.
+    pub seconds: f64,
+    /// Those of asking the teacher: of the point that asked, where this one took its answers.
+    pub teacher_seconds: f64,
+    /// PSNR in dB of the gray pictures as viewers show them.
+    pub psnr: Option<f64>,
+    /// Structural similarity of the gray pictures.
+    pub ssim: Option<f64>,
+    /// Mean ΔE00 of the colored pictures to the photos, where these have colors.
+    pub delta_e: Option<f64>,
+    /// Root mean square difference of a and b, in CIELAB units, between photographed
+    /// views of the same places.
+    pub consistency: Option<f64>,
+    /// Colorfulness (Hasler and Süsstrunk 2003).
+    pub colorfulness: Option<f64>,
+    /// Largest resident memory of a process in bytes, where the system tells.
+    pub peak_host_memory: Option<u64>,
+    /// Largest memory of the device's buffers in bytes, where the backend tells.
+    pub peak_device_memory: Option<u64>,
+}
+
+/// A figure that seconds are weighed against.
+pub struct Measure {
+    /// The stage whose points have it.
+    pub stage: PointStage,
+    /// Name and unit, for axes and columns.
+    pub title: &'static str,
+    /// Digits worth printing.
+    pub digits: usize,
+    /// 1 where more is better, −1 where less is, 0 where neither is: colors may be too strong
+    /// as well as too weak.
+    pub sign: f64,
+    /// The figure of an outcome.
+    pub value: fn(&Outcome) -> Option<f64>,
+}
+
+/// The measures of both stages, the one that decides first.
+pub(super) const MEASURES: [Measure; 5] = [
+    Measure {
+        stage: PointStage::Luma,
+        title: "PSNR, dB",
+        digits: 2,
+        sign: 1.0,
+        value: |outcome| outcome.psnr,
+    },
+    Measure {
+        stage: PointStage::Luma,
+        title: "SSIM",
+        digits: 4,
+        sign: 1.0,
+        value: |outcome| outcome.ssim,
+    },
+    Measure {
+        stage: PointStage::Color,
+        title: "ΔE00 to the photos",
+        digits: 2,
+        sign: -1.0,
+        value: |outcome| outcome.delta_e,
+    },
+    Measure {
+        stage: PointStage::Color,
+        title: "inconsistency of views, a/b",
+        digits: 2,
+        sign: -1.0,
+        value: |outcome| outcome.consistency,
+    },
+    Measure {
+        stage: PointStage::Color,
+        title: "colorfulness",
+        digits: 1,
+        sign: 0.0,
+        value: |outcome| outcome.colorfulness,
+    },
+];
+
+impl Measure {
+    /// An outcome's figure with its digits; empty without.
+    pub fn figure(&self, outcome: &Outcome) -> String {
+        let digits = self.digits;
+        (self.value)(outcome).map_or(String::new(), |value| format!("{value:.digits$}"))
+    }
+}
+
+impl Point {
+    /// Its settings in words, `base` without any.
+    pub fn label(&self) -> String {
+        let settings: Vec<String> = (self.settings.iter())
+            .map(|setting| format!("{} {}", setting.knob, setting.value))
+            .collect();
+        match settings.is_empty() {
+            true => "base".to_owned(),
+            false => settings.join(", "),
+        }
+    }
+
+    /// Seconds and, larger where it is better, figure of merit.
+    fn place(&self, measure: &Measure) -> Option<[f64; 2]> {
+        let outcome = self.outcome.as_ref()?;
+        let place = [outcome.seconds, measure.sign * (measure.value)(outcome)?];
+        (measure.sign != 0.0 && place.iter().all(|figure| figure.is_finite())).then_some(place)
+    }
+}
+
+impl Tradeoff {
+    /// The file as indented JSON.
+    pub fn to_json(&self) -> String {
+        // Plain structs with string keys: serializing them cannot fail.
+        serde_json::to_string_pretty(self).unwrap_or_default()
+    }
+
+    /// Wall seconds that the points took.
+    pub fn spent(&self) -> f64 {
+        self.points.iter().map(|point| point.took).sum()
+    }
+
+    /// The point of that name.
+    pub fn find(&self, name: &str) -> Option<&Point> {
+        self.points.iter().find(|point| point.name == name)
+    }
+
+    /// The points of a stage.
+    pub fn of(&self, stage: PointStage) -> impl Iterator<Item = &Point> {
+        self.points.iter().filter(move |point| point.stage == stage)
+    }
+
+    /// The base of a stage, where it ran.
+    pub fn base(&self, stage: PointStage) -> Option<&Point> {
+        self.of(stage).find(|point| point.phase == Phase::Base)
+    }
+
+    /// The measures that some point of a stage has.
+    pub fn measures(&self, stage: PointStage) -> impl Iterator<Item = &'static Measure> {
+        let of_stage = MEASURES.iter().filter(move |m| m.stage == stage);
+        of_stage.filter(move |measure| {
+            let mut outcomes = self.of(stage).filter_map(|point| point.outcome.as_ref());
+            outcomes.any(|outcome| (measure.value)(outcome).is_some())
+        })
+    }
+
+    /// The points of a stage that no other beats in seconds or a measure and equals in the
+    /// other, fastest first; of equal ones the first.
+    pub fn front(&self, stage: PointStage, measure: &Measure) -> Vec<&Point> {
+        let mut placed: Vec<(&Point, [f64; 2])> = (self.of(stage))
+            .filter_map(|point| Some((point, point.place(measure)?)))
+            .collect();
+        placed.sort_by(|(_, a), (_, b)| a[0].total_cmp(&b[0]).then(b[1].total_cmp(&a[1])));
+        let mut best = f64::NEG_INFINITY;
+        placed.retain(|(_, [_, merit])| {
+            let better = *merit > best;
+            best = best.max(*merit);
+            better
+        });
+        placed.into_iter().map(|(point, _)| point).collect()
+    }
+
+    /// The front of what decides in a stage: its first measure that its points have.
+    pub fn best(&self, stage: PointStage) -> Vec<&Point> {
+        let first = self.measures(stage).next();
+        first.map_or(Vec::new(), |measure| self.front(stage, measure))
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+
+    pub(in super::super) fn sweep(points: Vec<Point>) -> Tradeoff {
+        Tradeoff {
+            version: TRADEOFF_VERSION,
+            program: "0.1.0".to_owned(),
+            subject: Subject {
+                scene: "/photos/<garden>".to_owned(),
+                teacher: None,
+                options: vec!["--channel".to_owned(), "r".to_owned()],
+            },
+            device: None,
+            budget: 60.0,
+            points,
+        }
+    }
+
+    pub(in super::super) fn failed(name: &str, reason: &str) -> Point {
+        Point {
+            name: name.to_owned(),
+            stage: PointStage::Luma,
+            phase: Phase::One,
+            settings: Vec::new(),
+            commands: Vec::new(),
+            took: 1.0,
+            failed: Some(reason.to_owned()),
+            outcome: None,
+        }
+    }
+
+    pub(in super::super) fn luma(name: &str, seconds: f64, psnr: f64) -> Point {
+        let setting = |(knob, value): (&str, &str)| Setting {
+            knob: knob.to_owned(),
+            value: value.to_owned(),
+        };
+        let base = name == "base";
+        Point {
+            phase: if base { Phase::Base } else { Phase::One },
+            settings: name.rsplit_once('-').map(setting).into_iter().collect(),
+            took: seconds,
+            failed: None,
+            outcome: Some(Outcome {
+                iterations: 700,
+                splats: 1000,
+                seconds,
+                psnr: Some(psnr),
+                ssim: Some(psnr / 30.0),
+                ..Outcome::default()
+            }),
+            ..failed(name, "")
+        }
+    }
+
+    #[test]
+    fn the_front_is_of_one_stage_and_leaves_failures_out() {
+        let mut color = luma("color", 1.0, 99.0);
+        color.stage = PointStage::Color;
+        let sweep = sweep(vec![
+            luma("base", 10.0, 24.0),
+            color,
+            failed("sh-3", "no memory"),
+            luma("side-200", 5.0, 22.0),
+            luma("splats-5", 12.0, 23.0),
+            luma("splats-6", 5.0, 22.0),
+            luma("splats-7", 1.0, f64::INFINITY),
+        ]);
+        let names: Vec<&str> = (sweep.best(PointStage::Luma).iter())
+            .map(|point| &point.name[..])
+            .collect();
+        assert_eq!(names, ["side-200", "base"]);
+        assert!(sweep.best(PointStage::Color).is_empty());
+        assert_eq!(sweep.measures(PointStage::Luma).count(), 2);
+    }
+
+    /// The definition, applied to every pair.
+    #[test]
+    fn against_the_definition() {
+        let mut random = fastrand::Rng::with_seed(3);
+        for _ in 0..200 {
+            let places: Vec<[f64; 2]> = (0..random.usize(1..12))
+                .map(|_| [random.u8(0..6), random.u8(0..6)].map(f64::from))
+                .collect();
+            let points = places.iter().map(|&[x, y]| luma("side-1", x, y)).collect();
+            let beats = |a: [f64; 2], b: [f64; 2]| a != b && a[0] <= b[0] && a[1] >= b[1];
+            let mut expected: Vec<[f64; 2]> = (places.iter().copied())
+                .filter(|&place| !places.iter().any(|&other| beats(other, place)))
+                .collect();
+            expected.sort_by(|a, b| a[0].total_cmp(&b[0]));
+            expected.dedup();
+            let sweep = sweep(points);
+            let found: Vec<[f64; 2]> = (sweep.best(PointStage::Luma).iter())
+                .filter_map(|point| point.place(&MEASURES[0]))
+                .collect();
+            assert_eq!(found, expected, "{places:?}");
+        }
+    }
+}
