@@ -106,13 +106,7 @@ fn main() {
         }
     }
     compile("project", "_playcanvas", &["playcanvas"]);
-    for color in ["luma", "chroma", "rgb"] {
-        compile(
-            "blend",
-            &format!("_{color}_playcanvas"),
-            &[color, "playcanvas"],
-        );
-    }
+    compile("blend", "_rgb_playcanvas", &["rgb", "playcanvas"]);
     kernels.write();
 }
 

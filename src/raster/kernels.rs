@@ -18,11 +18,9 @@ impl LayerKernels {
             ColorKind::Rgb => shaders::SHADE_RGB,
         };
         let blend = match (falloff, kind) {
-            (Falloff::Gaussian, ColorKind::Luma) => shaders::BLEND_LUMA,
-            (Falloff::Gaussian, ColorKind::Chroma) => shaders::BLEND_CHROMA,
+            (_, ColorKind::Luma) => shaders::BLEND_LUMA,
+            (_, ColorKind::Chroma) => shaders::BLEND_CHROMA,
             (Falloff::Gaussian, ColorKind::Rgb) => shaders::BLEND_RGB,
-            (Falloff::PlayCanvas, ColorKind::Luma) => shaders::BLEND_LUMA_PLAYCANVAS,
-            (Falloff::PlayCanvas, ColorKind::Chroma) => shaders::BLEND_CHROMA_PLAYCANVAS,
             (Falloff::PlayCanvas, ColorKind::Rgb) => shaders::BLEND_RGB_PLAYCANVAS,
         };
         Self {

@@ -115,7 +115,7 @@ pub enum Falloff {
     Gaussian,
     /// As PlayCanvas' engine has it: less than a Gaussian by e⁻⁴, divided by what is left of 1,
     /// ended at √8 deviations, and blurred by [`PLAYCANVAS_BLUR`](constants::PLAYCANVAS_BLUR)
-    /// px² only. It is not antialiased. No adjoint but [`RgbAdjoint`] knows it.
+    /// px² only. It is not antialiased. Of layers and adjoints only RGB's know it.
     PlayCanvas,
 }
 

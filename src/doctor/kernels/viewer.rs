@@ -137,26 +137,12 @@ fn gradients(
 
 pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
     let allowed = Allowance::of(&raster.gpu);
-    let mut rows = vec![
-        Row::picture(
-            "blend, PlayCanvas",
-            "luma, 0 to 1",
-            bounds(allowed, 2.01e-6, 1.0),
-            &super::blend::pictures::<1>(raster, clipped(super::blend::scenes()))?,
-        ),
-        Row::picture(
-            "blend, PlayCanvas",
-            "chroma, Lab units",
-            bounds(allowed, 1.45e-6, 80.0),
-            &super::blend::pictures::<2>(raster, clipped(super::blend::scenes()))?,
-        ),
-        Row::picture(
-            "blend, PlayCanvas",
-            "RGB, 0 to 1",
-            bounds(allowed, 2.29e-6, 1.0),
-            &super::blend::pictures::<3>(raster, clipped(super::blend::scenes()))?,
-        ),
-    ];
+    let mut rows = vec![Row::picture(
+        "blend, PlayCanvas",
+        "RGB, 0 to 1",
+        bounds(allowed, 2.29e-6, 1.0),
+        &super::blend::pictures::<3>(raster, clipped(super::blend::scenes()))?,
+    )];
     // Colors are up to five times white here.
     let bounds_of = |l2, worst| allowed.gradient(l2, allowed.relative(worst, 1.0));
     let bounds = [
