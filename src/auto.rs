@@ -285,7 +285,6 @@ pub fn auto(options: &AutoOptions, tell: &mut Teller<'_>) -> Result<Results, Aut
             output: results.scene.clone(),
             luma: false,
             colmap_coordinates: false,
-            spz: None,
             clean: false,
             viewer: None,
             colmap: None,

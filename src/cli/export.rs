@@ -13,7 +13,6 @@ use super::{
 };
 use crate::{
     run::{Event, ExportOptions, Exported, Look, Shown, Stage, export},
-    splats::SpzVersion,
     view::{is_html, write_html},
     viewers::ViewerChoice,
 };
@@ -22,11 +21,6 @@ const VIEWERS: &[(ViewerChoice, &str)] = &[
     (ViewerChoice::Spark, "Spark"),
     (ViewerChoice::PlayCanvas, "PlayCanvas and SuperSplat"),
     (ViewerChoice::Any, "A compromise for all viewers"),
-];
-
-const SPZ_VERSIONS: &[(SpzVersion, &str)] = &[
-    (SpzVersion::V3, "One gzip stream, read by more viewers"),
-    (SpzVersion::V4, "Zstandard streams: smaller"),
 ];
 
 /// Write a scene for viewers, as a splat file or one HTML page.
@@ -51,9 +45,6 @@ pub struct Export {
     /// Write COLMAP's coordinates, even if the scene was moved to the origin.
     #[arg(long, help_heading = OUTPUT)]
     colmap_coordinates: bool,
-    /// Version of an .spz file [default: 3].
-    #[arg(long, help_heading = OUTPUT, value_name = "VERSION", value_parser = one_of(SPZ_VERSIONS))]
-    spz_version: Option<SpzVersion>,
     /// Leave out Gaussians that no training view needs.
     #[arg(long, help_heading = QUALITY, group = "before cameras")]
     clean: bool,
@@ -78,7 +69,6 @@ impl Export {
             output: self.output,
             luma: self.luma,
             colmap_coordinates: self.colmap_coordinates,
-            spz: self.spz_version,
             clean: self.clean,
             viewer: self.viewer,
             colmap: self.colmap,
@@ -123,7 +113,6 @@ impl Export {
         let of_files = [
             ("--clean", self.clean),
             ("--viewer", self.viewer.is_some()),
-            ("--spz-version", self.spz_version.is_some()),
             ("--colmap-coordinates", self.colmap_coordinates),
         ];
         for (name, _) in of_files.into_iter().filter(|(_, asked)| *asked) {

@@ -8,7 +8,7 @@ use super::{
     CliError,
     checkpoint::CheckpointArguments,
     effects::EffectArguments,
-    headings::{BUDGET, EXPERT, OUTPUT, QUALITY, TEACHER},
+    headings::{BUDGET, EXPERT, OUTPUT, TEACHER},
     luma::LumaArguments,
     network::NetworkArguments,
     next,
@@ -59,7 +59,7 @@ pub struct Fit {
     #[command(flatten)]
     luma: LumaArguments,
     /// Measure held-out views at this longer side, in pixels [default: size of training].
-    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(16..), help_heading = QUALITY, hide_short_help = true)]
+    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(16..), hide = true)]
     measure_side: Option<u32>,
     #[command(flatten)]
     effects: EffectArguments,

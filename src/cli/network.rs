@@ -1,7 +1,5 @@
 //! How a network is to be asked, wherever a command takes one.
 
-use std::time::Duration;
-
 use clap::Args;
 
 use super::{headings::TEACHER, values::one_of};
@@ -35,9 +33,6 @@ pub struct NetworkArguments {
     /// Processor on which the network runs.
     #[arg(long, value_parser = one_of(DEVICES), default_value = "auto", help_heading = TEACHER, hide_short_help = true)]
     teacher_device: TeacherDevice,
-    /// Give up on a network that takes longer than this for a photo.
-    #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u32).range(1..), default_value_t = 600, help_heading = TEACHER, hide_short_help = true)]
-    teacher_timeout: u32,
 }
 
 impl NetworkArguments {
@@ -47,7 +42,6 @@ impl NetworkArguments {
             profile: self.teacher_profile,
             size: self.teacher_size,
             device: self.teacher_device,
-            time_limit: Duration::from_secs(self.teacher_timeout.into()),
             ..TeacherSettings::default()
         }
     }

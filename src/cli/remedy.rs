@@ -50,7 +50,6 @@ pub(super) fn of_run(error: &RunError) -> String {
         RunError::Coarse { .. } => format!(
             "{error}: leave --colmap-coordinates out, and the file lies near the origin and says by how much"
         ),
-        RunError::NoSpz(_) => format!("{error}: leave --spz-version out, or name it .spz"),
         RunError::NothingToResume(_) => {
             format!("{error}; without --resume training starts over")
         }

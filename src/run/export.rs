@@ -19,7 +19,7 @@ use crate::{
     disk::trust::Originals,
     raster::RasterOptions,
     report::PhotoReport,
-    splats::{Format, Splats, SpzVersion, WriteOptions, is_splat_file, write_splats},
+    splats::{Splats, WriteOptions, is_splat_file, write_splats},
     viewers::ViewerChoice,
 };
 
@@ -38,8 +38,6 @@ pub struct ExportOptions {
     pub luma: bool,
     /// Whether centers are COLMAP's even where the scene was moved to the origin.
     pub colmap_coordinates: bool,
-    /// The version of an `.spz`, where one is asked for.
-    pub spz: Option<SpzVersion>,
     /// Whether Gaussians that no training view needs are left out.
     pub clean: bool,
     /// Whom the scene is fitted for; without, it is written as it is.
@@ -106,9 +104,6 @@ pub fn export(options: &ExportOptions, observe: &mut Observer<'_>) -> Result<Exp
     let observe = &mut keeping(&warnings, observe);
     let output = options.output.as_path();
     let format = files::format_of(output)?;
-    if options.spz.is_some() && format != Format::Spz {
-        return Err(RunError::NoSpz(output.to_owned()));
-    }
     observe(Event::begins(Stage::Model));
     let mut scene = open(options, observe)?;
     files::make_folder_of(output)?;
@@ -221,7 +216,6 @@ fn written(scene: &Scene, options: &ExportOptions) -> Result<WriteOptions, RunEr
     }
     Ok(WriteOptions {
         added,
-        spz: options.spz.unwrap_or_default(),
         ..written_as(scene.drawn, left)
     })
 }

@@ -154,9 +154,6 @@ pub enum RunError {
         /// The Gaussians' size in world units.
         size: f64,
     },
-    /// A version of `.spz` for a file of another format.
-    #[error("{}: not an .spz file", .0.display())]
-    NoSpz(PathBuf),
     /// All views were trained on.
     #[error("no view is held out")]
     NoHeldOut,

@@ -3,7 +3,6 @@
 use std::{io::Write, path::Path};
 
 use glam::DVec3;
-use serde::Serialize;
 
 use super::{
     Format, SplatError, Splats, format::is_splat_file, glb, ply, sh::coefficient_count, sog, splat,
@@ -48,18 +47,6 @@ pub struct ReadSplats {
     pub doubts: Vec<String>,
 }
 
-/// Versions of `.spz` that are written.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub enum SpzVersion {
-    /// One gzip stream, which more programs read.
-    #[default]
-    #[serde(rename = "3")]
-    V3,
-    /// Six Zstandard streams.
-    #[serde(rename = "4")]
-    V4,
-}
-
 /// How a splat file is written, and what it says of its Gaussians.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct WriteOptions {
@@ -71,8 +58,6 @@ pub struct WriteOptions {
     pub added: DVec3,
     /// What the centers lack, as the file says, in world units.
     pub offset: DVec3,
-    /// The version of an `.spz`.
-    pub spz: SpzVersion,
 }
 
 impl WriteOptions {

@@ -5,8 +5,8 @@ use std::{fs, path::Path};
 use glam::DVec3;
 
 use super::{
-    Format, ReadSplats, SplatError, Splats, SpzVersion, WriteOptions, fixtures::scattered,
-    quantize, read_splats, sh::C0, write_splats,
+    Format, ReadSplats, SplatError, Splats, WriteOptions, fixtures::scattered, quantize,
+    read_splats, sh::C0, write_splats,
 };
 
 /// A file as it was written, and the doubts.
@@ -92,11 +92,9 @@ fn bounds(format: Format) -> Bounds {
     }
 }
 
-/// Formats that are read, with versions.
-fn readable() -> impl Iterator<Item = (Format, SpzVersion)> {
-    let all = Format::ALL.into_iter().filter(|format| format.is_read());
-    all.map(|format| (format, SpzVersion::V3))
-        .chain([(Format::Spz, SpzVersion::V4)])
+/// Formats that are read.
+fn readable() -> impl Iterator<Item = Format> {
+    Format::ALL.into_iter().filter(|format| format.is_read())
 }
 
 /// The Gaussians of `found` in the order of `wanted`: formats may have their own.
@@ -117,13 +115,10 @@ fn matched(wanted: &Splats, found: &Splats) -> Vec<usize> {
 
 #[test]
 fn what_is_read_back_is_within_the_bits() {
-    for (format, version) in readable() {
+    for format in readable() {
         for degree in 0..=3 {
             let splats = scattered(300, degree);
-            let options = WriteOptions {
-                spz: version,
-                ..WriteOptions::default()
-            };
+            let options = WriteOptions::default();
             let name = format!("scene{}", format.extension());
             let (bytes, doubts) = written(&name, &splats, &options);
             let lost = degree > 0 && !format.has_harmonics();
@@ -200,14 +195,11 @@ fn the_same_gaussians_give_the_same_bytes() {
 #[test]
 fn what_is_read_back_is_written_alike() {
     // What a format keeps it keeps for good; palettes and bounds are chosen anew.
-    for (format, spz) in readable() {
+    for format in readable() {
         if matches!(format, Format::CompressedPly | Format::Sog | Format::Splat) {
             continue;
         }
-        let options = WriteOptions {
-            spz,
-            ..WriteOptions::default()
-        };
+        let options = WriteOptions::default();
         let name = format!("scene{}", format.extension());
         let (bytes, _) = written(&name, &scattered(200, 2), &options);
         let back = read(&name, &bytes).unwrap().splats;
@@ -224,13 +216,12 @@ fn what_is_read_back_is_written_alike() {
 #[test]
 fn how_to_draw_and_what_was_subtracted_is_said() {
     let offset = DVec3::new(456_789.125, 5_412_345.0, -97.1);
-    for (format, spz) in readable() {
+    for format in readable() {
         for antialiased in [false, true] {
             let options = WriteOptions {
                 generator: "gs-chroma 0".to_owned(),
                 antialiased,
                 offset,
-                spz,
                 ..WriteOptions::default()
             };
             let name = format!("scene{}", format.extension());
@@ -353,12 +344,9 @@ fn what_is_beyond_a_range_is_told() {
 #[test]
 fn damaged_files_name_the_part() {
     let splats = scattered(50, 2);
-    let files = readable().map(|(format, spz)| {
+    let files = readable().map(|format| {
         let name = format!("scene{}", format.extension());
-        let options = WriteOptions {
-            spz,
-            ..WriteOptions::default()
-        };
+        let options = WriteOptions::default();
         let (bytes, _) = written(&name, &splats, &options);
         (name, bytes)
     });

@@ -20,7 +20,7 @@ mod spz;
 mod usda;
 
 pub use error::SplatError;
-pub use file::{ReadSplats, SpzVersion, WriteOptions, read_splats, write_splats};
+pub use file::{ReadSplats, WriteOptions, read_splats, write_splats};
 pub use format::{Format, is_splat_file};
 pub use init::{InitialPoint, initial_splats};
 pub use neighbors::{nearest_neighbor_distances, nearest_neighbors};

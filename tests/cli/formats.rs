@@ -221,10 +221,6 @@ fn names_that_tell_no_format_are_refused() {
             "house.glb: .glb files are not read",
         ),
         (
-            &["export", "-o", "a.sog", "--spz-version", "4"],
-            "leave --spz-version out",
-        ),
-        (
             &["colorize", "--teacher", "photos", "-o", "house.zip"],
             "those known are",
         ),
@@ -239,8 +235,6 @@ fn names_that_tell_no_format_are_refused() {
         );
         assert_eq!(place.files(""), before);
     }
-    let done = place.run(&["export", "-o", "a.spz", "--spz-version", "2"]);
-    assert_eq!(done.code, Some(2), "{}", done.stderr);
 }
 
 /// The program that other people convert splats with.
@@ -266,17 +260,9 @@ fn splat_transform_reads_the_same_gaussians() {
             String::from_utf8_lossy(&done.stderr)
         );
     };
-    for (extension, version) in READ
-        .map(|extension| (extension, "3"))
-        .into_iter()
-        .chain([("spz", "4")])
-    {
-        let file = format!("a{version}.{extension}");
-        let mut export = vec!["export", "scene.ply", "-o", &file];
-        if extension == "spz" {
-            export.extend(["--spz-version", version]);
-        }
-        place.succeed(&export);
+    for extension in READ {
+        let file = format!("a.{extension}");
+        place.succeed(&["export", "scene.ply", "-o", &file]);
         place.succeed(&["export", &file, "-o", "ours.ply"]);
         convert(&file, "theirs.ply");
         let [ours, theirs] = ["ours.ply", "theirs.ply"].map(|name| SplatFile::read(&place, name));

@@ -391,9 +391,9 @@ fn a_page_is_no_splat_file() {
     let wrote = place.json(&export);
     let bytes = place.read("new/scene.html").len() as u64;
     assert_eq!(wrote["bytes"].as_u64(), Some(bytes), "{wrote}");
-    let done = place.run(&[&export[..], &["--viewer", "any", "--spz-version", "4"]].concat());
+    let done = place.run(&[&export[..], &["--viewer", "any", "--colmap-coordinates"]].concat());
     assert_eq!(done.code, Some(0), "{}", done.stderr);
-    for option in ["--viewer", "--spz-version"] {
+    for option in ["--viewer", "--colmap-coordinates"] {
         let told = format!("warning: {option} is for splat files");
         assert!(done.stderr.contains(&told), "{}", done.stderr);
     }

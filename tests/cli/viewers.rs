@@ -61,7 +61,6 @@ fn viewers_show_what_is_rendered() {
     for format in ["ply", "compressed.ply", "splat", "spz", "sog", "glb"] {
         place.succeed(&["export", "run", "-o", &format!("plain.{format}")]);
     }
-    place.succeed(&["export", "run", "--spz-version", "4", "-o", "v4.spz"]);
     let said = place.json(&[
         "export",
         "run",
@@ -82,7 +81,6 @@ fn viewers_show_what_is_rendered() {
             "plain.compressed.ply:spark,playcanvas",
             "plain.splat:spark,three",
             "plain.spz:spark,three",
-            "v4.spz:three",
             "plain.sog:spark,playcanvas",
             "plain.glb:playcanvas,three",
             "playcanvas.ply:playcanvas",
@@ -99,7 +97,6 @@ fn viewers_show_what_is_rendered() {
         ("plain.compressed.ply", "playcanvas"),
         ("plain.spz", "spark"),
         ("plain.spz", "three"),
-        ("v4.spz", "three"),
         ("plain.sog", "spark"),
         ("plain.sog", "playcanvas"),
         ("plain.glb", "playcanvas"),

@@ -19,7 +19,7 @@ use gs_chroma::{
     measure::decode_flo,
     oracle,
     run::RunFolder,
-    splats::{self, Format, SpzVersion, WriteOptions, read_ply, read_splats, write_splats},
+    splats::{self, Format, WriteOptions, read_ply, read_splats, write_splats},
 };
 use peak_alloc::PeakAlloc;
 use proptest::{
@@ -302,23 +302,11 @@ fn splat_files() {
         memory: PLAIN,
         cases: 300,
     });
-    for (format, spz) in (Format::ALL.into_iter())
-        .filter(|format| format.is_read())
-        .map(|format| (format, SpzVersion::V3))
-        .chain([(Format::Spz, SpzVersion::V4)])
-    {
+    for format in Format::ALL.into_iter().filter(|format| format.is_read()) {
         let path = place.path().join(format!("scene{}", format.extension()));
-        let options = WriteOptions {
-            spz,
-            ..WriteOptions::default()
-        };
-        write_splats(&path, &splats, &options).expect("writable");
-        let version = if spz == SpzVersion::V4 { "-4" } else { "" };
+        write_splats(&path, &splats, &WriteOptions::default()).expect("writable");
         survives(&Kind {
-            name: &format!(
-                "{}{version}",
-                format.extension().trim_start_matches('.').replace('.', "-")
-            ),
+            name: &format.extension().trim_start_matches('.').replace('.', "-"),
             corpus: vec![fs::read(&path).expect("a file")],
             path,
             read: &|path| read_splats(path).is_ok(),

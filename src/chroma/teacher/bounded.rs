@@ -55,10 +55,7 @@ fn bounded_by<T: Send + 'static>(
         }
         let remedy = "ask it at a smaller --teacher-size";
         if begun.elapsed() >= limit {
-            break format!(
-                "gave no answer within {} s: {remedy}, or allow more with --teacher-timeout",
-                limit.as_secs_f64()
-            );
+            break format!("gave no answer within {} s: {remedy}", limit.as_secs_f64());
         }
         if let Some(most) = most.filter(|most| resident() > Some(*most)) {
             break format!("took the program beyond {} MiB: {remedy}", most >> 10);

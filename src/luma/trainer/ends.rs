@@ -75,7 +75,7 @@ impl LumaTrainer {
         let grown = (FLAT_FROM * schedule.end as f64).min(GROWN);
         let early = grown.max(HARMONICS_SHOW * degrees as f64);
         // Harmonics that are yet to come only make a curve steeper.
-        let flat = gain_of_doubling(&self.curve())
+        let flat = gain_of_doubling(self.curve())
             .is_some_and(|gain| gain < threshold && !self.will_reach(iteration, gain));
         if !flat || (iteration as f64) < early {
             return Ok(None);

@@ -1,5 +1,5 @@
-//! `.spz` files, Niantic's: version 3, one gzip stream, and 4, six Zstandard streams. Versions 1
-//! and 2 are read, too.
+//! `.spz` files, Niantic's: version 3, one gzip stream, is written; 1, 2 and 4, six Zstandard
+//! streams, are read, too.
 //!
 //! Header, little-endian, in versions 1 to 3 inside of the stream:
 //!

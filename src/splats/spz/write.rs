@@ -6,10 +6,13 @@ use flate2::{Compression, write::GzEncoder};
 
 use super::*;
 use crate::splats::{
-    SplatError, Splats, SpzVersion, WriteOptions,
+    SplatError, Splats, WriteOptions,
     file::{Judge, middle},
     quantize::{level, opacity_byte, smallest_three},
 };
+
+/// Version of the files: more programs read it than 4, which is smaller by a few percent.
+const VERSION: u32 = 3;
 
 /// Most fractional bits that are written: readers shift a signed 32-bit 1 by them.
 const MOST_BITS: u32 = 30;
@@ -23,9 +26,6 @@ const SMALLER: f64 = 0.1;
 
 /// The largest 24-bit number.
 const LARGEST: f64 = 8_388_607.0;
-
-/// As the reference: slower ones save a percent or two.
-const ZSTD_LEVEL: i32 = 12;
 
 /// The bytes of a file.
 ///
@@ -83,20 +83,12 @@ pub(in crate::splats) fn encode(
         }));
     }
 
-    let version: u32 = match options.spz {
-        SpzVersion::V3 => 3,
-        SpzVersion::V4 => 4,
-    };
     let mut header = MAGIC.to_vec();
-    header.extend(version.to_le_bytes());
+    header.extend(VERSION.to_le_bytes());
     header.extend(count.to_le_bytes());
     let flags = if options.antialiased { ANTIALIASED } else { 0 };
-    header.extend([degree as u8, bits as u8, flags]);
-    let packed = match options.spz {
-        SpzVersion::V3 => gzip(header, &parts),
-        SpzVersion::V4 => streams(header, &parts[..if degree == 0 { 5 } else { 6 }]),
-    };
-    packed.map_err(SplatError::io(judge.path()))
+    header.extend([degree as u8, bits as u8, flags, 0]);
+    gzip(&header, &parts).map_err(SplatError::io(judge.path()))
 }
 
 /// The middle scale of a small Gaussian, in world units.
@@ -110,29 +102,13 @@ fn small(splats: &Splats) -> f64 {
     f64::from(*middles.select_nth_unstable_by(place, f32::total_cmp).1).exp()
 }
 
-fn gzip(mut header: Vec<u8>, parts: &[Vec<u8>]) -> std::io::Result<Vec<u8>> {
-    header.push(0);
+fn gzip(header: &[u8], parts: &[Vec<u8>]) -> std::io::Result<Vec<u8>> {
     let mut stream = GzEncoder::new(Vec::new(), Compression::best());
-    stream.write_all(&header)?;
+    stream.write_all(header)?;
     for part in parts {
         stream.write_all(part)?;
     }
     stream.finish()
-}
-
-fn streams(mut header: Vec<u8>, parts: &[Vec<u8>]) -> std::io::Result<Vec<u8>> {
-    header.push(parts.len() as u8);
-    header.extend((LONG_HEADER as u32).to_le_bytes());
-    header.resize(LONG_HEADER, 0);
-    let mut all = Vec::new();
-    for part in parts {
-        let compressed = zstd::bulk::compress(part, ZSTD_LEVEL)?;
-        header.extend((compressed.len() as u64).to_le_bytes());
-        header.extend((part.len() as u64).to_le_bytes());
-        all.extend(compressed);
-    }
-    header.extend(all);
-    Ok(header)
 }
 
 fn rotation([w, x, y, z]: [f32; 4]) -> u32 {
