@@ -44,10 +44,9 @@ impl EffectArguments {
             .iter()
             .find(|effect| self.without.contains(effect))
         {
-            let name = both.name();
             refuse(
                 ErrorKind::ArgumentConflict,
-                format_args!("the argument '--with {name}' cannot be used with '--without {name}'"),
+                format_args!("the argument '--with {both}' cannot be used with '--without {both}'"),
             );
         }
         Overrules {

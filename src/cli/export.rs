@@ -144,7 +144,7 @@ impl Export {
 /// What each viewer shows, and would have shown.
 fn line_of(shown: &[Shown]) -> String {
     let each = |of: fn(&Shown) -> f64| {
-        let each = (shown.iter()).map(|s| format!("{} {:.1} dB", s.viewer.name(), of(s)));
+        let each = (shown.iter()).map(|s| format!("{} {:.1} dB", s.viewer, of(s)));
         each.collect::<Vec<_>>().join(", ")
     };
     format!(

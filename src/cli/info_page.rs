@@ -109,9 +109,7 @@ fn of_scene(page: &mut Page, report: &Report) {
     );
     let names = |on: bool| {
         let effects = report.effects.iter().filter(|effect| effect.on == on);
-        let names: Vec<String> = effects
-            .map(|effect| effect.name.name().to_owned())
-            .collect();
+        let names: Vec<String> = effects.map(|effect| effect.name.to_string()).collect();
         names.join(", ")
     };
     let effects = match (names(true), names(false)) {
@@ -127,7 +125,7 @@ fn of_scene(page: &mut Page, report: &Report) {
         format!(
             "{} iterations with the preset {}, {}{}",
             count(luma.iterations),
-            report.preset.name(),
+            report.preset,
             duration(luma.seconds.all),
             memory(luma.peak_host_memory, luma.peak_device_memory)
         ),

@@ -56,7 +56,7 @@ struct Fetch {
     #[arg(long, short)]
     yes: bool,
     /// Seconds to wait for a silent host.
-    #[arg(long, value_name = "SECONDS", default_value_t = 30, value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "SECONDS", default_value_t = 30, hide = true, value_parser = clap::value_parser!(u16).range(1..))]
     patience: u16,
 }
 

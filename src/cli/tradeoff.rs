@@ -51,8 +51,9 @@ pub struct Tradeoff {
 
 impl Tradeoff {
     pub(super) fn run(self) -> Result<(), CliError> {
-        let preset = (self.preset.iter()).flat_map(|preset| ["--preset", preset.name()]);
-        let fit: Vec<String> = preset.map(str::to_owned).chain(self.fit).collect();
+        let preset = self.preset.iter();
+        let preset = preset.flat_map(|preset| ["--preset".to_owned(), preset.to_string()]);
+        let fit: Vec<String> = preset.chain(self.fit).collect();
         let words = ["gs-chroma", "fit", "scene", "-o", "point"].map(str::to_owned);
         if let Err(error) = Cli::try_parse_from(words.iter().chain(&fit)) {
             error.exit();

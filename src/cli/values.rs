@@ -33,21 +33,15 @@ pub(super) fn one_of<T>(
 where
     T: Copy + Serialize + Send + Sync + 'static,
 {
+    // Choices are enums without contents: serializing them cannot fail.
+    let name_of = move |value: &T| serde_plain::to_string(value).unwrap_or_default();
     let values = choices
         .iter()
-        .map(|(value, help)| PossibleValue::new(name(value)).help(*help));
-    PossibleValuesParser::new(values).try_map(|text| {
-        let chosen = choices.iter().find(|(value, _)| name(value) == text);
+        .map(|(value, help)| PossibleValue::new(name_of(value)).help(*help));
+    PossibleValuesParser::new(values).try_map(move |text| {
+        let chosen = choices.iter().find(|(value, _)| name_of(value) == text);
         chosen.map(|(value, _)| *value).ok_or("no such choice")
     })
-}
-
-/// The name of a value in reports.
-fn name(value: &impl Serialize) -> String {
-    match serde_json::to_value(value) {
-        Ok(serde_json::Value::String(name)) => name,
-        _ => String::new(),
-    }
 }
 
 /// Extensions of films, pictures, archives, splats and other files, which are no part of a
@@ -171,7 +165,9 @@ mod tests {
         let command = clap::Command::new("program")
             .arg(clap::Arg::new("preset").value_parser(one_of(PRESETS)));
         for preset in Preset::ALL {
-            let read = command.clone().get_matches_from(["program", preset.name()]);
+            let read = command
+                .clone()
+                .get_matches_from(["program", &preset.to_string()]);
             assert_eq!(read.get_one("preset"), Some(&preset));
         }
         let refused = command.try_get_matches_from(["program", "drafty"]);

@@ -82,6 +82,8 @@ pub enum Effect {
     ChromaDegree,
 }
 
+serde_plain::derive_display_from_serialize!(Effect);
+
 impl Effect {
     /// Those of stage 1, in the order of the table.
     pub const ALL: [Self; 7] = [
@@ -93,21 +95,6 @@ impl Effect {
         Self::Background,
         Self::LumaDegree,
     ];
-
-    /// As on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Lens => "lens",
-            Self::Masks => "masks",
-            Self::Exposure => "exposure",
-            Self::Robust => "robust",
-            Self::Antialias => "antialias",
-            Self::Background => "background",
-            Self::LumaDegree => "luma-degree",
-            Self::TeacherCorrection => "teacher-correction",
-            Self::ChromaDegree => "chroma-degree",
-        }
-    }
 
     /// What the evidence counts.
     pub fn unit(self) -> &'static str {

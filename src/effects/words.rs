@@ -63,7 +63,7 @@ impl fmt::Display for Decision {
             None => self.effect.unknown().to_owned(),
         };
         let on = if self.on { "on" } else { "off" };
-        write!(f, "{:<18} {on:<3} {found}", self.effect.name())?;
+        write!(f, "{:<18} {on:<3} {found}", self.effect.to_string())?;
         match (self.decided_by, self.effect) {
             (Decider::Evidence, _) => Ok(()),
             (Decider::Trial, Effect::TeacherCorrection) => {

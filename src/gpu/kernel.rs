@@ -281,15 +281,7 @@ impl Recorder {
 
     /// Copies a whole buffer onto another of the same size.
     pub fn copy(&mut self, from: &wgpu::Buffer, to: &wgpu::Buffer) {
-        self.copy_bytes(from, to, from.size());
-    }
-
-    /// Copies the front of a buffer onto one that is no longer.
-    pub fn copy_front(&mut self, from: &wgpu::Buffer, to: &wgpu::Buffer) {
-        self.copy_bytes(from, to, to.size());
-    }
-
-    fn copy_bytes(&mut self, from: &wgpu::Buffer, to: &wgpu::Buffer, size: u64) {
+        let size = from.size();
         self.pass = None;
         self.encoder.copy_buffer_to_buffer(from, 0, to, 0, size);
         if let Some(tape) = self.gpu.tape() {

@@ -1,6 +1,6 @@
 //! What training may trade accuracy for time in: `fit --numerics`.
 
-use std::{fmt, str::FromStr};
+use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
@@ -61,19 +61,10 @@ const KEYS: &str = "alpha-min=0.00001..0.1, transmittance-min=0..0.5, depth-bits
 impl FromStr for Numerics {
     type Err = String;
 
-    /// Reads `KEY=VALUE[,KEY=VALUE…]`; what is not named keeps its default.
+    /// Reads `KEY=VALUE[,KEY=VALUE…]`; what is not named keeps its default. An error names all
+    /// keys and values that there are.
     fn from_str(text: &str) -> Result<Self, String> {
-        Self::default().with(text)
-    }
-}
-
-impl Numerics {
-    /// The same but for what `KEY=VALUE[,KEY=VALUE…]` names.
-    ///
-    /// # Errors
-    /// What is wrong, with all keys and values that there are.
-    pub fn with(self, text: &str) -> Result<Self, String> {
-        let mut numerics = self;
+        let mut numerics = Self::default();
         for pair in text.split(',') {
             let taken = pair.split_once('=').and_then(|(key, value)| {
                 let raster = &mut numerics.raster;
@@ -118,31 +109,12 @@ fn one_of<T: Copy, const N: usize>(text: &str, values: [(&str, T); N]) -> Option
     Some(found.1)
 }
 
-impl fmt::Display for Numerics {
-    /// What differs from the default, as [`FromStr`] reads it; nothing if nothing does.
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (own, usual) = (&self.raster, &RasterNumerics::DEFAULT);
-        let pairs = [
-            (own.alpha_min != usual.alpha_min).then(|| format!("alpha-min={}", own.alpha_min)),
-            (own.transmittance_min != usual.transmittance_min)
-                .then(|| format!("transmittance-min={}", own.transmittance_min)),
-            (own.depth_bits != usual.depth_bits).then(|| format!("depth-bits={}", own.depth_bits)),
-            (own.storage == Storage::Half).then(|| "storage=half".to_owned()),
-            (self.ssim_window != SsimWindow::Eleven)
-                .then(|| format!("ssim-window={}", u32::from(self.ssim_window))),
-            (own.adam == AdamSteps::Lazy).then(|| "adam=lazy".to_owned()),
-        ];
-        f.write_str(&pairs.into_iter().flatten().collect::<Vec<_>>().join(","))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn what_is_written_is_read_again() {
-        assert_eq!(Numerics::default().to_string(), "");
         for text in [
             "alpha-min=0.015",
             "transmittance-min=0",
@@ -154,7 +126,6 @@ mod tests {
         ] {
             let numerics: Numerics = text.parse().unwrap();
             assert_ne!(numerics, Numerics::default(), "{text}");
-            assert_eq!(numerics.to_string(), text);
             let json = serde_json::to_string(&numerics).unwrap();
             assert_eq!(
                 serde_json::from_str::<Numerics>(&json).unwrap(),
@@ -169,7 +140,7 @@ mod tests {
         let named = "depth-bits=32,storage=full,ssim-window=11,adam=exact";
         assert_eq!(named.parse(), Ok(Numerics::default()));
         let old: Numerics = serde_json::from_str(r#"{ "storage": "half" }"#).unwrap();
-        assert_eq!(old.to_string(), "storage=half");
+        assert_eq!("storage=half".parse(), Ok(old));
     }
 
     #[test]

@@ -29,6 +29,8 @@ pub const FLAT: f64 = 0.1;
 /// The same for `balanced`: a gain that is worth twice the time to few.
 const BALANCED_FLAT: f64 = 0.3;
 
+serde_plain::derive_display_from_serialize!(Preset);
+
 impl Preset {
     /// All, by the work they are.
     pub const ALL: [Self; 3] = [Self::Draft, Self::Balanced, Self::Paper];
@@ -66,15 +68,6 @@ impl Preset {
             Self::Draft => Some(400),
             Self::Balanced => Some(1_600),
             Self::Paper => None,
-        }
-    }
-
-    /// The name on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Draft => "draft",
-            Self::Balanced => "balanced",
-            Self::Paper => "paper",
         }
     }
 }

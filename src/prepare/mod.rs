@@ -35,7 +35,7 @@ pub(crate) use state::{digest, of as digest_of};
 
 use crate::{
     capture::{CaptureError, Film, IMAGES, plain_header},
-    run::{Event, Observer, RunError, Stage, files},
+    run::{Event, Observer, RunError, Stage, files, keeping},
 };
 use colmap::Colmap;
 use ffmpeg::Source;
@@ -125,12 +125,7 @@ pub fn prepare(
     observe: &mut Observer<'_>,
 ) -> Result<Prepared, PrepareError> {
     let warnings = RefCell::<Vec<String>>::default();
-    let observe = &mut |event: Event| {
-        if let Event::Warning(line) = &event {
-            warnings.borrow_mut().push(line.clone());
-        }
-        observe(event);
-    };
+    let observe = &mut keeping(&warnings, observe);
     let input = fs::canonicalize(&options.input).map_err(files::at(&options.input))?;
     let output = path::absolute(&options.output).map_err(files::at(&options.output))?;
     let is_film = check_input(&options.input, &input)?;

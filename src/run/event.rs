@@ -182,7 +182,7 @@ impl From<eval::Progress<'_>> for Event {
 pub type Observer<'a> = dyn FnMut(Event) + 'a;
 
 /// Tells `observe` everything and keeps the warnings.
-pub(super) fn keeping<'a>(
+pub(crate) fn keeping<'a>(
     warnings: &'a RefCell<Vec<String>>,
     observe: &'a mut Observer<'_>,
 ) -> impl FnMut(Event) + 'a {

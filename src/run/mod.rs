@@ -46,7 +46,7 @@ pub use checkpoints::{CheckpointOptions, EVERY, Interrupt};
 pub use color_files::Output;
 pub use colorize::{ColorizeOptions, colorize};
 pub use eval::{EvalOptions, eval};
-use event::keeping;
+pub(crate) use event::keeping;
 pub use event::{Event, Observer, Stage};
 pub use export::{ExportOptions, Exported, export};
 pub use export_clean::Cleaned;

@@ -40,7 +40,7 @@ pub(super) fn open(
 /// Tells how far a trial is.
 pub(super) fn tell_trial(progress: &TrialProgress, observe: &mut Observer<'_>) {
     let message = match progress.effect {
-        Some(effect) => format!("with {}", effect.name()),
+        Some(effect) => format!("with {effect}"),
         None => "without effects in doubt".to_owned(),
     };
     observe(Event::Progress {

@@ -92,12 +92,14 @@ pub(super) const KNOBS: [Knob; 8] = [
         stage: PointStage::Luma,
         option: "--preset",
         values: |base| {
-            let others = Preset::ALL.map(Preset::name).into_iter();
-            let others = others.filter(|name| *name != base.report.preset.name());
-            others.map(str::to_owned).collect()
+            let others = Preset::ALL.into_iter();
+            let others = others.filter(|preset| *preset != base.report.preset);
+            others.map(|preset| preset.to_string()).collect()
         },
         time: |base, value| {
-            let preset = Preset::ALL.into_iter().find(|other| other.name() == value);
+            let preset = Preset::ALL
+                .into_iter()
+                .find(|other| other.to_string() == value);
             preset.map_or(1.0, |preset| base.work(preset))
         },
     },

@@ -1,6 +1,8 @@
 //! `tradeoff`: what quality costs in time, on the user's scene and device.
 
 mod child;
+#[cfg(test)]
+mod fixtures;
 mod knobs;
 mod plot;
 mod point;

@@ -186,7 +186,7 @@ fn axes(seconds: &Axis, quality: &Axis, title: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::sweep::tests::{failed, luma, sweep};
+    use super::super::fixtures::{failed, luma, sweep};
     use super::*;
 
     #[test]

@@ -245,7 +245,7 @@ fn link(from: &Path, to: &Path) -> Result<(), RunError> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::sweep::{Setting, tests::sweep};
+    use super::super::{fixtures::sweep, sweep::Setting};
     use super::*;
 
     fn commands(stage: PointStage, knob: &str, value: &str) -> Vec<String> {

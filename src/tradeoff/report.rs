@@ -30,8 +30,8 @@ pub(super) fn csv(sweep: &Tradeoff) -> String {
         let commands: Vec<String> = point.commands.iter().map(|c| shell_line(c)).collect();
         let cells = [
             point.name.clone(),
-            point.stage.name().to_owned(),
-            point.phase.name().to_owned(),
+            point.stage.to_string(),
+            point.phase.to_string(),
             settings.join(" "),
             on_front.to_string(),
             cell(point, |o| Some(o.iterations)),
@@ -214,7 +214,7 @@ pub fn shell_line(arguments: &[String]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::sweep::tests::{failed, luma, sweep};
+    use super::super::fixtures::{failed, luma, sweep};
     use super::*;
 
     #[test]

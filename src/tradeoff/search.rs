@@ -147,7 +147,10 @@ fn expected(
 
 #[cfg(test)]
 mod tests {
-    use super::super::sweep::{Outcome, Point, tests};
+    use super::super::{
+        fixtures,
+        sweep::{Outcome, Point},
+    };
     use super::*;
 
     /// A value with what it changes: the stage's time, and quality in dB or ΔE00.
@@ -200,13 +203,13 @@ mod tests {
                 delta_e: color.then_some(10.0 + quality),
                 ..Outcome::default()
             }),
-            ..tests::failed("", "")
+            ..fixtures::failed("", "")
         }
     }
 
     /// A whole sweep from points that are there.
     fn swept(points: Vec<Point>, budget: f64) -> Tradeoff {
-        let mut sweep = tests::sweep(points);
+        let mut sweep = fixtures::sweep(points);
         sweep.budget = budget;
         while let Some(task) = next(&values(), &sweep, true) {
             assert!(sweep.find(&task.name).is_none(), "{task:?} again");
@@ -300,7 +303,7 @@ mod tests {
         assert_eq!([seconds(&sweep, 6), seconds(&sweep, 7)], [36.0, 32.0]);
         sweep
             .points
-            .push(tests::luma("iterations-1400", 60.0, 25.0));
+            .push(fixtures::luma("iterations-1400", 60.0, 25.0));
         assert!((seconds(&sweep, 1) - 60.0).abs() < 1e-9);
     }
 }

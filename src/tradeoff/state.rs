@@ -124,7 +124,7 @@ fn read(text: &str, subject: &Subject) -> Result<Tradeoff, String> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::sweep::tests::{failed, luma, sweep};
+    use super::super::fixtures::{failed, luma, sweep};
     use super::*;
 
     #[test]

@@ -65,17 +65,12 @@ pub enum PointStage {
     Color,
 }
 
+serde_plain::derive_display_from_serialize!(PointStage);
+serde_plain::derive_display_from_serialize!(Phase);
+
 impl PointStage {
     /// Both, in the order in which they run.
     pub const ALL: [Self; 2] = [Self::Luma, Self::Color];
-
-    /// As in the files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Luma => "luma",
-            Self::Color => "color",
-        }
-    }
 }
 
 /// Why a point was asked for.
@@ -88,17 +83,6 @@ pub enum Phase {
     One,
     /// Two settings that alone are on the front.
     Front,
-}
-
-impl Phase {
-    /// As in the files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Base => "base",
-            Self::One => "one",
-            Self::Front => "front",
-        }
-    }
 }
 
 /// A knob and where it stands.
@@ -280,59 +264,9 @@ impl Tradeoff {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+mod tests {
+    use super::super::fixtures::{failed, luma, sweep};
     use super::*;
-
-    pub(in super::super) fn sweep(points: Vec<Point>) -> Tradeoff {
-        Tradeoff {
-            version: TRADEOFF_VERSION,
-            program: "0.1.0".to_owned(),
-            subject: Subject {
-                scene: "/photos/<garden>".to_owned(),
-                teacher: None,
-                options: vec!["--channel".to_owned(), "r".to_owned()],
-            },
-            device: None,
-            budget: 60.0,
-            points,
-        }
-    }
-
-    pub(in super::super) fn failed(name: &str, reason: &str) -> Point {
-        Point {
-            name: name.to_owned(),
-            stage: PointStage::Luma,
-            phase: Phase::One,
-            settings: Vec::new(),
-            commands: Vec::new(),
-            took: 1.0,
-            failed: Some(reason.to_owned()),
-            outcome: None,
-        }
-    }
-
-    pub(in super::super) fn luma(name: &str, seconds: f64, psnr: f64) -> Point {
-        let setting = |(knob, value): (&str, &str)| Setting {
-            knob: knob.to_owned(),
-            value: value.to_owned(),
-        };
-        let base = name == "base";
-        Point {
-            phase: if base { Phase::Base } else { Phase::One },
-            settings: name.rsplit_once('-').map(setting).into_iter().collect(),
-            took: seconds,
-            failed: None,
-            outcome: Some(Outcome {
-                iterations: 700,
-                splats: 1000,
-                seconds,
-                psnr: Some(psnr),
-                ssim: Some(psnr / 30.0),
-                ..Outcome::default()
-            }),
-            ..failed(name, "")
-        }
-    }
 
     #[test]
     fn the_front_is_of_one_stage_and_leaves_failures_out() {

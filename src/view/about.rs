@@ -89,7 +89,7 @@ fn figures(report: &Report) -> Vec<[String; 2]> {
         "Photos",
         format!("{} trained on, {} held out", capture.train, capture.test),
     );
-    row("Preset", report.preset.name().to_owned());
+    row("Preset", report.preset.to_string());
     row("Iterations", luma.iterations.to_string());
     if let Some(quality) = &luma.held_out {
         row(

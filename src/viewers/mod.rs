@@ -32,17 +32,11 @@ pub enum Viewer {
     PlayCanvas,
 }
 
+serde_plain::derive_display_from_serialize!(Viewer);
+
 impl Viewer {
     /// All of them.
     pub const ALL: [Self; 2] = [Self::Spark, Self::PlayCanvas];
-
-    /// Its name in options and reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Spark => "spark",
-            Self::PlayCanvas => "playcanvas",
-        }
-    }
 
     /// How it draws. Neither antialiases unless it is told to.
     pub fn drawing(self) -> RasterOptions {

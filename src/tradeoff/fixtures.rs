@@ -1,0 +1,56 @@
+//! Points and sweeps for tests.
+
+use super::sweep::{
+    Outcome, Phase, Point, PointStage, Setting, Subject, TRADEOFF_VERSION, Tradeoff,
+};
+
+pub(super) fn sweep(points: Vec<Point>) -> Tradeoff {
+    Tradeoff {
+        version: TRADEOFF_VERSION,
+        program: "0.1.0".to_owned(),
+        subject: Subject {
+            scene: "/photos/<garden>".to_owned(),
+            teacher: None,
+            options: vec!["--channel".to_owned(), "r".to_owned()],
+        },
+        device: None,
+        budget: 60.0,
+        points,
+    }
+}
+
+pub(super) fn failed(name: &str, reason: &str) -> Point {
+    Point {
+        name: name.to_owned(),
+        stage: PointStage::Luma,
+        phase: Phase::One,
+        settings: Vec::new(),
+        commands: Vec::new(),
+        took: 1.0,
+        failed: Some(reason.to_owned()),
+        outcome: None,
+    }
+}
+
+pub(super) fn luma(name: &str, seconds: f64, psnr: f64) -> Point {
+    let setting = |(knob, value): (&str, &str)| Setting {
+        knob: knob.to_owned(),
+        value: value.to_owned(),
+    };
+    let base = name == "base";
+    Point {
+        phase: if base { Phase::Base } else { Phase::One },
+        settings: name.rsplit_once('-').map(setting).into_iter().collect(),
+        took: seconds,
+        failed: None,
+        outcome: Some(Outcome {
+            iterations: 700,
+            splats: 1000,
+            seconds,
+            psnr: Some(psnr),
+            ssim: Some(psnr / 30.0),
+            ..Outcome::default()
+        }),
+        ..failed(name, "")
+    }
+}
