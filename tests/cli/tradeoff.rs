@@ -37,13 +37,13 @@ fn names(sweep: &Value) -> Vec<&str> {
 fn a_sweep_in_gray_and_color() {
     let place = place_with_scene();
     let teacher = onnx("ddcolor_tiny.onnx");
-    let knobs = ["--knobs", "max-splats,teacher-size,chroma-degree"];
+    let knobs = ["--knobs", "iterations,teacher-size"];
     let asked = [&QUICK[..], &["--teacher", &teacher], &knobs, &FIT].concat();
     let sweep = place.json(&asked);
     assert_eq!(sweep, sweep_in(&place));
     let names = names(&sweep);
     assert_eq!(names[..2], ["base", "color"]);
-    for name in ["chroma-degree-1", "teacher-size-16", "teacher-size-48"] {
+    for name in ["iterations-2", "teacher-size-16", "teacher-size-48"] {
         assert!(names.contains(&name), "{names:?}");
     }
     assert_eq!(names.iter().collect::<BTreeSet<_>>().len(), names.len());
