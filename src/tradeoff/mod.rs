@@ -173,10 +173,7 @@ fn in_words(point: &Point) -> String {
         return format!("{}: failed: {reason}", point.name);
     };
     let figures = sweep::MEASURES.iter().filter(|m| m.stage == point.stage);
-    let figures: Vec<String> = figures
-        .filter(|measure| (measure.value)(outcome).is_some())
-        .map(|measure| format!("; {} {}", measure.title, measure.figure(outcome)))
-        .collect();
+    let figures: Vec<String> = figures.map(|measure| measure.in_words(outcome)).collect();
     format!(
         "{}: {:.1} s{}",
         point.name,

@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use super::{
     knobs::KNOBS,
-    sweep::{Measure, Phase, Point, PointStage, Tradeoff},
+    sweep::{Measure, Outcome, Phase, Point, PointStage, Tradeoff},
 };
 use crate::report::html::escaped;
 
@@ -37,28 +37,28 @@ pub(super) fn group(point: &Point) -> (&str, &'static str) {
 
 /// A plot as SVG; empty without points.
 pub(super) fn plot(sweep: &Tradeoff, stage: PointStage, measure: &Measure) -> String {
-    let place = |point: &Point| {
-        let outcome = point.outcome.as_ref()?;
+    let place = |outcome: &Outcome| {
         let place = [outcome.seconds, (measure.value)(outcome)?];
-        place
-            .iter()
-            .all(|figure| figure.is_finite())
-            .then_some(place)
+        let finite = place.iter().all(|figure| figure.is_finite());
+        finite.then_some(place)
     };
-    let placed: Vec<(&Point, [f64; 2])> = (sweep.of(stage))
-        .filter_map(|point| Some((point, place(point)?)))
+    let placed: Vec<(&Point, &Outcome, [f64; 2])> = (sweep.of(stage))
+        .filter_map(|point| {
+            let outcome = point.outcome.as_ref()?;
+            Some((point, outcome, place(outcome)?))
+        })
         .collect();
     if placed.is_empty() {
         return String::new();
     }
-    let values = |axis: usize| placed.iter().map(move |(_, at)| at[axis]);
+    let values = |axis: usize| placed.iter().map(move |(_, _, at)| at[axis]);
     let seconds = Axis::around(values(0).chain([0.0]), [LEFT, RIGHT]);
     let quality = Axis::around(values(1), [BOTTOM, TOP]);
     let mut svg = axes(&seconds, &quality, measure.title);
     // Between two points of the front the faster one is the best to be had.
     let front = sweep.front(stage, measure);
     let mut path = String::new();
-    for [x, y] in front.iter().filter_map(|point| place(point)) {
+    for [x, y] in (front.iter()).filter_map(|point| place(point.outcome.as_ref()?)) {
         let to = if path.is_empty() {
             ['M', ' ']
         } else {
@@ -78,24 +78,21 @@ pub(super) fn plot(sweep: &Tradeoff, stage: PointStage, measure: &Measure) -> St
         svg,
         "<path d=\"{path}\" fill=\"none\" stroke=\"currentColor\" stroke-dasharray=\"2 3\"/>"
     );
-    for (point, [x, y]) in &placed {
+    for (point, outcome, [x, y]) in &placed {
         let size = match point.phase {
             Phase::Base => 8,
             _ if front.iter().any(|found| found.name == point.name) => 6,
             _ => 4,
         };
-        let outcome = point.outcome.iter();
-        let splats = outcome.map(|outcome| format!("{} Gaussians", outcome.splats));
         let _ = writeln!(
             svg,
-            "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"{size}\" fill=\"{}\"><title>{}\n{x:.1} s, {} {y:.*}\n{}</title></circle>",
+            "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"{size}\" fill=\"{}\"><title>{}\n{x:.1} s{}\n{} Gaussians</title></circle>",
             seconds.at(*x),
             quality.at(*y),
             group(point).1,
             escaped(&point.label()),
-            measure.title,
-            measure.digits,
-            splats.collect::<String>(),
+            measure.in_words(outcome),
+            outcome.splats,
         );
     }
     svg + "</svg>"
@@ -197,7 +194,7 @@ mod tests {
         let svg = plot(&sweep, PointStage::Luma, measure);
         assert!(svg.starts_with("<svg ") && svg.ends_with("</svg>"), "{svg}");
         assert_eq!(svg.matches("<circle").count(), 2, "{svg}");
-        let words = "<title>base\n10.0 s, PSNR, dB 24.00\n1000 Gaussians</title>";
+        let words = "<title>base\n10.0 s, PSNR 24.00 dB\n1000 Gaussians</title>";
         assert!(svg.contains(words), "{svg}");
         // From the faster point along its quality to the slower one's time, then up.
         let front = format!(

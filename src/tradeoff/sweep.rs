@@ -177,6 +177,16 @@ pub(super) const MEASURES: [Measure; 5] = [
 ];
 
 impl Measure {
+    /// An outcome's figure in words; empty without.
+    pub fn in_words(&self, outcome: &Outcome) -> String {
+        let figure = self.figure(outcome);
+        match self.title.split_once(", ") {
+            _ if figure.is_empty() => figure,
+            Some((name, unit)) => format!(", {name} {figure} {unit}"),
+            None => format!(", {} {figure}", self.title),
+        }
+    }
+
     /// An outcome's figure with its digits; empty without.
     pub fn figure(&self, outcome: &Outcome) -> String {
         let digits = self.digits;
