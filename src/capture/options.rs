@@ -1,7 +1,6 @@
 //! What photos become when they are loaded.
 
 use std::collections::BTreeSet;
-use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
 
@@ -215,20 +214,14 @@ pub enum MaskSource {
     Folder(PathBuf),
 }
 
-impl fmt::Display for MaskSource {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Beside => f.write_str("beside"),
-            Self::Alpha => f.write_str("alpha"),
-            Self::Off => f.write_str("off"),
-            Self::Folder(path) => write!(f, "{}", path.display()),
-        }
-    }
-}
-
 impl From<MaskSource> for String {
     fn from(source: MaskSource) -> Self {
-        source.to_string()
+        match source {
+            MaskSource::Beside => "beside".to_owned(),
+            MaskSource::Alpha => "alpha".to_owned(),
+            MaskSource::Off => "off".to_owned(),
+            MaskSource::Folder(path) => path.display().to_string(),
+        }
     }
 }
 

@@ -63,7 +63,6 @@ pub use merge::{MergeOptions, merge};
 pub use partition::{PartitionOptions, partition};
 pub(crate) use picture_names::picture_names;
 pub use plan::{PlanOptions, Planned, plan};
-pub use preset::Work;
 pub use render::{PathOptions, RenderOptions, Rendered, Views, Way, render, render_path};
 pub use seams::{SeamViews, ViewMean};
 pub use sound::Soundness;

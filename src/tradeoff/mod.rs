@@ -78,10 +78,12 @@ pub fn tradeoff(
     options: &TradeoffOptions,
     observe: &mut Observer<'_>,
 ) -> Result<(PathBuf, Tradeoff), TradeoffError> {
-    let folder = options
-        .output
-        .clone()
-        .unwrap_or_else(|| default_folder(&options.colmap_dir));
+    let folder = options.output.clone().unwrap_or_else(|| {
+        let run = RunFolder::for_capture(&options.colmap_dir);
+        let mut folder = run.path().as_os_str().to_owned();
+        folder.push("-tradeoff");
+        folder.into()
+    });
     let capture = Capture::load(&options.colmap_dir).map_err(RunError::from)?;
     if options.fit.iter().any(|word| word == "--no-holdout") {
         return Err(TradeoffError::NothingToMeasure(options.colmap_dir.clone()));
@@ -115,16 +117,6 @@ pub fn tradeoff(
     // An earlier start may have been stopped between its files.
     write(&folder, &state)?;
     Ok((folder, state.sweep))
-}
-
-/// `runs/<name of the COLMAP folder>-tradeoff`.
-fn default_folder(colmap_dir: &Path) -> PathBuf {
-    let mut folder = RunFolder::for_capture(colmap_dir)
-        .path()
-        .as_os_str()
-        .to_owned();
-    folder.push("-tradeoff");
-    PathBuf::from(folder)
 }
 
 /// The next point: what there is to try follows from the bases' reports.

@@ -2,7 +2,6 @@
 
 use std::{
     fs::{File, TryLockError},
-    io,
     path::{Path, PathBuf},
 };
 
@@ -22,7 +21,7 @@ const LOCK: &str = "tradeoff.lock";
 /// A sweep and its file.
 pub(super) struct State {
     /// Keeps a second sweep away; whatever ends the process frees it.
-    _lock: Option<File>,
+    _lock: File,
     /// File at fault.
     path: PathBuf,
     /// What it holds.
@@ -54,8 +53,7 @@ impl State {
             },
         };
         sweep.budget = budget;
-        let lost = |point: &Point| point.phase == Phase::Base && point.failed.is_some();
-        sweep.points.retain(|point| !lost(point));
+        (sweep.points).retain(|point| point.phase != Phase::Base || point.failed.is_none());
         Ok(Self {
             _lock: lock,
             path,
@@ -75,23 +73,16 @@ impl State {
     }
 }
 
-/// Locks a file; there is no lock where the file system knows none.
-fn lock(path: &Path) -> Result<Option<File>, RunError> {
-    let file = match disk::open_in_place(path) {
-        Ok(file) => file,
-        Err(error) if error.kind() == io::ErrorKind::InvalidInput => {
-            return Err(files::at(path)(error));
-        }
-        Err(_) => return Ok(None),
-    };
+/// Locks a file, where the file system can.
+fn lock(path: &Path) -> Result<File, RunError> {
+    let file = disk::open_in_place(path).map_err(files::at(path))?;
     match file.try_lock() {
-        Ok(()) => Ok(Some(file)),
-        Err(TryLockError::Error(_)) => Ok(None),
         Err(TryLockError::WouldBlock) => Err(RunError::File {
             path: path.to_path_buf(),
             reason: "another sweep runs in this folder: wait for it, or choose another with -o"
                 .to_owned(),
         }),
+        _ => Ok(file),
     }
 }
 
