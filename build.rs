@@ -50,6 +50,7 @@ fn main() {
             compile(kernel, &format!("_{color}"), &[color]);
         }
     }
+    compile("blend", "_depth", &["luma", "depth"]);
     for kernel in ["chroma_loss", "lab_loss"] {
         compile(kernel, "_agreeing", &["agreeing"]);
     }
@@ -128,6 +129,7 @@ impl Kernels {
             "luma",
             "chroma",
             "rgb",
+            "depth",
             "agreeing",
             "figures",
             "geometry",

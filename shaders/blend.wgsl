@@ -2,13 +2,18 @@
 // column. The Gaussians of the tile's list come in batches: each thread fetches
 // one and notes which of the tile's eight parts (8 by 4 pixels, eight
 // neighboring threads) it touches; then each part draws what touches it.
+//
+// With `depth` colors are depths, and the picture's are those of the Gaussians with which the
+// transmittance falls to what is asked: a pixel begins at minus that, and where it is not
+// reached ends at minus what is left to ask of Gaussians behind.
 import package::common::color::Color;
 import package::common::constants::{TILE_SIDE, TRANSMITTANCE_MIN};
 import package::common::numeric::linear_group;
 @if(playcanvas) import package::common::playcanvas::falloff;
 import package::common::portion::Portion;
 import package::common::projected::{Projected, power_cutoff, touches};
-import package::common::quad::{Quad, contributes, pixel_of, powers, quad_alpha, weighted};
+import package::common::quad::{Quad, contributes, powers, quad_alpha};
+@if(!depth) import package::common::quad::{pixel_of, weighted};
 import package::common::view::View;
 
 const BATCH: u32 = 64u;
@@ -23,7 +28,7 @@ const PART_SIZE: vec2f = vec2f(8.0, 4.0);
 @group(0) @binding(5) var<storage, read> colors: array<Color>;
 @group(0) @binding(6) var<storage, read_write> image: array<Color>;
 // Instances of the tile up to and including the last that this pixel used.
-@group(0) @binding(7) var<storage, read_write> lasts: array<u32>;
+@if(!depth) @group(0) @binding(7) var<storage, read_write> lasts: array<u32>;
 @group(0) @binding(8) var<uniform> portion: Portion;
 
 var<workgroup> means: array<vec2f, BATCH>;
@@ -50,8 +55,15 @@ fn blend(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_id) loca
     let count = starts[tile + 1u] - start;
     var color = Quad();
     var transmittance = vec4f(1.0);
-    var last = vec4u(0u);
+    @if(!depth) var last = vec4u(0u);
     let inside = vec4<bool>(first.x < view.size.x) & (rows < vec4u(view.size.y));
+    @if(depth) {
+        for (var row = 0u; row < 4u; row++) {
+            if inside[row] {
+                color[row] = image[rows[row] * view.size.x + first.x];
+            }
+        }
+    }
     var live = inside;
     for (var batch = 0u; batch < count; batch += BATCH) {
         if thread < 2u * PARTS {
@@ -97,9 +109,14 @@ fn blend(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_id) loca
                 let hit = contributes(power, alpha) & live;
                 let open = next >= vec4f(TRANSMITTANCE_MIN);
                 let used = hit & open;
-                color += weighted(select(vec4f(0.0), alpha * transmittance, used), batch_colors[k]);
+                @if(!depth) {
+                    color += weighted(select(vec4f(0.0), alpha * transmittance, used), batch_colors[k]);
+                    last = select(last, vec4u(batch + k + 1u), used);
+                }
+                @if(depth) {
+                    color = select(color, vec4f(batch_colors[k]), used & (next <= -color));
+                }
                 transmittance = select(transmittance, next, used);
-                last = select(last, vec4u(batch + k + 1u), used);
                 live = live & (open | !hit);
             }
         }
@@ -108,8 +125,13 @@ fn blend(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_id) loca
     for (var row = 0u; row < 4u; row++) {
         if inside[row] {
             let p = rows[row] * view.size.x + first.x;
-            image[p] = pixel_of(color, row);
-            lasts[p] = last[row];
+            @if(!depth) {
+                image[p] = pixel_of(color, row);
+                lasts[p] = last[row];
+            }
+            @if(depth) {
+                image[p] = select(color[row], color[row] / transmittance[row], color[row] < 0.0);
+            }
         }
     }
 }

@@ -12,8 +12,8 @@ use crate::{
     capture::Camera,
     gpu::{Gpu, GpuError, Recorder},
     raster::{
-        Field, Geometry, Layer, Lists, Load, Picture, Raster, Streamed, ViewUniform,
-        constants::NEAR_SHARE,
+        DepthLayer, Field, Geometry, Layer, Lists, Load, Picture, Raster, Streamed, UNREACHED,
+        ViewUniform, constants::NEAR_SHARE, depths,
     },
     splats::{ShField, Splats, sh},
 };
@@ -317,21 +317,20 @@ impl FrozenViews {
         drawn.collect()
     }
 
-    /// The same of harmonics of all Gaussians, which are on the device one after the other.
-    pub(super) fn draw_in_turn(
-        &self,
-        view: usize,
-        fields: &[ShField],
-    ) -> Result<Vec<Picture>, ChromaError> {
-        let Some(lists) = self.lists(view, 0) else {
-            return Ok(Vec::new());
-        };
-        let shown = self.put(view).unwrap_or_default();
-        let drawn = fields.iter().map(|field| {
-            let colors = self.colors(field)?;
-            Ok(self.picture(view, lists, &colors, &shown)?)
-        });
-        drawn.collect()
+    /// Median depth of a view at full size, as [`SceneRenderer::depth`] has it.
+    ///
+    /// [`SceneRenderer::depth`]: crate::raster::SceneRenderer::depth
+    pub(super) fn depth(&self, view: usize) -> Result<Vec<f32>, ChromaError> {
+        let lists = self.lists(view, 0).ok_or(ChromaError::NoViews)?;
+        let uniform = self.uniform(view, 0);
+        let pixels = vec![UNREACHED; uniform.pixel_count()];
+        let layer = DepthLayer::new(&self.raster, lists, &pixels, uniform.tile_count())?;
+        self.put(view);
+        let mut recorder = Recorder::new(self.gpu());
+        self.list(view, 0, 0, &mut recorder);
+        layer.record(&mut recorder);
+        recorder.submit();
+        Ok(depths(layer.read(&self.raster)?))
     }
 
     /// What a view shows of harmonics, `shown` being on the device where Gaussians wait on the

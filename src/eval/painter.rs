@@ -9,7 +9,6 @@ use super::{
 use crate::{
     capture::Camera,
     chroma::{native_rgb, teacher::AbImage},
-    measure::DepthSteps,
     raster::{Picture, Raster, SceneRenderer},
     report::Method,
     splats::ShField,
@@ -17,8 +16,6 @@ use crate::{
 
 /// Draws every method's picture.
 pub struct Painter<'a> {
-    raster: Arc<Raster>,
-    scene: &'a ColoredScene,
     renderer: SceneRenderer<'a>,
     has_native: bool,
     /// Methods that are RGB splats, in the order of their fields.
@@ -61,8 +58,6 @@ impl<'a> Painter<'a> {
         fields.extend(rgb.iter().map(|&(_, field)| field));
         fields.extend(&scene.chroma);
         Ok(Self {
-            raster: raster.clone(),
-            scene,
             renderer: SceneRenderer::of(raster, &scene.luma, &fields, dataset.extent)?,
             has_native: scene.chroma.is_some(),
             rgb: rgb.iter().map(|(method, _)| *method).collect(),
@@ -102,16 +97,8 @@ impl<'a> Painter<'a> {
     ///
     /// # Errors
     /// [`EvalError::Gpu`].
-    pub fn depth(&self, camera: &Camera) -> Result<Vec<f32>, EvalError> {
-        let steps = DepthSteps::new(&self.scene.luma, camera);
-        let fields: Vec<&ShField> = steps.fields.iter().collect();
-        let luma = &self.scene.luma;
-        let extent = self.scene.dataset.extent;
-        let renderer = SceneRenderer::of(&self.raster, luma, &fields, extent)?;
-        // Zeros and ones can be drawn.
-        let mut renderer = renderer.with_one_list();
-        let pixels = camera.width as usize * camera.height as usize;
-        Ok(steps.median(&renderer.render(camera)?, pixels))
+    pub fn depth(&mut self, camera: &Camera) -> Result<Vec<f32>, EvalError> {
+        Ok(self.renderer.depth(camera)?)
     }
 
     /// The teacher's answer for a photo.

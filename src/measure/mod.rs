@@ -5,7 +5,6 @@
 
 mod colorfulness;
 mod consistency;
-mod depth;
 mod diversity;
 mod flo;
 mod flow;
@@ -17,7 +16,6 @@ mod visibility;
 
 pub use colorfulness::colorfulness;
 pub use consistency::{Consistency, DENOMINATOR_RULE, SCALE_RULE};
-pub use depth::DepthSteps;
 pub use diversity::color_diversity;
 pub use flo::decode_flo;
 pub use flow::Flow;
@@ -27,4 +25,4 @@ pub use image_error::{
 pub use optical_flow::optical_flow;
 pub use sharpness::{laplacian, variance};
 pub use ssim::ssim;
-pub use visibility::{MASK_RULE, MIN_OPACITY, visible};
+pub use visibility::{MASK_RULE, visible};

@@ -2,9 +2,6 @@
 
 use super::flow::{Flow, sample};
 
-/// Opacity from which on a pixel shows the scene and has a depth.
-pub const MIN_OPACITY: f32 = 0.5;
-
 /// The rule in words, for reports.
 pub const MASK_RULE: &str = "hidden where |w(B)+F|² > 0.01(|w(B)|²+|F|²)+0.5, \
     where |∇u|²+|∇v|² > 0.01|F|²+0.002, outside the other picture, or below opacity 0.5 in either";

@@ -26,6 +26,8 @@ pub struct Pixel<T, const C: usize> {
     pub transmittance: T,
     /// Positions, in the blended list, of the splats that were added.
     pub contributors: Vec<usize>,
+    /// Share of the background that still shows behind each of them.
+    pub transmittances: Vec<f64>,
     /// The smallest relative distance of any decision from falling the other
     /// way: where it is tiny, `f32` and `f64` may differ in good faith.
     pub margin: f64,
@@ -42,6 +44,7 @@ pub fn blend_pixel<'a, T: Number, const C: usize>(
         color: [T::zero(); C],
         transmittance: T::one(),
         contributors: Vec::new(),
+        transmittances: Vec::new(),
         margin: f64::INFINITY,
     };
     for (position, splat) in splats.into_iter().enumerate() {
@@ -83,6 +86,7 @@ pub fn blend_pixel<'a, T: Number, const C: usize>(
         }
         pixel.transmittance = next;
         pixel.contributors.push(position);
+        pixel.transmittances.push(next.re());
     }
     pixel
 }

@@ -1,12 +1,12 @@
 //! The whole forward pass, brute force: every Gaussian at every pixel, no tiles.
 
-use super::Number;
 use super::blend::{Pixel, ScreenSplat, blend};
 use super::constants::COLOR_MAX;
 use super::project::{Cull, Projected};
 use super::scene::{Gaussian, Scene};
 use super::shade::{Shading, shade};
 use super::view::View;
+use super::{Number, relative_distance};
 
 /// A visible Gaussian: its index in the scene and its two faces.
 #[derive(Clone, Debug)]
@@ -87,6 +87,24 @@ pub fn render<T: Number, const C: usize>(
         .into_iter()
         .map(|p| p.color)
         .collect()
+}
+
+/// Per pixel, the depth of the Gaussian behind which at most half of the background shows, if
+/// any, and the smallest relative distance of any decision from falling the other way.
+pub fn median_depths<const C: usize>(
+    scene: &Scene<f64, C>,
+    view: &View,
+) -> Vec<(Option<f64>, f64)> {
+    let list = visible(scene, view, Shading::Plain);
+    let of_pixel = |pixel: Pixel<f64, C>| {
+        let behind = pixel.transmittances.iter().zip(&pixel.contributors);
+        let margins = behind.clone().map(|(&t, _)| relative_distance(t, 0.5));
+        let margin = margins.fold(pixel.margin, f64::min);
+        let first = behind.clone().find(|(t, _)| **t <= 0.5);
+        (first.map(|(_, &at)| list[at].projected.depth), margin)
+    };
+    let pixels = render_pixels(scene, view, Shading::Plain).into_iter();
+    pixels.map(of_pixel).collect()
 }
 
 /// Per pixel, the smallest relative distance of any alpha to its floor or

@@ -110,6 +110,8 @@ pub struct Lists {
     pub view: Buffer<ViewUniform>,
     /// Gaussians on the image plane, `[N]`; stale where not visible.
     pub projected: Buffer<Projected>,
+    /// Bits of each Gaussian's depth, `[N]`; stale where not visible.
+    pub depths: Buffer<u32>,
     /// Depth rank of each Gaussian, `[N]`; `u32::MAX` where not visible.
     pub ranks: Buffer<u32>,
     /// The status words.
@@ -271,6 +273,7 @@ impl Lists {
         Ok(Self {
             view,
             projected,
+            depths,
             ranks,
             status,
             offsets,

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Field, Geometry, Layer, Lists, Raster, ViewUniform};
+use super::{DepthLayer, Field, Geometry, Layer, Lists, Raster, ViewUniform};
 use crate::{
     capture::Camera,
     gpu::{GpuError, Recorder},
@@ -30,7 +30,6 @@ pub struct Renderer {
     geometry: Geometry,
     fields: Vec<Field>,
     near: f64,
-    one_list: bool,
     lists: Lists,
     layers: Vec<Layer>,
     max_pixels: usize,
@@ -66,20 +65,11 @@ impl Renderer {
             geometry,
             fields,
             near,
-            one_list: false,
             lists,
             layers: Vec::new(),
             max_pixels: 0,
             max_tiles: 0,
         })
-    }
-
-    /// Makes tile lists once a view, not once a field: for fields in which every
-    /// Gaussian has a color that can be drawn. One that shading refuses would be missing
-    /// in the fields behind.
-    pub fn with_one_list(mut self) -> Self {
-        self.one_list = true;
-        self
     }
 
     /// Draws all fields as `camera` sees them.
@@ -88,36 +78,17 @@ impl Renderer {
     /// [`GpuError`] when buffers do not fit or the device is lost.
     pub fn render(&mut self, camera: &Camera) -> Result<Vec<Picture>, GpuError> {
         let view = ViewUniform::new(camera, self.near, self.geometry.count, 0);
-        // Of two views, the one with fewer pixels may have more tiles.
-        if view.pixel_count() > self.max_pixels || view.tile_count() > self.max_tiles {
-            let capacity = self
-                .lists
-                .capacity
-                .max(self.geometry.count * INSTANCES_PER_SPLAT);
-            self.resize(&view, capacity)?;
-        }
-        loop {
-            for (index, (layer, field)) in self.layers.iter().zip(&self.fields).enumerate() {
+        self.with_room(&view, |renderer| {
+            for (layer, field) in renderer.layers.iter().zip(&renderer.fields) {
                 // The degree is a property of the field, the rest of the view.
-                let mut recorder = Recorder::new(&self.raster.gpu);
-                self.lists.set_view(
-                    &self.raster.gpu,
-                    &ViewUniform {
-                        sh_degree: field.degree,
-                        ..view
-                    },
-                );
-                if index == 0 || !self.one_list {
-                    self.lists.record(&self.raster, &mut recorder);
-                }
-                layer.record(&self.raster, &mut recorder);
-                recorder.submit();
+                let view = ViewUniform {
+                    sh_degree: field.degree,
+                    ..view
+                };
+                renderer.listed(&view, |recorder| layer.record(&renderer.raster, recorder));
             }
-            match self.lists.status(&self.raster.gpu)?.overflow {
-                None => break,
-                Some(needed) => self.resize(&view, needed + needed / 4)?,
-            }
-        }
+            Ok(())
+        })?;
         self.layers
             .iter()
             .map(|layer| {
@@ -129,6 +100,46 @@ impl Renderer {
                 })
             })
             .collect()
+    }
+
+    /// Median depth as `camera` sees it, going on from `pixels` of a [`DepthLayer`].
+    pub(super) fn depth(&mut self, camera: &Camera, pixels: &[f32]) -> Result<Vec<f32>, GpuError> {
+        let view = ViewUniform::new(camera, self.near, self.geometry.count, 0);
+        self.with_room(&view, |renderer| {
+            let (raster, tiles) = (&renderer.raster, view.tile_count());
+            let layer = DepthLayer::new(raster, &renderer.lists, pixels, tiles)?;
+            renderer.listed(&view, |recorder| layer.record(recorder));
+            layer.read(raster)
+        })
+    }
+
+    /// Lists a view, and what is recorded over its lists.
+    fn listed(&self, view: &ViewUniform, record: impl FnOnce(&mut Recorder)) {
+        let mut recorder = Recorder::new(&self.raster.gpu);
+        self.lists.set_view(&self.raster.gpu, view);
+        self.lists.record(&self.raster, &mut recorder);
+        record(&mut recorder);
+        recorder.submit();
+    }
+
+    /// Draws, again where the lists turn out to have no room.
+    fn with_room<T>(
+        &mut self,
+        view: &ViewUniform,
+        draw: impl Fn(&Self) -> Result<T, GpuError>,
+    ) -> Result<T, GpuError> {
+        // Of two views, the one with fewer pixels may have more tiles.
+        if view.pixel_count() > self.max_pixels || view.tile_count() > self.max_tiles {
+            let least = self.geometry.count * INSTANCES_PER_SPLAT;
+            self.resize(view, self.lists.capacity.max(least))?;
+        }
+        loop {
+            let drawn = draw(self)?;
+            match self.lists.status(&self.raster.gpu)?.overflow {
+                None => return Ok(drawn),
+                Some(needed) => self.resize(view, needed + needed / 4)?,
+            }
+        }
     }
 
     fn resize(&mut self, view: &ViewUniform, capacity: usize) -> Result<(), GpuError> {

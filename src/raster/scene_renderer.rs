@@ -2,7 +2,11 @@
 
 use std::sync::Arc;
 
-use super::{Field, Geometry, Picture, Raster, Renderer, Streamed, constants::NEAR_SHARE};
+use super::{
+    Field, Geometry, Picture, Raster, Renderer, Streamed,
+    constants::NEAR_SHARE,
+    depth::{UNREACHED, depths},
+};
 use crate::{
     capture::Camera,
     gpu::GpuError,
@@ -92,25 +96,41 @@ impl<'a> SceneRenderer<'a> {
         }
     }
 
-    /// As [`Renderer::with_one_list`]; of a scene on the host each field has its own.
-    #[must_use]
-    pub fn with_one_list(self) -> Self {
-        let place = match self.place {
-            Place::Device(renderer) => Place::Device(Box::new(renderer.with_one_list())),
-            host @ Place::Host(_) => host,
-        };
-        Self { place, ..self }
-    }
-
     /// Draws all fields as `camera` sees them.
     ///
     /// # Errors
     /// [`GpuError`] when buffers do not fit or the device is lost.
     pub fn render(&mut self, camera: &Camera) -> Result<Vec<Picture>, GpuError> {
+        self.on_device_or_host(
+            |renderer| renderer.render(camera),
+            |scene, raster, fields| scene.render(raster, fields, camera),
+        )
+    }
+
+    /// Median depth along the camera's z axis in world units, `[height, width]`: that of the
+    /// Gaussian behind which at most half of the light is left. NaN where there is none.
+    ///
+    /// # Errors
+    /// [`GpuError`] when buffers do not fit or the device is lost.
+    pub fn depth(&mut self, camera: &Camera) -> Result<Vec<f32>, GpuError> {
+        let unreached = vec![UNREACHED; camera.width as usize * camera.height as usize];
+        let pixels = self.on_device_or_host(
+            |renderer| renderer.depth(camera, &unreached),
+            |scene, raster, _| scene.depth(raster, camera, &unreached),
+        );
+        pixels.map(depths)
+    }
+
+    /// Draws from the device, or from the host where it turns out to have no room.
+    fn on_device_or_host<T>(
+        &mut self,
+        on_device: impl Fn(&mut Renderer) -> Result<T, GpuError>,
+        on_host: impl Fn(&mut Streamed, &Arc<Raster>, &[&ShField]) -> Result<T, GpuError>,
+    ) -> Result<T, GpuError> {
         loop {
             match &mut self.place {
-                Place::Host(scene) => return scene.render(&self.raster, &self.fields, camera),
-                Place::Device(renderer) => match renderer.render(camera) {
+                Place::Host(scene) => return on_host(scene, &self.raster, &self.fields),
+                Place::Device(renderer) => match on_device(renderer) {
                     // Of the view's tile lists.
                     Err(GpuError::TooLarge { .. }) => {
                         self.place = Place::Host(Streamed::new(self.splats, self.near));

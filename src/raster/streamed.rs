@@ -126,9 +126,51 @@ impl Streamed {
         fields: &[&ShField],
         camera: &Camera,
     ) -> Result<Vec<Picture>, GpuError> {
+        self.with_room(camera, |scene, shown| {
+            if shown.len() <= scene.at_once {
+                return (scene.renderer(raster, fields, shown, false)?).render(camera);
+            }
+            let mut drawn = Vec::new();
+            for part in scene.parts(shown, camera) {
+                let behind = (scene.renderer(raster, fields, part, true)?).render(camera)?;
+                if drawn.is_empty() {
+                    drawn = behind;
+                } else if !show_through(&mut drawn, &behind) {
+                    break;
+                }
+            }
+            drawn.pop();
+            Ok(drawn)
+        })
+    }
+
+    /// Median depth as `camera` sees it, going on from `pixels` of a [`DepthLayer`].
+    ///
+    /// [`DepthLayer`]: super::DepthLayer
+    pub(super) fn depth(
+        &mut self,
+        raster: &Arc<Raster>,
+        camera: &Camera,
+        pixels: &[f32],
+    ) -> Result<Vec<f32>, GpuError> {
+        self.with_room(camera, |scene, shown| {
+            let mut pixels = pixels.to_vec();
+            for part in scene.parts(shown, camera) {
+                pixels = (scene.renderer(raster, &[], part, false)?).depth(camera, &pixels)?;
+            }
+            Ok(pixels)
+        })
+    }
+
+    /// Draws what a camera may show, in smaller parts where there is no room.
+    fn with_room<T>(
+        &mut self,
+        camera: &Camera,
+        draw: impl Fn(&Self, &mut [usize]) -> Result<T, GpuError>,
+    ) -> Result<T, GpuError> {
         let mut shown = self.shown(camera);
         loop {
-            match self.in_parts(raster, fields, &mut shown, camera) {
+            match draw(self, &mut shown) {
                 Err(GpuError::TooLarge { .. }) if self.at_once.min(shown.len()) > 1 => {
                     self.at_once = self.at_once.min(shown.len()).div_ceil(2);
                 }
@@ -137,42 +179,29 @@ impl Streamed {
         }
     }
 
-    fn in_parts(
+    /// Gaussians front to back, as many at a time as have room.
+    fn parts<'s>(
         &self,
-        raster: &Arc<Raster>,
-        fields: &[&ShField],
-        shown: &mut [usize],
+        shown: &'s mut [usize],
         camera: &Camera,
-    ) -> Result<Vec<Picture>, GpuError> {
-        if shown.len() <= self.at_once {
-            return self.part(raster, fields, shown, camera, false);
-        }
+    ) -> impl Iterator<Item = &'s [usize]> {
         let depth = |i: usize| camera.depth(DVec3::from(self.splats.means[i].map(f64::from)));
         shown.sort_by(|&a, &b| depth(a).total_cmp(&depth(b)));
-        let mut drawn = Vec::new();
-        for part in shown.chunks_mut(self.at_once) {
+        shown.chunks_mut(self.at_once).map(|part| {
             // Of equal depths the first comes first.
             part.sort_unstable();
-            let behind = self.part(raster, fields, part, camera, true)?;
-            if drawn.is_empty() {
-                drawn = behind;
-            } else if !show_through(&mut drawn, &behind) {
-                break;
-            }
-        }
-        drawn.pop();
-        Ok(drawn)
+            &*part
+        })
     }
 
-    /// Pictures of some Gaussians, and with `opacity` how opaque they are.
-    fn part(
+    /// A renderer of some Gaussians, and with `opacity` of how opaque they are.
+    fn renderer(
         &self,
         raster: &Arc<Raster>,
         fields: &[&ShField],
         shown: &[usize],
-        camera: &Camera,
         opacity: bool,
-    ) -> Result<Vec<Picture>, GpuError> {
+    ) -> Result<Renderer, GpuError> {
         let gpu = &raster.gpu;
         let chosen = fields.iter().map(|field| field.chosen(shown));
         let white = opacity.then(|| ShField {
@@ -185,7 +214,7 @@ impl Streamed {
             .map(|field| Field::upload(gpu, &field))
             .collect::<Result<_, _>>()?;
         let geometry = Geometry::upload(gpu, &self.chosen(shown))?;
-        Renderer::new(raster.clone(), geometry, fields, self.near)?.render(camera)
+        Renderer::new(raster.clone(), geometry, fields, self.near)
     }
 }
 

@@ -14,9 +14,8 @@ use super::{
     teacher::{AbImage, HintImage},
 };
 use crate::{
-    capture::{Camera, Dataset, Photo},
+    capture::{Dataset, Photo},
     color::gray_to_lightness,
-    measure::DepthSteps,
     raster::Picture,
     splats::{ShField, Splats, sh},
 };
@@ -122,12 +121,11 @@ pub(super) fn lay(
             continue;
         };
         let photo = dataset.photo(i)?;
-        let camera = &dataset.cameras[i];
         let lightness = lightness(&photo);
         let surface = Surface {
             size: [photo.width, photo.height].map(|side| side as usize),
             lightness: &lightness,
-            depth: &depth(frozen, view, luma, camera)?,
+            depth: &frozen.depth(view)?,
         };
         let mut region = grow(&surface, &paint);
         if let Some(mask) = &photo.mask {
@@ -258,17 +256,4 @@ fn lightness(photo: &Photo) -> Vec<f32> {
         .iter()
         .map(|&gray| of_gray[usize::from(gray)])
         .collect()
-}
-
-/// How far away is what a view shows, `[height, width]` in world units; NaN where nothing is.
-fn depth(
-    frozen: &FrozenViews,
-    view: usize,
-    luma: &Splats,
-    camera: &Camera,
-) -> Result<Vec<f32>, ChromaError> {
-    let steps = DepthSteps::new(luma, camera);
-    let pictures = frozen.draw_in_turn(view, &steps.fields)?;
-    let pixels = camera.width as usize * camera.height as usize;
-    Ok(steps.median(&pictures, pixels))
 }

@@ -9,16 +9,16 @@ use crate::{
         measured::{Allowance, Row, Sample},
         stage::{Stage, splats},
     },
-    gpu::GpuError,
+    gpu::{GpuError, Recorder},
     oracle::{
         constants::ALPHA_MIN,
         random::{opaque_stack, random_scene_before, random_view},
-        render::render_pixels,
+        render::{median_depths, render_pixels},
         scene::Scene,
         shade::Shading,
         view::View,
     },
-    raster::Raster,
+    raster::{DepthLayer, Raster, UNREACHED},
 };
 
 /// Scenes of every degree before views of odd sizes, and opaque stacks.
@@ -51,6 +51,34 @@ pub(super) fn pictures<const C: usize>(
     pictures.collect()
 }
 
+/// Median depths, zero where there is none.
+fn depths(raster: &Arc<Raster>) -> Result<Vec<Sample>, GpuError> {
+    let samples = scenes::<1>().into_iter().map(|(scene, view)| {
+        let stage = Stage::new(raster, &splats(&scene), &view)?;
+        stage.forward()?;
+        let pixels = vec![UNREACHED; view.width * view.height];
+        let layer = DepthLayer::new(raster, &stage.lists, &pixels, stage.view.tile_count())?;
+        let mut recorder = Recorder::new(&raster.gpu);
+        layer.record(&mut recorder);
+        recorder.submit();
+        let (expected, margins): (Vec<_>, Vec<_>) =
+            median_depths(&scene, &view).into_iter().unzip();
+        Ok(Sample {
+            actual: layer
+                .read(raster)?
+                .iter()
+                .map(|z| f64::from(*z).max(0.0))
+                .collect(),
+            expected: expected
+                .into_iter()
+                .map(Option::unwrap_or_default)
+                .collect(),
+            may_flip: margins.into_iter().map(|margin| margin < MARGIN).collect(),
+        })
+    });
+    samples.collect()
+}
+
 /// `worst` is the largest error seen per unit of color, `brightest` the largest color.
 pub(super) fn bounds(allowed: Allowance, worst: f64, brightest: f64) -> FlipBounds {
     FlipBounds {
@@ -81,6 +109,17 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
             "RGB, 0 to 1",
             bounds(allowed, 1.34e-6, 1.0),
             &pictures::<3>(raster, scenes())?,
+        ),
+        Row::picture(
+            "blend",
+            "median depth, world units",
+            FlipBounds {
+                rest: allowed.relative(1e-7, 6.0),
+                // To any other Gaussian's.
+                jump: allowed.relative(1.0, 6.0),
+                cap: 0.01,
+            },
+            &depths(raster)?,
         ),
     ])
 }

@@ -3,12 +3,14 @@
 use glam::{DMat3, DVec3};
 use gs_chroma::{
     capture::Camera,
-    measure::{Consistency, DepthSteps, Flow, visible},
-    raster::{Field, Geometry, Renderer},
+    doctor::stage,
+    measure::{Consistency, Flow, visible},
+    oracle::random::{opaque_stack, random_scene_before, random_view},
+    raster::SceneRenderer,
     splats::{ShField, Splats, sh},
 };
 
-use crate::kernels::harness::{gpu, raster};
+use crate::kernels::harness::raster;
 
 /// Spacing of the wall's Gaussians in world units.
 const STEP: f64 = 0.05;
@@ -76,23 +78,17 @@ fn a_walls_depth_and_the_flow_between_two_views_of_it() {
         camera(DVec3::ZERO, 0.0),
         camera(DVec3::new(0.5, -0.2, 0.3), 0.12),
     ];
+    let mut renderer = SceneRenderer::new(&raster(), &splats, &[&ab], 0.01).unwrap();
     let drawn = cameras.each_ref().map(|camera| {
-        let steps = DepthSteps::new(&splats, camera);
-        let fields = [&ab].into_iter().chain(&steps.fields);
-        let fields = fields.map(|field| Field::upload(gpu(), field).unwrap());
-        let geometry = Geometry::upload(gpu(), &splats).unwrap();
-        let mut renderer = Renderer::new(raster(), geometry, fields.collect(), 0.01).unwrap();
         let pictures = renderer.render(camera).unwrap();
-        let again = renderer.with_one_list().render(camera).unwrap();
-        assert!(pictures == again, "one list for all fields");
-        let depth = steps.median(&pictures[1..], 96 * 72);
+        let depth = renderer.depth(camera).unwrap();
         (depth, pictures[0].pixels.as_chunks().0.to_vec())
     });
     let mut known = 0;
     for (camera, (depth, _)) in cameras.iter().zip(&drawn) {
         for (i, &z) in depth.iter().enumerate().filter(|(_, z)| !z.is_nan()) {
             let want = true_depth(camera, i);
-            // Gaussians have a thickness of 0.035, and steps are 0.05 apart.
+            // Gaussians have a thickness of 0.035.
             assert!((f64::from(z) - want).abs() < 0.08, "{i}: {z} {want}");
             known += 1;
         }
@@ -125,4 +121,63 @@ fn a_walls_depth_and_the_flow_between_two_views_of_it() {
     println!("{right:.3} with the flow, {still:.3} without");
     // The colors stand on the wall: what is left is the drawing's own.
     assert!(right < 0.6 && still > 4.0, "{right} {still}");
+}
+
+/// Depths that split a scene into equal parts, the last beyond everything; fields of two channels
+/// that draw how opaque what is no farther than each is.
+fn steps(splats: &Splats, camera: &Camera) -> (Vec<f64>, Vec<ShField>) {
+    let depth = |mean: &[f32; 3]| camera.depth(DVec3::from(mean.map(f64::from)));
+    let seen: Vec<f64> = splats.means.iter().map(depth).collect();
+    let mut sorted = seen.clone();
+    sorted.sort_by(f64::total_cmp);
+    let of_step = |k: usize| sorted.get(k * sorted.len() / 31);
+    let depths: Vec<f64> = (0..32)
+        .map(|k| of_step(k).copied().unwrap_or(f64::INFINITY))
+        .collect();
+    let one = (1.0 / sh::C0) as f32;
+    let field = |pair: &[f64; 2]| ShField {
+        degree: 0,
+        channels: 2,
+        coefficients: (seen.iter())
+            .flat_map(|z| pair.map(|depth| if *z <= depth { one } else { 0.0 }))
+            .collect(),
+    };
+    let fields = depths.as_chunks().0.iter().map(field).collect();
+    (depths, fields)
+}
+
+/// The pictures of what lies before each depth tell between which two the median is.
+#[test]
+fn the_median_lies_between_the_depths_where_opacity_passes_half() {
+    let random = (0..4).map(|seed| {
+        let view = random_view(seed);
+        (random_scene_before::<1>(&view, seed, 150, 0), view)
+    });
+    let stacks = (8..10).map(|seed| opaque_stack::<1>(seed, 60, 0));
+    let mut scenes: Vec<(Splats, Camera)> = (random.chain(stacks))
+        .map(|(scene, view)| (stage::splats(&scene), stage::camera(&view)))
+        .collect();
+    scenes.push((wall().0, camera(DVec3::new(0.5, -0.2, 0.3), 0.12)));
+    let (mut known, mut astray) = (0, 0);
+    for (splats, camera) in &scenes {
+        let (depths, fields) = steps(splats, camera);
+        let fields: Vec<&ShField> = fields.iter().collect();
+        let mut renderer = SceneRenderer::new(&raster(), splats, &fields, 0.01).unwrap();
+        let pictures = renderer.render(camera).unwrap();
+        for (pixel, &depth) in renderer.depth(camera).unwrap().iter().enumerate() {
+            let at = |step: usize| pictures[step / 2].pixels[2 * pixel + step % 2];
+            astray += usize::from(depth.is_nan() != (at(31) < 0.5));
+            // Half of the opacity, where that is nearly one.
+            let above = (0..32).find(|&step| at(step) >= 0.5 * at(31)).unwrap();
+            if at(31) < 0.99 {
+                continue;
+            }
+            let nearest = if above == 0 { 0.0 } else { depths[above - 1] };
+            let between = nearest * 0.9999..=depths[above] * 1.0001;
+            known += 1;
+            astray += usize::from(!between.contains(&f64::from(depth)));
+        }
+    }
+    // A pixel at which opacity is half but for rounding may fall to either side.
+    assert!(known > 5000 && astray < 20, "{known} {astray}");
 }
