@@ -39,7 +39,7 @@ pub struct LbfgsParameters {
 pub const REST: f64 = 20.0;
 
 /// Twin of `MEMORY`: pairs that are remembered. Eight do no better (docs/lab/07-chroma-solver.md).
-const MEMORY: usize = 5;
+pub(super) const MEMORY: usize = 5;
 
 /// Twin of `RHO`: scalars before those of the pairs, of which each has two.
 const SHARED_SCALARS: usize = 11;

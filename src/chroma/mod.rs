@@ -14,6 +14,7 @@ mod error;
 mod fill;
 mod frozen;
 mod gather;
+mod host_lbfgs;
 mod host_system;
 mod irls;
 mod kernels;

@@ -6,12 +6,12 @@ use std::collections::BTreeMap;
 use super::{
     ChromaError,
     checkpoint::SolverState,
-    lbfgs::{Lbfgs, LbfgsKernels, REST, State, System, UNBOUNDED, diagonal_scale},
+    host_lbfgs::HostLbfgs,
+    lbfgs::{Lbfgs, LbfgsKernels, State, System, UNBOUNDED, diagonal_scale},
     passes::Passes,
 };
 use crate::{
     gpu::{Buffer, Gpu, Recorder},
-    oracle,
     splats::sh,
 };
 
@@ -32,11 +32,9 @@ pub(super) enum Steps {
 
 /// On the host.
 pub(super) struct HostSteps {
-    lbfgs: oracle::lbfgs::Lbfgs,
+    lbfgs: HostLbfgs,
     priors: Priors,
     splats: usize,
-    /// How many of the first unknowns are constant harmonics.
-    constants: usize,
     diagonal_scale: f64,
 }
 
@@ -76,16 +74,11 @@ impl Steps {
         let length = on_host.gradient.len();
         let splats = passes.frozen.splat_count();
         let constants = channels * splats;
-        let ridge = |k: usize| factor(k, constants) * priors.ridge;
+        let unknowns = widened(&on_host.unknowns[..length]);
         Ok(Self::Host(Box::new(HostSteps {
-            lbfgs: oracle::lbfgs::Lbfgs::new(
-                widened(&on_host.unknowns[..length]),
-                vec![UNBOUNDED.into(); length],
-                (0..length).map(ridge).collect(),
-            ),
+            lbfgs: HostLbfgs::new(unknowns, priors.ridge, constants),
             priors,
             splats,
-            constants,
             diagonal_scale: diagonal_scale(length / constants.max(1)),
         })))
     }
@@ -94,7 +87,7 @@ impl Steps {
     pub fn set_floors(&mut self, gpu: &Gpu, floors: &[f32]) {
         match self {
             Self::Device(system, _) => system.floors.write(gpu, floors),
-            Self::Host(host) => host.lbfgs.set_floors(widened(floors)),
+            Self::Host(host) => host.lbfgs.set_floors(floors),
         }
     }
 
@@ -179,7 +172,7 @@ impl Steps {
                 }
             }
             Self::Host(host) => {
-                kept.doubles = host.lbfgs.kept();
+                (kept.doubles).insert(LBFGS.to_owned(), host.lbfgs.kept());
                 kept.buffers
                     .insert(DIAGONAL.to_owned(), passes.curvature()?);
             }
@@ -213,7 +206,9 @@ impl Steps {
                     return false;
                 };
                 on_host.diagonal.clone_from(diagonal);
-                let fits = host.lbfgs.go_on_from(&kept.doubles);
+                let steps = kept.doubles.get(LBFGS);
+                let found = steps.and_then(|steps| host.lbfgs.restored(steps));
+                let fits = found.map(|found| host.lbfgs = found).is_some();
                 host.show(passes);
                 fits
             }
@@ -221,8 +216,9 @@ impl Steps {
     }
 }
 
-/// The curvature's name in a checkpoint.
+/// Names in a checkpoint: of the curvature, and of the host's L-BFGS.
 const DIAGONAL: &str = "diagonal";
+const LBFGS: &str = "lbfgs";
 
 /// What of the system itself a checkpoint has.
 fn of_system(system: &System) -> [(&'static str, &Buffer<f32>); 2] {
@@ -235,11 +231,6 @@ fn state(lbfgs: &Lbfgs, gpu: &Gpu) -> Result<State, ChromaError> {
 
 fn widened(values: &[f32]) -> Vec<f64> {
     values.iter().map(|&value| f64::from(value)).collect()
-}
-
-/// Twin of `penalty_factor`.
-fn factor(k: usize, constants: usize) -> f64 {
-    if k < constants { 1.0 } else { REST }
 }
 
 impl HostSteps {
@@ -265,15 +256,12 @@ impl HostSteps {
         let loss = Self::loss(passes)?;
         let weights = self.weights(passes);
         let of_pictures = weights.iter().enumerate().map(|(k, weight)| {
-            factor(k, self.constants) * (self.diagonal_scale * weight + self.priors.ridge)
+            self.lbfgs.factor(k) * (self.diagonal_scale * weight + self.priors.ridge)
         });
         let diagonal: Vec<f64> = of_pictures.collect();
-        let gradient = passes
-            .on_host
-            .as_ref()
-            .map(|on_host| widened(&on_host.gradient));
-        self.lbfgs
-            .step(loss, &gradient.unwrap_or_default(), &diagonal);
+        let on_host = passes.on_host.as_ref();
+        let gradient = on_host.map(|on_host| widened(&on_host.gradient));
+        (self.lbfgs).step(loss, gradient.unwrap_or_default(), &diagonal);
         self.show(passes);
         Ok(self.state(&weights))
     }
@@ -302,7 +290,7 @@ impl HostSteps {
     }
 
     fn state(&self, weights: &[f64]) -> State {
-        let moved = self.lbfgs.moved(weights, self.constants);
+        let moved = self.lbfgs.moved(weights);
         State {
             loss: self.lbfgs.loss().unwrap_or(f64::MAX),
             moved: moved.map(|moved| sh::C0 * moved),

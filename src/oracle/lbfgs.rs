@@ -2,7 +2,7 @@
 //! is shortened where a parabola says (3.5 there), and if that raises it too, undone for the
 //! majorizer's. With anchors, with floors (Bertsekas 1982), and elimination to compare with.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::VecDeque;
 
 /// A symmetric matrix, rows.
 pub type Matrix = Vec<Vec<f64>>;
@@ -158,97 +158,6 @@ impl Lbfgs {
         self.loss
     }
 
-    /// All that the next step goes by, by name.
-    pub fn kept(&self) -> BTreeMap<String, Vec<f64>> {
-        let next = match self.next {
-            Next::Onward => 0.0,
-            Next::Shorter => 1.0,
-            Next::Safe => 2.0,
-        };
-        let loss = self.loss.unwrap_or(f64::INFINITY);
-        let of_steps = [loss, next, self.slope, self.scale];
-        let counted = [self.age, self.undone, usize::from(self.changed)].map(|n| n as f64);
-        let rhos = self.pairs.iter().map(|pair| match pair {
-            Some((_, _, rho)) => *rho,
-            None => f64::NAN,
-        });
-        let mut kept: BTreeMap<String, Vec<f64>> = [
-            ("unknowns", &self.unknowns),
-            ("displacement", &self.displacement),
-            ("anchors", &self.anchors.0),
-            ("pulls", &self.anchors.1),
-            ("accepted unknowns", &self.accepted.0),
-            ("accepted gradient", &self.accepted.1),
-            ("direction", &self.direction),
-            ("preconditioner", &self.preconditioner),
-            ("scalars", &[&of_steps[..], &counted].concat()),
-            ("rhos", &rhos.collect()),
-        ]
-        .map(|(name, values)| (name.to_owned(), values.clone()))
-        .into();
-        for (age, (s, y, _)) in self.pairs.iter().enumerate().filter_map(with_age) {
-            kept.insert(format!("displacement {age}"), s.clone());
-            kept.insert(format!("change {age}"), y.clone());
-        }
-        kept
-    }
-
-    /// Goes on from what another of the same problem kept; `false`, and nothing is changed, where
-    /// that is of another.
-    pub fn go_on_from(&mut self, kept: &BTreeMap<String, Vec<f64>>) -> bool {
-        self.restored(kept).map(|found| *self = found).is_some()
-    }
-
-    fn restored(&self, kept: &BTreeMap<String, Vec<f64>>) -> Option<Self> {
-        let length = self.unknowns.len();
-        let vector = |name: &str| {
-            let values = kept.get(name)?;
-            (values.len() == length).then(|| values.clone())
-        };
-        let &[loss, next, slope, scale, age, undone, changed] = &kept.get("scalars")?[..] else {
-            return None;
-        };
-        let pair = |(age, &rho): (usize, &f64)| match rho.is_nan() {
-            true => Some(None),
-            false => {
-                let s = vector(&format!("displacement {age}"))?;
-                Some(Some((s, vector(&format!("change {age}"))?, rho)))
-            }
-        };
-        Some(Self {
-            unknowns: vector("unknowns")?,
-            displacement: vector("displacement")?,
-            anchors: (vector("anchors")?, vector("pulls")?),
-            accepted: (vector("accepted unknowns")?, vector("accepted gradient")?),
-            direction: vector("direction")?,
-            preconditioner: vector("preconditioner")?,
-            pairs: kept
-                .get("rhos")?
-                .iter()
-                .enumerate()
-                .map(pair)
-                .collect::<Option<_>>()?,
-            loss: loss.is_finite().then_some(loss),
-            next: match next {
-                0.0 => Next::Onward,
-                1.0 => Next::Shorter,
-                _ => Next::Safe,
-            },
-            slope,
-            scale,
-            age: age as usize,
-            undone: undone as usize,
-            changed: changed > 0.0,
-            floors: self.floors.clone(),
-            ridges: self.ridges.clone(),
-        })
-    }
-
-    /// No unknown falls below these from now on.
-    pub fn set_floors(&mut self, floors: Vec<f64>) {
-        self.floors = floors;
-    }
-
     /// The end, where the loss is this: a last step that raised it is undone.
     pub fn end(&mut self, loss: f64) {
         self.judge(loss);
@@ -357,11 +266,6 @@ impl Lbfgs {
             };
         }
     }
-}
-
-/// A pair that counts, and its place.
-fn with_age((age, pair): (usize, &Option<Pair>)) -> Option<(usize, &Pair)> {
-    Some((age, pair.as_ref()?))
 }
 
 fn rises(before: f64, loss: f64) -> bool {

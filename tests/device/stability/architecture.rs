@@ -112,6 +112,25 @@ fn imports_go_down_only() {
     assert!(wrong.is_empty(), "{wrong:?}");
 }
 
+/// What production runs must not be what it is compared with.
+#[test]
+fn only_the_doctor_asks_the_oracle() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    for entry in fs::read_dir(&root).expect("src") {
+        let path = entry.expect("an entry").path();
+        let name = path.file_stem().expect("a name").to_string_lossy();
+        if ["oracle", "doctor", "compare"].contains(&&*name) {
+            continue;
+        }
+        let mut files = Vec::new();
+        rust_files(&path, &mut files);
+        for text in files {
+            let code = text.split("#[cfg(test)]").next().unwrap_or_default();
+            assert!(!imports(code).contains("oracle"), "{name}: {text}");
+        }
+    }
+}
+
 /// What reads and writes files, by whatever name.
 const ACCESS: [&str; 11] = [
     "File::open",
