@@ -5,6 +5,7 @@
 // that touches the loss from above. `agreeing`: the picture shall agree with that of the next
 // coarser scale as well.
 import package::common::correction::{Correction, corrected};
+import package::common::group_sum::group_sum;
 import package::common::numeric::linear_group;
 import package::common::pyramid::place_in_coarser;
 import package::common::view::View;
@@ -46,8 +47,6 @@ struct Penalty {
     curvature: vec2f,
 }
 
-var<workgroup> losses: array<f32, 256>;
-
 fn penalty(residual: vec2f, decline: f32, joint: bool) -> Penalty {
     let squares = residual * residual;
     let length = sqrt(select(squares, vec2f(squares.x + squares.y), joint) + SMOOTHING * SMOOTHING);
@@ -75,7 +74,7 @@ fn chroma_loss(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_in
     let block = linear_group(group);
     let p = block * 256u + local;
     let pixels = view.size.x * view.size.y;
-    losses[local] = 0.0;
+    var own = 0.0;
     if p < pixels {
         let scale = 0.5 / f32(pixels);
         var weight = 1.0;
@@ -101,17 +100,11 @@ fn chroma_loss(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_in
             curvature += weights.agreement * agreed.curvature;
             gradient += weights.agreement * agreed.curvature * drift;
         }
-        losses[local] = 0.5 * (loss.x + loss.y);
+        own = 0.5 * (loss.x + loss.y);
         image_gradient[p] = scale * vec4f(gradient, curvature);
     }
-    workgroupBarrier();
-    for (var half = 128u; half > 0u; half /= 2u) {
-        if local < half {
-            losses[local] += losses[local + half];
-        }
-        workgroupBarrier();
-    }
+    let sum = group_sum(local, own);
     if local == 0u && block * 256u < pixels {
-        block_losses[block] = losses[0];
+        block_losses[block] = sum;
     }
 }

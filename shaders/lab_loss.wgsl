@@ -2,6 +2,7 @@
 // between RGB pictures as drawn and as wanted, and how much neighboring pixels differ; value
 // and gradient. `agreeing`: a and b shall agree with those of the next coarser scale as well.
 import package::common::lab::{lab_of, rgb_gradient};
+import package::common::group_sum::group_sum;
 import package::common::numeric::linear_group;
 import package::common::pyramid::place_in_coarser;
 import package::common::view::View;
@@ -36,8 +37,6 @@ struct LabLossParameters {
 @group(0) @binding(6) var<storage, read> pixel_weights: array<f32>;
 // RGB rendered at the next coarser scale.
 @if(agreeing) @group(0) @binding(7) var<storage, read> coarser: array<vec3f>;
-
-var<workgroup> losses: array<f32, 256>;
 
 // |r|, smoothed over `width`, and its slope.
 struct Distance {
@@ -93,7 +92,7 @@ fn lab_loss(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index
     let block = linear_group(group);
     let p = block * 256u + local;
     let pixels = view.size.x * view.size.y;
-    losses[local] = 0.0;
+    var own = 0.0;
     if p < pixels {
         var weight = 1.0;
         if parameters.weighted != 0u {
@@ -117,17 +116,11 @@ fn lab_loss(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index
         let variation = total_variation(p);
         loss += parameters.variation * dot(variation.value, vec3f(1.0));
         let gradient = rgb_gradient(drawn, by_lab) + parameters.variation * variation.slope;
-        losses[local] = loss;
+        own = loss;
         image_gradient[p] = vec4f(gradient, 0.0) / f32(pixels);
     }
-    workgroupBarrier();
-    for (var half = 128u; half > 0u; half /= 2u) {
-        if local < half {
-            losses[local] += losses[local + half];
-        }
-        workgroupBarrier();
-    }
+    let sum = group_sum(local, own);
     if local == 0u && block * 256u < pixels {
-        block_losses[block] = losses[0];
+        block_losses[block] = sum;
     }
 }

@@ -14,6 +14,7 @@
 //
 // Unknowns may have floors. One that stands at its floor, and would go below, is held there;
 // the others are put onto theirs if they go below (after Bertsekas 1982, projected Newton).
+import package::common::group_sum::group_sum;
 import package::common::numeric::linear_group;
 
 struct LbfgsParameters {
@@ -116,24 +117,9 @@ const LEAST_SCALE: f32 = 1e-3;
 @group(0) @binding(17) var<storage, read_write> anchors: array<f32>;
 @group(0) @binding(18) var<storage, read_write> pulls: array<f32>;
 
-var<workgroup> sums: array<f32, 256>;
-
-// The sum over the workgroup, valid in thread 0.
-fn sum_of_group(local: u32, own: f32) -> f32 {
-    sums[local] = own;
-    workgroupBarrier();
-    for (var half = 128u; half > 0u; half /= 2u) {
-        if local < half {
-            sums[local] += sums[local + half];
-        }
-        workgroupBarrier();
-    }
-    return sums[0];
-}
-
 // Leaves the workgroup's sum for the kernel that adds up the blocks: the first of two.
 fn leave_sum(block: u32, local: u32, own: f32) {
-    let sum = sum_of_group(local, own);
+    let sum = group_sum(local, own);
     if local == 0u && block < parameters.blocks {
         block_sums[block] = sum;
     }
@@ -141,7 +127,7 @@ fn leave_sum(block: u32, local: u32, own: f32) {
 
 // The same for the second.
 fn leave_second_sum(block: u32, local: u32, own: f32) {
-    let sum = sum_of_group(local, own);
+    let sum = group_sum(local, own);
     if local == 0u && block < parameters.blocks {
         block_sums[parameters.blocks + block] = sum;
     }
@@ -157,7 +143,7 @@ fn total_from(first: u32, local: u32) -> f32 {
     for (var block = local; block < parameters.blocks; block += 256u) {
         own += block_sums[first + block];
     }
-    return sum_of_group(local, own);
+    return group_sum(local, own);
 }
 
 // One over the majorizer's diagonal. Blend weights sum to at most one a pixel, so the sum
@@ -206,7 +192,7 @@ fn lbfgs_judge(@builtin(local_invocation_index) local: u32) {
     for (var i = local; i < arrayLength(&losses); i += 256u) {
         own += losses[i];
     }
-    let loss = sum_of_group(local, own) + of_ridge;
+    let loss = group_sum(local, own) + of_ridge;
     if local != 0u {
         return;
     }

@@ -3,12 +3,10 @@
 // docs/architecture.md. In training (`step`) Adam moves the parameters at once, and
 // their gradient is never stored; or (`lazy`) it moves those of the Gaussians that the view
 // shows, and the others keep their moments as well.
-@if(step) import package::common::adam::{AdamParameters, GRADIENT_MAX, adam_step};
 import package::common::constants::{INVISIBLE, PLANE_LOG_SCALE, PLANE_MEAN, PLANE_OPACITY, PLANE_QUAT, STAT_PULL, STAT_VIEWS, STATUS_OVERFLOW};
-@if(step) import package::common::constants::STATUS_REFUSED;
+@if(step) import package::common::descend::{descended, status};
 import package::common::geometry::footprint;
 import package::common::numeric::linear_group;
-@if(step) import package::common::numeric::is_within;
 @if(mip) import package::common::numeric::sigmoid;
 import package::common::partials::{PARTIAL_PULL, PARTIAL_STRIDE};
 import package::common::projected::Projected;
@@ -25,36 +23,18 @@ import package::common::view::View;
 @if(!step) @group(0) @binding(5) var<storage, read_write> geometry_gradient: array<f32>;
 // Planes `[2, N]`, accumulated over iterations.
 @group(0) @binding(6) var<storage, read_write> statistics: array<f32>;
-@group(0) @binding(7) var<storage, read_write> status: array<atomic<u32>>;
 // Planes `[3, N]`, what `shade_backward` adds to the means' gradient.
-@group(0) @binding(8) var<storage, read> mean_gradient: array<f32>;
-@if(step) @group(0) @binding(9) var<uniform> parameters: AdamParameters;
-@if(step) @group(0) @binding(10) var<storage, read_write> first_moment: array<f32>;
-@if(step) @group(0) @binding(11) var<storage, read_write> second_moment: array<f32>;
+@group(0) @binding(7) var<storage, read> mean_gradient: array<f32>;
+@if(!step) @group(0) @binding(8) var<storage, read_write> status: array<atomic<u32>>;
 
 fn plane(index: u32, i: u32) -> f32 {
     return geometry[index * view.splat_count + i];
 }
 
-// Adam's step for element i of plane `plane`, instead of leaving the gradient. Nothing
-// known leads to a gradient that is refused; if something does, it is counted, and
-// the parameter stays what it is.
-@if(step) fn descend(plane: u32, i: u32, gradient: f32) {
-    if i >= parameters.trained { return; }
-    if !is_within(gradient, GRADIENT_MAX) {
-        atomicAdd(&status[STATUS_REFUSED], 1u);
-        return;
-    }
-    let k = plane * view.splat_count + i;
-    let rate = parameters.learning_rates[plane / 4u][plane % 4u];
-    let correction = vec2f(parameters.correction1, parameters.correction2);
-    let next = adam_step(vec3f(geometry[k], first_moment[k], second_moment[k]), gradient, rate, correction);
-    geometry[k] = next.x;
-    first_moment[k] = next.y;
-    second_moment[k] = next.z;
+@if(step) fn store(index: u32, i: u32, value: f32) {
+    let k = index * view.splat_count + i;
+    geometry[k] = descended(index, i, view.splat_count, geometry[k], value);
 }
-
-@if(step) fn store(index: u32, i: u32, value: f32) { descend(index, i, value); }
 
 @if(!step) fn store(index: u32, i: u32, value: f32) {
     geometry_gradient[index * view.splat_count + i] = value;

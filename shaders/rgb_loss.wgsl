@@ -1,6 +1,7 @@
 // Smoothed L1 between RGB pictures as drawn and as wanted, by their distance in each
 // pixel, with gradient and curvature as in `chroma_loss`. Viewers clip what is brighter
 // than white: where white is wanted nothing is too bright.
+import package::common::group_sum::group_sum;
 import package::common::numeric::linear_group;
 import package::common::view::View;
 import package::common::wanted::{SMOOTHING, wanted_rgb};
@@ -23,14 +24,12 @@ struct RgbLossParameters {
 // How much each wanted pixel counts.
 @group(0) @binding(6) var<storage, read> pixel_weights: array<f32>;
 
-var<workgroup> losses: array<f32, 256>;
-
 @compute @workgroup_size(256)
 fn rgb_loss(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
     let block = linear_group(group);
     let p = block * 256u + local;
     let pixels = view.size.x * view.size.y;
-    losses[local] = 0.0;
+    var own = 0.0;
     if p < pixels {
         let scale = 0.5 / f32(pixels);
         var weight = 1.0;
@@ -42,17 +41,11 @@ fn rgb_loss(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index
         let residual = UNITS * select(difference, min(difference, vec3f(0.0)), target_rgb >= vec3f(1.0));
         let length = sqrt(dot(residual, residual) + SMOOTHING * SMOOTHING);
         let curvature = weight / length;
-        losses[local] = 0.5 * weight * (length - SMOOTHING);
+        own = 0.5 * weight * (length - SMOOTHING);
         image_gradient[p] = scale * UNITS * curvature * vec4f(residual, UNITS);
     }
-    workgroupBarrier();
-    for (var half = 128u; half > 0u; half /= 2u) {
-        if local < half {
-            losses[local] += losses[local + half];
-        }
-        workgroupBarrier();
-    }
+    let sum = group_sum(local, own);
     if local == 0u && block * 256u < pixels {
-        block_losses[block] = losses[0];
+        block_losses[block] = sum;
     }
 }

@@ -2,13 +2,12 @@
 // direction of view, of the means. In training (`step`) Adam moves the harmonics at
 // once, and their gradient is never stored; `lazy` as in `project_backward`. On frozen
 // geometry gradients are added to what is there, and so are the curvatures' sums.
-@if(step) import package::common::adam::{AdamParameters, GRADIENT_MAX, adam_step};
 import package::common::color::{CHANNELS, Color, color_gradient};
 @if(geometry) import package::common::color::color_dot;
 import package::common::constants::{INVISIBLE, PLANE_MEAN};
-@if(step) import package::common::constants::{STATUS_OVERFLOW, STATUS_REFUSED};
+@if(step) import package::common::constants::STATUS_OVERFLOW;
+@if(step) import package::common::descend::{descended, status};
 import package::common::numeric::linear_group;
-@if(step) import package::common::numeric::is_within;
 import package::common::partials::PARTIAL_STRIDE;
 @if(geometry) import package::common::partials::PARTIAL_COLOR;
 import package::common::sh::sh_term;
@@ -29,31 +28,14 @@ import package::common::view::View;
 @if(!geometry) @group(0) @binding(6) var<storage, read_write> diagonal: array<f32>;
 // Planes `[3, N]`, what the means' gradient owes to the direction of view.
 @if(geometry) @group(0) @binding(7) var<storage, read_write> mean_gradient: array<f32>;
-@if(step) @group(0) @binding(8) var<uniform> parameters: AdamParameters;
-@if(step) @group(0) @binding(9) var<storage, read_write> status: array<atomic<u32>>;
-@if(step) @group(0) @binding(10) var<storage, read_write> first_moment: array<f32>;
-@if(step) @group(0) @binding(11) var<storage, read_write> second_moment: array<f32>;
 
 fn plane_index(k: u32, i: u32) -> u32 {
     return k * CHANNELS * view.splat_count + i;
 }
 
-// Adam's step for element i of plane `plane`, instead of leaving the gradient. Nothing
-// known leads to a gradient that is refused; if something does, it is counted, and
-// the parameter stays what it is.
 @if(step) fn descend(plane: u32, i: u32, gradient: f32) {
-    if i >= parameters.trained { return; }
-    if !is_within(gradient, GRADIENT_MAX) {
-        atomicAdd(&status[STATUS_REFUSED], 1u);
-        return;
-    }
     let k = plane * view.splat_count + i;
-    let rate = parameters.learning_rates[plane / 4u][plane % 4u];
-    let correction = vec2f(parameters.correction1, parameters.correction2);
-    let next = adam_step(vec3f(sh[k], first_moment[k], second_moment[k]), gradient, rate, correction);
-    sh[k] = next.x;
-    first_moment[k] = next.y;
-    second_moment[k] = next.z;
+    sh[k] = descended(plane, i, view.splat_count, sh[k], gradient);
 }
 
 @if(luma && step) fn store(k: u32, i: u32, value: Color) { descend(k, i, value); }

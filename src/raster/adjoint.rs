@@ -214,8 +214,8 @@ impl LumaAdjoint {
             .collect();
         of_project.extend([
             (6, statistics.raw()),
-            (7, lists.status.raw()),
-            (8, mean_gradient.raw()),
+            (7, mean_gradient.raw()),
+            (8, lists.status.raw()),
         ]);
         match outcome {
             Outcome::Gradient(gradient) => {
@@ -223,13 +223,13 @@ impl LumaAdjoint {
                 of_project.push((5, geometry_gradient.raw()));
             }
             Outcome::Step { geometry, field } => {
-                of_shade.extend([(8, field.parameters.raw()), (9, lists.status.raw())]);
-                of_project.push((9, geometry.parameters.raw()));
-                for (bindings, moments) in [
-                    (&mut of_shade, field.moments),
-                    (&mut of_project, geometry.moments),
-                ] {
-                    bindings.extend([(10, moments.first.raw()), (11, moments.second.raw())]);
+                of_shade.push((8, lists.status.raw()));
+                for (bindings, of) in [(&mut of_shade, field), (&mut of_project, geometry)] {
+                    bindings.extend([
+                        (9, of.parameters.raw()),
+                        (10, of.moments.first.raw()),
+                        (11, of.moments.second.raw()),
+                    ]);
                 }
             }
         }

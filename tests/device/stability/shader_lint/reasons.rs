@@ -285,7 +285,7 @@ pub const REASONS: &[(&str, &str, &str)] = &[
     ),
     (
         "sum_loss",
-        "sums[0] / f32(parameters.pixels)",
+        "sum / f32(parameters.pixels)",
         "the host sets a count of at least one pixel",
     ),
     (
