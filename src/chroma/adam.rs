@@ -6,7 +6,8 @@ use std::{ops::RangeInclusive, time::Instant};
 use super::{
     ChromaError, ChromaObserver, ChromaProgress, ChromaSettings, FrozenViews, Recipe, Targets,
     Task,
-    passes::{Ending, Judging, Passes, Space},
+    loss::Space,
+    passes::{Ending, Judging, Passes},
 };
 use crate::{
     capture::view_at,
@@ -231,6 +232,25 @@ impl<'a> AdamSolver<'a> {
         }
         Ok(())
     }
+}
+
+/// Colors `luma` by `recipe`; the targets of `tasks` are RGB pictures, and `seed` is that of
+/// the views' order.
+///
+/// # Errors
+/// As [`solve`](super::solve); [`ChromaError::Cancelled`] where `observe` says so.
+pub fn follow_recipe(
+    frozen: &FrozenViews,
+    recipe: &Recipe,
+    targets: &Targets,
+    tasks: Vec<Task>,
+    luma: &Splats,
+    seed: u64,
+    observe: &mut ChromaObserver<'_>,
+) -> Result<ShField, ChromaError> {
+    let mut adam = AdamSolver::by_recipe(frozen, recipe, targets, tasks, luma, seed)?;
+    adam.run(observe)?;
+    adam.harmonics()
 }
 
 /// A rate that falls from the first to the last by the same share in each of so many

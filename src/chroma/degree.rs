@@ -1,28 +1,15 @@
 //! Which degree of the chroma harmonics the views prove useful.
 
-use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 
 use super::{
-    ChromaError, ChromaProgress, ChromaSettings, FrozenViews, IrlsSolver, Targets, Task, solve,
+    ChosenDegree, ChromaError, ChromaProgress, ChromaSettings, FrozenViews, IrlsSolver, LEAST_GAIN,
+    Targets, Task, solve,
 };
 use crate::splats::{Splats, sh};
 
 /// Every so many views are held back to judge by.
 const HELD_BACK: usize = 5;
-
-/// A higher degree must lower the loss on the views held back by this share: less is
-/// within what the choice of these views amounts to.
-pub const LEAST_GAIN: f64 = 0.03;
-
-/// The degree that was chosen, and what each that was tried gave.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ChosenDegree {
-    /// The lowest degree that no higher one beats by enough.
-    pub degree: u32,
-    /// Mean loss on the views held back, in CIELAB units, from degree 0 on.
-    pub losses: Vec<f64>,
-}
 
 /// Distills most of `tasks` at degree 0, 1 and so on, as long as those held back gain.
 /// Fewer than two tasks prove nothing: degree 0. `observe` is told of the degree as well.

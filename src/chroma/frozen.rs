@@ -6,30 +6,21 @@ use std::sync::Arc;
 
 use super::{
     ChromaError, ChromaKernels,
+    frozen_view::Frozen,
     room::{Demand, Least, Room},
 };
 use crate::{
     capture::Camera,
     gpu::{Gpu, GpuError, Recorder},
     raster::{
-        DepthLayer, Field, Geometry, Layer, Lists, Load, Picture, Raster, Streamed, UNREACHED,
-        ViewUniform, constants::NEAR_SHARE, depths,
+        Field, Geometry, Layer, Lists, Load, Picture, Raster, Streamed, UNREACHED, ViewUniform,
+        blend_depth, constants::NEAR_SHARE, depths,
     },
     splats::{ShField, Splats, sh},
 };
 
 /// Counts that are on their way from the device at a time.
 const IN_FLIGHT: usize = 64;
-
-/// One view at one scale.
-pub(super) struct Frozen {
-    pub uniform: ViewUniform,
-    visible: usize,
-    /// Of its tile lists.
-    pub entries: usize,
-    /// Its own tile lists, made already.
-    lists: Option<Lists>,
-}
 
 /// What waits on the host.
 struct HostScene {
@@ -323,14 +314,13 @@ impl FrozenViews {
     pub(super) fn depth(&self, view: usize) -> Result<Vec<f32>, ChromaError> {
         let lists = self.lists(view, 0).ok_or(ChromaError::NoViews)?;
         let uniform = self.uniform(view, 0);
-        let pixels = vec![UNREACHED; uniform.pixel_count()];
-        let layer = DepthLayer::new(&self.raster, lists, &pixels, uniform.tile_count())?;
+        let (pixels, tiles) = (vec![UNREACHED; uniform.pixel_count()], uniform.tile_count());
         self.put(view);
         let mut recorder = Recorder::new(self.gpu());
         self.list(view, 0, 0, &mut recorder);
-        layer.record(&mut recorder);
+        let image = blend_depth(&self.raster, lists, &pixels, tiles, &mut recorder)?;
         recorder.submit();
-        Ok(depths(layer.read(&self.raster)?))
+        Ok(depths(image.read(self.gpu())?))
     }
 
     /// What a view shows of harmonics, `shown` being on the device where Gaussians wait on the

@@ -10,7 +10,8 @@ use super::{
     Task,
     checkpoint::{Rounds, SolverState},
     lbfgs::State,
-    passes::{Ending, Judging, Passes, Space},
+    loss::Space,
+    passes::{Ending, Judging, Passes},
     steps::{Kept, Priors, Steps},
 };
 use crate::{

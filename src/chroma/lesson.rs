@@ -146,11 +146,6 @@ impl Lesson {
         self.views.iter().filter(colored).count()
     }
 
-    /// Views that have strokes.
-    pub fn stroked_views(&self) -> usize {
-        self.strokes_of.iter().flatten().count()
-    }
-
     /// Whether a view was painted by hand.
     pub fn is_painted(&self, view: usize) -> bool {
         self.by_hand[view]

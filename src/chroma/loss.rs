@@ -94,3 +94,12 @@ pub struct LabLossParameters {
     /// 1 where each pixel has a weight.
     pub weighted: u32,
 }
+
+/// Where RGB pictures are judged; a/b have one place only.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Space {
+    /// By their distance in RGB.
+    Rgb,
+    /// By lightness, a and b.
+    Lab,
+}

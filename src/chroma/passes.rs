@@ -6,13 +6,14 @@ use super::{
     ChromaError, FrozenViews, Targets,
     correction::Corrections,
     host_system::HostSystem,
-    loss::{ChromaLossWeights, LOSS_BLOCK, LabLossParameters, RgbLossParameters},
-    seat::{Judge, Seat},
+    loss::{ChromaLossWeights, LOSS_BLOCK, LabLossParameters, RgbLossParameters, Space},
+    seat::{Judge, Seat, Shared},
 };
 use crate::{
     gpu::{Buffer, Recorder},
     raster::{
-        AdjointScratch, COLOR_FIGURES, Canvas, Field, Load, LossLog, constants::STATUS_WORDS,
+        AdjointScratch, COLOR_FIGURES, Canvas, ChromaSums, Field, Load, LossLog,
+        constants::STATUS_WORDS,
     },
     splats::ShField,
 };
@@ -36,15 +37,6 @@ pub(super) struct Judging {
     pub robust: Option<f32>,
     /// What counts in CIELAB, where RGB is judged there.
     pub lab: LabLossParameters,
-}
-
-/// Where RGB pictures are judged; a/b have one place only.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Space {
-    /// By their distance in RGB.
-    Rgb,
-    /// By lightness, a and b.
-    Lab,
 }
 
 /// What follows on the loss.
@@ -77,7 +69,6 @@ pub(super) struct Passes<'a> {
     /// A seat for each scale of each pinned task, then one for each scale that all
     /// others take turns in.
     seats: Vec<Seat>,
-    pub space: Space,
     scales: usize,
     kept: usize,
 }
@@ -136,7 +127,44 @@ impl<'a> Passes<'a> {
         let capacity = frozen.capacity(tasks.iter().map(|task| task.view));
         let scratch = AdjointScratch::color(gpu, splats, capacity)?;
         let image_gradient = Buffer::zeros(gpu, "image gradient", COLOR_FIGURES * pixels[0])?;
-        let mut passes = Self {
+        let weighted = targets.weighted();
+        let shared = Shared {
+            frozen,
+            field: &field,
+            sums: ChromaSums {
+                gradient: &gradient,
+                diagonal: &diagonal,
+            },
+            block_losses: &log.block_losses,
+            corrections: &corrections,
+            space,
+            image_gradient: &image_gradient,
+            scratch: &scratch,
+            canvases: &canvases,
+        };
+        let mut seats = Vec::new();
+        for &Task { view, target } in &tasks[..kept] {
+            for scale in 0..scales {
+                let target = targets.read(target, scale)?;
+                let wanted = Buffer::from_slice(gpu, "wanted", &target.pixels)?;
+                let weights = target.weights.as_deref().unwrap_or(&[0.0]);
+                let weights = Buffer::from_slice(gpu, "pixel weights", weights)?;
+                seats.push(Seat::new(&shared, view, scale, wanted, weights)?);
+            }
+            // What is written waits on the host until it is there.
+            gpu.queue().submit([]);
+            gpu.wait()?;
+        }
+        if let Some(&Task { view, .. }) = tasks.get(kept) {
+            let wanted: Buffer<u32> = Buffer::zeros(gpu, "wanted", pixels[0])?;
+            let count = if weighted { pixels[0] } else { 1 };
+            let weights: Buffer<f32> = Buffer::zeros(gpu, "pixel weights", count)?;
+            for scale in 0..scales {
+                let (wanted, weights) = (wanted.clone(), weights.clone());
+                seats.push(Seat::new(&shared, view, scale, wanted, weights)?);
+            }
+        }
+        Ok(Self {
             frozen,
             targets,
             tasks,
@@ -147,41 +175,10 @@ impl<'a> Passes<'a> {
             log,
             status,
             corrections,
-            seats: Vec::new(),
-            space,
+            seats,
             scales,
             kept,
-        };
-        let weighted = targets.weighted();
-        for task in 0..kept {
-            for (scale, canvas) in canvases.iter().enumerate() {
-                let Task { view, target } = passes.tasks[task];
-                let target = targets.read(target, scale)?;
-                let wanted = Buffer::from_slice(gpu, "wanted", &target.pixels)?;
-                let weights = target.weights.as_deref().unwrap_or(&[0.0]);
-                let weights = Buffer::from_slice(gpu, "pixel weights", weights)?;
-                let made = (canvas, canvases.get(scale + 1));
-                let shared = (&image_gradient, &scratch);
-                let seat = Seat::new(&passes, view, scale, made, shared, wanted, weights)?;
-                passes.seats.push(seat);
-            }
-            // What is written waits on the host until it is there.
-            gpu.queue().submit([]);
-            gpu.wait()?;
-        }
-        if let Some(&Task { view, .. }) = passes.tasks.get(kept) {
-            let wanted: Buffer<u32> = Buffer::zeros(gpu, "wanted", pixels[0])?;
-            let count = if weighted { pixels[0] } else { 1 };
-            let weights: Buffer<f32> = Buffer::zeros(gpu, "pixel weights", count)?;
-            for (scale, canvas) in canvases.iter().enumerate() {
-                let made = (canvas, canvases.get(scale + 1));
-                let shared = (&image_gradient, &scratch);
-                let (wanted, weights) = (wanted.clone(), weights.clone());
-                let seat = Seat::new(&passes, view, scale, made, shared, wanted, weights)?;
-                passes.seats.push(seat);
-            }
-        }
-        Ok(passes)
+        })
     }
 
     /// What a dispatch works on, the mean over the tasks at so many scales.
@@ -313,63 +310,50 @@ impl<'a> Passes<'a> {
         let mut recorder = Recorder::new(gpu);
         frozen.list(view, scale, self.field.degree, &mut recorder);
         seat.layer.record(raster, &mut recorder);
-        match &seat.judge {
-            Judge::Rgb { parameters, loss } => {
-                let weighted = u32::from(weighted);
-                parameters.write(gpu, &[RgbLossParameters { weighted }]);
-                recorder.dispatch(&frozen.kernels.rgb_loss, loss, blocks);
+        let kernels = &frozen.kernels;
+        let agreement = judging.agreement;
+        let agreeing = seat.agreeing.as_ref().filter(|_| agreement > 0.0);
+        let coarser = scale + usize::from(agreeing.is_some());
+        let coarser_size = frozen.uniform(view, coarser).size;
+        let told = u32::from(weighted);
+        let [plain, with_agreement] = match &seat.judge {
+            Judge::Rgb(parameters) => {
+                parameters.write(gpu, &[RgbLossParameters { weighted: told }]);
+                [&kernels.rgb_loss; 2]
             }
-            Judge::Lab {
-                parameters,
-                loss,
-                agreeing,
-            } => {
-                let agreeing = agreeing.as_ref().filter(|_| judging.agreement > 0.0);
-                let coarser = scale + usize::from(agreeing.is_some());
-                parameters.write(
-                    gpu,
-                    &[LabLossParameters {
-                        coarser_size: frozen.uniform(view, coarser).size,
-                        agreement: judging.agreement,
-                        weighted: u32::from(weighted),
-                        ..judging.lab
-                    }],
-                );
-                match agreeing {
-                    Some(loss) => {
-                        recorder.dispatch(&frozen.kernels.agreeing_lab_loss, loss, blocks);
-                    }
-                    None => recorder.dispatch(&frozen.kernels.lab_loss, loss, blocks),
-                }
+            Judge::Lab(parameters) => {
+                let parameters_now = LabLossParameters {
+                    coarser_size,
+                    agreement,
+                    weighted: told,
+                    ..judging.lab
+                };
+                parameters.write(gpu, &[parameters_now]);
+                [&kernels.lab_loss, &kernels.agreeing_lab_loss]
             }
-            Judge::Chroma {
-                weights,
-                loss,
-                agreeing,
-                parameters,
-                sums,
-            } => {
-                let agreeing = agreeing.as_ref().filter(|_| judging.agreement > 0.0);
-                let coarser = scale + usize::from(agreeing.is_some());
-                weights.write(
-                    gpu,
-                    &[ChromaLossWeights {
-                        coarser_size: frozen.uniform(view, coarser).size,
-                        agreement: judging.agreement,
-                        view_index: index as u32,
-                        weighted: u32::from(weighted),
-                        ..ChromaLossWeights::robust(judging.robust)
-                    }],
-                );
-                match agreeing {
-                    Some(loss) => recorder.dispatch(&frozen.kernels.agreeing_loss, loss, blocks),
-                    None => recorder.dispatch(&frozen.kernels.chroma_loss, loss, blocks),
-                }
-                if ending == Ending::GradientAndSums {
-                    self.corrections.choose(gpu, parameters, index, weighted);
-                    (self.corrections).sum(&frozen.kernels.correction, sums, &mut recorder);
-                }
+            Judge::Chroma { weights, .. } => {
+                let weights_now = ChromaLossWeights {
+                    coarser_size,
+                    agreement,
+                    view_index: index as u32,
+                    weighted: told,
+                    ..ChromaLossWeights::robust(judging.robust)
+                };
+                weights.write(gpu, &[weights_now]);
+                [&kernels.chroma_loss, &kernels.agreeing_loss]
             }
+        };
+        match agreeing {
+            Some(loss) => recorder.dispatch(with_agreement, loss, blocks),
+            None => recorder.dispatch(plain, &seat.loss, blocks),
+        }
+        if let Judge::Chroma {
+            parameters, sums, ..
+        } = &seat.judge
+            && ending == Ending::GradientAndSums
+        {
+            self.corrections.choose(gpu, parameters, index, weighted);
+            (self.corrections).sum(&kernels.correction, sums, &mut recorder);
         }
         let sum_loss = &frozen.kernels.sum_loss;
         self.log

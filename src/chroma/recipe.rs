@@ -3,10 +3,7 @@
 
 use std::ops::RangeInclusive;
 
-use super::{
-    AdamSolver, ChromaError, ChromaObserver, FrozenViews, LabLossParameters, Targets, Task,
-};
-use crate::splats::{ShField, Splats};
+use super::LabLossParameters;
 
 /// A way to color RGB splats whose geometry stays.
 #[derive(Clone, Debug, PartialEq)]
@@ -71,23 +68,4 @@ impl Recipe {
     pub fn target_scales(&self) -> usize {
         1 + self.scales.end()
     }
-}
-
-/// Colors `luma` by `recipe`; the targets of `tasks` are RGB pictures, and `seed` is that of
-/// the views' order.
-///
-/// # Errors
-/// As [`solve`](super::solve); [`ChromaError::Cancelled`] where `observe` says so.
-pub fn follow_recipe(
-    frozen: &FrozenViews,
-    recipe: &Recipe,
-    targets: &Targets,
-    tasks: Vec<Task>,
-    luma: &Splats,
-    seed: u64,
-    observe: &mut ChromaObserver<'_>,
-) -> Result<ShField, ChromaError> {
-    let mut adam = AdamSolver::by_recipe(frozen, recipe, targets, tasks, luma, seed)?;
-    adam.run(observe)?;
-    adam.harmonics()
 }

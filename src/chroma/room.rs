@@ -1,6 +1,6 @@
 //! What coloring takes of the device, reckoned before it is taken.
 
-use super::{ChromaError, correction::Corrections, frozen::Frozen};
+use super::{ChromaError, correction::Corrections, frozen_view::Frozen};
 use crate::{
     gpu::Gpu,
     raster::{

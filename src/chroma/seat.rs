@@ -1,36 +1,38 @@
 //! Where a view is drawn and judged: buffers and bindings of one pass.
 
 use super::{
-    ChromaError,
-    correction::CorrectionParameters,
-    loss::{ChromaLossWeights, LabLossParameters, RgbLossParameters},
-    passes::{Passes, Space},
+    ChromaError, FrozenViews,
+    correction::{CorrectionParameters, Corrections},
+    loss::{ChromaLossWeights, LabLossParameters, RgbLossParameters, Space},
 };
 use crate::{
-    gpu::{Bindings, Buffer},
-    raster::{AdjointScratch, Canvas, ChromaAdjoint, ChromaSums, ColorKind, Layer},
+    gpu::{Bindings, Buffer, Kernel},
+    raster::{AdjointScratch, Canvas, ChromaAdjoint, ChromaSums, ColorKind, Field, Layer},
 };
 
-/// A loss tied to what it judges.
+/// What a loss is told before it judges.
 pub(super) enum Judge {
     Chroma {
         weights: Buffer<ChromaLossWeights>,
-        loss: Bindings,
-        /// Where there is a coarser scale.
-        agreeing: Option<Bindings>,
         parameters: Buffer<CorrectionParameters>,
         sums: Bindings,
     },
-    Rgb {
-        parameters: Buffer<RgbLossParameters>,
-        loss: Bindings,
-    },
-    Lab {
-        parameters: Buffer<LabLossParameters>,
-        loss: Bindings,
-        /// Where there is a coarser scale.
-        agreeing: Option<Bindings>,
-    },
+    Rgb(Buffer<RgbLossParameters>),
+    Lab(Buffer<LabLossParameters>),
+}
+
+/// Buffers that all seats of a solve share.
+pub(super) struct Shared<'a> {
+    pub frozen: &'a FrozenViews,
+    pub field: &'a Field,
+    pub sums: ChromaSums<'a>,
+    pub block_losses: &'a Buffer<f32>,
+    pub corrections: &'a Corrections,
+    pub space: Space,
+    pub image_gradient: &'a Buffer<f32>,
+    pub scratch: &'a AdjointScratch,
+    /// One for each scale.
+    pub canvases: &'a [Canvas],
 }
 
 /// Where one view at one scale is drawn and judged.
@@ -38,41 +40,38 @@ pub(super) struct Seat {
     pub layer: Layer,
     pub adjoint: ChromaAdjoint,
     pub judge: Judge,
+    pub loss: Bindings,
+    /// The loss with the agreement with a coarser scale, where there is one.
+    pub agreeing: Option<Bindings>,
     pub wanted: Buffer<u32>,
     pub weights: Buffer<f32>,
 }
 
 impl Seat {
-    /// Of a view at a scale; `coarser` is the canvas of the next one.
+    /// Of a view at a scale.
     ///
     /// # Errors
     /// [`ChromaError::Gpu`].
     pub fn new(
-        passes: &Passes<'_>,
+        shared: &Shared<'_>,
         view: usize,
         scale: usize,
-        (canvas, coarser): (&Canvas, Option<&Canvas>),
-        (image_gradient, scratch): (&Buffer<f32>, &AdjointScratch),
         wanted: Buffer<u32>,
         weights: Buffer<f32>,
     ) -> Result<Self, ChromaError> {
-        let Passes { frozen, field, .. } = passes;
+        let &Shared {
+            frozen,
+            field,
+            corrections,
+            image_gradient,
+            ..
+        } = shared;
         let (raster, geometry, kernels) = (&frozen.raster, &frozen.geometry, &frozen.kernels);
         let gpu = &raster.gpu;
         let lists = frozen.lists(view, scale).ok_or(ChromaError::NoViews)?;
-        let layer = Layer::on(
-            raster,
-            geometry,
-            lists,
-            field,
-            canvas.clone(),
-            lists.max_tiles(),
-        );
-        let sums = ChromaSums {
-            gradient: &passes.gradient,
-            diagonal: &passes.diagonal,
-        };
-        let scratch = scratch.clone();
+        let (canvas, tiles) = (shared.canvases[scale].clone(), lists.max_tiles());
+        let layer = Layer::on(raster, geometry, lists, field, canvas, tiles);
+        let scratch = shared.scratch.clone();
         let adjoint = ChromaAdjoint::new(
             raster,
             geometry,
@@ -80,85 +79,67 @@ impl Seat {
             &layer,
             image_gradient,
             scratch,
-            sums,
+            shared.sums,
         );
-        let block_losses = passes.log.block_losses.raw();
-        let judge = match field.kind {
-            ColorKind::Rgb if passes.space == Space::Lab => {
-                let parameters =
-                    Buffer::uniform(gpu, "lab loss parameters", &LabLossParameters::default())?;
+        // The first bindings are the same for all losses; the coarser picture is the last.
+        let tied =
+            |parameters: &wgpu::Buffer, more: &[&wgpu::Buffer], [plain, agreeing]: [_; 2]| {
                 let mut buffers = vec![
                     lists.view.raw(),
                     layer.image.raw(),
                     wanted.raw(),
-                    parameters.raw(),
-                    block_losses,
+                    parameters,
+                    shared.block_losses.raw(),
                     image_gradient.raw(),
                     weights.raw(),
                 ];
-                let loss = kernels.lab_loss.bind(gpu, &buffers);
-                let agreeing = coarser.map(|coarser| {
+                buffers.extend(more);
+                let loss = Kernel::bind(plain, gpu, &buffers);
+                let agreeing = shared.canvases.get(scale + 1).map(|coarser| {
                     buffers.push(coarser.image().raw());
-                    kernels.agreeing_lab_loss.bind(gpu, &buffers)
+                    Kernel::bind(agreeing, gpu, &buffers)
                 });
-                Judge::Lab {
-                    parameters,
-                    loss,
-                    agreeing,
-                }
+                (loss, agreeing)
+            };
+        let (judge, (loss, agreeing)) = match field.kind {
+            ColorKind::Rgb if shared.space == Space::Lab => {
+                let parameters = LabLossParameters::default();
+                let parameters = Buffer::uniform(gpu, "lab loss parameters", &parameters)?;
+                let both = [&kernels.lab_loss, &kernels.agreeing_lab_loss];
+                let tied = tied(parameters.raw(), &[], both);
+                (Judge::Lab(parameters), tied)
             }
             ColorKind::Rgb => {
-                let parameters =
-                    Buffer::uniform(gpu, "rgb loss parameters", &RgbLossParameters::default())?;
-                let loss = kernels.rgb_loss.bind(
-                    gpu,
-                    &[
-                        lists.view.raw(),
-                        layer.image.raw(),
-                        wanted.raw(),
-                        parameters.raw(),
-                        block_losses,
-                        image_gradient.raw(),
-                        weights.raw(),
-                    ],
-                );
-                Judge::Rgb { parameters, loss }
+                let parameters = RgbLossParameters::default();
+                let parameters = Buffer::uniform(gpu, "rgb loss parameters", &parameters)?;
+                // There is one scale.
+                let tied = tied(parameters.raw(), &[], [&kernels.rgb_loss; 2]);
+                (Judge::Rgb(parameters), tied)
             }
             ColorKind::Chroma | ColorKind::Luma => {
-                let of_loss =
-                    Buffer::uniform(gpu, "chroma loss weights", &ChromaLossWeights::default())?;
-                let mut buffers = vec![
-                    lists.view.raw(),
-                    layer.image.raw(),
-                    wanted.raw(),
-                    of_loss.raw(),
-                    block_losses,
-                    image_gradient.raw(),
-                    weights.raw(),
-                    passes.corrections.corrections.raw(),
-                ];
-                let loss = kernels.chroma_loss.bind(gpu, &buffers);
-                let agreeing = coarser.map(|coarser| {
-                    buffers.push(coarser.image().raw());
-                    kernels.agreeing_loss.bind(gpu, &buffers)
-                });
-                let parameters = passes.corrections.parameters(gpu, 0, false)?;
+                let of_loss = ChromaLossWeights::default();
+                let of_loss = Buffer::uniform(gpu, "chroma loss weights", &of_loss)?;
+                let both = [&kernels.chroma_loss, &kernels.agreeing_loss];
+                let found = corrections.corrections.raw();
+                let tied = tied(of_loss.raw(), &[found], both);
+                let parameters = corrections.parameters(gpu, 0, false)?;
                 let inputs = [lists.view.raw(), layer.image.raw(), wanted.raw()];
                 let inputs = (inputs, image_gradient, &weights);
-                let sums = (passes.corrections).bind(gpu, &kernels.correction, &parameters, inputs);
-                Judge::Chroma {
+                let sums = corrections.bind(gpu, &kernels.correction, &parameters, inputs);
+                let judge = Judge::Chroma {
                     weights: of_loss,
-                    loss,
-                    agreeing,
                     parameters,
                     sums,
-                }
+                };
+                (judge, tied)
             }
         };
         Ok(Self {
             layer,
             adjoint,
             judge,
+            loss,
+            agreeing,
             wanted,
             weights,
         })

@@ -27,10 +27,8 @@ use crate::{
 use cases::{CASES, Case, Hard};
 use kernels::TOPICS;
 use measured::Row;
+pub use measured::{MARGIN, headroom};
 use stage::{Stage, splats};
-
-/// Pixels whose decisions are closer than this to falling the other way may do so in `f32`.
-pub const MARGIN: f64 = 1e-4;
 
 /// No bound is tighter than this: a case that happens to come out exact on one
 /// device need not on the next.
@@ -40,14 +38,6 @@ const TIGHTEST: f64 = 2e-6;
 /// largest group's is judged against that share: what is zero but for rounding
 /// has no relative error.
 const SMALL_GROUP: f64 = 1e-3;
-
-/// What a bound leaves above the worst that was seen. The figures in the tables
-/// were seen on Mesa 22.3's llvmpipe; WGSL allows `exp`, `sqrt` and quotients
-/// several units in the last place, of which other drivers make other use.
-pub fn headroom(gpu: &Gpu) -> f64 {
-    let measured = gpu.is_software() && gpu.info().driver_info.contains("Mesa 22.3");
-    if measured { 1.05 } else { 16.0 }
-}
 
 /// How a case came out.
 #[derive(Clone, Debug, Serialize)]

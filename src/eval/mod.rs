@@ -7,6 +7,7 @@ mod luma;
 mod painter;
 mod peers;
 mod picture;
+mod progress;
 mod reference;
 mod scene;
 mod score;
@@ -20,6 +21,7 @@ pub use lpips::Lpips;
 pub use luma::{GRAY_COLUMNS, gray_rows, mean_quality, measure_luma};
 pub use painter::{Drawing, Layer, Painter};
 pub use peers::Peer;
+pub use progress::{Observer, Progress, Task};
 pub use reference::{Reference, exposures};
 pub use scene::ColoredScene;
 pub use score::{Scored, Shot, mean_bake, mean_luma, mean_pictures, teacher_colorfulness};
@@ -74,38 +76,3 @@ pub enum EvalError {
         reason: String,
     },
 }
-
-/// What an evaluation is doing.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Task {
-    /// Asking the teacher.
-    Teacher,
-    /// Coloring the scene in another way to compare with.
-    Peer,
-    /// Measuring pictures against their photos.
-    Measure,
-    /// Drawing and comparing the frames of a path.
-    Path,
-    /// Drawing the photographed views.
-    Views,
-    /// Comparing them with each other.
-    Pairs,
-    /// Measuring how strong the teacher's colors are.
-    Strength,
-}
-
-/// How far it is.
-#[derive(Clone, Copy, Debug)]
-pub struct Progress<'a> {
-    /// What is being done.
-    pub task: Task,
-    /// Steps done.
-    pub done: usize,
-    /// Steps in all.
-    pub total: usize,
-    /// The view at hand, if it has a name.
-    pub name: &'a str,
-}
-
-/// Who is told.
-pub type Observer<'a> = dyn FnMut(Progress<'_>) + 'a;

@@ -30,6 +30,28 @@ impl LayerKernels {
     }
 }
 
+#[derive(Clone)]
+pub(super) struct ListKernels {
+    pub compact: Kernel,
+    pub tile_lists: Kernel,
+    pub tile_ranges: Kernel,
+}
+
+impl ListKernels {
+    pub fn new(gpu: &Gpu, numerics: &RasterNumerics) -> Self {
+        Self {
+            compact: Kernel::new(gpu, "compact", shaders::COMPACT),
+            tile_lists: Kernel::with(
+                gpu,
+                "tile_lists",
+                shaders::TILE_LISTS,
+                &numerics.alpha_cutoff(),
+            ),
+            tile_ranges: Kernel::new(gpu, "tile_ranges", shaders::TILE_RANGES),
+        }
+    }
+}
+
 /// `blend_backward` and `sum_instances`.
 #[derive(Clone)]
 pub(super) struct BlendBackwardKernels {

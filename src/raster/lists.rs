@@ -4,7 +4,7 @@
 use bytemuck::{Pod, Zeroable};
 
 use super::{
-    Raster, RasterNumerics,
+    Raster,
     constants::*,
     groups::{Count, Work},
     portions::Portions,
@@ -13,9 +13,7 @@ use super::{
     splats::Geometry,
     view::ViewUniform,
 };
-use crate::gpu::{
-    Bindings, Buffer, Gpu, GpuError, Kernel, Readback, Recorder, groups_for, shaders,
-};
+use crate::gpu::{Bindings, Buffer, Gpu, GpuError, Readback, Recorder, groups_for};
 
 /// Twin of `struct Projected` in `shaders/common/projected.wgsl`.
 #[repr(C)]
@@ -79,28 +77,6 @@ impl StatusReadback {
     /// [`GpuError::Lost`].
     pub fn wait(self, gpu: &Gpu) -> Result<Status, GpuError> {
         Ok(Status::from_words(&self.0.wait(gpu)?))
-    }
-}
-
-#[derive(Clone)]
-pub(super) struct ListKernels {
-    compact: Kernel,
-    tile_lists: Kernel,
-    tile_ranges: Kernel,
-}
-
-impl ListKernels {
-    pub(super) fn new(gpu: &Gpu, numerics: &RasterNumerics) -> Self {
-        Self {
-            compact: Kernel::new(gpu, "compact", shaders::COMPACT),
-            tile_lists: Kernel::with(
-                gpu,
-                "tile_lists",
-                shaders::TILE_LISTS,
-                &numerics.alpha_cutoff(),
-            ),
-            tile_ranges: Kernel::new(gpu, "tile_ranges", shaders::TILE_RANGES),
-        }
     }
 }
 

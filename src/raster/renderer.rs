@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{DepthLayer, Field, Geometry, Layer, Lists, Raster, ViewUniform};
+use super::{Field, Geometry, Layer, Lists, Raster, ViewUniform, blend_depth};
 use crate::{
     capture::Camera,
     gpu::{GpuError, Recorder},
@@ -102,24 +102,25 @@ impl Renderer {
             .collect()
     }
 
-    /// Median depth as `camera` sees it, going on from `pixels` of a [`DepthLayer`].
+    /// Median depth as `camera` sees it, going on from `pixels` of [`blend_depth`].
     pub(super) fn depth(&mut self, camera: &Camera, pixels: &[f32]) -> Result<Vec<f32>, GpuError> {
         let view = ViewUniform::new(camera, self.near, self.geometry.count, 0);
         self.with_room(&view, |renderer| {
             let (raster, tiles) = (&renderer.raster, view.tile_count());
-            let layer = DepthLayer::new(raster, &renderer.lists, pixels, tiles)?;
-            renderer.listed(&view, |recorder| layer.record(recorder));
-            layer.read(raster)
+            let blend =
+                |recorder: &mut _| blend_depth(raster, &renderer.lists, pixels, tiles, recorder);
+            renderer.listed(&view, blend)?.read(&raster.gpu)
         })
     }
 
     /// Lists a view, and what is recorded over its lists.
-    fn listed(&self, view: &ViewUniform, record: impl FnOnce(&mut Recorder)) {
+    fn listed<T>(&self, view: &ViewUniform, record: impl FnOnce(&mut Recorder) -> T) -> T {
         let mut recorder = Recorder::new(&self.raster.gpu);
         self.lists.set_view(&self.raster.gpu, view);
         self.lists.record(&self.raster, &mut recorder);
-        record(&mut recorder);
+        let recorded = record(&mut recorder);
         recorder.submit();
+        recorded
     }
 
     /// Draws, again where the lists turn out to have no room.

@@ -144,9 +144,8 @@ impl Streamed {
         })
     }
 
-    /// Median depth as `camera` sees it, going on from `pixels` of a [`DepthLayer`].
-    ///
-    /// [`DepthLayer`]: super::DepthLayer
+    /// Median depth as `camera` sees it, going on from `pixels` of
+    /// [`blend_depth`](super::blend_depth).
     pub(super) fn depth(
         &mut self,
         raster: &Arc<Raster>,

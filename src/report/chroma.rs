@@ -1,8 +1,8 @@
 //! Stage 2 in `report.json`.
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
-use super::{EffectReport, KernelReport, number_or_nan};
+use super::{EffectReport, KernelReport};
 use crate::{
     chroma::{
         ChromaSettings,
@@ -188,4 +188,9 @@ pub struct ColorView {
     /// Its quality.
     #[serde(flatten)]
     pub quality: ColorQuality,
+}
+
+/// JSON has no NaN and is given `null`; a run that diverged can still be read.
+pub(super) fn number_or_nan<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(deserializer)?.unwrap_or(f64::NAN))
 }

@@ -26,12 +26,13 @@ pub use timings::{KernelReport, kernel_reports, timings_table};
 
 use std::fmt::Write;
 
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Serialize};
 
 use crate::{
     capture::{Exposure, LoadOptions},
     luma::{CurvePoint, Goal, LumaSettings, Preset},
 };
+use chroma::number_or_nan;
 
 /// Version of the report's layout; raised when a key changes its meaning.
 pub const REPORT_VERSION: u32 = 2;
@@ -65,11 +66,6 @@ pub struct Report {
     /// Stage 2; missing before `colorize`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub chroma: Option<ChromaReport>,
-}
-
-/// JSON has no NaN and is given `null`; a run that diverged can still be read.
-fn number_or_nan<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-    Ok(Option::deserialize(deserializer)?.unwrap_or(f64::NAN))
 }
 
 /// What was photographed.

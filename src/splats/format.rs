@@ -1,12 +1,6 @@
 //! The formats of splat files, told by a file's name.
 
-use std::{
-    io::{ErrorKind, Read},
-    path::{Path, PathBuf},
-};
-
-use super::SplatError;
-use crate::input;
+use std::path::{Path, PathBuf};
 
 /// A format of splat files; docs/formats.md compares them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,23 +20,6 @@ pub enum Format {
     /// OpenUSD as text.
     Usda,
 }
-
-/// Extensions of others that are neither read nor written, and how to come to one that is read.
-const FOREIGN: [(&str, &str); 3] = [
-    (
-        "ksplat usd usdc usdz gltf lcc lcc2 rad json splatv spx zip csv html",
-        CONVERT,
-    ),
-    (
-        "ckpt pt pth npz npy safetensors pkl",
-        "convert it to .ply with the program that trained it",
-    ),
-    (
-        "obj las laz e57 pcd xyz pts stl fbx dae",
-        "a point cloud or mesh has no Gaussians: give a trained scene as .ply",
-    ),
-];
-const CONVERT: &str = "convert it to .ply, for example with splat-transform";
 
 impl Format {
     /// All of them; of two extensions that a name may end in, the longer is before the other.
@@ -73,16 +50,6 @@ impl Format {
     pub fn of(path: &Path) -> Option<Self> {
         let (format, _) = Self::split(path)?;
         Some(format)
-    }
-
-    /// The format to write a file in.
-    ///
-    /// # Errors
-    /// [`SplatError::UnknownFormat`].
-    pub fn to_write(path: &Path) -> Result<Self, SplatError> {
-        Self::of(path).ok_or_else(|| SplatError::UnknownFormat {
-            path: path.to_owned(),
-        })
     }
 
     /// The path of a splat file without its extension.
@@ -130,47 +97,9 @@ impl Format {
     }
 }
 
-/// True if a path is that of a readable splat file: named like one, or a `.ply` of another name.
-///
-/// # Errors
-/// [`SplatError::OtherFormat`] where it is named like one that cannot, or is another file.
-pub fn is_splat_file(path: &Path) -> Result<bool, SplatError> {
-    let other = |extension: &str, remedy| SplatError::OtherFormat {
-        path: path.to_path_buf(),
-        format: extension.to_owned(),
-        remedy,
-    };
-    // A folder may have any name.
-    if path.is_dir() {
-        return Ok(false);
-    }
-    if let Some(format) = Format::of(path) {
-        return match format.is_read() {
-            true => Ok(true),
-            false => Err(other(format.extension(), CONVERT)),
-        };
-    }
-    let extension = path.extension().unwrap_or_default();
-    for (extensions, remedy) in FOREIGN {
-        let known = (extensions.split(' ')).find(|known| extension.eq_ignore_ascii_case(known));
-        if let Some(known) = known {
-            return Err(other(&format!(".{known}"), remedy));
-        }
-    }
-    let mut begin = [0; 3];
-    match input::open(path).and_then(|mut file| file.read_exact(&mut begin)) {
-        Ok(()) if begin == *b"ply" => Ok(true),
-        Err(error) if error.kind() == ErrorKind::NotFound => Ok(false),
-        Err(error) if error.kind() != ErrorKind::UnexpectedEof => Err(SplatError::io(path)(error)),
-        _ => Err(match extension.is_empty() {
-            true => other("such", CONVERT),
-            false => other(&format!(".{}", extension.display()), CONVERT),
-        }),
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::is_splat_file;
     use super::*;
 
     #[test]

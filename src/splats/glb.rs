@@ -15,8 +15,8 @@ use std::path::Path;
 use serde_json::{Map, Value, json};
 
 use super::{
-    SplatError, Splats, WriteOptions, axes, file::CHANNELS, quantize::opacity_byte,
-    sh::coefficient_count, splat::shown_byte,
+    SplatError, Splats, WriteOptions, axes, quantize::opacity_byte, sh::coefficient_count,
+    shared::CHANNELS, splat::shown_byte,
 };
 
 const EXTENSION: &str = "KHR_gaussian_splatting";

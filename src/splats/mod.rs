@@ -14,18 +14,20 @@ pub mod npy;
 pub mod ply;
 mod quantize;
 pub mod sh;
+mod shared;
 mod sog;
 mod splat;
 mod spz;
 mod usda;
 
 pub use error::SplatError;
-pub use file::{ReadSplats, WriteOptions, read_splats, write_splats};
-pub use format::{Format, is_splat_file};
+pub use file::{is_splat_file, read_splats, write_splats};
+pub use format::Format;
 pub use init::{InitialPoint, initial_splats};
 pub use neighbors::{nearest_neighbor_distances, nearest_neighbors};
 pub use ply::{PlyError, read_ply, write_ply};
 pub use sh::ShField;
+pub use shared::{ReadSplats, WriteOptions};
 
 /// A set of `N` Gaussians with one field of spherical harmonics.
 ///

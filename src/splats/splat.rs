@@ -18,9 +18,9 @@ use std::path::Path;
 
 use super::{
     ReadSplats, SplatError, Splats,
-    file::{CHANNELS, Gathered},
     quantize::{FLAT, level, logit, opacity_byte, smallest_three},
     sh::C0,
+    shared::{CHANNELS, Gathered},
 };
 
 /// Bytes of a Gaussian.

@@ -10,7 +10,7 @@ use std::fmt::{Display, Write};
 
 use glam::DVec3;
 
-use super::{Splats, WriteOptions, axes, file::CHANNELS, sh::coefficient_count};
+use super::{Splats, WriteOptions, axes, sh::coefficient_count, shared::CHANNELS};
 
 /// Values on a line.
 const PER_LINE: usize = 8;

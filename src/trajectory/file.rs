@@ -20,7 +20,10 @@ use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use serde_json::Value;
 
-use super::{lens, supersplat};
+use super::{
+    lens,
+    supersplat::{self, typed},
+};
 use crate::{capture::Camera, disk, input};
 
 /// Where nerfstudio notes how it moved a scene.
@@ -283,10 +286,6 @@ fn parse(value: Value, size: [u32; 2]) -> Result<PathFile, String> {
         "is no camera path: it has neither camera_path (nerfstudio), frames (transforms.json), poseSets nor animTracks (SuperSplat)"
             .to_owned(),
     )
-}
-
-pub(super) fn typed<T: DeserializeOwned>(value: Value) -> Result<T, String> {
-    serde_json::from_value(value).map_err(|error| error.to_string())
 }
 
 /// Makes a camera of each item; errors name its field and number.

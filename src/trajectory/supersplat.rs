@@ -8,10 +8,10 @@
 use std::f64::consts::PI;
 
 use glam::{DMat3, DVec3};
-use serde::Deserialize;
+use serde::{Deserialize, de::DeserializeOwned};
 use serde_json::Value;
 
-use super::{file::typed, lens, looking};
+use super::{lens, looking};
 use crate::capture::Camera;
 
 /// What SuperSplat takes where a file does not say: frames, frames a second, smoothness, degrees.
@@ -259,6 +259,10 @@ fn camera(key: [f64; VALUES], size: [u32; 2]) -> Result<Camera, String> {
         ..lens(size, FOV)
     };
     Ok(looking(place, target, DVec3::NEG_Y, &like))
+}
+
+pub(super) fn typed<T: DeserializeOwned>(value: Value) -> Result<T, String> {
+    serde_json::from_value(value).map_err(|error| error.to_string())
 }
 
 #[cfg(test)]

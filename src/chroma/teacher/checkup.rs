@@ -1,7 +1,9 @@
 //! What the program understands of a network, and how it answers.
 
 use super::network::{Loaded, NetworkTeacher, ToldBy};
-use super::{Catalog, GrayImage, TeacherError, TeacherInfo, TeacherSettings, Upsample, trial};
+use super::{
+    Catalog, GrayImage, TeacherError, TeacherInfo, TeacherSettings, Upsample, plausible, trial,
+};
 use crate::color::{gray_to_lightness, lab_to_srgb};
 use crate::measure::colorfulness;
 use serde::Serialize;
@@ -84,8 +86,8 @@ pub fn check(
         }
         Err(error) => return Err(error),
     };
-    let ramp = trial::ramp();
-    let answers: Result<_, _> = [("ramp", trial::as_image(&ramp)), (name, photo)]
+    let ramp = plausible::ramp();
+    let answers: Result<_, _> = [("ramp", plausible::as_image(&ramp)), (name, photo)]
         .into_iter()
         .map(|(name, picture)| answered(&mut teacher, name, picture))
         .collect();

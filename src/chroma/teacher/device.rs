@@ -2,31 +2,12 @@
 
 use super::bounded::bounded;
 use super::error::first_line;
-use super::{TeacherError, TeacherSettings};
+use super::{TeacherDevice, TeacherError, TeacherSettings};
 use ort::environment::Environment;
 use ort::ep::{CUDA, CoreML, DirectML, ExecutionProvider, ExecutionProviderDispatch};
 use ort::session::{Session, builder::GraphOptimizationLevel};
-use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::time::Duration;
-
-/// On which processor networks run.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[cfg_attr(test, derive(schemars::JsonSchema))]
-#[serde(rename_all = "lowercase")]
-pub enum TeacherDevice {
-    /// The first of the others that the library at hand has and that takes the network.
-    #[default]
-    Auto,
-    /// The CPU.
-    Cpu,
-    /// NVIDIA's GPUs.
-    Cuda,
-    /// DirectX 12, on Windows.
-    DirectMl,
-    /// Apple's.
-    CoreMl,
-}
 
 /// How long loading may take where an answer may take less.
 const LOADING: Duration = Duration::from_secs(60);
@@ -40,17 +21,6 @@ const TRIED: [TeacherDevice; 4] = [
 ];
 
 impl TeacherDevice {
-    /// Its name in reports and on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Auto => "auto",
-            Self::Cpu => "cpu",
-            Self::Cuda => "cuda",
-            Self::DirectMl => "directml",
-            Self::CoreMl => "coreml",
-        }
-    }
-
     /// The provider to be registered; none for the processor, which is always there.
     ///
     /// # Errors

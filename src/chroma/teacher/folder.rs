@@ -1,8 +1,9 @@
 //! A folder of colored images as a teacher.
 
 use super::named_images::NamedImages;
+use super::settings::file_name;
 use super::shown::Shown;
-use super::{AbImage, GrayImage, Query, TeacherError, TeacherInfo, file_name};
+use super::{AbImage, GrayImage, Query, TeacherError, TeacherInfo};
 use crate::capture::{Capture, IMAGES};
 use crate::color::srgb_to_lab;
 use image::{DynamicImage, Rgb, Rgb32FImage};

@@ -22,6 +22,7 @@ mod plausible;
 mod profile;
 mod query;
 pub(crate) mod runtime;
+mod settings;
 mod shown;
 mod tensor;
 mod trial;
@@ -30,7 +31,6 @@ mod weights;
 
 pub use catalog::{Catalog, KnownTeacher};
 pub use checkup::{Answered, Checkup, Trial, check};
-pub use device::TeacherDevice;
 pub use error::TeacherError;
 pub use folder::FolderTeacher;
 pub use hints::{HintFolder, HintImage};
@@ -40,11 +40,10 @@ pub use network::{NetworkTeacher, ToldBy};
 #[cfg(feature = "cli")]
 pub(crate) use places::cache_folder;
 pub use query::Query;
+pub use settings::{TeacherDevice, TeacherInfo, TeacherSettings};
 pub use upsample::Upsample;
 
-use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 /// Someone who colors photos.
 pub struct Teacher {
@@ -55,59 +54,6 @@ pub struct Teacher {
 enum Source {
     Network(Box<NetworkTeacher>),
     Folder(Box<FolderTeacher>),
-}
-
-/// How a teacher is to be asked.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct TeacherSettings {
-    /// A network's contract: the name of a built-in profile or the path of a
-    /// `.toml` manifest. None for the manifest beside the model, or what its
-    /// inputs and outputs say.
-    pub profile: Option<String>,
-    /// Side in pixels of a network's input where the model leaves it open; none
-    /// for the profile's.
-    pub size: Option<u32>,
-    /// On which processor a network runs.
-    pub device: TeacherDevice,
-    /// How answers smaller than the photo are enlarged.
-    pub upsample: Upsample,
-    /// How long a network may take for one photo.
-    pub time_limit: Duration,
-}
-
-impl Default for TeacherSettings {
-    fn default() -> Self {
-        Self {
-            profile: None,
-            size: None,
-            device: TeacherDevice::default(),
-            upsample: Upsample::default(),
-            // The largest of the networks known take 20 s on two old cores.
-            time_limit: Duration::from_secs(600),
-        }
-    }
-}
-
-/// What a report says about a teacher.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[cfg_attr(test, derive(schemars::JsonSchema))]
-pub struct TeacherInfo {
-    /// Name of its file or folder.
-    pub name: String,
-    /// The network's profile, a manifest's `name`, or `folder`.
-    pub kind: String,
-    /// SHA-256 of the `.onnx` file and its weight files.
-    ///
-    /// Hexadecimal; `None` for a folder.
-    pub sha256: Option<String>,
-    /// Where the network ran.
-    ///
-    /// `None` for a folder.
-    pub device: Option<TeacherDevice>,
-    /// Width and height that the network sees, in pixels.
-    ///
-    /// `None` for a folder. Twice the shorter side where the longer follows the photo's aspect.
-    pub input_size: Option<[u32; 2]>,
 }
 
 impl Teacher {
@@ -294,12 +240,6 @@ fn asked(
 /// [`Catalog::open`].
 pub fn located(path: &Path) -> Result<PathBuf, TeacherError> {
     Catalog::open()?.locate(path)
-}
-
-/// The last part of a path, for reports.
-fn file_name(path: &Path) -> String {
-    let name = path.file_name().unwrap_or(path.as_os_str());
-    name.to_string_lossy().into_owned()
 }
 
 #[cfg(test)]

@@ -1,8 +1,9 @@
 //! A folder of images that belong to photos by name.
 
 use super::query::Original;
+use super::settings::file_name;
 use super::shown::stands;
-use super::{GrayImage, Query, TeacherError, file_name};
+use super::{GrayImage, Query, TeacherError};
 use crate::capture::names::{NamedFiles, known, stem, visit_files};
 use crate::capture::{Capture, Orientation, decode_image};
 use crate::effects::listed;

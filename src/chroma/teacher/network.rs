@@ -6,9 +6,10 @@ use super::error::first_line;
 use super::images::resample;
 use super::model::{Fit, Port, Ports};
 use super::profile::{self, OutputKind, Profile, Role};
+use super::settings::file_name;
 use super::tensor::{self, Picture};
 use super::{AbImage, GrayImage, HintImage};
-use super::{Catalog, device, file_name, runtime, trial, weights};
+use super::{Catalog, device, plausible, runtime, weights};
 use super::{TeacherDevice, TeacherError, TeacherInfo, TeacherSettings};
 use crate::color::srgb_to_lab;
 use ort::session::{RunOptions, Session, SessionInputValue};
@@ -253,13 +254,16 @@ impl NetworkTeacher {
         answer: &AbImage,
         photo: &GrayImage<'_>,
     ) -> Result<(), TeacherError> {
-        if self.supposed && self.profile.output == OutputKind::Ab && !trial::is_ab(answer, photo) {
-            let pixels = trial::ramp();
-            let ramp = trial::as_image(&pixels);
+        if self.supposed
+            && self.profile.output == OutputKind::Ab
+            && !plausible::is_ab(answer, photo)
+        {
+            let pixels = plausible::ramp();
+            let ramp = plausible::as_image(&pixels);
             let size = [ramp.width, ramp.height];
             let size = self.profile.input_size(size, self.fit.fixed, self.size);
             let is_ab = match self.ask("a ramp", &ramp, size, None) {
-                Ok(of_ramp) => trial::is_ab(&of_ramp, &ramp),
+                Ok(of_ramp) => plausible::is_ab(&of_ramp, &ramp),
                 // Whoever fails on black may well color a photo without.
                 Err(error) => !matches!(error, TeacherError::Senseless { .. }),
             };

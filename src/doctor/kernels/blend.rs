@@ -18,7 +18,7 @@ use crate::{
         shade::Shading,
         view::View,
     },
-    raster::{DepthLayer, Raster, UNREACHED},
+    raster::{Raster, UNREACHED, blend_depth},
 };
 
 /// Scenes of every degree before views of odd sizes, and opaque stacks.
@@ -57,15 +57,14 @@ fn depths(raster: &Arc<Raster>) -> Result<Vec<Sample>, GpuError> {
         let stage = Stage::new(raster, &splats(&scene), &view)?;
         stage.forward()?;
         let pixels = vec![UNREACHED; view.width * view.height];
-        let layer = DepthLayer::new(raster, &stage.lists, &pixels, stage.view.tile_count())?;
+        let tiles = stage.view.tile_count();
         let mut recorder = Recorder::new(&raster.gpu);
-        layer.record(&mut recorder);
+        let image = blend_depth(raster, &stage.lists, &pixels, tiles, &mut recorder)?;
         recorder.submit();
         let (expected, margins): (Vec<_>, Vec<_>) =
             median_depths(&scene, &view).into_iter().unzip();
         Ok(Sample {
-            actual: layer
-                .read(raster)?
+            actual: (image.read(&raster.gpu)?)
                 .iter()
                 .map(|z| f64::from(*z).max(0.0))
                 .collect(),

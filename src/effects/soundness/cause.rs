@@ -1,11 +1,10 @@
 //! Why points do not project to where they were seen.
 
-use std::fmt;
-
 use glam::{DMat3, DVec3};
 
 use super::{
-    ENOUGH, median,
+    contradiction::Cause,
+    photos::{ENOUGH, median},
     reprojection::{fits, project},
 };
 use crate::{
@@ -22,58 +21,6 @@ const CLEARLY_NEARER: f64 = 0.05;
 
 /// A scale so near to 1 is none.
 const SAME_SCALE: f64 = 0.02;
-
-/// What is likely wrong with a model that contradicts itself: what, put right, makes its points
-/// project to where they were seen.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Cause {
-    /// Poses are camera-to-world.
-    CameraToWorld,
-    /// Cameras look along -z, y up.
-    OpenGl,
-    /// Both.
-    CameraToWorldOpenGl,
-    /// Intrinsics are those of other photos: the focal length is so many times what it should
-    /// be, and the principal point may be off too.
-    Intrinsics(f64),
-    /// The principal point is that of other photos.
-    PrincipalPoint,
-    /// Observations are in pixels of pictures so many times as large as the cameras'.
-    Observations(f64),
-    /// None of these.
-    Unknown,
-}
-
-impl fmt::Display for Cause {
-    /// The cause and the remedy.
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::CameraToWorld => f.write_str(
-                "its poses are camera-to-world: invert them, images.txt holds world-to-camera ones",
-            ),
-            Self::OpenGl => f.write_str(
-                "its cameras have OpenGL's axes: turn y and z of each camera around, COLMAP's y points down and z forward",
-            ),
-            Self::CameraToWorldOpenGl => f.write_str(
-                "its poses are camera-to-world with OpenGL's axes: turn y and z of each camera around and invert the poses",
-            ),
-            Self::Intrinsics(ratio) => write!(
-                f,
-                "its intrinsics are those of other photos, with a focal length {ratio:.2} times what it should be: scale focal lengths and principal points to the width and height of the cameras"
-            ),
-            Self::PrincipalPoint => f.write_str(
-                "its principal points are those of other photos: give those of photos of the cameras' width and height",
-            ),
-            Self::Observations(ratio) => write!(
-                f,
-                "its observations are in pixels of pictures {ratio:.2} times as large as the cameras say: scale them"
-            ),
-            Self::Unknown => f.write_str(
-                "its poses, intrinsics and points do not belong together: export all three from COLMAP again",
-            ),
-        }
-    }
-}
 
 impl Cause {
     /// Tries one after the other; `cameras` are those of the capture's views at working size.

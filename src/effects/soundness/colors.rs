@@ -1,16 +1,14 @@
 //! Whether photos show at the points what COLMAP saw there.
 
-use super::{Contradiction, Contradictory, ENOUGH, median, photos};
+use super::{
+    contradiction::{Contradiction, Contradictory, LEAST},
+    photos::{ENOUGH, median, photos},
+};
 use crate::{
     capture::{Camera, Capture, Channel, Photo, Rejected},
     color::GrayTable,
     effects::{look_ups::LookUps, tracks::place_in},
 };
-
-/// Correlation of a photo with the points' colors from which on it is the one that COLMAP saw.
-/// The lowest photo of any sound scene tried has 0.69; turned, mirrored, renumbered and much
-/// cropped ones have at most 0.21 in the median.
-pub(super) const LEAST: f64 = 0.3;
 
 /// Side of the square over which a photo is averaged, in pixels: points lie where luma has an
 /// extremum, and larger squares lower the correlation of sound photos, to 0.59 for 2 pixels.

@@ -1,6 +1,6 @@
 //! How many points the photos see, where no observations say so.
 
-use super::photos;
+use super::photos::photos;
 use crate::capture::{Camera, Capture};
 
 /// A photo that has fewer points before it hardly sees the scene.

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::{median, photos};
+use super::photos::{median, photos};
 use crate::capture::{Camera, Capture, Photo};
 
 /// Pixels along a side of a photo that shows anything.

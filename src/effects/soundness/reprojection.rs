@@ -2,7 +2,10 @@
 
 use glam::DVec3;
 
-use super::{Cause, Contradiction, Contradictory, ENOUGH, distance, photos};
+use super::{
+    contradiction::{Cause, Contradiction, Contradictory, distance},
+    photos::{ENOUGH, photos},
+};
 use crate::{
     capture::{Camera, Capture, Rejected},
     effects::tracks::place_in,

@@ -2,9 +2,9 @@
 
 use glam::{DMat3, DVec3};
 
-use super::{reprojection::project, *};
+use super::{photos::ENOUGH, reprojection::project, *};
 use crate::{
-    capture::{Camera, Channel, Observation, Photo},
+    capture::{Camera, Capture, Channel, Observation, Photo},
     effects::fixtures::{capture, photo},
 };
 

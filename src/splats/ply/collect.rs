@@ -2,9 +2,9 @@
 
 use super::header::VertexLayout;
 use super::{CHANNELS, FILTER, ReadSplats, SHAPE, sh_position};
-use crate::splats::file::MIN_QUATERNION_NORM;
 use crate::splats::quantize::{FLAT, OPAQUE, logit};
 use crate::splats::sh::{C0, coefficient_count};
+use crate::splats::shared::MIN_QUATERNION_NORM;
 use crate::splats::{Splats, opacity};
 
 /// Sorts the numbers of each Gaussian into the arrays.

@@ -24,13 +24,12 @@ use super::{
 };
 use crate::input::excerpt;
 use crate::splats::{
-    Splats, WriteOptions,
-    file::{Gathered, Judge},
-    morton,
+    Splats, WriteOptions, morton,
     quantize::{
         FLAT, between, level, logit, of_smallest_three, opacity_byte, share, smallest_three,
     },
     sh::{C0, coefficient_count},
+    shared::{Gathered, Judge},
 };
 use ply_rs_bw::ply::{ElementDef, Encoding, Header, PropertyType, ScalarType};
 use std::io::BufRead;

@@ -28,8 +28,8 @@ pub(super) use write::check;
 
 use super::{
     ReadSplats,
-    file::CHANNELS,
     sh::{MAX_DEGREE, coefficient_count},
+    shared::CHANNELS,
 };
 
 /// The comment that tells readers to draw with opacities that fall by what the blur

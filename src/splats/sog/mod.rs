@@ -33,7 +33,7 @@ pub(super) use write::encode;
 
 use serde::{Deserialize, Serialize};
 
-use super::{file::CHANNELS, sh::coefficient_count};
+use super::{sh::coefficient_count, shared::CHANNELS};
 
 const META: &str = "meta.json";
 

@@ -12,9 +12,9 @@ use super::{texture::Texture, *};
 use crate::input::excerpt;
 use crate::splats::{
     ReadSplats, SplatError,
-    file::{Gathered, check_count, memory},
     quantize::{between, logit, of_smallest_three},
     sh::MAX_DEGREE,
+    shared::{Gathered, check_count, memory},
 };
 
 /// Longest `meta.json` that is read: codebooks take some 20 KiB.

@@ -12,10 +12,9 @@ use super::{
     *,
 };
 use crate::splats::{
-    SplatError, Splats, WriteOptions,
-    file::Judge,
-    morton,
+    SplatError, Splats, WriteOptions, morton,
     quantize::{level, opacity_byte, share, smallest_three},
+    shared::Judge,
 };
 
 /// Levels of a coordinate's logarithm.
@@ -34,7 +33,7 @@ pub(in crate::splats) fn encode(
     let size = Texture::for_splats(count);
     if size.width.max(size.height) > LONGEST_SIDE {
         return Err(SplatError::TooMany {
-            path: judge.path().to_owned(),
+            path: judge.path.to_owned(),
             reason: format!("{count} Gaussians do not fit into a picture of {LONGEST_SIDE} pixels"),
         });
     }
@@ -165,7 +164,7 @@ pub(in crate::splats) fn encode(
         sh_n,
     };
     let archive = files.archive(&meta).map_err(std::io::Error::other);
-    archive.map_err(SplatError::io(judge.path()))
+    archive.map_err(SplatError::io(judge.path))
 }
 
 /// Entries of the palette for so many Gaussians: as splat-transform has it, the highest power of

@@ -45,8 +45,8 @@ mod write;
 pub(super) use read::read;
 pub(super) use write::encode;
 
-use super::file::CHANNELS;
 use super::sh::coefficient_count;
+use super::shared::CHANNELS;
 
 const MAGIC: [u8; 4] = *b"NGSP";
 

@@ -8,9 +8,9 @@ use super::*;
 use crate::splats::{
     ReadSplats, SplatError,
     axes::{Turn, turned},
-    file::{Gathered, check_count, memory},
     quantize::{logit, of_smallest_three},
     sh::MAX_DEGREE,
+    shared::{Gathered, check_count, memory},
 };
 
 /// Longest extensions that are read, in bytes.

@@ -7,8 +7,8 @@ use flate2::{Compression, write::GzEncoder};
 use super::*;
 use crate::splats::{
     SplatError, Splats, WriteOptions,
-    file::{Judge, middle},
     quantize::{level, opacity_byte, smallest_three},
+    shared::{Judge, middle},
 };
 
 /// Version of the files: more programs read it than 4, which is smaller by a few percent.
@@ -38,7 +38,7 @@ pub(in crate::splats) fn encode(
 ) -> Result<Vec<u8>, SplatError> {
     let degree = splats.sh.degree;
     let count = u32::try_from(splats.len()).map_err(|_| SplatError::TooMany {
-        path: judge.path().to_owned(),
+        path: judge.path.to_owned(),
         reason: format!("{} Gaussians are more than 2³²", splats.len()),
     })?;
     let farthest = (splats.means.as_flattened().iter()).fold(0.0_f64, |farthest, &value| {
@@ -88,7 +88,7 @@ pub(in crate::splats) fn encode(
     header.extend(count.to_le_bytes());
     let flags = if options.antialiased { ANTIALIASED } else { 0 };
     header.extend([degree as u8, bits as u8, flags, 0]);
-    gzip(&header, &parts).map_err(SplatError::io(judge.path()))
+    gzip(&header, &parts).map_err(SplatError::io(judge.path))
 }
 
 /// The middle scale of a small Gaussian, in world units.

@@ -4,6 +4,7 @@
 mod architecture;
 mod broken_kernels;
 mod cases;
+mod circles;
 mod poison;
 mod poison_capture;
 mod shader_lint;

@@ -1,0 +1,96 @@
+//! What a teacher can be told, and what it says of itself.
+
+use super::Upsample;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+use std::time::Duration;
+
+/// On which processor networks run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(rename_all = "lowercase")]
+pub enum TeacherDevice {
+    /// The first of the others that the library at hand has and that takes the network.
+    #[default]
+    Auto,
+    /// The CPU.
+    Cpu,
+    /// NVIDIA's GPUs.
+    Cuda,
+    /// DirectX 12, on Windows.
+    DirectMl,
+    /// Apple's.
+    CoreMl,
+}
+
+impl TeacherDevice {
+    /// Its name in reports and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Cpu => "cpu",
+            Self::Cuda => "cuda",
+            Self::DirectMl => "directml",
+            Self::CoreMl => "coreml",
+        }
+    }
+}
+
+/// How a teacher is to be asked.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TeacherSettings {
+    /// A network's contract: the name of a built-in profile or the path of a
+    /// `.toml` manifest. None for the manifest beside the model, or what its
+    /// inputs and outputs say.
+    pub profile: Option<String>,
+    /// Side in pixels of a network's input where the model leaves it open; none
+    /// for the profile's.
+    pub size: Option<u32>,
+    /// On which processor a network runs.
+    pub device: TeacherDevice,
+    /// How answers smaller than the photo are enlarged.
+    pub upsample: Upsample,
+    /// How long a network may take for one photo.
+    pub time_limit: Duration,
+}
+
+impl Default for TeacherSettings {
+    fn default() -> Self {
+        Self {
+            profile: None,
+            size: None,
+            device: TeacherDevice::default(),
+            upsample: Upsample::default(),
+            // The largest of the networks known take 20 s on two old cores.
+            time_limit: Duration::from_secs(600),
+        }
+    }
+}
+
+/// What a report says about a teacher.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct TeacherInfo {
+    /// Name of its file or folder.
+    pub name: String,
+    /// The network's profile, a manifest's `name`, or `folder`.
+    pub kind: String,
+    /// SHA-256 of the `.onnx` file and its weight files.
+    ///
+    /// Hexadecimal; `None` for a folder.
+    pub sha256: Option<String>,
+    /// Where the network ran.
+    ///
+    /// `None` for a folder.
+    pub device: Option<TeacherDevice>,
+    /// Width and height that the network sees, in pixels.
+    ///
+    /// `None` for a folder. Twice the shorter side where the longer follows the photo's aspect.
+    pub input_size: Option<[u32; 2]>,
+}
+
+/// The last part of a path, for reports.
+pub(super) fn file_name(path: &Path) -> String {
+    let name = path.file_name().unwrap_or(path.as_os_str());
+    name.to_string_lossy().into_owned()
+}
