@@ -196,7 +196,7 @@ impl<'a> AdamSolver<'a> {
         self.passes.harmonics()
     }
 
-    /// What a dispatch works on, the mean over the passes.
+    /// Work of a dispatch, the mean over the passes.
     pub fn load(&self) -> Load {
         self.passes.load(1 + self.course.scales.end())
     }
@@ -260,7 +260,7 @@ fn exponential([first, last]: [f64; 2], iteration: usize, iterations: usize) -> 
     first * (last / first).powf(t.min(1.0))
 }
 
-/// What a pass over one scale is of a pass at full size.
+/// Cost of a pass over one scale, as a share of one at full size.
 fn share(scale: usize) -> f64 {
     0.25_f64.powi(scale as i32)
 }

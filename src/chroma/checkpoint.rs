@@ -15,7 +15,7 @@ pub struct ChromaCheckpoint {
     pub(super) solver: SolverState,
 }
 
-/// What was decided before.
+/// Decisions made before the solver began.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct State {
     /// The degree that views held back have chosen, where they were asked.
@@ -30,13 +30,13 @@ pub(super) struct State {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct SolverState {
     pub rounds: Rounds,
-    /// What its buffers hold.
+    /// Contents of its buffers.
     pub buffers: BTreeMap<String, Vec<f32>>,
-    /// What it holds on the host.
+    /// Contents of its vectors on the host.
     pub doubles: BTreeMap<String, Vec<f64>>,
 }
 
-/// What the host knows of a solver.
+/// A solver's counters on the host.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Rounds {
     /// Rounds done.
@@ -112,7 +112,7 @@ impl ChromaCheckpoint {
         sections
     }
 
-    /// What [`ChromaCheckpoint::to_sections`] gave; `None` of anything else.
+    /// The checkpoint of [`ChromaCheckpoint::to_sections`]; `None` of anything else.
     pub fn from_sections(sections: &BTreeMap<String, Vec<u8>>) -> Option<Self> {
         let numbers = serde_json::from_slice(sections.get("distillation")?);
         let (state, rounds): (State, Rounds) = numbers.ok()?;

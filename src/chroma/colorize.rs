@@ -26,7 +26,7 @@ pub struct Colored {
     pub splats: Splats,
     /// The a/b harmonics from which they are made.
     pub chroma: ShField,
-    /// What was solved with: what the plan decided included.
+    /// Settings of the solver, decisions of the plan included.
     pub settings: ChromaSettings,
     /// Which effects were reckoned with, and why.
     pub effects: [Decision; 2],
@@ -36,11 +36,11 @@ pub struct Colored {
     pub seen: Option<Vec<f32>>,
     /// Share of the Gaussians that strokes claim by half or more; `None` without strokes.
     pub claimed: Option<f64>,
-    /// What colors were multiplied by to be as strong as the teachers'; in `chroma` and `splats`.
+    /// Factor that makes colors as strong as the teachers'; in `chroma` and `splats`.
     pub saturation: f64,
     /// The last report of the solver.
     pub last: Option<ChromaProgress>,
-    /// What a dispatch of the solver worked on, the mean over the passes.
+    /// Work of a dispatch of the solver, the mean over the passes.
     pub load: Load,
     /// Bytes that it was estimated to take on the device at most.
     pub estimated_device_memory: u64,
@@ -54,7 +54,7 @@ pub struct Colored {
     pub seconds: [f64; 2],
 }
 
-/// What is worth telling while a scene is colored.
+/// News while a scene is colored.
 #[derive(Clone, Copy, Debug)]
 pub enum ColorizeEvent<'a> {
     /// This view is asked about next.
@@ -84,7 +84,7 @@ pub enum ColorizeEvent<'a> {
     Plan(&'a [Decision; 2]),
     /// Progress of the solver.
     Solving(ChromaProgress),
-    /// What brought the views into line is taken back, and all is solved anew without, for they
+    /// Corrections of views are taken back, and all is solved anew without, for views
     /// disagree more with it: shares of the colors' mean square about their mean.
     Uncorrected {
         /// Without it.
@@ -99,7 +99,7 @@ pub enum ColorizeEvent<'a> {
         /// Views in all.
         total: usize,
     },
-    /// What the bake is to come close to is drawn, view by view.
+    /// The bake's target is drawn, view by view.
     Drawing {
         /// Views that are drawn.
         view: usize,
@@ -145,11 +145,11 @@ pub fn colorize(
 pub struct Distill<'a> {
     /// How the scene is drawn.
     pub raster: &'a Arc<Raster>,
-    /// What it was trained on.
+    /// Photos that it was trained on.
     pub dataset: &'a Dataset,
     /// The scene, one channel.
     pub luma: &'a Splats,
-    /// What its views' colors are to be.
+    /// Colors that its views are to have.
     pub lesson: &'a Lesson,
     /// Degree of the chroma harmonics.
     pub sh_degree: Degree,

@@ -1,4 +1,4 @@
-//! What brings each view's teacher into line with the others
+//! Gain and offset that bring each view's teacher into line with the others
 //! (`shaders/view_correction.wgsl`).
 
 use bytemuck::{Pod, Zeroable};
@@ -87,7 +87,7 @@ impl Corrections {
         })
     }
 
-    /// What tells [`Corrections::sum`] which view it is about.
+    /// Parameters that tell [`Corrections::sum`] its view.
     ///
     /// # Errors
     /// [`GpuError::TooLarge`].
@@ -151,7 +151,7 @@ impl Corrections {
         recorder.dispatch(&kernels.solve, &self.solve, 1);
     }
 
-    /// What the next round goes by, by name.
+    /// Buffers that the next round goes by, by name.
     pub(super) fn kept(&self) -> [(&'static str, &Buffer<Correction>); 2] {
         [
             ("corrections", &self.corrections),

@@ -1,10 +1,10 @@
-//! What can go wrong in stage 2.
+//! Errors of stage 2.
 
 use std::error::Error;
 
 use crate::{capture::CaptureError, gpu::GpuError};
 
-/// What is wrong with a colorizer.
+/// An error of a colorizer.
 pub type ColorizerError = Box<dyn Error + Send + Sync>;
 
 /// Stage 2 cannot go on.
@@ -35,7 +35,7 @@ pub enum ChromaError {
     WrongSize {
         /// Width and height of the picture.
         found: [u32; 2],
-        /// Of the camera.
+        /// Size of the camera.
         expected: [u32; 2],
     },
     /// A checkpoint is one of another distillation.

@@ -11,7 +11,7 @@ const NEIGHBORS: usize = 8;
 /// luma are where colors end.
 const GRAY_RANGE: f64 = 0.1;
 
-/// What all neighbors together weigh against the views, in pixels that show the
+/// Weight of all neighbors together against the views, in pixels that show the
 /// Gaussian fully.
 const NEIGHBOR_PIXELS: f64 = 1.0;
 

@@ -22,18 +22,18 @@ use crate::{
 /// Counts that are on their way from the device at a time.
 const IN_FLIGHT: usize = 64;
 
-/// What waits on the host.
+/// Gaussians that wait on the host, and their cameras.
 struct HostScene {
     scene: Streamed,
-    /// Of each view.
+    /// Cameras of the views.
     cameras: Vec<Camera>,
 }
 
 /// Harmonics to be drawn over frozen geometry, on the device or on the host as this is.
 pub(super) enum Colors<'a> {
-    /// Of all Gaussians, on the device.
+    /// Harmonics of all Gaussians, on the device.
     Device(Field),
-    /// Of all Gaussians, on the host.
+    /// Harmonics of all Gaussians, on the host.
     Host(&'a ShField),
 }
 
@@ -41,13 +41,13 @@ pub(super) enum Colors<'a> {
 pub struct FrozenViews {
     pub(super) raster: Arc<Raster>,
     pub(super) kernels: ChromaKernels,
-    /// Of all Gaussians, or of those that the view before showed.
+    /// Geometry of all Gaussians, or of those that the view before showed.
     pub(super) geometry: Geometry,
     /// All Gaussians, where they wait on the host.
     streamed: Option<HostScene>,
     /// `[views][scales]`, full size first.
     views: Vec<Vec<Frozen>>,
-    /// What comes before this one stays on the device.
+    /// Number of views, the first ones, that stay on the device.
     pinned: usize,
     /// Lists that all other views take turns in.
     spare: Option<Lists>,
@@ -88,7 +88,7 @@ impl FrozenViews {
         Self::placed(raster, splats, extent, cameras, 1, room, Some(streamed))
     }
 
-    /// Of all Gaussians, or of those that wait on the host.
+    /// Views of all Gaussians, or of those that wait on the host.
     fn placed(
         raster: &Arc<Raster>,
         splats: &Splats,
@@ -277,7 +277,7 @@ impl FrozenViews {
         capacities.max().unwrap_or(0)
     }
 
-    /// What a dispatch works on, the mean over these views at so many scales.
+    /// Work of a dispatch, the mean over these views at so many scales.
     pub(super) fn load(&self, views: impl Iterator<Item = usize>, scales: usize) -> Load {
         let passes: Vec<&Frozen> = views.flat_map(|view| &self.views[view][..scales]).collect();
         let mean = |of: &dyn Fn(&Frozen) -> usize| {
@@ -323,7 +323,7 @@ impl FrozenViews {
         Ok(depths(image.read(self.gpu())?))
     }
 
-    /// What a view shows of harmonics, `shown` being on the device where Gaussians wait on the
+    /// Picture of harmonics in a view, `shown` being on the device where Gaussians wait on the
     /// host.
     fn picture(
         &self,

@@ -6,7 +6,7 @@ use crate::raster::{Lists, ViewUniform};
 pub(super) struct Frozen {
     pub uniform: ViewUniform,
     pub visible: usize,
-    /// Of its tile lists.
+    /// Entries of its tile lists.
     pub entries: usize,
     /// Its own tile lists, made already.
     pub lists: Option<Lists>,

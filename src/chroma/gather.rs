@@ -1,4 +1,4 @@
-//! What pixels say, gathered by the Gaussians that they show: the adjoint of drawing.
+//! Figures of pixels gathered by the Gaussians that they show: the adjoint of drawing.
 
 use super::{ChromaError, FrozenViews};
 use crate::{
@@ -8,7 +8,7 @@ use crate::{
 };
 
 impl FrozenViews {
-    /// Of each Gaussian the sums, over the pixels of a view at full size, of four figures a pixel
+    /// Sums for each Gaussian, over the pixels of a view at full size, of four figures a pixel
     /// (`[height, width]`), each times how much of the Gaussian the pixel shows, 0 to 1.
     ///
     /// # Errors

@@ -1,4 +1,4 @@
-//! What is solved for, where it waits on the host: planes `[planes, N]` of which the Gaussians of
+//! Unknowns that wait on the host: planes `[planes, N]` of which the Gaussians of
 //! one view go onto the device, and whose gradient comes back from there.
 
 use super::ChromaError;
@@ -15,7 +15,7 @@ pub(super) struct HostSystem {
     count: usize,
     /// The harmonics.
     pub unknowns: Vec<f32>,
-    /// Of the first so many planes.
+    /// Gradient of the first so many planes.
     pub gradient: Vec<f32>,
     /// See [`ChromaSums::diagonal`](crate::raster::ChromaSums).
     pub diagonal: Vec<f32>,

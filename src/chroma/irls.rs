@@ -51,7 +51,7 @@ pub struct IrlsSolver<'a> {
     passes: Passes<'a>,
     steps: Steps,
     settings: ChromaSettings,
-    /// Of the largest view.
+    /// Pixels of the largest view.
     pixels: usize,
     spent: f64,
     /// Seconds of earlier rounds.
@@ -387,7 +387,7 @@ impl<'a> IrlsSolver<'a> {
         Ok(self.passes.tasks.iter().copied().zip(found).collect())
     }
 
-    /// What a dispatch works on, the mean over the passes.
+    /// Work of a dispatch, the mean over the passes.
     pub fn load(&self) -> Load {
         self.passes.load(1)
     }
@@ -412,5 +412,5 @@ fn mean(losses: &[f32]) -> f64 {
     losses.iter().map(|&loss| f64::from(loss)).sum::<f64>() / losses.len() as f64
 }
 
-/// What drawing a view is of a pass over it, its adjoint included.
+/// Cost of drawing a view, as a share of a pass over it, its adjoint included.
 const DRAWING: f64 = 0.5;

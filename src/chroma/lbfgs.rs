@@ -21,19 +21,19 @@ pub struct LbfgsParameters {
     pub blocks: u32,
     /// Added to the matrix's diagonal.
     pub ridge: f32,
-    /// What a diagonal entry is of the sum of weights.
+    /// Ratio of a diagonal entry to the sum of weights.
     pub diagonal_scale: f32,
     /// How many of the first unknowns are constant harmonics.
     pub constants: u32,
-    /// What a constant harmonic of one adds to a color.
+    /// Color of a constant harmonic of one.
     pub color: f32,
-    /// What an anchor's pull is of the pictures'.
+    /// Pull of an anchor, as a share of the pictures'.
     pub anchor: f32,
-    /// What ridge and bound of a harmonic that is not constant are multiplied by.
+    /// Factor of ridge and bound of a harmonic that is not constant.
     pub rest: f32,
 }
 
-/// What ridge and bound of harmonics beyond the constant one are multiplied by. Photos see a
+/// Factor of ridge and bound of harmonics beyond the constant one. Photos see a
 /// Gaussian from one side, where many fields of degree 3 show the same: of these the one is found
 /// whose view dependence, weighted so, is least (docs/lab/07-chroma-solver.md).
 pub const REST: f64 = 20.0;
@@ -57,10 +57,10 @@ const ONWARD: f64 = 0.0;
 /// The loss before the first point is accepted, as the first scalar.
 const UNKNOWN: f32 = f32::MAX;
 
-/// What is minimized over, planes `[harmonics, channels, N]`, and what the caller leaves
+/// Unknowns, planes `[harmonics, channels, N]`, and the figures that the caller leaves
 /// before [`Lbfgs::step`].
 pub struct System {
-    /// What is solved for: the first planes of this, as many as the gradient has.
+    /// Unknowns: the first planes of this, as many as the gradient has.
     pub unknowns: Buffer<f32>,
     /// The loss's gradient.
     pub gradient: Buffer<f32>,
@@ -137,7 +137,7 @@ impl LbfgsKernels {
 /// An entry point and what it works on.
 struct Bound(Kernel, Bindings);
 
-/// What is done with one pair.
+/// Kernels of one pair.
 struct OfPair {
     keep: Bound,
     curvature: [Bound; 2],
@@ -168,7 +168,7 @@ pub struct Lbfgs {
     blocks: u32,
 }
 
-/// Where the iteration stands.
+/// State of the iteration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct State {
     /// The least loss so far, the parts of ridge and anchors included.
@@ -189,7 +189,7 @@ impl State {
     }
 }
 
-/// What the majorizer's diagonal is of the sum of weights, for a constant harmonic of so many.
+/// Ratio of the majorizer's diagonal to the sum of weights, for a constant harmonic of so many.
 pub fn diagonal_scale(harmonics: usize) -> f64 {
     sh::C0 * (1.0 + harmonics.saturating_sub(1) as f64 / REST)
 }
@@ -392,14 +392,14 @@ impl Lbfgs {
         Ok(lbfgs)
     }
 
-    /// What is minimized is another function from now on, though one like that before: the
+    /// The minimized function is another from now on, though one like that before: the
     /// present point is accepted whatever the loss there.
     pub fn restart(&self, gpu: &Gpu) {
         self.scalars.write_at(gpu, LOSS, &[UNKNOWN]);
     }
 
-    /// What is minimized is a little different from now on: the next step is judged by the loss
-    /// so far, but what the gradient changes by says nothing of the curvature.
+    /// The minimized function is a little different from now on: the next step is judged by the
+    /// loss so far, but what the gradient changes by says nothing of the curvature.
     pub fn changed(&self, gpu: &Gpu) {
         self.scalars.write_at(gpu, CHANGED, &[1.0]);
     }
@@ -410,7 +410,7 @@ impl Lbfgs {
         self.all(recorder, &self.anchor);
     }
 
-    /// Of what the next step goes by, the newest pair and the buffers.
+    /// The newest pair, and the buffers that the next step goes by.
     pub(super) fn kept(&self) -> (usize, &[(String, Buffer<f32>)]) {
         (self.newest, &self.kept)
     }

@@ -1,4 +1,4 @@
-//! What the colors of a dataset's views are to be, asked for view by view.
+//! Colors that a dataset's views are to have, asked for view by view.
 
 use std::ops::ControlFlow;
 
@@ -11,7 +11,7 @@ use crate::{
     effects::{TeacherSamples, TeacherSpread},
 };
 
-/// What a photo's colors are to be.
+/// Colors that a photo is to have.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Wanted {
     /// CIELAB a, b at the photo's size.
@@ -26,7 +26,7 @@ pub struct Wanted {
 }
 
 impl From<AbImage> for Wanted {
-    /// What a machine wants: all of it, alike, in views that are trained on.
+    /// Answer of a machine: all of it counts alike, in views that are trained on.
     fn from(ab: AbImage) -> Self {
         Self {
             ab,
@@ -62,9 +62,9 @@ impl Colorizer for Teacher {
     }
 }
 
-/// What all views were taught.
+/// Colors that all views are to have.
 pub struct Lesson {
-    /// What is known of the views, and how much of it counts.
+    /// Wanted colors and weights of the views.
     pub targets: Targets,
     /// Each view's place among these; `None` where nothing is known.
     pub of_view: Vec<Option<usize>>,
@@ -78,7 +78,7 @@ pub struct Lesson {
     by_hand: Vec<bool>,
     /// How far the training views disagree about COLMAP's points.
     pub spread: Option<TeacherSpread>,
-    /// What they say there.
+    /// Their colors there.
     pub samples: TeacherSamples,
 }
 
@@ -108,7 +108,7 @@ impl Lesson {
         }))
     }
 
-    /// What a view is wanted to look like, with the strokes on it as they were painted; `None`
+    /// Wanted picture of a view, with the strokes on it as they were painted; `None`
     /// where neither is known.
     ///
     /// # Errors
@@ -130,7 +130,7 @@ impl Lesson {
         Ok(Some(shown))
     }
 
-    /// What is wanted of each view that colors are learned from, by its place among them.
+    /// Tasks of the views that colors are learned from, by place among them.
     pub fn tasks(&self) -> Vec<Task> {
         (self.views.iter().enumerate())
             .filter_map(|(view, &i)| {

@@ -1,4 +1,4 @@
-//! What color a Gaussian is likely to have where no view shows it: that of seen ones that are
+//! Likely color of a Gaussian that no view shows: that of seen ones that are
 //! like it in lightness, texture, size and place.
 
 use crate::splats::{Splats, sh};
@@ -34,7 +34,7 @@ const INSIDE: f64 = 0.9;
 /// Place, gray, gray around, contrast around, size: in units that count alike.
 type Features = [f32; 7];
 
-/// What each Gaussian is like. `neighbors` are those around it, `grays` of 0 to 1.
+/// Features of each Gaussian. `neighbors` are those around it, `grays` of 0 to 1.
 fn features(luma: &Splats, grays: &[f64], neighbors: &[Vec<u32>]) -> Vec<Features> {
     let count = luma.len();
     let middle = |of: &dyn Fn(usize) -> f64, share: f64| {

@@ -95,7 +95,7 @@ pub struct LabLossParameters {
     pub weighted: u32,
 }
 
-/// Where RGB pictures are judged; a/b have one place only.
+/// Color space in which RGB pictures are judged; a/b have one only.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Space {
     /// By their distance in RGB.

@@ -35,11 +35,11 @@ pub(super) struct Judging {
     /// Residual at which the loss of a and b together levels off; without one, each has
     /// its own.
     pub robust: Option<f32>,
-    /// What counts in CIELAB, where RGB is judged there.
+    /// Weights in CIELAB, where RGB is judged there.
     pub lab: LabLossParameters,
 }
 
-/// What follows on the loss.
+/// Figures that follow on the loss.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Ending {
     /// Draws for the loss alone.
@@ -55,11 +55,11 @@ pub(super) struct Passes<'a> {
     pub frozen: &'a FrozenViews,
     targets: &'a Targets,
     pub tasks: Vec<Task>,
-    /// Of all Gaussians, or of those that one view shows.
+    /// Harmonics of all Gaussians, or of those that one view shows.
     pub field: Field,
     /// All of them, where they wait on the host.
     pub on_host: Option<HostSystem>,
-    /// Of the field's first planes: those that are solved for.
+    /// Gradient of the field's first planes: those that are solved for.
     pub gradient: Buffer<f32>,
     /// See [`ChromaSums::diagonal`].
     pub diagonal: Buffer<f32>,
@@ -181,7 +181,7 @@ impl<'a> Passes<'a> {
         })
     }
 
-    /// What a dispatch works on, the mean over the tasks at so many scales.
+    /// Work of a dispatch, the mean over the tasks at so many scales.
     pub fn load(&self, scales: usize) -> Load {
         let views = self.tasks.iter().map(|task| task.view);
         let channels = self.field.kind.channels() as f64;

@@ -1,4 +1,4 @@
-//! What luma and chroma look like together.
+//! Pictures of luma and chroma together.
 
 use crate::{
     color::{gamut_map_lab, gray_to_lightness},

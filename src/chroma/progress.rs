@@ -1,4 +1,4 @@
-//! What a solver tells of itself.
+//! Progress of a solver.
 
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
@@ -8,7 +8,7 @@ use std::ops::ControlFlow;
 pub struct ChromaProgress {
     /// Iterations of Adam, or rounds of reweighting, done.
     pub iteration: usize,
-    /// Of them in all.
+    /// Iterations or rounds in all.
     pub total: usize,
     /// Mean loss of a pixel in CIELAB units: of Adam at full size since the last report, of
     /// least squares the least so far.

@@ -20,7 +20,7 @@ pub struct Recipe {
     pub scales: RangeInclusive<usize>,
     /// Weight of a's and b's agreement with the next coarser scale.
     pub agreement: f32,
-    /// What counts in a picture.
+    /// Weights of the loss.
     pub loss: LabLossParameters,
 }
 

@@ -1,4 +1,4 @@
-//! What the kernels of stage 2 must read and write at least.
+//! Words that the kernels of stage 2 must read and write at least.
 
 use crate::raster::Load;
 

@@ -1,4 +1,4 @@
-//! What coloring takes of the device, reckoned before it is taken.
+//! Memory of the device for coloring, in bytes, estimated before it is taken.
 
 use super::{ChromaError, correction::Corrections, frozen_view::Frozen};
 use crate::{
@@ -14,13 +14,13 @@ use crate::{
 /// leaves room for the rest on devices of 4 GiB.
 const DEFAULT_PINS: u64 = 2 << 30;
 
-/// What the device may be asked for.
+/// Memory that the device may be asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Room {
     /// Bytes of the device that stage 2 may take; `None`: what views one at a time need,
     /// and 2 GiB of what is worth keeping.
     pub limit: Option<u64>,
-    /// What will be solved for: a and b, or all of RGB.
+    /// Channels to be solved for: a and b, or all of RGB.
     pub color: ColorKind,
     /// The highest degree of harmonics that will be solved for.
     pub sh_degree: u32,
@@ -46,10 +46,10 @@ impl Room {
     }
 }
 
-/// What Gaussians take at least that all stay on the device, whatever the views.
+/// Least memory of Gaussians that all stay on the device, whatever the views.
 pub(super) struct Least {
     bytes: u64,
-    /// Of the largest buffer.
+    /// Bytes of the largest buffer.
     buffer: u64,
 }
 
@@ -73,11 +73,11 @@ impl Least {
 /// Bytes on the device, known before they are taken.
 pub(super) struct Demand {
     splats: usize,
-    /// Of the largest view.
+    /// Tiles of the largest view.
     pub tiles: usize,
-    /// Of the longest lists.
+    /// Entries of the longest lists.
     pub entries: usize,
-    /// What does not depend on which views stay.
+    /// Bytes that do not depend on which views stay.
     fixed: u64,
     /// A wanted pixel's.
     of_pixel: u64,
@@ -88,7 +88,7 @@ pub(super) struct Demand {
 }
 
 impl Demand {
-    /// Of views that show so many Gaussians each, or with `streams` at most.
+    /// Demand of views that show so many Gaussians each, or with `streams` at most.
     pub fn of(
         splats: usize,
         luma_degree: u32,
@@ -146,7 +146,7 @@ impl Demand {
         }
     }
 
-    /// What keeping a view takes.
+    /// Bytes of a view that stays.
     fn of_view(&self, view: &[Frozen]) -> u64 {
         let of_scale = |frozen: &Frozen| {
             Lists::bytes(self.splats, frozen.uniform.tile_count(), frozen.entries)

@@ -1,4 +1,4 @@
-//! Where a view is drawn and judged: buffers and bindings of one pass.
+//! Buffers and bindings by which a view is drawn and judged in a pass.
 
 use super::{
     ChromaError, FrozenViews,
@@ -10,7 +10,7 @@ use crate::{
     raster::{AdjointScratch, Canvas, ChromaAdjoint, ChromaSums, ColorKind, Field, Layer},
 };
 
-/// What a loss is told before it judges.
+/// Parameters of a view's loss.
 pub(super) enum Judge {
     Chroma {
         weights: Buffer<ChromaLossWeights>,
@@ -35,7 +35,7 @@ pub(super) struct Shared<'a> {
     pub canvases: &'a [Canvas],
 }
 
-/// Where one view at one scale is drawn and judged.
+/// Buffers and bindings by which one view at one scale is drawn and judged.
 pub(super) struct Seat {
     pub layer: Layer,
     pub adjoint: ChromaAdjoint,
@@ -48,7 +48,7 @@ pub(super) struct Seat {
 }
 
 impl Seat {
-    /// Of a view at a scale.
+    /// Those of a view at a scale.
     ///
     /// # Errors
     /// [`ChromaError::Gpu`].

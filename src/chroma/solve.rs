@@ -9,13 +9,13 @@ use crate::{
     splats::{ShField, Splats},
 };
 
-/// What a distillation found.
+/// Result of a distillation.
 pub struct Solved {
     /// The chroma of each Gaussian.
     pub chroma: ShField,
-    /// What brought each view into line with the others, where that was asked for.
+    /// Corrections that bring each view into line with the others, where they were asked for.
     pub corrections: Vec<(Task, Correction)>,
-    /// What a dispatch worked on, the mean over the passes.
+    /// Work of a dispatch, the mean over the passes.
     pub load: Load,
     /// In how many pixels of all views each Gaussian shows, `[N]`; `None` of Adam, which does not
     /// know.
@@ -57,7 +57,7 @@ pub fn solve(
     )
 }
 
-/// Where to go on from, and what is done with the solver after each round.
+/// State to go on from, and the call after each round.
 pub(super) type Between<'a> = (
     Option<&'a SolverState>,
     &'a mut dyn FnMut(&IrlsSolver<'_>) -> Result<bool, ChromaError>,

@@ -15,12 +15,12 @@ use crate::{
     splats::sh,
 };
 
-/// What else than the pictures decides.
+/// Weights of the priors beside the pictures.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Priors {
     /// Added to the matrix's diagonal.
     pub ridge: f64,
-    /// What an anchor's pull is of the pictures'.
+    /// Pull of an anchor, as a share of the pictures'.
     pub anchor: f64,
 }
 
@@ -38,7 +38,7 @@ pub(super) struct HostSteps {
     diagonal_scale: f64,
 }
 
-/// What a step goes by: in f32 on the device, in f64 on the host.
+/// Figures that a step goes by: in f32 on the device, in f64 on the host.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Kept {
     pub newest: usize,
@@ -220,7 +220,7 @@ impl Steps {
 const DIAGONAL: &str = "diagonal";
 const LBFGS: &str = "lbfgs";
 
-/// What of the system itself a checkpoint has.
+/// Buffers of the system that a checkpoint has.
 fn of_system(system: &System) -> [(&'static str, &Buffer<f32>); 2] {
     [("unknowns", &system.unknowns), (DIAGONAL, &system.diagonal)]
 }
@@ -234,7 +234,7 @@ fn widened(values: &[f32]) -> Vec<f64> {
 }
 
 impl HostSteps {
-    /// What each unknown's pixels weigh: twin of `of_channel`.
+    /// Weight of each unknown's pixels: twin of `of_channel`.
     fn weights(&self, passes: &Passes<'_>) -> Vec<f64> {
         let Some(on_host) = &passes.on_host else {
             return Vec::new();

@@ -1,4 +1,4 @@
-//! What is wanted in each view, on the host: a word a pixel at each scale, in memory up to
+//! Wanted colors of each view, on the host: a word a pixel at each scale, in memory up to
 //! a bound and in a temporary file beyond.
 
 use std::{
@@ -60,7 +60,7 @@ impl Target {
     }
 }
 
-/// Where a picture waits: pixels, then weights, as words.
+/// Place of a picture: pixels, then weights, as words.
 enum Place {
     Memory(Vec<u32>),
     File(u64),

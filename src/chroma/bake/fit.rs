@@ -96,7 +96,7 @@ pub(in crate::chroma) fn bake_telling(
     Ok(baked)
 }
 
-/// What `exported` lacks of the native pictures, on top of the picture of `unmoved`. Wanted
+/// Difference of the native pictures to `exported`, on top of the picture of `unmoved`. Wanted
 /// pictures hold 0 to 1: what lacks more than half of that is asked for in part.
 fn missing(
     frozen: &FrozenViews,

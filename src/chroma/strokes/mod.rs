@@ -24,7 +24,7 @@ use shade::shaded;
 pub(crate) use shade::{at_middle as at_middle_lightness, shaded as shaded_at};
 use spread::{Claim, Cloud};
 
-/// What paint on a photo claims of it, as [`grow`] has it: α a, α b, α of each pixel, a and b at
+/// Claim of paint on a photo, as [`grow`] has it: α a, α b, α of each pixel, a and b at
 /// the middle lightness. `lightness` is `L*`, `depth` in any unit, NaN where nobody knows.
 pub(crate) fn claimed_by_strokes(
     size: [usize; 2],
@@ -40,14 +40,14 @@ pub(crate) fn claimed_by_strokes(
     grow(&surface, paint)
 }
 
-/// Of a pixel's opacity: from here on what is drawn there is the scene.
+/// Opacity of a pixel from which on it shows the scene.
 const OPAQUE: f32 = 0.5;
 
 /// Drawn claims below the first are none and above the second whole: between them lies an edge
 /// that Gaussians draw softer than the photo has it.
 const EDGE: [f32; 2] = [0.3, 0.7];
 
-/// What is wanted of all views, with strokes laid over what the teachers want.
+/// Targets of all views, with strokes over the teachers'.
 pub(super) struct Laid {
     pub targets: Targets,
     pub tasks: Vec<Task>,
@@ -55,7 +55,7 @@ pub(super) struct Laid {
     pub claimed: f64,
 }
 
-/// What all strokes together claim of each Gaussian.
+/// Claim of all strokes together on each Gaussian.
 struct Claims {
     /// Σ α² a, Σ α² b, Σ α² over the photos.
     colors: Vec<[f32; 3]>,

@@ -42,7 +42,7 @@ const FULL: f32 = 0.8;
 /// Pixels to each side that are around one.
 const AROUND: usize = 2;
 
-/// What a pixel costs that is unlike the stroke by one tolerance more: it grows with the square.
+/// Cost of a pixel that is unlike the stroke by one tolerance more: it grows with the square.
 const UNLIKE: f32 = 0.3;
 
 /// Share of the picture's diagonal that a front can run where nothing slows it.
@@ -54,20 +54,20 @@ const STEP: [f32; 2] = [0.02, 0.12];
 /// Up to here a front claims all, and from 1 on nothing.
 const SURE: f32 = 0.5;
 
-/// What all pixels of one stroke have in common.
+/// Figures of all pixels of one stroke.
 struct Stroke {
     /// a, b at the middle lightness.
     color: [f32; 2],
     /// Its α, but for its rim.
     strength: f32,
-    /// Of pixels beneath it, in tolerances.
+    /// Features of pixels beneath it, in tolerances.
     samples: Vec<Features>,
 }
 
 /// By which pixels are alike, in [`TOLERANCES`].
 type Features = [f32; 3];
 
-/// What paint on a photo claims: α a, α b, α of each pixel, `[height, width]`; a and b are
+/// Claim of paint on a photo: α a, α b, α of each pixel, `[height, width]`; a and b are
 /// those at the [middle lightness](super::shade), α from 0 to 1. `paint` has the photo's size.
 ///
 /// Every pixel goes to the stroke whose front reaches it first; painted ones keep their paint.
@@ -94,7 +94,7 @@ pub(super) fn grow(surface: &Surface<'_>, paint: &HintImage) -> Vec<[f32; 3]> {
     claims
 }
 
-/// What a front claims at a cost.
+/// Claim of a front at a cost, 0 to 1.
 pub(super) fn claimed(cost: f32) -> f32 {
     let t = ((1.0 - cost) / (1.0 - SURE)).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
@@ -273,7 +273,7 @@ impl PartialOrd for Front {
     }
 }
 
-/// What it costs the nearest stroke to come to each pixel, and whose it becomes.
+/// Cost at which the nearest stroke comes to each pixel, and whose it becomes.
 fn fronts(
     surface: &Surface<'_>,
     features: &[Features],
@@ -314,7 +314,7 @@ fn fronts(
     costs
 }
 
-/// What a step in depth costs: nothing, or up to all that a front has.
+/// Cost of a step in depth: nothing, or up to all that a front has.
 fn edge(from: f32, to: f32) -> f32 {
     let step = (from / to).ln().abs();
     let cost = (step - STEP[0]) / (STEP[1] - STEP[0]);

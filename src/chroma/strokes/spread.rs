@@ -43,7 +43,7 @@ pub(super) struct Cloud<'a> {
 }
 
 impl<'a> Cloud<'a> {
-    /// Of a scene of one channel.
+    /// The cloud of a scene of one channel.
     pub fn of(luma: &'a Splats) -> Self {
         let nearest = nearest_neighbors(&luma.means, NEIGHBORS);
         let mut neighbors = nearest.clone();
