@@ -3,7 +3,6 @@
 use std::path::Path;
 
 use glam::DVec3;
-use serde::Serialize;
 
 use super::{SplatError, Splats, sh::coefficient_count};
 
