@@ -9,18 +9,20 @@ use std::{
     sync::Arc,
 };
 
+use serde_json::json;
+
 use crate::{
     capture::{Film, IMAGES},
-    chroma::{
-        ChromaSettings, Degree,
-        teacher::{Teacher, TeacherSettings},
-    },
+    chroma::teacher::{Teacher, TeacherSettings},
     prepare::{PrepareError, PrepareOptions, digest, digest_of, prepare},
     run::{
-        CheckpointOptions, ColorizeOptions, EvalOptions, Event, ExportOptions, FitOptions,
-        FramesOptions, Interrupt, Preset, RunError, RunFolder, Stage, TeachOptions, colorize, eval,
-        export, files, fit, folder::OF_AUTO, frames, originals,
+        ColorizeRequest, EvalOptions, ExportOptions, FitRequest, FramesOptions, Preset, RunError,
+        TeachOptions, colorize, eval, export, fit, frames,
     },
+    store::{
+        CheckpointOptions, Interrupt, RunFolder, StoreError, files, folder::OF_AUTO, originals,
+    },
+    tell::{Event, Observer, Stage},
 };
 
 /// What each result was made from.
@@ -133,6 +135,9 @@ pub enum AutoError {
     /// A later step.
     #[error(transparent)]
     Run(#[from] RunError),
+    /// The folder of results.
+    #[error(transparent)]
+    Store(#[from] StoreError),
 }
 
 /// Whoever is told.
@@ -153,8 +158,6 @@ pub fn auto(options: &AutoOptions, tell: &mut Teller<'_>) -> Result<Results, Aut
         None => String::new(),
     };
     let input = &options.prepare.input;
-    // A folder that COLMAP has been through needs nothing.
-    let prepared = input.join(IMAGES).is_dir() && input.join("sparse").is_dir();
     files::make_folder(&options.output)?;
     let _originals = originals::Kept::default().with(input, "an original").keep();
     for result in [FILM, SCENE] {
@@ -163,22 +166,7 @@ pub fn auto(options: &AutoOptions, tell: &mut Teller<'_>) -> Result<Results, Aut
     if input.is_dir() && options.output.join(PICTURES).is_dir() {
         files::make_pictures_folder(&options.output.join(PICTURES))?;
     }
-    let mut kept = Kept::read(&options.output)?;
-    let house = match prepared {
-        true => input.clone(),
-        false => options.output.join("house"),
-    };
-    if prepared {
-        tell(Told::Skips(Step::Prepare));
-    } else {
-        // It knows by itself what is there.
-        tell(Told::Begins(Step::Prepare, Vec::new()));
-        let asked = PrepareOptions {
-            output: house.clone(),
-            ..options.prepare.clone()
-        };
-        prepare(&asked, &mut |event| tell(Told::Event(event)))?;
-    }
+    let house = prepared(options, tell)?;
     let film = Film::read(&house).map_err(RunError::from)?;
     let run = RunFolder::at(&options.output.join(OF_AUTO));
     let results = Results {
@@ -193,134 +181,157 @@ pub fn auto(options: &AutoOptions, tell: &mut Teller<'_>) -> Result<Results, Aut
         run: run.path().to_owned(),
     };
 
-    let preset = options.preset;
+    let mut steps = Steps {
+        kept: Kept::read(&options.output)?,
+        tell,
+    };
     let from = digest_of(&[
         &digest(&house.join("sparse"))?,
         &digest(&house.join(IMAGES))?,
         &masks(&house)?,
-        &format!("{preset:?}"),
+        &json!(options.preset).to_string(),
     ]);
-    let goes_on = run.checkpoint().is_file() && kept.begun(Step::Fit, &from);
-    if kept.due(Step::Fit, &from, &[&run.luma(), &run.report()]) {
-        kept.begin(Step::Fit, &from)?;
-        let asked = FitOptions {
-            output: Some(run.path().to_owned()),
-            preset,
-            checkpoints: checkpoints(options, goes_on),
-            ..FitOptions::new(house.clone())
-        };
-        tell(Told::Begins(Step::Fit, asked.stages()));
-        fit(&asked, &mut |event| tell(Told::Event(event)))?;
-        kept.done(Step::Fit, &from)?;
-    } else {
-        tell(Told::Skips(Step::Fit));
-    }
+    let mut asked = FitRequest {
+        output: Some(run.path().to_owned()),
+        preset: options.preset,
+        checkpoints: checkpoints(options),
+        ..FitRequest::new(house.clone())
+    };
+    let results_of = [&*run.luma(), &run.report()];
+    let stages = asked.stages();
+    steps.step(Step::Fit, &from, &results_of, stages, |begun, observe| {
+        asked.checkpoints.resume = begun && run.checkpoint().is_file();
+        fit(&asked, observe).map(drop)
+    })?;
 
-    let teacher = options.teacher.to_string_lossy().into_owned();
     let from = digest_of(&[
         &digest(&run.luma())?,
-        &teacher,
+        &*options.teacher.to_string_lossy(),
         &teacher_digest(&options.teacher)?,
-        &format!("{:?}", options.teacher_settings),
+        &json!(options.teacher_settings).to_string(),
         &hints,
     ]);
-    let goes_on = run.color_checkpoint().is_file() && kept.begun(Step::Colorize, &from);
-    if kept.due(Step::Colorize, &from, &[&run.color(), &run.chroma()]) {
-        kept.begin(Step::Colorize, &from)?;
-        let asked = ColorizeOptions {
-            run: Some(run.path().to_owned()),
-            teach: TeachOptions {
-                teachers: vec![(options.teacher.clone(), 1.0)],
-                settings: options.teacher_settings.clone(),
-                hints: options.hints.clone(),
-                ..TeachOptions::default()
-            },
-            output: None,
-            until: None,
-            settings: ChromaSettings::irls(),
-            sh_degree: Degree::Fixed(0),
-            correct_views: None,
-            colmap: None,
-            relight: false,
-            force: false,
-            timings: false,
-            checkpoints: checkpoints(options, goes_on),
-            live: None,
-        };
-        tell(Told::Begins(Step::Colorize, asked.stages()));
-        colorize(&asked, &mut |event| tell(Told::Event(event)))?;
-        kept.done(Step::Colorize, &from)?;
-    } else {
-        tell(Told::Skips(Step::Colorize));
-    }
+    let mut asked = ColorizeRequest {
+        run: Some(run.path().to_owned()),
+        teach: TeachOptions {
+            teachers: vec![(options.teacher.clone(), 1.0)],
+            settings: options.teacher_settings.clone(),
+            hints: options.hints.clone(),
+            ..TeachOptions::default()
+        },
+        checkpoints: checkpoints(options),
+        ..ColorizeRequest::default()
+    };
+    let results_of = [&*run.color(), &run.chroma()];
+    let stages = asked.stages();
+    steps.step(
+        Step::Colorize,
+        &from,
+        &results_of,
+        stages,
+        |begun, observe| {
+            asked.checkpoints.resume = begun && run.color_checkpoint().is_file();
+            colorize(&asked, observe).map(drop)
+        },
+    )?;
 
     let from = digest_of(&[&digest(&run.chroma())?, &digest(&run.color())?]);
-    if kept.due(Step::Frames, &from, &[&results.colored]) {
-        let asked = FramesOptions {
-            run: Some(run.path().to_owned()),
-            colmap: None,
-            teacher: Some(options.teacher.clone()),
-            teacher_settings: options.teacher_settings.clone(),
-            output: results.colored.clone(),
-            hints: options.hints.clone(),
-            teacher_alone: false,
-            frame_rate: None,
-        };
-        tell(Told::Begins(Step::Frames, asked.stages()));
-        let done = frames(&asked, &mut |event| tell(Told::Event(event)))?;
+    let asked = FramesOptions {
+        run: Some(run.path().to_owned()),
+        teacher: Some(options.teacher.clone()),
+        teacher_settings: options.teacher_settings.clone(),
+        output: results.colored.clone(),
+        hints: options.hints.clone(),
+        ..FramesOptions::default()
+    };
+    let stages = asked.stages();
+    steps.step(Step::Frames, &from, &[&results.colored], stages, |_, observe| {
+        let done = frames(&asked, observe)?;
         if done.carried > 0 {
-            tell(Told::Event(Event::Note(format!(
+            observe(Event::Note(format!(
                 "{} of {} photos have no pose: they take colors from their neighbors, or from the teacher alone",
                 done.carried, done.photos
-            ))));
+            )));
         }
-        kept.done(Step::Frames, &from)?;
-    } else {
-        tell(Told::Skips(Step::Frames));
-    }
+        Ok(())
+    })?;
 
-    if kept.due(Step::Export, &from, &[&results.scene]) {
-        let asked = ExportOptions {
-            run: Some(run.path().to_owned()),
-            output: results.scene.clone(),
-            luma: false,
-            colmap_coordinates: false,
-            clean: false,
-            viewer: None,
-            colmap: None,
-        };
-        tell(Told::Begins(Step::Export, asked.stages()));
-        export(&asked, &mut |event| tell(Told::Event(event)))?;
-        kept.done(Step::Export, &from)?;
-    } else {
-        tell(Told::Skips(Step::Export));
-    }
+    let asked = ExportOptions {
+        run: Some(run.path().to_owned()),
+        output: results.scene.clone(),
+        ..ExportOptions::default()
+    };
+    let stages = asked.stages();
+    steps.step(
+        Step::Export,
+        &from,
+        &[&results.scene],
+        stages,
+        |_, observe| export(&asked, observe).map(drop),
+    )?;
 
-    if kept.due(Step::Eval, &from, &[&results.page, &run.evaluation()]) {
-        let asked = EvalOptions {
-            run: Some(run.path().to_owned()),
-            teacher: Some(options.teacher.clone()),
-            teacher_settings: options.teacher_settings.clone(),
-            colmap: None,
-            frames: PATH,
-            baselines: false,
-            recipes: Vec::new(),
-            memory_limit: None,
-            flow: None,
-            lpips: None,
-        };
-        tell(Told::Begins(Step::Eval, asked.stages()));
-        eval(&asked, &mut |event| tell(Told::Event(event)))?;
-        kept.done(Step::Eval, &from)?;
-    } else {
-        tell(Told::Skips(Step::Eval));
-    }
+    let asked = EvalOptions {
+        run: Some(run.path().to_owned()),
+        teacher: Some(options.teacher.clone()),
+        teacher_settings: options.teacher_settings.clone(),
+        frames: PATH,
+        ..EvalOptions::default()
+    };
+    let results_of = [&*results.page, &run.evaluation()];
+    let stages = asked.stages();
+    steps.step(Step::Eval, &from, &results_of, stages, |_, observe| {
+        eval(&asked, observe).map(drop)
+    })?;
     Ok(results)
 }
 
-fn checkpoints(options: &AutoOptions, resume: bool) -> CheckpointOptions {
+/// The folder of photos and poses. One that COLMAP has been through needs nothing.
+fn prepared(options: &AutoOptions, tell: &mut Teller<'_>) -> Result<PathBuf, AutoError> {
+    let input = &options.prepare.input;
+    if input.join(IMAGES).is_dir() && input.join("sparse").is_dir() {
+        tell(Told::Skips(Step::Prepare));
+        return Ok(input.clone());
+    }
+    // It knows by itself what is there.
+    tell(Told::Begins(Step::Prepare, Vec::new()));
+    let asked = PrepareOptions {
+        output: options.output.join("house"),
+        ..options.prepare.clone()
+    };
+    prepare(&asked, &mut |event| tell(Told::Event(event)))?;
+    Ok(asked.output)
+}
+
+/// Steps, of which those are skipped whose results are there.
+struct Steps<'a, 'o> {
+    kept: Kept,
+    tell: &'a mut Teller<'o>,
+}
+
+impl Steps<'_, '_> {
+    /// Does a step that makes `results`; `work` hears whether it was begun from the same before.
+    fn step(
+        &mut self,
+        step: Step,
+        from: &str,
+        results: &[&Path],
+        stages: Vec<Stage>,
+        work: impl FnOnce(bool, &mut Observer<'_>) -> Result<(), RunError>,
+    ) -> Result<(), AutoError> {
+        if !self.kept.due(step, from, results) {
+            (self.tell)(Told::Skips(step));
+            return Ok(());
+        }
+        let begun = self.kept.begun(step, from);
+        self.kept.begin(step, from)?;
+        (self.tell)(Told::Begins(step, stages));
+        work(begun, &mut |event| (self.tell)(Told::Event(event)))?;
+        Ok(self.kept.done(step, from)?)
+    }
+}
+
+fn checkpoints(options: &AutoOptions) -> CheckpointOptions {
     CheckpointOptions {
-        resume,
         interrupt: options.interrupt.clone(),
         ..CheckpointOptions::default()
     }
@@ -350,7 +361,7 @@ struct Kept {
 }
 
 impl Kept {
-    fn read(folder: &Path) -> Result<Self, RunError> {
+    fn read(folder: &Path) -> Result<Self, StoreError> {
         let path = folder.join(KEPT);
         let text = crate::input::read_to_string(&path);
         // What cannot be read is made anew.
@@ -376,18 +387,18 @@ impl Kept {
         begun.is_some_and(|begun| begun == from)
     }
 
-    fn begin(&mut self, step: Step, from: &str) -> Result<(), RunError> {
+    fn begin(&mut self, step: Step, from: &str) -> Result<(), StoreError> {
         self.made.insert(begun(step), from.to_owned());
         self.write()
     }
 
-    fn done(&mut self, step: Step, from: &str) -> Result<(), RunError> {
+    fn done(&mut self, step: Step, from: &str) -> Result<(), StoreError> {
         self.made.remove(&begun(step));
         self.made.insert(step.command().to_owned(), from.to_owned());
         self.write()
     }
 
-    fn write(&self) -> Result<(), RunError> {
+    fn write(&self) -> Result<(), StoreError> {
         let text = serde_json::to_string_pretty(&self.made).unwrap_or_default();
         files::write(&self.path, (text + "\n").as_bytes())
     }

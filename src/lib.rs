@@ -3,7 +3,7 @@
 //! Imports go down only:
 //!
 //! ```text
-//! cli → auto → tradeoff, prepare, view → run → eval, frames, viewers, blocks → report, doctor → luma, chroma → effects, measure, trajectory → raster
+//! cli → auto → tradeoff, view → run, prepare → subject → store → tell → eval, frames, viewers, blocks → report, doctor → luma, chroma → effects, measure, trajectory → raster
 //! → capture, splats → gpu, color, sections, download, npy, programs, oracle, compare → disk, hash, input
 //! ```
 //!
@@ -75,6 +75,9 @@ pub mod report;
 pub mod run;
 mod sections;
 pub mod splats;
+pub mod store;
+pub mod subject;
+pub mod tell;
 #[cfg(feature = "cli")]
 pub mod tradeoff;
 pub mod trajectory;

@@ -13,8 +13,8 @@ use gs_chroma::{
         view::View,
     },
     raster::constants::NEAR_SHARE,
-    run::RunFolder,
     splats::{Splats, ply},
+    store::RunFolder,
 };
 
 use crate::{

@@ -8,9 +8,9 @@ use std::{
 use gs_chroma::{
     capture::LoadOptions,
     gpu::Gpu,
-    luma::{LumaSettings, LumaTrainer, Numerics, Schedule},
+    luma::{LumaOverlay, LumaSettings, LumaTrainer, Numerics, Schedule},
     raster::Raster,
-    run::{FitOptions, Preset, fit},
+    run::{FitRequest, Preset, fit},
     splats::Splats,
 };
 use serde::Serialize;
@@ -87,21 +87,22 @@ pub fn drifts(gpu: &Gpu, subject: &Subject) -> Fallible<Vec<f64>> {
         .collect()
 }
 
-fn options(capture: &Path, output: &Path, seed: u64, numerics: Numerics) -> FitOptions {
-    FitOptions {
+fn options(capture: &Path, output: &Path, seed: u64, numerics: Numerics) -> FitRequest {
+    FitRequest {
         output: Some(output.to_owned()),
         preset: Some(Preset::Draft),
-        settings: Box::new(move |settings| {
-            settings.iterations = FIT_ITERATIONS;
-            settings.stop_when_flat = None;
-            settings.seed = seed;
-            settings.numerics = numerics;
-        }),
+        settings: LumaOverlay {
+            iterations: Some(FIT_ITERATIONS),
+            stop_when_flat: Some(0.0),
+            seed: Some(seed),
+            numerics: Some(numerics),
+            ..LumaOverlay::default()
+        },
         load: LoadOptions {
             max_side: Some(FIT_SIDE),
             ..LoadOptions::default()
         },
-        ..FitOptions::new(capture.to_owned())
+        ..FitRequest::new(capture.to_owned())
     }
 }
 

@@ -220,7 +220,7 @@ pub enum CaptureError {
     },
     /// A range holds none of the values that a photo can have.
     #[error(
-        "{path}: has {depth} a channel, values from 0 to {white}: none lies within --normalize {},{}",
+        "{path}: has {depth} a channel, values from 0 to {white}: none lies within the range {},{}",
         .range[0], .range[1]
     )]
     RangeBeyond {

@@ -6,7 +6,8 @@ use super::SolverKind;
 use crate::effects::{Decider, Decision, Effect, TeacherSpread};
 
 /// Degree of the chroma harmonics.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Degree {
     /// This one.
     Fixed(u32),

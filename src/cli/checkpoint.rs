@@ -7,7 +7,7 @@ use super::{
     interrupt::interrupt,
     values::positive,
 };
-use crate::run::{CheckpointOptions, EVERY};
+use crate::store::{CheckpointOptions, EVERY};
 
 /// How a command can go on.
 #[derive(Args)]

@@ -20,7 +20,7 @@ use crate::chroma::{
     teacher::{TeacherSettings, Upsample},
 };
 use crate::report::timings_table;
-use crate::run::{ColorizeOptions, TeachOptions, colorize};
+use crate::run::{ColorizeRequest, TeachOptions, colorize};
 
 /// How a teacher's small picture becomes as large as the photo.
 const UPSAMPLE: &[(Upsample, &str)] = &[
@@ -234,7 +234,7 @@ impl Colorize {
     pub(super) fn run(self) -> Result<(), CliError> {
         self.check_solver();
         let settings = self.settings();
-        let options = ColorizeOptions {
+        let options = ColorizeRequest {
             teach: TeachOptions {
                 teachers: self.teachers(),
                 settings: TeacherSettings {
@@ -260,7 +260,7 @@ impl Colorize {
         };
         let run = options.run.as_deref().unwrap_or("colorize".as_ref());
         let live = self.view.begin(run)?;
-        let options = ColorizeOptions {
+        let options = ColorizeRequest {
             live: live.clone(),
             ..options
         };
@@ -271,23 +271,21 @@ impl Colorize {
         })?;
         progress.finish();
         if self.json {
-            print(report.to_json())?;
-        } else {
-            print(report.chroma_summary())?;
-            let chroma = report.chroma.as_ref();
-            if let Some(rows) = chroma.and_then(|chroma| chroma.timings.as_ref()) {
-                print(timings_table(rows))?;
-            }
-            let teacher = options.teach.teachers.first().map(|(path, _)| path);
-            let next = match output.contact_sheet.as_deref().and_then(Path::parent) {
-                Some(run) => next::eval(run, teacher.map(PathBuf::as_path)),
-                None => next::view(&output.ply),
-            };
-            let wrote = [Some(output.ply.as_path()), output.contact_sheet.as_deref()];
-            let wrote: Vec<&Path> = wrote.into_iter().flatten().collect();
-            let run = output.contact_sheet.as_deref().and_then(Path::parent);
-            progress.close_with(run.unwrap_or(&output.ply), &wrote, &next)?;
+            return print(report.to_json());
         }
-        Ok(())
+        print(report.chroma_summary())?;
+        let chroma = report.chroma.as_ref();
+        if let Some(rows) = chroma.and_then(|chroma| chroma.timings.as_ref()) {
+            print(timings_table(rows))?;
+        }
+        let teacher = options.teach.teachers.first().map(|(path, _)| path);
+        let run = output.contact_sheet.as_deref().and_then(Path::parent);
+        let next = match run {
+            Some(run) => next::eval(run, teacher.map(PathBuf::as_path)),
+            None => next::view(&output.ply),
+        };
+        let wrote = [Some(output.ply.as_path()), output.contact_sheet.as_deref()];
+        let wrote: Vec<&Path> = wrote.into_iter().flatten().collect();
+        progress.close_with(run.unwrap_or(&output.ply), &wrote, &next)
     }
 }

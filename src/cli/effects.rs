@@ -20,7 +20,7 @@ const EFFECTS: &[(Effect, &str)] = &[
 ];
 
 /// What the user wants regardless of evidence.
-#[derive(Args)]
+#[derive(Args, Clone)]
 pub struct EffectArguments {
     /// Simulate an effect, whatever the plan decides; repeatable.
     ///

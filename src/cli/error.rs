@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::remedy;
 use crate::{
     auto::AutoError, download::DownloadError, prepare::PrepareError, run::RunError,
-    tradeoff::TradeoffError, view::ViewerError,
+    store::StoreError, tradeoff::TradeoffError, view::ViewerError,
 };
 
 /// What stopped a command; one line that names the file and the remedy.
@@ -14,6 +14,9 @@ pub enum CliError {
     /// A run.
     #[error("{}", remedy::of_run(.0))]
     Run(#[from] RunError),
+    /// A file or a folder.
+    #[error("{}", remedy::of_store(.0))]
+    Store(#[from] StoreError),
     /// A sweep.
     #[error("{}", remedy::of_sweep(.0))]
     Tradeoff(#[from] TradeoffError),

@@ -12,7 +12,8 @@ use super::{
     values::one_of,
 };
 use crate::{
-    run::{Event, ExportOptions, Exported, Look, Shown, Stage, export},
+    run::{ExportOptions, Exported, Look, Shown, export},
+    tell::{Event, Stage},
     view::{is_html, write_html},
     viewers::ViewerChoice,
 };

@@ -19,11 +19,13 @@ use super::{
     values::{PRESETS, folder, one_of, positive},
     view::ViewArguments,
 };
-use crate::capture::LoadOptions;
-use crate::effects::Overrules;
-use crate::luma::Goal;
-use crate::report::timings_table;
-use crate::run::{AheadOptions, FitOptions, Init, Preset, fit};
+use crate::{
+    capture::LoadOptions,
+    effects::Overrules,
+    luma::Goal,
+    report::timings_table,
+    run::{AheadOptions, FitRequest, Init, Preset, fit},
+};
 
 /// Rows of the curve that is printed.
 const CURVE_ROWS: usize = 8;
@@ -94,144 +96,138 @@ pub struct Fit {
 
 impl Fit {
     pub(super) fn run(self) -> Result<(), CliError> {
-        let seconds = self.time_limit.map(|minutes| 60.0 * minutes);
-        let goal = match (self.target_psnr, seconds) {
-            (Some(psnr), within) => Goal::Reach { psnr, within },
-            (None, Some(seconds)) => Goal::Within { seconds },
-            (None, None) => Goal::Fixed,
-        };
-        let (load, overrules) = (self.photos.options(), self.effects.overrules());
-        let overlay = self.luma.overlay();
-        let asked = match FitOptions::continuing(&self.colmap_dir)? {
-            Some(run) => {
-                if [
-                    load != LoadOptions::default(),
-                    overrules != Overrules::default(),
-                    self.preset.is_some(),
-                    self.init.is_some(),
-                ]
-                .contains(&true)
-                {
-                    refuse(
-                        ErrorKind::ArgumentConflict,
-                        "a run continues with its own photos, effects, preset and Gaussians: leave out the options that name others",
-                    );
-                }
-                let run = match &self.around {
-                    Some(merged) => run.among(merged)?,
-                    None => run,
-                };
-                FitOptions {
-                    output: self.output.or(run.output),
-                    measure_side: self.measure_side.or(run.measure_side),
-                    settings: Box::new(move |settings| {
-                        (run.settings)(settings);
-                        overlay(settings);
-                    }),
-                    ..run
-                }
-            }
-            None if self.around.is_some() => refuse(
-                ErrorKind::ArgumentConflict,
-                "--around goes on with a trained block: train it first",
-            ),
-            None => match FitOptions::of_block(&self.colmap_dir)? {
-                Some(block) => {
-                    let photos = LoadOptions {
-                        max_side: None,
-                        ..load.clone()
-                    };
-                    let effects = Overrules {
-                        sh_degree: None,
-                        ..overrules.clone()
-                    };
-                    let asks = photos != LoadOptions::default() || effects != Overrules::default();
-                    if block.inherits() && asks {
-                        refuse(
-                            ErrorKind::ArgumentConflict,
-                            "a block has the photos' options and effects of its job's coarse model: give them to that",
-                        );
-                    }
-                    let inherited = block.inherits();
-                    FitOptions {
-                        output: self.output.or(block.output),
-                        preset: self.preset.or(block.preset),
-                        settings: Box::new(move |settings| {
-                            (block.settings)(settings);
-                            overlay(settings);
-                        }),
-                        load: match inherited {
-                            true => LoadOptions {
-                                max_side: load.max_side,
-                                ..block.load
-                            },
-                            false => LoadOptions {
-                                chosen: block.load.chosen,
-                                ..load
-                            },
-                        },
-                        overrules: match inherited {
-                            true => Overrules {
-                                sh_degree: overrules.sh_degree,
-                                ..block.overrules
-                            },
-                            false => overrules,
-                        },
-                        init: self.init.map(Init::File),
-                        measure_side: self.measure_side,
-                        ..block
-                    }
-                }
-                None => FitOptions {
-                    output: self.output,
-                    preset: self.preset,
-                    settings: overlay,
-                    load,
-                    overrules,
-                    init: self.init.map(Init::File),
-                    measure_side: self.measure_side,
-                    ..FitOptions::new(self.colmap_dir)
-                },
-            },
-        };
-        let options = FitOptions {
-            goal,
-            timings: self.timings,
-            checkpoints: self.checkpoints.options(),
-            ahead: AheadOptions {
-                teachers: self.teacher,
-                settings: self.network.settings(),
-            },
-            ..asked
-        };
-        let asked = options.ahead.teachers.first().cloned();
-        let run = options.output.as_ref().unwrap_or(&options.colmap_dir);
+        let request = self.request()?;
+        let run = request.output.as_ref().unwrap_or(&request.colmap_dir);
         let live = self.view.begin(run)?;
-        let options = FitOptions {
+        let request = FitRequest {
             live: live.clone(),
-            ..options
+            ..request
         };
-        let mut progress = Progress::through(options.stages());
-        let (folder, report) = fit(&options, &mut |event| {
+        let mut progress = Progress::through(request.stages());
+        let (folder, report) = fit(&request, &mut |event| {
             live.iter().for_each(|live| live.tell(&event));
             progress.show(&event);
         })?;
         progress.finish();
         if self.json {
-            print(report.to_json())?;
-        } else {
-            if let Some(curve) = report.curve_table(CURVE_ROWS) {
-                print(curve)?;
-            }
-            print(report.luma_summary())?;
-            if let Some(rows) = &report.luma.timings {
-                print(timings_table(rows))?;
-            }
-            let next = next::colorize(folder.path(), asked.as_deref());
-            let wrote = [folder.luma(), folder.contact_sheet()];
-            let wrote = wrote.each_ref().map(PathBuf::as_path);
-            progress.close_with(folder.path(), &wrote, &next)?;
+            return print(report.to_json());
         }
-        Ok(())
+        if let Some(curve) = report.curve_table(CURVE_ROWS) {
+            print(curve)?;
+        }
+        print(report.luma_summary())?;
+        if let Some(rows) = &report.luma.timings {
+            print(timings_table(rows))?;
+        }
+        let next = next::colorize(folder.path(), self.teacher.first().map(PathBuf::as_path));
+        let wrote = [folder.luma(), folder.contact_sheet()];
+        let wrote = wrote.each_ref().map(PathBuf::as_path);
+        progress.close_with(folder.path(), &wrote, &next)
+    }
+
+    /// The request: what the first argument names, with what else is given over it.
+    fn request(&self) -> Result<FitRequest, CliError> {
+        let (load, overrules) = (
+            self.photos.clone().options(),
+            self.effects.clone().overrules(),
+        );
+        let asked = match FitRequest::continuing(&self.colmap_dir)? {
+            Some(run) => self.further(run, &load, &overrules)?,
+            None if self.around.is_some() => refuse(
+                ErrorKind::ArgumentConflict,
+                "--around goes on with a trained block: train it first",
+            ),
+            None => match FitRequest::of_block(&self.colmap_dir)? {
+                Some(block) => of_block(block, load, overrules),
+                None => FitRequest {
+                    load,
+                    overrules,
+                    ..FitRequest::new(self.colmap_dir.clone())
+                },
+            },
+        };
+        let seconds = self.time_limit.map(|minutes| 60.0 * minutes);
+        Ok(FitRequest {
+            output: self.output.clone().or(asked.output),
+            preset: self.preset.or(asked.preset),
+            settings: self.luma.overlay().over(asked.settings),
+            measure_side: self.measure_side.or(asked.measure_side),
+            init: self.init.clone().map(Init::File).or(asked.init),
+            goal: match (self.target_psnr, seconds) {
+                (Some(psnr), within) => Goal::Reach { psnr, within },
+                (None, Some(seconds)) => Goal::Within { seconds },
+                (None, None) => Goal::Fixed,
+            },
+            timings: self.timings,
+            checkpoints: self.checkpoints.options(),
+            ahead: AheadOptions {
+                teachers: self.teacher.clone(),
+                settings: self.network.clone().settings(),
+            },
+            ..asked
+        })
+    }
+
+    /// A run that goes on with what it was made from.
+    fn further(
+        &self,
+        run: FitRequest,
+        load: &LoadOptions,
+        overrules: &Overrules,
+    ) -> Result<FitRequest, CliError> {
+        let names_others = *load != LoadOptions::default()
+            || *overrules != Overrules::default()
+            || self.preset.is_some()
+            || self.init.is_some();
+        if names_others {
+            refuse(
+                ErrorKind::ArgumentConflict,
+                "a run continues with its own photos, effects, preset and Gaussians: leave out the options that name others",
+            );
+        }
+        match &self.around {
+            Some(merged) => Ok(run.among(merged)?),
+            None => Ok(run),
+        }
+    }
+}
+
+/// A block with what is asked for over what its job's coarse model has decided.
+fn of_block(block: FitRequest, load: LoadOptions, overrules: Overrules) -> FitRequest {
+    if !block.inherits() {
+        return FitRequest {
+            load: LoadOptions {
+                chosen: block.load.chosen,
+                ..load
+            },
+            overrules,
+            ..block
+        };
+    }
+    let own = (load.max_side, overrules.sh_degree);
+    let shared = LoadOptions {
+        max_side: None,
+        ..load
+    };
+    let effects = Overrules {
+        sh_degree: None,
+        ..overrules
+    };
+    if shared != LoadOptions::default() || effects != Overrules::default() {
+        refuse(
+            ErrorKind::ArgumentConflict,
+            "a block has the photos' options and effects of its job's coarse model: give them to that",
+        );
+    }
+    FitRequest {
+        load: LoadOptions {
+            max_side: own.0,
+            ..block.load
+        },
+        overrules: Overrules {
+            sh_degree: own.1,
+            ..block.overrules
+        },
+        ..block
     }
 }

@@ -10,10 +10,7 @@ use std::{
 };
 
 use super::CliError;
-use crate::{
-    disk, programs,
-    run::{Interrupt, RunError},
-};
+use crate::{disk, programs, run::RunError, store::Interrupt};
 
 /// The statuses with which a shell expects a program to end that was interrupted, and one that was
 /// told to end.

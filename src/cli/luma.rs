@@ -6,8 +6,7 @@ use super::{
     headings::{BUDGET, EXPERT, QUALITY},
     values::positive,
 };
-use crate::luma::{FLAT, LumaSettings, Numerics};
-use crate::run::Overlay;
+use crate::luma::{FLAT, LumaOverlay, Numerics};
 
 /// What is asked for instead of the preset's settings.
 #[derive(Args)]
@@ -48,37 +47,21 @@ pub(super) struct LumaArguments {
 
 impl LumaArguments {
     /// What changes the preset's settings.
-    pub(super) fn overlay(self) -> Overlay {
-        Box::new(move |settings| self.apply(settings))
-    }
-
-    /// Puts what was given in the place of what is there.
-    fn apply(&self, settings: &mut LumaSettings) {
-        if self.no_fill_gaps {
-            settings.fill_gaps = false;
-        }
-        if self.no_surround {
-            settings.surround = false;
-        }
-        if let Some(iterations) = self.iterations {
-            settings.iterations = iterations as usize;
-            // Who says how many iterations wants them all.
-            settings.stop_when_flat = None;
-        }
-        if let Some(max_splats) = self.max_splats {
-            settings.max_splats = max_splats as usize;
-        }
-        if let Some(mib) = self.memory_limit {
-            settings.memory_limit = Some(u64::from(mib) << 20);
-        }
-        if let Some(gain) = self.stop_when_flat {
-            settings.stop_when_flat = Some(gain.unwrap_or(FLAT));
-        }
-        if let Some(numerics) = self.numerics {
-            settings.numerics = numerics;
-        }
-        if let Some(seed) = self.seed {
-            settings.seed = seed;
+    pub(super) fn overlay(&self) -> LumaOverlay {
+        LumaOverlay {
+            iterations: self.iterations.map(|count| count as usize),
+            stop_when_flat: match self.stop_when_flat {
+                Some(gain) => Some(gain.unwrap_or(FLAT)),
+                // Who says how many iterations wants them all.
+                None => self.iterations.map(|_| 0.0),
+            },
+            max_splats: self.max_splats.map(|count| count as usize),
+            surround: self.no_surround.then_some(false),
+            fill_gaps: self.no_fill_gaps.then_some(false),
+            memory_limit: self.memory_limit.map(|mib| u64::from(mib) << 20),
+            numerics: self.numerics,
+            seed: self.seed,
+            ..LumaOverlay::default()
         }
     }
 }
@@ -88,6 +71,7 @@ mod tests {
     use clap::Parser;
 
     use super::*;
+    use crate::luma::LumaSettings;
     use crate::luma::Preset;
 
     #[derive(Parser)]
@@ -99,7 +83,8 @@ mod tests {
     fn overlaid(preset: Preset, words: &[&str]) -> LumaSettings {
         let words = ["program"].iter().chain(words);
         let mut settings = preset.settings();
-        Only::parse_from(words).arguments.apply(&mut settings);
+        let overlay = Only::parse_from(words).arguments.overlay();
+        overlay.apply(&mut settings);
         settings
     }
 

@@ -39,7 +39,7 @@ mod view;
 use std::{
     fmt::Display,
     io::{self, Write},
-    path::PathBuf,
+    path::Path,
     process::ExitCode,
 };
 
@@ -47,7 +47,7 @@ use clap::{Parser, Subcommand};
 
 pub use error::CliError;
 
-use crate::run::RunError;
+use crate::store::StoreError;
 
 /// Turns grayscale photos or films into a colored 3D Gaussian splat scene.
 #[derive(Parser)]
@@ -132,12 +132,9 @@ fn print(line: impl Display) -> Result<(), CliError> {
 /// The same for text of our own. A reader that has seen enough (`| head`) is no error.
 fn print_as_is(text: &str) -> Result<(), CliError> {
     match writeln!(io::stdout(), "{text}") {
-        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
-            Err(CliError::Run(RunError::File {
-                path: PathBuf::from("standard output"),
-                reason: error.to_string(),
-            }))
-        }
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(CliError::Store(
+            StoreError::file(Path::new("standard output"), error.to_string()),
+        )),
         _ => Ok(()),
     }
 }

@@ -18,7 +18,7 @@ const DEVICES: &[(TeacherDevice, &str)] = &[
 ];
 
 /// How a network is to be asked.
-#[derive(Args)]
+#[derive(Args, Clone)]
 pub struct NetworkArguments {
     /// Input and output conventions of the network [default: detected].
     ///

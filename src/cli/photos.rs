@@ -36,7 +36,7 @@ const MASK_USES: &[(MaskUse, &str)] = &[
 ];
 
 /// How photos are loaded.
-#[derive(Args)]
+#[derive(Args, Clone)]
 pub(super) struct Photos {
     /// Shrink photos to this longer side, in pixels [default: the preset's].
     #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(16..), help_heading = QUALITY)]

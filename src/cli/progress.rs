@@ -10,7 +10,7 @@ use super::{
     bar::{Bar, WIDTH},
     next, print, printable,
 };
-use crate::run::{Event, Stage};
+use crate::tell::{Event, Stage};
 
 /// Stages whose messages are figures, of which the last is the best known; those of others name
 /// what is at hand.

@@ -9,27 +9,21 @@ use crate::{
     download::DownloadError,
     eval::EvalError,
     gpu::GpuError,
-    prepare::PrepareError,
+    prepare::{PrepareError, pycolmap::PINNED},
+    programs::ProgramError,
     run::RunError,
+    store::StoreError,
+    subject::SubjectError,
     tradeoff::TradeoffError,
+    trajectory::TrajectoryError,
     view::ViewerError,
 };
 
 /// What the user reads of an error of a run.
 pub(super) fn of_run(error: &RunError) -> String {
     match error {
-        RunError::Capture(error) => of_capture(error),
-        RunError::Unsound(error) => format!("{error}; or continue with --force"),
-        RunError::Exchanged { .. } => {
-            format!("{error}: name them as before, train again, or continue with --force")
-        }
-        RunError::OtherModel { .. } => {
-            format!("{error}: put the model back that `fit` has read, or run `fit` with this one")
-        }
-        RunError::OtherFile(_) => format!(
-            "{error}: put its own back, run `fit` or `colorize` again, or name the splat file in place of the run"
-        ),
-        RunError::Gpu(error) => of_gpu(error),
+        RunError::Store(error) => of_store(error),
+        RunError::Subject(error) => of_subject(error),
         RunError::Teacher(error) => of_teacher(error),
         RunError::Chroma(ChromaError::OverLimit { .. }) => format!(
             "{error}: raise --memory-limit, or train with fewer Gaussians or smaller photos"
@@ -40,26 +34,17 @@ pub(super) fn of_run(error: &RunError) -> String {
         RunError::Eval(EvalError::Flow { .. }) => {
             format!("{error}: make it from the frames that `eval` writes, with as many --frames")
         }
-        RunError::NoRun => {
-            format!("{error}: train one with `gs-chroma fit COLMAP_DIR`, or name a run folder")
-        }
-        RunError::NoCameras(_) => format!("{error}: name the COLMAP folder with --colmap"),
-        RunError::NoSplats(_) => {
-            format!("{error}: name another file, or train again with `gs-chroma fit`")
-        }
         RunError::Coarse { .. } => format!(
             "{error}: leave --colmap-coordinates out, and the file lies near the origin and says by how much"
         ),
         RunError::NothingToResume(_) => {
             format!("{error}; without --resume training starts over")
         }
-        RunError::OtherCheckpoint { .. } => {
-            format!("{error}: give the same options, or leave out --resume to train again")
+        RunError::NoTrainedBlock(_) => format!("{error}: --around is for these"),
+        RunError::Trajectory(error @ TrajectoryError::Long { .. }) => {
+            format!("{error}; lower --seconds or --fps")
         }
-        RunError::Interrupted { .. } => format!("{error} with the same command and --resume"),
-        RunError::Program(program) if program.lacks_ffmpeg() => {
-            format!("{error}, or write pictures: -o FOLDER")
-        }
+        RunError::Program(program) => of_program(program),
         RunError::NoHeldOut => format!("{error}: choose --views train or --views all"),
         RunError::NothingPainted(_) => format!("{error}, or give a --teacher as well"),
         RunError::NothingUntil { until, .. } => format!("--until {until}: {error}"),
@@ -76,10 +61,57 @@ pub(super) fn of_run(error: &RunError) -> String {
     }
 }
 
+/// What the user reads of a scene and photos that cannot be worked on.
+fn of_subject(error: &SubjectError) -> String {
+    match error {
+        SubjectError::Store(error) => of_store(error),
+        SubjectError::Capture(error) => of_capture(error),
+        SubjectError::Unsound(error) => format!("{error}; or continue with --force"),
+        SubjectError::Exchanged { .. } => {
+            format!("{error}: name them as before, train again, or continue with --force")
+        }
+        SubjectError::Gpu(error) => of_gpu(error),
+        SubjectError::NoCameras(_) => format!("{error}: name the COLMAP folder with --colmap"),
+        SubjectError::NoSplats(_) => {
+            format!("{error}: name another file, or train again with `gs-chroma fit`")
+        }
+        _ => error.to_string(),
+    }
+}
+
+/// What the user reads of a file or folder that is wrong.
+pub(super) fn of_store(error: &StoreError) -> String {
+    match error {
+        StoreError::Program(program) => of_program(program),
+        StoreError::OtherModel { .. } => {
+            format!("{error}: put the model back that `fit` has read, or run `fit` with this one")
+        }
+        StoreError::OtherFile(_) => format!(
+            "{error}: put its own back, run `fit` or `colorize` again, or name the splat file in place of the run"
+        ),
+        StoreError::NoRun => {
+            format!("{error}: train one with `gs-chroma fit COLMAP_DIR`, or name a run folder")
+        }
+        StoreError::Interrupted { .. } => format!("{error} with the same command and --resume"),
+        StoreError::OtherCheckpoint { .. } => {
+            format!("{error}: give the same options, or leave out --resume to train again")
+        }
+        _ => error.to_string(),
+    }
+}
+
+fn of_program(program: &ProgramError) -> String {
+    match program.lacks_ffmpeg() {
+        true => format!("{program}, or write pictures: -o FOLDER"),
+        false => program.to_string(),
+    }
+}
+
 /// What the user reads of an error of a sweep.
 pub(super) fn of_sweep(error: &TradeoffError) -> String {
     match error {
         TradeoffError::Run(error) => of_run(error),
+        TradeoffError::Store(error) => of_store(error),
         _ => error.to_string(),
     }
 }
@@ -88,6 +120,7 @@ pub(super) fn of_sweep(error: &TradeoffError) -> String {
 pub(super) fn of_viewer(error: &ViewerError) -> String {
     match error {
         ViewerError::Run(error) => of_run(error),
+        ViewerError::Store(error) => of_store(error),
         ViewerError::Port { .. } => format!("{error}: choose another --port, or leave it out"),
         ViewerError::Nothing(_) => format!("{error}: train one with `gs-chroma fit COLMAP_DIR`"),
     }
@@ -96,7 +129,15 @@ pub(super) fn of_viewer(error: &ViewerError) -> String {
 /// What the user reads of what keeps a film or photos from being prepared.
 pub(super) fn of_preparing(error: &PrepareError) -> String {
     match error {
-        PrepareError::Run(error) => of_run(error),
+        PrepareError::Capture(error) => of_capture(error),
+        PrepareError::Store(error) => of_store(error),
+        PrepareError::NoColmap | PrepareError::UnknownLens { .. } => {
+            format!("{error}, or give --install, which puts {PINNED} into the cache")
+        }
+        PrepareError::OtherInput { .. } => format!("{error}, or start over with --force"),
+        PrepareError::Changed { .. } => format!(
+            "{error} (masks are taken from there with --masks), or choose another folder with -o"
+        ),
         PrepareError::Program(program) if program.lacks_ffmpeg() => {
             format!("{error}, or give a folder of frames")
         }
@@ -113,12 +154,13 @@ pub(super) fn of_auto(error: &AutoError) -> String {
             input.display()
         ),
         AutoError::Prepare(error) => of_preparing(error),
-        AutoError::Run(RunError::Interrupted { iteration, .. }) => {
+        AutoError::Run(RunError::Store(StoreError::Interrupted { iteration, .. })) => {
             format!(
                 "interrupted after iteration {iteration}; the same command continues from there"
             )
         }
         AutoError::Run(error) => of_run(error),
+        AutoError::Store(error) => of_store(error),
     }
 }
 
@@ -148,6 +190,15 @@ fn of_gpu(error: &GpuError) -> String {
 
 fn of_capture(error: &CaptureError) -> String {
     match error {
+        CaptureError::RangeBeyond {
+            path,
+            depth,
+            white,
+            range: [low, high],
+        } => format!(
+            "{}: has {depth} a channel, values from 0 to {white}: none lies within --normalize {low},{high}",
+            path.display()
+        ),
         CaptureError::MixedDepths { .. } => format!("{error}, or give --normalize off"),
         CaptureError::NoMaskFolder { .. } => {
             format!("{error}; name another with --masks, or leave it out")
@@ -166,6 +217,9 @@ fn of_teacher(error: &TeacherError) -> String {
         TeacherError::Senseless { .. } => format!(
             "{error}: give --teacher-profile, or another one (`gs-chroma teacher check` tries the usual ones)"
         ),
+        TeacherError::NoTransparency { .. } => {
+            format!("{error}, or give whole pictures as a --teacher folder")
+        }
         TeacherError::UnknownTeacher { .. } => {
             format!("{error} (`gs-chroma teacher list` says more)")
         }

@@ -12,7 +12,10 @@ use super::{
     usage::refuse,
     values::{Rate, folder, one_of, positive, rate},
 };
-use crate::run::{PathOptions, RenderOptions, Rendered, Views, Way, is_film, render, render_path};
+use crate::{
+    run::{PathOptions, RenderOptions, Rendered, Views, Way, render, render_path},
+    store::is_film,
+};
 
 const VIEWS: &[(Views, &str)] = &[
     (Views::Train, "Those trained on"),

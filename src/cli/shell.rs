@@ -10,7 +10,7 @@ use clap_complete::{Shell, generate};
 use clap_mangen::Man;
 
 use super::{Cli, CliError, print, print_as_is};
-use crate::{disk, run::RunError};
+use crate::{disk, store::StoreError};
 
 /// Print a completion script for a shell.
 #[derive(Args)]
@@ -72,8 +72,5 @@ fn write(command: &Command, name: &str, folder: &Path) -> Result<usize, CliError
 }
 
 fn unwritable(path: &Path, error: &std::io::Error) -> CliError {
-    CliError::Run(RunError::File {
-        path: path.to_owned(),
-        reason: error.to_string(),
-    })
+    CliError::Store(StoreError::file(path, error.to_string()))
 }

@@ -16,7 +16,8 @@ use crate::{
     chroma::teacher::{Catalog, Checkup, GrayImage, KnownTeacher, TeacherError, ToldBy, check},
     download::{DownloadError, Source, download},
     input,
-    run::{RunError, files, originals::Kept},
+    run::RunError,
+    store::{StoreError, files, originals::Kept},
 };
 
 /// List, download and check colorization networks.
@@ -124,10 +125,7 @@ impl Check {
 }
 
 fn unreadable(path: &Path, reason: &impl ToString) -> CliError {
-    CliError::Run(RunError::File {
-        path: path.to_path_buf(),
-        reason: reason.to_string(),
-    })
+    CliError::Store(StoreError::file(path, reason.to_string()))
 }
 
 /// Candidates that are further off, in CIELAB units, are not worth a line.

@@ -11,8 +11,11 @@ use super::{
     progress::Progress,
     values::{PRESETS, folder, one_of, positive},
 };
-use crate::run::{Preset, Stage};
-use crate::tradeoff::{FILES, PointStage, TradeoffOptions, front_table, knob_names, tradeoff};
+use crate::{
+    run::Preset,
+    tell::Stage,
+    tradeoff::{FILES, PointStage, TradeoffOptions, front_table, knob_names, tradeoff},
+};
 
 /// Measure quality against time on your own photos and device.
 ///

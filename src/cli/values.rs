@@ -8,7 +8,7 @@ use std::{
 use clap::builder::{PathBufValueParser, PossibleValue, PossibleValuesParser, TypedValueParser};
 use serde::Serialize;
 
-use crate::run::{Preset, is_film};
+use crate::{run::Preset, store::is_film};
 
 /// The presets with their help.
 pub(super) const PRESETS: &[(Preset, &str)] = &[

@@ -11,7 +11,9 @@ use clap::Args;
 
 use super::{CliError, headings::OUTPUT, interrupt, print, progress::Progress};
 use crate::{
-    run::{Live, Look, Stage},
+    run::Look,
+    subject::Live,
+    tell::Stage,
     view::{OfCommand, OfRun, Server, answer},
 };
 

@@ -224,7 +224,7 @@ pub struct Room {
 }
 
 /// What the user wants regardless of evidence.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Overrules {
     /// On.
     pub with: Vec<Effect>,

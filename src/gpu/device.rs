@@ -347,6 +347,15 @@ impl Gpu {
         })
     }
 
+    /// [`Self::open`], and [`Self::timed`] where that is asked for.
+    ///
+    /// # Errors
+    /// As these.
+    pub fn open_timed(timed: bool) -> Result<Self, GpuError> {
+        let gpu = Self::open()?;
+        if timed { gpu.timed() } else { Ok(gpu) }
+    }
+
     /// What each kernel took since the last call, in order of first use; nothing
     /// unless the device is [`Self::timed`]. Waits for the device.
     ///

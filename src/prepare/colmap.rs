@@ -14,7 +14,7 @@ use crate::{
     capture::lens::MODELS,
     disk,
     programs::{Program, ProgramError},
-    run::files,
+    store::files,
 };
 
 /// As many camera models, the first of [`MODELS`], every version knows.

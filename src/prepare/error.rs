@@ -2,27 +2,25 @@
 
 use std::path::PathBuf;
 
-use super::pycolmap::PINNED;
-use crate::{programs::ProgramError, run::RunError};
+use crate::{capture::CaptureError, programs::ProgramError, store::StoreError};
 
 /// What stopped it; one line that names the file and the remedy.
 #[derive(Debug, thiserror::Error)]
 pub enum PrepareError {
-    /// The photos or the file system.
+    /// The photos.
     #[error(transparent)]
-    Run(#[from] RunError),
+    Capture(#[from] CaptureError),
+    /// The file system.
+    #[error(transparent)]
+    Store(#[from] StoreError),
     /// A program of others, such as FFmpeg.
     #[error(transparent)]
     Program(#[from] ProgramError),
     /// There is neither COLMAP nor its Python module.
-    #[error(
-        "COLMAP is not installed: install it (Debian, Ubuntu: apt-get install colmap), or give --install, which puts {PINNED} into the cache"
-    )]
+    #[error("COLMAP is not installed: install it (Debian, Ubuntu: apt-get install colmap)")]
     NoColmap,
     /// COLMAP knows no such camera model.
-    #[error(
-        "COLMAP {version} does not know the lens {lens}: install a newer one, or give --install, which puts {PINNED} into the cache"
-    )]
+    #[error("COLMAP {version} does not know the lens {lens}: install a newer one")]
     UnknownLens {
         /// COLMAP's name of the camera model.
         lens: String,
@@ -63,7 +61,7 @@ pub enum PrepareError {
     },
     /// The output folder belongs to another input.
     #[error(
-        "{}: was prepared from {}; name another folder with -o, or start over with --force", folder.display(), input.display()
+        "{}: was prepared from {}; name another folder with -o", folder.display(), input.display()
     )]
     OtherInput {
         /// Folder at fault.
@@ -73,7 +71,7 @@ pub enum PrepareError {
     },
     /// What would be replaced is not what was made.
     #[error(
-        "{}: was changed since it was made, and would be replaced; move it elsewhere (masks are taken from there with --masks), or choose another folder with -o", path.display()
+        "{}: was changed since it was made, and would be replaced; move it elsewhere", path.display()
     )]
     Changed {
         /// The file or folder.

@@ -17,7 +17,8 @@ use super::{
 use crate::{
     capture::{CaptureError, FRAMES, Film, IMAGES, in_order, plain_header},
     disk,
-    run::{Event, Observer, RunError, Stage, files},
+    store::{StoreError, files},
+    tell::{Event, Observer, Stage},
 };
 
 /// The file that says which film it is.
@@ -201,7 +202,7 @@ fn extract(
             reason: "has no frame there; choose another part with --start and --end".to_owned(),
         });
     };
-    let header = plain_header(&frames.join(first)).map_err(RunError::from)?;
+    let header = plain_header(&frames.join(first))?;
     let times = match scan {
         // Other frames than the file has.
         Scan::Telecined => Vec::new(),
@@ -279,11 +280,9 @@ fn choose_sharp(
         return Ok(());
     }
     state.check_own(IMAGES)?;
-    let film = Film::read(&state.path(".")).map_err(RunError::from)?;
-    let film = film.ok_or_else(|| RunError::File {
-        path: state.path(FILM),
-        reason: "is gone; start over with --force".to_owned(),
-    })?;
+    let film = Film::read(&state.path("."))?;
+    let film = film
+        .ok_or_else(|| StoreError::file(&state.path(FILM), "is gone; start over with --force"))?;
     let [numerator, denominator] = film.frame_rate.map(f64::from);
     let rate = numerator / denominator;
     let per_second = options
@@ -304,8 +303,7 @@ fn choose_sharp(
                 }
                 Ok::<_, CaptureError>(())
             },
-        )
-        .map_err(RunError::from)?;
+        )?;
         let chosen = sharp::sharpest(&sharpness, rate, per_second);
         chosen
             .into_iter()

@@ -5,7 +5,7 @@ use serde_json::Value;
 use super::PrepareError;
 use crate::{
     programs::{FFMPEG, Program},
-    run::{Event, Observer},
+    tell::{Event, Observer},
 };
 
 /// Transfers of HDR, and those of other films that usual screens do not show.

@@ -18,7 +18,7 @@ use crate::{
         plain_mask, plain_photo,
     },
     disk,
-    run::{RunError, files},
+    store::{StoreError, files},
 };
 
 /// Borders are looked for in so many photos, evenly spread.
@@ -80,8 +80,7 @@ pub(super) fn borders(
             told(looked_at, paths.len());
             Ok::<_, CaptureError>(())
         },
-    )
-    .map_err(RunError::from)?;
+    )?;
     Ok(found.found())
 }
 
@@ -99,12 +98,7 @@ pub(super) fn named(folder: &Path, photos: &Photos) -> Result<NamedFiles, Prepar
     .map_err(|(path, error)| files::at(&path)(error))?;
     named.know(photos.headers.keys().map(String::as_str));
     for name in photos.headers.keys() {
-        if named
-            .of(name)
-            .map_err(CaptureError::from)
-            .map_err(RunError::from)?
-            .is_some()
-        {
+        if named.of(name).map_err(CaptureError::from)?.is_some() {
             return Ok(named);
         }
     }
@@ -113,10 +107,10 @@ pub(super) fn named(folder: &Path, photos: &Photos) -> Result<NamedFiles, Prepar
         .keys()
         .next()
         .map(|name| format!("{name}.png"));
-    Err(RunError::from(CaptureError::NoMasks {
+    Err(CaptureError::NoMasks {
         dir: folder.into(),
         example: example.unwrap_or_default().into(),
-    })
+    }
     .into())
 }
 
@@ -141,10 +135,7 @@ impl Sources {
         for (done, (name, header)) in photos.headers.iter().enumerate() {
             told(done, photos.headers.len());
             let own = self.each.as_ref().map(|named| named.of(name)).transpose();
-            let own = own
-                .map_err(CaptureError::from)
-                .map_err(RunError::from)?
-                .flatten();
+            let own = own.map_err(CaptureError::from)?.flatten();
             let path = to.join(format!("{name}.png"));
             if own.is_none() && self.borders.is_none() && self.one.is_none() {
                 continue;
@@ -172,7 +163,7 @@ impl Sources {
         own: Option<&Path>,
         photo: &Path,
         size: [u32; 2],
-    ) -> Result<Vec<u8>, RunError> {
+    ) -> Result<Vec<u8>, PrepareError> {
         let mut counts = match self.borders {
             Some(borders) => borders.mask(size),
             None => vec![u8::MAX; size.iter().map(|&side| side as usize).product()],
@@ -185,10 +176,11 @@ impl Sources {
                 .for_each(|(count, mask)| *count = mask.min(*count));
         }
         if counts.iter().all(|&count| count == 0) {
-            return Err(RunError::File {
-                path: photo.into(),
-                reason: "its mask leaves no pixel; make it white where the photo counts".to_owned(),
-            });
+            return Err(StoreError::file(
+                photo,
+                "its mask leaves no pixel; make it white where the photo counts",
+            )
+            .into());
         }
         Ok(counts)
     }

@@ -14,7 +14,7 @@ mod looks;
 mod masks;
 mod photos;
 mod poses;
-mod pycolmap;
+pub(crate) mod pycolmap;
 mod scan;
 mod sharp;
 mod shots;
@@ -35,7 +35,8 @@ pub(crate) use state::{digest, of as digest_of};
 
 use crate::{
     capture::{CaptureError, Film, IMAGES, plain_header},
-    run::{Event, Observer, RunError, Stage, files, keeping},
+    store::{StoreError, files},
+    tell::{Event, Observer, Stage, keeping},
 };
 use colmap::Colmap;
 use ffmpeg::Source;
@@ -124,7 +125,7 @@ pub fn prepare(
     options: &PrepareOptions,
     observe: &mut Observer<'_>,
 ) -> Result<Prepared, PrepareError> {
-    let warnings = RefCell::<Vec<String>>::default();
+    let warnings = RefCell::default();
     let observe = &mut keeping(&warnings, observe);
     let input = fs::canonicalize(&options.input).map_err(files::at(&options.input))?;
     let output = path::absolute(&options.output).map_err(files::at(&options.output))?;
@@ -200,7 +201,7 @@ fn make(
     let poses = task.find(state, colmap, observe)?;
     Ok(Prepared {
         folder: options.output.clone(),
-        film: Film::read(&state.path(".")).map_err(RunError::from)?,
+        film: Film::read(&state.path("."))?,
         shots,
         photos: photos.headers.len(),
         masked,
@@ -213,11 +214,7 @@ fn make(
 /// Whether the input is a film; else it is a folder.
 fn check_input(named: &Path, input: &Path) -> Result<bool, PrepareError> {
     if input.to_str().is_none() {
-        return Err(RunError::File {
-            path: named.into(),
-            reason: "its path is no UTF-8; rename it".to_owned(),
-        }
-        .into());
+        return Err(StoreError::file(named, "its path is no UTF-8; rename it").into());
     }
     if input.is_dir() {
         return Ok(false);
@@ -238,13 +235,13 @@ fn check_apart(options: &PrepareOptions, input: &Path, output: &Path) -> Result<
     let output = fs::canonicalize(output).unwrap_or_else(|_| output.into());
     let own = [IMAGES, MASKS, STRETCHED, SPARSE].map(|name| output.join(name));
     if output.starts_with(input) || own.iter().any(|own| input.starts_with(own)) {
-        return Err(RunError::File {
-            path: options.output.clone(),
-            reason: format!(
+        return Err(StoreError::file(
+            &options.output,
+            format!(
                 "would be mixed with the photos of {}; name a folder beside it with -o",
                 options.input.display()
             ),
-        }
+        )
         .into());
     }
     Ok(())
@@ -274,7 +271,7 @@ fn check_masks(options: &PrepareOptions) -> Result<(), PrepareError> {
     match &options.masks {
         Some(dir) if !dir.is_dir() => {
             let dir = dir.clone();
-            Err(RunError::from(CaptureError::NoMaskFolder { dir }).into())
+            Err(CaptureError::NoMaskFolder { dir }.into())
         }
         _ => Ok(()),
     }
@@ -282,12 +279,7 @@ fn check_masks(options: &PrepareOptions) -> Result<(), PrepareError> {
 
 /// Tells how far a stage is.
 fn tell(observe: &mut Observer<'_>, stage: Stage, done: usize, total: usize) {
-    observe(Event::Progress {
-        stage,
-        done: done.min(total),
-        total,
-        message: String::new(),
-    });
+    observe(Event::progress(stage, done.min(total), total, ""));
 }
 
 /// Puts a folder's photos into `images/`.

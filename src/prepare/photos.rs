@@ -16,7 +16,7 @@ use crate::{
         plain_photo, plain_range, plain_values,
     },
     disk,
-    run::{RunError, files},
+    store::files,
 };
 
 /// Of each photo so many values are looked at to find the range of all.
@@ -90,8 +90,7 @@ impl Photos {
                 all.extend(values?);
                 Ok::<_, CaptureError>(())
             },
-        )
-        .map_err(RunError::from)?;
+        )?;
         let deep = self.headers.values().any(|header| header.deep);
         let range = plain_range(all);
         Ok(match deep {
@@ -156,7 +155,7 @@ pub(super) fn stretch_all(
             plain_photo(&from.join(name), range)
         },
         |(name, _), photo| {
-            let photo = photo.map_err(RunError::from)?;
+            let photo = photo?;
             let path = to.join(name);
             let size = [photo.width, photo.height];
             let bytes = encoded(name, size, &photo.gray).map_err(files::at(&path))?;

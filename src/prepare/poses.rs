@@ -7,6 +7,8 @@ use std::{
 
 use serde::Serialize;
 
+use serde_json::json;
+
 use super::{
     DATABASE, PrepareError, SPARSE,
     colmap::{self, Cameras, Colmap, Features, Matching},
@@ -19,7 +21,8 @@ use crate::{
     capture::{Piece, names::by_number},
     disk,
     programs::ProgramError,
-    run::{Event, Observer, RunError, Stage, files},
+    store::files,
+    tell::{Event, Observer, Stage},
 };
 
 /// A share of the photos without a pose that is not worth a word: COLMAP seldom places all.
@@ -72,7 +75,7 @@ impl Task<'_> {
             "features",
             &digest(self.seen)?,
             &masks,
-            &format!("{:?}", self.cameras),
+            &json!(self.cameras).to_string(),
             self.lens,
             &colmap.name(),
         ]);
@@ -80,7 +83,7 @@ impl Task<'_> {
             Some(_) => " by number",
             None => "",
         };
-        let matching = format!("{:?}{by_number}", self.matching);
+        let matching = format!("{}{by_number}", json!(self.matching));
         let matches = of(&["matches", &features, &matching]);
         let poses = of(&["poses", &matches]);
         let done = [
@@ -203,7 +206,7 @@ impl Task<'_> {
         });
         let mut pieces = Vec::new();
         for model in colmap::models(&found) {
-            if let Some(piece) = Piece::read(&model).map_err(RunError::from)? {
+            if let Some(piece) = Piece::read(&model)? {
                 pieces.push((piece, model));
             }
         }
@@ -230,7 +233,7 @@ impl Task<'_> {
     fn judge(&self, state: &State, observe: &mut Observer<'_>) -> Result<Poses, PrepareError> {
         let mut pieces = Vec::new();
         for model in colmap::models(&state.path(SPARSE)) {
-            pieces.extend(Piece::read(&model).map_err(RunError::from)?);
+            pieces.extend(Piece::read(&model)?);
         }
         let Some((taken, others)) = pieces.split_first() else {
             return Err(PrepareError::NoPoses {

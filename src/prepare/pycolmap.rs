@@ -10,14 +10,14 @@ use crate::{
     chroma::teacher::cache_folder,
     disk,
     programs::{Program, ProgramError},
-    run::files,
+    store::files,
 };
 
 /// What does with `pycolmap` what the program's commands do.
 const SCRIPT: &str = include_str!("pycolmap.py");
 
 /// What is installed where nothing is there.
-pub(super) const PINNED: &str = "pycolmap==4.2.1";
+pub(crate) const PINNED: &str = "pycolmap==4.2.1";
 
 /// The same, and all that it needs, with the SHA-256 of each wheel.
 const REQUIREMENTS: &str = include_str!("pycolmap.txt");

@@ -17,7 +17,7 @@ use crate::{
     disk,
     hash::Hasher,
     input,
-    run::{RunError, files},
+    store::{StoreError, files},
 };
 
 /// The file, in the output folder.
@@ -115,9 +115,11 @@ impl State {
             Ok(text) => {
                 let record = serde_json::from_str::<Record>(&text).map_err(|e| e.to_string());
                 let record = record.and_then(Record::check);
-                Some(record.map_err(|error| RunError::File {
-                    path: path.clone(),
-                    reason: format!("damaged ({error}); choose another folder with -o"),
+                Some(record.map_err(|error| {
+                    StoreError::file(
+                        &path,
+                        format!("damaged ({error}); choose another folder with -o"),
+                    )
                 })?)
             }
             Err(error) if error.kind() == io::ErrorKind::NotFound => None,
@@ -127,13 +129,13 @@ impl State {
         match &record {
             None => check_empty(folder, input)?,
             Some(record) if record.version != VERSION => {
-                return Err(RunError::File {
-                    path,
-                    reason: format!(
+                return Err(StoreError::file(
+                    &path,
+                    format!(
                         "was written by gs-chroma {}; choose another folder with -o",
                         record.program
                     ),
-                }
+                )
                 .into());
             }
             // What failed before it had poses is worth nothing for another input.
@@ -314,10 +316,8 @@ impl State {
 
     fn write(&self) -> Result<(), PrepareError> {
         let path = self.path(FILE);
-        let mut text = serde_json::to_vec_pretty(&self.record).map_err(|error| RunError::File {
-            path: path.clone(),
-            reason: error.to_string(),
-        })?;
+        let mut text = serde_json::to_vec_pretty(&self.record)
+            .map_err(|error| StoreError::file(&path, error.to_string()))?;
         text.push(b'\n');
         Ok(files::write(&path, &text)?)
     }
@@ -364,11 +364,10 @@ fn lock(path: &Path) -> Result<Option<File>, PrepareError> {
     match file.try_lock() {
         Ok(()) => Ok(Some(file)),
         Err(TryLockError::Error(_)) => Ok(None),
-        Err(TryLockError::WouldBlock) => Err(RunError::File {
-            path: path.to_path_buf(),
-            reason: "another process prepares this folder: wait for it, or choose another with -o"
-                .to_owned(),
-        }
+        Err(TryLockError::WouldBlock) => Err(StoreError::file(
+            path,
+            "another process prepares this folder: wait for it, or choose another with -o",
+        )
         .into()),
     }
 }

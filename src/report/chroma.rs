@@ -119,7 +119,7 @@ pub struct TeacherReport {
 }
 
 /// Wall seconds of stage 2.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct ChromaSeconds {
     /// Asking the teacher, in seconds.

@@ -24,12 +24,13 @@ pub use page::{Figure, Flight, MAP_END, PageRow, error_map, evaluation_page};
 pub use table::Table;
 pub use timings::{KernelReport, kernel_reports, timings_table};
 
-use std::fmt::Write;
+use std::{fmt::Write, path::Path};
 
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    capture::{Exposure, LoadOptions},
+    capture::{Dataset, Exposure, LoadOptions},
+    gpu::Gpu,
     luma::{CurvePoint, Goal, LumaSettings, Preset},
 };
 use chroma::number_or_nan;
@@ -106,6 +107,32 @@ pub struct CaptureReport {
     pub photos: Vec<PhotoReport>,
 }
 
+impl CaptureReport {
+    /// Of the photos of a COLMAP folder, but for their fingerprints.
+    pub fn of(colmap_dir: &Path, dataset: &Dataset) -> Self {
+        let capture = &dataset.capture;
+        let path = std::fs::canonicalize(colmap_dir).unwrap_or_else(|_| colmap_dir.to_owned());
+        Self {
+            path: path.to_string_lossy().into_owned(),
+            views: capture.views.len(),
+            train: dataset.split.train.len(),
+            test: dataset.split.test.len(),
+            points: capture.points.len(),
+            rejected: capture
+                .rejected
+                .iter()
+                .map(|rejected| format!("{}: {}", rejected.name, rejected.reason))
+                .collect(),
+            load: dataset.options.clone(),
+            masked_views: dataset.masked_views,
+            not_finite: dataset.not_finite(),
+            extent: dataset.extent,
+            offset: capture.offset.to_array(),
+            photos: Vec::new(),
+        }
+    }
+}
+
 /// A file of a run as it was written.
 #[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
@@ -154,6 +181,17 @@ pub struct DeviceReport {
     pub backend: String,
     /// Whether it is a software adapter.
     pub software: bool,
+}
+
+impl DeviceReport {
+    /// Of a device.
+    pub fn of(gpu: &Gpu) -> Self {
+        Self {
+            name: gpu.describe(),
+            backend: format!("{:?}", gpu.info().backend),
+            software: gpu.is_software(),
+        }
+    }
 }
 
 /// Stage 1.

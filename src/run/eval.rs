@@ -7,32 +7,29 @@ use std::{
     time::Instant,
 };
 
-use super::{
-    Event, Observer, RunError, RunFolder, Stage,
-    commit::Commit,
-    files,
-    fit::open_gpu,
-    flight::Filmed,
-    keeping,
-    lock::RunLock,
-    scene::{Frame, read_splats, written_as},
-    sound::open_same,
-    teach::teacher_or_photos,
-};
+use super::{RunError, flight::Filmed, teach::teacher_or_photos};
 use crate::{
-    capture::{Dataset, Orientation},
+    capture::{Dataset, Orientation, View},
     chroma::teacher::{Teacher, TeacherSettings},
     eval::{
         ColoredScene, EvalError, Lpips, MeasuredTeacher, Painter, Peer, Progress, Scored,
         along_path, between_views, exposures, mean_bake, mean_luma, mean_pictures,
         teacher_colorfulness,
     },
+    gpu::Gpu,
     raster::Raster,
     report::{
         EVALUATION_VERSION, Evaluation, Figure, Method, PageRow, PeerReport, Report, Rules,
         TeacherReport, evaluation_page, to_image,
     },
-    splats::{Splats, is_splat_file, write_splats},
+    splats::{ShField, Splats, is_splat_file, write_splats},
+    store::{RunFolder, StoreError, commit::Commit, files},
+    subject::{
+        Hold, Run,
+        scene::{Frame, read_splats, written_as},
+        sound::open_same,
+    },
+    tell::{Event, Observer, Stage, keeping},
 };
 
 /// Views on the page: a browser should not have to load a thousand pictures.
@@ -42,7 +39,7 @@ const MAX_ROWS: usize = 24;
 const STRIP_FRAMES: usize = 12;
 
 /// What `eval` is asked to do.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct EvalOptions {
     /// Run folder; the newest run by default.
     pub run: Option<PathBuf>,
@@ -80,93 +77,32 @@ pub fn eval(
     if let Some(path) = &options.run {
         is_splat_file(path)?;
     }
-    let folder = RunFolder::find(options.run.as_deref())?;
-    let (_lock, report) = RunLock::of_run(&folder)?;
+    let run = Run::find(options.run.as_deref(), Hold::Writing)?;
+    let (folder, report) = (&run.folder, &run.report);
     observe(Event::begins(Stage::Model));
-    let scene = load(&folder, &report, options, observe)?;
+    let scene = load(&run, options, observe)?;
     files::check_page(&folder.evaluation_page())?;
     let commit = Commit::new(folder.path())?;
-    let page = commit.place(&folder.evaluation_page());
-    files::make_folder(&page)?;
+    let page = &commit.place(&folder.evaluation_page());
+    files::make_folder(page)?;
     let mut lpips = options.lpips.as_deref().map(Lpips::open).transpose()?;
-    let asked = (options.teacher.as_deref())
-        .map(|teacher| teacher_or_photos(teacher, &scene.dataset.capture.root));
-    let mut teacher = match &asked {
-        Some(path) => {
-            observe(Event::begins(Stage::Teacher));
-            Some(ask(path, options, &folder, &report, &scene, observe)?)
-        }
-        None => None,
-    };
+    let mut teacher = ask(options, &run, &scene, observe)?;
     observe(Event::begins(Stage::Device));
     let drawn = report.luma.settings.raster_options();
-    let raster = Arc::new(Raster::with(&open_gpu(false)?, drawn));
-    let seed = report.luma.settings.seed;
-    let mut peers = Vec::new();
-    if let (Some(teacher), Some(path)) = (&teacher, &asked) {
-        let baseline = options.baselines.then_some(Peer::RgbSplats);
-        for peer in baseline.into_iter().chain(options.recipes.iter().copied()) {
-            if peers
-                .iter()
-                .any(|(_, told): &(_, PeerReport)| told.method == peer.method())
-            {
-                continue;
-            }
-            let limit = options.memory_limit;
-            let mut told = |progress: Progress<'_>| observe(Event::from(progress));
-            let colored = peer.color(&raster, &scene, teacher, seed, limit, &mut told);
-            peers.push(colored.map_err(covers_nothing(path, &scene.dataset))?);
-        }
-    }
-    for (field, told) in &peers {
-        let splats = Splats {
-            sh: field.clone(),
-            ..scene.luma.clone()
-        };
-        let path = page.join(told.method.file_stem()).with_extension("ply");
-        write_splats(
-            &path,
-            &splats,
-            &written_as(drawn, scene.dataset.capture.offset),
-        )?;
-    }
+    let raster = Arc::new(Raster::with(&Gpu::open()?, drawn));
+    let peers = match &teacher {
+        Some(teacher) => paint(options, &raster, (&scene, teacher), report, page, observe)?,
+        None => Vec::new(),
+    };
     let mut rgb = vec![(Method::Exported, &scene.exported)];
     rgb.extend(peers.iter().map(|(field, told)| (told.method, field)));
     let mut painter = Painter::new(&raster, &scene, &rgb, teacher.as_mut())?;
 
-    observe(Event::begins(Stage::Measuring));
-    let mut views = Vec::new();
-    let mut rows = Vec::new();
-    let dataset = &scene.dataset;
-    let (measured_on, measured) = dataset.measured();
-    let mut done = 0;
-    dataset.visit_colors(measured, |i, photo| {
-        let name = &dataset.capture.views[i].name;
-        observe(Event::Progress {
-            stage: Stage::Measuring,
-            done,
-            total: measured.len(),
-            message: name.clone(),
-        });
-        done += 1;
-        let reference = scene.reference(i, &photo);
-        if !reference.measures() {
-            return Ok(());
-        }
-        let drawing = painter.draw(&dataset.cameras[i], name)?;
-        let answer = painter.answer(i)?;
-        let scored = Scored::of(name, reference, &drawing, answer.as_ref(), lpips.as_mut())?;
-        if rows.len() < MAX_ROWS {
-            let upright = scene.dataset.capture.views[i].stance.upright;
-            rows.push(page_row(&page, rows.len(), &scored, upright)?);
-        }
-        views.push(scored);
-        Ok::<_, RunError>(())
-    })?;
+    let (views, rows) = measure(&scene, &mut painter, lpips.as_mut(), page, observe)?;
     let mut strip = Vec::new();
     let every = options.frames.div_ceil(STRIP_FRAMES);
     let flow = options.flow.as_deref();
-    let mut filmed = Filmed::begin(&page);
+    let mut filmed = Filmed::begin(page);
     let mut keep = |frame, image| {
         let file = format!("frame-{frame:04}.png");
         files::write_png(&page.join(&file), &image)?;
@@ -188,14 +124,14 @@ pub fn eval(
         )));
     }
     observe(Event::begins(Stage::Page));
-    let flight = filmed.end(&page, &path, observe);
+    let flight = filmed.end(page, &path, observe);
     let evaluation = Evaluation {
         version: EVALUATION_VERSION,
         program: env!("CARGO_PKG_VERSION").to_owned(),
         scene: scene.name(),
         teacher: painter.teacher(),
         teacher_colorfulness,
-        measured_on: measured_on.to_owned(),
+        measured_on: scene.dataset.measured().0.to_owned(),
         luma: mean_luma(&views),
         bake: mean_bake(&views),
         pictures: mean_pictures(&views),
@@ -212,19 +148,93 @@ pub fn eval(
     let json = evaluation.to_json() + "\n";
     files::write(&commit.place(&folder.evaluation()), json.as_bytes())?;
     commit.finish()?;
-    Ok((folder, evaluation))
+    Ok((run.folder, evaluation))
+}
+
+/// Colors the scene in other ways, and writes these scenes beside the page.
+fn paint(
+    options: &EvalOptions,
+    raster: &Arc<Raster>,
+    (scene, teacher): (&ColoredScene, &MeasuredTeacher),
+    report: &Report,
+    page: &Path,
+    observe: &mut Observer<'_>,
+) -> Result<Vec<(ShField, PeerReport)>, RunError> {
+    let settings = &report.luma.settings;
+    let written = written_as(settings.raster_options(), scene.dataset.capture.offset);
+    let mut peers: Vec<(ShField, PeerReport)> = Vec::new();
+    let baseline = options.baselines.then_some(Peer::RgbSplats);
+    for peer in baseline.into_iter().chain(options.recipes.iter().copied()) {
+        if peers.iter().any(|(_, told)| told.method == peer.method()) {
+            continue;
+        }
+        let mut told = |progress: Progress<'_>| observe(Event::from(progress));
+        let limit = options.memory_limit;
+        let colored = peer.color(raster, scene, teacher, settings.seed, limit, &mut told);
+        peers.push(colored.map_err(covers_nothing(options, &scene.dataset))?);
+    }
+    for (field, told) in &peers {
+        let splats = Splats {
+            sh: field.clone(),
+            ..scene.luma.clone()
+        };
+        let path = page.join(told.method.file_stem()).with_extension("ply");
+        write_splats(&path, &splats, &written)?;
+    }
+    Ok(peers)
+}
+
+/// Measures the views that are measured on, and writes pictures of some beside the page.
+fn measure(
+    scene: &ColoredScene,
+    painter: &mut Painter<'_>,
+    mut lpips: Option<&mut Lpips>,
+    page: &Path,
+    observe: &mut Observer<'_>,
+) -> Result<(Vec<Scored>, Vec<PageRow>), RunError> {
+    observe(Event::begins(Stage::Measuring));
+    let (mut views, mut rows) = (Vec::new(), Vec::new());
+    let dataset = &scene.dataset;
+    let measured = dataset.measured().1;
+    let mut done = 0;
+    dataset.visit_colors(measured, |i, photo| {
+        let View { name, stance, .. } = &dataset.capture.views[i];
+        observe(Event::progress(
+            Stage::Measuring,
+            done,
+            measured.len(),
+            name,
+        ));
+        done += 1;
+        let reference = scene.reference(i, &photo);
+        if !reference.measures() {
+            return Ok(());
+        }
+        let drawing = painter.draw(&dataset.cameras[i], name)?;
+        let answer = painter.answer(i)?;
+        let lpips = lpips.as_deref_mut();
+        let scored = Scored::of(name, reference, &drawing, answer.as_ref(), lpips)?;
+        if rows.len() < MAX_ROWS {
+            rows.push(page_row(page, rows.len(), &scored, stance.upright)?);
+        }
+        views.push(scored);
+        Ok::<_, RunError>(())
+    })?;
+    Ok((views, rows))
 }
 
 /// Opens the run that is to be measured.
 fn load(
-    folder: &RunFolder,
-    report: &Report,
+    run: &Run,
     options: &EvalOptions,
     observe: &mut Observer<'_>,
 ) -> Result<ColoredScene, RunError> {
-    let refused = |path: PathBuf, reason: &str| RunError::File {
-        path,
-        reason: format!("{reason}: run `gs-chroma colorize` first"),
+    let (folder, report) = (&run.folder, &run.report);
+    let refused = |path: PathBuf, reason: &str| {
+        RunError::from(StoreError::file(
+            &path,
+            format!("{reason}: run `gs-chroma colorize` first"),
+        ))
     };
     let color = folder.color();
     if !color.exists() {
@@ -244,10 +254,7 @@ fn load(
             folder.chroma().display()
         )));
     }
-    let colmap = match &options.colmap {
-        Some(path) => path.clone(),
-        None => PathBuf::from(&report.capture.path),
-    };
+    let colmap = run.colmap(options.colmap.as_deref());
     let mut dataset = open_same(&colmap, &report.capture.load, &report.capture, observe)?;
     if let Some(chroma) = &report.chroma {
         // Colors were learned from these.
@@ -265,32 +272,34 @@ fn load(
     })
 }
 
-/// Asks the teacher for all photos, through the run's cache; for frames too where baselines
-/// are wanted and it is a network.
+/// Asks the teacher that is named, if one is, for all photos, through the run's cache; for frames
+/// too where baselines are wanted and it is a network.
 fn ask(
-    path: &Path,
     options: &EvalOptions,
-    folder: &RunFolder,
-    report: &Report,
+    run: &Run,
     scene: &ColoredScene,
     observe: &mut Observer<'_>,
-) -> Result<MeasuredTeacher, RunError> {
+) -> Result<Option<MeasuredTeacher>, RunError> {
+    let dataset = &scene.dataset;
+    let Some(path) = named_teacher(options, dataset) else {
+        return Ok(None);
+    };
+    observe(Event::begins(Stage::Teacher));
     let settings = &options.teacher_settings;
-    let mut teacher = Teacher::open(path, Some(&folder.teacher()), settings)?;
-    teacher.know(&scene.dataset.capture);
+    let mut teacher = Teacher::open(&path, Some(&run.folder.teacher()), settings)?;
+    teacher.know(&dataset.capture);
     let info = teacher.describe();
     let is_same = |t: &TeacherReport| (&t.info.name, &t.info.sha256) == (&info.name, &info.sha256);
-    if let Some(chroma) = &report.chroma
+    if let Some(chroma) = &run.report.chroma
         && !chroma.teachers.iter().any(is_same)
     {
         observe(Event::Warning(
             "the run was colored by another teacher than the one it is measured against".to_owned(),
         ));
     }
-    let frames = if options.baselines && teacher.is_network() {
-        Some(Teacher::open(path, None, settings)?)
-    } else {
-        None
+    let frames = match options.baselines && teacher.is_network() {
+        true => Some(Teacher::open(&path, None, settings)?),
+        false => None,
     };
     if options.baselines && frames.is_none() {
         observe(Event::Warning(
@@ -298,15 +307,20 @@ fn ask(
         ));
     }
     let mut told = |progress: Progress<'_>| observe(Event::from(progress));
-    let asked = MeasuredTeacher::ask(teacher, frames, &scene.dataset, &mut told);
-    asked.map_err(covers_nothing(path, &scene.dataset))
+    let asked = MeasuredTeacher::ask(teacher, frames, dataset, &mut told);
+    Ok(Some(asked.map_err(covers_nothing(options, dataset))?))
+}
+
+fn named_teacher(options: &EvalOptions, dataset: &Dataset) -> Option<PathBuf> {
+    let teacher = options.teacher.as_deref()?;
+    Some(teacher_or_photos(teacher, &dataset.capture.root))
 }
 
 /// Names the teacher that has nothing to say.
-fn covers_nothing(path: &Path, dataset: &Dataset) -> impl FnOnce(EvalError) -> RunError {
+fn covers_nothing(options: &EvalOptions, dataset: &Dataset) -> impl FnOnce(EvalError) -> RunError {
     move |error| match error {
         EvalError::NothingTaught => RunError::TeacherCoversNothing {
-            teacher: path.to_owned(),
+            teacher: named_teacher(options, dataset).unwrap_or_default(),
             example: dataset.capture.views[dataset.split.train[0]].name.clone(),
         },
         other => other.into(),

@@ -6,20 +6,17 @@ use glam::DVec3;
 use serde::Serialize;
 
 use super::{
-    Cleaned, Event, Loss, Observer, RunError, RunFolder, Shown, Stage,
+    Cleaned, Loss, RunError, Shown,
     export_clean::cleaned,
     export_viewer::{Cameras, fitted},
-    files, keeping,
     loss::{Views, loss},
-    originals::Kept,
-    scene::{Frame, read_scene, written_as},
 };
 use crate::{
-    capture::LoadOptions,
-    disk::trust::Originals,
     raster::RasterOptions,
-    report::PhotoReport,
-    splats::{Splats, WriteOptions, is_splat_file, write_splats},
+    splats::{Splats, WriteOptions, write_splats},
+    store::{files, originals::Kept},
+    subject::{Hold, Opened, Scene, scene::written_as},
+    tell::{Event, Observer, Stage, keeping},
     viewers::ViewerChoice,
 };
 
@@ -28,7 +25,7 @@ use crate::{
 const COARSE: f64 = 0.1;
 
 /// What `export` is asked to do.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct ExportOptions {
     /// Run folder or splat file; the newest run by default.
     pub run: Option<PathBuf>,
@@ -74,25 +71,6 @@ pub struct Exported {
     pub warnings: Vec<String>,
 }
 
-/// The Gaussians to write.
-struct Scene {
-    splats: Splats,
-    drawn: RasterOptions,
-    /// What their centers lack of COLMAP's, in world units.
-    moved: DVec3,
-    views: Views,
-    /// How many of the Gaussians, the last ones, surround the scene.
-    surroundings: usize,
-    /// Where its cameras are, if anybody knows.
-    colmap: Option<PathBuf>,
-    /// How its photos are loaded.
-    load: LoadOptions,
-    /// The photos and poses that it was trained with.
-    photos: Vec<PhotoReport>,
-    /// Files that are not written over.
-    _kept: Originals,
-}
-
 /// Writes a run's scene, or the Gaussians of a file, as a splat file, reads it back and measures
 /// what that costs. Where COLMAP's coordinates are so large that `fit` moved the scene to the
 /// origin, it stays there and the file says so if its format can, unless COLMAP's are asked for.
@@ -105,14 +83,14 @@ pub fn export(options: &ExportOptions, observe: &mut Observer<'_>) -> Result<Exp
     let output = options.output.as_path();
     let format = files::format_of(output)?;
     observe(Event::begins(Stage::Model));
-    let mut scene = open(options, observe)?;
+    let opened = Opened::find(options.run.as_deref(), Hold::Free)?;
+    let _kept = opened.keep(Kept::default()).keep();
+    let mut scene = opened.read(options.luma, None, observe)?;
     files::make_folder_of(output)?;
     let before = &Cameras {
-        of: options.run.as_deref().unwrap_or(output),
-        colmap: scene.colmap.as_deref(),
-        load: scene.load.clone(),
-        photos: &scene.photos,
-        moved: scene.moved,
+        opened: &opened,
+        colmap: options.colmap.as_deref(),
+        moved: scene.offset,
     };
     let drawn = scene.drawn;
     let mut left_out = None;
@@ -139,7 +117,8 @@ pub fn export(options: &ExportOptions, observe: &mut Observer<'_>) -> Result<Exp
     let bytes = fs::metadata(output).map_err(files::at(output))?.len();
 
     let wrote = (output, &written);
-    let loss = loss(&scene.splats, scene.drawn, &scene.views, wrote, observe)?;
+    let views = (opened.report()).map_or(Views::MadeUp, |report| Views::of_run(&report.capture));
+    let loss = loss(&scene.splats, scene.drawn, &views, wrote, observe)?;
     Ok(Exported {
         file: output.to_owned(),
         splats: scene.splats.len(),
@@ -154,55 +133,11 @@ pub fn export(options: &ExportOptions, observe: &mut Observer<'_>) -> Result<Exp
     })
 }
 
-/// The scene of a run or of a file.
-fn open(options: &ExportOptions, observe: &mut Observer<'_>) -> Result<Scene, RunError> {
-    if let Some(path) = options.run.as_deref().filter(|path| !path.is_dir())
-        && is_splat_file(path)?
-    {
-        let read = read_scene(path, Frame::Own, observe)?;
-        return Ok(Scene {
-            splats: match options.luma {
-                true => read.splats.to_luma(),
-                false => read.splats,
-            },
-            drawn: read.drawn,
-            moved: read.offset,
-            views: Views::MadeUp,
-            surroundings: 0,
-            colmap: options.colmap.clone(),
-            load: LoadOptions::default(),
-            photos: Vec::new(),
-            _kept: Kept::default().with(path, "the splat file").keep(),
-        });
-    }
-    let folder = RunFolder::find(options.run.as_deref())?;
-    let report = folder.read_report()?;
-    let kept = Kept::default().with_run(&folder, &report);
-    let colored = !options.luma && folder.color().exists();
-    let file = if colored {
-        folder.color()
-    } else {
-        folder.luma()
-    };
-    let noted = PathBuf::from(&report.capture.path);
-    Ok(Scene {
-        splats: read_scene(&file, Frame::Own, observe)?.splats,
-        drawn: report.luma.settings.raster_options(),
-        moved: DVec3::from(report.capture.offset),
-        views: Views::of_run(&report.capture),
-        surroundings: report.luma.surroundings,
-        colmap: Some(options.colmap.clone().unwrap_or(noted)),
-        load: report.capture.load,
-        photos: report.capture.photos,
-        _kept: kept.keep(),
-    })
-}
-
-/// In which coordinates the scene is written.
+/// Coordinates that the scene is written in.
 fn written(scene: &Scene, options: &ExportOptions) -> Result<WriteOptions, RunError> {
     let (added, left) = match options.colmap_coordinates {
-        true => (scene.moved, DVec3::ZERO),
-        false => (DVec3::ZERO, scene.moved),
+        true => (scene.offset, DVec3::ZERO),
+        false => (DVec3::ZERO, scene.offset),
     };
     let (size, largest) = (median_size(&scene.splats), added.abs().max_element());
     let step = step_at(largest);

@@ -2,13 +2,14 @@
 
 use std::sync::Arc;
 
-use super::{Event, Observer, RunError, Stage, export_viewer::Cameras};
+use super::{RunError, export_viewer::Cameras};
 use crate::{
     capture::Camera,
     gpu::Gpu,
     measure::reported_psnr,
     raster::{Contributions, Raster, RasterOptions, SceneRenderer},
     splats::Splats,
+    tell::{Event, Observer, Stage},
 };
 
 /// A Gaussian that fills less of every training view than this many pixels is left out. What
@@ -26,9 +27,6 @@ pub struct Cleaned {
 }
 
 /// The Gaussians that a training view needs, in their order; the last `kept` stay in any case.
-///
-/// # Errors
-/// [`RunError`] of the capture or the device.
 pub(super) fn cleaned(
     (splats, drawn, kept): (&Splats, RasterOptions, usize),
     before: &Cameras<'_>,
@@ -43,12 +41,7 @@ pub(super) fn cleaned(
     let mut contributions = Contributions::new(&raster, splats, extent)?;
     let mut most = vec![0f32; splats.len()];
     for (done, camera) in train.iter().enumerate() {
-        observe(Event::Progress {
-            stage: Stage::Cleaning,
-            done,
-            total: train.len(),
-            message: String::new(),
-        });
+        observe(Event::progress(Stage::Cleaning, done, train.len(), ""));
         let filled = contributions.of(camera)?;
         (most.iter_mut().zip(&filled)).for_each(|(most, &filled)| *most = most.max(filled));
     }

@@ -4,13 +4,14 @@ use std::{path::Path, sync::Arc};
 
 use glam::DVec3;
 
-use super::{Event, Observer, RunError, Stage, fingerprint::check_poses};
+use super::RunError;
 use crate::{
-    capture::{Camera, Capture, LoadOptions, Loader, split},
+    capture::{Camera, LoadOptions, Loader, split},
     gpu::Gpu,
     raster::{Raster, RasterOptions},
-    report::PhotoReport,
     splats::Splats,
+    subject::Opened,
+    tell::{Event, Observer, Stage},
     viewers::{self, FitSettings, Viewer, ViewerChoice},
 };
 
@@ -34,25 +35,17 @@ pub struct Shown {
     pub after: f64,
 }
 
-/// Where the cameras of a scene are.
+/// The cameras of a scene.
 pub(super) struct Cameras<'a> {
-    /// The scene's file or run, for whoever has to be told that nobody knows.
-    pub of: &'a Path,
-    /// The COLMAP folder, if anybody knows.
+    pub opened: &'a Opened,
+    /// COLMAP folder, where it is not the one that `fit` noted.
     pub colmap: Option<&'a Path>,
-    /// How its photos are loaded.
-    pub load: LoadOptions,
-    /// The photos and poses that the scene was trained with; none where nobody knows.
-    pub photos: &'a [PhotoReport],
     /// What the scene's centers lack of COLMAP's, in world units.
     pub moved: DVec3,
 }
 
 /// A scene and how it is drawn here, moved until the viewers draw it alike; and what each
 /// shows.
-///
-/// # Errors
-/// [`RunError`] of the capture or the device.
 pub(super) fn fitted(
     choice: ViewerChoice,
     (splats, drawn): (&Splats, RasterOptions),
@@ -74,12 +67,7 @@ pub(super) fn fitted(
         extent,
         &FitSettings::DEFAULT,
         &mut |done, total| {
-            observe(Event::Progress {
-                stage: Stage::Viewer,
-                done,
-                total,
-                message: String::new(),
-            });
+            observe(Event::progress(Stage::Viewer, done, total, ""));
         },
     )?;
     let wanted = viewers::pictures(&raster, &colored, drawn, &test, extent)?;
@@ -103,15 +91,12 @@ impl Cameras<'_> {
         most: usize,
         most_side: u32,
     ) -> Result<(Vec<Camera>, Vec<Camera>, f64), RunError> {
-        let Some(colmap) = self.colmap else {
-            return Err(RunError::NoCameras(self.of.to_owned()));
-        };
-        let capture = Capture::load_with(colmap, &self.load.capture())?;
-        check_poses(&capture, self.photos)?;
-        let chosen = split(&capture.views, self.load.holdout);
+        let capture = self.opened.capture(self.colmap)?;
+        let load = self.opened.load();
+        let chosen = split(&capture.views, load.holdout);
         let loader = Loader::new(LoadOptions {
-            max_side: Some(self.load.max_side.unwrap_or(most_side).min(most_side)),
-            ..self.load.clone()
+            max_side: Some(load.max_side.unwrap_or(most_side).min(most_side)),
+            ..load
         });
         let shift = self.moved - capture.offset;
         let cameras = |views: &[usize]| -> Result<Vec<Camera>, RunError> {

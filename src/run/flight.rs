@@ -4,13 +4,14 @@ use std::{fs, path::Path};
 
 use image::RgbImage;
 
-use super::{
-    Event, Observer, RunError,
-    film::{FilmWriter, Purpose},
-};
 use crate::{
     programs::ProgramError,
     report::{Flight, PathScore},
+    store::{
+        StoreError,
+        film::{FilmWriter, Purpose},
+    },
+    tell::{Event, Observer},
 };
 
 /// Frames a second: slow enough to see what changes between two of them.
@@ -77,9 +78,9 @@ impl Filmed {
 }
 
 /// What went wrong, without the file that is not in its place yet.
-fn reason(error: RunError) -> String {
+fn reason(error: StoreError) -> String {
     match error {
-        RunError::File { reason, .. } => reason,
+        StoreError::File { reason, .. } => reason,
         other => other.to_string(),
     }
 }

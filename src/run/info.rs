@@ -4,14 +4,17 @@ use std::{cell::RefCell, path::Path};
 
 use serde_json::{Value, json};
 
-use super::{
-    Event, Observer, RunError, RunFolder, keeping,
-    scene::tell_skipped,
-    sound::{check_model, tell_headers, tell_masks, tell_unplaced},
-};
+use super::RunError;
 use crate::{
     capture::{Camera, Capture, Headers, LoadOptions, Loader, Normalize, Rejected},
     splats::{is_splat_file, read_splats},
+    store::{RunFolder, StoreError},
+    subject::{
+        SubjectError,
+        scene::tell_skipped,
+        sound::{check_model, tell_headers, tell_masks, tell_unplaced},
+    },
+    tell::{Event, Observer, keeping},
 };
 
 /// What a run folder, a splat file or a COLMAP folder holds, and what is doubtful about the
@@ -25,10 +28,7 @@ pub fn info(path: &Path, observe: &mut Observer<'_>) -> Result<Value, RunError> 
     }
     // Without an extension it is meant for a folder.
     if path.extension().is_some() && !path.exists() {
-        return Err(RunError::File {
-            path: path.to_owned(),
-            reason: "no such file or folder".to_owned(),
-        });
+        return Err(StoreError::file(path, "no such file or folder").into());
     }
     let folder = RunFolder::find(Some(path))?;
     if folder.report().exists() {
@@ -97,7 +97,7 @@ fn splat_info(path: &Path, observe: &mut Observer<'_>) -> Result<Value, RunError
     tell_skipped(path, &read, &mut keeping(&warnings, observe));
     let splats = &read.splats;
     if splats.is_empty() {
-        return Err(RunError::NoSplats(path.to_owned()));
+        return Err(SubjectError::NoSplats(path.to_owned()).into());
     }
     let bound = |pick: fn(f32, f32) -> f32, start: f32| -> [f32; 3] {
         std::array::from_fn(|axis| {

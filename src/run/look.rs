@@ -2,21 +2,18 @@
 
 use std::{
     fs,
-    path::{Path, PathBuf},
+    path::Path,
     sync::{Arc, Mutex, PoisonError},
 };
 
 use image::RgbImage;
 
 use super::{
-    Event, Observer, RunError, RunFolder, Stage,
-    fingerprint::check_poses,
-    originals::Kept,
-    scene::{Frame, open, read_scene},
+    RunError,
     teach::{TeachOptions, Teachers},
 };
 use crate::{
-    capture::{CaptureError, Dataset, LoadOptions, Photo},
+    capture::{CaptureError, Dataset, Photo},
     chroma::{
         native_rgb,
         teacher::{GrayImage, Query},
@@ -25,43 +22,23 @@ use crate::{
     input,
     raster::{Picture, RasterOptions, constants::NEAR_SHARE},
     report::{Report, to_image},
-    splats::{Splats, is_splat_file},
+    splats::Splats,
+    store::{RunFolder, StoreError, fingerprint::check_poses, originals::Kept},
+    subject::{Hold, Opened, SceneKind, scene::open},
+    tell::{Event, Observer, Stage},
 };
 
 /// Bytes of photos that are kept: those around the one that is looked at.
 const CACHE_BYTES: usize = 64 << 20;
 
-/// One of a run's scenes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SceneKind {
-    /// `color.ply`.
-    Color,
-    /// `luma.ply`.
-    Luma,
-}
-
-impl SceneKind {
-    /// Name on the command line and in reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Color => "color",
-            Self::Luma => "luma",
-        }
-    }
-}
-
 /// A run or a splat file that is looked at.
 pub struct Look {
     /// Name in titles.
     pub name: String,
-    /// The run's report; none of a splat file.
-    pub report: Option<Report>,
     /// Views with cameras and photos; none where the COLMAP folder is not there.
     pub dataset: Option<Dataset>,
-    /// The run's folder.
-    folder: Option<RunFolder>,
-    scenes: Vec<(SceneKind, PathBuf)>,
-    frame: Frame,
+    opened: Opened,
+    scenes: Vec<SceneKind>,
     teachers: Mutex<Asked>,
     /// Files that are not written over.
     _kept: Originals,
@@ -87,80 +64,40 @@ impl Look {
         observe: &mut Observer<'_>,
     ) -> Result<Self, RunError> {
         observe(Event::begins(Stage::Model));
-        match run {
-            Some(path) if is_splat_file(path)? => Self::of_file(path, colmap, observe),
-            run => Self::of_run(RunFolder::find(run)?, colmap, observe),
-        }
-    }
-
-    fn of_file(
-        path: &Path,
-        colmap: Option<&Path>,
-        observe: &mut Observer<'_>,
-    ) -> Result<Self, RunError> {
-        let dataset = colmap.map(|dir| open(dir, &LoadOptions::default(), observe));
-        let dataset = dataset.transpose()?.map(|found| found.caching(CACHE_BYTES));
-        let name = path.file_name().unwrap_or(path.as_os_str());
-        Ok(Self {
-            name: name.to_string_lossy().into_owned(),
-            report: None,
-            folder: None,
-            // What it shows is only known once it is read; it is shown as it is.
-            scenes: vec![(SceneKind::Color, path.to_owned())],
-            frame: (dataset.as_ref()).map_or(Frame::Own, |d| Frame::World(d.capture.offset)),
-            dataset,
-            teachers: Mutex::new(Asked::NotYet),
-            _kept: Kept::default().with(path, "the splat file").keep(),
-        })
-    }
-
-    fn of_run(
-        folder: RunFolder,
-        colmap: Option<&Path>,
-        observe: &mut Observer<'_>,
-    ) -> Result<Self, RunError> {
-        let report = folder.read_report()?;
-        let load = LoadOptions {
-            force: true,
-            ..report.capture.load.clone()
-        };
-        let noted = PathBuf::from(&report.capture.path);
-        let opened = open(colmap.unwrap_or(&noted), &load, &mut |_| {}).and_then(|dataset| {
-            check_poses(&dataset.capture, &report.capture.photos)?;
-            Ok(dataset)
-        });
-        let dataset = match opened {
-            Ok(dataset) => Some(dataset.caching(CACHE_BYTES)),
-            Err(error) if colmap.is_none() => {
-                observe(Event::Warning(format!(
-                    "no cameras and photos: {error} (name their folder with --colmap)"
-                )));
-                None
+        let opened = Opened::find(run, Hold::Free)?;
+        let (of, scenes) = match &opened {
+            // What a file shows is only known once it is read; it is shown as it is.
+            Opened::File(path) => (path.clone(), vec![SceneKind::Color]),
+            Opened::Run(run) => {
+                let all = [
+                    (SceneKind::Color, run.folder.color()),
+                    (SceneKind::Luma, run.folder.luma()),
+                ];
+                let there = all.into_iter().filter(|(_, path)| path.exists());
+                let here = fs::canonicalize(run.folder.path());
+                let here = here.unwrap_or_else(|_| run.folder.path().to_owned());
+                (here, there.map(|(kind, _)| kind).collect())
             }
-            Err(error) => return Err(error),
         };
-        let all = [
-            (SceneKind::Color, folder.color()),
-            (SceneKind::Luma, folder.luma()),
-        ];
-        let here = fs::canonicalize(folder.path());
-        let here = here.unwrap_or_else(|_| folder.path().to_owned());
-        let name = here.file_name().unwrap_or(here.as_os_str());
+        let name = of.file_name().unwrap_or(of.as_os_str()).to_string_lossy();
         Ok(Self {
-            name: name.to_string_lossy().into_owned(),
-            _kept: Kept::default().with_run(&folder, &report).keep(),
-            report: Some(report),
-            dataset,
-            scenes: all.into_iter().filter(|(_, path)| path.exists()).collect(),
-            folder: Some(folder),
-            frame: Frame::Own,
+            name: name.into_owned(),
+            dataset: views(&opened, colmap, observe)?,
+            scenes,
             teachers: Mutex::new(Asked::NotYet),
+            _kept: opened.keep(Kept::default()).keep(),
+            opened,
         })
+    }
+
+    /// The run's report; none of a splat file.
+    pub fn report(&self) -> Option<&Report> {
+        self.opened.report()
     }
 
     /// The scenes that there are, the colored one first.
     pub fn scenes(&self) -> impl Iterator<Item = SceneKind> {
-        self.scenes.iter().map(|(kind, _)| *kind)
+        self.scenes.iter().copied()
     }
 
     /// A scene, and how it is drawn; none where there is no such scene.
@@ -172,19 +109,17 @@ impl Look {
         kind: SceneKind,
         observe: &mut Observer<'_>,
     ) -> Result<Option<(Splats, RasterOptions)>, RunError> {
-        let path = self.scenes.iter().find(|(known, _)| *known == kind);
-        let Some((_, path)) = path else {
+        if !self.scenes.contains(&kind) {
             return Ok(None);
-        };
-        let scene = read_scene(path, self.frame, observe)?;
-        let drawn = (self.report.as_ref())
-            .map_or(scene.drawn, |report| report.luma.settings.raster_options());
+        }
+        let capture = self.dataset.as_ref().map(|dataset| &dataset.capture);
+        let scene = (self.opened).read(kind == SceneKind::Luma, capture, observe)?;
         let splats = match kind {
             // One channel, in luma's case, says all.
             SceneKind::Luma => scene.splats.to_luma(),
             SceneKind::Color => scene.splats,
         };
-        Ok(Some((splats, drawn)))
+        Ok(Some((splats, scene.drawn)))
     }
 
     /// The nearest depth at which Gaussians are shown, in world units; none where no cameras say
@@ -195,10 +130,7 @@ impl Look {
 
     /// Whether somebody can say what color photos are.
     pub fn has_teacher(&self) -> bool {
-        let chroma = self
-            .report
-            .as_ref()
-            .and_then(|report| report.chroma.as_ref());
+        let chroma = self.report().and_then(|report| report.chroma.as_ref());
         self.dataset.is_some()
             && chroma.is_some_and(|chroma| chroma.teachers.iter().any(|t| t.path.is_some()))
     }
@@ -222,14 +154,15 @@ impl Look {
         let teachers = match &mut *asked {
             Asked::Opened(teachers) => teachers,
             Asked::Refused(reason) => {
-                return Err(RunError::File {
-                    path: self
-                        .folder
-                        .as_ref()
+                return Err(StoreError::file(
+                    &self
+                        .opened
+                        .folder()
                         .map(RunFolder::teacher)
                         .unwrap_or_default(),
-                    reason: format!("the run's teacher cannot be asked: {reason}"),
-                });
+                    format!("the run's teacher cannot be asked: {reason}"),
+                )
+                .into());
             }
             Asked::NotYet => return Ok(None),
         };
@@ -254,10 +187,8 @@ impl Look {
     }
 
     fn open_teachers(&self, dataset: &Dataset) -> Result<Teachers, RunError> {
-        let options = (self.report.as_ref())
-            .map(TeachOptions::of_run)
-            .unwrap_or_default();
-        let cache = self.folder.as_ref().map(RunFolder::teacher);
+        let options = self.report().map(TeachOptions::of_run).unwrap_or_default();
+        let cache = self.opened.folder().map(RunFolder::teacher);
         let mut teachers = Teachers::open(&options, &dataset.capture.root, cache.as_deref())?;
         teachers.know(&dataset.capture);
         Ok(teachers)
@@ -276,15 +207,50 @@ impl Look {
 
     /// The rows of the run's log: iterations and losses of the luma.
     pub fn losses(&self) -> Vec<[f64; 2]> {
-        let log = (self.folder.as_ref())
+        let log = self
+            .opened
+            .folder()
             .and_then(|folder| input::read_to_string(&folder.log()).ok())
             .unwrap_or_default();
-        let until = (self.report.as_ref()).map_or(0, |report| report.luma.iterations) as f64;
+        let until = self.report().map_or(0, |report| report.luma.iterations) as f64;
         let row = |line: &str| -> Option<[f64; 2]> {
             let mut fields = line.split(',').map(|field| field.parse().ok());
             Some([fields.next()??, fields.next()??])
         };
         let rows = log.lines().filter_map(row);
         rows.filter(|[iteration, _]| *iteration <= until).collect()
+    }
+}
+
+/// Views of the scene, if there are any. Photos of a run that are not there any more are a
+/// warning, unless their folder was named.
+fn views(
+    opened: &Opened,
+    colmap: Option<&Path>,
+    observe: &mut Observer<'_>,
+) -> Result<Option<Dataset>, RunError> {
+    let of_run = opened.run().is_some();
+    if !of_run && colmap.is_none() {
+        return Ok(None);
+    }
+    let mut load = opened.load();
+    load.force |= of_run;
+    let mut told = |event| {
+        if !of_run {
+            observe(event);
+        }
+    };
+    let found = open(&opened.colmap(colmap)?, &load, &mut told).and_then(|dataset| {
+        check_poses(&dataset.capture, opened.photos())?;
+        Ok(dataset.caching(CACHE_BYTES))
+    });
+    match found {
+        Err(error) if colmap.is_none() => {
+            observe(Event::Warning(format!(
+                "no cameras and photos: {error} (name their folder with --colmap)"
+            )));
+            Ok(None)
+        }
+        found => Ok(Some(found?)),
     }
 }

@@ -5,7 +5,7 @@ use std::{path::Path, sync::Arc};
 use glam::DVec3;
 use serde::Serialize;
 
-use super::{Event, Observer, RunError, Stage};
+use super::RunError;
 use crate::{
     capture::{Camera, Capture, split},
     gpu::{Gpu, GpuError},
@@ -13,6 +13,7 @@ use crate::{
     raster::{Picture, Raster, RasterOptions, SceneRenderer},
     report::CaptureReport,
     splats::{Format, Splats, WriteOptions, read_splats},
+    tell::{Event, Observer, Stage},
     trajectory::{ball_of_splats, lens, orbit_of_ball},
 };
 
@@ -145,12 +146,7 @@ fn compared(
     let (mut wrote, mut read) = (wrote?, read?);
     let (mut ours, mut theirs) = (Vec::new(), Vec::new());
     for (done, camera) in cameras.iter().enumerate() {
-        observe(Event::Progress {
-            stage: Stage::Measuring,
-            done,
-            total: cameras.len(),
-            message: String::new(),
-        });
+        observe(Event::progress(Stage::Measuring, done, cameras.len(), ""));
         let shown = |pictures: Vec<Picture>| pictures[0].shown();
         ours.extend(shown(wrote.render(camera)?));
         theirs.extend(shown(read.render(camera)?));

@@ -8,24 +8,27 @@ use std::{
 };
 
 use super::{
-    Event, Observer, RunError, RunFolder, Stage, files,
-    fingerprint::of_photos,
-    fit::{GrayFiles, capture_report, open_gpu},
-    keeping,
-    lock::RunLock,
-    scene::{Frame, read_splats},
+    RunError,
+    fit::GrayFiles,
     seams::{SeamViews, seam_views},
-    sound::open_checked,
 };
 use crate::{
     blocks::{Block, BlockFile, COARSE, Job, Region},
     capture::{Dataset, LoadOptions},
     eval::{Progress, exposures, gray_rows, mean_quality, measure_luma},
+    gpu::Gpu,
     input,
     luma::{LumaSettings, start::started},
     raster::Raster,
     report::{CaptureReport, LumaReport, LumaSeconds, Report, ViewExposure},
     splats::Splats,
+    store::{RunFolder, StoreError, files, fingerprint::of_photos, lock::RunLock},
+    subject::{
+        SubjectError,
+        scene::{Frame, read_splats},
+        sound::open_checked,
+    },
+    tell::{Event, Observer, Stage, keeping},
 };
 
 /// What `merge` is asked to do.
@@ -62,10 +65,10 @@ pub fn merge(
     let job = Job::read(&options.job)?;
     let blocks = trained(&options.job, &job, observe)?;
     let Some(first) = blocks.first() else {
-        return Err(RunError::NoSplats(options.job.clone()));
+        return Err(SubjectError::NoSplats(options.job.clone()).into());
     };
     observe(Event::begins(Stage::Device));
-    let gpu = open_gpu(false)?;
+    let gpu = Gpu::open()?;
     let folder = match &options.output {
         Some(path) => RunFolder::at(path),
         None => RunFolder::for_capture(&options.job),
@@ -98,7 +101,7 @@ pub fn merge(
     let mut report = Report {
         capture: CaptureReport {
             photos: of_photos(&dataset.capture, &[])?,
-            ..capture_report(&job.capture, &dataset)
+            ..CaptureReport::of(&job.capture, &dataset)
         },
         warnings: warnings.take(),
         luma: LumaReport {
@@ -141,17 +144,14 @@ pub fn merge(
 /// The blocks' runs.
 ///
 /// # Errors
-/// [`RunError::File`] where one is not there, was trained for another plan, or is drawn or was
-/// loaded otherwise than the first; [`RunError::InUse`].
+/// [`StoreError::File`] where one is not there, was trained for another plan, or is drawn or was
+/// loaded otherwise than the first; [`StoreError::InUse`].
 fn trained(folder: &Path, job: &Job, observe: &mut Observer<'_>) -> Result<Vec<Trained>, RunError> {
     let mut blocks: Vec<Trained> = Vec::new();
     for block in &job.blocks {
         let path = folder.join(&block.name);
         let run = RunFolder::at(&path);
-        let refused = |reason: String| RunError::File {
-            path: path.clone(),
-            reason,
-        };
+        let refused = |reason: String| RunError::from(StoreError::file(&path, reason));
         if !run.report().is_file() {
             return Err(refused(format!(
                 "is not trained yet: run `gs-chroma fit {}`",
@@ -233,7 +233,7 @@ fn together(
         }
     }
     if all.is_empty() {
-        return Err(RunError::NoSplats(dataset.capture.root.clone()));
+        return Err(SubjectError::NoSplats(dataset.capture.root.clone()).into());
     }
     let surroundings = around.len();
     all.append(around);

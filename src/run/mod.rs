@@ -1,71 +1,44 @@
 //! Whole runs: what a command does from its options to its files.
 
 mod answers;
-mod checkpoints;
-mod color_checkpoint;
-mod color_files;
-mod color_source;
 mod colorize;
-mod commit;
 mod eval;
-mod event;
 mod export;
 mod export_clean;
 mod export_viewer;
-pub(crate) mod files;
-mod film;
-mod fingerprint;
 mod fit;
 mod flight;
-pub(crate) mod folder;
-mod foreign;
 mod frames;
 mod info;
-mod live;
-mod lock;
-mod log;
 mod look;
 mod loss;
 mod merge;
-pub(crate) mod originals;
 mod partition;
-mod picture_names;
 mod plan;
 mod preset;
 mod render;
-mod scene;
 mod seams;
-mod sound;
 mod stages;
 mod teach;
 
 use std::path::PathBuf;
 
 pub use answers::HINT_WEIGHT;
-pub use checkpoints::{CheckpointOptions, EVERY, Interrupt};
-pub use color_files::Output;
-pub use colorize::{ColorizeOptions, colorize};
+pub use colorize::{ColorizeRequest, Output, colorize};
 pub use eval::{EvalOptions, eval};
-pub(crate) use event::keeping;
-pub use event::{Event, Observer, Stage};
 pub use export::{ExportOptions, Exported, export};
 pub use export_clean::Cleaned;
 pub use export_viewer::Shown;
-pub use film::is_film;
-pub use fit::{AheadOptions, BlockPlace, FitOptions, Init, Overlay, fit};
-pub use folder::RunFolder;
+pub use fit::{AheadOptions, BlockPlace, FitRequest, Init, fit};
 pub use frames::{Frames, FramesOptions, frames};
 pub use info::info;
-pub use live::{Live, LiveScene, LiveState};
-pub use look::{Look, SceneKind};
+pub use look::Look;
 pub use loss::Loss;
 pub use merge::{MergeOptions, merge};
 pub use partition::{PartitionOptions, partition};
-pub(crate) use picture_names::picture_names;
 pub use plan::{PlanOptions, Planned, plan};
 pub use render::{PathOptions, RenderOptions, Rendered, Views, Way, render, render_path};
 pub use seams::{SeamViews, ViewMean};
-pub use sound::Soundness;
 pub use teach::{TeachOptions, teacher_or_photos};
 
 pub use crate::luma::Preset;
@@ -73,44 +46,31 @@ use crate::{
     blocks::BlocksError,
     capture::CaptureError,
     chroma::{ChromaError, teacher::TeacherError},
-    effects::Contradiction,
     eval::EvalError,
     gpu::GpuError,
     luma::LumaError,
     programs::ProgramError,
     splats::SplatError,
+    store::StoreError,
+    subject::SubjectError,
     trajectory::TrajectoryError,
 };
 
 /// What can stop a run.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
-    /// The photos or their poses.
+    /// A file or a folder.
     #[error(transparent)]
-    Capture(#[from] CaptureError),
-    /// Photos, poses and points, which contradict each other.
+    Store(#[from] StoreError),
+    /// The scene, its photos or the device.
     #[error(transparent)]
-    Unsound(#[from] Contradiction),
-    /// The device failed or is missing.
-    #[error(transparent)]
-    Gpu(#[from] GpuError),
+    Subject(#[from] SubjectError),
     /// Stage 2.
     #[error(transparent)]
     Chroma(ChromaError),
-    /// A splat file.
-    #[error(transparent)]
-    Splats(#[from] SplatError),
     /// A teacher cannot be used.
     #[error(transparent)]
     Teacher(#[from] TeacherError),
-    /// The file system.
-    #[error("{}: {reason}", path.display())]
-    File {
-        /// File at fault.
-        path: PathBuf,
-        /// What is wrong with it and what to do.
-        reason: String,
-    },
     /// Blocks of a scene.
     #[error(transparent)]
     Blocks(BlocksError),
@@ -123,18 +83,6 @@ pub enum RunError {
     /// A camera path.
     #[error(transparent)]
     Trajectory(#[from] TrajectoryError),
-    /// There is no run to go on with.
-    #[error("no run under runs/")]
-    NoRun,
-    /// A splat file without cameras.
-    #[error("{}: a splat file has no cameras", .0.display())]
-    NoCameras(PathBuf),
-    /// A splat file without Gaussians.
-    #[error("{}: holds no Gaussians", .0.display())]
-    NoSplats(PathBuf),
-    /// A run without colors.
-    #[error("{}: the run is not colored yet: run `gs-chroma colorize` first", .0.display())]
-    NoColors(PathBuf),
     /// A program of others, such as FFmpeg.
     #[error(transparent)]
     Program(#[from] ProgramError),
@@ -153,6 +101,9 @@ pub enum RunError {
         /// The Gaussians' size in world units.
         size: f64,
     },
+    /// A folder that is to go on among its neighbors.
+    #[error("{}: is no trained block of a job", .0.display())]
+    NoTrainedBlock(PathBuf),
     /// All views were trained on.
     #[error("no view is held out")]
     NoHeldOut,
@@ -187,62 +138,9 @@ pub enum RunError {
     /// The system does not let the program hear of signals.
     #[error("signals cannot be heeded: {0}")]
     Signals(String),
-    /// Another process writes into the run, or reads it.
-    #[error("{}: {holder}: wait for it, or choose another folder with -o", folder.display())]
-    InUse {
-        /// The run's folder.
-        folder: PathBuf,
-        /// Who it is, and what it does.
-        holder: String,
-    },
-    /// Photos have changed their names since they were trained on.
-    #[error(
-        "{}: photo {photo} is what {other} was when it was trained on", folder.display()
-    )]
-    Exchanged {
-        /// The COLMAP folder.
-        folder: PathBuf,
-        /// Its name now.
-        photo: String,
-        /// Its name then.
-        other: String,
-    },
-    /// Photos have other poses than when they were trained on.
-    #[error(
-        "{}: {moved} of {photos} photos have another pose or camera than when the scene was trained, such as {photo}", folder.display()
-    )]
-    OtherModel {
-        /// The COLMAP folder.
-        folder: PathBuf,
-        /// One of these photos.
-        photo: String,
-        /// How many there are.
-        moved: usize,
-        /// Photos in all.
-        photos: usize,
-    },
-    /// A run's file is not the one that its report describes.
-    #[error("{}: is not the file that this run wrote", .0.display())]
-    OtherFile(PathBuf),
     /// There is no training that was interrupted.
     #[error("{}: nothing to continue: the run is finished", .0.display())]
     NothingToResume(PathBuf),
-    /// A checkpoint of another training.
-    #[error("{}: belongs to another training: {differs}", path.display())]
-    OtherCheckpoint {
-        /// Checkpoint at fault.
-        path: PathBuf,
-        /// What was otherwise.
-        differs: String,
-    },
-    /// A training was ended from outside, and can go on.
-    #[error("interrupted after iteration {iteration}; {} continues from there", path.display())]
-    Interrupted {
-        /// Iterations done.
-        iteration: usize,
-        /// Checkpoint at fault.
-        path: PathBuf,
-    },
     /// Nothing is left for stage 2.
     #[error("stage 1 already took {luma} iterations: choose a larger number")]
     NothingUntil {
@@ -272,6 +170,24 @@ pub enum RunError {
         /// What was reached, in dB.
         reached: f64,
     },
+}
+
+impl From<CaptureError> for RunError {
+    fn from(error: CaptureError) -> Self {
+        Self::Subject(error.into())
+    }
+}
+
+impl From<GpuError> for RunError {
+    fn from(error: GpuError) -> Self {
+        Self::Subject(error.into())
+    }
+}
+
+impl From<SplatError> for RunError {
+    fn from(error: SplatError) -> Self {
+        Self::Subject(error.into())
+    }
 }
 
 impl From<ChromaError> for RunError {

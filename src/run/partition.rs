@@ -6,14 +6,16 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::{
-    Event, Observer, RunError, RunFolder, Stage, files,
-    lock::{LOCK, RunLock},
-};
+use super::RunError;
 use crate::{
     blocks::{BlockFile, BlocksError, COARSE, Division, Job, Planned, picture, plan, refuse_link},
     capture::{Capture, CaptureOptions, Rejected},
     disk,
+    store::{
+        RunFolder, StoreError, files,
+        lock::{LOCK, RunLock},
+    },
+    tell::{Event, Observer, Stage},
 };
 
 /// The plan as a picture, in a job's folder.
@@ -100,7 +102,7 @@ pub fn partition(options: &PartitionOptions, observe: &mut Observer<'_>) -> Resu
 /// The folders of a former job's blocks, which nobody has begun to train, nor can.
 ///
 /// # Errors
-/// [`RunError::File`] where somebody has, [`RunError::InUse`].
+/// [`StoreError::File`] where somebody has, [`StoreError::InUse`].
 fn replaceable(folder: &Path) -> Result<BTreeMap<PathBuf, RunLock>, RunError> {
     let mut blocks = BTreeMap::new();
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
@@ -110,18 +112,18 @@ fn replaceable(folder: &Path) -> Result<BTreeMap<PathBuf, RunLock>, RunError> {
         }
         let run = RunFolder::at(&path);
         if run.report().exists() || run.checkpoint().exists() {
-            return Err(RunError::File {
-                path,
-                reason: "is trained, or being trained: choose another folder with -o, or remove it"
-                    .to_owned(),
-            });
+            return Err(StoreError::file(
+                &path,
+                "is trained, or being trained: choose another folder with -o, or remove it",
+            )
+            .into());
         }
     }
     Ok(blocks)
 }
 
 /// Makes a folder none of a block; it stays where somebody has put something there.
-fn clear(block: &Path) -> Result<(), RunError> {
+fn clear(block: &Path) -> Result<(), StoreError> {
     let file = BlockFile::path(block);
     let entries = fs::read_dir(block).map_err(files::at(block))?.flatten();
     let ours = |path: &Path| path == file || path.file_name().is_some_and(|name| name == LOCK);
@@ -136,7 +138,7 @@ impl From<BlocksError> for RunError {
     fn from(error: BlocksError) -> Self {
         match error {
             BlocksError::Capture(error) => error.into(),
-            BlocksError::File { path, reason } => Self::File { path, reason },
+            BlocksError::File { path, reason } => StoreError::File { path, reason }.into(),
             other => Self::Blocks(other),
         }
     }

@@ -2,17 +2,18 @@
 
 use std::{ops::ControlFlow, path::PathBuf, sync::Arc};
 
-use super::{
-    Event, Observer, Preset, RunError, Stage,
-    fit::open_gpu,
-    scene::tell_trial,
-    sound::{Examined, Soundness, open_examined},
-};
+use super::{Preset, RunError};
 use crate::{
     capture::LoadOptions,
     effects::{Overrules, Plan},
+    gpu::Gpu,
     luma::planned,
     raster::Raster,
+    subject::{
+        scene::of_trial,
+        sound::{Examined, Soundness, open_examined},
+    },
+    tell::{Event, Observer, Stage},
 };
 
 /// What `plan` is asked to do; `None` leaves it to the preset.
@@ -48,7 +49,7 @@ pub fn plan(options: &PlanOptions, observe: &mut Observer<'_>) -> Result<Planned
         Some(preset) => preset,
         None => {
             observe(Event::begins(Stage::Device));
-            Preset::for_device(&open_gpu(false)?)
+            Preset::for_device(&Gpu::open()?)
         }
     };
     let load = preset.load_options(&options.load, &options.overrules);
@@ -61,7 +62,7 @@ pub fn plan(options: &PlanOptions, observe: &mut Observer<'_>) -> Result<Planned
     let dataset = Arc::new(dataset);
     let mut settings = preset.work().settings;
     settings.iterations = options.iterations.unwrap_or(settings.iterations);
-    let raster = || Ok(Arc::new(Raster::new(&open_gpu(false)?)));
+    let raster = || Ok(Arc::new(Raster::new(&Gpu::open()?)));
     let plan = planned(
         &dataset,
         &evidence,
@@ -69,7 +70,7 @@ pub fn plan(options: &PlanOptions, observe: &mut Observer<'_>) -> Result<Planned
         &options.overrules,
         raster,
         &mut |progress| {
-            tell_trial(&progress, observe);
+            observe(of_trial(&progress));
             ControlFlow::Continue(())
         },
     );

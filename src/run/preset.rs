@@ -1,14 +1,16 @@
 //! What a preset stands for on a device and for photos.
 
+use serde::{Deserialize, Serialize};
+
 use crate::{
     capture::LoadOptions,
     effects::{Effect, Overrules},
     gpu::Gpu,
-    luma::{LumaSettings, Preset},
+    luma::{LumaOverlay, LumaSettings, Preset},
 };
 
 /// An amount of work.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Work {
     /// How luma is trained.
     pub settings: LumaSettings,
@@ -18,13 +20,9 @@ pub struct Work {
 
 impl Work {
     /// A preset's where nothing else is asked for.
-    pub fn asked(
-        preset: Preset,
-        overlay: &dyn Fn(&mut LumaSettings),
-        max_side: Option<u32>,
-    ) -> Self {
+    pub fn asked(preset: Preset, overlay: &LumaOverlay, max_side: Option<u32>) -> Self {
         let mut work = preset.work();
-        overlay(&mut work.settings);
+        overlay.apply(&mut work.settings);
         work.max_side = max_side.or(work.max_side);
         work
     }

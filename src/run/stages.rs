@@ -2,11 +2,15 @@
 //! trial, is not among them.
 
 use super::{
-    ColorizeOptions, EvalOptions, ExportOptions, FitOptions, FramesOptions, MergeOptions,
+    ColorizeRequest, EvalOptions, ExportOptions, FitRequest, FramesOptions, MergeOptions,
     PartitionOptions, PathOptions, PlanOptions, RenderOptions,
-    Stage::{self, *},
 };
-use crate::{chroma, luma::Goal, splats::Format};
+use crate::{
+    chroma,
+    luma::Goal,
+    splats::Format,
+    tell::Stage::{self, *},
+};
 
 /// A stage that is gone through only where something is asked for.
 fn only_if(asked: bool, stage: Stage) -> Option<Stage> {
@@ -44,7 +48,7 @@ impl PartitionOptions {
     }
 }
 
-impl FitOptions {
+impl FitRequest {
     /// The stages of [`fit`](super::fit).
     pub fn stages(&self) -> Vec<Stage> {
         let limited = match self.goal {
@@ -66,7 +70,7 @@ impl FitOptions {
     }
 }
 
-impl ColorizeOptions {
+impl ColorizeRequest {
     /// The stages of [`colorize`](super::colorize).
     pub fn stages(&self) -> Vec<Stage> {
         all([

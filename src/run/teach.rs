@@ -7,8 +7,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use serde::{Deserialize, Serialize};
+
 use super::{
-    Event, Observer, RunError, Stage,
+    RunError,
     answers::{mean, scaled, with_hints, with_strokes},
 };
 use crate::{
@@ -22,10 +24,11 @@ use crate::{
     },
     hash::Hasher,
     report::{Report, TeacherReport},
+    tell::{Event, Observer, Stage},
 };
 
 /// Who colors the photos.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TeachOptions {
     /// Teachers and their weights, above 0; may be empty where there are hints.
     pub teachers: Vec<(PathBuf, f32)>,
@@ -135,12 +138,12 @@ impl Colorizer for Asking<'_, '_> {
     ) -> Result<Option<Wanted>, ColorizerError> {
         let (view, capture) = (self.view, &self.dataset.capture);
         self.view += 1;
-        (self.observe)(Event::Progress {
-            stage: Stage::Teacher,
-            done: view,
-            total: capture.views.len(),
-            message: query.name.to_owned(),
-        });
+        (self.observe)(Event::progress(
+            Stage::Teacher,
+            view,
+            capture.views.len(),
+            query.name,
+        ));
         let trained = self.dataset.split.train.contains(&view);
         let folder = self.teachers.hints.as_ref();
         let folder = folder.map(|(_, folder)| folder.load(query, gray));
@@ -195,9 +198,6 @@ impl Colorizer for Asking<'_, '_> {
 
 impl Teachers {
     /// Opens them for the photos of a COLMAP folder; networks keep their answers in `cache`.
-    ///
-    /// # Errors
-    /// [`RunError::Teacher`].
     pub fn open(
         options: &TeachOptions,
         colmap_dir: &Path,
@@ -259,9 +259,6 @@ impl Teachers {
     }
 
     /// What they say of one photo together, at its size; `None` where none has an answer.
-    ///
-    /// # Errors
-    /// [`RunError::Teacher`].
     pub fn color(
         &mut self,
         query: Query<'_>,

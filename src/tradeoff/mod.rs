@@ -20,7 +20,9 @@ pub use sweep::{PointStage, Tradeoff};
 
 use crate::{
     capture::Capture,
-    run::{Event, Observer, RunError, RunFolder, Stage, files},
+    run::RunError,
+    store::{RunFolder, StoreError, files},
+    tell::{Event, Observer, Stage},
 };
 use point::Bench;
 use search::Task;
@@ -49,6 +51,9 @@ pub enum TradeoffError {
     /// The photos, the device or the file system.
     #[error(transparent)]
     Run(#[from] RunError),
+    /// A file or a folder.
+    #[error(transparent)]
+    Store(#[from] StoreError),
     /// Nothing is held out, and quality cannot be weighed against time.
     #[error("{}: no view is held out to measure on: leave --no-holdout out, or name a folder with more photos", .0.display())]
     NothingToMeasure(PathBuf),
@@ -149,12 +154,12 @@ fn run(
         .expected
         .map_or(String::new(), |seconds| format!(", about {seconds:.0} s"));
     bench.run(task, sweep, &mut |seconds| {
-        observe(Event::Progress {
-            stage: Stage::Sweep,
-            done: (spent + seconds) as usize,
-            total: sweep.budget.ceil() as usize,
-            message: format!("{count} points; {}{expected}", task.name),
-        });
+        observe(Event::progress(
+            Stage::Sweep,
+            (spent + seconds) as usize,
+            sweep.budget.ceil() as usize,
+            format!("{count} points; {}{expected}", task.name),
+        ));
     })
 }
 
@@ -175,7 +180,7 @@ fn in_words(point: &Point) -> String {
 }
 
 /// Writes the three files; the one that a sweep goes on from last.
-fn write(folder: &Path, state: &State) -> Result<(), RunError> {
+fn write(folder: &Path, state: &State) -> Result<(), StoreError> {
     let [table, _, html] = FILES.map(|name| folder.join(name));
     files::write(&table, report::csv(&state.sweep).as_bytes())?;
     files::write(&html, report::page(&state.sweep).as_bytes())?;

@@ -16,7 +16,8 @@ use crate::{
     chroma::teacher::located,
     disk, input,
     report::{Evaluation, Method},
-    run::{RunError, RunFolder, files, teacher_or_photos},
+    run::{RunError, teacher_or_photos},
+    store::{RunFolder, StoreError, files},
 };
 
 /// The option of `fit` for the longer side at which held-out views are measured: only
@@ -40,7 +41,7 @@ impl Bench {
     /// The bench of a sweep in `folder`.
     ///
     /// # Errors
-    /// [`RunError::File`] when a file is missing.
+    /// [`StoreError::File`] when a file is missing.
     pub fn new(
         options: &TradeoffOptions,
         folder: &Path,
@@ -205,10 +206,8 @@ impl Bench {
 fn consistency(folder: &RunFolder) -> Result<Option<f64>, RunError> {
     let path = folder.evaluation();
     let text = input::read_to_string(&path).map_err(files::at(&path))?;
-    let evaluation: Evaluation = serde_json::from_str(&text).map_err(|error| RunError::File {
-        path,
-        reason: error.to_string(),
-    })?;
+    let evaluation: Evaluation =
+        serde_json::from_str(&text).map_err(|error| StoreError::file(&path, error.to_string()))?;
     let mut scores = evaluation.between.consistency.iter();
     let exported = scores.find(|score| score.method == Method::Exported);
     Ok(exported.and_then(|score| score.rms))
@@ -229,17 +228,14 @@ fn without(words: Vec<String>, option: &str) -> Vec<String> {
 }
 
 /// A path as an argument that JSON can hold.
-fn text(path: &Path) -> Result<String, RunError> {
+fn text(path: &Path) -> Result<String, StoreError> {
     let text = path.to_str().map(str::to_owned);
-    text.ok_or_else(|| RunError::File {
-        path: path.to_owned(),
-        reason: "its name is no Unicode: rename it".to_owned(),
-    })
+    text.ok_or_else(|| StoreError::file(path, "its name is no Unicode: rename it"))
 }
 
 /// The same file in two places, copied where the file system cannot do that. Every file
 /// of a run is replaced, never changed, so neither place notices the other.
-fn link(from: &Path, to: &Path) -> Result<(), RunError> {
+fn link(from: &Path, to: &Path) -> Result<(), StoreError> {
     disk::link(from, to).map_err(files::at(from))
 }
 

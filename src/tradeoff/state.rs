@@ -12,7 +12,7 @@ use super::{
 use crate::{
     disk::{self, trust},
     input,
-    run::{RunError, files},
+    store::{StoreError, files},
 };
 
 /// Locked while a sweep runs, and left behind empty.
@@ -32,17 +32,14 @@ impl State {
     /// The sweep of a folder, or a new one. A base that failed is tried again.
     ///
     /// # Errors
-    /// [`RunError::File`] when the folder holds a sweep of something else, or one that runs.
-    pub fn open(folder: &Path, subject: Subject, budget: f64) -> Result<Self, RunError> {
+    /// [`StoreError::File`] when the folder holds a sweep of something else, or one that runs.
+    pub fn open(folder: &Path, subject: Subject, budget: f64) -> Result<Self, StoreError> {
         let points = folder.join(POINTS);
         trust::check_inside(folder, &points).map_err(files::at(&points))?;
         let lock = lock(&folder.join(LOCK))?;
         let path = folder.join(FILES[1]);
         let mut sweep = match input::read_to_string(&path) {
-            Ok(text) => read(&text, &subject).map_err(|reason| RunError::File {
-                path: path.clone(),
-                reason,
-            })?,
+            Ok(text) => read(&text, &subject).map_err(|reason| StoreError::file(&path, reason))?,
             Err(_) => Tradeoff {
                 version: TRADEOFF_VERSION,
                 program: env!("CARGO_PKG_VERSION").to_owned(),
@@ -68,20 +65,19 @@ impl State {
     }
 
     /// Writes the file beside and renames.
-    pub fn write(&self) -> Result<(), RunError> {
+    pub fn write(&self) -> Result<(), StoreError> {
         files::write(&self.path, (self.sweep.to_json() + "\n").as_bytes())
     }
 }
 
 /// Locks a file, where the file system can.
-fn lock(path: &Path) -> Result<File, RunError> {
+fn lock(path: &Path) -> Result<File, StoreError> {
     let file = disk::open_in_place(path).map_err(files::at(path))?;
     match file.try_lock() {
-        Err(TryLockError::WouldBlock) => Err(RunError::File {
-            path: path.to_path_buf(),
-            reason: "another sweep runs in this folder: wait for it, or choose another with -o"
-                .to_owned(),
-        }),
+        Err(TryLockError::WouldBlock) => Err(StoreError::file(
+            path,
+            "another sweep runs in this folder: wait for it, or choose another with -o",
+        )),
         _ => Ok(file),
     }
 }

@@ -48,7 +48,7 @@ pub enum TrajectoryError {
         source: io::Error,
     },
     /// It would have too many frames.
-    #[error("a path of {frames:.0} frames: {MOST_FRAMES} at most; lower --seconds or --fps")]
+    #[error("a path of {frames:.0} frames: {MOST_FRAMES} at most")]
     Long {
         /// How many.
         frames: f64,

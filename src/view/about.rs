@@ -18,7 +18,7 @@ const POINTS: usize = 200;
 pub fn of_look(look: &Look, start: Option<(&Camera, Option<f64>)>) -> Value {
     let scenes: Vec<&str> = look.scenes().map(|kind| kind.name()).collect();
     let stamps: BTreeMap<&str, u32> = scenes.iter().map(|&kind| (kind, 0)).collect();
-    let report = look.report.as_ref();
+    let report = look.report();
     json!({
         "name": look.name,
         "scenes": scenes,

@@ -15,7 +15,9 @@ use super::{
 use crate::{
     capture::{Camera, Dataset, Orientation, Photo},
     hash::Hasher,
-    run::{Look, Observer, RunError, SceneKind},
+    run::{Look, RunError},
+    subject::SceneKind,
+    tell::Observer,
 };
 
 /// Longer side of the photos that the page shows, in pixels: what screens have.

@@ -13,8 +13,11 @@ use crate::{
     gpu::{Gpu, GpuError},
     raster::{Picture, Raster, RasterOptions, SceneRenderer},
     report::to_image,
-    run::{Event, Look, Observer, RunError, SceneKind, Stage, files},
+    run::{Look, RunError},
     splats::Splats,
+    store::files,
+    subject::SceneKind,
+    tell::{Event, Observer, Stage},
 };
 
 /// Longer side of the picture that is there before the scene is, in pixels, and its quality.

@@ -12,7 +12,8 @@ use super::{
 };
 use crate::{
     raster::constants::NEAR_SHARE,
-    run::{Live, RunError, SceneKind},
+    run::RunError,
+    subject::{Live, SceneKind},
 };
 
 /// A command that goes on, as a page shows it.

@@ -17,7 +17,7 @@ pub use overview::overview;
 pub use packed::pack;
 pub use server::{Answer, Request, Server};
 
-use crate::run::RunError;
+use crate::{run::RunError, store::StoreError};
 
 /// What can keep a scene from being shown.
 #[derive(Debug, thiserror::Error)]
@@ -25,6 +25,9 @@ pub enum ViewerError {
     /// The run or the file.
     #[error(transparent)]
     Run(#[from] RunError),
+    /// A file or a folder.
+    #[error(transparent)]
+    Store(#[from] StoreError),
     /// A port that is taken or not allowed.
     #[error("port {port} of 127.0.0.1 cannot be had ({reason})")]
     Port {

@@ -18,8 +18,8 @@ use gs_chroma::{
     chroma::teacher::{GrayImage, Teacher, TeacherError, TeacherSettings},
     measure::decode_flo,
     oracle,
-    run::RunFolder,
     splats::{self, Format, WriteOptions, read_ply, read_splats, write_splats},
+    store::RunFolder,
 };
 use peak_alloc::PeakAlloc;
 use proptest::{

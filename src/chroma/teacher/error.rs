@@ -168,8 +168,7 @@ pub enum TeacherError {
     /// A hint says something about every pixel.
     #[error(
         "{}: has no transparency and is not its photo with strokes on it, so it would paint the \
-         whole photo; save the strokes alone on a transparent layer, as PNG or TIFF, or give \
-         whole pictures as a --teacher folder", path.display()
+         whole photo; save the strokes alone on a transparent layer, as PNG or TIFF", path.display()
     )]
     NoTransparency {
         /// Image at fault.

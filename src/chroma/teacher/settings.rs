@@ -37,7 +37,7 @@ impl TeacherDevice {
 }
 
 /// How a teacher is to be asked.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TeacherSettings {
     /// A network's contract: the name of a built-in profile or the path of a
     /// `.toml` manifest. None for the manifest beside the model, or what its

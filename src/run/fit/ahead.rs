@@ -6,14 +6,18 @@ use std::{
     thread,
 };
 
-use super::super::{Event, Observer, RunError, RunFolder, Stage};
+use serde::{Deserialize, Serialize};
+
 use crate::{
     capture::Dataset,
     chroma::teacher::{GrayImage, Query, Teacher, TeacherSettings},
+    run::RunError,
+    store::RunFolder,
+    tell::{Event, Observer, Stage},
 };
 
 /// Teachers that are asked while luma trains; may be none.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct AheadOptions {
     /// Colorization networks. A folder of colored photos may be named, but has nothing to
     /// be asked.
@@ -34,9 +38,6 @@ struct Came {
 
 impl Ahead {
     /// Opens them; answers are kept in the run's folder, where `colorize` finds them.
-    ///
-    /// # Errors
-    /// [`RunError::Teacher`].
     pub fn open(options: &AheadOptions, folder: &RunFolder) -> Result<Self, RunError> {
         let open = |path: &PathBuf| Teacher::open(path, Some(&folder.teacher()), &options.settings);
         let teachers = (options.teachers.iter())

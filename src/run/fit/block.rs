@@ -3,22 +3,23 @@
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 
-use super::super::{
-    Event, Observer, RunError, RunFolder,
-    scene::{Frame, read_splats},
-};
-use super::{FitOptions, Init, Neighbors, checkpoint::sha256_of};
+use super::{FitRequest, Init, Neighbors, checkpoint::sha256_of};
 use crate::{
     blocks::{Area, Block, BlockFile, COARSE, FAR_PART, Job, Kind, Region},
     capture::{Camera, Dataset, LoadOptions},
     effects::{Effect, Overrules},
     luma::{
-        LumaSettings, Preset,
+        LumaOverlay, LumaSettings, Preset,
         start::{first_points, room_at_first},
     },
     report::{EffectReport, Report, ViewExposure},
+    run::RunError,
     splats::{Splats, initial_splats},
+    store::{RunFolder, StoreError},
+    subject::scene::{Frame, read_splats},
+    tell::{Event, Observer},
 };
 
 /// Effects that each block decides for itself: how far a lens displaces pixels depends on the
@@ -39,7 +40,7 @@ const HEADROOM: f64 = 0.5;
 const AGREEING_PART: usize = 6;
 
 /// A block and the job that it belongs to.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BlockPlace {
     job: Job,
     block: Block,
@@ -53,7 +54,7 @@ impl BlockPlace {
     /// That of a block's folder; none where it is no block's, or the coarse model's.
     ///
     /// # Errors
-    /// [`RunError::File`] where a file of the job is damaged.
+    /// [`StoreError::File`] where a file of the job is damaged.
     pub fn read(folder: &Path) -> Result<Option<Self>, RunError> {
         let file = match BlockFile::read(folder)? {
             Some(file) if file.kind == Kind::Block => file,
@@ -63,11 +64,11 @@ impl BlockPlace {
         let name = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
         let name = name.file_name().unwrap_or_default().to_string_lossy();
         let Some(block) = job.block(&name).cloned() else {
-            return Err(RunError::File {
-                path: folder.to_owned(),
-                reason: "is no block of the job that it lies in: run `gs-chroma partition` again"
-                    .to_owned(),
-            });
+            return Err(StoreError::file(
+                folder,
+                "is no block of the job that it lies in: run `gs-chroma partition` again",
+            )
+            .into());
         };
         let coarse = RunFolder::at(&job_of(folder).join(COARSE));
         let coarse = match coarse.report().is_file() {
@@ -129,9 +130,6 @@ impl BlockPlace {
     /// What the training starts from: points where the block is, beyond them what the coarse
     /// model has there, as far as the block's photos show it, and its surroundings; and how many
     /// these are. None without a coarse model, which is told.
-    ///
-    /// # Errors
-    /// [`RunError`] of the coarse model's file.
     pub(super) fn start(
         &self,
         dataset: &Dataset,
@@ -298,13 +296,13 @@ fn job_of(folder: &Path) -> PathBuf {
     folder.parent().unwrap_or(&folder).to_owned()
 }
 
-impl FitOptions {
+impl FitRequest {
     /// What trains a block of a job, or its coarse model, in its own folder; none where the
     /// folder is neither. What the coarse model found out about photos, effects and exposures
     /// holds for all blocks.
     ///
     /// # Errors
-    /// [`RunError::File`] where a file of the job is damaged.
+    /// [`StoreError::File`] where a file of the job is damaged.
     pub fn of_block(folder: &Path) -> Result<Option<Self>, RunError> {
         let Some(file) = BlockFile::read(folder)? else {
             return Ok(None);
@@ -316,24 +314,20 @@ impl FitOptions {
             Some((_, report)) => (report.capture.load.clone(), decided(&report.effects)),
             None => Default::default(),
         };
-        let (max_splats, iterations) = (file.max_splats, file.iterations);
-        // Those of the coarse model surround all blocks.
-        let surround = coarse.is_none();
-        // What is divided into blocks is larger than a device.
-        let stream = block.is_some();
-        let haste = (block.as_ref()).map_or(1.0, |block| block.job.haste(&block.block));
+        let settings = LumaOverlay {
+            max_splats: file.max_splats,
+            iterations: file.iterations,
+            // Those of the coarse model surround all blocks.
+            surround: coarse.map(|_| false),
+            // What is divided into blocks is larger than a device.
+            stream_photos: block.as_ref().map(|_| true),
+            haste: (block.as_ref()).map(|block| block.job.haste(&block.block)),
+            ..LumaOverlay::default()
+        };
         Ok(Some(Self {
             output: Some(folder.to_owned()),
             preset: (file.kind == Kind::Coarse).then_some(Preset::Draft),
-            settings: Box::new(move |settings| {
-                settings.max_splats = max_splats.unwrap_or(settings.max_splats);
-                settings.surround &= surround;
-                settings.stream_photos |= stream;
-                settings.rates = settings.rates.times(haste);
-                if let Some(iterations) = iterations {
-                    settings.iterations = iterations;
-                }
-            }),
+            settings,
             load: LoadOptions {
                 max_side: None,
                 chosen: Some(file.photos),
@@ -349,35 +343,30 @@ impl FitOptions {
     /// sixth of its iterations so far.
     ///
     /// # Errors
-    /// [`RunError::File`] where the run is none of the same photos, or this is no trained block.
+    /// [`StoreError::File`] where the run is none of the same photos, or this is no trained block.
     pub fn among(self, merged: &Path) -> Result<Self, RunError> {
         let folder = RunFolder::at(merged);
         let report = folder.read_report()?;
-        let refused = |path: &Path, reason: &str| RunError::File {
-            path: path.to_owned(),
-            reason: reason.to_owned(),
-        };
         let (Some(block), Some(Init::Run { iterations, .. })) = (&self.block, &self.init) else {
-            let path = self.output.as_ref().unwrap_or(&self.colmap_dir);
-            let reason = "is no trained block of a job: --around is for these";
-            return Err(refused(path, reason));
+            let path = self.output.unwrap_or(self.colmap_dir);
+            return Err(RunError::NoTrainedBlock(path));
         };
         if Path::new(&report.capture.path) != block.job.capture {
             let reason = "is no scene of the block's photos: give the run of `gs-chroma merge`";
-            return Err(refused(merged, reason));
+            return Err(StoreError::file(merged, reason).into());
         }
         let luma = folder.luma();
-        let iterations = iterations.div_ceil(AGREEING_PART);
+        let iterations = Some(iterations.div_ceil(AGREEING_PART));
         Ok(Self {
             around: Some(Neighbors {
                 sha256: sha256_of(luma.clone())?,
                 surroundings: report.luma.surroundings,
                 luma,
             }),
-            settings: Box::new(move |settings| {
-                (self.settings)(settings);
-                settings.iterations = iterations;
-            }),
+            settings: LumaOverlay {
+                iterations,
+                ..self.settings
+            },
             // Only photos at the size that is trained on are without what is beyond.
             measure_side: None,
             ..self

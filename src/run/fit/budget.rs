@@ -6,13 +6,16 @@
 
 use std::{sync::Arc, time::Instant};
 
-use super::super::{Event, Observer, Preset, RunError, Stage, preset::Work};
-use super::{FitOptions, Overlay};
+use serde::{Deserialize, Serialize};
+
+use super::FitRequest;
 use crate::{
     capture::{Capture, CaptureOptions},
     gpu::GpuError,
-    luma::{Goal, LumaError, LumaSettings, Schedule, rehearse},
+    luma::{Goal, LumaError, LumaOverlay, LumaSettings, Schedule, rehearse},
     raster::Raster,
+    run::{Preset, RunError, preset::Work},
+    tell::{Event, Observer, Stage},
 };
 
 /// Where a family begins: the level of the sketch.
@@ -83,6 +86,7 @@ fn at_level(level: f64, longest: u32) -> Work {
 }
 
 /// The work that a run is to do.
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Budget {
     /// The preset that comes nearest, and no higher than that asked for.
     pub preset: Preset,
@@ -98,7 +102,7 @@ impl Budget {
     /// # Errors
     /// [`RunError::Capture`], and [`GpuError::Lost`] of a rehearsal.
     pub fn of(
-        options: &FitOptions,
+        options: &FitRequest,
         raster: &Arc<Raster>,
         begun: Instant,
         observe: &mut Observer<'_>,
@@ -149,7 +153,7 @@ struct Family<'a> {
     /// The highest level, that of the preset asked for.
     pub highest: f64,
     /// Holds at every level.
-    pub overlay: &'a Overlay,
+    pub overlay: &'a LumaOverlay,
     /// The longer side of the photos as they are.
     pub longest_side: u32,
     /// The longer side at every level.
@@ -162,10 +166,7 @@ struct Family<'a> {
 
 impl<'a> Family<'a> {
     /// What there is for the capture and the options; `max_side` holds at every level.
-    ///
-    /// # Errors
-    /// [`RunError::Capture`].
-    fn of(options: &'a FitOptions, max_side: Option<u32>) -> Result<Self, RunError> {
+    fn of(options: &'a FitRequest, max_side: Option<u32>) -> Result<Self, RunError> {
         let of_photos = CaptureOptions {
             chosen: options.load.chosen.clone(),
             ..CaptureOptions::default()
@@ -186,7 +187,7 @@ impl<'a> Family<'a> {
     /// The work at a level.
     fn work(&self, level: f64) -> Work {
         let mut work = at_level(level.clamp(LOWEST, self.highest), self.longest_side);
-        (self.overlay)(&mut work.settings);
+        self.overlay.apply(&mut work.settings);
         work.max_side = self.max_side.or(work.max_side);
         work
     }
@@ -216,9 +217,6 @@ impl<'a> Family<'a> {
 
     /// The level whose training takes `seconds`, as near as a rehearsal on random Gaussians
     /// tells; with it the seconds of an iteration there.
-    ///
-    /// # Errors
-    /// [`GpuError::Lost`].
     fn level_for(
         &self,
         seconds: f64,
@@ -275,7 +273,7 @@ impl<'a> Family<'a> {
 mod tests {
     use super::*;
 
-    fn family(overlay: &Overlay) -> Family<'_> {
+    fn family(overlay: &LumaOverlay) -> Family<'_> {
         Family {
             highest: 2.0,
             overlay,
@@ -286,8 +284,8 @@ mod tests {
         }
     }
 
-    fn nothing() -> Overlay {
-        Box::new(|_| {})
+    fn nothing() -> LumaOverlay {
+        LumaOverlay::default()
     }
 
     #[test]
@@ -318,7 +316,10 @@ mod tests {
 
     #[test]
     fn what_was_asked_for_holds_at_every_level() {
-        let overlay: Overlay = Box::new(|settings| settings.max_splats = 5_000);
+        let overlay = LumaOverlay {
+            max_splats: Some(5_000),
+            ..LumaOverlay::default()
+        };
         let family = Family {
             max_side: Some(320),
             highest: 0.0,

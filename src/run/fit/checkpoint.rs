@@ -2,60 +2,25 @@
 
 use std::path::PathBuf;
 
-use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::{
-    super::{
-        Event, Observer, Preset, RunError, RunFolder,
-        checkpoints::{FileKeeper, Found},
-        files,
-        preset::Work,
-    },
-    FitOptions, Init,
-    budget::Budget,
-};
+use super::{FitRequest, Init, budget::Budget};
 use crate::{
     capture::LoadOptions,
     gpu::Gpu,
     hash, input,
-    luma::{Checkpoint, Keeper, LumaSettings},
+    luma::{Checkpoint, Keeper},
+    run::RunError,
+    store::{
+        RunFolder, StoreError,
+        checkpoints::{FileKeeper, Found},
+        files,
+    },
+    tell::{Event, Observer},
 };
 
-/// The work that a run has begun.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub(super) struct Started {
-    preset: Preset,
-    settings: LumaSettings,
-    max_side: Option<u32>,
-    /// Seconds that an iteration was expected to take.
-    each: f64,
-}
-
-impl Started {
-    pub fn of(budget: &Budget) -> Self {
-        Self {
-            preset: budget.preset,
-            settings: budget.work.settings.clone(),
-            max_side: budget.work.max_side,
-            each: budget.each,
-        }
-    }
-
-    pub fn budget(&self) -> Budget {
-        Budget {
-            preset: self.preset,
-            work: Work {
-                settings: self.settings.clone(),
-                max_side: self.max_side,
-            },
-            each: self.each,
-        }
-    }
-}
-
 /// A training that was interrupted.
-pub(super) type FoundTraining = Found<Started, Checkpoint>;
+pub(super) type FoundTraining = Found<Budget, Checkpoint>;
 
 /// The checkpoint to go on from; none where there never was one.
 ///
@@ -67,7 +32,7 @@ pub(super) fn found_in(
 ) -> Result<Option<FoundTraining>, RunError> {
     let path = folder.checkpoint();
     if path.exists() {
-        return Found::read(&path, Checkpoint::from_sections).map(Some);
+        return Ok(Some(Found::read(&path, Checkpoint::from_sections)?));
     }
     if folder.report().exists() {
         return Err(RunError::NothingToResume(folder.path().to_owned()));
@@ -82,14 +47,14 @@ pub(super) fn found_in(
 /// What a run is asked for and given.
 ///
 /// # Errors
-/// [`RunError::File`] of the Gaussians to start from.
+/// [`StoreError::File`] of the Gaussians to start from.
 pub(super) fn question(
-    options: &FitOptions,
+    options: &FitRequest,
     budget: &Budget,
     load: &LoadOptions,
     gpu: &Gpu,
     photos: &str,
-) -> Result<Value, RunError> {
+) -> Result<Value, StoreError> {
     let init = options.init.as_ref().map(Init::path).map(sha256_of);
     let mut question = serde_json::json!({
         "program": env!("CARGO_PKG_VERSION"),
@@ -98,7 +63,7 @@ pub(super) fn question(
         "preset": budget.preset,
         "settings": budget.work.settings,
         "load": load,
-        "effects": format!("{:?}", options.overrules),
+        "effects": options.overrules,
         "goal": options.goal,
         "measure-side": options.measure_side,
         "init": init.transpose()?,
@@ -115,12 +80,12 @@ pub(super) fn question(
 }
 
 /// The SHA-256 of a file.
-pub(super) fn sha256_of(path: PathBuf) -> Result<String, RunError> {
+pub(super) fn sha256_of(path: PathBuf) -> Result<String, StoreError> {
     let sha256 = input::open(&path).and_then(hash::of_file);
     sha256.map_err(files::at(&path))
 }
 
-impl Keeper for FileKeeper<'_, Started> {
+impl Keeper for FileKeeper<'_, '_, Budget> {
     fn wants(&mut self, _: usize) -> bool {
         self.is_due()
     }

@@ -2,17 +2,16 @@
 
 use std::{fs, path::Path};
 
-use super::super::{RunError, RunFolder};
-use super::{BlockPlace, FitOptions, Init};
-use crate::effects::Overrules;
+use super::{BlockPlace, FitRequest, Init};
+use crate::{effects::Overrules, luma::LumaOverlay, run::RunError, store::RunFolder};
 
-impl FitOptions {
+impl FitRequest {
     /// What goes on with a run that is finished, as it was asked for: the same photos, effects
     /// and settings, from its Gaussians, with the rates that it ended with, for as many
     /// iterations again; none where the folder is no run.
     ///
     /// # Errors
-    /// [`RunError::File`] where the run's report is damaged.
+    /// [`StoreError::File`] where the run's report is damaged.
     pub fn continuing(run: &Path) -> Result<Option<Self>, RunError> {
         let folder = RunFolder::find(Some(run))?;
         if !(folder.report().exists() && folder.luma().exists()) {
@@ -29,7 +28,10 @@ impl FitOptions {
         Ok(Some(Self {
             output: Some(folder.path().to_owned()),
             preset: Some(report.preset),
-            settings: Box::new(move |asked| asked.clone_from(&settings)),
+            settings: LumaOverlay {
+                settings: Some(settings),
+                ..LumaOverlay::default()
+            },
             overrules: Overrules {
                 with: named(true),
                 without: named(false),

@@ -7,30 +7,33 @@ mod checkpoint;
 mod continued;
 mod neighbors;
 mod report;
+mod request;
 mod training;
 
-use std::{cell::RefCell, path::PathBuf, sync::Arc, time::Instant};
+use std::{cell::RefCell, sync::Arc, time::Instant};
 
-use super::{
-    Event, Live, Observer, Preset, RunError, RunFolder, Stage,
-    checkpoints::{CheckpointOptions, tell_given_up},
-    commit::Commit,
-    files,
-    fingerprint::{check_poses, of_file, of_photos},
-    keeping,
-    lock::RunLock,
-    scene::{open, written_as},
-    sound::open_examined,
-};
+use super::RunError;
 use crate::{
     capture::LoadOptions,
-    effects::{Effect, Overrules},
+    effects::Effect,
     eval::GRAY_COLUMNS,
     gpu::Gpu,
-    luma::{Goal, LumaSettings},
     raster::Raster,
     report::{Report, Row, contact_sheet},
     splats::{Splats, write_splats},
+    store::{
+        RunFolder,
+        checkpoints::tell_given_up,
+        commit::Commit,
+        files,
+        fingerprint::{check_poses, of_file, of_photos},
+        lock::RunLock,
+    },
+    subject::{
+        scene::{open, written_as},
+        sound::open_examined,
+    },
+    tell::{Event, Observer, Stage, keeping},
 };
 use ahead::Ahead;
 pub use ahead::AheadOptions;
@@ -38,118 +41,8 @@ pub use block::BlockPlace;
 use budget::Budget;
 use checkpoint::{found_in, question};
 pub use neighbors::Neighbors;
-pub(super) use report::capture_report;
+pub use request::{FitRequest, Init};
 use training::Job;
-
-/// Changes settings: what is asked for over what a preset or a time limit has chosen.
-pub type Overlay = Box<dyn Fn(&mut LumaSettings)>;
-
-/// Gaussians to start from.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Init {
-    /// Those of a splat file.
-    File(PathBuf),
-    /// Those of a run that goes on.
-    Run {
-        /// The run.
-        folder: RunFolder,
-        /// Its iterations so far.
-        iterations: usize,
-        /// How many of its Gaussians, the last ones, are surroundings.
-        surroundings: usize,
-    },
-}
-
-impl Init {
-    /// The splat file.
-    pub fn path(&self) -> PathBuf {
-        match self {
-            Self::File(path) => path.clone(),
-            Self::Run { folder, .. } => folder.luma(),
-        }
-    }
-
-    /// Iterations that led to them, as far as the run's log has them.
-    fn iterations(&self) -> usize {
-        match self {
-            Self::File(_) => 0,
-            Self::Run { iterations, .. } => *iterations,
-        }
-    }
-
-    /// How many of them are surroundings.
-    fn surroundings(&self) -> usize {
-        match self {
-            Self::File(_) => 0,
-            Self::Run { surroundings, .. } => *surroundings,
-        }
-    }
-}
-
-/// What `fit` is asked to do; `None` leaves it to the preset.
-pub struct FitOptions {
-    /// The COLMAP folder.
-    pub colmap_dir: PathBuf,
-    /// The run folder; `runs/<folder name>` by default.
-    pub output: Option<PathBuf>,
-    /// Amount of work; `paper` on a GPU and `draft` on a software adapter by default.
-    /// With another goal than a fixed one, the most that is tried, `paper` by default.
-    pub preset: Option<Preset>,
-    /// What is asked for instead of the preset's settings. Not the iterations together with a
-    /// time limit or a target, nor what the plan of effects decides.
-    pub settings: Overlay,
-    /// How photos are loaded; the longer side is the preset's where it is `None`.
-    pub load: LoadOptions,
-    /// Longer side at which held-out views are measured; that of training by default.
-    pub measure_side: Option<u32>,
-    /// Effects that are on or off whatever the evidence.
-    pub overrules: Overrules,
-    /// Gaussians to start from.
-    pub init: Option<Init>,
-    /// The block of a larger scene that it is.
-    pub block: Option<BlockPlace>,
-    /// What a trained block goes on among.
-    pub around: Option<Neighbors>,
-    /// What is to end the run; seconds are those of all of it. A PSNR is that of the held-out
-    /// views, or of some training views where none is held out.
-    pub goal: Goal,
-    /// Whether the report says where the device's time went.
-    pub timings: bool,
-    /// Who is to color the photos meanwhile.
-    pub ahead: AheadOptions,
-    /// How it can go on where it is interrupted.
-    pub checkpoints: CheckpointOptions,
-    /// Who looks on.
-    pub live: Option<Arc<Live>>,
-}
-
-impl FitOptions {
-    /// All as the preset and the photos have it.
-    pub fn new(colmap_dir: PathBuf) -> Self {
-        Self {
-            colmap_dir,
-            output: None,
-            preset: None,
-            settings: Box::new(|_| {}),
-            load: LoadOptions::default(),
-            measure_side: None,
-            overrules: Overrules::default(),
-            init: None,
-            block: None,
-            around: None,
-            goal: Goal::Fixed,
-            timings: false,
-            ahead: AheadOptions::default(),
-            checkpoints: CheckpointOptions::default(),
-            live: None,
-        }
-    }
-
-    /// How many of the Gaussians to start from, the last ones, are surroundings.
-    fn surroundings(&self) -> usize {
-        self.init.as_ref().map_or(0, Init::surroundings)
-    }
-}
 
 /// Trains and writes the run folder.
 ///
@@ -157,7 +50,7 @@ impl FitOptions {
 /// [`RunError`]; files of an earlier run stay as they were until training is done.
 /// [`RunError::TargetMissed`] comes after the best that was reached is written.
 pub fn fit(
-    options: &FitOptions,
+    options: &FitRequest,
     observe: &mut Observer<'_>,
 ) -> Result<(RunFolder, Report), RunError> {
     let opened = Instant::now();
@@ -165,7 +58,7 @@ pub fn fit(
     let warnings = RefCell::default();
     let observe = &mut keeping(&warnings, observe);
     observe(Event::begins(Stage::Device));
-    let gpu = open_gpu(options.timings)?;
+    let gpu = Gpu::open_timed(options.timings)?;
     let raster = Arc::new(Raster::new(&gpu));
     let folder = match &options.output {
         Some(path) => RunFolder::at(path),
@@ -183,7 +76,7 @@ pub fn fit(
     };
     // How much there is time for was found out once.
     let budget = match &found {
-        Some(found) if options.goal.seconds().is_some() => found.started().budget(),
+        Some(found) if options.goal.seconds().is_some() => found.started().clone(),
         _ => Budget::of(options, &raster, begun, observe)?,
     };
     let load = LoadOptions {
@@ -273,9 +166,6 @@ pub(super) struct GrayFiles<'a> {
 
 impl GrayFiles<'_> {
     /// Writes them in the place of those of an earlier run.
-    ///
-    /// # Errors
-    /// [`RunError::File`] and [`RunError::Splats`].
     pub fn write(self, folder: &RunFolder) -> Result<(), RunError> {
         let mut commit = Commit::new(folder.path())?;
         // The old colors do not belong to the new geometry.
@@ -298,12 +188,6 @@ impl GrayFiles<'_> {
         files::write_png(&commit.place(&folder.contact_sheet()), &sheet)?;
         files::write(&commit.place(&folder.log()), self.log.as_bytes())?;
         files::write(&commit.place(&folder.report()), &self.report.to_file())?;
-        commit.finish()
+        Ok(commit.finish()?)
     }
-}
-
-/// The device; with `timed`, its dispatches are.
-pub(super) fn open_gpu(timed: bool) -> Result<Gpu, RunError> {
-    let gpu = Gpu::open()?;
-    Ok(if timed { gpu.timed()? } else { gpu })
 }

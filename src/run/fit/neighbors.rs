@@ -2,20 +2,22 @@
 
 use std::{path::PathBuf, sync::Arc};
 
-use super::super::{
-    Event, Observer, RunError, RunFolder, Stage,
-    scene::{Frame, read_splats},
-};
-use super::{FitOptions, Init};
+use serde::{Deserialize, Serialize};
+
+use super::{FitRequest, Init};
 use crate::{
     capture::{Dataset, Exposure, Layers},
     eval::exposures,
     raster::{Raster, SceneRenderer},
+    run::RunError,
     splats::Splats,
+    store::RunFolder,
+    subject::scene::{Frame, read_splats},
+    tell::{Event, Observer, Stage},
 };
 
 /// The scene of a merged run, of which a block takes what is in its cell and margin.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Neighbors {
     /// Its splat file.
     pub luma: PathBuf,
@@ -25,7 +27,7 @@ pub struct Neighbors {
     pub surroundings: usize,
 }
 
-impl FitOptions {
+impl FitRequest {
     /// Of a block that goes on among its neighbors its photos without what they show beyond it,
     /// for else its Gaussians would stand in for that and be wrong once blocks are put together;
     /// and what the merged scene has in its cell and margin, to start from. Surroundings come
@@ -111,12 +113,12 @@ impl Beyond<'_> {
         let fields = [&self.whole.sh];
         let mut whole = SceneRenderer::on_host(self.raster, self.whole, &fields, dataset.extent);
         for (view, camera) in dataset.cameras.iter().enumerate() {
-            observe(Event::Progress {
-                stage: Stage::Placing,
-                done: view,
+            observe(Event::progress(
+                Stage::Placing,
+                view,
                 total,
-                message: dataset.capture.views[view].name.clone(),
-            });
+                &dataset.capture.views[view].name,
+            ));
             let whole = whole.render(camera)?.remove(0);
             let part = part.render(camera)?.remove(0);
             let gain = self.exposures[view].gain as f32;

@@ -1,8 +1,5 @@
 //! The report of `fit`.
 
-use std::path::Path;
-
-use super::super::{Preset, files};
 use super::{
     Init,
     training::{Job, Trained},
@@ -14,6 +11,8 @@ use crate::{
         CaptureReport, DeviceReport, EffectReport, LumaReport, LumaSeconds, REPORT_VERSION, Report,
         ViewExposure,
     },
+    run::Preset,
+    store::files,
 };
 
 impl Job<'_> {
@@ -26,13 +25,9 @@ impl Job<'_> {
             program: env!("CARGO_PKG_VERSION").to_owned(),
             capture: CaptureReport {
                 photos: self.photos.to_vec(),
-                ..capture_report(&options.colmap_dir, self.dataset)
+                ..CaptureReport::of(&options.colmap_dir, self.dataset)
             },
-            device: DeviceReport {
-                name: self.gpu.describe(),
-                backend: format!("{:?}", self.gpu.info().backend),
-                software: self.gpu.is_software(),
-            },
+            device: DeviceReport::of(self.gpu),
             preset,
             effects: EffectReport::of(&scene.plan.decisions),
             warnings: Vec::new(),
@@ -82,28 +77,4 @@ fn exposures(dataset: &Dataset, plan: &Plan) -> Vec<ViewExposure> {
             exposure,
         })
         .collect()
-}
-
-/// What a report says about the photos.
-pub(in crate::run) fn capture_report(colmap_dir: &Path, dataset: &Dataset) -> CaptureReport {
-    let capture = &dataset.capture;
-    let path = std::fs::canonicalize(colmap_dir).unwrap_or_else(|_| colmap_dir.to_owned());
-    CaptureReport {
-        path: path.to_string_lossy().into_owned(),
-        views: capture.views.len(),
-        train: dataset.split.train.len(),
-        test: dataset.split.test.len(),
-        points: capture.points.len(),
-        rejected: capture
-            .rejected
-            .iter()
-            .map(|rejected| format!("{}: {}", rejected.name, rejected.reason))
-            .collect(),
-        load: dataset.options.clone(),
-        masked_views: dataset.masked_views,
-        not_finite: dataset.not_finite(),
-        extent: dataset.extent,
-        offset: capture.offset.to_array(),
-        photos: Vec::new(),
-    }
 }

@@ -1,37 +1,40 @@
 //! One training, from settings to measured splats.
 
 use std::{
-    cell::RefCell,
-    fmt::Write,
     ops::ControlFlow,
+    path::PathBuf,
     sync::Arc,
     time::{Duration, Instant},
 };
 
 use serde_json::Value;
 
-use super::super::{
-    Event, Observer, RunError, RunFolder, SceneKind, Stage,
-    checkpoints::FileKeeper,
-    foreign::tell_unlike,
-    live::Showing,
-    log::with_rows,
-    scene::{Frame, read_splats, tell_trial},
-};
 use super::{
-    BlockPlace, FitOptions, Init,
+    BlockPlace, FitRequest, Init,
     budget::{Budget, ITERATIONS_MIN, WRITING},
-    checkpoint::{FoundTraining, Started},
+    checkpoint::FoundTraining,
 };
 use crate::{
     capture::{CaptureError, Dataset, Exposure},
     effects::{Effect, Evidence},
     eval::{Progress, Reference, exposures, gray_rows, mean_quality, measure_luma},
     gpu::Gpu,
-    luma::{Fit, Grows, LumaEvent, LumaProgress, LumaScene},
+    luma::{Fit, Grows, LumaEvent, LumaProgress, LumaScene, LumaSettings},
     raster::{Raster, RasterOptions},
     report::{KernelReport, LumaQuality, LumaView, PhotoReport, Row, kernel_reports},
+    run::RunError,
     splats::Splats,
+    store::{
+        RunFolder,
+        checkpoints::{FileKeeper, Journal},
+        log::with_rows,
+    },
+    subject::{
+        SceneKind, Showing,
+        foreign::tell_unlike,
+        scene::{Frame, of_trial, read_splats},
+    },
+    tell::{Event, Observer, Stage},
 };
 
 /// Runs that may take no longer, in seconds, do without a trial: on a slow device it would
@@ -40,7 +43,7 @@ const TRIAL_FROM: f64 = 300.0;
 
 /// What a training needs.
 pub(super) struct Job<'a> {
-    pub options: &'a FitOptions,
+    pub options: &'a FitRequest,
     pub gpu: &'a Gpu,
     pub raster: &'a Arc<Raster>,
     /// Photos at the size that is trained on.
@@ -101,9 +104,6 @@ impl Job<'_> {
     /// Seconds for training within the time limit, measuring and writing taken off; an
     /// iteration takes about `each`. Of a training that goes on, its seconds so far are among
     /// them.
-    ///
-    /// # Errors
-    /// [`RunError::TimeTooShort`].
     fn time_for_training(
         &self,
         each: f64,
@@ -153,9 +153,6 @@ impl Job<'_> {
     }
 
     /// Trains towards the goal and measures.
-    ///
-    /// # Errors
-    /// [`RunError`].
     pub fn train(
         &self,
         budget: &Budget,
@@ -167,36 +164,16 @@ impl Job<'_> {
         let (options, dataset) = (self.options, self.dataset);
         let limit = self.time_for_training(budget.each, found)?;
         let mut settings = budget.work.settings.clone();
-        let init = options.init.as_ref().map(|init| {
-            let frame = match init {
-                Init::File(_) => Frame::World(dataset.capture.offset),
-                Init::Run { .. } => Frame::Own,
-            };
-            let path = init.path();
-            let (splats, drawn) = read_splats(&path, frame, observe)?;
-            Ok::<_, RunError>((path, splats, drawn))
-        });
-        let init = init.transpose()?;
-        if let (Some((path, splats, drawn)), None) = (&init, &self.among) {
-            let splats = (path.as_path(), &splats.to_luma());
-            tell_unlike(self.gpu, dataset, splats, *drawn, observe)?;
-        }
-        let block = options.block.as_ref();
-        let placed = match (block, &init, found) {
-            // One that goes on has its Gaussians.
-            (Some(block), None, None) => block.start(dataset, &settings, observe)?,
-            (_, _, None) => (self.among.clone()).map(|splats| (splats, options.surroundings())),
-            _ => None,
-        };
-        if let (Some((splats, _)), Some(_)) = (&placed, &self.among) {
+        let begin = self.begin(&settings, found, observe)?;
+        let (init, placed) = (begin.init.as_ref(), begin.placed.as_ref());
+        if let (Some((splats, _)), Some(_)) = (placed, &self.among) {
             // What neighbors have in the margin may be more than the block has there.
             settings.max_splats = settings.max_splats.max(splats.len());
         }
-        let settings = &settings;
+        let block = options.block.as_ref();
         let told = block.and_then(BlockPlace::exposures);
         let shared = told.map(|told| exposures(dataset, told));
         let near = block.map(|block| block.near(dataset.capture.offset));
-        let before = options.init.as_ref().map_or(0, Init::iterations);
         let seconds = options.goal.seconds();
         // Held-out views have to be seen as they are measured, where they are to be reached.
         let reaches = options.goal.psnr().is_some() && !self.judge.split.test.is_empty();
@@ -207,9 +184,8 @@ impl Job<'_> {
             overrules: &options.overrules,
             goal: limit.map_or(options.goal, |limit| options.goal.with_seconds(limit)),
             tries: seconds.is_none_or(|limit| limit >= TRIAL_FROM),
-            start: (placed.as_ref().map(|(splats, _)| splats))
-                .or(init.as_ref().map(|(_, splats, _)| splats)),
-            surroundings: (placed.as_ref()).map_or(options.surroundings(), |(_, around)| *around),
+            start: (placed.map(|(splats, _)| splats)).or(init.map(|init| &init.splats)),
+            surroundings: placed.map_or(options.surroundings(), |(_, around)| *around),
             exposures: shared.as_deref(),
             // More Gaussians would only learn what the others lack beyond.
             grows: match self.among {
@@ -218,7 +194,75 @@ impl Job<'_> {
             },
             watched: reaches.then(|| (self.judge, self.judge.split.test.clone())),
         };
-        let log = RefCell::new(match (found, &options.init) {
+        let journal = &Journal::new(self.log(found), observe);
+        let mut keeper = FileKeeper::new(
+            folder.checkpoint(),
+            question,
+            budget.clone(),
+            &options.checkpoints,
+            journal,
+            self.begun,
+        );
+        let checkpoint = found.map(|found| &found.checkpoint);
+        let mut showing = Showing {
+            keeper: &mut keeper,
+            live: options.live.as_deref(),
+            luma: None,
+        };
+        let scene = fit.run_from(checkpoint, &mut showing, &settings, &mut |event| {
+            self.tell(event, init, settings.memory_limit, journal);
+            ControlFlow::Continue(())
+        });
+        keeper.close()?;
+        self.measure(scene?, journal)
+    }
+
+    /// Reads and places the Gaussians to start from.
+    fn begin(
+        &self,
+        settings: &LumaSettings,
+        found: Option<&FoundTraining>,
+        observe: &mut Observer<'_>,
+    ) -> Result<Begin, RunError> {
+        let (options, dataset) = (self.options, self.dataset);
+        let init = options.init.as_ref().map(|init| {
+            let frame = match init {
+                Init::File(_) => Frame::World(dataset.capture.offset),
+                Init::Run { .. } => Frame::Own,
+            };
+            let path = init.path();
+            let (splats, drawn) = read_splats(&path, frame, observe)?;
+            Ok::<_, RunError>(ReadInit {
+                path,
+                splats,
+                drawn,
+            })
+        });
+        let init = init.transpose()?;
+        if let (
+            Some(ReadInit {
+                path,
+                splats,
+                drawn,
+            }),
+            None,
+        ) = (&init, &self.among)
+        {
+            let splats = (path.as_path(), &splats.to_luma());
+            tell_unlike(self.gpu, dataset, splats, *drawn, observe)?;
+        }
+        let placed = match (&options.block, &init, found) {
+            // One that goes on has its Gaussians.
+            (Some(block), None, None) => block.start(dataset, settings, observe)?,
+            (_, _, None) => (self.among.clone()).map(|splats| (splats, options.surroundings())),
+            _ => None,
+        };
+        Ok(Begin { init, placed })
+    }
+
+    /// Rows of the log so far.
+    fn log(&self, found: Option<&FoundTraining>) -> String {
+        match (found, &self.options.init) {
             (Some(found), _) => found.log(),
             (
                 None,
@@ -227,123 +271,112 @@ impl Job<'_> {
                 }),
             ) => with_rows(&folder.log(), *iterations, ""),
             (None, _) => String::from("iteration,loss,splats,seconds,poisoned\n"),
-        });
-        let observe = RefCell::new(observe);
-        let tell = |event| observe.borrow_mut()(event);
-        let mut keeper = FileKeeper::new(
-            folder.checkpoint(),
-            question,
-            Started::of(budget),
-            &options.checkpoints,
-            &log,
-            &tell,
-            self.begun,
-        );
-        let checkpoint = found.map(|found| &found.checkpoint);
-        let live = options.live.as_deref();
-        let mut showing = Showing {
-            keeper: &mut keeper,
-            live,
-            luma: None,
-        };
-        let scene = fit.run_from(checkpoint, &mut showing, settings, &mut |event| {
-            let observe = &mut *observe.borrow_mut();
-            match event {
-                // Not asked for: the evidence is there.
-                LumaEvent::Examined { .. } => {}
-                LumaEvent::Placing => observe(Event::begins(Stage::Placing)),
-                LumaEvent::Starting { iteration, end } => observe(Event::Progress {
-                    stage: Stage::Training,
-                    done: iteration,
-                    total: end,
-                    message: String::new(),
-                }),
-                LumaEvent::Trial(progress) => tell_trial(&progress, observe),
-                LumaEvent::Plan(plan) => {
-                    observe(Event::Note(plan.to_string()));
-                    if let Some(live) = live {
-                        let antialiased = plan.has(Effect::Antialias);
-                        let drawn = RasterOptions {
-                            antialiased,
-                            ..RasterOptions::default()
-                        };
-                        live.plan(plan, drawn);
-                    }
-                    if let Some((path, _, drawn)) = &init {
-                        let antialiased = plan.has(Effect::Antialias);
-                        if drawn.antialiased != antialiased {
-                            let [is, is_not] = ["antialiased", "not antialiased"];
-                            let named = |is_so| if is_so { is } else { is_not };
-                            observe(Event::Warning(format!(
-                                "{} was trained {}, this run is {}: small Gaussians will have to adapt",
-                                path.display(),
-                                named(drawn.antialiased),
-                                named(antialiased),
-                            )));
-                        }
-                    }
+        }
+    }
+
+    /// Tells an event in words, and notes the losses.
+    fn tell(
+        &self,
+        event: LumaEvent<'_>,
+        init: Option<&ReadInit>,
+        memory_limit: Option<u64>,
+        journal: &Journal<'_>,
+    ) {
+        let live = self.options.live.as_deref();
+        journal.tell(match event {
+            // Not asked for: the evidence is there.
+            LumaEvent::Examined { .. } => return,
+            LumaEvent::Placing => Event::begins(Stage::Placing),
+            LumaEvent::Starting { iteration, end } => {
+                Event::progress(Stage::Training, iteration, end, "")
+            }
+            LumaEvent::Trial(progress) => of_trial(&progress),
+            LumaEvent::Plan(plan) => {
+                let antialiased = plan.has(Effect::Antialias);
+                if let Some(live) = live {
+                    let drawn = RasterOptions {
+                        antialiased,
+                        ..RasterOptions::default()
+                    };
+                    live.plan(plan, drawn);
                 }
-                LumaEvent::Capped(fits) => observe(Event::Note(match settings.memory_limit {
-                    Some(limit) => format!("at most {fits} Gaussians fit into {} MiB", limit >> 20),
-                    None => format!("at most {fits} Gaussians fit into the adapter's bindings"),
-                })),
-                LumaEvent::Training(progress) => {
-                    if let Some(live) = live {
-                        live.note(&progress);
+                journal.tell(Event::Note(plan.to_string()));
+                match init {
+                    Some(init) if init.drawn.antialiased != antialiased => {
+                        let [is, is_not] = ["antialiased", "not antialiased"];
+                        let named = |is_so| if is_so { is } else { is_not };
+                        Event::Warning(format!(
+                            "{} was trained {}, this run is {}: small Gaussians will have to adapt",
+                            init.path.display(),
+                            named(init.drawn.antialiased),
+                            named(antialiased),
+                        ))
                     }
-                    // Writing to a string cannot fail.
-                    let _ = writeln!(
-                        log.borrow_mut(),
-                        "{},{:.6},{},{:.3},{}",
-                        before + progress.iteration,
-                        progress.loss,
-                        progress.splats,
-                        progress.seconds,
-                        progress.poisoned
-                    );
-                    observe(Event::Progress {
-                        stage: Stage::Training,
-                        done: progress.iteration,
-                        total: progress.end,
-                        message: in_words(&progress),
-                    });
+                    _ => return,
                 }
             }
-            ControlFlow::Continue(())
-        });
-        let scene = match keeper.interrupted.take() {
-            Some(written) => {
-                return Err(RunError::Interrupted {
-                    iteration: written?,
-                    path: folder.checkpoint(),
-                });
+            LumaEvent::Capped(fits) => Event::Note(match memory_limit {
+                Some(limit) => format!("at most {fits} Gaussians fit into {} MiB", limit >> 20),
+                None => format!("at most {fits} Gaussians fit into the adapter's bindings"),
+            }),
+            LumaEvent::Training(progress) => {
+                if let Some(live) = live {
+                    live.note(&progress);
+                }
+                let before = self.options.init.as_ref().map_or(0, Init::iterations);
+                journal.row(format_args!(
+                    "{},{:.6},{},{:.3},{}",
+                    before + progress.iteration,
+                    progress.loss,
+                    progress.splats,
+                    progress.seconds,
+                    progress.poisoned
+                ));
+                let (done, total) = (progress.iteration, progress.end);
+                Event::progress(Stage::Training, done, total, in_words(&progress))
             }
-            None => scene?,
-        };
-        drop(keeper);
-        if let Some(live) = live {
+        });
+    }
+
+    /// Measures what was trained.
+    fn measure(&self, scene: LumaScene, journal: &Journal<'_>) -> Result<Trained, RunError> {
+        if let Some(live) = &self.options.live {
             live.show(SceneKind::Luma, scene.splats.clone(), Duration::ZERO);
         }
-        let timings = (options.timings)
-            .then(|| Ok::<_, RunError>(kernel_reports(&self.gpu.timings()?, &scene.load)))
-            .transpose()?;
-
+        let timings = match self.options.timings {
+            true => Some(kernel_reports(&self.gpu.timings()?, &scene.load)),
+            false => None,
+        };
         let begun = Instant::now();
         let drawn = self.raster.drawing(scene.settings.raster_options());
-        observe.borrow_mut()(Event::begins(Stage::Measuring));
-        let mut told = |progress: Progress<'_>| observe.borrow_mut()(progress.into());
+        journal.tell(Event::begins(Stage::Measuring));
+        let mut told = |progress: Progress<'_>| journal.tell(progress.into());
         let (splats, exposures) = (&scene.splats, scene.exposures());
         let held_out_views = measure_luma(&drawn, self.judge, splats, &mut told)?;
         let rows = gray_rows(&drawn, self.judge, splats, exposures)?;
         Ok(Trained {
             rows,
             scene,
-            log: log.into_inner(),
+            log: journal.rows(),
             held_out_views,
             timings,
             measuring: begun.elapsed().as_secs_f64(),
         })
     }
+}
+
+/// Gaussians of a splat file.
+struct ReadInit {
+    path: PathBuf,
+    splats: Splats,
+    drawn: RasterOptions,
+}
+
+/// Gaussians that a training starts from.
+struct Begin {
+    init: Option<ReadInit>,
+    /// Those of a block, and how many of them, the last ones, are surroundings.
+    placed: Option<(Splats, usize)>,
 }
 
 /// The figures beside a progress bar.

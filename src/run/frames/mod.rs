@@ -17,14 +17,7 @@ use shots::{Shot, shots_of};
 use unplaced::{Ends, Known, Unknown, carry, chain, tell, way, whole};
 
 use super::{
-    Event, Observer, RunError, RunFolder, Stage,
-    film::{FRAME_RATE, is_film},
-    fit::open_gpu,
-    keeping,
-    lock::RunLock,
-    originals::Kept,
-    scene::{Frame, read_scene},
-    sound::open_same,
+    RunError,
     teach::{TeachOptions, Teachers},
 };
 use crate::{
@@ -32,8 +25,20 @@ use crate::{
     chroma::teacher::TeacherSettings,
     eval::exposures,
     frames::{Believed, Canvas, SceneDrawer, believable, blend, finish},
+    gpu::Gpu,
     raster::Raster,
     report::Report,
+    store::{
+        RunFolder,
+        film::{FRAME_RATE, is_film},
+        originals::Kept,
+    },
+    subject::{
+        Hold, Run, SubjectError,
+        scene::{Frame, read_scene},
+        sound::open_same,
+    },
+    tell::{Event, Observer, Stage, keeping},
 };
 
 /// A share of a photo that the scene leaves open from which on the photo before is asked.
@@ -44,7 +49,7 @@ const OPEN: f64 = 0.005;
 const KEPT: usize = 1 << 28;
 
 /// What `frames` is asked to do.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct FramesOptions {
     /// Run folder; the newest run by default.
     pub run: Option<PathBuf>,
@@ -94,18 +99,17 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
     let begun = std::time::Instant::now();
     let warnings = RefCell::default();
     let observe = &mut keeping(&warnings, observe);
-    let folder = RunFolder::find(options.run.as_deref())?;
     observe(Event::begins(Stage::Model));
-    let (_lock, report) = RunLock::to_read(&folder)?;
+    let run = Run::find(options.run.as_deref(), Hold::Reading)?;
+    let (folder, report) = (&run.folder, &run.report);
     let named = options.teacher.iter().chain(&options.hints);
     let named = Kept::default().with_all(named, "a file of a teacher or a hint");
     let kept = named.with_all(&options.colmap, "a file of the COLMAP folder");
-    let _kept = kept.with_run(&folder, &report).keep();
-    let noted = PathBuf::from(&report.capture.path);
-    let colmap_dir = options.colmap.clone().unwrap_or(noted);
+    let _kept = kept.with_run(folder, report).keep();
+    let colmap_dir = run.colmap(options.colmap.as_deref());
     let scene = read_scene(&folder.luma(), Frame::Own, observe)?;
     let chroma = folder.read_chroma(scene.splats.len())?;
-    let chroma = chroma.ok_or_else(|| RunError::NoColors(folder.path().to_owned()))?;
+    let chroma = chroma.ok_or_else(|| SubjectError::NoColors(folder.path().to_owned()))?;
     let load = LoadOptions {
         force: true,
         ..report.capture.load.clone()
@@ -124,11 +128,11 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
             "at another frame rate some frames are repeated or left out, so that the sound stays in step".to_owned(),
         ));
     }
-    let teachers = open_teachers(options, &report, &folder, &dataset, observe)?;
+    let teachers = open_teachers(options, report, folder, &dataset, observe)?;
     let luma = scene.splats.to_luma();
     let drawn = report.luma.settings.raster_options();
     observe(Event::begins(Stage::Device));
-    let raster = Arc::new(Raster::with(&open_gpu(false)?, drawn));
+    let raster = Arc::new(Raster::with(&Gpu::open()?, drawn));
     let believed = believable(luma.len(), report.luma.surroundings);
     let mut painter = Painter {
         drawer: SceneDrawer::new(&raster, &luma, [&chroma, &believed], dataset.extent)?,
@@ -139,7 +143,7 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
         side: None,
     };
     let mut out = Out::open(options, rate, film.as_ref(), &shots, observe)?;
-    let painted = find_painted(options, &report, &shots, &mut painter, observe)?;
+    let painted = find_painted(options, report, &shots, &mut painter, observe)?;
     let mut told = Frames {
         output: options.output.clone(),
         photos: 0,
@@ -151,12 +155,7 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
         seconds: 0.0,
     };
     let mut progress = |done: usize, name: &str| {
-        observe(Event::Progress {
-            stage: Stage::Coloring,
-            done,
-            total: shots.len(),
-            message: name.to_owned(),
-        });
+        observe(Event::progress(Stage::Coloring, done, shots.len(), name));
     };
 
     // The last photo with a pose, and those without one since.

@@ -6,10 +6,12 @@ use super::{FramesOptions, shots::Shot};
 use crate::{
     capture::Film,
     frames::Colored,
-    run::{
-        Observer, RunError, files,
+    run::RunError,
+    store::{
+        StoreError, files,
         film::{FilmWriter, Purpose, is_film},
     },
+    tell::Observer,
 };
 
 /// Where colored photos go.
@@ -25,7 +27,7 @@ impl Out {
         film: Option<&Film>,
         shots: &[Shot],
         observe: &mut Observer<'_>,
-    ) -> Result<Self, RunError> {
+    ) -> Result<Self, StoreError> {
         if !is_film(&options.output) {
             files::make_pictures_folder(&options.output)?;
             for shot in shots {
@@ -41,15 +43,16 @@ impl Out {
     }
 
     pub fn write(&mut self, shot: &Shot, colored: Colored) -> Result<(), RunError> {
-        match self {
+        let written = match self {
             Self::Folder(folder) => files::write_colored(&folder.join(&shot.output), colored),
             Self::Film(film) => {
                 (0..shot.repeats).try_for_each(|_| film.write_colored(&shot.name, &colored))
             }
-        }
+        };
+        Ok(written?)
     }
 
-    pub fn finish(self, observe: &mut Observer<'_>) -> Result<(), RunError> {
+    pub fn finish(self, observe: &mut Observer<'_>) -> Result<(), StoreError> {
         match self {
             Self::Folder(_) => Ok(()),
             Self::Film(film) => film.finish(observe),

@@ -6,7 +6,8 @@ use super::{Painter, shots::Shot};
 use crate::{
     chroma::teacher::HintFolder,
     frames::{Believed, Between, Canvas, Strokes},
-    run::{Event, Observer, RunError, Stage},
+    run::RunError,
+    tell::{Event, Observer, Stage},
 };
 
 /// So many photos before and after one that is painted take its strokes, unless another is
@@ -28,9 +29,6 @@ struct Seen {
 
 impl Painted {
     /// Reads the hints and carries them on; `grow` is whether a stroke colors what it lies on.
-    ///
-    /// # Errors
-    /// [`RunError`] of a photo, a hint or the device.
     pub fn find(
         folder: &Path,
         grow: bool,
@@ -43,12 +41,7 @@ impl Painted {
         let mut own = BTreeMap::new();
         let mut done = 0;
         let mut tell = |done: usize, name: &str| {
-            observe(Event::Progress {
-                stage: Stage::Strokes,
-                done,
-                total: 0,
-                message: name.to_owned(),
-            });
+            observe(Event::progress(Stage::Strokes, done, 0, name));
         };
         for (i, shot) in shots.iter().enumerate() {
             if !hints.covers(shot.name.as_str())? {

@@ -3,7 +3,7 @@
 use super::shots::Shot;
 use crate::{
     capture::{CaptureError, Dataset, Film, Normalize, in_order},
-    run::{Event, Observer, Stage},
+    tell::{Event, Observer, Stage},
 };
 
 /// Values that become black and white in pictures: the file's own, or, if the scene's photos are

@@ -4,7 +4,8 @@ use std::{collections::BTreeMap, ops::Range, path::PathBuf};
 
 use crate::{
     capture::{CaptureError, Dataset, FRAMES, Film, IMAGES, names::by_number, photos_in},
-    run::{RunError, picture_names::distinct},
+    run::RunError,
+    store::distinct,
 };
 
 /// A photo.
@@ -26,7 +27,7 @@ pub(super) struct Shot {
 /// a second.
 ///
 /// # Errors
-/// [`RunError::File`] where a frame is missing.
+/// [`StoreError::File`] where a frame is missing.
 pub(super) fn shots_of(
     dataset: &Dataset,
     film: Option<&Film>,

@@ -6,7 +6,8 @@ use super::{Out, Painter, shots::Shot};
 use crate::{
     capture::{CaptureError, Original, in_order},
     frames::{Believed, Between, Canvas, Carried, Colored, Strokes, blend, finish},
-    run::{Event, Observer, RunError},
+    run::RunError,
+    tell::{Event, Observer},
 };
 
 /// A share of a photo without a pose that has to be known from its neighbors; else the teacher

@@ -1,25 +1,34 @@
 //! `render`: pictures from the photographed viewpoints, and along a path.
 
 mod path;
-mod subject;
 
-use std::{path::PathBuf, sync::Arc};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 pub use path::{PathOptions, Rendered, Way, render_path};
-use subject::Subject;
 
-use super::{Event, Observer, RunError, Stage, files, foreign::tell_unlike, picture_names, scene};
+use super::RunError;
 use crate::{
-    capture::{LoadOptions, Loader, Normalize, split},
+    capture::{Capture, LoadOptions, Loader, Normalize, split},
+    disk::trust::Originals,
     gpu::Gpu,
     raster::{Raster, SceneRenderer},
     report::to_image,
+    splats::Splats,
+    store::{files, originals::Kept, picture_names},
+    subject::{Hold, Opened, Scene, SubjectError, foreign::tell_unlike, scene},
+    tell::{Event, Observer, Stage},
 };
 
 /// Longer side in pixels at which a splat file is compared with the photos.
 const CHECKED_SIDE: u32 = 640;
 
-/// Which of a capture's views.
+/// Half an 8-bit step: what no viewer shows as a color.
+const NO_COLOR: f32 = 0.5 / 255.0;
+
+/// Some of a capture's views.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Views {
@@ -54,8 +63,9 @@ pub fn render(options: &RenderOptions, observe: &mut Observer<'_>) -> Result<usi
     let colmap = options.colmap.as_deref();
     let subject = Subject::open(options.run.as_deref(), colmap, options.luma, observe)?;
     let capture = subject.cameras()?;
-    let split = split(&capture.views, subject.load.holdout);
-    let loader = Loader::new(subject.load.clone());
+    let load = subject.opened.load();
+    let split = split(&capture.views, load.holdout);
+    let loader = Loader::new(load);
     let chosen: Vec<usize> = match options.views {
         Some(Views::Train) => split.train,
         Some(Views::Test) => split.test,
@@ -70,17 +80,17 @@ pub fn render(options: &RenderOptions, observe: &mut Observer<'_>) -> Result<usi
     observe(Event::begins(Stage::Device));
     let gpu = Gpu::open()?;
     subject.tell_unlike(&gpu, observe)?;
-    let raster = Arc::new(Raster::with(&gpu, subject.drawn));
-    let splats = &subject.splats;
+    let raster = Arc::new(Raster::with(&gpu, subject.scene.drawn));
+    let splats = &subject.scene.splats;
     let mut renderer = SceneRenderer::of(&raster, splats, &[&splats.sh], capture.extent())?;
     for (done, &i) in chosen.iter().enumerate() {
         let view = &capture.views[i];
-        observe(Event::Progress {
-            stage: Stage::Rendering,
+        observe(Event::progress(
+            Stage::Rendering,
             done,
-            total: chosen.len(),
-            message: view.name.clone(),
-        });
+            chosen.len(),
+            &view.name,
+        ));
         // The photo decides the size, which the model's camera may miss by a pixel.
         let (camera, stance) = loader.standing(view)?;
         let picture = renderer.render(&camera)?.remove(0);
@@ -94,10 +104,71 @@ pub fn render(options: &RenderOptions, observe: &mut Observer<'_>) -> Result<usi
     Ok(chosen.len())
 }
 
+/// A scene that is drawn.
+struct Subject {
+    opened: Opened,
+    /// Its Gaussians, with the colors that are wanted.
+    scene: Scene,
+    /// Cameras and points; none of a splat file without a COLMAP folder.
+    capture: Option<Capture>,
+    /// Files that are not written over.
+    _kept: Originals,
+}
+
 impl Subject {
+    /// Opens a run or a splat file, the newest run by default; without colors where `luma` is
+    /// wanted.
+    fn open(
+        path: Option<&Path>,
+        colmap: Option<&Path>,
+        luma: bool,
+        observe: &mut Observer<'_>,
+    ) -> Result<Self, RunError> {
+        let opened = Opened::find(path, Hold::Free)?;
+        observe(Event::begins(Stage::Model));
+        let known = opened.run().is_some() || colmap.is_some();
+        let capture = known.then(|| opened.capture(colmap)).transpose()?;
+        let mut scene = opened.read(luma, capture.as_ref(), observe)?;
+        if luma {
+            scene.splats = scene.splats.to_luma();
+        }
+        if let Some(capture) = &capture {
+            scene.offset = capture.offset;
+        }
+        let kept = Kept::default();
+        let kept = colmap
+            .iter()
+            .fold(kept, |kept, dir| kept.with_capture(dir, None));
+        Ok(Self {
+            _kept: opened.keep(kept).keep(),
+            opened,
+            scene,
+            capture,
+        })
+    }
+
+    /// The capture.
+    fn cameras(&self) -> Result<&Capture, SubjectError> {
+        let none = || SubjectError::NoCameras(self.scene.file.clone());
+        self.capture.as_ref().ok_or_else(none)
+    }
+
+    /// The same scene without colors.
+    fn gray(&self, observe: &mut Observer<'_>) -> Result<Splats, SubjectError> {
+        let splats = &self.scene.splats;
+        match self.opened.run() {
+            run if splats.is_gray(NO_COLOR) => {
+                let path = run.map_or(&*self.scene.file, |run| run.folder.path());
+                Err(SubjectError::NoColors(path.to_owned()))
+            }
+            Some(_) => Ok(self.opened.read(true, None, observe)?.splats.to_luma()),
+            None => Ok(splats.to_luma()),
+        }
+    }
+
     /// Warns where a splat file of others does not show what the photos show.
     fn tell_unlike(&self, gpu: &Gpu, observe: &mut Observer<'_>) -> Result<(), RunError> {
-        let (true, Some(capture)) = (self.foreign, &self.capture) else {
+        let (None, Some(capture)) = (self.opened.run(), &self.capture) else {
             return Ok(());
         };
         let load = LoadOptions {
@@ -107,8 +178,13 @@ impl Subject {
         };
         // Pictures do not depend on what photos show: where they cannot be compared, they are not.
         if let Ok(dataset) = scene::open(&capture.root, &load, &mut |_| {}) {
-            let luma = self.splats.to_luma();
-            tell_unlike(gpu, &dataset, (&self.file, &luma), self.drawn, observe)?;
+            let Scene {
+                file,
+                splats,
+                drawn,
+                ..
+            } = &self.scene;
+            tell_unlike(gpu, &dataset, (file, &splats.to_luma()), *drawn, observe)?;
         }
         Ok(())
     }

@@ -5,16 +5,19 @@ use std::{path::PathBuf, sync::Arc};
 use glam::DVec3;
 use image::{GenericImage, RgbImage};
 
-use super::subject::Subject;
+use super::Subject;
 use crate::{
     capture::{Camera, Loader, split},
     gpu::Gpu,
     raster::{Raster, SceneRenderer},
     report::to_image,
-    run::{
-        Event, Observer, RunError, Stage, files,
+    run::RunError,
+    store::{
+        StoreError, files,
         film::{FRAME_RATE, FilmWriter, Purpose},
     },
+    subject::SubjectError,
+    tell::{Event, Observer, Stage},
     trajectory::{
         Coordinates, MOST_FRAMES, TrajectoryError, ball_of_splats, camera_path, framed, lens,
         orbit_of_ball, orbit_of_cameras, read_path, write_path,
@@ -97,7 +100,7 @@ pub fn render_path(
     let rate = f64::from(path.rate[0]) / f64::from(path.rate[1]);
     if let Some(file) = &options.save_path {
         files::make_folder_of(file)?;
-        let back = |camera: &Camera| camera.recentered(-subject.offset);
+        let back = |camera: &Camera| camera.recentered(-subject.scene.offset);
         let world: Vec<Camera> = path.cameras.iter().map(back).collect();
         write_path(file, &world, rate)?;
     }
@@ -105,20 +108,15 @@ pub fn render_path(
     observe(Event::begins(Stage::Device));
     let gpu = Gpu::open()?;
     subject.tell_unlike(&gpu, observe)?;
-    let raster = Arc::new(Raster::with(&gpu, subject.drawn));
-    let scenes = gray.iter().chain([&subject.splats]);
+    let raster = Arc::new(Raster::with(&gpu, subject.scene.drawn));
+    let scenes = gray.iter().chain([&subject.scene.splats]);
     let renderers =
         scenes.map(|splats| SceneRenderer::of(&raster, splats, &[&splats.sh], path.extent));
     let mut renderers = renderers.collect::<Result<Vec<_>, _>>()?;
     let total = path.cameras.len();
     let mut size = [0; 2];
     for (done, camera) in path.cameras.iter().enumerate() {
-        observe(Event::Progress {
-            stage: Stage::Rendering,
-            done,
-            total,
-            message: String::new(),
-        });
+        observe(Event::progress(Stage::Rendering, done, total, ""));
         let drawn = renderers.iter_mut().map(|renderer| {
             let picture = renderer.render(camera)?.remove(0);
             Ok::<_, RunError>(to_image(picture.width, picture.height, &picture.shown()))
@@ -128,12 +126,7 @@ pub fn render_path(
         out.write(&format!("frame-{done:04}.png"), &picture)?;
     }
     out.finish(observe)?;
-    observe(Event::Progress {
-        stage: Stage::Rendering,
-        done: total,
-        total,
-        message: String::new(),
-    });
+    observe(Event::progress(Stage::Rendering, total, total, ""));
     Ok(Rendered {
         frames: total,
         size,
@@ -159,7 +152,7 @@ impl Path {
                 false => Err(TrajectoryError::Long { frames }),
             }
         };
-        let ball = || ball_of_splats(&subject.splats, 0.5);
+        let ball = || ball_of_splats(&subject.scene.splats, 0.5);
         let extent = match &subject.capture {
             Some(capture) => capture.extent(),
             None => ball().1,
@@ -169,7 +162,7 @@ impl Path {
             (Way::File(file), _) => {
                 let read = read_path(file, options.size.unwrap_or(SIZE))?;
                 let from = match read.coordinates {
-                    Coordinates::Colmap => subject.offset,
+                    Coordinates::Colmap => subject.scene.offset,
                     Coordinates::SplatFile => DVec3::ZERO,
                 };
                 let cameras = read.cameras.iter().map(|camera| camera.recentered(from));
@@ -180,10 +173,12 @@ impl Path {
                 let lens = lens(options.size.unwrap_or(SIZE), FIELD_OF_VIEW);
                 (orbit_of_ball(ball(), &lens, frames(rate)?), rate)
             }
-            (Way::Photos, None) => return Err(RunError::NoCameras(subject.file.clone())),
+            (Way::Photos, None) => {
+                return Err(SubjectError::NoCameras(subject.scene.file.clone()).into());
+            }
             (way, Some(capture)) => {
-                let loader = Loader::new(subject.load.clone());
-                let train = split(&capture.views, subject.load.holdout).train;
+                let loader = Loader::new(subject.opened.load());
+                let train = split(&capture.views, subject.opened.load().holdout).train;
                 let cameras = train.iter().map(|&i| loader.camera(&capture.views[i]));
                 let cameras: Vec<Camera> = cameras.collect::<Result<_, _>>()?;
                 let cameras: Vec<&Camera> = cameras.iter().collect();
@@ -242,13 +237,13 @@ struct Out {
 }
 
 impl Out {
-    fn open(options: &PathOptions, rate: [u32; 2]) -> Result<Self, RunError> {
+    fn open(options: &PathOptions, rate: [u32; 2]) -> Result<Self, StoreError> {
         if let Some(folder) = &options.output {
             files::make_pictures_folder(folder)?;
         }
         let film = options.video.as_ref().map(|video| {
             files::make_folder_of(video)?;
-            Ok::<_, RunError>(FilmWriter::new(video, rate, Purpose::Viewing)?)
+            Ok::<_, StoreError>(FilmWriter::new(video, rate, Purpose::Viewing)?)
         });
         Ok(Self {
             folder: options.output.clone(),
@@ -256,7 +251,7 @@ impl Out {
         })
     }
 
-    fn write(&mut self, name: &str, picture: &RgbImage) -> Result<(), RunError> {
+    fn write(&mut self, name: &str, picture: &RgbImage) -> Result<(), StoreError> {
         if let Some(folder) = &self.folder {
             files::write_png(&folder.join(name), picture)?;
         }
@@ -266,7 +261,7 @@ impl Out {
         }
     }
 
-    fn finish(self, observe: &mut Observer<'_>) -> Result<(), RunError> {
+    fn finish(self, observe: &mut Observer<'_>) -> Result<(), StoreError> {
         self.film.map_or(Ok(()), |film| film.finish(observe))
     }
 }

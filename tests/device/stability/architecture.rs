@@ -4,11 +4,14 @@ use std::{collections::BTreeSet, fs, path::Path};
 
 /// The folders and files right below `src`, from top to bottom. What stands on one floor
 /// does not know each other.
-const FLOORS: [&[&str]; 12] = [
+const FLOORS: [&[&str]; 15] = [
     &["cli"],
     &["auto"],
-    &["tradeoff", "prepare", "view"],
-    &["run"],
+    &["tradeoff", "view"],
+    &["run", "prepare"],
+    &["subject"],
+    &["store"],
+    &["tell"],
     &["eval", "frames", "viewers", "blocks"],
     &["report", "doctor"],
     &["luma", "chroma"],
@@ -173,6 +176,34 @@ fn files_are_read_and_written_in_one_place() {
         &mut found,
     );
     assert!(found.is_empty(), "{found:?}");
+}
+
+/// The texts of errors.
+fn error_texts(code: &str) -> impl Iterator<Item = &str> {
+    let texts = code.split("#[error(").skip(1);
+    texts.map(|text| text.split(")]").next().unwrap_or(text))
+}
+
+/// Remedies of the command line are its own: `cli/remedy.rs` adds them.
+#[test]
+fn errors_below_the_command_line_name_no_options() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut wrong = Vec::new();
+    for entry in fs::read_dir(&root).expect("src") {
+        let path = entry.expect("an entry").path();
+        if path.ends_with("cli") || path.ends_with("tradeoff") {
+            continue;
+        }
+        let mut files = Vec::new();
+        rust_files(&path, &mut files);
+        let texts = files.iter().flat_map(|text| error_texts(text));
+        let named = texts.filter(|text| {
+            let mut options = text.match_indices("--");
+            options.any(|(at, _)| text[at + 2..].starts_with(|c: char| c.is_ascii_lowercase()))
+        });
+        wrong.extend(named.map(str::to_owned));
+    }
+    assert!(wrong.is_empty(), "{wrong:?}");
 }
 
 #[test]

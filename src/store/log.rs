@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::input;
 
 /// The log with the chroma rows behind the luma rows, in place of those of an earlier coloring.
-pub(super) fn with_rows(path: &Path, luma: usize, rows: &str) -> String {
+pub(crate) fn with_rows(path: &Path, luma: usize, rows: &str) -> String {
     // What cannot be read is begun anew.
     let log = input::read_to_string(path).unwrap_or_default();
     let mut kept: String = log

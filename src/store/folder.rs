@@ -6,12 +6,15 @@ use std::{
     time::SystemTime,
 };
 
-use super::{RunError, commit, files, fingerprint::hashed, lock::finish_what_is_left};
+use serde::{Deserialize, Serialize};
+
+use super::{commit, files, fingerprint::hashed, lock::finish_what_is_left};
 use crate::{
     disk::trust,
     input,
     report::Report,
     splats::{ShField, npy},
+    store::StoreError,
 };
 
 /// The run in a folder of `auto`'s results.
@@ -21,7 +24,7 @@ pub(crate) const OF_AUTO: &str = "run";
 const RUNS: &str = "runs";
 
 /// Files and folders of a run that commands write together.
-pub(super) const ENTRIES: [&str; 10] = [
+pub(crate) const ENTRIES: [&str; 10] = [
     "luma.ply",
     "color.ply",
     "chroma.npy",
@@ -38,7 +41,7 @@ pub(super) const ENTRIES: [&str; 10] = [
 const TEACHER: &str = "teacher";
 
 /// The folder of one run; docs/run-folder.md lists what lies in it.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RunFolder(PathBuf);
 
 impl RunFolder {
@@ -57,8 +60,8 @@ impl RunFolder {
     /// The run at `path`, or that of `auto`'s results there; the newest where none is named.
     ///
     /// # Errors
-    /// [`RunError::NoRun`].
-    pub fn find(path: Option<&Path>) -> Result<Self, RunError> {
+    /// [`StoreError::NoRun`].
+    pub fn find(path: Option<&Path>) -> Result<Self, StoreError> {
         let Some(path) = path else {
             return Self::newest();
         };
@@ -70,18 +73,18 @@ impl RunFolder {
     /// The run under `runs/` whose report is newest.
     ///
     /// # Errors
-    /// [`RunError::NoRun`].
-    pub fn newest() -> Result<Self, RunError> {
+    /// [`StoreError::NoRun`].
+    pub fn newest() -> Result<Self, StoreError> {
         let written = |path: &Path| -> Option<SystemTime> {
             fs::metadata(Self::at(path).report()).ok()?.modified().ok()
         };
         fs::read_dir(RUNS)
-            .map_err(|_| RunError::NoRun)?
+            .map_err(|_| StoreError::NoRun)?
             .filter_map(|entry| Some(entry.ok()?.path()))
             .filter_map(|path| Some((written(&path)?, path)))
             .max()
             .map(|(_, path)| Self(path))
-            .ok_or(RunError::NoRun)
+            .ok_or(StoreError::NoRun)
     }
 
     /// The folder itself.
@@ -145,10 +148,7 @@ impl RunFolder {
     }
 
     /// Refuses a run whose files are elsewhere: a folder may come from somebody else.
-    ///
-    /// # Errors
-    /// [`RunError::File`].
-    pub(super) fn check_links(&self) -> Result<(), RunError> {
+    pub(crate) fn check_links(&self) -> Result<(), StoreError> {
         for name in ENTRIES.into_iter().chain([TEACHER]) {
             let path = self.0.join(name);
             trust::check_inside(&self.0, &path).map_err(files::at(&path))?;
@@ -160,7 +160,7 @@ impl RunFolder {
     ///
     /// # Errors
     /// As [`Self::parse_report`] and [`Self::check_files`].
-    pub fn read_report(&self) -> Result<Report, RunError> {
+    pub fn read_report(&self) -> Result<Report, StoreError> {
         let report = self.parse_report()?;
         self.check_files(&report)?;
         Ok(report)
@@ -169,33 +169,37 @@ impl RunFolder {
     /// Reads the report, whatever lies beside it.
     ///
     /// # Errors
-    /// [`RunError::File`] when there is none or it is damaged, and as [`Self::check_links`].
-    pub(super) fn parse_report(&self) -> Result<Report, RunError> {
+    /// [`StoreError::File`] when there is none or it is damaged, and as [`Self::check_links`].
+    pub(crate) fn parse_report(&self) -> Result<Report, StoreError> {
         self.check_links()?;
         finish_what_is_left(&self.0)?;
         let path = self.report();
         if self.0.is_file() {
-            return Err(RunError::File {
-                path: self.0.clone(),
-                reason: "is a file; name a run folder, as `gs-chroma fit` makes them".to_owned(),
-            });
+            return Err(StoreError::file(
+                &self.0,
+                "is a file; name a run folder, as `gs-chroma fit` makes them",
+            ));
         }
-        let text = input::read_to_string(&path).map_err(|error| RunError::File {
-            path: path.clone(),
-            reason: format!("{error}: a run folder has a report; make one with `gs-chroma fit`"),
+        let text = input::read_to_string(&path).map_err(|error| {
+            StoreError::file(
+                &path,
+                format!("{error}: a run folder has a report; make one with `gs-chroma fit`"),
+            )
         })?;
-        serde_json::from_str(&text).map_err(|error| RunError::File {
-            path,
-            reason: format!("damaged ({error}): run `gs-chroma fit` again"),
+        serde_json::from_str(&text).map_err(|error| {
+            StoreError::file(
+                &path,
+                format!("damaged ({error}): run `gs-chroma fit` again"),
+            )
         })
     }
 
     /// Refuses scenes of another run in this one: those that its report does not describe.
     ///
     /// # Errors
-    /// [`RunError::OtherFile`], [`RunError::InUse`], and [`RunError::File`] where one cannot be
+    /// [`StoreError::OtherFile`], [`StoreError::InUse`], and [`StoreError::File`] where one cannot be
     /// read.
-    pub(super) fn check_files(&self, report: &Report) -> Result<(), RunError> {
+    pub(crate) fn check_files(&self, report: &Report) -> Result<(), StoreError> {
         // Reports of former versions describe none.
         if report.files.is_empty() {
             return Ok(());
@@ -214,12 +218,12 @@ impl RunFolder {
                 true => {}
                 // Somebody is replacing them.
                 false if commit::left(&self.0)?.is_some() => {
-                    return Err(RunError::InUse {
+                    return Err(StoreError::InUse {
                         folder: self.0.clone(),
                         holder: "another process is writing into it".to_owned(),
                     });
                 }
-                false => return Err(RunError::OtherFile(path)),
+                false => return Err(StoreError::OtherFile(path)),
             }
         }
         Ok(())
@@ -229,16 +233,15 @@ impl RunFolder {
     /// the run has no such file.
     ///
     /// # Errors
-    /// [`RunError::File`] when it is damaged or belongs to other Gaussians.
-    pub fn read_chroma(&self, count: usize) -> Result<Option<ShField>, RunError> {
+    /// [`StoreError::File`] when it is damaged or belongs to other Gaussians.
+    pub fn read_chroma(&self, count: usize) -> Result<Option<ShField>, StoreError> {
         let path = self.chroma();
         if !path.exists() {
             return Ok(None);
         }
         let bytes = input::read(&path).map_err(files::at(&path))?;
-        let field = npy::decode(&bytes, count, 2).map_err(|reason| RunError::File {
-            path,
-            reason: format!("{reason}: run `gs-chroma colorize` again"),
+        let field = npy::decode(&bytes, count, 2).map_err(|reason| {
+            StoreError::file(&path, format!("{reason}: run `gs-chroma colorize` again"))
         })?;
         Ok(Some(field))
     }

@@ -8,18 +8,19 @@ use std::{
 
 use glam::DVec3;
 
-use super::{RunError, files};
+use super::files;
 use crate::{
     capture::{Capture, Dataset, Photo, View, first_views, in_order},
     disk::trust,
     hash::{self, Hasher},
     input,
     report::{FileReport, PhotoReport},
+    store::StoreError,
 };
 
 /// A SHA-256 over photos at working size, their cameras and COLMAP's points.
 #[derive(Default)]
-pub(super) struct Fingerprint(Hasher);
+pub(crate) struct Fingerprint(Hasher);
 
 impl Fingerprint {
     /// Takes a view; all are taken in their order.
@@ -55,13 +56,10 @@ const DIGITS: usize = 16;
 
 /// The photos of a capture, in the order of their names: their files and poses. Files that have
 /// not changed since `before` are not hashed again.
-///
-/// # Errors
-/// [`RunError::File`].
-pub(super) fn of_photos(
+pub(crate) fn of_photos(
     capture: &Capture,
     before: &[PhotoReport],
-) -> Result<Vec<PhotoReport>, RunError> {
+) -> Result<Vec<PhotoReport>, StoreError> {
     let views: Vec<_> = first_views(&capture.views).collect();
     let known: BTreeMap<&str, &PhotoReport> =
         before.iter().map(|photo| (&*photo.name, photo)).collect();
@@ -83,7 +81,7 @@ pub(super) fn of_photos(
                 stamp,
                 pose: pose(view, capture.offset),
             });
-            Ok::<_, RunError>(())
+            Ok::<_, StoreError>(())
         },
     )?;
     photos.sort();
@@ -91,10 +89,7 @@ pub(super) fn of_photos(
 }
 
 /// A file of a run that has just been written to `path`.
-///
-/// # Errors
-/// [`RunError::File`].
-pub(super) fn of_file(path: &Path) -> Result<FileReport, RunError> {
+pub(crate) fn of_file(path: &Path) -> Result<FileReport, StoreError> {
     let [stamp, sha256] = hashed(path, None).map_err(files::at(path))?;
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     Ok(FileReport {
@@ -105,7 +100,7 @@ pub(super) fn of_file(path: &Path) -> Result<FileReport, RunError> {
 }
 
 /// Stamp and digits of a file's SHA-256; `known` are those of before.
-pub(super) fn hashed(path: &Path, known: Option<[&str; 2]>) -> io::Result<[String; 2]> {
+pub(crate) fn hashed(path: &Path, known: Option<[&str; 2]>) -> io::Result<[String; 2]> {
     let file = input::open(path)?;
     let stamp = trust::stamp(&file)?;
     let sha256 = match known {
@@ -139,7 +134,7 @@ fn digits(mut sha256: String) -> String {
 
 /// What became of photos since they were trained on, by name.
 #[derive(Debug, Default, PartialEq, Eq)]
-pub(super) struct Changes {
+pub(crate) struct Changes {
     /// Photos that are there, of all.
     pub photos: usize,
     /// Their files are others, or were not there.
@@ -185,13 +180,10 @@ impl Changes {
     }
 
     /// Refuses photos that have other poses now: a scene's colors would go elsewhere.
-    ///
-    /// # Errors
-    /// [`RunError::OtherModel`].
-    pub fn check_poses(&self, folder: &Path) -> Result<(), RunError> {
+    pub fn check_poses(&self, folder: &Path) -> Result<(), StoreError> {
         match self.moved.first() {
             None => Ok(()),
-            Some(photo) => Err(RunError::OtherModel {
+            Some(photo) => Err(StoreError::OtherModel {
                 folder: folder.to_owned(),
                 photo: photo.clone(),
                 moved: self.moved.len(),
@@ -203,10 +195,7 @@ impl Changes {
 
 /// Refuses a capture whose photos have other poses than those a run was trained with; photos are
 /// not read.
-///
-/// # Errors
-/// [`RunError::OtherModel`].
-pub(super) fn check_poses(capture: &Capture, before: &[PhotoReport]) -> Result<(), RunError> {
+pub(crate) fn check_poses(capture: &Capture, before: &[PhotoReport]) -> Result<(), StoreError> {
     let views = first_views(&capture.views);
     let now: Vec<PhotoReport> = views
         .map(|view| PhotoReport {

@@ -8,33 +8,31 @@ use std::{
 
 use image::{DynamicImage, ImageBuffer, ImageEncoder, RgbImage, codecs::png::PngEncoder};
 
-use super::{RunError, RunFolder};
+use super::RunFolder;
 use crate::{
     disk::{self, folder_of, trust},
     frames::Colored,
     input,
     splats::Format,
+    store::StoreError,
 };
 
 /// Turns a system error into one that names the path.
-pub(crate) fn at(path: &Path) -> impl FnOnce(std::io::Error) -> RunError {
+pub(crate) fn at(path: &Path) -> impl FnOnce(std::io::Error) -> StoreError {
     let path = path.to_owned();
-    move |error| RunError::File {
-        path,
-        reason: error.to_string(),
-    }
+    move |error| StoreError::file(&path, error.to_string())
 }
 
 /// Writes beside and renames.
-pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), RunError> {
+pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
     write_by(path, |to| to.write_all(bytes))
 }
 
 /// Lets `fill` write beside, and renames what is on the disk.
-pub(super) fn write_by<T>(
+pub(crate) fn write_by<T>(
     path: &Path,
     fill: impl FnOnce(&mut dyn Write) -> io::Result<T>,
-) -> Result<T, RunError> {
+) -> Result<T, StoreError> {
     let filled = || {
         let mut file = disk::create(path)?;
         let mut to = BufWriter::new(&mut file);
@@ -48,24 +46,18 @@ pub(super) fn write_by<T>(
 }
 
 /// Writes a PNG beside and renames.
-pub(super) fn write_png(path: &Path, image: &RgbImage) -> Result<(), RunError> {
+pub(crate) fn write_png(path: &Path, image: &RgbImage) -> Result<(), StoreError> {
     let mut bytes = std::io::Cursor::new(Vec::new());
     image
         .write_to(&mut bytes, image::ImageFormat::Png)
-        .map_err(|error| RunError::File {
-            path: path.to_owned(),
-            reason: error.to_string(),
-        })?;
+        .map_err(|error| StoreError::file(path, error.to_string()))?;
     write(path, &marked(bytes.into_inner()))
 }
 
 /// Writes a photo in color as a PNG of its depth with the photo's EXIF, beside and renamed.
-pub(super) fn write_colored(path: &Path, mut colored: Colored) -> Result<(), RunError> {
+pub(crate) fn write_colored(path: &Path, mut colored: Colored) -> Result<(), StoreError> {
     let [width, height] = [colored.width, colored.height];
-    let failed = |reason: String| RunError::File {
-        path: path.to_owned(),
-        reason,
-    };
+    let failed = |reason: String| StoreError::file(path, reason);
     let exif = colored.exif.take();
     let image = match colored.deep {
         true => ImageBuffer::from_raw(width, height, colored.rgb.into_flattened())
@@ -116,9 +108,9 @@ pub(crate) const OF_SYSTEMS: [&str; 3] = [".DS_Store", "Thumbs.db", "desktop.ini
 /// Makes a folder for pictures, see [`make_folder`]. It may hold earlier ones of this program.
 ///
 /// # Errors
-/// [`RunError::File`] where it holds anything else, which pictures would be mixed with or
+/// [`StoreError::File`] where it holds anything else, which pictures would be mixed with or
 /// replace.
-pub(crate) fn make_pictures_folder(path: &Path) -> Result<(), RunError> {
+pub(crate) fn make_pictures_folder(path: &Path) -> Result<(), StoreError> {
     make_folder(path)?;
     if let Some(other) = other_file(path) {
         return Err(not_empty(path, &other));
@@ -150,8 +142,8 @@ fn other_file(folder: &Path) -> Option<PathBuf> {
 /// `may` be there before; or this program has begun it, which `begun` tell: names of its files.
 ///
 /// # Errors
-/// [`RunError::File`] where it holds something else.
-pub(crate) fn make_own_folder(path: &Path, begun: &[&str], may: &[&str]) -> Result<(), RunError> {
+/// [`StoreError::File`] where it holds something else.
+pub(crate) fn make_own_folder(path: &Path, begun: &[&str], may: &[&str]) -> Result<(), StoreError> {
     make_folder(path)?;
     let entries = fs::read_dir(path).into_iter().flatten().flatten();
     let names: Vec<String> = entries
@@ -171,31 +163,28 @@ pub(crate) fn make_own_folder(path: &Path, begun: &[&str], may: &[&str]) -> Resu
 /// Makes a run's folder, see [`make_own_folder`].
 ///
 /// # Errors
-/// [`RunError::File`] where it holds what belongs to no run.
-pub(super) fn make_run_folder(folder: &RunFolder) -> Result<(), RunError> {
+/// [`StoreError::File`] where it holds what belongs to no run.
+pub(crate) fn make_run_folder(folder: &RunFolder) -> Result<(), StoreError> {
     let begun = [".lock", "report.json", "checkpoint", "block.json"];
     // Who colors meanwhile may have begun before; a sweep's point has the others.
     let may = ["teacher", "settings.json", "stderr.txt"];
     make_own_folder(folder.path(), &begun, &may)
 }
 
-fn not_empty(folder: &Path, other: &Path) -> RunError {
-    RunError::File {
-        path: folder.to_owned(),
-        reason: format!(
+fn not_empty(folder: &Path, other: &Path) -> StoreError {
+    StoreError::file(
+        folder,
+        format!(
             "holds files that this command did not write, such as {}; name a new or an empty folder with -o",
             other.strip_prefix(folder).unwrap_or(other).display()
         ),
-    }
+    )
 }
 
 /// Makes a folder and those above it, and tries whether it can be written to:
 /// better now than after hours of work.
-pub(crate) fn make_folder(path: &Path) -> Result<(), RunError> {
-    let refused = |reason: String| RunError::File {
-        path: path.to_owned(),
-        reason,
-    };
+pub(crate) fn make_folder(path: &Path) -> Result<(), StoreError> {
+    let refused = |reason: String| StoreError::file(path, reason);
     if path.is_file() {
         return Err(refused("is a file; name a folder".to_owned()));
     }
@@ -208,25 +197,25 @@ pub(crate) fn make_folder(path: &Path) -> Result<(), RunError> {
     }
 }
 
-fn no_folder(path: &Path) -> Result<(), RunError> {
+fn no_folder(path: &Path) -> Result<(), StoreError> {
     if path.is_dir() {
-        return Err(RunError::File {
-            path: path.to_owned(),
-            reason: "is a folder; name a file such as scene.ply".to_owned(),
-        });
+        return Err(StoreError::file(
+            path,
+            "is a folder; name a file such as scene.ply",
+        ));
     }
     Ok(())
 }
 
 /// The format that a splat file's name tells, where no folder has this name.
-pub(super) fn format_of(path: &Path) -> Result<Format, RunError> {
+pub(crate) fn format_of(path: &Path) -> Result<Format, StoreError> {
     no_folder(path)?;
     check_no_original(path)?;
     Ok(Format::to_write(path)?)
 }
 
 /// Makes the folder that a file will be written to, see [`make_folder`].
-pub(crate) fn make_folder_of(path: &Path) -> Result<(), RunError> {
+pub(crate) fn make_folder_of(path: &Path) -> Result<(), StoreError> {
     no_folder(path)?;
     check_no_original(path)?;
     make_folder(folder_of(path))?;
@@ -235,7 +224,7 @@ pub(crate) fn make_folder_of(path: &Path) -> Result<(), RunError> {
 }
 
 /// Refuses a file for a command's output that is one of its originals.
-pub(crate) fn check_no_original(path: &Path) -> Result<(), RunError> {
+pub(crate) fn check_no_original(path: &Path) -> Result<(), StoreError> {
     trust::check_no_original(path).map_err(at(path))
 }
 
@@ -243,17 +232,17 @@ pub(crate) fn check_no_original(path: &Path) -> Result<(), RunError> {
 pub(crate) const PAGE: &str = "index.html";
 
 /// Refuses a folder that `eval` would not replace.
-pub(super) fn check_page(folder: &Path) -> Result<(), RunError> {
+pub(crate) fn check_page(folder: &Path) -> Result<(), StoreError> {
     if folder.exists() && !folder.join(PAGE).is_file() {
-        return Err(RunError::File {
-            path: folder.to_owned(),
-            reason: format!("is in the way: no page ({PAGE} is missing); move it elsewhere"),
-        });
+        return Err(StoreError::file(
+            folder,
+            format!("is in the way: no page ({PAGE} is missing); move it elsewhere"),
+        ));
     }
     Ok(())
 }
 
 /// The largest resident memory of this process so far, in bytes.
-pub(super) fn peak_host_memory() -> Option<u64> {
+pub(crate) fn peak_host_memory() -> Option<u64> {
     Some(input::kib(Path::new("/proc/self/status"), "VmHWM:")? * 1024)
 }

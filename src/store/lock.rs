@@ -6,25 +6,22 @@ use std::{
     path::Path,
 };
 
-use super::{RunError, RunFolder, commit, files};
-use crate::{disk, input, report::Report};
+use super::{RunFolder, commit, files};
+use crate::{disk, input, report::Report, store::StoreError};
 
 /// The file that is locked; it says who holds it.
-pub(super) const LOCK: &str = ".lock";
+pub(crate) const LOCK: &str = ".lock";
 
 /// The right to write into a run's folder. The system takes it back when the process ends,
 /// however it does.
 #[derive(Debug)]
-pub(super) struct RunLock {
+pub(crate) struct RunLock {
     _file: File,
 }
 
 impl RunLock {
     /// Takes that of a run that is there, and reads its report.
-    ///
-    /// # Errors
-    /// As [`RunFolder::read_report`] and [`RunLock::take`].
-    pub fn of_run(folder: &RunFolder) -> Result<(Self, Report), RunError> {
+    pub fn of_run(folder: &RunFolder) -> Result<(Self, Report), StoreError> {
         // Only what is a run is locked; what its report says is read once nobody writes it.
         folder.read_report()?;
         let lock = Self::take(folder.path())?;
@@ -33,16 +30,13 @@ impl RunLock {
 
     /// Lets nobody write into a run that is there as long as it is read, and reads its report.
     /// Others may read it as well.
-    ///
-    /// # Errors
-    /// As [`RunFolder::read_report`] and [`RunError::InUse`].
-    pub fn to_read(folder: &RunFolder) -> Result<(Option<Self>, Report), RunError> {
+    pub fn to_read(folder: &RunFolder) -> Result<(Option<Self>, Report), StoreError> {
         folder.read_report()?;
         let path = folder.path().join(LOCK);
         let lock = match disk::open_in_place(&path) {
             Ok(file) => match file.try_lock_shared() {
                 Err(TryLockError::WouldBlock) => {
-                    return Err(RunError::InUse {
+                    return Err(StoreError::InUse {
                         folder: folder.path().to_owned(),
                         holder: format!("{} is writing into it", holder(&path)),
                     });
@@ -61,10 +55,7 @@ impl RunLock {
 
     /// Takes it, finishes what a process that held it has left complete, and removes what it
     /// had only begun.
-    ///
-    /// # Errors
-    /// [`RunError::InUse`], [`RunError::File`].
-    pub fn take(folder: &Path) -> Result<Self, RunError> {
+    pub fn take(folder: &Path) -> Result<Self, StoreError> {
         RunFolder::at(folder).check_links()?;
         let path = folder.join(LOCK);
         let mut file = disk::open_in_place(&path).map_err(files::at(&path))?;
@@ -76,7 +67,7 @@ impl RunLock {
                     Ok(()) => "another process is reading it".to_owned(),
                     Err(_) => format!("{} is writing into it", holder(&path)),
                 };
-                return Err(RunError::InUse {
+                return Err(StoreError::InUse {
                     folder: folder.to_owned(),
                     holder,
                 });
@@ -113,11 +104,11 @@ fn holder(path: &Path) -> String {
 /// Finishes what a process has left complete, unless somebody is about to.
 ///
 /// # Errors
-/// [`RunError::File`] where no process of this program has left it.
-pub(super) fn finish_what_is_left(folder: &Path) -> Result<(), RunError> {
+/// [`StoreError::File`] where no process of this program has left it.
+pub(crate) fn finish_what_is_left(folder: &Path) -> Result<(), StoreError> {
     if commit::left(folder)?.is_some() {
         // Whoever holds the lock does it.
-        let _: Result<RunLock, RunError> = RunLock::take(folder);
+        let _: Result<RunLock, StoreError> = RunLock::take(folder);
     }
     Ok(())
 }

@@ -4,11 +4,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::{
-    Event, Observer, RunError, Stage,
-    fingerprint::{Changes, Fingerprint, of_photos},
-    scene,
-};
+use super::{SubjectError, scene};
 use crate::{
     capture::{
         Camera, Capture, CaptureError, Dataset, Headers, LoadOptions, MaskSource, Masked, Rejected,
@@ -19,6 +15,8 @@ use crate::{
         Reprojection, Survey, Unseeing, doubts, listed, observe_where_projected,
     },
     report::{CaptureReport, PhotoReport},
+    store::fingerprint::{Changes, Fingerprint, of_photos},
+    tell::{Event, Observer, Stage},
 };
 
 /// Fewer photos make no scene: before as few are left, all are used.
@@ -37,7 +35,7 @@ pub struct Soundness {
 }
 
 /// A capture that can be worked with.
-pub(super) struct Examined {
+pub(crate) struct Examined {
     pub dataset: Dataset,
     /// What its photos say.
     pub evidence: Evidence,
@@ -48,7 +46,7 @@ pub(super) struct Examined {
 }
 
 /// What follows from the model alone.
-pub(super) struct Model {
+pub(crate) struct Model {
     /// See [`Soundness`].
     pub reprojection_error: Option<f64>,
     /// Photos with poses that contradict it.
@@ -70,13 +68,13 @@ enum Tracks {
 /// Opens a COLMAP folder and judges the model; of the photos only headers are read.
 ///
 /// # Errors
-/// [`RunError::Unsound`] where the model contradicts itself, unless the options say that this
+/// [`SubjectError::Unsound`] where the model contradicts itself, unless the options say that this
 /// does not matter.
-pub(super) fn open_checked(
+pub(crate) fn open_checked(
     dir: &Path,
     options: &LoadOptions,
     observe: &mut Observer<'_>,
-) -> Result<Dataset, RunError> {
+) -> Result<Dataset, SubjectError> {
     let (dataset, model) = open_judged(dir, options, observe)?;
     for Rejected { name, reason } in &model.photos {
         observe(Event::Warning(format!("{name}: {reason}")));
@@ -89,13 +87,13 @@ pub(super) fn open_checked(
 ///
 /// # Errors
 /// As [`open_checked`], and as [`open_examined`] where photos have changed;
-/// [`RunError::OtherModel`], [`RunError::Exchanged`].
-pub(super) fn open_trusted(
+/// [`StoreError::OtherModel`], [`SubjectError::Exchanged`].
+pub(crate) fn open_trusted(
     dir: &Path,
     options: &LoadOptions,
     trained: &[PhotoReport],
     observe: &mut Observer<'_>,
-) -> Result<Dataset, RunError> {
+) -> Result<Dataset, SubjectError> {
     let dataset = open_checked(dir, options, observe)?;
     match tell_changes(&dataset.capture, trained, options.force, observe)? {
         true => Ok(open_examined(dir, options, observe)?.dataset),
@@ -104,15 +102,12 @@ pub(super) fn open_trusted(
 }
 
 /// The same without a word about the model, for commands that do not learn from photos.
-///
-/// # Errors
-/// As [`open_trusted`].
-pub(super) fn open_same(
+pub(crate) fn open_same(
     dir: &Path,
     options: &LoadOptions,
     trained: &CaptureReport,
     observe: &mut Observer<'_>,
-) -> Result<Dataset, RunError> {
+) -> Result<Dataset, SubjectError> {
     let dataset = scene::open(dir, options, observe)?;
     let force = trained.load.force;
     match tell_changes(&dataset.capture, &trained.photos, force, observe)? {
@@ -134,7 +129,7 @@ fn tell_changes(
     trained: &[PhotoReport],
     force: bool,
     observe: &mut Observer<'_>,
-) -> Result<bool, RunError> {
+) -> Result<bool, SubjectError> {
     // Runs of former versions say nothing.
     if trained.is_empty() {
         return Ok(false);
@@ -142,7 +137,7 @@ fn tell_changes(
     let found = Changes::between(trained, &of_photos(capture, trained)?);
     found.check_poses(&capture.root)?;
     if let Some([photo, other]) = found.exchanged.filter(|_| !force) {
-        return Err(RunError::Exchanged {
+        return Err(SubjectError::Exchanged {
             folder: capture.root.clone(),
             photo,
             other,
@@ -171,7 +166,7 @@ fn open_judged(
     dir: &Path,
     options: &LoadOptions,
     observe: &mut Observer<'_>,
-) -> Result<(Dataset, Model), RunError> {
+) -> Result<(Dataset, Model), SubjectError> {
     observe(Event::begins(Stage::Model));
     let mut dataset = scene::open(dir, options, observe)?;
     let headers = Headers::read(&dataset.capture.views)?;
@@ -190,13 +185,13 @@ fn open_judged(
 /// Where single photos contradict the model, all is done again without them.
 ///
 /// # Errors
-/// [`RunError::Unsound`] where all contradict it, unless the options say that this does not
+/// [`SubjectError::Unsound`] where all contradict it, unless the options say that this does not
 /// matter.
-pub(super) fn open_examined(
+pub(crate) fn open_examined(
     dir: &Path,
     options: &LoadOptions,
     observe: &mut Observer<'_>,
-) -> Result<Examined, RunError> {
+) -> Result<Examined, SubjectError> {
     let (mut dataset, model) = open_judged(dir, options, observe)?;
     for doubt in doubts(&dataset.capture, &dataset.cameras) {
         observe(Event::Warning(doubt));
@@ -254,13 +249,13 @@ pub(super) fn open_examined(
 /// Judges the model of a capture; `cameras` are those of its views at working size.
 ///
 /// # Errors
-/// [`RunError::Unsound`] where it contradicts itself, unless it is `forced`.
-pub(super) fn check_model(
+/// [`SubjectError::Unsound`] where it contradicts itself, unless it is `forced`.
+pub(crate) fn check_model(
     capture: &Capture,
     cameras: &[Camera],
     forced: bool,
     observe: &mut Observer<'_>,
-) -> Result<Model, RunError> {
+) -> Result<Model, SubjectError> {
     let reprojection = Reprojection::of(capture, cameras);
     let found = (reprojection.as_ref()).and_then(|found| found.contradictory(capture, cameras));
     let mut model = Model {
@@ -317,7 +312,7 @@ impl Model {
 fn examine(
     dataset: &Dataset,
     observe: &mut Observer<'_>,
-) -> Result<(Evidence, Agreement, String), RunError> {
+) -> Result<(Evidence, Agreement, String), SubjectError> {
     let mut fingerprint = Fingerprint::default();
     let channel = dataset.options.channel;
     observe(Event::begins(Stage::Photos));
@@ -330,12 +325,12 @@ fn examine(
         levels.look(photo);
         colors.look(view, photo);
         fingerprint.look(dataset, view, photo);
-        observe(Event::Progress {
-            stage: Stage::Photos,
-            done: view + 1,
-            total: all.len(),
-            message: dataset.capture.views[view].name.clone(),
-        });
+        observe(Event::progress(
+            Stage::Photos,
+            view + 1,
+            all.len(),
+            &dataset.capture.views[view].name,
+        ));
         Ok::<_, CaptureError>(())
     })?;
     scene::tell_not_finite(dataset, observe);
@@ -351,12 +346,12 @@ fn examine(
 /// The photos that do not show what COLMAP saw.
 ///
 /// # Errors
-/// [`RunError::Unsound`] where these are most of them, unless that does not matter.
+/// [`SubjectError::Unsound`] where these are most of them, unless that does not matter.
 fn unlike(
     agreement: &Agreement,
     dataset: &Dataset,
     observe: &mut Observer<'_>,
-) -> Result<Vec<Rejected>, RunError> {
+) -> Result<Vec<Rejected>, SubjectError> {
     match agreement.contradictory(&dataset.capture) {
         None => Ok(Vec::new()),
         Some(Contradictory::Some(photos)) => Ok(photos),
@@ -371,8 +366,11 @@ fn unlike(
 /// Warns where few of the photos that are there are used.
 ///
 /// # Errors
-/// [`RunError::Capture`] if the model is gone.
-pub(super) fn tell_unplaced(capture: &Capture, observe: &mut Observer<'_>) -> Result<(), RunError> {
+/// [`SubjectError::Capture`] if the model is gone.
+pub(crate) fn tell_unplaced(
+    capture: &Capture,
+    observe: &mut Observer<'_>,
+) -> Result<(), SubjectError> {
     if let Some(unplaced) = Unplaced::of(capture)? {
         observe(Event::Warning(of_unplaced(&unplaced)));
     }
@@ -380,14 +378,14 @@ pub(super) fn tell_unplaced(capture: &Capture, observe: &mut Observer<'_>) -> Re
 }
 
 /// Warns where photos are small versions of what COLMAP saw.
-pub(super) fn tell_headers(headers: &Headers, observe: &mut Observer<'_>) {
+pub(crate) fn tell_headers(headers: &Headers, observe: &mut Observer<'_>) {
     if let Some(shrunk) = &headers.shrunk {
         observe(Event::Warning(of_shrunk(shrunk)));
     }
 }
 
 /// Warns where only some of the photos have masks, or some masks no photo.
-pub(super) fn tell_masks(masked: Option<&Masked>, observe: &mut Observer<'_>) {
+pub(crate) fn tell_masks(masked: Option<&Masked>, observe: &mut Observer<'_>) {
     let Some(found) = masked else { return };
     let dir = found.dir.display();
     if let Some(first) = found.strays.first() {

@@ -6,7 +6,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use super::{Event, RunError, SceneKind};
+use super::{SceneKind, SubjectError};
 use crate::{
     capture::{Dataset, Photo},
     chroma::{ChromaCheckpoint, ChromaKeeper, bake_rgb},
@@ -15,6 +15,7 @@ use crate::{
     raster::RasterOptions,
     report::EffectReport,
     splats::{ShField, Splats},
+    tell::Event,
 };
 
 /// Whoever has not asked for so long does not look any more.
@@ -79,8 +80,8 @@ impl Live {
     /// The photo of a view; none as long as there are no photos, or no such view.
     ///
     /// # Errors
-    /// [`RunError::Capture`] of the photo.
-    pub fn photo(&self, view: usize) -> Result<Option<Arc<Photo>>, RunError> {
+    /// [`SubjectError::Capture`] of the photo.
+    pub fn photo(&self, view: usize) -> Result<Option<Arc<Photo>>, SubjectError> {
         let dataset = self.state().dataset.clone();
         match dataset.filter(|dataset| view < dataset.cameras.len()) {
             Some(dataset) => Ok(Some(dataset.photo(view)?)),
@@ -110,21 +111,21 @@ impl Live {
         self.state().doing = format!("{stage}{far}{more}");
     }
 
-    pub(super) fn begin(&self, dataset: &Arc<Dataset>) {
+    pub(crate) fn begin(&self, dataset: &Arc<Dataset>) {
         self.state().dataset = Some(dataset.clone());
     }
 
-    pub(super) fn plan(&self, plan: &Plan, drawn: RasterOptions) {
+    pub(crate) fn plan(&self, plan: &Plan, drawn: RasterOptions) {
         let mut state = self.state();
         state.plan = EffectReport::of(&plan.decisions);
         state.drawn = drawn;
     }
 
-    pub(super) fn draw(&self, drawn: RasterOptions) {
+    pub(crate) fn draw(&self, drawn: RasterOptions) {
         self.state().drawn = drawn;
     }
 
-    pub(super) fn note(&self, progress: &LumaProgress) {
+    pub(crate) fn note(&self, progress: &LumaProgress) {
         let mut state = self.state();
         let iteration = progress.iteration as f64;
         // A training may go back to its best.
@@ -140,7 +141,7 @@ impl Live {
     }
 
     /// Whether somebody wants to see Gaussians now.
-    pub(super) fn wants(&self) -> bool {
+    pub(crate) fn wants(&self) -> bool {
         let mut state = self.state();
         let now = Instant::now();
         let looked_at = state.asked.is_some_and(|asked| now - asked < GONE_AFTER);
@@ -153,7 +154,7 @@ impl Live {
     }
 
     /// Shows a scene, that took so long to read.
-    pub(super) fn show(&self, kind: SceneKind, splats: Splats, took: Duration) {
+    pub(crate) fn show(&self, kind: SceneKind, splats: Splats, took: Duration) {
         let mut state = self.state();
         state.count += 1;
         state.due = Some(Instant::now() + EVERY.max(took.saturating_mul(RARELY)));
@@ -171,7 +172,7 @@ impl Live {
 }
 
 /// Keeps checkpoints as another does, and shows what is trained.
-pub(super) struct Showing<'a, K: ?Sized> {
+pub(crate) struct Showing<'a, K: ?Sized> {
     pub keeper: &'a mut K,
     pub live: Option<&'a Live>,
     /// The gray scene that is colored; of no use to a training.
@@ -226,7 +227,7 @@ impl<K: ChromaKeeper + ?Sized> ChromaKeeper for Showing<'_, K> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::run::Stage;
+    use crate::tell::Stage;
 
     #[test]
     fn nothing_is_read_for_nobody() {
@@ -253,12 +254,7 @@ mod tests {
         let live = Live::default();
         live.tell(&Event::begins(Stage::Model));
         assert_eq!(live.ask().doing, "model");
-        live.tell(&Event::Progress {
-            stage: Stage::Training,
-            done: 50,
-            total: 700,
-            message: "loss 0.1".to_owned(),
-        });
+        live.tell(&Event::progress(Stage::Training, 50, 700, "loss 0.1"));
         assert_eq!(live.ask().doing, "training 50 of 700, loss 0.1");
     }
 }

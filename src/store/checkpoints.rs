@@ -3,6 +3,7 @@
 use std::{
     cell::RefCell,
     collections::BTreeMap,
+    fmt::{self, Write as _},
     path::{Path, PathBuf},
     sync::{
         Arc,
@@ -14,11 +15,15 @@ use std::{
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use serde_json::Value;
 
-use super::{Event, Observer, RunError, files};
-use crate::{input, sections};
+use super::files;
+use crate::{
+    input, sections,
+    store::StoreError,
+    tell::{Event, Observer},
+};
 
 /// Layout of the files; raised when another program could not go on from them.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 
 /// A checkpoint is made no sooner than after so many times what the last one took: at most one
 /// fiftieth of the time goes into them.
@@ -82,7 +87,7 @@ struct Header<S> {
 }
 
 /// A checkpoint that was found.
-pub(super) struct Found<S, C> {
+pub(crate) struct Found<S, C> {
     path: PathBuf,
     header: Header<S>,
     pub checkpoint: C,
@@ -92,15 +97,13 @@ impl<S: DeserializeOwned, C> Found<S, C> {
     /// The checkpoint at a path, of which `parse` makes what goes on.
     ///
     /// # Errors
-    /// [`RunError::File`] where it is damaged or of another layout.
+    /// [`StoreError::File`] where it is damaged or of another layout.
     pub fn read(
         path: &Path,
         parse: impl FnOnce(&BTreeMap<String, Vec<u8>>) -> Option<C>,
-    ) -> Result<Self, RunError> {
-        let damaged = |reason: &str| RunError::File {
-            path: path.to_owned(),
-            reason: format!("{reason}: remove it, and start over"),
-        };
+    ) -> Result<Self, StoreError> {
+        let damaged =
+            |reason: &str| StoreError::file(path, format!("{reason}: remove it, and start over"));
         let bytes = input::read(path).map_err(files::at(path))?;
         let sections = sections::read(&bytes).ok_or_else(|| damaged("is damaged"))?;
         let header = sections.get("run").map(Vec::as_slice).unwrap_or_default();
@@ -136,14 +139,14 @@ impl<S: DeserializeOwned, C> Found<S, C> {
     }
 
     /// # Errors
-    /// [`RunError::OtherCheckpoint`] where it is one of something else.
-    pub fn check(&self, question: &Value) -> Result<(), RunError> {
+    /// [`StoreError::OtherCheckpoint`] where it is one of something else.
+    pub fn check(&self, question: &Value) -> Result<(), StoreError> {
         let mut differs = Vec::new();
         differences("", &self.header.question, question, &mut differs);
         if differs.is_empty() {
             return Ok(());
         }
-        Err(RunError::OtherCheckpoint {
+        Err(StoreError::OtherCheckpoint {
             path: self.path.clone(),
             differs: differs.join(", "),
         })
@@ -170,32 +173,59 @@ fn differences(name: &str, before: &Value, now: &Value, found: &mut Vec<String>)
     }
 }
 
+/// Events and rows of the log of a command that keeps checkpoints meanwhile.
+pub(crate) struct Journal<'o> {
+    observe: RefCell<&'o mut Observer<'o>>,
+    log: RefCell<String>,
+}
+
+impl<'o> Journal<'o> {
+    /// One that begins with some rows.
+    pub fn new(log: String, observe: &'o mut Observer<'o>) -> Self {
+        Self {
+            observe: RefCell::new(observe),
+            log: RefCell::new(log),
+        }
+    }
+
+    pub fn tell(&self, event: Event) {
+        self.observe.borrow_mut()(event);
+    }
+
+    pub fn row(&self, row: fmt::Arguments<'_>) {
+        // Writing to a string cannot fail.
+        let _ = writeln!(self.log.borrow_mut(), "{row}");
+    }
+
+    pub fn rows(&self) -> String {
+        self.log.borrow().clone()
+    }
+}
+
 /// Writes checkpoints of a command that has `started` so.
-pub(super) struct FileKeeper<'a, S> {
+pub(crate) struct FileKeeper<'a, 'o, S> {
     path: PathBuf,
     header: Header<S>,
     options: &'a CheckpointOptions,
-    log: &'a RefCell<String>,
-    tell: &'a dyn Fn(Event),
+    journal: &'a Journal<'o>,
     begun: Instant,
     /// When the next is due.
     due: Option<Instant>,
     told: bool,
     /// When the one that is being made was asked for.
     asked: Option<Instant>,
-    /// What was written when it was interrupted: how far the work was.
-    pub interrupted: Option<Result<usize, RunError>>,
+    /// How far the work was when it was interrupted, once that is written.
+    interrupted: Option<Result<usize, StoreError>>,
 }
 
-impl<'a, S: Serialize> FileKeeper<'a, S> {
+impl<'a, 'o, S: Serialize> FileKeeper<'a, 'o, S> {
     /// A keeper for the command that answers `question`, begun at `begun`.
     pub fn new(
         path: PathBuf,
         question: Value,
         started: S,
         options: &'a CheckpointOptions,
-        log: &'a RefCell<String>,
-        tell: &'a dyn Fn(Event),
+        journal: &'a Journal<'o>,
         begun: Instant,
     ) -> Self {
         options.interrupt.heeded.store(true, Ordering::SeqCst);
@@ -209,14 +239,27 @@ impl<'a, S: Serialize> FileKeeper<'a, S> {
                 started,
             },
             options,
-            log,
-            tell,
+            journal,
             begun,
             due: options.every.map(|minutes| Instant::now() + wait(minutes)),
             told: false,
             asked: None,
             interrupted: None,
         }
+    }
+
+    /// Ends with the work.
+    ///
+    /// # Errors
+    /// [`StoreError::Interrupted`], or why the last checkpoint was not written.
+    pub fn close(mut self) -> Result<(), StoreError> {
+        let Some(written) = self.interrupted.take() else {
+            return Ok(());
+        };
+        Err(StoreError::Interrupted {
+            iteration: written?,
+            path: self.path.clone(),
+        })
     }
 
     /// Nobody heeds an interrupt any more.
@@ -237,7 +280,7 @@ impl<'a, S: Serialize> FileKeeper<'a, S> {
         // What it takes to read the work back from the device belongs to it.
         let begun = self.asked.take().unwrap_or_else(Instant::now);
         self.header.seconds = self.begun.elapsed().as_secs_f64();
-        self.header.log.clone_from(&self.log.borrow());
+        self.header.log = self.journal.rows();
         // Plain structs with string keys: serializing them cannot fail.
         let header = serde_json::to_vec(&self.header).unwrap_or_default();
         let mut all = vec![("run", header.as_slice())];
@@ -253,7 +296,7 @@ impl<'a, S: Serialize> FileKeeper<'a, S> {
         match written {
             Ok(size) if !self.told => {
                 self.told = true;
-                (self.tell)(Event::Note(format!(
+                self.journal.tell(Event::Note(format!(
                     "wrote {}, {:.1} MiB: --resume continues from there",
                     self.path.display(),
                     size as f64 / f64::from(1 << 20)
@@ -261,13 +304,15 @@ impl<'a, S: Serialize> FileKeeper<'a, S> {
             }
             Ok(_) => {}
             // Better none than no result.
-            Err(error) => (self.tell)(Event::Warning(format!("no checkpoint: {error}"))),
+            Err(error) => self
+                .journal
+                .tell(Event::Warning(format!("no checkpoint: {error}"))),
         }
         true
     }
 }
 
-impl<S> Drop for FileKeeper<'_, S> {
+impl<S> Drop for FileKeeper<'_, '_, S> {
     fn drop(&mut self) {
         self.options.interrupt.heeded.store(false, Ordering::SeqCst);
     }
@@ -278,7 +323,7 @@ fn wait(minutes: f64) -> Duration {
 }
 
 /// Says that what was interrupted is given up, if there is one.
-pub(super) fn tell_given_up(path: &Path, observe: &mut Observer<'_>) {
+pub(crate) fn tell_given_up(path: &Path, observe: &mut Observer<'_>) {
     if path.exists() {
         observe(Event::Warning(format!(
             "{} is left of an interrupted command, which is dropped: --resume would continue it",

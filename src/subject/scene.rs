@@ -4,32 +4,30 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::{Event, Observer, RunError, Stage};
+use super::SubjectError;
 use crate::{
     capture::{Dataset, LoadOptions, Notice, Rejected},
     luma::TrialProgress,
     raster::RasterOptions,
     splats::{self, ReadSplats, Splats, WriteOptions},
+    tell::{Event, Observer, Stage},
 };
 
 /// Opens a COLMAP folder; nothing is decoded but what [`Dataset::open`] has to.
-pub(super) fn open(
+pub(crate) fn open(
     colmap_dir: &Path,
     options: &LoadOptions,
     observe: &mut Observer<'_>,
-) -> Result<Dataset, RunError> {
+) -> Result<Dataset, SubjectError> {
     Ok(Dataset::open(colmap_dir, options, &mut |notice| {
         observe(match notice {
             Notice::Doubt(doubt) => Event::Warning(doubt.to_owned()),
             Notice::LeftOut(Rejected { name, reason }) => {
                 Event::Warning(format!("left out {name}: {reason}"))
             }
-            Notice::Sampled { done, total, name } => Event::Progress {
-                stage: Stage::Survey,
-                done,
-                total,
-                message: name.to_owned(),
-            },
+            Notice::Sampled { done, total, name } => {
+                Event::progress(Stage::Survey, done, total, name)
+            }
             Notice::Normalized([low, high]) => Event::Note(format!(
                 "photos are normalized: {low:.6} becomes black, {high:.6} white (--normalize off turns this off)"
             )),
@@ -37,21 +35,16 @@ pub(super) fn open(
     })?)
 }
 
-/// Tells how far a trial is.
-pub(super) fn tell_trial(progress: &TrialProgress, observe: &mut Observer<'_>) {
+/// How far a trial is.
+pub(crate) fn of_trial(progress: &TrialProgress) -> Event {
     let message = match progress.effect {
         Some(effect) => format!("with {effect}"),
         None => "without effects in doubt".to_owned(),
     };
-    observe(Event::Progress {
-        stage: Stage::Trial,
-        done: progress.done,
-        total: progress.total,
-        message,
-    });
+    Event::progress(Stage::Trial, progress.done, progress.total, message)
 }
 
-pub(super) fn tell_not_finite(dataset: &Dataset, observe: &mut Observer<'_>) {
+pub(crate) fn tell_not_finite(dataset: &Dataset, observe: &mut Observer<'_>) {
     let count = dataset.not_finite();
     if count > 0 {
         observe(Event::Warning(format!(
@@ -61,7 +54,7 @@ pub(super) fn tell_not_finite(dataset: &Dataset, observe: &mut Observer<'_>) {
 }
 
 /// Tells what was done to a splat file on reading, and what of it is not used.
-pub(super) fn tell_skipped(path: &Path, read: &ReadSplats, observe: &mut Observer<'_>) {
+pub(crate) fn tell_skipped(path: &Path, read: &ReadSplats, observe: &mut Observer<'_>) {
     let (path, skipped, surplus) = (path.display(), read.skipped, read.surplus);
     for note in &read.notes {
         observe(Event::Note(format!("{path}: {note}")));
@@ -83,7 +76,7 @@ pub(super) fn tell_skipped(path: &Path, read: &ReadSplats, observe: &mut Observe
 }
 
 /// A splat file as a scene.
-pub(super) struct ReadScene {
+pub(crate) struct ReadScene {
     pub splats: Splats,
     /// How the file wants to be drawn.
     pub drawn: RasterOptions,
@@ -93,7 +86,7 @@ pub(super) struct ReadScene {
 
 /// Which coordinates Gaussians are wanted in.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Frame {
+pub(crate) enum Frame {
     /// COLMAP's, less this, in world units.
     World(DVec3),
     /// Their run's, as its own files have them.
@@ -101,16 +94,16 @@ pub(super) enum Frame {
 }
 
 /// Reads a splat file that has at least one Gaussian and moves it to a frame.
-pub(super) fn read_scene(
+pub(crate) fn read_scene(
     path: &Path,
     frame: Frame,
     observe: &mut Observer<'_>,
-) -> Result<ReadScene, RunError> {
+) -> Result<ReadScene, SubjectError> {
     let read = splats::read_splats(path)?;
     tell_skipped(path, &read, observe);
     let mut splats = read.splats;
     if splats.is_empty() {
-        return Err(RunError::NoSplats(path.to_owned()));
+        return Err(SubjectError::NoSplats(path.to_owned()));
     }
     let by = match frame {
         Frame::World(offset) => read.offset - offset,
@@ -132,17 +125,17 @@ pub(super) fn read_scene(
 }
 
 /// [`read_scene`] for whoever writes no such file.
-pub(super) fn read_splats(
+pub(crate) fn read_splats(
     path: &Path,
     frame: Frame,
     observe: &mut Observer<'_>,
-) -> Result<(Splats, RasterOptions), RunError> {
+) -> Result<(Splats, RasterOptions), SubjectError> {
     let scene = read_scene(path, frame, observe)?;
     Ok((scene.splats, scene.drawn))
 }
 
 /// How splats are written whose centers are COLMAP's less `offset`, in world units.
-pub(super) fn written_as(drawn: RasterOptions, offset: DVec3) -> WriteOptions {
+pub(crate) fn written_as(drawn: RasterOptions, offset: DVec3) -> WriteOptions {
     WriteOptions {
         generator: format!("gs-chroma {}", env!("CARGO_PKG_VERSION")),
         antialiased: drawn.antialiased,

@@ -3,13 +3,13 @@
 
 use std::{path::Path, sync::Arc};
 
-use super::{Event, Observer, RunError};
+use super::SubjectError;
 use crate::{
     capture::Dataset,
-    eval::EvalError,
     gpu::Gpu,
     raster::{Raster, RasterOptions, SceneRenderer},
     splats::Splats,
+    tell::{Event, Observer},
 };
 
 /// Views that are drawn; an even choice.
@@ -36,16 +36,13 @@ struct Fit {
 
 /// How the gray splats of `path` are best drawn before the cameras of `dataset`: as the file
 /// says, unless the photos plainly say otherwise. Warns where they show something else.
-///
-/// # Errors
-/// [`RunError`] of a photo or the device.
-pub(super) fn drawn_like_photos(
+pub(crate) fn drawn_like_photos(
     gpu: &Gpu,
     dataset: &Dataset,
     (path, luma): (&Path, &Splats),
     said: RasterOptions,
     observe: &mut Observer<'_>,
-) -> Result<RasterOptions, RunError> {
+) -> Result<RasterOptions, SubjectError> {
     let other = RasterOptions {
         antialiased: !said.antialiased,
         ..said
@@ -72,16 +69,13 @@ pub(super) fn drawn_like_photos(
 
 /// Warns where the gray splats of `path`, drawn as the file says, do not show what the photos of
 /// `dataset` show.
-///
-/// # Errors
-/// [`RunError`] of a photo or the device.
-pub(super) fn tell_unlike(
+pub(crate) fn tell_unlike(
     gpu: &Gpu,
     dataset: &Dataset,
     (path, luma): (&Path, &Splats),
     said: RasterOptions,
     observe: &mut Observer<'_>,
-) -> Result<(), RunError> {
+) -> Result<(), SubjectError> {
     let [fit] = fits(gpu, dataset, luma, [said])?;
     if fit.correlation < CORRELATED {
         observe(of_unlike(path, fit));
@@ -103,7 +97,7 @@ fn fits<const N: usize>(
     dataset: &Dataset,
     luma: &Splats,
     ways: [RasterOptions; N],
-) -> Result<[Fit; N], EvalError> {
+) -> Result<[Fit; N], SubjectError> {
     let views = dataset.cameras.len();
     let chosen: Vec<usize> = (0..views).step_by(views.div_ceil(VIEWS).max(1)).collect();
     let mut found = [Fit::default(); N];
@@ -123,7 +117,7 @@ fn fits<const N: usize>(
                 squares += pairs.iter().map(|[a, b]| (a - b).powi(2)).sum::<f64>();
                 pixels += pairs.len() as f64;
             }
-            Ok::<_, EvalError>(())
+            Ok::<_, SubjectError>(())
         })?;
         let count = correlations.len().max(1) as f64;
         *fit = Fit {

@@ -7,16 +7,18 @@ use std::path::{Path, PathBuf};
 use image::RgbImage;
 use sound::Sound;
 
-use super::{Event, Observer, RunError, files};
+use super::files;
 use crate::{
     capture::Film,
     disk::{self, Draft},
     frames::Colored,
     programs::{FFMPEG, Fed, Program, ProgramError},
+    store::StoreError,
+    tell::{Event, Observer},
 };
 
 /// Frames a second where nobody says: film's.
-pub(super) const FRAME_RATE: [u32; 2] = [24, 1];
+pub(crate) const FRAME_RATE: [u32; 2] = [24, 1];
 
 /// Extensions of films.
 const FILMS: [&str; 4] = ["mp4", "mov", "mkv", "m4v"];
@@ -34,7 +36,7 @@ pub fn is_film(path: &Path) -> bool {
 
 /// What a film is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Purpose {
+pub(crate) enum Purpose {
     /// To be worked on: hardly to be told from its pictures, and of their very size.
     Editing,
     /// To be looked at in a browser: chroma at half size, and so a side that is odd grows.
@@ -52,7 +54,7 @@ impl Purpose {
 }
 
 /// Writes a film frame by frame.
-pub(super) struct FilmWriter {
+pub(crate) struct FilmWriter {
     path: PathBuf,
     rate: [u32; 2],
     purpose: Purpose,
@@ -93,10 +95,7 @@ impl FilmWriter {
     }
 
     /// Adds a photo in color; `name` is for errors.
-    ///
-    /// # Errors
-    /// As [`Self::write`].
-    pub fn write_colored(&mut self, name: &str, colored: &Colored) -> Result<(), RunError> {
+    pub fn write_colored(&mut self, name: &str, colored: &Colored) -> Result<(), StoreError> {
         let size = [colored.width, colored.height];
         match self.started(size, colored.deep)?.deep {
             true => self.add(name, size, bytemuck::cast_slice(&colored.rgb)),
@@ -107,14 +106,14 @@ impl FilmWriter {
     /// Adds a picture; `name` is for errors.
     ///
     /// # Errors
-    /// [`RunError::File`] where it has another size than those before, or ffmpeg fails.
-    pub fn write(&mut self, name: &str, picture: &RgbImage) -> Result<(), RunError> {
+    /// [`StoreError::File`] where it has another size than those before, or ffmpeg fails.
+    pub fn write(&mut self, name: &str, picture: &RgbImage) -> Result<(), StoreError> {
         let size = [picture.width(), picture.height()];
         self.started(size, false)?;
         self.add(name, size, picture.as_raw())
     }
 
-    fn started(&mut self, size: [u32; 2], deep: bool) -> Result<&mut Started, RunError> {
+    fn started(&mut self, size: [u32; 2], deep: bool) -> Result<&mut Started, StoreError> {
         let started = match self.started.take() {
             Some(started) => started,
             None => self.start(size, deep)?,
@@ -122,18 +121,18 @@ impl FilmWriter {
         Ok(self.started.insert(started))
     }
 
-    fn add(&mut self, name: &str, size: [u32; 2], bytes: &[u8]) -> Result<(), RunError> {
+    fn add(&mut self, name: &str, size: [u32; 2], bytes: &[u8]) -> Result<(), StoreError> {
         let Some(started) = &mut self.started else {
             return Ok(());
         };
         if started.size != size {
             let [[width, height], [w, h]] = [size, started.size];
-            return Err(RunError::File {
-                path: self.path.clone(),
-                reason: format!(
+            return Err(StoreError::file(
+                &self.path,
+                format!(
                     "{name} has {width} x {height} pixels, those before {w} x {h}: a film's frames have one size; write them to a folder"
                 ),
-            });
+            ));
         }
         let written = started.encoder.write(bytes);
         written.map_err(|error| self.failed(&error))
@@ -142,8 +141,8 @@ impl FilmWriter {
     /// Ends the film and puts it in its place, with its sound as far as that can be had.
     ///
     /// # Errors
-    /// [`RunError::File`] where ffmpeg fails on the pictures.
-    pub fn finish(mut self, observe: &mut Observer<'_>) -> Result<(), RunError> {
+    /// [`StoreError::File`] where ffmpeg fails on the pictures.
+    pub fn finish(mut self, observe: &mut Observer<'_>) -> Result<(), StoreError> {
         let Some(Started { encoder, draft, .. }) = self.started.take() else {
             return Ok(());
         };
@@ -168,14 +167,11 @@ impl FilmWriter {
         }
     }
 
-    fn failed(&self, error: &ProgramError) -> RunError {
-        RunError::File {
-            path: self.path.clone(),
-            reason: error.to_string(),
-        }
+    fn failed(&self, error: &ProgramError) -> StoreError {
+        StoreError::file(&self.path, error.to_string())
     }
 
-    fn start(&self, [width, height]: [u32; 2], deep: bool) -> Result<Started, RunError> {
+    fn start(&self, [width, height]: [u32; 2], deep: bool) -> Result<Started, StoreError> {
         let draft = disk::create(&self.path).map_err(files::at(&self.path))?;
         let container = self.container();
         let mut ffmpeg = Program::new(FFMPEG)

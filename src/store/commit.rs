@@ -8,10 +8,11 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::{RunError, files, folder::ENTRIES};
+use super::{files, folder::ENTRIES};
 use crate::{
     disk::{self, DraftFolder},
     input,
+    store::StoreError,
 };
 
 /// What is complete, and is to be moved into its place.
@@ -24,7 +25,7 @@ const BEGUN: &str = ".next-";
 const REMOVED: &str = ".removed";
 
 /// New files of a run, not in their place yet. Dropped, it leaves nothing behind.
-pub(super) struct Commit {
+pub(crate) struct Commit {
     folder: PathBuf,
     made: DraftFolder,
     removed: Vec<String>,
@@ -32,10 +33,7 @@ pub(super) struct Commit {
 
 impl Commit {
     /// An empty one for the run in `folder`.
-    ///
-    /// # Errors
-    /// [`RunError::File`].
-    pub fn new(folder: &Path) -> Result<Self, RunError> {
+    pub fn new(folder: &Path) -> Result<Self, StoreError> {
         let made = disk::create_folder(BEGUN, folder);
         Ok(Self {
             folder: folder.to_owned(),
@@ -64,8 +62,8 @@ impl Commit {
     /// Puts all in its place.
     ///
     /// # Errors
-    /// [`RunError::File`]; then either nothing has changed, or [`finish`] will do what is left.
-    pub fn finish(self) -> Result<(), RunError> {
+    /// [`StoreError::File`]; then either nothing has changed, or [`finish`] will do what is left.
+    pub fn finish(self) -> Result<(), StoreError> {
         let list = self.made.path().join(REMOVED);
         files::write(&list, self.removed.join("\n").as_bytes())?;
         let complete = self.folder.join(COMPLETE);
@@ -76,10 +74,7 @@ impl Commit {
 }
 
 /// Puts in its place what a process that ended too early has left complete.
-///
-/// # Errors
-/// As [`left`], and [`RunError::File`].
-pub(super) fn finish(folder: &Path) -> Result<(), RunError> {
+pub(crate) fn finish(folder: &Path) -> Result<(), StoreError> {
     let Some(Left {
         complete,
         removed,
@@ -104,7 +99,7 @@ pub(super) fn finish(folder: &Path) -> Result<(), RunError> {
 }
 
 /// A complete commit that is not in its place yet.
-pub(super) struct Left {
+pub(crate) struct Left {
     complete: PathBuf,
     /// Names of entries of the run that have to go.
     removed: Vec<&'static str>,
@@ -116,8 +111,8 @@ pub(super) struct Left {
 /// may only name what commits of this program hold.
 ///
 /// # Errors
-/// [`RunError::File`] where it names or holds anything else.
-pub(super) fn left(folder: &Path) -> Result<Option<Left>, RunError> {
+/// [`StoreError::File`] where it names or holds anything else.
+pub(crate) fn left(folder: &Path) -> Result<Option<Left>, StoreError> {
     let complete = folder.join(COMPLETE);
     let there = match complete.symlink_metadata() {
         // Of a run that is no folder the report says it.
@@ -131,9 +126,11 @@ pub(super) fn left(folder: &Path) -> Result<Option<Left>, RunError> {
         }
         there => there.map_err(files::at(&complete))?,
     };
-    let refused = |what: &str| RunError::File {
-        path: complete.clone(),
-        reason: format!("was not left by this program: it {what}; look at it and remove it"),
+    let refused = |what: &str| {
+        StoreError::file(
+            &complete,
+            format!("was not left by this program: it {what}; look at it and remove it"),
+        )
     };
     if !there.is_dir() {
         return Err(refused("is no folder"));
@@ -171,7 +168,7 @@ pub(super) fn left(folder: &Path) -> Result<Option<Left>, RunError> {
 }
 
 /// Removes what processes that ended too early have begun. Nobody may be writing.
-pub(super) fn clean(folder: &Path) {
+pub(crate) fn clean(folder: &Path) {
     disk::remove_drafts(folder, None);
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let name = entry.file_name();
@@ -186,7 +183,7 @@ pub(super) fn clean(folder: &Path) {
     }
 }
 
-fn remove(path: &Path) -> Result<(), RunError> {
+fn remove(path: &Path) -> Result<(), StoreError> {
     disk::remove(path).map_err(files::at(path))
 }
 

@@ -12,7 +12,7 @@ pub(crate) fn picture_names(views: &[View]) -> Vec<String> {
 }
 
 /// [`picture_names`] of names.
-pub(super) fn distinct(names: &[&str]) -> Vec<String> {
+pub(crate) fn distinct(names: &[&str]) -> Vec<String> {
     let mut files: Vec<String> = (names.iter())
         .map(|name| format!("{}.png", stem(name)))
         .collect();

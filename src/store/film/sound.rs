@@ -30,7 +30,7 @@ const PACKET: f64 = 0.05;
 const SLACK: f64 = 1.0;
 
 /// The sound of a shot.
-pub(super) struct Sound {
+pub(crate) struct Sound {
     source: PathBuf,
     /// When the shot begins, in seconds from the beginning of its film.
     start: f64,

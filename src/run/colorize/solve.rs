@@ -1,0 +1,162 @@
+//! Solving for the colors, which can go on where it was interrupted.
+
+use std::{ops::ControlFlow, time::Instant};
+
+use serde_json::Value;
+
+use super::{Lessons, open::Coloring};
+use crate::{
+    chroma::{
+        ChromaCheckpoint, ChromaKeeper, ChromaSettings, Colored, Distill, NoChromaKeeper,
+        SolverKind,
+    },
+    hash, input,
+    report::{KernelReport, kernel_reports},
+    run::RunError,
+    store::{
+        RunFolder, StoreError,
+        checkpoints::{FileKeeper, Found, Journal, tell_given_up},
+        files,
+    },
+    subject::{SceneKind, Showing},
+    tell::{Event, Observer},
+};
+
+/// The colors.
+pub(super) struct Solved {
+    pub colored: Colored,
+    /// Rows of the log.
+    pub log: String,
+    pub timings: Option<Vec<KernelReport>>,
+}
+
+impl Coloring<'_> {
+    /// Solves for what was taught, a command that began at `begun`.
+    pub fn solve(
+        &self,
+        lessons: &Lessons,
+        begun: Instant,
+        observe: &mut Observer<'_>,
+    ) -> Result<Solved, RunError> {
+        let (request, settings) = (self.request, &lessons.settings);
+        let (kept, total) = match settings.solver {
+            SolverKind::Irls => (self.kept(), settings.rounds),
+            // Adam keeps no checkpoints.
+            SolverKind::Adam => (None, settings.iterations),
+        };
+        let found = match request.checkpoints.resume {
+            true => found_in(kept, observe)?,
+            false => {
+                if let Some(folder) = self.kept() {
+                    tell_given_up(&folder.color_checkpoint(), observe);
+                }
+                None
+            }
+        };
+        let journal = &Journal::new(found.as_ref().map_or(String::new(), Found::log), observe);
+        let keeper = kept.map(|folder| {
+            let question = self.question(folder, settings, &lessons.taught.wanted)?;
+            found.iter().try_for_each(|found| found.check(&question))?;
+            let (path, checkpoints) = (folder.color_checkpoint(), &request.checkpoints);
+            Ok::<_, StoreError>(FileKeeper::new(
+                path,
+                question,
+                (),
+                checkpoints,
+                journal,
+                begun,
+            ))
+        });
+        let mut keeper = keeper.transpose()?;
+        let checkpoint = found.as_ref().map(|found| &found.checkpoint);
+        let rounds = [checkpoint.map_or(0, ChromaCheckpoint::rounds), total];
+        let keeps: &mut dyn ChromaKeeper = match &mut keeper {
+            Some(keeper) => keeper,
+            None => &mut NoChromaKeeper,
+        };
+        let mut showing = Showing {
+            keeper: keeps,
+            live: request.live.as_deref(),
+            luma: Some(&self.luma),
+        };
+        let distill = Distill {
+            raster: &self.raster,
+            dataset: &self.dataset,
+            luma: &self.luma,
+            lesson: &lessons.taught.lesson,
+            sh_degree: request.sh_degree,
+            correct_views: request.correct_views,
+        };
+        let colored = distill.run_from(checkpoint, &mut showing, settings, &mut |event| {
+            self.tell(event, rounds, journal);
+            ControlFlow::Continue(())
+        });
+        keeper.map_or(Ok(()), FileKeeper::close)?;
+        let colored = colored?;
+        self.show(SceneKind::Color, &colored.splats);
+        let timings = match request.timings {
+            true => Some(kernel_reports(&self.gpu.timings()?, &colored.load)),
+            false => None,
+        };
+        Ok(Solved {
+            colored,
+            log: journal.rows(),
+            timings,
+        })
+    }
+
+    /// What a coloring is asked for and given; `taught` is a hash of what the teachers want.
+    ///
+    /// # Errors
+    /// [`StoreError::File`] of the gray Gaussians.
+    fn question(
+        &self,
+        folder: &RunFolder,
+        settings: &ChromaSettings,
+        taught: &str,
+    ) -> Result<Value, StoreError> {
+        let (luma, request) = (folder.luma(), self.request);
+        let sha256 = input::open(&luma).and_then(hash::of_file);
+        Ok(serde_json::json!({
+            "program": env!("CARGO_PKG_VERSION"),
+            "device": self.gpu.describe(),
+            "luma": sha256.map_err(files::at(&luma))?,
+            "taught": taught,
+            "settings": settings,
+            "degree": request.sh_degree,
+            "correct-views": request.correct_views,
+            "relight": request.relight,
+        }))
+    }
+}
+
+/// The checkpoint to go on from; none where there is none.
+fn found_in(
+    folder: Option<&RunFolder>,
+    observe: &mut Observer<'_>,
+) -> Result<Option<Found<(), ChromaCheckpoint>>, StoreError> {
+    let path = folder.map(RunFolder::color_checkpoint);
+    match path.filter(|path| path.exists()) {
+        Some(path) => Found::read(&path, ChromaCheckpoint::from_sections).map(Some),
+        None => {
+            observe(Event::Note(
+                "there is no checkpoint of a coloring: it starts over".to_owned(),
+            ));
+            Ok(None)
+        }
+    }
+}
+
+impl ChromaKeeper for FileKeeper<'_, '_, ()> {
+    fn wants(&mut self) -> bool {
+        self.is_due()
+    }
+
+    fn keep(&mut self, checkpoint: ChromaCheckpoint) -> bool {
+        self.write(checkpoint.rounds(), &checkpoint.to_sections())
+    }
+
+    fn end(&mut self) {
+        self.heed_no_more();
+    }
+}

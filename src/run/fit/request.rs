@@ -1,0 +1,124 @@
+//! What `fit` is asked to do.
+
+use std::{path::PathBuf, sync::Arc};
+
+use serde::{Deserialize, Serialize};
+
+use super::{AheadOptions, BlockPlace, Neighbors};
+use crate::{
+    capture::LoadOptions,
+    effects::Overrules,
+    luma::{Goal, LumaOverlay, Preset},
+    store::{CheckpointOptions, RunFolder},
+    subject::Live,
+};
+
+/// Gaussians to start from.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Init {
+    /// Those of a splat file.
+    File(PathBuf),
+    /// Those of a run that goes on.
+    Run {
+        /// The run.
+        folder: RunFolder,
+        /// Its iterations so far.
+        iterations: usize,
+        /// How many of its Gaussians, the last ones, are surroundings.
+        surroundings: usize,
+    },
+}
+
+impl Init {
+    /// The splat file.
+    pub fn path(&self) -> PathBuf {
+        match self {
+            Self::File(path) => path.clone(),
+            Self::Run { folder, .. } => folder.luma(),
+        }
+    }
+
+    /// Iterations that led to them, as far as the run's log has them.
+    pub(super) fn iterations(&self) -> usize {
+        match self {
+            Self::File(_) => 0,
+            Self::Run { iterations, .. } => *iterations,
+        }
+    }
+
+    /// How many of them are surroundings.
+    fn surroundings(&self) -> usize {
+        match self {
+            Self::File(_) => 0,
+            Self::Run { surroundings, .. } => *surroundings,
+        }
+    }
+}
+
+/// What `fit` is asked to do; `None` leaves it to the preset.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct FitRequest {
+    /// The COLMAP folder.
+    pub colmap_dir: PathBuf,
+    /// The run folder; `runs/<folder name>` by default.
+    pub output: Option<PathBuf>,
+    /// Amount of work; `paper` on a GPU and `draft` on a software adapter by default.
+    /// With another goal than a fixed one, the most that is tried, `paper` by default.
+    pub preset: Option<Preset>,
+    /// What is asked for instead of the preset's settings. Not the iterations together with a
+    /// time limit or a target, nor what the plan of effects decides.
+    pub settings: LumaOverlay,
+    /// How photos are loaded; the longer side is the preset's where it is `None`.
+    pub load: LoadOptions,
+    /// Longer side at which held-out views are measured; that of training by default.
+    pub measure_side: Option<u32>,
+    /// Effects that are on or off whatever the evidence.
+    pub overrules: Overrules,
+    /// Gaussians to start from.
+    pub init: Option<Init>,
+    /// The block of a larger scene that it is.
+    pub block: Option<BlockPlace>,
+    /// What a trained block goes on among.
+    pub around: Option<Neighbors>,
+    /// What is to end the run; seconds are those of all of it. A PSNR is that of the held-out
+    /// views, or of some training views where none is held out.
+    pub goal: Goal,
+    /// The report tells where the device's time went.
+    pub timings: bool,
+    /// Who is to color the photos meanwhile.
+    pub ahead: AheadOptions,
+    /// How it can go on where it is interrupted.
+    #[serde(skip)]
+    pub checkpoints: CheckpointOptions,
+    /// Who looks on.
+    #[serde(skip)]
+    pub live: Option<Arc<Live>>,
+}
+
+impl FitRequest {
+    /// All as the preset and the photos have it.
+    pub fn new(colmap_dir: PathBuf) -> Self {
+        Self {
+            colmap_dir,
+            output: None,
+            preset: None,
+            settings: LumaOverlay::default(),
+            load: LoadOptions::default(),
+            measure_side: None,
+            overrules: Overrules::default(),
+            init: None,
+            block: None,
+            around: None,
+            goal: Goal::Fixed,
+            timings: false,
+            ahead: AheadOptions::default(),
+            checkpoints: CheckpointOptions::default(),
+            live: None,
+        }
+    }
+
+    /// How many of the Gaussians to start from, the last ones, are surroundings.
+    pub(super) fn surroundings(&self) -> usize {
+        self.init.as_ref().map_or(0, Init::surroundings)
+    }
+}

@@ -1,0 +1,78 @@
+//! What is wrong with a file or a folder.
+
+use std::path::{Path, PathBuf};
+
+use crate::{programs::ProgramError, splats::SplatError};
+
+/// What is wrong with a file or a folder.
+#[derive(Debug, thiserror::Error)]
+pub enum StoreError {
+    /// The file system, or what a file holds.
+    #[error("{}: {reason}", path.display())]
+    File {
+        /// File at fault.
+        path: PathBuf,
+        /// What is wrong with it and what to do.
+        reason: String,
+    },
+    /// A splat file's name.
+    #[error(transparent)]
+    Splats(#[from] SplatError),
+    /// A program of others, such as FFmpeg.
+    #[error(transparent)]
+    Program(#[from] ProgramError),
+    /// There is no run to go on with.
+    #[error("no run under runs/")]
+    NoRun,
+    /// Another process writes into the run, or reads it.
+    #[error("{}: {holder}: wait for it, or choose another folder with -o", folder.display())]
+    InUse {
+        /// The run's folder.
+        folder: PathBuf,
+        /// Who it is, and what it does.
+        holder: String,
+    },
+    /// Photos have other poses than when they were trained on.
+    #[error(
+        "{}: {moved} of {photos} photos have another pose or camera than when the scene was trained, such as {photo}", folder.display()
+    )]
+    OtherModel {
+        /// The COLMAP folder.
+        folder: PathBuf,
+        /// One of these photos.
+        photo: String,
+        /// How many there are.
+        moved: usize,
+        /// Photos in all.
+        photos: usize,
+    },
+    /// A run's file is not the one that its report describes.
+    #[error("{}: is not the file that this run wrote", .0.display())]
+    OtherFile(PathBuf),
+    /// A checkpoint of another training.
+    #[error("{}: belongs to another training: {differs}", path.display())]
+    OtherCheckpoint {
+        /// Checkpoint at fault.
+        path: PathBuf,
+        /// What was otherwise.
+        differs: String,
+    },
+    /// A training was ended from outside, and can go on.
+    #[error("interrupted after iteration {iteration}; {} continues from there", path.display())]
+    Interrupted {
+        /// Iterations done.
+        iteration: usize,
+        /// Checkpoint at fault.
+        path: PathBuf,
+    },
+}
+
+impl StoreError {
+    /// A file that is wrong for a reason.
+    pub(crate) fn file(path: &Path, reason: impl Into<String>) -> Self {
+        Self::File {
+            path: path.to_owned(),
+            reason: reason.into(),
+        }
+    }
+}
