@@ -22,7 +22,7 @@ use crate::{
     raster::Raster,
     report::{CaptureReport, LumaReport, LumaSeconds, Report, ViewExposure},
     splats::Splats,
-    store::{RunFolder, StoreError, files, fingerprint::of_photos, lock::RunLock},
+    store::{RunFolder, StoreError, fingerprint::of_photos, lock::RunLock},
     subject::{
         SubjectError,
         scene::{Frame, read_splats},
@@ -73,7 +73,7 @@ pub fn merge(
         Some(path) => RunFolder::at(path),
         None => RunFolder::for_capture(&options.job),
     };
-    files::make_run_folder(&folder)?;
+    folder.make()?;
     let _lock = RunLock::take(folder.path())?;
     let coarse = options.job.join(COARSE);
     let load = LoadOptions {
@@ -158,7 +158,7 @@ fn trained(folder: &Path, job: &Job, observe: &mut Observer<'_>) -> Result<Vec<T
                 path.display()
             )));
         }
-        let (lock, report) = RunLock::to_read(&run)?;
+        let (lock, report) = run.lock_to_read()?;
         let file = BlockFile::read(&path)?;
         let plan = file.map(|file| job.plan_of(block, &file));
         match &report.luma.plan {

@@ -8,7 +8,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::{files, folder::ENTRIES};
+use super::{entries::ENTRIES, files};
 use crate::{
     disk::{self, DraftFolder},
     input,

@@ -8,7 +8,6 @@ use std::{
 
 use image::{DynamicImage, ImageBuffer, ImageEncoder, RgbImage, codecs::png::PngEncoder};
 
-use super::RunFolder;
 use crate::{
     disk::{self, folder_of, trust},
     frames::Colored,
@@ -158,17 +157,6 @@ pub(crate) fn make_own_folder(path: &Path, begun: &[&str], may: &[&str]) -> Resu
         }
         _ => Ok(()),
     }
-}
-
-/// Makes a run's folder, see [`make_own_folder`].
-///
-/// # Errors
-/// [`StoreError::File`] where it holds what belongs to no run.
-pub(crate) fn make_run_folder(folder: &RunFolder) -> Result<(), StoreError> {
-    let begun = [".lock", "report.json", "checkpoint", "block.json"];
-    // Who colors meanwhile may have begun before; a sweep's point has the others.
-    let may = ["teacher", "settings.json", "stderr.txt"];
-    make_own_folder(folder.path(), &begun, &may)
 }
 
 fn not_empty(folder: &Path, other: &Path) -> StoreError {

@@ -5,7 +5,7 @@ mod sound;
 use std::path::{Path, PathBuf};
 
 use image::RgbImage;
-use sound::Sound;
+use sound::{Sound, in_container};
 
 use super::files;
 use crate::{
@@ -203,13 +203,4 @@ impl FilmWriter {
             deep,
         })
     }
-}
-
-/// FFmpeg with a container for its output.
-fn in_container(mut ffmpeg: Program, container: &str) -> Program {
-    if container != "matroska" {
-        // A page shows it before all of it is there.
-        ffmpeg = ffmpeg.args(["-movflags", "+faststart"]);
-    }
-    ffmpeg.args(["-f", container])
 }

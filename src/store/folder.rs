@@ -8,9 +8,14 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 
-use super::{commit, files, fingerprint::hashed, lock::finish_what_is_left};
+use super::{
+    commit,
+    entries::{TEACHER, check_links},
+    files,
+    fingerprint::hashed,
+    lock::{RunLock, finish_what_is_left},
+};
 use crate::{
-    disk::trust,
     input,
     report::Report,
     splats::{ShField, npy},
@@ -22,23 +27,6 @@ pub(crate) const OF_AUTO: &str = "run";
 
 /// Where runs go unless told otherwise.
 const RUNS: &str = "runs";
-
-/// Files and folders of a run that commands write together.
-pub(crate) const ENTRIES: [&str; 10] = [
-    "luma.ply",
-    "color.ply",
-    "chroma.npy",
-    "report.json",
-    "log.csv",
-    "contact-sheet.png",
-    "eval.json",
-    "eval",
-    "checkpoint",
-    "checkpoint-color",
-];
-
-/// The folder of the teacher's answers.
-const TEACHER: &str = "teacher";
 
 /// The folder of one run; docs/run-folder.md lists what lies in it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -147,13 +135,30 @@ impl RunFolder {
         self.0.join("contact-sheet.png")
     }
 
-    /// Refuses a run whose files are elsewhere: a folder may come from somebody else.
-    pub(crate) fn check_links(&self) -> Result<(), StoreError> {
-        for name in ENTRIES.into_iter().chain([TEACHER]) {
-            let path = self.0.join(name);
-            trust::check_inside(&self.0, &path).map_err(files::at(&path))?;
-        }
-        Ok(())
+    /// Makes the folder, see [`files::make_own_folder`].
+    ///
+    /// # Errors
+    /// [`StoreError::File`] where it holds what belongs to no run.
+    pub(crate) fn make(&self) -> Result<(), StoreError> {
+        let begun = [".lock", "report.json", "checkpoint", "block.json"];
+        // Who colors meanwhile may have begun before; a sweep's point has the last.
+        let may = [TEACHER, "stderr.txt"];
+        files::make_own_folder(&self.0, &begun, &may)
+    }
+
+    /// Takes the lock of a run that is there, and reads its report.
+    pub(crate) fn lock(&self) -> Result<(RunLock, Report), StoreError> {
+        // Only what is a run is locked; what its report says is read once nobody writes it.
+        self.read_report()?;
+        let lock = RunLock::take(&self.0)?;
+        Ok((lock, self.read_report()?))
+    }
+
+    /// Lets nobody write into a run that is there as long as it is read, and reads its report.
+    pub(crate) fn lock_to_read(&self) -> Result<(Option<RunLock>, Report), StoreError> {
+        self.read_report()?;
+        let lock = RunLock::shared(&self.0)?;
+        Ok((lock, self.read_report()?))
     }
 
     /// Reads the report of a run whose files it describes.
@@ -169,9 +174,9 @@ impl RunFolder {
     /// Reads the report, whatever lies beside it.
     ///
     /// # Errors
-    /// [`StoreError::File`] when there is none or it is damaged, and as [`Self::check_links`].
+    /// [`StoreError::File`] when there is none or it is damaged, and as [`check_links`].
     pub(crate) fn parse_report(&self) -> Result<Report, StoreError> {
-        self.check_links()?;
+        check_links(&self.0)?;
         finish_what_is_left(&self.0)?;
         let path = self.report();
         if self.0.is_file() {

@@ -6,8 +6,8 @@ use std::{
     path::Path,
 };
 
-use super::{RunFolder, commit, files};
-use crate::{disk, input, report::Report, store::StoreError};
+use super::{StoreError, commit, entries::check_links, files};
+use crate::{disk, input};
 
 /// The file that is locked; it says who holds it.
 pub(crate) const LOCK: &str = ".lock";
@@ -20,43 +20,29 @@ pub(crate) struct RunLock {
 }
 
 impl RunLock {
-    /// Takes that of a run that is there, and reads its report.
-    pub fn of_run(folder: &RunFolder) -> Result<(Self, Report), StoreError> {
-        // Only what is a run is locked; what its report says is read once nobody writes it.
-        folder.read_report()?;
-        let lock = Self::take(folder.path())?;
-        Ok((lock, folder.read_report()?))
-    }
-
-    /// Lets nobody write into a run that is there as long as it is read, and reads its report.
-    /// Others may read it as well.
-    pub fn to_read(folder: &RunFolder) -> Result<(Option<Self>, Report), StoreError> {
-        folder.read_report()?;
-        let path = folder.path().join(LOCK);
-        let lock = match disk::open_in_place(&path) {
+    /// Lets nobody write into a run's folder as long as it is read. Others may read it as well;
+    /// none where the file system cannot lock or write.
+    pub fn shared(folder: &Path) -> Result<Option<Self>, StoreError> {
+        let path = folder.join(LOCK);
+        match disk::open_in_place(&path) {
             Ok(file) => match file.try_lock_shared() {
-                Err(TryLockError::WouldBlock) => {
-                    return Err(StoreError::InUse {
-                        folder: folder.path().to_owned(),
-                        holder: format!("{} is writing into it", holder(&path)),
-                    });
-                }
-                // Some file systems cannot lock.
-                Ok(()) | Err(TryLockError::Error(_)) => Some(Self { _file: file }),
+                Err(TryLockError::WouldBlock) => Err(StoreError::InUse {
+                    folder: folder.to_owned(),
+                    holder: format!("{} is writing into it", holder(&path)),
+                }),
+                Ok(()) | Err(TryLockError::Error(_)) => Ok(Some(Self { _file: file })),
             },
             Err(error) if error.kind() == io::ErrorKind::InvalidInput => {
-                return Err(files::at(&path)(error));
+                Err(files::at(&path)(error))
             }
-            // Where nobody can write there is nothing to keep anybody from.
-            Err(_) => None,
-        };
-        Ok((lock, folder.read_report()?))
+            Err(_) => Ok(None),
+        }
     }
 
     /// Takes it, finishes what a process that held it has left complete, and removes what it
     /// had only begun.
     pub fn take(folder: &Path) -> Result<Self, StoreError> {
-        RunFolder::at(folder).check_links()?;
+        check_links(folder)?;
         let path = folder.join(LOCK);
         let mut file = disk::open_in_place(&path).map_err(files::at(&path))?;
         match file.try_lock() {

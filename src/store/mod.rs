@@ -2,6 +2,7 @@
 
 pub(crate) mod checkpoints;
 pub(crate) mod commit;
+mod entries;
 mod error;
 pub(crate) mod files;
 pub(crate) mod film;

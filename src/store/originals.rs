@@ -9,7 +9,7 @@ use std::{
 
 use serde_json::Value;
 
-use super::{RunFolder, folder::ENTRIES};
+use super::{RunFolder, entries::ENTRIES};
 use crate::{
     capture::{FRAMES, Film, IMAGES, MaskSource},
     disk::trust::{FileId, Originals},

@@ -41,9 +41,9 @@ impl Run {
         let folder = RunFolder::find(path)?;
         let (_lock, report) = match hold {
             Hold::Free => (None, folder.read_report()?),
-            Hold::Reading => RunLock::to_read(&folder)?,
+            Hold::Reading => folder.lock_to_read()?,
             Hold::Writing => {
-                let (lock, report) = RunLock::of_run(&folder)?;
+                let (lock, report) = folder.lock()?;
                 (Some(lock), report)
             }
         };

@@ -64,7 +64,7 @@ pub fn fit(
         Some(path) => RunFolder::at(path),
         None => RunFolder::for_capture(&options.colmap_dir),
     };
-    files::make_run_folder(&folder)?;
+    folder.make()?;
     let _lock = RunLock::take(folder.path())?;
     let ahead = Ahead::open(&options.ahead, &folder)?;
     let found = match options.checkpoints.resume {

@@ -210,7 +210,7 @@ impl Sound {
                 ffmpeg = ffmpeg.option(&format!("-filter:a:{k}"), &way.filters);
             }
         }
-        super::in_container(ffmpeg, container)
+        in_container(ffmpeg, container)
     }
 }
 
@@ -262,6 +262,15 @@ fn probe(path: &Path) -> Value {
         .film(path)
         .ask();
     serde_json::from_str(&said.unwrap_or_default()).unwrap_or_default()
+}
+
+/// FFmpeg with a container for its output.
+pub(super) fn in_container(mut ffmpeg: Program, container: &str) -> Program {
+    if container != "matroska" {
+        // A page shows it before all of it is there.
+        ffmpeg = ffmpeg.args(["-movflags", "+faststart"]);
+    }
+    ffmpeg.args(["-f", container])
 }
 
 #[cfg(test)]
