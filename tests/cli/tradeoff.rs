@@ -104,7 +104,8 @@ fn what_the_files_hold(place: &Place, sweep: &Value) {
     }
     // PSNR and SSIM of luma; three measures of color.
     assert_eq!(html.matches("<svg ").count(), 5);
-    assert!(html.contains("src=\"points/base/contact-sheet.png\""));
+    // Which points are the best depends on how long they took.
+    assert!(html.contains("/contact-sheet.png\" alt="));
     assert!(html.len() < 100_000 && !html.contains("<script"));
 }
 
