@@ -29,6 +29,11 @@ pub fn widen(values: &[f32]) -> Vec<f64> {
     values.iter().map(|&v| f64::from(v)).collect()
 }
 
+/// `f64` values as the device takes them.
+pub fn narrow<'a>(values: impl IntoIterator<Item = &'a f64>) -> Vec<f32> {
+    values.into_iter().map(|&v| v as f32).collect()
+}
+
 /// What makes two arrays unfit for any comparison, if anything.
 fn unfit(actual: &[f64], expected: &[f64]) -> Option<String> {
     if actual.len() != expected.len() {

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use crate::{
     compare::{Elementwise, FlipBounds, GradientBounds},
-    gpu::Gpu,
+    gpu::{Gpu, GpuError},
 };
 
 /// Pixels whose decisions are closer than this to falling the other way may do so in `f32`.
@@ -62,18 +62,86 @@ impl Allowance {
         }
     }
 
-    /// Bounds on a gradient of which this relative L2 error was seen; angle and
-    /// bias have to be as small as it makes them.
-    pub fn gradient(self, worst_l2: f64, elements: Elementwise) -> GradientBounds {
-        let relative_l2 = worst_l2 * self.0;
-        GradientBounds {
-            elementwise: elements,
+    /// A row of values whose worst error was `worst · (scale + |x|)`.
+    pub fn values(
+        self,
+        kernel: &'static str,
+        what: impl Into<String>,
+        [worst, scale]: [f64; 2],
+        samples: &[Sample],
+    ) -> Row {
+        Row::elementwise(kernel, what, self.relative(worst, scale), samples)
+    }
+
+    /// A row of gradients of which the relative L2 error `l2` was seen, and of an element
+    /// `worst · (scale + |x|)`; angle and bias have to be as small as `l2` makes them.
+    pub fn gradients(
+        self,
+        kernel: &'static str,
+        what: impl Into<String>,
+        [l2, worst, scale]: [f64; 3],
+        samples: &[Sample],
+    ) -> Row {
+        let relative_l2 = l2 * self.0;
+        let bounds = GradientBounds {
+            elementwise: self.relative(worst, scale),
             relative_l2,
             // 1 - cos φ is about φ²/2, and φ is at most the relative error.
             cosine: 0.51 * relative_l2 * relative_l2,
             // In L1 norms, in which small elements weigh more.
             signed_bias: 2.0 * relative_l2,
+        };
+        let elementwise = bounds.elementwise;
+        let bound = format!(
+            "L2 {:.1e}; {:.1e} + {:.1e}·abs(x)",
+            bounds.relative_l2, elementwise.absolute, elementwise.relative
+        );
+        Row::judged(kernel, what, bound, samples, |sample| {
+            let figures = bounds.compare(&sample.actual, &sample.expected);
+            (figures.elementwise.used, figures.check())
+        })
+    }
+
+    /// Rows of gradients by group, of which these errors were seen: of the whole, and of an
+    /// element of size 1.
+    pub fn groups(
+        self,
+        kernel: &'static str,
+        seen: &[[f64; 2]],
+        groups: impl IntoIterator<Item = (&'static str, Vec<Sample>)>,
+    ) -> Vec<Row> {
+        (groups.into_iter().zip(seen))
+            .map(|((name, samples), &[l2, worst])| {
+                self.gradients(kernel, name, [l2, worst, 1.0], &samples)
+            })
+            .collect()
+    }
+}
+
+/// Samples by quantity, of inputs that each give one of every quantity.
+///
+/// # Errors
+/// The first input's that has one.
+pub fn by_quantity<const N: usize>(
+    inputs: impl IntoIterator<Item = Result<[Sample; N], GpuError>>,
+) -> Result<[Vec<Sample>; N], GpuError> {
+    let mut quantities = [const { Vec::new() }; N];
+    for input in inputs {
+        for (samples, sample) in quantities.iter_mut().zip(input?) {
+            samples.push(sample);
         }
+    }
+    Ok(quantities)
+}
+
+/// Samples by name, in the order in which names came first.
+pub type Groups = Vec<(&'static str, Vec<Sample>)>;
+
+/// Adds samples to those of the same name.
+pub fn add(groups: &mut Groups, name: &'static str, samples: impl IntoIterator<Item = Sample>) {
+    match groups.iter_mut().find(|(known, _)| *known == name) {
+        Some((_, known)) => known.extend(samples),
+        None => groups.push((name, samples.into_iter().collect())),
     }
 }
 
@@ -83,7 +151,7 @@ pub struct Row {
     /// Name of the kernel, as in `shaders/`.
     pub kernel: &'static str,
     /// The quantity, with its unit.
-    pub what: &'static str,
+    pub what: String,
     /// Inputs it was measured on.
     pub inputs: usize,
     /// Largest absolute error.
@@ -99,15 +167,22 @@ pub struct Row {
 }
 
 impl Row {
-    fn new(kernel: &'static str, what: &'static str, samples: &[Sample]) -> Self {
+    /// `judge` says how much of the bound a sample used, and what is wrong with it.
+    fn judged(
+        kernel: &'static str,
+        what: impl Into<String>,
+        bound: String,
+        samples: &[Sample],
+        judge: impl Fn(&Sample) -> (f64, Result<(), String>),
+    ) -> Self {
         let mut row = Self {
             kernel,
-            what,
+            what: what.into(),
             inputs: samples.len(),
             largest_error: 0.0,
             relative_l2: 0.0,
             used: 0.0,
-            bound: String::new(),
+            bound,
             failures: Vec::new(),
         };
         if samples.is_empty() {
@@ -123,65 +198,42 @@ impl Row {
             if error > 0.0 && norm > 0.0 {
                 row.relative_l2 = row.relative_l2.max((error / norm).sqrt());
             }
+            let (used, checked) = judge(sample);
+            row.used = row.used.max(used);
+            row.failures.extend(checked.err());
         }
         row
     }
 
     /// Every element within its bound.
-    pub fn elementwise(
+    fn elementwise(
         kernel: &'static str,
-        what: &'static str,
+        what: impl Into<String>,
         bound: Elementwise,
         samples: &[Sample],
     ) -> Self {
-        let mut row = Self::new(kernel, what, samples);
-        row.bound = format!("{:.1e} + {:.1e}·abs(x)", bound.absolute, bound.relative);
-        for sample in samples {
+        let words = format!("{:.1e} + {:.1e}·abs(x)", bound.absolute, bound.relative);
+        Self::judged(kernel, what, words, samples, |sample| {
             let figures = bound.compare(&sample.actual, &sample.expected);
-            row.used = row.used.max(figures.used);
-            row.failures.extend(figures.check().err());
-        }
-        row
-    }
-
-    /// A gradient as a whole and element by element.
-    pub fn gradient(
-        kernel: &'static str,
-        what: &'static str,
-        bounds: GradientBounds,
-        samples: &[Sample],
-    ) -> Self {
-        let mut row = Self::new(kernel, what, samples);
-        row.bound = format!(
-            "L2 {:.1e}; {:.1e} + {:.1e}·abs(x)",
-            bounds.relative_l2, bounds.elementwise.absolute, bounds.elementwise.relative
-        );
-        for sample in samples {
-            let figures = bounds.compare(&sample.actual, &sample.expected);
-            row.used = row.used.max(figures.elementwise.used);
-            row.failures.extend(figures.check().err());
-        }
-        row
+            (figures.used, figures.check())
+        })
     }
 
     /// A picture, whose pixels may flip where the oracle marks them.
     pub fn picture(
         kernel: &'static str,
-        what: &'static str,
+        what: impl Into<String>,
         bounds: FlipBounds,
         samples: &[Sample],
     ) -> Self {
-        let mut row = Self::new(kernel, what, samples);
-        row.bound = format!(
+        let words = format!(
             "{:.1e} + {:.1e}·abs(x), flips ≤ {:.1e}",
             bounds.rest.absolute, bounds.rest.relative, bounds.cap
         );
-        for sample in samples {
+        Self::judged(kernel, what, words, samples, |sample| {
             let figures = bounds.compare(&sample.actual, &sample.expected, &sample.may_flip);
-            row.used = row.used.max(figures.rest_used);
-            row.failures.extend(figures.check().err());
-        }
-        row
+            (figures.rest_used, figures.check())
+        })
     }
 
     /// Integers, which are right or wrong.
@@ -190,9 +242,10 @@ impl Row {
             absolute: 0.0,
             relative: 0.0,
         };
-        let mut row = Self::elementwise(kernel, what, bound, samples);
-        "exact".clone_into(&mut row.bound);
-        row
+        Self {
+            bound: "exact".to_owned(),
+            ..Self::elementwise(kernel, what, bound, samples)
+        }
     }
 }
 

@@ -229,11 +229,12 @@ pub fn examine_with(
         .map(|&may_flip| [random.range(-1.0, 1.0)].map(|v| if may_flip { 0.0 } else { v }))
         .collect();
     let actual = stage.backward(upstream.as_flattened())?.groups();
-    let expected = groups(&gradient(&wanted, &hard.view, Shading::Offset, &upstream));
+    let expected = gradient(&wanted, &hard.view, Shading::Offset, &upstream);
+    let expected = expected.groups();
     let norm = |values: &[f64]| values.iter().map(|v| v * v).sum::<f64>().sqrt();
     let largest = expected.iter().map(|group| norm(group)).fold(0.0, f64::max);
     let mut gradient_error = 0.0;
-    for ((name, actual), expected) in actual.iter().zip(&expected) {
+    for ((name, actual), expected) in actual.iter().zip(expected) {
         let difference: Vec<f64> = actual.iter().zip(expected).map(|(a, e)| a - e).collect();
         let unit = norm(expected).max(SMALL_GROUP * largest);
         let error = norm(&difference);
@@ -290,15 +291,4 @@ fn without_broken(hard: &Hard) -> Scene<f64, 1> {
         }
     });
     Scene::of(scene.degree, gaussians)
-}
-
-/// The oracle's gradient in the groups of [`stage::Gradient::groups`].
-fn groups(gradient: &Scene<f64, 1>) -> [Vec<f64>; 5] {
-    [
-        gradient.means.as_flattened().to_vec(),
-        gradient.quats.as_flattened().to_vec(),
-        gradient.log_scales.as_flattened().to_vec(),
-        gradient.opacity_logits.clone(),
-        gradient.sh.as_flattened().to_vec(),
-    ]
 }

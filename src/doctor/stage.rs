@@ -6,6 +6,7 @@ use glam::{DMat3, DVec3};
 
 use crate::{
     capture::Camera,
+    compare::narrow,
     gpu::{Buffer, GpuError, Recorder},
     oracle::{
         numerics::{self as oracle, Numerics},
@@ -36,18 +37,18 @@ pub fn camera(view: &View) -> Camera {
 
 /// The oracle's scene as splats; its values are exact in `f32`.
 pub fn splats<const C: usize>(scene: &Scene<f64, C>) -> Splats {
-    fn narrow<const K: usize>(rows: &[[f64; K]]) -> Vec<[f32; K]> {
+    fn rows<const K: usize>(rows: &[[f64; K]]) -> Vec<[f32; K]> {
         rows.iter().map(|row| row.map(|v| v as f32)).collect()
     }
     Splats {
-        means: narrow(&scene.means),
-        quats: narrow(&scene.quats),
-        log_scales: narrow(&scene.log_scales),
-        opacity_logits: scene.opacity_logits.iter().map(|&v| v as f32).collect(),
+        means: rows(&scene.means),
+        quats: rows(&scene.quats),
+        log_scales: rows(&scene.log_scales),
+        opacity_logits: narrow(&scene.opacity_logits),
         sh: ShField {
             degree: scene.degree as u32,
             channels: C,
-            coefficients: scene.sh.iter().flatten().map(|&v| v as f32).collect(),
+            coefficients: narrow(scene.sh.as_flattened()),
         },
     }
 }
@@ -195,7 +196,6 @@ impl Stage {
     /// [`GpuError::Lost`].
     pub fn backward_onto(&self, upstream: &[f64], before: &[f32]) -> Result<Gradient, GpuError> {
         let gpu = &self.raster.gpu;
-        let narrow = |values: &[f64]| values.iter().map(|&v| v as f32).collect::<Vec<_>>();
         let mut recorder = self.record();
         Ok(match &self.adjoint {
             Adjoint::Luma(adjoint, gradient) => {

@@ -15,10 +15,6 @@ use super::view::View;
 use super::{lift, seed};
 use num_dual::Dual64;
 
-/// Derivatives with respect to what blending takes of one Gaussian.
-/// `conic[1]` is that of the one off-diagonal number.
-pub type ScreenGradient<const C: usize> = ScreenSplat<f64, C>;
-
 /// A rendered view, ready to be differentiated.
 struct Tape<'a, const C: usize> {
     view: &'a View,
@@ -98,22 +94,6 @@ fn lift_splat<const C: usize>(splat: &ScreenSplat<f64, C>) -> ScreenSplat<Dual64
     }
 }
 
-fn zero_splat<const C: usize>() -> ScreenGradient<C> {
-    ScreenSplat {
-        mean2d: [0.0; 2],
-        conic: [0.0; 3],
-        opacity: 0.0,
-        color: [0.0; C],
-    }
-}
-
-fn splat_fields<T, const C: usize>(splat: &mut ScreenSplat<T, C>) -> impl Iterator<Item = &mut T> {
-    (splat.mean2d.iter_mut())
-        .chain(&mut splat.conic)
-        .chain(std::iter::once(&mut splat.opacity))
-        .chain(&mut splat.color)
-}
-
 /// The gradient with respect to every parameter, in the shape of the scene;
 /// zero for Gaussians that are culled. `upstream` is v, `[height · width][C]`.
 pub fn gradient<const C: usize>(
@@ -158,28 +138,6 @@ pub fn gradient_of<const C: usize>(
         }
     }
     Scene::of(scene.degree, rows)
-}
-
-/// The gradient with respect to what blending takes of each Gaussian,
-/// `[N]`; zero for Gaussians that are culled.
-pub fn screen_gradient<const C: usize>(
-    scene: &Scene<f64, C>,
-    view: &View,
-    shading: Shading,
-    upstream: &[[f64; C]],
-) -> Vec<ScreenGradient<C>> {
-    let tape = Tape::record(scene, view, shading, upstream);
-    let mut result = vec![zero_splat(); scene.len()];
-    for (position, &index) in tape.order.iter().enumerate() {
-        for (field, slot) in splat_fields(&mut result[index]).enumerate() {
-            let mut varied = tape.splats[position];
-            if let Some(value) = splat_fields(&mut varied).nth(field) {
-                *value = seed(value.re);
-            }
-            *slot = tape.derivative(position, &varied);
-        }
-    }
-    result
 }
 
 /// The pull on each Gaussian, `[N]`: the sum over pixels of the length of the

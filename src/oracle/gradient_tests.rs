@@ -1,9 +1,9 @@
-//! Tests of the oracle's gradients: against finite differences, against dual
-//! numbers through the whole brute-force render, and through the chain rule.
+//! Tests of the oracle's gradients: against finite differences, and against dual
+//! numbers through the whole brute-force render.
 
-use super::gradient::{gradient, screen_gradient};
+use super::gradient::gradient;
 use super::random::{Random, opaque_stack, random_scene};
-use super::render::{decision_margin, render, to_screen};
+use super::render::{decision_margin, render};
 use super::scene::Scene;
 use super::seed;
 use super::shade::Shading;
@@ -111,39 +111,6 @@ fn shortcut_equals_dual_numbers_through_everything() {
             let mut row = fast.gaussian(index);
             let value = *row.parameters_mut().nth(parameter).unwrap();
             assert!((value - slow).abs() <= 1e-12 * (1.0 + slow.abs()));
-        }
-    }
-}
-
-#[test]
-fn screen_gradient_and_projection_make_the_whole_by_the_chain_rule() {
-    let (scene, view) = random_scene::<3>(16, 12, 2);
-    let v = upstream(&scene, &view, 0.0);
-    let whole = gradient(&scene, &view, Shading::Offset, &v);
-    let screen = screen_gradient(&scene, &view, Shading::Offset, &v);
-    for (index, s) in screen.iter().enumerate() {
-        for parameter in 0..11 {
-            let mut varied = scene.gaussian(index).to_dual();
-            let value = varied.parameters_mut().nth(parameter).unwrap();
-            *value = seed(value.re);
-            let mut chained = 0.0;
-            if let Ok((_, splat)) = to_screen(&varied, &view, Shading::Offset) {
-                let inner = (splat.mean2d.iter())
-                    .chain(&splat.conic)
-                    .chain(std::iter::once(&splat.opacity))
-                    .chain(&splat.color);
-                let outer = (s.mean2d.iter())
-                    .chain(&s.conic)
-                    .chain(std::iter::once(&s.opacity))
-                    .chain(&s.color);
-                chained = inner.zip(outer).map(|(i, o)| i.eps * o).sum();
-            }
-            let mut row = whole.gaussian(index);
-            let value = *row.parameters_mut().nth(parameter).unwrap();
-            assert!(
-                (value - chained).abs() <= 1e-10 * (1.0 + value.abs()),
-                "{index} {parameter}: {value} or {chained}"
-            );
         }
     }
 }

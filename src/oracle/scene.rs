@@ -181,6 +181,17 @@ impl<T: Number, const C: usize> Scene<T, C> {
 }
 
 impl<const C: usize> Scene<f64, C> {
+    /// Means, quaternions, log-scales, logits and harmonics in a row each.
+    pub fn groups(&self) -> [&[f64]; 5] {
+        [
+            self.means.as_flattened(),
+            self.quats.as_flattened(),
+            self.log_scales.as_flattened(),
+            &self.opacity_logits,
+            self.sh.as_flattened(),
+        ]
+    }
+
     /// The same scene as dual constants.
     pub fn to_dual(&self) -> Scene<Dual64, C> {
         Scene::of(

@@ -90,23 +90,26 @@ pub(super) fn bounds(allowed: Allowance, worst: f64, brightest: f64) -> FlipBoun
 
 pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
     let allowed = Allowance::of(&raster.gpu);
+    let row = |what, worst, brightest, samples: &[Sample]| {
+        Row::picture("blend", what, bounds(allowed, worst, brightest), samples)
+    };
     Ok(vec![
-        Row::picture(
-            "blend",
+        row(
             "luma, 0 to 1",
-            bounds(allowed, 1.27e-6, 1.0),
+            1.27e-6,
+            1.0,
             &pictures::<1>(raster, scenes())?,
         ),
-        Row::picture(
-            "blend",
+        row(
             "chroma, Lab units",
-            bounds(allowed, 1.09e-6, 80.0),
+            1.09e-6,
+            80.0,
             &pictures::<2>(raster, scenes())?,
         ),
-        Row::picture(
-            "blend",
+        row(
             "RGB, 0 to 1",
-            bounds(allowed, 1.34e-6, 1.0),
+            1.34e-6,
+            1.0,
             &pictures::<3>(raster, scenes())?,
         ),
         Row::picture(

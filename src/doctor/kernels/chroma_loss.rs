@@ -5,8 +5,8 @@ use std::sync::Arc;
 use super::losses::{SIZES, logged, view};
 use crate::{
     chroma::{ChromaLossWeights, Correction, pack_ab},
-    compare::widen,
-    doctor::measured::{Allowance, Row, Sample},
+    compare::{narrow, widen},
+    doctor::measured::{Allowance, Row, Sample, by_quantity},
     gpu::{Buffer, Gpu, GpuError, Kernel, groups_for, shaders},
     oracle::{
         chroma_loss::{Teaching, chroma_loss, chroma_loss_gradient, curvature},
@@ -49,11 +49,6 @@ pub struct ChromaOutput {
     pub curvatures: Vec<f32>,
 }
 
-fn pixels(gpu: &Gpu, values: &[[f64; 2]]) -> Result<Buffer<f32>, GpuError> {
-    let values: Vec<f32> = values.as_flattened().iter().map(|&v| v as f32).collect();
-    Buffer::from_slice(gpu, "pixels", &values)
-}
-
 impl ChromaInput<'_> {
     /// Runs the kernel.
     ///
@@ -69,13 +64,14 @@ impl ChromaInput<'_> {
         let kernel = Kernel::new(gpu, "chroma_loss", shader);
         let view = view(gpu, self.size)?;
         let weights = Buffer::uniform(gpu, "weights", &self.weights)?;
-        let (image, coarser) = (pixels(gpu, self.image)?, pixels(gpu, self.coarser)?);
+        let pixels = |values: &[f64]| Buffer::from_slice(gpu, "pixels", &narrow(values));
+        let image = pixels(self.image.as_flattened())?;
+        let coarser = pixels(self.coarser.as_flattened())?;
         let wanted: Vec<u32> = (self.wanted.iter())
             .map(|ab| pack_ab(ab.map(|v| v as f32)))
             .collect();
         let wanted = Buffer::from_slice(gpu, "wanted", &wanted)?;
-        let narrow: Vec<f32> = self.pixel_weights.iter().map(|&w| w as f32).collect();
-        let pixel_weights = Buffer::from_slice(gpu, "pixel weights", &narrow)?;
+        let pixel_weights = pixels(self.pixel_weights)?;
         let corrections = Buffer::from_slice(gpu, "corrections", self.corrections)?;
         let figures = Buffer::<f32>::zeros(gpu, "figures", 2 * image.len())?;
         let groups = groups_for(self.size[0] * self.size[1]);
@@ -177,9 +173,8 @@ const CORRECTIONS: [Correction; 3] = [
 
 /// Values, gradients and curvatures, the latter two by pixel.
 fn measure(gpu: &Gpu, terms: Terms) -> Result<[Vec<Sample>; 3], GpuError> {
-    let mut samples: [Vec<Sample>; 3] = Default::default();
     let sizes = SIZES.into_iter().chain([MANY_BLOCKS]);
-    for (seed, size) in sizes.enumerate() {
+    by_quantity(sizes.enumerate().map(|(seed, size)| {
         let mut random = Random::new(seed as u64);
         let half = size.map(|side| side.div_ceil(2));
         let mut pixels = |[width, height]: [usize; 2], spread: f64| -> Vec<[f64; 2]> {
@@ -251,98 +246,72 @@ fn measure(gpu: &Gpu, terms: Terms) -> Result<[Vec<Sample>; 3], GpuError> {
         };
         let loss = TEACHER * teaching.loss(&image) + terms.agreement * chroma_loss(&image, &smooth);
         let scaled = |values: &[f32]| widen(values).into_iter().map(|v| v * scale).collect();
-        samples[0].push(Sample::new(vec![output.loss], vec![loss]));
-        samples[1].push(Sample::new(scaled(&output.gradient), sum(&slopes, &drift)));
-        let expected = sum(&curves, &by_drift);
-        samples[2].push(Sample::new(scaled(&output.curvatures), expected));
-    }
-    Ok(samples)
+        Ok([
+            Sample::new(vec![output.loss], vec![loss]),
+            Sample::new(scaled(&output.gradient), sum(&slopes, &drift)),
+            Sample::new(scaled(&output.curvatures), sum(&curves, &by_drift)),
+        ])
+    }))
 }
 
 pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
-    let gpu = &raster.gpu;
-    let allowed = Allowance::of(gpu);
-    let value = |what, worst, samples: &[Sample]| {
-        Row::elementwise("chroma_loss", what, allowed.relative(worst, 0.0), samples)
-    };
-    let gradient = |what, l2, worst, samples: &[Sample]| {
-        let bounds = allowed.gradient(l2, allowed.relative(worst, 1.0));
-        Row::gradient("chroma_loss", what, bounds, samples)
-    };
-    let [plain_values, plain_gradients, _] = measure(gpu, PLAIN)?;
-    let agreement = Terms {
+    let (gpu, allowed) = (&raster.gpu, Allowance::of(&raster.gpu));
+    let agreeing = |terms| Terms {
         agreement: 0.5,
-        ..PLAIN
+        ..terms
     };
-    let [values, gradients, _] = measure(gpu, agreement)?;
     let solver = Terms {
         decline: 0.1,
         weighed: true,
         ..PLAIN
     };
-    let [weighed_values, weighed_gradients, weighed_curvatures] = measure(gpu, solver)?;
-    let together = Terms {
+    let joint = Terms {
         joint: true,
         ..solver
     };
-    let [joint_values, joint_gradients, joint_curvatures] = measure(gpu, together)?;
-    let all = Terms {
-        agreement: 0.5,
-        ..together
-    };
-    let [all_values, all_gradients, all_curvatures] = measure(gpu, all)?;
-    Ok(vec![
-        value("value", 6.35e-8, &plain_values),
-        gradient("gradient × pixels", 7.40e-8, 6.31e-8, &plain_gradients),
-        value("value with agreement", 1.24e-7, &values),
-        gradient(
-            "gradient × pixels with agreement",
-            1.53e-7,
-            1.88e-6,
-            &gradients,
+    let solvers = ", weighed, corrected, declining";
+    let mut rows = Vec::new();
+    // The worst errors seen: of values, and of gradients and curvatures as a whole and of an
+    // element.
+    for (kind, terms, value, gradient, curvature) in [
+        ("", PLAIN, 6.35e-8, [7.40e-8, 6.31e-8], None),
+        (
+            " with agreement",
+            agreeing(PLAIN),
+            1.24e-7,
+            [1.53e-7, 1.88e-6],
+            None,
         ),
-        value(
-            "value, weighed, corrected, declining",
+        (
+            solvers,
+            solver,
             6.61e-7,
-            &weighed_values,
+            [3.43e-7, 5.28e-6],
+            Some([3.90e-7, 2.62e-6]),
         ),
-        gradient(
-            "gradient × pixels, weighed, corrected, declining",
-            3.43e-7,
-            5.28e-6,
-            &weighed_gradients,
+        (
+            ", a and b together",
+            joint,
+            1.12e-7,
+            [2.17e-7, 4.42e-6],
+            Some([1.34e-7, 1.86e-6]),
         ),
-        gradient(
-            "curvature × pixels, weighed, corrected, declining",
-            3.90e-7,
-            2.62e-6,
-            &weighed_curvatures,
+        (
+            ", all terms",
+            agreeing(joint),
+            8.48e-8,
+            [8.84e-8, 3.80e-6],
+            Some([1.43e-7, 1.83e-6]),
         ),
-        value("value, a and b together", 1.12e-7, &joint_values),
-        gradient(
-            "gradient × pixels, a and b together",
-            2.17e-7,
-            4.42e-6,
-            &joint_gradients,
-        ),
-        gradient(
-            "curvature × pixels, a and b together",
-            1.34e-7,
-            1.86e-6,
-            &joint_curvatures,
-        ),
-        value("value, all terms", 8.48e-8, &all_values),
-        gradient(
-            "gradient × pixels, all terms",
-            8.84e-8,
-            3.80e-6,
-            &all_gradients,
-        ),
-        gradient(
-            "curvature × pixels, all terms",
-            1.43e-7,
-            1.83e-6,
-            &all_curvatures,
-        ),
-    ])
+    ] {
+        let [values, gradients, curvatures] = measure(gpu, terms)?;
+        let row = |what, [l2, worst]: [f64; 2], samples: &[Sample]| {
+            let what = format!("{what} × pixels{kind}");
+            allowed.gradients("chroma_loss", what, [l2, worst, 1.0], samples)
+        };
+        rows.push(allowed.values("chroma_loss", format!("value{kind}"), [value, 0.0], &values));
+        rows.push(row("gradient", gradient, &gradients));
+        rows.extend(curvature.map(|seen| row("curvature", seen, &curvatures)));
+    }
+    Ok(rows)
 }

@@ -117,10 +117,10 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
     let sample = |(actual, expected): (Vec<f32>, Vec<f64>)| [Sample::new(widen(&actual), expected)];
     Ok(vec![
         Row::exact("densify_geometry", "copies", &sample(copied)),
-        Row::elementwise(
+        allowed.values(
             "densify_geometry",
             "halves of splits",
-            allowed.relative(3.82e-7, 1.0),
+            [3.82e-7, 1.0],
             &sample(split),
         ),
         Row::exact("densify_sh", "copies", &fields),

@@ -7,7 +7,7 @@ use crate::{
     compare::widen,
     doctor::{
         MARGIN,
-        measured::{Allowance, Row, Sample},
+        measured::{Allowance, Groups, Row, Sample, add, by_quantity},
         stage::{Stage, splats},
     },
     gpu::GpuError,
@@ -38,18 +38,6 @@ pub(super) fn upstream<const C: usize>(
         .collect()
 }
 
-fn oracle_groups<const C: usize>(gradient: &Scene<f64, C>) -> Vec<Vec<f64>> {
-    let geometry = [
-        gradient.means.as_flattened().to_vec(),
-        gradient.quats.as_flattened().to_vec(),
-        gradient.log_scales.as_flattened().to_vec(),
-        gradient.opacity_logits.clone(),
-    ];
-    let sh = gradient.sh.as_flattened().to_vec();
-    let geometry = geometry.into_iter().filter(|_| C == 1);
-    geometry.chain([sh]).collect()
-}
-
 /// The gradient of a luma picture.
 pub(super) fn of_luma(scene: &Scene<f64, 1>, view: &View, upstream: &[[f64; 1]]) -> Scene<f64, 1> {
     gradient(scene, view, Shading::Offset, upstream)
@@ -60,25 +48,22 @@ pub(super) fn measure<const C: usize>(
     raster: &Arc<Raster>,
     scenes: &[(Scene<f64, C>, View)],
     expect: impl Fn(&Scene<f64, C>, &View, &[[f64; C]]) -> Scene<f64, C>,
-) -> Result<Vec<(&'static str, Vec<Sample>)>, GpuError> {
-    let mut groups: Vec<(&'static str, Vec<Sample>)> = Vec::new();
+) -> Result<Groups, GpuError> {
+    let mut groups = Groups::new();
     for (seed, (scene, view)) in scenes.iter().enumerate() {
         let upstream = upstream(seed as u64, scene, view);
         let expected = expect(scene, view, &upstream);
         let stage = Stage::new(raster, &splats(scene), view)?;
         let actual = stage.backward(upstream.as_flattened())?;
-        let mut rows = actual.groups();
-        let mut expected = oracle_groups(&expected);
-        if C == 1 {
-            rows.push(("pull", widen(&actual.statistics[..scene.len()])));
-            expected.push(pulls(scene, view, Shading::of_channels(C), &upstream));
+        // Of color the harmonics alone.
+        let expected = &expected.groups()[if C == 1 { 0 } else { 4 }..];
+        for ((name, actual), expected) in actual.groups().into_iter().zip(expected) {
+            add(&mut groups, name, [Sample::new(actual, expected.to_vec())]);
         }
-        let pairs = rows.into_iter().zip(expected);
-        for (k, ((name, actual), expected)) in pairs.enumerate() {
-            if groups.len() <= k {
-                groups.push((name, Vec::new()));
-            }
-            groups[k].1.push(Sample::new(actual, expected));
+        if C == 1 {
+            let actual = widen(&actual.statistics[..scene.len()]);
+            let expected = pulls(scene, view, Shading::of_channels(C), &upstream);
+            add(&mut groups, "pull", [Sample::new(actual, expected)]);
         }
     }
     Ok(groups)
@@ -90,8 +75,7 @@ fn frozen<const C: usize>(
     raster: &Arc<Raster>,
     scenes: &[(Scene<f64, C>, View)],
 ) -> Result<[Vec<Sample>; 2], GpuError> {
-    let (mut diagonals, mut added) = (Vec::new(), Vec::new());
-    for (seed, (scene, view)) in scenes.iter().enumerate() {
+    by_quantity(scenes.iter().enumerate().map(|(seed, (scene, view))| {
         let upstream = upstream(seed as u64, scene, view);
         let stage = Stage::new(raster, &splats(scene), view)?;
         let once = stage.backward(upstream.as_flattened())?;
@@ -100,15 +84,14 @@ fn frozen<const C: usize>(
         let harmonics = scene.sh.len() / scene.len();
         let expected = (0..4 - C).flat_map(|c| (0..scene.len()).map(move |i| (c, i)));
         let expected = expected.map(|(c, i)| plain.sh[i * harmonics][c]).collect();
-        diagonals.push(Sample::new(widen(&once.diagonal), expected));
+        let diagonal = Sample::new(widen(&once.diagonal), expected);
         // Not the gradient itself: what nobody sees keeps what was there.
         let before: Vec<f32> = once.field.iter().map(|slope| 3.0 - 0.5 * slope).collect();
         let sum = stage.backward_onto(upstream.as_flattened(), &before)?.field;
         let pairs = before.iter().zip(&once.field);
         let expected = pairs.map(|(&b, &o)| f64::from(b) + f64::from(o)).collect();
-        added.push(Sample::new(widen(&sum), expected));
-    }
-    Ok([diagonals, added])
+        Ok([diagonal, Sample::new(widen(&sum), expected)])
+    }))
 }
 
 /// What the RGB adjoint gives: the plain gradient, but for channels that are black and
@@ -138,49 +121,43 @@ fn brightening(scene: &Scene<f64, 3>, view: &View, plain: Scene<f64, 3>) -> Scen
 /// Scenes of every degree before views of odd sizes, and opaque stacks.
 pub(super) fn scenes<const C: usize>(antialiased: bool) -> Vec<(Scene<f64, C>, View)> {
     let loose = (20..26).map(|seed| {
-        let view = View {
-            antialiased,
-            ..random_view(seed)
-        };
-        let scene = random_scene_before(&view, seed, 60, seed as usize % 4);
-        (scene, view)
+        let view = random_view(seed);
+        (
+            random_scene_before(&view, seed, 60, seed as usize % 4),
+            view,
+        )
     });
     loose
-        .chain((30..32).map(|seed| {
-            let (scene, view) = opaque_stack(seed, 40, 3);
-            let view = View {
-                antialiased,
-                ..view
-            };
-            (scene, view)
-        }))
+        .chain((30..32).map(|seed| opaque_stack(seed, 40, 3)))
+        .map(|(scene, view)| {
+            (
+                scene,
+                View {
+                    antialiased,
+                    ..view
+                },
+            )
+        })
         .collect()
 }
 
 pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
     let allowed = Allowance::of(&raster.gpu);
-    let bounds_of = |l2, worst| allowed.gradient(l2, allowed.relative(worst, 1.0));
-    let bounds = |opacity| {
-        [
-            bounds_of(3.16e-6, 1.52e-5),
-            bounds_of(4.34e-6, 5.29e-6),
-            bounds_of(1.44e-6, 2.69e-6),
-            bounds_of(opacity, 8.40e-7),
-            bounds_of(1.97e-6, 1.98e-6),
-            bounds_of(4.03e-7, 5.6e-6),
-        ]
-    };
-    let chroma = bounds_of(1.94e-6, 2.22e-6);
-    let rgb = bounds_of(2.99e-6, 2.53e-6);
     let mut rows = Vec::new();
     for (kernel, antialiased, opacity) in [
         ("luma adjoint", false, 2.02e-6),
         ("luma adjoint, antialiased", true, 3.21e-6),
     ] {
+        let seen = [
+            [3.16e-6, 1.52e-5],
+            [4.34e-6, 5.29e-6],
+            [1.44e-6, 2.69e-6],
+            [opacity, 8.40e-7],
+            [1.97e-6, 1.98e-6],
+            [4.03e-7, 5.6e-6],
+        ];
         let groups = measure(raster, &scenes(antialiased), of_luma)?;
-        for ((name, samples), bounds) in groups.into_iter().zip(bounds(opacity)) {
-            rows.push(Row::gradient(kernel, name, bounds, &samples));
-        }
+        rows.extend(allowed.groups(kernel, &seen, groups));
     }
     let of_chroma = measure::<2>(raster, &scenes(false), |scene, view, upstream| {
         gradient(scene, view, Shading::Plain, upstream)
@@ -188,35 +165,22 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
     let of_rgb = measure::<3>(raster, &scenes(false), |scene, view, upstream| {
         brightening(scene, view, gradient(scene, view, Shading::Plain, upstream))
     })?;
-    for (kernel, bounds, groups, [diagonals, added]) in [
+    let frozen_chroma = frozen::<2>(raster, &scenes(false))?;
+    let frozen_rgb = frozen::<3>(raster, &scenes(false))?;
+    for (kernel, seen, groups, [diagonals, added]) in [
         (
             "chroma adjoint",
-            chroma,
+            [1.94e-6, 2.22e-6],
             of_chroma,
-            frozen::<2>(raster, &scenes(false))?,
+            frozen_chroma,
         ),
-        (
-            "rgb adjoint",
-            rgb,
-            of_rgb,
-            frozen::<3>(raster, &scenes(false))?,
-        ),
+        ("rgb adjoint", [2.99e-6, 2.53e-6], of_rgb, frozen_rgb),
     ] {
-        for (name, samples) in groups {
-            rows.push(Row::gradient(kernel, name, bounds, &samples));
-        }
-        rows.push(Row::gradient(
-            kernel,
-            "sums of curvatures",
-            bounds,
-            &diagonals,
-        ));
-        rows.push(Row::elementwise(
-            kernel,
-            "sh, added to what is there",
-            allowed.relative(4.66e-8, 1.0),
-            &added,
-        ));
+        let curvatures = ("sums of curvatures", diagonals);
+        let groups = groups.into_iter().chain([curvatures]);
+        rows.extend(allowed.groups(kernel, &[seen; 2], groups));
+        let what = "sh, added to what is there";
+        rows.push(allowed.values(kernel, what, [4.66e-8, 1.0], &added));
     }
     Ok(rows)
 }

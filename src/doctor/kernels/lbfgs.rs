@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use crate::{
     chroma::{Lbfgs, LbfgsKernels, REST, State, System, UNBOUNDED, diagonal_scale},
-    compare::widen,
+    compare::{narrow, widen},
     doctor::measured::{Allowance, Row, Sample},
     gpu::{Buffer, Gpu, GpuError, Recorder},
     oracle::{
@@ -154,22 +154,6 @@ impl Problem {
         self
     }
 
-    /// The same anchored after so many steps.
-    fn anchored(self, steps: usize) -> Self {
-        Self {
-            anchored: Some(steps),
-            ..self
-        }
-    }
-
-    /// The same whose last step is judged after so many.
-    fn judged(self, steps: usize) -> Self {
-        Self {
-            judged: Some(steps),
-            ..self
-        }
-    }
-
     /// Loss and gradient at `x`, without the ridge.
     fn at(&self, x: &[f64]) -> (f64, Vec<f64>) {
         let off: Vec<f64> = x.iter().zip(&self.start).map(|(x, s)| x - s).collect();
@@ -220,10 +204,7 @@ impl Problem {
         kernels: &LbfgsKernels,
         told: &[f64],
     ) -> Result<(Vec<f64>, Option<f64>), GpuError> {
-        let buffer = |values: &[f64]| {
-            let values: Vec<f32> = values.iter().map(|&v| v as f32).collect();
-            Buffer::from_slice(gpu, "planes", &values)
-        };
+        let buffer = |values: &[f64]| Buffer::from_slice(gpu, "planes", &narrow(values));
         let system = System {
             unknowns: buffer(&self.start)?,
             gradient: buffer(&self.gradient)?,
@@ -245,8 +226,7 @@ impl Problem {
         };
         let evaluate = |more: f64| {
             let (loss, gradient) = self.at(&widen(&system.unknowns.read(gpu)?));
-            let gradient: Vec<f32> = gradient.iter().map(|&g| g as f32).collect();
-            system.gradient.write(gpu, &gradient);
+            system.gradient.write(gpu, &narrow(&gradient));
             tell(loss, more);
             Ok::<(), GpuError>(())
         };
@@ -320,7 +300,7 @@ pub(super) fn end_rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
 /// Unknowns in units of the colors. Where steps go along pairs, what no pixel shows stays where
 /// it is by terms that cancel.
 fn row(allowed: &Allowance, what: &'static str, worst: f64, samples: &[Sample]) -> Row {
-    Row::elementwise("lbfgs", what, allowed.relative(worst, 100.0), samples)
+    allowed.values("lbfgs", what, [worst, 100.0], samples)
 }
 
 /// Problems on the device and by the oracle: the unknowns after as many steps as are told of, and
@@ -381,7 +361,10 @@ pub(super) fn held_rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
     let kernels = LbfgsKernels::new(gpu);
     let bounded: Vec<Problem> = problems().into_iter().map(Problem::bounded).collect();
     let above_floors = after(gpu, &kernels, &bounded, &[0.0; 5])?.0;
-    let anchored: Vec<Problem> = problems().into_iter().map(|p| p.anchored(3)).collect();
+    let mut anchored = problems();
+    anchored
+        .iter_mut()
+        .for_each(|problem| problem.anchored = Some(3));
     let drawn_to_anchors = after(gpu, &kernels, &anchored, &[0.0; 6])?.0;
     Ok(vec![
         row(&allowed, "unknowns with floors", 4.38e-5, &above_floors),
@@ -404,7 +387,10 @@ pub(super) fn judged_rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
     let (shortened, mut moved) = after(gpu, &kernels, &free, &[0.0, 0.02, 0.0])?;
     let (undone, far) = after(gpu, &kernels, &free, &[0.0, 0.0, 0.0, 9.0, 9.0, 0.0])?;
     moved.extend(far);
-    let judged: Vec<Problem> = problems().into_iter().map(|p| p.judged(3)).collect();
+    let mut judged = problems();
+    judged
+        .iter_mut()
+        .for_each(|problem| problem.judged = Some(3));
     let (after_judged, far) = after(gpu, &kernels, &judged, &[0.0; 6])?;
     moved.extend(far);
     let row = |what, worst, samples: &[Sample]| row(&allowed, what, worst, samples);

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::{
     capture::Exposure,
     compare::widen,
-    doctor::measured::{Allowance, Row, Sample},
+    doctor::measured::{Allowance, Row, Sample, by_quantity},
     gpu::{Buffer, Gpu, GpuError, Kernel, Recorder},
     luma::{LossEffects, LumaLossParameters, SsimWindow},
     oracle::{
@@ -175,13 +175,7 @@ fn sampled(
     gpu: &Gpu,
     comparisons: impl Iterator<Item = Comparison>,
 ) -> Result<[Vec<Sample>; 2], GpuError> {
-    let (mut values, mut gradients) = (Vec::new(), Vec::new());
-    for comparison in comparisons {
-        let [value, gradient] = comparison.samples(gpu)?;
-        values.push(value);
-        gradients.push(gradient);
-    }
-    Ok([values, gradients])
+    by_quantity(comparisons.map(|comparison| comparison.samples(gpu)))
 }
 
 fn random(tones: &[Tone]) -> impl Iterator<Item = Comparison> {
@@ -238,72 +232,42 @@ fn constant() -> impl Iterator<Item = Comparison> {
 }
 
 pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
-    let gpu = &raster.gpu;
-    let allowed = Allowance::of(gpu);
-    let value = |kernel, what, worst, samples: &[Sample]| {
-        Row::elementwise(kernel, what, allowed.relative(worst, 0.0), samples)
+    let (gpu, allowed) = (&raster.gpu, Allowance::of(&raster.gpu));
+    // The worst errors seen of values, and of gradients as a whole and of an element.
+    let both = |kind, [value, l2, worst]: [f64; 3], [values, gradients]: [Vec<Sample>; 2]| {
+        let what = format!("gradient × pixels{kind}");
+        [
+            allowed.values("luma_loss", format!("value{kind}"), [value, 0.0], &values),
+            allowed.gradients("luma_loss", what, [l2, worst, 1.0], &gradients),
+        ]
     };
-    let gradient = |kernel, what, l2, worst, samples: &[Sample]| {
-        Row::gradient(
-            kernel,
-            what,
-            allowed.gradient(l2, allowed.relative(worst, 1.0)),
-            samples,
-        )
-    };
-    let [luma_values, luma_gradients] = sampled(gpu, random(&TONES))?;
-    let [flat_values, flat_gradients] = sampled(gpu, random(&BRIGHT_AND_FLAT))?;
-    let [constant_values, constant_gradients] = sampled(gpu, constant())?;
-    let mut rows = vec![
-        value("luma_loss", "value", 2.86e-7, &luma_values),
-        gradient(
-            "luma_loss",
-            "gradient × pixels",
-            1.04e-6,
-            6.18e-6,
-            &luma_gradients,
-        ),
-        value("luma_loss", "value, bright and flat", 4.95e-4, &flat_values),
-        gradient(
-            "luma_loss",
-            "gradient × pixels, bright and flat",
-            5.94e-5,
-            1.93e-4,
-            &flat_gradients,
-        ),
-        Row::elementwise(
-            "luma_loss",
-            "value, constant pictures",
-            allowed.relative(4.2e-7, 1.0),
-            &constant_values,
-        ),
-        Row::elementwise(
-            "luma_loss",
+    let mut rows = Vec::new();
+    rows.extend(both(
+        "",
+        [2.86e-7, 1.04e-6, 6.18e-6],
+        sampled(gpu, random(&TONES))?,
+    ));
+    let flat = sampled(gpu, random(&BRIGHT_AND_FLAT))?;
+    rows.extend(both(", bright and flat", [4.95e-4, 5.94e-5, 1.93e-4], flat));
+    let constant = sampled(gpu, constant())?;
+    for (what, worst, samples) in [
+        ("value, constant pictures", 4.2e-7, &constant[0]),
+        (
             "gradient × pixels, constant pictures",
-            allowed.relative(1.38e-4, 1.0),
-            &constant_gradients,
+            1.38e-4,
+            &constant[1],
         ),
-    ];
-    for (which, (of_value, of_gradient)) in [
-        ("value, exposed", "gradient × pixels, exposed"),
-        ("value, masked", "gradient × pixels, masked"),
-        ("value, both", "gradient × pixels, both"),
-    ]
-    .into_iter()
-    .enumerate()
-    {
-        let [values, gradients] = sampled(gpu, with_effects(which))?;
-        rows.push(value("luma_loss", of_value, 1e-6, &values));
-        rows.push(gradient("luma_loss", of_gradient, 1e-6, 1e-5, &gradients));
+    ] {
+        rows.push(allowed.values("luma_loss", what, [worst, 1.0], samples));
+    }
+    for (which, kind) in [", exposed", ", masked", ", both"].into_iter().enumerate() {
+        let samples = sampled(gpu, with_effects(which))?;
+        rows.extend(both(kind, [1e-6, 1e-6, 1e-5], samples));
     }
     let mut flat: [Vec<Sample>; 2] = Default::default();
-    for (window, of_value, of_gradient) in [
-        (
-            SsimWindow::Seven,
-            "value, 7 × 7",
-            "gradient × pixels, 7 × 7",
-        ),
-        (SsimWindow::Five, "value, 5 × 5", "gradient × pixels, 5 × 5"),
+    for (window, kind) in [
+        (SsimWindow::Seven, ", 7 × 7"),
+        (SsimWindow::Five, ", 5 × 5"),
     ] {
         let windowed = |comparison| Comparison {
             window,
@@ -312,17 +276,13 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
         // Without effects, with an exposure, with a mask, with both.
         let effects = (0..3).flat_map(with_effects);
         let all = random(&TONES).chain(effects).map(windowed);
-        let [values, gradients] = sampled(gpu, all)?;
-        rows.push(value("luma_loss", of_value, 1e-6, &values));
-        rows.push(gradient("luma_loss", of_gradient, 1e-6, 1e-5, &gradients));
-        let [values, gradients] = sampled(gpu, random(&BRIGHT_AND_FLAT).map(windowed))?;
-        for (kind, samples) in flat.iter_mut().zip([values, gradients]) {
-            kind.extend(samples);
-        }
+        rows.extend(both(kind, [1e-6, 1e-6, 1e-5], sampled(gpu, all)?));
+        let samples = sampled(gpu, random(&BRIGHT_AND_FLAT).map(windowed))?;
+        flat.iter_mut()
+            .zip(samples)
+            .for_each(|(all, more)| all.extend(more));
     }
-    let what = "value, smaller windows, bright and flat";
-    rows.push(value("luma_loss", what, 1.13e-3, &flat[0]));
-    let what = "gradient × pixels, smaller windows, bright and flat";
-    rows.push(gradient("luma_loss", what, 4.63e-5, 3.8e-4, &flat[1]));
+    let kind = ", smaller windows, bright and flat";
+    rows.extend(both(kind, [1.13e-3, 4.63e-5, 3.8e-4], flat));
     Ok(rows)
 }

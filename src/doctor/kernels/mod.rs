@@ -6,7 +6,6 @@ mod blend;
 mod chroma_loss;
 mod densify;
 mod gradient;
-mod lab_loss;
 mod lbfgs;
 mod losses;
 pub mod numerics;
@@ -38,8 +37,8 @@ pub const TOPICS: [(&str, Measure); 19] = [
     ("blend", blend::rows),
     ("losses", losses::rows),
     ("chroma loss", chroma_loss::rows),
-    ("rgb loss", rgb_loss::rows),
-    ("lab loss", lab_loss::rows),
+    ("rgb loss", rgb_loss::rgb_rows),
+    ("lab loss", rgb_loss::lab_rows),
     ("adjoint", gradient::rows),
     ("numerics", numerics::rows),
     ("step", step::rows),

@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use super::{blend, gradient};
 use crate::{
-    compare::{FlipBounds, widen},
+    compare::{FlipBounds, narrow, widen},
     doctor::{
-        measured::{Allowance, Row, Sample},
+        measured::{Allowance, Groups, Row, Sample, add, by_quantity},
         stage::{Stage, cutting, splats},
     },
     gpu::{Buffer, GpuError, Recorder},
@@ -51,23 +51,23 @@ pub const CUTS: [Numerics; 5] = [
 
 /// Worst errors seen of the gradient of a group of parameters, in the groups' order: of
 /// the whole, relative, and of an element.
-const CUT_SEEN: [(f64, f64); 6] = [
-    (3.16e-6, 2.14e-5),
-    (4.88e-6, 6.10e-6),
-    (1.70e-6, 2.69e-6),
-    (5.13e-6, 8.5e-7),
-    (1.97e-6, 2.22e-6),
-    (5.72e-7, 2.34e-5),
+const CUT_SEEN: [[f64; 2]; 6] = [
+    [3.16e-6, 2.14e-5],
+    [4.88e-6, 6.10e-6],
+    [1.70e-6, 2.69e-6],
+    [5.13e-6, 8.5e-7],
+    [1.97e-6, 2.22e-6],
+    [5.72e-7, 2.34e-5],
 ];
 
 /// The same with records at half the size.
-const HALF_SEEN: [(f64, f64); 6] = [
-    (8.10e-3, 0.0336),
-    (1.27e-2, 0.0210),
-    (2.88e-3, 0.0095),
-    (2.09e-3, 0.0013),
-    (2.44e-3, 0.0035),
-    (1.64e-3, 0.0035),
+const HALF_SEEN: [[f64; 2]; 6] = [
+    [8.10e-3, 0.0336],
+    [1.27e-2, 0.0210],
+    [2.88e-3, 0.0095],
+    [2.09e-3, 0.0013],
+    [2.44e-3, 0.0035],
+    [1.64e-3, 0.0035],
 ];
 
 type Scenes = Vec<(Scene<f64, 1>, View)>;
@@ -85,10 +85,8 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
     let mut pictures = Vec::new();
     for numerics in CUTS {
         let raster = &cutting(raster, &numerics);
-        pictures.extend(blend::pictures::<1>(
-            raster,
-            cut(blend::scenes(), numerics),
-        )?);
+        let scenes = cut(blend::scenes(), numerics);
+        pictures.extend(blend::pictures::<1>(raster, scenes)?);
     }
     rows.push(Row::picture(
         "blend",
@@ -101,47 +99,27 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
         },
         &pictures,
     ));
-    let mut groups: Vec<(&'static str, Vec<Sample>)> = Vec::new();
+    let mut groups = Groups::new();
     for numerics in CUTS {
         let raster = &cutting(raster, &numerics);
-        let measured = gradient::measure(
-            raster,
-            &cut(gradient::scenes(false), numerics),
-            gradient::of_luma,
-        )?;
-        for (k, (name, samples)) in measured.into_iter().enumerate() {
-            if groups.len() <= k {
-                groups.push((name, Vec::new()));
-            }
-            groups[k].1.extend(samples);
+        let scenes = cut(gradient::scenes(false), numerics);
+        for (name, samples) in gradient::measure(raster, &scenes, gradient::of_luma)? {
+            add(&mut groups, name, samples);
         }
     }
-    let bounds = |l2, worst| allowed.gradient(l2, allowed.relative(worst, 1.0));
-    for ((name, samples), (l2, worst)) in groups.into_iter().zip(CUT_SEEN) {
-        let kernel = "luma adjoint, other cut-offs and depth bits";
-        rows.push(Row::gradient(kernel, name, bounds(l2, worst), &samples));
-    }
+    let kernel = "luma adjoint, other cut-offs and depth bits";
+    rows.extend(allowed.groups(kernel, &CUT_SEEN, groups));
     let half = raster.computing(RasterNumerics {
         storage: Storage::Half,
         ..raster.numerics()
     });
     let groups = gradient::measure(&half, &gradient::scenes(false), gradient::of_luma)?;
-    for ((name, samples), (l2, worst)) in groups.into_iter().zip(HALF_SEEN) {
-        let kernel = "luma adjoint, half storage";
-        rows.push(Row::gradient(kernel, name, bounds(l2, worst), &samples));
-    }
+    rows.extend(allowed.groups("luma adjoint, half storage", &HALF_SEEN, groups));
     let [records, sums] = halves(raster, &half)?;
-    rows.push(Row::exact(
-        "blend_backward, half storage",
-        "records",
-        &records,
-    ));
-    rows.push(Row::elementwise(
-        "sum_instances, half storage",
-        "sums of the records",
-        allowed.relative(3.4e-8, 1.0),
-        &sums,
-    ));
+    let kernel = "blend_backward, half storage";
+    rows.push(Row::exact(kernel, "records", &records));
+    let kernel = "sum_instances, half storage";
+    rows.push(allowed.values(kernel, "sums of the records", [3.4e-8, 1.0], &sums));
     Ok(rows)
 }
 
@@ -185,13 +163,9 @@ fn left(
 /// Records at half the size against those in full, rounded; and their sums.
 fn halves(raster: &Arc<Raster>, half: &Arc<Raster>) -> Result<[Vec<Sample>; 2], GpuError> {
     let gpu = &raster.gpu;
-    let (mut records, mut sums) = (Vec::new(), Vec::new());
-    for (seed, (scene, view)) in (0..).zip(gradient::scenes::<1>(false)) {
-        let upstream: Vec<f32> = (gradient::upstream(seed, &scene, &view)
-            .as_flattened()
-            .iter())
-        .map(|&slope| slope as f32)
-        .collect();
+    let scenes = gradient::scenes::<1>(false);
+    by_quantity((0..).zip(scenes).map(|(seed, (scene, view))| {
+        let upstream = narrow(gradient::upstream(seed, &scene, &view).as_flattened());
         let stage = Stage::new(raster, &splats(&scene), &view)?;
         stage.forward()?;
         let instances = stage.status()?.instances;
@@ -225,8 +199,9 @@ fn halves(raster: &Arc<Raster>, half: &Arc<Raster>) -> Result<[Vec<Sample>; 2], 
             wanted.extend([0.5 * m[3], m[4], 0.5 * m[5], -m[0] / opacity, m[6], m[7]]);
             given.extend(&halved.gradients[i * FIGURES..(i + 1) * FIGURES]);
         }
-        records.push(Sample::new(actual, expected));
-        sums.push(Sample::new(widen(&given), wanted));
-    }
-    Ok([records, sums])
+        Ok([
+            Sample::new(actual, expected),
+            Sample::new(widen(&given), wanted),
+        ])
+    }))
 }

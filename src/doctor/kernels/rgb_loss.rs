@@ -1,14 +1,17 @@
-//! `rgb_loss`.
+//! `rgb_loss`, and `lab_loss` with and without a coarser picture.
 
 use std::sync::Arc;
 
+use bytemuck::Pod;
+
 use super::losses::{SIZES, logged, view};
 use crate::{
-    chroma::{RgbLossParameters, pack_rgb},
-    compare::widen,
-    doctor::measured::{Allowance, Row, Sample},
+    chroma::{LabLossParameters, RgbLossParameters, pack_rgb},
+    compare::{narrow, widen},
+    doctor::measured::{Allowance, Row, Sample, by_quantity},
     gpu::{Buffer, Gpu, GpuError, Kernel, groups_for, shaders},
     oracle::{
+        lab_loss::{LabTarget, LabWeights},
         random::{Random, round},
         rgb_loss::Wanted,
     },
@@ -18,60 +21,96 @@ use crate::{
 /// What wanted RGB are rounded to.
 const STEPS: f64 = 1023.0;
 
-/// Loss, and gradient with curvature, on the device.
-fn on_device(
-    gpu: &Gpu,
-    size: [usize; 2],
-    drawn: &[[f64; 3]],
-    wanted: &Wanted,
-    weighted: bool,
-) -> Result<(f64, Vec<f32>), GpuError> {
-    let kernel = Kernel::new(gpu, "rgb_loss", shaders::RGB_LOSS);
-    let view = view(gpu, size)?;
-    let image: Vec<f32> = (drawn.iter())
-        .flat_map(|&[r, g, b]| [r, g, b, f64::NAN])
-        .map(|v| v as f32)
-        .collect();
-    let image = Buffer::from_slice(gpu, "image", &image)?;
-    let words = wanted.rgb.iter().map(|rgb| pack_rgb(rgb.map(|v| v as f32)));
-    let words = Buffer::from_slice(gpu, "wanted", &words.collect::<Vec<_>>())?;
-    let parameters = RgbLossParameters {
-        weighted: u32::from(weighted),
-    };
-    let parameters = Buffer::uniform(gpu, "parameters", &parameters)?;
-    let weights: Vec<f32> = wanted.weights.iter().map(|&w| w as f32).collect();
-    let weights = Buffer::from_slice(gpu, "pixel weights", &weights)?;
-    let figures = Buffer::<f32>::zeros(gpu, "figures", 4 * drawn.len())?;
-    let groups = groups_for(drawn.len());
-    let loss = logged(gpu, size, groups as usize, |recorder, block_losses| {
-        let buffers = [
-            view.raw(),
-            image.raw(),
-            words.raw(),
-            parameters.raw(),
-            block_losses.raw(),
-            figures.raw(),
-            weights.raw(),
-        ];
-        recorder.dispatch(&kernel, &kernel.bind(gpu, &buffers), groups);
-    })?;
-    Ok((loss, figures.read(gpu)?))
+/// All terms of `lab_loss`, none of which drowns another.
+const WEIGHTS: LabWeights = LabWeights {
+    lightness: 0.5,
+    squared: false,
+    chroma: 0.75,
+    agreement: 0.25,
+    variation: 2.0,
+};
+
+/// RGB as the device has pictures.
+fn picture(gpu: &Gpu, rgb: &[[f64; 3]]) -> Result<Buffer<f32>, GpuError> {
+    let padded = rgb.iter().map(|&[r, g, b]| [r, g, b, f64::NAN]);
+    let padded: Vec<[f64; 4]> = padded.collect();
+    Buffer::from_slice(gpu, "image", &narrow(padded.as_flattened()))
 }
 
-/// Values, gradients and curvatures. Pictures are near what is wanted, or where they are
-/// hard: beyond white and black, wanted or not, and where nothing is off.
-fn measure(gpu: &Gpu, hard: bool, weighted: bool) -> Result<[Vec<Sample>; 3], GpuError> {
-    let mut samples: [Vec<Sample>; 3] = Default::default();
-    for (seed, size) in (0..).zip(SIZES) {
+/// Pictures as a loss takes them.
+struct Compared<'a, P> {
+    size: [usize; 2],
+    drawn: &'a [[f64; 3]],
+    wanted: &'a [[f64; 3]],
+    weights: &'a [f64],
+    parameters: P,
+    coarser: Option<&'a [[f64; 3]]>,
+}
+
+impl<P: Pod> Compared<'_, P> {
+    /// The loss on the device, and a pixel's four figures.
+    fn on_device(&self, gpu: &Gpu, kernel: &Kernel) -> Result<(f64, Vec<[f64; 4]>), GpuError> {
+        let view = view(gpu, self.size)?;
+        let image = picture(gpu, self.drawn)?;
+        let words = self
+            .wanted
+            .iter()
+            .map(|rgb| pack_rgb(rgb.map(|v| v as f32)));
+        let words = Buffer::from_slice(gpu, "wanted", &words.collect::<Vec<_>>())?;
+        let coarser = self.coarser.map(|rgb| picture(gpu, rgb)).transpose()?;
+        let parameters = Buffer::uniform(gpu, "parameters", &self.parameters)?;
+        let weights = Buffer::from_slice(gpu, "pixel weights", &narrow(self.weights))?;
+        let figures = Buffer::<f32>::zeros(gpu, "figures", 4 * self.drawn.len())?;
+        let groups = groups_for(self.drawn.len());
+        let loss = logged(gpu, self.size, groups as usize, |recorder, block_losses| {
+            let mut buffers = vec![
+                view.raw(),
+                image.raw(),
+                words.raw(),
+                parameters.raw(),
+                block_losses.raw(),
+                figures.raw(),
+                weights.raw(),
+            ];
+            buffers.extend(coarser.as_ref().map(Buffer::raw));
+            recorder.dispatch(kernel, &kernel.bind(gpu, &buffers), groups);
+        })?;
+        let figures = widen(&figures.read(gpu)?);
+        Ok((loss, figures.as_chunks().0.to_vec()))
+    }
+}
+
+/// Wanted RGB from black, or `darkest`, to white; where it is `hard`, many of them clipped.
+fn wanted(random: &mut Random, count: usize, hard: bool, darkest: f64) -> Vec<[f64; 3]> {
+    let [low, high] = if hard { [-0.5, 1.5] } else { [darkest, 1.0] };
+    (0..count)
+        .map(|_| {
+            let rgb: [f64; 3] = random.array(low, high);
+            rgb.map(|v| (v.clamp(0.0, 1.0) * STEPS).round() / STEPS)
+        })
+        .collect()
+}
+
+/// Weights of pixels: all alike, or some unknown and some half known.
+fn weights(count: usize, differ: bool) -> Vec<f64> {
+    let weight = |p: usize| {
+        if differ {
+            [0.0, 0.375, 1.0][p % 3]
+        } else {
+            1.0
+        }
+    };
+    (0..count).map(weight).collect()
+}
+
+/// Values, gradients and curvatures of `rgb_loss`. Pictures are near what is wanted, or `hard`
+/// and weighed: beyond white and black, wanted or not, and where nothing is off.
+fn of_rgb(gpu: &Gpu, hard: bool) -> Result<[Vec<Sample>; 3], GpuError> {
+    let kernel = Kernel::new(gpu, "rgb_loss", shaders::RGB_LOSS);
+    by_quantity((0..).zip(SIZES).map(|(seed, size)| {
         let mut random = Random::new(seed);
         let count = size[0] * size[1];
-        let rgb: Vec<[f64; 3]> = (0..count)
-            .map(|_| {
-                let spread = if hard { [-0.5, 1.5] } else { [0.0, 1.0] };
-                let rgb: [f64; 3] = random.array(spread[0], spread[1]);
-                rgb.map(|v| (v.clamp(0.0, 1.0) * STEPS).round() / STEPS)
-            })
-            .collect();
+        let rgb = wanted(&mut random, count, hard, 0.0);
         let drawn: Vec<[f64; 3]> = (rgb.iter().enumerate())
             .map(|(p, rgb)| {
                 let off: [f64; 3] = match (hard, p % 3) {
@@ -83,58 +122,127 @@ fn measure(gpu: &Gpu, hard: bool, weighted: bool) -> Result<[Vec<Sample>; 3], Gp
                 [0, 1, 2].map(|c| round(rgb[c] + off[c]))
             })
             .collect();
-        let weight = |p: usize| {
-            if weighted {
-                [0.0, 0.375, 1.0][p % 3]
-            } else {
-                1.0
-            }
-        };
         let wanted = Wanted {
             rgb,
-            weights: (0..count).map(weight).collect(),
+            weights: weights(count, hard),
         };
-        let (loss, figures) = on_device(gpu, size, &drawn, &wanted, weighted)?;
+        let compared = Compared {
+            size,
+            drawn: &drawn,
+            wanted: &wanted.rgb,
+            weights: &wanted.weights,
+            parameters: RgbLossParameters {
+                weighted: u32::from(hard),
+            },
+            coarser: None,
+        };
+        let (loss, figures) = compared.on_device(gpu, &kernel)?;
         let slopes = wanted.slopes(&drawn);
-        let scale = count as f64;
-        let scaled = |values: Vec<f64>| values.into_iter().map(|v| v * scale).collect();
-        let figures: Vec<[f64; 4]> = widen(&figures).as_chunks().0.to_vec();
         let part = |of: &[[f64; 4]], from: usize, to: usize| -> Vec<f64> {
-            scaled(of.iter().flat_map(|f| f[from..to].to_vec()).collect())
+            let values = of.iter().flat_map(|f| f[from..to].to_vec());
+            values.map(|v| v * count as f64).collect()
         };
-        samples[0].push(Sample::new(vec![loss], vec![wanted.loss(&drawn)]));
-        samples[1].push(Sample::new(part(&figures, 0, 3), part(&slopes, 0, 3)));
-        samples[2].push(Sample::new(part(&figures, 3, 4), part(&slopes, 3, 4)));
-    }
-    Ok(samples)
+        Ok([
+            Sample::new(vec![loss], vec![wanted.loss(&drawn)]),
+            Sample::new(part(&figures, 0, 3), part(&slopes, 0, 3)),
+            Sample::new(part(&figures, 3, 4), part(&slopes, 3, 4)),
+        ])
+    }))
 }
 
-pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
+/// Values and gradients of `lab_loss`. Pictures that are `hard` are beyond black and white, far
+/// off, or not off at all; a `full` comparison has weights, a coarser picture and squares of
+/// lightness.
+fn of_lab(gpu: &Gpu, hard: bool, full: bool) -> Result<[Vec<Sample>; 2], GpuError> {
+    let source = match full {
+        true => shaders::LAB_LOSS_AGREEING,
+        false => shaders::LAB_LOSS,
+    };
+    let kernel = Kernel::new(gpu, "lab_loss", source);
+    by_quantity((0..).zip(SIZES).map(|(seed, size)| {
+        let mut random = Random::new(seed);
+        let count = size[0] * size[1];
+        let rgb = wanted(&mut random, count, hard, 0.05);
+        let drawn: Vec<[f64; 3]> = (rgb.iter().enumerate())
+            .map(|(p, rgb)| {
+                let off: [f64; 3] = match (hard, p % 3) {
+                    (false, _) => random.array(-0.1, 0.1),
+                    (true, 0) => random.array(0.0, 8.0),
+                    (true, 1) => random.array(-1e-4, 1e-4),
+                    (true, _) => [0.0; 3],
+                };
+                // What is drawn is not negative.
+                [0, 1, 2].map(|c| round((rgb[c] + off[c]).max(0.0)))
+            })
+            .collect();
+        let coarse = size.map(|side| (side / 2).max(1));
+        let of_coarse = (0..coarse[0] * coarse[1]).map(|_| random.array(0.0, 1.0).map(round));
+        let target = LabTarget {
+            size,
+            rgb,
+            weights: weights(count, full),
+            coarser: full.then(|| (coarse, of_coarse.collect())),
+            of: LabWeights {
+                squared: full,
+                ..WEIGHTS
+            },
+        };
+        let compared = Compared {
+            size,
+            drawn: &drawn,
+            wanted: &target.rgb,
+            weights: &target.weights,
+            parameters: LabLossParameters {
+                coarser_size: coarse.map(|side| if full { side as u32 } else { 0 }),
+                lightness: WEIGHTS.lightness as f32,
+                squared: u32::from(full),
+                chroma: WEIGHTS.chroma as f32,
+                agreement: WEIGHTS.agreement as f32,
+                variation: WEIGHTS.variation as f32,
+                weighted: u32::from(full),
+            },
+            coarser: target.coarser.as_ref().map(|(_, rgb)| &rgb[..]),
+        };
+        let (loss, figures) = compared.on_device(gpu, &kernel)?;
+        let scaled = |values: &mut dyn Iterator<Item = f64>| -> Vec<f64> {
+            values.map(|v| v * count as f64).collect()
+        };
+        let found = scaled(&mut figures.iter().flat_map(|f| [f[0], f[1], f[2]]));
+        let expected = scaled(&mut target.gradient(&drawn).into_iter().flatten());
+        Ok([
+            Sample::new(vec![loss], vec![target.loss(&drawn)]),
+            Sample::new(found, expected),
+        ])
+    }))
+}
+
+pub(super) fn rgb_rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
     let (gpu, allowed) = (&raster.gpu, Allowance::of(&raster.gpu));
     let mut rows = Vec::new();
-    for (what, hard, weighted) in [
-        (
-            ["value", "gradient × pixels", "curvature × pixels"],
-            false,
-            false,
-        ),
-        (
-            [
-                "value, weighed, hard",
-                "gradient × pixels, weighed, hard",
-                "curvature × pixels, weighed, hard",
-            ],
-            true,
-            true,
-        ),
-    ] {
-        let [values, gradients, curvatures] = measure(gpu, hard, weighted)?;
-        let value = allowed.relative(5.19e-7, 0.0);
-        rows.push(Row::elementwise("rgb_loss", what[0], value, &values));
-        for (what, samples) in [(what[1], &gradients), (what[2], &curvatures)] {
-            let bounds = allowed.gradient(1.32e-6, allowed.relative(1.71e-6, 100.0));
-            rows.push(Row::gradient("rgb_loss", what, bounds, samples));
+    for (kind, hard) in [("", false), (", weighed, hard", true)] {
+        let [values, gradients, curvatures] = of_rgb(gpu, hard)?;
+        rows.push(allowed.values("rgb_loss", format!("value{kind}"), [5.19e-7, 0.0], &values));
+        for (what, samples) in [("gradient", &gradients), ("curvature", &curvatures)] {
+            let what = format!("{what} × pixels{kind}");
+            rows.push(allowed.gradients("rgb_loss", what, [1.32e-6, 1.71e-6, 100.0], samples));
         }
+    }
+    Ok(rows)
+}
+
+pub(super) fn lab_rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
+    let (gpu, allowed) = (&raster.gpu, Allowance::of(&raster.gpu));
+    let mut rows = Vec::new();
+    // a and b are 500 and 200 times small differences: what f32 rounds in these is seen.
+    for (kind, [hard, full], [l2, worst]) in [
+        ("", [false, false], [5e-6, 8e-5]),
+        (", agreeing", [false, true], [3e-6, 8e-5]),
+        (", hard", [true, false], [5.4e-5, 1.7e-4]),
+    ] {
+        let [values, gradients] = of_lab(gpu, hard, full)?;
+        rows.push(allowed.values("lab_loss", format!("value{kind}"), [9e-7, 0.0], &values));
+        let what = format!("gradient × pixels{kind}");
+        rows.push(allowed.gradients("lab_loss", what, [l2, worst, 100.0], &gradients));
     }
     Ok(rows)
 }

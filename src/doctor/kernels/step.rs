@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use crate::{
-    compare::widen,
+    compare::{narrow, widen},
     doctor::{
         measured::{Allowance, Row, Sample},
         stage::{Stage, splats},
@@ -84,35 +84,28 @@ fn stepped(
 }
 
 pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
-    let mut rows = measure(raster, ["project_backward", "shade_backward"])?;
     let antialiased = raster.drawing(RasterOptions {
         antialiased: true,
         ..RasterOptions::default()
     });
-    let names = ["project_backward, antialiased", "shade_backward"];
-    // Shading is the same either way.
-    rows.extend(
-        measure(&antialiased, names)?
-            .into_iter()
-            .take(QUANTITIES.len()),
-    );
     let lazily = |raster: &Arc<Raster>| {
         raster.computing(RasterNumerics {
             adam: AdamSteps::Lazy,
             ..raster.numerics()
         })
     };
-    let names = ["project_backward, lazy", "shade_backward, lazy"];
-    rows.extend(measure(&lazily(raster), names)?);
-    let names = [
-        "project_backward, antialiased, lazy",
-        "shade_backward, lazy",
-    ];
-    rows.extend(
-        measure(&lazily(&antialiased), names)?
-            .into_iter()
-            .take(QUANTITIES.len()),
-    );
+    let (lazy, antialiased_lazy) = (lazily(raster), lazily(&antialiased));
+    // Shading is the same, antialiased or not.
+    let mut rows = measure(raster, &["project_backward", "shade_backward"])?;
+    rows.extend(measure(&antialiased, &["project_backward, antialiased"])?);
+    rows.extend(measure(
+        &lazy,
+        &["project_backward, lazy", "shade_backward, lazy"],
+    )?);
+    rows.extend(measure(
+        &antialiased_lazy,
+        &["project_backward, antialiased, lazy"],
+    )?);
     Ok(rows)
 }
 
@@ -123,7 +116,7 @@ const HELD: usize = 30;
 /// What a step leaves.
 const QUANTITIES: [&str; 3] = ["value after a step", "first moment", "second moment"];
 
-fn measure(raster: &Arc<Raster>, kernels: [&'static str; 2]) -> Result<Vec<Row>, GpuError> {
+fn measure(raster: &Arc<Raster>, kernels: &[&'static str]) -> Result<Vec<Row>, GpuError> {
     let (gpu, allowed) = (&raster.gpu, Allowance::of(&raster.gpu));
     let mut samples: [[Vec<Sample>; 3]; 2] = Default::default();
     for seed in 40..43 {
@@ -164,8 +157,7 @@ fn measure(raster: &Arc<Raster>, kernels: [&'static str; 2]) -> Result<Vec<Row>,
                 sizes.iter().map(|size| some(size).powi(2)).collect(),
             ]
         });
-        let narrow: Vec<f32> = upstream.iter().map(|&v| v as f32).collect();
-        let actual = stepped(raster, &splats, &stage, &narrow, &moments)?;
+        let actual = stepped(raster, &splats, &stage, &narrow(&upstream), &moments)?;
         for (which, actual) in actual.iter().enumerate() {
             let mut expected: [Vec<f64>; 3] = Default::default();
             for at in 0..starts[which].len() {
@@ -188,15 +180,11 @@ fn measure(raster: &Arc<Raster>, kernels: [&'static str; 2]) -> Result<Vec<Row>,
             }
         }
     }
-    let bounds = [
-        allowed.relative(4.9e-8, 1.0),
-        allowed.relative(6.0e-7, 1e-3),
-        allowed.relative(5.4e-7, 1e-6),
-    ];
+    let seen = [[4.9e-8, 1.0], [6.0e-7, 1e-3], [5.4e-7, 1e-6]];
     let mut rows = Vec::new();
-    for (kernel, samples) in kernels.into_iter().zip(&samples) {
-        for ((what, bound), samples) in QUANTITIES.into_iter().zip(bounds).zip(samples) {
-            rows.push(Row::elementwise(kernel, what, bound, samples));
+    for (kernel, samples) in kernels.iter().zip(&samples) {
+        for ((what, seen), samples) in QUANTITIES.into_iter().zip(seen).zip(samples) {
+            rows.push(allowed.values(kernel, what, seen, samples));
         }
     }
     Ok(rows)

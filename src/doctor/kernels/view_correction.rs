@@ -5,7 +5,8 @@ use std::sync::Arc;
 use super::{chroma_loss::in_steps, losses::view};
 use crate::{
     chroma::{Correction, CorrectionKernels, Corrections, pack_ab},
-    doctor::measured::{Allowance, Row, Sample},
+    compare::narrow,
+    doctor::measured::{Allowance, Row, Sample, by_quantity},
     gpu::{Buffer, Gpu, GpuError, Recorder},
     oracle::{
         random::{Random, round},
@@ -74,23 +75,17 @@ impl Taught {
 fn on_device(gpu: &Gpu, views: &[Taught]) -> Result<Vec<Correction>, GpuError> {
     let kernels = CorrectionKernels::new(gpu);
     let corrections = Corrections::new(gpu, &kernels, views.len())?;
-    let narrow = |values: Vec<[f64; 2]>| {
-        let values: Vec<f32> = values.as_flattened().iter().map(|&v| v as f32).collect();
-        Buffer::from_slice(gpu, "pixels", &values)
-    };
+    let buffer = |values: &[f64]| Buffer::from_slice(gpu, "pixels", &narrow(values));
     for (index, taught) in views.iter().enumerate() {
         let view = view(gpu, taught.size)?;
         let pixels = || taught.pixels.iter();
         // The channels differ; their mean is the weight.
         let curvatures = pixels().flat_map(|p| [[7.0, -7.0], [1.5 * p.0, 0.5 * p.0]]);
-        let left = narrow(curvatures.collect())?;
-        let image = narrow(pixels().map(|p| p.1).collect())?;
+        let left = buffer(curvatures.collect::<Vec<_>>().as_flattened())?;
+        let image = buffer(pixels().map(|p| p.1).collect::<Vec<_>>().as_flattened())?;
         let wanted: Vec<u32> = pixels().map(|p| pack_ab(p.2.map(|v| v as f32))).collect();
         let wanted = Buffer::from_slice(gpu, "wanted", &wanted)?;
-        let weights: Vec<f32> = (taught.weights.as_deref().unwrap_or(&[0.0]).iter())
-            .map(|&w| w as f32)
-            .collect();
-        let weights = Buffer::from_slice(gpu, "pixel weights", &weights)?;
+        let weights = buffer(taught.weights.as_deref().unwrap_or(&[0.0]))?;
         let parameters = corrections.parameters(gpu, index, taught.weights.is_some())?;
         let inputs = [view.raw(), image.raw(), wanted.raw()];
         let bindings = corrections.bind(gpu, &kernels, &parameters, (inputs, &left, &weights));
@@ -106,30 +101,19 @@ fn on_device(gpu: &Gpu, views: &[Taught]) -> Result<Vec<Correction>, GpuError> {
 
 /// Gains and offsets of each set of views.
 fn measure(gpu: &Gpu, sets: &[Vec<Taught>]) -> Result<[Vec<Sample>; 2], GpuError> {
-    let (mut gains, mut offsets) = (Vec::new(), Vec::new());
-    for views in sets {
+    by_quantity(sets.iter().map(|views| {
         let actual = on_device(gpu, views)?;
         let pixels: Vec<_> = views.iter().map(Taught::counted).collect();
         let expected = view_corrections(&pixels);
-        gains.push(Sample::new(
-            (actual.iter())
-                .flat_map(|c| c.gain.as_flattened().to_vec())
-                .map(f64::from)
-                .collect(),
-            (expected.iter())
-                .flat_map(|c| c.gain.as_flattened().to_vec())
-                .collect(),
-        ));
-        offsets.push(Sample::new(
-            actual
-                .iter()
-                .flat_map(|c| c.offset)
-                .map(f64::from)
-                .collect(),
-            expected.iter().flat_map(|c| c.offset).collect(),
-        ));
-    }
-    Ok([gains, offsets])
+        let gains = actual.iter().flat_map(|c| c.gain).flatten();
+        let expected_gains = expected.iter().flat_map(|c| c.gain).flatten();
+        let offsets = actual.iter().flat_map(|c| c.offset);
+        let expected_offsets = expected.iter().flat_map(|c| c.offset);
+        Ok([
+            Sample::new(gains.map(f64::from).collect(), expected_gains.collect()),
+            Sample::new(offsets.map(f64::from).collect(), expected_offsets.collect()),
+        ])
+    }))
 }
 
 /// Sets of views as captures have them.
@@ -188,18 +172,13 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
     let mut random = Random::new(11);
     let [gains, offsets] = measure(gpu, &ordinary(&mut random))?;
     let [hard_gains, hard_offsets] = measure(gpu, &hard(&mut random))?;
-    let row = |what, worst, scale, samples: &[Sample]| {
-        Row::elementwise(
-            "view_correction",
-            what,
-            allowed.relative(worst, scale),
-            samples,
-        )
+    let row = |what, worst, samples: &[Sample]| {
+        allowed.values("view_correction", what, [worst, 1.0], samples)
     };
     Ok(vec![
-        row("gain", 1.20e-6, 1.0, &gains),
-        row("offset, in CIELAB units", 3.54e-5, 1.0, &offsets),
-        row("gain, views that say little", 9.42e-5, 1.0, &hard_gains),
-        row("offset, views that say little", 3.57e-4, 1.0, &hard_offsets),
+        row("gain", 1.20e-6, &gains),
+        row("offset, in CIELAB units", 3.54e-5, &offsets),
+        row("gain, views that say little", 9.42e-5, &hard_gains),
+        row("offset, views that say little", 3.57e-4, &hard_offsets),
     ])
 }

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::{blend::bounds, gradient::upstream};
 use crate::{
     doctor::{
-        measured::{Allowance, Row, Sample},
+        measured::{Allowance, Groups, Row, Sample, add},
         stage::{Gradient, splats},
     },
     gpu::{GpuError, Recorder},
@@ -107,29 +107,16 @@ fn gradient_of(
 }
 
 /// Samples by group of parameters.
-fn gradients(
-    raster: &Arc<Raster>,
-    scenes: Vec<(Scene<f64, 3>, View)>,
-) -> Result<Vec<(&'static str, Vec<Sample>)>, GpuError> {
-    let mut groups: Vec<(&'static str, Vec<Sample>)> = Vec::new();
+fn gradients(raster: &Arc<Raster>, scenes: Vec<(Scene<f64, 3>, View)>) -> Result<Groups, GpuError> {
+    let mut groups = Groups::new();
     for (seed, (scene, view)) in (0..).zip(scenes) {
         let scene = bright(scene);
         let upstream = upstream(seed, &scene, &view);
         let actual = gradient_of(raster, &scene, &view, &upstream)?.groups();
         let expected = gradient(&scene, &view, Shading::Offset, &upstream);
-        let expected = [
-            expected.means.as_flattened(),
-            expected.quats.as_flattened(),
-            expected.log_scales.as_flattened(),
-            &expected.opacity_logits,
-            expected.sh.as_flattened(),
-        ];
-        for (k, ((name, actual), expected)) in actual.into_iter().zip(expected).enumerate() {
-            if groups.len() <= k {
-                groups.push((name, Vec::new()));
-            }
+        for ((name, actual), expected) in actual.into_iter().zip(expected.groups()) {
             let actual = actual.iter().map(|value| value / SHARE).collect();
-            groups[k].1.push(Sample::new(actual, expected.to_vec()));
+            add(&mut groups, name, [Sample::new(actual, expected.to_vec())]);
         }
     }
     Ok(groups)
@@ -144,23 +131,19 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
         &super::blend::pictures::<3>(raster, clipped(super::blend::scenes()))?,
     )];
     // Colors are up to five times white here.
-    let bounds_of = |l2, worst| allowed.gradient(l2, allowed.relative(worst, 1.0));
-    let bounds = [
-        bounds_of(3.26e-6, 4.03e-5),
-        bounds_of(7.59e-6, 3.18e-5),
-        bounds_of(2.22e-6, 1.35e-5),
-        bounds_of(2.20e-6, 4.86e-6),
-        bounds_of(2.51e-6, 2.51e-6),
+    let seen = [
+        [3.26e-6, 4.03e-5],
+        [7.59e-6, 3.18e-5],
+        [2.22e-6, 1.35e-5],
+        [2.20e-6, 4.86e-6],
+        [2.51e-6, 2.51e-6],
     ];
     let scenes = || super::gradient::scenes::<3>(false);
     for (kernel, scenes) in [
         ("rgb training", scenes()),
         ("rgb training, PlayCanvas", clipped(scenes())),
     ] {
-        let groups = gradients(raster, scenes)?;
-        for ((name, samples), bounds) in groups.into_iter().zip(bounds) {
-            rows.push(Row::gradient(kernel, name, bounds, &samples));
-        }
+        rows.extend(allowed.groups(kernel, &seen, gradients(raster, scenes)?));
     }
     Ok(rows)
 }
