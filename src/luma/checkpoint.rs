@@ -31,7 +31,7 @@ pub struct Checkpoint {
 /// What of it is few numbers.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct State {
-    /// Which effects are simulated; filled in by who planned.
+    /// Which effects are simulated, where a plan says.
     pub plan: Option<Plan>,
     /// Iterations done.
     pub iteration: usize,

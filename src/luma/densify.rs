@@ -155,20 +155,12 @@ fn halves(source: u32, log_scales: [f64; 3], logit: f64) -> [Descent; 2] {
 
 /// The three entry points.
 pub struct DensifyKernels {
-    geometry: Kernel,
-    sh: Kernel,
-    moments: Kernel,
-}
-
-/// Which array a plan is applied to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Target {
-    /// Geometry planes.
-    Geometry,
-    /// Spherical-harmonic planes.
-    Field,
-    /// Moments of either.
-    Moments,
+    /// Of geometry planes.
+    pub geometry: Kernel,
+    /// Of spherical-harmonic planes.
+    pub sh: Kernel,
+    /// Of the moments of either.
+    pub moments: Kernel,
 }
 
 impl DensifyKernels {
@@ -192,12 +184,11 @@ impl DensifyKernels {
         plan: &Buffer<Descent>,
         model: &Model,
     ) -> Result<Model, GpuError> {
-        let apply =
-            |source: &Buffer<f32>, target| self.apply(gpu, plan, model.len(), source, target);
+        let apply = |source: &Buffer<f32>, kernel| apply(gpu, kernel, plan, model.len(), source);
         let moments = |moments: &AdamMoments| -> Result<_, GpuError> {
             Ok(AdamMoments {
-                first: apply(&moments.first, Target::Moments)?,
-                second: apply(&moments.second, Target::Moments)?,
+                first: apply(&moments.first, &self.moments)?,
+                second: apply(&moments.second, &self.moments)?,
             })
         };
         Ok(Model {
@@ -205,58 +196,46 @@ impl DensifyKernels {
             field_moments: moments(&model.field_moments)?,
             geometry: Geometry {
                 count: plan.len(),
-                planes: apply(&model.geometry.planes, Target::Geometry)?,
+                planes: apply(&model.geometry.planes, &self.geometry)?,
             },
             held: model.held,
             field: Field {
-                planes: apply(&model.field.planes, Target::Field)?,
+                planes: apply(&model.field.planes, &self.sh)?,
                 ..model.field
             },
         })
     }
+}
 
-    /// Applies a plan to one array of planes and gives the new one.
-    ///
-    /// # Errors
-    /// [`GpuError::TooLarge`].
-    pub fn apply(
-        &self,
-        gpu: &Gpu,
-        plan: &Buffer<Descent>,
-        old_count: usize,
-        source: &Buffer<f32>,
-        target: Target,
-    ) -> Result<Buffer<f32>, GpuError> {
-        let planes = source.len() / old_count.max(1);
-        let destination = Buffer::zeros(gpu, "densified", planes * plan.len())?;
-        let parameters = Buffer::uniform(
-            gpu,
-            "densify parameters",
-            &DensifyParameters {
-                old_count: old_count as u32,
-                new_count: plan.len() as u32,
-                planes: planes as u32,
-            },
-        )?;
-        let kernel = match target {
-            Target::Geometry => &self.geometry,
-            Target::Field => &self.sh,
-            Target::Moments => &self.moments,
-        };
-        let bindings = kernel.bind(
-            gpu,
-            &[
-                parameters.raw(),
-                plan.raw(),
-                source.raw(),
-                destination.raw(),
-            ],
-        );
-        let mut recorder = Recorder::new(gpu);
-        recorder.dispatch(kernel, &bindings, groups_for(plan.len()));
-        recorder.submit();
-        Ok(destination)
-    }
+/// Applies a plan to one array of planes and gives the new one.
+///
+/// # Errors
+/// [`GpuError::TooLarge`].
+pub fn apply(
+    gpu: &Gpu,
+    kernel: &Kernel,
+    plan: &Buffer<Descent>,
+    old_count: usize,
+    source: &Buffer<f32>,
+) -> Result<Buffer<f32>, GpuError> {
+    let planes = source.len() / old_count.max(1);
+    let destination = Buffer::zeros(gpu, "densified", planes * plan.len())?;
+    let parameters = DensifyParameters {
+        old_count: old_count as u32,
+        new_count: plan.len() as u32,
+        planes: planes as u32,
+    };
+    let parameters = Buffer::uniform(gpu, "densify parameters", &parameters)?;
+    let buffers = [
+        parameters.raw(),
+        plan.raw(),
+        source.raw(),
+        destination.raw(),
+    ];
+    let mut recorder = Recorder::new(gpu);
+    recorder.dispatch(kernel, &kernel.bind(gpu, &buffers), groups_for(plan.len()));
+    recorder.submit();
+    Ok(destination)
 }
 
 #[cfg(test)]

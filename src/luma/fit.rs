@@ -3,16 +3,14 @@
 use std::{
     ops::{ControlFlow, Range},
     sync::Arc,
-    time::{Duration, Instant},
+    time::Instant,
 };
 
 use super::{
     Checkpoint, CurvePoint, Demand, Goal, Grows, Keeper, LumaError, LumaProgress, LumaSettings,
     LumaTrainer, NoKeeper, PlannedViews, TrialProgress,
     carve::carved,
-    planned,
-    planned::WatchedViews,
-    resident_photos,
+    planned, resident_photos,
     start::{placed_splats, started, surroundings},
 };
 use crate::{
@@ -225,11 +223,13 @@ impl Fit<'_> {
             None => self.goal,
         });
         let (photographed, views) = self.watched();
-        trainer.watch(WatchedViews {
-            dataset: photographed.clone(),
+        let exposures = plan.exposures.clone();
+        trainer.watch(PlannedViews::watched(
+            photographed.clone(),
             views,
-            exposures: plan.exposures.clone(),
-        })?;
+            exposures,
+        ))?;
+        trainer.remember(plan.clone());
         if let Some(checkpoint) = checkpoint {
             trainer.resume(checkpoint)?;
         }
@@ -238,11 +238,7 @@ impl Fit<'_> {
             iteration: checkpoint.map_or(0, Checkpoint::iteration),
             end: trainer.schedule().end,
         }))?;
-        let mut keeper = Planned {
-            plan: &plan,
-            keeper,
-        };
-        trainer.train_keeping(&mut keeper, &mut |progress| {
+        trainer.train_keeping(keeper, &mut |progress| {
             last = Some(progress);
             peak_device_memory = peak_device_memory.max(gpu.allocated_bytes());
             observe(LumaEvent::Training(progress))
@@ -364,31 +360,6 @@ impl Fit<'_> {
         let count = measured.len().min(WATCHED);
         let spread = (0..count).map(|k| measured[k * measured.len() / count]);
         (self.dataset, spread.collect())
-    }
-}
-
-/// Adds the plan to what is kept.
-struct Planned<'a> {
-    plan: &'a Plan,
-    keeper: &'a mut dyn Keeper,
-}
-
-impl Keeper for Planned<'_> {
-    fn wants(&mut self, iteration: usize) -> bool {
-        self.keeper.wants(iteration)
-    }
-
-    fn keep(&mut self, mut checkpoint: Checkpoint) -> bool {
-        checkpoint.state.plan = Some(self.plan.clone());
-        self.keeper.keep(checkpoint)
-    }
-
-    fn looks_on(&mut self) -> bool {
-        self.keeper.looks_on()
-    }
-
-    fn show(&mut self, splats: Splats, took: Duration) {
-        self.keeper.show(splats, took);
     }
 }
 

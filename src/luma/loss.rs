@@ -4,7 +4,7 @@ use bytemuck::{Pod, Zeroable};
 
 use std::sync::Arc;
 
-use super::{LumaError, SsimWindow, TrainingViews, photos::Photos};
+use super::{Demand, LumaError, SsimWindow, TrainingViews, photos::Photos};
 use crate::{
     capture::Exposure,
     gpu::{Bindings, Buffer, Gpu, Kernel, Recorder, shaders},
@@ -105,7 +105,7 @@ impl Targets {
         4 * 3 * max_pixels as u64
     }
 
-    /// The photos of `views`, of at most `max_pixels` pixels; where `streamed`, one at a time.
+    /// The photos of `views`, which make this demand.
     ///
     /// # Errors
     /// [`LumaError`].
@@ -113,13 +113,12 @@ impl Targets {
         gpu: &Gpu,
         effects: LossEffects,
         views: &Arc<dyn TrainingViews>,
-        max_pixels: usize,
-        streamed: bool,
+        demand: &Demand,
     ) -> Result<Self, LumaError> {
-        let slopes = || Buffer::zeros(gpu, "slopes", max_pixels);
+        let slopes = || Buffer::zeros(gpu, "slopes", demand.max_pixels);
         let unset = LumaLossParameters::zeroed();
         Ok(Self {
-            photos: Photos::new(gpu, views, effects.masked, streamed)?,
+            photos: Photos::new(gpu, views, effects.masked, demand.streams)?,
             parameters: (effects.exposed)
                 .then(|| Buffer::uniform(gpu, "loss parameters", &unset))
                 .transpose()?,

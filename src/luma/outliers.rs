@@ -55,7 +55,7 @@ impl Photo {
     fn load(views: &dyn TrainingViews, view: usize) -> Result<Self, LumaError> {
         let mut view = view::load(views, view)?;
         Ok(Self {
-            mask: view.counts(),
+            mask: view.whole_mask(),
             camera: view.camera,
             gray: view.gray,
             exposure: view.exposure,

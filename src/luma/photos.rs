@@ -105,7 +105,7 @@ impl Photos {
         if self.stream.is_some() {
             self.left_out.insert(photo, bits);
         } else {
-            let mut mask = view::load(views, photo)?.counts();
+            let mut mask = view::load(views, photo)?.whole_mask();
             without(&mut mask, &bits);
             self.leave_out(gpu, photo, &mask);
         }
@@ -136,7 +136,7 @@ impl Photos {
         };
         let mut view = stream.take(photo, next)?;
         if let Some(left_out) = self.left_out.get(&photo) {
-            let mut mask = view.counts();
+            let mut mask = view.whole_mask();
             without(&mut mask, left_out);
             view.mask = Some(mask);
         }
@@ -157,7 +157,7 @@ impl Picture {
     fn write(&self, gpu: &Gpu, mut view: TrainingView) {
         self.gray.write(gpu, &pack(&view.gray));
         if let Some(mask) = &self.mask {
-            mask.write(gpu, &pack(&view.counts()));
+            mask.write(gpu, &pack(&view.whole_mask()));
         }
     }
 }

@@ -8,10 +8,12 @@ use crate::{
     effects::{Effect, Evidence, Plan},
 };
 
-/// Training views whose photos come from a [`Dataset`].
+/// Views whose photos come from a [`Dataset`].
 #[derive(Clone, Debug)]
 pub struct PlannedViews {
     dataset: Arc<Dataset>,
+    /// Which of its views.
+    views: Vec<usize>,
     /// Of all views of the dataset.
     exposures: Vec<Exposure>,
     masks: Masks,
@@ -41,6 +43,22 @@ impl PlannedViews {
             exposures: plan.exposures.clone(),
             masked: masks != Masks::Off && evidence.masks_any(&dataset.split.train),
             masks,
+            views: dataset.split.train.clone(),
+            dataset,
+        }
+    }
+
+    /// Views to look at while others are trained on; `exposures` are those of all views.
+    pub(super) fn watched(
+        dataset: Arc<Dataset>,
+        views: Vec<usize>,
+        exposures: Vec<Exposure>,
+    ) -> Self {
+        Self {
+            exposures,
+            masked: dataset.masked_views > 0,
+            masks: Masks::Count,
+            views,
             dataset,
         }
     }
@@ -66,38 +84,6 @@ impl PlannedViews {
 
 impl TrainingViews for PlannedViews {
     fn count(&self) -> usize {
-        self.dataset.split.train.len()
-    }
-
-    fn camera(&self, view: usize) -> &Camera {
-        &self.dataset.cameras[self.dataset.split.train[view]]
-    }
-
-    fn exposure(&self, view: usize) -> Exposure {
-        self.exposures[self.dataset.split.train[view]]
-    }
-
-    fn masked(&self) -> bool {
-        self.masked
-    }
-
-    fn load(&self, view: usize) -> Result<TrainingView, CaptureError> {
-        self.of(self.dataset.split.train[view])
-    }
-}
-
-/// Views to look at while others are trained on; their photos come from a [`Dataset`].
-#[derive(Clone, Debug)]
-pub(super) struct WatchedViews {
-    pub dataset: Arc<Dataset>,
-    /// Which of its views.
-    pub views: Vec<usize>,
-    /// Of all views of the dataset.
-    pub exposures: Vec<Exposure>,
-}
-
-impl TrainingViews for WatchedViews {
-    fn count(&self) -> usize {
         self.views.len()
     }
 
@@ -110,16 +96,10 @@ impl TrainingViews for WatchedViews {
     }
 
     fn masked(&self) -> bool {
-        self.dataset.masked_views > 0
+        self.masked
     }
 
     fn load(&self, view: usize) -> Result<TrainingView, CaptureError> {
-        let photo = self.dataset.photo(self.views[view])?;
-        Ok(TrainingView {
-            camera: self.camera(view).clone(),
-            gray: photo.gray.clone(),
-            mask: photo.mask.clone(),
-            exposure: self.exposure(view),
-        })
+        self.of(self.views[view])
     }
 }

@@ -37,6 +37,7 @@ use super::{
 };
 use crate::{
     capture::{Exposure, view_at},
+    effects::Plan,
     gpu::{Gpu, GpuError, Readback, Recorder},
     raster::{Load, Model, Raster, StatusReadback, ViewUniform, constants::*},
     splats::{Splats, sh},
@@ -86,8 +87,6 @@ pub struct LumaTrainer {
     near: f64,
     views: Arc<dyn TrainingViews>,
     targets: Targets,
-    max_pixels: usize,
-    max_tiles: usize,
     model: Model,
     /// None while a new one is made, which the old one would crowd out, or when there was
     /// no room for it.
@@ -107,6 +106,8 @@ pub struct LumaTrainer {
     reports: usize,
     /// Where Gaussians may be split, if not everywhere.
     grows: Option<Grows>,
+    /// What checkpoints hold of it.
+    plan: Option<Plan>,
     /// Iterations and seconds that an interrupted training had done.
     done: (usize, f64),
 }
@@ -138,12 +139,6 @@ impl LumaTrainer {
         };
         let kernels = Kernels::new(&gpu, effects, settings.numerics.ssim_window);
         let near = NEAR_SHARE * extent;
-        let (mut max_pixels, mut max_tiles) = (0, 0);
-        for view in all.clone() {
-            let uniform = ViewUniform::new(views.camera(view), near, 0, 0);
-            max_pixels = max_pixels.max(uniform.pixel_count());
-            max_tiles = max_tiles.max(uniform.tile_count());
-        }
         let schedule = Schedule::of(&settings);
         let demand = Demand::of(
             all.map(|view| views.camera(view)),
@@ -154,16 +149,9 @@ impl LumaTrainer {
         let longest = ends::LONGER * settings.iterations;
         let capacity = splats.len() * ENTRIES_PER_SPLAT;
         demand.check(settings.memory_limit, splats.len(), capacity)?;
-        let targets = Targets::new(&gpu, effects, &views, max_pixels, demand.streams)?;
+        let targets = Targets::new(&gpu, effects, &views, &demand)?;
         let model = Model::upload(&gpu, splats)?;
-        let workspace = Workspace::new(
-            &raster,
-            &kernels,
-            &model,
-            &targets,
-            [max_pixels, max_tiles],
-            capacity,
-        )?;
+        let workspace = Workspace::new(&raster, &kernels, &model, &targets, &demand, capacity)?;
         Ok(Self {
             raster,
             gpu,
@@ -175,8 +163,6 @@ impl LumaTrainer {
             near,
             views,
             targets,
-            max_pixels,
-            max_tiles,
             model,
             workspace: Some(workspace),
             demand,
@@ -188,6 +174,7 @@ impl LumaTrainer {
             seen: Load::default(),
             reports: 0,
             grows: None,
+            plan: None,
             done: (0, 0.0),
         })
     }
@@ -367,7 +354,7 @@ impl LumaTrainer {
             instances: mean(self.seen.instances),
             capacity: mean(self.seen.capacity),
             pixels: pixels.sum::<f64>() / count as f64,
-            tiles: self.max_tiles as f64,
+            tiles: self.demand.max_tiles as f64,
             channels: 1.0,
             sh_planes: sh::coefficient_count(self.model.field.degree) as f64,
             numerics: self.raster.numerics(),

@@ -328,16 +328,7 @@ fn chosen(train: &[usize]) -> [Vec<usize>; 2] {
 
 /// PSNR of a picture after the photo's gain and offset, where anything counts.
 fn corrected(view: &TrainingView, picture: &[f32]) -> Option<f64> {
-    let counts = |pixel: &usize| (view.mask.as_ref()).is_none_or(|mask| mask[*pixel] >= 128);
-    let (ours, truth): (Vec<f32>, Vec<f32>) = (0..view.gray.len())
-        .filter(counts)
-        .map(|pixel| {
-            (
-                picture[pixel].clamp(0.0, 1.0),
-                f32::from(view.gray[pixel]) / 255.0,
-            )
-        })
-        .unzip();
+    let (ours, truth) = view.compared(picture, |luma| luma.clamp(0.0, 1.0));
     (!ours.is_empty()).then(|| measure::corrected_psnr(&ours, &truth))
 }
 

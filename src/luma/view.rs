@@ -45,8 +45,25 @@ impl TrainingView {
         }
     }
 
+    /// Whether a pixel is not masked.
+    pub(super) fn counts(&self, pixel: usize) -> bool {
+        self.mask.as_ref().is_none_or(|mask| mask[pixel] >= 128)
+    }
+
+    /// Of the pixels that count what is `shown` of a picture, and what the photo shows, 0 to 1.
+    pub(super) fn compared(
+        &self,
+        picture: &[f32],
+        shown: impl Fn(f32) -> f32,
+    ) -> (Vec<f32>, Vec<f32>) {
+        (0..self.gray.len())
+            .filter(|&pixel| self.counts(pixel))
+            .map(|pixel| (shown(picture[pixel]), f32::from(self.gray[pixel]) / 255.0))
+            .unzip()
+    }
+
     /// What each pixel counts, where some do not as where all do.
-    pub(super) fn counts(&mut self) -> Vec<u8> {
+    pub(super) fn whole_mask(&mut self) -> Vec<u8> {
         let pixels = self.gray.len();
         self.mask.take().unwrap_or_else(|| vec![255; pixels])
     }

@@ -2,7 +2,7 @@
 //! the room of the tile lists.
 
 use super::{
-    SsimWindow,
+    Demand, SsimWindow,
     densify::DensifyKernels,
     loss::{Loss, LossEffects, LossKernels, Targets},
     settings::SYNC_EVERY,
@@ -57,11 +57,12 @@ impl Workspace {
         kernels: &Kernels,
         model: &Model,
         targets: &Targets,
-        [max_pixels, max_tiles]: [usize; 2],
+        demand: &Demand,
         capacity: usize,
     ) -> Result<Self, GpuError> {
         let gpu = &raster.gpu;
         let (geometry, field) = (&model.geometry, &model.field);
+        let (max_pixels, max_tiles) = (demand.max_pixels, demand.max_tiles);
         let lists = Lists::new(raster, geometry, max_tiles, capacity)?;
         let layer = Layer::new(raster, geometry, &lists, field, max_pixels, max_tiles)?;
         let step = |planes| AdamStep::holding(gpu, planes, geometry.count, model.held);

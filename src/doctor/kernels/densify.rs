@@ -5,10 +5,10 @@ use std::sync::Arc;
 use crate::{
     compare::widen,
     doctor::measured::{Allowance, Row, Sample},
-    gpu::{Buffer, Gpu, GpuError},
-    luma::densify::{DensifyKernels, Descent, Target},
+    gpu::{Buffer, Gpu, GpuError, Kernel},
+    luma::densify::{DensifyKernels, Descent, apply},
     oracle::{
-        linear::{apply, rotation},
+        linear::{self, rotation},
         random::Random,
     },
     raster::{Raster, constants::*},
@@ -44,15 +44,13 @@ fn plan(random: &mut Random) -> Vec<Descent> {
 
 fn applied(
     gpu: &Gpu,
+    kernel: &Kernel,
     plan: &[Descent],
     source: &[f32],
-    target: Target,
 ) -> Result<Vec<f32>, GpuError> {
     let plan = Buffer::from_slice(gpu, "plan", plan)?;
     let source = Buffer::from_slice(gpu, "source", source)?;
-    let kernels = DensifyKernels::new(gpu);
-    let new = kernels.apply(gpu, &plan, OLD, &source, target)?;
-    new.read(gpu)
+    apply(gpu, kernel, &plan, OLD, &source)?.read(gpu)
 }
 
 /// What one row of the plan makes of the geometry, in `f64`.
@@ -68,7 +66,7 @@ fn descendant(old: &[f32], descent: &Descent) -> Vec<f64> {
             new[PLANE_LOG_SCALE + axis].exp() * f64::from(descent.offset[axis])
         });
         new[PLANE_OPACITY] += f64::from(descent.logit_step);
-        let moved = apply(&rotation(quat.map(|q| q / norm)), &offset);
+        let moved = linear::apply(&rotation(quat.map(|q| q / norm)), &offset);
         for axis in 0..3 {
             new[PLANE_MEAN + axis] += moved[axis];
             new[PLANE_LOG_SCALE + axis] += f64::from(descent.log_growth[axis]);
@@ -81,7 +79,8 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
     let allowed = Allowance::of(&raster.gpu);
     let mut random = Random::new(1);
     let (old, plan) = (geometry(&mut random), plan(&mut random));
-    let new = applied(&raster.gpu, &plan, &old, Target::Geometry)?;
+    let kernels = DensifyKernels::new(&raster.gpu);
+    let new = applied(&raster.gpu, &kernels.geometry, &plan, &old)?;
     let count = plan.len();
     let (mut copied, mut split) = ((Vec::new(), Vec::new()), (Vec::new(), Vec::new()));
     for (j, descent) in plan.iter().enumerate() {
@@ -108,11 +107,11 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
                 })
                 .collect()
         };
-        let moved = |target| Ok(widen(&applied(&raster.gpu, &plan, &old, target)?));
-        fields.push(Sample::new(moved(Target::Field)?, expected(|_| true)));
+        let moved = |kernel| Ok(widen(&applied(&raster.gpu, kernel, &plan, &old)?));
+        fields.push(Sample::new(moved(&kernels.sh)?, expected(|_| true)));
         // Newcomers have none.
         let kept = expected(|descent| descent.survives == 1);
-        moments.push(Sample::new(moved(Target::Moments)?, kept));
+        moments.push(Sample::new(moved(&kernels.moments)?, kept));
     }
     let sample = |(actual, expected): (Vec<f32>, Vec<f64>)| [Sample::new(widen(&actual), expected)];
     Ok(vec![

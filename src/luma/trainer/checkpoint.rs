@@ -2,6 +2,7 @@
 
 use super::{LumaTrainer, best::Best};
 use crate::{
+    effects::Plan,
     gpu::GpuError,
     luma::{
         LumaError,
@@ -10,6 +11,11 @@ use crate::{
 };
 
 impl LumaTrainer {
+    /// The plan that its checkpoints hold.
+    pub(in crate::luma) fn remember(&mut self, plan: Plan) {
+        self.plan = Some(plan);
+    }
+
     /// The training after `iteration` and `seconds`. Nothing may be on its way.
     pub(super) fn checkpoint(
         &self,
@@ -24,7 +30,7 @@ impl LumaTrainer {
             best: best.map(|best| best.model.clone()),
             left_out: self.targets.photos.left_out(),
             state: State {
-                plan: None,
+                plan: self.plan.clone(),
                 iteration,
                 seconds,
                 schedule: self.schedule.clone(),

@@ -40,7 +40,7 @@ impl LumaTrainer {
             &self.kernels,
             &self.model,
             &self.targets,
-            [self.max_pixels, self.max_tiles],
+            &self.demand,
             capacity,
         );
         self.workspace = Some(workspace.map_err(|error| error.of_splats(self.model.len()))?);

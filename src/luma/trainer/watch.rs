@@ -84,19 +84,14 @@ impl LumaTrainer {
         let mut counting = Vec::new();
         for index in 0..views.count() {
             let view = view::load(&views, index)?;
-            if (0..view.gray.len()).any(|pixel| counts(&view, pixel)) {
+            if (0..view.gray.len()).any(|pixel| view.counts(pixel)) {
                 counting.push(index);
             }
         }
         let cameras = || counting.iter().map(|&index| views.camera(index));
-        let before = [self.max_pixels, self.max_tiles];
-        for camera in cameras() {
-            let uniform = ViewUniform::new(camera, self.near, 0, 0);
-            self.max_pixels = self.max_pixels.max(uniform.pixel_count());
-            self.max_tiles = self.max_tiles.max(uniform.tile_count());
-        }
-        self.demand = self.demand.watching(cameras());
-        if before != [self.max_pixels, self.max_tiles] {
+        let before = self.demand;
+        self.demand = before.watching(cameras());
+        if before != self.demand {
             let capacity = self.workspace()?.lists.capacity;
             self.rebuild(capacity, self.base)?;
         }
@@ -163,16 +158,8 @@ impl LumaTrainer {
                 Some(needed) => self.make_room(needed, iteration)?,
             }
         };
-        let (mut shown, mut truth) = (Vec::new(), Vec::new());
-        for pixel in (0..watched.gray.len()).filter(|&pixel| counts(watched, pixel)) {
-            shown.push(watched.exposure.shown(f64::from(pixels[pixel])) as f32);
-            truth.push(f32::from(watched.gray[pixel]) / 255.0);
-        }
+        let shown = |luma: f32| watched.exposure.shown(f64::from(luma)) as f32;
+        let (shown, truth) = watched.compared(&pixels, shown);
         Ok(measure::reported_psnr(&shown, &truth))
     }
-}
-
-/// Whether a pixel of the photo is not masked.
-fn counts(view: &TrainingView, pixel: usize) -> bool {
-    view.mask.as_ref().is_none_or(|mask| mask[pixel] >= 128)
 }
