@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum, error::ErrorKind};
+use clap::{ArgAction, Args, error::ErrorKind};
 
 use super::{
     CliError,
@@ -12,7 +12,7 @@ use super::{
     next, print,
     progress::Progress,
     usage::refuse,
-    values::{one_of, positive, share},
+    values::{mebibytes, one_of, positive, share, switch},
     view::ViewArguments,
 };
 use crate::chroma::{
@@ -78,8 +78,8 @@ pub struct Colorize {
     /// Whether a stroke colors the whole thing it lies on, in all views.
     ///
     /// off: paint counts only where it is, 50 times as much as a teacher.
-    #[arg(long, value_enum, value_name = "on|off", default_value = "on", help_heading = TEACHER, hide_short_help = true)]
-    grow_hints: Switch,
+    #[arg(long, action = ArgAction::Set, value_parser = switch(), value_name = "on|off", default_value = "on", help_heading = TEACHER, hide_short_help = true)]
+    grow_hints: bool,
     /// Strength of the teachers' colors; hints stay as painted.
     #[arg(long, value_name = "0..1", default_value_t = 1.0, value_parser = share::<f32>, help_heading = TEACHER)]
     strength: f32,
@@ -92,11 +92,11 @@ pub struct Colorize {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000), help_heading = BUDGET)]
     rounds: Option<u32>,
     /// Limit device memory, in MiB; views and Gaussians that do not fit are loaded view by view.
-    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u32).range(1..), help_heading = BUDGET)]
-    memory_limit: Option<u32>,
+    #[arg(long, value_name = "MIB", value_parser = mebibytes(), help_heading = BUDGET)]
+    memory_limit: Option<u64>,
     /// Correct each view's saturation and tint to agree with the others [default: by evidence].
-    #[arg(long, value_enum, value_name = "on|off", hide_possible_values = true, help_heading = QUALITY)]
-    correct_views: Option<Switch>,
+    #[arg(long, value_parser = switch(), value_name = "on|off", hide_possible_values = true, help_heading = QUALITY)]
+    correct_views: Option<bool>,
     /// Outlier threshold of the chroma loss, in CIELAB units; off for plain L1 [default: 10].
     ///
     /// With --solver adam the default is off.
@@ -105,13 +105,13 @@ pub struct Colorize {
     /// Color what no view shows well like its neighbors and what looks like it [default: on].
     ///
     /// With --solver adam the default is off.
-    #[arg(long, value_enum, value_name = "on|off", hide_possible_values = true, help_heading = QUALITY)]
-    fill: Option<Switch>,
+    #[arg(long, value_parser = switch(), value_name = "on|off", hide_possible_values = true, help_heading = QUALITY)]
+    fill: Option<bool>,
     /// Scale colors to the teacher's saturation, as far as views agree [default: on].
     ///
     /// Off where there are hints, and with --solver adam.
-    #[arg(long, value_enum, value_name = "on|off", hide_possible_values = true, help_heading = QUALITY)]
-    match_saturation: Option<Switch>,
+    #[arg(long, value_parser = switch(), value_name = "on|off", hide_possible_values = true, help_heading = QUALITY)]
+    match_saturation: Option<bool>,
     /// SH degree of chroma; auto tries it on training views that are held back.
     #[arg(long, value_name = "0..3|auto", default_value = "0", value_parser = degree, help_heading = QUALITY)]
     sh_degree: Degree,
@@ -143,13 +143,6 @@ pub struct Colorize {
     /// Time every kernel and print a table.
     #[arg(long, help_heading = EXPERT, hide_short_help = true)]
     timings: bool,
-}
-
-/// A choice to be made either way, whatever the default is.
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Switch {
-    On,
-    Off,
 }
 
 /// A residual; `off` is one that is never reached.
@@ -200,13 +193,9 @@ impl Colorize {
         if let Some(residual) = self.robust {
             settings.robust = Some(residual).filter(|residual| residual.is_finite());
         }
-        if let Some(switch) = self.fill {
-            settings.fill = switch == Switch::On;
-        }
-        if let Some(switch) = self.match_saturation {
-            settings.match_saturation = switch == Switch::On;
-        }
-        settings.memory_limit = self.memory_limit.map(|mib| u64::from(mib) << 20);
+        settings.fill = self.fill.unwrap_or(settings.fill);
+        settings.match_saturation = self.match_saturation.unwrap_or(settings.match_saturation);
+        settings.memory_limit = self.memory_limit;
         settings
     }
 
@@ -214,8 +203,8 @@ impl Colorize {
     fn check_solver(&self) {
         let of_irls = [
             ("--rounds", self.rounds.is_some()),
-            ("--correct-views", self.correct_views == Some(Switch::On)),
-            ("--fill", self.fill == Some(Switch::On)),
+            ("--correct-views", self.correct_views == Some(true)),
+            ("--fill", self.fill == Some(true)),
         ];
         let of_adam = [
             ("--until", self.until.is_some()),
@@ -234,6 +223,8 @@ impl Colorize {
     pub(super) fn run(self) -> Result<(), CliError> {
         self.check_solver();
         let settings = self.settings();
+        let run = self.run.as_deref().unwrap_or("colorize".as_ref());
+        let live = self.view.begin(run)?;
         let options = ColorizeRequest {
             teach: TeachOptions {
                 teachers: self.teachers(),
@@ -243,26 +234,20 @@ impl Colorize {
                 },
                 strength: self.strength,
                 hints: self.hints,
-                grow_hints: self.grow_hints == Switch::On,
+                grow_hints: self.grow_hints,
             },
             run: self.run,
             output: self.output,
             until: self.until.map(|n| n as usize),
             settings,
             sh_degree: self.sh_degree,
-            correct_views: self.correct_views.map(|switch| switch == Switch::On),
+            correct_views: self.correct_views,
             colmap: self.colmap,
             relight: self.relight,
             force: self.force,
             timings: self.timings,
             checkpoints: self.checkpoints.options(),
-            live: None,
-        };
-        let run = options.run.as_deref().unwrap_or("colorize".as_ref());
-        let live = self.view.begin(run)?;
-        let options = ColorizeRequest {
             live: live.clone(),
-            ..options
         };
         let mut progress = Progress::through(options.stages());
         let (output, report) = colorize(&options, &mut |event| {

@@ -10,7 +10,7 @@ use super::{
     network::NetworkArguments,
     next, print,
     progress::Progress,
-    values::one_of,
+    values::{mebibytes, one_of},
 };
 use crate::{
     eval::Peer,
@@ -51,8 +51,8 @@ pub struct Eval {
     #[arg(long, help_heading = COMPARE, value_parser = one_of(RECIPES), requires = "teacher")]
     recipe: Vec<Peer>,
     /// Limit device memory for --baselines and --recipe, in MiB.
-    #[arg(long, help_heading = COMPARE, value_name = "MIB", value_parser = clap::value_parser!(u32).range(1..), requires = "teacher")]
-    memory_limit: Option<u32>,
+    #[arg(long, help_heading = COMPARE, value_name = "MIB", value_parser = mebibytes(), requires = "teacher")]
+    memory_limit: Option<u64>,
     /// Frames of the rendered path.
     #[arg(long, help_heading = MEASURES, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u32).range(2..=9999))]
     frames: u32,
@@ -82,7 +82,7 @@ impl Eval {
             frames: self.frames as usize,
             baselines: self.baselines,
             recipes: self.recipe,
-            memory_limit: self.memory_limit.map(|mib| u64::from(mib) << 20),
+            memory_limit: self.memory_limit,
             flow: self.flow,
             lpips: self.lpips,
         };

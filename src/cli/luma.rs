@@ -4,7 +4,7 @@ use clap::Args;
 
 use super::{
     headings::{BUDGET, EXPERT, QUALITY},
-    values::positive,
+    values::{mebibytes, positive},
 };
 use crate::luma::{FLAT, LumaOverlay, Numerics};
 
@@ -24,8 +24,8 @@ pub(super) struct LumaArguments {
     #[arg(long, help_heading = QUALITY, hide_short_help = true)]
     no_fill_gaps: bool,
     /// Limit device memory, in MiB; lowers the maximum of Gaussians if need be.
-    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u32).range(1..), help_heading = BUDGET)]
-    memory_limit: Option<u32>,
+    #[arg(long, value_name = "MIB", value_parser = mebibytes(), help_heading = BUDGET)]
+    memory_limit: Option<u64>,
     /// Early stopping: roll back to the best and end when twice the iterations would gain less than
     /// this, in dB.
     ///
@@ -58,7 +58,7 @@ impl LumaArguments {
             max_splats: self.max_splats.map(|count| count as usize),
             surround: self.no_surround.then_some(false),
             fill_gaps: self.no_fill_gaps.then_some(false),
-            memory_limit: self.memory_limit.map(|mib| u64::from(mib) << 20),
+            memory_limit: self.memory_limit,
             numerics: self.numerics,
             seed: self.seed,
             ..LumaOverlay::default()

@@ -2,23 +2,18 @@
 
 use std::{env, path::Path};
 
-use crate::tradeoff::shell_line;
-
-/// A line to type.
-fn line(arguments: &[&str]) -> String {
-    let owned: Vec<String> = arguments.iter().map(|&word| word.to_owned()).collect();
-    shell_line(&owned)
-}
+use crate::tradeoff::shell_line as line;
 
 /// `fit` with the options that `plan` was given.
 pub(super) fn fit_as_planned() -> String {
     let given = env::args_os().skip(2);
-    let given: Vec<String> = given
-        .map(|word| word.to_string_lossy().into_owned())
-        .collect();
-    let mut words = vec!["fit"];
-    words.extend(given.iter().map(String::as_str));
-    line(&words)
+    let given = given.map(|word| word.to_string_lossy().into_owned());
+    line(
+        &["fit".to_owned()]
+            .into_iter()
+            .chain(given)
+            .collect::<Vec<_>>(),
+    )
 }
 
 /// `fit` of a COLMAP folder.

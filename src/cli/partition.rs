@@ -7,7 +7,7 @@ use clap::Args;
 use super::{
     CliError, next, print,
     progress::Progress,
-    values::{folder, share},
+    values::{folder, mebibytes, share},
 };
 use crate::{
     blocks::{Blocks, Division, Estimate, Job},
@@ -42,8 +42,8 @@ pub struct Partition {
     #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(16..))]
     max_side: Option<u32>,
     /// Divide until every block is expected to need no more of the device's memory than this.
-    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u32).range(1..))]
-    memory_limit: Option<u32>,
+    #[arg(long, value_name = "MIB", value_parser = mebibytes())]
+    memory_limit: Option<u64>,
     /// Train on all photos, and measure on none.
     #[arg(long)]
     no_holdout: bool,
@@ -62,7 +62,7 @@ impl Partition {
                 overlap: self.overlap,
                 max_splats: self.max_splats.map(|splats| splats as usize),
                 max_side: self.max_side,
-                memory_limit: self.memory_limit.map(|mib| u64::from(mib) << 20),
+                memory_limit: self.memory_limit,
                 holdout: !self.no_holdout,
             },
         };

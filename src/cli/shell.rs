@@ -1,16 +1,13 @@
 //! `gs-chroma completions` and `gs-chroma man`: what shells and `man` want to know.
 
-use std::{
-    io::Write,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 use clap::{Args, Command, CommandFactory};
 use clap_complete::{Shell, generate};
 use clap_mangen::Man;
 
 use super::{Cli, CliError, print, print_as_is};
-use crate::{disk, store::StoreError};
+use crate::{disk, store::files};
 
 /// Print a completion script for a shell.
 #[derive(Args)]
@@ -43,7 +40,7 @@ impl ManPages {
     pub(super) fn run(self) -> Result<(), CliError> {
         let mut program = Cli::command();
         program.build();
-        disk::make_folder(&self.folder).map_err(|error| unwritable(&self.folder, &error))?;
+        disk::make_folder(&self.folder).map_err(files::at(&self.folder))?;
         let count = write(&program, "gs-chroma", &self.folder)?;
         print(format_args!(
             "wrote {count} man pages to {}",
@@ -55,13 +52,12 @@ impl ManPages {
 /// Writes the page of a command and those of its subcommands; how many.
 fn write(command: &Command, name: &str, folder: &Path) -> Result<usize, CliError> {
     let path = folder.join(format!("{name}.1"));
-    let failed = |error: std::io::Error| unwritable(&path, &error);
     let mut page = Vec::new();
     let named = command.clone().name(name.to_owned());
-    Man::new(named).render(&mut page).map_err(failed)?;
-    let mut file = disk::create(&path).map_err(failed)?;
-    file.write_all(&page).map_err(failed)?;
-    file.persist(&path).map_err(failed)?;
+    Man::new(named)
+        .render(&mut page)
+        .map_err(files::at(&path))?;
+    files::write(&path, &page)?;
     let others = command
         .get_subcommands()
         .filter(|other| other.get_name() != "help");
@@ -69,8 +65,4 @@ fn write(command: &Command, name: &str, folder: &Path) -> Result<usize, CliError
         .map(|other| write(other, &format!("{name}-{}", other.get_name()), folder))
         .sum::<Result<usize, CliError>>()
         .map(|pages| pages + 1)
-}
-
-fn unwritable(path: &Path, error: &std::io::Error) -> CliError {
-    CliError::Store(StoreError::file(path, error.to_string()))
 }

@@ -5,7 +5,10 @@ use std::{
     str::FromStr,
 };
 
-use clap::builder::{PathBufValueParser, PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::{
+    builder::{PathBufValueParser, PossibleValue, PossibleValuesParser, TypedValueParser},
+    value_parser,
+};
 use serde::Serialize;
 
 use crate::{run::Preset, store::is_film};
@@ -42,6 +45,11 @@ where
         let chosen = choices.iter().find(|(value, _)| name_of(value) == text);
         chosen.map(|(value, _)| *value).ok_or("no such choice")
     })
+}
+
+/// `on` or `off`.
+pub(super) fn switch() -> impl TypedValueParser<Value = bool> {
+    PossibleValuesParser::new(["on", "off"]).map(|word| word == "on")
 }
 
 /// Extensions of films, pictures, archives, splats and other files, which are no part of a
@@ -96,6 +104,13 @@ where
     let number = text.parse().ok();
     let number = number.filter(|&number: &T| (0.0..=1.0).contains(&number.into()));
     number.ok_or_else(|| "must be a number from 0 to 1".to_owned())
+}
+
+/// Mebibytes, at least one, in bytes.
+pub(super) fn mebibytes() -> impl TypedValueParser<Value = u64> {
+    value_parser!(u32)
+        .range(1..)
+        .map(|mib| u64::from(mib) << 20)
 }
 
 /// Frames a second: numerator and denominator, both positive.

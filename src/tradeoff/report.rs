@@ -199,10 +199,10 @@ fn push_stage(html: &mut String, sweep: &Tradeoff, stage: PointStage) {
 }
 
 /// The program with these arguments, quoted for a POSIX shell.
-pub fn shell_line(arguments: &[String]) -> String {
+pub fn shell_line(arguments: &[impl AsRef<str>]) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:+@%".contains(c);
     let mut line = String::from("gs-chroma");
-    for argument in arguments {
+    for argument in arguments.iter().map(AsRef::as_ref) {
         // In single quotes where the shell would see more than a word.
         line += &match !argument.is_empty() && argument.chars().all(plain) {
             true => format!(" {argument}"),
