@@ -59,11 +59,6 @@ pub(super) fn luminance_to_lightness(y: f64) -> f64 {
     116.0 * compress(y) - 16.0
 }
 
-/// `L*` to relative luminance.
-pub(super) fn lightness_to_luminance(l: f64) -> f64 {
-    expand((l + 16.0) / 116.0)
-}
-
 /// The CIE function f: a cube root with a linear segment below `DELTA³`, where
 /// the root's slope would grow without bound.
 fn compress(t: f64) -> f64 {

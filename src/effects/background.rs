@@ -2,7 +2,10 @@
 
 use glam::DVec3;
 
-use super::shell::{self, Shell};
+use super::{
+    shell::{self, Shell},
+    soundness::median,
+};
 use crate::{
     capture::{Camera, Capture, Photo},
     splats::{Splats, dome::dome},
@@ -221,17 +224,13 @@ impl FarPlaces {
     /// The gray, encoded, 0 to 1, of each place: the median of what photos show there;
     /// `None` unless at least two of them, and two thirds, agree with it.
     fn grays(&self) -> impl Iterator<Item = Option<f32>> {
-        self.grays.iter().map(|grays| agreed(grays.clone()))
+        self.grays.iter().map(|grays| agreed(grays))
     }
 }
 
 /// The median of gray levels that agree.
-fn agreed(mut grays: Vec<f64>) -> Option<f32> {
-    let middle = grays.len() / 2;
-    let median = match grays.len() {
-        0 => return None,
-        _ => *grays.select_nth_unstable_by(middle, f64::total_cmp).1,
-    };
+fn agreed(grays: &[f64]) -> Option<f32> {
+    let median = median(grays.to_vec())?;
     let near = |gray: &&f64| (**gray - median).abs() <= AGREEMENT;
     let agree = grays.iter().filter(near).count();
     (agree >= 2 && 3 * agree >= 2 * grays.len()).then_some((median / 255.0) as f32)

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::tracks::Sample;
+use super::{soundness::median, tracks::Sample};
 use crate::{
     capture::Exposure,
     splats::sh::{basis, coefficient_count},
@@ -38,9 +38,7 @@ pub fn left_out_errors(tracks: &[Vec<Sample>], exposures: &[Exposure]) -> Option
                     (sample.direction, (sample.value - offset) / gain)
                 })
                 .collect();
-            let mut lumas: Vec<f64> = samples.iter().map(|&(_, luma)| luma).collect();
-            lumas.sort_by(f64::total_cmp);
-            let middle = *lumas.get(lumas.len() / 2)?;
+            let middle = median(samples.iter().map(|&(_, luma)| luma).collect())?;
             let near: Vec<_> = (samples.into_iter())
                 .filter(|&(_, luma)| (luma - middle).abs() < OUTLIER)
                 .collect();

@@ -2,7 +2,7 @@
 
 use std::iter;
 
-use super::tracks::Sample;
+use super::{soundness::median, tracks::Sample};
 use crate::capture::{Exposure, View};
 
 /// Alternations between the points' lumas and the views' exposures. Each takes a few
@@ -60,8 +60,9 @@ pub fn find_exposures(tracks: &[Vec<Sample>], views: usize, train: &[usize]) -> 
         lumas = (tracks.iter())
             .map(|track| luma_of(track, &exposures, scale))
             .collect();
-        let residuals = residuals(tracks, &lumas, &exposures);
-        scale = deviation(&mut residuals.clone());
+        let sizes = with_lumas(tracks, &lumas)
+            .map(|(sample, luma)| residual(sample, luma, &exposures).abs());
+        scale = deviation(sizes.collect());
         exposures = regress(tracks, &lumas, &exposures, scale);
         center(&mut exposures, train);
         if round == 0 {
@@ -75,13 +76,11 @@ pub fn find_exposures(tracks: &[Vec<Sample>], views: usize, train: &[usize]) -> 
     }
     // Of each view its samples, and the squares of how far they are moved.
     let mut sums = vec![[0.0; 2]; views];
-    for (track, &luma) in tracks.iter().zip(&lumas) {
-        for sample in track {
-            let Exposure { gain, offset } = exposures[sample.view];
-            let [count, squares] = &mut sums[sample.view];
-            *count += 1.0;
-            *squares += ((gain - 1.0) * luma + offset).powi(2);
-        }
+    for (sample, luma) in with_lumas(tracks, &lumas) {
+        let Exposure { gain, offset } = exposures[sample.view];
+        let [count, squares] = &mut sums[sample.view];
+        *count += 1.0;
+        *squares += ((gain - 1.0) * luma + offset).powi(2);
     }
     let (mut moved, mut expected, mut counted) = (0.0, 0.0, 0.0);
     for &view in train {
@@ -93,13 +92,7 @@ pub fn find_exposures(tracks: &[Vec<Sample>], views: usize, train: &[usize]) -> 
             counted += 1.0;
         }
     }
-    let mean_root = |sum: f64| {
-        if counted > 0.0 {
-            (sum / counted).sqrt()
-        } else {
-            0.0
-        }
-    };
+    let mean_root = |sum: f64| (sum / f64::max(counted, 1.0)).sqrt();
     Exposures {
         views: exposures,
         local,
@@ -164,11 +157,6 @@ fn drifts(tracks: &[Vec<Sample>], lumas: &[f64], exposures: &[Exposure], train: 
     mean(near) < DRIFT * mean(pairs(&mut train.iter().copied()))
 }
 
-/// What a view that shows `luma` shows of the scene.
-fn of_scene(sample: &Sample, exposure: Exposure) -> f64 {
-    (sample.value - exposure.offset) / exposure.gain
-}
-
 /// A residual's weight.
 fn weight(residual: f64, scale: f64) -> f64 {
     (HUBER * scale / residual.abs()).min(1.0)
@@ -177,7 +165,10 @@ fn weight(residual: f64, scale: f64) -> f64 {
 /// The luma about which a point's views agree best: their median, then a weighted mean.
 fn luma_of(track: &[Sample], exposures: &[Exposure], scale: f64) -> f64 {
     let mut lumas: Vec<f64> = (track.iter())
-        .map(|sample| of_scene(sample, exposures[sample.view]))
+        .map(|sample| {
+            let Exposure { gain, offset } = exposures[sample.view];
+            (sample.value - offset) / gain
+        })
         .collect();
     lumas.sort_by(f64::total_cmp);
     let middle = lumas[lumas.len() / 2];
@@ -193,29 +184,25 @@ fn luma_of(track: &[Sample], exposures: &[Exposure], scale: f64) -> f64 {
     sum / weights
 }
 
-fn residuals(tracks: &[Vec<Sample>], lumas: &[f64], exposures: &[Exposure]) -> Vec<f64> {
-    (tracks.iter().zip(lumas))
-        .flat_map(|(track, &luma)| {
-            (track.iter()).map(move |sample| {
-                let Exposure { gain, offset } = exposures[sample.view];
-                sample.value - gain * luma - offset
-            })
-        })
-        .collect()
+/// All samples with the lumas of their points.
+fn with_lumas<'a>(
+    tracks: &'a [Vec<Sample>],
+    lumas: &'a [f64],
+) -> impl Iterator<Item = (&'a Sample, f64)> {
+    let points = tracks.iter().zip(lumas);
+    points.flat_map(|(track, &luma)| track.iter().map(move |sample| (sample, luma)))
+}
+
+/// How far a sample is from what its view is to show of a luma.
+fn residual(sample: &Sample, luma: f64, exposures: &[Exposure]) -> f64 {
+    let Exposure { gain, offset } = exposures[sample.view];
+    sample.value - gain * luma - offset
 }
 
 /// A robust standard deviation: 1.4826 times the median of the sizes.
-fn deviation(residuals: &mut [f64]) -> f64 {
-    if residuals.is_empty() {
-        return 0.0;
-    }
-    for residual in residuals.iter_mut() {
-        *residual = residual.abs();
-    }
-    let middle = residuals.len() / 2;
-    let (_, median, _) = residuals.select_nth_unstable_by(middle, f64::total_cmp);
+fn deviation(sizes: Vec<f64>) -> f64 {
     // Photos in 256 levels are no more certain than this.
-    (1.4826 * *median).max(0.3 / 255.0)
+    median(sizes).map_or(0.0, |median| (1.4826 * median).max(0.3 / 255.0))
 }
 
 /// Each view's weighted regression of what it shows on the points' lumas.
@@ -227,15 +214,12 @@ fn regress(
 ) -> Vec<Exposure> {
     // Weight, luma, shown, luma², luma·shown.
     let mut sums = vec![[0.0; 5]; exposures.len()];
-    for (track, &luma) in tracks.iter().zip(lumas) {
-        for sample in track {
-            let Exposure { gain, offset } = exposures[sample.view];
-            let weight = weight(sample.value - gain * luma - offset, scale);
-            let shown = sample.value;
-            let terms = [1.0, luma, shown, luma * luma, luma * shown];
-            for (sum, term) in sums[sample.view].iter_mut().zip(terms) {
-                *sum += weight * term;
-            }
+    for (sample, luma) in with_lumas(tracks, lumas) {
+        let weight = weight(residual(sample, luma, exposures), scale);
+        let shown = sample.value;
+        let terms = [1.0, luma, shown, luma * luma, luma * shown];
+        for (sum, term) in sums[sample.view].iter_mut().zip(terms) {
+            *sum += weight * term;
         }
     }
     let mean_luma = lumas.iter().sum::<f64>() / lumas.len().max(1) as f64;
@@ -263,17 +247,17 @@ fn regress(
 /// Brings the training views' medians to none: the scene is as bright as the typical photo
 /// shows it, whatever a few others do.
 fn center(exposures: &mut [Exposure], train: &[usize]) {
-    let median = |value: fn(&Exposure) -> f64, exposures: &[Exposure]| {
+    let middle = |value: fn(&Exposure) -> f64, exposures: &[Exposure]| {
         let mut values: Vec<f64> = train.iter().map(|&v| value(&exposures[v])).collect();
         values.sort_by(f64::total_cmp);
         let (low, high) = (values.len().checked_sub(1)? / 2, values.len() / 2);
         Some((values[low] + values[high]) / 2.0)
     };
-    let gain = median(|exposure| exposure.gain, exposures).unwrap_or(1.0);
+    let gain = middle(|exposure| exposure.gain, exposures).unwrap_or(1.0);
     for exposure in exposures.iter_mut() {
         exposure.gain /= gain;
     }
-    let offset = median(|exposure| exposure.offset, exposures).unwrap_or(0.0);
+    let offset = middle(|exposure| exposure.offset, exposures).unwrap_or(0.0);
     for exposure in exposures {
         exposure.offset -= offset;
     }

@@ -126,16 +126,13 @@ impl Effect {
     fn sure_from(self) -> Option<f64> {
         match self {
             Self::Exposure => Some(8.0),
-            // On the smaller photos of a trial a pixel is larger, and so is what this gains: 0.5 dB
-            // where a whole run lost 0.15.
-            Self::Antialias => None,
             Self::Background => Some(10.0),
-            // Only long runs learn it: trials said -0.06 to 0.04 dB of what gained up to 0.14.
-            Self::LumaDegree => None,
-            // What is far off is told from what is not learned yet in long runs only, and a
-            // wrong decision costs 0.05 dB (docs/lab/12-effects.md).
-            Self::Robust => None,
-            Self::Lens | Self::Masks | Self::TeacherCorrection | Self::ChromaDegree => None,
+            // Antialiasing: on the smaller photos of a trial a pixel is larger, and so is what it
+            // gains: 0.5 dB where a whole run lost 0.15. Harmonics: only long runs learn them:
+            // trials said -0.06 to 0.04 dB of what gained up to 0.14. Outliers: what is far off is
+            // told from what is not learned yet in long runs only, and a wrong decision costs
+            // 0.05 dB (docs/lab/12-effects.md).
+            _ => None,
         }
     }
 
@@ -203,13 +200,31 @@ impl Decision {
     /// What follows from a trial, which is asked only where the evidence says yes.
     fn after(self, trials: &Trials) -> Self {
         match trials.get(&self.effect).copied() {
-            Some(gain) => Self {
-                on: gain >= self.effect.trial_gain(),
-                decided_by: Decider::Trial,
-                trial: Some(gain),
-                ..self
-            },
+            Some(gain) => {
+                let on = gain >= self.effect.trial_gain();
+                Self {
+                    trial: Some(gain),
+                    ..self.by(Decider::Trial, on)
+                }
+            }
             None => self,
+        }
+    }
+
+    /// The same after someone else decided.
+    fn by(self, decided_by: Decider, on: bool) -> Self {
+        Self {
+            on,
+            decided_by,
+            ..self
+        }
+    }
+
+    /// The same after the user has had a say.
+    fn overruled(self, overrules: &Overrules) -> Self {
+        match overrules.choice(self.effect) {
+            Choice::Auto => self,
+            choice => self.by(Decider::User, choice == Choice::On),
         }
     }
 }
@@ -306,7 +321,7 @@ impl Evidence {
             let evidence = (!self.samples.is_empty()).then_some(255.0 * found.spread);
             let noise = EXPOSURE_OVER_NOISE * 255.0 * found.noise;
             let decision = Decision::new(Effect::Exposure, evidence, EXPOSURE_LEVELS.max(noise));
-            overruled(decision.after(trials), overrules)
+            decision.after(trials).overruled(overrules)
         };
         if exposure.decided_by == Decider::Trial && !exposure.on {
             // What points show differently then has another reason.
@@ -317,11 +332,7 @@ impl Evidence {
             let percent = evidence.map(|share| 100.0 * share);
             let decision = Decision::new(Effect::Robust, percent, 100.0 * OUTLIER_SHARE);
             match decision.on && room.iterations < ROBUST_ITERATIONS {
-                true => Decision {
-                    on: false,
-                    decided_by: Decider::Preset,
-                    ..decision
-                },
+                true => decision.by(Decider::Preset, false),
                 false => decision,
             }
         };
@@ -331,40 +342,22 @@ impl Evidence {
         let (degree, sh_degree) = degree(&self.samples, &found.views, room, overrules);
         let lens = Decision::new(Effect::Lens, Some(self.distortion), IMPERCEPTIBLE);
         let masks = Decision::new(Effect::Masks, self.masked, 0.0);
-        let decisions = vec![
-            overruled(lens, overrules),
-            overruled(masks, overrules),
-            exposure,
-            overruled(robust, overrules),
-            overruled(antialias, overrules),
-            overruled(background.after(trials), overrules),
-            degree,
-        ];
-        let exposures = match decisions
-            .iter()
-            .any(|d| d.effect == Effect::Exposure && d.on)
-        {
-            true => found.local,
-            false => vec![Exposure::NONE; self.exposures.views.len()],
-        };
         Plan {
-            decisions,
-            exposures,
+            exposures: match exposure.on {
+                true => found.local,
+                false => vec![Exposure::NONE; self.exposures.views.len()],
+            },
+            decisions: vec![
+                lens.overruled(overrules),
+                masks.overruled(overrules),
+                exposure,
+                robust.overruled(overrules),
+                antialias.overruled(overrules),
+                background.after(trials).overruled(overrules),
+                degree,
+            ],
             sh_degree,
         }
-    }
-}
-
-/// A decision after the user has had a say.
-fn overruled(decision: Decision, overrules: &Overrules) -> Decision {
-    let on = match overrules.choice(decision.effect) {
-        Choice::Auto => return decision,
-        choice => choice == Choice::On,
-    };
-    Decision {
-        on,
-        decided_by: Decider::User,
-        ..decision
     }
 }
 
@@ -402,12 +395,7 @@ fn degree(
         (_, Choice::Auto, Some(wanted)) if wanted <= room => (wanted, decision.decided_by),
         _ => (room, Decider::Preset),
     };
-    let decision = Decision {
-        on: degree > 0,
-        decided_by,
-        ..decision
-    };
-    (decision, degree)
+    (decision.by(decided_by, degree > 0), degree)
 }
 
 #[cfg(test)]

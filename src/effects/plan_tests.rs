@@ -100,7 +100,7 @@ fn a_trial_decides_where_the_evidence_is_in_doubt() {
         with: vec![Effect::Exposure],
         ..Overrules::default()
     };
-    assert!(!needs(overruled(exposure(5.0), &asked)));
+    assert!(!needs(exposure(5.0).overruled(&asked)));
     let tried = |gain| Trials::from([(Effect::Exposure, gain)]);
     for (gain, on) in [
         (0.31, true),

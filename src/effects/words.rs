@@ -18,31 +18,18 @@ impl Effect {
     /// What was found, and what would have to be.
     fn found(self, figure: f64, threshold: f64) -> String {
         let (x, least) = (number(figure), number(threshold));
-        match self {
-            Self::Lens => format!("the lens moves pixels by {x}; {least} would be visible"),
-            Self::Masks => format!("{x} % of the pixels are masked"),
-            Self::Exposure => {
-                format!("photos differ by {x} gray levels; {least} would be visible")
-            }
-            Self::Robust => {
-                format!("{x} % of places differ in one photo; {least} would matter")
-            }
-            Self::Antialias => {
-                format!("near views are {x} times finer; {least} would matter")
-            }
-            Self::Background => {
-                format!("{x} % of the photos lie far behind; {least} would matter")
-            }
-            Self::LumaDegree => {
-                format!("direction changes {x} gray levels; {least} would matter")
-            }
-            Self::TeacherCorrection => {
-                format!("views differ by {x} CIELAB units; {least} would be visible")
-            }
-            Self::ChromaDegree => {
-                format!("views held back gain {x} %; {least} would be worth it")
-            }
-        }
+        let (found, count) = match self {
+            Self::Lens => (format!("the lens moves pixels by {x}"), "be visible"),
+            Self::Masks => return format!("{x} % of the pixels are masked"),
+            Self::Exposure => (format!("photos differ by {x} gray levels"), "be visible"),
+            Self::Robust => (format!("{x} % of places differ in one photo"), "matter"),
+            Self::Antialias => (format!("near views are {x} times finer"), "matter"),
+            Self::Background => (format!("{x} % of the photos lie far behind"), "matter"),
+            Self::LumaDegree => (format!("direction changes {x} gray levels"), "matter"),
+            Self::TeacherCorrection => (format!("views differ by {x} CIELAB units"), "be visible"),
+            Self::ChromaDegree => (format!("views held back gain {x} %"), "be worth it"),
+        };
+        format!("{found}; {least} would {count}")
     }
 
     /// What there is to say where there is no figure.

@@ -4,7 +4,7 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-use crate::raster::{AdamSteps, RasterNumerics, Storage};
+use crate::raster::RasterNumerics;
 
 /// How accurately stage 1 computes while it trains. What is measured, drawn and written
 /// afterwards is computed with the default, as viewers do.
@@ -73,22 +73,15 @@ impl FromStr for Numerics {
                     "alpha-min" => raster.alpha_min = number(value, 1e-5, 0.1)?,
                     "transmittance-min" => raster.transmittance_min = number(value, 0.0, 0.5)?,
                     "depth-bits" => {
-                        raster.depth_bits = one_of(value, [("32", 32), ("24", 24), ("16", 16)])?
+                        let named = |bits: &u32| bits.to_string() == value.trim();
+                        raster.depth_bits = [32, 24, 16].into_iter().find(named)?;
                     }
-                    "storage" => {
-                        raster.storage =
-                            one_of(value, [("full", Storage::Full), ("half", Storage::Half)])?;
-                    }
+                    "storage" => raster.storage = serde_plain::from_str(value.trim()).ok()?,
                     "ssim-window" => {
                         numerics.ssim_window =
                             SsimWindow::try_from(value.trim().parse::<u32>().ok()?).ok()?;
                     }
-                    "adam" => {
-                        raster.adam = one_of(
-                            value,
-                            [("exact", AdamSteps::Exact), ("lazy", AdamSteps::Lazy)],
-                        )?;
-                    }
+                    "adam" => raster.adam = serde_plain::from_str(value.trim()).ok()?,
                     _ => return None,
                 }
                 Some(())
@@ -102,11 +95,6 @@ impl FromStr for Numerics {
 fn number(text: &str, low: f64, high: f64) -> Option<f64> {
     let value = text.trim().parse().ok()?;
     (low..=high).contains(&value).then_some(value)
-}
-
-fn one_of<T: Copy, const N: usize>(text: &str, values: [(&str, T); N]) -> Option<T> {
-    let found = values.iter().find(|(name, _)| *name == text.trim())?;
-    Some(found.1)
 }
 
 #[cfg(test)]

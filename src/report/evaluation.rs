@@ -36,21 +36,12 @@ pub enum Method {
 
 impl Method {
     /// Part of the names of its files.
-    pub fn file_stem(self) -> &'static str {
-        match self {
-            Self::Native => "native",
-            Self::Exported => "exported",
-            Self::Teacher => "teacher",
-            Self::RgbSplats => "rgb-splats",
-            Self::ChromadistillPaper => "chromadistill-paper",
-            Self::ChromadistillCode => "chromadistill-code",
-            Self::PerFrame => "per-frame",
-            Self::Photo => "photo",
-        }
+    pub fn file_stem(self) -> String {
+        // An enum without contents: serializing it cannot fail.
+        let name = serde_plain::to_string(&self).unwrap_or_default();
+        name.replace('_', "-")
     }
-}
 
-impl Method {
     /// What its pictures are called, in tables and under pictures.
     pub fn name(self) -> &'static str {
         match self {

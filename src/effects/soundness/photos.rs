@@ -21,7 +21,7 @@ pub(super) fn photos(capture: &Capture) -> (Vec<&str>, Vec<usize>) {
 }
 
 /// The value in the middle, if there is one; not-a-numbers are not allowed.
-pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
+pub(in crate::effects) fn median(mut values: Vec<f64>) -> Option<f64> {
     let middle = values.len() / 2;
     (middle < values.len()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
