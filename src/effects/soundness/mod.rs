@@ -17,8 +17,8 @@ pub use colors::{Agreement, PointColors};
 pub use contradiction::{Cause, Contradiction, Contradictory};
 pub use coverage::{FEW_POINTS, Unseeing};
 pub use doubts::{Levels, doubts};
-pub(super) use photos::median;
 pub(crate) use photos::listed;
+pub(super) use photos::median;
 pub use reprojection::{Reprojection, observe_where_projected};
 
 #[cfg(test)]
