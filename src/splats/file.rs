@@ -54,7 +54,7 @@ pub fn read_splats(path: &Path) -> Result<ReadSplats, SplatError> {
         Some(Format::Spz) => spz::read(path, &bytes()?),
         Some(Format::Sog) => sog::read(path, &bytes()?),
         // Which of the two it is its header tells.
-        _ => Ok(ply::read_ply(path)?),
+        _ => ply::read_ply(path),
     }
 }
 

@@ -34,7 +34,7 @@ const POINTS: u32 = 0;
 /// The bytes of a file.
 ///
 /// # Errors
-/// [`SplatError::TooMany`] where it would have more than 4 GiB.
+/// [`SplatError::NotWritten`] where it would have more than 4 GiB.
 pub(super) fn encode(
     path: &Path,
     splats: &Splats,
@@ -100,7 +100,7 @@ pub(super) fn encode(
     let mut text = json.to_string().into_bytes();
     text.resize(text.len().next_multiple_of(4), b' ');
     let length = 12 + 8 + text.len() + 8 + parts.bytes.len();
-    let too_many = |_| SplatError::TooMany {
+    let too_many = |_| SplatError::NotWritten {
         path: path.to_owned(),
         reason: format!("{length} bytes are more than a .glb can have; write a .sog or a .spz"),
     };

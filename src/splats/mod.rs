@@ -25,7 +25,7 @@ pub use file::{is_splat_file, read_splats, write_splats};
 pub use format::Format;
 pub use init::{InitialPoint, initial_splats};
 pub use neighbors::{nearest_neighbor_distances, nearest_neighbors};
-pub use ply::{PlyError, read_ply, write_ply};
+pub use ply::{read_ply, write_ply};
 pub use sh::ShField;
 pub use shared::{ReadSplats, WriteOptions};
 

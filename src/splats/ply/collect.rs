@@ -2,16 +2,20 @@
 
 use super::header::VertexLayout;
 use super::{CHANNELS, FILTER, ReadSplats, SHAPE, sh_position};
+use crate::splats::shared::Gathered;
+use crate::splats::opacity;
 use crate::splats::quantize::{FLAT, OPAQUE, logit};
 use crate::splats::sh::{C0, coefficient_count};
-use crate::splats::shared::MIN_QUATERNION_NORM;
-use crate::splats::{Splats, opacity};
 
 /// Sorts the numbers of each Gaussian into the arrays.
 pub(super) struct Collector {
-    read: ReadSplats,
+    gathered: Gathered,
+    /// A line about the filter, where there is one.
+    notes: Vec<String>,
     /// For each coefficient of the field its place among the SH properties.
     sh_positions: Vec<usize>,
+    /// The coefficients of the Gaussian at hand.
+    ordered: Vec<f32>,
     byte_colors: bool,
     /// Scales of a Gaussian that a filter widens.
     axes: usize,
@@ -24,15 +28,13 @@ impl Collector {
             .flat_map(|k| (0..CHANNELS).map(move |channel| sh_position(degree, k, channel)))
             .collect();
         Self {
-            read: ReadSplats {
-                splats: Splats::with_capacity(count, degree, CHANNELS),
-                notes: (layout.filtered())
-                    .then(|| format!("{FILTER} is put into scales and opacities"))
-                    .into_iter()
-                    .collect(),
-                ..ReadSplats::default()
-            },
+            gathered: Gathered::new(count, degree),
+            notes: (layout.filtered())
+                .then(|| format!("{FILTER} is put into scales and opacities"))
+                .into_iter()
+                .collect(),
             sh_positions,
+            ordered: Vec::new(),
             byte_colors: layout.byte_colors,
             axes: if layout.columns.contains(&None) { 2 } else { 3 },
         }
@@ -60,28 +62,23 @@ impl Collector {
                 *color = ((f64::from(*color) / 255.0 - 0.5) / C0) as f32;
             }
         }
-        let quaternion = [shape[4], shape[5], shape[6], shape[7]];
-        let norm = quaternion
-            .iter()
-            .map(|&q| f64::from(q).powi(2))
-            .sum::<f64>()
-            .sqrt();
-        let finite = |values: &[f32]| values.iter().all(|value| value.is_finite());
-        if !(finite(center) && finite(sh) && finite(shape)) || norm < MIN_QUATERNION_NORM {
-            self.read.skipped += 1;
-            return;
-        }
-        let splats = &mut self.read.splats;
-        splats.means.push([center[0], center[1], center[2]]);
-        splats.opacity_logits.push(shape[0]);
-        splats.log_scales.push([shape[1], shape[2], shape[3]]);
-        splats.quats.push(quaternion);
+        self.ordered.clear();
         let coefficients = self.sh_positions.iter().map(|&position| sh[position]);
-        splats.sh.coefficients.extend(coefficients);
+        self.ordered.extend(coefficients);
+        self.gathered.push(
+            [center[0], center[1], center[2]],
+            [shape[4], shape[5], shape[6], shape[7]],
+            [shape[1], shape[2], shape[3]],
+            shape[0],
+            &self.ordered,
+        );
     }
 
     pub fn finish(self) -> ReadSplats {
-        self.read
+        ReadSplats {
+            notes: self.notes,
+            ..self.gathered.finish()
+        }
     }
 }
 

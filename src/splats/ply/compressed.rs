@@ -18,8 +18,8 @@
 //! Source: the writer and the reader of <https://github.com/playcanvas/splat-transform>.
 
 use super::{
-    CHANNELS, PlyError, ReadSplats, degree_of_rest_count,
-    header::{byte_size, decode, is_antialiased, offset},
+    CHANNELS, ReadSplats, SplatError, degree_of_rest_count,
+    header::{HEADER, byte_size, decode, is_antialiased, offset},
     rest_count, sh_position,
 };
 use crate::input::excerpt;
@@ -32,6 +32,7 @@ use crate::splats::{
     shared::{Gathered, Judge},
 };
 use ply_rs_bw::ply::{ElementDef, Encoding, Header, PropertyType, ScalarType};
+use std::collections::HashMap;
 use std::io::BufRead;
 use std::path::Path;
 
@@ -85,45 +86,42 @@ pub(super) fn is_compressed(header: &Header) -> bool {
 /// Reads what follows the header.
 ///
 /// # Errors
-/// [`PlyError`] where a property is missing or the file is shorter than its header says.
+/// [`SplatError`] where a property is missing or the file is shorter than its header says.
 pub(super) fn read(
     path: &Path,
     header: &Header,
     file: &mut impl BufRead,
-) -> Result<ReadSplats, PlyError> {
+) -> Result<ReadSplats, SplatError> {
     let mut bytes = Vec::new();
-    file.read_to_end(&mut bytes).map_err(PlyError::io(path))?;
+    file.read_to_end(&mut bytes).map_err(SplatError::io(path))?;
     let mut rest = &bytes[..];
     let mut tables = Vec::new();
     for element in header.elements.values() {
         tables.push(Table::cut(path, header.encoding, element, &mut rest)?);
     }
     let table = |name: &str| tables.iter().find(|table| table.element.name == name);
-    let missing = |property: &str| PlyError::MissingProperty {
-        path: path.to_owned(),
-        property: property.to_owned(),
-    };
+    let missing = |property: &str| SplatError::missing(path, property);
     let chunks = table("chunk").ok_or_else(|| missing(BOUNDS[0]))?;
     let vertices = table("vertex").ok_or_else(|| missing(PACKED[0]))?;
     if chunks.element.count < vertices.element.count.div_ceil(CHUNK) {
         return Err(chunks.truncated());
     }
-    let packed: Vec<Column> = (PACKED.iter())
+    let packed: Vec<&Column> = (PACKED.iter())
         .map(|name| vertices.column(name))
         .collect::<Result<_, _>>()?;
     // Old files have no bounds of colors: these lie in [0, 1].
     let has_colors = chunks.element.properties.contains_key(BOUNDS[12]);
-    let bounds: Vec<Column> = (BOUNDS[..if has_colors { 18 } else { 12 }].iter())
+    let bounds: Vec<&Column> = (BOUNDS[..if has_colors { 18 } else { 12 }].iter())
         .map(|name| chunks.column(name))
         .collect::<Result<_, _>>()?;
 
     let harmonics = table("sh");
     let rest_columns = harmonics.map_or(0, |table| table.element.properties.len());
-    let degree = degree_of_rest_count(rest_columns).ok_or_else(|| PlyError::RestCount {
+    let degree = degree_of_rest_count(rest_columns).ok_or_else(|| SplatError::RestCount {
         path: path.to_owned(),
         count: rest_columns,
     })?;
-    let rest_columns: Vec<Column> = match harmonics {
+    let rest_columns: Vec<&Column> = match harmonics {
         Some(table) if table.element.count < vertices.element.count => {
             return Err(table.truncated());
         }
@@ -143,7 +141,7 @@ pub(super) fn read(
             }
         }
         let [place, turn, size, color] =
-            [0, 1, 2, 3].map(|k| vertices.number(index, &packed[k]) as u32);
+            [0, 1, 2, 3].map(|k| vertices.number(index, packed[k]) as u32);
         let place = unpack(place, PLACE_BITS, &low_high[..6]);
         let size = unpack(size, PLACE_BITS, &low_high[6..12]);
         let shown = unpack(color >> 8, [8; 3], &low_high[12..]);
@@ -152,7 +150,7 @@ pub(super) fn read(
         }
         for (k, terms) in (1..coefficient_count(degree)).map(|k| (k, k * CHANNELS)) {
             for channel in 0..CHANNELS {
-                let column = &rest_columns[sh_position(degree, k, channel) - CHANNELS];
+                let column = rest_columns[sh_position(degree, k, channel) - CHANNELS];
                 let byte = harmonics.map_or(0.0, |table| table.number(index, column));
                 coefficients[terms + channel] = of_sh_byte(byte);
             }
@@ -181,6 +179,7 @@ struct Table<'a> {
     path: &'a Path,
     element: &'a ElementDef,
     big_endian: bool,
+    columns: HashMap<&'a str, Column>,
     stride: usize,
     bytes: &'a [u8],
 }
@@ -198,60 +197,42 @@ impl<'a> Table<'a> {
         encoding: Encoding,
         element: &'a ElementDef,
         rest: &mut &'a [u8],
-    ) -> Result<Self, PlyError> {
-        let header = |reason: String| PlyError::Header {
-            path: path.to_owned(),
-            reason,
-        };
+    ) -> Result<Self, SplatError> {
+        let header = |reason: String| SplatError::damaged(path, HEADER, reason);
         if encoding == Encoding::Ascii {
             return Err(header("a compressed file is never text".to_owned()));
         }
-        let mut stride = 0;
+        let (mut columns, mut stride) = (HashMap::new(), 0);
         for property in element.properties.values() {
             let PropertyType::Scalar(kind) = &property.data_type else {
                 let name = excerpt(&property.name);
                 return Err(header(format!("property \"{name}\" is a list")));
             };
-            stride += byte_size(kind);
+            let (at, kind) = (stride, kind.clone());
+            stride += byte_size(&kind);
+            columns.insert(&*property.name, Column { at, kind });
         }
-        let table = Self {
+        let length = element.count.checked_mul(stride);
+        let cut = length.and_then(|length| rest.split_at_checked(length));
+        let (bytes, behind) = cut.ok_or_else(|| SplatError::truncated(path, element))?;
+        *rest = behind;
+        Ok(Self {
             path,
             element,
             big_endian: encoding == Encoding::BinaryBigEndian,
+            columns,
             stride,
-            bytes: rest,
-        };
-        let length = element.count.checked_mul(stride);
-        let cut = length.and_then(|length| rest.split_at_checked(length));
-        let (bytes, behind) = cut.ok_or_else(|| table.truncated())?;
-        *rest = behind;
-        Ok(Self { bytes, ..table })
-    }
-
-    fn truncated(&self) -> PlyError {
-        PlyError::Truncated {
-            path: self.path.to_owned(),
-            element: excerpt(&self.element.name).into_owned(),
-            announced: self.element.count,
-        }
-    }
-
-    fn column(&self, name: &str) -> Result<Column, PlyError> {
-        let mut at = 0;
-        for property in self.element.properties.values() {
-            let PropertyType::Scalar(kind) = &property.data_type else {
-                continue;
-            };
-            if property.name == name {
-                let kind = kind.clone();
-                return Ok(Column { at, kind });
-            }
-            at += byte_size(kind);
-        }
-        Err(PlyError::MissingProperty {
-            path: self.path.to_owned(),
-            property: name.to_owned(),
+            bytes,
         })
+    }
+
+    fn truncated(&self) -> SplatError {
+        SplatError::truncated(self.path, self.element)
+    }
+
+    fn column(&self, name: &str) -> Result<&Column, SplatError> {
+        let missing = || SplatError::missing(self.path, name);
+        self.columns.get(name).ok_or_else(missing)
     }
 
     fn number(&self, row: usize, column: &Column) -> f64 {

@@ -1,12 +1,17 @@
 //! The header of a PLY file and where its numbers lie.
 
-use super::{CENTER, FILTER, OFFSET, PlyError, SHAPE, THIRD_SCALE, degree_of_rest_count, sh_names};
+use super::{
+    CENTER, FILTER, OFFSET, SHAPE, SplatError, THIRD_SCALE, degree_of_rest_count, sh_names,
+};
 use crate::input::excerpt;
 use glam::DVec3;
 use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{DefaultElement, ElementDef, Encoding, Header, PropertyType, ScalarType};
 use std::io::{BufRead, Read};
 use std::path::Path;
+
+/// The part of a file that is damaged where this one does not read it.
+pub(super) const HEADER: &str = "not a readable PLY header";
 
 /// Longest header that is read. A splat header takes 2 KiB; a file without
 /// `end_header` must not be read to its end.
@@ -42,17 +47,14 @@ pub(super) struct VertexLayout {
 ///
 /// The header is cut out before it is parsed so that its length is bounded and
 /// comments in any text encoding do no harm.
-pub(super) fn read_header(path: &Path, file: &mut impl BufRead) -> Result<Header, PlyError> {
-    let wrong = |reason: String| PlyError::Header {
-        path: path.to_path_buf(),
-        reason,
-    };
+pub(super) fn read_header(path: &Path, file: &mut impl BufRead) -> Result<Header, SplatError> {
+    let wrong = |reason: String| SplatError::damaged(path, HEADER, reason);
     let mut bytes = Vec::new();
     let mut limited = file.take(MAX_HEADER_BYTES);
     loop {
         let start = bytes.len();
         let read = limited.read_until(b'\n', &mut bytes);
-        read.map_err(PlyError::io(path))?;
+        read.map_err(SplatError::io(path))?;
         let line = bytes[start..].trim_ascii();
         if start == 0 && line != b"ply" {
             return Err(wrong("the first line is not \"ply\"".into()));
@@ -123,29 +125,30 @@ pub(super) fn offset(comments: &[String]) -> DVec3 {
 
 impl VertexLayout {
     /// Finds the properties of a Gaussian among those of the vertex element.
-    pub fn new(path: &Path, vertex: &ElementDef, encoding: Encoding) -> Result<Self, PlyError> {
+    pub fn new(path: &Path, vertex: &ElementDef, encoding: Encoding) -> Result<Self, SplatError> {
         let properties = &vertex.properties;
         let types = properties
             .values()
             .map(|property| match &property.data_type {
                 PropertyType::Scalar(scalar) => Ok(scalar.clone()),
-                PropertyType::List(..) => Err(PlyError::Header {
-                    path: path.to_path_buf(),
-                    reason: format!("vertex property \"{}\" is a list", excerpt(&property.name)),
-                }),
+                PropertyType::List(..) => {
+                    let name = excerpt(&property.name);
+                    let reason = format!("vertex property \"{name}\" is a list");
+                    Err(SplatError::damaged(path, HEADER, reason))
+                }
             });
         let types: Vec<_> = types.collect::<Result<_, _>>()?;
 
         let is_rest = |name: &&String| name.starts_with("f_rest_");
         let count = properties.keys().filter(is_rest).count();
-        let degree = degree_of_rest_count(count).ok_or_else(|| PlyError::RestCount {
+        let degree = degree_of_rest_count(count).ok_or_else(|| SplatError::RestCount {
             path: path.to_path_buf(),
             count,
         })?;
 
         let has = |name: &str| properties.contains_key(name);
         if has(CENTER[0]) && !(SHAPE[..2].iter().any(|name| has(name)) || has("f_dc_0")) {
-            return Err(PlyError::PointCloud {
+            return Err(SplatError::PointCloud {
                 path: path.to_path_buf(),
             });
         }
@@ -164,10 +167,7 @@ impl VertexLayout {
         let names = names.chain(SHAPE.into_iter().map(String::from));
         let names = names.chain(has(FILTER).then(|| FILTER.to_owned()));
         let columns = names.map(|property| match properties.get_index_of(&property) {
-            None if property != THIRD_SCALE => Err(PlyError::MissingProperty {
-                path: path.to_path_buf(),
-                property,
-            }),
+            None if property != THIRD_SCALE => Err(SplatError::missing(path, &property)),
             column => Ok(column),
         });
         let columns: Vec<Option<usize>> = columns.collect::<Result<_, _>>()?;
@@ -186,7 +186,7 @@ impl VertexLayout {
             !is_float(kind) && (place >= CENTER.len() || *kind == ScalarType::UShort)
         });
         if let Some((_, column)) = integers.next().filter(|_| !half) {
-            return Err(PlyError::Integer {
+            return Err(SplatError::Integer {
                 path: path.to_path_buf(),
                 property: properties[column].name.clone(),
             });

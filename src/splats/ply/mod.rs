@@ -12,12 +12,10 @@
 
 mod collect;
 mod compressed;
-mod error;
 mod header;
 mod read;
 mod write;
 
-pub use error::PlyError;
 pub use read::read_ply;
 pub use write::write_ply;
 
@@ -27,7 +25,7 @@ pub(super) use compressed::encode as encode_compressed;
 pub(super) use write::check;
 
 use super::{
-    ReadSplats,
+    ReadSplats, SplatError,
     sh::{MAX_DEGREE, coefficient_count},
     shared::CHANNELS,
 };

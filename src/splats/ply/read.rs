@@ -2,7 +2,7 @@
 
 use super::collect::Collector;
 use super::header::{VertexLayout, byte_size, decode, is_antialiased, offset, read_header};
-use super::{PlyError, ReadSplats, compressed};
+use super::{ReadSplats, SplatError, compressed};
 use crate::input::{self, excerpt};
 use ply_rs_bw::ply::{ElementDef, Encoding, PropertyType, ScalarType};
 use std::fs::File;
@@ -19,12 +19,12 @@ const CHUNK_BYTES: usize = 1 << 20;
 /// f32. Gaussians of two scales are flat; `red green blue` of 8 bits stand for `f_dc_0..2`.
 ///
 /// # Errors
-/// A [`PlyError`] where the header is damaged or longer than 64 KiB, a property
+/// A [`SplatError`] where the header is damaged or longer than 64 KiB, a property
 /// is missing, the number of `f_rest_*` fits no degree, or the file is shorter
 /// than its header says (found out before memory is taken for it).
-pub fn read_ply(path: &Path) -> Result<ReadSplats, PlyError> {
-    let file = input::open(path).map_err(PlyError::io(path))?;
-    let file_bytes = file.metadata().map_err(PlyError::io(path))?.len();
+pub fn read_ply(path: &Path) -> Result<ReadSplats, SplatError> {
+    let file = input::open(path).map_err(SplatError::io(path))?;
+    let file_bytes = file.metadata().map_err(SplatError::io(path))?.len();
     let mut file = BufReader::with_capacity(CHUNK_BYTES, file);
     let header = read_header(path, &mut file)?;
     if compressed::is_compressed(&header) {
@@ -53,7 +53,7 @@ pub fn read_ply(path: &Path) -> Result<ReadSplats, PlyError> {
         };
         // One byte of grace: the last line of a text file may lack its end.
         if element.count as u128 * min_row_bytes as u128 > u128::from(file_bytes) + 1 {
-            return Err(body.truncated(element));
+            return Err(SplatError::truncated(path, element));
         }
         let read = body.read_vertices(element, &layout)?;
         return Ok(ReadSplats {
@@ -64,10 +64,7 @@ pub fn read_ply(path: &Path) -> Result<ReadSplats, PlyError> {
             ..read
         });
     }
-    Err(PlyError::MissingProperty {
-        path: path.to_path_buf(),
-        property: "x".into(),
-    })
+    Err(SplatError::missing(path, "x"))
 }
 
 /// The numbers after the header.
@@ -79,27 +76,19 @@ struct Body<'a> {
 }
 
 impl Body<'_> {
-    fn truncated(&self, element: &ElementDef) -> PlyError {
-        PlyError::Truncated {
-            path: self.path.to_path_buf(),
-            element: excerpt(&element.name).into_owned(),
-            announced: element.count,
-        }
-    }
-
     /// Names the file, and the element where the file ended too early.
-    fn failed(&self, element: &ElementDef, source: io::Error) -> PlyError {
+    fn failed(&self, element: &ElementDef, source: io::Error) -> SplatError {
         match source.kind() {
-            ErrorKind::UnexpectedEof => self.truncated(element),
-            _ => PlyError::io(self.path)(source),
+            ErrorKind::UnexpectedEof => SplatError::truncated(self.path, element),
+            _ => SplatError::io(self.path)(source),
         }
     }
 
     /// The next line of a text file.
-    fn next_line(&mut self, element: &ElementDef, index: usize) -> Result<&str, PlyError> {
+    fn next_line(&mut self, element: &ElementDef, index: usize) -> Result<&str, SplatError> {
         self.line.clear();
         match self.file.read_line(&mut self.line) {
-            Ok(0) => Err(self.truncated(element)),
+            Ok(0) => Err(SplatError::truncated(self.path, element)),
             Ok(_) => Ok(&self.line),
             Err(error) if error.kind() == ErrorKind::InvalidData => {
                 Err(self.bad_row(element, index))
@@ -108,8 +97,8 @@ impl Body<'_> {
         }
     }
 
-    fn bad_row(&self, element: &ElementDef, index: usize) -> PlyError {
-        PlyError::Row {
+    fn bad_row(&self, element: &ElementDef, index: usize) -> SplatError {
+        SplatError::Row {
             path: self.path.to_path_buf(),
             element: excerpt(&element.name).into_owned(),
             index,
@@ -122,13 +111,13 @@ impl Body<'_> {
     fn surplus<'e>(
         &mut self,
         mut elements: impl Iterator<Item = &'e ElementDef>,
-    ) -> Result<u64, PlyError> {
+    ) -> Result<u64, SplatError> {
         if elements.any(|element| self.skip(element).is_err()) {
             return Ok(0);
         }
         let (mut bytes, mut blank) = (0, true);
         loop {
-            let chunk = self.file.fill_buf().map_err(PlyError::io(self.path))?;
+            let chunk = self.file.fill_buf().map_err(SplatError::io(self.path))?;
             let length = chunk.len();
             if length == 0 {
                 return Ok(if blank { 0 } else { bytes });
@@ -140,7 +129,7 @@ impl Body<'_> {
     }
 
     /// Passes over an element.
-    fn skip(&mut self, element: &ElementDef) -> Result<(), PlyError> {
+    fn skip(&mut self, element: &ElementDef) -> Result<(), SplatError> {
         if element.properties.is_empty() {
             return Ok(());
         }
@@ -162,14 +151,14 @@ impl Body<'_> {
                 };
                 let skipped = io::copy(&mut (&mut self.file).take(bytes), &mut io::sink());
                 if skipped.map_err(|error| self.failed(element, error))? < bytes {
-                    return Err(self.truncated(element));
+                    return Err(SplatError::truncated(self.path, element));
                 }
             }
         }
         Ok(())
     }
 
-    fn read_number(&mut self, element: &ElementDef, kind: &ScalarType) -> Result<f64, PlyError> {
+    fn read_number(&mut self, element: &ElementDef, kind: &ScalarType) -> Result<f64, SplatError> {
         let mut buffer = [0; 8];
         let read = self.file.read_exact(&mut buffer[..byte_size(kind)]);
         read.map_err(|error| self.failed(element, error))?;
@@ -184,7 +173,7 @@ impl Body<'_> {
         &mut self,
         element: &ElementDef,
         layout: &VertexLayout,
-    ) -> Result<ReadSplats, PlyError> {
+    ) -> Result<ReadSplats, SplatError> {
         let mut collected = Collector::new(element.count, layout);
         let mut needed = vec![0.0; layout.columns.len()];
         if self.encoding == Encoding::Ascii {

@@ -27,7 +27,7 @@ fn folder_and_file() -> (TempDir, PathBuf) {
     (folder, file)
 }
 
-pub(super) fn read_bytes(bytes: &[u8]) -> Result<ReadSplats, PlyError> {
+pub(super) fn read_bytes(bytes: &[u8]) -> Result<ReadSplats, SplatError> {
     let (_folder, file) = folder_and_file();
     fs::write(&file, bytes).unwrap();
     read_ply(&file)

@@ -1,6 +1,6 @@
 //! Writing splat files that every viewer accepts.
 
-use super::{CENTER, CHANNELS, NORMALS, PlyError, SHAPE, rest_count, sh_names, sh_position};
+use super::{CENTER, CHANNELS, NORMALS, SHAPE, SplatError, rest_count, sh_names, sh_position};
 use crate::disk;
 use crate::splats::{Splats, sh};
 use glam::DVec3;
@@ -27,20 +27,20 @@ const CHUNK_ROWS: usize = 4096;
 /// replaced.
 ///
 /// # Errors
-/// [`PlyError::BadValue`] where a number is not finite or a quaternion zero,
-/// [`PlyError::BadSplats`] where the arrays have different lengths, the degree
-/// is above 3 or the channels are neither 1 nor 3, [`PlyError::Io`].
+/// [`SplatError::BadValue`] where a number is not finite or a quaternion zero,
+/// [`SplatError::NotWritten`] where the arrays have different lengths, the degree
+/// is above 3 or the channels are neither 1 nor 3, [`SplatError::Io`].
 pub fn write_ply(
     path: &Path,
     splats: &Splats,
     offset: DVec3,
     comments: &[String],
-) -> Result<(), PlyError> {
+) -> Result<(), SplatError> {
     check_arrays(path, splats)?;
-    let mut file = disk::create(path).map_err(PlyError::io(path))?;
+    let mut file = disk::create(path).map_err(SplatError::io(path))?;
 
     let header = header(splats.len(), splats.sh.degree, comments);
-    let io_error = PlyError::io;
+    let io_error = SplatError::io;
     file.write_all(header.as_bytes()).map_err(io_error(path))?;
     let mut values = Vec::with_capacity(CHUNK_ROWS * 62);
     for start in (0..splats.len()).step_by(CHUNK_ROWS) {
@@ -62,7 +62,7 @@ pub(in crate::splats) fn check(
     path: &Path,
     splats: &Splats,
     offset: DVec3,
-) -> Result<(), PlyError> {
+) -> Result<(), SplatError> {
     check_arrays(path, splats)?;
     let mut row = Vec::new();
     for index in 0..splats.len() {
@@ -72,8 +72,8 @@ pub(in crate::splats) fn check(
     Ok(())
 }
 
-fn bad_value(path: &Path, index: usize) -> impl FnOnce((&'static str, f64)) -> PlyError {
-    move |(property, value)| PlyError::BadValue {
+fn bad_value(path: &Path, index: usize) -> impl FnOnce((&'static str, f64)) -> SplatError {
+    move |(property, value)| SplatError::BadValue {
         path: path.to_path_buf(),
         index,
         property,
@@ -81,7 +81,7 @@ fn bad_value(path: &Path, index: usize) -> impl FnOnce((&'static str, f64)) -> P
     }
 }
 
-fn check_arrays(path: &Path, splats: &Splats) -> Result<(), PlyError> {
+fn check_arrays(path: &Path, splats: &Splats) -> Result<(), SplatError> {
     let field = &splats.sh;
     let reason = if field.degree > sh::MAX_DEGREE {
         format!("SH degree {} is above {}", field.degree, sh::MAX_DEGREE)
@@ -103,7 +103,7 @@ fn check_arrays(path: &Path, splats: &Splats) -> Result<(), PlyError> {
             splats.len()
         )
     };
-    Err(PlyError::BadSplats {
+    Err(SplatError::NotWritten {
         path: path.to_path_buf(),
         reason,
     })

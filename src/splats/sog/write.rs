@@ -32,7 +32,7 @@ pub(in crate::splats) fn encode(
     let (count, degree) = (splats.len(), splats.sh.degree);
     let size = Texture::for_splats(count);
     if size.width.max(size.height) > LONGEST_SIDE {
-        return Err(SplatError::TooMany {
+        return Err(SplatError::NotWritten {
             path: judge.path.to_owned(),
             reason: format!("{count} Gaussians do not fit into a picture of {LONGEST_SIDE} pixels"),
         });

@@ -37,7 +37,7 @@ pub(in crate::splats) fn encode(
     judge: &mut Judge<'_>,
 ) -> Result<Vec<u8>, SplatError> {
     let degree = splats.sh.degree;
-    let count = u32::try_from(splats.len()).map_err(|_| SplatError::TooMany {
+    let count = u32::try_from(splats.len()).map_err(|_| SplatError::NotWritten {
         path: judge.path.to_owned(),
         reason: format!("{} Gaussians are more than 2³²", splats.len()),
     })?;
