@@ -2,7 +2,7 @@
 
 use std::fmt;
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
@@ -281,4 +281,14 @@ pub enum CaptureError {
         /// What leaves nothing of it.
         reason: String,
     },
+}
+
+impl CaptureError {
+    /// Names the file that could not be read.
+    pub(super) fn read(path: &Path) -> impl Fn(io::Error) -> Self {
+        |source| Self::Read {
+            path: path.into(),
+            source,
+        }
+    }
 }

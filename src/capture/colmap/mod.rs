@@ -4,6 +4,7 @@
 //! composed of them.
 
 mod binary;
+mod records;
 mod rigs;
 mod text;
 mod tracks;
@@ -17,6 +18,7 @@ use super::error::CaptureError;
 use super::lens::{Lens, ModelName};
 use super::{Chosen, Point};
 use crate::input::excerpt;
+use records::Source;
 
 /// What the three files of a model say.
 pub(super) struct Model {
@@ -68,6 +70,9 @@ struct Cameras {
 
 /// Images no camera makes; beyond this a size is taken for a damaged field.
 const MAX_SIDE: u64 = 1 << 20;
+
+/// The name of a record of the images file.
+const IMAGE: &str = "image";
 
 /// Linux's longest path, in bytes.
 const LONGEST_NAME: usize = 4096;
@@ -142,24 +147,31 @@ fn files_in(dir: &Path) -> Result<Files, Option<CaptureError>> {
 }
 
 fn read_files(
-    [cameras_path, images_path, points_path]: [PathBuf; 3],
+    paths: [PathBuf; 3],
     extension: &str,
     chosen: Option<&Chosen>,
 ) -> Result<Model, CaptureError> {
+    match extension {
+        "bin" => read_records(binary::Records::open, paths, chosen),
+        _ => read_records(text::Lines::open, paths, chosen),
+    }
+}
+
+fn read_records<S: Source>(
+    open: impl Fn(&Path, &'static str) -> Result<S, CaptureError>,
+    [cameras_path, images_path, points_path]: [PathBuf; 3],
+    chosen: Option<&Chosen>,
+) -> Result<Model, CaptureError> {
     let rigs = rigs_beside(&images_path)?;
-    let (cameras, mut images, points, poses) = if extension == "bin" {
-        let cameras = binary::cameras(&cameras_path)?;
-        let (images, sightings) = binary::images(&images_path, &cameras, chosen)?;
-        let points = binary::points(&points_path, &sightings)?;
-        (cameras, images, points, rigs.map(binary::poses))
-    } else {
-        let cameras = text::cameras(&cameras_path)?;
-        let (images, sightings) = text::images(&images_path, &cameras, chosen)?;
-        let points = text::points(&points_path, &sightings)?;
-        (cameras, images, points, rigs.map(text::poses))
-    };
-    let doubts = match poses.transpose()? {
-        Some(poses) => rigs::place(&mut images, &poses),
+    let cameras = records::cameras(open(&cameras_path, "camera")?)?;
+    let images = open(&images_path, IMAGE)?;
+    let (mut images, sightings) = records::images(images, &cameras, chosen)?;
+    let points = records::points(open(&points_path, "point")?, &sightings)?;
+    let doubts = match rigs {
+        Some([rigs, frames]) => {
+            let poses = rigs::read(open(&rigs, "rig")?, open(&frames, "frame")?)?;
+            rigs::place(&mut images, &poses)
+        }
         None => Vec::new(),
     };
     let folder = images_path.parent().unwrap_or(&images_path).display();

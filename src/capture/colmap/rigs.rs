@@ -6,6 +6,7 @@ use std::collections::HashMap;
 use glam::{DQuat, DVec3};
 
 use super::Image;
+use super::records::{Pose, Source};
 use crate::capture::error::CaptureError;
 
 /// Poses that differ by less are one: radians, and shares of the longest translation.
@@ -13,38 +14,6 @@ const SAME: f64 = 1e-9;
 
 /// Largest difference that rounding to six digits causes, in the same units.
 const ROUNDED: f64 = 1e-5;
-
-/// A file of records, binary or text.
-pub(super) trait Source {
-    /// Goes to the next record, if there is one.
-    fn next(&mut self) -> Result<bool, CaptureError>;
-    /// An integer, of so many bytes in a binary file.
-    fn integer(&mut self, bytes: usize, field: &str) -> Result<u64, CaptureError>;
-    /// Reads a sensor's type; true if it is a camera. Other sensors are ignored.
-    fn is_camera(&mut self) -> Result<bool, CaptureError>;
-    fn float(&mut self, field: &str) -> Result<f64, CaptureError>;
-    fn wrong(&self, reason: String) -> CaptureError;
-
-    /// A 32-bit id.
-    fn id(&mut self, field: &str) -> Result<u32, CaptureError> {
-        let id = self.integer(4, field)?;
-        u32::try_from(id).map_err(|_| self.wrong(format!("{id} cannot be {field}")))
-    }
-
-    /// A pose; none where it is not finite.
-    fn pose(&mut self, field: &str) -> Result<Option<Pose>, CaptureError> {
-        let mut all = [0.0; 7];
-        for value in &mut all {
-            *value = self.float(field)?;
-        }
-        let [w, x, y, z, translation @ ..] = all;
-        let finite = all.iter().all(|value| value.is_finite());
-        Ok(finite.then_some((DQuat::from_xyzw(x, y, z, w), translation.into())))
-    }
-}
-
-/// A rotation, of about unit length, and a translation.
-type Pose = (DQuat, DVec3);
 
 /// Camera poses relative to the rig, by rig id and camera id; `None` if unknown.
 type Rigs = HashMap<u32, HashMap<u32, Option<Pose>>>;
@@ -57,21 +26,21 @@ pub(super) type Poses = HashMap<u32, Option<Pose>>;
 fn rigs(source: &mut impl Source) -> Result<Rigs, CaptureError> {
     let mut rigs = Rigs::new();
     while source.next()? {
-        let id = source.id("the id")?;
+        let id = source.u32("the id")?;
         let mut cameras = HashMap::new();
-        for place in 0..source.id("the number of sensors")? {
-            let (is_camera, sensor) = (source.is_camera()?, source.id("the sensor's id")?);
-            let pose = match place == 0 || source.integer(1, "whether a pose follows")? != 0 {
+        for place in 0..source.u32("the number of sensors")? {
+            let (is_camera, sensor) = (source.is_camera()?, source.u32("the sensor's id")?);
+            let pose = match place == 0 || source.u8("whether a pose follows")? != 0 {
                 false => None,
                 true if place == 0 => Some((DQuat::IDENTITY, DVec3::ZERO)),
                 true => source.pose("the sensor's pose")?,
             };
             if is_camera && cameras.insert(sensor, pose).is_some() {
-                return Err(source.wrong(format!("camera {sensor} is there twice")));
+                return Err(source.malformed(format!("camera {sensor} is there twice")));
             }
         }
         if rigs.insert(id, cameras).is_some() {
-            return Err(source.wrong(format!("rig {id} is there twice")));
+            return Err(source.malformed(format!("rig {id} is there twice")));
         }
     }
     Ok(rigs)
@@ -82,19 +51,20 @@ fn rigs(source: &mut impl Source) -> Result<Rigs, CaptureError> {
 fn frames(source: &mut impl Source, rigs: &Rigs) -> Result<Poses, CaptureError> {
     let mut poses = Poses::new();
     while source.next()? {
-        source.id("the id")?;
-        let id = source.id("the rig")?;
+        source.u32("the id")?;
+        let id = source.u32("the rig")?;
         let rig = rigs.get(&id);
-        let rig = rig.ok_or_else(|| source.wrong(format!("rig {id} is not in the rigs file")))?;
+        let rig =
+            rig.ok_or_else(|| source.malformed(format!("rig {id} is not in the rigs file")))?;
         let in_world = source.pose("the pose")?;
-        for _ in 0..source.id("the number of data")? {
-            let (is_camera, sensor) = (source.is_camera()?, source.id("the sensor's id")?);
-            let image = source.integer(8, "the image")?;
+        for _ in 0..source.u32("the number of data")? {
+            let (is_camera, sensor) = (source.is_camera()?, source.u32("the sensor's id")?);
+            let image = source.u64("the image")?;
             if !is_camera {
                 continue;
             }
             let Some(in_rig) = rig.get(&sensor) else {
-                return Err(source.wrong(format!("camera {sensor} is not in rig {id}")));
+                return Err(source.malformed(format!("camera {sensor} is not in rig {id}")));
             };
             let pose = in_rig
                 .zip(in_world)
@@ -102,7 +72,7 @@ fn frames(source: &mut impl Source, rigs: &Rigs) -> Result<Poses, CaptureError> 
             // No image has a larger id.
             let image = u32::try_from(image).unwrap_or(u32::MAX);
             if poses.insert(image, pose).is_some() {
-                return Err(source.wrong(format!("image {image} is in two frames")));
+                return Err(source.malformed(format!("image {image} is in two frames")));
             }
         }
     }
