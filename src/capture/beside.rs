@@ -4,24 +4,13 @@ use std::io::{self, SeekFrom};
 
 use flate2::Crc;
 use image::{ImageDecoder, metadata::Orientation};
-use tiff::{
-    TiffResult,
-    decoder::IfdDecoder,
-    encoder::TiffEncoder,
-    tags::{ByteOrder, Tag, Type, ValueBuffer},
-};
+use tiff::{decoder::ifd::Value, tags::Tag};
 
 use super::sample::Bytes;
 use super::tiff::Decoder;
 
 /// The most EXIF that is read, in bytes: what a JPEG file has room for.
 const LARGEST_EXIF: usize = 1 << 16;
-
-/// TIFF tags that describe a photo: description, make, model, software, date, artist, copyright.
-const TOLD: [u16; 7] = [270, 271, 272, 305, 306, 315, 33_432];
-
-/// Tags that lead elsewhere in the file: a maker's own notes, and what they can be used for.
-const LEADING_AWAY: [u16; 2] = [37_500, 40_965];
 
 /// Metadata of an image file: EXIF and color space.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -67,16 +56,12 @@ impl Beside {
         }
     }
 
-    /// Metadata of a TIFF file.
+    /// Metadata of a TIFF file: what its colors mean.
     pub fn of_tiff(decoder: &mut Decoder) -> Self {
-        let profile = match value(decoder.image_ifd(), Tag::IccProfile) {
-            Ok(found) => found.map(|value| value.as_bytes().to_vec()),
-            // There is one, and it cannot be heeded.
-            Err(_) => Some(Vec::new()),
-        };
+        let profile = decoder.find_tag(Tag::IccProfile).transpose();
         Self {
-            exif: exif_of_tiff(decoder),
-            profile,
+            // One that cannot be read cannot be heeded.
+            profile: profile.map(|found| found.and_then(Value::into_u8_vec).unwrap_or_default()),
             ..Self::default()
         }
     }
@@ -137,49 +122,6 @@ pub(super) fn exif_at_the_end(bytes: &mut dyn Bytes) -> io::Result<Option<Vec<u8
     Ok(found())
 }
 
-/// The value of a tag, in this machine's byte order.
-fn value(mut directory: IfdDecoder<'_>, tag: Tag) -> TiffResult<Option<ValueBuffer>> {
-    let mut value = ValueBuffer::empty(Type::BYTE);
-    let found = directory.find_tag_buf(tag, &mut value)?;
-    value.set_byte_order(ByteOrder::native());
-    Ok(found.map(|_| value))
-}
-
-/// An EXIF block with what a TIFF file tells.
-fn exif_of_tiff(decoder: &mut Decoder) -> Option<Vec<u8>> {
-    let mut file = io::Cursor::new(Vec::new());
-    let mut encoder = TiffEncoder::new(&mut file).ok()?;
-    let mut parts = Vec::new();
-    for part in [Tag::ExifDirectory, Tag::GpsDirectory] {
-        let Ok(pointer) = decoder.get_tag(part).and_then(|at| at.into_ifd_pointer()) else {
-            continue;
-        };
-        let directory = decoder.read_directory(pointer).ok()?;
-        let mut told = encoder.extra_directory().ok()?;
-        let tags = directory.iter().map(|(tag, _)| tag);
-        for tag in tags.filter(|tag| !LEADING_AWAY.contains(&tag.to_u16())) {
-            let known = decoder.read_directory_tags(&directory);
-            if let Ok(Some(value)) = value(known, tag) {
-                told.write_tag_buf(tag, &value).ok()?;
-            }
-        }
-        parts.push((part, told.finish_with_offsets().ok()?.offset));
-    }
-    let mut told = encoder.image_directory().ok()?;
-    let mut any = !parts.is_empty();
-    for tag in TOLD.map(Tag::from_u16_exhaustive) {
-        if let Ok(Some(value)) = value(decoder.image_ifd(), tag) {
-            told.write_tag_buf(tag, &value).ok()?;
-            any = true;
-        }
-    }
-    for (part, offset) in parts {
-        told.write_tag(part, offset).ok()?;
-    }
-    told.finish().ok()?;
-    any.then(|| file.into_inner())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -222,33 +164,5 @@ mod tests {
         damaged[20] ^= 1;
         assert_eq!(found(damaged), None);
         assert_eq!(found(b"eXIf".to_vec()), None);
-    }
-
-    #[test]
-    fn tiff_files_tell_who_took_the_photo_and_when() {
-        let mut file = io::Cursor::new(Vec::new());
-        let mut encoder = TiffEncoder::new(&mut file).unwrap();
-        let mut told = encoder.extra_directory().unwrap();
-        told.write_tag(Tag::from_u16_exhaustive(36_867), "1931:05:01 10:00:00")
-            .unwrap();
-        let told = told.finish_with_offsets().unwrap().offset;
-        let mut picture = encoder
-            .new_image::<tiff::encoder::colortype::Gray8>(9, 7)
-            .unwrap();
-        let tags = picture.encoder();
-        tags.write_tag(Tag::Make, "Maker").unwrap();
-        tags.write_tag(Tag::Orientation, 6_u16).unwrap();
-        tags.write_tag(Tag::ExifDirectory, told).unwrap();
-        picture.write_data(&[1; 63]).unwrap();
-        file.set_position(0);
-        let (header, mut decoder) = super::super::tiff::open(Box::new(file)).unwrap();
-        assert_eq!(header.orientation.size(header.size), [7, 9]);
-        let exif = Beside::of_tiff(&mut decoder)
-            .exif
-            .and_then(for_upright)
-            .unwrap();
-        let says = |words: &[u8]| exif.windows(words.len()).any(|found| found == words);
-        assert!(says(b"Maker\0") && says(b"1931:05:01 10:00:00\0"));
-        assert!(Orientation::from_exif_chunk(&exif).is_none());
     }
 }

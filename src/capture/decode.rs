@@ -59,12 +59,12 @@ impl Picture {
 const SAMPLES_PER_BYTE: u64 = 8 * 1032;
 
 /// Reads what a file announces, and of TIFF and PNG files nothing else.
-pub(super) fn header(path: &Path) -> Result<Header, CaptureError> {
-    let file = input::open(path).map_err(unread(path))?;
+pub(crate) fn header(path: &Path) -> Result<Header, CaptureError> {
+    let file = input::open(path).map_err(CaptureError::read(path))?;
     let opened = open(Box::new(BufReader::new(file)), false);
     if opened.is_err() {
         // The decoder's words about what it does not read help nobody.
-        check_jpeg(&input::read(path).map_err(unread(path))?).map_err(failure(path))?;
+        check_jpeg(&input::read(path).map_err(CaptureError::read(path))?).map_err(failure(path))?;
     }
     Ok(opened.map_err(failure(path))?.0)
 }
@@ -94,16 +94,13 @@ fn decode_with(
     check: impl FnOnce(&Header) -> Result<(), CaptureError>,
     hold: impl FnOnce(u64) -> Option<Held>,
 ) -> Result<Picture, CaptureError> {
-    let file: Arc<[u8]> = input::read(path).map_err(unread(path))?.into();
+    let file: Arc<[u8]> = input::read(path).map_err(CaptureError::read(path))?.into();
     let frame = check_jpeg(&file).map_err(failure(path))?;
     let bytes = Box::new(Cursor::new(file.clone()));
-    let (header, mut beside, mut source) = open(bytes, false).map_err(failure(path))?;
+    let (header, beside, source) = open(bytes, false).map_err(failure(path))?;
     check(&header)?;
     let bytes = check_bytes(header, file.len()).map_err(failure(path))?;
     let held = hold(bytes);
-    if let Source::Tiff(decoder) = &mut source {
-        beside = Beside::of_tiff(decoder);
-    }
     let samples = source.samples(header, &file, frame);
     Ok(Picture {
         header,
@@ -135,11 +132,8 @@ impl Painting {
 pub(crate) fn decode_image(file: Vec<u8>) -> Result<Painting, String> {
     let file: Arc<[u8]> = file.into();
     let frame = check_jpeg(&file)?;
-    let (header, mut beside, mut source) = open(Box::new(Cursor::new(file.clone())), true)?;
+    let (header, beside, source) = open(Box::new(Cursor::new(file.clone())), true)?;
     check_bytes(header, file.len())?;
-    if let Source::Tiff(decoder) = &mut source {
-        beside = Beside::of_tiff(decoder);
-    }
     let samples = source.samples(header, &file, frame)?;
     let (image, unheeded) = colors::in_srgb(picture_of(header, samples)?, &beside);
     Ok(Painting {
@@ -212,8 +206,8 @@ fn undecodable(error: impl std::fmt::Display) -> String {
     format!("cannot be decoded ({error}); save it again")
 }
 
-/// Reads a header; of what a JPEG or PNG file holds beside its pixels that of its colors only
-/// where they are wanted, and of a TIFF file nothing.
+/// Reads a header and what the file holds beside its pixels, that of its colors only where they
+/// are wanted. Of a TIFF file there is nothing else.
 fn open(mut bytes: Box<dyn Bytes>, colors: bool) -> Result<(Header, Beside, Source), String> {
     let mut magic = Vec::new();
     (&mut bytes)
@@ -227,8 +221,12 @@ fn open(mut bytes: Box<dyn Bytes>, colors: bool) -> Result<(Header, Beside, Sour
     };
     let format = match format {
         Ok(ImageFormat::Tiff) => {
-            let (header, decoder) = tiff::open(bytes)?;
-            return Ok((header, Beside::default(), Source::Tiff(decoder)));
+            let (header, mut decoder) = tiff::open(bytes)?;
+            let beside = match colors {
+                true => Beside::of_tiff(&mut decoder),
+                false => Beside::default(),
+            };
+            return Ok((header, beside, Source::Tiff(decoder)));
         }
         Ok(format @ (ImageFormat::Jpeg | ImageFormat::Png)) => format,
         _ => return Err("is neither JPEG, PNG nor TIFF; convert it (its name may stay)".into()),
@@ -278,32 +276,20 @@ fn samples_of(picture: DynamicImage) -> Result<Samples, String> {
 
 /// A picture of values as they stand in a file; floats become 16 bits from 0 to 1.
 fn picture_of(header: Header, samples: Samples) -> Result<DynamicImage, String> {
+    use DynamicImage::{
+        ImageLuma8, ImageLuma16, ImageLumaA8, ImageLumaA16, ImageRgb8, ImageRgb16, ImageRgba8,
+        ImageRgba16,
+    };
     let [width, height] = header.size;
     let picture = match (samples, header.channels) {
-        (Samples::Eight(values), 1) => {
-            ImageBuffer::from_raw(width, height, values).map(DynamicImage::ImageLuma8)
-        }
-        (Samples::Eight(values), 2) => {
-            ImageBuffer::from_raw(width, height, values).map(DynamicImage::ImageLumaA8)
-        }
-        (Samples::Eight(values), 3) => {
-            ImageBuffer::from_raw(width, height, values).map(DynamicImage::ImageRgb8)
-        }
-        (Samples::Eight(values), _) => {
-            ImageBuffer::from_raw(width, height, values).map(DynamicImage::ImageRgba8)
-        }
-        (Samples::Sixteen(values), 1) => {
-            ImageBuffer::from_raw(width, height, values).map(DynamicImage::ImageLuma16)
-        }
-        (Samples::Sixteen(values), 2) => {
-            ImageBuffer::from_raw(width, height, values).map(DynamicImage::ImageLumaA16)
-        }
-        (Samples::Sixteen(values), 3) => {
-            ImageBuffer::from_raw(width, height, values).map(DynamicImage::ImageRgb16)
-        }
-        (Samples::Sixteen(values), _) => {
-            ImageBuffer::from_raw(width, height, values).map(DynamicImage::ImageRgba16)
-        }
+        (Samples::Eight(v), 1) => ImageBuffer::from_raw(width, height, v).map(ImageLuma8),
+        (Samples::Eight(v), 2) => ImageBuffer::from_raw(width, height, v).map(ImageLumaA8),
+        (Samples::Eight(v), 3) => ImageBuffer::from_raw(width, height, v).map(ImageRgb8),
+        (Samples::Eight(v), _) => ImageBuffer::from_raw(width, height, v).map(ImageRgba8),
+        (Samples::Sixteen(v), 1) => ImageBuffer::from_raw(width, height, v).map(ImageLuma16),
+        (Samples::Sixteen(v), 2) => ImageBuffer::from_raw(width, height, v).map(ImageLumaA16),
+        (Samples::Sixteen(v), 3) => ImageBuffer::from_raw(width, height, v).map(ImageRgb16),
+        (Samples::Sixteen(v), _) => ImageBuffer::from_raw(width, height, v).map(ImageRgba16),
         (Samples::Float(values), _) => {
             let white = f32::from(u16::MAX);
             let whole = |value: f32| (value.clamp(0.0, 1.0) * white).round() as u16;
@@ -329,13 +315,6 @@ fn check_jpeg(file: &[u8]) -> Result<Option<jpeg::Frame>, String> {
             Err("has CMYK colors; convert it to RGB or gray".into())
         }
         Some(frame) => Ok(Some(frame)),
-    }
-}
-
-fn unread(path: &Path) -> impl Fn(std::io::Error) -> CaptureError {
-    |source| CaptureError::Read {
-        path: path.into(),
-        source,
     }
 }
 

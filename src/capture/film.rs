@@ -56,10 +56,7 @@ impl Film {
         let path = dir.join(FILE);
         let text = match input::read_to_string(&path) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
-            read => read.map_err(|source| CaptureError::Read {
-                path: path.clone(),
-                source,
-            })?,
+            read => read.map_err(CaptureError::read(&path))?,
         };
         let film: Result<Self, String> =
             serde_json::from_str(&text).map_err(|error| error.to_string());

@@ -1,6 +1,7 @@
 //! What photos show of something else than what is trained on.
 
 use std::{
+    io,
     path::{Path, PathBuf},
     sync::{Mutex, PoisonError},
 };
@@ -27,13 +28,10 @@ impl Layers {
     /// # Errors
     /// [`CaptureError::Write`].
     pub fn new(folder: &Path, views: usize) -> Result<Self, CaptureError> {
-        let failed = |source| CaptureError::Write {
-            path: folder.to_owned(),
-            source,
-        };
+        let file = Scratch::new(folder).map_err(unwritten(folder))?;
         Ok(Self {
             folder: folder.to_owned(),
-            file: Mutex::new(Scratch::new(folder).map_err(failed)?),
+            file: Mutex::new(file),
             places: vec![None; views],
         })
     }
@@ -46,11 +44,8 @@ impl Layers {
         let steps = |luma: &f32| ((luma * 255.0 * STEPS).round() as i16).to_le_bytes();
         let bytes: Vec<u8> = picture.iter().flat_map(steps).collect();
         let file = self.file.get_mut().unwrap_or_else(PoisonError::into_inner);
-        let place = file.append(&bytes);
-        self.places[view] = Some(place.map_err(|source| CaptureError::Write {
-            path: self.folder.clone(),
-            source,
-        })?);
+        let place = file.append(&bytes).map_err(unwritten(&self.folder))?;
+        self.places[view] = Some(place);
         Ok(())
     }
 
@@ -66,15 +61,19 @@ impl Layers {
         let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
         let read = file.read_at(place, &mut bytes);
         drop(file);
-        read.map_err(|source| CaptureError::Read {
-            path: self.folder.clone(),
-            source,
-        })?;
+        read.map_err(CaptureError::read(&self.folder))?;
         for (gray, bytes) in gray.iter_mut().zip(bytes.as_chunks::<2>().0) {
             let level = f32::from(i16::from_le_bytes(*bytes)) / STEPS;
             *gray = (f32::from(*gray) - level).round() as u8;
         }
         Ok(())
+    }
+}
+
+fn unwritten(path: &Path) -> impl Fn(io::Error) -> CaptureError {
+    |source| CaptureError::Write {
+        path: path.to_owned(),
+        source,
     }
 }
 

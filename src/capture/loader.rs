@@ -481,7 +481,7 @@ fn absolute(source: &MaskSource) -> MaskSource {
 
 /// Values below which, and above which, a share of [`BEYOND`] lies; `None` where there
 /// is no value, or but one.
-pub(super) fn percentiles(values: &mut [f32]) -> Option<[f64; 2]> {
+pub(crate) fn percentiles(values: &mut [f32]) -> Option<[f64; 2]> {
     let last = values.len().checked_sub(1)?;
     let mut rank = |share: f64| {
         let rank = (share * last as f64).round() as usize;

@@ -138,7 +138,7 @@ const DARK: u8 = 64;
 /// # Errors
 /// If the file cannot be read or decoded, is not of 8 bits, has another shape, or if its values
 /// are labels of several things.
-pub(super) fn read(
+pub(crate) fn read(
     path: &Path,
     photo: &Path,
     size: [u32; 2],

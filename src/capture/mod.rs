@@ -74,14 +74,18 @@ pub use order::view_at;
 pub use orientation::{Orientation, Stance};
 pub use original::Original;
 pub use photo::Photo;
-#[cfg(feature = "cli")]
-pub(crate) use plain::{
-    Piece, PlainHeader, plain_header, plain_mask, plain_photo, plain_range, plain_values,
-};
 pub use resample::downscale;
 pub use split::{Split, split, split_as};
 pub use unplaced::Unplaced;
 pub(crate) use unplaced::photos_in;
+#[cfg(feature = "cli")]
+pub(crate) use {
+    decode::header as photo_header,
+    loader::percentiles,
+    mask::read as read_mask,
+    plain::{Piece, plain_photo, plain_values},
+    sample::{Depth, Header},
+};
 
 /// Where a COLMAP folder has its photos.
 pub const IMAGES: &str = "images";

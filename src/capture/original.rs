@@ -21,7 +21,7 @@ pub struct Original {
     pub mask: Option<Vec<u8>>,
     /// How it stands.
     pub stance: Stance,
-    /// The file's EXIF, as it is for the same picture upright.
+    /// EXIF of a JPEG or PNG file, as it is for the same picture upright.
     pub exif: Option<Vec<u8>>,
 }
 

@@ -11,7 +11,7 @@ pub(super) const LARGEST_FILE: u64 = 512 << 20;
 
 /// How exactly a file tells the brightness of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Depth {
+pub(crate) enum Depth {
     /// Whole numbers from 0 to 255.
     Eight,
     /// Whole numbers from 0 to 65,535.
@@ -43,7 +43,7 @@ impl fmt::Display for Depth {
 
 /// What a file announces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Header {
+pub(crate) struct Header {
     /// Width and height in pixels.
     pub size: [u32; 2],
     pub depth: Depth,

@@ -15,7 +15,8 @@ pub(super) fn develop(picture: Picture, options: &LoadOptions) -> Pixels {
         header, samples, ..
     } = picture;
     let mask = finite(&samples, header.channels, options.channel);
-    let levels = Tone::of(header.depth, options.normalize, options).levels(samples);
+    let levels = Tone::of(header.depth, options.normalize, options).levels(&samples);
+    drop(samples);
     let rgb = |step| levels.chunks_exact(step).map(|p| [p[0], p[1], p[2]]);
     let values = match (header.channels, options.channel) {
         (1, _) => Values::Gray(levels.as_chunks().0.to_vec()),
@@ -204,18 +205,10 @@ impl Tone {
         }
     }
 
-    /// The encoded level. NaN is black.
-    fn level(&self, value: f64) -> u8 {
-        (255.0 * self.share(value)).round() as u8
-    }
-
-    /// [`Self::share`] of every sample, 0 for NaN.
-    fn shares(&self, samples: &Samples) -> Vec<f32> {
-        let share = |value: f64| {
-            let share = self.share(value) as f32;
-            if share.is_nan() { 0.0 } else { share }
-        };
-        let table = |count: u32| (0..count).map(|v| share(v.into())).collect::<Vec<f32>>();
+    /// What `of` makes of every sample's share, by a table where there are few values.
+    fn all<T: Copy>(&self, samples: &Samples, of: impl Fn(f64) -> T) -> Vec<T> {
+        let one = |value: f64| of(self.share(value));
+        let table = |count: u32| (0..count).map(|v| one(v.into())).collect::<Vec<T>>();
         match samples {
             Samples::Eight(values) => {
                 let table = table(1 << 8);
@@ -225,27 +218,20 @@ impl Tone {
                 let table = table(1 << 16);
                 values.iter().map(|&v| table[usize::from(v)]).collect()
             }
-            Samples::Float(values) => values.iter().map(|&v| share(v.into())).collect(),
+            Samples::Float(values) => values.iter().map(|&v| one(v.into())).collect(),
         }
     }
 
-    fn levels(&self, samples: Samples) -> Vec<u8> {
-        let table = |count: u32| {
-            (0..count)
-                .map(|v| self.level(v.into()))
-                .collect::<Vec<u8>>()
-        };
-        match samples {
-            Samples::Eight(mut values) => {
-                let table = table(1 << 8);
-                values.iter_mut().for_each(|v| *v = table[usize::from(*v)]);
-                values
-            }
-            Samples::Sixteen(values) => {
-                let table = table(1 << 16);
-                values.iter().map(|&v| table[usize::from(v)]).collect()
-            }
-            Samples::Float(values) => values.iter().map(|&v| self.level(v.into())).collect(),
-        }
+    /// [`Self::share`] of every sample, 0 for NaN.
+    fn shares(&self, samples: &Samples) -> Vec<f32> {
+        self.all(
+            samples,
+            |share| if share.is_nan() { 0.0 } else { share as f32 },
+        )
+    }
+
+    /// The encoded level of every sample. NaN is black.
+    fn levels(&self, samples: &Samples) -> Vec<u8> {
+        self.all(samples, |share| (255.0 * share).round() as u8)
     }
 }

@@ -15,7 +15,7 @@ use super::{
     tell,
 };
 use crate::{
-    capture::{CaptureError, FRAMES, Film, IMAGES, in_order, plain_header},
+    capture::{CaptureError, FRAMES, Film, IMAGES, in_order, photo_header},
     disk,
     store::{StoreError, files},
     tell::{Event, Observer, Stage},
@@ -202,7 +202,7 @@ fn extract(
             reason: "has no frame there; choose another part with --start and --end".to_owned(),
         });
     };
-    let header = plain_header(&frames.join(first))?;
+    let header = photo_header(&frames.join(first))?;
     let times = match scan {
         // Other frames than the file has.
         Scan::Telecined => Vec::new(),

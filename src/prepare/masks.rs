@@ -13,9 +13,9 @@ use super::{
 };
 use crate::{
     capture::{
-        CaptureError, Normalize, in_order,
+        CaptureError, Normalize, Stance, in_order,
         names::{NamedFiles, visit_files},
-        plain_mask, plain_photo,
+        plain_photo, read_mask,
     },
     disk,
     store::{StoreError, files},
@@ -169,7 +169,7 @@ impl Sources {
             None => vec![u8::MAX; size.iter().map(|&side| side as usize).product()],
         };
         for mask in own.into_iter().chain(self.one.as_deref()) {
-            let mask = plain_mask(mask, photo, size)?;
+            let mask = read_mask(mask, photo, size, Stance::default())?;
             counts
                 .iter_mut()
                 .zip(mask)

@@ -34,7 +34,7 @@ pub use poses::Poses;
 pub(crate) use state::{digest, of as digest_of};
 
 use crate::{
-    capture::{CaptureError, Film, IMAGES, plain_header},
+    capture::{CaptureError, Film, IMAGES, photo_header},
     store::{StoreError, files},
     tell::{Event, Observer, Stage, keeping},
 };
@@ -221,7 +221,7 @@ fn check_input(named: &Path, input: &Path) -> Result<bool, PrepareError> {
     }
     // A pipe or a device is refused.
     crate::input::open(input).map_err(files::at(named))?;
-    match plain_header(input) {
+    match photo_header(input) {
         Ok(_) => Err(PrepareError::NoFilm {
             path: named.into(),
             reason: "is a photo; name the folder that holds it and others".to_owned(),

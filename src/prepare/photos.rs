@@ -12,8 +12,8 @@ use tiff::encoder::{TiffEncoder, colortype::Gray8};
 use super::PrepareError;
 use crate::{
     capture::{
-        CaptureError, Normalize, PlainHeader, in_order, names::visit_files, plain_header,
-        plain_photo, plain_range, plain_values,
+        CaptureError, Depth, Header, Normalize, in_order, names::visit_files, percentiles,
+        photo_header, plain_photo, plain_values,
     },
     disk,
     store::files,
@@ -32,7 +32,7 @@ const QUALITY: u8 = 95;
 /// Photos in a folder.
 pub(super) struct Photos {
     /// By name below the folder, with `/` between parts.
-    pub headers: BTreeMap<String, PlainHeader>,
+    pub headers: BTreeMap<String, Header>,
     /// Files that are no photos, and why.
     pub others: Vec<(String, String)>,
 }
@@ -54,7 +54,7 @@ impl Photos {
                 continue;
             }
             // A name with what is no UTF-8 is not the path's.
-            match plain_header(&path) {
+            match photo_header(&path) {
                 Ok(header) if folder.join(&name).is_file() => {
                     headers.insert(name, header);
                 }
@@ -91,8 +91,11 @@ impl Photos {
                 Ok::<_, CaptureError>(())
             },
         )?;
-        let deep = self.headers.values().any(|header| header.deep);
-        let range = plain_range(all);
+        let deep = self
+            .headers
+            .values()
+            .any(|header| header.depth > Depth::Eight);
+        let range = percentiles(&mut all);
         Ok(match deep {
             true => Some(range.unwrap_or([0.0, 1.0])),
             false => range.filter(|[low, high]| high - low < FULL_ENOUGH),
@@ -145,12 +148,12 @@ pub(super) fn stretch_all(
     [low, high]: [f64; 2],
     told: &mut dyn FnMut(usize),
 ) -> Result<(), PrepareError> {
-    let names: Vec<(&String, &PlainHeader)> = photos.headers.iter().collect();
+    let names: Vec<(&String, &Header)> = photos.headers.iter().collect();
     let mut done = 0;
     in_order(
         &names,
         |(name, header)| {
-            let white = header.white;
+            let white = header.depth.white();
             let range = Normalize::Range([low * white, high * white]);
             plain_photo(&from.join(name), range)
         },
