@@ -160,13 +160,7 @@ impl Source {
     }
 
     fn parse(path: &Path, said: &str) -> Result<Self, String> {
-        // Warnings may stand before the JSON, on another stream.
-        let json = &said[said.find('{').unwrap_or(0)..];
-        let json: Value = serde_json::Deserializer::from_str(json)
-            .into_iter()
-            .next()
-            .and_then(Result::ok)
-            .ok_or("cannot be read as a film: ffprobe says nothing of it")?;
+        let json = json(said).ok_or("cannot be read as a film: ffprobe says nothing of it")?;
         let streams = json["streams"].as_array().map_or(&[][..], Vec::as_slice);
         // The picture of a cover is no film.
         let still = ["attached_pic", "timed_thumbnails", "still_image"];
@@ -334,6 +328,15 @@ impl Source {
 fn unlisted(said: &str) -> Option<&str> {
     let (before, _) = said.split_once("] Format not on whitelist")?;
     before.rsplit('[').next()?.split(' ').next()
+}
+
+/// What `ffprobe` tells; warnings may stand before it, on another stream.
+pub(super) fn json(said: &str) -> Option<Value> {
+    let json = &said[said.find('{').unwrap_or(0)..];
+    serde_json::Deserializer::from_str(json)
+        .into_iter()
+        .next()?
+        .ok()
 }
 
 /// A time that `ffprobe` tells, in seconds.

@@ -1,10 +1,8 @@
 //! When the frames of a film are shown, where they do not follow each other at one rate.
 
-use serde_json::Value;
-
 use super::{
     PrepareError,
-    ffmpeg::{Part, Source, stamp},
+    ffmpeg::{Part, Source, json, stamp},
 };
 
 /// Frames a second of a film whose rate varies, at most.
@@ -66,9 +64,7 @@ impl Source {
 
 /// The time stamps of packets that are shown, or of frames, from what `ffprobe` says.
 pub(super) fn stamps(said: &str) -> Vec<f64> {
-    let json = &said[said.find('{').unwrap_or(0)..];
-    let json = serde_json::Deserializer::from_str(json).into_iter::<Value>();
-    let json = json.flatten().next().unwrap_or_default();
+    let json = json(said).unwrap_or_default();
     let all = json["packets"].as_array().or(json["frames"].as_array());
     let shown = all.into_iter().flatten().filter(|one| {
         let flags = one["flags"].as_str().unwrap_or_default();

@@ -8,7 +8,7 @@ use std::{
     ffi::OsString,
     io::{self, Read, Write},
     path::Path,
-    process::{Child, ChildStdin, Command, ExitStatus, Stdio},
+    process::{Child, ChildStderr, ChildStdin, ChildStdout, Command, ExitStatus, Stdio},
     sync::{
         Arc, Mutex, MutexGuard, PoisonError,
         mpsc::{Receiver, channel},
@@ -100,12 +100,6 @@ struct Running {
     child: Arc<Mutex<Child>>,
 }
 
-/// The ends of a program's pipes that are here.
-struct Pipes<Output, Error> {
-    output: Output,
-    error: Error,
-}
-
 /// A program that is given bytes. Dropped, it is ended.
 #[derive(Debug)]
 pub(crate) struct Fed {
@@ -146,10 +140,9 @@ impl Program {
     /// # Errors
     /// [`ProgramError`].
     pub fn run(self, folder: &Path, heard: &mut dyn FnMut(&str)) -> Result<(), ProgramError> {
-        let (running, _, pipes) = self.start(folder, Stdio::null())?;
+        let (running, _, output, error) = self.start(folder, Stdio::null())?;
         let mut last = Last::default();
-        // Until both of its pipes are closed.
-        for (stream, line) in pipes.listen() {
+        for (stream, line) in lines_of(output, error) {
             heard(&line);
             last.keep(stream, line);
         }
@@ -161,12 +154,12 @@ impl Program {
     /// # Errors
     /// As [`Self::run`].
     pub fn feed(self) -> Result<Fed, ProgramError> {
-        let (running, input, pipes) = self.start(Path::new("."), Stdio::piped())?;
+        let (running, input, output, error) = self.start(Path::new("."), Stdio::piped())?;
         Ok(Fed {
             program: self,
             running: Some(running),
             input,
-            lines: pipes.listen(),
+            lines: lines_of(output, error),
         })
     }
 
@@ -194,11 +187,7 @@ impl Program {
         self,
         mut take: impl FnMut(&mut dyn Read) -> io::Result<bool>,
     ) -> Result<(), ProgramError> {
-        let (running, _, pipes) = self.start(Path::new("."), Stdio::null())?;
-        let Pipes {
-            output: mut stdout,
-            error,
-        } = pipes;
+        let (running, _, mut stdout, error) = self.start(Path::new("."), Stdio::null())?;
         let (sender, lines) = channel();
         listen(error, sender, Stream::Error);
         let enough = loop {
@@ -224,18 +213,12 @@ impl Program {
         }
     }
 
+    /// Starts it; gives the ends of its pipes that are here.
     fn start(
         &self,
         folder: &Path,
         input: Stdio,
-    ) -> Result<
-        (
-            Running,
-            Option<ChildStdin>,
-            Pipes<impl Read + Send + use<>, impl Read + Send + use<>>,
-        ),
-        ProgramError,
-    > {
+    ) -> Result<(Running, Option<ChildStdin>, ChildStdout, ChildStderr), ProgramError> {
         let mut command = Command::new(&self.name);
         command
             .args(&self.arguments)
@@ -256,10 +239,8 @@ impl Program {
         running.push(child.clone());
         drop(running);
         let running = Running { child };
-        match pipes {
-            Some((output, error)) => Ok((running, input, Pipes { output, error })),
-            None => Err(self.failed(io::ErrorKind::BrokenPipe.into())),
-        }
+        let (output, error) = pipes.ok_or_else(|| self.failed(io::ErrorKind::BrokenPipe.into()))?;
+        Ok((running, input, output, error))
     }
 
     /// The program's name as users know it.
@@ -332,18 +313,12 @@ impl Fed {
     }
 }
 
-impl<Output, Error> Pipes<Output, Error>
-where
-    Output: Read + Send + 'static,
-    Error: Read + Send + 'static,
-{
-    /// All lines of both, until both are closed.
-    fn listen(self) -> Receiver<(Stream, String)> {
-        let (sender, lines) = channel();
-        listen(self.output, sender.clone(), Stream::Output);
-        listen(self.error, sender, Stream::Error);
-        lines
-    }
+/// All lines of both, until both are closed.
+fn lines_of(output: ChildStdout, error: ChildStderr) -> Receiver<(Stream, String)> {
+    let (sender, lines) = channel();
+    listen(output, sender.clone(), Stream::Output);
+    listen(error, sender, Stream::Error);
+    lines
 }
 
 impl Running {
