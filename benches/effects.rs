@@ -211,7 +211,7 @@ fn lens() -> Result<[f64; 2], Box<dyn Error>> {
             lens,
             ..LoadOptions::default()
         };
-        let capture = Capture::load_with(folder.path(), &options.capture())?;
+        let capture = Capture::load_with(folder.path(), &options)?;
         let loader = Loader::open(&capture, &options)?;
         let begun = Instant::now();
         for view in &capture.views {

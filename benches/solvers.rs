@@ -51,7 +51,7 @@ fn load(run: &Path, teacher: &Path) -> Fallible<Problem> {
     let noted = &report["capture"];
     let colmap = PathBuf::from(noted["path"].as_str().ok_or("report.json has no path")?);
     let options: LoadOptions = serde_json::from_value(noted.clone())?;
-    let capture = Capture::load_with(&colmap, &options.capture())?;
+    let capture = Capture::load_with(&colmap, &options)?;
     let mut teacher = Teacher::open(
         teacher,
         Some(&run.join("teacher")),

@@ -80,7 +80,7 @@ impl Subject {
     pub fn trained(folder: &RunFolder) -> Fallible<Self> {
         let report = folder.read_report()?;
         let options = report.capture.load.clone();
-        let capture = Capture::load_with(report.capture.path.as_ref(), &options.capture())?;
+        let capture = Capture::load_with(report.capture.path.as_ref(), &options)?;
         let splats = ply::read_ply(&folder.luma())?.splats.to_luma();
         let train = split(&capture.views, options.holdout).train;
         let load = |options: &LoadOptions, chosen: &[usize]| -> Fallible<Vec<TrainingView>> {

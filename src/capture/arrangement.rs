@@ -6,7 +6,7 @@ use std::sync::Arc;
 use glam::{DMat3, DVec2, DVec3};
 
 use super::lens::{Cut, IMPERCEPTIBLE, Lens, Undistortion};
-use super::{CaptureOptions, Choice, Observation, Stance, View};
+use super::{Choice, LoadOptions, Observation, Stance, View};
 
 /// The views that every photo of a camera becomes.
 pub(super) struct Arrangement {
@@ -22,7 +22,7 @@ pub(super) struct Arrangement {
 impl Arrangement {
     /// # Errors
     /// In words, if the lens is to be taken out and cannot be.
-    pub fn new(lens: Lens, options: &CaptureOptions) -> Result<Self, String> {
+    pub fn new(lens: Lens, options: &LoadOptions) -> Result<Self, String> {
         let longer = lens.width.max(lens.height);
         let working = options.max_side.unwrap_or(longer).min(longer);
         let displacement = lens.displacement() * f64::from(working) / f64::from(longer);

@@ -71,7 +71,7 @@ impl Dataset {
         options: &LoadOptions,
         tell: &mut dyn FnMut(Notice<'_>),
     ) -> Result<Self, CaptureError> {
-        let mut capture = Capture::load_with(dir, &options.capture())?;
+        let mut capture = Capture::load_with(dir, options)?;
         for doubt in &capture.doubts {
             tell(Notice::Doubt(doubt));
         }

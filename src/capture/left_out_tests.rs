@@ -1,7 +1,7 @@
 //! Photos that a capture does without, and cameras that no photo has.
 
 use super::fixtures::{Model, folder, load, load_files, write};
-use super::{Capture, CaptureOptions, Chosen, Dataset, LoadOptions, Rejected};
+use super::{Capture, Chosen, Dataset, LoadOptions, Rejected};
 
 #[test]
 fn cameras_without_photos_do_not_matter() {
@@ -57,9 +57,9 @@ fn photos_that_are_not_wanted_are_left_out() {
         name: "b.png".into(),
         reason: "turned".into(),
     };
-    let options = CaptureOptions {
+    let options = LoadOptions {
         left_out: vec![unwanted.clone()],
-        ..CaptureOptions::default()
+        ..LoadOptions::default()
     };
     let capture = Capture::load_with(dir.path(), &options).unwrap();
     assert_eq!(capture.rejected, [unwanted]);
@@ -85,7 +85,7 @@ fn of_a_part_only_its_photos_and_what_they_show_are_read() {
     for (files, extension) in [(model.binary(), "bin"), (model.text(), "txt")] {
         let dir = folder(&model);
         write(dir.path(), "sparse/0", files, extension);
-        let load = |options: &LoadOptions| Capture::load_with(dir.path(), &options.capture());
+        let load = |options: &LoadOptions| Capture::load_with(dir.path(), options);
         let part = options(&["left/a c.png", "gone.png"], &["a.png"]);
         let capture = load(&part).unwrap();
         let views: Vec<&str> = capture.views.iter().map(|view| &*view.name).collect();
@@ -119,9 +119,9 @@ fn without_tracks_a_part_has_all_points() {
         train: ["a.png".to_owned()].into(),
         ..Chosen::default()
     };
-    let options = CaptureOptions {
+    let options = LoadOptions {
         chosen: Some(chosen),
-        ..CaptureOptions::default()
+        ..LoadOptions::default()
     };
     let capture = Capture::load_with(dir.path(), &options).unwrap();
     assert_eq!((capture.views.len(), capture.points.len()), (1, 2));

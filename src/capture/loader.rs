@@ -299,14 +299,6 @@ impl Loader {
         }
     }
 
-    /// Width and height of the photo of a view in its file, turned as COLMAP saw it.
-    ///
-    /// # Errors
-    /// If the header cannot be read, or as for [`Self::camera`].
-    pub fn file_size(&self, view: &View) -> Result<[u32; 2], CaptureError> {
-        Ok(self.seen(view)?.0)
-    }
-
     /// The camera that [`Self::load`] gives, from the photo's header alone.
     ///
     /// # Errors
@@ -329,7 +321,12 @@ impl Loader {
         Ok((camera, stance))
     }
 
-    fn seen(&self, view: &View) -> Result<([u32; 2], Stance), CaptureError> {
+    /// Width and height of the photo of a view in its file, turned as COLMAP saw it, and how it
+    /// stands.
+    ///
+    /// # Errors
+    /// As [`Self::standing`].
+    pub fn seen(&self, view: &View) -> Result<([u32; 2], Stance), CaptureError> {
         let header = decode::header(&view.image_path)?;
         let stance = stance(view, &header)?;
         if !stance.from_file.is_none() {

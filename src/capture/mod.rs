@@ -153,21 +153,6 @@ pub enum Choice {
     Off,
 }
 
-/// How to load a capture.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct CaptureOptions {
-    /// Whether the lens's distortion is taken out of photos; without it lenses are
-    /// taken for pinholes of their focal length.
-    pub lens: Choice,
-    /// The longest side that photos will be shrunk to, in pixels: it decides what
-    /// can be seen.
-    pub max_side: Option<u32>,
-    /// Photos that are not to be used, and why.
-    pub left_out: Vec<Rejected>,
-    /// The only photos that are to be used, where not all are.
-    pub chosen: Option<Chosen>,
-}
-
 /// A point that COLMAP triangulated.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Point {
@@ -228,7 +213,7 @@ impl Capture {
     /// # Errors
     /// As there.
     pub fn load(dir: &Path) -> Result<Self, CaptureError> {
-        Self::load_with(dir, &CaptureOptions::default())
+        Self::load_with(dir, &LoadOptions::default())
     }
 
     /// Loads a COLMAP folder: `images/` and a model in `sparse/0/`, `sparse/` or
@@ -242,7 +227,7 @@ impl Capture {
     /// If a folder, a file or a photo is missing, a file is damaged, no photo's camera has a
     /// known model and a lens's calibration, a name leads out of `images/`, or
     /// nothing usable is left.
-    pub fn load_with(dir: &Path, options: &CaptureOptions) -> Result<Self, CaptureError> {
+    pub fn load_with(dir: &Path, options: &LoadOptions) -> Result<Self, CaptureError> {
         if !dir.is_dir() {
             return Err(CaptureError::NoFolder { dir: dir.into() });
         }
@@ -447,7 +432,7 @@ fn not_placed(chosen: Option<&Chosen>, images: &[(usize, colmap::Image)]) -> Vec
 fn arranged(
     camera: colmap::Camera,
     path: &Path,
-    options: &CaptureOptions,
+    options: &LoadOptions,
 ) -> Result<Arrangement, CaptureError> {
     let lens = camera.lens?;
     let model = lens.model;

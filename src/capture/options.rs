@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-use super::{CaptureOptions, Choice, Rejected};
+use super::{Choice, Rejected};
 
 /// How a capture's photos are loaded. `report.json` keeps it, so that every later
 /// command loads them alike.
@@ -58,18 +58,6 @@ impl Default for LoadOptions {
             force: false,
             left_out: Vec::new(),
             chosen: None,
-        }
-    }
-}
-
-impl LoadOptions {
-    /// What of it the capture itself depends on.
-    pub fn capture(&self) -> CaptureOptions {
-        CaptureOptions {
-            lens: self.lens,
-            max_side: self.max_side,
-            left_out: self.left_out.clone(),
-            chosen: self.chosen.clone(),
         }
     }
 }

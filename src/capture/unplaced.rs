@@ -88,7 +88,7 @@ fn best_model(root: &Path, used: &Path) -> Option<(PathBuf, u64)> {
 #[cfg(test)]
 mod tests {
     use super::super::fixtures::{Model, folder, write};
-    use super::super::{CaptureOptions, Rejected};
+    use super::super::{LoadOptions, Rejected};
     use super::*;
 
     fn unplaced(dir: &Path) -> Option<Unplaced> {
@@ -110,12 +110,12 @@ mod tests {
         assert_eq!((found.placed, found.photos), (3, 5));
         assert_eq!(found.better, None);
         // What is left out has a pose all the same.
-        let options = CaptureOptions {
+        let options = LoadOptions {
             left_out: vec![Rejected {
                 name: "b.png".into(),
                 reason: "turned".into(),
             }],
-            ..CaptureOptions::default()
+            ..LoadOptions::default()
         };
         let capture = Capture::load_with(dir.path(), &options).unwrap();
         assert_eq!(Unplaced::of(&capture).unwrap(), Some(found));

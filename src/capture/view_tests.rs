@@ -2,9 +2,7 @@
 
 use super::fixtures::{Model, folder, load, load_files, write};
 use super::tests::assert_says;
-use super::{
-    Capture, CaptureError, CaptureOptions, Choice, LoadOptions, Loader, Observation, split,
-};
+use super::{Capture, CaptureError, Choice, LoadOptions, Loader, Observation, split};
 
 /// The example with a lens for its first camera.
 fn with_lens(model: (&'static str, i32), parameters: &[f64]) -> Model {
@@ -18,9 +16,9 @@ fn with_lens(model: (&'static str, i32), parameters: &[f64]) -> Model {
 fn load_choosing(model: &Model, lens: Choice) -> Result<Capture, CaptureError> {
     let dir = folder(model);
     write(dir.path(), "sparse/0", model.binary(), "bin");
-    let options = CaptureOptions {
+    let options = LoadOptions {
         lens,
-        ..CaptureOptions::default()
+        ..LoadOptions::default()
     };
     Capture::load_with(dir.path(), &options)
 }
@@ -59,9 +57,9 @@ fn lenses_are_taken_out_where_they_show_or_as_asked() {
     // What cannot be seen at working size is none.
     let dir = folder(&strong);
     write(dir.path(), "sparse/0", strong.binary(), "bin");
-    let options = CaptureOptions {
+    let options = LoadOptions {
         max_side: Some(1),
-        ..CaptureOptions::default()
+        ..LoadOptions::default()
     };
     let small = Capture::load_with(dir.path(), &options).unwrap();
     assert!(small.distortion < 0.5, "{}", small.distortion);

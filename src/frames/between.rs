@@ -1,6 +1,6 @@
 //! Colors carried from one photo to others by what moves between neighbors.
 
-use super::{Believed, Canvas};
+use super::{Believed, Canvas, window::taps};
 use crate::measure::{Flow, optical_flow, visible};
 
 /// Longer side in pixels at which photos are compared: motion is smooth.
@@ -132,15 +132,9 @@ fn interpolated(
     [width, height]: [usize; 2],
     [x, y]: [f32; 2],
 ) -> Option<([f32; 2], f32)> {
-    let axis = |c: f32, length: usize| {
-        let c = c.clamp(0.0, (length - 1) as f32);
-        let first = c as usize;
-        let share = c - first as f32;
-        [(first, 1.0 - share), ((first + 1).min(length - 1), share)]
-    };
     let (mut sum, mut share) = ([0.0; 2], 0.0);
-    for (row, wy) in axis(y, height) {
-        for (column, wx) in axis(x, width) {
+    for (row, wy) in taps(y, height) {
+        for (column, wx) in taps(x, width) {
             if let Some([u, v]) = places[row * width + column] {
                 sum = [sum[0] + wx * wy * u, sum[1] + wx * wy * v];
                 share += wx * wy;

@@ -237,12 +237,8 @@ fn over(a: f32, b: f32, w: f32) -> [f32; 2] {
 
 /// Bilinear value at a place in pixel indices, the border going on as it ends.
 fn bilinear(pixels: &[[f32; 2]], size: [usize; 2], place: [f32; 2]) -> [f32; 2] {
-    let axis = |c: f32, length: usize| {
-        let c = c.clamp(0.0, (length - 1) as f32);
-        let first = c as usize;
-        (first, (first + 1).min(length - 1), c - first as f32)
-    };
-    let ((x0, x1, s), (y0, y1, t)) = (axis(place[0], size[0]), axis(place[1], size[1]));
+    let [[(x0, _), (x1, s)], [(y0, _), (y1, t)]] =
+        [0, 1].map(|k: usize| window::taps(place[k], size[k]));
     let at = |x: usize, y: usize| pixels[y * size[0] + x];
     let row = |y: usize| mix(at(x0, y), at(x1, y), s);
     mix(row(y0), row(y1), t)

@@ -1,7 +1,7 @@
 //! A photo at the size at which its colors are found.
 
 use crate::{
-    capture::{Original, Stance, View, downscale},
+    capture::{Original, Stance, downscale},
     chroma::teacher::{GrayImage, Query},
 };
 
@@ -78,14 +78,5 @@ impl Canvas {
         let to = from.map(|length| ((length as f64 * scale).round() as usize).max(1));
         let gray = downscale(self.gray.as_chunks::<1>().0, from, to);
         (gray.iter().map(|&[v]| f32::from(v)).collect(), to)
-    }
-}
-
-/// Width and height of the photo at which its middle has the scale of its views at working size;
-/// `camera` is that of one of them.
-pub(super) fn working_size(view: &View, camera: &crate::capture::Camera) -> [u32; 2] {
-    match &view.undistortion {
-        Some(undistortion) => undistortion.photo_size(camera),
-        None => [camera.width, camera.height],
     }
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Believed, Canvas, canvas::working_size, window};
+use super::{Believed, Canvas, window};
 use crate::{
     capture::{Camera, Exposure, View, lens::Undistortion},
     gpu::GpuError,
@@ -74,10 +74,14 @@ impl<'a> SceneDrawer<'a> {
         })
     }
 
-    /// Width and height at which a photo's colors are found.
+    /// Width and height at which a photo's colors are found: those at which its middle has the scale
+    /// of its views at working size.
     pub fn size(views: &[ViewOf<'_>]) -> Option<[u32; 2]> {
-        let first = views.first()?;
-        Some(working_size(first.view, first.camera))
+        let ViewOf { view, camera, .. } = views.first()?;
+        Some(match &view.undistortion {
+            Some(undistortion) => undistortion.photo_size(camera),
+            None => [camera.width, camera.height],
+        })
     }
 
     /// The scene's colors on a photo's canvas.
@@ -173,16 +177,10 @@ fn value(picture: &Picture, [x, y]: [f32; 2]) -> Option<[f32; 2]> {
     if !((0.0..=width as f32).contains(&x) && (0.0..=height as f32).contains(&y)) {
         return None;
     }
-    let axis = |c: f32, length: usize| {
-        let c = (c - 0.5).clamp(0.0, (length - 1) as f32);
-        let first = c as usize;
-        let share = c - first as f32;
-        [(first, 1.0 - share), ((first + 1).min(length - 1), share)]
-    };
     let mut sum = [0.0; 2];
     let last = picture.channels - 1;
-    for (row, wy) in axis(y, height) {
-        for (column, wx) in axis(x, width) {
+    for (row, wy) in window::taps(y - 0.5, height) {
+        for (column, wx) in window::taps(x - 0.5, width) {
             let pixel = &picture.pixels[(row * width + column) * picture.channels..];
             sum = [
                 sum[0] + wx * wy * pixel[0],

@@ -1,4 +1,13 @@
-//! Sums over the pixels around each pixel.
+//! Sums over the pixels around each pixel, and the two pixels that a place lies between.
+
+/// The pixels before and after a place along an axis, in pixel indices, and what each counts in a
+/// linear interpolation; the border goes on as it ends.
+pub fn taps(place: f32, length: usize) -> [(usize, f32); 2] {
+    let place = place.clamp(0.0, (length - 1) as f32);
+    let first = place as usize;
+    let share = place - first as f32;
+    [(first, 1.0 - share), ((first + 1).min(length - 1), share)]
+}
 
 /// Sums over squares of `2 reach + 1` pixels, cut off at the border; `[height, width]`.
 pub fn sums<const N: usize>(

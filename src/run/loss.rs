@@ -57,8 +57,7 @@ impl Views {
     /// Those of a run: held-out ones if there are any. Made-up ones where its COLMAP folder is
     /// gone.
     pub fn of_run(report: &CaptureReport) -> Self {
-        let options = report.load.capture();
-        let Ok(capture) = Capture::load_with(Path::new(&report.path), &options) else {
+        let Ok(capture) = Capture::load_with(Path::new(&report.path), &report.load) else {
             return Self::MadeUp;
         };
         let split = split(&capture.views, report.load.holdout);

@@ -9,7 +9,7 @@ use std::{
 use super::RunError;
 use crate::{
     blocks::{BlockFile, BlocksError, COARSE, Division, Job, Planned, picture, plan, refuse_link},
-    capture::{Capture, CaptureOptions, Rejected},
+    capture::{Capture, LoadOptions, Rejected},
     disk,
     store::{
         RunFolder, StoreError, files,
@@ -46,9 +46,9 @@ pub fn partition(options: &PartitionOptions, observe: &mut Observer<'_>) -> Resu
     observe(Event::begins(Stage::Model));
     let capture = Capture::load_with(
         &options.colmap_dir,
-        &CaptureOptions {
+        &LoadOptions {
             max_side: options.division.max_side,
-            ..CaptureOptions::default()
+            ..LoadOptions::default()
         },
     )?;
     for doubt in &capture.doubts {

@@ -76,12 +76,6 @@ impl FitSettings {
     }
 }
 
-impl Default for FitSettings {
-    fn default() -> Self {
-        Self::DEFAULT
-    }
-}
-
 /// Where a fit to these viewers begins: constant colors between black and white, scales as much
 /// wider as they are on average; for Spark alone, centers and rotations as it keeps them.
 pub fn start(viewers: &[Viewer], splats: &Splats) -> Splats {

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::FitRequest;
 use crate::{
-    capture::{Capture, CaptureOptions},
+    capture::{Capture, LoadOptions},
     gpu::GpuError,
     luma::{Goal, LumaError, LumaOverlay, LumaSettings, Schedule, rehearse},
     raster::Raster,
@@ -167,9 +167,9 @@ struct Family<'a> {
 impl<'a> Family<'a> {
     /// What there is for the capture and the options; `max_side` holds at every level.
     fn of(options: &'a FitRequest, max_side: Option<u32>) -> Result<Self, RunError> {
-        let of_photos = CaptureOptions {
+        let of_photos = LoadOptions {
             chosen: options.load.chosen.clone(),
-            ..CaptureOptions::default()
+            ..LoadOptions::default()
         };
         let capture = Capture::load_with(&options.colmap_dir, &of_photos)?;
         let sizes = || capture.views.iter().map(|view| view.photo_size());

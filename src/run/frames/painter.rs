@@ -71,7 +71,7 @@ impl<'a> Painter<'a> {
             exposure: Exposure::NONE,
         };
         let [width, height] = SceneDrawer::size(&[seen])?;
-        let size = self.dataset.loader().file_size(view).ok()?;
+        let size = self.dataset.loader().seen(view).ok()?.0;
         Some(f64::from(width.max(height)) / f64::from(size[0].max(size[1])))
     }
 

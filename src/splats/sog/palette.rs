@@ -6,6 +6,7 @@
 //! chance is involved, nor the number of threads.
 
 use std::{
+    cmp::Reverse,
     collections::BinaryHeap,
     num::NonZero,
     sync::atomic::{AtomicUsize, Ordering},
@@ -70,12 +71,10 @@ struct Cluster {
     members: Vec<u32>,
     /// The first cluster with so many descendants at most that it is refined by itself.
     group: usize,
-    /// Its place in the order of making, for equal errors.
-    born: usize,
 }
 
 impl Cluster {
-    fn of(points: &[Point], members: Vec<u32>, group: usize, born: usize) -> Self {
+    fn of(points: &[Point], members: Vec<u32>, group: usize) -> Self {
         let center = mean(points, &members);
         let error = |&index: &u32| f64::from(distance(&points[index as usize], &center));
         Self {
@@ -83,29 +82,7 @@ impl Cluster {
             center,
             members,
             group,
-            born,
         }
-    }
-}
-
-impl PartialEq for Cluster {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other).is_eq()
-    }
-}
-
-impl Eq for Cluster {}
-
-impl PartialOrd for Cluster {
-    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl Ord for Cluster {
-    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
-        let older = other.born.cmp(&self.born);
-        self.error.total_cmp(&other.error).then(older)
     }
 }
 
@@ -115,35 +92,38 @@ fn groups(points: &[Point], most: usize) -> Vec<Vec<Cluster>> {
         return Vec::new();
     }
     let everyone = (0..points.len() as u32).collect();
-    let mut open = BinaryHeap::from([Cluster::of(points, everyone, 0, 0)]);
-    let mut born = 1;
+    let mut all = vec![Cluster::of(points, everyone, 0)];
+    // The largest error first, as bits, which are in order as no error is negative; of equal ones
+    // the oldest.
+    let entry = |cluster: &Cluster, born| (cluster.error.to_bits(), Reverse(born));
+    let mut open = BinaryHeap::from([entry(&all[0], 0)]);
     // So many that each has about as many descendants as are compared all with all.
     let group_count = most.div_ceil(TOGETHER);
     while open.len() < most {
         if open.len() == group_count {
             // From here on descendants keep to their group.
-            let mut first: Vec<Cluster> = open.into_vec();
-            first.sort_unstable_by_key(|cluster| cluster.born);
-            (first.iter_mut().enumerate()).for_each(|(group, cluster)| cluster.group = group);
-            open = first.into();
+            let mut first: Vec<usize> = open.iter().map(|(_, Reverse(born))| *born).collect();
+            first.sort_unstable();
+            (first.into_iter().enumerate()).for_each(|(group, born)| all[born].group = group);
         }
-        let Some(worst) = open.pop() else { break };
-        match halves(points, &worst) {
-            Some(parts) => {
-                for members in parts {
-                    open.push(Cluster::of(points, members, worst.group, born));
-                    born += 1;
-                }
-            }
-            None => {
-                // The largest error is none at all: so are the others.
-                open.push(worst);
-                break;
-            }
+        let Some(&(_, Reverse(worst))) = open.peek() else {
+            break;
+        };
+        // The largest error may be none at all: so are the others.
+        let Some(parts) = halves(points, &all[worst]) else {
+            break;
+        };
+        open.pop();
+        all[worst].members = Vec::new();
+        for members in parts {
+            let cluster = Cluster::of(points, members, all[worst].group);
+            open.push(entry(&cluster, all.len()));
+            all.push(cluster);
         }
     }
-    let mut all = open.into_vec();
-    all.sort_unstable_by_key(|cluster| (cluster.group, cluster.born));
+    // Those that were split have no members any more.
+    all.retain(|cluster| !cluster.members.is_empty());
+    all.sort_by_key(|cluster| cluster.group);
     let mut groups: Vec<Vec<Cluster>> = Vec::new();
     for cluster in all {
         match groups.last_mut() {
