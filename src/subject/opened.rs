@@ -131,7 +131,7 @@ impl Opened {
 
     /// Cameras and points, without photos.
     pub fn capture(&self, named: Option<&Path>) -> Result<Capture, SubjectError> {
-        let capture = Capture::load_with(&self.colmap(named)?, &self.load().capture())?;
+        let capture = Capture::load_with(&self.colmap(named)?, &self.load())?;
         check_poses(&capture, self.photos())?;
         Ok(capture)
     }

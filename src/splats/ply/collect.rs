@@ -2,10 +2,10 @@
 
 use super::header::VertexLayout;
 use super::{CHANNELS, FILTER, ReadSplats, SHAPE, sh_position};
-use crate::splats::shared::Gathered;
 use crate::splats::opacity;
 use crate::splats::quantize::{FLAT, OPAQUE, logit};
 use crate::splats::sh::{C0, coefficient_count};
+use crate::splats::shared::Gathered;
 
 /// Sorts the numbers of each Gaussian into the arrays.
 pub(super) struct Collector {
