@@ -8,9 +8,8 @@ use super::{
     CliError,
     checkpoint::CheckpointArguments,
     effects::EffectArguments,
-    headings::{BUDGET, EXPERT, OUTPUT, TEACHER},
+    headings::{BUDGET, EXPERT, OUTPUT},
     luma::LumaArguments,
-    network::NetworkArguments,
     next,
     photos::Photos,
     print,
@@ -24,7 +23,7 @@ use crate::{
     effects::Overrules,
     luma::Goal,
     report::timings_table,
-    run::{AheadOptions, FitRequest, Init, Preset, fit},
+    run::{FitRequest, Init, Preset, fit},
 };
 
 /// Rows of the curve that is printed.
@@ -67,11 +66,6 @@ pub struct Fit {
     effects: EffectArguments,
     #[command(flatten)]
     photos: Photos,
-    /// Ask this network for colors during training, so that colorize need not; repeatable.
-    #[arg(long, value_name = "NAME|FILE.onnx", help_heading = TEACHER)]
-    teacher: Vec<PathBuf>,
-    #[command(flatten)]
-    network: NetworkArguments,
     /// Run folder to write [default: runs/<folder name>].
     #[arg(short, long, value_name = "RUN", value_parser = folder(), help_heading = OUTPUT)]
     output: Option<PathBuf>,
@@ -119,7 +113,7 @@ impl Fit {
         if let Some(rows) = &report.luma.timings {
             print(timings_table(rows))?;
         }
-        let next = next::colorize(folder.path(), self.teacher.first().map(PathBuf::as_path));
+        let next = next::colorize(folder.path());
         let wrote = [folder.luma(), folder.contact_sheet()];
         let wrote = wrote.each_ref().map(PathBuf::as_path);
         progress.close_with(folder.path(), &wrote, &next)
@@ -160,10 +154,6 @@ impl Fit {
             },
             timings: self.timings,
             checkpoints: self.checkpoints.options(),
-            ahead: AheadOptions {
-                teachers: self.teacher.clone(),
-                settings: self.network.clone().settings(),
-            },
             ..asked
         })
     }

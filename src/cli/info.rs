@@ -32,7 +32,7 @@ impl Info {
             Ok(report) => {
                 let next = match report.chroma.is_some() {
                     true => next::frames(path),
-                    false => next::colorize(path, None),
+                    false => next::colorize(path),
                 };
                 (info_page::of_run(path, &report), next)
             }

@@ -39,7 +39,7 @@ impl Merge {
         print(in_words(&seams))?;
         let wrote = [folder.luma(), folder.contact_sheet()];
         let wrote = wrote.each_ref().map(PathBuf::as_path);
-        progress.close_with(folder.path(), &wrote, &next::colorize(folder.path(), None))
+        progress.close_with(folder.path(), &wrote, &next::colorize(folder.path()))
     }
 }
 

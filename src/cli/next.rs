@@ -26,16 +26,12 @@ pub(super) fn fit(colmap_dir: &Path) -> String {
     }
 }
 
-/// `colorize` by the teacher that was asked ahead, if there was one.
-pub(super) fn colorize(run: &Path, asked: Option<&Path>) -> String {
-    let run = run.to_string_lossy();
-    match asked {
-        Some(teacher) => line(&["colorize", &run, "--teacher", &teacher.to_string_lossy()]),
-        None => format!(
-            "{}\n      (gs-chroma teacher list shows the names)",
-            line(&["colorize", &run, "--teacher", "NAME"])
-        ),
-    }
+/// `colorize` by a teacher that only the user can name.
+pub(super) fn colorize(run: &Path) -> String {
+    format!(
+        "{}\n      (gs-chroma teacher list shows the names)",
+        line(&["colorize", &run.to_string_lossy(), "--teacher", "NAME"])
+    )
 }
 
 /// `eval` beside the teacher, if there was one.

@@ -29,7 +29,7 @@ pub use eval::{EvalOptions, eval};
 pub use export::{ExportOptions, Exported, export};
 pub use export_clean::Cleaned;
 pub use export_viewer::Shown;
-pub use fit::{AheadOptions, BlockPlace, FitRequest, Init, fit};
+pub use fit::{BlockPlace, FitRequest, Init, fit};
 pub use frames::{Frames, FramesOptions, frames};
 pub use info::info;
 pub use look::Look;

@@ -5,7 +5,6 @@
 
 use gs_chroma::oracle;
 
-mod ahead;
 mod auto;
 mod blocks;
 mod checkup;

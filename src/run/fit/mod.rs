@@ -1,6 +1,5 @@
 //! `fit`: photos to geometry and luma.
 
-mod ahead;
 mod block;
 mod budget;
 mod checkpoint;
@@ -35,8 +34,6 @@ use crate::{
     },
     tell::{Event, Observer, Stage, keeping},
 };
-use ahead::Ahead;
-pub use ahead::AheadOptions;
 pub use block::BlockPlace;
 use budget::Budget;
 use checkpoint::{found_in, question};
@@ -66,7 +63,6 @@ pub fn fit(
     };
     folder.make()?;
     let _lock = RunLock::take(folder.path())?;
-    let ahead = Ahead::open(&options.ahead, &folder)?;
     let found = match options.checkpoints.resume {
         true => found_in(&folder, observe)?,
         false => {
@@ -132,9 +128,7 @@ pub fn fit(
         begun,
         loading: opened.elapsed().as_secs_f64(),
     };
-    let trained = ahead.meanwhile(&dataset, observe, |observe| {
-        job.train(&budget, &folder, question, found.as_ref(), observe)
-    })?;
+    let trained = job.train(&budget, &folder, question, found.as_ref(), observe)?;
     let mut report = Report {
         warnings: warnings.take(),
         ..job.report(budget.preset, &trained)

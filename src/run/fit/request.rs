@@ -4,7 +4,7 @@ use std::{path::PathBuf, sync::Arc};
 
 use serde::{Deserialize, Serialize};
 
-use super::{AheadOptions, BlockPlace, Neighbors};
+use super::{BlockPlace, Neighbors};
 use crate::{
     capture::LoadOptions,
     effects::Overrules,
@@ -85,8 +85,6 @@ pub struct FitRequest {
     pub goal: Goal,
     /// The report tells where the device's time went.
     pub timings: bool,
-    /// Who is to color the photos meanwhile.
-    pub ahead: AheadOptions,
     /// How it can go on where it is interrupted.
     #[serde(skip)]
     pub checkpoints: CheckpointOptions,
@@ -111,7 +109,6 @@ impl FitRequest {
             around: None,
             goal: Goal::Fixed,
             timings: false,
-            ahead: AheadOptions::default(),
             checkpoints: CheckpointOptions::default(),
             live: None,
         }
