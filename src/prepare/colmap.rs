@@ -1,7 +1,6 @@
 //! Camera poses from COLMAP: the program, or the same as a module of Python.
 
 use std::{
-    collections::BTreeSet,
     env,
     ffi::OsString,
     path::{Path, PathBuf},
@@ -19,6 +18,14 @@ use crate::{
 
 /// As many camera models, the first of [`MODELS`], every version knows.
 const KNOWN_TO_ALL: usize = 11;
+
+/// The option that makes features and pairs the same each time.
+const SEED: &str = "random_seed";
+
+/// Options of versions before 4 and since, each for what it is called there: no GPU, and hence no
+/// display.
+const EXTRACTION: [&str; 2] = ["SiftExtraction.use_gpu", "FeatureExtraction.use_gpu"];
+const MATCHING: [&str; 2] = ["SiftMatching.use_gpu", "FeatureMatching.use_gpu"];
 
 /// So many frames to either side of one are matched with it.
 const OVERLAP: u32 = 10;
@@ -115,22 +122,22 @@ impl Colmap {
         of: &Features,
         told: &mut Told,
     ) -> Result<(), PrepareError> {
-        let mut arguments = vec![
-            Argument::path("database_path", database),
-            Argument::path("image_path", of.images),
-            Argument::new("ImageReader.camera_model", of.lens),
-        ];
         let one = match of.cameras {
             Cameras::One => "ImageReader.single_camera",
             Cameras::Folder => "ImageReader.single_camera_per_folder",
             Cameras::Photo => "ImageReader.single_camera_per_image",
         };
-        arguments.push(Argument::new(one, "1"));
-        if let Some(masks) = of.masks {
-            arguments.push(Argument::path("ImageReader.mask_path", masks));
-        }
-        arguments.extend(without_gpu(["SiftExtraction", "FeatureExtraction"]));
-        self.run("feature_extractor", arguments, told)
+        let mut arguments: Vec<Argument> = vec![
+            ("database_path", database.into()),
+            ("image_path", of.images.into()),
+            ("ImageReader.camera_model", of.lens.into()),
+            (one, "1".into()),
+        ];
+        arguments.extend(
+            of.masks
+                .map(|masks| ("ImageReader.mask_path", masks.into())),
+        );
+        self.run("feature_extractor", arguments, &EXTRACTION, told)
     }
 
     /// Matches the photos of a database; those of `pairs`, a file of [`pairs`], where there is
@@ -144,23 +151,21 @@ impl Colmap {
         (matching, pairs): (Matching, Option<&Path>),
         told: &mut Told,
     ) -> Result<(), PrepareError> {
-        let mut arguments = vec![Argument::path("database_path", database)];
-        arguments.extend(without_gpu(["SiftMatching", "FeatureMatching"]));
+        let mut arguments: Vec<Argument> = vec![("database_path", database.into())];
         let command = match (matching, pairs) {
             (Matching::Exhaustive, _) => "exhaustive_matcher",
             (Matching::Sequential, Some(pairs)) => {
-                arguments.push(Argument::path("match_list_path", pairs));
-                arguments.push(Argument::new("match_type", "pairs"));
+                arguments.push(("match_list_path", pairs.into()));
+                arguments.push(("match_type", "pairs".into()));
                 "matches_importer"
             }
             (Matching::Sequential, None) => {
-                let overlap = OVERLAP.to_string();
-                arguments.push(Argument::new("SequentialMatching.overlap", overlap));
-                arguments.push(Argument::new("SequentialMatching.quadratic_overlap", "1"));
+                arguments.push(("SequentialMatching.overlap", OVERLAP.to_string().into()));
+                arguments.push(("SequentialMatching.quadratic_overlap", "1".into()));
                 "sequential_matcher"
             }
         };
-        self.run(command, arguments, told)
+        self.run(command, arguments, &MATCHING, told)
     }
 
     /// Finds poses, and writes models into `0`, `1`, … below a folder that is there.
@@ -175,35 +180,35 @@ impl Colmap {
         told: &mut Told,
     ) -> Result<(), PrepareError> {
         let arguments = vec![
-            Argument::path("database_path", database),
-            Argument::path("image_path", images),
-            Argument::path("output_path", models),
+            ("database_path", database.into()),
+            ("image_path", images.into()),
+            ("output_path", models.into()),
         ];
-        self.run("mapper", arguments, told)
+        self.run("mapper", arguments, &[], told)
     }
 
+    /// Runs a command; `without_gpu` are options that it may know.
     fn run(
         &self,
         command: &str,
         mut arguments: Vec<Argument>,
+        without_gpu: &[&'static str],
         told: &mut Told,
     ) -> Result<(), PrepareError> {
-        arguments.push(Argument::optional("random_seed", "0"));
         let program = match self {
             Self::Program(_) => {
                 let said = Program::new("colmap").args([command, "--help"]).ask()?;
-                let known = options(&said);
+                arguments.extend(known(&said, without_gpu).chain(known(&said, &[SEED])));
                 let program = Program::new("colmap").arg(command);
-                given(arguments, &known)
-                    .into_iter()
-                    .fold(program, |program, argument| {
-                        program.option(&format!("--{}", argument.name), argument.value)
-                    })
+                (arguments.into_iter()).fold(program, |program, (name, value)| {
+                    program.option(&format!("--{name}"), value)
+                })
             }
             Self::Python(python, _) => {
+                arguments.push((SEED, "0".into()));
                 let program = pycolmap::program(python, command);
-                arguments.into_iter().fold(program, |program, argument| {
-                    program.option(argument.name, argument.value)
+                (arguments.into_iter()).fold(program, |program, (name, value)| {
+                    program.option(name, value)
                 })
             }
         };
@@ -217,64 +222,16 @@ impl Colmap {
     }
 }
 
-/// An option of a command of COLMAP's.
-#[derive(Clone, Debug, PartialEq, Eq)]
-struct Argument {
-    name: &'static str,
-    value: OsString,
-    /// Whether the command does what is asked without it, where it does not know it.
-    optional: bool,
-}
+/// An option of a command of COLMAP's, and its value.
+type Argument = (&'static str, OsString);
 
-impl Argument {
-    fn new(name: &'static str, value: impl Into<OsString>) -> Self {
-        Self {
-            name,
-            value: value.into(),
-            optional: false,
-        }
-    }
-
-    fn path(name: &'static str, path: &Path) -> Self {
-        Self::new(name, path)
-    }
-
-    fn optional(name: &'static str, value: &str) -> Self {
-        Self {
-            optional: true,
-            ..Self::new(name, value)
-        }
-    }
-}
-
-/// The options of versions before 4 and since, each for what it is called there: no GPU, and
-/// hence no display.
-fn without_gpu(groups: [&'static str; 2]) -> [Argument; 2] {
-    groups.map(|group| {
-        let name = match group {
-            "SiftExtraction" => "SiftExtraction.use_gpu",
-            "FeatureExtraction" => "FeatureExtraction.use_gpu",
-            "SiftMatching" => "SiftMatching.use_gpu",
-            _ => "FeatureMatching.use_gpu",
-        };
-        Argument::optional(name, "0")
-    })
-}
-
-/// Those that are given to a command that knows these options.
-fn given(arguments: Vec<Argument>, known: &BTreeSet<String>) -> Vec<Argument> {
-    arguments
-        .into_iter()
-        .filter(|argument| !argument.optional || known.contains(argument.name))
-        .collect()
-}
-
-/// The names of options in what `--help` says.
-fn options(said: &str) -> BTreeSet<String> {
-    said.split_whitespace()
-        .filter_map(|word| word.strip_prefix("--"))
-        .map(str::to_owned)
-        .collect()
+/// Those of some options that a command knows, by what its `--help` says, each with 0.
+fn known(said: &str, names: &[&'static str]) -> impl Iterator<Item = Argument> {
+    let is_known = |name: &&&str| {
+        let mut words = said.split_whitespace();
+        words.any(|word| word.strip_prefix("--") == Some(**name))
+    };
+    (names.iter().filter(is_known)).map(|&name| (name, "0".into()))
 }
 
 /// True if the program has a camera model of this name.
@@ -398,20 +355,10 @@ mod tests {
     fn a_command_is_given_what_it_knows() {
         let help =
             "  -h [ --help ]\n  --random_seed arg (=0)\n  --SiftExtraction.use_gpu arg (=1)\n";
-        let known = options(help);
-        let mut arguments = vec![
-            Argument::new("database_path", "/db"),
-            Argument::optional("random_seed", "0"),
-        ];
-        arguments.extend(without_gpu(["SiftExtraction", "FeatureExtraction"]));
-        let names: Vec<_> = given(arguments, &known)
-            .into_iter()
-            .map(|a| a.name)
-            .collect();
-        assert_eq!(
-            names,
-            ["database_path", "random_seed", "SiftExtraction.use_gpu"]
-        );
+        let given = |names: &[&'static str]| known(help, names).collect::<Vec<_>>();
+        assert_eq!(given(&EXTRACTION), [("SiftExtraction.use_gpu", "0".into())]);
+        assert_eq!(given(&[SEED]), [("random_seed", "0".into())]);
+        assert_eq!(given(&MATCHING), []);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! What can stop `prepare`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::{capture::CaptureError, programs::ProgramError, store::StoreError};
 
@@ -32,14 +32,6 @@ pub enum PrepareError {
     OldFfmpeg {
         /// Its version.
         found: String,
-    },
-    /// The input is no film that can be used.
-    #[error("{}: {reason}", path.display())]
-    NoFilm {
-        /// File at fault.
-        path: PathBuf,
-        /// What is wrong.
-        reason: String,
     },
     /// Not enough for a scene.
     #[error(
@@ -83,4 +75,11 @@ pub enum PrepareError {
         /// What to try.
         remedy: String,
     },
+}
+
+impl PrepareError {
+    /// Names a file and what is wrong with it.
+    pub(super) fn at(path: &Path, reason: impl Into<String>) -> Self {
+        Self::Store(StoreError::file(path, reason))
+    }
 }

@@ -109,22 +109,16 @@ impl Source {
             .film(path)
             .ask();
         let said = said.map_err(|error| match error {
-            ProgramError::Failed { said, .. } => PrepareError::NoFilm {
-                path: path.into(),
-                reason: match unlisted(&said) {
-                    Some(format) => format!(
-                        "is no film by itself, but {format}, which may lead to other files; make one file of it, such as .mp4 or .mkv"
-                    ),
-                    None => format!("cannot be read as a film ({said})"),
-                },
-            },
+            ProgramError::Failed { said, .. } => PrepareError::at(path, match unlisted(&said) {
+                Some(format) => format!(
+                    "is no film by itself, but {format}, which may lead to other files; make one file of it, such as .mp4 or .mkv"
+                ),
+                None => format!("cannot be read as a film ({said})"),
+            }),
             other => other.into(),
         })?;
         let source = Self::parse(path, &said);
-        let mut source = source.map_err(|reason| PrepareError::NoFilm {
-            path: path.into(),
-            reason,
-        })?;
+        let mut source = source.map_err(|reason| PrepareError::at(path, reason))?;
         if !source.is_indexed() {
             // A recording may begin with pictures that cannot be decoded.
             let first = ["-read_intervals", FIRST_WITHIN];

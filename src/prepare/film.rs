@@ -17,7 +17,7 @@ use super::{
 use crate::{
     capture::{CaptureError, FRAMES, Film, IMAGES, in_order, photo_header},
     disk,
-    store::{StoreError, files},
+    store::files,
     tell::{Event, Observer, Stage},
 };
 
@@ -77,10 +77,7 @@ fn choose(
     same_film: &str,
     observe: &mut Observer<'_>,
 ) -> Result<Part, PrepareError> {
-    let no_film = |reason: String| PrepareError::NoFilm {
-        path: options.input.clone(),
-        reason,
-    };
+    let no_film = |reason: String| PrepareError::at(&options.input, reason);
     let start = options.start.unwrap_or(0.0);
     if source.seconds > 0.0 && start >= source.seconds {
         return Err(no_film(format!(
@@ -197,10 +194,8 @@ fn extract(
     })?;
     let names = names_in(&frames)?;
     let Some(first) = names.first() else {
-        return Err(PrepareError::NoFilm {
-            path: source.path.clone(),
-            reason: "has no frame there; choose another part with --start and --end".to_owned(),
-        });
+        let reason = "has no frame there; choose another part with --start and --end";
+        return Err(PrepareError::at(&source.path, reason));
     };
     let header = photo_header(&frames.join(first))?;
     let times = match scan {
@@ -281,8 +276,8 @@ fn choose_sharp(
     }
     state.check_own(IMAGES)?;
     let film = Film::read(&state.path("."))?;
-    let film = film
-        .ok_or_else(|| StoreError::file(&state.path(FILM), "is gone; start over with --force"))?;
+    let gone = || PrepareError::at(&state.path(FILM), "is gone; start over with --force");
+    let film = film.ok_or_else(gone)?;
     let [numerator, denominator] = film.frame_rate.map(f64::from);
     let rate = numerator / denominator;
     let per_second = options

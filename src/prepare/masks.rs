@@ -18,7 +18,7 @@ use crate::{
         plain_photo, read_mask,
     },
     disk,
-    store::{StoreError, files},
+    store::files,
 };
 
 /// Borders are looked for in so many photos, evenly spread.
@@ -107,11 +107,10 @@ pub(super) fn named(folder: &Path, photos: &Photos) -> Result<NamedFiles, Prepar
         .keys()
         .next()
         .map(|name| format!("{name}.png"));
-    Err(CaptureError::NoMasks {
+    Err(PrepareError::from(CaptureError::NoMasks {
         dir: folder.into(),
         example: example.unwrap_or_default().into(),
-    }
-    .into())
+    }))
 }
 
 impl Sources {
@@ -176,11 +175,8 @@ impl Sources {
                 .for_each(|(count, mask)| *count = mask.min(*count));
         }
         if counts.iter().all(|&count| count == 0) {
-            return Err(StoreError::file(
-                photo,
-                "its mask leaves no pixel; make it white where the photo counts",
-            )
-            .into());
+            let reason = "its mask leaves no pixel; make it white where the photo counts";
+            return Err(PrepareError::at(photo, reason));
         }
         Ok(counts)
     }

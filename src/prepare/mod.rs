@@ -35,7 +35,7 @@ pub(crate) use state::{digest, of as digest_of};
 
 use crate::{
     capture::{CaptureError, Film, IMAGES, photo_header},
-    store::{StoreError, files},
+    store::files,
     tell::{Event, Observer, Stage, keeping},
 };
 use colmap::Colmap;
@@ -214,7 +214,8 @@ fn make(
 /// Whether the input is a film; else it is a folder.
 fn check_input(named: &Path, input: &Path) -> Result<bool, PrepareError> {
     if input.to_str().is_none() {
-        return Err(StoreError::file(named, "its path is no UTF-8; rename it").into());
+        let reason = "its path is no UTF-8; rename it";
+        return Err(PrepareError::at(named, reason));
     }
     if input.is_dir() {
         return Ok(false);
@@ -222,10 +223,10 @@ fn check_input(named: &Path, input: &Path) -> Result<bool, PrepareError> {
     // A pipe or a device is refused.
     crate::input::open(input).map_err(files::at(named))?;
     match photo_header(input) {
-        Ok(_) => Err(PrepareError::NoFilm {
-            path: named.into(),
-            reason: "is a photo; name the folder that holds it and others".to_owned(),
-        }),
+        Ok(_) => Err(PrepareError::at(
+            named,
+            "is a photo; name the folder that holds it and others",
+        )),
         Err(_) => Ok(true),
     }
 }
@@ -235,14 +236,11 @@ fn check_apart(options: &PrepareOptions, input: &Path, output: &Path) -> Result<
     let output = fs::canonicalize(output).unwrap_or_else(|_| output.into());
     let own = [IMAGES, MASKS, STRETCHED, SPARSE].map(|name| output.join(name));
     if output.starts_with(input) || own.iter().any(|own| input.starts_with(own)) {
-        return Err(StoreError::file(
-            &options.output,
-            format!(
-                "would be mixed with the photos of {}; name a folder beside it with -o",
-                options.input.display()
-            ),
-        )
-        .into());
+        let reason = format!(
+            "would be mixed with the photos of {}; name a folder beside it with -o",
+            options.input.display()
+        );
+        return Err(PrepareError::at(&options.output, reason));
     }
     Ok(())
 }
@@ -255,10 +253,10 @@ fn check_film_options(options: &PrepareOptions) -> Result<(), PrepareError> {
         ("--per-second", options.per_second.is_some()),
     ];
     match given.iter().find(|(_, given)| *given) {
-        Some((option, _)) => Err(PrepareError::NoFilm {
-            path: options.input.clone(),
-            reason: format!("is a folder of photos, and {option} is for films; leave it out"),
-        }),
+        Some((option, _)) => Err(PrepareError::at(
+            &options.input,
+            format!("is a folder of photos, and {option} is for films; leave it out"),
+        )),
         None => Ok(()),
     }
 }

@@ -17,7 +17,7 @@ use crate::{
     disk,
     hash::Hasher,
     input,
-    store::{StoreError, files},
+    store::files,
 };
 
 /// The file, in the output folder.
@@ -115,12 +115,8 @@ impl State {
             Ok(text) => {
                 let record = serde_json::from_str::<Record>(&text).map_err(|e| e.to_string());
                 let record = record.and_then(Record::check);
-                Some(record.map_err(|error| {
-                    StoreError::file(
-                        &path,
-                        format!("damaged ({error}); choose another folder with -o"),
-                    )
-                })?)
+                let damaged = |error| format!("damaged ({error}); choose another folder with -o");
+                Some(record.map_err(|error| PrepareError::at(&path, damaged(error)))?)
             }
             Err(error) if error.kind() == io::ErrorKind::NotFound => None,
             Err(error) => return Err(files::at(&path)(error).into()),
@@ -129,14 +125,11 @@ impl State {
         match &record {
             None => check_empty(folder, input)?,
             Some(record) if record.version != VERSION => {
-                return Err(StoreError::file(
-                    &path,
-                    format!(
-                        "was written by gs-chroma {}; choose another folder with -o",
-                        record.program
-                    ),
-                )
-                .into());
+                let reason = format!(
+                    "was written by gs-chroma {}; choose another folder with -o",
+                    record.program
+                );
+                return Err(PrepareError::at(&path, reason));
             }
             // What failed before it had poses is worth nothing for another input.
             Some(record) if other && !options.force && record.has_worth() => {
@@ -317,7 +310,7 @@ impl State {
     fn write(&self) -> Result<(), PrepareError> {
         let path = self.path(FILE);
         let mut text = serde_json::to_vec_pretty(&self.record)
-            .map_err(|error| StoreError::file(&path, error.to_string()))?;
+            .map_err(|error| PrepareError::at(&path, error.to_string()))?;
         text.push(b'\n');
         Ok(files::write(&path, &text)?)
     }
@@ -364,11 +357,10 @@ fn lock(path: &Path) -> Result<Option<File>, PrepareError> {
     match file.try_lock() {
         Ok(()) => Ok(Some(file)),
         Err(TryLockError::Error(_)) => Ok(None),
-        Err(TryLockError::WouldBlock) => Err(StoreError::file(
+        Err(TryLockError::WouldBlock) => Err(PrepareError::at(
             path,
             "another process prepares this folder: wait for it, or choose another with -o",
-        )
-        .into()),
+        )),
     }
 }
 
