@@ -188,25 +188,6 @@ impl Teacher {
         };
         Ok(answer.map(|answer| answer.upsampled(photo, self.upsample)))
     }
-
-    /// Has a network answer for a photo without hints and keep the answer, so that
-    /// [`Self::colorize`] need not wait for it. Nothing is asked of a folder.
-    ///
-    /// # Errors
-    /// As for [`Self::colorize`], and where the answer is not kept.
-    pub fn prepare(&mut self, query: Query<'_>, photo: GrayImage<'_>) -> Result<(), TeacherError> {
-        photo.check(query.name)?;
-        match &mut self.source {
-            Source::Network(network) => {
-                if network.unkept.is_none() {
-                    asked(network, query, photo, None)?;
-                }
-                // What is not kept would be asked for again.
-                network.unkept.take().map_or(Ok(()), Err)
-            }
-            Source::Folder(_) => Ok(()),
-        }
-    }
 }
 
 /// Answer of a network for a photo, which is shown to it upright.
