@@ -4,7 +4,7 @@ use bytemuck::{Pod, Zeroable};
 
 use std::sync::Arc;
 
-use super::{Demand, LumaError, SsimWindow, TrainingViews, photos::Photos};
+use super::{LumaError, SsimWindow, TrainingViews, photos::Photos};
 use crate::{
     capture::Exposure,
     gpu::{Bindings, Buffer, Gpu, Kernel, Recorder, shaders},
@@ -105,7 +105,8 @@ impl Targets {
         4 * 3 * max_pixels as u64
     }
 
-    /// The photos of `views`, which make this demand.
+    /// The photos of `views`, of at most so many pixels each; `streams` is whether they come to
+    /// the device one by one.
     ///
     /// # Errors
     /// [`LumaError`].
@@ -113,12 +114,13 @@ impl Targets {
         gpu: &Gpu,
         effects: LossEffects,
         views: &Arc<dyn TrainingViews>,
-        demand: &Demand,
+        max_pixels: usize,
+        streams: bool,
     ) -> Result<Self, LumaError> {
-        let slopes = || Buffer::zeros(gpu, "slopes", demand.max_pixels);
+        let slopes = || Buffer::zeros(gpu, "slopes", max_pixels);
         let unset = LumaLossParameters::zeroed();
         Ok(Self {
-            photos: Photos::new(gpu, views, effects.masked, demand.streams)?,
+            photos: Photos::new(gpu, views, effects.masked, streams)?,
             parameters: (effects.exposed)
                 .then(|| Buffer::uniform(gpu, "loss parameters", &unset))
                 .transpose()?,

@@ -149,7 +149,7 @@ impl LumaTrainer {
         let longest = ends::LONGER * settings.iterations;
         let capacity = splats.len() * ENTRIES_PER_SPLAT;
         demand.check(settings.memory_limit, splats.len(), capacity)?;
-        let targets = Targets::new(&gpu, effects, &views, &demand)?;
+        let targets = Targets::new(&gpu, effects, &views, demand.max_pixels, demand.streams)?;
         let model = Model::upload(&gpu, splats)?;
         let workspace = Workspace::new(&raster, &kernels, &model, &targets, &demand, capacity)?;
         Ok(Self {

@@ -8,9 +8,10 @@ use std::{
 };
 
 /// Files that stand in circles, and folders full of them. What is taken off this list stays off.
-const CIRCLES: [&str; 22] = [
+const CIRCLES: [&str; 23] = [
     "capture/colmap",
     "capture/colmap/binary",
+    "capture/colmap/records",
     "capture/colmap/rigs",
     "capture/colmap/text",
     // A device holds what records on it.
