@@ -148,39 +148,16 @@ pub type Teller<'a> = dyn FnMut(Told) + 'a;
 /// # Errors
 /// [`AutoError`]; what was done before it stays, and the same command goes on from there.
 pub fn auto(options: &AutoOptions, tell: &mut Teller<'_>) -> Result<Results, AutoError> {
-    // Better now than after hours of work; photos are asked for once they are there.
-    if options.teacher.as_os_str() != "photos" {
-        let opened = Teacher::open(&options.teacher, None, &options.teacher_settings);
-        opened.map_err(RunError::from)?;
-    }
     let hints = match &options.hints {
         Some(hints) => digest(hints)?,
         None => String::new(),
     };
     let input = &options.prepare.input;
-    files::make_folder(&options.output)?;
     let _originals = originals::Kept::default().with(input, "an original").keep();
-    for result in [FILM, SCENE] {
-        files::check_no_original(&options.output.join(result))?;
-    }
-    if input.is_dir() && options.output.join(PICTURES).is_dir() {
-        files::make_pictures_folder(&options.output.join(PICTURES))?;
-    }
+    check(options)?;
     let house = prepared(options, tell)?;
-    let film = Film::read(&house).map_err(RunError::from)?;
     let run = RunFolder::at(&options.output.join(OF_AUTO));
-    let results = Results {
-        colored: options.output.join(match film {
-            Some(_) => FILM,
-            None => PICTURES,
-        }),
-        scene: options.output.join(SCENE),
-        page: run.evaluation_page().join(files::PAGE),
-        contact_sheet: run.contact_sheet(),
-        house: house.clone(),
-        run: run.path().to_owned(),
-    };
-
+    let results = results(options, &house, &run)?;
     let mut steps = Steps {
         kept: Kept::read(&options.output)?,
         tell,
@@ -283,6 +260,39 @@ pub fn auto(options: &AutoOptions, tell: &mut Teller<'_>) -> Result<Results, Aut
         eval(&asked, observe).map(drop)
     })?;
     Ok(results)
+}
+
+/// Opens the teacher and the places of results: better now than after hours of work.
+fn check(options: &AutoOptions) -> Result<(), AutoError> {
+    // Photos are asked for once they are there.
+    if options.teacher.as_os_str() != "photos" {
+        let opened = Teacher::open(&options.teacher, None, &options.teacher_settings);
+        opened.map_err(RunError::from)?;
+    }
+    files::make_folder(&options.output)?;
+    for result in [FILM, SCENE] {
+        files::check_no_original(&options.output.join(result))?;
+    }
+    if options.prepare.input.is_dir() && options.output.join(PICTURES).is_dir() {
+        files::make_pictures_folder(&options.output.join(PICTURES))?;
+    }
+    Ok(())
+}
+
+/// Where results of photos and poses in `house` go.
+fn results(options: &AutoOptions, house: &Path, run: &RunFolder) -> Result<Results, AutoError> {
+    let film = Film::read(house).map_err(RunError::from)?;
+    Ok(Results {
+        colored: options.output.join(match film {
+            Some(_) => FILM,
+            None => PICTURES,
+        }),
+        scene: options.output.join(SCENE),
+        page: run.evaluation_page().join(files::PAGE),
+        contact_sheet: run.contact_sheet(),
+        house: house.to_owned(),
+        run: run.path().to_owned(),
+    })
 }
 
 /// The folder of photos and poses. One that COLMAP has been through needs nothing.

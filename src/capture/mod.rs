@@ -317,24 +317,8 @@ impl Capture {
         names::find_spelled(&mut views, &photos);
         check_photos_exist(&views)?;
 
-        let announced = model.points.len();
         let mut points = model.points;
-        points.retain(|point| is_place(point.position));
-        if points.is_empty() {
-            return Err(CaptureError::NoPoints {
-                path: model.points_path,
-            });
-        }
-        if points.len() < announced {
-            rejected.push(Rejected {
-                name: colmap::file_name(&model.points_path),
-                reason: format!(
-                    "{} of {announced} points have coordinates that are not finite or beyond {LARGEST_COORDINATE:e}",
-                    announced - points.len()
-                ),
-            });
-        }
-
+        rejected.extend(retain_places(&mut points, &model.points_path)?);
         for point in &mut points {
             point.track.retain_mut(|seen| match view_at[seen.view] {
                 Some((first, camera)) => (cameras[camera].as_ref())
@@ -408,6 +392,25 @@ impl Capture {
         }
         self.offset = offset;
     }
+}
+
+/// Takes points out whose coordinates no scene has, and names how many.
+///
+/// # Errors
+/// [`CaptureError::NoPoints`] where none is left.
+fn retain_places(points: &mut Vec<Point>, path: &Path) -> Result<Option<Rejected>, CaptureError> {
+    let announced = points.len();
+    points.retain(|point| is_place(point.position));
+    if points.is_empty() {
+        return Err(CaptureError::NoPoints { path: path.into() });
+    }
+    let left_out = announced - points.len();
+    Ok((left_out > 0).then(|| Rejected {
+        name: colmap::file_name(path),
+        reason: format!(
+            "{left_out} of {announced} points have coordinates that are not finite or beyond {LARGEST_COORDINATE:e}"
+        ),
+    }))
 }
 
 /// Photos that were chosen and that the model does not place.

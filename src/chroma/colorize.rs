@@ -187,36 +187,8 @@ impl Distill<'_> {
         // No photo is looked at any more.
         self.dataset.release();
         let (dataset, lesson, gpu) = (self.dataset, self.lesson, &self.raster.gpu);
-        let learned = &lesson.views;
-        let cameras: Vec<Camera> = learned
-            .iter()
-            .map(|&i| dataset.cameras[i].clone())
-            .collect();
-        let colored_views = lesson.colored_views();
         let mut settings = settings.clone();
-        let room = Room {
-            limit: settings.memory_limit,
-            color: ColorKind::Chroma,
-            sh_degree: match self.sh_degree {
-                Degree::Fixed(degree) => degree,
-                Degree::Auto => sh::MAX_DEGREE,
-            },
-            weighted: lesson.targets.weighted() || lesson.has_strokes(),
-            streams: settings.solver == SolverKind::Irls,
-        };
-        let scales = settings.target_scales();
-        go_on(observe(ColorizeEvent::Listing))?;
-        let frozen = FrozenViews::new(
-            self.raster,
-            self.luma,
-            dataset.extent,
-            &cameras,
-            scales,
-            room,
-        )?;
-        if let Some(at_a_time) = frozen.streamed() {
-            go_on(observe(ColorizeEvent::Streaming { at_a_time }))?;
-        }
+        let frozen = self.freeze(&settings, observe)?;
         let laid = match lesson.has_strokes() {
             true => Some(lay(&frozen, dataset, lesson, self.luma)?),
             false => None,
@@ -230,28 +202,13 @@ impl Distill<'_> {
         let last = Cell::new(checkpoint.and_then(|found| found.state.last));
         let mut peak = None;
         let mut chosen = checkpoint.and_then(|found| found.state.chosen.clone());
-        settings.sh_degree = match (self.sh_degree, &chosen) {
-            (Degree::Fixed(degree), _) => degree,
-            (Degree::Auto, Some(chosen)) => {
-                go_on(observe(ColorizeEvent::Chosen(chosen)))?;
-                chosen.degree
-            }
-            (Degree::Auto, None) => {
-                let found = choose_degree(
-                    &frozen,
-                    &settings,
-                    targets,
-                    &tasks,
-                    self.luma,
-                    &mut |degree, progress| {
-                        peak = peak.max(gpu.allocated_bytes());
-                        observe(ColorizeEvent::Trying { degree, progress })
-                    },
-                )?;
-                go_on(observe(ColorizeEvent::Chosen(&found)))?;
-                chosen.insert(found).degree
-            }
-        };
+        settings.sh_degree = self.degree(&mut chosen, observe, |observe| {
+            let tried = &mut |degree, progress| {
+                peak = peak.max(gpu.allocated_bytes());
+                observe(ColorizeEvent::Trying { degree, progress })
+            };
+            choose_degree(&frozen, &settings, targets, &tasks, self.luma, tried)
+        })?;
         let mut effects = [correction, plan::degree(self.sh_degree, chosen.as_ref())];
         go_on(observe(ColorizeEvent::Plan(&effects)))?;
         let mut solved = |settings: &ChromaSettings, from, uncorrected| {
@@ -272,19 +229,13 @@ impl Distill<'_> {
                     solver: solver.state()?,
                 }))
             };
-            solve_from(
-                (from, between),
-                &frozen,
-                settings,
-                targets,
-                tasks.clone(),
-                self.luma,
-                &mut |progress| {
-                    last.set(Some(progress));
-                    peak = peak.max(gpu.allocated_bytes());
-                    observe(ColorizeEvent::Solving(progress))
-                },
-            )
+            let told = &mut |progress| {
+                last.set(Some(progress));
+                peak = peak.max(gpu.allocated_bytes());
+                observe(ColorizeEvent::Solving(progress))
+            };
+            let (of, tasks, luma) = ((from, between as _), tasks.clone(), self.luma);
+            solve_from(of, &frozen, settings, targets, tasks, luma, told)
         };
         let mut from = checkpoint.map(|found| &found.solver);
         let mut worse = checkpoint.and_then(|found| found.state.uncorrected);
@@ -311,8 +262,8 @@ impl Distill<'_> {
         let mut saturation = 1.0;
         // Where no point is seen twice nobody knows what views agree on.
         if let (true, Some(spread)) = (settings.match_saturation, lesson.spread) {
-            let agreed = spread.agreed;
             let told = &mut |view, total| observe(ColorizeEvent::Matching { view, total });
+            let agreed = spread.agreed;
             saturation = match_saturation(&frozen, targets, &tasks, agreed, &mut chroma, told)?;
             peak = peak.max(gpu.allocated_bytes());
         }
@@ -332,7 +283,7 @@ impl Distill<'_> {
             claimed: laid.as_ref().map(|laid| laid.claimed),
             saturation,
             effects,
-            colored_views,
+            colored_views: lesson.colored_views(),
             last: last.get(),
             load: solved.load,
             estimated_device_memory: frozen.demand(),
@@ -346,6 +297,53 @@ impl Distill<'_> {
 }
 
 impl Distill<'_> {
+    /// The gray scene as the learned views see it.
+    fn freeze(
+        &self,
+        settings: &ChromaSettings,
+        observe: &mut ColorizeObserver<'_>,
+    ) -> Result<FrozenViews, ChromaError> {
+        let (dataset, lesson) = (self.dataset, self.lesson);
+        let learned = lesson.views.iter();
+        let cameras: Vec<Camera> = learned.map(|&i| dataset.cameras[i].clone()).collect();
+        let room = Room {
+            limit: settings.memory_limit,
+            color: ColorKind::Chroma,
+            sh_degree: match self.sh_degree {
+                Degree::Fixed(degree) => degree,
+                Degree::Auto => sh::MAX_DEGREE,
+            },
+            weighted: lesson.targets.weighted() || lesson.has_strokes(),
+            streams: settings.solver == SolverKind::Irls,
+        };
+        let scales = settings.target_scales();
+        go_on(observe(ColorizeEvent::Listing))?;
+        let (raster, luma, extent) = (self.raster, self.luma, dataset.extent);
+        let frozen = FrozenViews::new(raster, luma, extent, &cameras, scales, room)?;
+        if let Some(at_a_time) = frozen.streamed() {
+            go_on(observe(ColorizeEvent::Streaming { at_a_time }))?;
+        }
+        Ok(frozen)
+    }
+
+    /// The degree that is asked for or was chosen, or the one that `choose` finds.
+    fn degree(
+        &self,
+        chosen: &mut Option<ChosenDegree>,
+        observe: &mut ColorizeObserver<'_>,
+        choose: impl FnOnce(&mut ColorizeObserver<'_>) -> Result<ChosenDegree, ChromaError>,
+    ) -> Result<u32, ChromaError> {
+        if let Degree::Fixed(degree) = self.sh_degree {
+            return Ok(degree);
+        }
+        let found = match chosen.take() {
+            Some(found) => found,
+            None => choose(observe)?,
+        };
+        go_on(observe(ColorizeEvent::Chosen(&found)))?;
+        Ok(chosen.insert(found).degree)
+    }
+
     /// How far views disagree without and with `corrections`, where these make them disagree
     /// more.
     fn worse(&self, corrections: &[(Task, Correction)]) -> Option<[f64; 2]> {

@@ -12,7 +12,7 @@ use super::{
     scan::{Scan, scan},
     shots::{self, Cutter},
 };
-use crate::programs::{FFMPEG, Program, ProgramError};
+use crate::programs::{self, FFMPEG, Program, ProgramError};
 
 /// The oldest that knows `-fps_mode`.
 const OLDEST: [u32; 2] = [5, 1];
@@ -97,18 +97,7 @@ impl Source {
     /// # Errors
     /// [`PrepareError`].
     pub fn probe(path: &Path) -> Result<Self, PrepareError> {
-        let said = Program::new("ffprobe")
-            .args([
-                "-v",
-                "error",
-                "-of",
-                "json",
-                "-show_streams",
-                "-show_format",
-            ])
-            .film(path)
-            .ask();
-        let said = said.map_err(|error| match error {
+        let said = programs::probe(path).map_err(|error| match error {
             ProgramError::Failed { said, .. } => PrepareError::at(path, match unlisted(&said) {
                 Some(format) => format!(
                     "is no film by itself, but {format}, which may lead to other files; make one file of it, such as .mp4 or .mkv"

@@ -27,6 +27,22 @@ pub(crate) const FFMPEG: &str = "ffmpeg";
 /// How often a program is looked after that has closed its output.
 const PATIENCE: Duration = Duration::from_millis(5);
 
+/// Streams and format of a film in the words of `ffprobe`, which are JSON.
+///
+/// # Errors
+/// [`ProgramError`].
+pub(crate) fn probe(film: &Path) -> Result<String, ProgramError> {
+    let told = [
+        "-v",
+        "error",
+        "-of",
+        "json",
+        "-show_streams",
+        "-show_format",
+    ];
+    Program::new("ffprobe").args(told).film(film).ask()
+}
+
 /// Programs that run, so that they can be ended.
 static RUNNING: Mutex<Vec<Arc<Mutex<Child>>>> = Mutex::new(Vec::new());
 

@@ -19,7 +19,7 @@ pub use report::{front_table, shell_line};
 pub use sweep::{PointStage, Tradeoff};
 
 use crate::{
-    capture::Capture,
+    capture::{Capture, split},
     run::RunError,
     store::{RunFolder, StoreError, files},
     tell::{Event, Observer, Stage},
@@ -29,7 +29,7 @@ use search::Task;
 use state::State;
 use sweep::{Phase, Point};
 
-/// What `tradeoff` is asked to do.
+/// A request to sweep.
 pub struct TradeoffOptions {
     /// The COLMAP folder.
     pub colmap_dir: PathBuf,
@@ -90,7 +90,8 @@ pub fn tradeoff(
         folder.into()
     });
     let capture = Capture::load(&options.colmap_dir).map_err(RunError::from)?;
-    if options.fit.iter().any(|word| word == "--no-holdout") {
+    let holdout = options.fit.iter().all(|word| word != "--no-holdout");
+    if split(&capture.views, holdout).test.is_empty() {
         return Err(TradeoffError::NothingToMeasure(options.colmap_dir.clone()));
     }
     let sides = capture.views.iter().flat_map(|view| view.photo_size());

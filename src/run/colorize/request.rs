@@ -1,4 +1,4 @@
-//! What `colorize` is asked to do.
+//! A request to `colorize`.
 
 use std::{path::PathBuf, sync::Arc};
 
@@ -11,7 +11,7 @@ use crate::{
     subject::Live,
 };
 
-/// What `colorize` is asked to do.
+/// A request to color a gray scene.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ColorizeRequest {
     /// Run folder or gray splat file; the newest run by default.

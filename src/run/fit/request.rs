@@ -1,4 +1,4 @@
-//! What `fit` is asked to do.
+//! A request to `fit`.
 
 use std::{path::PathBuf, sync::Arc};
 
@@ -55,7 +55,7 @@ impl Init {
     }
 }
 
-/// What `fit` is asked to do; `None` leaves it to the preset.
+/// A request to train a gray scene; `None` leaves a value to the preset.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct FitRequest {
     /// The COLMAP folder.
@@ -65,7 +65,7 @@ pub struct FitRequest {
     /// Amount of work; `paper` on a GPU and `draft` on a software adapter by default.
     /// With another goal than a fixed one, the most that is tried, `paper` by default.
     pub preset: Option<Preset>,
-    /// What is asked for instead of the preset's settings. Not the iterations together with a
+    /// Settings in the place of the preset's. Not the iterations together with a
     /// time limit or a target, nor what the plan of effects decides.
     pub settings: LumaOverlay,
     /// How photos are loaded; the longer side is the preset's where it is `None`.

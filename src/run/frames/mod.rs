@@ -14,7 +14,7 @@ use painted::Painted;
 use painter::Painter;
 use range::own_range;
 use shots::{Shot, shots_of};
-use unplaced::{Ends, Known, Unknown, carry, chain, tell, way, whole};
+use unplaced::{Ends, Known, Steps, Unknown, carry, chain, tell, way, whole};
 
 use super::{
     RunError,
@@ -24,7 +24,7 @@ use crate::{
     capture::{Dataset, Film, LoadOptions},
     chroma::teacher::TeacherSettings,
     eval::exposures,
-    frames::{Believed, Canvas, SceneDrawer, believable, blend, finish},
+    frames::{Believed, Canvas, SceneDrawer, Strokes, believable, blend, finish},
     gpu::Gpu,
     raster::Raster,
     report::Report,
@@ -142,117 +142,171 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
         range: own_range(&dataset, film.as_ref(), &shots, observe),
         side: None,
     };
-    let mut out = Out::open(options, rate, film.as_ref(), &shots, observe)?;
+    let out = Out::open(options, rate, film.as_ref(), &shots, observe)?;
     let painted = find_painted(options, report, &shots, &mut painter, observe)?;
-    let mut told = Frames {
-        output: options.output.clone(),
-        photos: 0,
-        placed: 0,
-        carried: 0,
-        painted: 0,
-        covered: 0.0,
-        warnings: Vec::new(),
-        seconds: 0.0,
+    let mut coloring = Coloring {
+        painter,
+        out,
+        teacher_alone: options.teacher_alone,
+        last: None,
+        open: Vec::new(),
+        kept: 0,
+        unplaced: Vec::new(),
+        unread: Vec::new(),
+        told: Frames {
+            output: options.output.clone(),
+            photos: 0,
+            placed: 0,
+            carried: 0,
+            painted: 0,
+            covered: 0.0,
+            warnings: Vec::new(),
+            seconds: 0.0,
+        },
     };
-    let mut progress = |done: usize, name: &str| {
-        observe(Event::progress(Stage::Coloring, done, shots.len(), name));
-    };
-
-    // The last photo with a pose, and those without one since.
-    let mut last: Option<Known> = None;
-    let mut open: Vec<Unknown<'_>> = Vec::new();
-    let (mut unplaced, mut unread) = (Vec::new(), Vec::new());
-    let mut kept = 0;
     for (index, shot) in shots.iter().enumerate() {
-        progress(told.photos + open.len(), &shot.name);
+        let done = coloring.told.photos + coloring.open.len();
+        observe(Event::progress(
+            Stage::Coloring,
+            done,
+            shots.len(),
+            &*shot.name,
+        ));
         let strokes = painted.on(index);
-        told.painted += usize::from(strokes.is_some());
-        if shot.views.is_empty() {
-            match painter.original(shot) {
-                Ok(original) => {
-                    let canvas = Canvas::of(&original, painter.side(&original));
-                    kept += original.gray.len();
-                    open.push(Unknown {
-                        index,
-                        shot,
-                        canvas,
-                        strokes,
-                        original: (kept <= KEPT).then_some(original),
-                    });
-                }
-                Err(error) => unread.push(error.to_string()),
-            }
-            continue;
+        coloring.told.painted += usize::from(strokes.is_some());
+        match shot.views.is_empty() {
+            true => coloring.wait(index, shot, strokes),
+            false => coloring.color(shot, strokes)?,
         }
-        kept = 0;
-        let original = painter.original(shot)?;
-        let canvas = painter.canvas(shot, &original);
-        let seen = match options.teacher_alone {
+    }
+    coloring.end()?;
+    observe(Event::progress(
+        Stage::Coloring,
+        shots.len(),
+        shots.len(),
+        "",
+    ));
+    coloring.out.finish(observe)?;
+    if !options.teacher_alone {
+        tell(&coloring.unplaced, &shots, observe);
+    }
+    for line in coloring.unread {
+        observe(Event::Warning(format!("left out: {line}")));
+    }
+    let told = coloring.told;
+    Ok(Frames {
+        covered: told.covered / told.placed.max(1) as f64,
+        seconds: begun.elapsed().as_secs_f64(),
+        warnings: warnings.take(),
+        ..told
+    })
+}
+
+/// Photos in color, one after the other; those without a pose wait for the next that has one.
+struct Coloring<'a> {
+    painter: Painter<'a>,
+    out: Out,
+    teacher_alone: bool,
+    /// The last photo with a pose.
+    last: Option<Known>,
+    /// Photos without one since.
+    open: Vec<Unknown<'a>>,
+    /// Their pixels that are kept.
+    kept: usize,
+    /// Places of photos that were colored from others, and whether the teacher did most of it.
+    unplaced: Vec<(usize, bool)>,
+    unread: Vec<String>,
+    told: Frames,
+}
+
+impl<'a> Coloring<'a> {
+    /// Takes a photo without a pose.
+    fn wait(&mut self, index: usize, shot: &'a Shot, strokes: Option<&'a Strokes>) {
+        match self.painter.original(shot) {
+            Ok(original) => {
+                let canvas = Canvas::of(&original, self.painter.side(&original));
+                self.kept += original.gray.len();
+                self.open.push(Unknown {
+                    index,
+                    shot,
+                    canvas,
+                    strokes,
+                    original: (self.kept <= KEPT).then_some(original),
+                });
+            }
+            Err(error) => self.unread.push(error.to_string()),
+        }
+    }
+
+    /// Colors a photo with a pose, and those that waited for it.
+    fn color(&mut self, shot: &Shot, strokes: Option<&'a Strokes>) -> Result<(), RunError> {
+        self.kept = 0;
+        let original = self.painter.original(shot)?;
+        let canvas = self.painter.canvas(shot, &original);
+        let seen = match self.teacher_alone {
             true => Believed::nothing(canvas.len()),
-            false => painter.seen(shot, &canvas)?,
+            false => self.painter.seen(shot, &canvas)?,
         };
-        let steps = match &last {
+        let steps = match &self.last {
             Some(last)
-                if !options.teacher_alone && (!open.is_empty() || 1.0 - seen.share() > OPEN) =>
+                if !self.teacher_alone && (!self.open.is_empty() || 1.0 - seen.share() > OPEN) =>
             {
-                way(&last.canvas, &open, Some(&canvas))
+                way(&last.canvas, &self.open, Some(&canvas))
             }
             // Those before the first photo with a pose take its colors.
-            None if !options.teacher_alone => {
-                chain(open.iter().map(|unknown| &unknown.canvas).chain([&canvas]))
-            }
+            None if !self.teacher_alone => chain(
+                self.open
+                    .iter()
+                    .map(|unknown| &unknown.canvas)
+                    .chain([&canvas]),
+            ),
             _ => Vec::new(),
         };
-        let before = (last.as_ref()).and_then(|last| {
+        let before = (self.last.as_ref()).and_then(|last| {
             Some(
                 last.as_carried(false)
                     .along(&whole(&steps)?, false, &canvas),
             )
         });
-        let answer = painter.answer(&shot.name, painter.views(shot).first(), &canvas)?;
+        let views = self.painter.views(shot);
+        let answer = (self.painter).answer(&shot.name, views.first(), &canvas)?;
         let ab = blend(&canvas, &seen, answer.as_deref(), before.as_ref());
         // What comes after is colored as if nothing were painted, and painted by itself.
         let shown = strokes.map(|strokes| strokes.over(&canvas, &seen, &ab));
         let next = Known { canvas, ab, shown };
+        self.carry(&steps, Some(&next))?;
+        self.out
+            .write(shot, finish(&original, &next.canvas, next.shown().to_vec()))?;
+        self.told.covered += seen.share();
+        self.told.placed += 1;
+        self.told.photos += 1;
+        self.last = Some(next);
+        Ok(())
+    }
+
+    /// Colors the photos that wait for none any more.
+    fn end(&mut self) -> Result<(), RunError> {
+        let steps = match &self.last {
+            Some(known) if !self.teacher_alone => way(&known.canvas, &self.open, None),
+            Some(_) => Vec::new(),
+            None => return Ok(()),
+        };
+        self.carry(&steps, None)
+    }
+
+    /// Colors those that wait from the photos before and after them.
+    fn carry(&mut self, steps: &Steps, after: Option<&Known>) -> Result<(), RunError> {
         let ends = Ends {
-            before: last.as_ref(),
-            after: Some(&next),
+            before: self.last.as_ref(),
+            after,
         };
-        told.carried += open.len();
-        told.photos += open.len();
-        unplaced.extend(carry(&mut painter, &open, &steps, &ends, &mut out)?);
-        open.clear();
-        out.write(shot, finish(&original, &next.canvas, next.shown().to_vec()))?;
-        told.covered += seen.share();
-        told.placed += 1;
-        told.photos += 1;
-        last = Some(next);
+        self.told.carried += self.open.len();
+        self.told.photos += self.open.len();
+        let unplaced = carry(&mut self.painter, &self.open, steps, &ends, &mut self.out)?;
+        self.unplaced.extend(unplaced);
+        self.open.clear();
+        Ok(())
     }
-    if let Some(known) = &last {
-        let steps = match options.teacher_alone {
-            true => Vec::new(),
-            false => way(&known.canvas, &open, None),
-        };
-        let ends = Ends {
-            before: last.as_ref(),
-            after: None,
-        };
-        told.carried += open.len();
-        told.photos += open.len();
-        unplaced.extend(carry(&mut painter, &open, &steps, &ends, &mut out)?);
-    }
-    progress(shots.len(), "");
-    out.finish(observe)?;
-    if !options.teacher_alone {
-        tell(&unplaced, &shots, observe);
-    }
-    for line in unread {
-        observe(Event::Warning(format!("left out: {line}")));
-    }
-    told.covered /= told.placed.max(1) as f64;
-    told.seconds = begun.elapsed().as_secs_f64();
-    told.warnings = warnings.take();
-    Ok(told)
 }
 
 /// The teachers of the run, or the one that is named; none where nobody can be asked.

@@ -7,7 +7,7 @@ use serde_json::Value;
 use crate::{
     capture::Film,
     disk::Draft,
-    programs::{FFMPEG, Program},
+    programs::{self, FFMPEG, Program},
 };
 
 /// Codecs that players expect beside H.264 in MP4 and QuickTime files.
@@ -66,7 +66,8 @@ impl Sound {
             return None;
         }
         let name = film.source.display();
-        let probed = probe(&film.source);
+        let said = programs::probe(&film.source).unwrap_or_default();
+        let probed: Value = serde_json::from_str(&said).unwrap_or_default();
         let all = probed["streams"].as_array().map_or(&[][..], Vec::as_slice);
         let of = |kind: &'static str| all.iter().filter(move |s| s["codec_type"] == kind);
         if of("audio").next().is_none() {
@@ -246,22 +247,6 @@ fn ways(codec: &str, channels: u64, together: bool, container: &str) -> Vec<Way>
         }
     }
     ways
-}
-
-/// Streams and format of a film, as `ffprobe` says them; null where it cannot.
-fn probe(path: &Path) -> Value {
-    let said = Program::new("ffprobe")
-        .args([
-            "-v",
-            "quiet",
-            "-of",
-            "json",
-            "-show_streams",
-            "-show_format",
-        ])
-        .film(path)
-        .ask();
-    serde_json::from_str(&said.unwrap_or_default()).unwrap_or_default()
 }
 
 /// FFmpeg with a container for its output.
