@@ -41,7 +41,7 @@ test-all: export PATH := $(CURDIR)/target/test-all/bin:$(PATH)
 test-all: setup-all lint
 	cargo clippy --release --lib --test fuzz --no-default-features -- -D warnings
 	cargo test --release -- --include-ignored
-	if [ "$$(id -u)" = 0 ]; then tools/bare_machine.sh; else sudo -n tools/bare_machine.sh; fi
+	$(if $(filter-out 0,$(shell id -u)),sudo -n --preserve-env=HOME) tools/bare_machine.sh
 
 lint:
 	@cargo fmt --version >/dev/null 2>&1 && cargo clippy --version >/dev/null 2>&1 || rustup component add rustfmt clippy

@@ -4,18 +4,24 @@
 #
 #     sudo tools/bare_machine.sh [COMMAND]    # default: make demo && make test
 #
-# Needs root and debootstrap. BARE_ROOT is where the root goes (target/bare by default; what is
-# there is used again), DEBIAN_MIRROR where packages come from.
+# Needs root, debootstrap and a machine of Debian or its kin, whose sources of packages are used.
+# BARE_ROOT is where the root goes (target/bare by default; what is there is used again).
 set -eu
 cd "$(dirname "$0")/.."
+# Mounts are this process' alone, and gone with it: nothing that removes the root reaches them.
+if [ -z "${BARE_UNSHARED:-}" ]; then
+    exec env BARE_UNSHARED=1 unshare --mount --propagation private "$0" "$@"
+fi
 root=${BARE_ROOT:-$PWD/target/bare}
 cargo=${CARGO_HOME:-$HOME/.cargo}
 rustup=${RUSTUP_HOME:-$HOME/.rustup}
 packages=ca-certificates,git,make,python3
 
-if [ ! -e "$root/etc/debian_version" ]; then
-    debootstrap --variant=minbase --include="$packages" bookworm "$root" \
-        "${DEBIAN_MIRROR:-http://deb.debian.org/debian}"
+if [ ! -e "$root/complete" ]; then
+    mirror=$(apt-get indextargets --format '$(REPO_URI)' 'Created-By: Packages' | head -n 1)
+    rm -rf "$root"
+    debootstrap --variant=minbase --include="$packages" bookworm "$root" "$mirror"
+    touch "$root/complete"
 fi
 # The network as it is here.
 cp -r /etc/apt/. "$root/etc/apt"
@@ -24,10 +30,8 @@ for file in /etc/resolv.conf /etc/hosts /etc/pip.conf; do
     if [ -e "$file" ]; then cp "$file" "$root$file"; fi
 done
 rm -rf "$root/gs-chroma"
-git clone --quiet --no-hardlinks . "$root/gs-chroma"
+git -c safe.directory='*' clone --quiet --no-hardlinks . "$root/gs-chroma"
 
-leave() { umount "$root/proc" "$root/dev" "$root$cargo" "$root$rustup" 2>/dev/null || true; }
-trap leave EXIT
 mkdir -p "$root$cargo" "$root$rustup"
 mount -t proc proc "$root/proc"
 mount --rbind /dev "$root/dev"

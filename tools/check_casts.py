@@ -5,7 +5,7 @@
 
 However well a scene is made from pictures of unsteady_teacher.py, it ends at best at the mean
 saturation and cast of those in training, and that mean is not the truth. For each scene below DATA
-(default ../shared/data) this gives the held-out photos that mean, and takes their a/b error. To what is
+(default $SCENES or scenes) this gives the held-out photos that mean, and takes their a/b error. To what is
 expected of ours is added, as if the two were independent, what is left with the photos themselves
 as teacher; that, and what ours and RGB splats reached, is read from the table that
 check_color.py printed into RESULTS (default docs/lab/09-colors.md). An estimate, no bound: another method may
@@ -16,6 +16,7 @@ many draws of them. No scene is trained. Needs numpy, Pillow and matplotlib.
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -135,7 +136,7 @@ def against(least: float, ours: float, bound: float) -> str:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--svg", type=Path, required=True)
-    parser.add_argument("--data", type=Path, default=Path("../shared/data"))
+    parser.add_argument("--data", type=Path, default=Path(os.environ.get("SCENES", "scenes")))
     parser.add_argument("--results", type=Path, default=Path("docs/lab/09-colors.md"))
     parser.add_argument("--seeds", type=int, default=20)
     arguments = parser.parse_args()

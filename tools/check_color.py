@@ -3,7 +3,7 @@
 
     cargo build --release && python3 tools/check_color.py -o target/color
 
-Each scene is a COLMAP folder of color photos below DATA (default ../shared/data); scenes that are
+Each scene is a COLMAP folder of color photos below DATA (default $SCENES or scenes); scenes that are
 not there are skipped with a word. A scene is fitted once (and not again while its run is there),
 then colored and evaluated with each teacher: the photos themselves (oracle), the photos made
 unsteady by unsteady_teacher.py, and the bundled network. Needs numpy and Pillow.
@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import shlex
 import subprocess
 import sys
@@ -193,7 +194,7 @@ def ablation(
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("-o", "--output", type=Path, default=Path("target/color"))
-    parser.add_argument("--data", type=Path, default=Path("../shared/data"))
+    parser.add_argument("--data", type=Path, default=Path(os.environ.get("SCENES", "scenes")))
     parser.add_argument("--program", default="target/release/gs-chroma")
     parser.add_argument("--network", default="assets/teacher/demo-teacher.onnx")
     parser.add_argument("--iterations", type=int, default=1000, help="of fit")

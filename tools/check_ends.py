@@ -3,7 +3,7 @@
 
     cargo build --release && python3 tools/check_ends.py -o target/ends
 
-Of COLMAP folders below DATA (default ../shared/data) the first and the last photo are held out, or
+Of COLMAP folders below DATA (default $SCENES or scenes) the first and the last photo are held out, or
 every eighth, in a copy without them. Drafts at 240 px without shell and gaps, with the shell, with
 both; held-out PSNR as viewers show the scene. With `--against`, drafts as planned by another build
 of the program and by this one; PSNR as viewers show the scene, after each photo's own gain and
@@ -13,6 +13,7 @@ offset, and SSIM. A scene that is not there is skipped with a word. Needs numpy 
 from __future__ import annotations
 
 import argparse
+import os
 import shutil
 import statistics
 import subprocess
@@ -67,7 +68,7 @@ class Place(NamedTuple):
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("-o", "--output", type=Path, default=Path("target/ends"))
-    parser.add_argument("--data", type=Path, default=Path("../shared/data"))
+    parser.add_argument("--data", type=Path, default=Path(os.environ.get("SCENES", "scenes")))
     parser.add_argument("--scenes", nargs="*", default=SCENES)
     parser.add_argument("--hold", nargs="+", choices=HELD, default=HELD[::-1], help="which photos are held out")
     parser.add_argument("--seeds", type=int, default=2)

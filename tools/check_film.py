@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import shlex
 import subprocess
 import sys
@@ -170,7 +171,7 @@ def measure(out: Path, film: Path, told: dict) -> None:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("-o", "--output", type=Path, default=Path("target/film"))
-    parser.add_argument("--data", type=Path, default=Path("../shared/data"))
+    parser.add_argument("--data", type=Path, default=Path(os.environ.get("SCENES", "scenes")))
     parser.add_argument("--program", default="target/release/gs-chroma")
     parser.add_argument("--teacher", help="[default: the network in DATA/teacher-places]")
     parser.add_argument("--photos", help="a folder [default: the bundled scene's]")

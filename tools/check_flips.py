@@ -3,7 +3,7 @@
 
     cargo build --release --bins --examples && python3 tools/check_flips.py -o target/flips
 
-The bundled scene, the scenes below DATA (default ../shared/data; skipped with a word where
+The bundled scene, the scenes below DATA (default $SCENES or scenes; skipped with a word where
 missing), few photos in an arc, an object before a plain backdrop, and every variant that
 make_variants makes of the bundled scene. A run as planned tells which effects are on; then every
 effect is flipped by itself, all others as planned. What a flip gains is the mean over the seeds
@@ -21,6 +21,7 @@ from __future__ import annotations
 import argparse
 import itertools
 import json
+import os
 import shlex
 import shutil
 import statistics
@@ -146,7 +147,7 @@ def mean_row(options: argparse.Namespace, found: list[dict]) -> str:
 def main() -> int:
     """Makes, fits, prints."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--data", type=Path, default=Path("../shared/data"))
+    parser.add_argument("--data", type=Path, default=Path(os.environ.get("SCENES", "scenes")))
     parser.add_argument("-o", "--output", type=Path, default=Path("target/flips"))
     parser.add_argument("--program", default="target/release/gs-chroma")
     parser.add_argument("--maker", default="target/release/examples/make_variants")

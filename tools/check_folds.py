@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """What an effect gains on every photo of a scene, each held out once, and prints Markdown.
 
-    cargo build --release && python3 tools/check_folds.py ../shared/data/tiny-brighton background
+    cargo build --release && python3 tools/check_folds.py $SCENES/tiny-brighton background
 
 `fit` holds out every eighth photo by name: of twelve photos two, which say little. Here names are
 turned around eight times, so that every photo is held out, and the scene is fitted with the

@@ -3,7 +3,7 @@
 
     cargo build --release && python3 tools/check_frames.py -o target/networks
 
-The bundled scene and those below DATA (default ../shared/data), each fitted once and not again
+The bundled scene and those below DATA (default $SCENES or scenes), each fitted once and not again
 while its run is there, colored by the network in DATA/teacher-places (or `--teacher`), and by
 their own photos where these are in color. What is not there is skipped with a word. Photos t and
 t + Δ are compared in two ways that use nothing of the program: at COLMAP's points (means of 3 × 3
@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import shlex
 import struct
 import sys
@@ -225,7 +226,7 @@ def measure(program: str, scene: str, folder: Path, teacher: str, out: Path, fla
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("-o", "--output", type=Path, default=Path("target/networks"))
-    parser.add_argument("--data", type=Path, default=Path("../shared/data"))
+    parser.add_argument("--data", type=Path, default=Path(os.environ.get("SCENES", "scenes")))
     parser.add_argument("--program", default="target/release/gs-chroma")
     parser.add_argument("--teacher", help="[default: the network in DATA/teacher-places]")
     parser.add_argument("--fit", default="--max-side 320 --seed 0", help="flags, as one word")

@@ -3,7 +3,7 @@
 enough to do that without one, and prints as Markdown where the held-out PSNR ended and
 where it was best on the way.
 
-    cargo build --release && python3 tools/check_long_runs.py ../shared/data/fern-llff --iterations 7000 -o target/long
+    cargo build --release && python3 tools/check_long_runs.py $SCENES/fern-llff --iterations 7000 -o target/long
 
 Without `--iterations` a preset may end earlier, where its curve is flat.
 

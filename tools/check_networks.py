@@ -3,7 +3,7 @@
 
     cargo build --release && python3 tools/check_networks.py -o target/networks
 
-The bundled scene and those below DATA (default ../shared/data), each fitted once and not again
+The bundled scene and those below DATA (default $SCENES or scenes), each fitted once and not again
 while its run is there, colored by the network in DATA/teacher-places or by `--teacher FILE.onnx`.
 What is not there is skipped with a word. `--svg FILE` draws the loss after every round, `--rounds`
 compares fewer and more rounds than by default, as pictures of all views. Beside each run lie its
@@ -15,6 +15,7 @@ from __future__ import annotations
 import argparse
 import csv
 import json
+import os
 import shlex
 import shutil
 import sys
@@ -159,7 +160,7 @@ def draw(curves: dict[str, list[float]], path: Path) -> None:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("-o", "--output", type=Path, default=Path("target/networks"))
-    parser.add_argument("--data", type=Path, default=Path("../shared/data"))
+    parser.add_argument("--data", type=Path, default=Path(os.environ.get("SCENES", "scenes")))
     parser.add_argument("--program", default="target/release/gs-chroma")
     parser.add_argument("--teacher", type=Path, help="[default: the network in DATA/teacher-places]")
     parser.add_argument("--fit", default="--preset draft --max-side 320 --seed 0", help="flags, as one word")

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Runs `fit` and `colorize` on real scenes and prints what came out as Markdown.
 
-Each scene is a COLMAP folder of color photos below DATA (default ../shared/data).
+Each scene is a COLMAP folder of color photos below DATA (default $SCENES or scenes).
 The photos are turned to gray by the program; they serve as the teacher and as
 the truth. Scenes that are not there are skipped with a word.
 
@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import shlex
 import subprocess
 import sys
@@ -36,7 +37,7 @@ def run(command: list[str]) -> tuple[dict, float]:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("-o", "--output", type=Path, default=Path("target/scenes"))
-    parser.add_argument("--data", type=Path, default=Path("../shared/data"))
+    parser.add_argument("--data", type=Path, default=Path(os.environ.get("SCENES", "scenes")))
     parser.add_argument("--program", default="target/release/gs-chroma")
     parser.add_argument("--iterations", type=int, default=1000)
     parser.add_argument("--colorize", default="", help="more flags for colorize, as one word")

@@ -3,7 +3,7 @@
 
     cargo build --release && python3 tools/check_strokes.py -o target/strokes
 
-The scene is a COLMAP folder of color photos below DATA (default ../shared/data), fitted with
+The scene is a COLMAP folder of color photos below DATA (default $SCENES or scenes), fitted with
 `--fit` unless `--run` names a fitted run, and colored four times: by a real network without strokes, with
 strokes that count where they are painted (`--grow-hints off`), with strokes that grow, and by
 the photos themselves. All strokes are on one photo; their color is the mean of the true ones
@@ -17,6 +17,7 @@ the plant, by distance from what is green in the photo. Needs numpy, Pillow, sci
 from __future__ import annotations
 
 import argparse
+import os
 import shlex
 import shutil
 import subprocess
@@ -125,7 +126,7 @@ def from_the_plant(photo: Path, size: tuple[int, int]) -> np.ndarray:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--program", default="target/release/gs-chroma")
-    parser.add_argument("--data", type=Path, default=Path("../shared/data"))
+    parser.add_argument("--data", type=Path, default=Path(os.environ.get("SCENES", "scenes")))
     parser.add_argument("--run", type=Path, help="a fitted run of fern-llff")
     parser.add_argument("--fit", default="--preset draft --max-side 800 --max-splats 40000", help="flags, as one word")
     parser.add_argument("--network", type=Path, help="default: places-resnet18 below DATA")

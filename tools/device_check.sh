@@ -6,7 +6,7 @@
 #   tools/device_check.sh --pack FOLDER             builds here what PREBUILT takes there
 #
 # Environment, with paths from the repository's root:
-#   SCENE                     COLMAP folder of color photos, ../shared/data/fern-llff unless given
+#   SCENE                     COLMAP folder of color photos, fern-llff below SCENES unless given
 #   STEPS                     those to do, all unless given: device build doctor bench accuracy tests fit
 #                             colorize-adam colorize eval peers
 #   ITERATIONS, SIDE          of the fit: 15000 and 800
@@ -53,7 +53,7 @@ for argument in "$@"; do
         *) out=$argument ;;
     esac
 done
-scene=${SCENE:-../shared/data/fern-llff} iterations=${ITERATIONS:-15000} side=${SIDE:-800}
+scene=${SCENE:-${SCENES:-scenes}/fern-llff} iterations=${ITERATIONS:-15000} side=${SIDE:-800}
 prebuilt=${PREBUILT:-} program=${PROGRAM:-${prebuilt:+$prebuilt/bin-gs-chroma}}
 program=${program:-target/release/gs-chroma}
 mkdir -p "$out" || exit 1

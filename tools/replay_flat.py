@@ -2,7 +2,7 @@
 """Prints as Markdown where runs that went on to the end would have ended with other rules for
 a flat curve (`src/luma/trainer/ends.rs`), by the curves in their `report.json`.
 
-    gs-chroma fit ../shared/data/banana-object --preset balanced --max-side 160 --max-splats 5000 --iterations 7000 -o target/flat/banana
+    gs-chroma fit $SCENES/banana-object --preset balanced --max-side 160 --max-splats 5000 --iterations 7000 -o target/flat/banana
     python3 tools/replay_flat.py target/flat/* --gains 0.1,0.3 --from 1050,1750
 
 What a run would have ended with only a run tells: of what remains after a verdict, the table

@@ -123,7 +123,7 @@ def install_tools_of_all_tests() -> None:
     elif not run([str(python), "-m", "pip", "--quiet", "install", "usd-core==26.11"]):
         say(f"there is no OpenUSD: pip failed in {folder}")
     if not shutil.which("naga") and not (folder / "bin" / "naga").exists():
-        cargo = ["cargo", "install", "--quiet", "--locked", "naga-cli@30", "--root", str(folder)]
+        cargo = ["cargo", "install", "--quiet", "--locked", "naga-cli@30.0.1", "--root", str(folder)]
         if not run(cargo):
             say("there is no naga: cargo install naga-cli failed")
 

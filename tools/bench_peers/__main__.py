@@ -1,7 +1,7 @@
 """Trains one scene with gs-chroma and with its peers, and prints time and quality side by side.
 
     cargo build --release
-    python3 tools/bench_peers ../shared/data/tiny-brighton --side 320 --iterations 1000 \\
+    python3 tools/bench_peers $SCENES/tiny-brighton --side 320 --iterations 1000 \\
         --max-splats 10000 --rounds 3 --brush path/to/brush -o target/peers
 
 Any of --brush PROGRAM, --gsplat "python path/to/simple_trainer.py" and --opensplat PROGRAM may be
