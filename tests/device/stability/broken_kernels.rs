@@ -111,6 +111,16 @@ fn a_compensation_without_its_gradient_is_noticed() {
 }
 
 #[test]
+fn a_depth_of_the_next_gaussian_is_noticed() {
+    assert_noticed(&[[
+        "blend",
+        "blend",
+        "(next <= -color)",
+        "(transmittance <= -color)",
+    ]]);
+}
+
+#[test]
 fn an_untouched_kernel_is_not() {
     let cases = [
         "antialiased",
