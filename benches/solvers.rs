@@ -18,7 +18,7 @@ use std::{
 use gs_chroma::{
     capture::{Capture, LoadOptions, Loader, split},
     chroma::{
-        AdamSolver, ChromaSettings, FrozenViews, IrlsSolver, Room, Targets, Task,
+        AdamSolver, ChromaSettings, FrozenViews, IrlsSolver, MemoryBudget, Targets, Task,
         teacher::{GrayImage, Teacher, TeacherSettings},
     },
     gpu::Gpu,
@@ -78,7 +78,7 @@ fn load(run: &Path, teacher: &Path) -> Fallible<Problem> {
     }
     let raster = Arc::new(Raster::new(&Gpu::open()?));
     let luma = ply::read_ply(&run.join("luma.ply"))?.splats.to_luma();
-    let (extent, room) = (capture.extent(), Room::of(ColorKind::Chroma, 0));
+    let (extent, room) = (capture.extent(), MemoryBudget::of(ColorKind::Chroma, 0));
     Ok(Problem {
         frozen: FrozenViews::new(&raster, &luma, extent, &cameras, SCALES, room)?,
         targets,

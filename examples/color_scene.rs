@@ -7,7 +7,7 @@ use std::{env, error::Error, ops::ControlFlow, path::PathBuf, sync::Arc};
 use gs_chroma::{
     capture::{Dataset, LoadOptions},
     chroma::{
-        self, ChromaSettings, Colorizer, ColorizerError, Wanted,
+        self, ChromaSettings, Colorizer, ColorizerError, ViewTarget,
         teacher::{AbImage, GrayImage, Query},
     },
     gpu::Gpu,
@@ -24,7 +24,7 @@ impl Colorizer for Sepia {
         &mut self,
         _: Query<'_>,
         photo: GrayImage<'_>,
-    ) -> Result<Option<Wanted>, ColorizerError> {
+    ) -> Result<Option<ViewTarget>, ColorizerError> {
         let (width, height) = (photo.width, photo.height);
         let ab = vec![[6.0, 18.0]; photo.pixels.len()];
         let ab = AbImage { width, height, ab };

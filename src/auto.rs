@@ -91,7 +91,7 @@ impl Step {
 }
 
 /// What is told while it goes on.
-pub enum Told {
+pub enum AutoEvent {
     /// A step begins, and goes through these stages.
     Begins(Step, Vec<Stage>),
     /// A step's result is there.
@@ -141,7 +141,7 @@ pub enum AutoError {
 }
 
 /// Whoever is told.
-pub type Teller<'a> = dyn FnMut(Told) + 'a;
+pub type Teller<'a> = dyn FnMut(AutoEvent) + 'a;
 
 /// Does every step whose result is not there.
 ///
@@ -153,13 +153,15 @@ pub fn auto(options: &AutoOptions, tell: &mut Teller<'_>) -> Result<Results, Aut
         None => String::new(),
     };
     let input = &options.prepare.input;
-    let _originals = originals::Kept::default().with(input, "an original").keep();
+    let _originals = originals::OriginalFiles::default()
+        .with(input, "an original")
+        .keep();
     check(options)?;
     let house = prepared(options, tell)?;
     let run = RunFolder::at(&options.output.join(OF_AUTO));
     let results = results(options, &house, &run)?;
     let mut steps = Steps {
-        kept: Kept::read(&options.output)?,
+        kept: StepRecords::read(&options.output)?,
         tell,
     };
     let from = digest_of(&[
@@ -299,22 +301,22 @@ fn results(options: &AutoOptions, house: &Path, run: &RunFolder) -> Result<Resul
 fn prepared(options: &AutoOptions, tell: &mut Teller<'_>) -> Result<PathBuf, AutoError> {
     let input = &options.prepare.input;
     if input.join(IMAGES).is_dir() && input.join("sparse").is_dir() {
-        tell(Told::Skips(Step::Prepare));
+        tell(AutoEvent::Skips(Step::Prepare));
         return Ok(input.clone());
     }
     // It knows by itself what is there.
-    tell(Told::Begins(Step::Prepare, Vec::new()));
+    tell(AutoEvent::Begins(Step::Prepare, Vec::new()));
     let asked = PrepareOptions {
         output: options.output.join("house"),
         ..options.prepare.clone()
     };
-    prepare(&asked, &mut |event| tell(Told::Event(event)))?;
+    prepare(&asked, &mut |event| tell(AutoEvent::Event(event)))?;
     Ok(asked.output)
 }
 
 /// Steps, of which those are skipped whose results are there.
 struct Steps<'a, 'o> {
-    kept: Kept,
+    kept: StepRecords,
     tell: &'a mut Teller<'o>,
 }
 
@@ -329,13 +331,13 @@ impl Steps<'_, '_> {
         work: impl FnOnce(bool, &mut Observer<'_>) -> Result<(), RunError>,
     ) -> Result<(), AutoError> {
         if !self.kept.due(step, from, results) {
-            (self.tell)(Told::Skips(step));
+            (self.tell)(AutoEvent::Skips(step));
             return Ok(());
         }
         let begun = self.kept.begun(step, from);
         self.kept.begin(step, from)?;
-        (self.tell)(Told::Begins(step, stages));
-        work(begun, &mut |event| (self.tell)(Told::Event(event)))?;
+        (self.tell)(AutoEvent::Begins(step, stages));
+        work(begun, &mut |event| (self.tell)(AutoEvent::Event(event)))?;
         Ok(self.kept.done(step, from)?)
     }
 }
@@ -365,12 +367,12 @@ fn teacher_digest(teacher: &Path) -> Result<String, PrepareError> {
 }
 
 /// What results were made from, by step; of a step that has only begun with `begun` behind.
-struct Kept {
+struct StepRecords {
     path: PathBuf,
     made: BTreeMap<String, String>,
 }
 
-impl Kept {
+impl StepRecords {
     fn read(folder: &Path) -> Result<Self, StoreError> {
         let path = folder.join(KEPT);
         let text = crate::input::read_to_string(&path);
@@ -426,14 +428,14 @@ mod tests {
     fn a_step_is_due_unless_its_result_was_made_from_the_same() {
         let folder = tempfile::tempdir().expect("a folder");
         let result = folder.path().join("luma.ply");
-        let mut kept = Kept::read(folder.path()).expect("nothing yet");
+        let mut kept = StepRecords::read(folder.path()).expect("nothing yet");
         assert!(kept.due(Step::Fit, "a", &[&result]));
         kept.begin(Step::Fit, "a").expect("writable");
-        let again = Kept::read(folder.path()).expect("readable");
+        let again = StepRecords::read(folder.path()).expect("readable");
         assert!(again.begun(Step::Fit, "a") && !again.begun(Step::Fit, "b"));
         assert!(!again.begun(Step::Colorize, "a"));
         kept.done(Step::Fit, "a").expect("writable");
-        let kept = Kept::read(folder.path()).expect("readable");
+        let kept = StepRecords::read(folder.path()).expect("readable");
         assert!(!kept.begun(Step::Fit, "a"));
         // The result is missing, there, and there from something else.
         assert!(kept.due(Step::Fit, "a", &[&result]));
@@ -441,7 +443,7 @@ mod tests {
         assert!(!kept.due(Step::Fit, "a", &[&result]));
         assert!(kept.due(Step::Fit, "b", &[&result]));
         std::fs::write(folder.path().join(KEPT), "damaged").expect("writable");
-        let kept = Kept::read(folder.path()).expect("nothing is known");
+        let kept = StepRecords::read(folder.path()).expect("nothing is known");
         assert!(kept.due(Step::Fit, "a", &[&result]));
     }
 }

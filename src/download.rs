@@ -37,7 +37,7 @@ const BLOCK: usize = 1 << 16;
 
 /// A file to be fetched.
 #[derive(Clone, Debug)]
-pub(crate) struct Source<'a> {
+pub(crate) struct DownloadSource<'a> {
     /// Where it lies; `https` only.
     pub url: &'a str,
     /// Its SHA-256 in lower-case hexadecimal.
@@ -142,7 +142,7 @@ fn io_error(path: &Path) -> impl Fn(io::Error) -> DownloadError {
 /// # Errors
 /// [`DownloadError`].
 pub(crate) fn download(
-    source: &Source<'_>,
+    source: &DownloadSource<'_>,
     path: &Path,
     observe: &mut dyn FnMut(u64, Option<u64>) -> ControlFlow<()>,
 ) -> Result<(), DownloadError> {
@@ -186,7 +186,7 @@ pub(crate) fn download(
 
 /// Appends to the unfinished file until it is whole, and checks it.
 fn fill(
-    source: &Source<'_>,
+    source: &DownloadSource<'_>,
     part: &mut File,
     failed: &impl Fn(io::Error) -> DownloadError,
     observe: &mut dyn FnMut(u64, Option<u64>) -> ControlFlow<()>,
@@ -226,7 +226,7 @@ fn fill(
 /// One request for what is missing.
 fn transfer(
     agent: &Agent,
-    source: &Source<'_>,
+    source: &DownloadSource<'_>,
     part: &mut File,
     failed: &impl Fn(io::Error) -> DownloadError,
     observe: &mut dyn FnMut(u64, Option<u64>) -> ControlFlow<()>,
@@ -317,7 +317,7 @@ fn keeps_pace(judged: &mut (Instant, u64), now: Instant, bytes: u64) -> bool {
 /// The answer to a request for the bytes from `done` on, after redirects, and who gave it.
 fn ask(
     agent: &Agent,
-    source: &Source<'_>,
+    source: &DownloadSource<'_>,
     done: u64,
 ) -> Result<(Response<Body>, String), DownloadError> {
     let mut url = source.url.to_owned();
@@ -351,7 +351,7 @@ fn ask(
 }
 
 /// The host and port of a URL, if something may be fetched there.
-fn allowed(url: &str, source: &Source<'_>) -> Result<String, DownloadError> {
+fn allowed(url: &str, source: &DownloadSource<'_>) -> Result<String, DownloadError> {
     let uri: Option<Uri> = url.parse().ok();
     let secure = uri.as_ref().and_then(Uri::scheme_str) == Some("https");
     let authority = uri.as_ref().and_then(Uri::authority);
@@ -398,7 +398,7 @@ mod tests {
 
     fn leads_to(url: &str) -> Option<String> {
         let hosts = ["github.com", ".githubusercontent.com"].map(String::from);
-        let source = Source {
+        let source = DownloadSource {
             url: "https://github.com/a",
             sha256: "",
             bytes: None,

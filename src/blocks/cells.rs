@@ -72,21 +72,21 @@ pub(super) struct Cell {
 }
 
 /// What there is to do at places on the ground.
-pub(super) struct Work<'a> {
+pub(super) struct GroundWork<'a> {
     /// Along the two axes of the ground.
     pub places: &'a [[f64; 2]],
     /// How much there is at each.
     pub weights: &'a [f32],
 }
 
-impl Work<'_> {
+impl GroundWork<'_> {
     /// Cuts all of the ground so that no cell has much more work with its margin, which `near`
     /// tells, than another: one in the middle has margins on all sides, and is smaller.
     pub fn balanced(&self, blocks: Blocks, near: impl Fn(&Area) -> Area) -> Cell {
         let step = self.places.len().div_ceil(BALANCED_ON).max(1);
         let places: Vec<[f64; 2]> = self.places.iter().step_by(step).copied().collect();
         let weights: Vec<f32> = self.weights.iter().step_by(step).copied().collect();
-        let some = Work {
+        let some = GroundWork {
             places: &places,
             weights: &weights,
         };
@@ -251,7 +251,7 @@ mod tests {
     fn cells_have_equal_work_and_cover_the_ground_once() {
         let places = places();
         let weights = vec![1.0; places.len()];
-        let work = Work {
+        let work = GroundWork {
             places: &places,
             weights: &weights,
         };
@@ -276,7 +276,7 @@ mod tests {
     #[test]
     fn cells_have_the_work_that_is_asked() {
         let (places, weights) = (places(), vec![1.0; 4000]);
-        let work = Work {
+        let work = GroundWork {
             places: &places,
             weights: &weights,
         };
@@ -293,7 +293,7 @@ mod tests {
     #[test]
     fn cells_are_balanced_with_their_margins() {
         let (places, weights) = (places(), vec![1.0; 4000]);
-        let work = Work {
+        let work = GroundWork {
             places: &places,
             weights: &weights,
         };
@@ -316,7 +316,7 @@ mod tests {
     #[test]
     fn the_longer_side_is_cut_and_a_grid_is_cut_as_asked() {
         let (places, weights) = (places(), vec![1.0; 4000]);
-        let work = Work {
+        let work = GroundWork {
             places: &places,
             weights: &weights,
         };
@@ -330,14 +330,14 @@ mod tests {
 
     #[test]
     fn places_in_one_spot_are_one_cell() {
-        let work = Work {
+        let work = GroundWork {
             places: &[[1.0, 2.0]; 50],
             weights: &[1.0; 50],
         };
         let cells = work.cells(Blocks::Count(4), &[1.0; 4]);
         assert_eq!(cells.leaves(), [Area::EVERYWHERE]);
         let two = [[0.0, 0.0], [0.0, 0.0], [0.0, 0.0], [1.0, 0.0]];
-        let work = Work {
+        let work = GroundWork {
             places: &two,
             weights: &[1.0; 4],
         };
@@ -350,7 +350,7 @@ mod tests {
     #[test]
     fn a_cell_is_joined_with_its_neighbor() {
         let (places, weights) = (places(), vec![1.0; 4000]);
-        let work = Work {
+        let work = GroundWork {
             places: &places,
             weights: &weights,
         };

@@ -23,6 +23,6 @@ pub use estimate::Estimate;
 pub use ground::Ground;
 pub use job::{Block, BlockFile, COARSE, JOB_VERSION, Job, Kind, refuse_link};
 pub use picture::picture;
-pub use plan::{Division, FAR_PART, Planned, plan};
+pub use plan::{Division, FAR_PART, PartitionPlan, plan};
 pub use region::Region;
-pub use seen::Seen;
+pub use seen::PhotoCoverage;

@@ -3,8 +3,9 @@
 use std::{collections::BTreeSet, path::PathBuf};
 
 use super::{
-    Area, Block, BlockFile, Blocks, BlocksError, Estimate, Ground, JOB_VERSION, Job, Kind, Seen,
-    cells::{Cell, MOST, Work, ends},
+    Area, Block, BlockFile, Blocks, BlocksError, Estimate, Ground, JOB_VERSION, Job, Kind,
+    PhotoCoverage,
+    cells::{Cell, GroundWork, MOST, ends},
 };
 use crate::{
     capture::{Camera, Capture, Chosen, split},
@@ -62,7 +63,7 @@ pub struct Division {
 
 /// A division, with what belongs into the folders of the coarse model and of each block.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Planned {
+pub struct PartitionPlan {
     /// `job.json`.
     pub job: Job,
     /// Of the coarse model.
@@ -77,7 +78,11 @@ pub struct Planned {
 ///
 /// # Errors
 /// [`BlocksError::MemoryLimit`].
-pub fn plan(capture: &Capture, root: PathBuf, division: &Division) -> Result<Planned, BlocksError> {
+pub fn plan(
+    capture: &Capture,
+    root: PathBuf,
+    division: &Division,
+) -> Result<PartitionPlan, BlocksError> {
     let scene = Scene::of(capture, division);
     let photos = scene.photos.len();
     let counts = match (division.blocks, division.memory_limit) {
@@ -211,7 +216,7 @@ impl<'a> Scene<'a> {
 
     /// Blocks that all have enough photos, with these.
     fn divided(&self, blocks: Blocks) -> Vec<(Block, Chosen)> {
-        let work = Work {
+        let work = GroundWork {
             places: &self.places,
             weights: &self.weights,
         };
@@ -253,7 +258,7 @@ impl<'a> Scene<'a> {
     /// The photos of each block: those that show enough of it, and every photo at least where
     /// it shows most.
     fn chosen(&self, cores: &[Area], near: &[Area]) -> Vec<Chosen> {
-        let seen = Seen::count(self.capture, &self.ground, near);
+        let seen = PhotoCoverage::count(self.capture, &self.ground, near);
         let mut chosen = vec![Chosen::default(); cores.len()];
         for (photo, name) in self.photos.iter().enumerate() {
             let share = |block: usize| seen.share(block, photo);
@@ -336,7 +341,7 @@ impl<'a> Scene<'a> {
         root: PathBuf,
         divided: Vec<(Block, Chosen)>,
         warnings: Vec<String>,
-    ) -> Planned {
+    ) -> PartitionPlan {
         let mut photos = Chosen::default();
         for (name, &held_out) in self.photos.iter().zip(&self.held_out) {
             let names = if held_out {
@@ -370,7 +375,7 @@ impl<'a> Scene<'a> {
                 (block, file)
             })
             .unzip();
-        Planned {
+        PartitionPlan {
             job: Job {
                 version: JOB_VERSION,
                 program: env!("CARGO_PKG_VERSION").to_owned(),

@@ -10,7 +10,7 @@ const SAMPLES: usize = 2000;
 
 /// How many observations each photo has, and where.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Seen {
+pub struct PhotoCoverage {
     /// The photos' names, sorted.
     pub photos: Vec<String>,
     /// Of each photo, its observations of points.
@@ -19,7 +19,7 @@ pub struct Seen {
     pub of: Vec<Vec<u32>>,
 }
 
-impl Seen {
+impl PhotoCoverage {
     /// Counts observations; where a model has none, points that project into photos.
     pub fn count(capture: &Capture, ground: &Ground, areas: &[Area]) -> Self {
         let mut photos: Vec<String> = Vec::new();

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use glam::{DMat3, DVec2, DVec3};
 
 use super::lens::{Cut, IMPERCEPTIBLE, Lens, Undistortion};
-use super::{Choice, LoadOptions, Observation, Stance, View};
+use super::{Choice, LoadOptions, Observation, SensorOrientation, View};
 
 /// The views that every photo of a camera becomes.
 pub(super) struct Arrangement {
@@ -65,7 +65,7 @@ impl Arrangement {
                     lens: self.lens.clone(),
                     rotation: cut.rotation,
                 }),
-                stance: Stance::default(),
+                stance: SensorOrientation::default(),
             }
         })
     }

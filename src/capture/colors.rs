@@ -6,7 +6,7 @@ use moxcms::{
     TransferCharacteristics, TransformF32Executor, TransformOptions,
 };
 
-use super::beside::Beside;
+use super::metadata::ImageMetadata;
 
 /// How far each channel may be off for a color space to be sRGB, in 1.
 const SAME: f32 = 1.5 / 255.0;
@@ -19,20 +19,23 @@ const SAME_GAMMA: f32 = 0.02;
 const HIGH_DYNAMIC_RANGE: [u8; 2] = [16, 18];
 
 /// A picture in sRGB by what its file says of its colors, and what is not heeded of that.
-pub(super) fn in_srgb(image: DynamicImage, beside: &Beside) -> (DynamicImage, Option<String>) {
+pub(super) fn in_srgb(
+    image: DynamicImage,
+    metadata: &ImageMetadata,
+) -> (DynamicImage, Option<String>) {
     // Without a color there is none to become another.
     if !image.color().has_color() {
         return (image, None);
     }
-    let (profile, name) = match beside {
-        Beside {
+    let (profile, name) = match metadata {
+        ImageMetadata {
             code_points: Some([primaries, transfer]),
             ..
         } => (
             by_code_points(*primaries, *transfer),
             format!("cICP {primaries}, {transfer}"),
         ),
-        Beside {
+        ImageMetadata {
             profile: Some(profile),
             ..
         } => {
@@ -40,7 +43,7 @@ pub(super) fn in_srgb(image: DynamicImage, beside: &Beside) -> (DynamicImage, Op
             let name = profile.as_ref().and_then(name).unwrap_or_default();
             (profile, name)
         }
-        Beside {
+        ImageMetadata {
             gamma: Some(gamma), ..
         } if (gamma - SRGB_GAMMA).abs() > SAME_GAMMA => (None, format!("gAMA {gamma}")),
         _ => return (image, None),
@@ -151,26 +154,26 @@ mod tests {
         saved.into()
     }
 
-    fn beside(space: &ColorProfile) -> Beside {
-        Beside {
+    fn metadata(space: &ColorProfile) -> ImageMetadata {
+        ImageMetadata {
             profile: Some(space.encode().unwrap()),
-            ..Beside::default()
+            ..ImageMetadata::default()
         }
     }
 
     #[test]
     fn pictures_of_other_color_spaces_become_srgb() {
         let p3 = ColorProfile::new_display_p3();
-        let by_points = Beside {
+        let by_points = ImageMetadata {
             code_points: Some([12, 13]),
-            ..Beside::default()
+            ..ImageMetadata::default()
         };
         let adobe = ColorProfile::new_adobe_rgb();
         let wide = ColorProfile::new_pro_photo_rgb();
-        for (space, beside) in [
-            (&adobe, beside(&adobe)),
-            (&wide, beside(&wide)),
-            (&p3, beside(&p3)),
+        for (space, metadata) in [
+            (&adobe, metadata(&adobe)),
+            (&wide, metadata(&wide)),
+            (&p3, metadata(&p3)),
             (&p3, by_points),
         ] {
             let saved = saved_in(space);
@@ -179,36 +182,36 @@ mod tests {
                 channels.map(|(a, b)| a.abs_diff(b)).max().unwrap()
             };
             assert!(far(&saved.to_rgb8()) > 6);
-            let (shown, unheeded) = in_srgb(saved, &beside);
+            let (shown, unheeded) = in_srgb(saved, &metadata);
             assert_eq!(unheeded, None);
             // Bytes of a wide space are coarse.
             assert!(far(&shown.to_rgb8()) <= 3, "{}", far(&shown.to_rgb8()));
         }
         // Nothing is lost of what is sRGB anyway.
-        let srgb = beside(&ColorProfile::new_srgb());
+        let srgb = metadata(&ColorProfile::new_srgb());
         let same = in_srgb(picture().into(), &srgb);
         assert_eq!(same, (picture().into(), None));
     }
 
     #[test]
     fn what_cannot_be_heeded_is_named() {
-        let gray = beside(&ColorProfile::new_gray_with_gamma(1.8));
-        let of = |beside: &Beside| in_srgb(picture().into(), beside);
+        let gray = metadata(&ColorProfile::new_gray_with_gamma(1.8));
+        let of = |metadata: &ImageMetadata| in_srgb(picture().into(), metadata);
         assert!(of(&gray).1.is_some());
-        let damaged = Beside {
+        let damaged = ImageMetadata {
             profile: Some(vec![7; 200]),
-            ..Beside::default()
+            ..ImageMetadata::default()
         };
-        let gamma = |gamma| Beside {
+        let gamma = |gamma| ImageMetadata {
             gamma: Some(gamma),
-            ..Beside::default()
+            ..ImageMetadata::default()
         };
-        let bright = Beside {
+        let bright = ImageMetadata {
             code_points: Some([9, 16]),
-            ..Beside::default()
+            ..ImageMetadata::default()
         };
-        for beside in [damaged, gamma(1.0), bright] {
-            let (picture_shown, unheeded) = of(&beside);
+        for metadata in [damaged, gamma(1.0), bright] {
+            let (picture_shown, unheeded) = of(&metadata);
             assert!(unheeded.is_some() && picture_shown == picture().into());
         }
         assert_eq!(of(&gamma(0.45455)).1, None);

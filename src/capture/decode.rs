@@ -6,10 +6,10 @@ use std::sync::Arc;
 
 use image::{DynamicImage, ImageBuffer, ImageDecoder, ImageFormat, codecs::jpeg::JpegDecoder};
 
-use super::beside::{self, Beside};
 use super::error::CaptureError;
+use super::memory::{self, ReservedBytes};
+use super::metadata::{self, ImageMetadata};
 use super::orientation::Orientation;
-use super::room::{self, Held};
 use super::sample::{Bytes, Depth, Header, LARGEST_FILE, Samples};
 use super::{colors, jpeg, tiff};
 use crate::input;
@@ -21,16 +21,16 @@ const BIG_TIFF: [&[u8]; 2] = [b"II+\0", b"MM\0+"];
 const MAGIC: u64 = 16;
 
 /// A decoded file.
-pub(super) struct Picture {
+pub(super) struct DecodedImage {
     pub header: Header,
     /// `[height, width, channels]`.
     pub samples: Samples,
     /// EXIF for the same picture with its pixels upright, where the file has some.
     pub exif: Option<Vec<u8>>,
-    _held: Option<Held>,
+    _held: Option<ReservedBytes>,
 }
 
-impl Picture {
+impl DecodedImage {
     /// The same with its pixels turned.
     pub fn turned(self, orientation: Orientation) -> Self {
         let (size, channels) = (self.header.size, self.header.channels);
@@ -77,35 +77,35 @@ pub(crate) fn header(path: &Path) -> Result<Header, CaptureError> {
 pub(super) fn decode(
     path: &Path,
     check: impl FnOnce(&Header) -> Result<(), CaptureError>,
-) -> Result<Picture, CaptureError> {
-    decode_with(path, check, |bytes| Some(room::wait_for(bytes)))
+) -> Result<DecodedImage, CaptureError> {
+    decode_with(path, check, |bytes| Some(memory::wait_for(bytes)))
 }
 
 /// [`decode`] for a picture that belongs to one that is held.
 pub(super) fn decode_beside(
     path: &Path,
     check: impl FnOnce(&Header) -> Result<(), CaptureError>,
-) -> Result<Picture, CaptureError> {
+) -> Result<DecodedImage, CaptureError> {
     decode_with(path, check, |_| None)
 }
 
 fn decode_with(
     path: &Path,
     check: impl FnOnce(&Header) -> Result<(), CaptureError>,
-    hold: impl FnOnce(u64) -> Option<Held>,
-) -> Result<Picture, CaptureError> {
+    hold: impl FnOnce(u64) -> Option<ReservedBytes>,
+) -> Result<DecodedImage, CaptureError> {
     let file: Arc<[u8]> = input::read(path).map_err(CaptureError::read(path))?.into();
     let frame = check_jpeg(&file).map_err(failure(path))?;
     let bytes = Box::new(Cursor::new(file.clone()));
-    let (header, beside, source) = open(bytes, false).map_err(failure(path))?;
+    let (header, metadata, source) = open(bytes, false).map_err(failure(path))?;
     check(&header)?;
     let bytes = check_bytes(header, file.len()).map_err(failure(path))?;
     let held = hold(bytes);
     let samples = source.samples(header, &file, frame);
-    Ok(Picture {
+    Ok(DecodedImage {
         header,
         samples: samples.map_err(failure(path))?,
-        exif: beside.exif.and_then(beside::for_upright),
+        exif: metadata.exif.and_then(metadata::for_upright),
         _held: held,
     })
 }
@@ -132,10 +132,10 @@ impl Painting {
 pub(crate) fn decode_image(file: Vec<u8>) -> Result<Painting, String> {
     let file: Arc<[u8]> = file.into();
     let frame = check_jpeg(&file)?;
-    let (header, beside, source) = open(Box::new(Cursor::new(file.clone())), true)?;
+    let (header, metadata, source) = open(Box::new(Cursor::new(file.clone())), true)?;
     check_bytes(header, file.len())?;
     let samples = source.samples(header, &file, frame)?;
-    let (image, unheeded) = colors::in_srgb(picture_of(header, samples)?, &beside);
+    let (image, unheeded) = colors::in_srgb(picture_of(header, samples)?, &metadata);
     Ok(Painting {
         image,
         orientation: header.orientation,
@@ -167,13 +167,13 @@ fn check_bytes(header: Header, file: usize) -> Result<u64, String> {
 }
 
 /// A file whose header has been read.
-enum Source {
+enum OpenedImage {
     Jpeg,
     Png(Box<png::Reader<Box<dyn Bytes>>>),
     Tiff(tiff::Decoder),
 }
 
-impl Source {
+impl OpenedImage {
     /// `frame` is that of a JPEG file.
     fn samples(
         self,
@@ -208,7 +208,10 @@ fn undecodable(error: impl std::fmt::Display) -> String {
 
 /// Reads a header and what the file holds beside its pixels, that of its colors only where they
 /// are wanted. Of a TIFF file there is nothing else.
-fn open(mut bytes: Box<dyn Bytes>, colors: bool) -> Result<(Header, Beside, Source), String> {
+fn open(
+    mut bytes: Box<dyn Bytes>,
+    colors: bool,
+) -> Result<(Header, ImageMetadata, OpenedImage), String> {
     let mut magic = Vec::new();
     (&mut bytes)
         .take(MAGIC)
@@ -222,28 +225,28 @@ fn open(mut bytes: Box<dyn Bytes>, colors: bool) -> Result<(Header, Beside, Sour
     let format = match format {
         Ok(ImageFormat::Tiff) => {
             let (header, mut decoder) = tiff::open(bytes)?;
-            let beside = match colors {
-                true => Beside::of_tiff(&mut decoder),
-                false => Beside::default(),
+            let metadata = match colors {
+                true => ImageMetadata::of_tiff(&mut decoder),
+                false => ImageMetadata::default(),
             };
-            return Ok((header, beside, Source::Tiff(decoder)));
+            return Ok((header, metadata, OpenedImage::Tiff(decoder)));
         }
         Ok(format @ (ImageFormat::Jpeg | ImageFormat::Png)) => format,
         _ => return Err("is neither JPEG, PNG nor TIFF; convert it (its name may stay)".into()),
     };
     if format == ImageFormat::Jpeg {
         let mut decoder = JpegDecoder::new(bytes).map_err(undecodable)?;
-        let beside = Beside::of_jpeg(&mut decoder, colors);
+        let metadata = ImageMetadata::of_jpeg(&mut decoder, colors);
         let header = Header {
             size: decoder.dimensions().into(),
             depth: Depth::Eight,
             channels: decoder.color_type().channel_count().into(),
             indexed: false,
-            orientation: Orientation::of_exif(beside.exif.as_deref()),
+            orientation: Orientation::of_exif(metadata.exif.as_deref()),
         };
-        return Ok((header, beside, Source::Jpeg));
+        return Ok((header, metadata, OpenedImage::Jpeg));
     }
-    let at_the_end = beside::exif_at_the_end(&mut bytes).map_err(|error| error.to_string())?;
+    let at_the_end = metadata::exif_at_the_end(&mut bytes).map_err(|error| error.to_string())?;
     let mut decoder = png::Decoder::new(bytes);
     // A few bytes of these may become many.
     decoder.set_ignore_text_chunk(true);
@@ -251,7 +254,7 @@ fn open(mut bytes: Box<dyn Bytes>, colors: bool) -> Result<(Header, Beside, Sour
     decoder.set_transformations(png::Transformations::EXPAND);
     let decoder = decoder.read_info().map_err(undecodable)?;
     let (color, depth) = decoder.output_color_type();
-    let beside = Beside::of_png(decoder.info(), at_the_end);
+    let metadata = ImageMetadata::of_png(decoder.info(), at_the_end);
     let header = Header {
         size: decoder.info().size().into(),
         depth: match depth {
@@ -260,9 +263,9 @@ fn open(mut bytes: Box<dyn Bytes>, colors: bool) -> Result<(Header, Beside, Sour
         },
         channels: color.samples(),
         indexed: decoder.info().color_type == png::ColorType::Indexed,
-        orientation: Orientation::of_exif(beside.exif.as_deref()),
+        orientation: Orientation::of_exif(metadata.exif.as_deref()),
     };
-    Ok((header, beside, Source::Png(Box::new(decoder))))
+    Ok((header, metadata, OpenedImage::Png(Box::new(decoder))))
 }
 
 /// The values of what JPEG files can hold.

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
-use super::names::Ambiguous;
+use super::names::AmbiguousNames;
 
 /// Where in a file something is wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -272,7 +272,7 @@ pub enum CaptureError {
     },
     /// Nobody knows which mask belongs to which photo.
     #[error(transparent)]
-    Mask(#[from] Ambiguous),
+    Mask(#[from] AmbiguousNames),
     /// Nothing of a photo is left.
     #[error("{path}: {reason}; mend it, or remove the photo with COLMAP's image_deleter")]
     NothingCounts {

@@ -11,7 +11,7 @@ use super::decode;
 use super::error::CaptureError;
 use super::mask::{self, MaskFolder, Masked};
 use super::options::{LoadOptions, MaskSource, Normalize};
-use super::orientation::Stance;
+use super::orientation::SensorOrientation;
 use super::original::Original;
 use super::photo::{Photo, stance, working_size};
 use super::sample::Depth;
@@ -250,16 +250,16 @@ impl Loader {
     pub fn unplaced(&self, path: &Path, range: Normalize) -> Result<Original, CaptureError> {
         let mut picture = decode::decode(path, |_| Ok(()))?;
         let turned = self.turned.load(Ordering::Relaxed);
-        let stance = Stance::new(picture.header.orientation, turned);
+        let stance = SensorOrientation::new(picture.header.orientation, turned);
         let exif = picture.exif.take();
         Ok(self.made_gray(&picture.turned(stance.from_file), range, stance, exif))
     }
 
     fn made_gray(
         &self,
-        picture: &decode::Picture,
+        picture: &decode::DecodedImage,
         range: Normalize,
-        stance: Stance,
+        stance: SensorOrientation,
         exif: Option<Vec<u8>>,
     ) -> Original {
         let [width, height] = picture.header.size;
@@ -311,7 +311,7 @@ impl Loader {
     ///
     /// # Errors
     /// As there.
-    pub fn standing(&self, view: &View) -> Result<(Camera, Stance), CaptureError> {
+    pub fn standing(&self, view: &View) -> Result<(Camera, SensorOrientation), CaptureError> {
         let (size, stance) = self.seen(view)?;
         let size = working_size(size, self.photo_side(view));
         let camera = match &view.undistortion {
@@ -326,7 +326,7 @@ impl Loader {
     ///
     /// # Errors
     /// As [`Self::standing`].
-    pub fn seen(&self, view: &View) -> Result<([u32; 2], Stance), CaptureError> {
+    pub fn seen(&self, view: &View) -> Result<([u32; 2], SensorOrientation), CaptureError> {
         let header = decode::header(&view.image_path)?;
         let stance = stance(view, &header)?;
         if !stance.from_file.is_none() {
@@ -377,7 +377,7 @@ impl Loader {
         &self,
         view: &View,
         size: [u32; 2],
-        stance: Stance,
+        stance: SensorOrientation,
     ) -> Result<Option<Vec<u8>>, CaptureError> {
         let path = self.masks.as_ref().and_then(|masks| masks.of(view));
         path.map(|path| mask::read(path, &view.image_path, size, stance))
@@ -385,7 +385,7 @@ impl Loader {
     }
 
     /// The photo's transparency, where it is its mask.
-    fn alpha(&self, view: &View, picture: &decode::Picture) -> Option<Vec<u8>> {
+    fn alpha(&self, view: &View, picture: &decode::DecodedImage) -> Option<Vec<u8>> {
         let taken = self.with_alpha.contains(&view.photo);
         let alpha = taken.then(|| tone::alpha(picture)).flatten()?;
         let known = self.transparent.lock();
@@ -397,8 +397,8 @@ impl Loader {
 }
 
 /// The photo of a view as COLMAP saw it.
-fn decoded(view: &View) -> Result<(decode::Picture, Stance), CaptureError> {
-    let mut found = Stance::default();
+fn decoded(view: &View) -> Result<(decode::DecodedImage, SensorOrientation), CaptureError> {
+    let mut found = SensorOrientation::default();
     let picture = decode::decode(&view.image_path, |header| {
         found = stance(view, header)?;
         Ok(())

@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use super::decode::{self, Picture};
+use super::decode::{self, DecodedImage};
 use super::error::CaptureError;
 use super::names::{self, NamedFiles, composed, is_one_of, visit_files};
 use super::options::MaskSource;
-use super::orientation::{Orientation, Stance};
+use super::orientation::{Orientation, SensorOrientation};
 use super::photo::same_shape;
 use super::resample::downscale;
 use super::sample::{Depth, Header, Samples};
@@ -52,7 +52,7 @@ impl MaskFolder {
         let images = capture.root.join(IMAGES);
         let masks = match source {
             MaskSource::Off | MaskSource::Alpha => return Ok(None),
-            MaskSource::Beside => capture.root.join(BESIDE),
+            MaskSource::ImageMetadata => capture.root.join(BESIDE),
             MaskSource::Folder(path) => path.clone(),
         };
         if !masks.is_dir() {
@@ -142,10 +142,10 @@ pub(crate) fn read(
     path: &Path,
     photo: &Path,
     size: [u32; 2],
-    stance: Stance,
+    stance: SensorOrientation,
 ) -> Result<Vec<u8>, CaptureError> {
     let mut way = Orientation::default();
-    let Picture {
+    let DecodedImage {
         header, samples, ..
     } = decode::decode_beside(path, |mask| {
         let ways = || stance.ways(mask.orientation);

@@ -68,7 +68,7 @@ fn masks_are_found_by_colmaps_names() {
     let options = LoadOptions::default();
     let loader = Loader::open(&capture, &options).unwrap();
     assert_eq!(loader.masked_views(&capture.views), 2);
-    assert_eq!(loader.options().masks, MaskSource::Beside);
+    assert_eq!(loader.options().masks, MaskSource::ImageMetadata);
     let row = |mask: Option<Vec<u8>>| mask.map(|mask| mask[..8].to_vec());
     let first = load(&capture, &options, 0);
     assert_eq!(row(first.mask), Some(vec![100, 100, 100, 100, 0, 0, 0, 0]));
@@ -145,7 +145,7 @@ fn a_mask_of_two_photos_is_refused() {
     let capture = Capture::load(dir.path()).unwrap();
     put(&capture, "b.png", half(SIZE.0, SIZE.1, 255));
     let words = ["masks/b.png", "b.jpg", "b.jpeg", "b.jpeg.png"];
-    assert_fails(&capture, MaskSource::Beside, &words);
+    assert_fails(&capture, MaskSource::ImageMetadata, &words);
 }
 
 /// Gray 200 where it is opaque; what is under the transparency of the right half is 9.
@@ -160,13 +160,13 @@ fn transparent(opacity: u8) -> RgbaImage {
 fn transparency_is_a_mask_where_no_other_is() {
     let (_dir, capture) = capture();
     transparent(0).save(&capture.views[1].image_path).unwrap();
-    let beside = LoadOptions::default();
+    let metadata = LoadOptions::default();
     let off = LoadOptions {
         masks: MaskSource::Off,
         ..LoadOptions::default()
     };
     assert_eq!(load(&capture, &off, 1).mask, None);
-    let mut loader = Loader::open(&capture, &beside).unwrap();
+    let mut loader = Loader::open(&capture, &metadata).unwrap();
     assert_eq!(loader.options().masks, MaskSource::Alpha);
     assert_eq!(loader.masked_views(&capture.views), 1);
     assert_eq!(loader.load(&capture.views[0]).unwrap().0.mask, None);
@@ -180,13 +180,13 @@ fn transparency_is_a_mask_where_no_other_is() {
     for view in &capture.views {
         deep.save(&view.image_path).unwrap();
     }
-    loader = Loader::open(&capture, &beside).unwrap();
+    loader = Loader::open(&capture, &metadata).unwrap();
     let sample = loader.sample(&capture.views[1]).unwrap();
     assert!(sample.iter().all(|&value| value == 200.0 * 257.0));
-    assert_eq!(load(&capture, &beside, 1).mask, expected);
+    assert_eq!(load(&capture, &metadata, 1).mask, expected);
     // Masks go before it.
     put(&capture, "a.png", half(SIZE.0, SIZE.1, 255));
-    assert_eq!(load(&capture, &beside, 1).mask, None);
+    assert_eq!(load(&capture, &metadata, 1).mask, None);
 }
 
 #[test]
@@ -200,7 +200,7 @@ fn opaque_alpha_is_no_mask_and_nothing_else_is_left_of_none() {
         .save(&capture.views[1].image_path)
         .unwrap();
     let words = ["images/b.png", "transparency leaves no pixel"];
-    assert_fails(&capture, MaskSource::Beside, &words);
+    assert_fails(&capture, MaskSource::ImageMetadata, &words);
     assert_fails(&capture, MaskSource::Alpha, &words);
 }
 
@@ -257,7 +257,7 @@ fn labels_of_several_things_are_no_mask() {
     for (mask, words) in kinds {
         let (_dir, capture) = capture();
         put(&capture, "a.png", mask);
-        assert_fails(&capture, MaskSource::Beside, &["masks/a.png", words]);
+        assert_fails(&capture, MaskSource::ImageMetadata, &["masks/a.png", words]);
     }
     // One label, void, and gray edges.
     for (values, expected) in [
@@ -281,7 +281,7 @@ fn masks_of_another_scale_are_resized() {
         put(&capture, "a.png", half(width, height, 255));
         if (width, height) == (2, 2) {
             let words = ["a.png", "2×2", "8×6", "aspect"];
-            assert_fails(&capture, MaskSource::Beside, &words);
+            assert_fails(&capture, MaskSource::ImageMetadata, &words);
             continue;
         }
         assert_eq!(
@@ -307,7 +307,7 @@ fn masks_that_leave_all_or_nothing() {
         "leaves no pixel",
         "image_deleter",
     ];
-    assert_fails(&capture, MaskSource::Beside, &words);
+    assert_fails(&capture, MaskSource::ImageMetadata, &words);
 }
 
 #[test]
@@ -318,14 +318,14 @@ fn masks_that_cannot_be_read() {
     fs::write(&path, &fs::read(&path).unwrap()[..50]).unwrap();
     assert_fails(
         &capture,
-        MaskSource::Beside,
+        MaskSource::ImageMetadata,
         &["masks/a.png", "cannot be decoded"],
     );
     let deep = image::ImageBuffer::<Luma<u16>, _>::new(SIZE.0, SIZE.1);
     put(&capture, "a.png", DynamicImage::from(deep));
     assert_fails(
         &capture,
-        MaskSource::Beside,
+        MaskSource::ImageMetadata,
         &["masks/a.png", "16 bits", "8 bits or 1 bit"],
     );
 }

@@ -1,7 +1,6 @@
 //! What was photographed: COLMAP models, pinhole cameras, photos and splits.
 
 mod arrangement;
-mod beside;
 pub mod camera;
 mod colmap;
 mod colors;
@@ -16,6 +15,8 @@ mod layers;
 pub mod lens;
 mod loader;
 mod mask;
+mod memory;
+mod metadata;
 pub(crate) mod names;
 mod options;
 mod order;
@@ -25,7 +26,6 @@ mod photo;
 #[cfg(feature = "cli")]
 mod plain;
 mod resample;
-mod room;
 mod sample;
 mod split;
 mod tiff;
@@ -68,10 +68,10 @@ pub use lens::IMPERCEPTIBLE;
 use lens::Undistortion;
 pub use loader::{Headers, Loader, Shrunk, first_views};
 pub use mask::Masked;
-pub use names::Ambiguous;
+pub use names::AmbiguousNames;
 pub use options::{Channel, Chosen, Encoding, LoadOptions, MaskSource, MaskUse, Normalize};
 pub use order::view_at;
-pub use orientation::{Orientation, Stance};
+pub use orientation::{Orientation, SensorOrientation};
 pub use original::Original;
 pub use photo::Photo;
 pub use resample::downscale;
@@ -126,7 +126,7 @@ pub struct View {
     /// How the view's picture comes from its photo; none where it is the photo.
     pub undistortion: Option<Undistortion>,
     /// How the photo stands; known once a [`Dataset`] has read its header.
-    pub stance: Stance,
+    pub stance: SensorOrientation,
 }
 
 impl View {

@@ -138,7 +138,7 @@ pub struct NamedFiles {
 
 /// Why nobody knows which file belongs to which photo.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum Ambiguous {
+pub enum AmbiguousNames {
     /// Two files would belong to one photo.
     #[error("{} and {}: both would belong to one photo; keep one of them", .0[0].display(), .0[1].display())]
     Files([PathBuf; 2]),
@@ -175,8 +175,8 @@ impl NamedFiles {
     /// The file that belongs to a photo, if there is one.
     ///
     /// # Errors
-    /// [`Ambiguous`].
-    pub fn of(&self, photo: &str) -> Result<Option<&Path>, Ambiguous> {
+    /// [`AmbiguousNames`].
+    pub fn of(&self, photo: &str) -> Result<Option<&Path>, AmbiguousNames> {
         let photo = composed(photo);
         let found = match self.exact(&photo)? {
             Some(file) => Some(file),
@@ -197,7 +197,7 @@ impl NamedFiles {
     }
 
     /// The file with the photo's full name, with or without an extension behind it.
-    fn exact(&self, photo: &str) -> Result<Option<&str>, Ambiguous> {
+    fn exact(&self, photo: &str) -> Result<Option<&str>, AmbiguousNames> {
         let with_extension = self.files_of.get(photo).into_iter().flatten();
         let with_extension = with_extension
             .map(String::as_str)
@@ -208,7 +208,7 @@ impl NamedFiles {
             .or(same.map(|(file, _)| file.as_str())))
     }
 
-    fn by_stem(&self, photo: &str) -> Result<Option<&str>, Ambiguous> {
+    fn by_stem(&self, photo: &str) -> Result<Option<&str>, AmbiguousNames> {
         let stem_of_photo = stem(photo);
         let free = self.files_of.get(stem_of_photo).into_iter().flatten();
         let free = free
@@ -224,7 +224,7 @@ impl NamedFiles {
             Some(rival) => {
                 let mut photos = [photo.to_owned(), rival.clone()];
                 photos.sort();
-                Err(Ambiguous::Photos(self.files[file].clone(), photos))
+                Err(AmbiguousNames::Photos(self.files[file].clone(), photos))
             }
             None => Ok(Some(file)),
         }
@@ -234,12 +234,12 @@ impl NamedFiles {
     fn only<'a>(
         &self,
         mut files: impl Iterator<Item = &'a str>,
-    ) -> Result<Option<&'a str>, Ambiguous> {
+    ) -> Result<Option<&'a str>, AmbiguousNames> {
         match (files.next(), files.next()) {
             (Some(first), Some(second)) => {
                 let mut both = [first, second].map(|file| self.files[file].clone());
                 both.sort();
-                Err(Ambiguous::Files(both))
+                Err(AmbiguousNames::Files(both))
             }
             (first, _) => Ok(first),
         }
@@ -332,7 +332,7 @@ mod tests {
     fn what_could_belong_to_two_is_ambiguous() {
         let two = ["a/b.jpg", "a/b.tif"];
         let file = named(&["a/b.png"], &two);
-        let expected = Ambiguous::Photos("a/b.png".into(), two.map(str::to_owned));
+        let expected = AmbiguousNames::Photos("a/b.png".into(), two.map(str::to_owned));
         for photo in two {
             assert_eq!(file.of(photo), Err(expected.clone()));
         }
@@ -340,7 +340,7 @@ mod tests {
         let both = found(&["a/b.png", "a/b.tif"], &two);
         assert_eq!(both, ["a/b.png", "a/b.tif"].map(|name| Some(name.into())));
         let files = named(&["v.png", "v.jpeg"], &["v.jpg"]);
-        let expected = Ambiguous::Files(["v.jpeg".into(), "v.png".into()]);
+        let expected = AmbiguousNames::Files(["v.jpeg".into(), "v.png".into()]);
         assert_eq!(files.of("v.jpg"), Err(expected));
     }
 

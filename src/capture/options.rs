@@ -27,7 +27,7 @@ pub struct LoadOptions {
     pub encoding: Encoding,
     /// Values that become black and white, in the files' unit; `null`: the full range.
     pub normalize: Normalize,
-    /// Source of masks: `beside` the photos, their `alpha`, `off`, or a folder.
+    /// Source of masks: `metadata` the photos, their `alpha`, `off`, or a folder.
     pub masks: MaskSource,
     /// What becomes of masked pixels; `remove`: black.
     pub masked: MaskUse,
@@ -185,7 +185,7 @@ impl FromStr for Normalize {
 
 /// Where masks are: for `images/a/b.jpg` in the file `a/b.jpg.png` or `a/b.png`.
 ///
-/// In JSON `beside`, `alpha`, `off` or the folder.
+/// In JSON `metadata`, `alpha`, `off` or the folder.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(into = "String", from = "String")]
@@ -193,7 +193,7 @@ pub enum MaskSource {
     /// In `masks/` beside `images/`, if it is there, and else in the photos' transparency, if
     /// they have any.
     #[default]
-    Beside,
+    ImageMetadata,
     /// In the photos' transparency.
     Alpha,
     /// No masks.
@@ -205,7 +205,7 @@ pub enum MaskSource {
 impl From<MaskSource> for String {
     fn from(source: MaskSource) -> Self {
         match source {
-            MaskSource::Beside => "beside".to_owned(),
+            MaskSource::ImageMetadata => "beside".to_owned(),
             MaskSource::Alpha => "alpha".to_owned(),
             MaskSource::Off => "off".to_owned(),
             MaskSource::Folder(path) => path.display().to_string(),
@@ -216,7 +216,7 @@ impl From<MaskSource> for String {
 impl From<String> for MaskSource {
     fn from(text: String) -> Self {
         match text.as_str() {
-            "beside" => Self::Beside,
+            "beside" => Self::ImageMetadata,
             "alpha" => Self::Alpha,
             "off" => Self::Off,
             _ => Self::Folder(text.into()),

@@ -117,14 +117,14 @@ impl Orientation {
 /// COLMAP ignores the orientation; where photos were turned for it and the files were not, its
 /// cameras have the turned sides. One of the two is nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Stance {
+pub struct SensorOrientation {
     /// From the file's pixels to those that COLMAP saw.
     pub from_file: Orientation,
     /// From those that COLMAP saw to upright ones.
     pub upright: Orientation,
 }
 
-impl Stance {
+impl SensorOrientation {
     /// A photo that COLMAP saw as its file has it, or `turned`.
     pub(super) fn new(orientation: Orientation, turned: bool) -> Self {
         let as_it_is = Orientation::default();
@@ -178,7 +178,7 @@ mod tests {
         let pixels = || (0..6).collect::<Vec<u8>>();
         // COLMAP saw the photo lying, 3 × 2, and turned.
         for turned in [false, true] {
-            let stance = Stance::new(quarter, turned);
+            let stance = SensorOrientation::new(quarter, turned);
             let lying = [3, 2];
             let wanted = match turned {
                 false => pixels(),

@@ -1,6 +1,6 @@
 //! A photo's lightness as the file has it: its size, its depth, its lens.
 
-use super::{Stance, resample::downscale};
+use super::{SensorOrientation, resample::downscale};
 
 /// A photo before anything is done to it but being made gray.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -20,7 +20,7 @@ pub struct Original {
     /// As [`Photo::mask`](super::Photo::mask).
     pub mask: Option<Vec<u8>>,
     /// How it stands.
-    pub stance: Stance,
+    pub stance: SensorOrientation,
     /// EXIF of a JPEG or PNG file, as it is for the same picture upright.
     pub exif: Option<Vec<u8>>,
 }
@@ -66,7 +66,7 @@ mod tests {
             in_scene: None,
             deep: false,
             mask: Some((0..=255).collect()),
-            stance: Stance::default(),
+            stance: SensorOrientation::default(),
             exif: None,
         };
         let bytes: Vec<u8> = (0..=255).collect();

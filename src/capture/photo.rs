@@ -3,7 +3,7 @@
 use super::View;
 use super::error::CaptureError;
 use super::options::MaskUse;
-use super::orientation::Stance;
+use super::orientation::SensorOrientation;
 use super::resample::{downscale, downscale_masked};
 use super::sample::Header;
 use crate::color::GrayTable;
@@ -155,7 +155,7 @@ pub(super) fn working_size(size: [u32; 2], max_side: Option<u32>) -> [u32; 2] {
 
 /// How a photo stands to what COLMAP saw, which the sides of the view's camera tell; refuses one
 /// that cannot be that camera's.
-pub(super) fn stance(view: &View, header: &Header) -> Result<Stance, CaptureError> {
+pub(super) fn stance(view: &View, header: &Header) -> Result<SensorOrientation, CaptureError> {
     let (camera, photo) = (view.photo_size(), header.size);
     let turned = header.orientation.size(photo);
     // Nearly square photos have about the camera's shape either way.
@@ -171,7 +171,7 @@ pub(super) fn stance(view: &View, header: &Header) -> Result<Stance, CaptureErro
             camera,
         });
     }
-    Ok(Stance::new(header.orientation, is_turned))
+    Ok(SensorOrientation::new(header.orientation, is_turned))
 }
 
 /// Whether two pictures can be of one shape: they differ by rounding, or in scale.

@@ -1,6 +1,6 @@
 //! From a file's values to 8-bit pixels.
 
-use super::decode::Picture;
+use super::decode::DecodedImage;
 use super::options::{Channel, Encoding, LoadOptions, Normalize};
 use super::photo::{Pixels, Values};
 use super::sample::{Depth, Header, Samples};
@@ -10,8 +10,8 @@ use crate::color::{gray_from_rgb, linear_to_srgb};
 /// count nothing and are black.
 ///
 /// `options.normalize` must be decided; `Auto` is taken for `Off`.
-pub(super) fn develop(picture: Picture, options: &LoadOptions) -> Pixels {
-    let Picture {
+pub(super) fn develop(picture: DecodedImage, options: &LoadOptions) -> Pixels {
+    let DecodedImage {
         header, samples, ..
     } = picture;
     let mask = finite(&samples, header.channels, options.channel);
@@ -42,8 +42,8 @@ pub(super) fn develop(picture: Picture, options: &LoadOptions) -> Pixels {
 
 /// A photo's gray in 65,535ths of white, encoded sRGB, as [`develop`] has it, but with its own
 /// range.
-pub(super) fn gray(picture: &Picture, range: Normalize, options: &LoadOptions) -> Vec<u16> {
-    let Picture {
+pub(super) fn gray(picture: &DecodedImage, range: Normalize, options: &LoadOptions) -> Vec<u16> {
+    let DecodedImage {
         header, samples, ..
     } = picture;
     let shares = Tone::of(header.depth, range, options).shares(samples);
@@ -67,7 +67,7 @@ pub(super) fn gray(picture: &Picture, range: Normalize, options: &LoadOptions) -
 
 /// The least and the greatest value in use that is finite, in the file's unit; `None` where there
 /// is but one.
-pub(super) fn extremes(picture: &Picture, channel: Channel) -> Option<[f64; 2]> {
+pub(super) fn extremes(picture: &DecodedImage, channel: Channel) -> Option<[f64; 2]> {
     let Header { size, channels, .. } = picture.header;
     let pixels = 0..size[0] as usize * size[1] as usize;
     let used = used(channels, channel);
@@ -103,7 +103,7 @@ pub(super) fn finite(samples: &Samples, channels: usize, channel: Channel) -> Op
 }
 
 /// What each pixel counts by its transparency; `None` where all are opaque.
-pub(super) fn alpha(picture: &Picture) -> Option<Vec<u8>> {
+pub(super) fn alpha(picture: &DecodedImage) -> Option<Vec<u8>> {
     let channels = picture.header.channels;
     if !picture.header.has_alpha() {
         return None;
@@ -133,7 +133,7 @@ fn used(channels: usize, channel: Channel) -> std::ops::Range<usize> {
 /// color photo those of every channel in use. Values that are not finite and pixels
 /// that count nothing are left out.
 pub(super) fn sample(
-    picture: &Picture,
+    picture: &DecodedImage,
     mask: Option<&[u8]>,
     channel: Channel,
     most: usize,

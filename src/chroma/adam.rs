@@ -7,7 +7,7 @@ use super::{
     ChromaError, ChromaObserver, ChromaProgress, ChromaSettings, FrozenViews, Recipe, Targets,
     Task,
     loss::Space,
-    passes::{Ending, Judging, Passes},
+    passes::{LossOutput, LossSettings, Passes},
 };
 use crate::{
     capture::view_at,
@@ -20,14 +20,14 @@ use crate::{
 const REPORT_EVERY: usize = 50;
 
 /// How steps follow each other.
-struct Course {
+struct AdamSchedule {
     iterations: usize,
     rates: [f64; 2],
     rest_share: f64,
     seed: u64,
     /// Scales that are drawn, 0 the full one; the coarsest is drawn first.
     scales: RangeInclusive<usize>,
-    judging: Judging,
+    loss_settings: LossSettings,
     /// Planes of the constant harmonics, then of all that are solved for.
     planes: [usize; 2],
 }
@@ -35,7 +35,7 @@ struct Course {
 /// Distills a teacher into chroma harmonics by Adam, or RGB harmonics by a [`Recipe`].
 pub struct AdamSolver<'a> {
     passes: Passes<'a>,
-    course: Course,
+    schedule: AdamSchedule,
     adam: Adam,
     /// Iterations done.
     done: usize,
@@ -56,20 +56,20 @@ impl<'a> AdamSolver<'a> {
         tasks: Vec<Task>,
     ) -> Result<Self, ChromaError> {
         let start = ShField::zeros(frozen.geometry.count, settings.sh_degree, 2);
-        let course = Course {
+        let schedule = AdamSchedule {
             iterations: settings.iterations,
             rates: settings.rates,
             rest_share: settings.rest_share,
             seed: settings.seed,
             scales: 0..=settings.scales as usize,
-            judging: Judging {
+            loss_settings: LossSettings {
                 agreement: settings.agreement,
                 robust: settings.robust,
-                ..Judging::default()
+                ..LossSettings::default()
             },
             planes: [2, 2 * sh::coefficient_count(settings.sh_degree)],
         };
-        Self::along(frozen, course, targets, tasks, &start)
+        Self::along(frozen, schedule, targets, tasks, &start)
     }
 
     /// A solver for RGB harmonics by `recipe`, starting from the gray of `luma`; `seed` is that
@@ -90,33 +90,33 @@ impl<'a> AdamSolver<'a> {
             Some(_) => sh::coefficient_count(start.degree) - 1,
             None => 0,
         };
-        let course = Course {
+        let schedule = AdamSchedule {
             iterations: recipe.iterations,
             rates: recipe.rates,
             rest_share: recipe.rest_share.unwrap_or_default(),
             seed,
             scales: recipe.scales.clone(),
-            judging: Judging {
+            loss_settings: LossSettings {
                 agreement: recipe.agreement,
                 robust: None,
                 lab: recipe.loss,
             },
             planes: [3, 3 + 3 * of_rest],
         };
-        Self::along(frozen, course, targets, tasks, &start)
+        Self::along(frozen, schedule, targets, tasks, &start)
     }
 
     fn along(
         frozen: &'a FrozenViews,
-        course: Course,
+        schedule: AdamSchedule,
         targets: &'a Targets,
         tasks: Vec<Task>,
         start: &ShField,
     ) -> Result<Self, ChromaError> {
         assert!(frozen.streamed().is_none(), "all Gaussians on the device");
         let gpu = &frozen.raster.gpu;
-        let sizes = [1 + course.scales.end(), REPORT_EVERY];
-        let [_, planes] = course.planes;
+        let sizes = [1 + schedule.scales.end(), REPORT_EVERY];
+        let [_, planes] = schedule.planes;
         let passes = Passes::new(frozen, targets, tasks, start, planes, Space::Lab, sizes)?;
         let adam = Adam::new(
             gpu,
@@ -128,7 +128,7 @@ impl<'a> AdamSolver<'a> {
         )?;
         Ok(Self {
             passes,
-            course,
+            schedule,
             adam,
             done: 0,
         })
@@ -143,7 +143,7 @@ impl<'a> AdamSolver<'a> {
     /// # Errors
     /// [`ChromaError`] when the device is lost or targets cannot be read.
     pub fn run(&mut self, observe: &mut ChromaObserver<'_>) -> Result<(), ChromaError> {
-        self.run_to(self.course.iterations, observe)
+        self.run_to(self.schedule.iterations, observe)
     }
 
     /// Goes on until so many iterations are done, and leaves the rest for later.
@@ -157,7 +157,7 @@ impl<'a> AdamSolver<'a> {
     ) -> Result<(), ChromaError> {
         let begun = Instant::now();
         let mut pending = None;
-        let until = until.min(self.course.iterations);
+        let until = until.min(self.schedule.iterations);
         for iteration in self.done..until {
             self.step(iteration)?;
             let done = iteration + 1;
@@ -173,11 +173,11 @@ impl<'a> AdamSolver<'a> {
                 let recent = &losses[..done - (done - 1) / REPORT_EVERY * REPORT_EVERY];
                 let told = observe(ChromaProgress {
                     iteration: done,
-                    total: self.course.iterations,
+                    total: self.schedule.iterations,
                     moved: None,
                     loss: recent.iter().map(|&loss| f64::from(loss)).sum::<f64>()
                         / recent.len() as f64,
-                    passes: done as f64 * self.course.scales.clone().map(share).sum::<f64>(),
+                    passes: done as f64 * self.schedule.scales.clone().map(share).sum::<f64>(),
                     seconds: begun.elapsed().as_secs_f64(),
                 });
                 if told.is_break() {
@@ -198,31 +198,31 @@ impl<'a> AdamSolver<'a> {
 
     /// Work of a dispatch, the mean over the passes.
     pub fn load(&self) -> Load {
-        self.passes.load(1 + self.course.scales.end())
+        self.passes.load(1 + self.schedule.scales.end())
     }
 
     /// One view through all scales, one step of Adam a scale.
     fn step(&mut self, iteration: usize) -> Result<(), ChromaError> {
         let gpu = self.gpu();
-        let course = &self.course;
-        let task = view_at(course.seed, self.passes.tasks.len(), iteration);
-        let rate = exponential(course.rates, iteration, course.iterations);
-        let [constants, planes] = course.planes;
-        let mut rates = vec![(rate * course.rest_share) as f32; planes];
+        let schedule = &self.schedule;
+        let task = view_at(schedule.seed, self.passes.tasks.len(), iteration);
+        let rate = exponential(schedule.rates, iteration, schedule.iterations);
+        let [constants, planes] = schedule.planes;
+        let mut rates = vec![(rate * schedule.rest_share) as f32; planes];
         rates[..constants].fill(rate as f32);
-        let (finest, coarsest) = (*course.scales.start(), *course.scales.end());
+        let (finest, coarsest) = (*schedule.scales.start(), *schedule.scales.end());
         for scale in (finest..=coarsest).rev() {
             let mut recorder = Recorder::new(gpu);
             recorder.clear(self.passes.gradient.raw());
             recorder.submit();
-            let agreement = course.judging.agreement;
-            let judging = Judging {
+            let agreement = schedule.loss_settings.agreement;
+            let loss_settings = LossSettings {
                 agreement: if scale < coarsest { agreement } else { 0.0 },
-                ..course.judging
+                ..schedule.loss_settings
             };
             // The finest scale is drawn last, and its loss stays.
             self.passes
-                .draw(task, scale, judging, iteration, Ending::Gradient)?;
+                .draw(task, scale, loss_settings, iteration, LossOutput::Gradient)?;
             let done = iteration * (coarsest - finest + 1) + coarsest - scale;
             let step = u32::try_from(done + 1).unwrap_or(u32::MAX);
             let mut recorder = Recorder::new(gpu);

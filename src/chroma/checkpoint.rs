@@ -11,13 +11,13 @@ use crate::splats::ShField;
 /// ends with the bytes of one that was never interrupted.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ChromaCheckpoint {
-    pub(super) state: State,
+    pub(super) state: SolveDecisions,
     pub(super) solver: SolverState,
 }
 
 /// Decisions made before the solver began.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(super) struct State {
+pub(super) struct SolveDecisions {
     /// The degree that views held back have chosen, where they were asked.
     pub chosen: Option<ChosenDegree>,
     /// How far views disagreed before and after corrections that were taken back.
@@ -55,7 +55,7 @@ pub(super) struct Rounds {
 }
 
 /// Who keeps checkpoints.
-pub trait ChromaKeeper {
+pub trait ChromaCheckpointing {
     /// Whether one is wanted after a round.
     fn wants(&mut self) -> bool;
 
@@ -76,9 +76,9 @@ pub trait ChromaKeeper {
 }
 
 /// Keeps none.
-pub struct NoChromaKeeper;
+pub struct NoChromaCheckpoints;
 
-impl ChromaKeeper for NoChromaKeeper {
+impl ChromaCheckpointing for NoChromaCheckpoints {
     fn wants(&mut self) -> bool {
         false
     }
@@ -115,7 +115,7 @@ impl ChromaCheckpoint {
     /// The checkpoint of [`ChromaCheckpoint::to_sections`]; `None` of anything else.
     pub fn from_sections(sections: &BTreeMap<String, Vec<u8>>) -> Option<Self> {
         let numbers = serde_json::from_slice(sections.get("distillation")?);
-        let (state, rounds): (State, Rounds) = numbers.ok()?;
+        let (state, rounds): (SolveDecisions, Rounds) = numbers.ok()?;
         let buffers = sections.iter().filter_map(|(name, bytes)| {
             let (floats, rest) = bytes.as_chunks::<4>();
             let values = floats.iter().map(|&bytes| f32::from_le_bytes(bytes));
@@ -152,7 +152,7 @@ mod tests {
     #[test]
     fn what_is_written_is_read_again() {
         let checkpoint = ChromaCheckpoint {
-            state: State {
+            state: SolveDecisions {
                 chosen: Some(ChosenDegree {
                     degree: 1,
                     losses: vec![2.5, 1.0 / 3.0],

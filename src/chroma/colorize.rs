@@ -4,9 +4,9 @@ use std::{cell::Cell, ops::ControlFlow, sync::Arc, time::Instant};
 
 use super::{
     ChosenDegree, ChromaError, ChromaProgress, ChromaSettings, Colorizer, Correction, Degree,
-    FrozenViews, IrlsSolver, Lesson, Room, SolverKind, Task,
+    FrozenViews, IrlsSolver, MemoryBudget, SolverKind, Supervision, Task,
     bake::{BakeStep, bake_telling},
-    checkpoint::{ChromaCheckpoint, ChromaKeeper, NoChromaKeeper, State},
+    checkpoint::{ChromaCheckpoint, ChromaCheckpointing, NoChromaCheckpoints, SolveDecisions},
     choose_degree, match_saturation, plan,
     solve::solve_from,
     strokes::lay,
@@ -127,14 +127,14 @@ pub fn colorize(
     observe: &mut ColorizeObserver<'_>,
 ) -> Result<Colored, ChromaError> {
     let total = dataset.cameras.len();
-    let lesson = teach(dataset, colorizer, settings.target_scales(), &mut |view| {
+    let supervision = teach(dataset, colorizer, settings.target_scales(), &mut |view| {
         observe(ColorizeEvent::Asked { view, total })
     })?;
     Distill {
         raster,
         dataset,
         luma,
-        lesson: &lesson,
+        supervision: &supervision,
         sh_degree: Degree::Fixed(settings.sh_degree),
         correct_views: None,
     }
@@ -150,7 +150,7 @@ pub struct Distill<'a> {
     /// The scene, one channel.
     pub luma: &'a Splats,
     /// Colors that its views are to have.
-    pub lesson: &'a Lesson,
+    pub supervision: &'a Supervision,
     /// Degree of the chroma harmonics.
     pub sh_degree: Degree,
     /// Whether each view's teacher is brought into line with the others; by default where
@@ -168,10 +168,10 @@ impl Distill<'_> {
         settings: &ChromaSettings,
         observe: &mut ColorizeObserver<'_>,
     ) -> Result<Colored, ChromaError> {
-        self.run_from(None, &mut NoChromaKeeper, settings, observe)
+        self.run_from(None, &mut NoChromaCheckpoints, settings, observe)
     }
 
-    /// The same from a checkpoint on, and with checkpoints for `keeper` after rounds.
+    /// The same from a checkpoint on, and with checkpoints for `checkpointing` after rounds.
     ///
     /// # Errors
     /// As [`colorize`], [`ChromaError::OtherCheckpoint`], and [`ChromaError::Cancelled`] where
@@ -179,25 +179,25 @@ impl Distill<'_> {
     pub fn run_from(
         &self,
         checkpoint: Option<&ChromaCheckpoint>,
-        keeper: &mut dyn ChromaKeeper,
+        checkpointing: &mut dyn ChromaCheckpointing,
         settings: &ChromaSettings,
         observe: &mut ColorizeObserver<'_>,
     ) -> Result<Colored, ChromaError> {
         let begun = Instant::now();
         // No photo is looked at any more.
         self.dataset.release();
-        let (dataset, lesson, gpu) = (self.dataset, self.lesson, &self.raster.gpu);
+        let (dataset, supervision, gpu) = (self.dataset, self.supervision, &self.raster.gpu);
         let mut settings = settings.clone();
         let frozen = self.freeze(&settings, observe)?;
-        let laid = match lesson.has_strokes() {
-            true => Some(lay(&frozen, dataset, lesson, self.luma)?),
+        let laid = match supervision.has_strokes() {
+            true => Some(lay(&frozen, dataset, supervision, self.luma)?),
             false => None,
         };
         let (targets, tasks) = match &laid {
             Some(laid) => (&laid.targets, laid.tasks.clone()),
-            None => (&lesson.targets, lesson.tasks()),
+            None => (&supervision.targets, supervision.tasks()),
         };
-        let correction = plan::correction(lesson.spread, settings.solver, self.correct_views);
+        let correction = plan::correction(supervision.spread, settings.solver, self.correct_views);
         settings.correct_views = correction.on;
         let last = Cell::new(checkpoint.and_then(|found| found.state.last));
         let mut peak = None;
@@ -213,15 +213,15 @@ impl Distill<'_> {
         go_on(observe(ColorizeEvent::Plan(&effects)))?;
         let mut solved = |settings: &ChromaSettings, from, uncorrected| {
             let between = &mut |solver: &IrlsSolver<'_>| {
-                if keeper.looks_on() {
+                if checkpointing.looks_on() {
                     let asked = Instant::now();
-                    keeper.show(&solver.chroma()?, asked.elapsed());
+                    checkpointing.show(&solver.chroma()?, asked.elapsed());
                 }
-                if !keeper.wants() {
+                if !checkpointing.wants() {
                     return Ok(true);
                 }
-                Ok(keeper.keep(ChromaCheckpoint {
-                    state: State {
+                Ok(checkpointing.keep(ChromaCheckpoint {
+                    state: SolveDecisions {
                         chosen: chosen.clone(),
                         uncorrected,
                         last: last.get(),
@@ -257,11 +257,11 @@ impl Distill<'_> {
                 found
             }
         };
-        keeper.end();
+        checkpointing.end();
         let mut chroma = solved.chroma;
         let mut saturation = 1.0;
         // Where no point is seen twice nobody knows what views agree on.
-        if let (true, Some(spread)) = (settings.match_saturation, lesson.spread) {
+        if let (true, Some(spread)) = (settings.match_saturation, supervision.spread) {
             let told = &mut |view, total| observe(ColorizeEvent::Matching { view, total });
             let agreed = spread.agreed;
             saturation = match_saturation(&frozen, targets, &tasks, agreed, &mut chroma, told)?;
@@ -283,7 +283,7 @@ impl Distill<'_> {
             claimed: laid.as_ref().map(|laid| laid.claimed),
             saturation,
             effects,
-            colored_views: lesson.colored_views(),
+            colored_views: supervision.colored_views(),
             last: last.get(),
             load: solved.load,
             estimated_device_memory: frozen.demand(),
@@ -303,17 +303,17 @@ impl Distill<'_> {
         settings: &ChromaSettings,
         observe: &mut ColorizeObserver<'_>,
     ) -> Result<FrozenViews, ChromaError> {
-        let (dataset, lesson) = (self.dataset, self.lesson);
-        let learned = lesson.views.iter();
+        let (dataset, supervision) = (self.dataset, self.supervision);
+        let learned = supervision.views.iter();
         let cameras: Vec<Camera> = learned.map(|&i| dataset.cameras[i].clone()).collect();
-        let room = Room {
+        let room = MemoryBudget {
             limit: settings.memory_limit,
             color: ColorKind::Chroma,
             sh_degree: match self.sh_degree {
                 Degree::Fixed(degree) => degree,
                 Degree::Auto => sh::MAX_DEGREE,
             },
-            weighted: lesson.targets.weighted() || lesson.has_strokes(),
+            weighted: supervision.targets.weighted() || supervision.has_strokes(),
             streams: settings.solver == SolverKind::Irls,
         };
         let scales = settings.target_scales();
@@ -347,12 +347,12 @@ impl Distill<'_> {
     /// How far views disagree without and with `corrections`, where these make them disagree
     /// more.
     fn worse(&self, corrections: &[(Task, Correction)]) -> Option<[f64; 2]> {
-        let (capture, learned) = (&self.dataset.capture, &self.lesson.views);
+        let (capture, learned) = (&self.dataset.capture, &self.supervision.views);
         let mut of_view = vec![Correction::NONE; capture.views.len()];
         for (task, correction) in corrections {
             of_view[learned[task.view]] = *correction;
         }
-        let samples = &self.lesson.samples;
+        let samples = &self.supervision.samples;
         let before = samples.disagreement(capture, |_, ab| ab)?;
         let after = samples.disagreement(capture, |view, ab| of_view[view].of(ab))?;
         (after > before).then_some([before, after])

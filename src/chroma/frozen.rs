@@ -7,14 +7,14 @@ use std::sync::Arc;
 use super::{
     ChromaError, ChromaKernels,
     frozen_view::Frozen,
-    room::{Demand, Least, Room},
+    memory::{Demand, MemoryBudget, MinimumMemory},
 };
 use crate::{
     capture::Camera,
     gpu::{Gpu, GpuError, Recorder},
     raster::{
-        Field, Geometry, Layer, Lists, Load, Picture, Raster, Streamed, UNREACHED, ViewUniform,
-        blend_depth, constants::NEAR_SHARE, depths,
+        Field, Geometry, Layer, Lists, Load, Raster, RenderedImage, Streamed, UNREACHED,
+        ViewUniform, blend_depth, constants::NEAR_SHARE, depths,
     },
     splats::{ShField, Splats, sh},
 };
@@ -68,13 +68,14 @@ impl FrozenViews {
         extent: f64,
         cameras: &[Camera],
         scales: usize,
-        room: Room,
+        room: MemoryBudget,
     ) -> Result<Self, ChromaError> {
         if cameras.is_empty() {
             return Err(ChromaError::NoViews);
         }
         let streams = room.streams && scales <= 1;
-        if !streams || Least::of(splats.len(), splats.sh.degree, room).fits(&raster.gpu, room.limit)
+        if !streams
+            || MinimumMemory::of(splats.len(), splats.sh.degree, room).fits(&raster.gpu, room.limit)
         {
             let all = Self::placed(raster, splats, extent, cameras, scales, room, None);
             if !(streams && matches!(all, Err(ChromaError::OverLimit { .. }))) {
@@ -95,7 +96,7 @@ impl FrozenViews {
         extent: f64,
         cameras: &[Camera],
         scales: usize,
-        room: Room,
+        room: MemoryBudget,
         streamed: Option<HostScene>,
     ) -> Result<Self, ChromaError> {
         let gpu = &raster.gpu;
@@ -299,7 +300,7 @@ impl FrozenViews {
         &self,
         view: usize,
         fields: &[&Colors<'_>],
-    ) -> Result<Vec<Picture>, GpuError> {
+    ) -> Result<Vec<RenderedImage>, GpuError> {
         let Some(lists) = self.lists(view, 0) else {
             return Ok(Vec::new());
         };
@@ -331,7 +332,7 @@ impl FrozenViews {
         lists: &Lists,
         colors: &Colors<'_>,
         shown: &[usize],
-    ) -> Result<Picture, GpuError> {
+    ) -> Result<RenderedImage, GpuError> {
         let gpu = &self.raster.gpu;
         let uniform = self.uniform(view, 0);
         let (pixels, tiles) = (uniform.pixel_count(), uniform.tile_count());
@@ -351,7 +352,7 @@ impl FrozenViews {
         self.list(view, 0, field.degree, &mut recorder);
         layer.record(&self.raster, &mut recorder);
         recorder.submit();
-        let picture = Picture {
+        let picture = RenderedImage {
             width: uniform.size[0],
             height: uniform.size[1],
             channels: field.kind.channels(),

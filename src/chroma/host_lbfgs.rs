@@ -22,7 +22,7 @@ struct Pair {
 
 /// The next step: along a new direction, a shorter one along the last, or the majorizer's.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Next {
+enum NextStep {
     Onward,
     Shorter,
     Safe,
@@ -46,7 +46,7 @@ pub(super) struct HostLbfgs {
     pairs: VecDeque<Pair>,
     /// The loss at the accepted point, priors included.
     loss: Option<f64>,
-    next: Next,
+    next: NextStep,
     slope: f64,
     scale: f64,
     /// Points accepted so far.
@@ -74,7 +74,7 @@ impl HostLbfgs {
             preconditioner: zeros(),
             pairs: VecDeque::new(),
             loss: None,
-            next: Next::Onward,
+            next: NextStep::Onward,
             slope: 0.0,
             scale: 1.0,
             age: 0,
@@ -127,10 +127,10 @@ impl HostLbfgs {
         let changed = std::mem::take(&mut self.changed);
         let paired = self.loss.is_some() && self.age >= AGE && !changed;
         let length = self.judge(loss);
-        let accepted = self.next == Next::Onward;
+        let accepted = self.next == NextStep::Onward;
         let pair = accepted.then(|| self.accept(gradient, diagonal, paired));
         self.remember(pair.unwrap_or_default());
-        if self.next != Next::Shorter {
+        if self.next != NextStep::Shorter {
             self.direction = self.descent();
         }
         self.slope = -dot(&self.gradient, &self.direction);
@@ -145,7 +145,7 @@ impl HostLbfgs {
     /// The end, at this loss: a last step that raised it is undone.
     pub fn end(&mut self, loss: f64) {
         self.judge(loss);
-        if self.next == Next::Onward {
+        if self.next == NextStep::Onward {
             self.displacement = difference(&self.unknowns, &self.accepted);
             self.accepted.clone_from(&self.unknowns);
         }
@@ -160,7 +160,7 @@ impl HostLbfgs {
         let whole: f64 = weights[..self.constants].iter().sum();
         // Nothing is drawn.
         let mean = if whole > 0.0 { moved / whole } else { 0.0 };
-        (self.next == Next::Onward).then_some(mean)
+        (self.next == NextStep::Onward).then_some(mean)
     }
 
     /// Accepts the present point or goes back; gives the length of the next step.
@@ -168,19 +168,19 @@ impl HostLbfgs {
         let loss = self.with_priors(loss);
         let Some(before) = self.loss.filter(|&before| rises(before, loss)) else {
             self.loss = Some(loss);
-            self.next = Next::Onward;
+            self.next = NextStep::Onward;
             self.age += 1;
             return 1.0;
         };
         self.unknowns.clone_from(&self.accepted);
-        if self.next == Next::Onward {
-            self.next = Next::Shorter;
+        if self.next == NextStep::Onward {
+            self.next = NextStep::Shorter;
             let bend = loss - before - self.slope;
             let known = self.slope < 0.0 && bend.is_finite();
             let least = if known { -0.5 * self.slope / bend } else { 0.0 };
             return least.clamp(SHORTENED[0], SHORTENED[1]);
         }
-        self.next = Next::Safe;
+        self.next = NextStep::Safe;
         self.pairs.clear();
         self.scale = 1.0;
         1.0
@@ -289,7 +289,7 @@ impl HostLbfgs {
         let mut found = Self {
             pairs: rhos.iter().map(pair).collect(),
             loss: loss.is_finite().then_some(loss),
-            next: [Next::Onward, Next::Shorter, Next::Safe][(next as usize).min(2)],
+            next: [NextStep::Onward, NextStep::Shorter, NextStep::Safe][(next as usize).min(2)],
             slope,
             scale,
             age: age as usize,

@@ -9,10 +9,10 @@ use super::{
     ChromaError, ChromaObserver, ChromaProgress, ChromaSettings, Correction, FrozenViews, Targets,
     Task,
     checkpoint::{Rounds, SolverState},
-    lbfgs::State,
+    lbfgs::LbfgsState,
     loss::Space,
-    passes::{Ending, Judging, Passes},
-    steps::{Kept, Priors, Steps},
+    passes::{LossOutput, LossSettings, Passes},
+    steps::{Priors, StepStatus, Steps},
 };
 use crate::{
     gpu::{Gpu, Recorder},
@@ -179,7 +179,7 @@ impl<'a> IrlsSolver<'a> {
     /// [`ChromaError::Gpu`] when the device is lost.
     pub(super) fn state(&self) -> Result<SolverState, ChromaError> {
         let gpu = self.gpu();
-        let Kept {
+        let StepStatus {
             newest,
             mut buffers,
             doubles,
@@ -245,9 +245,9 @@ impl<'a> IrlsSolver<'a> {
         while self.done < until.min(self.settings.rounds) && !self.ended {
             let round = self.done;
             let ending = if self.correction_is_due(round) {
-                Ending::GradientAndSums
+                LossOutput::GradientAndSums
             } else {
-                Ending::Gradient
+                LossOutput::Gradient
             };
             self.draw(self.robust(), ending)?;
             let mut state = self.steps.step(&mut self.passes)?;
@@ -317,8 +317,8 @@ impl<'a> IrlsSolver<'a> {
     }
 
     /// Judges the last step.
-    fn end(&mut self) -> Result<State, ChromaError> {
-        self.draw(self.robust(), Ending::Loss)?;
+    fn end(&mut self) -> Result<LbfgsState, ChromaError> {
+        self.draw(self.robust(), LossOutput::Loss)?;
         let state = self.steps.end(&mut self.passes)?;
         let corrected = std::mem::take(&mut self.corrected);
         if state.moved.is_none() {
@@ -342,7 +342,7 @@ impl<'a> IrlsSolver<'a> {
         let gpu = self.gpu();
         self.passes.put(chroma)?;
         let spent = self.spent;
-        self.draw(None, Ending::Loss)?;
+        self.draw(None, LossOutput::Loss)?;
         self.spent = spent;
         self.steps.restart(gpu);
         self.passes.frozen.relist(self.passes.field.degree);
@@ -357,7 +357,7 @@ impl<'a> IrlsSolver<'a> {
     pub fn seen(&mut self) -> Result<Vec<f32>, ChromaError> {
         if self.undone {
             // The sums are of the step that was undone, where hardly a color was met.
-            self.draw(self.robust(), Ending::Gradient)?;
+            self.draw(self.robust(), LossOutput::Gradient)?;
         }
         let count = self.passes.frozen.splat_count();
         let diagonal = self.passes.curvature()?;
@@ -393,15 +393,15 @@ impl<'a> IrlsSolver<'a> {
     }
 
     /// Draws every view for its loss and what follows on it.
-    fn draw(&mut self, robust: Option<f32>, ending: Ending) -> Result<(), ChromaError> {
-        let adjoint = ending != Ending::Loss;
+    fn draw(&mut self, robust: Option<f32>, ending: LossOutput) -> Result<(), ChromaError> {
+        let adjoint = ending != LossOutput::Loss;
         self.passes.clear(adjoint);
-        let judging = Judging {
+        let loss_settings = LossSettings {
             robust,
-            ..Judging::default()
+            ..LossSettings::default()
         };
         for task in 0..self.passes.tasks.len() {
-            self.passes.draw(task, 0, judging, task, ending)?;
+            self.passes.draw(task, 0, loss_settings, task, ending)?;
         }
         self.spent += if adjoint { 1.0 } else { DRAWING } * self.passes.tasks.len() as f64;
         Ok(())

@@ -138,7 +138,7 @@ impl LbfgsKernels {
 struct Bound(Kernel, Bindings);
 
 /// Kernels of one pair.
-struct OfPair {
+struct PairKernels {
     keep: Bound,
     curvature: [Bound; 2],
     spread: [Bound; 2],
@@ -163,14 +163,14 @@ pub struct Lbfgs {
     precondition: Bound,
     slope: [Bound; 2],
     step: Bound,
-    pairs: Vec<OfPair>,
+    pairs: Vec<PairKernels>,
     newest: usize,
     blocks: u32,
 }
 
 /// State of the iteration.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct State {
+pub struct LbfgsState {
     /// The least loss so far, the parts of ridge and anchors included.
     pub loss: f64,
     /// Mean change of the colors by the last step: as Gaussians are drawn, and as the loss
@@ -178,7 +178,7 @@ pub struct State {
     pub moved: Option<f64>,
 }
 
-impl State {
+impl LbfgsState {
     /// From what [`Lbfgs::state_later`] reads.
     pub fn of(scalars: &[f32]) -> Self {
         let at = |index: usize| f64::from(scalars[index]);
@@ -279,7 +279,7 @@ impl Lbfgs {
                         &[parameters, of_direction, of_scalars, (15, left.raw())],
                     )
                 };
-                Ok(OfPair {
+                Ok(PairKernels {
                     keep: bind(
                         &kernels.keep,
                         &[

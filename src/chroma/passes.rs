@@ -7,7 +7,7 @@ use super::{
     correction::Corrections,
     host_system::HostSystem,
     loss::{ChromaLossWeights, LOSS_BLOCK, LabLossParameters, RgbLossParameters, Space},
-    seat::{Judge, Seat, Shared},
+    view_adjoint::{SolveBuffers, ViewAdjoint, ViewLoss},
 };
 use crate::{
     gpu::{Buffer, Recorder},
@@ -29,7 +29,7 @@ pub struct Task {
 
 /// How a view is judged.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Judging {
+pub(super) struct LossSettings {
     /// Weight of the agreement with the next coarser scale, drawn just before.
     pub agreement: f32,
     /// Residual at which the loss of a and b together levels off; without one, each has
@@ -41,7 +41,7 @@ pub(super) struct Judging {
 
 /// Figures that follow on the loss.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Ending {
+pub(super) enum LossOutput {
     /// Draws for the loss alone.
     Loss,
     /// Draws and takes the adjoint: loss and gradient.
@@ -68,7 +68,7 @@ pub(super) struct Passes<'a> {
     pub corrections: Corrections,
     /// A seat for each scale of each pinned task, then one for each scale that all
     /// others take turns in.
-    seats: Vec<Seat>,
+    adjoints: Vec<ViewAdjoint>,
     scales: usize,
     kept: usize,
 }
@@ -128,7 +128,7 @@ impl<'a> Passes<'a> {
         let scratch = AdjointScratch::color(gpu, splats, capacity)?;
         let image_gradient = Buffer::zeros(gpu, "image gradient", COLOR_FIGURES * pixels[0])?;
         let weighted = targets.weighted();
-        let shared = Shared {
+        let shared = SolveBuffers {
             frozen,
             field: &field,
             sums: ChromaSums {
@@ -142,14 +142,14 @@ impl<'a> Passes<'a> {
             scratch: &scratch,
             canvases: &canvases,
         };
-        let mut seats = Vec::new();
+        let mut adjoints = Vec::new();
         for &Task { view, target } in &tasks[..kept] {
             for scale in 0..scales {
                 let target = targets.read(target, scale)?;
                 let wanted = Buffer::from_slice(gpu, "wanted", &target.pixels)?;
                 let weights = target.weights.as_deref().unwrap_or(&[0.0]);
                 let weights = Buffer::from_slice(gpu, "pixel weights", weights)?;
-                seats.push(Seat::new(&shared, view, scale, wanted, weights)?);
+                adjoints.push(ViewAdjoint::new(&shared, view, scale, wanted, weights)?);
             }
             // What is written waits on the host until it is there.
             gpu.queue().submit([]);
@@ -161,7 +161,7 @@ impl<'a> Passes<'a> {
             let weights: Buffer<f32> = Buffer::zeros(gpu, "pixel weights", count)?;
             for scale in 0..scales {
                 let (wanted, weights) = (wanted.clone(), weights.clone());
-                seats.push(Seat::new(&shared, view, scale, wanted, weights)?);
+                adjoints.push(ViewAdjoint::new(&shared, view, scale, wanted, weights)?);
             }
         }
         Ok(Self {
@@ -175,7 +175,7 @@ impl<'a> Passes<'a> {
             log,
             status,
             corrections,
-            seats,
+            adjoints,
             scales,
             kept,
         })
@@ -255,9 +255,9 @@ impl<'a> Passes<'a> {
         &mut self,
         index: usize,
         scale: usize,
-        judging: Judging,
+        loss_settings: LossSettings,
         entry: usize,
-        ending: Ending,
+        ending: LossOutput,
     ) -> Result<(), ChromaError> {
         let shown = self.frozen.put(self.tasks[index].view);
         if let (Some(on_host), Some(shown)) = (&self.on_host, &shown) {
@@ -268,9 +268,9 @@ impl<'a> Passes<'a> {
             recorder.clear(self.diagonal.raw());
             recorder.submit();
         }
-        self.draw_on_device(index, scale, judging, entry, ending)?;
+        self.draw_on_device(index, scale, loss_settings, entry, ending)?;
         if let (Some(on_host), Some(shown)) = (&mut self.on_host, &shown)
-            && ending != Ending::Loss
+            && ending != LossOutput::Loss
         {
             let found = [&self.gradient, &self.diagonal];
             on_host.receive(self.frozen.gpu(), shown, found)?;
@@ -283,25 +283,26 @@ impl<'a> Passes<'a> {
         &self,
         index: usize,
         scale: usize,
-        judging: Judging,
+        loss_settings: LossSettings,
         entry: usize,
-        ending: Ending,
+        ending: LossOutput,
     ) -> Result<(), ChromaError> {
         let (frozen, raster) = (self.frozen, &self.frozen.raster);
         let gpu = &raster.gpu;
         let Task { view, target } = self.tasks[index];
         let stays = index < self.kept;
-        let seat = &self.seats[if stays { index } else { self.kept } * self.scales + scale];
+        let view_adjoint =
+            &self.adjoints[if stays { index } else { self.kept } * self.scales + scale];
         let weighted = if stays {
-            seat.weights.len() > 1
+            view_adjoint.weights.len() > 1
         } else {
             // What the view before this one reads must be read, and what waits on the
             // host must be gone.
             gpu.wait()?;
             let target = self.targets.read(target, scale)?;
-            seat.wanted.write(gpu, &target.pixels);
+            view_adjoint.wanted.write(gpu, &target.pixels);
             if let Some(weights) = &target.weights {
-                seat.weights.write(gpu, weights);
+                view_adjoint.weights.write(gpu, weights);
             }
             target.weights.is_some()
         };
@@ -309,35 +310,35 @@ impl<'a> Passes<'a> {
         let blocks = pixels.div_ceil(LOSS_BLOCK) as u32;
         let mut recorder = Recorder::new(gpu);
         frozen.list(view, scale, self.field.degree, &mut recorder);
-        seat.layer.record(raster, &mut recorder);
+        view_adjoint.layer.record(raster, &mut recorder);
         let kernels = &frozen.kernels;
-        let agreement = judging.agreement;
-        let agreeing = seat.agreeing.as_ref().filter(|_| agreement > 0.0);
+        let agreement = loss_settings.agreement;
+        let agreeing = view_adjoint.agreeing.as_ref().filter(|_| agreement > 0.0);
         let coarser = scale + usize::from(agreeing.is_some());
         let coarser_size = frozen.uniform(view, coarser).size;
         let told = u32::from(weighted);
-        let [plain, with_agreement] = match &seat.judge {
-            Judge::Rgb(parameters) => {
+        let [plain, with_agreement] = match &view_adjoint.view_loss {
+            ViewLoss::Rgb(parameters) => {
                 parameters.write(gpu, &[RgbLossParameters { weighted: told }]);
                 [&kernels.rgb_loss; 2]
             }
-            Judge::Lab(parameters) => {
+            ViewLoss::Lab(parameters) => {
                 let parameters_now = LabLossParameters {
                     coarser_size,
                     agreement,
                     weighted: told,
-                    ..judging.lab
+                    ..loss_settings.lab
                 };
                 parameters.write(gpu, &[parameters_now]);
                 [&kernels.lab_loss, &kernels.agreeing_lab_loss]
             }
-            Judge::Chroma { weights, .. } => {
+            ViewLoss::Chroma { weights, .. } => {
                 let weights_now = ChromaLossWeights {
                     coarser_size,
                     agreement,
                     view_index: index as u32,
                     weighted: told,
-                    ..ChromaLossWeights::robust(judging.robust)
+                    ..ChromaLossWeights::robust(loss_settings.robust)
                 };
                 weights.write(gpu, &[weights_now]);
                 [&kernels.chroma_loss, &kernels.agreeing_loss]
@@ -345,12 +346,12 @@ impl<'a> Passes<'a> {
         };
         match agreeing {
             Some(loss) => recorder.dispatch(with_agreement, loss, blocks),
-            None => recorder.dispatch(plain, &seat.loss, blocks),
+            None => recorder.dispatch(plain, &view_adjoint.loss, blocks),
         }
-        if let Judge::Chroma {
+        if let ViewLoss::Chroma {
             parameters, sums, ..
-        } = &seat.judge
-            && ending == Ending::GradientAndSums
+        } = &view_adjoint.view_loss
+            && ending == LossOutput::GradientAndSums
         {
             self.corrections.choose(gpu, parameters, index, weighted);
             (self.corrections).sum(&kernels.correction, sums, &mut recorder);
@@ -358,8 +359,8 @@ impl<'a> Passes<'a> {
         let sum_loss = &frozen.kernels.sum_loss;
         self.log
             .record(gpu, sum_loss, &mut recorder, blocks, pixels, entry);
-        if ending != Ending::Loss {
-            seat.adjoint.record(raster, &mut recorder);
+        if ending != LossOutput::Loss {
+            view_adjoint.adjoint.record(raster, &mut recorder);
         }
         recorder.submit();
         Ok(())

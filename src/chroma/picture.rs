@@ -2,12 +2,12 @@
 
 use crate::{
     color::{gamut_map_lab, gray_to_lightness},
-    raster::Picture,
+    raster::RenderedImage,
 };
 
 /// The native picture: at each pixel L* of the luma and the blended a/b, brought
 /// into the sRGB gamut at constant L* and hue. `[pixels]` of RGB in [0, 1].
-pub fn native_rgb(luma: &Picture, chroma: &Picture) -> Vec<[f32; 3]> {
+pub fn native_rgb(luma: &RenderedImage, chroma: &RenderedImage) -> Vec<[f32; 3]> {
     luma.pixels
         .iter()
         .zip(chroma.pixels.chunks_exact(2))

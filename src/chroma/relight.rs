@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use super::{
-    ChromaError, ChromaObserver, ChromaSettings, FrozenViews, IrlsSolver, Room, Targets, Task,
-    masked_weights, solve::SEEN,
+    ChromaError, ChromaObserver, ChromaSettings, FrozenViews, IrlsSolver, MemoryBudget, Targets,
+    Task, masked_weights, solve::SEEN,
 };
 use crate::{
     capture::{Camera, Dataset},
@@ -46,7 +46,7 @@ pub fn relight(
         rounds: ROUNDS,
         ..ChromaSettings::exact()
     };
-    let room = Room {
+    let room = MemoryBudget {
         limit: memory_limit,
         color: ColorKind::Rgb,
         sh_degree: luma.sh.degree,

@@ -7,7 +7,7 @@ use super::{
     ChromaError,
     checkpoint::SolverState,
     host_lbfgs::HostLbfgs,
-    lbfgs::{Lbfgs, LbfgsKernels, State, System, UNBOUNDED, diagonal_scale},
+    lbfgs::{Lbfgs, LbfgsKernels, LbfgsState, System, UNBOUNDED, diagonal_scale},
     passes::Passes,
 };
 use crate::{
@@ -40,7 +40,7 @@ pub(super) struct HostSteps {
 
 /// Figures that a step goes by: in f32 on the device, in f64 on the host.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Kept {
+pub(super) struct StepStatus {
     pub newest: usize,
     pub buffers: BTreeMap<String, Vec<f32>>,
     pub doubles: BTreeMap<String, Vec<f64>>,
@@ -95,7 +95,7 @@ impl Steps {
     ///
     /// # Errors
     /// [`ChromaError::Gpu`].
-    pub fn step(&mut self, passes: &mut Passes<'_>) -> Result<State, ChromaError> {
+    pub fn step(&mut self, passes: &mut Passes<'_>) -> Result<LbfgsState, ChromaError> {
         match self {
             Self::Device(_, lbfgs) => {
                 let mut recorder = Recorder::new(passes.frozen.gpu());
@@ -111,7 +111,7 @@ impl Steps {
     ///
     /// # Errors
     /// [`ChromaError::Gpu`].
-    pub fn end(&mut self, passes: &mut Passes<'_>) -> Result<State, ChromaError> {
+    pub fn end(&mut self, passes: &mut Passes<'_>) -> Result<LbfgsState, ChromaError> {
         let gpu = passes.frozen.gpu();
         match self {
             Self::Device(_, lbfgs) => {
@@ -157,9 +157,9 @@ impl Steps {
     ///
     /// # Errors
     /// [`ChromaError::Gpu`].
-    pub fn kept(&self, passes: &Passes<'_>) -> Result<Kept, ChromaError> {
+    pub fn kept(&self, passes: &Passes<'_>) -> Result<StepStatus, ChromaError> {
         let gpu = passes.frozen.gpu();
-        let mut kept = Kept::default();
+        let mut kept = StepStatus::default();
         match self {
             Self::Device(system, lbfgs) => {
                 for (name, buffer) in of_system(system) {
@@ -225,8 +225,8 @@ fn of_system(system: &System) -> [(&'static str, &Buffer<f32>); 2] {
     [("unknowns", &system.unknowns), (DIAGONAL, &system.diagonal)]
 }
 
-fn state(lbfgs: &Lbfgs, gpu: &Gpu) -> Result<State, ChromaError> {
-    Ok(State::of(&lbfgs.state_later(gpu).wait(gpu)?))
+fn state(lbfgs: &Lbfgs, gpu: &Gpu) -> Result<LbfgsState, ChromaError> {
+    Ok(LbfgsState::of(&lbfgs.state_later(gpu).wait(gpu)?))
 }
 
 fn widened(values: &[f32]) -> Vec<f64> {
@@ -252,7 +252,7 @@ impl HostSteps {
         Ok(losses.iter().map(|&loss| f64::from(loss)).sum())
     }
 
-    fn step(&mut self, passes: &mut Passes<'_>) -> Result<State, ChromaError> {
+    fn step(&mut self, passes: &mut Passes<'_>) -> Result<LbfgsState, ChromaError> {
         let loss = Self::loss(passes)?;
         let weights = self.weights(passes);
         let of_pictures = weights.iter().enumerate().map(|(k, weight)| {
@@ -266,7 +266,7 @@ impl HostSteps {
         Ok(self.state(&weights))
     }
 
-    fn end(&mut self, passes: &mut Passes<'_>) -> Result<State, ChromaError> {
+    fn end(&mut self, passes: &mut Passes<'_>) -> Result<LbfgsState, ChromaError> {
         self.lbfgs.end(Self::loss(passes)?);
         self.show(passes);
         Ok(self.state(&self.weights(passes)))
@@ -289,9 +289,9 @@ impl HostSteps {
         }
     }
 
-    fn state(&self, weights: &[f64]) -> State {
+    fn state(&self, weights: &[f64]) -> LbfgsState {
         let moved = self.lbfgs.moved(weights);
-        State {
+        LbfgsState {
             loss: self.lbfgs.loss().unwrap_or(f64::MAX),
             moved: moved.map(|moved| sh::C0 * moved),
         }

@@ -61,7 +61,7 @@ impl Target {
 }
 
 /// Place of a picture: pixels, then weights, as words.
-enum Place {
+enum TargetData {
     Memory(Vec<u32>),
     File(u64),
 }
@@ -69,7 +69,7 @@ enum Place {
 struct Stored {
     size: [u32; 2],
     weighted: bool,
-    place: Place,
+    place: TargetData,
 }
 
 /// Wanted pictures of many views at 2^0, 2^1, … times smaller sizes.
@@ -174,11 +174,11 @@ impl Targets {
         Ok(self.stored.len() - 1)
     }
 
-    fn place(&mut self, words: Vec<u32>) -> io::Result<Place> {
+    fn place(&mut self, words: Vec<u32>) -> io::Result<TargetData> {
         let bytes = 4 * words.len();
         if bytes <= self.room {
             self.room -= bytes;
-            return Ok(Place::Memory(words));
+            return Ok(TargetData::Memory(words));
         }
         let file = match &mut self.file {
             Some(file) => file,
@@ -187,7 +187,7 @@ impl Targets {
         let at = file.seek(SeekFrom::End(0))?;
         disk::step()?;
         file.write_all(bytemuck::cast_slice(&words))?;
-        Ok(Place::File(at))
+        Ok(TargetData::File(at))
     }
 
     /// A target at a scale.
@@ -202,15 +202,17 @@ impl Targets {
         } = &self.stored[index][scale];
         let count = size[0] as usize * size[1] as usize;
         let mut pixels = match (place, &self.file) {
-            (Place::Memory(words), _) => words.clone(),
-            (Place::File(at), Some(file)) => {
+            (TargetData::Memory(words), _) => words.clone(),
+            (TargetData::File(at), Some(file)) => {
                 let mut words = vec![0; count * (1 + usize::from(*weighted))];
                 let mut file = file;
                 file.seek(SeekFrom::Start(*at))?;
                 file.read_exact(bytemuck::cast_slice_mut(&mut words))?;
                 words
             }
-            (Place::File(_), None) => return Err(io::Error::from(io::ErrorKind::NotFound).into()),
+            (TargetData::File(_), None) => {
+                return Err(io::Error::from(io::ErrorKind::NotFound).into());
+            }
         };
         let weights = pixels.split_off(count).into_iter().map(f32::from_bits);
         Ok(Target {

@@ -16,7 +16,7 @@ use super::{
     values::{PRESETS, folder, one_of},
 };
 use crate::{
-    auto::{AutoOptions, Results, Step, Told, auto},
+    auto::{AutoEvent, AutoOptions, Results, Step, auto},
     run::Preset,
 };
 
@@ -66,16 +66,16 @@ impl Auto {
         let mut whole = Progress::default();
         let mut progress = Progress::default();
         let results = auto(&options, &mut |told| match told {
-            Told::Begins(step, stages) => {
+            AutoEvent::Begins(step, stages) => {
                 whole.join(&mut progress);
                 eprintln!("{}", heading(step, ""));
                 progress = Progress::through(stages);
             }
-            Told::Skips(step) => {
+            AutoEvent::Skips(step) => {
                 whole.join(&mut progress);
                 eprintln!("{}", heading(step, ": its result is there"));
             }
-            Told::Event(event) => progress.show(&event),
+            AutoEvent::Event(event) => progress.show(&event),
         })?;
         whole.join(&mut progress);
         if self.json {

@@ -27,13 +27,13 @@ const TICK: Duration = Duration::from_millis(250);
 /// A line on standard error that shows how far something is; none where that is no terminal.
 pub(super) struct Bar {
     shown: ProgressBar,
-    state: Arc<Mutex<State>>,
+    state: Arc<Mutex<BarText>>,
 }
 
 impl Bar {
     /// A bar for something that begins; `place` is which of how many it is.
     pub fn begin(name: &str, place: Option<[usize; 2]>) -> Self {
-        let state = Arc::new(Mutex::new(State::new(name, place, Instant::now())));
+        let state = Arc::new(Mutex::new(BarText::new(name, place, Instant::now())));
         let said = state.clone();
         let line = move |_: &ProgressState, out: &mut dyn fmt::Write| {
             // Writing to a string cannot fail.
@@ -81,12 +81,12 @@ impl Drop for Bar {
 }
 
 /// Whoever panicked while drawing leaves a state that can be drawn.
-fn locked(state: &Mutex<State>) -> MutexGuard<'_, State> {
+fn locked(state: &Mutex<BarText>) -> MutexGuard<'_, BarText> {
     state.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// What a bar says.
-struct State {
+struct BarText {
     name: String,
     place: String,
     begun: Instant,
@@ -100,7 +100,7 @@ struct State {
     pace: [f64; 2],
 }
 
-impl State {
+impl BarText {
     fn new(name: &str, place: Option<[usize; 2]>, now: Instant) -> Self {
         Self {
             name: name.to_owned(),
@@ -193,16 +193,16 @@ mod tests {
     use super::*;
 
     /// A bar that began a while ago, and what it says so many seconds after its beginning.
-    struct Story {
-        state: State,
+    struct Excerpt {
+        state: BarText,
         begun: Instant,
     }
 
-    impl Story {
+    impl Excerpt {
         fn new(name: &str, place: Option<[usize; 2]>) -> Self {
             let begun = Instant::now();
             Self {
-                state: State::new(name, place, begun),
+                state: BarText::new(name, place, begun),
                 begun,
             }
         }
@@ -220,7 +220,7 @@ mod tests {
 
     #[test]
     fn a_bar_says_where_it_is_and_how_fast() {
-        let mut story = Story::new("training", Some([5, 8]));
+        let mut story = Excerpt::new("training", Some([5, 8]));
         assert_eq!(story.at(2.0), "training    5 of 8 ░░░░░░░░░░░░ 2 s");
         story.update(2.0, 0, 700, "");
         assert_eq!(story.at(3.5), "training    5 of 8 ░░░░░░░░░░░░ 0/700 3 s");
@@ -243,7 +243,7 @@ mod tests {
 
     #[test]
     fn what_is_slow_is_told_in_seconds() {
-        let mut story = Story::new("solving", None);
+        let mut story = Excerpt::new("solving", None);
         story.update(0.0, 0, 12, "");
         story.update(73.0, 1, 12, "loss 3.412");
         assert_eq!(
@@ -255,7 +255,7 @@ mod tests {
 
     #[test]
     fn the_time_left_does_not_jump() {
-        let mut story = Story::new("training", None);
+        let mut story = Excerpt::new("training", None);
         story.update(0.0, 0, 1000, "");
         let (mut now, mut before) = (0.0, 0.0);
         // Every tenth report is late.
@@ -276,7 +276,7 @@ mod tests {
 
     #[test]
     fn a_second_round_begins_anew() {
-        let mut story = Story::new("photos", None);
+        let mut story = Excerpt::new("photos", None);
         story.update(0.0, 0, 30, "");
         story.update(30.0, 30, 30, "");
         story.update(31.0, 1, 30, "");
@@ -295,7 +295,7 @@ mod tests {
             "DSC_0042 of the very long walk around the old town hall.jpg",
             &"日本".repeat(40),
         ] {
-            let mut story = Story::new("measuring", Some([10, 12]));
+            let mut story = Excerpt::new("measuring", Some([10, 12]));
             story.update(0.0, 10_000, 123_456, name);
             story.update(9.0, 20_000, 123_456, name);
             for line in [story.at(9.0), story.at(10_000.0)] {

@@ -12,7 +12,7 @@ use super::{
     values::one_of,
 };
 use crate::{
-    run::{ExportOptions, Exported, Look, Shown, export},
+    run::{ExportOptions, Exported, ViewedScene, ViewerCameras, export},
     tell::{Event, Stage},
     view::{is_html, write_html},
     viewers::ViewerChoice,
@@ -120,11 +120,11 @@ impl Export {
             let told = format!("{name} is for splat files: the page is written without");
             progress.show(&Event::Warning(told));
         }
-        let look = Look::open(self.run.as_deref(), None, &mut |event| {
+        let viewed = ViewedScene::open(self.run.as_deref(), None, &mut |event| {
             progress.show(&event)
         })?;
         let observe = &mut |event| progress.show(&event);
-        let wrote = write_html(&look, self.luma, &self.output, observe)?;
+        let wrote = write_html(&viewed, self.luma, &self.output, observe)?;
         progress.finish();
         if self.json {
             let wrote = serde_json::json!({
@@ -143,8 +143,8 @@ impl Export {
 }
 
 /// What each viewer shows, and would have shown.
-fn line_of(shown: &[Shown]) -> String {
-    let each = |of: fn(&Shown) -> f64| {
+fn line_of(shown: &[ViewerCameras]) -> String {
+    let each = |of: fn(&ViewerCameras) -> f64| {
         let each = (shown.iter()).map(|s| format!("{} {:.1} dB", s.viewer, of(s)));
         each.collect::<Vec<_>>().join(", ")
     };

@@ -14,7 +14,7 @@ use super::{
     progress::Progress,
     values::{PRESETS, one_of},
 };
-use crate::run::{PlanOptions, Planned, Preset, plan};
+use crate::run::{PlanOptions, PlanReport, Preset, plan};
 
 /// List the effects your photos need, with the evidence, without training.
 #[derive(Args)]
@@ -49,7 +49,7 @@ impl Plan {
             overrules: self.effects.overrules(),
         };
         let mut progress = Progress::through(options.stages());
-        let Planned { plan, soundness } = plan(&options, &mut |event| progress.show(&event))?;
+        let PlanReport { plan, soundness } = plan(&options, &mut |event| progress.show(&event))?;
         progress.finish();
         if self.json {
             let report = crate::report::EffectReport::of(&plan.decisions);

@@ -13,7 +13,7 @@ use super::{
     values::{Rate, folder, one_of, positive, rate},
 };
 use crate::{
-    run::{PathOptions, RenderOptions, Rendered, Views, Way, render, render_path},
+    run::{PathOptions, PathShape, RenderOptions, Rendered, Views, render, render_path},
     store::is_film,
 };
 
@@ -55,7 +55,7 @@ struct PathArguments {
     /// Files: nerfstudio's camera_path.json, transforms.json, 3DGS's cameras.json, SuperSplat's
     /// document.json or settings.json.
     #[arg(long, value_name = "orbit|photos|FILE.json", value_parser = way)]
-    path: Option<Way>,
+    path: Option<PathShape>,
     /// Film to write (.mp4, .mov, .mkv, .m4v), by FFmpeg.
     #[arg(long, value_name = "FILM", requires = "path", value_parser = film)]
     video: Option<PathBuf>,
@@ -91,11 +91,11 @@ fn size(text: &str) -> Result<Size, String> {
     }
 }
 
-fn way(text: &str) -> Result<Way, String> {
+fn way(text: &str) -> Result<PathShape, String> {
     match text {
-        "orbit" => Ok(Way::Orbit),
-        "photos" => Ok(Way::Photos),
-        file if file.to_ascii_lowercase().ends_with(".json") => Ok(Way::File(file.into())),
+        "orbit" => Ok(PathShape::Orbit),
+        "photos" => Ok(PathShape::Photos),
+        file if file.to_ascii_lowercase().ends_with(".json") => Ok(PathShape::File(file.into())),
         _ => Err("must be orbit, photos or a .json file".to_owned()),
     }
 }
@@ -139,8 +139,8 @@ impl Render {
         progress.close(&[], next)
     }
 
-    fn along(self, way: Way, next: &str) -> Result<(), CliError> {
-        if let (Way::File(file), Some(_)) = (&way, self.path.seconds) {
+    fn along(self, way: PathShape, next: &str) -> Result<(), CliError> {
+        if let (PathShape::File(file), Some(_)) = (&way, self.path.seconds) {
             let reason = format!(
                 "--seconds cannot be used with {}, which says it",
                 file.display()

@@ -13,11 +13,13 @@ use indicatif::{ProgressBar, ProgressStyle};
 use super::{CliError, network::NetworkArguments, next, print, progress::Progress};
 use crate::{
     capture::decode_image,
-    chroma::teacher::{Catalog, Checkup, GrayImage, KnownTeacher, TeacherError, ToldBy, check},
-    download::{DownloadError, Source, download},
+    chroma::teacher::{
+        Catalog, Checkup, GrayImage, KnownTeacher, ProfileSource, TeacherError, check,
+    },
+    download::{DownloadError, DownloadSource, download},
     input,
     run::RunError,
-    store::{StoreError, files, originals::Kept},
+    store::{StoreError, files, originals::OriginalFiles},
 };
 
 /// List, download and check colorization networks.
@@ -110,7 +112,7 @@ impl Check {
         let checkup = checkup.map_err(teacher_error)?;
         if let Some(path) = &self.manifest {
             let read = [&self.teacher].into_iter().chain(&self.photo);
-            let _kept = Kept::default().with_all(read, "an input").keep();
+            let _kept = OriginalFiles::default().with_all(read, "an input").keep();
             files::write(path, checkup.manifest.as_bytes())?;
         }
         if self.json {
@@ -135,11 +137,11 @@ const FAR: f64 = 60.0;
 fn lines(checkup: &Checkup) -> Vec<String> {
     let info = &checkup.info;
     let by = match checkup.told_by {
-        ToldBy::User => "as --teacher-profile says",
-        ToldBy::Manifest => "as the manifest beside it says",
-        ToldBy::Catalog => "as its SHA-256 tells",
-        ToldBy::Shapes => "as inputs and outputs tell",
-        ToldBy::Trial => "a guess, from answers to what was tried",
+        ProfileSource::User => "as --teacher-profile says",
+        ProfileSource::Manifest => "as the manifest beside it says",
+        ProfileSource::Catalog => "as its SHA-256 tells",
+        ProfileSource::Shapes => "as inputs and outputs tell",
+        ProfileSource::Trial => "a guess, from answers to what was tried",
     };
     let known = checkup.known_as.as_ref();
     let known = known.map_or(String::new(), |name| format!(", {name} of `teacher list`"));
@@ -244,7 +246,7 @@ impl Fetch {
                 license: teacher.license.clone(),
             });
         }
-        let source = Source {
+        let source = DownloadSource {
             url: &teacher.url,
             sha256: &teacher.sha256,
             bytes: teacher.bytes,

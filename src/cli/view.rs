@@ -11,10 +11,10 @@ use clap::Args;
 
 use super::{CliError, headings::OUTPUT, interrupt, print, progress::Progress};
 use crate::{
-    run::Look,
+    run::ViewedScene,
     subject::Live,
     tell::Stage,
-    view::{OfCommand, OfRun, Server, answer},
+    view::{LiveContent, RunContent, Server, answer},
 };
 
 /// Show a run or a splat file in the browser, beside its photos.
@@ -41,9 +41,9 @@ impl View {
     pub(super) fn run(self) -> Result<(), CliError> {
         let mut progress = Progress::through(vec![Stage::Model]);
         let (run, colmap) = (self.run.as_deref(), self.colmap.as_deref());
-        let look = Look::open(run, colmap, &mut |event| progress.show(&event))?;
-        let name = look.name.clone();
-        let content = OfRun::new(look, &mut |event| progress.show(&event))?;
+        let viewed = ViewedScene::open(run, colmap, &mut |event| progress.show(&event))?;
+        let name = viewed.name.clone();
+        let content = RunContent::new(viewed, &mut |event| progress.show(&event))?;
         let server = Server::bind(self.port)?;
         progress.finish();
         let url = server.url();
@@ -82,7 +82,7 @@ impl ViewArguments {
         let url = server.url();
         eprintln!("{url} shows the scene as it grows");
         let live = Arc::<Live>::default();
-        let content = OfCommand::new(folder, live.clone());
+        let content = LiveContent::new(folder, live.clone());
         // Ends with the program.
         thread::spawn(move || server.serve(move |request| answer(&content, request)));
         open(&url);

@@ -20,7 +20,7 @@ const COUNT: usize = 40;
 
 /// A scene before a view.
 #[derive(Clone, Debug)]
-pub struct Hard {
+pub struct HardCase {
     /// As the kernels get it; values that are not finite included.
     pub scene: Scene<f64, 1>,
     /// From where it is looked at.
@@ -35,7 +35,7 @@ pub struct Hard {
 /// rounding may lie beyond it.
 const ROUNDING: u32 = 64;
 
-impl Hard {
+impl HardCase {
     /// Moves Gaussians off the borders between sort keys of fewer bits, where rounding decides
     /// what is drawn first, by a quarter to a half of a key's width.
     pub(super) fn between_sort_keys(&mut self) {
@@ -64,17 +64,17 @@ pub struct Case {
     /// What goes wrong where nothing is done about it.
     pub trouble: &'static str,
     /// Makes it.
-    pub make: fn() -> Hard,
+    pub make: fn() -> HardCase,
     /// Worst error seen of the picture (absolute) and of the gradient
     /// (relative L2), on llvmpipe of Mesa 22.3.
     pub seen: [f64; 2],
 }
 
 /// Forty random Gaussians, number [`ODD`] two units straight ahead of the camera.
-fn ordinary() -> Hard {
+fn ordinary() -> HardCase {
     let (mut scene, view) = random_scene(7, COUNT, 1);
     scene.means[ODD] = ahead(&view, 2.0);
-    Hard {
+    HardCase {
         scene,
         view,
         broken: Vec::new(),
@@ -83,15 +83,15 @@ fn ordinary() -> Hard {
 }
 
 /// The same with something done to it.
-fn with(change: impl FnOnce(&mut Scene<f64, 1>, &View)) -> Hard {
+fn with(change: impl FnOnce(&mut Scene<f64, 1>, &View)) -> HardCase {
     let mut hard = ordinary();
     change(&mut hard.scene, &hard.view);
     hard
 }
 
 /// The same with something done to number [`ODD`] that must make it vanish.
-fn broken(poisoned: usize, change: impl FnOnce(&mut Scene<f64, 1>)) -> Hard {
-    Hard {
+fn broken(poisoned: usize, change: impl FnOnce(&mut Scene<f64, 1>)) -> HardCase {
+    HardCase {
         broken: vec![ODD],
         poisoned,
         ..with(|scene, _| change(scene))
@@ -99,8 +99,8 @@ fn broken(poisoned: usize, change: impl FnOnce(&mut Scene<f64, 1>)) -> Hard {
 }
 
 /// A scene before a view, nothing broken.
-fn sound((scene, view): (Scene<f64, 1>, View)) -> Hard {
-    Hard {
+fn sound((scene, view): (Scene<f64, 1>, View)) -> HardCase {
+    HardCase {
         scene,
         view,
         broken: Vec::new(),
@@ -152,7 +152,7 @@ fn balls(
     view: View,
     [faint, dense]: [f64; 2],
     places: impl IntoIterator<Item = ([f64; 3], f64)>,
-) -> Hard {
+) -> HardCase {
     let mut random = Random::new(11);
     let gaussians = places.into_iter().map(|(mean, deviation)| {
         let [opacity, gray] = [random.range(faint, dense), random.range(0.1, 0.9)];
@@ -163,9 +163,9 @@ fn balls(
 }
 
 /// The same scene and view in units `factor` times smaller.
-fn scaled(factor: f64) -> Hard {
+fn scaled(factor: f64) -> HardCase {
     let mut hard = ordinary();
-    let Hard { scene, view, .. } = &mut hard;
+    let HardCase { scene, view, .. } = &mut hard;
     for mean in &mut scene.means {
         *mean = mean.map(|x| round(x * factor));
     }
@@ -178,19 +178,19 @@ fn scaled(factor: f64) -> Hard {
 }
 
 /// A view of a random scene with other intrinsics.
-fn seen_through(change: impl FnOnce(&mut View)) -> Hard {
+fn seen_through(change: impl FnOnce(&mut View)) -> HardCase {
     let mut view = oblique_view();
     change(&mut view);
     sound((random_scene_before(&view, 5, COUNT, 1), view))
 }
 
 /// The same, antialiased.
-fn antialiased(hard: Hard) -> Hard {
+fn antialiased(hard: HardCase) -> HardCase {
     let view = View {
         antialiased: true,
         ..hard.view
     };
-    Hard { view, ..hard }
+    HardCase { view, ..hard }
 }
 
 macro_rules! cases {
@@ -330,7 +330,7 @@ pub const CASES: &[Case] = cases! {
     "antialiased disc seen edge-on", "a projected area of zero: 0/0 in the root's adjoint",
         antialiased({ let view = straight_view(48, 40); let mut s = random_scene_before(&view, 29, COUNT, 1);
           s.means[ODD] = [0.0, 0.0, 4.0]; s.quats[ODD] = [1.0, 0.0, 0.0, 0.0]; s.log_scales[ODD] = [-1.5, -120.0, -1.5];
-          Hard { broken: vec![ODD], ..sound((s, view)) } }), [2.45e-7, 6.35e-7];
+          HardCase { broken: vec![ODD], ..sound((s, view)) } }), [2.45e-7, 6.35e-7];
     "antialiased, a tenth of a pixel", "1/c where c² is left of the opacity",
         antialiased(with(|s, _| { s.log_scales[ODD] = [-5.3; 3]; s.opacity_logits[ODD] = 6.0; })), [4.35e-7, 2.95e-6];
     "antialiased, variances underflow", "1/0 in the root's adjoint",
@@ -347,7 +347,7 @@ mod tests {
 
     #[test]
     fn nothing_stands_on_the_border_of_a_sort_key() {
-        let from_border = |hard: &Hard| {
+        let from_border = |hard: &HardCase| {
             let [.., ahead] = hard.view.rotation;
             let mean = hard.scene.means[ODD];
             let depth = hard.view.translation[2] + (0..3).map(|k| ahead[k] * mean[k]).sum::<f64>();

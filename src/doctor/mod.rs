@@ -24,7 +24,7 @@ use crate::{
     },
     raster::Raster,
 };
-use cases::{CASES, Case, Hard};
+use cases::{CASES, Case, HardCase};
 use kernels::TOPICS;
 use measured::Row;
 pub use measured::{MARGIN, headroom};
@@ -275,7 +275,7 @@ fn nan_is_worst(worst: f64, error: f64) -> f64 {
 
 /// What must be seen: Gaussians that must leave no trace replaced by ones that
 /// nobody draws.
-fn without_broken(hard: &Hard) -> Scene<f64, 1> {
+fn without_broken(hard: &HardCase) -> Scene<f64, 1> {
     let scene = &hard.scene;
     let gaussians = (0..scene.len()).map(|i| {
         if hard.broken.contains(&i) {

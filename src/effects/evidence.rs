@@ -3,8 +3,8 @@
 use super::{
     background::{Backdrop, FarPlaces},
     exposure::{Exposures, find_photo_exposures},
-    look_ups::LookUps,
     outliers::Midpoints,
+    patch_means::PatchMeans,
     sampling::sampling_spread,
     tracks::{Sample, look_up_tracks, sample_tracks},
 };
@@ -17,7 +17,7 @@ pub struct Survey<'a> {
     capture: &'a Capture,
     cameras: &'a [Camera],
     split: &'a Split,
-    tracks: LookUps,
+    tracks: PatchMeans,
     midpoints: Midpoints,
     backdrop: Backdrop,
     cells: FarPlaces,

@@ -10,8 +10,8 @@ mod evidence;
 mod exposure;
 #[cfg(test)]
 pub(crate) mod fixtures;
-mod look_ups;
 mod outliers;
+mod patch_means;
 mod plan;
 mod sampling;
 mod shell;
@@ -24,12 +24,12 @@ pub use background::{Backdrop, FarPlaces};
 pub use direction::left_out_errors;
 pub use evidence::{Evidence, Survey};
 pub use exposure::{Exposures, find_exposures, find_photo_exposures};
-pub use plan::{Decider, Decision, Effect, Overrules, Plan, Room, Trials};
+pub use plan::{Decider, Decision, Effect, Overrules, Plan, TrainingBudget, Trials};
 pub use sampling::sampling_spread;
 pub use shell::Shell;
 pub use soundness::{
     Agreement, Cause, Contradiction, Contradictory, FEW_POINTS, Levels, PointColors, Reprojection,
-    Unseeing, doubts, observe_where_projected,
+    SparsePhotos, doubts, observe_where_projected,
 };
 pub(crate) use soundness::{correlation, listed};
 pub use teacher::{TeacherSamples, TeacherSpread};

@@ -7,7 +7,7 @@
 
 use std::collections::BTreeSet;
 
-use super::look_ups::LookUps;
+use super::patch_means::PatchMeans;
 use crate::{
     capture::{Camera, Capture, Exposure, Photo},
     splats::nearest_neighbors,
@@ -34,7 +34,7 @@ const DISAGREEMENT: f64 = 0.2;
 pub(super) struct Midpoints {
     /// Of each place the views.
     views: Vec<Vec<usize>>,
-    look_ups: LookUps,
+    patch_means: PatchMeans,
 }
 
 impl Midpoints {
@@ -52,7 +52,7 @@ impl Midpoints {
                 pairs.insert((a.min(b), a.max(b)));
             }
         }
-        let mut look_ups = LookUps::of(cameras.len());
+        let mut patch_means = PatchMeans::of(cameras.len());
         let mut views = Vec::with_capacity(pairs.len());
         for (a, b) in pairs {
             let [first, second] = [a, b].map(|index| &capture.points[index]);
@@ -63,25 +63,25 @@ impl Midpoints {
                     continue;
                 }
                 if let Some(pixel) = cameras[seen.view].pixel_of(middle) {
-                    look_ups.ask(seen.view, pixel, SIDE);
+                    patch_means.ask(seen.view, pixel, SIDE);
                     seeing.push(seen.view);
                 }
             }
             views.push(seeing);
         }
-        Self { views, look_ups }
+        Self { views, patch_means }
     }
 
     /// Takes what is wanted of the photo of a view.
     pub fn look(&mut self, view: usize, photo: &Photo) {
-        self.look_ups.look(view, photo);
+        self.patch_means.look(view, photo);
     }
 
     /// Share of the samples at places about which the other views agree that disagree with
     /// them; `None` where there is no such place.
     pub fn outlier_share(&self, exposures: &[Exposure]) -> Option<f64> {
         let (mut judged, mut disagreeing) = (0_u64, 0_u64);
-        let mut means = self.look_ups.means();
+        let mut means = self.patch_means.means();
         for views in &self.views {
             let mut lumas: Vec<f64> = (views.iter().zip(&mut means))
                 .filter_map(|(&view, mean)| {

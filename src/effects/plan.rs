@@ -231,7 +231,7 @@ impl Decision {
 
 /// What a training has room for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Room {
+pub struct TrainingBudget {
     /// The highest degree of the luma harmonics.
     pub sh_degree: u32,
     /// Iterations.
@@ -315,7 +315,7 @@ impl Evidence {
     }
 
     /// The plan that follows. `trials` are what trainings [that were asked for](Self::open) said.
-    pub fn decide(&self, room: Room, overrules: &Overrules, trials: &Trials) -> Plan {
+    pub fn decide(&self, room: TrainingBudget, overrules: &Overrules, trials: &Trials) -> Plan {
         let mut found = self.exposures.clone();
         let exposure = {
             let evidence = (!self.samples.is_empty()).then_some(255.0 * found.spread);
@@ -366,7 +366,7 @@ impl Evidence {
 fn degree(
     samples: &[Vec<tracks::Sample>],
     exposures: &[Exposure],
-    room: Room,
+    room: TrainingBudget,
     overrules: &Overrules,
 ) -> (Decision, u32) {
     let explained = direction::left_out_errors(samples, exposures).map(|errors| {

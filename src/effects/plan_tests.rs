@@ -17,7 +17,7 @@ fn plan(sh_degree: u32, overrules: &Overrules) -> Plan {
         .collect();
     let points = (0..100).map(|i| DVec3::new(f64::from(i % 10), f64::from(i / 10), 0.0) * 0.1);
     let capture = capture(&photos, points);
-    let room = Room {
+    let room = TrainingBudget {
         sh_degree,
         iterations: 700,
     };
@@ -145,7 +145,7 @@ fn what_a_trial_rejects_is_not_simulated() {
             })
             .collect();
     }
-    let room = Room {
+    let room = TrainingBudget {
         sh_degree: 0,
         iterations: 700,
     };

@@ -29,14 +29,14 @@ const PATCH: f64 = 1.0 / 14.0;
 pub struct Shell {
     center: DVec3,
     radius: f64,
-    places: Vec<Place>,
+    places: Vec<ShellPoint>,
     /// The views whose photos tell, ascending, and their cameras.
     views: Vec<usize>,
     cameras: Vec<Camera>,
 }
 
 #[derive(Clone, Debug)]
-struct Place {
+struct ShellPoint {
     at: DVec3,
     /// Whether a photo shows it, or would if it were larger by [`MARGIN`] on all sides.
     near: bool,
@@ -64,7 +64,7 @@ impl Shell {
         let _: Splats = dome(center, radius, COUNT.min(most), 0, |at| {
             let near = cameras.iter().any(|camera| nearly_shows(camera, at));
             let grays = Vec::new();
-            places.push(Place { at, near, grays });
+            places.push(ShellPoint { at, near, grays });
             None
         });
         Self {

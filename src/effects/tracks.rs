@@ -3,7 +3,7 @@
 
 use glam::DVec3;
 
-use super::look_ups::LookUps;
+use super::patch_means::PatchMeans;
 use crate::capture::{Camera, Capture, Point};
 
 /// Gray at which a sensor may have stopped counting, from below and from above: such
@@ -28,8 +28,8 @@ pub struct Sample {
 
 /// Where photos are to be looked at for the samples of the points, in the order of the
 /// points and their tracks. `cameras` are those of the capture's views at working size.
-pub(super) fn look_up_tracks(capture: &Capture, cameras: &[Camera]) -> LookUps {
-    let mut look_ups = LookUps::of(cameras.len());
+pub(super) fn look_up_tracks(capture: &Capture, cameras: &[Camera]) -> PatchMeans {
+    let mut patch_means = PatchMeans::of(cameras.len());
     for point in &capture.points {
         let coarsest = (point.track.iter())
             .map(|seen| sampling_rate(&cameras[seen.view], point))
@@ -38,10 +38,10 @@ pub(super) fn look_up_tracks(capture: &Capture, cameras: &[Camera]) -> LookUps {
             let camera = &cameras[seen.view];
             let at = place_in(camera, &capture.views[seen.view].camera, seen.pixel);
             let side = FOOTPRINT * sampling_rate(camera, point) / coarsest;
-            look_ups.ask(seen.view, at, side);
+            patch_means.ask(seen.view, at, side);
         }
     }
-    look_ups
+    patch_means
 }
 
 /// Samples of each point that at least two views show, neither clipped nor masked; `found`
@@ -49,7 +49,7 @@ pub(super) fn look_up_tracks(capture: &Capture, cameras: &[Camera]) -> LookUps {
 pub(super) fn sample_tracks(
     capture: &Capture,
     cameras: &[Camera],
-    found: &LookUps,
+    found: &PatchMeans,
 ) -> Vec<Vec<Sample>> {
     let mut found = found.means();
     (capture.points.iter())

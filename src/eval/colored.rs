@@ -5,9 +5,9 @@ use std::sync::Arc;
 use super::{EvalError, Observer, Progress, Reference, Task};
 use crate::{
     capture::{Dataset, Exposure},
-    chroma::{Lesson, native_rgb, teacher::AbImage},
+    chroma::{Supervision, native_rgb, teacher::AbImage},
     measure,
-    raster::{Picture, Raster, SceneRenderer},
+    raster::{Raster, RenderedImage, SceneRenderer},
     report::{ColorError, ColorQuality, ColorView, Row, to_image},
     splats::{ShField, Splats},
 };
@@ -41,7 +41,7 @@ impl Measured {
         exposures: &[Exposure],
         [luma, baked]: [&Splats; 2],
         (chroma, streams): (&ShField, bool),
-        lesson: &Lesson,
+        supervision: &Supervision,
         observe: &mut Observer<'_>,
     ) -> Result<Self, EvalError> {
         let fields = [&luma.sh, chroma, &baked.sh];
@@ -50,8 +50,11 @@ impl Measured {
             false => SceneRenderer::of(raster, luma, &fields, dataset.extent)?,
         };
         let (mut errors, mut views, mut rows) = (Vec::new(), Vec::new(), Vec::new());
-        let measured = lesson.measured(&dataset.split).1;
-        let painted = lesson.views.iter().filter(|&&view| lesson.is_painted(view));
+        let measured = supervision.measured(&dataset.split).1;
+        let painted = supervision
+            .views
+            .iter()
+            .filter(|&&view| supervision.is_painted(view));
         let mut on_sheet: Vec<usize> = painted.copied().take(PAINTED_ROWS).collect();
         let others = measured.iter().filter(|view| !on_sheet.contains(view));
         let room = SHEET_ROWS - on_sheet.len();
@@ -79,7 +82,7 @@ impl Measured {
             if measures {
                 errors.push(ColorError::from(measure::mean_delta_e(&native, &exported)));
             }
-            let taught = lesson.shown(i)?;
+            let taught = supervision.shown(i)?;
             let taught = taught.map(|ab| teacher_picture(&photo.gray, &ab));
             if measures && reference.measures() {
                 let shown = reference.shown(&exported);
@@ -100,7 +103,7 @@ impl Measured {
                 let row = Row {
                     width,
                     height,
-                    caption: caption(dataset, lesson, i),
+                    caption: caption(dataset, supervision, i),
                     pictures: vec![
                         Some(bytes(&photo.rgb_values())),
                         Some(bytes(&pictures[0].shown())),
@@ -147,9 +150,12 @@ impl Measured {
 }
 
 /// A view's name, and what it was to the colors.
-fn caption(dataset: &Dataset, lesson: &Lesson, view: usize) -> String {
+fn caption(dataset: &Dataset, supervision: &Supervision, view: usize) -> String {
     let name = &dataset.capture.views[view].name;
-    let role = match (lesson.is_painted(view), lesson.views.contains(&view)) {
+    let role = match (
+        supervision.is_painted(view),
+        supervision.views.contains(&view),
+    ) {
         (true, _) => " (painted: colors are learned from it)",
         (false, true) => "",
         (false, false) => " (held out: no color is learned from it)",
@@ -167,7 +173,7 @@ fn mean_error(errors: &[ColorError]) -> ColorError {
 
 /// The photo's lightness with the teacher's a/b.
 fn teacher_picture(gray: &[u8], answer: &AbImage) -> Vec<[f32; 3]> {
-    let as_picture = |channels, pixels| Picture {
+    let as_picture = |channels, pixels| RenderedImage {
         width: answer.width,
         height: answer.height,
         channels,

@@ -9,7 +9,7 @@ use super::{
 use crate::{
     capture::Camera,
     chroma::{native_rgb, teacher::AbImage},
-    raster::{Picture, Raster, SceneRenderer},
+    raster::{Raster, RenderedImage, SceneRenderer},
     report::Method,
     splats::ShField,
 };
@@ -26,7 +26,7 @@ pub struct Painter<'a> {
 /// A colored picture as a method makes it.
 pub enum Layer {
     /// a and b, to be shown with the gray picture's lightness.
-    Ab(Picture),
+    Ab(RenderedImage),
     /// RGB in [0, 1], `[height, width]`.
     Rgb(Vec<[f32; 3]>),
 }
@@ -36,7 +36,7 @@ pub struct Drawing {
     /// Where from.
     pub camera: Camera,
     /// One channel, encoded sRGB.
-    pub gray: Picture,
+    pub gray: RenderedImage,
     /// Each method's picture.
     pub layers: Vec<(Method, Layer)>,
 }
@@ -141,7 +141,7 @@ impl Layer {
     }
 
     /// RGB in [0, 1] of each pixel, with the lightness of `gray` where the layer has none.
-    pub fn rgb(&self, gray: &Picture) -> Vec<[f32; 3]> {
+    pub fn rgb(&self, gray: &RenderedImage) -> Vec<[f32; 3]> {
         match self {
             Self::Ab(picture) => native_rgb(gray, picture),
             Self::Rgb(rgb) => rgb.clone(),

@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{
     chroma::{
-        ChromaProgress, ChromaSettings, FrozenViews, Recipe, Room, Targets, Task, fit_rgb,
+        ChromaProgress, ChromaSettings, FrozenViews, MemoryBudget, Recipe, Targets, Task, fit_rgb,
         follow_recipe, masked_weights, native_rgb,
     },
     raster::{ColorKind, Raster},
@@ -98,7 +98,7 @@ impl Peer {
             return Err(EvalError::NothingTaught);
         }
         let begun = Instant::now();
-        let room = Room {
+        let room = MemoryBudget {
             limit: memory_limit,
             color: ColorKind::Rgb,
             sh_degree: sh::MAX_DEGREE,

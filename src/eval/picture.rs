@@ -1,6 +1,6 @@
 //! Photos and answers as pictures.
 
-use crate::{capture::Photo, chroma::teacher::AbImage, color::srgb_to_lab, raster::Picture};
+use crate::{capture::Photo, chroma::teacher::AbImage, color::srgb_to_lab, raster::RenderedImage};
 
 /// CIELAB a and b of RGB in [0, 1].
 pub fn ab_of(rgb: &[[f32; 3]]) -> Vec<[f32; 2]> {
@@ -12,8 +12,8 @@ pub fn ab_of(rgb: &[[f32; 3]]) -> Vec<[f32; 2]> {
 }
 
 /// A photo's gray as a picture of one channel.
-pub fn gray_picture(photo: &Photo) -> Picture {
-    Picture {
+pub fn gray_picture(photo: &Photo) -> RenderedImage {
+    RenderedImage {
         width: photo.width,
         height: photo.height,
         channels: 1,
@@ -22,8 +22,8 @@ pub fn gray_picture(photo: &Photo) -> Picture {
 }
 
 /// A teacher's answer as a picture of two channels.
-pub fn to_picture(answer: &AbImage) -> Picture {
-    Picture {
+pub fn to_picture(answer: &AbImage) -> RenderedImage {
+    RenderedImage {
         width: answer.width,
         height: answer.height,
         channels: 2,

@@ -8,7 +8,7 @@ use crate::{
         Targets,
         teacher::{AbImage, GrayImage, Query, Teacher},
     },
-    raster::Picture,
+    raster::RenderedImage,
 };
 
 /// A teacher and its answers for the photos.
@@ -88,7 +88,7 @@ impl MeasuredTeacher {
     pub fn color_frame(
         &mut self,
         name: &str,
-        gray: &Picture,
+        gray: &RenderedImage,
     ) -> Result<Option<AbImage>, EvalError> {
         let Some(teacher) = &mut self.frames else {
             return Ok(None);

@@ -1,6 +1,6 @@
 //! Colors carried from one photo to others by what moves between neighbors.
 
-use super::{Believed, Canvas, window::taps};
+use super::{Canvas, WeightedColors, window::taps};
 use crate::measure::{Flow, optical_flow, visible};
 
 /// Longer side in pixels at which photos are compared: motion is smooth.
@@ -19,7 +19,7 @@ pub struct Between {
 }
 
 /// A photo whose colors are known.
-pub struct Carried<'a> {
+pub struct ColoredPhoto<'a> {
     /// The photo.
     pub canvas: &'a Canvas,
     /// CIELAB a and b of each of its pixels.
@@ -42,11 +42,11 @@ impl Between {
     }
 }
 
-impl Carried<'_> {
+impl ColoredPhoto<'_> {
     /// The colors as `to` shows them, which comes after this photo by `way`, in order, or, with
     /// `backwards`, before it. What is hidden on the way, or looks otherwise there, is not
     /// believed.
-    pub fn along(&self, way: &[&Between], backwards: bool, to: &Canvas) -> Believed {
+    pub fn along(&self, way: &[&Between], backwards: bool, to: &Canvas) -> WeightedColors {
         let pixels = to.len();
         // From the last step back to this photo, by the flow that leads there.
         let side = usize::from(!backwards);
@@ -55,18 +55,18 @@ impl Carried<'_> {
             false => way.iter().rev().copied().collect(),
         };
         let Some(first) = steps.first() else {
-            return Believed::nothing(pixels);
+            return WeightedColors::nothing(pixels);
         };
         let size = [first.flows[side].width, first.flows[side].height];
         if steps.iter().any(|step| {
             let flow = &step.flows[side];
             [flow.width, flow.height] != size
         }) {
-            return Believed::nothing(pixels);
+            return WeightedColors::nothing(pixels);
         }
         let places = followed(&steps, side, size);
         let offset = median_difference(self.canvas, to, &places, size);
-        let mut believed = Believed::nothing(pixels);
+        let mut believed = WeightedColors::nothing(pixels);
         let [width, height] = to.size();
         let scale = [
             size[0] as f32 / width as f32,
@@ -215,7 +215,7 @@ mod tests {
         let way: Vec<&Between> = steps.iter().collect();
         for backwards in [false, true] {
             let (from, to) = if backwards { (3, 0) } else { (0, 3) };
-            let known = Carried {
+            let known = ColoredPhoto {
                 canvas: &photos[from],
                 ab: &colors(3.0 * from as f32),
             };
@@ -244,7 +244,7 @@ mod tests {
             second.gray[start + 30..start + 60].fill(250);
         }
         let step = Between::of(&first, &second).expect("one size");
-        let known = Carried {
+        let known = ColoredPhoto {
             canvas: &first,
             ab: &colors(0.0),
         };

@@ -62,14 +62,14 @@ const STEPS: usize = 200;
 
 /// Colors and how far each pixel of them is to be believed.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Believed {
+pub struct WeightedColors {
     /// CIELAB a and b, `[height, width]`.
     pub ab: Vec<[f32; 2]>,
     /// 0 to 1.
     pub weight: Vec<f32>,
 }
 
-impl Believed {
+impl WeightedColors {
     /// Nothing, for a number of pixels.
     pub fn nothing(pixels: usize) -> Self {
         Self {
@@ -91,9 +91,9 @@ impl Believed {
 /// Without a teacher, what nothing covers takes the colors around.
 pub fn blend(
     canvas: &Canvas,
-    scene: &Believed,
+    scene: &WeightedColors,
     teacher: Option<&[[f32; 2]]>,
-    before: Option<&Believed>,
+    before: Option<&WeightedColors>,
 ) -> Vec<[f32; 2]> {
     let nothing;
     let own = match teacher {
@@ -103,7 +103,7 @@ pub fn blend(
             &nothing
         }
     };
-    let from_teacher = |other: &Believed| Believed {
+    let from_teacher = |other: &WeightedColors| WeightedColors {
         ab: (other.ab.iter().zip(own))
             .map(|(&ab, &own)| difference(ab, own))
             .collect(),
@@ -146,7 +146,7 @@ pub fn blend(
 /// How far the teacher's detail can be believed at each pixel, 0 to 1: where it and the scene, of
 /// which `scene` is the difference from it, say the same but for a cast and a saturation of the
 /// whole photo.
-fn likeness(scene: &Believed, teacher: &[[f32; 2]], size: [usize; 2]) -> Vec<f32> {
+fn likeness(scene: &WeightedColors, teacher: &[[f32; 2]], size: [usize; 2]) -> Vec<f32> {
     let casts = [0, 1].map(|k: usize| {
         let points = teacher.iter().zip(&scene.ab).zip(&scene.weight);
         cast(points.map(|((own, ab), &c)| [own[k], ab[k], c].map(f64::from)))
@@ -268,9 +268,9 @@ impl System {
     fn new(
         size: [usize; 2],
         edge: impl Fn(usize, usize) -> f32,
-        scene: &Believed,
+        scene: &WeightedColors,
         around: &[[f32; 2]],
-        before: Option<&Believed>,
+        before: Option<&WeightedColors>,
     ) -> Self {
         let [width, height] = size;
         let edges: Vec<[f32; 2]> = (0..around.len())

@@ -13,8 +13,8 @@ fn halves(width: u32, height: u32, edge: u32) -> Canvas {
     }
 }
 
-fn flat(canvas: &Canvas, ab: [f32; 2], weight: f32) -> Believed {
-    Believed {
+fn flat(canvas: &Canvas, ab: [f32; 2], weight: f32) -> WeightedColors {
+    WeightedColors {
         ab: vec![ab; canvas.len()],
         weight: vec![weight; canvas.len()],
     }
@@ -112,10 +112,10 @@ fn what_nothing_covers_takes_the_colors_around_and_the_photo_before_steadies_it(
     let found = blend(&canvas, &scene, None, None);
     assert!(found.iter().all(|&ab| near(ab, [30.0, 10.0], 0.2)));
     // A teacher that flickers by 20 units between photos, where the scene says nothing.
-    let nothing = Believed::nothing(canvas.len());
+    let nothing = WeightedColors::nothing(canvas.len());
     let teachers = [10.0, -10.0].map(|a| vec![[a, 0.0]; canvas.len()]);
     let first = blend(&canvas, &nothing, Some(&teachers[0]), None);
-    let before = Believed {
+    let before = WeightedColors {
         weight: vec![1.0; canvas.len()],
         ab: first.clone(),
     };
@@ -128,7 +128,7 @@ fn what_nothing_covers_takes_the_colors_around_and_the_photo_before_steadies_it(
 fn whatever_the_size_and_nothing_known_it_ends() {
     for (width, height) in [(1, 1), (1, 9), (7, 1), (3, 5)] {
         let canvas = halves(width, height, 2);
-        let nothing = Believed::nothing(canvas.len());
+        let nothing = WeightedColors::nothing(canvas.len());
         let found = blend(&canvas, &nothing, None, None);
         assert!(found.iter().all(|&ab| ab == [0.0; 2]));
         let found = blend(&canvas, &flat(&canvas, [7.0, 7.0], 1.0), None, None);

@@ -1,7 +1,7 @@
 //! A photo at the size at which its colors are found.
 
 use crate::{
-    capture::{Original, Stance, downscale},
+    capture::{Original, SensorOrientation, downscale},
     chroma::teacher::{GrayImage, Query},
 };
 
@@ -17,7 +17,7 @@ pub struct Canvas {
     /// What each pixel counts by the photo's mask, 0 to 255; `None` where all count.
     pub mask: Option<Vec<u8>>,
     /// How the photo stands.
-    pub stance: Stance,
+    pub stance: SensorOrientation,
 }
 
 impl Canvas {

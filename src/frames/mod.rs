@@ -14,8 +14,8 @@ mod painted;
 mod scene;
 mod window;
 
-pub use between::{Between, Carried};
-pub use blend::{Believed, blend};
+pub use between::{Between, ColoredPhoto};
+pub use blend::{WeightedColors, blend};
 pub use canvas::Canvas;
 pub use finish::{Colored, finish};
 pub use painted::Strokes;

@@ -4,7 +4,7 @@
 //! where the scene begins. From photo to photo the claim follows what moves, and is drawn anew
 //! along the edges there: what comes into the picture beside it belongs to it, and nothing blurs.
 
-use super::{Believed, Between, Canvas, Carried};
+use super::{Between, Canvas, ColoredPhoto, WeightedColors};
 use crate::{
     chroma::{at_middle_lightness, claimed_by_strokes, shaded_at, teacher::HintImage},
     color::gray_to_lightness,
@@ -37,7 +37,7 @@ pub struct Strokes {
 impl Strokes {
     /// What paint claims of a photo of which `seen` is the scene: nothing where the scene is
     /// believed, and with `grow` what is alike beside a stroke.
-    pub fn of(canvas: &Canvas, seen: &Believed, paint: &HintImage, grow: bool) -> Self {
+    pub fn of(canvas: &Canvas, seen: &WeightedColors, paint: &HintImage, grow: bool) -> Self {
         let paint = paint.resized(canvas.width, canvas.height);
         let lightness = lightness(canvas);
         let mut open = paint;
@@ -87,9 +87,9 @@ impl Strokes {
         from: &Canvas,
         way: &[&Between],
         backwards: bool,
-        (to, seen): (&Canvas, &Believed),
+        (to, seen): (&Canvas, &WeightedColors),
     ) -> Self {
-        let along = |ab: &[[f32; 2]]| Carried { canvas: from, ab }.along(way, backwards, to);
+        let along = |ab: &[[f32; 2]]| ColoredPhoto { canvas: from, ab }.along(way, backwards, to);
         let colors: Vec<[f32; 2]> = self.colors.iter().map(|c| c.map(f32::from)).collect();
         let alphas: Vec<[f32; 2]> = (self.alphas.iter())
             .map(|&alpha| [f32::from(alpha) / 255.0, 0.0])
@@ -117,7 +117,7 @@ impl Strokes {
     }
 
     /// The colors of a photo with strokes laid over what the scene, `seen`, leaves open.
-    pub fn over(&self, canvas: &Canvas, seen: &Believed, ab: &[[f32; 2]]) -> Vec<[f32; 2]> {
+    pub fn over(&self, canvas: &Canvas, seen: &WeightedColors, ab: &[[f32; 2]]) -> Vec<[f32; 2]> {
         let lightness = lightness(canvas);
         (0..ab.len())
             .map(|i| {
@@ -149,7 +149,12 @@ impl Strokes {
 }
 
 /// What paint claims of what the scene leaves open.
-fn grown(canvas: &Canvas, seen: &Believed, lightness: &[f32], paint: &HintImage) -> Vec<[f32; 3]> {
+fn grown(
+    canvas: &Canvas,
+    seen: &WeightedColors,
+    lightness: &[f32],
+    paint: &HintImage,
+) -> Vec<[f32; 3]> {
     if paint.is_empty() {
         return vec![[0.0; 3]; canvas.len()];
     }
@@ -168,7 +173,7 @@ fn widened(
     claims: &[[f32; 3]],
     [width, height]: [usize; 2],
     lightness: &[f32],
-    seen: &Believed,
+    seen: &WeightedColors,
 ) -> Vec<[f32; 3]> {
     (claims.iter().enumerate())
         .map(|(i, &own)| {
@@ -241,8 +246,8 @@ mod tests {
     }
 
     /// The scene shows the ground and the left half of the sky, in a dull brown.
-    fn seen(shift: f32) -> Believed {
-        let mut seen = Believed::nothing((SIZE[0] * SIZE[1]) as usize);
+    fn seen(shift: f32) -> WeightedColors {
+        let mut seen = WeightedColors::nothing((SIZE[0] * SIZE[1]) as usize);
         for (i, weight) in seen.weight.iter_mut().enumerate() {
             let (x, y) = (i as u32 % SIZE[0], i as u32 / SIZE[0]);
             *weight = f32::from(y >= SKY || (x as f32) + shift < 48.0);

@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use super::{Believed, Canvas, window};
+use super::{Canvas, WeightedColors, window};
 use crate::{
     capture::{Camera, Exposure, View, lens::Undistortion},
     gpu::GpuError,
-    raster::{Picture, Raster, SceneRenderer},
+    raster::{Raster, RenderedImage, SceneRenderer},
     splats::{ShField, Splats, sh},
 };
 
@@ -88,8 +88,12 @@ impl<'a> SceneDrawer<'a> {
     ///
     /// # Errors
     /// [`GpuError`].
-    pub fn draw(&mut self, views: &[ViewOf<'_>], canvas: &Canvas) -> Result<Believed, GpuError> {
-        let mut believed = Believed::nothing(canvas.len());
+    pub fn draw(
+        &mut self,
+        views: &[ViewOf<'_>],
+        canvas: &Canvas,
+    ) -> Result<WeightedColors, GpuError> {
+        let mut believed = WeightedColors::nothing(canvas.len());
         // Drawing less photo, where the scene shows something.
         let mut differences: Vec<Option<f32>> = vec![None; canvas.len()];
         for seen in views {
@@ -171,7 +175,7 @@ const LENSES: usize = 12;
 
 /// Bilinear value of a drawn picture at a place in pixels from its top left corner, its first two
 /// channels; none outside.
-fn value(picture: &Picture, [x, y]: [f32; 2]) -> Option<[f32; 2]> {
+fn value(picture: &RenderedImage, [x, y]: [f32; 2]) -> Option<[f32; 2]> {
     let [width, height] = [picture.width, picture.height].map(|side| side as usize);
     // NaN fails both.
     if !((0.0..=width as f32).contains(&x) && (0.0..=height as f32).contains(&y)) {
@@ -256,7 +260,7 @@ mod tests {
             [0.1, 0.2, 0.6, 1.0].map(|v| step(v, OPAQUE)),
             [0.0, 0.0, 1.0, 1.0]
         );
-        let picture = Picture {
+        let picture = RenderedImage {
             width: 2,
             height: 1,
             channels: 1,

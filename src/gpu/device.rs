@@ -9,7 +9,7 @@ use super::{
     Kernel,
     kernel::Recipe,
     stopwatch::{KernelTime, Stopwatch},
-    tape::Deck,
+    tape::TapeMode,
 };
 
 /// What can go wrong with the device.
@@ -142,7 +142,7 @@ pub struct Gpu {
     inner: Arc<Inner>,
     patch: Option<Patch>,
     stopwatch: Option<Arc<Mutex<Stopwatch>>>,
-    deck: Option<Arc<Deck>>,
+    tape_mode: Option<Arc<TapeMode>>,
     tiles_at_once: usize,
     most_bound: u64,
 }
@@ -261,7 +261,7 @@ impl Gpu {
             }),
             patch: None,
             stopwatch: None,
-            deck: None,
+            tape_mode: None,
         })
     }
 
@@ -292,15 +292,15 @@ impl Gpu {
         }
     }
 
-    pub(super) fn with_deck(&self, deck: Deck) -> Self {
+    pub(super) fn with_tape_mode(&self, tape_mode: TapeMode) -> Self {
         Self {
-            deck: Some(Arc::new(deck)),
+            tape_mode: Some(Arc::new(tape_mode)),
             ..self.clone()
         }
     }
 
-    pub(super) fn deck(&self) -> Option<&Deck> {
-        self.deck.as_deref()
+    pub(super) fn tape_mode(&self) -> Option<&TapeMode> {
+        self.tape_mode.as_deref()
     }
 
     /// What is compiled already.

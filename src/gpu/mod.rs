@@ -13,4 +13,4 @@ pub use device::{
 };
 pub use kernel::{Bindings, Kernel, LINEAR_WORKGROUP, MAX_GROUPS, Recorder, folded, groups_for};
 pub use stopwatch::KernelTime;
-pub use tape::{Ran, Step, Tape};
+pub use tape::{Dispatch, Step, Tape};

@@ -46,7 +46,7 @@ pub enum Step {
     Dispatch {
         /// Of what.
         #[serde(flatten)]
-        ran: Ran,
+        ran: Dispatch,
         /// Workgroups along x and y.
         groups: [u32; 2],
     },
@@ -54,7 +54,7 @@ pub enum Step {
     DispatchIndirect {
         /// Of what.
         #[serde(flatten)]
-        ran: Ran,
+        ran: Dispatch,
         /// The buffer.
         counts: usize,
         /// Where in the buffer, in bytes.
@@ -85,7 +85,7 @@ pub enum Step {
 
 /// A kernel and its buffers.
 #[derive(Clone, Debug, Serialize)]
-pub struct Ran {
+pub struct Dispatch {
     /// The kernel.
     pub kernel: usize,
     /// Bindings of group 0 and their buffers.
@@ -129,7 +129,7 @@ impl Tape {
     }
 
     /// What a dispatch runs; the step is to be [`Self::submitted`] with what is recorded beside it.
-    pub(super) fn ran(&mut self, kernel: &Kernel, buffers: &[(u32, wgpu::Buffer)]) -> Ran {
+    pub(super) fn ran(&mut self, kernel: &Kernel, buffers: &[(u32, wgpu::Buffer)]) -> Dispatch {
         let next = self.kernels.len();
         let kernel = match self.kernels.get(&kernel.pipeline) {
             Some(&known) => known,
@@ -144,7 +144,7 @@ impl Tape {
             }
         };
         let bindings = (buffers.iter()).map(|(binding, buffer)| (*binding, self.number(buffer)));
-        Ran {
+        Dispatch {
             kernel,
             bindings: bindings.collect(),
         }
@@ -172,7 +172,7 @@ impl Tape {
 
 /// What a [`Gpu`] writes down, or answers in its device's place.
 #[derive(Debug)]
-pub(super) enum Deck {
+pub(super) enum TapeMode {
     Recording(Mutex<Tape>),
     Answering(Mutex<VecDeque<Vec<u8>>>),
 }
@@ -182,7 +182,7 @@ impl Gpu {
     #[doc(hidden)]
     #[must_use]
     pub fn taped(&self) -> Self {
-        self.with_deck(Deck::Recording(Mutex::default()))
+        self.with_tape_mode(TapeMode::Recording(Mutex::default()))
     }
 
     /// What was written down so far; nothing unless the device is [`Self::taped`].
@@ -199,26 +199,26 @@ impl Gpu {
     #[must_use]
     pub fn answering(&self, name: &str, answers: Vec<Vec<u8>>) -> Self {
         self.named(name)
-            .with_deck(Deck::Answering(Mutex::new(answers.into())))
+            .with_tape_mode(TapeMode::Answering(Mutex::new(answers.into())))
     }
 
     pub(super) fn tape(&self) -> Option<MutexGuard<'_, Tape>> {
-        match self.deck()? {
-            Deck::Recording(tape) => Some(tape.lock().unwrap_or_else(PoisonError::into_inner)),
-            Deck::Answering(_) => None,
+        match self.tape_mode()? {
+            TapeMode::Recording(tape) => Some(tape.lock().unwrap_or_else(PoisonError::into_inner)),
+            TapeMode::Answering(_) => None,
         }
     }
 
     /// Whether another device's answers stand in the place of what this one would compute.
     pub(super) fn answers(&self) -> bool {
-        matches!(self.deck(), Some(Deck::Answering(_)))
+        matches!(self.tape_mode(), Some(TapeMode::Answering(_)))
     }
 
     /// The next answer in the device's place, empty where there is none left.
     pub(super) fn answer(&self) -> Option<Vec<u8>> {
-        match self.deck()? {
-            Deck::Recording(_) => None,
-            Deck::Answering(answers) => {
+        match self.tape_mode()? {
+            TapeMode::Recording(_) => None,
+            TapeMode::Answering(answers) => {
                 let mut answers = answers.lock().unwrap_or_else(PoisonError::into_inner);
                 Some(answers.pop_front().unwrap_or_default())
             }

@@ -18,7 +18,7 @@ use crate::{
 /// never interrupted.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Checkpoint {
-    pub(super) state: State,
+    pub(super) state: TrainingState,
     pub(super) model: Snapshot,
     /// Densification statistics since the set last changed.
     pub(super) statistics: Vec<f32>,
@@ -30,7 +30,7 @@ pub struct Checkpoint {
 
 /// What of it is few numbers.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct State {
+pub(super) struct TrainingState {
     /// Which effects are simulated, where a plan says.
     pub plan: Option<Plan>,
     /// Iterations done.
@@ -59,7 +59,7 @@ pub(super) struct State {
 }
 
 /// Who keeps checkpoints.
-pub trait Keeper {
+pub trait Checkpointing {
     /// Whether one is wanted after this iteration.
     fn wants(&mut self, iteration: usize) -> bool;
 
@@ -76,9 +76,9 @@ pub trait Keeper {
 }
 
 /// Keeps none.
-pub struct NoKeeper;
+pub struct NoCheckpoints;
 
-impl Keeper for NoKeeper {
+impl Checkpointing for NoCheckpoints {
     fn wants(&mut self, _: usize) -> bool {
         false
     }
@@ -120,7 +120,7 @@ impl Checkpoint {
 
     /// What [`Checkpoint::to_sections`] gave; `None` of anything else.
     pub fn from_sections(sections: &BTreeMap<String, Vec<u8>>) -> Option<Self> {
-        let state: State = serde_json::from_slice(sections.get("training")?).ok()?;
+        let state: TrainingState = serde_json::from_slice(sections.get("training")?).ok()?;
         let floats = |name: &str| -> Option<Vec<f32>> {
             let bytes = sections.get(name)?;
             let floats = bytes.chunks_exact(4);

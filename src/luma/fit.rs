@@ -7,8 +7,8 @@ use std::{
 };
 
 use super::{
-    Checkpoint, CurvePoint, Demand, Goal, Grows, Keeper, LumaError, LumaProgress, LumaSettings,
-    LumaTrainer, NoKeeper, PlannedViews, TrialProgress,
+    Checkpoint, Checkpointing, CurvePoint, Demand, Goal, Grows, LumaError, LumaProgress,
+    LumaSettings, LumaTrainer, NoCheckpoints, PlannedViews, TrialProgress,
     carve::carved,
     planned, resident_photos,
     start::{placed_splats, started, surroundings},
@@ -167,11 +167,11 @@ impl Fit<'_> {
         settings: &LumaSettings,
         observe: &mut LumaObserver<'_>,
     ) -> Result<LumaScene, LumaError> {
-        self.run_from(None, &mut NoKeeper, settings, observe)
+        self.run_from(None, &mut NoCheckpoints, settings, observe)
     }
 
     /// Trains, or goes on with what an interrupted training of the same kept; seconds of the
-    /// goal count from its beginning. `keeper` is asked now and then whether it wants a
+    /// goal count from its beginning. `checkpointing` is asked now and then whether it wants a
     /// checkpoint.
     ///
     /// # Errors
@@ -179,7 +179,7 @@ impl Fit<'_> {
     pub fn run_from(
         &self,
         checkpoint: Option<&Checkpoint>,
-        keeper: &mut dyn Keeper,
+        checkpointing: &mut dyn Checkpointing,
         settings: &LumaSettings,
         observe: &mut LumaObserver<'_>,
     ) -> Result<LumaScene, LumaError> {
@@ -238,7 +238,7 @@ impl Fit<'_> {
             iteration: checkpoint.map_or(0, Checkpoint::iteration),
             end: trainer.schedule().end,
         }))?;
-        trainer.train_keeping(keeper, &mut |progress| {
+        trainer.train_keeping(checkpointing, &mut |progress| {
             last = Some(progress);
             peak_device_memory = peak_device_memory.max(gpu.allocated_bytes());
             observe(LumaEvent::Training(progress))

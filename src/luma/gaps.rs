@@ -192,7 +192,7 @@ impl<'a> Gaps<'a> {
     /// The point on the ray of a pixel.
     fn point_at(&self, pixel: [f64; 2], neighbors: &[&SmallPhoto]) -> Option<GapPoint> {
         self.photo.textured(pixel)?;
-        let Around { depths, slant } = self.around(pixel)?;
+        let Neighborhood { depths, slant } = self.around(pixel)?;
         // It faces the camera, or lies in the plane of the points nearby.
         let slants: Vec<_> = std::iter::once([0.0; 2]).chain(slant).collect();
         let found = self.photo.matched(pixel, depths, &slants, neighbors)?;
@@ -207,7 +207,7 @@ impl<'a> Gaps<'a> {
     }
 
     /// What the points around a pixel say of it; `None` where one is near.
-    fn around(&self, [x, y]: [f64; 2]) -> Option<Around> {
+    fn around(&self, [x, y]: [f64; 2]) -> Option<Neighborhood> {
         let mut near: Vec<(f64, [f64; 3])> = (self.points.iter())
             .map(|([u, v], depth)| {
                 let [u, v] = [u - x, v - y];
@@ -227,7 +227,7 @@ impl<'a> Gaps<'a> {
         let depths = near[..NEAREST].iter().map(|(_, [_, _, depth])| *depth);
         let [closer, beyond] = BEYOND;
         let plane = near.iter().map(|(_, point)| *point);
-        Some(Around {
+        Some(Neighborhood {
             depths: [
                 closer * depths.clone().fold(f64::INFINITY, f64::min),
                 beyond * depths.fold(0.0, f64::max),
@@ -238,7 +238,7 @@ impl<'a> Gaps<'a> {
 }
 
 /// What points around a pixel say of it.
-struct Around {
+struct Neighborhood {
     /// Between which its ray may end.
     depths: [f64; 2],
     /// Of the plane through them, if there is one.

@@ -9,7 +9,7 @@ use crate::{
 };
 
 /// What a photo shows and what counts of it: 8 bits a pixel, four pixels a word.
-pub struct Picture {
+pub struct PackedPhoto {
     /// Gray.
     pub gray: Buffer<u32>,
     /// What each pixel counts, where some do not.
@@ -19,7 +19,7 @@ pub struct Picture {
 /// Photos by number.
 pub struct Photos {
     /// One for each photo, or one in which they take turns.
-    pictures: Vec<Picture>,
+    pictures: Vec<PackedPhoto>,
     /// Photos that stay where they are until they are shown.
     stream: Option<Prefetch<Result<TrainingView, LumaError>>>,
     /// Of some views the pixels that no longer count, a bit each.
@@ -47,14 +47,14 @@ impl Photos {
             let views = views.clone();
             let load = move |photo| view::load(&*views, photo);
             return Ok(Self {
-                pictures: vec![Picture::zeros(gpu, words, masked)?],
+                pictures: vec![PackedPhoto::zeros(gpu, words, masked)?],
                 stream: Some(Prefetch::new(Arc::new(load))),
                 left_out: BTreeMap::new(),
             });
         }
         let mut pictures = Vec::new();
         for photo in 0..count {
-            pictures.push(Picture::zeros(gpu, pixels(photo).div_ceil(4), masked)?);
+            pictures.push(PackedPhoto::zeros(gpu, pixels(photo).div_ceil(4), masked)?);
         }
         let all: Vec<usize> = (0..count).collect();
         in_order(
@@ -73,7 +73,7 @@ impl Photos {
     }
 
     /// What a photo may stand in.
-    pub fn pictures(&self) -> &[Picture] {
+    pub fn pictures(&self) -> &[PackedPhoto] {
         &self.pictures
     }
 
@@ -145,7 +145,7 @@ impl Photos {
     }
 }
 
-impl Picture {
+impl PackedPhoto {
     fn zeros(gpu: &Gpu, words: usize, masked: bool) -> Result<Self, GpuError> {
         let zeros = |label| Buffer::zeros(gpu, label, words);
         Ok(Self {

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize, de::IgnoredAny};
 
 use super::Numerics;
 use crate::{
-    effects::{Effect, Plan, Room},
+    effects::{Effect, Plan, TrainingBudget},
     raster::RasterOptions,
 };
 
@@ -182,8 +182,8 @@ impl LumaSettings {
     }
 
     /// What it has room for, before effects are decided.
-    pub fn room(&self) -> Room {
-        Room {
+    pub fn room(&self) -> TrainingBudget {
+        TrainingBudget {
             iterations: self.iterations,
             sh_degree: self.sh_degree,
         }

@@ -8,15 +8,15 @@
 //! does not depend on when it noticed.
 
 mod best;
+mod capacity;
 mod changes;
 mod checkpoint;
 mod ends;
 mod rates;
-mod room;
 mod watch;
 
 pub use changes::Grows;
-pub use watch::Look;
+pub use watch::HeldOutScore;
 
 use std::{
     ops::ControlFlow,
@@ -27,7 +27,7 @@ use std::{
 use watch::Watch;
 
 use super::{
-    Goal, Keeper, LumaError, LumaSettings, NoKeeper, Schedule,
+    Checkpointing, Goal, LumaError, LumaSettings, NoCheckpoints, Schedule,
     loss::{self, LossEffects, Targets},
     memory::{Demand, ENTRIES_PER_SPLAT, resident_photos},
     pace::Pace,
@@ -61,7 +61,7 @@ pub struct LumaProgress {
     /// Seconds of training, those of watching not counted.
     pub seconds: f64,
     /// What the last look at the [watched](LumaTrainer::watch) views showed.
-    pub looked: Option<Look>,
+    pub looked: Option<HeldOutScore>,
 }
 
 /// An order on its way: the status and losses at the end of an iteration.
@@ -200,17 +200,17 @@ impl LumaTrainer {
         &mut self,
         observe: &mut dyn FnMut(LumaProgress) -> ControlFlow<()>,
     ) -> Result<(), LumaError> {
-        self.train_keeping(&mut NoKeeper, observe)
+        self.train_keeping(&mut NoCheckpoints, observe)
     }
 
-    /// The same; `keeper` is asked now and then whether it wants a checkpoint, which changes
+    /// The same; `checkpointing` is asked now and then whether it wants a checkpoint, which changes
     /// nothing in what is trained.
     ///
     /// # Errors
     /// As there; [`LumaError::Cancelled`] also where the keeper wants no more.
     pub fn train_keeping(
         &mut self,
-        keeper: &mut dyn Keeper,
+        checkpointing: &mut dyn Checkpointing,
         observe: &mut dyn FnMut(LumaProgress) -> ControlFlow<()>,
     ) -> Result<(), LumaError> {
         let (mut iteration, seconds) = self.done;
@@ -229,16 +229,17 @@ impl LumaTrainer {
             let ends = iteration == schedule.end;
             let looks = self.watch.is_due(iteration, schedule.end);
             // Its losses are told by then.
-            let keeps = iteration.is_multiple_of(SYNC_EVERY) && !ends && keeper.wants(iteration);
+            let keeps =
+                iteration.is_multiple_of(SYNC_EVERY) && !ends && checkpointing.wants(iteration);
             let surrounds = !self.is_surrounded() && !ends && iteration >= schedule.surround_at;
             let pauses = surrounds || densifies || finds_outliers || looks || ends || keeps;
             // The first views say how much room is needed: those lost to an overflow
             // are few if it is noticed early.
             let early = iteration < SYNC_EVERY && iteration.is_power_of_two();
             let told = pauses || iteration.is_multiple_of(SYNC_EVERY);
-            if iteration.is_multiple_of(SYNC_EVERY) && keeper.looks_on() {
+            if iteration.is_multiple_of(SYNC_EVERY) && checkpointing.looks_on() {
                 let asked = Instant::now();
-                keeper.show(self.splats()?, asked.elapsed());
+                checkpointing.show(self.splats()?, asked.elapsed());
             }
             if !(told || early) {
                 continue;
@@ -293,7 +294,7 @@ impl LumaTrainer {
             }
             if keeps {
                 let checkpoint = self.checkpoint(iteration, begun.elapsed().as_secs_f64())?;
-                if !keeper.keep(checkpoint) {
+                if !checkpointing.keep(checkpoint) {
                     return Err(LumaError::Cancelled);
                 }
             }

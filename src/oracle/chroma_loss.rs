@@ -57,7 +57,7 @@ pub fn chroma_loss_gradient(rendered: &[[f64; 2]], target: &[[f64; 2]]) -> Vec<[
 
 /// How a teacher's a/b enter the loss.
 #[derive(Clone, Debug)]
-pub struct Teaching {
+pub struct AbTargets {
     /// Wanted a/b, `[pixels][2]`.
     pub wanted: Vec<[f64; 2]>,
     /// How much each pixel counts; those above 1 were painted by hand.
@@ -72,7 +72,7 @@ pub struct Teaching {
     pub joint: bool,
 }
 
-impl Teaching {
+impl AbTargets {
     /// Target and decline of pixel `p`.
     fn of(&self, p: usize) -> ([f64; 2], f64) {
         let [a, b] = self.wanted[p];
@@ -199,7 +199,7 @@ mod tests {
     #[test]
     fn a_distance_knows_no_axes() {
         let at = |[a, b]: [f64; 2], joint: bool| {
-            let teaching = Teaching {
+            let teaching = AbTargets {
                 wanted: vec![[0.0; 2]],
                 weights: vec![1.0],
                 gain: [[1.0, 0.0], [0.0, 1.0]],
@@ -219,8 +219,8 @@ mod tests {
         assert!(right > 1000.0 * wrong);
     }
 
-    fn teaching() -> Teaching {
-        Teaching {
+    fn teaching() -> AbTargets {
+        AbTargets {
             wanted: vec![[9.0, -3.0], [0.0, 60.0], [-7.0, 7.25], [30.0, 1.0]],
             weights: vec![1.0, 0.25, 0.0, 50.0],
             gain: [[1.2, -0.1], [0.2, 0.8]],
@@ -234,7 +234,7 @@ mod tests {
     fn slopes_are_those_of_the_whole_taught_loss() {
         let rendered = [[10.0, -3.0], [0.2, 55.0], [7.0, 7.0], [29.0, -4.0]];
         for joint in [false, true] {
-            let teaching = Teaching {
+            let teaching = AbTargets {
                 joint,
                 ..teaching()
             };

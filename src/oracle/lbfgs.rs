@@ -32,7 +32,7 @@ type Pair = (Vec<f64>, Vec<f64>, f64);
 
 /// What the next step is.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Next {
+enum NextStep {
     Onward,
     Shorter,
     Safe,
@@ -56,7 +56,7 @@ pub struct Lbfgs {
     accepted: (Vec<f64>, Vec<f64>),
     /// The loss there, of what is minimized now.
     loss: Option<f64>,
-    next: Next,
+    next: NextStep,
     direction: Vec<f64>,
     slope: f64,
     /// Points accepted so far.
@@ -85,7 +85,7 @@ impl Lbfgs {
             floors,
             ridges,
             loss: None,
-            next: Next::Onward,
+            next: NextStep::Onward,
             slope: 0.0,
             age: 0,
             changed: false,
@@ -110,7 +110,7 @@ impl Lbfgs {
         let changed = std::mem::take(&mut self.changed);
         let paired = self.loss.is_some() && self.age >= AGE && !changed;
         let length = self.judge(loss);
-        if self.next == Next::Onward {
+        if self.next == NextStep::Onward {
             let before = std::mem::replace(&mut self.accepted, (self.unknowns.clone(), gradient));
             let difference = |to: &[f64], from: &[f64]| -> Vec<f64> {
                 to.iter().zip(from).map(|(to, from)| to - from).collect()
@@ -131,7 +131,7 @@ impl Lbfgs {
         } else {
             self.remember(None);
         }
-        if self.next != Next::Shorter {
+        if self.next != NextStep::Shorter {
             self.direction = self.direction();
         }
         self.slope = -dot(&self.accepted.1, &self.direction);
@@ -161,7 +161,7 @@ impl Lbfgs {
     /// The end, where the loss is this: a last step that raised it is undone.
     pub fn end(&mut self, loss: f64) {
         self.judge(loss);
-        if self.next == Next::Onward {
+        if self.next == NextStep::Onward {
             let from = self.unknowns.iter().zip(&self.accepted.0);
             self.displacement = from.map(|(to, from)| to - from).collect();
             self.accepted.0.clone_from(&self.unknowns);
@@ -177,7 +177,7 @@ impl Lbfgs {
         let whole: f64 = weights[..constants].iter().sum();
         // Nothing is drawn.
         let mean = if whole > 0.0 { moved / whole } else { 0.0 };
-        (self.next == Next::Onward).then_some(mean)
+        (self.next == NextStep::Onward).then_some(mean)
     }
 
     /// Accepts the present point or goes back; gives the length of the next step.
@@ -187,20 +187,20 @@ impl Lbfgs {
             Some(before) if rises(before, loss) => {
                 self.unknowns.clone_from(&self.accepted.0);
                 self.undone += 1;
-                if self.next == Next::Onward {
-                    self.next = Next::Shorter;
+                if self.next == NextStep::Onward {
+                    self.next = NextStep::Shorter;
                     let bend = loss - before - self.slope;
                     let known = self.slope < 0.0 && bend.is_finite();
                     let least = if known { -0.5 * self.slope / bend } else { 0.0 };
                     return least.clamp(SHORTENED[0], SHORTENED[1]);
                 }
-                self.next = Next::Safe;
+                self.next = NextStep::Safe;
                 self.pairs.clear();
                 self.scale = 1.0;
             }
             _ => {
                 self.loss = Some(loss);
-                self.next = Next::Onward;
+                self.next = NextStep::Onward;
                 self.age += 1;
             }
         }

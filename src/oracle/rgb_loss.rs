@@ -14,14 +14,14 @@ const UNITS: f64 = 100.0;
 
 /// Pictures and what they are compared with.
 #[derive(Clone, Debug)]
-pub struct Wanted {
+pub struct RgbTargets {
     /// Wanted RGB, 0 to 1.
     pub rgb: Vec<[f64; 3]>,
     /// How much each pixel counts.
     pub weights: Vec<f64>,
 }
 
-impl Wanted {
+impl RgbTargets {
     fn residual<T: Number>(&self, p: usize, drawn: &[T; 3]) -> [T; 3] {
         [0, 1, 2].map(|c| {
             let wanted = self.rgb[p][c];
@@ -78,7 +78,7 @@ mod tests {
 
     #[test]
     fn slopes_are_those_of_the_whole_loss() {
-        let wanted = Wanted {
+        let wanted = RgbTargets {
             rgb: vec![[0.2, 1.0, 0.7], [1.0, 1.0, 1.0], [0.0, 0.5, 1.0]],
             weights: vec![1.0, 0.5, 0.0],
         };
@@ -98,7 +98,7 @@ mod tests {
 
     #[test]
     fn a_known_value() {
-        let wanted = Wanted {
+        let wanted = RgbTargets {
             rgb: vec![[0.0; 3]],
             weights: vec![1.0],
         };

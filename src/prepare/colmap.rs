@@ -64,7 +64,7 @@ pub(super) struct Features<'a> {
 }
 
 /// How far a step is: done and, where it is known, of how many.
-pub(super) type Told<'a> = dyn FnMut(usize, Option<usize>) + 'a;
+pub(super) type StepProgress<'a> = dyn FnMut(usize, Option<usize>) + 'a;
 
 /// Who finds poses.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -120,7 +120,7 @@ impl Colmap {
         &self,
         database: &Path,
         of: &Features,
-        told: &mut Told,
+        told: &mut StepProgress,
     ) -> Result<(), PrepareError> {
         let one = match of.cameras {
             Cameras::One => "ImageReader.single_camera",
@@ -149,7 +149,7 @@ impl Colmap {
         &self,
         database: &Path,
         (matching, pairs): (Matching, Option<&Path>),
-        told: &mut Told,
+        told: &mut StepProgress,
     ) -> Result<(), PrepareError> {
         let mut arguments: Vec<Argument> = vec![("database_path", database.into())];
         let command = match (matching, pairs) {
@@ -177,7 +177,7 @@ impl Colmap {
         database: &Path,
         images: &Path,
         models: &Path,
-        told: &mut Told,
+        told: &mut StepProgress,
     ) -> Result<(), PrepareError> {
         let arguments = vec![
             ("database_path", database.into()),
@@ -193,7 +193,7 @@ impl Colmap {
         command: &str,
         mut arguments: Vec<Argument>,
         without_gpu: &[&'static str],
-        told: &mut Told,
+        told: &mut StepProgress,
     ) -> Result<(), PrepareError> {
         let program = match self {
             Self::Program(_) => {

@@ -7,10 +7,10 @@ use serde_json::Value;
 
 use super::{
     PrepareError,
+    color_tags::ColorTags,
     frame_times::stamps,
-    looks::Looks,
     scan::{Scan, scan},
-    shots::{self, Cutter},
+    shots::{self, ShotDetector},
 };
 use crate::programs::{self, FFMPEG, Program, ProgramError};
 
@@ -31,7 +31,7 @@ const NAMES: &str = "%06d.png";
 
 /// A film's file and what it holds.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Source {
+pub(super) struct FilmSource {
     /// The file, absolute.
     pub path: PathBuf,
     /// FFmpeg's number of the stream of pictures.
@@ -51,7 +51,7 @@ pub(super) struct Source {
     /// By how many seconds that is later than the beginning of the file, with its sound.
     pub late: f64,
     /// Its colors and its projection.
-    pub looks: Looks,
+    pub color_tags: ColorTags,
     /// Whether pixels are square.
     square: bool,
     /// Whether it has more than 8 bits a channel.
@@ -91,7 +91,7 @@ fn version(said: &str) -> Option<[u32; 2]> {
     Some([parts.next()?.ok()?, parts.next()?.ok()?])
 }
 
-impl Source {
+impl FilmSource {
     /// Asks `ffprobe` what a film is.
     ///
     /// # Errors
@@ -176,7 +176,7 @@ impl Source {
             container: names.split(',').next().unwrap_or_default().to_owned(),
             zero: begin,
             late: 0.0,
-            looks: Looks::of(pictures),
+            color_tags: ColorTags::of(pictures),
             square: matches!(aspect, "1:1" | "0:1"),
             deep: is_deep(format),
         })
@@ -231,7 +231,7 @@ impl Source {
     ) -> Result<Vec<[f64; 2]>, PrepareError> {
         let [width, height] = shots::SIZE;
         let [numerator, denominator] = self.frame_rate;
-        let mut cutter = Cutter::default();
+        let mut cutter = ShotDetector::default();
         let mut frame = vec![0; width * height];
         let tiny = format!("scale={width}:{height}:flags=area,format=gray");
         self.part(part, "error", &[&tiny])
@@ -381,8 +381,8 @@ and another"#;
     #[test]
     fn a_film_is_read() {
         let path = Path::new("/films/a.mkv");
-        let film = Source::parse(path, PROBED).unwrap();
-        let expected = Source {
+        let film = FilmSource::parse(path, PROBED).unwrap();
+        let expected = FilmSource {
             path: path.into(),
             stream: 2,
             frame_rate: [24000, 1001],
@@ -392,7 +392,7 @@ and another"#;
             container: "matroska".to_owned(),
             zero: -0.5,
             late: 0.0,
-            looks: Looks::of(&Value::Null),
+            color_tags: ColorTags::of(&Value::Null),
             square: false,
             deep: true,
         };
@@ -408,7 +408,7 @@ and another"#;
             ),
             ("", "nothing"),
         ] {
-            let error = Source::parse(path, said).unwrap_err();
+            let error = FilmSource::parse(path, said).unwrap_err();
             assert!(error.contains(word), "{error}");
         }
     }

@@ -7,11 +7,11 @@ use std::{
 
 use super::{
     PrepareError, PrepareOptions,
-    ffmpeg::{self, Part, Source},
+    ffmpeg::{self, FilmSource, Part},
     photos::link_all,
     scan::Scan,
     sharp,
-    state::{State, Step, digest, of},
+    state::{OutputState, Step, digest, of},
     tell,
 };
 use crate::{
@@ -35,9 +35,9 @@ const SHORTEST: f64 = 0.5;
 ///
 /// # Errors
 /// [`PrepareError`]: FFmpeg is missing or too old, or the file is none.
-pub(super) fn probe(input: &Path) -> Result<Source, PrepareError> {
+pub(super) fn probe(input: &Path) -> Result<FilmSource, PrepareError> {
     ffmpeg::check_version()?;
-    Source::probe(input)
+    FilmSource::probe(input)
 }
 
 /// Makes `frames/`, `film.json` and `images/`; the shots of the film, where they were looked for.
@@ -45,9 +45,9 @@ pub(super) fn probe(input: &Path) -> Result<Source, PrepareError> {
 /// # Errors
 /// [`PrepareError`].
 pub(super) fn frames(
-    state: &mut State,
+    state: &mut OutputState,
     options: &PrepareOptions,
-    source: &Source,
+    source: &FilmSource,
     observe: &mut Observer<'_>,
 ) -> Result<Vec<[f64; 2]>, PrepareError> {
     let same_film = of(&["film", &digest(&source.path)?]);
@@ -71,9 +71,9 @@ pub(super) fn frames(
 
 /// The part of the film that is asked for, or its longest shot.
 fn choose(
-    state: &mut State,
+    state: &mut OutputState,
     options: &PrepareOptions,
-    source: &Source,
+    source: &FilmSource,
     same_film: &str,
     observe: &mut Observer<'_>,
 ) -> Result<Part, PrepareError> {
@@ -160,13 +160,13 @@ fn choose(
 
 /// Writes all frames of a part.
 fn extract(
-    state: &mut State,
-    source: &Source,
+    state: &mut OutputState,
+    source: &FilmSource,
     part: Part,
     from: &str,
     observe: &mut Observer<'_>,
 ) -> Result<(), PrepareError> {
-    let colors = source.looks.filters(observe)?;
+    let colors = source.color_tags.filters(observe)?;
     let scan = source.scan(part)?;
     match scan {
         Scan::Progressive => {}
@@ -262,7 +262,7 @@ fn names_in(frames: &Path) -> Result<Vec<String>, PrepareError> {
 
 /// Links the sharpest frames of each time step to `images/`.
 fn choose_sharp(
-    state: &mut State,
+    state: &mut OutputState,
     options: &PrepareOptions,
     observe: &mut Observer<'_>,
 ) -> Result<(), PrepareError> {

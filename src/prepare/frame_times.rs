@@ -2,7 +2,7 @@
 
 use super::{
     PrepareError,
-    ffmpeg::{Part, Source, json, stamp},
+    ffmpeg::{FilmSource, Part, json, stamp},
 };
 
 /// Frames a second of a film whose rate varies, at most.
@@ -12,7 +12,7 @@ const FASTEST: f64 = 120.0;
 /// containers round times.
 const UNEVEN: f64 = 0.75;
 
-impl Source {
+impl FilmSource {
     /// When the frames of a part are shown, in seconds from the film's zero, in order: from its
     /// packets where these are `count`, else from what the decoder makes of them.
     ///

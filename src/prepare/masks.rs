@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{
     capture::{
-        CaptureError, Normalize, Stance, in_order,
+        CaptureError, Normalize, SensorOrientation, in_order,
         names::{NamedFiles, visit_files},
         plain_photo, read_mask,
     },
@@ -40,7 +40,7 @@ pub(super) struct Sources {
 
 /// What masks were made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Made {
+pub(super) struct MaskFiles {
     /// Photos with a mask.
     pub masked: usize,
     /// Pictures in the folder of masks that belong to no photo.
@@ -124,10 +124,10 @@ impl Sources {
         images: &Path,
         to: &Path,
         told: &mut dyn FnMut(usize, usize),
-    ) -> Result<Made, PrepareError> {
-        let mut made = Made {
+    ) -> Result<MaskFiles, PrepareError> {
+        let mut made = MaskFiles {
             strays: self.each.as_ref().map_or(0, |named| named.strays().len()),
-            ..Made::default()
+            ..MaskFiles::default()
         };
         // Photos without a mask of their own share one file for each size.
         let mut shared: BTreeMap<[u32; 2], PathBuf> = BTreeMap::new();
@@ -168,7 +168,7 @@ impl Sources {
             None => vec![u8::MAX; size.iter().map(|&side| side as usize).product()],
         };
         for mask in own.into_iter().chain(self.one.as_deref()) {
-            let mask = read_mask(mask, photo, size, Stance::default())?;
+            let mask = read_mask(mask, photo, size, SensorOrientation::default())?;
             counts
                 .iter_mut()
                 .zip(mask)

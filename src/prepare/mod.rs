@@ -6,11 +6,11 @@
 
 mod borders;
 mod colmap;
+mod color_tags;
 mod error;
 mod ffmpeg;
 mod film;
 mod frame_times;
-mod looks;
 mod masks;
 mod photos;
 mod poses;
@@ -39,10 +39,10 @@ use crate::{
     tell::{Event, Observer, Stage, keeping},
 };
 use colmap::Colmap;
-use ffmpeg::Source;
+use ffmpeg::FilmSource;
 use masks::Sources;
 use photos::Photos;
-use state::{State, Step, of};
+use state::{OutputState, Step, of};
 
 /// Where masks go.
 const MASKS: &str = "masks";
@@ -140,13 +140,13 @@ pub fn prepare(
         false => None,
     };
     let lens = match &source {
-        Some(source) => source.looks.lens(&options.lens, observe),
+        Some(source) => source.color_tags.lens(&options.lens, observe),
         None => options.lens.clone(),
     };
     let colmap = Colmap::find(&lens, options.install, &mut |line| {
         observe(Event::Note(line));
     })?;
-    let mut state = State::open(&output, &input, options)?;
+    let mut state = OutputState::open(&output, &input, options)?;
     let made = make(
         &mut state,
         options,
@@ -166,9 +166,9 @@ pub fn prepare(
 
 /// Does every step whose result is not there.
 fn make(
-    state: &mut State,
+    state: &mut OutputState,
     options: &PrepareOptions,
-    source: Option<&Source>,
+    source: Option<&FilmSource>,
     (lens, colmap): (&str, &Colmap),
     observe: &mut Observer<'_>,
 ) -> Result<Prepared, PrepareError> {
@@ -282,7 +282,7 @@ fn tell(observe: &mut Observer<'_>, stage: Stage, done: usize, total: usize) {
 
 /// Puts a folder's photos into `images/`.
 fn link_photos(
-    state: &mut State,
+    state: &mut OutputState,
     options: &PrepareOptions,
     observe: &mut Observer<'_>,
 ) -> Result<(), PrepareError> {
@@ -309,7 +309,7 @@ fn link_photos(
 
 /// Makes `masks/` where there is anything to mask; how many photos have one.
 fn make_masks(
-    state: &mut State,
+    state: &mut OutputState,
     options: &PrepareOptions,
     photos: &Photos,
     observe: &mut Observer<'_>,
@@ -380,7 +380,7 @@ fn make_masks(
 
 /// The folder of what COLMAP looks at: the photos, or copies of 8 bits that fill their range.
 fn stretch(
-    state: &mut State,
+    state: &mut OutputState,
     photos: &Photos,
     observe: &mut Observer<'_>,
 ) -> Result<PathBuf, PrepareError> {

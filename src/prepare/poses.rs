@@ -14,7 +14,7 @@ use super::{
     colmap::{self, Cameras, Colmap, Features, Matching},
     masks,
     photos::Photos,
-    state::{State, Step, digest, of},
+    state::{OutputState, Step, digest, of},
     tell,
 };
 use crate::{
@@ -66,7 +66,7 @@ impl Task<'_> {
     /// [`PrepareError`].
     pub fn find(
         &self,
-        state: &mut State,
+        state: &mut OutputState,
         colmap: &Colmap,
         observe: &mut Observer<'_>,
     ) -> Result<Poses, PrepareError> {
@@ -118,7 +118,7 @@ impl Task<'_> {
 
     fn look_for_features(
         &self,
-        state: &mut State,
+        state: &mut OutputState,
         colmap: &Colmap,
         from: &str,
         observe: &mut Observer<'_>,
@@ -154,7 +154,7 @@ impl Task<'_> {
 
     fn match_photos(
         &self,
-        state: &mut State,
+        state: &mut OutputState,
         colmap: &Colmap,
         from: &str,
         observe: &mut Observer<'_>,
@@ -184,7 +184,7 @@ impl Task<'_> {
 
     fn place(
         &self,
-        state: &mut State,
+        state: &mut OutputState,
         colmap: &Colmap,
         from: &str,
         observe: &mut Observer<'_>,
@@ -230,7 +230,11 @@ impl Task<'_> {
     }
 
     /// Counts what was placed, and says what to try where that is little.
-    fn judge(&self, state: &State, observe: &mut Observer<'_>) -> Result<Poses, PrepareError> {
+    fn judge(
+        &self,
+        state: &OutputState,
+        observe: &mut Observer<'_>,
+    ) -> Result<Poses, PrepareError> {
         let mut pieces = Vec::new();
         for model in colmap::models(&state.path(SPARSE)) {
             pieces.extend(Piece::read(&model)?);

@@ -26,7 +26,7 @@ type Shape = Option<Vec<f32>>;
 /// Looks at frame after frame. How bright a frame is and how strong its contrast do not matter:
 /// old films flicker.
 #[derive(Default)]
-pub(super) struct Cutter {
+pub(super) struct ShotDetector {
     /// The last three frames.
     last: VecDeque<Shape>,
     /// How much the frames on either side of each boundary differ: before frame 1, 2, ….
@@ -35,7 +35,7 @@ pub(super) struct Cutter {
     empty: Vec<bool>,
 }
 
-impl Cutter {
+impl ShotDetector {
     /// Takes the next frame, `[height, width]` of [`SIZE`].
     pub fn look(&mut self, frame: &[u8]) {
         let shape = shape(frame);
@@ -156,7 +156,7 @@ mod tests {
     }
 
     fn shots_of(frames: impl IntoIterator<Item = Vec<u8>>) -> Vec<[usize; 2]> {
-        let mut cutter = Cutter::default();
+        let mut cutter = ShotDetector::default();
         frames.into_iter().for_each(|frame| cutter.look(&frame));
         let shots = cutter.shots().into_iter();
         shots.map(|shot| [shot.start, shot.end]).collect()
@@ -198,7 +198,7 @@ mod tests {
 
     #[test]
     fn the_first_shot_is_known_early() {
-        let mut cutter = Cutter::default();
+        let mut cutter = ShotDetector::default();
         for n in 0..60 {
             cutter.look(&frame(usize::from(n >= 30), n, 1.0));
             assert_eq!(cutter.has_first(), n >= 30 + AROUND + 2, "{n}");

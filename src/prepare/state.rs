@@ -92,14 +92,14 @@ pub(super) enum Step {
 }
 
 /// An output folder that this process works in.
-pub(super) struct State {
+pub(super) struct OutputState {
     folder: PathBuf,
     record: Record,
     /// Keeps a second process away; whatever ends this one frees it.
     _lock: Option<File>,
 }
 
-impl State {
+impl OutputState {
     /// Takes an output folder: a new one, an empty one, or one that was prepared from the same
     /// input; with `force` from any. What a process has left half-done is removed.
     ///

@@ -118,7 +118,7 @@ struct Running {
 
 /// A program that is given bytes. Dropped, it is ended.
 #[derive(Debug)]
-pub(crate) struct Fed {
+pub(crate) struct PipedProgram {
     program: Program,
     running: Option<Running>,
     input: Option<ChildStdin>,
@@ -169,9 +169,9 @@ impl Program {
     ///
     /// # Errors
     /// As [`Self::run`].
-    pub fn feed(self) -> Result<Fed, ProgramError> {
+    pub fn feed(self) -> Result<PipedProgram, ProgramError> {
         let (running, input, output, error) = self.start(Path::new("."), Stdio::piped())?;
-        Ok(Fed {
+        Ok(PipedProgram {
             program: self,
             running: Some(running),
             input,
@@ -293,7 +293,7 @@ impl Program {
     }
 }
 
-impl Fed {
+impl PipedProgram {
     /// Gives it bytes.
     ///
     /// # Errors

@@ -4,7 +4,7 @@
 use super::{
     ColorKind, Falloff, Raster, StepBuffers, Storage,
     constants::*,
-    groups::{Count, Work},
+    groups::{Count, WorkKind},
     layer::Layer,
     lists::Lists,
     portions::TileBindings,
@@ -129,7 +129,7 @@ impl BlendAdjoint {
     pub(super) fn record(&self, [blend, sum]: [&Kernel; 2], recorder: &mut Recorder) {
         self.blend.record(blend, recorder);
         self.visible
-            .dispatch(Work::Thread, sum, &self.sum, recorder);
+            .dispatch(WorkKind::Thread, sum, &self.sum, recorder);
     }
 }
 

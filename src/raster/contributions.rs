@@ -21,11 +21,11 @@ pub struct Contributions {
     near: f64,
     gradient: Buffer<f32>,
     diagonal: Buffer<f32>,
-    room: Option<Room>,
+    room: Option<Buffers>,
 }
 
 /// Buffers for views up to a size.
-struct Room {
+struct Buffers {
     max_pixels: usize,
     max_tiles: usize,
     lists: Lists,
@@ -96,7 +96,7 @@ impl Contributions {
         Ok(gradient[..self.geometry.count].iter().map(weight).collect())
     }
 
-    fn room(&self, pixels: usize, tiles: usize, capacity: usize) -> Result<Room, GpuError> {
+    fn room(&self, pixels: usize, tiles: usize, capacity: usize) -> Result<Buffers, GpuError> {
         let (raster, gpu) = (&self.raster, &self.raster.gpu);
         let lists = Lists::new(raster, &self.geometry, tiles, capacity)?;
         let layer = Layer::new(raster, &self.geometry, &lists, &self.field, pixels, tiles)?;
@@ -110,7 +110,7 @@ impl Contributions {
         };
         let adjoint =
             ChromaAdjoint::new(raster, &self.geometry, &lists, &layer, &ones, scratch, sums);
-        Ok(Room {
+        Ok(Buffers {
             max_pixels: pixels,
             max_tiles: tiles,
             lists,

@@ -16,7 +16,7 @@ pub(super) const DIGITS: usize = 256;
 
 /// What workgroups do with the elements.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Work {
+pub enum WorkKind {
     /// A thread each.
     Thread,
     /// Scan them.
@@ -46,7 +46,7 @@ impl Groups {
         }
     }
 
-    /// The twin of `groups_for_count`, in the order of [`Work`].
+    /// The twin of `groups_for_count`, in the order of [`WorkKind`].
     pub fn for_count(count: usize) -> [Self; 4] {
         let histogram = DIGITS * count.div_ceil(SORT_BLOCK);
         [
@@ -82,7 +82,7 @@ impl Count {
     /// Runs a kernel for the elements.
     pub fn dispatch(
         &self,
-        work: Work,
+        work: WorkKind,
         kernel: &Kernel,
         bindings: &Bindings,
         recorder: &mut Recorder,

@@ -6,7 +6,7 @@ use bytemuck::{Pod, Zeroable};
 use super::{
     Raster,
     constants::*,
-    groups::{Count, Work},
+    groups::{Count, WorkKind},
     portions::Portions,
     scan::{Scan, Total},
     sort::Sort,
@@ -175,7 +175,7 @@ impl Lists {
             &raster.scan,
             &visible,
             &status,
-            (&all, Work::Scan),
+            (&all, WorkKind::Scan),
             Some(Total {
                 word: STATUS_VISIBLE,
                 count: &in_view,
@@ -187,7 +187,7 @@ impl Lists {
             &raster.scan,
             &offsets,
             &status,
-            (&in_view, Work::Scan),
+            (&in_view, WorkKind::Scan),
             Some(Total {
                 word: STATUS_INSTANCES,
                 count: &entries,
@@ -310,7 +310,7 @@ impl Lists {
         recorder.dispatch(&kernels.compact, &self.compact, groups);
         self.by_depth.record(&raster.sort, &raster.scan, recorder);
         let tile_lists = |bindings, recorder: &mut Recorder| {
-            (self.visible).dispatch(Work::Thread, &kernels.tile_lists, bindings, recorder);
+            (self.visible).dispatch(WorkKind::Thread, &kernels.tile_lists, bindings, recorder);
         };
         tile_lists(&self.count_tiles, recorder);
         self.scan_offsets.record(&raster.scan, recorder);

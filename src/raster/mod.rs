@@ -39,7 +39,7 @@ pub use model::{Model, Snapshot};
 pub use numerics::{AdamSteps, RasterNumerics, Storage};
 pub use options::{ColorKind, Falloff, RasterOptions};
 pub use portions::Portion;
-pub use renderer::{Picture, Renderer};
+pub use renderer::{RenderedImage, Renderer};
 pub use rgb_adjoint::{RgbAdjoint, RgbAdjointKernels};
 pub use roofline::{Load, minimum_words};
 pub use scene_renderer::SceneRenderer;

@@ -13,7 +13,7 @@ pub(super) const INSTANCES_PER_SPLAT: usize = 8;
 
 /// A picture as the rasterizer gives it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Picture {
+pub struct RenderedImage {
     /// Width in pixels.
     pub width: u32,
     /// Height in pixels.
@@ -36,7 +36,7 @@ pub struct Renderer {
     max_tiles: usize,
 }
 
-impl Picture {
+impl RenderedImage {
     /// The picture as viewers show it, sRGB in [0, 1], `[height, width]`: of one channel
     /// gray, of three RGB.
     pub fn shown(&self) -> Vec<[f32; 3]> {
@@ -76,7 +76,7 @@ impl Renderer {
     ///
     /// # Errors
     /// [`GpuError`] when buffers do not fit or the device is lost.
-    pub fn render(&mut self, camera: &Camera) -> Result<Vec<Picture>, GpuError> {
+    pub fn render(&mut self, camera: &Camera) -> Result<Vec<RenderedImage>, GpuError> {
         let view = ViewUniform::new(camera, self.near, self.geometry.count, 0);
         self.with_room(&view, |renderer| {
             for (layer, field) in renderer.layers.iter().zip(&renderer.fields) {
@@ -92,7 +92,7 @@ impl Renderer {
         self.layers
             .iter()
             .map(|layer| {
-                Ok(Picture {
+                Ok(RenderedImage {
                     width: camera.width,
                     height: camera.height,
                     channels: layer.kind.channels(),

@@ -2,14 +2,14 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::groups::{Count, SCAN_BLOCK, Work};
+use super::groups::{Count, SCAN_BLOCK, WorkKind};
 use crate::gpu::{Bindings, Buffer, Gpu, GpuError, Kernel, Recorder, shaders};
 
 /// Twin of `struct ScanParameters`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct ScanParameters {
-    /// Which [`Work`] the elements are those of.
+    /// Which [`WorkKind`] the elements are those of.
     pub which: u32,
     /// Status word for the total, `u32::MAX` for none.
     pub total_word: u32,
@@ -48,7 +48,7 @@ impl ScanKernels {
 
 /// A scan tied to its buffer.
 pub struct Scan {
-    elements: (Count, Work),
+    elements: (Count, WorkKind),
     reduce: Bindings,
     sums: Bindings,
     apply: Bindings,
@@ -56,7 +56,7 @@ pub struct Scan {
 
 impl Scan {
     /// Scans the front of `values` in place: as many as `elements` say when it runs, those of
-    /// [`Work::Scan`] or of [`Work::Histogram`].
+    /// [`WorkKind::Scan`] or of [`WorkKind::Histogram`].
     ///
     /// # Errors
     /// [`GpuError::TooLarge`].
@@ -65,7 +65,7 @@ impl Scan {
         kernels: &ScanKernels,
         values: &Buffer<u32>,
         status: &Buffer<u32>,
-        elements: (&Count, Work),
+        elements: (&Count, WorkKind),
         total: Option<Total<'_>>,
     ) -> Result<Self, GpuError> {
         let (count, work) = elements;

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::{
-    Field, Geometry, Picture, Raster, Renderer, Streamed,
+    Field, Geometry, Raster, RenderedImage, Renderer, Streamed,
     constants::NEAR_SHARE,
     depth::{UNREACHED, depths},
 };
@@ -20,11 +20,11 @@ pub struct SceneRenderer<'a> {
     splats: &'a Splats,
     fields: Vec<&'a ShField>,
     near: f64,
-    place: Place,
+    place: SceneLocation,
 }
 
 /// Where the scene is.
-enum Place {
+enum SceneLocation {
     Device(Box<Renderer>),
     Host(Streamed),
 }
@@ -66,8 +66,8 @@ impl<'a> SceneRenderer<'a> {
             )
         };
         let place = match whole() {
-            Ok(renderer) => Place::Device(Box::new(renderer)),
-            Err(GpuError::TooLarge { .. }) => Place::Host(Streamed::new(splats, near)),
+            Ok(renderer) => SceneLocation::Device(Box::new(renderer)),
+            Err(GpuError::TooLarge { .. }) => SceneLocation::Host(Streamed::new(splats, near)),
             Err(other) => return Err(other),
         };
         Ok(Self {
@@ -88,7 +88,7 @@ impl<'a> SceneRenderer<'a> {
     ) -> Self {
         let near = NEAR_SHARE * extent;
         Self {
-            place: Place::Host(Streamed::new(splats, near)),
+            place: SceneLocation::Host(Streamed::new(splats, near)),
             raster: raster.clone(),
             splats,
             fields: fields.to_vec(),
@@ -100,7 +100,7 @@ impl<'a> SceneRenderer<'a> {
     ///
     /// # Errors
     /// [`GpuError`] when buffers do not fit or the device is lost.
-    pub fn render(&mut self, camera: &Camera) -> Result<Vec<Picture>, GpuError> {
+    pub fn render(&mut self, camera: &Camera) -> Result<Vec<RenderedImage>, GpuError> {
         self.on_device_or_host(
             |renderer| renderer.render(camera),
             |scene, raster, fields| scene.render(raster, fields, camera),
@@ -129,11 +129,11 @@ impl<'a> SceneRenderer<'a> {
     ) -> Result<T, GpuError> {
         loop {
             match &mut self.place {
-                Place::Host(scene) => return on_host(scene, &self.raster, &self.fields),
-                Place::Device(renderer) => match on_device(renderer) {
+                SceneLocation::Host(scene) => return on_host(scene, &self.raster, &self.fields),
+                SceneLocation::Device(renderer) => match on_device(renderer) {
                     // Of the view's tile lists.
                     Err(GpuError::TooLarge { .. }) => {
-                        self.place = Place::Host(Streamed::new(self.splats, self.near));
+                        self.place = SceneLocation::Host(Streamed::new(self.splats, self.near));
                     }
                     done => return done,
                 },

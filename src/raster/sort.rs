@@ -5,7 +5,7 @@ use std::ops::Range;
 use bytemuck::{Pod, Zeroable};
 
 use super::{
-    groups::{Count, DIGITS, SORT_BLOCK, Work},
+    groups::{Count, DIGITS, SORT_BLOCK, WorkKind},
     scan::{Scan, ScanKernels},
 };
 use crate::gpu::{Bindings, Buffer, Gpu, GpuError, Kernel, Recorder, shaders};
@@ -108,7 +108,7 @@ impl Sort {
                 ),
             });
         }
-        let elements = (count, Work::Histogram);
+        let elements = (count, WorkKind::Histogram);
         let scan = Scan::new(gpu, scan_kernels, &histogram, status, elements, None)?;
         Ok(Self {
             keys,
@@ -138,10 +138,10 @@ impl Sort {
     ) {
         for pass in &self.passes {
             self.count
-                .dispatch(Work::Sort, &kernels.count, &pass.count, recorder);
+                .dispatch(WorkKind::Sort, &kernels.count, &pass.count, recorder);
             self.scan.record(scan_kernels, recorder);
             self.count
-                .dispatch(Work::Sort, &kernels.scatter, &pass.scatter, recorder);
+                .dispatch(WorkKind::Sort, &kernels.scatter, &pass.scatter, recorder);
         }
     }
 }

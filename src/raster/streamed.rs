@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::{
-    Field, Geometry, Picture, Raster, Renderer,
+    Field, Geometry, Raster, RenderedImage, Renderer,
     constants::{ALPHA_MIN, BLUR, FRUSTUM_MARGIN, TRANSMITTANCE_MIN},
 };
 use crate::{
@@ -125,7 +125,7 @@ impl Streamed {
         raster: &Arc<Raster>,
         fields: &[&ShField],
         camera: &Camera,
-    ) -> Result<Vec<Picture>, GpuError> {
+    ) -> Result<Vec<RenderedImage>, GpuError> {
         self.with_room(camera, |scene, shown| {
             if shown.len() <= scene.at_once {
                 return (scene.renderer(raster, fields, shown, false)?).render(camera);
@@ -219,7 +219,7 @@ impl Streamed {
 
 /// Puts pictures behind others where these let light through. The last of each is opacity.
 /// Whether there is light left: what the rasterizer ignores is none.
-fn show_through(front: &mut [Picture], behind: &[Picture]) -> bool {
+fn show_through(front: &mut [RenderedImage], behind: &[RenderedImage]) -> bool {
     let Some(opacity) = front.last() else {
         return false;
     };

@@ -1,7 +1,7 @@
 //! What several teachers and paint say of one photo, together.
 
 use crate::chroma::{
-    Wanted,
+    ViewTarget,
     teacher::{AbImage, HintImage},
 };
 
@@ -35,7 +35,7 @@ pub(super) fn scaled(mut answer: AbImage, strength: f32) -> AbImage {
 }
 
 /// An answer with strokes of its size that are to grow, or strokes alone.
-pub(super) fn with_strokes(answer: Option<AbImage>, strokes: HintImage) -> Wanted {
+pub(super) fn with_strokes(answer: Option<AbImage>, strokes: HintImage) -> ViewTarget {
     let unknown = || {
         let count = strokes.paint.len();
         let ab = AbImage {
@@ -46,7 +46,7 @@ pub(super) fn with_strokes(answer: Option<AbImage>, strokes: HintImage) -> Wante
         (ab, Some(vec![0.0; count]))
     };
     let (ab, weights) = answer.map_or_else(unknown, |ab| (ab, None));
-    Wanted {
+    ViewTarget {
         ab,
         weights,
         strokes: Some(strokes),
@@ -57,7 +57,7 @@ pub(super) fn with_strokes(answer: Option<AbImage>, strokes: HintImage) -> Wante
 /// Lays paint of the photo's size over an answer. Each pixel is the mean of the
 /// teachers' answer, of weight 1 − α (0 without one), and the paint, of weight
 /// α · [`HINT_WEIGHT`]; it counts as much as both.
-pub(super) fn with_hints(answer: Option<AbImage>, hints: &HintImage) -> Wanted {
+pub(super) fn with_hints(answer: Option<AbImage>, hints: &HintImage) -> ViewTarget {
     let known = f32::from(answer.is_some());
     let mut answer = answer.unwrap_or_else(|| AbImage {
         width: hints.width,
@@ -74,7 +74,7 @@ pub(super) fn with_hints(answer: Option<AbImage>, hints: &HintImage) -> Wanted {
         }
         weights.push(weight);
     }
-    Wanted {
+    ViewTarget {
         weights: Some(weights),
         by_hand: true,
         ..answer.into()

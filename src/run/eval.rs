@@ -7,7 +7,7 @@ use std::{
     time::Instant,
 };
 
-use super::{RunError, flight::Filmed, teach::teacher_or_photos};
+use super::{RunError, flight::FlightOutput, teach::teacher_or_photos};
 use crate::{
     capture::{Dataset, Orientation, View},
     chroma::teacher::{Teacher, TeacherSettings},
@@ -25,7 +25,7 @@ use crate::{
     splats::{ShField, Splats, is_splat_file, write_splats},
     store::{RunFolder, StoreError, commit::Commit, files},
     subject::{
-        Hold, Run,
+        LockMode, Run,
         scene::{Frame, read_splats, written_as},
         sound::open_same,
     },
@@ -77,7 +77,7 @@ pub fn eval(
     if let Some(path) = &options.run {
         is_splat_file(path)?;
     }
-    let run = Run::find(options.run.as_deref(), Hold::Writing)?;
+    let run = Run::find(options.run.as_deref(), LockMode::Writing)?;
     let (folder, report) = (&run.folder, &run.report);
     observe(Event::begins(Stage::Model));
     let scene = load(&run, options, observe)?;
@@ -102,7 +102,7 @@ pub fn eval(
     let mut strip = Vec::new();
     let every = options.frames.div_ceil(STRIP_FRAMES);
     let flow = options.flow.as_deref();
-    let mut filmed = Filmed::begin(page);
+    let mut filmed = FlightOutput::begin(page);
     let mut keep = |frame, image| {
         let file = format!("frame-{frame:04}.png");
         files::write_png(&page.join(&file), &image)?;

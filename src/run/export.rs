@@ -6,7 +6,7 @@ use glam::DVec3;
 use serde::Serialize;
 
 use super::{
-    Cleaned, Loss, RunError, Shown,
+    Cleaned, Loss, RunError, ViewerCameras,
     export_clean::cleaned,
     export_viewer::{Cameras, fitted},
     loss::{Views, loss},
@@ -14,8 +14,8 @@ use super::{
 use crate::{
     raster::RasterOptions,
     splats::{Splats, WriteOptions, write_splats},
-    store::{files, originals::Kept},
-    subject::{Hold, Opened, Scene, scene::written_as},
+    store::{files, originals::OriginalFiles},
+    subject::{LockMode, Opened, Scene, scene::written_as},
     tell::{Event, Observer, Stage, keeping},
     viewers::ViewerChoice,
 };
@@ -66,7 +66,7 @@ pub struct Exported {
     pub cleaned: Option<Cleaned>,
     /// What each viewer shows of the scene, where it was fitted.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub shown: Vec<Shown>,
+    pub shown: Vec<ViewerCameras>,
     /// What is doubtful.
     pub warnings: Vec<String>,
 }
@@ -83,8 +83,8 @@ pub fn export(options: &ExportOptions, observe: &mut Observer<'_>) -> Result<Exp
     let output = options.output.as_path();
     let format = files::format_of(output)?;
     observe(Event::begins(Stage::Model));
-    let opened = Opened::find(options.run.as_deref(), Hold::Free)?;
-    let _kept = opened.keep(Kept::default()).keep();
+    let opened = Opened::find(options.run.as_deref(), LockMode::Free)?;
+    let _kept = opened.keep(OriginalFiles::default()).keep();
     let mut scene = opened.read(options.luma, None, observe)?;
     files::make_folder_of(output)?;
     let before = &Cameras {

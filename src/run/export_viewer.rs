@@ -26,7 +26,7 @@ const MOST_SIDE: u32 = 640;
 /// What a viewer shows of the scene, compared with `gs-chroma render`: mean PSNR in dB before
 /// the cameras that were held out, or without any before all.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
-pub struct Shown {
+pub struct ViewerCameras {
     /// Which viewer.
     pub viewer: Viewer,
     /// Of the scene as it is in the run.
@@ -51,7 +51,7 @@ pub(super) fn fitted(
     (splats, drawn): (&Splats, RasterOptions),
     before: &Cameras<'_>,
     observe: &mut Observer<'_>,
-) -> Result<(Splats, Vec<Shown>), RunError> {
+) -> Result<(Splats, Vec<ViewerCameras>), RunError> {
     let (train, test, extent) = before.open(MOST_CAMERAS, MOST_SIDE)?;
     observe(Event::begins(Stage::Device));
     let gpu = Gpu::open()?;
@@ -73,7 +73,7 @@ pub(super) fn fitted(
     let wanted = viewers::pictures(&raster, &colored, drawn, &test, extent)?;
     let shown = Viewer::ALL.map(|viewer| {
         let psnr = |splats| viewers::shown_psnr(&raster, viewer, splats, &wanted, &test, extent);
-        Ok(Shown {
+        Ok(ViewerCameras {
             viewer,
             before: psnr(&colored)?,
             after: psnr(&fitted)?,

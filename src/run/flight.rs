@@ -21,13 +21,13 @@ const RATE: u32 = 12;
 const FILM: &str = "flight.mp4";
 
 /// Becomes a film where one can be made.
-pub(super) struct Filmed {
+pub(super) struct FlightOutput {
     writer: Option<FilmWriter>,
     /// What keeps it from being made.
     failed: Option<String>,
 }
 
-impl Filmed {
+impl FlightOutput {
     /// In the folder of a page.
     pub fn begin(page: &Path) -> Self {
         // Where nothing makes films, the page says so.

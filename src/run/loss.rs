@@ -10,7 +10,7 @@ use crate::{
     capture::{Camera, Capture, split},
     gpu::{Gpu, GpuError},
     measure,
-    raster::{Picture, Raster, RasterOptions, SceneRenderer},
+    raster::{Raster, RasterOptions, RenderedImage, SceneRenderer},
     report::CaptureReport,
     splats::{Format, Splats, WriteOptions, read_splats},
     tell::{Event, Observer, Stage},
@@ -146,7 +146,7 @@ fn compared(
     let (mut ours, mut theirs) = (Vec::new(), Vec::new());
     for (done, camera) in cameras.iter().enumerate() {
         observe(Event::progress(Stage::Measuring, done, cameras.len(), ""));
-        let shown = |pictures: Vec<Picture>| pictures[0].shown();
+        let shown = |pictures: Vec<RenderedImage>| pictures[0].shown();
         ours.extend(shown(wrote.render(camera)?));
         theirs.extend(shown(read.render(camera)?));
     }

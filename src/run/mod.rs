@@ -10,7 +10,6 @@ mod fit;
 mod flight;
 mod frames;
 mod info;
-mod look;
 mod loss;
 mod merge;
 mod partition;
@@ -20,6 +19,7 @@ mod render;
 mod seams;
 mod stages;
 mod teach;
+mod viewed;
 
 use std::path::PathBuf;
 
@@ -28,18 +28,18 @@ pub use colorize::{ColorizeRequest, Output, colorize};
 pub use eval::{EvalOptions, eval};
 pub use export::{ExportOptions, Exported, export};
 pub use export_clean::Cleaned;
-pub use export_viewer::Shown;
+pub use export_viewer::ViewerCameras;
 pub use fit::{BlockPlace, FitRequest, Init, fit};
 pub use frames::{Frames, FramesOptions, frames};
 pub use info::info;
-pub use look::Look;
 pub use loss::Loss;
 pub use merge::{MergeOptions, merge};
 pub use partition::{PartitionOptions, partition};
-pub use plan::{PlanOptions, Planned, plan};
-pub use render::{PathOptions, RenderOptions, Rendered, Views, Way, render, render_path};
+pub use plan::{PlanOptions, PlanReport, plan};
+pub use render::{PathOptions, PathShape, RenderOptions, Rendered, Views, render, render_path};
 pub use seams::{SeamViews, ViewMean};
 pub use teach::{TeachOptions, teacher_or_photos};
+pub use viewed::ViewedScene;
 
 pub use crate::luma::Preset;
 use crate::{

@@ -8,7 +8,9 @@ use std::{
 
 use super::RunError;
 use crate::{
-    blocks::{BlockFile, BlocksError, COARSE, Division, Job, Planned, picture, plan, refuse_link},
+    blocks::{
+        BlockFile, BlocksError, COARSE, Division, Job, PartitionPlan, picture, plan, refuse_link,
+    },
     capture::{Capture, LoadOptions, Rejected},
     disk,
     store::{
@@ -59,7 +61,7 @@ pub fn partition(options: &PartitionOptions, observe: &mut Observer<'_>) -> Resu
     }
     observe(Event::begins(Stage::Dividing));
     let root = fs::canonicalize(&options.colmap_dir).map_err(files::at(&options.colmap_dir))?;
-    let Planned {
+    let PartitionPlan {
         mut job,
         coarse,
         blocks,

@@ -11,7 +11,7 @@ use crate::{
     raster::Raster,
     subject::{
         scene::of_trial,
-        sound::{Examined, Soundness, open_examined},
+        sound::{SoundCapture, Soundness, open_examined},
     },
     tell::{Event, Observer, Stage},
 };
@@ -33,7 +33,7 @@ pub struct PlanOptions {
 
 /// What a capture calls for, and whether it is sound.
 #[derive(Clone, Debug)]
-pub struct Planned {
+pub struct PlanReport {
     /// The effects.
     pub plan: Plan,
     /// How well photos and model agree.
@@ -44,7 +44,7 @@ pub struct Planned {
 ///
 /// # Errors
 /// [`RunError`].
-pub fn plan(options: &PlanOptions, observe: &mut Observer<'_>) -> Result<Planned, RunError> {
+pub fn plan(options: &PlanOptions, observe: &mut Observer<'_>) -> Result<PlanReport, RunError> {
     let preset = match options.preset {
         Some(preset) => preset,
         None => {
@@ -53,7 +53,7 @@ pub fn plan(options: &PlanOptions, observe: &mut Observer<'_>) -> Result<Planned
         }
     };
     let load = preset.load_options(&options.load, &options.overrules);
-    let Examined {
+    let SoundCapture {
         dataset,
         evidence,
         soundness,
@@ -74,5 +74,5 @@ pub fn plan(options: &PlanOptions, observe: &mut Observer<'_>) -> Result<Planned
             ControlFlow::Continue(())
         },
     );
-    plan.map(|plan| Planned { plan, soundness })
+    plan.map(|plan| PlanReport { plan, soundness })
 }

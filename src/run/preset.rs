@@ -11,14 +11,14 @@ use crate::{
 
 /// An amount of work.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Work {
+pub struct Workload {
     /// How luma is trained.
     pub settings: LumaSettings,
     /// Longer side of the photos.
     pub max_side: Option<u32>,
 }
 
-impl Work {
+impl Workload {
     /// A preset's where nothing else is asked for.
     pub fn asked(preset: Preset, overlay: &LumaOverlay, max_side: Option<u32>) -> Self {
         let mut work = preset.work();
@@ -39,8 +39,8 @@ impl Preset {
     }
 
     /// As much work as it is.
-    pub(crate) fn work(self) -> Work {
-        Work {
+    pub(crate) fn work(self) -> Workload {
+        Workload {
             settings: self.settings(),
             max_side: self.max_side(),
         }

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use crate::{
-    blocks::{Job, Seen},
+    blocks::{Job, PhotoCoverage},
     capture::Capture,
     report::LumaView,
 };
@@ -32,7 +32,7 @@ pub struct ViewMean {
 /// Means over held-out views that show a border, and over the others.
 pub(super) fn seam_views(capture: &Capture, job: &Job, views: &[LumaView]) -> SeamViews {
     let cores: Vec<_> = job.blocks.iter().map(|block| block.core).collect();
-    let seen = Seen::count(capture, &job.ground, &cores);
+    let seen = PhotoCoverage::count(capture, &job.ground, &cores);
     let place: HashMap<&str, usize> = (seen.photos.iter().map(String::as_str)).zip(0..).collect();
     let photo_of: HashMap<&str, &str> = (capture.views.iter())
         .map(|view| (view.name.as_str(), view.photo.as_str()))

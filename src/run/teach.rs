@@ -16,7 +16,7 @@ use super::{
 use crate::{
     capture::{Capture, Dataset, FRAMES, IMAGES, photos_in},
     chroma::{
-        Colorizer, ColorizerError, Lesson, Wanted, teach,
+        Colorizer, ColorizerError, Supervision, ViewTarget, teach,
         teacher::{
             AbImage, GrayImage, HintFolder, HintImage, Query, Teacher, TeacherError,
             TeacherSettings,
@@ -104,8 +104,8 @@ struct Member {
 }
 
 /// What teachers and hints say.
-pub(super) struct Taught {
-    pub lesson: Lesson,
+pub(super) struct TeacherAnswers {
+    pub supervision: Supervision,
     /// Views that have hints.
     pub hinted: usize,
     /// SHA-256 of all that is wanted.
@@ -113,7 +113,7 @@ pub(super) struct Taught {
 }
 
 /// Teachers while they are asked about the views of a dataset, in order.
-struct Asking<'a, 'o> {
+struct TeacherQueries<'a, 'o> {
     teachers: &'a mut Teachers,
     dataset: &'a Dataset,
     observe: &'a mut Observer<'o>,
@@ -130,12 +130,12 @@ struct Asking<'a, 'o> {
     wanted: Hasher,
 }
 
-impl Colorizer for Asking<'_, '_> {
+impl Colorizer for TeacherQueries<'_, '_> {
     fn colorize(
         &mut self,
         query: Query<'_>,
         gray: GrayImage<'_>,
-    ) -> Result<Option<Wanted>, ColorizerError> {
+    ) -> Result<Option<ViewTarget>, ColorizerError> {
         let (view, capture) = (self.view, &self.dataset.capture);
         self.view += 1;
         (self.observe)(Event::progress(
@@ -179,9 +179,9 @@ impl Colorizer for Asking<'_, '_> {
         let wanted = match hints {
             Some(hints) if self.teachers.grow_hints => Some(with_strokes(answer, hints)),
             Some(hints) => Some(with_hints(answer, &hints)),
-            None => answer.map(Wanted::from),
+            None => answer.map(ViewTarget::from),
         };
-        let wanted = wanted.map(|wanted| Wanted { by_hand, ..wanted });
+        let wanted = wanted.map(|wanted| ViewTarget { by_hand, ..wanted });
         self.wanted.update(query.name.as_bytes());
         if let Some(wanted) = &wanted {
             self.wanted.update(bytemuck::cast_slice(&wanted.ab.ab));
@@ -285,7 +285,7 @@ impl Teachers {
         dataset: &Dataset,
         scales: usize,
         observe: &mut Observer<'_>,
-    ) -> Result<Taught, RunError> {
+    ) -> Result<TeacherAnswers, RunError> {
         if self.asks_no_network() {
             observe(Event::Warning(
                 "profile and size change nothing: no teacher is a network".into(),
@@ -300,7 +300,7 @@ impl Teachers {
         if let Some((_, hints)) = &mut self.hints {
             hints.know(&dataset.capture);
         }
-        let mut asking = Asking {
+        let mut asking = TeacherQueries {
             answered: vec![[0; 2]; self.teachers.len()],
             hints_cover: false,
             hinted: 0,
@@ -311,11 +311,11 @@ impl Teachers {
             teachers: self,
         };
         let told = &mut |_| ControlFlow::Continue(());
-        let lesson = teach(dataset, &mut asking, scales, told)?;
+        let supervision = teach(dataset, &mut asking, scales, told)?;
         let (answered, hinted, wanted) = (asking.answered, asking.hinted, asking.wanted.finish());
         let mut covers: Vec<bool> = answered.iter().map(|[count, _]| *count > 0).collect();
         covers.push(asking.hints_cover);
-        self.check(&covers, dataset, &lesson)?;
+        self.check(&covers, dataset, &supervision)?;
         for member in &self.teachers {
             member.teacher.check_images()?;
             let doubts = member.teacher.doubts().into_iter();
@@ -337,8 +337,8 @@ impl Teachers {
                 )));
             }
         }
-        Ok(Taught {
-            lesson,
+        Ok(TeacherAnswers {
+            supervision,
             hinted,
             wanted,
         })
@@ -346,7 +346,12 @@ impl Teachers {
 
     /// Whether every source has something for a view that counts; `covers` says so
     /// of each teacher and then of the hints.
-    fn check(&self, covers: &[bool], dataset: &Dataset, lesson: &Lesson) -> Result<(), RunError> {
+    fn check(
+        &self,
+        covers: &[bool],
+        dataset: &Dataset,
+        supervision: &Supervision,
+    ) -> Result<(), RunError> {
         if let Some(source) = covers.iter().position(|covers| !covers) {
             let (path, unplaced) = match (self.teachers.get(source), &self.hints) {
                 (Some(member), _) => {
@@ -375,7 +380,7 @@ impl Teachers {
             });
         }
         match self.hints.as_ref().map(|(path, _)| path) {
-            Some(path) if lesson.colored_views() == 0 => {
+            Some(path) if supervision.colored_views() == 0 => {
                 Err(RunError::NothingPainted(path.clone()))
             }
             _ => Ok(()),

@@ -9,7 +9,7 @@ use glam::DVec3;
 
 use super::{
     Format, ReadSplats, SplatError, Splats, WriteOptions, glb, ply,
-    shared::{Judge, norm},
+    shared::{FormatFidelity, norm},
     sog, splat, spz, usda,
 };
 use crate::{disk, input};
@@ -90,21 +90,23 @@ pub fn write_splats(
         return Ok(doubts);
     }
     let splats = ready(path, splats, options.added)?;
-    let mut judge = Judge {
+    let mut fidelity = FormatFidelity {
         path,
         splats: &splats,
         doubts,
     };
     let bytes = match format {
         // The first is written already.
-        Format::Ply | Format::CompressedPly => ply::encode_compressed(&splats, options, &mut judge),
+        Format::Ply | Format::CompressedPly => {
+            ply::encode_compressed(&splats, options, &mut fidelity)
+        }
         Format::Splat => splat::encode(&splats),
-        Format::Spz => spz::encode(&splats, options, &mut judge)?,
-        Format::Sog => sog::encode(&splats, options, &mut judge)?,
+        Format::Spz => spz::encode(&splats, options, &mut fidelity)?,
+        Format::Sog => sog::encode(&splats, options, &mut fidelity)?,
         Format::Glb => glb::encode(path, &splats, options)?,
         Format::Usda => usda::encode(&splats, options),
     };
-    let doubts = judge.doubts;
+    let doubts = fidelity.doubts;
     let mut file = disk::create(path).map_err(SplatError::io(path))?;
     file.write_all(&bytes).map_err(SplatError::io(path))?;
     file.persist(path).map_err(SplatError::io(path))?;

@@ -62,13 +62,13 @@ pub(super) fn norm(quaternion: &[f32; 4]) -> f64 {
 }
 
 /// Finds out what a format does to the Gaussians that it is given.
-pub(super) struct Judge<'a> {
+pub(super) struct FormatFidelity<'a> {
     pub path: &'a Path,
     pub splats: &'a Splats,
     pub doubts: Vec<String>,
 }
 
-impl Judge<'_> {
+impl FormatFidelity<'_> {
     /// Judges a format whose numbers are `steps` apart at a center, in world units: a Gaussian
     /// whose middle scale is below that would be moved by half its size or more.
     ///
@@ -166,11 +166,11 @@ pub(super) fn check_count(
 }
 
 /// Gaussians as they are read, one after the other.
-pub(super) struct Gathered {
+pub(super) struct SplatBuilder {
     read: ReadSplats,
 }
 
-impl Gathered {
+impl SplatBuilder {
     /// For so many, with harmonics of a degree.
     pub fn new(count: usize, degree: u32) -> Self {
         Self {

@@ -20,7 +20,7 @@ use super::{
     ReadSplats, SplatError, Splats,
     quantize::{FLAT, level, logit, opacity_byte, smallest_three},
     sh::C0,
-    shared::{CHANNELS, Gathered},
+    shared::{CHANNELS, SplatBuilder},
 };
 
 /// Bytes of a Gaussian.
@@ -42,7 +42,7 @@ pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<ReadSplats, SplatError> 
             ),
         ));
     }
-    let mut gathered = Gathered::new(rows.len(), 0);
+    let mut gathered = SplatBuilder::new(rows.len(), 0);
     for row in rows {
         let float =
             |at: usize| f32::from_le_bytes([row[at], row[at + 1], row[at + 2], row[at + 3]]);

@@ -203,7 +203,7 @@ impl<'o> Journal<'o> {
 }
 
 /// Writes checkpoints of a command that has `started` so.
-pub(crate) struct FileKeeper<'a, 'o, S> {
+pub(crate) struct CheckpointFiles<'a, 'o, S> {
     path: PathBuf,
     header: Header<S>,
     options: &'a CheckpointOptions,
@@ -218,7 +218,7 @@ pub(crate) struct FileKeeper<'a, 'o, S> {
     interrupted: Option<Result<usize, StoreError>>,
 }
 
-impl<'a, 'o, S: Serialize> FileKeeper<'a, 'o, S> {
+impl<'a, 'o, S: Serialize> CheckpointFiles<'a, 'o, S> {
     /// A keeper for the command that answers `question`, begun at `begun`.
     pub fn new(
         path: PathBuf,
@@ -312,7 +312,7 @@ impl<'a, 'o, S: Serialize> FileKeeper<'a, 'o, S> {
     }
 }
 
-impl<S> Drop for FileKeeper<'_, '_, S> {
+impl<S> Drop for CheckpointFiles<'_, '_, S> {
     fn drop(&mut self) {
         self.options.interrupt.heeded.store(false, Ordering::SeqCst);
     }

@@ -75,7 +75,7 @@ impl Commit {
 
 /// Puts in its place what a process that ended too early has left complete.
 pub(crate) fn finish(folder: &Path) -> Result<(), StoreError> {
-    let Some(Left {
+    let Some(PendingCommit {
         complete,
         removed,
         made,
@@ -99,7 +99,7 @@ pub(crate) fn finish(folder: &Path) -> Result<(), StoreError> {
 }
 
 /// A complete commit that is not in its place yet.
-pub(crate) struct Left {
+pub(crate) struct PendingCommit {
     complete: PathBuf,
     /// Names of entries of the run that have to go.
     removed: Vec<&'static str>,
@@ -112,7 +112,7 @@ pub(crate) struct Left {
 ///
 /// # Errors
 /// [`StoreError::File`] where it names or holds anything else.
-pub(crate) fn left(folder: &Path) -> Result<Option<Left>, StoreError> {
+pub(crate) fn left(folder: &Path) -> Result<Option<PendingCommit>, StoreError> {
     let complete = folder.join(COMPLETE);
     let there = match complete.symlink_metadata() {
         // Of a run that is no folder the report says it.
@@ -160,7 +160,7 @@ pub(crate) fn left(folder: &Path) -> Result<Option<Left>, StoreError> {
         }
         made.push(name);
     }
-    Ok(Some(Left {
+    Ok(Some(PendingCommit {
         complete,
         removed,
         made,

@@ -12,7 +12,7 @@ use crate::{
     capture::Film,
     disk::{self, Draft},
     frames::Colored,
-    programs::{FFMPEG, Fed, Program, ProgramError},
+    programs::{FFMPEG, PipedProgram, Program, ProgramError},
     store::StoreError,
     tell::{Event, Observer},
 };
@@ -64,7 +64,7 @@ pub(crate) struct FilmWriter {
 
 struct Started {
     // Ended before its file is removed.
-    encoder: Fed,
+    encoder: PipedProgram,
     /// Until it is in its place.
     draft: Draft,
     size: [u32; 2],

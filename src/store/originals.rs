@@ -23,9 +23,9 @@ const MOST: usize = 100_000;
 
 /// Originals of a command, each by its file.
 #[derive(Default)]
-pub(crate) struct Kept(HashMap<FileId, &'static str>);
+pub(crate) struct OriginalFiles(HashMap<FileId, &'static str>);
 
-impl Kept {
+impl OriginalFiles {
     /// Adds a file, or the files below a folder, at most [`MOST`] in all. Missing paths add
     /// nothing, nor do folders that cannot be read.
     pub fn with(mut self, path: &Path, kind: &'static str) -> Self {

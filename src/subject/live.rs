@@ -9,9 +9,9 @@ use std::{
 use super::{SceneKind, SubjectError};
 use crate::{
     capture::{Dataset, Photo},
-    chroma::{ChromaCheckpoint, ChromaKeeper, bake_rgb},
+    chroma::{ChromaCheckpoint, ChromaCheckpointing, bake_rgb},
     effects::Plan,
-    luma::{Checkpoint, Keeper, LumaProgress},
+    luma::{Checkpoint, Checkpointing, LumaProgress},
     raster::RasterOptions,
     report::EffectReport,
     splats::{ShField, Splats},
@@ -172,20 +172,20 @@ impl Live {
 }
 
 /// Keeps checkpoints as another does, and shows what is trained.
-pub(crate) struct Showing<'a, K: ?Sized> {
-    pub keeper: &'a mut K,
+pub(crate) struct LiveCheckpoints<'a, K: ?Sized> {
+    pub checkpointing: &'a mut K,
     pub live: Option<&'a Live>,
     /// The gray scene that is colored; of no use to a training.
     pub luma: Option<&'a Splats>,
 }
 
-impl<K: Keeper + ?Sized> Keeper for Showing<'_, K> {
+impl<K: Checkpointing + ?Sized> Checkpointing for LiveCheckpoints<'_, K> {
     fn wants(&mut self, iteration: usize) -> bool {
-        self.keeper.wants(iteration)
+        self.checkpointing.wants(iteration)
     }
 
     fn keep(&mut self, checkpoint: Checkpoint) -> bool {
-        self.keeper.keep(checkpoint)
+        self.checkpointing.keep(checkpoint)
     }
 
     fn looks_on(&mut self) -> bool {
@@ -199,17 +199,17 @@ impl<K: Keeper + ?Sized> Keeper for Showing<'_, K> {
     }
 }
 
-impl<K: ChromaKeeper + ?Sized> ChromaKeeper for Showing<'_, K> {
+impl<K: ChromaCheckpointing + ?Sized> ChromaCheckpointing for LiveCheckpoints<'_, K> {
     fn wants(&mut self) -> bool {
-        self.keeper.wants()
+        self.checkpointing.wants()
     }
 
     fn keep(&mut self, checkpoint: ChromaCheckpoint) -> bool {
-        self.keeper.keep(checkpoint)
+        self.checkpointing.keep(checkpoint)
     }
 
     fn end(&mut self) {
-        self.keeper.end();
+        self.checkpointing.end();
     }
 
     fn looks_on(&mut self) -> bool {

@@ -13,13 +13,15 @@ use crate::{
     raster::RasterOptions,
     report::{PhotoReport, Report},
     splats::{Splats, is_splat_file},
-    store::{RunFolder, StoreError, fingerprint::check_poses, lock::RunLock, originals::Kept},
+    store::{
+        RunFolder, StoreError, fingerprint::check_poses, lock::RunLock, originals::OriginalFiles,
+    },
     tell::Observer,
 };
 
 /// Who else may work on a run meanwhile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Hold {
+pub(crate) enum LockMode {
     /// Anybody.
     Free,
     /// Those who read it.
@@ -37,12 +39,12 @@ pub(crate) struct Run {
 
 impl Run {
     /// The run at a path, by default the newest.
-    pub fn find(path: Option<&Path>, hold: Hold) -> Result<Self, StoreError> {
+    pub fn find(path: Option<&Path>, hold: LockMode) -> Result<Self, StoreError> {
         let folder = RunFolder::find(path)?;
         let (_lock, report) = match hold {
-            Hold::Free => (None, folder.read_report()?),
-            Hold::Reading => folder.lock_to_read()?,
-            Hold::Writing => {
+            LockMode::Free => (None, folder.read_report()?),
+            LockMode::Reading => folder.lock_to_read()?,
+            LockMode::Writing => {
                 let (lock, report) = folder.lock()?;
                 (Some(lock), report)
             }
@@ -84,7 +86,7 @@ impl Opened {
     ///
     /// # Errors
     /// As [`Run::find`], and [`SubjectError::Splats`] of a file of another format.
-    pub fn find(path: Option<&Path>, hold: Hold) -> Result<Self, SubjectError> {
+    pub fn find(path: Option<&Path>, hold: LockMode) -> Result<Self, SubjectError> {
         match path {
             Some(path) if is_splat_file(path)? => Ok(Self::File(path.to_owned())),
             run => Ok(Self::Run(Box::new(Run::find(run, hold)?))),
@@ -137,7 +139,7 @@ impl Opened {
     }
 
     /// Adds the files that it consists of and was made from.
-    pub fn keep(&self, kept: Kept) -> Kept {
+    pub fn keep(&self, kept: OriginalFiles) -> OriginalFiles {
         match self {
             Self::Run(run) => kept.with_run(&run.folder, &run.report),
             Self::File(path) => kept.with(path, "the splat file"),

@@ -12,7 +12,7 @@ use crate::{
     },
     effects::{
         Agreement, Cause, Contradiction, Contradictory, Evidence, FEW_POINTS, Levels, PointColors,
-        Reprojection, Survey, Unseeing, doubts, listed, observe_where_projected,
+        Reprojection, SparsePhotos, Survey, doubts, listed, observe_where_projected,
     },
     report::{CaptureReport, PhotoReport},
     store::fingerprint::{Changes, Fingerprint, of_photos},
@@ -35,7 +35,7 @@ pub struct Soundness {
 }
 
 /// A capture that can be worked with.
-pub(crate) struct Examined {
+pub(crate) struct SoundCapture {
     pub dataset: Dataset,
     /// What its photos say.
     pub evidence: Evidence,
@@ -191,7 +191,7 @@ pub(crate) fn open_examined(
     dir: &Path,
     options: &LoadOptions,
     observe: &mut Observer<'_>,
-) -> Result<Examined, SubjectError> {
+) -> Result<SoundCapture, SubjectError> {
     let (mut dataset, model) = open_judged(dir, options, observe)?;
     for doubt in doubts(&dataset.capture, &dataset.cameras) {
         observe(Event::Warning(doubt));
@@ -238,7 +238,7 @@ pub(crate) fn open_examined(
             (dataset, evidence, fingerprint)
         }
     };
-    Ok(Examined {
+    Ok(SoundCapture {
         dataset,
         evidence,
         soundness,
@@ -289,7 +289,7 @@ pub(crate) fn check_model(
         }
     }
     if model.tracks != Tracks::Sound
-        && let Some(unseeing) = Unseeing::of(capture, cameras)
+        && let Some(unseeing) = SparsePhotos::of(capture, cameras)
     {
         observe(Event::Warning(of_unseeing(&unseeing)));
     }
@@ -434,7 +434,7 @@ fn of_shrunk(found: &Shrunk) -> String {
     )
 }
 
-fn of_unseeing(found: &Unseeing) -> String {
+fn of_unseeing(found: &SparsePhotos) -> String {
     let (count, total) = (found.photos.len(), found.total);
     let names = listed(found.photos.iter().map(String::as_str));
     let center = match found.center_outside {

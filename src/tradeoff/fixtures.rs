@@ -1,10 +1,10 @@
 //! Points and sweeps for tests.
 
 use super::sweep::{
-    Outcome, Phase, Point, PointStage, Setting, Subject, TRADEOFF_VERSION, Tradeoff,
+    Outcome, Phase, PointStage, Setting, Subject, SweepPoint, TRADEOFF_VERSION, Tradeoff,
 };
 
-pub(super) fn sweep(points: Vec<Point>) -> Tradeoff {
+pub(super) fn sweep(points: Vec<SweepPoint>) -> Tradeoff {
     Tradeoff {
         version: TRADEOFF_VERSION,
         program: "0.1.0".to_owned(),
@@ -19,8 +19,8 @@ pub(super) fn sweep(points: Vec<Point>) -> Tradeoff {
     }
 }
 
-pub(super) fn failed(name: &str, reason: &str) -> Point {
-    Point {
+pub(super) fn failed(name: &str, reason: &str) -> SweepPoint {
+    SweepPoint {
         name: name.to_owned(),
         stage: PointStage::Luma,
         phase: Phase::One,
@@ -32,13 +32,13 @@ pub(super) fn failed(name: &str, reason: &str) -> Point {
     }
 }
 
-pub(super) fn luma(name: &str, seconds: f64, psnr: f64) -> Point {
+pub(super) fn luma(name: &str, seconds: f64, psnr: f64) -> SweepPoint {
     let setting = |(knob, value): (&str, &str)| Setting {
         knob: knob.to_owned(),
         value: value.to_owned(),
     };
     let base = name == "base";
-    Point {
+    SweepPoint {
         phase: if base { Phase::Base } else { Phase::One },
         settings: name.rsplit_once('-').map(setting).into_iter().collect(),
         took: seconds,

@@ -26,8 +26,8 @@ use crate::{
 };
 use point::Bench;
 use search::Task;
-use state::State;
-use sweep::{Phase, Point};
+use state::SweepState;
+use sweep::{Phase, SweepPoint};
 
 /// A request to sweep.
 pub struct TradeoffOptions {
@@ -98,7 +98,7 @@ pub fn tradeoff(
     let largest_side = sides.max().unwrap_or(0);
     files::make_own_folder(&folder, &["tradeoff.lock", FILES[1]], &[])?;
     let bench = Bench::new(options, &folder, largest_side)?;
-    let mut state = State::open(&folder, bench.subject.clone(), options.budget)?;
+    let mut state = SweepState::open(&folder, bench.subject.clone(), options.budget)?;
 
     while let Some(task) = next(options, &bench, &state.sweep)? {
         let point = run(&bench, &task, &state.sweep, observe)?;
@@ -149,7 +149,7 @@ fn run(
     task: &Task,
     sweep: &Tradeoff,
     observe: &mut Observer<'_>,
-) -> Result<Point, RunError> {
+) -> Result<SweepPoint, RunError> {
     let (spent, count) = (sweep.spent(), sweep.points.len());
     let expected = task
         .expected
@@ -165,7 +165,7 @@ fn run(
 }
 
 /// A finished point on one line.
-fn in_words(point: &Point) -> String {
+fn in_words(point: &SweepPoint) -> String {
     let Some(outcome) = &point.outcome else {
         let reason = point.failed.as_deref().unwrap_or_default();
         return format!("{}: failed: {reason}", point.name);
@@ -181,7 +181,7 @@ fn in_words(point: &Point) -> String {
 }
 
 /// Writes the three files; the one that a sweep goes on from last.
-fn write(folder: &Path, state: &State) -> Result<(), StoreError> {
+fn write(folder: &Path, state: &SweepState) -> Result<(), StoreError> {
     let [table, _, html] = FILES.map(|name| folder.join(name));
     files::write(&table, report::csv(&state.sweep).as_bytes())?;
     files::write(&html, report::page(&state.sweep).as_bytes())?;

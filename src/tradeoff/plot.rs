@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use super::{
     knobs::KNOBS,
-    sweep::{Measure, Outcome, Phase, Point, PointStage, Tradeoff},
+    sweep::{Measure, Outcome, Phase, PointStage, SweepPoint, Tradeoff},
 };
 use crate::report::html::escaped;
 
@@ -24,7 +24,7 @@ const TOP: f64 = 14.0;
 const BOTTOM: f64 = 314.0;
 
 /// A point's group and its color.
-pub(super) fn group(point: &Point) -> (&str, &'static str) {
+pub(super) fn group(point: &SweepPoint) -> (&str, &'static str) {
     match (point.phase, &point.settings[..]) {
         (Phase::Base, _) => ("base", "currentColor"),
         (Phase::One, [only]) => {
@@ -42,7 +42,7 @@ pub(super) fn plot(sweep: &Tradeoff, stage: PointStage, measure: &Measure) -> St
         let finite = place.iter().all(|figure| figure.is_finite());
         finite.then_some(place)
     };
-    let placed: Vec<(&Point, &Outcome, [f64; 2])> = (sweep.of(stage))
+    let placed: Vec<(&SweepPoint, &Outcome, [f64; 2])> = (sweep.of(stage))
         .filter_map(|point| {
             let outcome = point.outcome.as_ref()?;
             Some((point, outcome, place(outcome)?))

@@ -10,7 +10,7 @@ use super::{
     TradeoffError, TradeoffOptions, child,
     knobs::{self, Base},
     search::{Task, base_name},
-    sweep::{Outcome, Phase, Point, PointStage, Subject, Tradeoff},
+    sweep::{Outcome, Phase, PointStage, Subject, SweepPoint, Tradeoff},
 };
 use crate::{
     chroma::teacher::located,
@@ -87,7 +87,7 @@ impl Bench {
         task: &Task,
         sweep: &Tradeoff,
         tell: &mut dyn FnMut(f64),
-    ) -> Result<Point, RunError> {
+    ) -> Result<SweepPoint, RunError> {
         let begun = Instant::now();
         let folder = self.folder(&task.name);
         // Of a sweep that was stopped in the middle of this point.
@@ -105,7 +105,7 @@ impl Bench {
             let outcome = self.outcome(task, sweep);
             outcome.map_err(|error| error.to_string())
         });
-        Ok(Point {
+        Ok(SweepPoint {
             name: task.name.clone(),
             stage: task.stage,
             phase: task.phase,

@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use super::{
     plot::{group, plot},
-    sweep::{Measure, Outcome, Point, PointStage, Tradeoff},
+    sweep::{Measure, Outcome, PointStage, SweepPoint, Tradeoff},
 };
 use crate::report::{
     Table,
@@ -56,7 +56,7 @@ pub(super) fn csv(sweep: &Tradeoff) -> String {
 }
 
 /// A figure of the outcome; empty without.
-fn cell<T: ToString>(point: &Point, value: fn(&Outcome) -> Option<T>) -> String {
+fn cell<T: ToString>(point: &SweepPoint, value: fn(&Outcome) -> Option<T>) -> String {
     let value = point.outcome.as_ref().and_then(value);
     value.map_or(String::new(), |value| value.to_string())
 }
@@ -79,10 +79,10 @@ pub fn front_table(sweep: &Tradeoff, stage: PointStage) -> Option<Table> {
 }
 
 /// Points in figures, a failure as its reason.
-fn table(sweep: &Tradeoff, stage: PointStage, title: &str, points: &[&Point]) -> Table {
+fn table(sweep: &Tradeoff, stage: PointStage, title: &str, points: &[&SweepPoint]) -> Table {
     let measures: Vec<&Measure> = sweep.measures(stage).collect();
     let base = sweep.base(stage).and_then(|base| base.outcome.as_ref());
-    let row = |point: &&Point| {
+    let row = |point: &&SweepPoint| {
         let mut row = vec![point.label()];
         match &point.outcome {
             Some(outcome) => {
@@ -194,7 +194,7 @@ fn push_stage(html: &mut String, sweep: &Tradeoff, stage: PointStage) {
         );
     }
     html.push_str("</div>\n");
-    let all: Vec<&Point> = sweep.of(stage).collect();
+    let all: Vec<&SweepPoint> = sweep.of(stage).collect();
     push_table(html, &table(sweep, stage, "All points", &all));
 }
 

@@ -149,7 +149,7 @@ fn expected(
 mod tests {
     use super::super::{
         fixtures,
-        sweep::{Outcome, Point},
+        sweep::{Outcome, SweepPoint},
     };
     use super::*;
 
@@ -180,7 +180,7 @@ mod tests {
     }
 
     /// What running a task comes to.
-    fn run(task: &Task) -> Point {
+    fn run(task: &Task) -> SweepPoint {
         let (mut seconds, mut quality) = (40.0, 0.0);
         for setting in &task.settings {
             let known = EFFECTS
@@ -190,7 +190,7 @@ mod tests {
             (seconds, quality) = (seconds * time, quality + change);
         }
         let color = task.stage == PointStage::Color;
-        Point {
+        SweepPoint {
             name: task.name.clone(),
             stage: task.stage,
             phase: task.phase,
@@ -208,7 +208,7 @@ mod tests {
     }
 
     /// A whole sweep from points that are there.
-    fn swept(points: Vec<Point>, budget: f64) -> Tradeoff {
+    fn swept(points: Vec<SweepPoint>, budget: f64) -> Tradeoff {
         let mut sweep = fixtures::sweep(points);
         sweep.budget = budget;
         while let Some(task) = next(&values(), &sweep, true) {

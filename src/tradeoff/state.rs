@@ -7,7 +7,7 @@ use std::{
 
 use super::{
     FILES, POINTS,
-    sweep::{Phase, Point, Subject, TRADEOFF_VERSION, Tradeoff},
+    sweep::{Phase, Subject, SweepPoint, TRADEOFF_VERSION, Tradeoff},
 };
 use crate::{
     disk::{self, trust},
@@ -19,7 +19,7 @@ use crate::{
 const LOCK: &str = "tradeoff.lock";
 
 /// A sweep and its file.
-pub(super) struct State {
+pub(super) struct SweepState {
     /// Keeps a second sweep away; whatever ends the process frees it.
     _lock: File,
     /// File at fault.
@@ -28,7 +28,7 @@ pub(super) struct State {
     pub sweep: Tradeoff,
 }
 
-impl State {
+impl SweepState {
     /// The sweep of a folder, or a new one. A base that failed is tried again.
     ///
     /// # Errors
@@ -59,7 +59,7 @@ impl State {
     }
 
     /// Adds a point that has run.
-    pub fn add(&mut self, point: Point, device: Option<String>) {
+    pub fn add(&mut self, point: SweepPoint, device: Option<String>) {
         self.sweep.points.push(point);
         self.sweep.device = device.or(self.sweep.device.take());
     }
@@ -118,7 +118,7 @@ mod tests {
     fn a_sweep_goes_on_where_it_was() {
         let subject = sweep(Vec::new()).subject;
         let folder = tempfile::tempdir().expect("a folder");
-        let open = |budget| State::open(folder.path(), subject.clone(), budget);
+        let open = |budget| SweepState::open(folder.path(), subject.clone(), budget);
         let mut state = open(60.0).expect("new");
         state.add(luma("base", 3.0, 24.0), Some("llvmpipe".to_owned()));
         state.add(failed("sh-degree-3", "no memory"), None);
@@ -142,7 +142,7 @@ mod tests {
     fn another_subject_is_refused_with_a_remedy() {
         let subject = sweep(Vec::new()).subject;
         let folder = tempfile::tempdir().expect("a folder");
-        State::open(folder.path(), subject.clone(), 60.0)
+        SweepState::open(folder.path(), subject.clone(), 60.0)
             .and_then(|state| state.write())
             .expect("written");
         type Change = (&'static str, fn(&mut Subject));
@@ -154,14 +154,14 @@ mod tests {
         for (what, change) in changes {
             let mut other = subject.clone();
             change(&mut other);
-            let error = State::open(folder.path(), other, 60.0)
+            let error = SweepState::open(folder.path(), other, 60.0)
                 .err()
                 .expect("refused");
             let error = error.to_string();
             assert!(error.contains(what) && error.contains("-o"), "{error}");
         }
         std::fs::write(folder.path().join(FILES[1]), "{").expect("written");
-        let error = State::open(folder.path(), subject, 60.0)
+        let error = SweepState::open(folder.path(), subject, 60.0)
             .err()
             .expect("refused");
         assert!(error.to_string().contains("damaged"), "{error}");

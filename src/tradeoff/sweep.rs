@@ -20,7 +20,7 @@ pub struct Tradeoff {
     /// Wall seconds that the points may take together.
     pub budget: f64,
     /// Every point that ran, in the order in which they did.
-    pub points: Vec<Point>,
+    pub points: Vec<SweepPoint>,
 }
 
 /// What is swept; a folder holds points of one subject only.
@@ -36,7 +36,7 @@ pub struct Subject {
 
 /// One choice of settings, and what came of it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Point {
+pub struct SweepPoint {
     /// Name of its run folder under `points/`.
     pub name: String,
     /// What it says something about.
@@ -194,7 +194,7 @@ impl Measure {
     }
 }
 
-impl Point {
+impl SweepPoint {
     /// Its settings in words, `base` without any.
     pub fn label(&self) -> String {
         let settings: Vec<String> = (self.settings.iter())
@@ -227,17 +227,17 @@ impl Tradeoff {
     }
 
     /// The point of that name.
-    pub fn find(&self, name: &str) -> Option<&Point> {
+    pub fn find(&self, name: &str) -> Option<&SweepPoint> {
         self.points.iter().find(|point| point.name == name)
     }
 
     /// The points of a stage.
-    pub fn of(&self, stage: PointStage) -> impl Iterator<Item = &Point> {
+    pub fn of(&self, stage: PointStage) -> impl Iterator<Item = &SweepPoint> {
         self.points.iter().filter(move |point| point.stage == stage)
     }
 
     /// The base of a stage, where it ran.
-    pub fn base(&self, stage: PointStage) -> Option<&Point> {
+    pub fn base(&self, stage: PointStage) -> Option<&SweepPoint> {
         self.of(stage).find(|point| point.phase == Phase::Base)
     }
 
@@ -252,8 +252,8 @@ impl Tradeoff {
 
     /// The points of a stage that no other beats in seconds or a measure and equals in the
     /// other, fastest first; of equal ones the first.
-    pub fn front(&self, stage: PointStage, measure: &Measure) -> Vec<&Point> {
-        let mut placed: Vec<(&Point, [f64; 2])> = (self.of(stage))
+    pub fn front(&self, stage: PointStage, measure: &Measure) -> Vec<&SweepPoint> {
+        let mut placed: Vec<(&SweepPoint, [f64; 2])> = (self.of(stage))
             .filter_map(|point| Some((point, point.place(measure)?)))
             .collect();
         placed.sort_by(|(_, a), (_, b)| a[0].total_cmp(&b[0]).then(b[1].total_cmp(&a[1])));
@@ -267,7 +267,7 @@ impl Tradeoff {
     }
 
     /// The front of what decides in a stage: its first measure that its points have.
-    pub fn best(&self, stage: PointStage) -> Vec<&Point> {
+    pub fn best(&self, stage: PointStage) -> Vec<&SweepPoint> {
         let first = self.measures(stage).next();
         first.map_or(Vec::new(), |measure| self.front(stage, measure))
     }

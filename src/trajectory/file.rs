@@ -157,7 +157,7 @@ struct Trained {
 
 /// How nerfstudio moves COLMAP's world: x becomes `scale` · (`transform` · x).
 #[derive(Deserialize)]
-struct Moved {
+struct WorldTransform {
     transform: Vec<[f64; 4]>,
     scale: f64,
 }
@@ -185,7 +185,7 @@ pub fn read_path(path: &Path, size: [u32; 2]) -> Result<PathFile, TrajectoryErro
     {
         read.rate = None;
     }
-    if let Some(moved) = Moved::beside(path)? {
+    if let Some(moved) = WorldTransform::beside(path)? {
         read.cameras = read
             .cameras
             .iter()
@@ -200,7 +200,7 @@ pub fn read_path(path: &Path, size: [u32; 2]) -> Result<PathFile, TrajectoryErro
 /// # Errors
 /// The system's, and [`TrajectoryError`] of a file that says how nerfstudio moved the scene.
 pub fn write_path(path: &Path, cameras: &[Camera], rate: f64) -> Result<(), TrajectoryError> {
-    let moved = Moved::beside(path)?;
+    let moved = WorldTransform::beside(path)?;
     let size = cameras
         .first()
         .map_or([0, 0], |camera| [camera.width, camera.height]);
@@ -437,7 +437,7 @@ fn to_opengl(camera: &Camera) -> [f64; 16] {
     })
 }
 
-impl Moved {
+impl WorldTransform {
     /// What lies beside a path, if it does.
     fn beside(path: &Path) -> Result<Option<Self>, TrajectoryError> {
         let path = path.with_file_name(MOVED);

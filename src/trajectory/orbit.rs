@@ -37,7 +37,7 @@ const SAMPLES: usize = 20_000;
 const ROUNDS: usize = 100;
 
 /// What the way goes around, seen from above.
-struct Place {
+struct OrbitCenter {
     /// What is looked at.
     focus: DVec3,
     up: DVec3,
@@ -70,7 +70,7 @@ pub fn orbit_of_cameras(cameras: &[&Camera], points: &[DVec3], frames: usize) ->
     let towards = mean(&forward);
     let part = |frame: usize| TAU * frame as f64 / frames.max(1) as f64;
     if towards.length() > ONE_WAY {
-        let place = Place::new(focus, up, towards);
+        let place = OrbitCenter::new(focus, up, towards);
         let distance = (focus - middle).length();
         let below = place.right.cross(towards.normalize());
         let sway = |axis: DVec3| {
@@ -88,7 +88,7 @@ pub fn orbit_of_cameras(cameras: &[&Camera], points: &[DVec3], frames: usize) ->
             })
             .collect();
     }
-    let place = Place::new(focus, up, focus - like.center());
+    let place = OrbitCenter::new(focus, up, focus - like.center());
     let around: Vec<[f64; 3]> = cameras.iter().map(|c| place.around(c.center())).collect();
     let median_of = |k: usize| median(around.iter().map(|at| at[k]).collect());
     let [distance, height] = [median_of(1), median_of(2)];
@@ -139,7 +139,7 @@ pub fn orbit_of_ball((middle, radius): (DVec3, f64), lens: &Camera, frames: usiz
         (0.5 * f64::from(lens.height) / lens.fy).atan(),
     ];
     let distance = radius / half[0].min(half[1]).sin();
-    let place = Place::new(middle, DVec3::NEG_Y, DVec3::Z);
+    let place = OrbitCenter::new(middle, DVec3::NEG_Y, DVec3::Z);
     let (rise, out) = RISE.sin_cos();
     (0..frames)
         .map(|frame| {
@@ -150,7 +150,7 @@ pub fn orbit_of_ball((middle, radius): (DVec3, f64), lens: &Camera, frames: usiz
         .collect()
 }
 
-impl Place {
+impl OrbitCenter {
     fn new(focus: DVec3, up: DVec3, ahead: DVec3) -> Self {
         let level = (ahead - ahead.dot(up) * up).try_normalize();
         let ahead = level.unwrap_or_else(|| up.any_orthonormal_vector());

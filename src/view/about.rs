@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use crate::{
     capture::{Camera, Dataset, View},
     report::{EffectReport, Report},
-    run::Look,
+    run::ViewedScene,
 };
 
 /// Points of a curve that are drawn, at most.
@@ -15,26 +15,26 @@ const POINTS: usize = 200;
 
 /// What the page is told of a run or a splat file. Without cameras it begins at `start`, and
 /// shows nothing nearer than the depth that comes with it.
-pub fn of_look(look: &Look, start: Option<(&Camera, Option<f64>)>) -> Value {
-    let scenes: Vec<&str> = look.scenes().map(|kind| kind.name()).collect();
+pub fn of_look(viewed: &ViewedScene, start: Option<(&Camera, Option<f64>)>) -> Value {
+    let scenes: Vec<&str> = viewed.scenes().map(|kind| kind.name()).collect();
     let stamps: BTreeMap<&str, u32> = scenes.iter().map(|&kind| (kind, 0)).collect();
-    let report = look.report();
+    let report = viewed.report();
     json!({
-        "name": look.name,
+        "name": viewed.name,
         "scenes": scenes,
         // They do not change.
         "stamps": stamps,
         "live": null,
-        "near": look.near().or(start.and_then(|(_, near)| near)),
+        "near": viewed.near().or(start.and_then(|(_, near)| near)),
         "start": start.map(|(camera, _)| pose(camera)),
-        "cameras": look.dataset.as_ref().map_or_else(Vec::new, |d| cameras(d, report)),
-        "first": look.dataset.as_ref().map_or(0, first),
-        "photos": look.dataset.is_some(),
-        "teacher": look.has_teacher(),
+        "cameras": viewed.dataset.as_ref().map_or_else(Vec::new, |d| cameras(d, report)),
+        "first": viewed.dataset.as_ref().map_or(0, first),
+        "photos": viewed.dataset.is_some(),
+        "teacher": viewed.has_teacher(),
         "figures": report.map_or_else(Vec::new, figures),
         "curves": {
             "psnr": report.map_or_else(Vec::new, psnr),
-            "loss": thinned(&look.losses()),
+            "loss": thinned(&viewed.losses()),
         },
         "plan": report.map_or_else(Vec::new, |report| plan(&report.effects)),
     })

@@ -10,12 +10,12 @@ use serde_json::Value;
 
 use super::{
     ViewerError, about, assets, overview, pack,
-    server::{Answer, Request},
+    server::{Request, Response},
 };
 use crate::{
     capture::{Camera, Dataset, Orientation, Photo},
     hash::Hasher,
-    run::{Look, RunError},
+    run::{RunError, ViewedScene},
     subject::SceneKind,
     tell::Observer,
 };
@@ -52,12 +52,12 @@ pub trait Content: Send + Sync {
 
 /// The answer to a request. Paths are compared with those that there are, and never lead into a
 /// folder.
-pub fn answer(content: &dyn Content, request: &Request) -> Answer {
-    let text = |kind, body: &str| Answer::ok(kind, body.as_bytes());
+pub fn answer(content: &dyn Content, request: &Request) -> Response {
+    let text = |kind, body: &str| Response::ok(kind, body.as_bytes());
     match request.path.as_str() {
         "/" => text("text/html; charset=utf-8", assets::PAGE),
         "/viewer.css" => text("text/css; charset=utf-8", assets::STYLE),
-        "/viewer.js" => Answer::ok("text/javascript; charset=utf-8", assets::script()),
+        "/viewer.js" => Response::ok("text/javascript; charset=utf-8", assets::script()),
         "/scene.json" => match content.about() {
             Ok(told) => tagged(told.to_string()),
             Err(error) => failed(&error),
@@ -73,57 +73,57 @@ pub fn answer(content: &dyn Content, request: &Request) -> Answer {
                 let photo = content.teacher(view);
                 picture(photo.map(|found| found.map(DynamicImage::ImageRgb8)))
             } else {
-                Answer::not_found()
+                Response::not_found()
             }
         }
     }
 }
 
 /// JSON, with a tag by which the page knows whether it is another.
-fn tagged(body: String) -> Answer {
+fn tagged(body: String) -> Response {
     let mut hash = Hasher::default();
     hash.update(body.as_bytes());
-    Answer {
+    Response {
         tag: Some(format!("\"{}\"", &hash.finish()[..16])),
-        ..Answer::ok("application/json", body)
+        ..Response::ok("application/json", body)
     }
 }
 
-fn scene(content: &dyn Content, kind: SceneKind) -> Answer {
+fn scene(content: &dyn Content, kind: SceneKind) -> Response {
     match content.scene(kind) {
-        Ok(Some(body)) => Answer {
+        Ok(Some(body)) => Response {
             body,
-            ..Answer::ok("application/octet-stream", Vec::new())
+            ..Response::ok("application/octet-stream", Vec::new())
         },
-        Ok(None) => Answer::not_found(),
+        Ok(None) => Response::not_found(),
         Err(error) => failed(&error),
     }
 }
 
 /// A picture as PNG, no larger than a screen.
-fn picture(found: Result<Option<DynamicImage>, RunError>) -> Answer {
+fn picture(found: Result<Option<DynamicImage>, RunError>) -> Response {
     let image = match found {
         Ok(Some(image)) if image.width().max(image.height()) > SIDE => {
             image.resize(SIDE, SIDE, imageops::FilterType::Triangle)
         }
         Ok(Some(image)) => image,
-        Ok(None) => return Answer::not_found(),
+        Ok(None) => return Response::not_found(),
         Err(error) => return failed(&error),
     };
     let mut bytes = Cursor::new(Vec::new());
     match image.write_to(&mut bytes, ImageFormat::Png) {
-        Ok(()) => Answer::ok("image/png", bytes.into_inner()),
-        Err(error) => Answer::refused("500 Internal Server Error", error.to_string()),
+        Ok(()) => Response::ok("image/png", bytes.into_inner()),
+        Err(error) => Response::refused("500 Internal Server Error", error.to_string()),
     }
 }
 
-fn failed(error: &RunError) -> Answer {
-    Answer::refused("500 Internal Server Error", error.to_string())
+fn failed(error: &RunError) -> Response {
+    Response::refused("500 Internal Server Error", error.to_string())
 }
 
 /// A run or a splat file that stays as it is.
-pub struct OfRun {
-    look: Look,
+pub struct RunContent {
+    viewed: ViewedScene,
     /// The scenes by kind, packed when they are asked for the first time.
     packed: [Mutex<Option<Packed>>; 2],
 }
@@ -136,17 +136,17 @@ struct Packed {
     overview: (Camera, f64),
 }
 
-impl OfRun {
+impl RunContent {
     /// What there is to see, with the first of its scenes read.
     ///
     /// # Errors
     /// [`ViewerError::Nothing`] without a scene, and [`RunError`] of its file.
-    pub fn new(look: Look, observe: &mut Observer<'_>) -> Result<Self, ViewerError> {
-        let Some(first) = look.scenes().next() else {
-            return Err(ViewerError::Nothing(look.name));
+    pub fn new(viewed: ViewedScene, observe: &mut Observer<'_>) -> Result<Self, ViewerError> {
+        let Some(first) = viewed.scenes().next() else {
+            return Err(ViewerError::Nothing(viewed.name));
         };
         let content = Self {
-            look,
+            viewed,
             packed: Default::default(),
         };
         content.packed(first, observe)?;
@@ -161,7 +161,7 @@ impl OfRun {
         let packed = self.packed[kind as usize].lock();
         let mut packed = packed.unwrap_or_else(PoisonError::into_inner);
         if packed.is_none() {
-            let read = self.look.read(kind, observe)?;
+            let read = self.viewed.read(kind, observe)?;
             *packed = read.map(|(splats, drawn)| Packed {
                 bytes: Arc::new(pack(&splats, drawn)),
                 overview: overview(&splats),
@@ -171,16 +171,16 @@ impl OfRun {
     }
 }
 
-impl Content for OfRun {
+impl Content for RunContent {
     fn about(&self) -> Result<Value, RunError> {
-        let start = match (&self.look.dataset, self.look.scenes().next()) {
+        let start = match (&self.viewed.dataset, self.viewed.scenes().next()) {
             (None, Some(kind)) => self
                 .packed(kind, &mut |_| {})?
                 .map(|packed| packed.overview),
             _ => None,
         };
         let start = start.as_ref().map(|(camera, near)| (camera, Some(*near)));
-        Ok(about::of_look(&self.look, start))
+        Ok(about::of_look(&self.viewed, start))
     }
 
     fn scene(&self, kind: SceneKind) -> Result<Option<Arc<Vec<u8>>>, RunError> {
@@ -188,13 +188,13 @@ impl Content for OfRun {
     }
 
     fn photo(&self, view: usize) -> Result<Option<GrayImage>, RunError> {
-        let photo = self.look.photo(view)?;
-        Ok(photo.and_then(|photo| gray(&photo, upright(self.look.dataset.as_ref(), view))))
+        let photo = self.viewed.photo(view)?;
+        Ok(photo.and_then(|photo| gray(&photo, upright(self.viewed.dataset.as_ref(), view))))
     }
 
     fn teacher(&self, view: usize) -> Result<Option<RgbImage>, RunError> {
-        let picture = self.look.teacher(view)?;
-        let upright = upright(self.look.dataset.as_ref(), view);
+        let picture = self.viewed.teacher(view)?;
+        let upright = upright(self.viewed.dataset.as_ref(), view);
         Ok(picture.map(|picture| upright.image(picture.into()).into_rgb8()))
     }
 }

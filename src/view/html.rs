@@ -11,9 +11,9 @@ use super::{ViewerError, about, assets, overview, pack};
 use crate::{
     capture::Camera,
     gpu::{Gpu, GpuError},
-    raster::{Picture, Raster, RasterOptions, SceneRenderer},
+    raster::{Raster, RasterOptions, RenderedImage, SceneRenderer},
     report::to_image,
-    run::{Look, RunError},
+    run::{RunError, ViewedScene},
     splats::Splats,
     store::files,
     subject::SceneKind,
@@ -49,21 +49,23 @@ pub fn is_html(path: &Path) -> bool {
 /// # Errors
 /// [`ViewerError`] of the scene, the device or the file.
 pub fn write_html(
-    look: &Look,
+    viewed: &ViewedScene,
     luma: bool,
     path: &Path,
     observe: &mut Observer<'_>,
 ) -> Result<Written, ViewerError> {
-    let colored = look.scenes().find(|kind| !luma || *kind == SceneKind::Luma);
-    let kind = colored.ok_or_else(|| ViewerError::Nothing(look.name.clone()))?;
-    let read = look.read(kind, observe)?;
-    let (splats, drawn) = read.ok_or_else(|| ViewerError::Nothing(look.name.clone()))?;
+    let colored = viewed
+        .scenes()
+        .find(|kind| !luma || *kind == SceneKind::Luma);
+    let kind = colored.ok_or_else(|| ViewerError::Nothing(viewed.name.clone()))?;
+    let read = viewed.read(kind, observe)?;
+    let (splats, drawn) = read.ok_or_else(|| ViewerError::Nothing(viewed.name.clone()))?;
     observe(Event::begins(Stage::Rendering));
-    let (start, near) = match &look.dataset {
+    let (start, near) = match &viewed.dataset {
         Some(dataset) => {
             let first = about::first(dataset);
             let upright = dataset.capture.views[first].stance.upright;
-            (dataset.cameras[first].turned(upright), look.near())
+            (dataset.cameras[first].turned(upright), viewed.near())
         }
         None => {
             let (camera, near) = overview(&splats);
@@ -72,7 +74,7 @@ pub fn write_html(
     };
     let poster = poster(&splats, drawn, &start, near.unwrap_or_default())?;
     observe(Event::begins(Stage::Saving));
-    let mut told = about::of_look(look, Some((&start, near)));
+    let mut told = about::of_look(viewed, Some((&start, near)));
     told["scenes"] = Value::from(vec![kind.name()]);
     for absent in ["photos", "teacher"] {
         told[absent] = Value::Bool(false);
@@ -98,7 +100,7 @@ fn poster(
     let side = |pixels: u32| ((scale * f64::from(pixels)).round() as u32).max(1);
     let camera = camera.resized(side(camera.width), side(camera.height));
     let gpu = Gpu::open().map_err(RunError::from)?;
-    let drawing = || -> Result<Picture, GpuError> {
+    let drawing = || -> Result<RenderedImage, GpuError> {
         let raster = Arc::new(Raster::with(&gpu, drawn));
         let mut renderer = SceneRenderer::new(&raster, splats, &[&splats.sh], near)?;
         Ok(renderer.render(&camera)?.remove(0))

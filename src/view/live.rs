@@ -17,12 +17,12 @@ use crate::{
 };
 
 /// A command that goes on, as a page shows it.
-pub struct OfCommand {
+pub struct LiveContent {
     name: String,
     live: Arc<Live>,
 }
 
-impl OfCommand {
+impl LiveContent {
     /// The command that makes the run `folder`.
     pub fn new(folder: &Path, live: Arc<Live>) -> Self {
         let name = folder.file_name().unwrap_or(folder.as_os_str());
@@ -33,7 +33,7 @@ impl OfCommand {
     }
 }
 
-impl Content for OfCommand {
+impl Content for LiveContent {
     fn about(&self) -> Result<Value, RunError> {
         let state = self.live.ask();
         let kinds = [SceneKind::Color, SceneKind::Luma];

@@ -50,7 +50,7 @@ pub struct Request {
 
 /// An answer.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Answer {
+pub struct Response {
     /// HTTP's code and its words.
     pub status: &'static str,
     /// The body's kind.
@@ -61,7 +61,7 @@ pub struct Answer {
     pub body: Arc<Vec<u8>>,
 }
 
-impl Answer {
+impl Response {
     /// A body that was there.
     pub fn ok(kind: &'static str, body: impl Into<Vec<u8>>) -> Self {
         Self {
@@ -117,7 +117,7 @@ impl Server {
     }
 
     /// Answers until the program ends.
-    pub fn serve(&self, answer: impl Fn(&Request) -> Answer + Send + Sync + 'static) {
+    pub fn serve(&self, answer: impl Fn(&Request) -> Response + Send + Sync + 'static) {
         let answer = Arc::new(answer);
         let open = Arc::new(AtomicUsize::new(0));
         let names = names(self.address);
@@ -130,7 +130,7 @@ impl Server {
             while open.load(Ordering::Acquire) >= CONNECTIONS {
                 thread::sleep(Duration::from_millis(10));
             }
-            let place = Place::take(&open);
+            let place = ConnectionSlot::take(&open);
             let (answer, names) = (answer.clone(), names.clone());
             let handled = thread::Builder::new().name("page".to_owned());
             // Where no thread can be had, the connection is closed.
@@ -154,16 +154,16 @@ fn names(address: SocketAddr) -> Vec<String> {
 }
 
 /// One of the connections that may be open.
-struct Place(Arc<AtomicUsize>);
+struct ConnectionSlot(Arc<AtomicUsize>);
 
-impl Place {
+impl ConnectionSlot {
     fn take(open: &Arc<AtomicUsize>) -> Self {
         open.fetch_add(1, Ordering::AcqRel);
         Self(open.clone())
     }
 }
 
-impl Drop for Place {
+impl Drop for ConnectionSlot {
     fn drop(&mut self) {
         self.0.fetch_sub(1, Ordering::AcqRel);
     }
@@ -172,14 +172,14 @@ impl Drop for Place {
 fn handle(
     mut stream: TcpStream,
     names: &[String],
-    answer: &dyn Fn(&Request) -> Answer,
+    answer: &dyn Fn(&Request) -> Response,
 ) -> io::Result<()> {
     let head = hear(&mut stream)?;
     let answered = match understood(&head, names) {
         Ok(request) => {
             let answered = answer(&request);
             match answered.tag.is_some() && answered.tag == request.known {
-                true => Answer {
+                true => Response {
                     status: "304 Not Modified",
                     body: Arc::default(),
                     ..answered
@@ -207,7 +207,7 @@ fn hear(stream: &mut TcpStream) -> io::Result<Vec<u8>> {
 }
 
 /// Writes an answer and ends the connection.
-fn tell(stream: &mut TcpStream, answer: &Answer) -> io::Result<()> {
+fn tell(stream: &mut TcpStream, answer: &Response) -> io::Result<()> {
     let mib = u32::try_from(answer.body.len() >> 20).unwrap_or(u32::MAX);
     let until = Instant::now() + TAKEN_WITHIN + EACH_MIB.saturating_mul(mib);
     let tag = answer.tag.as_ref();
@@ -241,15 +241,15 @@ fn left(until: Instant) -> io::Result<Duration> {
 
 /// What a head asks for, if it is GET and came to one of our names: a page of another site that
 /// had its name lead here is refused.
-fn understood(head: &[u8], names: &[String]) -> Result<Request, Answer> {
-    let bad = || Answer::refused("400 Bad Request", "this is no HTTP request");
+fn understood(head: &[u8], names: &[String]) -> Result<Request, Response> {
+    let bad = || Response::refused("400 Bad Request", "this is no HTTP request");
     let mut headers = [httparse::EMPTY_HEADER; HEADERS];
     let mut request = httparse::Request::new(&mut headers);
     match request.parse(head) {
         Ok(httparse::Status::Complete(_)) => {}
         Ok(httparse::Status::Partial) | Err(httparse::Error::TooManyHeaders) => {
             let status = "431 Request Header Fields Too Large";
-            return Err(Answer::refused(status, "the request is too long"));
+            return Err(Response::refused(status, "the request is too long"));
         }
         Err(_) => return Err(bad()),
     }
@@ -266,10 +266,10 @@ fn understood(head: &[u8], names: &[String]) -> Result<Request, Answer> {
     };
     if hosts.len() != 1 || !ours(hosts[0]) {
         let why = format!("this page is at http://{}/ only", names[0]);
-        return Err(Answer::refused("421 Misdirected Request", why));
+        return Err(Response::refused("421 Misdirected Request", why));
     }
     if request.method != Some("GET") {
-        return Err(Answer::refused("405 Method Not Allowed", "GET only"));
+        return Err(Response::refused("405 Method Not Allowed", "GET only"));
     }
     let known = named("if-none-match");
     let known = known.first().and_then(|tag| std::str::from_utf8(tag).ok());

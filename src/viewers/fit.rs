@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{
     Pictures, Viewer, bound,
-    easel::{Easel, Largest},
+    kernels::{Largest, ViewerKernels},
     packed,
 };
 use crate::{
@@ -132,9 +132,9 @@ pub fn fit(
     let room = count * ENTRIES_PER_SPLAT;
     let mut easels = Vec::new();
     for &viewer in viewers {
-        let easel = Easel::new(raster, viewer);
-        let canvas = easel.canvas(&loss, &target, scene, largest, room)?;
-        easels.push((easel, canvas));
+        let kernels = ViewerKernels::new(raster, viewer);
+        let canvas = kernels.canvas(&loss, &target, scene, largest, room)?;
+        easels.push((kernels, canvas));
     }
     let total = settings.iterations * viewers.len();
     let stay = match viewers {
@@ -153,14 +153,14 @@ pub fn fit(
         }
         set(gpu, &steps, iteration, &rates);
         target.write(gpu, &words[view]);
-        let (easel, canvas) = &easels[turn];
-        easel.step(canvas, &loss, &views[view]);
+        let (kernels, canvas) = &easels[turn];
+        kernels.step(canvas, &loss, &views[view]);
         let done = iteration + 1;
         if done.is_power_of_two() || done.is_multiple_of(LOOK_EVERY) || done == total {
-            for (easel, canvas) in &mut easels {
-                if let Some(needed) = easel.overflow(canvas)? {
+            for (kernels, canvas) in &mut easels {
+                if let Some(needed) = kernels.overflow(canvas)? {
                     let room = (needed as f64 * MORE_ROOM) as usize;
-                    *canvas = easel.canvas(&loss, &target, scene, largest, room)?;
+                    *canvas = kernels.canvas(&loss, &target, scene, largest, room)?;
                 }
             }
             observe(done, total);

@@ -6,8 +6,8 @@
 //! pictures are those that the scene has here. docs/viewers.md has what the viewers themselves
 //! draw, beside what [`Viewer::drawing`] says that they do.
 
-mod easel;
 mod fit;
+mod kernels;
 mod packed;
 
 pub use fit::{FitSettings, fit, start};

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
-use super::records::Source;
+use super::records::RecordSource;
 use super::tracks::Sighting;
 use super::{IMAGE, LONGEST_NAME};
 use crate::capture::error::{CaptureError, Position};
@@ -116,7 +116,7 @@ impl Records {
     }
 }
 
-impl Source for Records {
+impl RecordSource for Records {
     /// After the last one nothing may follow.
     fn next(&mut self) -> Result<bool, CaptureError> {
         self.current += 1;

@@ -18,7 +18,7 @@ use super::error::CaptureError;
 use super::lens::{Lens, ModelName};
 use super::{Chosen, Point};
 use crate::input::excerpt;
-use records::Source;
+use records::RecordSource;
 
 /// What the three files of a model say.
 pub(super) struct Model {
@@ -157,7 +157,7 @@ fn read_files(
     }
 }
 
-fn read_records<S: Source>(
+fn read_records<S: RecordSource>(
     open: impl Fn(&Path, &'static str) -> Result<S, CaptureError>,
     [cameras_path, images_path, points_path]: [PathBuf; 3],
     chosen: Option<&Chosen>,

@@ -13,7 +13,7 @@ use crate::capture::lens::{MOST_PARAMETERS, ModelName};
 pub(super) type Pose = (DQuat, DVec3);
 
 /// A file of records, binary or text.
-pub(super) trait Source {
+pub(super) trait RecordSource {
     /// Goes to the next record, if there is one. Refuses what the last one holds beyond its
     /// fields.
     fn next(&mut self) -> Result<bool, CaptureError>;
@@ -76,7 +76,7 @@ pub(super) trait Source {
 }
 
 /// `CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]`
-pub(super) fn cameras(mut source: impl Source) -> Result<Cameras, CaptureError> {
+pub(super) fn cameras(mut source: impl RecordSource) -> Result<Cameras, CaptureError> {
     let mut cameras = Cameras::default();
     while source.next()? {
         let id = source.u32("the id")?;
@@ -111,7 +111,7 @@ pub(super) fn cameras(mut source: impl Source) -> Result<Cameras, CaptureError> 
 
 /// `IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME`, then `X Y POINT3D_ID` of each 2D point.
 pub(super) fn images(
-    mut source: impl Source,
+    mut source: impl RecordSource,
     cameras: &Cameras,
     chosen: Option<&Chosen>,
 ) -> Result<(Vec<Image>, Sightings), CaptureError> {
@@ -145,7 +145,7 @@ pub(super) fn images(
 /// `POINT3D_ID X Y Z R G B ERROR TRACK[]`, the track being pairs of an image's id and
 /// the index of a 2D point.
 pub(super) fn points(
-    mut source: impl Source,
+    mut source: impl RecordSource,
     sightings: &Sightings,
 ) -> Result<Vec<Point>, CaptureError> {
     let mut points = Vec::new();

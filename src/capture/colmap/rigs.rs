@@ -6,7 +6,7 @@ use std::collections::HashMap;
 use glam::{DQuat, DVec3};
 
 use super::Image;
-use super::records::{Pose, Source};
+use super::records::{Pose, RecordSource};
 use crate::capture::error::CaptureError;
 
 /// Poses that differ by less are one: radians, and shares of the longest translation.
@@ -23,7 +23,7 @@ pub(super) type Poses = HashMap<u32, Option<Pose>>;
 
 /// `RIG_ID`, the number of sensors, the first one (kind and id), which is the rig's origin, and of
 /// each other kind, id, whether its pose is known, and the pose.
-fn rigs(source: &mut impl Source) -> Result<Rigs, CaptureError> {
+fn rigs(source: &mut impl RecordSource) -> Result<Rigs, CaptureError> {
     let mut rigs = Rigs::new();
     while source.next()? {
         let id = source.u32("the id")?;
@@ -48,7 +48,7 @@ fn rigs(source: &mut impl Source) -> Result<Rigs, CaptureError> {
 
 /// `FRAME_ID`, its rig's, the rig's pose in the world, the number of data, and of each its
 /// sensor's kind and id, and its own: that of an image.
-fn frames(source: &mut impl Source, rigs: &Rigs) -> Result<Poses, CaptureError> {
+fn frames(source: &mut impl RecordSource, rigs: &Rigs) -> Result<Poses, CaptureError> {
     let mut poses = Poses::new();
     while source.next()? {
         source.u32("the id")?;
@@ -80,7 +80,10 @@ fn frames(source: &mut impl Source, rigs: &Rigs) -> Result<Poses, CaptureError> 
 }
 
 /// Reads both files.
-pub(super) fn read<S: Source>(mut of_rigs: S, mut of_frames: S) -> Result<Poses, CaptureError> {
+pub(super) fn read<S: RecordSource>(
+    mut of_rigs: S,
+    mut of_frames: S,
+) -> Result<Poses, CaptureError> {
     frames(&mut of_frames, &rigs(&mut of_rigs)?)
 }
 

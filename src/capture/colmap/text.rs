@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use super::IMAGE;
-use super::records::Source;
+use super::records::RecordSource;
 use super::tracks::Sighting;
 use crate::capture::error::{CaptureError, Position};
 use crate::capture::lens::ModelName;
@@ -145,7 +145,7 @@ impl Lines {
     }
 }
 
-impl Source for Lines {
+impl RecordSource for Lines {
     fn next(&mut self) -> Result<bool, CaptureError> {
         if !self.rest().is_empty() {
             let rest = excerpt(self.rest());

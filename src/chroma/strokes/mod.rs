@@ -10,19 +10,19 @@ mod shade;
 mod spread;
 
 use super::{
-    ChromaError, FrozenViews, Lesson, Targets, Task,
+    ChromaError, FrozenViews, Supervision, Targets, Task,
     teacher::{AbImage, HintImage},
 };
 use crate::{
     capture::{Dataset, Photo},
     color::gray_to_lightness,
-    raster::Picture,
+    raster::RenderedImage,
     splats::{ShField, Splats, sh},
 };
 use region::{Surface, grow};
 use shade::shaded;
 pub(crate) use shade::{at_middle as at_middle_lightness, shaded as shaded_at};
-use spread::{Claim, Cloud};
+use spread::{Cloud, StrokeWeight};
 
 /// Claim of paint on a photo, as [`grow`] has it: α a, α b, α of each pixel, a and b at
 /// the middle lightness. `lightness` is `L*`, `depth` in any unit, NaN where nobody knows.
@@ -48,7 +48,7 @@ const OPAQUE: f32 = 0.5;
 const EDGE: [f32; 2] = [0.3, 0.7];
 
 /// Targets of all views, with strokes over the teachers'.
-pub(super) struct Laid {
+pub(super) struct StrokeTargets {
     pub targets: Targets,
     pub tasks: Vec<Task>,
     /// Share of the Gaussians that are claimed by half or more.
@@ -56,14 +56,14 @@ pub(super) struct Laid {
 }
 
 /// Claim of all strokes together on each Gaussian.
-struct Claims {
+struct StrokeWeights {
     /// Σ α² a, Σ α² b, Σ α² over the photos.
     colors: Vec<[f32; 3]>,
     /// The largest α.
     alphas: Vec<f32>,
 }
 
-impl Claims {
+impl StrokeWeights {
     fn new(count: usize) -> Self {
         Self {
             colors: vec![[0.0; 3]; count],
@@ -72,7 +72,7 @@ impl Claims {
     }
 
     /// A photo that shows a thing without strokes takes nothing from what another's claim.
-    fn add(&mut self, claims: &[Claim]) {
+    fn add(&mut self, claims: &[StrokeWeight]) {
         for claim in claims {
             let i = claim.splat as usize;
             let weight = claim.alpha * claim.alpha;
@@ -109,15 +109,15 @@ impl Claims {
 pub(super) fn lay(
     frozen: &FrozenViews,
     dataset: &Dataset,
-    lesson: &Lesson,
+    supervision: &Supervision,
     luma: &Splats,
-) -> Result<Laid, ChromaError> {
+) -> Result<StrokeTargets, ChromaError> {
     let cloud = Cloud::of(luma);
-    let mut claims = Claims::new(luma.len());
+    let mut claims = StrokeWeights::new(luma.len());
     let mut regions = Targets::new(1);
-    let mut region_of = vec![None; lesson.views.len()];
-    for (view, &i) in lesson.views.iter().enumerate() {
-        let Some(paint) = lesson.paint(i)? else {
+    let mut region_of = vec![None; supervision.views.len()];
+    for (view, &i) in supervision.views.iter().enumerate() {
+        let Some(paint) = supervision.paint(i)? else {
             continue;
         };
         let photo = dataset.photo(i)?;
@@ -154,10 +154,10 @@ pub(super) fn lay(
     let claimed = claims.alphas.iter().filter(|&&alpha| alpha >= 0.5).count();
     let fields = claims.fields();
     let fields = [frozen.colors(&fields[0])?, frozen.colors(&fields[1])?];
-    let mut targets = Targets::new(lesson.targets.scales());
+    let mut targets = Targets::new(supervision.targets.scales());
     let mut tasks = Vec::new();
     let mut view = 0;
-    dataset.visit(&lesson.views, |i, photo| {
+    dataset.visit(&supervision.views, |i, photo| {
         let drawn = frozen.draw(view, &[&fields[0], &fields[1]])?;
         let mut over = drawn_claims(&drawn);
         if let Some(region) = region_of[view] {
@@ -169,14 +169,14 @@ pub(super) fn lay(
                 }
             }
         }
-        if let Some(target) = laid_over(lesson, i, photo, &over, &mut targets)? {
+        if let Some(target) = laid_over(supervision, i, photo, &over, &mut targets)? {
             tasks.push(Task { view, target });
         }
         view += 1;
         Ok::<_, ChromaError>(())
     })?;
     dataset.release();
-    Ok(Laid {
+    Ok(StrokeTargets {
         targets,
         tasks,
         claimed: claimed as f64 / luma.len().max(1) as f64,
@@ -184,7 +184,7 @@ pub(super) fn lay(
 }
 
 /// Claims as a view shows them: colors at the middle lightness, and α.
-fn drawn_claims(drawn: &[Picture]) -> Vec<([f32; 2], f32)> {
+fn drawn_claims(drawn: &[RenderedImage]) -> Vec<([f32; 2], f32)> {
     let [colors, alphas] = [0, 1].map(|k: usize| drawn[k].pixels.as_chunks::<2>().0);
     (colors.iter().zip(alphas))
         .map(|(color, &[alpha, opacity])| {
@@ -200,14 +200,14 @@ fn drawn_claims(drawn: &[Picture]) -> Vec<([f32; 2], f32)> {
 
 /// Keeps what is wanted of a view with claims over it; `None` where nothing is.
 fn laid_over(
-    lesson: &Lesson,
+    supervision: &Supervision,
     view: usize,
     photo: &Photo,
     claims: &[([f32; 2], f32)],
     targets: &mut Targets,
 ) -> Result<Option<usize>, ChromaError> {
-    let taught = (lesson.of_view[view])
-        .map(|target| lesson.targets.read(target, 0))
+    let taught = (supervision.of_view[view])
+        .map(|target| supervision.targets.read(target, 0))
         .transpose()?;
     if taught.is_none() && claims.iter().all(|&(_, alpha)| alpha == 0.0) {
         return Ok(None);

@@ -26,7 +26,7 @@ const INSIDE: f64 = 0.9;
 
 /// A claim on a Gaussian.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Claim {
+pub(super) struct StrokeWeight {
     /// The Gaussian.
     pub splat: u32,
     /// a, b at the middle lightness.
@@ -68,7 +68,7 @@ impl<'a> Cloud<'a> {
 
     /// All that one photo's strokes claim. `sums` are, of each Gaussian, α a, α b, α and 1 summed
     /// over the photo's pixels by how much of it each shows.
-    pub fn claims(&self, sums: &[[f32; 4]]) -> Vec<Claim> {
+    pub fn claims(&self, sums: &[[f32; 4]]) -> Vec<StrokeWeight> {
         let mut colors = vec![[0.0; 2]; sums.len()];
         let mut alphas = vec![0.0; sums.len()];
         let mut costs = vec![f32::INFINITY; sums.len()];
@@ -108,7 +108,7 @@ impl<'a> Cloud<'a> {
         }
         (0..sums.len())
             .filter(|&i| alphas[i] > 0.0)
-            .map(|i| Claim {
+            .map(|i| StrokeWeight {
                 splat: i as u32,
                 color: colors[i],
                 alpha: alphas[i] * claimed(costs[i]),

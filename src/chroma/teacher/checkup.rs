@@ -1,6 +1,6 @@
 //! What the program understands of a network, and how it answers.
 
-use super::network::{Loaded, NetworkTeacher, ToldBy};
+use super::network::{Loaded, NetworkTeacher, ProfileSource};
 use super::{
     Catalog, GrayImage, TeacherError, TeacherInfo, TeacherSettings, Upsample, plausible, trial,
 };
@@ -23,18 +23,18 @@ pub struct Checkup {
     /// Inputs and outputs in words.
     pub ports: String,
     /// Who says what they mean.
-    pub told_by: ToldBy,
+    pub told_by: ProfileSource,
     /// What was tried where nobody does.
     pub trials: Vec<Trial>,
     /// What its numbers are taken for: a manifest.
     pub manifest: String,
     /// Answers to a ramp from black to white and to a photo.
-    pub answers: Vec<Answered>,
+    pub answers: Vec<NetworkCheck>,
 }
 
 /// How a network answers for one picture.
 #[derive(Clone, Debug, Serialize)]
-pub struct Answered {
+pub struct NetworkCheck {
     /// The picture's name.
     pub picture: String,
     /// Least and largest of the answer's numbers, as they come.
@@ -64,12 +64,12 @@ pub fn check(
     let ports = loaded.ports.describe();
     let tried = |loaded| {
         let (teacher, trials) = trial::guess(loaded, settings, &[(name, photo)])?;
-        Ok::<_, TeacherError>((teacher, ToldBy::Trial, trials))
+        Ok::<_, TeacherError>((teacher, ProfileSource::Trial, trials))
     };
     let (mut teacher, told_by, trials) = match loaded.contract(settings) {
         Ok((profile, fit, by)) => {
             let mut teacher = NetworkTeacher::following(loaded, profile, fit, settings)?;
-            teacher.supposed = by == ToldBy::Shapes;
+            teacher.supposed = by == ProfileSource::Shapes;
             let asked = teacher
                 .supposed
                 .then(|| teacher.colorize(name, photo, None));
@@ -106,7 +106,7 @@ fn answered(
     teacher: &mut NetworkTeacher,
     name: &str,
     picture: GrayImage<'_>,
-) -> Result<Answered, TeacherError> {
+) -> Result<NetworkCheck, TeacherError> {
     let numbers = teacher.look(name, &picture)?.values;
     let range = |f: fn(f32, f32) -> f32| numbers.iter().copied().reduce(f).unwrap_or(0.0);
     // The first time a network prepares itself.
@@ -119,7 +119,7 @@ fn answered(
         let rgb = lab_to_srgb([lightness, ab[0].into(), ab[1].into()]);
         rgb.map(|value| value.clamp(0.0, 1.0) as f32)
     });
-    Ok(Answered {
+    Ok(NetworkCheck {
         picture: name.to_owned(),
         range: [range(f32::min), range(f32::max)],
         colorfulness: colorfulness(&rgb.collect::<Vec<_>>()),

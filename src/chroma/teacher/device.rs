@@ -40,7 +40,7 @@ impl TeacherDevice {
 }
 
 /// What is made of a model, a session for one, and where it runs.
-pub(super) struct Placed<T> {
+pub(super) struct SessionOn<T> {
     pub made: T,
     pub device: TeacherDevice,
     /// The devices that the library at hand has, and that come first, but that do not take the
@@ -57,7 +57,7 @@ pub(super) fn load(
     path: &Path,
     environment: &Environment,
     settings: &TeacherSettings,
-) -> Result<Placed<Session>, TeacherError> {
+) -> Result<SessionOn<Session>, TeacherError> {
     let on = |device: TeacherDevice| {
         let provider = device.provider().map_err(|device| TeacherError::NoDevice {
             path: path.to_path_buf(),
@@ -87,12 +87,12 @@ pub(super) fn load(
 fn first_that_takes<T>(
     tried: &[TeacherDevice],
     on: impl Fn(TeacherDevice) -> Result<T, TeacherError>,
-) -> Result<Placed<T>, TeacherError> {
+) -> Result<SessionOn<T>, TeacherError> {
     let mut refused = Vec::new();
     for (k, &device) in tried.iter().enumerate() {
         match on(device) {
             Ok(made) => {
-                return Ok(Placed {
+                return Ok(SessionOn {
                     made,
                     device,
                     refused,

@@ -3,7 +3,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use crate::capture::Ambiguous;
+use crate::capture::AmbiguousNames;
 
 /// Why a teacher could not be opened or could not color a photo.
 #[derive(Debug, thiserror::Error)]
@@ -204,7 +204,7 @@ pub enum TeacherError {
     },
     /// Nobody knows which image of the folder belongs to which photo.
     #[error(transparent)]
-    Ambiguous(Ambiguous),
+    AmbiguousNames(AmbiguousNames),
     /// An image of the folder does not decode.
     #[error("{}: not a readable image: {reason}", path.display())]
     BadImage {

@@ -2,7 +2,7 @@
 
 use super::named_images::NamedImages;
 use super::settings::file_name;
-use super::shown::Shown;
+use super::shown::SampleSheet;
 use super::{AbImage, GrayImage, Query, TeacherError, TeacherInfo};
 use crate::capture::{Capture, IMAGES};
 use crate::color::srgb_to_lab;
@@ -20,7 +20,7 @@ pub struct FolderTeacher {
     images: NamedImages,
     /// True if the images are the photos themselves.
     of_photos: bool,
-    shown: RefCell<Shown>,
+    shown: RefCell<SampleSheet>,
 }
 
 /// Share of an image that may be transparent without a word.
@@ -62,7 +62,7 @@ impl FolderTeacher {
     /// folder.
     ///
     /// # Errors
-    /// [`TeacherError::Ambiguous`] where nobody knows.
+    /// [`TeacherError::AmbiguousNames`] where nobody knows.
     pub fn covers<'a>(&'a self, query: impl Into<Query<'a>>) -> Result<bool, TeacherError> {
         self.images.covers(query)
     }

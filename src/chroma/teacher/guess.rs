@@ -5,7 +5,7 @@ use super::profile::{Layout, Role};
 
 /// What shapes let suppose of a network that nobody knows.
 #[derive(Clone, Debug)]
-pub(super) struct Guess {
+pub(super) struct GuessedProfile {
     /// The first picture, and nothing for the others.
     pub inputs: Vec<Role>,
     /// Channels of that picture.
@@ -20,7 +20,7 @@ pub(super) struct Guess {
     pub name: Option<String>,
 }
 
-impl Guess {
+impl GuessedProfile {
     /// This, or the largest power of two that goes into it and into the fixed sides.
     pub fn multiple(&self, most: u32) -> u32 {
         let sides = self.fixed.into_iter().flatten();
@@ -34,7 +34,7 @@ impl Ports {
     /// The roles that inputs may have where nobody says so, the channels of the photo and of the
     /// answer: the first picture of one or three channels, and the first answer of two or three.
     /// None where there are no such.
-    pub fn guess(&self, layout: Layout) -> Option<Guess> {
+    pub fn guess(&self, layout: Layout) -> Option<GuessedProfile> {
         let channels = |port: &Port, among: [usize; 2]| {
             let is_it = |&count: &usize| port.image(count, layout).is_some();
             among.into_iter().find(is_it)
@@ -46,7 +46,7 @@ impl Ports {
             Element::I64 | Element::I32 => Role::Class,
             _ => Role::Zeros,
         };
-        Some(Guess {
+        Some(GuessedProfile {
             inputs: self.inputs.iter().enumerate().map(role).collect(),
             image: channels(&self.inputs[image], [3, 1])?,
             bytes: self.inputs[image].element == Element::U8,

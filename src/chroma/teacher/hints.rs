@@ -3,7 +3,7 @@
 use super::images::{Filter, resample};
 use super::named_images::NamedImages;
 use super::{GrayImage, Query, TeacherError};
-use crate::capture::{Capture, Orientation, Stance, decode_image};
+use crate::capture::{Capture, Orientation, SensorOrientation, decode_image};
 use crate::color::srgb_to_lab;
 use crate::input;
 use image::Rgba32FImage;
@@ -62,7 +62,7 @@ impl HintFolder {
     }
 
     /// Adds a photo of which there is no view, and that stands like this.
-    pub fn know_photo(&mut self, name: &str, path: &Path, stance: Stance) {
+    pub fn know_photo(&mut self, name: &str, path: &Path, stance: SensorOrientation) {
         let file = (path.to_owned(), stance.from_file);
         self.photos.insert(name.to_owned(), file);
     }
@@ -75,7 +75,7 @@ impl HintFolder {
     /// Whether there is an image for a photo, painted or not.
     ///
     /// # Errors
-    /// [`TeacherError::Ambiguous`] where nobody knows.
+    /// [`TeacherError::AmbiguousNames`] where nobody knows.
     pub fn covers<'a>(&'a self, query: impl Into<Query<'a>>) -> Result<bool, TeacherError> {
         self.images.covers(query)
     }

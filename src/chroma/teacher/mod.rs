@@ -30,13 +30,13 @@ mod upsample;
 mod weights;
 
 pub use catalog::{Catalog, KnownTeacher};
-pub use checkup::{Answered, Checkup, Trial, check};
+pub use checkup::{Checkup, NetworkCheck, Trial, check};
 pub use error::TeacherError;
 pub use folder::FolderTeacher;
 pub use hints::{HintFolder, HintImage};
 pub use images::{AbImage, GrayImage};
 pub(super) use images::{Filter, resample};
-pub use network::{NetworkTeacher, ToldBy};
+pub use network::{NetworkTeacher, ProfileSource};
 #[cfg(feature = "cli")]
 pub(crate) use places::cache_folder;
 pub use query::Query;
@@ -47,11 +47,11 @@ use std::path::{Path, PathBuf};
 
 /// Someone who colors photos.
 pub struct Teacher {
-    source: Source,
+    source: TeacherKind,
     upsample: Upsample,
 }
 
-enum Source {
+enum TeacherKind {
     Network(Box<NetworkTeacher>),
     Folder(Box<FolderTeacher>),
 }
@@ -82,9 +82,9 @@ impl Teacher {
             .extension()
             .is_some_and(|e| e.eq_ignore_ascii_case("onnx"));
         let source = if metadata.is_dir() {
-            Source::Folder(Box::new(FolderTeacher::open(path)?))
+            TeacherKind::Folder(Box::new(FolderTeacher::open(path)?))
         } else if is_onnx {
-            Source::Network(Box::new(NetworkTeacher::open(
+            TeacherKind::Network(Box::new(NetworkTeacher::open(
                 path, cache_dir, settings, &catalog,
             )?))
         } else {
@@ -100,12 +100,12 @@ impl Teacher {
 
     /// Whether it is a network and not a folder.
     pub fn is_network(&self) -> bool {
-        matches!(self.source, Source::Network(_))
+        matches!(self.source, TeacherKind::Network(_))
     }
 
     /// Says which photos there are, so that a folder's image of one is not taken for another's.
     pub fn know(&mut self, capture: &crate::capture::Capture) {
-        if let Source::Folder(folder) = &mut self.source {
+        if let TeacherKind::Folder(folder) = &mut self.source {
             folder.know(capture);
         }
     }
@@ -113,43 +113,43 @@ impl Teacher {
     /// Whether it has an answer for a photo: a network always, a folder where there is an image.
     ///
     /// # Errors
-    /// [`TeacherError::Ambiguous`] where nobody knows.
+    /// [`TeacherError::AmbiguousNames`] where nobody knows.
     pub fn covers<'a>(&'a self, query: impl Into<Query<'a>>) -> Result<bool, TeacherError> {
         match &self.source {
-            Source::Network(_) => Ok(true),
-            Source::Folder(folder) => folder.covers(query),
+            TeacherKind::Network(_) => Ok(true),
+            TeacherKind::Folder(folder) => folder.covers(query),
         }
     }
 
     /// Name, kind and identity, for reports.
     pub fn describe(&self) -> TeacherInfo {
         match &self.source {
-            Source::Network(network) => network.describe(),
-            Source::Folder(folder) => folder.describe(),
+            TeacherKind::Network(network) => network.describe(),
+            TeacherKind::Folder(folder) => folder.describe(),
         }
     }
 
     /// Why a network's answers are not kept, where they were to be.
     pub fn unkept(&self) -> Option<&TeacherError> {
         match &self.source {
-            Source::Network(network) => network.unkept.as_ref(),
-            Source::Folder(_) => None,
+            TeacherKind::Network(network) => network.unkept.as_ref(),
+            TeacherKind::Folder(_) => None,
         }
     }
 
     /// What to say of processors that a network would rather run on, but that fail.
     pub fn passed_over(&self) -> Vec<String> {
         match &self.source {
-            Source::Network(network) => network.passed_over(),
-            Source::Folder(_) => Vec::new(),
+            TeacherKind::Network(network) => network.passed_over(),
+            TeacherKind::Folder(_) => Vec::new(),
         }
     }
 
     /// Warnings about the images that a folder has answered with so far, a line each.
     pub fn doubts(&self) -> Vec<String> {
         match &self.source {
-            Source::Network(_) => Vec::new(),
-            Source::Folder(folder) => folder.doubts(),
+            TeacherKind::Network(_) => Vec::new(),
+            TeacherKind::Folder(folder) => folder.doubts(),
         }
     }
 
@@ -159,8 +159,8 @@ impl Teacher {
     /// [`TeacherError::OtherPhotos`].
     pub fn check_images(&self) -> Result<(), TeacherError> {
         match &self.source {
-            Source::Network(_) => Ok(()),
-            Source::Folder(folder) => folder.check(),
+            TeacherKind::Network(_) => Ok(()),
+            TeacherKind::Folder(folder) => folder.check(),
         }
     }
 
@@ -183,8 +183,8 @@ impl Teacher {
         let query = query.into();
         photo.check(query.name)?;
         let answer = match &mut self.source {
-            Source::Network(network) => Some(asked(network, query, photo, hints)?),
-            Source::Folder(folder) => folder.colorize(query, photo)?,
+            TeacherKind::Network(network) => Some(asked(network, query, photo, hints)?),
+            TeacherKind::Folder(folder) => folder.colorize(query, photo)?,
         };
         Ok(answer.map(|answer| answer.upsampled(photo, self.upsample)))
     }

@@ -98,13 +98,13 @@ impl NamedImages {
     /// folder.
     ///
     /// # Errors
-    /// [`TeacherError::Ambiguous`] where nobody knows.
+    /// [`TeacherError::AmbiguousNames`] where nobody knows.
     pub fn covers<'a>(&'a self, query: impl Into<Query<'a>>) -> Result<bool, TeacherError> {
         Ok(self.of(query.into())?.is_some())
     }
 
     fn find(&self, name: &str) -> Result<Option<&Path>, TeacherError> {
-        self.images.of(name).map_err(TeacherError::Ambiguous)
+        self.images.of(name).map_err(TeacherError::AmbiguousNames)
     }
 
     /// Where the image for a view lies, and of which photo it is where that is not the view as
@@ -132,7 +132,7 @@ impl NamedImages {
     ///
     /// # Errors
     /// [`TeacherError::BadImage`] where it is damaged, [`TeacherError::Aspect`]
-    /// where it shows another cut of the photo, [`TeacherError::Ambiguous`] where two images
+    /// where it shows another cut of the photo, [`TeacherError::AmbiguousNames`] where two images
     /// may be the photo's or the image may be another's, [`TeacherError::Io`].
     pub fn load<'a>(
         &'a self,

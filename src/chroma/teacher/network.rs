@@ -7,7 +7,7 @@ use super::images::resample;
 use super::model::{Fit, Port, Ports};
 use super::profile::{self, OutputKind, Profile, Role};
 use super::settings::file_name;
-use super::tensor::{self, Picture};
+use super::tensor::{self, NetworkImage};
 use super::{AbImage, GrayImage, HintImage};
 use super::{Catalog, device, plausible, runtime, weights};
 use super::{TeacherDevice, TeacherError, TeacherInfo, TeacherSettings};
@@ -48,7 +48,7 @@ pub(super) struct Loaded {
     /// None once it has not ended in time.
     session: Option<Session>,
     device: TeacherDevice,
-    /// See [`device::Placed`].
+    /// See [`device::SessionOn`].
     refused: Vec<(TeacherDevice, String)>,
     sha256: String,
     /// What the table of networks says of it: its name there and its contract.
@@ -58,7 +58,7 @@ pub(super) struct Loaded {
 /// Who says what a network takes and gives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum ToldBy {
+pub enum ProfileSource {
     /// `--teacher-profile`.
     User,
     /// The manifest beside the model.
@@ -97,15 +97,15 @@ impl Loaded {
     pub fn contract(
         &self,
         settings: &TeacherSettings,
-    ) -> Result<(Profile, Fit, ToldBy), TeacherError> {
+    ) -> Result<(Profile, Fit, ProfileSource), TeacherError> {
         let manifest = self.path.with_extension("toml");
         let (profile, by) = match (&settings.profile, &self.known) {
-            (Some(name), _) => (profile::named(name)?, ToldBy::User),
-            _ if manifest.exists() => (Profile::read(&manifest)?, ToldBy::Manifest),
-            (None, Some((_, contract))) => (contract.clone(), ToldBy::Catalog),
+            (Some(name), _) => (profile::named(name)?, ProfileSource::User),
+            _ if manifest.exists() => (Profile::read(&manifest)?, ProfileSource::Manifest),
+            (None, Some((_, contract))) => (contract.clone(), ProfileSource::Catalog),
             (None, None) => {
                 let (profile, fit) = self.ports.choose(&self.path)?;
-                return Ok((profile, fit, ToldBy::Shapes));
+                return Ok((profile, fit, ProfileSource::Shapes));
             }
         };
         let fit = self.ports.check(&self.path, &profile)?;
@@ -127,7 +127,7 @@ impl NetworkTeacher {
         let loaded = Loaded::open(path, settings, catalog)?;
         let (profile, fit, by) = loaded.contract(settings)?;
         let mut teacher = Self::following(loaded, profile, fit, settings)?;
-        teacher.supposed = by == ToldBy::Shapes;
+        teacher.supposed = by == ProfileSource::Shapes;
         match cache_dir.map(Cache::open).transpose() {
             Ok(cache) => teacher.cache = cache,
             Err(error) => teacher.unkept = Some(error),
@@ -302,7 +302,7 @@ impl NetworkTeacher {
         size: [u32; 2],
         hints: Option<&HintImage>,
     ) -> Result<(Vec<i64>, Vec<f32>), String> {
-        let picture = |values: Vec<f32>| Picture {
+        let picture = |values: Vec<f32>| NetworkImage {
             layout: self.profile.layout,
             batch: self.fit.batch,
             size,

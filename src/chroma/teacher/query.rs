@@ -1,7 +1,7 @@
 //! Which photo a teacher is asked about.
 
 use super::images::{Filter, resample};
-use crate::capture::{Camera, Stance, View, lens::Undistortion};
+use crate::capture::{Camera, SensorOrientation, View, lens::Undistortion};
 
 /// The photo that a teacher is asked about.
 ///
@@ -13,7 +13,7 @@ pub struct Query<'a> {
     pub name: &'a str,
     pub(super) original: Option<Original<'a>>,
     /// How the photo stands.
-    pub(super) stance: Stance,
+    pub(super) stance: SensorOrientation,
 }
 
 /// A photo of which a view is a resampled part.
@@ -28,13 +28,13 @@ pub(super) struct Original<'a> {
 
 impl<'a> From<&'a str> for Query<'a> {
     fn from(name: &'a str) -> Self {
-        Self::of(name, Stance::default())
+        Self::of(name, SensorOrientation::default())
     }
 }
 
 impl<'a> Query<'a> {
     /// A photo as its file has it, or as it was turned for COLMAP.
-    pub fn of(name: &'a str, stance: Stance) -> Self {
+    pub fn of(name: &'a str, stance: SensorOrientation) -> Self {
         Self {
             name,
             original: None,

@@ -31,14 +31,14 @@ const TOLD: usize = 3;
 
 /// Photos that were asked about, and the images that answered, small.
 #[derive(Default)]
-pub(super) struct Shown {
+pub(super) struct SampleSheet {
     /// Name and gray of each photo.
     photos: Vec<(String, Vec<f32>)>,
     /// Name, index of the photo, and gray of each image.
     images: Vec<(String, usize, Vec<f32>)>,
 }
 
-impl Shown {
+impl SampleSheet {
     /// Takes a photo.
     pub fn look(&mut self, name: &str, photo: GrayImage<'_>) {
         self.photos.push((name.to_owned(), small(photo)));
@@ -149,8 +149,8 @@ mod tests {
         })
     }
 
-    fn shown(images: &[GrayImage]) -> Shown {
-        let mut shown = Shown::default();
+    fn shown(images: &[GrayImage]) -> SampleSheet {
+        let mut shown = SampleSheet::default();
         for (number, image) in (0..).zip(images) {
             let photo = photo(number);
             shown.look(&format!("{number}.jpg"), gray_image(&photo));

@@ -8,7 +8,7 @@ use ort::session::SessionInputValue;
 use ort::value::{DynValue, Tensor, TensorElementType};
 
 /// A picture for a network, `[channels, height, width]`.
-pub(super) struct Picture {
+pub(super) struct NetworkImage {
     /// How the network wants it.
     pub layout: Layout,
     /// How often it wants it.
@@ -18,7 +18,7 @@ pub(super) struct Picture {
     pub values: Vec<f32>,
 }
 
-impl Picture {
+impl NetworkImage {
     /// The picture as a tensor, so many times over.
     pub fn tensor(self, element: Element) -> Result<SessionInputValue<'static>, String> {
         let [width, height] = self.size.map(|side| side as usize);

@@ -1,7 +1,7 @@
 //! What a network's numbers mean, where nobody says so: candidates are tried, and the answers
 //! looked at.
 
-use super::guess::Guess;
+use super::guess::GuessedProfile;
 use super::images::Filter;
 use super::model::Fit;
 use super::network::{Loaded, NetworkTeacher, Numbers};
@@ -174,7 +174,7 @@ pub(super) fn guess(
 }
 
 /// What a candidate says of a network.
-fn candidate(guess: &Guess, layout: Layout, input: &Input) -> Profile {
+fn candidate(guess: &GuessedProfile, layout: Layout, input: &Input) -> Profile {
     let output = match guess.answer {
         2 => OutputKind::Ab,
         _ => OutputKind::Rgb,

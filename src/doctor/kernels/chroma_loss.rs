@@ -9,7 +9,7 @@ use crate::{
     doctor::measured::{Allowance, Row, Sample, by_quantity},
     gpu::{Buffer, Gpu, GpuError, Kernel, groups_for, shaders},
     oracle::{
-        chroma_loss::{Teaching, chroma_loss, chroma_loss_gradient, curvature},
+        chroma_loss::{AbTargets, chroma_loss, chroma_loss_gradient, curvature},
         random::{Random, round},
     },
     raster::Raster,
@@ -137,7 +137,7 @@ fn upsample(coarser: &[[f64; 2]], from: [usize; 2], to: [usize; 2]) -> Vec<[f64;
 
 /// How a row asks for the loss.
 #[derive(Clone, Copy)]
-struct Terms {
+struct LossRequest {
     agreement: f64,
     decline: f64,
     /// Whether pixels have weights and the teacher is corrected.
@@ -146,7 +146,7 @@ struct Terms {
     joint: bool,
 }
 
-const PLAIN: Terms = Terms {
+const PLAIN: LossRequest = LossRequest {
     agreement: 0.0,
     decline: 0.0,
     weighed: false,
@@ -172,7 +172,7 @@ const CORRECTIONS: [Correction; 3] = [
 ];
 
 /// Values, gradients and curvatures, the latter two by pixel.
-fn measure(gpu: &Gpu, terms: Terms) -> Result<[Vec<Sample>; 3], GpuError> {
+fn measure(gpu: &Gpu, terms: LossRequest) -> Result<[Vec<Sample>; 3], GpuError> {
     let sizes = SIZES.into_iter().chain([MANY_BLOCKS]);
     by_quantity(sizes.enumerate().map(|(seed, size)| {
         let mut random = Random::new(seed as u64);
@@ -187,7 +187,7 @@ fn measure(gpu: &Gpu, terms: Terms) -> Result<[Vec<Sample>; 3], GpuError> {
         let wanted = wanted.into_iter().map(|ab| ab.map(in_steps)).collect();
         let noise = pixels(size, 3.0);
         let count = size[0] * size[1];
-        let mut teaching = Teaching {
+        let mut teaching = AbTargets {
             weights: vec![1.0; count],
             gain: [[1.0, 0.0], [0.0, 1.0]],
             offset: [0.0; 2],
@@ -256,16 +256,16 @@ fn measure(gpu: &Gpu, terms: Terms) -> Result<[Vec<Sample>; 3], GpuError> {
 
 pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
     let (gpu, allowed) = (&raster.gpu, Allowance::of(&raster.gpu));
-    let agreeing = |terms| Terms {
+    let agreeing = |terms| LossRequest {
         agreement: 0.5,
         ..terms
     };
-    let solver = Terms {
+    let solver = LossRequest {
         decline: 0.1,
         weighed: true,
         ..PLAIN
     };
-    let joint = Terms {
+    let joint = LossRequest {
         joint: true,
         ..solver
     };

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use crate::{
-    chroma::{Lbfgs, LbfgsKernels, REST, State, System, UNBOUNDED, diagonal_scale},
+    chroma::{Lbfgs, LbfgsKernels, LbfgsState, REST, System, UNBOUNDED, diagonal_scale},
     compare::{narrow, widen},
     doctor::measured::{Allowance, Row, Sample},
     gpu::{Buffer, Gpu, GpuError, Recorder},
@@ -250,7 +250,7 @@ impl Problem {
         let mut recorder = Recorder::new(gpu);
         lbfgs.end(gpu, &mut recorder);
         recorder.submit();
-        let moved = State::of(&lbfgs.state_later(gpu).wait(gpu)?).moved;
+        let moved = LbfgsState::of(&lbfgs.state_later(gpu).wait(gpu)?).moved;
         Ok((widen(&system.unknowns.read(gpu)?), moved))
     }
 }

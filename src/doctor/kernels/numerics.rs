@@ -124,7 +124,7 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
 }
 
 /// What an adjoint leaves in its scratch.
-struct Left {
+struct ScratchValues {
     /// By emission slot.
     records: Vec<u32>,
     /// By Gaussian.
@@ -136,7 +136,7 @@ fn left(
     stage: &Stage,
     scene: &Scene<f64, 1>,
     upstream: &[f32],
-) -> Result<Left, GpuError> {
+) -> Result<ScratchValues, GpuError> {
     let gpu = &raster.gpu;
     let splats = splats(scene);
     let geometry = Geometry::upload(gpu, &splats)?;
@@ -154,7 +154,7 @@ fn left(
     layer.record(raster, &mut recorder);
     adjoint.record(raster, &mut recorder);
     recorder.submit();
-    Ok(Left {
+    Ok(ScratchValues {
         records: adjoint.scratch().partials.read(gpu)?,
         gradients: adjoint.scratch().gradients.read(gpu)?,
     })

@@ -13,7 +13,7 @@ use crate::{
     oracle::{
         lab_loss::{LabTarget, LabWeights},
         random::{Random, round},
-        rgb_loss::Wanted,
+        rgb_loss::RgbTargets,
     },
     raster::Raster,
 };
@@ -122,7 +122,7 @@ fn of_rgb(gpu: &Gpu, hard: bool) -> Result<[Vec<Sample>; 3], GpuError> {
                 [0, 1, 2].map(|c| round(rgb[c] + off[c]))
             })
             .collect();
-        let wanted = Wanted {
+        let wanted = RgbTargets {
             rgb,
             weights: weights(count, hard),
         };

@@ -9,7 +9,7 @@ use crate::{
     raster::{
         Raster,
         constants::*,
-        groups::{Count, Groups, Work},
+        groups::{Count, Groups, WorkKind},
         scan::{Scan, Total},
     },
 };
@@ -49,7 +49,7 @@ pub fn scan_on(
         count: &count,
         limit,
     });
-    let elements = (&elements, Work::Scan);
+    let elements = (&elements, WorkKind::Scan);
     let scan = Scan::new(gpu, kernels, &buffer, &status, elements, total)?;
     let mut recorder = Recorder::new(gpu);
     scan.record(kernels, &mut recorder);

@@ -16,7 +16,7 @@ use crate::{
 };
 
 /// One view's pixels.
-struct Taught {
+struct TestView {
     size: [usize; 2],
     /// Weight (the mean over both channels), rendered and taught a/b.
     pixels: Vec<Pixel>,
@@ -24,7 +24,7 @@ struct Taught {
     weights: Option<Vec<f64>>,
 }
 
-impl Taught {
+impl TestView {
     /// Colors of this spread about a mean, and a teacher that strays from them by gain,
     /// offset and noise.
     fn random(random: &mut Random, size: [usize; 2], spread: f64) -> Self {
@@ -72,7 +72,7 @@ impl Taught {
     }
 }
 
-fn on_device(gpu: &Gpu, views: &[Taught]) -> Result<Vec<Correction>, GpuError> {
+fn on_device(gpu: &Gpu, views: &[TestView]) -> Result<Vec<Correction>, GpuError> {
     let kernels = CorrectionKernels::new(gpu);
     let corrections = Corrections::new(gpu, &kernels, views.len())?;
     let buffer = |values: &[f64]| Buffer::from_slice(gpu, "pixels", &narrow(values));
@@ -100,10 +100,10 @@ fn on_device(gpu: &Gpu, views: &[Taught]) -> Result<Vec<Correction>, GpuError> {
 }
 
 /// Gains and offsets of each set of views.
-fn measure(gpu: &Gpu, sets: &[Vec<Taught>]) -> Result<[Vec<Sample>; 2], GpuError> {
+fn measure(gpu: &Gpu, sets: &[Vec<TestView>]) -> Result<[Vec<Sample>; 2], GpuError> {
     by_quantity(sets.iter().map(|views| {
         let actual = on_device(gpu, views)?;
-        let pixels: Vec<_> = views.iter().map(Taught::counted).collect();
+        let pixels: Vec<_> = views.iter().map(TestView::counted).collect();
         let expected = view_corrections(&pixels);
         let gains = actual.iter().flat_map(|c| c.gain).flatten();
         let expected_gains = expected.iter().flat_map(|c| c.gain).flatten();
@@ -117,8 +117,8 @@ fn measure(gpu: &Gpu, sets: &[Vec<Taught>]) -> Result<[Vec<Sample>; 2], GpuError
 }
 
 /// Sets of views as captures have them.
-fn ordinary(random: &mut Random) -> Vec<Vec<Taught>> {
-    let mut view = |size, spread| Taught::random(random, size, spread);
+fn ordinary(random: &mut Random) -> Vec<Vec<TestView>> {
+    let mut view = |size, spread| TestView::random(random, size, spread);
     vec![
         // More pixels than the workgroups of a view take at once; some to leave out.
         vec![
@@ -133,8 +133,8 @@ fn ordinary(random: &mut Random) -> Vec<Vec<Taught>> {
 }
 
 /// Views that say little or nothing.
-fn hard(random: &mut Random) -> Vec<Vec<Taught>> {
-    let mut view = |spread| Taught::random(random, [21, 16], spread);
+fn hard(random: &mut Random) -> Vec<Vec<TestView>> {
+    let mut view = |spread| TestView::random(random, [21, 16], spread);
     vec![
         // One view: its mean is all there is, and nothing is corrected.
         vec![view(30.0)],

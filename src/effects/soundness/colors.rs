@@ -7,7 +7,7 @@ use super::{
 use crate::{
     capture::{Camera, Capture, Channel, Photo, Rejected},
     color::GrayTable,
-    effects::{look_ups::LookUps, tracks::place_in},
+    effects::{patch_means::PatchMeans, tracks::place_in},
 };
 
 /// Side of the square over which a photo is averaged, in pixels: points lie where luma has an
@@ -22,7 +22,7 @@ const SPREAD: f64 = 0.02;
 /// order of the views.
 #[derive(Clone, Debug)]
 pub struct PointColors {
-    look_ups: LookUps,
+    patch_means: PatchMeans,
     /// Of each look-up the photo and the point's gray, 0 to 1.
     asked: Vec<(usize, f64)>,
 }
@@ -41,7 +41,7 @@ impl PointColors {
     pub fn of(capture: &Capture, cameras: &[Camera], channel: Channel) -> Self {
         let (_, photo_of) = photos(capture);
         let table = GrayTable::new();
-        let mut look_ups = LookUps::of(cameras.len());
+        let mut patch_means = PatchMeans::of(cameras.len());
         let mut asked = Vec::new();
         for point in &capture.points {
             let gray = match channel {
@@ -53,23 +53,23 @@ impl PointColors {
             for seen in &point.track {
                 let camera = &cameras[seen.view];
                 let of_model = &capture.views[seen.view].camera;
-                look_ups.ask(seen.view, place_in(camera, of_model, seen.pixel), SIDE);
+                patch_means.ask(seen.view, place_in(camera, of_model, seen.pixel), SIDE);
                 asked.push((photo_of[seen.view], f64::from(gray) / 255.0));
             }
         }
-        Self { look_ups, asked }
+        Self { patch_means, asked }
     }
 
     /// Takes what is wanted of the photo of a view.
     pub fn look(&mut self, view: usize, photo: &Photo) {
-        self.look_ups.look(view, photo);
+        self.patch_means.look(view, photo);
     }
 
     /// What all photos together say; `capture` is the one it was made of.
     pub fn finish(self, capture: &Capture) -> Agreement {
         let (names, _) = photos(capture);
         let mut pairs = vec![Vec::new(); names.len()];
-        for (&(photo, point), shown) in self.asked.iter().zip(self.look_ups.means()) {
+        for (&(photo, point), shown) in self.asked.iter().zip(self.patch_means.means()) {
             if let Some(shown) = shown {
                 pairs[photo].push([point, shown]);
             }

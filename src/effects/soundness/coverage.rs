@@ -8,7 +8,7 @@ pub const FEW_POINTS: usize = 10;
 
 /// Photos that hardly see a point.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Unseeing {
+pub struct SparsePhotos {
     /// Their names.
     pub photos: Vec<String>,
     /// Photos in all.
@@ -18,7 +18,7 @@ pub struct Unseeing {
     pub center_outside: bool,
 }
 
-impl Unseeing {
+impl SparsePhotos {
     /// Projects the points into the views until each photo has seen enough; `None` where all
     /// have.
     pub fn of(capture: &Capture, cameras: &[Camera]) -> Option<Self> {

@@ -15,7 +15,7 @@ mod reprojection;
 pub(crate) use colors::correlation;
 pub use colors::{Agreement, PointColors};
 pub use contradiction::{Cause, Contradiction, Contradictory};
-pub use coverage::{FEW_POINTS, Unseeing};
+pub use coverage::{FEW_POINTS, SparsePhotos};
 pub use doubts::{Levels, doubts};
 pub(crate) use photos::listed;
 pub(super) use photos::median;

@@ -320,22 +320,22 @@ fn points_tell_where_observations_do_not() {
 #[test]
 fn photos_before_which_nothing_lies_are_told() {
     let (mut capture, _) = sound();
-    assert_eq!(Unseeing::of(&capture, &cameras(&capture)), None);
+    assert_eq!(SparsePhotos::of(&capture, &cameras(&capture)), None);
     open_gl(&mut capture.views[1].camera);
-    let found = Unseeing::of(&capture, &cameras(&capture)).expect("one sees nothing");
+    let found = SparsePhotos::of(&capture, &cameras(&capture)).expect("one sees nothing");
     assert_eq!((found.photos, found.total), (vec!["1.png".to_owned()], 6));
     assert!(!found.center_outside);
     for view in &mut capture.views {
         view.camera.cx = -2000.0;
     }
-    let found = Unseeing::of(&capture, &cameras(&capture)).expect("none sees anything");
+    let found = SparsePhotos::of(&capture, &cameras(&capture)).expect("none sees anything");
     assert!(found.photos.len() == VIEWS && found.center_outside);
     // A crop's principal point may lie outside, where there is something to see.
     let (mut crop, _) = sound();
     for view in &mut crop.views {
         view.camera.cx = -10.0;
     }
-    assert_eq!(Unseeing::of(&crop, &cameras(&crop)), None);
+    assert_eq!(SparsePhotos::of(&crop, &cameras(&crop)), None);
 }
 
 #[test]

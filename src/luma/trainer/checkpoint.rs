@@ -6,7 +6,7 @@ use crate::{
     gpu::GpuError,
     luma::{
         LumaError,
-        checkpoint::{Checkpoint, State},
+        checkpoint::{Checkpoint, TrainingState},
     },
 };
 
@@ -29,7 +29,7 @@ impl LumaTrainer {
             statistics: workspace.statistics().read(&self.gpu)?,
             best: best.map(|best| best.model.clone()),
             left_out: self.targets.photos.left_out(),
-            state: State {
+            state: TrainingState {
                 plan: self.plan.clone(),
                 iteration,
                 seconds,

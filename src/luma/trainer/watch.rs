@@ -27,7 +27,7 @@ fn next_look(iteration: usize) -> usize {
 
 /// What a look showed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Look {
+pub struct HeldOutScore {
     /// Mean PSNR of the views, in dB.
     pub psnr: f64,
     /// How much it rose since the look before, in dB per minute of training.
@@ -58,14 +58,14 @@ impl Watch {
     }
 
     /// What the last look showed.
-    pub fn last(&self) -> Option<Look> {
+    pub fn last(&self) -> Option<HeldOutScore> {
         let last = self.curve.last()?;
         let rise = |before: &CurvePoint| {
             let minutes = (last.seconds - before.seconds) / 60.0;
             (minutes > 0.0).then(|| (last.psnr - before.psnr) / minutes)
         };
         let before = self.curve.iter().nth_back(1);
-        Some(Look {
+        Some(HeldOutScore {
             psnr: last.psnr,
             per_minute: before.and_then(rise),
         })

@@ -13,7 +13,7 @@ pub use commit::Output;
 use open::Coloring;
 pub use request::ColorizeRequest;
 
-use super::{RunError, teach::Taught};
+use super::{RunError, teach::TeacherAnswers};
 use crate::{
     chroma::{ChromaSettings, Colored, relight, unseen_share},
     eval::{Measured, exposures},
@@ -38,14 +38,14 @@ pub fn colorize(
     let observe = &mut keeping(&warnings, observe);
     let mut coloring = Coloring::open(request, observe)?;
     let begun = Instant::now();
-    let lessons = coloring.teach(observe)?;
+    let supervised = coloring.teach(observe)?;
     let seconds = begun.elapsed().as_secs_f64();
-    coloring.relight(&lessons.settings, observe)?;
-    let solved = coloring.solve(&lessons, begun, observe)?;
+    coloring.relight(&supervised.settings, observe)?;
+    let solved = coloring.solve(&supervised, begun, observe)?;
     let begun = Instant::now();
-    let measured = coloring.measure(&lessons, &solved.colored, observe)?;
+    let measured = coloring.measure(&supervised, &solved.colored, observe)?;
     observe(Event::begins(Stage::Saving));
-    let mut report = coloring.report(&lessons, &solved, &measured);
+    let mut report = coloring.report(&supervised, &solved, &measured);
     if let Some(chroma) = &mut report.chroma {
         chroma.warnings = warnings.take();
         chroma.seconds.teacher = seconds;
@@ -57,14 +57,14 @@ pub fn colorize(
 }
 
 /// What the teachers want, and how it is solved for.
-struct Lessons {
-    taught: Taught,
+struct Supervised {
+    taught: TeacherAnswers,
     settings: ChromaSettings,
 }
 
 impl Coloring<'_> {
     /// Asks the teachers about all photos.
-    fn teach(&mut self, observe: &mut Observer<'_>) -> Result<Lessons, RunError> {
+    fn teach(&mut self, observe: &mut Observer<'_>) -> Result<Supervised, RunError> {
         let asked = &self.request.settings;
         observe(Event::begins(Stage::Teacher));
         let taught = self
@@ -78,12 +78,12 @@ impl Coloring<'_> {
             ..asked.clone()
         };
         let split = &self.dataset.split;
-        let painted = taught.lesson.painted_held_out(split).len();
+        let painted = taught.supervision.painted_held_out(split).len();
         if painted > 0 {
             observe(Event::Note(format!(
                 "colors are learned from {painted} held-out {} painted by hand, too; measured {}",
                 if painted == 1 { "photo" } else { "photos" },
-                match taught.lesson.measured(split) {
+                match taught.supervision.measured(split) {
                     ("test", views) => format!("on the other {}", views.len()),
                     _ =>
                         "on the photos that they are learned from, for no other is left".to_owned(),
@@ -93,7 +93,7 @@ impl Coloring<'_> {
         if self.trusted {
             tell_not_finite(&self.dataset, observe);
         }
-        Ok(Lessons { taught, settings })
+        Ok(Supervised { taught, settings })
     }
 
     /// Solves for the lightness of other photos, where that is asked for, and shows the scene.
@@ -123,12 +123,12 @@ impl Coloring<'_> {
     /// Measures the colors on views that they were not learned from.
     fn measure(
         &self,
-        lessons: &Lessons,
+        supervised: &Supervised,
         colored: &Colored,
         observe: &mut Observer<'_>,
     ) -> Result<Measured, RunError> {
-        let lesson = &lessons.taught.lesson;
-        let views = [colored.colored_views, lesson.views.len()];
+        let supervision = &supervised.taught.supervision;
+        let views = [colored.colored_views, supervision.views.len()];
         if let Some(warning) = few_colors(self.unseen(colored), views) {
             observe(Event::Warning(warning));
         }
@@ -138,7 +138,7 @@ impl Coloring<'_> {
             &exposures(&self.dataset, &self.trained.exposures),
             [&self.luma, &colored.splats],
             (&colored.chroma, colored.splats_at_a_time.is_some()),
-            lesson,
+            supervision,
             &mut |progress| observe(progress.into()),
         );
         Ok(measured?)

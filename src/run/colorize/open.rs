@@ -15,9 +15,9 @@ use crate::{
     report::LumaReport,
     run::{RunError, teach::Teachers},
     splats::{Format, Splats, WriteOptions},
-    store::{RunFolder, files, fingerprint::check_poses, originals::Kept},
+    store::{RunFolder, files, fingerprint::check_poses, originals::OriginalFiles},
     subject::{
-        Hold, Opened, SceneKind,
+        LockMode, Opened, SceneKind,
         foreign::drawn_like_photos,
         scene::written_as,
         sound::{open_checked, open_examined, open_trusted},
@@ -55,10 +55,10 @@ impl<'a> Coloring<'a> {
         request: &'a ColorizeRequest,
         observe: &mut Observer<'_>,
     ) -> Result<Self, RunError> {
-        let opened = Opened::find(request.run.as_deref(), Hold::Writing)?;
+        let opened = Opened::find(request.run.as_deref(), LockMode::Writing)?;
         let colmap = opened.colmap(request.colmap.as_deref())?;
         let named = request.teach.teachers.iter().map(|(path, _)| path);
-        let kept = Kept::default()
+        let kept = OriginalFiles::default()
             .with_all(
                 named.chain(&request.teach.hints),
                 "a file of a teacher or a hint",

@@ -1,6 +1,6 @@
 //! The report of a coloring.
 
-use super::{Lessons, open::Coloring, solve::Solved};
+use super::{Supervised, open::Coloring, solve::Solved};
 use crate::{
     eval::Measured,
     report::{
@@ -13,8 +13,8 @@ use crate::{
 impl Coloring<'_> {
     /// The run's report with what was found, but for warnings and seconds; one of a splat file
     /// knows its photos and its colors.
-    pub fn report(&self, lessons: &Lessons, solved: &Solved, measured: &Measured) -> Report {
-        let chroma = Some(self.chroma(lessons, solved, measured));
+    pub fn report(&self, supervised: &Supervised, solved: &Solved, measured: &Measured) -> Report {
+        let chroma = Some(self.chroma(supervised, solved, measured));
         let luma = self.trained.clone();
         match self.opened.report() {
             Some(report) => Report {
@@ -37,19 +37,24 @@ impl Coloring<'_> {
         }
     }
 
-    fn chroma(&self, lessons: &Lessons, solved: &Solved, measured: &Measured) -> ChromaReport {
-        let (colored, lesson) = (&solved.colored, &lessons.taught.lesson);
+    fn chroma(
+        &self,
+        supervised: &Supervised,
+        solved: &Solved,
+        measured: &Measured,
+    ) -> ChromaReport {
+        let (colored, supervision) = (&solved.colored, &supervised.taught.supervision);
         let (teach, split) = (&self.request.teach, &self.dataset.split);
         let [distill, bake] = colored.seconds;
         let last = colored.last;
         let steps = last.map_or(0, |progress| progress.iteration);
-        let painted = lesson.painted_held_out(split);
+        let painted = supervision.painted_held_out(split);
         let name = |view: usize| self.dataset.capture.views[view].name.clone();
         ChromaReport {
             teachers: self.teachers.describe(),
             strength: teach.strength,
             upsample: teach.settings.upsample,
-            hints: lessons.taught.hinted,
+            hints: supervised.taught.hinted,
             hint_folder: teach.hints.as_ref().and_then(|folder| {
                 let found = folder.canonicalize();
                 let path = found.as_ref().unwrap_or(folder);
@@ -79,7 +84,7 @@ impl Coloring<'_> {
             splats_at_a_time: colored.splats_at_a_time,
             settings: colored.settings.clone(),
             bake: measured.bake,
-            measured_on: lesson.measured(split).0.to_owned(),
+            measured_on: supervision.measured(split).0.to_owned(),
             pictures: measured.mean(),
             views: measured.views.clone(),
             timings: solved.timings.clone(),

@@ -4,21 +4,21 @@ use std::{ops::ControlFlow, time::Instant};
 
 use serde_json::Value;
 
-use super::{Lessons, open::Coloring};
+use super::{Supervised, open::Coloring};
 use crate::{
     chroma::{
-        ChromaCheckpoint, ChromaKeeper, ChromaSettings, Colored, Distill, NoChromaKeeper,
-        SolverKind,
+        ChromaCheckpoint, ChromaCheckpointing, ChromaSettings, Colored, Distill,
+        NoChromaCheckpoints, SolverKind,
     },
     hash, input,
     report::{KernelReport, kernel_reports},
     run::RunError,
     store::{
         RunFolder, StoreError,
-        checkpoints::{FileKeeper, Found, Journal, tell_given_up},
+        checkpoints::{CheckpointFiles, Found, Journal, tell_given_up},
         files,
     },
-    subject::{SceneKind, Showing},
+    subject::{LiveCheckpoints, SceneKind},
     tell::{Event, Observer},
 };
 
@@ -34,11 +34,11 @@ impl Coloring<'_> {
     /// Solves for what was taught, a command that began at `begun`.
     pub fn solve(
         &self,
-        lessons: &Lessons,
+        supervised: &Supervised,
         begun: Instant,
         observe: &mut Observer<'_>,
     ) -> Result<Solved, RunError> {
-        let (request, settings) = (self.request, &lessons.settings);
+        let (request, settings) = (self.request, &supervised.settings);
         let (kept, total) = match settings.solver {
             SolverKind::Irls => (self.kept(), settings.rounds),
             // Adam keeps no checkpoints.
@@ -54,11 +54,11 @@ impl Coloring<'_> {
             }
         };
         let journal = &Journal::new(found.as_ref().map_or(String::new(), Found::log), observe);
-        let keeper = kept.map(|folder| {
-            let question = self.question(folder, settings, &lessons.taught.wanted)?;
+        let checkpointing = kept.map(|folder| {
+            let question = self.question(folder, settings, &supervised.taught.wanted)?;
             found.iter().try_for_each(|found| found.check(&question))?;
             let (path, checkpoints) = (folder.color_checkpoint(), &request.checkpoints);
-            Ok::<_, StoreError>(FileKeeper::new(
+            Ok::<_, StoreError>(CheckpointFiles::new(
                 path,
                 question,
                 (),
@@ -67,15 +67,15 @@ impl Coloring<'_> {
                 begun,
             ))
         });
-        let mut keeper = keeper.transpose()?;
+        let mut checkpointing = checkpointing.transpose()?;
         let checkpoint = found.as_ref().map(|found| &found.checkpoint);
         let rounds = [checkpoint.map_or(0, ChromaCheckpoint::rounds), total];
-        let keeps: &mut dyn ChromaKeeper = match &mut keeper {
-            Some(keeper) => keeper,
-            None => &mut NoChromaKeeper,
+        let keeps: &mut dyn ChromaCheckpointing = match &mut checkpointing {
+            Some(checkpointing) => checkpointing,
+            None => &mut NoChromaCheckpoints,
         };
-        let mut showing = Showing {
-            keeper: keeps,
+        let mut showing = LiveCheckpoints {
+            checkpointing: keeps,
             live: request.live.as_deref(),
             luma: Some(&self.luma),
         };
@@ -83,7 +83,7 @@ impl Coloring<'_> {
             raster: &self.raster,
             dataset: &self.dataset,
             luma: &self.luma,
-            lesson: &lessons.taught.lesson,
+            supervision: &supervised.taught.supervision,
             sh_degree: request.sh_degree,
             correct_views: request.correct_views,
         };
@@ -91,7 +91,7 @@ impl Coloring<'_> {
             self.tell(event, rounds, journal);
             ControlFlow::Continue(())
         });
-        keeper.map_or(Ok(()), FileKeeper::close)?;
+        checkpointing.map_or(Ok(()), CheckpointFiles::close)?;
         let colored = colored?;
         self.show(SceneKind::Color, &colored.splats);
         let timings = match request.timings {
@@ -147,7 +147,7 @@ fn found_in(
     }
 }
 
-impl ChromaKeeper for FileKeeper<'_, '_, ()> {
+impl ChromaCheckpointing for CheckpointFiles<'_, '_, ()> {
     fn wants(&mut self) -> bool {
         self.is_due()
     }

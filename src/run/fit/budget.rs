@@ -14,7 +14,7 @@ use crate::{
     gpu::GpuError,
     luma::{Goal, LumaError, LumaOverlay, LumaSettings, Schedule, rehearse},
     raster::Raster,
-    run::{Preset, RunError, preset::Work},
+    run::{Preset, RunError, preset::Workload},
     tell::{Event, Observer, Stage},
 };
 
@@ -36,8 +36,8 @@ const SURELY: f64 = 0.9;
 
 /// The least work that makes a scene. With fewer iterations there is none yet, so time
 /// is saved on Gaussians and pixels (docs/lab/05-goals.md).
-fn sketch() -> Work {
-    Work {
+fn sketch() -> Workload {
+    Workload {
         settings: LumaSettings {
             max_splats: 3_000,
             sh_degree: 0,
@@ -60,21 +60,21 @@ fn preset_below(level: f64) -> Preset {
 /// The work at a level from [`LOWEST`] to 2: that of a preset at its own level, and between
 /// two for equal steps each amount grown by the same factor. `longest` is the longer side of
 /// the photos as they are.
-fn at_level(level: f64, longest: u32) -> Work {
+fn at_level(level: f64, longest: u32) -> Workload {
     let [draft, balanced, paper] = Preset::ALL.map(Preset::work);
     let (from, to, share) = match level {
         _ if level < 0.0 => (sketch(), draft, 1.0 - level / LOWEST),
         _ if level < 1.0 => (draft, balanced, level),
         _ => (balanced, paper, level - 1.0),
     };
-    let between = |amount: &dyn Fn(&Work) -> f64| {
+    let between = |amount: &dyn Fn(&Workload) -> f64| {
         let [from, to] = [&from, &to].map(amount);
         (from * (to / from).powf(share)).round()
     };
-    let degree = |work: &Work| f64::from(work.settings.sh_degree);
+    let degree = |work: &Workload| f64::from(work.settings.sh_degree);
     let degree = degree(&from) + share * (degree(&to) - degree(&from));
-    let side = |work: &Work| f64::from(work.max_side.unwrap_or(longest).min(longest));
-    Work {
+    let side = |work: &Workload| f64::from(work.max_side.unwrap_or(longest).min(longest));
+    Workload {
         settings: LumaSettings {
             max_splats: between(&|work| work.settings.max_splats as f64) as usize,
             sh_degree: degree as u32,
@@ -90,7 +90,7 @@ fn at_level(level: f64, longest: u32) -> Work {
 pub(super) struct Budget {
     /// The preset that comes nearest, and no higher than that asked for.
     pub preset: Preset,
-    pub work: Work,
+    pub work: Workload,
     /// Seconds that an iteration is expected to take; 0 where time does not matter.
     pub each: f64,
 }
@@ -128,7 +128,7 @@ impl Budget {
             }
             return Ok(Self {
                 preset,
-                work: Work::asked(preset, &options.settings, max_side),
+                work: Workload::asked(preset, &options.settings, max_side),
                 each: 0.0,
             });
         };
@@ -185,7 +185,7 @@ impl<'a> Family<'a> {
     }
 
     /// The work at a level.
-    fn work(&self, level: f64) -> Work {
+    fn work(&self, level: f64) -> Workload {
         let mut work = at_level(level.clamp(LOWEST, self.highest), self.longest_side);
         self.overlay.apply(&mut work.settings);
         work.max_side = self.max_side.or(work.max_side);
@@ -203,7 +203,7 @@ impl<'a> Family<'a> {
     }
 
     /// The size of the photos.
-    fn size(&self, work: &Work) -> [u32; 2] {
+    fn size(&self, work: &Workload) -> [u32; 2] {
         let side = f64::from(
             work.max_side
                 .map_or(self.longest_side, |side| side.min(self.longest_side)),
@@ -304,7 +304,7 @@ mod tests {
 
     #[test]
     fn work_grows_with_the_level() {
-        let all: Vec<Work> = (-5..=20)
+        let all: Vec<Workload> = (-5..=20)
             .map(|l| family(&nothing()).work(f64::from(l) / 10.0))
             .collect();
         for pair in all.windows(2) {

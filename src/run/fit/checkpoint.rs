@@ -9,11 +9,11 @@ use crate::{
     capture::LoadOptions,
     gpu::Gpu,
     hash, input,
-    luma::{Checkpoint, Keeper},
+    luma::{Checkpoint, Checkpointing},
     run::RunError,
     store::{
         RunFolder, StoreError,
-        checkpoints::{FileKeeper, Found},
+        checkpoints::{CheckpointFiles, Found},
         files,
     },
     tell::{Event, Observer},
@@ -85,7 +85,7 @@ pub(super) fn sha256_of(path: PathBuf) -> Result<String, StoreError> {
     sha256.map_err(files::at(&path))
 }
 
-impl Keeper for FileKeeper<'_, '_, Budget> {
+impl Checkpointing for CheckpointFiles<'_, '_, Budget> {
     fn wants(&mut self, _: usize) -> bool {
         self.is_due()
     }

@@ -78,7 +78,7 @@ impl FitRequest {
 
         let raster = raster.drawing(drawn);
         let told = block.exposures().unwrap_or_default();
-        let beyond = Beyond {
+        let beyond = Complement {
             raster: &raster,
             whole: &merged,
             part: &start,
@@ -90,7 +90,7 @@ impl FitRequest {
 }
 
 /// What a scene has and a part of it has not.
-struct Beyond<'a> {
+struct Complement<'a> {
     raster: &'a Arc<Raster>,
     whole: &'a Splats,
     part: &'a Splats,
@@ -98,7 +98,7 @@ struct Beyond<'a> {
     exposures: &'a [Exposure],
 }
 
-impl Beyond<'_> {
+impl Complement<'_> {
     /// What photos show of it.
     fn layers(
         &self,

@@ -26,11 +26,11 @@ use crate::{
     splats::Splats,
     store::{
         RunFolder,
-        checkpoints::{FileKeeper, Journal},
+        checkpoints::{CheckpointFiles, Journal},
         log::with_rows,
     },
     subject::{
-        SceneKind, Showing,
+        LiveCheckpoints, SceneKind,
         foreign::tell_unlike,
         scene::{Frame, of_trial, read_splats},
     },
@@ -195,7 +195,7 @@ impl Job<'_> {
             watched: reaches.then(|| (self.judge, self.judge.split.test.clone())),
         };
         let journal = &Journal::new(self.log(found), observe);
-        let mut keeper = FileKeeper::new(
+        let mut checkpointing = CheckpointFiles::new(
             folder.checkpoint(),
             question,
             budget.clone(),
@@ -204,8 +204,8 @@ impl Job<'_> {
             self.begun,
         );
         let checkpoint = found.map(|found| &found.checkpoint);
-        let mut showing = Showing {
-            keeper: &mut keeper,
+        let mut showing = LiveCheckpoints {
+            checkpointing: &mut checkpointing,
             live: options.live.as_deref(),
             luma: None,
         };
@@ -213,7 +213,7 @@ impl Job<'_> {
             self.tell(event, init, settings.memory_limit, journal);
             ControlFlow::Continue(())
         });
-        keeper.close()?;
+        checkpointing.close()?;
         self.measure(scene?, journal)
     }
 

@@ -9,12 +9,12 @@ mod unplaced;
 
 use std::{cell::RefCell, path::PathBuf, sync::Arc};
 
-use out::Out;
+use out::FrameOutput;
 use painted::Painted;
 use painter::Painter;
 use range::own_range;
 use shots::{Shot, shots_of};
-use unplaced::{Ends, Known, Steps, Unknown, carry, chain, tell, way, whole};
+use unplaced::{Bracket, Known, Steps, Unknown, carry, chain, tell, way, whole};
 
 use super::{
     RunError,
@@ -24,17 +24,17 @@ use crate::{
     capture::{Dataset, Film, LoadOptions},
     chroma::teacher::TeacherSettings,
     eval::exposures,
-    frames::{Believed, Canvas, SceneDrawer, Strokes, believable, blend, finish},
+    frames::{Canvas, SceneDrawer, Strokes, WeightedColors, believable, blend, finish},
     gpu::Gpu,
     raster::Raster,
     report::Report,
     store::{
         RunFolder,
         film::{FRAME_RATE, is_film},
-        originals::Kept,
+        originals::OriginalFiles,
     },
     subject::{
-        Hold, Run, SubjectError,
+        LockMode, Run, SubjectError,
         scene::{Frame, read_scene},
         sound::open_same,
     },
@@ -100,10 +100,10 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
     let warnings = RefCell::default();
     let observe = &mut keeping(&warnings, observe);
     observe(Event::begins(Stage::Model));
-    let run = Run::find(options.run.as_deref(), Hold::Reading)?;
+    let run = Run::find(options.run.as_deref(), LockMode::Reading)?;
     let (folder, report) = (&run.folder, &run.report);
     let named = options.teacher.iter().chain(&options.hints);
-    let named = Kept::default().with_all(named, "a file of a teacher or a hint");
+    let named = OriginalFiles::default().with_all(named, "a file of a teacher or a hint");
     let kept = named.with_all(&options.colmap, "a file of the COLMAP folder");
     let _kept = kept.with_run(folder, report).keep();
     let colmap_dir = run.colmap(options.colmap.as_deref());
@@ -142,7 +142,7 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
         range: own_range(&dataset, film.as_ref(), &shots, observe),
         side: None,
     };
-    let out = Out::open(options, rate, film.as_ref(), &shots, observe)?;
+    let out = FrameOutput::open(options, rate, film.as_ref(), &shots, observe)?;
     let painted = find_painted(options, report, &shots, &mut painter, observe)?;
     let mut coloring = Coloring {
         painter,
@@ -205,7 +205,7 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
 /// Photos in color, one after the other; those without a pose wait for the next that has one.
 struct Coloring<'a> {
     painter: Painter<'a>,
-    out: Out,
+    out: FrameOutput,
     teacher_alone: bool,
     /// The last photo with a pose.
     last: Option<Known>,
@@ -244,7 +244,7 @@ impl<'a> Coloring<'a> {
         let original = self.painter.original(shot)?;
         let canvas = self.painter.canvas(shot, &original);
         let seen = match self.teacher_alone {
-            true => Believed::nothing(canvas.len()),
+            true => WeightedColors::nothing(canvas.len()),
             false => self.painter.seen(shot, &canvas)?,
         };
         let steps = match &self.last {
@@ -296,7 +296,7 @@ impl<'a> Coloring<'a> {
 
     /// Colors those that wait from the photos before and after them.
     fn carry(&mut self, steps: &Steps, after: Option<&Known>) -> Result<(), RunError> {
-        let ends = Ends {
+        let ends = Bracket {
             before: self.last.as_ref(),
             after,
         };

@@ -15,12 +15,12 @@ use crate::{
 };
 
 /// Where colored photos go.
-pub(super) enum Out {
+pub(super) enum FrameOutput {
     Folder(PathBuf),
     Film(Box<FilmWriter>),
 }
 
-impl Out {
+impl FrameOutput {
     pub fn open(
         options: &FramesOptions,
         rate: [u32; 2],

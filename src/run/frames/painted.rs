@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, path::Path};
 use super::{Painter, shots::Shot};
 use crate::{
     chroma::teacher::HintFolder,
-    frames::{Believed, Between, Canvas, Strokes},
+    frames::{Between, Canvas, Strokes, WeightedColors},
     run::RunError,
     tell::{Event, Observer, Stage},
 };
@@ -22,9 +22,9 @@ const LEAST: f64 = 0.002;
 pub(super) struct Painted(BTreeMap<usize, Strokes>);
 
 /// A photo at working size with what the scene covers of it.
-struct Seen {
+struct CoveredPhoto {
     canvas: Canvas,
-    believed: Believed,
+    believed: WeightedColors,
 }
 
 impl Painted {
@@ -49,7 +49,7 @@ impl Painted {
             }
             tell(done, &shot.name);
             done += 1;
-            let seen = Seen::of(shot, painter)?;
+            let seen = CoveredPhoto::of(shot, painter)?;
             if shot.views.is_empty() {
                 hints.know_photo(&shot.name, &shot.path, seen.canvas.stance);
             }
@@ -118,12 +118,12 @@ impl Painted {
     }
 }
 
-impl Seen {
+impl CoveredPhoto {
     fn of(shot: &Shot, painter: &mut Painter<'_>) -> Result<Self, RunError> {
         let original = painter.original(shot)?;
         if shot.views.is_empty() {
             let canvas = Canvas::of(&original, painter.side(&original));
-            let believed = Believed::nothing(canvas.len());
+            let believed = WeightedColors::nothing(canvas.len());
             return Ok(Self { canvas, believed });
         }
         let canvas = painter.canvas(shot, &original);
@@ -135,7 +135,7 @@ impl Seen {
 /// Carries strokes from a photo along others, as far as there is something of them: those with a
 /// pose keep them, and those between, which take their colors from these, are but followed.
 fn carry(
-    (first, strokes): (&Seen, &Strokes),
+    (first, strokes): (&CoveredPhoto, &Strokes),
     backwards: bool,
     way: &[usize],
     shots: &[Shot],
@@ -145,13 +145,13 @@ fn carry(
     let mut found: Vec<(usize, Strokes)> = Vec::new();
     // The last photo that has strokes, where it is not the first; the last of all; and the steps
     // from one to the other, in the photos' order.
-    let mut from: Option<Seen> = None;
+    let mut from: Option<CoveredPhoto> = None;
     let mut last: Option<Canvas> = None;
     let mut steps: Vec<Between> = Vec::new();
     for &i in way {
         let shot = &shots[i];
         tell(&shot.name);
-        let seen = match Seen::of(shot, painter) {
+        let seen = match CoveredPhoto::of(shot, painter) {
             Ok(seen) => seen,
             // What cannot be read and has no pose is left out.
             Err(_) if shot.views.is_empty() => continue,

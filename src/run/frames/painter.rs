@@ -4,7 +4,7 @@ use super::shots::Shot;
 use crate::{
     capture::{CaptureError, Dataset, Exposure, Normalize, Original, View},
     chroma::teacher::AbImage,
-    frames::{Believed, Canvas, SceneDrawer, ViewOf},
+    frames::{Canvas, SceneDrawer, ViewOf, WeightedColors},
     run::{RunError, teach::Teachers},
 };
 
@@ -75,7 +75,7 @@ impl<'a> Painter<'a> {
         Some(f64::from(width.max(height)) / f64::from(size[0].max(size[1])))
     }
 
-    pub fn seen(&mut self, shot: &Shot, canvas: &Canvas) -> Result<Believed, RunError> {
+    pub fn seen(&mut self, shot: &Shot, canvas: &Canvas) -> Result<WeightedColors, RunError> {
         let views = self.views(shot);
         Ok(self.drawer.draw(&views, canvas)?)
     }

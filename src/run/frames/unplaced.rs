@@ -2,10 +2,10 @@
 
 use std::{num::NonZero, thread};
 
-use super::{Out, Painter, shots::Shot};
+use super::{FrameOutput, Painter, shots::Shot};
 use crate::{
     capture::{CaptureError, Original, in_order},
-    frames::{Believed, Between, Canvas, Carried, Colored, Strokes, blend, finish},
+    frames::{Between, Canvas, Colored, ColoredPhoto, Strokes, WeightedColors, blend, finish},
     run::RunError,
     tell::{Event, Observer},
 };
@@ -33,8 +33,8 @@ impl Known {
         self.shown.as_deref().unwrap_or(&self.ab)
     }
 
-    pub fn as_carried(&self, shown: bool) -> Carried<'_> {
-        Carried {
+    pub fn as_carried(&self, shown: bool) -> ColoredPhoto<'_> {
+        ColoredPhoto {
             canvas: &self.canvas,
             ab: if shown { self.shown() } else { &self.ab },
         }
@@ -53,7 +53,7 @@ pub(super) struct Unknown<'a> {
 }
 
 /// What is known before and after photos without a pose.
-pub(super) struct Ends<'a> {
+pub(super) struct Bracket<'a> {
     pub before: Option<&'a Known>,
     pub after: Option<&'a Known>,
 }
@@ -96,8 +96,8 @@ pub(super) fn carry(
     painter: &mut Painter<'_>,
     open: &[Unknown<'_>],
     steps: &Steps,
-    ends: &Ends<'_>,
-    out: &mut Out,
+    ends: &Bracket<'_>,
+    out: &mut FrameOutput,
 ) -> Result<Vec<(usize, bool)>, RunError> {
     let mut taught = Vec::with_capacity(open.len());
     // Of several the slow part is done at once, and as many wait as there are threads.
@@ -137,7 +137,9 @@ pub(super) fn carry(
                 let canvas = &unknown.canvas;
                 let ab = blend(canvas, seen, answer.as_deref(), None);
                 let ab = match unknown.strokes {
-                    Some(strokes) => strokes.over(canvas, &Believed::nothing(canvas.len()), &ab),
+                    Some(strokes) => {
+                        strokes.over(canvas, &WeightedColors::nothing(canvas.len()), &ab)
+                    }
                     None => ab,
                 };
                 match &unknown.original {
@@ -194,8 +196,8 @@ fn in_ranges(photos: &[usize], shots: &[Shot]) -> String {
 }
 
 /// What is carried from both sides, each by its share.
-fn joined(pixels: usize, sides: [(Option<Believed>, f32); 2]) -> Believed {
-    let mut all = Believed::nothing(pixels);
+fn joined(pixels: usize, sides: [(Option<WeightedColors>, f32); 2]) -> WeightedColors {
+    let mut all = WeightedColors::nothing(pixels);
     let mut total = vec![0.0; pixels];
     for (side, share) in sides {
         let Some(side) = side else { continue };

@@ -7,7 +7,7 @@ use std::{
     sync::Arc,
 };
 
-pub use path::{PathOptions, Rendered, Way, render_path};
+pub use path::{PathOptions, PathShape, Rendered, render_path};
 
 use super::RunError;
 use crate::{
@@ -17,8 +17,8 @@ use crate::{
     raster::{Raster, SceneRenderer},
     report::to_image,
     splats::Splats,
-    store::{files, originals::Kept, picture_names},
-    subject::{Hold, Opened, Scene, SubjectError, foreign::tell_unlike, scene},
+    store::{files, originals::OriginalFiles, picture_names},
+    subject::{LockMode, Opened, Scene, SubjectError, foreign::tell_unlike, scene},
     tell::{Event, Observer, Stage},
 };
 
@@ -124,7 +124,7 @@ impl Subject {
         luma: bool,
         observe: &mut Observer<'_>,
     ) -> Result<Self, RunError> {
-        let opened = Opened::find(path, Hold::Free)?;
+        let opened = Opened::find(path, LockMode::Free)?;
         observe(Event::begins(Stage::Model));
         let known = opened.run().is_some() || colmap.is_some();
         let capture = known.then(|| opened.capture(colmap)).transpose()?;
@@ -135,7 +135,7 @@ impl Subject {
         if let Some(capture) = &capture {
             scene.offset = capture.offset;
         }
-        let kept = Kept::default();
+        let kept = OriginalFiles::default();
         let kept = colmap
             .iter()
             .fold(kept, |kept, dir| kept.with_capture(dir, None));

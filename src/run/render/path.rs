@@ -35,7 +35,7 @@ const SECONDS: f64 = 10.0;
 
 /// Where a path goes.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Way {
+pub enum PathShape {
     /// Around what the cameras look at, or around a splat file's Gaussians.
     Orbit,
     /// Through the photographed viewpoints.
@@ -52,7 +52,7 @@ pub struct PathOptions {
     /// COLMAP folder, where it is not the one that `fit` noted.
     pub colmap: Option<PathBuf>,
     /// Where the path goes.
-    pub way: Way,
+    pub way: PathShape,
     /// How long it takes, in seconds, above 0; 10 by default. A file says for itself.
     pub seconds: Option<f64>,
     /// Frames a second, as a fraction; the file's by default, or 24.
@@ -104,7 +104,7 @@ pub fn render_path(
         let world: Vec<Camera> = path.cameras.iter().map(back).collect();
         write_path(file, &world, rate)?;
     }
-    let mut out = Out::open(options, path.rate)?;
+    let mut out = PathOutput::open(options, path.rate)?;
     observe(Event::begins(Stage::Device));
     let gpu = Gpu::open()?;
     subject.tell_unlike(&gpu, observe)?;
@@ -159,7 +159,7 @@ impl Path {
         };
         let rate = options.rate.unwrap_or(FRAME_RATE);
         let (cameras, rate) = match (&options.way, &subject.capture) {
-            (Way::File(file), _) => {
+            (PathShape::File(file), _) => {
                 let read = read_path(file, options.size.unwrap_or(SIZE))?;
                 let from = match read.coordinates {
                     Coordinates::Colmap => subject.scene.offset,
@@ -169,11 +169,11 @@ impl Path {
                 let rate = options.rate.or(read.rate.map(fraction)).unwrap_or(rate);
                 (cameras.collect(), rate)
             }
-            (Way::Orbit, None) => {
+            (PathShape::Orbit, None) => {
                 let lens = lens(options.size.unwrap_or(SIZE), FIELD_OF_VIEW);
                 (orbit_of_ball(ball(), &lens, frames(rate)?), rate)
             }
-            (Way::Photos, None) => {
+            (PathShape::Photos, None) => {
                 return Err(SubjectError::NoCameras(subject.scene.file.clone()).into());
             }
             (way, Some(capture)) => {
@@ -183,7 +183,7 @@ impl Path {
                 let cameras: Vec<Camera> = cameras.collect::<Result<_, _>>()?;
                 let cameras: Vec<&Camera> = cameras.iter().collect();
                 let path = match way {
-                    Way::Orbit => {
+                    PathShape::Orbit => {
                         let points = capture.points.iter().map(|point| point.position);
                         let points: Vec<DVec3> = points.collect();
                         orbit_of_cameras(&cameras, &points, frames(rate)?)
@@ -231,12 +231,12 @@ fn beside(pictures: Vec<RgbImage>) -> RgbImage {
 }
 
 /// Where pictures go.
-struct Out {
+struct PathOutput {
     folder: Option<PathBuf>,
     film: Option<FilmWriter>,
 }
 
-impl Out {
+impl PathOutput {
     fn open(options: &PathOptions, rate: [u32; 2]) -> Result<Self, StoreError> {
         if let Some(folder) = &options.output {
             files::make_pictures_folder(folder)?;

@@ -5,11 +5,11 @@ use super::{CHANNELS, FILTER, ReadSplats, SHAPE, sh_position};
 use crate::splats::opacity;
 use crate::splats::quantize::{FLAT, OPAQUE, logit};
 use crate::splats::sh::{C0, coefficient_count};
-use crate::splats::shared::Gathered;
+use crate::splats::shared::SplatBuilder;
 
 /// Sorts the numbers of each Gaussian into the arrays.
 pub(super) struct Collector {
-    gathered: Gathered,
+    gathered: SplatBuilder,
     /// A line about the filter, where there is one.
     notes: Vec<String>,
     /// For each coefficient of the field its place among the SH properties.
@@ -28,7 +28,7 @@ impl Collector {
             .flat_map(|k| (0..CHANNELS).map(move |channel| sh_position(degree, k, channel)))
             .collect();
         Self {
-            gathered: Gathered::new(count, degree),
+            gathered: SplatBuilder::new(count, degree),
             notes: (layout.filtered())
                 .then(|| format!("{FILTER} is put into scales and opacities"))
                 .into_iter()

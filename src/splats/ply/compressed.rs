@@ -29,7 +29,7 @@ use crate::splats::{
         FLAT, between, level, logit, of_smallest_three, opacity_byte, share, smallest_three,
     },
     sh::{C0, coefficient_count},
-    shared::{Gathered, Judge},
+    shared::{FormatFidelity, SplatBuilder},
 };
 use ply_rs_bw::ply::{ElementDef, Encoding, Header, PropertyType, ScalarType};
 use std::collections::HashMap;
@@ -131,7 +131,7 @@ pub(super) fn read(
         None => Vec::new(),
     };
 
-    let mut gathered = Gathered::new(vertices.element.count, degree);
+    let mut gathered = SplatBuilder::new(vertices.element.count, degree);
     let mut low_high = [[0.0; 3], [1.0; 3]].as_flattened().repeat(3);
     let mut coefficients = vec![0.0; coefficient_count(degree) * CHANNELS];
     for index in 0..vertices.element.count {
@@ -279,9 +279,9 @@ fn sh_byte(value: f32) -> u8 {
 pub(in crate::splats) fn encode(
     splats: &Splats,
     options: &WriteOptions,
-    judge: &mut Judge<'_>,
+    fidelity: &mut FormatFidelity<'_>,
 ) -> Vec<u8> {
-    judge.harmonics(false, [-SH_LIMIT, SH_LIMIT]);
+    fidelity.harmonics(false, [-SH_LIMIT, SH_LIMIT]);
     let (count, degree) = (splats.len(), splats.sh.degree);
     let order = morton::order(&splats.means);
     let mut bytes = header(count, degree, &options.comments()).into_bytes();

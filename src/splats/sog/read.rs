@@ -14,7 +14,7 @@ use crate::splats::{
     ReadSplats, SplatError,
     quantize::{between, logit, of_smallest_three},
     sh::MAX_DEGREE,
-    shared::{Gathered, check_count, memory},
+    shared::{SplatBuilder, check_count, memory},
 };
 
 /// Longest `meta.json` that is read: codebooks take some 20 KiB.
@@ -37,7 +37,7 @@ const SPARE: [usize; 2] = [4, 1 << 16];
 pub(in crate::splats) fn read(path: &Path, bytes: &[u8]) -> Result<ReadSplats, SplatError> {
     let archive = ZipArchive::new(Cursor::new(bytes))
         .map_err(|error| SplatError::damaged(path, "zip archive", error.to_string()))?;
-    let mut source = Source { path, archive };
+    let mut source = SogFiles { path, archive };
     let meta = source.file(META, META, MOST_META)?;
     let meta: Meta = serde_json::from_slice(&meta)
         .map_err(|error| SplatError::damaged(path, META, excerpt(&error.to_string())))?;
@@ -64,7 +64,7 @@ pub(in crate::splats) fn read(path: &Path, bytes: &[u8]) -> Result<ReadSplats, S
     };
     let degree = meta.sh_n.as_ref().map_or(0, |harmonics| harmonics.bands);
 
-    let mut gathered = Gathered::new(meta.count, degree);
+    let mut gathered = SplatBuilder::new(meta.count, degree);
     let mut coefficients = vec![0.0; coefficient_count(degree) * CHANNELS];
     for index in 0..meta.count {
         let mean = [0, 1, 2].map(|axis| {
@@ -130,12 +130,12 @@ struct Palette {
     values: Vec<f32>,
 }
 
-struct Source<'a> {
+struct SogFiles<'a> {
     path: &'a Path,
     archive: ZipArchive<Cursor<&'a [u8]>>,
 }
 
-impl Source<'_> {
+impl SogFiles<'_> {
     /// A file of the archive, of at most so many bytes.
     fn file(&mut self, part: &'static str, name: &str, most: usize) -> Result<Vec<u8>, SplatError> {
         let path = self.path;

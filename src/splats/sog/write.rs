@@ -14,7 +14,7 @@ use super::{
 use crate::splats::{
     SplatError, Splats, WriteOptions, morton,
     quantize::{level, opacity_byte, share, smallest_three},
-    shared::Judge,
+    shared::FormatFidelity,
 };
 
 /// Levels of a coordinate's logarithm.
@@ -27,13 +27,13 @@ const LEVELS: u32 = 65_535;
 pub(in crate::splats) fn encode(
     splats: &Splats,
     options: &WriteOptions,
-    judge: &mut Judge<'_>,
+    fidelity: &mut FormatFidelity<'_>,
 ) -> Result<Vec<u8>, SplatError> {
     let (count, degree) = (splats.len(), splats.sh.degree);
     let size = Texture::for_splats(count);
     if size.width.max(size.height) > LONGEST_SIDE {
         return Err(SplatError::NotWritten {
-            path: judge.path.to_owned(),
+            path: fidelity.path.to_owned(),
             reason: format!("{count} Gaussians do not fit into a picture of {LONGEST_SIDE} pixels"),
         });
     }
@@ -44,7 +44,7 @@ pub(in crate::splats) fn encode(
         })
     };
     let (mins, maxs) = (bound(f64::min, 0.0), bound(f64::max, 0.0));
-    judge.steps(|mean| {
+    fidelity.steps(|mean| {
         let steps = [0, 1, 2].map(|axis| {
             let step = (maxs[axis] - mins[axis]) / f64::from(LEVELS);
             step * (1.0 + f64::from(mean[axis].abs()))
@@ -164,7 +164,7 @@ pub(in crate::splats) fn encode(
         sh_n,
     };
     let archive = files.archive(&meta).map_err(std::io::Error::other);
-    archive.map_err(SplatError::io(judge.path))
+    archive.map_err(SplatError::io(fidelity.path))
 }
 
 /// Entries of the palette for so many Gaussians: as splat-transform has it, the highest power of

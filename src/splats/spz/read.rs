@@ -10,7 +10,7 @@ use crate::splats::{
     axes::{Turn, turned},
     quantize::{logit, of_smallest_three},
     sh::MAX_DEGREE,
-    shared::{Gathered, check_count, memory},
+    shared::{SplatBuilder, check_count, memory},
 };
 
 /// Longest extensions that are read, in bytes.
@@ -185,7 +185,7 @@ impl Header {
     /// The Gaussians of parts that have the sizes which the header says.
     fn gather(&self, parts: [&[u8]; 6]) -> ReadSplats {
         let sizes = part_bytes(self.version, self.degree);
-        let mut gathered = Gathered::new(self.count, self.degree);
+        let mut gathered = SplatBuilder::new(self.count, self.degree);
         let mut coefficients = vec![0.0; coefficient_count(self.degree) * CHANNELS];
         for index in 0..self.count {
             let [center, opacity, color, scale, rotation, rest] =

@@ -8,7 +8,7 @@ use super::*;
 use crate::splats::{
     SplatError, Splats, WriteOptions,
     quantize::{level, opacity_byte, smallest_three},
-    shared::{Judge, middle},
+    shared::{FormatFidelity, middle},
 };
 
 /// Version of the files: more programs read it than 4, which is smaller by a few percent.
@@ -34,11 +34,11 @@ const LARGEST: f64 = 8_388_607.0;
 pub(in crate::splats) fn encode(
     splats: &Splats,
     options: &WriteOptions,
-    judge: &mut Judge<'_>,
+    fidelity: &mut FormatFidelity<'_>,
 ) -> Result<Vec<u8>, SplatError> {
     let degree = splats.sh.degree;
     let count = u32::try_from(splats.len()).map_err(|_| SplatError::NotWritten {
-        path: judge.path.to_owned(),
+        path: fidelity.path.to_owned(),
         reason: format!("{} Gaussians are more than 2³²", splats.len()),
     })?;
     let farthest = (splats.means.as_flattened().iter()).fold(0.0_f64, |farthest, &value| {
@@ -53,12 +53,12 @@ pub(in crate::splats) fn encode(
         true => f64::INFINITY,
         false => 1.0 / unit,
     };
-    judge.steps(|_| step)?;
+    fidelity.steps(|_| step)?;
     let log_scale = |byte: f64| (byte / SCALE_STEPS + LOWEST_SCALE) as f32;
-    judge.log_scales([log_scale(-0.5), log_scale(255.5)]);
+    fidelity.log_scales([log_scale(-0.5), log_scale(255.5)]);
     let color = (0.5 / COLOR_SCALE) as f32;
-    judge.harmonics(true, [-color, color]);
-    judge.harmonics(false, [-1.0, 1.0]);
+    fidelity.harmonics(true, [-color, color]);
+    fidelity.harmonics(false, [-1.0, 1.0]);
 
     let mut parts: [Vec<u8>; 6] = Default::default();
     for index in 0..splats.len() {
@@ -88,7 +88,7 @@ pub(in crate::splats) fn encode(
     header.extend(count.to_le_bytes());
     let flags = if options.antialiased { ANTIALIASED } else { 0 };
     header.extend([degree as u8, bits as u8, flags, 0]);
-    gzip(&header, &parts).map_err(SplatError::io(judge.path))
+    gzip(&header, &parts).map_err(SplatError::io(fidelity.path))
 }
 
 /// The middle scale of a small Gaussian, in world units.

@@ -45,11 +45,11 @@ struct Stream {
     index: u64,
     codec: String,
     /// How it can be written, the best way first.
-    ways: Vec<Way>,
+    ways: Vec<AudioCodec>,
 }
 
 /// How a stream is written.
-struct Way {
+struct AudioCodec {
     /// FFmpeg's name of the codec, or `copy`.
     codec: String,
     /// FFmpeg's filters, if any.
@@ -130,7 +130,7 @@ impl Sound {
         draft: &dyn Fn() -> Result<Draft, String>,
         tell: &mut dyn FnMut(String),
     ) -> Option<Draft> {
-        let join = |chosen: &[(&Stream, &Way)]| {
+        let join = |chosen: &[(&Stream, &AudioCodec)]| {
             let draft = draft()?;
             let ffmpeg = self.joining(pictures, container, chosen);
             let done = ffmpeg.arg(draft.path()).ask();
@@ -175,7 +175,12 @@ impl Sound {
     }
 
     /// FFmpeg, up to its output.
-    fn joining(&self, pictures: &Path, container: &str, chosen: &[(&Stream, &Way)]) -> Program {
+    fn joining(
+        &self,
+        pictures: &Path,
+        container: &str,
+        chosen: &[(&Stream, &AudioCodec)],
+    ) -> Program {
         let mut ffmpeg = Program::new(FFMPEG)
             .args([
                 "-hide_banner",
@@ -217,8 +222,8 @@ impl Sound {
 
 /// How a stream of so many channels can be written, the best way first; `together` is whether it
 /// begins with the pictures.
-fn ways(codec: &str, channels: u64, together: bool, container: &str) -> Vec<Way> {
-    let way = |codec: &str, filters: &str, lost: &str| Way {
+fn ways(codec: &str, channels: u64, together: bool, container: &str) -> Vec<AudioCodec> {
+    let way = |codec: &str, filters: &str, lost: &str| AudioCodec {
         codec: codec.to_owned(),
         filters: filters.to_owned(),
         lost: lost.to_owned(),

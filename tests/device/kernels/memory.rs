@@ -4,8 +4,8 @@ use std::{ops::ControlFlow, sync::Arc};
 
 use gs_chroma::{
     chroma::{
-        ChromaError, ChromaSettings, FrozenViews, IrlsSolver, Room, Targets, Task, bake, solve,
-        teacher::AbImage,
+        ChromaError, ChromaSettings, FrozenViews, IrlsSolver, MemoryBudget, Targets, Task, bake,
+        solve, teacher::AbImage,
     },
     gpu::{Gpu, GpuError},
     luma::{Demand, LumaError, LumaSettings, LumaTrainer, TrainingView, resident_photos},
@@ -179,7 +179,7 @@ fn coloring(
     let tasks = tasks.collect::<Result<Vec<_>, _>>()?;
     let raster = Arc::new(Raster::new(&gpu));
     let before = gpu.allocated_bytes().unwrap();
-    let room = Room {
+    let room = MemoryBudget {
         limit,
         color,
         sh_degree,

@@ -8,7 +8,9 @@ use std::{
 };
 
 use gs_chroma::{
-    luma::{Checkpoint, Keeper, LumaError, LumaProgress, LumaSettings, LumaTrainer, Schedule},
+    luma::{
+        Checkpoint, Checkpointing, LumaError, LumaProgress, LumaSettings, LumaTrainer, Schedule,
+    },
     splats::{ShField, Splats},
 };
 
@@ -20,7 +22,7 @@ struct KeepsAll<'a> {
     kept: Vec<(usize, Checkpoint)>,
 }
 
-impl Keeper for KeepsAll<'_> {
+impl Checkpointing for KeepsAll<'_> {
     fn wants(&mut self, _: usize) -> bool {
         true
     }
@@ -34,7 +36,7 @@ impl Keeper for KeepsAll<'_> {
 /// Ends the training at the first checkpoint.
 struct Ends(Option<Checkpoint>);
 
-impl Keeper for Ends {
+impl Checkpointing for Ends {
     fn wants(&mut self, _: usize) -> bool {
         true
     }
@@ -75,18 +77,18 @@ fn keeps_and_resumes(
         .unwrap();
     let expected = whole.splats().unwrap();
     let seen = RefCell::new(Vec::new());
-    let mut keeper = KeepsAll {
+    let mut checkpointing = KeepsAll {
         reports: &seen,
         kept: Vec::new(),
     };
     let mut keeping = of(start);
     keeping
-        .train_keeping(&mut keeper, &mut |progress| {
+        .train_keeping(&mut checkpointing, &mut |progress| {
             seen.borrow_mut().push(told(&progress));
             ControlFlow::Continue(())
         })
         .unwrap();
-    let kept = keeper.kept;
+    let kept = checkpointing.kept;
     // Asking for checkpoints changes nothing.
     assert!(same(&keeping.splats().unwrap(), &expected) && *seen.borrow() == reports);
     // All that the settings say of a start is its number of harmonics.
@@ -230,11 +232,11 @@ fn what_is_no_checkpoint_is_refused() {
     let [start, target] = start_and_target();
     let settings = settings(&start);
     let schedule = Schedule::of(&settings);
-    let mut keeper = Ends(None);
+    let mut checkpointing = Ends(None);
     let mut trainer = trainer_by(settings, schedule, 4.0, &start, photos(&target));
-    let ended = trainer.train_keeping(&mut keeper, &mut |_| ControlFlow::Continue(()));
+    let ended = trainer.train_keeping(&mut checkpointing, &mut |_| ControlFlow::Continue(()));
     assert!(matches!(ended, Err(LumaError::Cancelled)));
-    let sections: BTreeMap<_, _> = keeper.0.unwrap().to_sections().into_iter().collect();
+    let sections: BTreeMap<_, _> = checkpointing.0.unwrap().to_sections().into_iter().collect();
     for name in sections.keys() {
         let mut other = sections.clone();
         other.remove(name);

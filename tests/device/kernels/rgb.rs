@@ -5,10 +5,10 @@ use std::ops::ControlFlow;
 
 use gs_chroma::{
     chroma::{
-        ChromaSettings, FrozenViews, Recipe, Room, Targets, Task, bake, bake_rgb, fit_rgb,
+        ChromaSettings, FrozenViews, MemoryBudget, Recipe, Targets, Task, bake, bake_rgb, fit_rgb,
         follow_recipe, native_rgb,
     },
-    raster::{ColorKind, Field, Geometry, Picture, Renderer, constants::NEAR_SHARE},
+    raster::{ColorKind, Field, Geometry, RenderedImage, Renderer, constants::NEAR_SHARE},
     splats::{ShField, Splats, sh},
 };
 
@@ -17,7 +17,7 @@ use crate::kernels::harness::{bits, cameras, gpu, overlapping, raster};
 const EXTENT: f64 = 1.0;
 
 /// `fields` on the geometry of `splats`, for each camera a picture of each.
-fn drawn(splats: &Splats, fields: &[&ShField]) -> Vec<Vec<Picture>> {
+fn drawn(splats: &Splats, fields: &[&ShField]) -> Vec<Vec<RenderedImage>> {
     let geometry = Geometry::upload(gpu(), splats).unwrap();
     let fields = (fields.iter())
         .map(|field| Field::upload(gpu(), field).unwrap())
@@ -60,7 +60,7 @@ fn colorful() -> Splats {
 }
 
 fn frozen(splats: &Splats) -> FrozenViews {
-    let room = Room::of(ColorKind::Rgb, 0);
+    let room = MemoryBudget::of(ColorKind::Rgb, 0);
     FrozenViews::new(&raster(), splats, EXTENT, &cameras(), 3, room).unwrap()
 }
 

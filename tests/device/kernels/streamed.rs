@@ -6,12 +6,12 @@ use glam::DVec3;
 use gs_chroma::{
     capture::Camera,
     chroma::{
-        ChromaError, ChromaSettings, FrozenViews, IrlsSolver, Room, Targets, Task, bake, solve,
-        teacher::AbImage,
+        ChromaError, ChromaSettings, FrozenViews, IrlsSolver, MemoryBudget, Targets, Task, bake,
+        solve, teacher::AbImage,
     },
     gpu::GpuError,
     raster::{
-        ColorKind, Geometry, Picture, Raster, SceneRenderer, Streamed, constants::NEAR_SHARE,
+        ColorKind, Geometry, Raster, RenderedImage, SceneRenderer, Streamed, constants::NEAR_SHARE,
     },
     splats::{ShField, Splats, sh},
 };
@@ -67,7 +67,7 @@ fn problem(
         let target = targets.push_ab(&wanted, weights.as_deref())?;
         tasks.push(Task { view, target });
     }
-    let room = Room {
+    let room = MemoryBudget {
         limit,
         color: ColorKind::Chroma,
         sh_degree,
@@ -162,7 +162,7 @@ fn what_the_adapter_cannot_bind_draws_its_picture() {
                 > 100
         );
         let expected = whole.render(&camera).unwrap();
-        let pixels = |pictures: &[Picture]| -> Vec<f32> {
+        let pixels = |pictures: &[RenderedImage]| -> Vec<f32> {
             let each = pictures.iter().flat_map(|picture| &picture.pixels);
             each.copied().collect()
         };

@@ -4,7 +4,8 @@ use glam::{DMat3, DVec3};
 use gs_chroma::{
     capture::Camera,
     chroma::{
-        ChromaError, ChromaSettings, FrozenViews, IrlsSolver, Room, Targets, Task, teacher::AbImage,
+        ChromaError, ChromaSettings, FrozenViews, IrlsSolver, MemoryBudget, Targets, Task,
+        teacher::AbImage,
     },
     raster::{ColorKind, Field, Geometry, Renderer},
     splats::{ShField, Splats, sh},
@@ -59,10 +60,10 @@ impl Problem {
             )
             .collect::<Result<_, ChromaError>>()?;
         let cameras: Vec<Camera> = views.iter().map(|view| view.camera.clone()).collect();
-        let room = Room {
+        let room = MemoryBudget {
             limit,
             weighted: targets.weighted(),
-            ..Room::of(ColorKind::Chroma, 1)
+            ..MemoryBudget::of(ColorKind::Chroma, 1)
         };
         let frozen = FrozenViews::new(&raster(), luma, 1.0, &cameras, 3, room)?;
         Ok(Self {

@@ -14,7 +14,7 @@ const LARGEST_EXIF: usize = 1 << 16;
 
 /// Metadata of an image file: EXIF and color space.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Beside {
+pub(super) struct ImageMetadata {
     /// EXIF from its TIFF header on.
     pub exif: Option<Vec<u8>>,
     /// An ICC profile.
@@ -25,7 +25,7 @@ pub(super) struct Beside {
     pub gamma: Option<f32>,
 }
 
-impl Beside {
+impl ImageMetadata {
     /// Metadata of a PNG file, from its header; EXIF also from the end of the file.
     pub fn of_png(info: &png::Info<'_>, exif_at_the_end: Option<Vec<u8>>) -> Self {
         let exif = info.exif_metadata.as_deref().map(without_prefix);

@@ -18,7 +18,7 @@ const USUAL: &str = "SIMPLE_RADIAL";
 
 /// Color and projection by a stream's tags; missing tags stand for the usual values.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Looks {
+pub(super) struct ColorTags {
     transfer: String,
     /// True if its primaries are wide-gamut (BT.2020).
     wide: bool,
@@ -27,7 +27,7 @@ pub(super) struct Looks {
     projection: Option<String>,
 }
 
-impl Looks {
+impl ColorTags {
     /// Reads the tags of a stream, as `ffprobe` describes it.
     pub fn of(stream: &Value) -> Self {
         let tag = |name: &str| stream[name].as_str().unwrap_or("unknown");
@@ -120,12 +120,12 @@ mod tests {
             ("cubemap", USUAL, USUAL, 1),
             ("rectilinear", USUAL, USUAL, 0),
         ] {
-            let looks = Looks::of(&json!({"side_data_list": [
+            let color_tags = ColorTags::of(&json!({"side_data_list": [
                 {"side_data_type": "Display Matrix", "rotation": 90},
                 {"side_data_type": "Spherical Mapping", "projection": projection},
             ]}));
             let mut events = 0;
-            assert_eq!(looks.lens(asked, &mut |_| events += 1), lens);
+            assert_eq!(color_tags.lens(asked, &mut |_| events += 1), lens);
             assert_eq!(events, told, "{projection}");
         }
     }

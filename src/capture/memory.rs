@@ -9,28 +9,28 @@ use super::sample::LARGEST_FILE;
 const ALL: u64 = 2 * LARGEST_FILE;
 
 /// That of this program.
-static ROOM: Room = Room::new(ALL);
+static ROOM: SharedBytes = SharedBytes::new(ALL);
 
 /// A number of bytes that several threads share.
-struct Room {
+struct SharedBytes {
     size: u64,
     taken: Mutex<u64>,
     given_back: Condvar,
 }
 
 /// Bytes that are taken until this is dropped.
-pub(super) struct Held {
-    room: &'static Room,
+pub(super) struct ReservedBytes {
+    room: &'static SharedBytes,
     bytes: u64,
 }
 
 /// Waits until there is room for a photo of so many bytes. Whoever holds some must not wait for
 /// more.
-pub(super) fn wait_for(bytes: u64) -> Held {
+pub(super) fn wait_for(bytes: u64) -> ReservedBytes {
     ROOM.wait_for(bytes)
 }
 
-impl Room {
+impl SharedBytes {
     const fn new(size: u64) -> Self {
         Self {
             size,
@@ -39,7 +39,7 @@ impl Room {
         }
     }
 
-    fn wait_for(&'static self, bytes: u64) -> Held {
+    fn wait_for(&'static self, bytes: u64) -> ReservedBytes {
         // One that is larger than all of it has it for itself.
         let bytes = bytes.min(self.size);
         // A number is whole even where a thread has panicked.
@@ -47,11 +47,11 @@ impl Room {
         let full = |taken: &mut u64| *taken + bytes > self.size;
         let waited = self.given_back.wait_while(taken, full);
         *waited.unwrap_or_else(PoisonError::into_inner) += bytes;
-        Held { room: self, bytes }
+        ReservedBytes { room: self, bytes }
     }
 }
 
-impl Drop for Held {
+impl Drop for ReservedBytes {
     fn drop(&mut self) {
         let taken = self.room.taken.lock();
         *taken.unwrap_or_else(PoisonError::into_inner) -= self.bytes;
@@ -70,7 +70,7 @@ mod tests {
 
     #[test]
     fn no_more_is_taken_than_there_is() {
-        static SMALL: Room = Room::new(10);
+        static SMALL: SharedBytes = SharedBytes::new(10);
         let (taken, most) = (AtomicU64::new(0), AtomicU64::new(0));
         thread::scope(|scope| {
             for bytes in [3, 10, 4, 4, 25, 1, 7, 5] {

@@ -13,7 +13,7 @@ use crate::{
 pub type Largest = [usize; 2];
 
 /// One viewer's kernels.
-pub struct Easel {
+pub struct ViewerKernels {
     raster: Arc<Raster>,
     kernels: RgbAdjointKernels,
 }
@@ -26,7 +26,7 @@ pub struct Canvas {
     loss: Bindings,
 }
 
-impl Easel {
+impl ViewerKernels {
     pub fn new(raster: &Arc<Raster>, viewer: Viewer) -> Self {
         let raster = raster.drawing(viewer.drawing());
         Self {

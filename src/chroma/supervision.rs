@@ -13,7 +13,7 @@ use crate::{
 
 /// Colors that a photo is to have.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Wanted {
+pub struct ViewTarget {
     /// CIELAB a, b at the photo's size.
     pub ab: AbImage,
     /// How much each pixel counts, `[height, width]`; `None` stands for 1 everywhere.
@@ -25,7 +25,7 @@ pub struct Wanted {
     pub by_hand: bool,
 }
 
-impl From<AbImage> for Wanted {
+impl From<AbImage> for ViewTarget {
     /// Answer of a machine: all of it counts alike, in views that are trained on.
     fn from(ab: AbImage) -> Self {
         Self {
@@ -48,7 +48,7 @@ pub trait Colorizer {
         &mut self,
         query: Query<'_>,
         photo: GrayImage<'_>,
-    ) -> Result<Option<Wanted>, ColorizerError>;
+    ) -> Result<Option<ViewTarget>, ColorizerError>;
 }
 
 impl Colorizer for Teacher {
@@ -56,14 +56,14 @@ impl Colorizer for Teacher {
         &mut self,
         query: Query<'_>,
         photo: GrayImage<'_>,
-    ) -> Result<Option<Wanted>, ColorizerError> {
+    ) -> Result<Option<ViewTarget>, ColorizerError> {
         let answer = Self::colorize(self, query, photo, None)?;
-        Ok(answer.map(Wanted::from))
+        Ok(answer.map(ViewTarget::from))
     }
 }
 
 /// Colors that all views are to have.
-pub struct Lesson {
+pub struct Supervision {
     /// Wanted colors and weights of the views.
     pub targets: Targets,
     /// Each view's place among these; `None` where nothing is known.
@@ -82,7 +82,7 @@ pub struct Lesson {
     pub samples: TeacherSamples,
 }
 
-impl Lesson {
+impl Supervision {
     /// Whether there are strokes on any view that colors are learned from.
     pub fn has_strokes(&self) -> bool {
         !self.strokes.is_empty()
@@ -181,7 +181,7 @@ pub fn teach(
     colorizer: &mut dyn Colorizer,
     scales: usize,
     observe: &mut dyn FnMut(usize) -> ControlFlow<()>,
-) -> Result<Lesson, ChromaError> {
+) -> Result<Supervision, ChromaError> {
     let capture = &dataset.capture;
     let mut samples = TeacherSamples::new(capture);
     let (mut targets, mut of_view) = (Targets::new(scales), Vec::new());
@@ -211,7 +211,7 @@ pub fn teach(
             of_view.push(None);
             return Ok(());
         };
-        let Wanted { ab, weights, .. } = wanted;
+        let ViewTarget { ab, weights, .. } = wanted;
         let (found, expected) = ([ab.width, ab.height], [photo.width, photo.height]);
         if found != expected {
             return Err(ChromaError::WrongSize { found, expected });
@@ -242,7 +242,7 @@ pub fn teach(
         of_view.push(Some(targets.push_ab(&ab, weights.as_deref())?));
         Ok(())
     })?;
-    Ok(Lesson {
+    Ok(Supervision {
         targets,
         of_view,
         views: learned,

@@ -16,7 +16,7 @@ const DEFAULT_PINS: u64 = 2 << 30;
 
 /// Memory that the device may be asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Room {
+pub struct MemoryBudget {
     /// Bytes of the device that stage 2 may take; `None`: what views one at a time need,
     /// and 2 GiB of what is worth keeping.
     pub limit: Option<u64>,
@@ -32,7 +32,7 @@ pub struct Room {
     pub streams: bool,
 }
 
-impl Room {
+impl MemoryBudget {
     /// Without a limit, for pixels that all weigh the same and Gaussians that all stay on the
     /// device.
     pub fn of(color: ColorKind, sh_degree: u32) -> Self {
@@ -47,14 +47,14 @@ impl Room {
 }
 
 /// Least memory of Gaussians that all stay on the device, whatever the views.
-pub(super) struct Least {
+pub(super) struct MinimumMemory {
     bytes: u64,
     /// Bytes of the largest buffer.
     buffer: u64,
 }
 
-impl Least {
-    pub fn of(splats: usize, luma_degree: u32, room: Room) -> Self {
+impl MinimumMemory {
+    pub fn of(splats: usize, luma_degree: u32, room: MemoryBudget) -> Self {
         let [luma, solved] = [luma_degree, room.sh_degree].map(sh::coefficient_count);
         let widest = GEOMETRY_PLANES.max(3 * luma.max(solved));
         let unknowns = room.color.channels() * solved;
@@ -93,7 +93,7 @@ impl Demand {
         splats: usize,
         luma_degree: u32,
         views: &[Vec<Frozen>],
-        room: Room,
+        room: MemoryBudget,
         streams: bool,
     ) -> Self {
         let all = || views.iter().flatten();

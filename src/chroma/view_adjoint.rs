@@ -11,7 +11,7 @@ use crate::{
 };
 
 /// Parameters of a view's loss.
-pub(super) enum Judge {
+pub(super) enum ViewLoss {
     Chroma {
         weights: Buffer<ChromaLossWeights>,
         parameters: Buffer<CorrectionParameters>,
@@ -22,7 +22,7 @@ pub(super) enum Judge {
 }
 
 /// Buffers that all seats of a solve share.
-pub(super) struct Shared<'a> {
+pub(super) struct SolveBuffers<'a> {
     pub frozen: &'a FrozenViews,
     pub field: &'a Field,
     pub sums: ChromaSums<'a>,
@@ -36,10 +36,10 @@ pub(super) struct Shared<'a> {
 }
 
 /// Buffers and bindings by which one view at one scale is drawn and judged.
-pub(super) struct Seat {
+pub(super) struct ViewAdjoint {
     pub layer: Layer,
     pub adjoint: ChromaAdjoint,
-    pub judge: Judge,
+    pub view_loss: ViewLoss,
     pub loss: Bindings,
     /// The loss with the agreement with a coarser scale, where there is one.
     pub agreeing: Option<Bindings>,
@@ -47,19 +47,19 @@ pub(super) struct Seat {
     pub weights: Buffer<f32>,
 }
 
-impl Seat {
+impl ViewAdjoint {
     /// Those of a view at a scale.
     ///
     /// # Errors
     /// [`ChromaError::Gpu`].
     pub fn new(
-        shared: &Shared<'_>,
+        shared: &SolveBuffers<'_>,
         view: usize,
         scale: usize,
         wanted: Buffer<u32>,
         weights: Buffer<f32>,
     ) -> Result<Self, ChromaError> {
-        let &Shared {
+        let &SolveBuffers {
             frozen,
             field,
             corrections,
@@ -101,20 +101,20 @@ impl Seat {
                 });
                 (loss, agreeing)
             };
-        let (judge, (loss, agreeing)) = match field.kind {
+        let (view_loss, (loss, agreeing)) = match field.kind {
             ColorKind::Rgb if shared.space == Space::Lab => {
                 let parameters = LabLossParameters::default();
                 let parameters = Buffer::uniform(gpu, "lab loss parameters", &parameters)?;
                 let both = [&kernels.lab_loss, &kernels.agreeing_lab_loss];
                 let tied = tied(parameters.raw(), &[], both);
-                (Judge::Lab(parameters), tied)
+                (ViewLoss::Lab(parameters), tied)
             }
             ColorKind::Rgb => {
                 let parameters = RgbLossParameters::default();
                 let parameters = Buffer::uniform(gpu, "rgb loss parameters", &parameters)?;
                 // There is one scale.
                 let tied = tied(parameters.raw(), &[], [&kernels.rgb_loss; 2]);
-                (Judge::Rgb(parameters), tied)
+                (ViewLoss::Rgb(parameters), tied)
             }
             ColorKind::Chroma | ColorKind::Luma => {
                 let of_loss = ChromaLossWeights::default();
@@ -126,18 +126,18 @@ impl Seat {
                 let inputs = [lists.view.raw(), layer.image.raw(), wanted.raw()];
                 let inputs = (inputs, image_gradient, &weights);
                 let sums = corrections.bind(gpu, &kernels.correction, &parameters, inputs);
-                let judge = Judge::Chroma {
+                let view_loss = ViewLoss::Chroma {
                     weights: of_loss,
                     parameters,
                     sums,
                 };
-                (judge, tied)
+                (view_loss, tied)
             }
         };
         Ok(Self {
             layer,
             adjoint,
-            judge,
+            view_loss,
             loss,
             agreeing,
             wanted,

@@ -4,7 +4,7 @@ use crate::capture::Photo;
 
 /// Squares in the photos of many views, whose means come photo by photo.
 #[derive(Clone, Debug, Default)]
-pub(super) struct LookUps {
+pub(super) struct PatchMeans {
     /// Of each view what is wanted of its photo.
     by_view: Vec<Vec<Square>>,
     /// In the order in which they were asked for; not a number where there is none.
@@ -20,7 +20,7 @@ struct Square {
     side: f64,
 }
 
-impl LookUps {
+impl PatchMeans {
     /// Nothing is wanted of the photos of so many views.
     pub fn of(views: usize) -> Self {
         Self {

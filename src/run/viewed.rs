@@ -20,11 +20,11 @@ use crate::{
     },
     disk::trust::Originals,
     input,
-    raster::{Picture, RasterOptions, constants::NEAR_SHARE},
+    raster::{RasterOptions, RenderedImage, constants::NEAR_SHARE},
     report::{Report, to_image},
     splats::Splats,
-    store::{RunFolder, StoreError, fingerprint::check_poses, originals::Kept},
-    subject::{Hold, Opened, SceneKind, scene::open},
+    store::{RunFolder, StoreError, fingerprint::check_poses, originals::OriginalFiles},
+    subject::{LockMode, Opened, SceneKind, scene::open},
     tell::{Event, Observer, Stage},
 };
 
@@ -32,26 +32,26 @@ use crate::{
 const CACHE_BYTES: usize = 64 << 20;
 
 /// A run or a splat file that is looked at.
-pub struct Look {
+pub struct ViewedScene {
     /// Name in titles.
     pub name: String,
     /// Views with cameras and photos; none where the COLMAP folder is not there.
     pub dataset: Option<Dataset>,
     opened: Opened,
     scenes: Vec<SceneKind>,
-    teachers: Mutex<Asked>,
+    teachers: Mutex<LazyTeachers>,
     /// Files that are not written over.
     _kept: Originals,
 }
 
 /// The run's teachers, opened when they are asked for the first time.
-enum Asked {
+enum LazyTeachers {
     NotYet,
     Opened(Box<Teachers>),
     Refused(String),
 }
 
-impl Look {
+impl ViewedScene {
     /// Opens a run folder, by default the newest, or a splat file, with the cameras of a COLMAP
     /// folder: that which `fit` noted unless another is named.
     ///
@@ -64,7 +64,7 @@ impl Look {
         observe: &mut Observer<'_>,
     ) -> Result<Self, RunError> {
         observe(Event::begins(Stage::Model));
-        let opened = Opened::find(run, Hold::Free)?;
+        let opened = Opened::find(run, LockMode::Free)?;
         let (of, scenes) = match &opened {
             // What a file shows is only known once it is read; it is shown as it is.
             Opened::File(path) => (path.clone(), vec![SceneKind::Color]),
@@ -84,8 +84,8 @@ impl Look {
             name: name.into_owned(),
             dataset: views(&opened, colmap, observe)?,
             scenes,
-            teachers: Mutex::new(Asked::NotYet),
-            _kept: opened.keep(Kept::default()).keep(),
+            teachers: Mutex::new(LazyTeachers::NotYet),
+            _kept: opened.keep(OriginalFiles::default()).keep(),
             opened,
         })
     }
@@ -145,15 +145,15 @@ impl Look {
             return Ok(None);
         };
         let mut asked = self.teachers.lock().unwrap_or_else(PoisonError::into_inner);
-        if matches!(*asked, Asked::NotYet) {
+        if matches!(*asked, LazyTeachers::NotYet) {
             *asked = match self.open_teachers(dataset) {
-                Ok(teachers) => Asked::Opened(Box::new(teachers)),
-                Err(error) => Asked::Refused(error.to_string()),
+                Ok(teachers) => LazyTeachers::Opened(Box::new(teachers)),
+                Err(error) => LazyTeachers::Refused(error.to_string()),
             };
         }
         let teachers = match &mut *asked {
-            Asked::Opened(teachers) => teachers,
-            Asked::Refused(reason) => {
+            LazyTeachers::Opened(teachers) => teachers,
+            LazyTeachers::Refused(reason) => {
                 return Err(StoreError::file(
                     &self
                         .opened
@@ -164,7 +164,7 @@ impl Look {
                 )
                 .into());
             }
-            Asked::NotYet => return Ok(None),
+            LazyTeachers::NotYet => return Ok(None),
         };
         let gray = GrayImage {
             width: photo.width,
@@ -175,7 +175,7 @@ impl Look {
         let Some(answer) = teachers.color(query, gray)? else {
             return Ok(None);
         };
-        let channels = |channels, pixels| Picture {
+        let channels = |channels, pixels| RenderedImage {
             width: photo.width,
             height: photo.height,
             channels,
