@@ -175,7 +175,7 @@ impl Distill<'_> {
     ///
     /// # Errors
     /// As [`colorize`], [`ChromaError::OtherCheckpoint`], and [`ChromaError::Cancelled`] where
-    /// the keeper ends it.
+    /// the checkpointing ends it.
     pub fn run_from(
         &self,
         checkpoint: Option<&ChromaCheckpoint>,

@@ -73,7 +73,11 @@ pub fn frontal_camera(width: u32, height: u32) -> Camera {
 ///
 /// # Errors
 /// [`LumaError::Gpu`] when the device cannot hold them.
-pub fn rehearse(raster: &Arc<Raster>, splats: usize, size: [u32; 2]) -> Result<f64, LumaError> {
+pub fn seconds_per_iteration(
+    raster: &Arc<Raster>,
+    splats: usize,
+    size: [u32; 2],
+) -> Result<f64, LumaError> {
     let camera = frontal_camera(size[0], size[1]);
     let settings = LumaSettings {
         sh_degree: 0,

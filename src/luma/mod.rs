@@ -35,7 +35,7 @@ pub use densify::DensifyParameters;
 pub use error::LumaError;
 pub use fit::{Fit, LumaEvent, LumaObserver, LumaScene, fit};
 pub use goal::Goal;
-pub use iteration_cost::{frontal_camera, random_cloud, rehearse};
+pub use iteration_cost::{frontal_camera, random_cloud, seconds_per_iteration};
 pub use loss::{LossEffects, LumaLossParameters};
 pub use memory::{Demand, resident_photos};
 pub use numerics::{Numerics, SsimWindow};

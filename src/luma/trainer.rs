@@ -207,7 +207,7 @@ impl LumaTrainer {
     /// nothing in what is trained.
     ///
     /// # Errors
-    /// As there; [`LumaError::Cancelled`] also where the keeper wants no more.
+    /// As there; [`LumaError::Cancelled`] also where the checkpointing wants no more.
     pub fn train_keeping(
         &mut self,
         checkpointing: &mut dyn Checkpointing,

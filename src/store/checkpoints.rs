@@ -219,7 +219,7 @@ pub(crate) struct CheckpointFiles<'a, 'o, S> {
 }
 
 impl<'a, 'o, S: Serialize> CheckpointFiles<'a, 'o, S> {
-    /// A keeper for the command that answers `question`, begun at `begun`.
+    /// Checkpoints of the command that answers `question`, begun at `begun`.
     pub fn new(
         path: PathBuf,
         question: Value,

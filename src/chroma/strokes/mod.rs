@@ -101,7 +101,7 @@ impl StrokeWeights {
     }
 }
 
-/// Lays the strokes of a lesson over what its teachers want, in all views that color learns
+/// Lays the strokes of a supervision over what its teachers want, in all views that color learns
 /// from: `frozen` has these and no others, in their order.
 ///
 /// # Errors

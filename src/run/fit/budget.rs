@@ -12,7 +12,7 @@ use super::FitRequest;
 use crate::{
     capture::{Capture, LoadOptions},
     gpu::GpuError,
-    luma::{Goal, LumaError, LumaOverlay, LumaSettings, Schedule, rehearse},
+    luma::{Goal, LumaError, LumaOverlay, LumaSettings, Schedule, seconds_per_iteration},
     raster::Raster,
     run::{Preset, RunError, preset::Workload},
     tell::{Event, Observer, Stage},
@@ -21,7 +21,7 @@ use crate::{
 /// Where a family begins: the level of the sketch.
 const LOWEST: f64 = -0.5;
 
-/// Between two levels that are rehearsed.
+/// Between two levels whose cost is measured.
 const STEP: f64 = 0.5;
 
 /// Fewer iterations than this make no scene.
@@ -100,7 +100,7 @@ impl Budget {
     /// as much as there is time for. `begun` is when the time began to run.
     ///
     /// # Errors
-    /// [`RunError::Capture`], and [`GpuError::Lost`] of a rehearsal.
+    /// [`RunError::Capture`], and [`GpuError::Lost`] while an iteration is timed.
     pub fn of(
         options: &FitRequest,
         raster: &Arc<Raster>,
@@ -137,7 +137,7 @@ impl Budget {
         let seconds = SURELY * limit - begun.elapsed().as_secs_f64();
         let (level, each) = family.level_for(seconds, raster, observe)?;
         if options.timings {
-            // What was rehearsed is no part of the run.
+            // The timed iterations are no part of the run.
             raster.gpu.timings()?;
         }
         Ok(Self {
@@ -215,7 +215,7 @@ impl<'a> Family<'a> {
         [width, height].map(|side| side.round().max(1.0) as u32)
     }
 
-    /// The level whose training takes `seconds`, as near as a rehearsal on random Gaussians
+    /// The level whose training takes `seconds`, as near as timed iterations on random Gaussians
     /// tells; with it the seconds of an iteration there.
     fn level_for(
         &self,
@@ -223,10 +223,10 @@ impl<'a> Family<'a> {
         raster: &Arc<Raster>,
         observe: &mut Observer<'_>,
     ) -> Result<(f64, f64), RunError> {
-        let rehearsed = |level: f64| -> Result<Option<[f64; 2]>, RunError> {
+        let cost_of = |level: f64| -> Result<Option<[f64; 2]>, RunError> {
             let work = self.work(level);
             let splats = self.mean_splats(&work.settings);
-            match rehearse(raster, splats, self.size(&work)) {
+            match seconds_per_iteration(raster, splats, self.size(&work)) {
                 Ok(each) => Ok(Some([each * work.settings.iterations as f64, each])),
                 Err(LumaError::Gpu(GpuError::TooLarge { .. } | GpuError::TooManySplats { .. })) => {
                     Ok(None)
@@ -235,9 +235,9 @@ impl<'a> Family<'a> {
             }
         };
         let start = 0.0_f64.min(self.highest);
-        let (mut low, mut at_low) = (start, rehearsed(start)?);
+        let (mut low, mut at_low) = (start, cost_of(start)?);
         if at_low.is_none_or(|[whole, _]| whole > seconds) && start > LOWEST {
-            let at_lowest = rehearsed(LOWEST)?;
+            let at_lowest = cost_of(LOWEST)?;
             (low, at_low) = (LOWEST, at_lowest);
         }
         let Some(mut known) = at_low else {
@@ -246,7 +246,7 @@ impl<'a> Family<'a> {
         };
         while known[0] < seconds && low < self.highest {
             let high = (low + STEP).min(self.highest);
-            let Some(next) = rehearsed(high)? else {
+            let Some(next) = cost_of(high)? else {
                 break;
             };
             if next[0] >= seconds {
