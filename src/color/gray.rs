@@ -23,7 +23,7 @@ pub fn gray_to_lightness(gray: f64) -> f64 {
 /// [`gray_from_rgb`] for 8-bit colors, by tables, rounded to the nearest
 /// 8-bit gray.
 pub struct GrayTable {
-    /// What each 8-bit value of R, G and B adds to luminance.
+    /// Contribution of each 8-bit value of R, G and B to luminance, 0 to 1.
     luminance: [[f64; 256]; 3],
     /// The luminance halfway, in encoded values, between grays k and k + 1;
     /// the last is never reached.

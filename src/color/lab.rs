@@ -24,7 +24,7 @@ const RELATIVE_XYZ_TO_RGB: [[f64; 3]; 3] = inverse(RGB_TO_RELATIVE_XYZ);
 /// The weights of linear R, G and B in relative luminance Y; they sum to 1.
 pub(super) const LUMINANCE: [f64; 3] = RGB_TO_RELATIVE_XYZ[1];
 
-/// Where the CIE function turns from linear to cube root is `DELTA³`.
+/// Cube root of the value at which the CIE function turns from linear to cube root.
 const DELTA: f64 = 6.0 / 29.0;
 
 /// Encoded sRGB to Lab.
