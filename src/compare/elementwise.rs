@@ -14,15 +14,15 @@ pub struct Elementwise {
 /// The worst element of a comparison.
 #[derive(Clone, Debug)]
 pub struct ElementwiseFigures {
-    /// Why nothing could be compared, if so.
+    /// Reason why nothing could be compared, if any.
     pub unfit: Option<String>,
     /// Bound on each element.
     pub bound: Elementwise,
     /// Index of the element that uses most of its bound.
     pub worst: usize,
-    /// What was computed there.
+    /// Computed value there.
     pub actual: f64,
-    /// What should have been.
+    /// Expected value there.
     pub expected: f64,
     /// Error over allowance there; the comparison passes up to 1.
     pub used: f64,

@@ -13,10 +13,10 @@ pub struct FlipBounds {
     pub cap: f64,
 }
 
-/// How many elements flipped, and which way.
+/// Counts of flipped elements by direction.
 #[derive(Clone, Debug)]
 pub struct FlipFigures {
-    /// Why nothing could be compared, if so.
+    /// Reason why nothing could be compared, if any.
     pub unfit: Option<String>,
     /// Flips where the actual value is above the expected one.
     pub up: usize,
@@ -82,8 +82,8 @@ impl FlipBounds {
 }
 
 impl FlipFigures {
-    /// Whether one direction prevails by more than chance: fair flips keep
-    /// within three standard deviations, `|up - down| <= 3 √(up + down)`.
+    /// Returns true if one direction prevails by more than chance: fair flips keep within three
+    /// standard deviations, `|up - down| <= 3 √(up + down)`.
     pub fn lopsided(&self) -> bool {
         let excess = self.up.abs_diff(self.down) as f64;
         excess > 3.0 * ((self.up + self.down) as f64).sqrt()

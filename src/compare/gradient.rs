@@ -5,9 +5,9 @@ use super::{Elementwise, ElementwiseFigures, unfit};
 /// One figure against its tolerance.
 #[derive(Clone, Debug)]
 pub struct Figure {
-    /// What was measured.
+    /// Name of the figure.
     pub name: &'static str,
-    /// Why nothing could be compared, if so.
+    /// Reason why nothing could be compared, if any.
     pub unfit: Option<String>,
     /// The figure; zero is best.
     pub value: f64,
@@ -103,7 +103,7 @@ impl BiasFigures {
     }
 }
 
-/// Whether errors lean to one side: as an offset, or as a factor.
+/// Signed bias of the errors, as an offset and as a factor.
 pub fn signed_bias(actual: &[f64], expected: &[f64], tolerance: f64) -> BiasFigures {
     let pairs = || actual.iter().zip(expected);
     let figure = |name, value| Figure {
@@ -139,7 +139,7 @@ pub struct GradientBounds {
     pub signed_bias: f64,
 }
 
-/// What [`GradientBounds::compare`] measured.
+/// Results of [`GradientBounds::compare`].
 #[derive(Clone, Debug)]
 pub struct GradientFigures {
     /// The worst element.

@@ -34,7 +34,7 @@ pub fn narrow<'a>(values: impl IntoIterator<Item = &'a f64>) -> Vec<f32> {
     values.into_iter().map(|&v| v as f32).collect()
 }
 
-/// What makes two arrays unfit for any comparison, if anything.
+/// Returns the reason why two arrays cannot be compared, if any.
 fn unfit(actual: &[f64], expected: &[f64]) -> Option<String> {
     if actual.len() != expected.len() {
         return Some(format!(
