@@ -13,7 +13,7 @@ impl Area {
     /// All of the ground.
     pub const EVERYWHERE: Self = Self([[f64::NEG_INFINITY, f64::INFINITY]; 2]);
 
-    /// Whether a place belongs to it.
+    /// Returns true if a ground position lies in the area.
     pub fn holds(&self, place: [f64; 2]) -> bool {
         (self.0.iter().zip(place)).all(|(&[least, most], at)| least <= at && at < most)
     }
@@ -26,7 +26,7 @@ impl Area {
         parts
     }
 
-    /// What of it lies in another area.
+    /// Intersection with another area.
     pub fn within(&self, other: &Self) -> Self {
         Self([0, 1].map(|axis| {
             let ([a, b], [c, d]) = (self.0[axis], other.0[axis]);

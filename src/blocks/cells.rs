@@ -7,7 +7,7 @@ use super::Area;
 /// Blocks of a job, at most.
 pub const MOST: usize = 4096;
 
-/// How many blocks there are to be.
+/// Number of blocks to cut a scene into.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Blocks {
     /// So many, each cut along its longer side.
@@ -17,7 +17,7 @@ pub enum Blocks {
 }
 
 impl Blocks {
-    /// How many these are.
+    /// Number of blocks.
     pub fn count(self) -> usize {
         match self {
             Self::Count(count) => count,
@@ -61,7 +61,7 @@ const BALANCED_ON: usize = 100_000;
 /// Cells with less of the work than this part of the fullest one's grow no faster for it.
 const LEAST: f64 = 1e-3;
 
-/// How often cells' sizes are mended: by then they settle to a percent.
+/// Rounds of balancing the cells' sizes: by then they settle to a percent.
 const BALANCE_ROUNDS: usize = 12;
 
 /// A cell, and the two that it is cut into.
@@ -71,11 +71,11 @@ pub(super) struct Cell {
     pub parts: Option<Box<[Cell; 2]>>,
 }
 
-/// What there is to do at places on the ground.
+/// Training work at positions on the ground.
 pub(super) struct GroundWork<'a> {
     /// Along the two axes of the ground.
     pub places: &'a [[f64; 2]],
-    /// How much there is at each.
+    /// Weight of the work at each position.
     pub weights: &'a [f32],
 }
 
@@ -165,7 +165,7 @@ impl GroundWork<'_> {
         }
     }
 
-    /// How many of the sorted places have a share of the work; none where all stand on one line.
+    /// Number of the sorted positions that hold a share of the work; none if all lie on one line.
     fn split(&self, sorted: &[u32], at: impl Fn(u32) -> f64, share: f64) -> Option<usize> {
         let weight = |&i: &u32| f64::from(self.weights[i as usize]);
         let wanted = share * sorted.iter().map(weight).sum::<f64>();

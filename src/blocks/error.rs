@@ -1,10 +1,10 @@
-//! What can be wrong with blocks.
+//! Errors of dividing a capture into blocks and of reading a job.
 
 use std::path::PathBuf;
 
 use crate::capture::CaptureError;
 
-/// Why a capture cannot be divided, or a job not be read.
+/// A capture cannot be divided, or a job cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum BlocksError {
     /// The photos or their poses.
@@ -15,7 +15,7 @@ pub enum BlocksError {
     File {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it and what to do.
+        /// The error and its remedy.
         reason: String,
     },
     /// However small the blocks, they need more memory than that.
@@ -23,9 +23,9 @@ pub enum BlocksError {
         "{limit} MiB are too little for any block: the smallest that {photos} photos can be divided into needs {needed} MiB"
     )]
     MemoryLimit {
-        /// What was asked for, in MiB.
+        /// The requested limit, in MiB.
         limit: u64,
-        /// What the smallest division needs, in MiB.
+        /// Demand of the smallest division, in MiB.
         needed: u64,
         /// Photos of the capture.
         photos: usize,

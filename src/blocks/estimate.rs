@@ -1,4 +1,4 @@
-//! What a training is expected to take.
+//! Expected Gaussians, memory and time of a training.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,11 +7,11 @@ use crate::{
     luma::{Demand, LumaSettings, resident_photos},
 };
 
-/// Of the time of an iteration, the part that does not depend on the number of Gaussians. A
-/// round figure: how much it is depends on the device and the photos' size.
+/// Share of an iteration's time that does not depend on the number of Gaussians: a round figure, as
+/// it varies with the device and the photos' size.
 const FIXED: f64 = 0.5;
 
-/// What a training is expected to take.
+/// Expected Gaussians, memory and time of a training.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Estimate {

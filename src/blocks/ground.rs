@@ -5,14 +5,14 @@ use serde::{Deserialize, Serialize};
 
 use crate::capture::{Camera, Capture};
 
-/// How much it counts, beside cameras held level, that cameras move over the ground: level
-/// cameras with one heading, as of a drone that never turns, leave a plane of directions open.
+/// Weight of the cameras' moving over the ground, beside that of level cameras: level cameras with
+/// one heading, as of a drone that never turns, leave a plane of directions open.
 const MOVED: f64 = 0.2;
 
 /// The same for pictures held upright. Less: a picture from straight above has no upper side.
 const UPRIGHT: f64 = 0.05;
 
-/// What looking down counts for which of two ends is up, against the pictures' upper sides.
+/// Weight of viewing directions that point down, against the images' upper sides, in finding up.
 const DOWNWARD: f64 = 0.5;
 
 /// Rounds of inverse iteration: each brings the answer closer by the ratio of two eigenvalues.
@@ -51,20 +51,20 @@ impl Ground {
         }
     }
 
-    /// Where a place of the world stands on the ground, along its two axes.
+    /// Position of a world point on the ground, along its two axes.
     pub fn place(&self, position: DVec3) -> [f64; 2] {
         [self.along, self.across].map(|axis| DVec3::from(axis).dot(position))
     }
 
-    /// How high a place of the world lies, in world units.
+    /// Height of a world point, in world units.
     pub fn height(&self, position: DVec3) -> f64 {
         DVec3::from(self.up).dot(position)
     }
 }
 
-/// Which way is up: across the sides of all pictures, which cameras on tripods, gimbals and in
-/// hands hold level; where these leave it open, across the ways that the cameras moved, and as
-/// pictures are held.
+/// Up direction: across the horizontal axes of all images, which cameras on tripods, gimbals and in
+/// hands hold level; if these leave it open, across the cameras' movements, and by the images'
+/// upper sides.
 fn up_of<'a>(cameras: impl Iterator<Item = &'a Camera> + Clone) -> DVec3 {
     let outer = |v: DVec3| DMat3::from_cols(v.x * v, v.y * v, v.z * v);
     let count = cameras.clone().count().max(1) as f64;

@@ -33,9 +33,9 @@ pub struct Job {
     /// The same, seen from the job's folder: both may be moved together.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub nearby: Option<PathBuf>,
-    /// What the areas lie on.
+    /// The ground plane of the areas.
     pub ground: Ground,
-    /// How far blocks train beyond their own cells, as a share of a cell's length.
+    /// Margin by which blocks train beyond their own cells, as a share of a cell's length.
     pub overlap: f64,
     /// Photos with a pose.
     pub photos: usize,
@@ -43,7 +43,7 @@ pub struct Job {
     pub held_out: usize,
     /// Triangulated points.
     pub points: usize,
-    /// Where all but the farthest points lie on the ground.
+    /// Area of the ground that holds all but the farthest points.
     pub bounds: Area,
     /// The heights between which all but the farthest points lie, in world units along `up`.
     pub heights: [f64; 2],
@@ -55,7 +55,7 @@ pub struct Job {
     pub blocks: Vec<Block>,
 }
 
-/// What is planned of a block.
+/// Plan of a block.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Block {
@@ -71,11 +71,11 @@ pub struct Block {
     pub held_out: usize,
     /// Points above its own cell.
     pub points: usize,
-    /// What its training is expected to take.
+    /// Expected Gaussians, memory and time of its training.
     pub estimate: Estimate,
 }
 
-/// What kind of training a folder of a job is for.
+/// Kind of training that a job's folder is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
@@ -91,7 +91,7 @@ pub enum Kind {
 pub struct BlockFile {
     /// [`JOB_VERSION`].
     pub version: u32,
-    /// What it is for.
+    /// Kind of training.
     pub kind: Kind,
     /// Its photos.
     pub photos: Chosen,
@@ -235,7 +235,7 @@ fn damaged(path: &Path, reason: &str) -> BlocksError {
     }
 }
 
-/// What says which version the rest is of.
+/// The version field of a job's file.
 #[derive(Deserialize)]
 struct Version {
     version: u32,

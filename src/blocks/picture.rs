@@ -123,7 +123,7 @@ impl Sheet {
         inside.then(|| at.map(|c| c as u32))
     }
 
-    /// Where an area begins and ends on the paper, at its top left and bottom right.
+    /// Top left and bottom right corner of an area on the paper, in pixels.
     fn corners(&self, area: &Area) -> [[i64; 2]; 2] {
         let [[left, right], [low, high]] = area.0;
         let on_paper =

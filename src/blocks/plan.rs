@@ -41,15 +41,15 @@ const COARSE_LEAST: usize = 1000;
 /// Gaussians from the coarse model, beyond a block's margin, as a part of the block's own.
 pub const FAR_PART: usize = 16;
 
-/// How often the coarse model's training sees each photo at least.
+/// Least number of times that the coarse model's training sees each photo.
 const COARSE_EPOCHS: usize = 5;
 
-/// How a capture is to be divided.
+/// Options of dividing a capture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Division {
-    /// How many blocks; by default as many as the memory limit or the photos ask for.
+    /// Number of blocks; by default as many as the memory limit or the photos require.
     pub blocks: Option<Blocks>,
-    /// How far blocks train beyond their own cells, as a share of a cell's length.
+    /// Margin by which blocks train beyond their own cells, as a share of a cell's length.
     pub overlap: f64,
     /// Gaussians of the whole scene; by default each block may have its preset's.
     pub max_splats: Option<usize>,
@@ -57,7 +57,7 @@ pub struct Division {
     pub max_side: Option<u32>,
     /// Bytes of the device that no block's training is to exceed.
     pub memory_limit: Option<u64>,
-    /// Whether every 8th photo is held out.
+    /// True if every 8th photo is held out.
     pub holdout: bool,
 }
 
@@ -66,11 +66,11 @@ pub struct Division {
 pub struct PartitionPlan {
     /// `job.json`.
     pub job: Job,
-    /// Of the coarse model.
+    /// `block.json` of the coarse model.
     pub coarse: BlockFile,
-    /// Of each block.
+    /// `block.json` of each block.
     pub blocks: Vec<BlockFile>,
-    /// What is doubtful.
+    /// Warnings about the division, a line each.
     pub warnings: Vec<String>,
 }
 
@@ -118,7 +118,7 @@ pub fn plan(
     Ok(scene.planned(root, divided, warnings))
 }
 
-/// What is doubtful about a division.
+/// Warnings about a division, a line each.
 fn doubts(division: &Division, asked: Blocks, divided: &[(Block, Chosen)]) -> Vec<String> {
     let mut warnings = Vec::new();
     if divided.len() < asked.count() {
@@ -141,12 +141,12 @@ fn doubts(division: &Division, asked: Blocks, divided: &[(Block, Chosen)]) -> Ve
     warnings
 }
 
-/// What a division needs to know of a capture.
+/// Ground, points and photos of a capture, as a division needs them.
 struct Scene<'a> {
     capture: &'a Capture,
     division: &'a Division,
     ground: Ground,
-    /// Of each point, where it stands on the ground, and its observations.
+    /// Position of each point on the ground, and its number of observations.
     places: Vec<[f64; 2]>,
     weights: Vec<f32>,
     bounds: Area,
@@ -154,9 +154,9 @@ struct Scene<'a> {
     /// The photos' names, sorted, and whether each is held out.
     photos: Vec<String>,
     held_out: Vec<bool>,
-    /// Of each photo, the cameras of its views at working size.
+    /// Cameras of each photo's views, at working size.
     cameras: Vec<Vec<Camera>>,
-    /// Where each was taken.
+    /// Camera center of each photo on the ground.
     stands: Vec<[f64; 2]>,
     /// Gaussians of the whole, as asked or expected.
     splats: usize,
@@ -324,7 +324,7 @@ impl<'a> Scene<'a> {
         (self.splats / COARSE_PART).max(COARSE_LEAST)
     }
 
-    /// What a training of so many Gaussians on some photos takes.
+    /// Estimate of a training of so many Gaussians on some photos.
     fn estimate(&self, splats: usize, streams: bool, has: impl Fn(&str) -> bool) -> Estimate {
         let of_photos = (self.photos.iter().zip(&self.cameras)).filter(|(name, _)| has(name));
         let share = of_photos.clone().count() as f64 / self.photos.len() as f64;

@@ -4,19 +4,19 @@ use glam::DVec3;
 
 use super::{Area, Ground};
 
-/// What stands above or below an area of the ground, in coordinates that were moved.
+/// Part of the world above or below an area of the ground, in coordinates that were moved.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Region {
     /// The ground of COLMAP's world.
     pub ground: Ground,
     /// The area of it.
     pub area: Area,
-    /// What was subtracted from COLMAP's coordinates, in world units.
+    /// Offset that was subtracted from COLMAP's coordinates, in world units.
     pub offset: DVec3,
 }
 
 impl Region {
-    /// Whether a place is in it.
+    /// Returns true if a position lies in the region.
     pub fn holds(&self, place: [f32; 3]) -> bool {
         let place = DVec3::from(place.map(f64::from)) + self.offset;
         self.area.holds(self.ground.place(place))

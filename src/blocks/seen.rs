@@ -1,4 +1,4 @@
-//! What each photo shows of each area.
+//! Coverage of areas by photos.
 
 use glam::DVec3;
 
@@ -8,14 +8,14 @@ use crate::capture::Capture;
 /// Points that stand for all where nobody knows which photo shows which; an even choice.
 const SAMPLES: usize = 2000;
 
-/// How many observations each photo has, and where.
+/// Number of observations of each photo, in all and by area.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PhotoCoverage {
     /// The photos' names, sorted.
     pub photos: Vec<String>,
-    /// Of each photo, its observations of points.
+    /// Each photo's observations of points.
     pub all: Vec<u32>,
-    /// Of each area and each photo, those of points above it.
+    /// Each area's observations by each photo, of points above it.
     pub of: Vec<Vec<u32>>,
 }
 
