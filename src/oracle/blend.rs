@@ -4,7 +4,7 @@ use super::constants::ALPHA_MAX;
 use super::numerics::Numerics;
 use super::{Number, relative_distance};
 
-/// What blending needs to know of a Gaussian.
+/// Screen-space parameters of a Gaussian for blending.
 #[derive(Clone, Copy, Debug)]
 pub struct ScreenSplat<T, const C: usize> {
     /// Center in pixels.
@@ -17,7 +17,7 @@ pub struct ScreenSplat<T, const C: usize> {
     pub color: [T; C],
 }
 
-/// What blending leaves at a pixel.
+/// Result of blending at a pixel.
 #[derive(Clone, Debug)]
 pub struct Pixel<T, const C: usize> {
     /// Blended color over a background of zero.

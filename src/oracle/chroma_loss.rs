@@ -55,20 +55,20 @@ pub fn chroma_loss_gradient(rendered: &[[f64; 2]], target: &[[f64; 2]]) -> Vec<[
         .collect()
 }
 
-/// How a teacher's a/b enter the loss.
+/// A teacher's a/b with their weights and correction, as the loss takes them.
 #[derive(Clone, Debug)]
 pub struct AbTargets {
     /// Wanted a/b, `[pixels][2]`.
     pub wanted: Vec<[f64; 2]>,
-    /// How much each pixel counts; those above 1 were painted by hand.
+    /// Weight of each pixel; above 1 for those painted by hand.
     pub weights: Vec<f64>,
     /// Rows of what wanted a/b are multiplied by, painted ones excepted.
     pub gain: [[f64; 2]; 2],
-    /// What is added then, in Lab units.
+    /// Added after the gain, in Lab units.
     pub offset: [f64; 2],
     /// See [`declining`]; painted pixels never decline.
     pub decline: f64,
-    /// Whether a and b are judged by their distance, half of which is each one's.
+    /// True if a and b are judged by their distance, half of which is each one's.
     pub joint: bool,
 }
 
@@ -175,8 +175,8 @@ mod tests {
         assert!((declining(30.0_f64, 1e-9) - smooth_l1(30.0)).abs() < 1e-5);
     }
 
-    /// What makes reweighting descend: the parabola with this curvature that touches
-    /// the loss lies above it everywhere (Lange 2016, chapter 4).
+    /// Reweighting descends: the parabola with this curvature that touches the loss lies above it
+    /// everywhere (Lange 2016, chapter 4).
     #[test]
     fn the_curvature_is_that_of_a_parabola_above() {
         for decline in [0.0, 0.05, 0.3] {

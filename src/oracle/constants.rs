@@ -7,7 +7,7 @@ pub const BLUR: f64 = 0.3;
 /// The same in PlayCanvas' engine.
 pub const PLAYCANVAS_BLUR: f64 = 0.075;
 
-/// What is left of a Gaussian where PlayCanvas' engine cuts it off, e⁻⁴.
+/// Density of a Gaussian where PlayCanvas' engine cuts it off, e⁻⁴.
 pub const PLAYCANVAS_TAIL: f64 = 0.018_315_638_888_734_18;
 
 /// The largest opacity of a splat at a pixel; keeps `1 / (1 - alpha)` bounded.
@@ -25,8 +25,8 @@ pub const COLOR_MAX: f64 = 1e4;
 /// Quaternions with a squared norm up to this have no direction worth trusting.
 pub const QUAT_NORM_MIN_SQ: f64 = 1e-8;
 
-/// How far beyond the image the projection's Jacobian follows the splat, as
-/// a share of half the field of view.
+/// Distance beyond the image up to which the projection's Jacobian follows the splat, as a share of
+/// half the field of view.
 pub const FRUSTUM_MARGIN: f64 = 0.3;
 
 /// Side of a tile in pixels.

@@ -39,18 +39,18 @@ pub fn lab<T: Number>(rgb: [T; 3]) -> [T; 3] {
     [y * 116.0 - 16.0, (x - y) * 500.0, (y - z) * 200.0]
 }
 
-/// How differences count.
+/// Weights of the loss's terms.
 #[derive(Clone, Copy, Debug)]
 pub struct LabWeights {
-    /// Of lightness.
+    /// Weight of the difference in lightness.
     pub lightness: f64,
-    /// Whether its difference is squared.
+    /// True if the difference in lightness is squared.
     pub squared: bool,
-    /// Of a and of b.
+    /// Weight of the differences in a and in b.
     pub chroma: f64,
-    /// Of a's and b's agreement with the coarser picture.
+    /// Weight of a's and b's agreement with the coarser image.
     pub agreement: f64,
-    /// Of the total variation of R, G and B.
+    /// Weight of the total variation of R, G and B.
     pub variation: f64,
 }
 
@@ -61,11 +61,11 @@ pub struct LabTarget {
     pub size: [usize; 2],
     /// Wanted RGB, 0 to 1.
     pub rgb: Vec<[f64; 3]>,
-    /// How much each pixel counts.
+    /// Weight of each pixel.
     pub weights: Vec<f64>,
     /// Size and RGB of the coarser picture, where there is one.
     pub coarser: Option<([usize; 2], Vec<[f64; 3]>)>,
-    /// How differences count.
+    /// Weights of the loss's terms.
     pub of: LabWeights,
 }
 
@@ -90,7 +90,7 @@ impl LabTarget {
         Some(mix(top, bottom, y.2))
     }
 
-    /// What pixel `p` alone is charged for.
+    /// Loss of pixel `p`, without the total variation.
     fn own<T: Number>(&self, p: usize, rgb: [T; 3]) -> T {
         let of = &self.of;
         let drawn = lab(rgb);

@@ -30,7 +30,7 @@ const AGE: usize = 2;
 /// A displacement, the change of the gradient along it, and one over their product.
 type Pair = (Vec<f64>, Vec<f64>, f64);
 
-/// What the next step is.
+/// Kind of the next step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum NextStep {
     Onward,
@@ -38,7 +38,7 @@ enum NextStep {
     Safe,
 }
 
-/// Where the iteration stands.
+/// State of the iteration.
 #[derive(Clone, Debug)]
 pub struct Lbfgs {
     /// x.
@@ -48,9 +48,9 @@ pub struct Lbfgs {
     /// From the accepted point before to this one.
     displacement: Vec<f64>,
     floors: Vec<f64>,
-    /// Of each unknown.
+    /// Ridge of each unknown.
     ridges: Vec<f64>,
-    /// Where each unknown is drawn to, and how strongly.
+    /// Anchor of each unknown, and its pull.
     anchors: (Vec<f64>, Vec<f64>),
     /// The accepted point and its gradient.
     accepted: (Vec<f64>, Vec<f64>),
@@ -61,7 +61,7 @@ pub struct Lbfgs {
     slope: f64,
     /// Points accepted so far.
     age: usize,
-    /// Whether what is minimized has changed a little since the accepted point.
+    /// True if the loss has changed slightly since the accepted point.
     changed: bool,
     /// One over the majorizer's diagonal there; zero for what is held at its floor.
     preconditioner: Vec<f64>,
@@ -142,13 +142,13 @@ impl Lbfgs {
         }
     }
 
-    /// What is minimized is another function from now on.
+    /// Minimizes another loss from now on.
     pub fn restart(&mut self) {
         self.loss = None;
     }
 
-    /// What is minimized is a little different from now on: what the gradient changes by in the
-    /// next step says nothing of the curvature.
+    /// The loss is a slightly different one from now on: the change of the gradient in the next
+    /// step tells nothing about the curvature.
     pub fn changed(&mut self) {
         self.changed = true;
     }

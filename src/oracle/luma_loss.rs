@@ -56,14 +56,14 @@ fn ssim_at<T: Number>(
     luminance * structure
 }
 
-/// What the loss reckons with besides.
+/// SSIM window, exposure and mask of the loss.
 #[derive(Clone, Copy, Debug)]
 pub struct LumaEffects<'a> {
     /// Taps of SSIM's window along one axis.
     pub ssim_window: usize,
     /// Gain and offset: what the photo shows of the image.
     pub exposure: Option<[f64; 2]>,
-    /// What each pixel counts, `[height · width]`.
+    /// Weight of each pixel, `[height · width]`.
     pub mask: Option<&'a [f64]>,
 }
 
@@ -89,7 +89,7 @@ impl LumaEffects<'_> {
         if beyond { T::from(y) } else { value }
     }
 
-    /// What a pixel counts.
+    /// Weight of a pixel.
     fn weight(&self, pixel: usize) -> f64 {
         self.mask.map_or(1.0, |mask| mask[pixel])
     }

@@ -36,7 +36,7 @@ pub mod view_correction;
 
 use num_dual::{Dual64, DualNum};
 
-/// What the oracle computes with: `f64`, or a dual number over it.
+/// Scalar of the oracle: `f64`, or a dual number over it.
 pub trait Number: DualNum<Primitive = f64> + Copy {}
 
 impl<T: DualNum<Primitive = f64> + Copy> Number for T {}

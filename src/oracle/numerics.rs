@@ -1,9 +1,9 @@
-//! Where the forward pass stops counting, and what else may be computed less accurately.
+//! Thresholds of the forward pass, and other settings of its accuracy.
 
 use super::Number;
 use super::constants::{ALPHA_MIN, BLUR, PLAYCANVAS_BLUR, PLAYCANVAS_TAIL, TRANSMITTANCE_MIN};
 
-/// What the kernels leave out.
+/// Thresholds, depth precision and falloff of the kernels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Numerics {
     /// The smallest opacity that is blended.
@@ -13,11 +13,11 @@ pub struct Numerics {
     /// Highest bits of a depth, as `f32`, that decide the order; with all 32 depths are
     /// compared as `f64`.
     pub depth_bits: u32,
-    /// How a Gaussian ends.
+    /// Falloff of a Gaussian.
     pub falloff: Falloff,
 }
 
-/// How a Gaussian's opacity falls towards its border.
+/// Falloff of a Gaussian's opacity towards its border.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Falloff {
     /// As a Gaussian.
@@ -27,7 +27,7 @@ pub enum Falloff {
 }
 
 impl Falloff {
-    /// What a Gaussian shows of its opacity at a power, ½ dᵀ Σ⁻¹ d.
+    /// Share of a Gaussian's opacity at a power, ½ dᵀ Σ⁻¹ d.
     pub fn at<T: Number>(self, power: T) -> T {
         match self {
             Self::Gaussian => (-power).exp(),
@@ -45,7 +45,7 @@ impl Falloff {
 }
 
 impl Numerics {
-    /// What 3D Gaussian splatting leaves out.
+    /// Thresholds of 3D Gaussian splatting.
     pub const DEFAULT: Self = Self {
         alpha_min: ALPHA_MIN,
         transmittance_min: TRANSMITTANCE_MIN,

@@ -29,7 +29,7 @@ pub struct Projected<T> {
     pub half_extent: [f64; 2],
 }
 
-/// Why a Gaussian is not drawn. Checked in this order.
+/// Reason for which a Gaussian is not drawn. Checked in this order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cull {
     /// A parameter is NaN or infinite.
@@ -48,7 +48,7 @@ pub enum Cull {
     Color,
 }
 
-/// Where the Jacobian stops following x/z, y/z: `[[low, high]; 2]`.
+/// Limits of x/z and y/z beyond which the Jacobian does not follow: `[[low, high]; 2]`.
 pub fn jacobian_limits(view: &View) -> [[f64; 2]; 2] {
     let axis = |size: usize, focal: f64, principal: f64| {
         let margin = FRUSTUM_MARGIN * 0.5 * size as f64 / focal;

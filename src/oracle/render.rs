@@ -13,9 +13,9 @@ use super::{Number, relative_distance};
 pub struct Visible<T, const C: usize> {
     /// Index in the scene.
     pub index: usize,
-    /// What projection says.
+    /// Result of projection.
     pub projected: Projected<T>,
-    /// What blending takes.
+    /// Input of blending.
     pub splat: ScreenSplat<T, C>,
 }
 

@@ -17,7 +17,7 @@ const UNITS: f64 = 100.0;
 pub struct RgbTargets {
     /// Wanted RGB, 0 to 1.
     pub rgb: Vec<[f64; 3]>,
-    /// How much each pixel counts.
+    /// Weight of each pixel.
     pub weights: Vec<f64>,
 }
 

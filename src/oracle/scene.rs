@@ -140,7 +140,7 @@ impl<T: Number, const C: usize> Scene<T, C> {
         self.means.len()
     }
 
-    /// Whether it has none.
+    /// Returns true if the scene has no Gaussians.
     pub fn is_empty(&self) -> bool {
         self.means.is_empty()
     }

@@ -5,7 +5,7 @@ use super::constants::{SH_C0, SH_C1, SH_C2, SH_C3};
 use super::linear::dot;
 use super::view::View;
 
-/// What the sum of harmonics means.
+/// Mapping from the sum of harmonics to a color.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shading {
     /// Luma and RGB: plus 0.5, and nothing below zero.

@@ -1,9 +1,9 @@
-//! Which tiles a Gaussian touches: its visible ellipse against the rectangle
-//! of each tile's pixel centers, exactly.
+//! Tiles that a Gaussian touches: its visible ellipse against the rectangle of each tile's pixel
+//! centers, exactly.
 
 use super::project::Projected;
 
-/// How an image is cut into square tiles.
+/// Grid of square tiles over an image.
 #[derive(Clone, Copy, Debug)]
 pub struct TileGrid {
     /// Side of a tile in pixels.
@@ -60,7 +60,7 @@ pub fn min_power(projected: &Projected<f64>, rectangle: [[f64; 2]; 2]) -> f64 {
     (vertical.into_iter().chain(horizontal)).fold(f64::INFINITY, f64::min)
 }
 
-/// Whether a Gaussian touches a tile.
+/// Returns true if a Gaussian touches a tile.
 pub fn touches(projected: &Projected<f64>, grid: &TileGrid, column: usize, row: usize) -> bool {
     min_power(projected, grid.centers(column, row)) <= projected.cutoff
 }

@@ -23,9 +23,9 @@ pub struct View {
     pub height: usize,
     /// Gaussians are drawn beyond this depth only, in world units; 0 or more.
     pub near: f64,
-    /// Whether a Gaussian's opacity falls by what the blur spreads it.
+    /// True if a Gaussian's opacity falls by what the blur spreads it.
     pub antialiased: bool,
-    /// What is left out.
+    /// Thresholds and falloff.
     pub numerics: Numerics,
 }
 

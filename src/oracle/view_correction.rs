@@ -1,6 +1,5 @@
-//! What brings the views' teachers into line: of each view, the affine map from
-//! rendered to taught a/b by weighted least squares; of all, what is left when that about
-//! which they gather (Huber's location) is taken out, undone.
+//! Corrections that align the views' teachers: each view's affine map from rendered to taught a/b
+//! by weighted least squares, relative to the center of all maps (Huber's location), inverted.
 
 use super::constants::{
     CORRECTION_DETERMINANT_MIN, CORRECTION_GAIN_UNITS, CORRECTION_NEAR, CORRECTION_PRIOR,
@@ -80,7 +79,7 @@ fn mean_of(maps: &[Affine], weight: impl Fn(&Affine) -> f64) -> Affine {
     }
 }
 
-/// How far two maps are apart, in Lab units.
+/// Distance of two maps, in Lab units.
 fn distance(a: &Affine, b: &Affine) -> f64 {
     let length = |a: &[f64], b: &[f64]| {
         let squares = a.iter().zip(b).map(|(a, b)| (a - b).powi(2));
@@ -90,7 +89,7 @@ fn distance(a: &Affine, b: &Affine) -> f64 {
         + CORRECTION_GAIN_UNITS * length(a.gain.as_flattened(), b.gain.as_flattened())
 }
 
-/// Where maps gather: Huber's location by reweighted means.
+/// Center of maps: Huber's location by reweighted means.
 pub fn center_of(maps: &[Affine]) -> Affine {
     let mut center = mean_of(maps, |_| 1.0);
     for _ in 0..GATHERINGS {
@@ -104,7 +103,7 @@ pub fn center_of(maps: &[Affine]) -> Affine {
 /// Steps of [`center_of`].
 const GATHERINGS: usize = 16;
 
-/// What wanted a/b of each view have to go through.
+/// Correction of each view's wanted a/b.
 pub fn view_corrections(views: &[Vec<Pixel>]) -> Vec<Affine> {
     let teachers: Vec<Affine> = views.iter().map(|pixels| teacher_of(pixels)).collect();
     let Affine {
@@ -193,7 +192,7 @@ mod tests {
         }
     }
 
-    /// What all teachers share is the scene's color, which must not drift.
+    /// The bias that all teachers share is the scene's color, which must not drift.
     #[test]
     fn what_all_share_stays() {
         let mut random = Random::new(3);
