@@ -1,4 +1,4 @@
-//! Which views a camera's photos become.
+//! Views made from a camera's photos.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -13,9 +13,9 @@ pub(super) struct Arrangement {
     lens: Arc<Lens>,
     /// At least one.
     cuts: Vec<Cut>,
-    /// Whether photos are resampled at all.
+    /// True if photos are resampled.
     undistorts: bool,
-    /// How far the lens displaces a pixel, at working size.
+    /// Largest displacement by the lens, in pixels at working size.
     pub displacement: f64,
 }
 

@@ -1,4 +1,4 @@
-//! What the colors of a picture mean: pictures of other color spaces become sRGB.
+//! Color management: images of other color spaces become sRGB.
 
 use image::{DynamicImage, Rgb32FImage, Rgba32FImage};
 use moxcms::{
@@ -8,7 +8,7 @@ use moxcms::{
 
 use super::metadata::ImageMetadata;
 
-/// How far each channel may be off for a color space to be sRGB, in 1.
+/// Tolerance of each channel, 0 to 1, within which a color space counts as sRGB.
 const SAME: f32 = 1.5 / 255.0;
 
 /// The gamma that stands for sRGB, and how far one may be off to be it.

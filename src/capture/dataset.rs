@@ -14,7 +14,7 @@ use super::{
     Normalize, Photo, Rejected, Split, View, first_views, in_order, split, split_as,
 };
 
-/// What is worth telling while a dataset is opened.
+/// Notice given while a dataset is opened.
 #[derive(Clone, Copy, Debug)]
 pub enum Notice<'a> {
     /// A warning about the model's files.
@@ -38,13 +38,13 @@ pub enum Notice<'a> {
 /// by any number of threads, and kept while they take little room.
 #[derive(Debug)]
 pub struct Dataset {
-    /// What was photographed.
+    /// The photos' views, points and cameras.
     pub capture: Capture,
-    /// Which views train and which are held out.
+    /// Training and held-out views.
     pub split: Split,
-    /// How photos are loaded; nothing in it is left open.
+    /// Load options with every `Auto` resolved.
     pub options: LoadOptions,
-    /// Of each view, at working size.
+    /// Camera of each view, at working size.
     pub cameras: Vec<Camera>,
     /// Views whose photo has a mask file, or an alpha channel that is taken for its mask.
     pub masked_views: usize,
@@ -165,7 +165,7 @@ impl Dataset {
         Ok(self.loader.load(&self.capture.views[view])?.0)
     }
 
-    /// How its photos are loaded.
+    /// Loader of the photos.
     pub fn loader(&self) -> &Loader {
         &self.loader
     }
@@ -212,12 +212,12 @@ impl Dataset {
         }
     }
 
-    /// Whether nothing is where masks are black; photos are black there, and that counts.
+    /// Returns true if masked pixels are removed: photos are black there, and that counts.
     pub fn removes_masked(&self) -> bool {
         self.masked_views > 0 && self.options.masked == MaskUse::Remove
     }
 
-    /// What the folder of masks holds, if there is one.
+    /// Summary of the mask folder, if there is one.
     pub fn masked(&self) -> Option<&Masked> {
         self.loader.masked()
     }
@@ -238,7 +238,7 @@ impl Dataset {
         self.loader.not_finite()
     }
 
-    /// How often a photo was decoded so far.
+    /// Number of times that a photo was decoded so far.
     pub fn decoded(&self) -> usize {
         self.decoded.load(Ordering::Relaxed)
     }
@@ -266,7 +266,7 @@ impl Dataset {
 struct Cache {
     most: usize,
     bytes: usize,
-    /// Of each view its photo and when it was asked for.
+    /// Photo of each view, with the time of its last use.
     photos: HashMap<usize, (Arc<Photo>, u64)>,
     now: u64,
 }

@@ -14,7 +14,7 @@ use super::sample::{Bytes, Depth, Header, LARGEST_FILE, Samples};
 use super::{colors, jpeg, tiff};
 use crate::input;
 
-/// How TIFF files begin that may be larger than 4 GiB, in either byte order.
+/// First bytes of TIFF files that may be larger than 4 GiB, in either byte order.
 const BIG_TIFF: [&[u8]; 2] = [b"II+\0", b"MM\0+"];
 
 /// The longest of the formats' magic numbers, in bytes.
@@ -114,7 +114,7 @@ fn decode_with(
 pub(crate) struct Painting {
     /// As its file has it, but in sRGB.
     pub image: DynamicImage,
-    /// How it stands upright.
+    /// Transform that makes it upright.
     pub orientation: Orientation,
     /// Color space of the file if it is not supported; the colors are then taken for sRGB.
     pub unheeded: Option<String>,

@@ -1,4 +1,4 @@
-//! What can be wrong with a capture.
+//! Errors of loading a capture.
 
 use std::fmt;
 use std::io;
@@ -8,7 +8,7 @@ use thiserror::Error;
 
 use super::names::AmbiguousNames;
 
-/// Where in a file something is wrong.
+/// Position of an error in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Position {
     /// Bytes from the start of a binary file.
@@ -26,7 +26,7 @@ impl fmt::Display for Position {
     }
 }
 
-/// Why a capture or one of its photos cannot be loaded.
+/// A capture or one of its photos cannot be loaded.
 #[derive(Debug, Error)]
 pub enum CaptureError {
     /// The given path is no folder.
@@ -76,7 +76,7 @@ pub enum CaptureError {
     Write {
         /// Folder at fault.
         path: PathBuf,
-        /// What the operating system says.
+        /// The operating system's error.
         source: io::Error,
     },
     /// The operating system could not read a file.
@@ -84,7 +84,7 @@ pub enum CaptureError {
     Read {
         /// File at fault.
         path: PathBuf,
-        /// What the operating system says.
+        /// The operating system's error.
         source: io::Error,
     },
     /// A model file contradicts COLMAP's format.
@@ -94,9 +94,9 @@ pub enum CaptureError {
         path: PathBuf,
         /// The record, such as `image 3 of 12`.
         record: String,
-        /// Where in the file.
+        /// Position in the file.
         position: Position,
-        /// What is wrong.
+        /// The contradiction.
         reason: String,
     },
     /// An image's name leads to no photo.
@@ -108,9 +108,9 @@ pub enum CaptureError {
         path: PathBuf,
         /// The record, such as `image 3 of 12`.
         record: String,
-        /// Where in the file.
+        /// Position in the file.
         position: Position,
-        /// What is wrong with the name.
+        /// The error in the name.
         reason: String,
     },
     /// A camera's model is not one of COLMAP's.
@@ -136,7 +136,7 @@ pub enum CaptureError {
         camera_id: u32,
         /// COLMAP's name of the model.
         model: &'static str,
-        /// What is wrong.
+        /// The error in the calibration.
         reason: String,
     },
     /// The model holds no images.
@@ -164,11 +164,11 @@ pub enum CaptureError {
     AllRejected {
         /// The images file.
         path: PathBuf,
-        /// How many images were rejected.
+        /// Number of rejected images.
         count: usize,
         /// The first of them by name.
         name: String,
-        /// Why that one was rejected.
+        /// Reason for which that one was rejected.
         reason: String,
     },
     /// Photos that the model names are not there.
@@ -178,9 +178,9 @@ pub enum CaptureError {
     MissingPhotos {
         /// The first missing photo by name.
         first: PathBuf,
-        /// How many are missing.
+        /// Number of missing photos.
         missing: usize,
-        /// How many photos the model names.
+        /// Number of photos that the model names.
         total: usize,
     },
     /// A photo or a mask cannot be decoded.
@@ -188,7 +188,7 @@ pub enum CaptureError {
     Photo {
         /// File at fault.
         path: PathBuf,
-        /// What is wrong and what helps.
+        /// The error and its remedy.
         reason: String,
     },
     /// A photo has another shape than its camera.
@@ -211,11 +211,11 @@ pub enum CaptureError {
     MixedDepths {
         /// A photo.
         path: PathBuf,
-        /// What its values are.
+        /// Depth of its values, such as `8 bits`.
         depth: String,
         /// A photo of another kind.
         other: PathBuf,
-        /// What its values are.
+        /// Depth of that photo's values.
         other_depth: String,
     },
     /// A range holds none of the values that a photo can have.
@@ -226,7 +226,7 @@ pub enum CaptureError {
     RangeBeyond {
         /// A photo.
         path: PathBuf,
-        /// What its values are.
+        /// Depth of its values, such as `8 bits`.
         depth: String,
         /// The greatest of them.
         white: f64,
@@ -244,7 +244,7 @@ pub enum CaptureError {
     NoMasks {
         /// The folder of masks.
         dir: PathBuf,
-        /// What the first photo's mask would be called.
+        /// Expected path of the first photo's mask.
         example: PathBuf,
     },
     /// A mask has another shape than its photo.
@@ -262,12 +262,12 @@ pub enum CaptureError {
         /// The photo's width and height.
         size: [u32; 2],
     },
-    /// What is said of a capture's film cannot be.
+    /// The description of a capture's film is invalid.
     #[error("{path}: {reason}; prepare the film again")]
     Film {
         /// File at fault.
         path: PathBuf,
-        /// What is wrong.
+        /// The error in the description.
         reason: String,
     },
     /// Nobody knows which mask belongs to which photo.
@@ -278,7 +278,7 @@ pub enum CaptureError {
     NothingCounts {
         /// Photo at fault.
         path: PathBuf,
-        /// What leaves nothing of it.
+        /// Reason for which nothing of it is left.
         reason: String,
     },
 }

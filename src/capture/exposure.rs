@@ -1,4 +1,4 @@
-//! How bright a photo shows the scene.
+//! Exposure: gain and offset from the scene's luma to a photo's gray.
 
 /// A photo shows `gain · luma + offset` of the scene's luma, both as encoded gray
 /// in [0, 1], as far as black and white allow.
@@ -18,7 +18,7 @@ impl Exposure {
         offset: 0.0,
     };
 
-    /// What a photo shows of a luma.
+    /// Gray of a photo for a luma of the scene, 0 to 1.
     pub fn shown(self, luma: f64) -> f64 {
         (self.gain * luma + self.offset).clamp(0.0, 1.0)
     }

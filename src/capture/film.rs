@@ -11,7 +11,7 @@ use crate::{disk, input};
 /// The file, in the folder of a capture.
 const FILE: &str = "film.json";
 
-/// Where a capture keeps all frames of its film.
+/// Folder of a capture that holds all frames of its film.
 pub const FRAMES: &str = "frames";
 
 /// Seconds of a shot at most, a day: its frames are counted.
@@ -79,8 +79,8 @@ impl Film {
         file.persist(&path)
     }
 
-    /// How often each frame is shown, at so many frames a second, for all to be shown when they
-    /// were: once, unless they have times of their own, or the film has sound and another rate.
+    /// Repetitions of each frame at a frame rate that keep all frames at their times: one, unless
+    /// they have times of their own, or the film has sound and another rate.
     pub fn repeats(&self, rate: [u32; 2]) -> Vec<usize> {
         let per_second = |[frames, seconds]: [u32; 2]| f64::from(frames) / f64::from(seconds);
         let own = per_second(self.frame_rate);
@@ -108,7 +108,7 @@ impl Film {
         repeats
     }
 
-    /// What about it cannot be, if anything.
+    /// Checks that times, rate, size and names are valid; the error names the field.
     fn check(&self) -> Result<(), String> {
         let time = |seconds: f64| seconds.is_finite() && seconds >= 0.0;
         let plain =

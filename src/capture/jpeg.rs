@@ -13,7 +13,7 @@ pub(super) struct Frame {
     pub precision: u8,
     /// Color components: 1 gray, 3 color, 4 CMYK or YCCK.
     pub components: u8,
-    /// Where the end-of-image marker stands.
+    /// Offset of the end-of-image marker, in bytes.
     pub end: usize,
 }
 

@@ -1,4 +1,4 @@
-//! What photos show of something else than what is trained on.
+//! Parts of photos that show something other than the trained scene.
 
 use std::{
     io,
@@ -18,7 +18,7 @@ const STEPS: f32 = 64.0;
 pub struct Layers {
     folder: PathBuf,
     file: Mutex<Scratch>,
-    /// Of each view, where its picture begins.
+    /// Offset of each view's image in the file, in bytes.
     places: Vec<Option<u64>>,
 }
 

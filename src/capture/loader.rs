@@ -18,8 +18,8 @@ use super::sample::Depth;
 use super::tone;
 use super::{Camera, Capture, View};
 
-/// Of each photo so many pixels are looked at to find the range of all: of 20 photos,
-/// 400 lie beyond each of the two percentiles.
+/// Pixels of each photo that are sampled to find the range of all: of 20 photos, 400 lie beyond
+/// each of the two percentiles.
 const SAMPLED_PIXELS: usize = 4096;
 
 /// The share of all values that may lie beyond either end of the range: specular
@@ -35,14 +35,14 @@ const FULL_ENOUGH: f64 = 0.5;
 pub struct Loader {
     options: LoadOptions,
     masks: Option<MaskFolder>,
-    /// How their values are kept; `None` where it is not needed.
+    /// Depth of all photos' values; `None` where it is not needed.
     depth: Option<Depth>,
-    /// Of each photo loaded, pixels whose values are not finite; a photo may be loaded
-    /// for several views.
+    /// Number of pixels of each loaded photo whose values are not finite; a photo may be loaded for
+    /// several views.
     not_finite: Mutex<BTreeMap<String, usize>>,
     /// Photos whose files have an alpha channel that is taken for their mask.
     with_alpha: BTreeSet<String>,
-    /// Of those loaded, the ones that are transparent anywhere.
+    /// Loaded photos with alpha that are transparent anywhere.
     transparent: Mutex<BTreeSet<String>>,
     /// True if COLMAP saw any photo rotated by its EXIF orientation.
     turned: AtomicBool,
@@ -127,7 +127,7 @@ impl Loader {
         Ok(loader)
     }
 
-    /// Whether [`Self::sample`]s of all photos are needed before one can be loaded.
+    /// Returns true if [`Self::sample`]s of all photos are needed before one can be loaded.
     pub fn undecided(&self) -> bool {
         self.options.normalize == Normalize::Auto
     }
@@ -340,7 +340,7 @@ impl Loader {
         &self.options
     }
 
-    /// How many of the views have a mask, or a photo with an alpha channel that is taken for it.
+    /// Number of views with a mask, or a photo with an alpha channel that is taken for it.
     pub fn masked_views(&self, views: &[View]) -> usize {
         let masked = |view: &&View| {
             let of_file = self.masks.as_ref().and_then(|masks| masks.of(view));
@@ -349,12 +349,12 @@ impl Loader {
         views.iter().filter(masked).count()
     }
 
-    /// What the folder of masks holds, if there is one.
+    /// Summary of the mask folder, if there is one.
     pub fn masked(&self) -> Option<&Masked> {
         self.masks.as_ref().map(|masks| &masks.found)
     }
 
-    /// How many of the photos loaded so far are transparent where that is taken for a mask.
+    /// Number of photos loaded so far that are transparent where that is taken for a mask.
     pub fn transparent(&self) -> usize {
         let known = self.transparent.lock();
         known.unwrap_or_else(PoisonError::into_inner).len()
@@ -413,7 +413,7 @@ pub fn first_views(views: &[View]) -> impl Iterator<Item = &View> {
         .map(|views| &views[0])
 }
 
-/// What the headers of a capture's photos say.
+/// Summary of the headers of a capture's photos.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Headers {
     /// Kinds of photos in words, and how many there are of each.
@@ -426,7 +426,7 @@ pub struct Headers {
 /// saw, or thumbnails.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Shrunk {
-    /// How many.
+    /// Number of such photos.
     pub count: usize,
     /// The first of them.
     pub name: String,
@@ -488,7 +488,7 @@ pub(crate) fn percentiles(values: &mut [f32]) -> Option<[f64; 2]> {
     (range[0] < range[1]).then_some(range)
 }
 
-/// Whether a range, in shares of the scale, can stay as it is.
+/// Returns true if a range, in shares of the scale, needs no normalization.
 fn fills(low: f64, high: f64) -> bool {
     low >= 0.0 && high <= 1.0 && high - low >= FULL_ENOUGH
 }

@@ -13,7 +13,7 @@ use super::sample::{Depth, Header, Samples};
 use super::unplaced::photos_in;
 use super::{Capture, IMAGES, View, first_views};
 
-/// Where masks lie unless told otherwise.
+/// Default folder of masks, beside `images/`.
 const BESIDE: &str = "masks";
 
 /// A folder of masks with COLMAP's names: for `images/a/b.jpg` the file
@@ -24,14 +24,14 @@ pub(super) struct MaskFolder {
     pub found: Masked,
 }
 
-/// What a folder of masks holds.
+/// Summary of a mask folder.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Masked {
     /// The folder.
     pub dir: PathBuf,
     /// Photos that the capture has views of.
     pub photos: usize,
-    /// How many of these have a mask.
+    /// Number of these that have a mask.
     pub masked: usize,
     /// Pictures in the folder that belong to no photo in `images/`, sorted.
     pub strays: Vec<String>,
@@ -188,8 +188,8 @@ pub(crate) fn read(
     Ok(resized(mask, way.size(header.size), size))
 }
 
-/// Why a mask does not tell what counts and what does not, where it does not: its values are
-/// numbers or colors of several things, or only its transparency tells.
+/// Reason why a mask is ambiguous, if any: its values are numbers or colors of several things, or
+/// only its transparency tells.
 fn several_things(values: &[u8], header: &Header) -> Option<String> {
     let colors = if header.channels < 3 { 1 } else { 3 };
     let mut known = [false; 256];

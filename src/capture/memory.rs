@@ -4,11 +4,11 @@ use std::sync::{Condvar, Mutex, PoisonError};
 
 use super::sample::LARGEST_FILE;
 
-/// What photos that are decoded at once may take together, in bytes: two of the largest, some
-/// fourteen of 24 million RGB pixels.
+/// Largest memory of photos decoded at once, in bytes: two of the largest, some fourteen of 24
+/// million RGB pixels.
 const ALL: u64 = 2 * LARGEST_FILE;
 
-/// That of this program.
+/// Memory shared by all decoding threads of the program.
 static ROOM: SharedBytes = SharedBytes::new(ALL);
 
 /// A number of bytes that several threads share.

@@ -1,4 +1,4 @@
-//! What a photo's file holds beside its pixels: EXIF, and what its colors mean.
+//! Metadata of a photo's file: EXIF and color space.
 
 use std::io::{self, SeekFrom};
 

@@ -1,4 +1,4 @@
-//! What was photographed: COLMAP models, pinhole cameras, photos and splits.
+//! Captures: COLMAP models, pinhole cameras, photos and splits.
 
 mod arrangement;
 pub mod camera;
@@ -87,7 +87,7 @@ pub(crate) use {
     sample::{Depth, Header},
 };
 
-/// Where a COLMAP folder has its photos.
+/// Folder of the photos in a COLMAP folder.
 pub const IMAGES: &str = "images";
 
 /// A quaternion's length may be off by so much: text files round its digits.
@@ -103,7 +103,7 @@ const LARGEST_COORDINATE: f64 = 1e12;
 /// extents: f32 then has less than 2⁻²⁴ · 100 ≈ 6e-6 of the extent as its step.
 const RECENTER_EXTENTS: f64 = 100.0;
 
-/// What 3DGS multiplies the cameras' radius by for the scene's extent.
+/// Factor from the cameras' radius to the scene's extent, as in 3DGS.
 const EXTENT_MARGIN: f64 = 1.1;
 
 /// Cameras closer together than this part of the distance to the points stand,
@@ -123,9 +123,9 @@ pub struct View {
     /// The pinhole that shows the view, in the size of COLMAP's model; the file may
     /// differ, see [`Loader::load`].
     pub camera: Camera,
-    /// How the view's picture comes from its photo; none where it is the photo.
+    /// Mapping from the photo to the view's image; none if the photo is the image.
     pub undistortion: Option<Undistortion>,
-    /// How the photo stands; known once a [`Dataset`] has read its header.
+    /// Orientation of the photo; known once a [`Dataset`] has read its header.
     pub stance: SensorOrientation,
 }
 
@@ -139,12 +139,12 @@ impl View {
     }
 }
 
-/// Whether something is done: where the photos call for it, always or never.
+/// Switch: on if the photos require it, always or never.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 pub enum Choice {
-    /// Where its effect can be seen.
+    /// On if its effect can be seen.
     #[default]
     Auto,
     /// Wherever it has any effect.
@@ -160,12 +160,11 @@ pub struct Point {
     pub position: DVec3,
     /// Encoded sRGB.
     pub color: [u8; 3],
-    /// Where views saw it, in the order of the file; empty where the model was
-    /// written without observations.
+    /// Observations in the order of the file; empty where the model was written without them.
     pub track: Vec<Observation>,
 }
 
-/// Where a view saw a point.
+/// Observation of a point in a view.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Observation {
     /// Index into [`Capture::views`].
@@ -193,8 +192,8 @@ pub struct Capture {
     pub views: Vec<View>,
     /// The usable points in the order of the file; at least one.
     pub points: Vec<Point>,
-    /// What was subtracted from every position; add it to come back to COLMAP's
-    /// coordinates. Zero unless these were large; whole numbers.
+    /// Offset that was subtracted from every position; add it to come back to COLMAP's coordinates.
+    /// Zero unless these were large; whole numbers.
     pub offset: DVec3,
     /// Photos without a usable pose or camera and those that were not to be used, sorted by
     /// name, and one entry for all points without a usable position.
@@ -465,7 +464,7 @@ fn pose([w, x, y, z]: [f64; 4], translation: DVec3) -> Result<DMat3, String> {
     Ok(DMat3::from_quat(quaternion.normalize()))
 }
 
-/// Whether coordinates are finite and of a size that a scene can have.
+/// Returns true if coordinates are finite and of a size that a scene can have.
 fn is_place(position: DVec3) -> bool {
     // NaN fails the comparison.
     position

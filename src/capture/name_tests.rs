@@ -40,7 +40,7 @@ fn a_byte_order_mark_is_passed_over() {
     assert_eq!(marked.views.len(), plain.views.len());
 }
 
-/// Whether a message says what helps against an image's name.
+/// Asserts that a message gives the remedy for an image's name.
 #[track_caller]
 fn names_the_remedy(error: CaptureError, words: &[&str]) {
     let error = error.to_string();

@@ -26,7 +26,7 @@ pub fn stem(name: &str) -> &str {
     }
 }
 
-/// Whether an extension is one of these, in letters of either case.
+/// Returns true if an extension is one of these, in letters of either case.
 pub(super) fn is_one_of(extension: &str, known: &[&str]) -> bool {
     known
         .iter()
@@ -127,16 +127,16 @@ pub(super) fn find_spelled(views: &mut [View], images: &Path) {
 /// of the same path but for the extension.
 #[derive(Clone, Debug, Default)]
 pub struct NamedFiles {
-    /// Where files lie, by their path below the folder.
+    /// Paths of the files, by their paths below the folder.
     files: BTreeMap<String, PathBuf>,
-    /// Of each path without extension the files.
+    /// Files by their path without extension.
     files_of: BTreeMap<String, Vec<String>>,
     photos: BTreeSet<String>,
-    /// Of each path without extension the photos.
+    /// Photos by their path without extension.
     photos_of: BTreeMap<String, Vec<String>>,
 }
 
-/// Why nobody knows which file belongs to which photo.
+/// A file or a photo cannot be matched by name.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum AmbiguousNames {
     /// Two files would belong to one photo.
@@ -156,7 +156,7 @@ impl NamedFiles {
         self.files.insert(name, path);
     }
 
-    /// Whether there is no file at all.
+    /// Returns true if there are no files.
     pub fn is_empty(&self) -> bool {
         self.files.is_empty()
     }

@@ -1,4 +1,4 @@
-//! What photos become when they are loaded.
+//! Options of loading photos.
 
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 
 use super::{Choice, Rejected};
 
-/// How a capture's photos are loaded. `report.json` keeps it, so that every later
-/// command loads them alike.
+/// Options of loading a capture's photos. `report.json` keeps them, so that every later command
+/// loads photos alike.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct LoadOptions {
@@ -27,7 +27,7 @@ pub struct LoadOptions {
     pub encoding: Encoding,
     /// Values that become black and white, in the files' unit; `null`: the full range.
     pub normalize: Normalize,
-    /// Source of masks: `metadata` the photos, their `alpha`, `off`, or a folder.
+    /// Source of masks: `beside` the photos, their `alpha`, `off`, or a folder.
     pub masks: MaskSource,
     /// What becomes of masked pixels; `remove`: black.
     pub masked: MaskUse,
@@ -74,23 +74,23 @@ pub struct Chosen {
 }
 
 impl Chosen {
-    /// Whether a photo is one of them.
+    /// Returns true if a photo is one of them.
     pub fn has(&self, photo: &str) -> bool {
         self.train.contains(photo) || self.test.contains(photo)
     }
 
-    /// How many they are.
+    /// Number of photos.
     pub fn len(&self) -> usize {
         self.train.len() + self.test.len()
     }
 
-    /// Whether there is none.
+    /// Returns true if there are no photos.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 }
 
-/// What of a color photo becomes gray; a gray photo is what it is.
+/// Channel of a color photo that becomes gray; a gray photo stays as it is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
@@ -118,7 +118,7 @@ impl Channel {
     }
 }
 
-/// What a file's values are.
+/// Encoding of a file's values.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
@@ -132,8 +132,8 @@ pub enum Encoding {
     Linear,
 }
 
-/// Which of the files' values, in their own unit, become black and white; the same
-/// for all photos of a capture, since what changes from photo to photo flickers.
+/// Range of the files' values, in their own unit, that becomes black to white; the same for all
+/// photos of a capture, since changes from photo to photo flicker.
 ///
 /// In JSON two numbers, or `null` for `Off`: what `Auto` comes to is known once the
 /// photos have been seen.
@@ -183,9 +183,9 @@ impl FromStr for Normalize {
     }
 }
 
-/// Where masks are: for `images/a/b.jpg` in the file `a/b.jpg.png` or `a/b.png`.
+/// Source of masks: for `images/a/b.jpg` the file `a/b.jpg.png` or `a/b.png`.
 ///
-/// In JSON `metadata`, `alpha`, `off` or the folder.
+/// In JSON `beside`, `alpha`, `off` or the folder.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(into = "String", from = "String")]
@@ -224,7 +224,7 @@ impl From<String> for MaskSource {
     }
 }
 
-/// What is where a mask is black.
+/// Meaning of black mask pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]

@@ -1,8 +1,8 @@
-//! How pictures stand: EXIF's orientation, and which of its sides COLMAP saw.
+//! Orientation of photos: EXIF's tag, and the sides that COLMAP saw.
 
 use image::{DynamicImage, metadata::Orientation as Exif};
 
-/// How pixels are turned or mirrored to stand upright.
+/// Rotation or mirroring that makes pixels upright.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Orientation(Exif);
 
@@ -13,13 +13,13 @@ impl Default for Orientation {
 }
 
 impl Orientation {
-    /// That of an EXIF block; what says nothing sensible leaves pixels as they are.
+    /// Orientation of an EXIF block; the identity if the block is invalid.
     pub(super) fn of_exif(exif: Option<&[u8]>) -> Self {
         let told = exif.and_then(Exif::from_exif_chunk);
         told.map_or_else(Self::default, Self)
     }
 
-    /// That of the value of EXIF's tag, 1 to 8.
+    /// Orientation of a value of EXIF's tag, 1 to 8.
     pub(super) fn of_tag(value: u16) -> Self {
         let known = u8::try_from(value).ok().and_then(Exif::from_exif);
         known.map_or_else(Self::default, Self)
@@ -30,7 +30,7 @@ impl Orientation {
         self == Self::default()
     }
 
-    /// How often it turns clockwise by 90°; `None` where it mirrors.
+    /// Number of clockwise turns by 90°; `None` if it mirrors.
     pub fn quarter_turns(self) -> Option<u32> {
         match self.0 {
             Exif::NoTransforms => Some(0),
@@ -112,7 +112,7 @@ impl Orientation {
     }
 }
 
-/// How a photo's file, the picture that COLMAP saw of it and the upright one stand to each other.
+/// Orientations that relate a photo's file, the image that COLMAP saw of it and the upright one.
 ///
 /// COLMAP ignores the orientation; where photos were turned for it and the files were not, its
 /// cameras have the turned sides. One of the two is nothing.
@@ -140,8 +140,8 @@ impl SensorOrientation {
         }
     }
 
-    /// How another picture of the photo, such as its mask, may be turned to what COLMAP saw, the
-    /// likeliest first: `own` is the orientation that its file tells.
+    /// Turns that may take another image of the photo, such as its mask, to the one that COLMAP
+    /// saw, the likeliest first; `own` is the orientation in that image's file.
     pub(crate) fn ways(self, own: Orientation) -> impl Iterator<Item = Orientation> {
         let from_upright = self.upright.inverse();
         let by_its_tag = (!own.is_none()).then(|| own.then(from_upright));

@@ -15,11 +15,11 @@ pub struct Original {
     /// The same in 255ths in the range that the scene's photos are normalized to, where that is
     /// another.
     pub in_scene: Option<Vec<u8>>,
-    /// Whether the file tells more than 256 levels apart.
+    /// True if the file distinguishes more than 256 levels.
     pub deep: bool,
     /// As [`Photo::mask`](super::Photo::mask).
     pub mask: Option<Vec<u8>>,
-    /// How it stands.
+    /// Orientation of the photo.
     pub stance: SensorOrientation,
     /// EXIF of a JPEG or PNG file, as it is for the same picture upright.
     pub exif: Option<Vec<u8>>,
@@ -41,7 +41,7 @@ impl Original {
         self.smaller(&self.bytes(), size)
     }
 
-    /// What each pixel of [`Self::shrunk`] counts, 0 to 255; `None` where all count.
+    /// Weight of each pixel of [`Self::shrunk`], 0 to 255; `None` if all have full weight.
     pub fn shrunk_mask(&self, size: [u32; 2]) -> Option<Vec<u8>> {
         self.mask.as_ref().map(|mask| self.smaller(mask, size))
     }

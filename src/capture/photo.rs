@@ -27,13 +27,13 @@ pub struct Photo {
     pub gray: Vec<u8>,
     /// Colors, `[height · width]`, where the photo has a pixel that is not gray.
     pub rgb: Option<Vec<[u8; 3]>>,
-    /// What each pixel counts, `[height · width]`: 255 fully, 0 not at all. `None`
-    /// where every pixel counts. With [`MaskUse::Remove`], what is 0 is black as well.
+    /// Weight of each pixel, `[height · width]`: 255 fully, 0 not at all. `None` if every pixel has
+    /// full weight. With [`MaskUse::Remove`], pixels of weight 0 are black as well.
     pub mask: Option<Vec<u8>>,
 }
 
 impl Photo {
-    /// Whether a pixel, by its place in `[height, width]`, counts at least half.
+    /// Returns true if a pixel, by its index in `[height, width]`, counts at least half.
     pub fn counts(&self, pixel: usize) -> bool {
         self.mask.as_ref().is_none_or(|mask| mask[pixel] >= 128)
     }
@@ -153,8 +153,8 @@ pub(super) fn working_size(size: [u32; 2], max_side: Option<u32>) -> [u32; 2] {
     })
 }
 
-/// How a photo stands to what COLMAP saw, which the sides of the view's camera tell; refuses one
-/// that cannot be that camera's.
+/// Orientation of a photo against the image that COLMAP saw, by the sides of the view's camera;
+/// refuses a photo that cannot be that camera's.
 pub(super) fn stance(view: &View, header: &Header) -> Result<SensorOrientation, CaptureError> {
     let (camera, photo) = (view.photo_size(), header.size);
     let turned = header.orientation.size(photo);
@@ -174,7 +174,7 @@ pub(super) fn stance(view: &View, header: &Header) -> Result<SensorOrientation, 
     Ok(SensorOrientation::new(header.orientation, is_turned))
 }
 
-/// Whether two pictures can be of one shape: they differ by rounding, or in scale.
+/// Returns true if two images can be of one shape: they differ by rounding, or in scale.
 pub(super) fn same_shape(a: [u32; 2], b: [u32; 2]) -> bool {
     let near = (0..2).all(|axis| a[axis].abs_diff(b[axis]) <= SIZE_SLACK);
     let aspect = |[width, height]: [u32; 2]| f64::from(width) / f64::from(height);

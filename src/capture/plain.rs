@@ -32,12 +32,12 @@ pub(crate) fn plain_values(path: &Path, most: usize) -> Result<Vec<f32>, Capture
     Ok(values.into_iter().map(|value| value / white).collect())
 }
 
-/// What a folder with one model of COLMAP's places.
+/// Photos and points of a folder with one COLMAP model.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Piece {
     /// Names of the photos with a pose, sorted.
     pub photos: Vec<String>,
-    /// How many points there are.
+    /// Number of points.
     pub points: usize,
 }
 

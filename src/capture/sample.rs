@@ -9,7 +9,7 @@ use super::orientation::Orientation;
 /// than any camera's, and little enough to fail with words instead of by force.
 pub(super) const LARGEST_FILE: u64 = 512 << 20;
 
-/// How exactly a file tells the brightness of a pixel.
+/// Precision of a file's brightness values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Depth {
     /// Whole numbers from 0 to 255.
@@ -41,7 +41,7 @@ impl fmt::Display for Depth {
     }
 }
 
-/// What a file announces.
+/// Header of an image file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Header {
     /// Width and height in pixels.
@@ -51,12 +51,12 @@ pub(crate) struct Header {
     pub channels: usize,
     /// True if the file stores palette indices; the palette's colors are read.
     pub indexed: bool,
-    /// How it stands upright.
+    /// Transform that makes it upright.
     pub orientation: Orientation,
 }
 
 impl Header {
-    /// Whether the last channel is alpha.
+    /// Returns true if the last channel is alpha.
     pub fn has_alpha(&self) -> bool {
         self.channels.is_multiple_of(2)
     }
@@ -69,6 +69,6 @@ pub(super) enum Samples {
     Float(Vec<f32>),
 }
 
-/// Where a file's bytes come from.
+/// Source of a file's bytes.
 pub(super) trait Bytes: BufRead + Seek {}
 impl<T: BufRead + Seek> Bytes for T {}

@@ -1,4 +1,4 @@
-//! Which views train and which test.
+//! Split into training and test views.
 
 use super::{Chosen, View};
 

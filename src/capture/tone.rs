@@ -102,7 +102,7 @@ pub(super) fn finite(samples: &Samples, channels: usize, channel: Channel) -> Op
     mask.contains(&0).then_some(mask)
 }
 
-/// What each pixel counts by its transparency; `None` where all are opaque.
+/// Weight of each pixel by its transparency, 0 to 255; `None` if all are opaque.
 pub(super) fn alpha(picture: &DecodedImage) -> Option<Vec<u8>> {
     let channels = picture.header.channels;
     if !picture.header.has_alpha() {
@@ -171,7 +171,7 @@ fn value(samples: &Samples, i: usize) -> f32 {
     }
 }
 
-/// What a value becomes.
+/// Tone curve from a file's value to an encoded one.
 struct Tone {
     low: f64,
     high: f64,
@@ -205,7 +205,7 @@ impl Tone {
         }
     }
 
-    /// What `of` makes of every sample's share, by a table where there are few values.
+    /// Result of `of` for every sample's encoded value, by a table where there are few values.
     fn all<T: Copy>(&self, samples: &Samples, of: impl Fn(f64) -> T) -> Vec<T> {
         let one = |value: f64| of(self.share(value));
         let table = |count: u32| (0..count).map(|v| one(v.into())).collect::<Vec<T>>();

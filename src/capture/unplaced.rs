@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use super::names::{composed, is_one_of, visit_files};
 use super::{Capture, CaptureError, IMAGES, colmap, first_views};
 
-/// What photos are called.
+/// File extensions of photos.
 const EXTENSIONS: [&str; 5] = ["jpg", "jpeg", "png", "tif", "tiff"];
 
 /// A share of the photos without a pose that is not worth a word: COLMAP seldom places all.

@@ -1,4 +1,4 @@
-//! What images of a model become: views through lenses, and tracks of points.
+//! Loading a model's images: views through lenses, and tracks of points.
 
 use super::fixtures::{Model, folder, load, load_files, write};
 use super::tests::assert_says;

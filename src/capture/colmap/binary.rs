@@ -31,7 +31,7 @@ const OBSERVATION: u64 = 8 + 8 + 8;
 const TRACK_ELEMENT: u64 = 4 + 4;
 /// The point's id of a 2D point that belongs to none.
 const NO_POINT: u64 = u64::MAX;
-/// How many images a file announces, if it is long enough for them.
+/// Number of images that a file announces, if it is long enough for them.
 pub(super) fn count_images(path: &Path) -> Option<u64> {
     let mut file = input::open(path).ok()?;
     let most = file.metadata().ok()?.len() / SMALLEST_IMAGE;
@@ -49,11 +49,11 @@ pub(super) struct Records {
     length: u64,
     /// The next byte to read.
     offset: u64,
-    /// Where the field read last begins, for errors.
+    /// Start of the field read last, in bytes, for errors.
     field: u64,
-    /// What a record is, for errors.
+    /// Name of a record, for errors.
     kind: &'static str,
-    /// How many records the file announces.
+    /// Number of records that the file announces.
     count: u64,
     /// The current record, from 1; 0 before the first.
     current: u64,
@@ -104,7 +104,7 @@ impl Records {
         Ok(bytes)
     }
 
-    /// How many elements of `size` bytes follow, which the file can hold.
+    /// Number of elements of `size` bytes that follow; checks that the file can hold them.
     fn elements(&mut self, field: &str, size: u64, what: &str) -> Result<u32, CaptureError> {
         let count = self.u64(field)?;
         match u32::try_from(count) {

@@ -20,7 +20,7 @@ use super::{Chosen, Point};
 use crate::input::excerpt;
 use records::RecordSource;
 
-/// What the three files of a model say.
+/// Contents of a model's three files.
 pub(super) struct Model {
     /// Cameras in the order of the file.
     pub cameras: Vec<Camera>,
@@ -57,7 +57,7 @@ pub(super) struct Image {
 pub(super) struct Camera {
     /// COLMAP's id.
     pub id: u32,
-    /// What is wrong with it matters where an image uses it.
+    /// The lens; its error matters only if an image uses it.
     pub lens: Result<Lens, CaptureError>,
 }
 
@@ -100,8 +100,8 @@ pub(super) fn folder(root: &Path) -> Result<PathBuf, CaptureError> {
     Ok(cameras.parent().unwrap_or(root).into())
 }
 
-/// How many images the model in this very folder places; `None` where there is no whole
-/// model or its file cannot be read.
+/// Number of images with a pose in the model of this very folder; `None` if there is no whole model
+/// or its file cannot be read.
 pub(super) fn images_in(dir: &Path) -> Option<u64> {
     let ([_, images, _], extension) = files_in(dir).ok()?;
     match extension {

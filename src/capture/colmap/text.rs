@@ -13,10 +13,10 @@ use crate::capture::error::{CaptureError, Position};
 use crate::capture::lens::ModelName;
 use crate::input::{self, excerpt};
 
-/// What some editors write before the text.
+/// Byte order mark that some editors write before the text.
 const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
 
-/// How many images a file holds.
+/// Number of images in a file.
 pub(super) fn count_images(path: &Path) -> Result<u64, CaptureError> {
     let mut lines = Lines::open(path, IMAGE)?;
     while lines.next_record()? {
@@ -46,7 +46,7 @@ fn seen(line: &str) -> Option<Vec<Sighting>> {
     Some(seen)
 }
 
-/// What follows the first `count` fields of a line, trimmed.
+/// Text after the first `count` fields of a line, trimmed.
 fn after_fields(line: &str, count: usize) -> &str {
     (0..count).fold(line.trim(), |rest, _| {
         rest.find(char::is_whitespace)
@@ -66,7 +66,7 @@ pub(super) struct Lines {
     at: usize,
     /// The current line's number, from 1.
     number: u64,
-    /// What a record is, for errors.
+    /// Name of a record, for errors.
     kind: &'static str,
     /// The current record, from 1; 0 before the first.
     current: u64,
@@ -139,7 +139,7 @@ impl Lines {
         }
     }
 
-    /// What was not read of the current line.
+    /// Unread part of the current line, trimmed.
     fn rest(&self) -> &str {
         self.line[self.at..].trim()
     }

@@ -11,7 +11,7 @@ use crate::capture::Observation;
 pub(super) struct Sightings {
     /// By COLMAP's id: the image's place in the file, its sightings by index.
     images: HashMap<u32, (usize, Vec<Sighting>)>,
-    /// Whether no image of the file was left out.
+    /// True if no image of the file was left out.
     whole: bool,
 }
 
@@ -34,7 +34,7 @@ impl Sightings {
         }
     }
 
-    /// Whether a point that this image shows is of use: in a whole file all are.
+    /// Returns true if points seen by this image are used; in a whole file all are.
     pub fn has(&self, image_id: u32) -> bool {
         self.whole || self.images.contains_key(&image_id)
     }
@@ -52,8 +52,7 @@ impl Sightings {
         self.images.insert(image_id, (place, sightings));
     }
 
-    /// What an element of a point's track stands for, its `view` being the
-    /// image's place in the file.
+    /// Observation for an element of a point's track; its `view` is the image's place in the file.
     ///
     /// None where the image is unknown or does not say that it sees the point
     /// there: some tools write tracks, but no 2D points.

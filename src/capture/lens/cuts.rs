@@ -1,4 +1,4 @@
-//! Which pinhole pictures show what a lens shows.
+//! Pinhole images that cover a lens's field of view.
 
 use glam::{DMat3, DVec2, DVec3};
 
@@ -44,7 +44,7 @@ pub struct Cut {
 }
 
 impl Cut {
-    /// Where the picture shows a ray of the photo's camera; none outside of it.
+    /// Pixel of a ray of the photo's camera; none outside of the image.
     pub fn pixel(&self, ray: DVec3) -> Option<[f64; 2]> {
         let ray = self.rotation * ray;
         let camera = &self.camera;

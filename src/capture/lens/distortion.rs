@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-/// Where a place on the plane is moved to.
+/// Distortion model: maps a point on the plane to its distorted position.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Distortion {
     None,
@@ -32,15 +32,15 @@ pub(super) struct Polynomial {
     pub below: [f64; 3],
     /// OpenCV's p1, p2.
     pub tangential: [f64; 2],
-    /// Of r², r⁴ along x, then along y.
+    /// Coefficients of r², r⁴ along x, then along y.
     pub prism: [f64; 4],
-    /// Whether the tangential and prism terms are taken of the radially distorted
-    /// place instead of the undistorted one.
+    /// True if the tangential and prism terms apply to the radially distorted point instead of the
+    /// undistorted one.
     pub after_radial: bool,
 }
 
 impl Distortion {
-    /// Where `plane` is moved to. Formulas: COLMAP, `sensor/models.h`.
+    /// Distorted position of `plane`. Formulas: COLMAP, `sensor/models.h`.
     pub fn apply(&self, plane: DVec2) -> DVec2 {
         let radial = plane * self.radial(plane.length_squared());
         match self {
@@ -80,7 +80,7 @@ impl Distortion {
         self.radial(0.0)
     }
 
-    /// Whether it moves along radii only.
+    /// Returns true if it moves points along radii only.
     pub fn is_radial(&self) -> bool {
         match self {
             Self::Polynomial(polynomial) => {
@@ -90,7 +90,7 @@ impl Distortion {
         }
     }
 
-    /// Whether it moves nothing.
+    /// Returns true if it moves no point.
     pub fn is_none(&self) -> bool {
         match self {
             Self::None => true,

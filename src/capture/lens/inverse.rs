@@ -1,4 +1,4 @@
-//! Where a distortion is one-to-one, and its inverse there.
+//! Range in which a distortion is one-to-one, and its inverse there.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -20,7 +20,7 @@ const HALVINGS: usize = 2100;
 /// Newton's steps after the radial part, which converge in four or not at all.
 const NEWTON_STEPS: usize = 30;
 
-/// What may be left of a residual, as a part of the radius and at least absolute.
+/// Largest residual of the inverse, as a part of the radius and at least absolute.
 const TOLERANCE: f64 = 1e-11;
 
 /// The largest radius on the plane up to which the distortion neither folds back

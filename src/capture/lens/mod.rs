@@ -57,7 +57,7 @@ pub struct Lens {
     limit: f64,
 }
 
-/// How a ray meets the plane on which a lens distorts.
+/// Projection of rays to the plane on which a lens distorts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Projection {
     /// Radius tan θ at the angle θ from the axis, 0 ≤ θ < 90°.
@@ -70,7 +70,7 @@ enum Projection {
 }
 
 impl Projection {
-    /// Where a ray of any length meets the plane; none where it does not.
+    /// Intersection of a ray of any length with the plane, if any.
     fn plane(self, ray: DVec3) -> Option<DVec2> {
         let across = ray.truncate().length();
         match self {

@@ -11,9 +11,9 @@ use super::{Lens, Projection, inverse};
 pub struct ModelName {
     /// COLMAP's name.
     pub name: &'static str,
-    /// How many parameters it has.
+    /// Number of parameters.
     pub parameters: usize,
-    /// How many of them, the first, are focal lengths.
+    /// Number of focal lengths, the first of the parameters.
     focals: usize,
 }
 
@@ -108,7 +108,7 @@ impl ModelName {
         )
     }
 
-    /// What the parameters after the principal point mean.
+    /// Projection and distortion of the parameters after the principal point.
     fn shape(self, coefficients: &[f64]) -> Result<(Projection, Distortion), String> {
         let perspective = |polynomial| (Projection::Perspective, polynomial);
         let fisheye = |polynomial| (Projection::Fisheye, polynomial);

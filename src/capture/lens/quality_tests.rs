@@ -1,5 +1,5 @@
-//! What the way of resampling costs, on a photo of the bundled scene; `--nocapture`
-//! prints the figures.
+//! Error by the method of resampling, on a photo of the bundled scene; `--nocapture` prints the
+//! figures.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -29,7 +29,7 @@ fn barrel(camera: &Camera, size: [u32; 2]) -> Lens {
     model.lens(size[0], size[1], &parameters).unwrap()
 }
 
-/// What a lens photographs of a picture: the mean of 16 rays a pixel.
+/// Image of a picture through a lens: the mean of 16 rays a pixel.
 fn photographed(lens: &Lens, (photo, camera): &(Photo, Camera)) -> Gray {
     let subpixels = 4;
     let mut sources = Vec::new();

@@ -249,7 +249,7 @@ fn world(ray: DVec3) -> f64 {
     127.0 + 40.0 * (9.0 * ray.x + 1.0).sin() + 30.0 * (11.0 * ray.y).cos() * (7.0 * ray.z).sin()
 }
 
-/// What `lens` photographs of the world at a part of its size.
+/// Photo of the world through `lens`, at a part of its size.
 fn photographed(lens: &Lens, width: u32, height: u32) -> Photo {
     let mut gray = Vec::new();
     for y in 0..height {

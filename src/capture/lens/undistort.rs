@@ -12,7 +12,7 @@ use crate::capture::{Camera, Photo, downscale};
 /// own scale blurs it; docs/lab/01-photos.md has the figures.
 const OVERSAMPLING: u32 = 2;
 
-/// How a view's picture comes from its photo.
+/// Mapping from a photo to a view's image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Undistortion {
     /// The lens that took the photo.
@@ -22,8 +22,8 @@ pub struct Undistortion {
 }
 
 impl Undistortion {
-    /// How long the photo's longer side may be for the picture of `camera` to keep
-    /// to `max_side`: at most [`OVERSAMPLING`] times the picture's scale.
+    /// Longest side of the photo for which the image of `camera` keeps to `max_side`: at most
+    /// [`OVERSAMPLING`] times the image's scale.
     pub fn photo_side(&self, camera: &Camera, max_side: Option<u32>) -> Option<u32> {
         let photo = f64::from(self.lens.width.max(self.lens.height));
         let picture = f64::from(camera.width.max(camera.height));
@@ -104,9 +104,8 @@ impl Undistortion {
             .collect()
     }
 
-    /// Where in the camera's picture each pixel of the photo lies, the photo being of this width
-    /// and height, in pixels from the picture's top left corner; NaN where the picture does not
-    /// show it. `[height, width]`.
+    /// Position of each pixel of a photo of this width and height in the camera's image, `[height,
+    /// width]`, in pixels from the image's top left corner; NaN if the image does not show it.
     pub fn places(&self, size: [u32; 2], camera: &Camera) -> Vec<[f32; 2]> {
         let scale = DVec2::new(
             f64::from(self.lens.width) / f64::from(size[0]),
@@ -129,8 +128,8 @@ impl Undistortion {
             .collect()
     }
 
-    /// Where in a photo of this size each pixel of the camera's picture lies, in
-    /// pixels; NaN where no ray meets the photo's plane.
+    /// Position of each pixel of the camera's image in a photo of this size, in pixels; NaN where
+    /// no ray meets the photo's plane.
     pub(super) fn sources(&self, camera: &Camera, size: [u32; 2]) -> Vec<[f32; 2]> {
         let scale = DVec2::new(
             f64::from(size[0]) / f64::from(self.lens.width),
@@ -157,7 +156,7 @@ impl Undistortion {
     }
 }
 
-/// Whether a place lies in a photo of this size.
+/// Returns true if a position lies in a photo of this size.
 fn shows(source: [f32; 2], size: [u32; 2]) -> bool {
     source
         .iter()
