@@ -19,7 +19,7 @@ use crate::{
 /// Iterations between two reports.
 const REPORT_EVERY: usize = 50;
 
-/// How steps follow each other.
+/// Iterations, learning rates and scales of the steps.
 struct AdamSchedule {
     iterations: usize,
     rates: [f64; 2],

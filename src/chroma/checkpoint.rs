@@ -20,7 +20,7 @@ pub struct ChromaCheckpoint {
 pub(super) struct SolveDecisions {
     /// The degree that views held back have chosen, where they were asked.
     pub chosen: Option<ChosenDegree>,
-    /// How far views disagreed before and after corrections that were taken back.
+    /// Disagreement of the views before and after corrections that were taken back.
     pub uncorrected: Option<[f64; 2]>,
     /// The solver's last report.
     pub last: Option<ChromaProgress>,
@@ -54,9 +54,9 @@ pub(super) struct Rounds {
     pub spent: f64,
 }
 
-/// Who keeps checkpoints.
+/// Receiver of checkpoints.
 pub trait ChromaCheckpointing {
-    /// Whether one is wanted after a round.
+    /// Returns true if a checkpoint is due after a round.
     fn wants(&mut self) -> bool;
 
     /// Takes one; `false` ends the distillation with
@@ -66,7 +66,7 @@ pub trait ChromaCheckpointing {
     /// There will be no other.
     fn end(&mut self) {}
 
-    /// Whether somebody wants to see the colors now.
+    /// Returns true if a viewer needs the colors now.
     fn looks_on(&mut self) -> bool {
         false
     }
@@ -141,7 +141,7 @@ impl ChromaCheckpoint {
     }
 }
 
-/// How the names of buffers' sections begin.
+/// Prefixes of the names of buffers' sections.
 const BUFFER: &str = "solver ";
 const DOUBLES: &str = "solver's host ";
 

@@ -28,7 +28,7 @@ pub struct Colored {
     pub chroma: ShField,
     /// Settings of the solver, decisions of the plan included.
     pub settings: ChromaSettings,
-    /// Which effects were reckoned with, and why.
+    /// Plan: each effect, on or off, with the evidence.
     pub effects: [Decision; 2],
     /// Views that colors were learned from and that a teacher colored or that have strokes.
     pub colored_views: usize,
@@ -75,12 +75,12 @@ pub enum ColorizeEvent<'a> {
     Trying {
         /// Degree of the chroma harmonics.
         degree: u32,
-        /// How far it is.
+        /// Progress of the solver.
         progress: ChromaProgress,
     },
     /// The degree that held-back views prove useful.
     Chosen(&'a ChosenDegree),
-    /// Which effects are reckoned with.
+    /// Plan of the effects that are modeled.
     Plan(&'a [Decision; 2]),
     /// Progress of the solver.
     Solving(ChromaProgress),
@@ -110,7 +110,7 @@ pub enum ColorizeEvent<'a> {
     Baking(ChromaProgress),
 }
 
-/// Who is told; a [`ControlFlow::Break`] ends it with [`ChromaError::Cancelled`].
+/// Receiver of events; a [`ControlFlow::Break`] ends it with [`ChromaError::Cancelled`].
 pub type ColorizeObserver<'a> = dyn FnMut(ColorizeEvent<'_>) -> ControlFlow<()> + 'a;
 
 /// Colors the gray scene `luma`, which was trained on `dataset` and is drawn by `raster`.
@@ -143,7 +143,7 @@ pub fn colorize(
 
 /// A distillation of which more is said than [`colorize`] asks for.
 pub struct Distill<'a> {
-    /// How the scene is drawn.
+    /// Rasterizer of the scene.
     pub raster: &'a Arc<Raster>,
     /// Photos that it was trained on.
     pub dataset: &'a Dataset,
@@ -153,8 +153,7 @@ pub struct Distill<'a> {
     pub supervision: &'a Supervision,
     /// Degree of the chroma harmonics.
     pub sh_degree: Degree,
-    /// Whether each view's teacher is brought into line with the others; by default where
-    /// they disagree.
+    /// True if each view's teacher is aligned with the others; by default if they disagree.
     pub correct_views: Option<bool>,
 }
 
@@ -344,8 +343,7 @@ impl Distill<'_> {
         Ok(chosen.insert(found).degree)
     }
 
-    /// How far views disagree without and with `corrections`, where these make them disagree
-    /// more.
+    /// Disagreement of the views without and with `corrections`, if these make it larger.
     fn worse(&self, corrections: &[(Task, Correction)]) -> Option<[f64; 2]> {
         let (capture, learned) = (&self.dataset.capture, &self.supervision.views);
         let mut of_view = vec![Correction::NONE; capture.views.len()];

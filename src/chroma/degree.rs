@@ -1,4 +1,4 @@
-//! Which degree of the chroma harmonics the views prove useful.
+//! Choice of the chroma harmonics' degree by held-back views.
 
 use std::ops::ControlFlow;
 

@@ -161,7 +161,7 @@ impl FrozenViews {
         })
     }
 
-    /// How many Gaussians there are.
+    /// Number of Gaussians.
     pub fn splat_count(&self) -> usize {
         match &self.streamed {
             Some(on_host) => on_host.scene.len(),
@@ -169,7 +169,7 @@ impl FrozenViews {
         }
     }
 
-    /// Whether they wait on the host, and how many come at a time at most.
+    /// Number of Gaussians on the device at a time, at most, if they wait on the host.
     pub fn streamed(&self) -> Option<usize> {
         self.streamed.as_ref().map(|_| self.geometry.count)
     }
@@ -199,12 +199,12 @@ impl FrozenViews {
         &self.raster.gpu
     }
 
-    /// How many views there are.
+    /// Number of views.
     pub fn len(&self) -> usize {
         self.views.len()
     }
 
-    /// Whether there is none; never.
+    /// Returns true if there are no views; never.
     pub fn is_empty(&self) -> bool {
         self.views.is_empty()
     }

@@ -51,7 +51,7 @@ pub(super) struct HostLbfgs {
     scale: f64,
     /// Points accepted so far.
     age: usize,
-    /// Whether the loss is another function since the accepted point, a little.
+    /// True if the loss has changed slightly since the accepted point.
     changed: bool,
     /// Empty where nothing is bounded.
     floors: Vec<f32>,
@@ -436,7 +436,7 @@ mod tests {
         }
     }
 
-    /// What it keeps is all that it goes by: another goes on from there to the same bits.
+    /// A solver that is restored from a kept state goes on from there to the same bits.
     #[test]
     fn goes_on_from_what_is_kept() {
         let problem = Problem::random(5, 10);

@@ -58,17 +58,17 @@ pub struct IrlsSolver<'a> {
     seconds: f64,
     /// Rounds done.
     done: usize,
-    /// Whether the loss does not level off yet.
+    /// True until the loss levels off at large residuals.
     plain: bool,
-    /// Whether the colors are anchored.
+    /// True if the colors are anchored.
     anchored: bool,
     /// Rounds of late, in a row, that hardly moved the colors.
     settled: usize,
-    /// Whether the last round's step was undone, for a shorter one to be tried.
+    /// True if the last round's step was undone, for a shorter one to be tried.
     undone: bool,
-    /// Whether no round will follow.
+    /// True if no round will follow.
     ended: bool,
-    /// Whether the views' corrections are not those of the accepted point.
+    /// True if the views' corrections are not those of the accepted point.
     corrected: bool,
 }
 
@@ -309,8 +309,8 @@ impl<'a> IrlsSolver<'a> {
         recorder.submit();
     }
 
-    /// Whether a round finds the views' corrections anew. The first picture is gray and says
-    /// nothing about the teachers.
+    /// Returns true if a round solves for the views' corrections anew. The first image is gray and
+    /// tells nothing about the teachers.
     fn correction_is_due(&self, round: usize) -> bool {
         let due = round > 0 && (round < PLAIN_ROUNDS || round.is_multiple_of(CORRECT_EVERY));
         self.settings.correct_views && due
@@ -349,8 +349,8 @@ impl<'a> IrlsSolver<'a> {
         Ok(mean(&self.passes.log.read_later(gpu).wait(gpu)?))
     }
 
-    /// How far the views decide each Gaussian's a/b, in pixels that show it fully and
-    /// whose wanted color is about met.
+    /// Weight of the views in each Gaussian's a/b, in pixels that show it fully and whose target
+    /// color is about met.
     ///
     /// # Errors
     /// [`ChromaError`] when the device is lost or targets cannot be read.

@@ -23,7 +23,7 @@ pub struct LbfgsParameters {
     pub ridge: f32,
     /// Ratio of a diagonal entry to the sum of weights.
     pub diagonal_scale: f32,
-    /// How many of the first unknowns are constant harmonics.
+    /// Number of constant harmonics, the first of the unknowns.
     pub constants: u32,
     /// Color of a constant harmonic of one.
     pub color: f32,

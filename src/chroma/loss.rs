@@ -19,7 +19,7 @@ pub struct ChromaLossWeights {
     /// One over the residual, in CIELAB units, at which the loss has all but
     /// leveled off; 0: it never does.
     pub decline: f32,
-    /// Which correction is this view's.
+    /// Index of this view's correction.
     pub view_index: u32,
     /// 1 where each pixel has a weight.
     pub weighted: u32,

@@ -24,11 +24,11 @@ pub struct MemoryBudget {
     pub color: ColorKind,
     /// The highest degree of harmonics that will be solved for.
     pub sh_degree: u32,
-    /// Whether wanted pixels have weights.
+    /// True if target pixels have weights.
     pub weighted: bool,
-    /// Whether Gaussians may wait on the host where the limit, or what the adapter binds, leaves
-    /// no room for all of them. [`AdamSolver`](super::AdamSolver) needs them all, and coarser
-    /// scales do.
+    /// True if Gaussians may wait on the host when the limit or the adapter's largest binding
+    /// leaves no room for all of them. [`AdamSolver`](super::AdamSolver) needs them all, and
+    /// coarser scales do.
     pub streams: bool,
 }
 
@@ -64,7 +64,7 @@ impl MinimumMemory {
         }
     }
 
-    /// Whether the adapter binds so much, and the limit allows it.
+    /// Returns true if the adapter can bind the largest buffer, and the limit allows all bytes.
     pub fn fits(&self, gpu: &Gpu, limit: Option<u64>) -> bool {
         self.buffer <= gpu.binding_limit() && limit.is_none_or(|limit| self.bytes <= limit)
     }
@@ -83,7 +83,7 @@ pub(super) struct Demand {
     of_pixel: u64,
     /// One view's lists and targets, for all that take turns.
     turns: u64,
-    /// Whether the Gaussians wait on the host.
+    /// True if the Gaussians wait on the host.
     streams: bool,
 }
 
@@ -162,8 +162,8 @@ impl Demand {
         self.fixed + turns + kept
     }
 
-    /// How many views stay on the device. The order in which views are met never changes,
-    /// so that keeping the first ones brings as few as any choice.
+    /// Number of views that stay on the device. The order of the views never changes, so that
+    /// keeping the first ones saves as many uploads as any choice.
     pub fn pinned(&self, views: &[Vec<Frozen>], limit: Option<u64>) -> Result<usize, ChromaError> {
         let allowed = limit.unwrap_or(self.fixed + self.turns + DEFAULT_PINS);
         if !self.streams && self.bytes(views, views.len()) <= allowed {

@@ -27,7 +27,7 @@ pub struct Task {
     pub target: usize,
 }
 
-/// How a view is judged.
+/// Settings of a view's loss.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct LossSettings {
     /// Weight of the agreement with the next coarser scale, drawn just before.

@@ -1,4 +1,4 @@
-//! Which effects of teachers stage 2 reckons with.
+//! Plan of the teacher effects that stage 2 models.
 
 use serde::{Deserialize, Serialize};
 
@@ -34,8 +34,8 @@ const SPREAD: f64 = 1.0;
 /// And they must differ by so many times what noise at the points makes of it.
 const SPREAD_OVER_NOISE: f64 = 3.0;
 
-/// Whether the views' teachers are brought into line: where they disagree about the same
-/// points in saturation or tint, unless the user has a `wish`. Adam cannot.
+/// Decision to align the views' teachers: on if they disagree about the same points in saturation
+/// or tint, unless the user has a `wish`. Adam cannot.
 pub(super) fn correction(
     found: Option<TeacherSpread>,
     solver: SolverKind,
@@ -65,8 +65,8 @@ pub(super) fn correction(
     }
 }
 
-/// Whether chroma depends on the direction of view: as the views that were held back
-/// say, in percent of their loss, where they were asked.
+/// Decision that chroma depends on the view direction: by the gain on held-back views, in percent
+/// of their loss, if it was measured.
 pub(super) fn degree(asked: Degree, chosen: Option<&ChosenDegree>) -> Decision {
     let gain = chosen.and_then(|chosen| {
         let first = *chosen.losses.first()?;

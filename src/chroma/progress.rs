@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 
-/// How far a distillation is.
+/// Progress of a distillation.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ChromaProgress {
     /// Iterations of Adam, or rounds of reweighting, done.
@@ -13,8 +13,8 @@ pub struct ChromaProgress {
     /// Mean loss of a pixel in CIELAB units: of Adam at full size since the last report, of
     /// least squares the least so far.
     pub loss: f64,
-    /// How far the last step of least squares moved the colors, in CIELAB units: the mean over
-    /// what is drawn, as the loss weighs it. `None` where it was undone, and of Adam.
+    /// Mean change of the colors by the last step of least squares, in CIELAB units, weighted as in
+    /// the loss. `None` if the step was undone, and with Adam.
     pub moved: Option<f64>,
     /// Drawings of a view with their adjoints, those of coarser scales by their share of
     /// the pixels.
@@ -23,6 +23,6 @@ pub struct ChromaProgress {
     pub seconds: f64,
 }
 
-/// Who is told; a [`ControlFlow::Break`] ends it with
+/// Receiver of progress; a [`ControlFlow::Break`] ends the distillation with
 /// [`ChromaError::Cancelled`](super::ChromaError::Cancelled).
 pub type ChromaObserver<'a> = dyn FnMut(ChromaProgress) -> ControlFlow<()> + 'a;

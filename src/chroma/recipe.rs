@@ -1,5 +1,5 @@
-//! How others color splats, to compare with: RGB harmonics that Adam moves until pictures are
-//! like the teacher's in CIELAB.
+//! Colorization recipes of other methods, for comparison: RGB harmonics that Adam moves until
+//! images are like the teacher's in CIELAB.
 
 use std::ops::RangeInclusive;
 

@@ -1,8 +1,8 @@
-//! What stage 2 can be told.
+//! Settings of stage 2.
 
 use serde::{Deserialize, Serialize};
 
-/// How chroma is solved for.
+/// Solver of chroma.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]

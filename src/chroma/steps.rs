@@ -24,7 +24,7 @@ pub(super) struct Priors {
     pub anchor: f64,
 }
 
-/// Who minimizes.
+/// Minimizer, on the device or on the host.
 pub(super) enum Steps {
     Device(System, Box<Lbfgs>),
     Host(Box<HostSteps>),

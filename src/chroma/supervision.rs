@@ -16,12 +16,12 @@ use crate::{
 pub struct ViewTarget {
     /// CIELAB a, b at the photo's size.
     pub ab: AbImage,
-    /// How much each pixel counts, `[height, width]`; `None` stands for 1 everywhere.
+    /// Weight of each pixel, `[height, width]`; `None` stands for 1 everywhere.
     pub weights: Option<Vec<f32>>,
     /// Strokes painted on the photo, at its size, which color what they lie on in all views.
     pub strokes: Option<HintImage>,
-    /// Whether a person has painted it: colors are learned from it even where the view is held
-    /// out, and it is not measured then.
+    /// True if painted by hand: colors are learned from it even if the view is held out, and it is
+    /// not measured then.
     pub by_hand: bool,
 }
 
@@ -74,16 +74,16 @@ pub struct Supervision {
     /// Strokes, as a/b and α, and each view's place among them.
     strokes: Targets,
     strokes_of: Vec<Option<usize>>,
-    /// Whether each view was painted by hand.
+    /// True for each view that was painted by hand.
     by_hand: Vec<bool>,
-    /// How far the training views disagree about COLMAP's points.
+    /// Disagreement of the training views about COLMAP's points.
     pub spread: Option<TeacherSpread>,
     /// Their colors there.
     pub samples: TeacherSamples,
 }
 
 impl Supervision {
-    /// Whether there are strokes on any view that colors are learned from.
+    /// Returns true if any view that colors are learned from has strokes.
     pub fn has_strokes(&self) -> bool {
         !self.strokes.is_empty()
     }
@@ -146,7 +146,7 @@ impl Supervision {
         self.views.iter().filter(colored).count()
     }
 
-    /// Whether a view was painted by hand.
+    /// Returns true if a view was painted by hand.
     pub fn is_painted(&self, view: usize) -> bool {
         self.by_hand[view]
     }

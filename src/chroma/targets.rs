@@ -44,8 +44,8 @@ pub struct Target {
     pub size: [u32; 2],
     /// Packed colors, `[height, width]`.
     pub pixels: Vec<u32>,
-    /// How much each pixel counts, `[height, width]`: 0 where nothing is known, 1 as
-    /// an ordinary pixel, more where it was painted by hand. `None`: 1 everywhere.
+    /// Weight of each pixel, `[height, width]`: 0 if unknown, 1 for an ordinary pixel, more if it
+    /// was painted by hand. `None`: 1 everywhere.
     pub weights: Option<Vec<f32>>,
 }
 
@@ -97,12 +97,12 @@ impl Targets {
         }
     }
 
-    /// How many there are.
+    /// Number of targets.
     pub fn len(&self) -> usize {
         self.stored.len()
     }
 
-    /// Whether there is none.
+    /// Returns true if there are no targets.
     pub fn is_empty(&self) -> bool {
         self.stored.is_empty()
     }
@@ -112,7 +112,7 @@ impl Targets {
         self.scales
     }
 
-    /// Whether pixels of some have weights.
+    /// Returns true if pixels of any target have weights.
     pub fn weighted(&self) -> bool {
         self.stored.iter().flatten().any(|stored| stored.weighted)
     }

@@ -104,8 +104,8 @@ impl Undistortion {
             .collect()
     }
 
-    /// Position of each pixel of a photo of this width and height in the camera's image, `[height,
-    /// width]`, in pixels from the image's top left corner; NaN if the image does not show it.
+    /// Position of each pixel of a photo of this width and height in the camera's image, in
+    /// pixels from its top left corner; NaN if the image does not show it. `[height, width]`.
     pub fn places(&self, size: [u32; 2], camera: &Camera) -> Vec<[f32; 2]> {
         let scale = DVec2::new(
             f64::from(self.lens.width) / f64::from(size[0]),

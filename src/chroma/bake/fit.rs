@@ -38,7 +38,7 @@ pub fn fit_rgb(
     solver.chroma()
 }
 
-/// How far a bake is.
+/// Progress of a bake.
 pub(in crate::chroma) enum BakeStep {
     /// This view is drawn next.
     Drawing { view: usize, total: usize },

@@ -29,8 +29,8 @@ const ALIKE: f32 = 0.05;
 /// Pixels of a stroke that others are compared with at most, an even choice.
 const SAMPLES: usize = 128;
 
-/// How unlike two pixels may be before a front is slowed: in lightness, in the mean lightness
-/// around them (both in units of `L*`), and in the logarithm of the deviation around them.
+/// Differences of two pixels that do not slow a front: in lightness, in the mean lightness around
+/// them (both in units of `L*`), and in the logarithm of the deviation around them.
 const TOLERANCES: [f32; 3] = [8.0, 5.0, 0.35];
 
 /// Deviation of `L*` that noise has anyway.

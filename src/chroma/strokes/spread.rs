@@ -17,8 +17,8 @@ const SENDS: f32 = 0.5;
 /// Gray levels, of 1, by which neighbors may differ for nothing, and that end a front beyond.
 const GRAY: [f32; 2] = [0.04, 0.12];
 
-/// How far a front runs where nothing slows it, as a share of how far the claimed Gaussians lie
-/// from their middle.
+/// Range of a front that nothing slows, as a share of the claimed Gaussians' distance from their
+/// middle.
 const REACH: f32 = 0.5;
 
 /// Share of the claimed Gaussians that are no farther than this from their middle.
@@ -31,11 +31,11 @@ pub(super) struct StrokeWeight {
     pub splat: u32,
     /// a, b at the middle lightness.
     pub color: [f32; 2],
-    /// How much of it is claimed, 0 to 1.
+    /// Claimed share of it, 0 to 1.
     pub alpha: f32,
 }
 
-/// Which Gaussians lie beside each other, and how light they are.
+/// Neighborhood and gray of the Gaussians.
 pub(super) struct Cloud<'a> {
     means: &'a [[f32; 3]],
     grays: Vec<f32>,
@@ -123,7 +123,7 @@ impl<'a> Cloud<'a> {
         far / reach + edge
     }
 
-    /// How far most of some Gaussians lie from their middle.
+    /// Distance of most of some Gaussians from their middle.
     fn size(&self, some: &[usize]) -> f32 {
         let middle = [0, 1, 2].map(|axis| {
             let mut values: Vec<f32> = some.iter().map(|&i| self.means[i][axis]).collect();

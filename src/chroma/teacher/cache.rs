@@ -45,19 +45,19 @@ impl Cache {
     }
 }
 
-/// What an answer depends on: the photo, the model and how it is asked.
+/// Inputs that determine an answer: the photo, the model and its settings.
 #[derive(Clone, Copy)]
 pub(super) struct Question<'a> {
     pub photo: GrayImage<'a>,
     /// SHA-256 of the model's file.
     pub model: &'a str,
-    /// Where it ran: processors round differently.
+    /// Device that it ran on: processors round differently.
     pub device: &'a str,
     /// The profile in full.
     pub profile: &'a str,
     /// Width and height of the network's input.
     pub input: [u32; 2],
-    /// What the network is told of hints, as it is told it.
+    /// Hints as the network receives them.
     pub hints: Option<&'a [[f32; 3]]>,
 }
 

@@ -22,7 +22,7 @@ pub struct Catalog {
     pub hosts: Vec<String>,
     /// The networks, in the order in which they are shown.
     pub teachers: Vec<KnownTeacher>,
-    /// Where networks are kept; some may not be there.
+    /// Folder of fetched networks; some may not be there.
     #[serde(skip)]
     folder: Option<PathBuf>,
 }
@@ -31,9 +31,9 @@ pub struct Catalog {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct KnownTeacher {
-    /// What users call it: lower-case letters, digits and dashes.
+    /// Name for users: lower-case letters, digits and dashes.
     pub name: String,
-    /// What it is good for.
+    /// Recommended use, in words.
     pub about: String,
     /// Under which license its host gives it away.
     pub license: String,
@@ -43,7 +43,7 @@ pub struct KnownTeacher {
     pub size: Option<u32>,
     /// Length of its file, where published.
     pub bytes: Option<u64>,
-    /// Where it lies, `https`.
+    /// Address of its file, `https`.
     pub url: String,
     /// SHA-256 of its file in lower-case hexadecimal.
     pub sha256: String,
@@ -99,7 +99,7 @@ impl Catalog {
         })
     }
 
-    /// Where a network is kept once it is fetched.
+    /// Path of a network once it is fetched.
     ///
     /// # Errors
     /// [`TeacherError::NoCacheFolder`].
@@ -108,7 +108,7 @@ impl Catalog {
         Ok(folder.join(format!("{}.onnx", teacher.name)))
     }
 
-    /// Whether a network is on this machine.
+    /// Returns true if a network is on this machine.
     ///
     /// # Errors
     /// [`TeacherError::OtherBytes`] where something else has its place, [`TeacherError::Io`],
@@ -140,7 +140,7 @@ impl Catalog {
         }
     }
 
-    /// What is known of the file at this path with this SHA-256.
+    /// Entry of the file at this path with this SHA-256, if it is known.
     ///
     /// # Errors
     /// [`TeacherError::OtherBytes`] where a network that is kept under its name is not that.
@@ -165,7 +165,7 @@ impl Catalog {
 }
 
 impl KnownTeacher {
-    /// What it takes and gives.
+    /// Its profile, with this entry's size if it has one.
     pub(super) fn contract(&self) -> Result<Profile, TeacherError> {
         let profile = named(&self.profile)?;
         let size = self.size.unwrap_or(profile.size);
@@ -190,7 +190,7 @@ impl KnownTeacher {
     }
 }
 
-/// Whether it can be the name of a network; paths to `.onnx` files cannot.
+/// Returns true if it can be the name of a network; paths to `.onnx` files cannot.
 fn is_name(name: &str) -> bool {
     let plain = |c: u8| c.is_ascii_lowercase() || c.is_ascii_digit() || c == b'-';
     !name.is_empty() && name.bytes().all(plain)

@@ -1,4 +1,4 @@
-//! What the program understands of a network, and how it answers.
+//! Checkup of a network: its contract and its answers to test images.
 
 use super::network::{Loaded, NetworkTeacher, ProfileSource};
 use super::{
@@ -12,7 +12,7 @@ use std::time::Instant;
 
 pub use trial::Trial;
 
-/// What a look at a network tells.
+/// Result of checking a network.
 #[derive(Clone, Debug, Serialize)]
 pub struct Checkup {
     /// Name, kind and identity.
@@ -22,17 +22,17 @@ pub struct Checkup {
     pub known_as: Option<String>,
     /// Inputs and outputs in words.
     pub ports: String,
-    /// Who says what they mean.
+    /// Source of their meaning.
     pub told_by: ProfileSource,
-    /// What was tried where nobody does.
+    /// Candidates that were tried, if there is no other source.
     pub trials: Vec<Trial>,
-    /// What its numbers are taken for: a manifest.
+    /// Manifest of its profile.
     pub manifest: String,
     /// Answers to a ramp from black to white and to a photo.
     pub answers: Vec<NetworkCheck>,
 }
 
-/// How a network answers for one picture.
+/// Summary of a network's answer to one image.
 #[derive(Clone, Debug, Serialize)]
 pub struct NetworkCheck {
     /// The picture's name.

@@ -72,7 +72,7 @@ fn ab_of_rgb(rgb: [f64; 3]) -> [f64; 2] {
     [500.0 * (x - y), 200.0 * (y - z)]
 }
 
-/// What the networks of RGB answer: half the gray, moved by 0.4, 0.2 and 0.1.
+/// Answer of the networks of RGB: half the gray, moved by 0.4, 0.2 and 0.1.
 pub(super) fn ab_of_moved(level: u8) -> [f64; 2] {
     let half = f64::from(level) / 510.0;
     ab_of_rgb([half + 0.4, half + 0.2, half + 0.1])

@@ -9,10 +9,10 @@ use ort::session::{Session, builder::GraphOptimizationLevel};
 use std::path::Path;
 use std::time::Duration;
 
-/// How long loading may take where an answer may take less.
+/// Time limit of loading if that of an answer is shorter.
 const LOADING: Duration = Duration::from_secs(60);
 
-/// What `Auto` tries, in this order.
+/// Devices that `Auto` tries, in this order.
 const TRIED: [TeacherDevice; 4] = [
     TeacherDevice::Cuda,
     TeacherDevice::DirectMl,
@@ -39,7 +39,7 @@ impl TeacherDevice {
     }
 }
 
-/// What is made of a model, a session for one, and where it runs.
+/// Result of setting up a model, such as its session, and its device.
 pub(super) struct SessionOn<T> {
     pub made: T,
     pub device: TeacherDevice,
@@ -82,8 +82,7 @@ pub(super) fn load(
     first_that_takes(tried, on)
 }
 
-/// What is made on the first of some devices where that succeeds; the last one's error where none
-/// does.
+/// Result on the first of some devices that succeeds; the last one's error if none does.
 fn first_that_takes<T>(
     tried: &[TeacherDevice],
     on: impl Fn(TeacherDevice) -> Result<T, TeacherError>,

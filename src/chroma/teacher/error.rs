@@ -1,11 +1,11 @@
-//! What can go wrong with a teacher.
+//! Errors of teachers.
 
 use std::io;
 use std::path::{Path, PathBuf};
 
 use crate::capture::AmbiguousNames;
 
-/// Why a teacher could not be opened or could not color a photo.
+/// A teacher cannot be opened or cannot color a photo.
 #[derive(Debug, thiserror::Error)]
 pub enum TeacherError {
     /// The file system refused.
@@ -112,7 +112,7 @@ pub enum TeacherError {
     /// No built-in profile has this name.
     #[error("{name}: no such profile; there are {known}, or name a .toml manifest")]
     UnknownProfile {
-        /// What was asked for.
+        /// Name that was given.
         name: String,
         /// Names of the built-in profiles.
         known: String,
@@ -120,7 +120,7 @@ pub enum TeacherError {
     /// Neither a path nor a network that is known by name.
     #[error("{name}: no such file or folder, and no network of that name; there are {known}")]
     UnknownTeacher {
-        /// What was asked for.
+        /// Name that was given.
         name: String,
         /// Names of the networks.
         known: String,
@@ -160,9 +160,9 @@ pub enum TeacherError {
     BadSize {
         /// The `.onnx` file.
         path: PathBuf,
-        /// What was asked for.
+        /// Size that was given, in pixels.
         size: u32,
-        /// Why it cannot be, and what can.
+        /// Reason, and sizes that are possible.
         reason: String,
     },
     /// A hint says something about every pixel.
@@ -181,7 +181,7 @@ pub enum TeacherError {
         path: PathBuf,
         /// The photo's name.
         photo: String,
-        /// What happened.
+        /// Reason of the failure.
         reason: String,
     },
     /// The photo's pixels do not fill its size.
@@ -193,7 +193,7 @@ pub enum TeacherError {
         width: u32,
         /// The photo's height.
         height: u32,
-        /// How many pixels there are.
+        /// Number of pixels.
         pixels: usize,
     },
     /// The folder holds no image.
@@ -221,7 +221,7 @@ pub enum TeacherError {
     OtherPhotos {
         /// The folder.
         path: PathBuf,
-        /// How many.
+        /// Number of images that show other photos.
         count: usize,
         /// Images that were asked for.
         images: usize,
@@ -249,7 +249,7 @@ pub enum TeacherError {
     },
 }
 
-/// Whether a picture has the other's aspect once it is turned, to within 2 %.
+/// Returns true if an image has the other's aspect once it is turned, to within 2 %.
 fn turned([width, height]: [u32; 2], [of_width, of_height]: [u32; 2]) -> bool {
     let aspect = f64::from(width) * f64::from(of_width);
     (aspect / (f64::from(height) * f64::from(of_height)) - 1.0).abs() <= 0.02
@@ -263,7 +263,7 @@ impl TeacherError {
     }
 }
 
-/// Where to put the library of ONNX Runtime.
+/// Advice on the folder for ONNX Runtime's library.
 fn where_to(cache: Option<&Path>) -> String {
     match cache {
         Some(cache) => format!("into {}, or let ORT_DYLIB_PATH name it", cache.display()),

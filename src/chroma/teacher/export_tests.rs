@@ -14,7 +14,7 @@ fn manifest(output: &str, range: &str, more: &str) -> String {
     )
 }
 
-/// What `ddcolor_tiny` says of a gray, 0 to 1.
+/// Answer of `ddcolor_tiny` to a gray, 0 to 1.
 fn expected(gray: f64) -> [f64; 2] {
     let g = 2.0 * gray - 1.0;
     [40.0 * g, 10.0 - 30.0 * g]

@@ -58,8 +58,8 @@ impl FolderTeacher {
         self.of_photos = matches!((own, photos), (Ok(own), Ok(photos)) if own == photos);
     }
 
-    /// Whether there is an image for a photo, which may be given by its path below the photo
-    /// folder.
+    /// Returns true if there is an image for a photo, which may be given by its path below the
+    /// photo folder.
     ///
     /// # Errors
     /// [`TeacherError::AmbiguousNames`] where nobody knows.

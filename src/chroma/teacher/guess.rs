@@ -1,16 +1,16 @@
-//! What the shapes of a model let suppose where nobody says what it takes and gives.
+//! Guess of a profile from the tensor shapes of an unknown model.
 
 use super::model::{Element, Port, Ports};
 use super::profile::{Layout, Role};
 
-/// What shapes let suppose of a network that nobody knows.
+/// Profile of an unknown network as far as tensor shapes suggest it.
 #[derive(Clone, Debug)]
 pub(super) struct GuessedProfile {
     /// The first picture, and nothing for the others.
     pub inputs: Vec<Role>,
     /// Channels of that picture.
     pub image: usize,
-    /// Whether it consists of bytes.
+    /// True if it consists of bytes.
     pub bytes: bool,
     /// Width and height where the model fixes them.
     pub fixed: [Option<u32>; 2],

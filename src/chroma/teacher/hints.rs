@@ -72,7 +72,7 @@ impl HintFolder {
         self.images.doubts()
     }
 
-    /// Whether there is an image for a photo, painted or not.
+    /// Returns true if there is an image for a photo, painted or not.
     ///
     /// # Errors
     /// [`TeacherError::AmbiguousNames`] where nobody knows.
@@ -144,8 +144,8 @@ impl HintFolder {
 }
 
 impl HintFolder {
-    /// How much of each pixel of an opaque picture was painted over the photo of this name, 0 to
-    /// 1; none where it is not that photo, or nobody knows it.
+    /// Opacity of the paint on each pixel of an opaque image over the photo of this name, 0 to 1;
+    /// none if it is not that photo, or the photo is unknown.
     ///
     /// # Errors
     /// [`TeacherError::Io`] or [`TeacherError::BadImage`] of the photo.
@@ -203,7 +203,7 @@ impl HintFolder {
 }
 
 impl HintImage {
-    /// Whether nothing is painted.
+    /// Returns true if nothing is painted.
     pub fn is_empty(&self) -> bool {
         self.paint.iter().all(|paint| paint[2] == 0.0)
     }

@@ -74,8 +74,7 @@ impl AbImage {
     }
 }
 
-/// How an image becomes another size. Along an axis that becomes longer,
-/// `Bilinear` and `Average` are the same.
+/// Resampling filter. Along an axis that becomes longer, `Bilinear` and `Average` are the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Filter {

@@ -98,7 +98,7 @@ impl Teacher {
         })
     }
 
-    /// Whether it is a network and not a folder.
+    /// Returns true if it is a network and not a folder.
     pub fn is_network(&self) -> bool {
         matches!(self.source, TeacherKind::Network(_))
     }
@@ -110,7 +110,7 @@ impl Teacher {
         }
     }
 
-    /// Whether it has an answer for a photo: a network always, a folder where there is an image.
+    /// Returns true if it can answer for a photo: a network always, a folder if there is an image.
     ///
     /// # Errors
     /// [`TeacherError::AmbiguousNames`] where nobody knows.
@@ -129,7 +129,7 @@ impl Teacher {
         }
     }
 
-    /// Why a network's answers are not kept, where they were to be.
+    /// Error that prevents a network's answers from being cached, if any.
     pub fn unkept(&self) -> Option<&TeacherError> {
         match &self.source {
             TeacherKind::Network(network) => network.unkept.as_ref(),
@@ -137,7 +137,7 @@ impl Teacher {
         }
     }
 
-    /// What to say of processors that a network would rather run on, but that fail.
+    /// Warnings about preferred devices that fail to run a network, a line each.
     pub fn passed_over(&self) -> Vec<String> {
         match &self.source {
             TeacherKind::Network(network) => network.passed_over(),

@@ -1,5 +1,4 @@
-//! Which profile describes a model: its inputs and outputs against the
-//! profiles' contracts.
+//! Match of a model to a profile: its inputs and outputs against the profiles' contracts.
 
 use super::TeacherError;
 use super::profile::{BUILT_IN, BuiltIn, Layout, MAX_SIDE, Profile, Role};
@@ -19,7 +18,7 @@ pub(super) enum Element {
 }
 
 impl Element {
-    /// Whether a picture can consist of it.
+    /// Returns true if an image can consist of it.
     fn is_number(self) -> bool {
         matches!(self, Self::F32 | Self::F16 | Self::U8)
     }
@@ -39,23 +38,23 @@ pub(super) struct Port {
     words: String,
 }
 
-/// What a model takes and gives.
+/// Inputs and outputs of a model.
 #[derive(Clone, Debug)]
 pub(super) struct Ports {
     pub inputs: Vec<Port>,
     pub outputs: Vec<Port>,
 }
 
-/// How a profile fits a model.
+/// Assignment of a model's inputs and outputs to a profile.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Fit {
     /// Role of each of the model's inputs, in the model's order.
     pub roles: Vec<Role>,
     /// Width and height of the model's image where it fixes them.
     pub fixed: [Option<u32>; 2],
-    /// How many pictures the model wants at once.
+    /// Number of images that the model takes at once.
     pub batch: usize,
-    /// Which of the model's outputs is the answer.
+    /// Index of the model's output that is the answer.
     pub answer: usize,
 }
 
@@ -84,7 +83,7 @@ impl Ports {
         own.is_empty() && self.inputs.len() + self.outputs.len() == names.len()
     }
 
-    /// How a profile fits; none where it does not.
+    /// Fit of a profile; none if it does not fit.
     ///
     /// An input goes to the first role that it can play and that no other has.
     pub fn fit(&self, profile: &Profile) -> Option<Fit> {
@@ -116,8 +115,8 @@ impl Ports {
         fits.then_some(fit)
     }
 
-    /// Whether input and output have the ratio of sides of a kind of network,
-    /// as far as the model fixes both.
+    /// Returns true if input and output have the ratio of sides of a kind of network, as far as the
+    /// model fixes both.
     fn has_stride(&self, fit: &Fit, profile: &Profile, stride: u32) -> bool {
         let answer = self.outputs[fit.answer]
             .image(profile.output.channels(), profile.layout)
@@ -159,7 +158,7 @@ impl Ports {
         chosen.ok_or_else(|| self.unknown(path))
     }
 
-    /// How the profile that was asked for fits.
+    /// Fit of the given profile.
     ///
     /// # Errors
     /// [`TeacherError::NoProfile`] where it does not.
@@ -168,7 +167,7 @@ impl Ports {
         fit.ok_or_else(|| self.no_profile(path, [profile.clone()].into_iter()))
     }
 
-    /// That nothing is known of the model.
+    /// Error of a model that no built-in profile fits.
     pub fn unknown(&self, path: &Path) -> TeacherError {
         self.no_profile(path, BUILT_IN.iter().flat_map(BuiltIn::profile))
     }
@@ -236,7 +235,7 @@ impl Port {
         self.image(channels, profile.layout).is_some()
     }
 
-    /// Whether this input can play a role.
+    /// Returns true if this input can play a role.
     fn plays(&self, role: Role, profile: &Profile) -> bool {
         match role {
             Role::Image => self.is_image(profile.image.channels(), profile),
@@ -249,8 +248,8 @@ impl Port {
         }
     }
 
-    /// How many elements it has, an open batch counting as 1; none where other
-    /// sides are open or it is larger than any image.
+    /// Number of elements, an open batch counting as 1; none if other sides are open or it is
+    /// larger than any image.
     pub fn len(&self) -> Option<usize> {
         let most = 3 * i64::from(MAX_SIDE) * i64::from(MAX_SIDE);
         let product = self.closed().iter().try_fold(1_i64, |product, &side| {
@@ -285,7 +284,7 @@ fn shape_in_words(shape: &[i64]) -> String {
     format!("[{}]", sides.join(","))
 }
 
-/// What a profile accepts, in words.
+/// Description of the shapes that a profile accepts.
 fn accepted(profile: &Profile) -> String {
     let inputs = profile.inputs.iter().map(|role| match role {
         Role::Image => format!("[1,{},H,W]", profile.image.channels()),

@@ -14,8 +14,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-/// How far the aspects of photo and image may differ: rounding to whole pixels
-/// in a tool that works at a small size, not another cut of the photo.
+/// Tolerance between the aspects of photo and image: rounding to whole pixels in a tool that works
+/// at a small size, not another cut of the photo.
 const ASPECT_TOLERANCE: f64 = 0.02;
 
 /// Images for any subset of the photos.
@@ -32,7 +32,7 @@ pub(super) struct NamedImages {
 
 /// An image that belongs to a photo.
 pub(super) struct Found<'a> {
-    /// Where it lies.
+    /// Path of the image.
     pub path: &'a Path,
     /// In sRGB, and turned as the photo that COLMAP saw.
     pub image: DynamicImage,
@@ -94,8 +94,8 @@ impl NamedImages {
         self.images.know(known(capture));
     }
 
-    /// Whether there is an image for a photo, which may be given by its path below the photo
-    /// folder.
+    /// Returns true if there is an image for a photo, which may be given by its path below the
+    /// photo folder.
     ///
     /// # Errors
     /// [`TeacherError::AmbiguousNames`] where nobody knows.
@@ -107,8 +107,7 @@ impl NamedImages {
         self.images.of(name).map_err(TeacherError::AmbiguousNames)
     }
 
-    /// Where the image for a view lies, and of which photo it is where that is not the view as
-    /// it is.
+    /// Path of the image for a view, and the photo it is of if that is not the view as it is.
     fn of<'a>(
         &'a self,
         query: Query<'a>,
@@ -194,8 +193,8 @@ impl NamedImages {
     }
 }
 
-/// Whether a file's name says that it is an image that can be read, or its first bytes do where
-/// its name does not say that it is a picture.
+/// Returns true if a file's extension is that of a readable image, or if it has none and its first
+/// bytes are an image's.
 fn is_image(path: &Path) -> bool {
     let extension = path.extension().unwrap_or_default();
     let named = ["png", "jpg", "jpeg", "tif", "tiff"];

@@ -37,7 +37,7 @@ pub struct NetworkTeacher {
     cache: Option<Cache>,
     /// True while the profile is guessed from tensor shapes and no answer has confirmed it.
     pub(super) supposed: bool,
-    /// Why answers are not kept, where they were to be.
+    /// Error that prevents answers from being cached, if any.
     pub(super) unkept: Option<TeacherError>,
 }
 
@@ -51,11 +51,11 @@ pub(super) struct Loaded {
     /// See [`device::SessionOn`].
     refused: Vec<(TeacherDevice, String)>,
     sha256: String,
-    /// What the table of networks says of it: its name there and its contract.
+    /// Entry in the table of networks: its name there and its contract.
     pub known: Option<(String, Profile)>,
 }
 
-/// Who says what a network takes and gives.
+/// Source of a network's contract.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ProfileSource {
@@ -93,7 +93,7 @@ impl Loaded {
         })
     }
 
-    /// What the model takes and gives, as far as somebody says so or its inputs and outputs do.
+    /// The model's contract by settings, manifest, table of networks or tensor shapes.
     pub fn contract(
         &self,
         settings: &TeacherSettings,
@@ -174,7 +174,7 @@ impl NetworkTeacher {
         }
     }
 
-    /// What to say of devices that would have come first.
+    /// Warnings about preferred devices that failed, a line each.
     pub(super) fn passed_over(&self) -> Vec<String> {
         let (name, taken) = (file_name(&self.loaded.path), self.loaded.device.name());
         (self.loaded.refused.iter())
@@ -372,7 +372,7 @@ pub(super) struct Numbers {
     pub values: Vec<f32>,
 }
 
-/// Whether a network can be asked at a side; if not, why not.
+/// Checks that a network can run at a side; the error gives the reason.
 fn check_size(asked: Option<u32>, profile: &Profile, fit: &Fit) -> Result<(), String> {
     let Some(size) = asked else { return Ok(()) };
     if let Some(fixed) = fit.fixed.into_iter().flatten().find(|&fixed| fixed != size) {
@@ -404,8 +404,8 @@ fn image(profile: &Profile, photo: &GrayImage<'_>, size: [u32; 2]) -> Vec<f32> {
         .collect()
 }
 
-/// What a network is told of hints at its own size: `[2, height, width]` for
-/// their colors, `[1, height, width]` for the mask.
+/// Hints as the network receives them, at its own size: `[2, height, width]` for their colors,
+/// `[1, height, width]` for the mask.
 fn told(profile: &Profile, hints: Option<&HintImage>, size: [u32; 2], role: Role) -> Vec<f32> {
     let pixels = size[0] as usize * size[1] as usize;
     let mut colors = match hints {

@@ -1,4 +1,4 @@
-//! Where this project keeps what is not part of the program.
+//! Cache folders of files that are not part of the program.
 
 use std::env;
 use std::path::PathBuf;

@@ -38,7 +38,7 @@ pub(super) fn ramp() -> Vec<u8> {
         .collect()
 }
 
-/// That picture, of its grays.
+/// Image of the ramp.
 pub(super) fn as_image(ramp: &[u8]) -> GrayImage<'_> {
     GrayImage {
         width: RAMP[0],
@@ -60,7 +60,7 @@ pub(super) fn is_unit(value: &f32) -> bool {
     value.abs() <= UNIT
 }
 
-/// How far a color of CIELAB is from one that sRGB has.
+/// Distance of a CIELAB color from the sRGB gamut, in CIELAB units.
 pub(super) fn beyond_colors(said: [f64; 3]) -> f64 {
     let shown = lab_to_srgb(said).map(|value| value.clamp(0.0, 1.0));
     let shown = srgb_to_lab(shown);

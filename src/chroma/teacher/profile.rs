@@ -1,4 +1,4 @@
-//! What a colorization network takes and gives, as data.
+//! Contract of a colorization network, as data.
 
 use super::TeacherError;
 use super::images::Filter;
@@ -22,23 +22,23 @@ const AB_LIMIT: f32 = 110.0;
 pub(super) struct Profile {
     /// Name for reports.
     pub name: String,
-    /// What the model's inputs are for, in their order.
+    /// Roles of the model's inputs, in their order.
     pub inputs: Vec<Role>,
-    /// What the channels of the image are.
+    /// Meaning of the image's channels.
     pub image: ImageKind,
-    /// What black and white are, before `mean` and `std`.
+    /// Values of black and white, before `mean` and `std`.
     pub input_range: [f32; 2],
     /// Subtracted from each channel.
     pub mean: Vec<f32>,
-    /// What each channel is then divided by.
+    /// Divisor of each channel, after `mean`.
     pub std: Vec<f32>,
     /// Side of the input in pixels where the model leaves it open.
     pub size: u32,
-    /// What open sides are multiples of.
+    /// Divisor of open sides, in pixels.
     pub size_multiple: u32,
-    /// How the photo's shape becomes the input's.
+    /// Mapping from the photo's shape to the input's.
     pub resize: Resize,
-    /// How the photo's pixels become the input's.
+    /// Resampling filter from the photo to the input.
     pub filter: Filter,
     /// In which order a picture's numbers stand.
     #[serde(default, skip_serializing_if = "Layout::is_planes")]
@@ -46,11 +46,11 @@ pub(super) struct Profile {
     /// Name of the output that is the answer, where a model has several.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub answer: Option<String>,
-    /// What the answer is.
+    /// Meaning of the answer's channels.
     pub output: OutputKind,
-    /// What black and white are, or a, b of -110 and 110.
+    /// Values of black and white, or of -110 and 110 in a, b.
     pub output_range: [f32; 2],
-    /// What a, b of -110 and 110 are in the hints.
+    /// Values of -110 and 110 in the hints' a, b.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub hint_range: Option<[f32; 2]>,
     /// Standard deviation of the random code.
@@ -58,7 +58,7 @@ pub(super) struct Profile {
     pub noise_std: Option<f32>,
 }
 
-/// What an input of a model is for.
+/// Role of a model's input.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum Role {
@@ -77,7 +77,7 @@ pub(super) enum Role {
     Zeros,
 }
 
-/// What the channels of a network's image are.
+/// Meaning of the channels of a network's image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum ImageKind {
@@ -89,7 +89,7 @@ pub(super) enum ImageKind {
     Lightness,
 }
 
-/// How a photo's shape becomes that of the input.
+/// Mapping from a photo's shape to the input's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum Resize {
@@ -110,7 +110,7 @@ pub(super) enum Layout {
     Nhwc,
 }
 
-/// What a network answers with.
+/// Meaning of a network's answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum OutputKind {
@@ -142,7 +142,7 @@ impl Layout {
         }
     }
 
-    /// Where a value stands in one picture of so many channels and pixels.
+    /// Index of a value in one image of so many channels and pixels.
     pub fn index(self, channel: usize, pixel: usize, [channels, pixels]: [usize; 2]) -> usize {
         match self {
             Self::Nchw => channel * pixels + pixel,
@@ -200,7 +200,7 @@ impl Profile {
         Ok(profile)
     }
 
-    /// Whether the fields make sense; if not, which does not and why.
+    /// Checks that the fields make sense; the error names the field and the reason.
     pub fn check(&self) -> Result<(), String> {
         let count = |role| self.inputs.iter().filter(|&&input| input == role).count();
         let ranges = [
@@ -259,7 +259,7 @@ impl Profile {
         ((value - black) / (white - black)).clamp(0.0, 1.0)
     }
 
-    /// What a painted a or b is among the hints.
+    /// Value of a painted a or b among the hints.
     pub fn hint(&self, value: f32) -> f32 {
         let [low, high] = self.hint_range.unwrap_or([-AB_LIMIT, AB_LIMIT]);
         (low + high) / 2.0 + value * (high - low) / (2.0 * AB_LIMIT)

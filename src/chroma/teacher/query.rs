@@ -1,4 +1,4 @@
-//! Which photo a teacher is asked about.
+//! Query of a teacher for a photo.
 
 use super::images::{Filter, resample};
 use crate::capture::{Camera, SensorOrientation, View, lens::Undistortion};
@@ -12,7 +12,7 @@ pub struct Query<'a> {
     /// The view's name: a path below the photo folder.
     pub name: &'a str,
     pub(super) original: Option<Original<'a>>,
-    /// How the photo stands.
+    /// Orientation of the photo.
     pub(super) stance: SensorOrientation,
 }
 

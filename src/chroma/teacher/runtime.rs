@@ -13,7 +13,7 @@ use std::sync::{Mutex, PoisonError};
 /// Environment variable that names the library.
 const LIBRARY_VARIABLE: &str = "ORT_DYLIB_PATH";
 
-/// Where the project keeps the library.
+/// Name of the library's cache folder.
 const FOLDER: &str = "onnxruntime";
 
 /// File name of the library; releases append their version.
@@ -94,7 +94,7 @@ fn library_in(folder: &Path) -> Option<PathBuf> {
     paths.filter(is_library).max()
 }
 
-/// What the system's loader is asked for.
+/// Library names to try with the system's loader.
 fn system_names() -> Vec<String> {
     let plain = format!("{LIBRARY_STEM}{}", env::consts::DLL_SUFFIX);
     match env::consts::DLL_SUFFIX {

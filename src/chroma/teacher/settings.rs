@@ -1,4 +1,4 @@
-//! What a teacher can be told, and what it says of itself.
+//! Settings of a teacher, and its description in reports.
 
 use super::Upsample;
 use serde::{Deserialize, Serialize};
@@ -36,7 +36,7 @@ impl TeacherDevice {
     }
 }
 
-/// How a teacher is to be asked.
+/// Settings of a teacher.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TeacherSettings {
     /// A network's contract: the name of a built-in profile or the path of a
@@ -48,9 +48,9 @@ pub struct TeacherSettings {
     pub size: Option<u32>,
     /// On which processor a network runs.
     pub device: TeacherDevice,
-    /// How answers smaller than the photo are enlarged.
+    /// Enlargement of answers smaller than the photo.
     pub upsample: Upsample,
-    /// How long a network may take for one photo.
+    /// Time limit of a network for one photo.
     pub time_limit: Duration,
 }
 
@@ -67,7 +67,7 @@ impl Default for TeacherSettings {
     }
 }
 
-/// What a report says about a teacher.
+/// Description of a teacher in reports.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct TeacherInfo {

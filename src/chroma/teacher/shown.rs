@@ -1,4 +1,4 @@
-//! What the images of a folder show: the photos that they are named after, or others.
+//! Check that the images of a folder show the photos that they are named after.
 
 use std::path::Path;
 

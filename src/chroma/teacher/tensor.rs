@@ -9,9 +9,9 @@ use ort::value::{DynValue, Tensor, TensorElementType};
 
 /// A picture for a network, `[channels, height, width]`.
 pub(super) struct NetworkImage {
-    /// How the network wants it.
+    /// Axis order of the network's input.
     pub layout: Layout,
-    /// How often it wants it.
+    /// Number of copies that the network takes at once.
     pub batch: usize,
     /// Width and height.
     pub size: [u32; 2],

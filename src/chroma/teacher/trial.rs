@@ -1,5 +1,4 @@
-//! What a network's numbers mean, where nobody says so: candidates are tried, and the answers
-//! looked at.
+//! Trial of a network without a contract: candidates are tried, and their answers rated.
 
 use super::guess::GuessedProfile;
 use super::images::Filter;
@@ -29,21 +28,20 @@ const OUTSIDE: f64 = 100.0;
 /// Side at which networks that leave it open are tried: what most are trained at.
 const SIDE: u32 = 256;
 
-/// What open sides are multiples of: networks halve their input five times at most.
+/// Divisor of open sides: networks halve their input five times at most.
 const MULTIPLE: u32 = 32;
 
 /// A candidate that was tried.
 #[derive(Clone, Debug, Serialize)]
 pub struct Trial {
-    /// What it takes the photo's and the answer's numbers for.
+    /// Supposed encoding of the photo's and the answer's numbers.
     pub candidate: String,
-    /// How far the answers are from any that make sense, in CIELAB units, 100 at most: of RGB,
-    /// lightness against the photo's; of a and b, colors that do not exist at the photo's
-    /// lightness.
+    /// Distance of the answers from plausible ones, in CIELAB units, 100 at most: of RGB, lightness
+    /// against the photo's; of a and b, colors that do not exist at the photo's lightness.
     pub off: f64,
 }
 
-/// What a photo's numbers may be.
+/// Candidate encoding of a photo.
 struct Input {
     name: &'static str,
     image: ImageKind,
@@ -64,8 +62,8 @@ impl Input {
     }
 }
 
-/// What a photo of three channels may be, the likeliest first. The last is scaled by mean and
-/// deviation of ImageNet's photos.
+/// Candidate encodings of a photo of three channels, the likeliest first. The last is scaled by
+/// mean and deviation of ImageNet's photos.
 const OF_THREE: &[Input] = &[
     Input::new("gray 0 to 1", ImageKind::GrayRgb, [0.0, 1.0]),
     Input::new("gray 0 to 255", ImageKind::GrayRgb, [0.0, 255.0]),
@@ -77,7 +75,7 @@ const OF_THREE: &[Input] = &[
     },
 ];
 
-/// What a photo of one channel may be, the likeliest first.
+/// Candidate encodings of a photo of one channel, the likeliest first.
 const OF_ONE: &[Input] = &[
     Input::new("L* 0 to 100", ImageKind::Lightness, [0.0, 100.0]),
     Input::new("L* -50 to 50", ImageKind::Lightness, [-50.0, 50.0]),
@@ -87,14 +85,14 @@ const OF_ONE: &[Input] = &[
     Input::new("gray -1 to 1", ImageKind::Gray, [-1.0, 1.0]),
 ];
 
-/// What RGB may be.
+/// Candidate encodings of RGB.
 const RGB: &[(&str, [f32; 2])] = &[
     ("RGB 0 to 1", [0.0, 1.0]),
     ("RGB 0 to 255", [0.0, 255.0]),
     ("RGB -1 to 1", [-1.0, 1.0]),
 ];
 
-/// What a and b may be.
+/// Candidate encodings of a and b.
 const AB: &[(&str, [f32; 2])] = &[
     ("a, b", [-110.0, 110.0]),
     ("a, b / 110", [-1.0, 1.0]),
@@ -173,7 +171,7 @@ pub(super) fn guess(
     }
 }
 
-/// What a candidate says of a network.
+/// Profile of a candidate for a network.
 fn candidate(guess: &GuessedProfile, layout: Layout, input: &Input) -> Profile {
     let output = match guess.answer {
         2 => OutputKind::Ab,
@@ -199,7 +197,7 @@ fn candidate(guess: &GuessedProfile, layout: Layout, input: &Input) -> Profile {
     }
 }
 
-/// How far an answer is from one that makes sense; see [`Trial::off`].
+/// Distance of an answer from plausible ones; see [`Trial::off`].
 fn off(profile: &Profile, numbers: &Numbers, photo: &GrayImage<'_>) -> f64 {
     let pixels = numbers.size[0] as usize * numbers.size[1] as usize;
     let channels = profile.output.channels();

@@ -3,7 +3,7 @@
 use super::images::{Filter, resample};
 use super::{AbImage, GrayImage};
 
-/// How an answer smaller than its photo is enlarged.
+/// Enlargement of an answer smaller than its photo.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]

@@ -63,7 +63,7 @@ enum Kind {
 }
 
 impl Kind {
-    /// What a field holds; none where it leads nowhere. Tags are those of `onnx.proto`.
+    /// Kind of a field's contents; none if it is not followed. Tags are those of `onnx.proto`.
     fn field(self, tag: u64) -> Option<Self> {
         Some(match (self, tag) {
             (Self::Model, 7) | (Self::Attribute, 6 | 11) => Self::Graph,
