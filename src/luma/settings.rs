@@ -71,7 +71,7 @@ impl LearningRates {
         }
     }
 
-    /// That of the means in world units after a share `t` of the training.
+    /// Learning rate of the means in world units after a share `t` of the training.
     pub fn means_at(&self, t: f64, extent: f64) -> f64 {
         let [first, last] = self.means;
         extent * first * (last / first).powf(t)
@@ -181,7 +181,7 @@ impl LumaSettings {
         }
     }
 
-    /// What it has room for, before effects are decided.
+    /// Training budget before effects are decided.
     pub fn room(&self) -> TrainingBudget {
         TrainingBudget {
             iterations: self.iterations,
@@ -200,7 +200,7 @@ impl LumaSettings {
         }
     }
 
-    /// How the scene is drawn.
+    /// Rasterizer options of the scene.
     pub fn raster_options(&self) -> RasterOptions {
         RasterOptions {
             antialiased: self.antialiased,
