@@ -77,11 +77,11 @@ pub struct Frames {
     pub output: PathBuf,
     /// Photos in color.
     pub photos: usize,
-    /// How many of them have a pose.
+    /// Photos with a pose.
     pub placed: usize,
-    /// How many take their neighbors' colors.
+    /// Photos with colors carried from their neighbors.
     pub carried: usize,
-    /// How many show strokes on what the scene leaves open.
+    /// Photos with strokes on what the scene does not cover.
     pub painted: usize,
     /// Share of photos with a pose that the scene covers.
     pub covered: f64,
