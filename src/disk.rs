@@ -27,7 +27,7 @@ static ASKED: LazyLock<Option<Fault>> =
 /// Steps so far.
 static STEPS: AtomicU64 = AtomicU64::new(0);
 
-/// Which steps fail.
+/// Steps that fail.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Fault {
     step: u64,
@@ -238,7 +238,7 @@ pub(crate) fn remove_drafts(folder: &Path, path: Option<&Path>) {
 }
 
 impl Draft {
-    /// Where it is, for another program that fills it.
+    /// Path of the file, for another program that fills it.
     pub fn path(&self) -> &Path {
         self.file.path()
     }
@@ -276,7 +276,7 @@ pub(crate) struct DraftFolder {
 }
 
 impl DraftFolder {
-    /// Where it is.
+    /// Path of the folder.
     pub fn path(&self) -> &Path {
         self.made.path()
     }

@@ -65,7 +65,7 @@ pub(crate) fn check_inside(folder: &Path, path: &Path) -> io::Result<()> {
 pub(crate) struct FileId(#[cfg(unix)] [u64; 2], #[cfg(not(unix))] std::path::PathBuf);
 
 impl FileId {
-    /// That of a file, links followed; none where there is none.
+    /// Identity of a file, links followed; `None` if it does not exist.
     pub fn of(path: &Path) -> Option<Self> {
         #[cfg(unix)]
         {

@@ -1,4 +1,4 @@
-//! What no point explains: sky, and backdrops too far away to be triangulated.
+//! Background that no point explains: sky, and backdrops too far away to be triangulated.
 
 use glam::DVec3;
 
@@ -26,17 +26,17 @@ const DOME_BEYOND_POINTS: f64 = 2.0;
 /// Gaussians on the whole sphere, 3.2° apart: a photo of 60° sees some 300.
 const DOME_COUNT: usize = 4_000;
 
-/// What photos show of one far place may differ by so many gray levels: noise and the sun
-/// move less, a textured wall that is not far moves more.
+/// Largest difference between photos of one far place, in gray levels: noise and the sun move less,
+/// a textured wall that is not far moves more.
 const AGREEMENT: f64 = 8.0;
 
 /// Views that are looked at, at most: each place is looked up in all of them, and so many
 /// photos around a scene show all of its background more than once.
 const VIEWS_MAX: usize = 128;
 
-/// What lies behind the scene: the parts of the photos that no point explains, where the
-/// photos agree if these are put far away. A wall without points that stands near does
-/// not agree, unless it has no texture either; then its gray is right behind it as well.
+/// Background of the scene: the parts of the photos that no point explains, if the photos agree
+/// when these are put far away. A near wall without points does not agree, unless it has no texture
+/// either; then its gray is right behind it as well.
 #[derive(Clone, Debug)]
 pub struct Backdrop {
     /// The views whose photos are looked at.
@@ -59,7 +59,7 @@ struct Holes {
     /// Side of a cell in pixels.
     side: f64,
     columns: usize,
-    /// Whether no point lies in the cell or a neighbor of it, row by row.
+    /// True if no point lies in the cell or a neighbor of it, row by row.
     empty: Vec<bool>,
 }
 
@@ -208,7 +208,7 @@ impl Backdrop {
 #[derive(Clone, Debug)]
 pub struct FarPlaces {
     places: Vec<DVec3>,
-    /// Of each place, one a photo that shows it.
+    /// Gray of each place in each photo that shows it.
     grays: Vec<Vec<f64>>,
 }
 

@@ -1,4 +1,4 @@
-//! Whether luma depends on the direction of view, from points seen by several views.
+//! View dependence of luma, from points seen by several views.
 
 use glam::DVec3;
 
@@ -11,7 +11,7 @@ use crate::{
 /// Points with fewer samples say nothing about a slope.
 const SAMPLES_MIN: usize = 5;
 
-/// Of longer tracks the first so many samples are used: the work grows with their cube.
+/// Maximum number of samples per track, the first ones: the work grows with their cube.
 const SAMPLES_MAX: usize = 24;
 
 /// Standard deviations of a harmonic's coefficient that are tried, in gray.
@@ -27,8 +27,8 @@ const CONSTANT_VARIANCE: f64 = 1.0;
 /// A sample farther off than this, in gray, is a wrong match or an occlusion.
 const OUTLIER: f64 = 0.2;
 
-/// How well harmonics of each degree, 0 to 3, foretell a sample that was left out: root
-/// mean square error in gray; `None` where no point has enough samples.
+/// Leave-one-out error of harmonics of each degree, 0 to 3: root mean square in gray; `None` if no
+/// point has enough samples.
 pub fn left_out_errors(tracks: &[Vec<Sample>], exposures: &[Exposure]) -> Option<[f64; 4]> {
     let long: Vec<Vec<(DVec3, f64)>> = (tracks.iter())
         .filter_map(|track| {

@@ -1,4 +1,4 @@
-//! What a capture and its photos say, measured once.
+//! Evidence from a capture and its photos, measured once.
 
 use super::{
     background::{Backdrop, FarPlaces},
@@ -23,24 +23,24 @@ pub struct Survey<'a> {
     cells: FarPlaces,
     masked: f64,
     pixels: f64,
-    /// Of each view.
+    /// True for each view whose photo has a mask.
     with_mask: Vec<bool>,
 }
 
 /// The numbers from which follows which effects are simulated.
 #[derive(Clone, Debug)]
 pub struct Evidence {
-    /// What the views show of each point.
+    /// Samples of each point in the views.
     pub(super) samples: Vec<Vec<Sample>>,
     /// By view, as the samples have it.
     pub(super) exposures: Exposures,
-    /// What the views show between the points.
+    /// Samples between the points.
     pub(super) midpoints: Midpoints,
     /// See [`sampling_spread`].
     pub(super) sampling_spread: Option<f64>,
     /// Per cent of the pixels that do not count; `None` where no photo has a mask.
     pub(super) masked: Option<f64>,
-    /// Whether a view's photo has a mask.
+    /// True for each view whose photo has a mask.
     with_mask: Vec<bool>,
     /// Share of the photos' area far behind all points.
     pub(super) behind: f64,
@@ -83,7 +83,7 @@ impl<'a> Survey<'a> {
         }
     }
 
-    /// What all photos together say.
+    /// Evidence of all photos together.
     pub fn finish(self) -> Evidence {
         let samples = sample_tracks(self.capture, self.cameras, &self.tracks);
         let views = &self.capture.views;
@@ -102,12 +102,12 @@ impl<'a> Survey<'a> {
 }
 
 impl Evidence {
-    /// Whether the photo of any of these views has a mask.
+    /// Returns true if the photo of any of these views has a mask.
     pub fn masks_any(&self, views: &[usize]) -> bool {
         views.iter().any(|&view| self.with_mask[view])
     }
 
-    /// What lies behind the scene.
+    /// Background of the scene.
     pub fn backdrop(&self) -> &Backdrop {
         &self.backdrop
     }

@@ -40,12 +40,12 @@ pub struct Exposures {
     /// where exposures drift along the capture, each place is as bright as the photos that see it
     /// show it on average.
     pub local: Vec<Exposure>,
-    /// Whether photos that see the same points are exposed more alike than any two. What changes
-    /// with the place may be the light on a surface; what changes from photo to photo is not.
+    /// True if photos that see the same points are exposed more alike than any two. Changes by
+    /// place may be light on a surface; changes from photo to photo are not.
     pub drifts: bool,
-    /// How far they move what the training views show, root mean square in gray.
+    /// Effect of the exposures on the training views, root mean square in gray.
     pub spread: f64,
-    /// How large that would be by chance, from the noise of the samples.
+    /// Expected spread by chance, from the noise of the samples.
     pub noise: f64,
 }
 
@@ -131,7 +131,7 @@ pub fn find_photo_exposures(tracks: &[Vec<Sample>], views: &[View], train: &[usi
     }
 }
 
-/// Whether training views that see the same points are exposed more alike than any two are.
+/// Returns true if training views of the same points are exposed more alike than any two are.
 fn drifts(tracks: &[Vec<Sample>], lumas: &[f64], exposures: &[Exposure], train: &[usize]) -> bool {
     let typical = lumas.iter().sum::<f64>() / lumas.len().max(1) as f64;
     let brightness = |view: usize| exposures[view].gain * typical + exposures[view].offset;
@@ -193,7 +193,7 @@ fn with_lumas<'a>(
     points.flat_map(|(track, &luma)| track.iter().map(move |sample| (sample, luma)))
 }
 
-/// How far a sample is from what its view is to show of a luma.
+/// Residual of a sample against a luma under its view's exposure, in gray.
 fn residual(sample: &Sample, luma: f64, exposures: &[Exposure]) -> f64 {
     let Exposure { gain, offset } = exposures[sample.view];
     sample.value - gain * luma - offset

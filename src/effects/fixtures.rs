@@ -61,7 +61,7 @@ pub fn capture(photos: &[(Photo, Camera)], points: impl IntoIterator<Item = DVec
     }
 }
 
-/// What all the photos say, all of them trained on.
+/// Evidence from all the photos, with every view in the training split.
 pub fn evidence(capture: &Capture, photos: &[(Photo, Camera)]) -> Evidence {
     let cameras: Vec<Camera> = photos.iter().map(|(_, camera)| camera.clone()).collect();
     let split = Split {

@@ -1,8 +1,8 @@
-//! Which effects of image formation a scene calls for, and whether its photos and its model
-//! agree at all.
+//! Selection of the effects of image formation to simulate, and consistency checks of photos and
+//! model.
 //!
-//! Each effect has a number that speaks for it, found in the capture, and a threshold.
-//! What is off is in no kernel and no buffer.
+//! Each effect has a figure of evidence, measured in the capture, and a threshold. Effects that are
+//! off are in no kernel and no buffer.
 
 mod background;
 mod direction;

@@ -1,4 +1,4 @@
-//! Whether photos show what the scene does not: dust, scratches, passers-by.
+//! Outliers in photos: dust, scratches, passers-by.
 //!
 //! Places half-way between neighboring points mostly lie on the surface too. COLMAP
 //! matched nothing there, so that a defect has not driven the match away as it does at
@@ -32,7 +32,7 @@ const DISAGREEMENT: f64 = 0.2;
 /// Places half-way between neighboring points, and what the views that see both show there.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Midpoints {
-    /// Of each place the views.
+    /// Views of each place.
     views: Vec<Vec<usize>>,
     patch_means: PatchMeans,
 }
@@ -98,8 +98,8 @@ impl Midpoints {
     }
 }
 
-/// Of sorted lumas at one place: how many there are about which the others agree, and
-/// how many of these disagree with them.
+/// Counts sorted lumas at one place: those on which the others agree, and how many of these
+/// disagree with them.
 fn judge(lumas: &[f64]) -> [u64; 2] {
     let n = lumas.len();
     if n <= WITNESSES {

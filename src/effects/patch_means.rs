@@ -5,7 +5,7 @@ use crate::capture::Photo;
 /// Squares in the photos of many views, whose means come photo by photo.
 #[derive(Clone, Debug, Default)]
 pub(super) struct PatchMeans {
-    /// Of each view what is wanted of its photo.
+    /// Squares to average in the photo of each view.
     by_view: Vec<Vec<Square>>,
     /// In the order in which they were asked for; not a number where there is none.
     means: Vec<f64>,
@@ -48,8 +48,8 @@ impl PatchMeans {
         }
     }
 
-    /// What was found, in the order in which it was asked for: gray in [0, 1], none where a
-    /// square leaves its photo or meets a masked pixel.
+    /// Mean gray of each square in the order of the requests, 0 to 1; `None` if a square leaves its
+    /// photo or meets a masked pixel.
     pub fn means(&self) -> impl Iterator<Item = Option<f64>> {
         let means = self.means.iter().copied();
         means.map(|mean| (!mean.is_nan()).then_some(mean))

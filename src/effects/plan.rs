@@ -1,4 +1,4 @@
-//! What each effect's evidence is and what follows from it.
+//! Decision on each effect from its evidence.
 
 use std::collections::BTreeMap;
 
@@ -40,9 +40,8 @@ const SAMPLING_SPREAD: f64 = 2.0;
 /// with 0.26 % `caliterra-drone` gains 0.5 dB, with 0.14 % the bundled scene loses 0.1.
 const BACKGROUND_SHARE: f64 = 0.002;
 
-/// What the direction of view must explain of a point's luma, root mean square in gray
-/// levels, in a short run: matt scenes show 2 to 4, for perspective changes a little what lies in
-/// a pixel.
+/// Luma that the view direction must explain in a short run, root mean square in gray levels: matt
+/// scenes show 2 to 4, for perspective slightly changes what a pixel covers.
 const DIRECTION_LEVELS: f64 = 5.0;
 
 /// And in a run of as many iterations, which learns from less: on eight of nine scenes with more
@@ -54,7 +53,7 @@ const DIRECTION_LEVELS_LONG: f64 = 2.0;
 /// A higher degree must explain so much more, in gray levels, to be worth its memory.
 const DEGREE_LEVELS: f64 = 1.0;
 
-/// What trials gained: dB of corrected PSNR on views held back.
+/// Gain of each effect in trials, in dB of corrected PSNR on held-out views.
 pub type Trials = BTreeMap<Effect, f64>;
 
 /// An effect of image formation.
@@ -96,7 +95,7 @@ impl Effect {
         Self::LumaDegree,
     ];
 
-    /// What the evidence counts.
+    /// Unit of the evidence.
     pub fn unit(self) -> &'static str {
         match self {
             Self::Lens => "pixels that the lens displaces",
@@ -136,7 +135,7 @@ impl Effect {
         }
     }
 
-    /// What it costs while it is on (docs/lab/12-effects.md has the measurements).
+    /// Cost while it is on (docs/lab/12-effects.md has the measurements).
     pub fn cost(self) -> &'static str {
         match self {
             Self::Lens => "nothing once photos are read",
@@ -152,7 +151,7 @@ impl Effect {
     }
 }
 
-/// Who decided.
+/// Source of a decision.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
@@ -167,25 +166,25 @@ pub enum Decider {
     Preset,
 }
 
-/// What is decided about an effect.
+/// Decision on an effect.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Decision {
-    /// Which.
+    /// The effect.
     pub effect: Effect,
-    /// Whether it is simulated.
+    /// True if it is simulated.
     pub on: bool,
-    /// The number that speaks for it; `None` where the capture says nothing.
+    /// Evidence for it; `None` if the capture has none.
     pub evidence: Option<f64>,
-    /// From this on it is called for.
+    /// Threshold above which it is on.
     pub threshold: f64,
-    /// Who decided.
+    /// Source of the decision.
     pub decided_by: Decider,
     /// dB that a short training gained with it on views held back, where that was tried.
     pub trial: Option<f64>,
 }
 
 impl Decision {
-    /// What follows from the evidence alone.
+    /// Decision from the evidence alone.
     pub fn new(effect: Effect, evidence: Option<f64>, threshold: f64) -> Self {
         Self {
             effect,
@@ -197,7 +196,7 @@ impl Decision {
         }
     }
 
-    /// What follows from a trial, which is asked only where the evidence says yes.
+    /// Decision after a trial, which runs only if the evidence is above its threshold.
     fn after(self, trials: &Trials) -> Self {
         match trials.get(&self.effect).copied() {
             Some(gain) => {
@@ -229,7 +228,7 @@ impl Decision {
     }
 }
 
-/// What a training has room for.
+/// Budget of a training.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TrainingBudget {
     /// The highest degree of the luma harmonics.
@@ -238,7 +237,7 @@ pub struct TrainingBudget {
     pub iterations: usize,
 }
 
-/// What the user wants regardless of evidence.
+/// User overrides, regardless of the evidence.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Overrules {
     /// On.
@@ -250,7 +249,7 @@ pub struct Overrules {
 }
 
 impl Overrules {
-    /// What they say about an effect that is decided when photos are loaded.
+    /// Override of an effect that is decided when photos are loaded.
     pub fn choice(&self, effect: Effect) -> Choice {
         if self.with.contains(&effect) {
             Choice::On
@@ -262,12 +261,12 @@ impl Overrules {
     }
 }
 
-/// Which effects are simulated, and how.
+/// Effects to simulate, and their parameters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
     /// About each effect, in the order of [`Effect::ALL`].
     pub decisions: Vec<Decision>,
-    /// Of each view of the capture; none at all while the effect is off.
+    /// Exposure of each view of the capture; empty while the effect is off.
     pub exposures: Vec<Exposure>,
     /// Degree of the luma harmonics.
     pub sh_degree: u32,
@@ -298,7 +297,7 @@ impl Plan {
         self
     }
 
-    /// Whether an effect is simulated.
+    /// Returns true if an effect is simulated.
     pub fn has(&self, effect: Effect) -> bool {
         (self.decisions.iter()).any(|decision| decision.effect == effect && decision.on)
     }
@@ -361,8 +360,8 @@ impl Evidence {
     }
 }
 
-/// Whether luma depends on direction, and the degree of harmonics that says how: at most
-/// what there is room for unless the user says otherwise.
+/// Decision on view-dependent luma, and the degree of its harmonics: at most that of the budget
+/// unless the user overrides it.
 fn degree(
     samples: &[Vec<tracks::Sample>],
     exposures: &[Exposure],

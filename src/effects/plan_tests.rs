@@ -1,4 +1,4 @@
-//! What follows from evidence, trials and the user's word.
+//! Plans from evidence, trials and overrides.
 
 use glam::DVec3;
 

@@ -1,4 +1,4 @@
-//! How finely the views see the same places.
+//! Sampling rates of the same places in several views.
 
 use crate::capture::{Camera, Capture, Point};
 
@@ -6,9 +6,8 @@ use crate::capture::{Camera, Capture, Point};
 /// oddly near or far do not make a scene of mixed distances.
 const PERCENTILE: f64 = 0.9;
 
-/// How far apart the finest and the coarsest view of a place are: the ratio of their
-/// sampling rates (focal length by depth, pixels on one world unit), 90th percentile
-/// over the points. At least 1; `None` where no point has two views.
+/// Ratio of the finest to the coarsest sampling rate of a place (focal length by depth, pixels on
+/// one world unit), 90th percentile over the points. At least 1; `None` if no point has two views.
 ///
 /// `cameras` are those of the capture's views at working size.
 pub fn sampling_spread(capture: &Capture, cameras: &[Camera]) -> Option<f64> {

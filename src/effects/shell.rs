@@ -1,4 +1,4 @@
-//! What stands where no photo shows anything: a shell far around the scene.
+//! Shell far around the scene, for directions that no photo shows.
 
 use glam::DVec3;
 
@@ -38,7 +38,7 @@ pub struct Shell {
 #[derive(Clone, Debug)]
 struct ShellPoint {
     at: DVec3,
-    /// Whether a photo shows it, or would if it were larger by [`MARGIN`] on all sides.
+    /// True if a photo shows it, or would if it were larger by [`MARGIN`] on all sides.
     near: bool,
     /// One a photo that shows it, 0 to 1.
     grays: Vec<f32>,
@@ -125,7 +125,7 @@ impl Shell {
     }
 }
 
-/// Whether a camera sees a place, or would with larger photos.
+/// Returns true if a camera sees a place, or would with larger photos.
 fn nearly_shows(camera: &Camera, place: DVec3) -> bool {
     let at = camera.rotation * place + camera.translation;
     let within = |at: f64, side: u32| {
@@ -164,7 +164,7 @@ mod tests {
     use super::*;
     use crate::effects::fixtures::{looking_along_z, photo};
 
-    /// What a camera at the origin that looks along z shows: dark on the left, bright on the right.
+    /// Shell of a camera at the origin that looks along z: dark on the left, bright on the right.
     fn looked(masked: bool) -> Splats {
         let camera = looking_along_z(DVec3::ZERO, 64);
         let mut shown = photo(&camera, |x, _| if x < 32 { 51 } else { 204 });

@@ -1,4 +1,4 @@
-//! Whether a teacher colors the same place alike in all views.
+//! Consistency of a teacher's colors between views.
 
 use super::{
     exposure::find_exposures,
@@ -11,12 +11,12 @@ use crate::capture::{Camera, Capture};
 /// against each other, and what pale teachers say would decide by how much.
 const UNITS: f64 = 255.0;
 
-/// How far the teacher's views differ in saturation and tint, in CIELAB units.
+/// Differences of the teacher's views in saturation and tint, in CIELAB units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TeacherSpread {
-    /// What gains and offsets of the views explain, root mean square over both channels.
+    /// Effect of the views' gains and offsets, root mean square over both channels.
     pub spread: f64,
-    /// How large that would be by chance, from the noise at the points.
+    /// Expected spread by chance, from the noise at the points.
     pub noise: f64,
     /// Share of the mean square of a and b, 0 to 1, that the views agree on at the points: what
     /// one says times what another says, over what each says squared. Whims of single views
@@ -24,7 +24,7 @@ pub struct TeacherSpread {
     pub agreed: f64,
 }
 
-/// What a teacher says at COLMAP's points, taken view by view.
+/// The teacher's colors at COLMAP's points, collected view by view.
 pub struct TeacherSamples {
     /// For each view the points it shows, and their places in the points' tracks.
     seen: Vec<Vec<(usize, usize)>>,
@@ -109,10 +109,10 @@ impl TeacherSamples {
         })
     }
 
-    /// How far views disagree about the points once `corrected` has changed what each says:
-    /// the mean square of a and b about their point's mean, over that about the mean of all.
-    /// It does not fall where corrections make all paler or tint all alike. `None` where no
-    /// point is seen in two views, or all say the same.
+    /// Disagreement of the views at the points after the correction `corrected`: the mean square of
+    /// a and b about their point's mean, over that about the mean of all. It does not fall if
+    /// corrections make all paler or tint all alike. `None` if no point is seen in two views, or
+    /// all agree.
     pub fn disagreement(
         &self,
         capture: &Capture,

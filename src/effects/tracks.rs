@@ -1,5 +1,4 @@
-//! What the photos show at COLMAP's points: the same place of the scene, seen by
-//! several views.
+//! Samples of the photos at COLMAP's points: the same place of the scene, seen by several views.
 
 use glam::DVec3;
 
@@ -15,7 +14,7 @@ const CLIPPED: [f64; 2] = [2.0 / 255.0, 253.0 / 255.0];
 /// resolve it differently would seem to differ in exposure.
 const FOOTPRINT: f64 = 2.0;
 
-/// What one view shows of a point.
+/// Sample of a point in one view.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
     /// Index of the view.
@@ -26,8 +25,8 @@ pub struct Sample {
     pub direction: DVec3,
 }
 
-/// Where photos are to be looked at for the samples of the points, in the order of the
-/// points and their tracks. `cameras` are those of the capture's views at working size.
+/// Squares to average for the samples of the points, in the order of the points and their tracks.
+/// `cameras` are those of the capture's views at working size.
 pub(super) fn look_up_tracks(capture: &Capture, cameras: &[Camera]) -> PatchMeans {
     let mut patch_means = PatchMeans::of(cameras.len());
     for point in &capture.points {

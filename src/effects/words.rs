@@ -15,7 +15,7 @@ fn number(value: f64) -> String {
 }
 
 impl Effect {
-    /// What was found, and what would have to be.
+    /// The evidence and its threshold, in words.
     fn found(self, figure: f64, threshold: f64) -> String {
         let (x, least) = (number(figure), number(threshold));
         let (found, count) = match self {
@@ -32,7 +32,7 @@ impl Effect {
         format!("{found}; {least} would {count}")
     }
 
-    /// What there is to say where there is no figure.
+    /// Text for missing evidence.
     fn unknown(self) -> &'static str {
         match self {
             Self::Masks => "no photo has a mask",
@@ -70,7 +70,7 @@ impl fmt::Display for Decision {
     }
 }
 
-/// What a trial showed, in dB.
+/// Result of a trial in words; gains in dB.
 fn tried(gain: f64, least: f64) -> String {
     let (how, but) = match gain < least {
         true if gain < 0.0 => ("loses", "but"),

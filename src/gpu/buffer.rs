@@ -94,7 +94,7 @@ impl<T: Pod> Buffer<T> {
         self.len
     }
 
-    /// Whether there is no element.
+    /// Returns true if there are no elements.
     pub fn is_empty(&self) -> bool {
         self.len == 0
     }
@@ -176,7 +176,7 @@ impl<T: Pod> Buffer<T> {
 pub struct Readback<T> {
     staging: wgpu::Buffer,
     done: mpsc::Receiver<Result<(), wgpu::BufferAsyncError>>,
-    /// What another device answered, in this one's place.
+    /// Answer of another device, used instead.
     answer: Option<Vec<u8>>,
     len: usize,
     element: PhantomData<T>,

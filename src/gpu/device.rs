@@ -12,7 +12,7 @@ use super::{
     tape::TapeMode,
 };
 
-/// What can go wrong with the device.
+/// Error of the device.
 #[derive(Debug, thiserror::Error)]
 pub enum GpuError {
     /// There is no adapter to run on.
@@ -21,14 +21,14 @@ pub enum GpuError {
          (Debian: apt-get install mesa-vulkan-drivers)"
     )]
     NoAdapter(String),
-    /// None is called as the environment asks.
+    /// No adapter has the name in the environment variable.
     #[error(
         "WGPU_ADAPTER_NAME: no adapter's name contains {wanted:?} (there is: {found}): choose one of these, or unset it"
     )]
     NoSuchAdapter {
-        /// What was asked for.
+        /// Requested name.
         wanted: String,
-        /// The adapters there are.
+        /// Names of the adapters.
         found: String,
     },
     /// The adapter refused a device.
@@ -38,7 +38,7 @@ pub enum GpuError {
     NoDevice {
         /// The adapter's name.
         adapter: String,
-        /// What the driver said.
+        /// Reason from the driver.
         reason: String,
     },
     /// A field that no kernel shades.
@@ -47,7 +47,7 @@ pub enum GpuError {
     /// A buffer is larger than the adapter can bind.
     #[error("buffer `{label}` needs {needed} bytes but the adapter binds at most {limit}")]
     TooLarge {
-        /// What the buffer holds.
+        /// Label of the buffer.
         label: String,
         /// Bytes wanted.
         needed: u64,
@@ -61,9 +61,9 @@ pub enum GpuError {
     TooManySplats {
         /// Number of Gaussians.
         splats: usize,
-        /// How many there is room for, roughly.
+        /// Number of Gaussians that would fit, roughly.
         fits: usize,
-        /// What the buffer holds.
+        /// Label of the buffer.
         label: String,
         /// Bytes that one binding may have.
         limit: u64,
@@ -93,8 +93,8 @@ pub enum GpuError {
 }
 
 impl GpuError {
-    /// Of a buffer that grows with the set of Gaussians: says how many of these
-    /// `splats` there would have been room for.
+    /// Adds the number of Gaussians to an error of a buffer that grows with the set, and how many
+    /// of these `splats` would fit.
     #[must_use]
     pub fn of_splats(self, splats: usize) -> Self {
         match self {
@@ -159,9 +159,9 @@ struct Inner {
     device: wgpu::Device,
     queue: wgpu::Queue,
     info: wgpu::AdapterInfo,
-    /// What the device has refused, such as memory that is not there.
+    /// Error reported by the device, such as memory exhaustion.
     failed: Arc<OnceLock<String>>,
-    /// What is compiled already: drivers without a cache take up to a second for a kernel.
+    /// Compiled kernels: drivers without a cache take up to a second for one.
     kernels: Mutex<HashMap<Recipe, Kernel>>,
 }
 
@@ -303,7 +303,7 @@ impl Gpu {
         self.tape_mode.as_deref()
     }
 
-    /// What is compiled already.
+    /// Compiled kernels.
     pub(super) fn kernels(&self) -> MutexGuard<'_, HashMap<Recipe, Kernel>> {
         let kernels = self.inner.kernels.lock();
         kernels.unwrap_or_else(PoisonError::into_inner)
@@ -356,8 +356,8 @@ impl Gpu {
         if timed { gpu.timed() } else { Ok(gpu) }
     }
 
-    /// What each kernel took since the last call, in order of first use; nothing
-    /// unless the device is [`Self::timed`]. Waits for the device.
+    /// Time of each kernel since the last call, in order of first use; empty unless the device is
+    /// [`Self::timed`]. Waits for the device.
     ///
     /// # Errors
     /// [`GpuError::Lost`].
@@ -439,7 +439,7 @@ impl Gpu {
         format!("{} ({} {})", info.name, info.driver, info.driver_info)
     }
 
-    /// Whether the adapter is a software one.
+    /// Returns true if the adapter is a software one.
     pub fn is_software(&self) -> bool {
         self.inner.info.device_type == wgpu::DeviceType::Cpu
     }

@@ -20,12 +20,12 @@ pub fn folded(groups: u32) -> [u32; 2] {
     [groups.min(MAX_GROUPS), groups.div_ceil(MAX_GROUPS)]
 }
 
-/// How many workgroups run.
+/// Number of workgroups.
 #[derive(Clone, Copy)]
 enum Groups<'a> {
     /// A grid.
     Grid([u32; 2]),
-    /// What stands in a buffer from so many bytes on.
+    /// Counts in a buffer, at a byte offset.
     Indirect(&'a wgpu::Buffer, u64),
 }
 
@@ -39,8 +39,7 @@ pub struct Kernel {
     pub(super) constants: Vec<(String, f64)>,
 }
 
-/// What a compiled entry point comes from: its name, its source, and the bits of its
-/// overridable constants.
+/// Key of a compiled entry point: its name, its source, and the bits of its overridable constants.
 pub(super) type Recipe = (&'static str, &'static str, Vec<(String, u64)>);
 
 impl Kernel {

@@ -1,8 +1,8 @@
-//! Where the device's time goes: every dispatch timed.
+//! Device time of every dispatch.
 //!
-//! With timestamp queries each dispatch becomes a compute pass of its own, whose
-//! beginning and end the device notes; nothing waits. Devices without them are
-//! timed from the host, which submits each dispatch alone and waits for it.
+//! With timestamp queries each dispatch becomes a compute pass of its own, whose beginning and end
+//! the device records without waiting. Devices without them are timed from the host, which submits
+//! each dispatch alone and waits for it.
 
 use std::time::Duration;
 
@@ -14,12 +14,12 @@ const QUERIES: u32 = wgpu::QUERY_SET_MAX_QUERIES;
 /// Queries that one recording may need; the set is read when fewer are left.
 const SPARE: u32 = QUERIES / 2;
 
-/// What one kernel took.
+/// Time of one kernel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KernelTime {
     /// Name of the kernel, as in `shaders/`.
     pub kernel: &'static str,
-    /// How often it was dispatched.
+    /// Number of dispatches.
     pub dispatches: u64,
     /// Seconds in all.
     pub seconds: f64,
@@ -43,7 +43,7 @@ enum Clock {
     Host,
 }
 
-/// How a dispatch is to be timed.
+/// Method of timing a dispatch.
 pub(super) enum Timing {
     /// By these two queries.
     Device(wgpu::QuerySet, u32),
@@ -95,7 +95,7 @@ impl Stopwatch {
         }
     }
 
-    /// Whether the queries should be read after the recording at hand.
+    /// Returns true if the queries should be read after the current recording.
     pub(super) fn is_filling(&self) -> bool {
         matches!(&self.clock, Clock::Device { claimed, .. } if 2 * claimed.len() as u32 > SPARE)
     }

@@ -1,5 +1,5 @@
-//! What a device was asked to do, written down so that another can do it again: WebGPU in a
-//! browser, say, whose answers [`Gpu::answering`] then puts in the place of the device's own.
+//! Recording of a device's commands for replay on another: WebGPU in a browser, say, whose answers
+//! [`Gpu::answering`] then returns instead of the device's own.
 
 use std::{
     collections::{HashMap, VecDeque},
@@ -10,8 +10,8 @@ use serde::Serialize;
 
 use super::{Gpu, Kernel};
 
-/// One thing that a device was asked to do. Buffers and kernels are numbered from 0 in the
-/// order in which they are made.
+/// One command of a device. Buffers and kernels are numbered from 0 in the order in which they are
+/// made.
 #[derive(Clone, Debug, Serialize)]
 #[serde(tag = "do", rename_all = "snake_case")]
 pub enum Step {
@@ -19,16 +19,16 @@ pub enum Step {
     Buffer {
         /// Bytes.
         size: u64,
-        /// Whether it is a uniform one, not storage.
+        /// True for a uniform buffer, false for storage.
         uniform: bool,
     },
     /// Write a span of [`Tape::bytes`] into a buffer.
     Write {
         /// The buffer.
         buffer: usize,
-        /// Where in the buffer, in bytes.
+        /// Offset in the buffer, in bytes.
         offset: u64,
-        /// Where on the tape, in bytes.
+        /// Offset on the tape, in bytes.
         at: usize,
         /// Bytes.
         size: usize,
@@ -44,7 +44,7 @@ pub enum Step {
     },
     /// Run a grid of workgroups.
     Dispatch {
-        /// Of what.
+        /// Kernel and its buffers.
         #[serde(flatten)]
         ran: Dispatch,
         /// Workgroups along x and y.
@@ -52,12 +52,12 @@ pub enum Step {
     },
     /// Run as many workgroups as a buffer says.
     DispatchIndirect {
-        /// Of what.
+        /// Kernel and its buffers.
         #[serde(flatten)]
         ran: Dispatch,
         /// The buffer.
         counts: usize,
-        /// Where in the buffer, in bytes.
+        /// Offset in the buffer, in bytes.
         offset: u64,
     },
     /// Copy the front of a buffer to the front of another.
@@ -95,9 +95,9 @@ pub struct Dispatch {
 /// A recording, in order.
 #[derive(Debug, Default)]
 pub struct Tape {
-    /// What was asked.
+    /// Recorded commands.
     pub steps: Vec<Step>,
-    /// What was written into buffers, one after the other.
+    /// Bytes written into buffers, one after the other.
     pub bytes: Vec<u8>,
     buffers: HashMap<wgpu::Buffer, usize>,
     kernels: HashMap<wgpu::ComputePipeline, usize>,
@@ -128,7 +128,7 @@ impl Tape {
         self.steps.push(Step::Read { buffer, size });
     }
 
-    /// What a dispatch runs; the step is to be [`Self::submitted`] with what is recorded beside it.
+    /// Records a dispatch's kernel; the step is to be [`Self::submitted`] with those beside it.
     pub(super) fn ran(&mut self, kernel: &Kernel, buffers: &[(u32, wgpu::Buffer)]) -> Dispatch {
         let next = self.kernels.len();
         let kernel = match self.kernels.get(&kernel.pipeline) {
@@ -170,7 +170,7 @@ impl Tape {
     }
 }
 
-/// What a [`Gpu`] writes down, or answers in its device's place.
+/// Mode of a [`Gpu`] with a tape: recording commands, or answering instead of its device.
 #[derive(Debug)]
 pub(super) enum TapeMode {
     Recording(Mutex<Tape>),
@@ -185,7 +185,7 @@ impl Gpu {
         self.with_tape_mode(TapeMode::Recording(Mutex::default()))
     }
 
-    /// What was written down so far; nothing unless the device is [`Self::taped`].
+    /// Takes the recording so far; empty unless the device is [`Self::taped`].
     #[doc(hidden)]
     pub fn take_tape(&self) -> Tape {
         self.tape()
@@ -209,7 +209,7 @@ impl Gpu {
         }
     }
 
-    /// Whether another device's answers stand in the place of what this one would compute.
+    /// Returns true if another device's answers replace computation on this one.
     pub(super) fn answers(&self) -> bool {
         matches!(self.tape_mode(), Some(TapeMode::Answering(_)))
     }

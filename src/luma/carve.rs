@@ -1,4 +1,4 @@
-//! What masks say is not there, taken out of a set of Gaussians.
+//! Silhouette carving: removes Gaussians outside the masks of the training views.
 
 use glam::DVec3;
 
@@ -11,7 +11,7 @@ use crate::{
 /// removed: the hull of the silhouettes, with some patience for masks drawn by hand.
 const REMOVED_SHARE: f64 = 0.25;
 
-/// What a photo does not say: what its mask removes is black, and that it says.
+/// Mask of a photo with removed (black) pixels set to 255, since they are known to be empty.
 pub(super) fn unknown(photo: &Photo) -> Option<Vec<u8>> {
     let mask = photo.mask.as_ref()?;
     let known =

@@ -24,14 +24,14 @@ pub struct Checkpoint {
     pub(super) statistics: Vec<f32>,
     /// The best set so far, while the training may go back to it.
     pub(super) best: Option<Snapshot>,
-    /// Of some photos the pixels that no longer count, a bit each.
+    /// Excluded pixels of some photos, one bit each.
     pub(super) left_out: Vec<(usize, Vec<u8>)>,
 }
 
-/// What of it is few numbers.
+/// Scalar state of a training, stored as JSON.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct TrainingState {
-    /// Which effects are simulated, where a plan says.
+    /// Simulated effects; `None` without a plan.
     pub plan: Option<Plan>,
     /// Iterations done.
     pub iteration: usize,
@@ -58,15 +58,15 @@ pub(super) struct TrainingState {
     pub reports: usize,
 }
 
-/// Who keeps checkpoints.
+/// Receiver of checkpoints.
 pub trait Checkpointing {
-    /// Whether one is wanted after this iteration.
+    /// Returns true if a checkpoint is due after this iteration.
     fn wants(&mut self, iteration: usize) -> bool;
 
     /// Takes one; `false` ends the training with [`LumaError::Cancelled`](super::LumaError).
     fn keep(&mut self, checkpoint: Checkpoint) -> bool;
 
-    /// Whether somebody wants to see the Gaussians now.
+    /// Returns true if a viewer is waiting for the Gaussians.
     fn looks_on(&mut self) -> bool {
         false
     }
@@ -118,7 +118,7 @@ impl Checkpoint {
         sections
     }
 
-    /// What [`Checkpoint::to_sections`] gave; `None` of anything else.
+    /// Parses the output of [`Checkpoint::to_sections`]; `None` if a section is missing or damaged.
     pub fn from_sections(sections: &BTreeMap<String, Vec<u8>>) -> Option<Self> {
         let state: TrainingState = serde_json::from_slice(sections.get("training")?).ok()?;
         let floats = |name: &str| -> Option<Vec<f32>> {

@@ -1,11 +1,11 @@
-//! What a training gains with time.
+//! Held-out PSNR over the course of a training.
 
 use serde::{Deserialize, Serialize};
 
 /// Fewer points than this say nothing about a slope.
 const POINTS_MIN: usize = 3;
 
-/// How good a scene was at one moment of its training.
+/// Held-out score at one iteration of a training.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct CurvePoint {
@@ -21,9 +21,9 @@ pub struct CurvePoint {
     pub psnr: f64,
 }
 
-/// What twice as many iterations would bring by the last half of a curve, in dB: the slope
-/// of the least-squares line through PSNR against log₂ of the iteration. `None` while there
-/// are too few points.
+/// Expected gain of twice the iterations, in dB: the slope of the least-squares line through PSNR
+/// against log₂ of the iteration, over the last half of a curve. `None` while there are too few
+/// points.
 pub fn gain_of_doubling(curve: &[CurvePoint]) -> Option<f64> {
     let last = curve.last()?.iteration;
     let points: Vec<[f64; 2]> = curve

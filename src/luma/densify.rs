@@ -54,7 +54,7 @@ pub struct DensifyParameters {
     pub planes: u32,
 }
 
-/// What the plan is made from.
+/// Input of a densification plan.
 pub struct Evidence<'a> {
     /// Geometry planes `[11, N]`.
     pub geometry: &'a [f32],
@@ -155,11 +155,11 @@ fn halves(source: u32, log_scales: [f64; 3], logit: f64) -> [Descent; 2] {
 
 /// The three entry points.
 pub struct DensifyKernels {
-    /// Of geometry planes.
+    /// Kernel for geometry planes.
     pub geometry: Kernel,
-    /// Of spherical-harmonic planes.
+    /// Kernel for spherical-harmonic planes.
     pub sh: Kernel,
-    /// Of the moments of either.
+    /// Kernel for Adam's moments of either.
     pub moments: Kernel,
 }
 

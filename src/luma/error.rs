@@ -1,10 +1,10 @@
-//! What can go wrong while luma is trained.
+//! Errors of luma training.
 
 use thiserror::Error;
 
 use crate::{capture::CaptureError, gpu::GpuError};
 
-/// Why there is no trained scene.
+/// Error that ends luma training without a scene.
 #[derive(Debug, Error)]
 pub enum LumaError {
     /// The device.

@@ -29,23 +29,23 @@ const WATCHED: usize = 3;
 pub struct LumaScene {
     /// Its Gaussians, one channel.
     pub splats: Splats,
-    /// How many of them, the last ones, are surroundings.
+    /// Number of surroundings, the last of these Gaussians.
     pub surroundings: usize,
-    /// What it was trained with: what the plan and the memory decided included.
+    /// Settings of the training, with the decisions of the plan and the memory limit.
     pub settings: LumaSettings,
-    /// Which effects were simulated, and why; exposures of all views.
+    /// Simulated effects with their evidence; exposures of all views.
     pub plan: Plan,
     /// The scene's extent in world units.
     pub extent: f64,
     /// Iterations that led to the Gaussians.
     pub iterations: usize,
-    /// What the looks at the watched views showed.
+    /// Held-out scores of the validations during training.
     pub curve: Vec<CurvePoint>,
     /// The iteration at which the training gave up what had brought no gain.
     pub given_up: Option<usize>,
     /// The last report.
     pub last: Option<LumaProgress>,
-    /// What an iteration worked on, the mean over the reports.
+    /// Mean load of an iteration, over the reports.
     pub load: Load,
     /// Bytes that it was estimated to take on the device at most.
     pub estimated_device_memory: u64,
@@ -56,13 +56,13 @@ pub struct LumaScene {
 }
 
 impl LumaScene {
-    /// How bright the photos of all views show the scene.
+    /// Exposure of each view.
     pub fn exposures(&self) -> &[Exposure] {
         &self.plan.exposures
     }
 }
 
-/// What is worth telling while a scene is trained.
+/// Event of a training.
 #[derive(Clone, Copy, Debug)]
 pub enum LumaEvent<'a> {
     /// So many photos have been examined.
@@ -92,7 +92,7 @@ pub enum LumaEvent<'a> {
     Training(LumaProgress),
 }
 
-/// Who is told; a [`ControlFlow::Break`] ends the training with [`LumaError::Cancelled`].
+/// Observer of a training; a [`ControlFlow::Break`] ends it with [`LumaError::Cancelled`].
 pub type LumaObserver<'a> = dyn FnMut(LumaEvent<'_>) -> ControlFlow<()> + 'a;
 
 /// Trains a gray scene on a dataset, with the effects that its photos call for.
@@ -131,27 +131,27 @@ pub fn fit(
     .run(settings, observe)
 }
 
-/// A training of which more is said than [`fit`] asks for.
+/// A training with all options, where [`fit`] takes the defaults.
 pub struct Fit<'a> {
-    /// Where it is trained.
+    /// Rasterizer of the training.
     pub raster: &'a Arc<Raster>,
     /// Photos at the size that is trained on.
     pub dataset: &'a Arc<Dataset>,
-    /// What they say.
+    /// Evidence from the photos.
     pub evidence: &'a Evidence,
-    /// Effects that are on or off whatever they say.
+    /// Effects that are on or off regardless of the evidence.
     pub overrules: &'a Overrules,
-    /// What ends it; seconds count from [`Fit::run`] on.
+    /// Stopping goal; its seconds count from [`Fit::run`] on.
     pub goal: Goal,
-    /// Whether a short training may decide what the photos leave open.
+    /// True if trials may decide effects that the photos leave open.
     pub tries: bool,
     /// Gaussians to start from instead of COLMAP's points.
     pub start: Option<&'a Splats>,
-    /// How many of these, the last ones, are surroundings that stay as they are.
+    /// Number of surroundings, the last of these Gaussians; they stay fixed.
     pub surroundings: usize,
-    /// How bright all photos show the scene, where that is known and the plan simulates it.
+    /// Exposure of each view, if known and the plan simulates exposure.
     pub exposures: Option<&'a [Exposure]>,
-    /// Where Gaussians may be split; everywhere by default.
+    /// Region in which Gaussians may be split; everywhere by default.
     pub grows: Option<Grows>,
     /// Views that are looked at on the way; a few of the held-out ones by default.
     pub watched: Option<(&'a Arc<Dataset>, Vec<usize>)>,

@@ -101,8 +101,8 @@ fn nearest_photos<'a>(
     others
 }
 
-/// Of each photo, pixel and depth of the points that it shows: those that were found in it, or
-/// all before it where the model does not say.
+/// Pixel and depth of the points visible in each photo: those observed in it, or all in front of it
+/// if the model has no tracks.
 fn seen_points(capture: &Capture, photos: &[(usize, SmallPhoto)]) -> Vec<Vec<([f64; 2], f64)>> {
     let tracked = capture.points.iter().any(|point| !point.track.is_empty());
     let places: HashMap<usize, usize> = (photos.iter().zip(0..))
@@ -156,7 +156,7 @@ impl<'a> Gaps<'a> {
         gaps
     }
 
-    /// What the photos around show in them.
+    /// Points in the empty cells, by matching with neighboring photos.
     fn filled(&self, neighbors: &[&SmallPhoto]) -> Vec<GapPoint> {
         if self.points.len() < NEAREST || neighbors.len() < 2 {
             return Vec::new();
@@ -206,7 +206,7 @@ impl<'a> Gaps<'a> {
         })
     }
 
-    /// What the points around a pixel say of it; `None` where one is near.
+    /// Depth range and slant from the points nearest to a pixel; `None` if one is too close.
     fn around(&self, [x, y]: [f64; 2]) -> Option<Neighborhood> {
         let mut near: Vec<(f64, [f64; 3])> = (self.points.iter())
             .map(|([u, v], depth)| {
@@ -237,11 +237,11 @@ impl<'a> Gaps<'a> {
     }
 }
 
-/// What points around a pixel say of it.
+/// Depth range and slant from the points around a pixel.
 struct Neighborhood {
-    /// Between which its ray may end.
+    /// Range in which its ray may end.
     depths: [f64; 2],
-    /// Of the plane through them, if there is one.
+    /// Slant of the plane through them, if there is one.
     slant: Option<[f64; 2]>,
 }
 
@@ -250,7 +250,7 @@ mod tests {
     use super::*;
     use crate::effects::fixtures::{capture, looking_along_z, photo};
 
-    /// What a textured wall at a depth of 4 shows at a place.
+    /// Gray of a textured wall at a depth of 4.
     fn texture(x: f64, y: f64) -> u8 {
         let wave = (25.0 * x).sin() + (31.0 * y + 9.0 * x).sin() + (17.0 * x - 23.0 * y).cos();
         (128.0 + 35.0 * wave) as u8

@@ -1,9 +1,9 @@
-//! What ends a training, besides a curve that is flat
+//! Stopping goals of a training, besides early stopping
 //! ([`LumaSettings::stop_when_flat`](super::LumaSettings::stop_when_flat)).
 
 use serde::{Deserialize, Serialize};
 
-/// What ends a training.
+/// Stopping goal of a training.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(tag = "kind", rename_all = "lowercase", deny_unknown_fields)]

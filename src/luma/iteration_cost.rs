@@ -1,4 +1,4 @@
-//! What an iteration will cost on this device, before there is a scene.
+//! Estimated time of an iteration on this device, before a scene exists.
 
 use std::{sync::Arc, time::Instant};
 

@@ -19,8 +19,7 @@ pub fn blocks(view: &ViewUniform) -> [u32; 2] {
     view.size.map(|side| side.div_ceil(BLOCK_SIDE))
 }
 
-/// What the loss reckons with. What it does not is neither in the compiled kernels nor
-/// in any buffer.
+/// Effects in the loss. Those that are off are neither in the compiled kernels nor in any buffer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LossEffects {
     /// Photos differ in exposure.
@@ -54,9 +53,9 @@ impl LossEffects {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct LumaLossParameters {
-    /// What the picture is multiplied by to be the photo's.
+    /// Factor from scene luma to the photo's.
     pub gain: f32,
-    /// What is added then.
+    /// Offset added after the factor.
     pub offset: f32,
     /// Nothing.
     pub padding: [u32; 2],
@@ -89,7 +88,7 @@ impl LossKernels {
     }
 }
 
-/// What the pictures are compared with, and room to do so.
+/// Photos to compare renders with, and buffers for the loss.
 pub struct Targets {
     /// The photos.
     pub photos: Photos,

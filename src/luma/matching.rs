@@ -30,16 +30,16 @@ const TEXTURE: f64 = 4.0;
 /// most wrong ones along silhouettes, few on a lawn (docs/lab/16-ends-and-gaps.md).
 const PLAIN: f64 = 1.0 / 3.0;
 
-/// How much 1 / depth may change within a pixel, at most, as share of itself: a steeper plane
-/// comes from points on several things.
+/// Largest slant: relative change of 1 / depth per pixel. A steeper plane comes from points on
+/// several surfaces.
 const STEEPEST: f64 = 0.03;
 
-/// How far, as share of a depth, the place may be that another photo finds.
+/// Tolerance of the depth found from another photo, relative.
 const SAME: f64 = 0.02;
 
 /// A small photo with its camera.
 pub struct SmallPhoto {
-    /// Of its size.
+    /// Camera at the size of the photo.
     pub camera: Camera,
     /// Encoded.
     pub gray: Vec<u8>,
@@ -106,14 +106,14 @@ impl SmallPhoto {
         Some(above + (below - above) * t)
     }
 
-    /// What is around a pixel, if it has texture.
+    /// Patch around a pixel, if it has texture.
     pub fn textured(&self, [x, y]: [f64; 2]) -> Option<Patch> {
         let patch = Patch::of(|[dx, dy]| self.between([x + dx, y + dy]))?;
         (patch.deviation >= TEXTURE).then_some(patch)
     }
 
-    /// Where the ray of a pixel ends between two depths: where other photos agree best, with one
-    /// of these slants. `None` where there is no texture, or fewer than two of them show the place.
+    /// Best match along the ray of a pixel between two depths, with one of these slants. `None`
+    /// without texture, or if fewer than two other photos show the place.
     pub fn matched(
         &self,
         pixel: [f64; 2],
@@ -139,7 +139,7 @@ impl SmallPhoto {
         sweeps.max_by(|a, b| a.score.total_cmp(&b.score))
     }
 
-    /// Whether the photo that agrees best with what was found between two depths finds it too.
+    /// Returns true if the photo that agrees best confirms a match between two depths.
     pub fn found_back(&self, found: &Match, depths: [f64; 2], others: &[&Self]) -> bool {
         let Surface { pixel, depth, .. } = found.surface;
         let seen = || {
@@ -159,8 +159,8 @@ impl SmallPhoto {
         seen().is_some_and(|ratio| (ratio - 1.0).abs() <= SAME)
     }
 
-    /// Whether one of the others shows something plain where a match is. Along a silhouette before
-    /// a plain backdrop two photos may agree at any depth; a third then sees through it.
+    /// Returns true if another photo is untextured at a match. Along a silhouette before a plain
+    /// backdrop two photos may agree at any depth; a third then sees through it.
     pub fn denied(&self, found: &Match, others: &[&Self]) -> bool {
         let seen = |other: &&Self| self.patch_in(&found.surface, other);
         let plain = |patch: Patch| patch.deviation < PLAIN * found.deviation;
@@ -199,12 +199,12 @@ impl SmallPhoto {
         }
     }
 
-    /// How a patch correlates with another photo if it lies on a surface.
+    /// Correlation of a patch with another photo if it lies on a surface, -1 to 1.
     fn correlation(&self, patch: &Patch, surface: &Surface, other: &Self) -> Option<f64> {
         Some(patch.correlation(&self.patch_in(surface, other)?))
     }
 
-    /// What another photo shows where a patch lies on a surface.
+    /// Patch of another photo at the projection of a surface.
     fn patch_in(&self, surface: &Surface, other: &Self) -> Option<Patch> {
         let homography = surface.homography(&self.camera, &other.camera);
         Patch::of(|[dx, dy]| {
@@ -215,11 +215,11 @@ impl SmallPhoto {
     }
 }
 
-/// What was found along the ray of a pixel.
+/// Match along the ray of a pixel.
 pub struct Match {
     /// Mean of the best two correlations, at most 1.
     pub score: f64,
-    /// Where.
+    /// Position and slant.
     pub surface: Surface,
     /// Mean of the patch, in gray levels.
     pub gray: f64,
@@ -312,7 +312,7 @@ pub struct Patch {
 }
 
 impl Patch {
-    /// Of a value at each offset from its middle.
+    /// Normalized patch of a value at each offset from its center.
     fn of(value: impl Fn([f64; 2]) -> Option<f64>) -> Option<Self> {
         let mut values = Grid::default();
         for (row, y) in values.iter_mut().zip(-REACH..) {
@@ -356,7 +356,7 @@ mod tests {
     use super::*;
     use crate::effects::fixtures::{looking_along_z, photo};
 
-    /// Of ground that falls away: its depth is 4 and so much for each unit that y grows.
+    /// Slope of tilted ground: growth of its depth, 4 at y = 0, per unit of y.
     const GRADE: f64 = 1.5;
 
     fn photos() -> Vec<SmallPhoto> {
@@ -377,7 +377,7 @@ mod tests {
         centers.map(|[x, y]| shoot(DVec3::new(x, y, 0.0))).into()
     }
 
-    /// Of the pixel in the middle.
+    /// Slant at the center pixel.
     const SLANT: [f64; 2] = [0.0, -GRADE / 160.0];
     const MIDDLE: [f64; 2] = [80.5, 80.5];
 

@@ -1,4 +1,4 @@
-//! How much room a training takes on the device, known before any is taken.
+//! Device memory of a training, estimated before any is allocated.
 
 use super::{LumaSettings, loss::Targets};
 use crate::{
@@ -37,7 +37,7 @@ pub fn resident_photos(settings: &LumaSettings) -> u64 {
     }
 }
 
-/// What does not depend on the number of Gaussians.
+/// Memory demand that does not depend on the number of Gaussians.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Demand {
     /// Pixels of the largest photo.
@@ -46,15 +46,15 @@ pub struct Demand {
     pub max_tiles: usize,
     /// Bytes of the photos and masks on the device: all, or the largest if they are streamed.
     pub photos: u64,
-    /// Whether photos are brought to the device one at a time.
+    /// True if photos are streamed to the device one at a time.
     pub streams: bool,
     /// Degree of the luma harmonics.
     pub sh_degree: u32,
 }
 
 impl Demand {
-    /// What photos by these cameras need; with masks, twice as much. They stay on the device
-    /// while they take at most `resident` bytes ([`resident_photos`]).
+    /// Demand of photos by these cameras; masks double it. Photos stay on the device while they
+    /// take at most `resident` bytes ([`resident_photos`]).
     pub fn of<'a>(
         cameras: impl Iterator<Item = &'a Camera>,
         masked: bool,
@@ -87,8 +87,7 @@ impl Demand {
         }
     }
 
-    /// What is asked for when views by these cameras are looked at besides; their photos
-    /// stay on the host.
+    /// Demand if views by these cameras are validated as well; their photos stay on the host.
     pub fn watching<'a>(mut self, cameras: impl Iterator<Item = &'a Camera>) -> Self {
         for camera in cameras {
             self.hold(camera);
@@ -113,8 +112,7 @@ impl Demand {
             + self.photos
     }
 
-    /// Whether `splats` Gaussians with `entries` tile-list entries are within `limit`
-    /// bytes.
+    /// Checks that `splats` Gaussians with `entries` tile-list entries are within `limit` bytes.
     ///
     /// # Errors
     /// [`GpuError::OverLimit`] if not.

@@ -1,4 +1,4 @@
-//! What training may trade accuracy for time in: `fit --numerics`.
+//! Accuracy of training that may be traded for time: `fit --numerics`.
 
 use std::str::FromStr;
 
@@ -6,13 +6,13 @@ use serde::{Deserialize, Serialize};
 
 use crate::raster::RasterNumerics;
 
-/// How accurately stage 1 computes while it trains. What is measured, drawn and written
-/// afterwards is computed with the default, as viewers do.
+/// Numerical accuracy of stage 1's training. Measuring, rendering and writing afterwards use the
+/// default, as viewers do.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(default)]
 pub struct Numerics {
-    /// Of the rasterizer and of its steps.
+    /// Accuracy of the rasterizer and of Adam's steps.
     #[serde(flatten)]
     pub raster: RasterNumerics,
     /// Side of SSIM's window in the loss, in pixels.

@@ -39,15 +39,15 @@ const SEEN_MIN: f32 = 0.5;
 /// They know a pixel when Gaussians that they have seen cover so much of it.
 const KNOWN_MIN: f32 = 0.5;
 
-/// What a photo shows, and what counts of it.
+/// A photo with its camera, mask and exposure.
 struct Photo {
-    /// Where it was taken.
+    /// Camera of the photo.
     camera: Camera,
     /// 8-bit gray, `[height, width]`.
     gray: Vec<u8>,
     /// 255 where a pixel counts, `[height, width]`.
     mask: Vec<u8>,
-    /// How bright it shows the scene.
+    /// Exposure of the photo.
     exposure: Exposure,
 }
 
@@ -113,12 +113,12 @@ struct Drawing {
     luma: Layer,
     pair: Layer,
     pair_field: Field,
-    /// What the adjoints bring back, `[pixels, 4]`; the last two are not used.
+    /// Result of the adjoints, `[pixels, 4]`; the last two are not used.
     image_gradient: Buffer<f32>,
-    /// Of all views, `[2, N]`.
+    /// Sums over all views, `[2, N]`.
     sums: Buffer<f32>,
     to_sums: ChromaAdjoint,
-    /// Of one view.
+    /// Sums of one view, `[2, N]`.
     of_one: Buffer<f32>,
     to_one: ChromaAdjoint,
 }
@@ -261,7 +261,7 @@ impl Scene<'_> {
     }
 }
 
-/// How far the picture is from the photo, each pixel with its neighbors.
+/// Absolute residual of each pixel, averaged with its neighbors, in gray 0 to 1.
 fn residuals(photo: &Photo, luma: &[f32]) -> Vec<f32> {
     let sizes: Vec<f32> = (luma.iter().zip(&photo.gray))
         .map(|(&luma, &gray)| {
@@ -294,7 +294,7 @@ fn mask(photo: &Photo, residuals: &[f32], expectation: &[f32]) -> Vec<u8> {
         .collect()
 }
 
-/// What `of` makes of each pixel's neighborhood.
+/// Applies `of` to the neighborhood of each pixel.
 fn around(
     camera: &Camera,
     values: &[f32],

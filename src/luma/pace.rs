@@ -11,9 +11,9 @@ const RECENT_MIN: usize = 20;
 /// The first iterations also compile what the driver puts off.
 const WARM_UP: usize = 16;
 
-/// Of an iteration's cost, what goes with the number of Gaussians; the rest goes with the
-/// pixels. On a software adapter at the sizes of the presets (docs/lab/13-performance.md); elsewhere
-/// it decides only how well the first guesses are, for they are corrected as training goes on.
+/// Share of an iteration's cost that grows with the number of Gaussians; the rest grows with the
+/// pixels. Measured on a software adapter at the presets' sizes (docs/lab/13-performance.md);
+/// elsewhere it affects only the first estimates, which are corrected as training goes on.
 const SHARE_OF_SPLATS: f64 = 0.5;
 
 /// The clock of a training: which iteration was done when.
@@ -107,7 +107,7 @@ mod tests {
         assert!(ends.is_sorted_by(|a, b| a > b), "{ends:?}");
     }
 
-    /// What an overflow cost is lost, and the pace shows it.
+    /// Time lost to an overflow counts in the pace.
     #[test]
     fn what_is_repeated_is_done_once() {
         let mut pace = steady(500);

@@ -8,11 +8,11 @@ use crate::{
     gpu::{Buffer, Gpu, GpuError},
 };
 
-/// What a photo shows and what counts of it: 8 bits a pixel, four pixels a word.
+/// Gray and mask of a photo on the device: 8 bits a pixel, four pixels a word.
 pub struct PackedPhoto {
     /// Gray.
     pub gray: Buffer<u32>,
-    /// What each pixel counts, where some do not.
+    /// Weight of each pixel, 0 to 255, if some do not count.
     pub mask: Option<Buffer<u32>>,
 }
 
@@ -22,7 +22,7 @@ pub struct Photos {
     pictures: Vec<PackedPhoto>,
     /// Photos that stay where they are until they are shown.
     stream: Option<Prefetch<Result<TrainingView, LumaError>>>,
-    /// Of some views the pixels that no longer count, a bit each.
+    /// Excluded pixels of some views, one bit each.
     left_out: BTreeMap<usize, Vec<u8>>,
 }
 
@@ -72,7 +72,7 @@ impl Photos {
         })
     }
 
-    /// What a photo may stand in.
+    /// Buffers of the photos.
     pub fn pictures(&self) -> &[PackedPhoto] {
         &self.pictures
     }
@@ -112,7 +112,7 @@ impl Photos {
         Ok(())
     }
 
-    /// Of which photos which pixels do not count, a bit each.
+    /// Excluded pixels of each photo that has any, one bit each.
     pub fn left_out(&self) -> Vec<(usize, Vec<u8>)> {
         let left_out = self.left_out.iter();
         left_out

@@ -12,22 +12,22 @@ use crate::{
 #[derive(Clone, Debug)]
 pub struct PlannedViews {
     dataset: Arc<Dataset>,
-    /// Which of its views.
+    /// Views of the dataset in use.
     views: Vec<usize>,
-    /// Of all views of the dataset.
+    /// Exposure of each view of the dataset.
     exposures: Vec<Exposure>,
     masks: Masks,
     masked: bool,
 }
 
-/// What becomes of masks.
+/// Use of masks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Masks {
     /// All pixels count.
     Off,
-    /// What is masked does not count.
+    /// Masked pixels do not count.
     Count,
-    /// What is masked is not there.
+    /// Masked pixels are empty space.
     Remove,
 }
 

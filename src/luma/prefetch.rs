@@ -13,7 +13,7 @@ use std::{
 /// of a second to decode and, in gray, 24 MB.
 const AHEAD: usize = 4;
 
-/// What loads an item by its number.
+/// Loader of an item by number.
 type Load<T> = Arc<dyn Fn(usize) -> T + Send + Sync>;
 
 /// An item that is wanted, and who waits for it.

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{LumaSettings, PAPER_ITERATIONS};
 
-/// How much work to put into a scene.
+/// Amount of work for a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]

@@ -1,4 +1,4 @@
-//! What the kernels of stage 1 must read and write at least.
+//! Minimum memory traffic of the kernels of stage 1.
 
 use crate::raster::{Load, constants::GEOMETRY_PLANES};
 

@@ -22,7 +22,7 @@ pub struct Schedule {
     /// From here on the scene's surroundings are drawn.
     #[serde(default)]
     pub surround_at: usize,
-    /// Where outliers are looked for, if they are.
+    /// Iterations of the outlier search, if enabled.
     pub find_outliers_at: [usize; 2],
 }
 
@@ -98,7 +98,7 @@ impl Schedule {
         (iteration as f64 / self.end.max(1) as f64).min(1.0)
     }
 
-    /// What all learning rates are multiplied by at `iteration`, the means' included.
+    /// Factor of all learning rates at `iteration`, the means' included.
     pub fn settling(&self, iteration: usize) -> f64 {
         let settled = iteration.saturating_sub(self.settle_from) as f64;
         SETTLED.powf(settled / self.end.saturating_sub(self.settle_from).max(1) as f64)
@@ -115,14 +115,14 @@ impl Schedule {
         degree as usize * self.raise_degree_every
     }
 
-    /// Whether the set changes after `iteration` (counted from 1).
+    /// Returns true if a densification follows `iteration` (counted from 1).
     pub fn densifies_after(&self, iteration: usize) -> bool {
         iteration > self.densify_from
             && iteration < self.densify_until
             && iteration.is_multiple_of(self.densify_every)
     }
 
-    /// How often the set changes.
+    /// Number of densifications.
     pub fn densifications(&self) -> usize {
         (1..self.densify_until)
             .filter(|&iteration| self.densifies_after(iteration))

@@ -71,7 +71,7 @@ impl LearningRates {
         }
     }
 
-    /// That of the means in world units after a share `t` of the training.
+    /// Learning rate of the means in world units after a share `t` of the training.
     pub fn means_at(&self, t: f64, extent: f64) -> f64 {
         let [first, last] = self.means;
         extent * first * (last / first).powf(t)
@@ -115,35 +115,35 @@ pub struct LumaSettings {
     pub prune_opacity: f64,
     /// Learning rates of Adam.
     pub rates: LearningRates,
-    /// Whether outlier pixels are left out.
+    /// True if outlier pixels are left out.
     ///
     /// They show something else than the scene and are found on the way (`luma::outliers`).
     pub robust: bool,
-    /// Whether opacities fall by what the screen blur spreads.
+    /// True if opacities fall by what the screen blur spreads.
     ///
     /// The scene must then be drawn the same way ([`RasterOptions::antialiased`]).
     pub antialiased: bool,
-    /// Whether some Gaussians stand for a far background.
+    /// True if some Gaussians represent a far background.
     ///
     /// How large one may be then grows with its distance.
     pub background: bool,
-    /// Whether a shell of gray surrounds the scene.
+    /// True if a gray shell surrounds the scene.
     ///
     /// A few hundred Gaussians far behind it, in the grays that photos show in their direction:
     /// what other views see where no photo shows anything.
     #[serde(default)]
     pub surround: bool,
-    /// Whether Gaussians also start where COLMAP has no points.
+    /// True if Gaussians also start where COLMAP has no points.
     ///
-    /// Where photos have texture, by matching them.
+    /// Photos are matched where they have texture.
     #[serde(default)]
     pub fill_gaps: bool,
     /// Most memory of the device, in bytes; `None`: no limit.
     pub memory_limit: Option<u64>,
-    /// Whether photos stay on the host, however small, and come one at a time; set for blocks.
+    /// True if photos of any size are streamed from the host one at a time; set for blocks.
     #[serde(default)]
     pub stream_photos: bool,
-    /// How accurately it computes (`--numerics`).
+    /// Numerical accuracy (`--numerics`).
     pub numerics: Numerics,
 }
 
@@ -181,7 +181,7 @@ impl LumaSettings {
         }
     }
 
-    /// What it has room for, before effects are decided.
+    /// Training budget before effects are decided.
     pub fn room(&self) -> TrainingBudget {
         TrainingBudget {
             iterations: self.iterations,
@@ -200,7 +200,7 @@ impl LumaSettings {
         }
     }
 
-    /// How the scene is drawn.
+    /// Rasterizer options of the scene.
     pub fn raster_options(&self) -> RasterOptions {
         RasterOptions {
             antialiased: self.antialiased,

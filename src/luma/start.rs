@@ -24,8 +24,7 @@ const GAPS_PARTS: [usize; 2] = [3, 10];
 /// At most one in so many Gaussians is one of the surroundings.
 const SURROUNDINGS_SHARE: usize = 16;
 
-/// What a training can start from that is there: luma of the settings' degree, and no more
-/// Gaussians than they allow.
+/// Initial Gaussians from given ones: luma of the settings' degree, cut to their maximum number.
 pub fn started(splats: &Splats, settings: &LumaSettings) -> Splats {
     let mut splats = splats.to_luma();
     splats.sh = at_degree(&splats.sh, splats.means.len(), settings.sh_degree);
@@ -64,8 +63,8 @@ pub fn placed_splats(
     Ok(splats)
 }
 
-/// How many Gaussians a training starts with at most that may have so many: some are left to
-/// growth, unless it is too short for them.
+/// Maximum number of initial Gaussians of a training that may have so many: some are left to
+/// densification, unless the training is too short for it.
 pub fn room_at_first(settings: &LumaSettings, splats: usize) -> usize {
     let densifications = Schedule::of(settings).densifications() as f64;
     match FIRST_SHARE * (1.0 + settings.growth).powf(densifications) < 1.0 {
@@ -126,8 +125,7 @@ fn background(
     Ok(backdrop.dome(&places, settings.sh_degree))
 }
 
-/// What stands around the scene: nothing where the settings want none, or where masks say that
-/// there is nothing.
+/// Shell around the scene: empty if the settings have none, or if masks remove the background.
 ///
 /// # Errors
 /// [`CaptureError`] of a photo.

@@ -43,7 +43,7 @@ use crate::{
     splats::{Splats, sh},
 };
 
-/// How far a training is.
+/// Progress of a training.
 #[derive(Clone, Copy, Debug)]
 pub struct LumaProgress {
     /// Iterations done.
@@ -60,7 +60,7 @@ pub struct LumaProgress {
     pub refused: usize,
     /// Seconds of training, those of watching not counted.
     pub seconds: f64,
-    /// What the last look at the [watched](LumaTrainer::watch) views showed.
+    /// Score of the last validation on the [watched](LumaTrainer::watch) views.
     pub looked: Option<HeldOutScore>,
 }
 
@@ -68,7 +68,7 @@ pub struct LumaProgress {
 struct Report {
     /// Iterations done when it was ordered, had none been refused.
     iteration: usize,
-    /// Whether the caller hears of it, and not only of an overflow.
+    /// True if the caller is notified of it, and not only of an overflow.
     told: bool,
     status: StatusReadback,
     losses: Readback<f32>,
@@ -80,7 +80,7 @@ pub struct LumaTrainer {
     gpu: Gpu,
     kernels: Kernels,
     settings: LumaSettings,
-    /// What has become of the schedule that the settings stand for.
+    /// Schedule from the settings, as changed since.
     schedule: Schedule,
     goal: Goal,
     extent: f64,
@@ -98,15 +98,15 @@ pub struct LumaTrainer {
     /// Iterations that a run with time left may take.
     longest: usize,
     watch: Watch,
-    /// What is to be drawn behind the scene.
+    /// Shell to draw behind the scene.
     surroundings: Option<Splats>,
     /// Sums over the reports of what [`Self::load`] averages.
     seen: Load,
     /// Reports.
     reports: usize,
-    /// Where Gaussians may be split, if not everywhere.
+    /// Region in which Gaussians may be split, if not everywhere.
     grows: Option<Grows>,
-    /// What checkpoints hold of it.
+    /// Plan to store in checkpoints.
     plan: Option<Plan>,
     /// Iterations and seconds that an interrupted training had done.
     done: (usize, f64),
@@ -318,7 +318,7 @@ impl LumaTrainer {
         self.schedule = schedule;
     }
 
-    /// What it trains with.
+    /// Settings of the training.
     pub fn settings(&self) -> &LumaSettings {
         &self.settings
     }
@@ -328,7 +328,7 @@ impl LumaTrainer {
         &self.schedule
     }
 
-    /// How many of the Gaussians, the last ones, are surroundings.
+    /// Number of surroundings, the last of the Gaussians.
     pub fn surroundings(&self) -> usize {
         self.model.held
     }
@@ -341,7 +341,7 @@ impl LumaTrainer {
         self.model.download(&self.gpu)
     }
 
-    /// What an iteration worked on, the mean over the reports.
+    /// Mean load of an iteration, over the reports.
     pub fn load(&self) -> Load {
         let mean = |sum: f64| sum / self.reports.max(1) as f64;
         let count = self.views.count();

@@ -22,7 +22,7 @@ use crate::{
 /// Share of the run's time that all trainings of a trial may take.
 const SHARE: f64 = 0.15;
 
-/// What an iteration costs beside its pixels, in pixels: small dispatches wait for each other
+/// Fixed cost of an iteration, in pixels: small dispatches wait for each other
 /// (docs/lab/12-effects.md has the measurements).
 const BESIDE_PIXELS_ON_A_CPU: f64 = 9_000.0;
 const BESIDE_PIXELS_ON_A_GPU: f64 = 730_000.0;
@@ -49,12 +49,12 @@ const HELD_BACK: usize = 6;
 /// within [`NOISE`] of what counts.
 const ROUNDS: usize = 3;
 
-/// How near a gain may be to what counts, in dB, to be asked for again with another seed. At 160
-/// pixels a seed moves the PSNR of `banana-object` by 0.35 dB and the gain of its exposures by 0.1;
-/// smaller trials are noisier.
+/// Distance of a gain from its threshold within which another seed is tried, in dB. At 160 pixels a
+/// seed moves the PSNR of `banana-object` by 0.35 dB and the gain of its exposures by 0.1; smaller
+/// trials are noisier.
 const NOISE: f64 = 0.3;
 
-/// How far a trial is.
+/// Progress of a trial.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TrialProgress {
     /// Iterations done, of all trainings.
@@ -133,11 +133,11 @@ fn arms(plan: &Plan, asked: &[Effect]) -> Vec<Arm> {
     std::iter::once(only(None)).chain(with).collect()
 }
 
-/// How large the trainings are.
+/// Size of each training of a trial.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Size {
     iterations: usize,
-    /// How often photos are halved.
+    /// Number of times that photos are halved.
     halvings: u32,
     max_splats: usize,
     rounds: usize,
@@ -182,7 +182,7 @@ impl Size {
     }
 }
 
-/// What an iteration on photos halved so often takes of one of the run.
+/// Cost of an iteration on photos halved so often, as share of one of the run.
 fn share([width, height]: [u32; 2], halvings: u32, beside: f64) -> f64 {
     let pixels = f64::from(width) * f64::from(height);
     (pixels * 0.25_f64.powi(halvings as i32) + beside) / (pixels + beside)
@@ -201,20 +201,19 @@ fn largest_photo(dataset: &Dataset) -> Option<[u32; 2]> {
         .filter(|_| train.len() >= 4)
 }
 
-/// What all trainings of a trial share.
+/// Parameters that all trainings of a trial share.
 struct Trial<'a> {
     dataset: &'a Arc<Dataset>,
     evidence: &'a Evidence,
     raster: Arc<Raster>,
     size: Size,
-    /// Whether a shell surrounds the scene.
+    /// True if a shell surrounds the scene.
     surround: bool,
     total: usize,
 }
 
 impl Trial<'_> {
-    /// What each effect gains, in dB of corrected PSNR on the views held back, the mean over the
-    /// seeds.
+    /// Gain of each effect, in dB of corrected PSNR on the held-out views, averaged over the seeds.
     fn gains(
         &self,
         arms: &[Arm],
@@ -314,7 +313,7 @@ impl Trial<'_> {
     }
 }
 
-/// Which of the training views a trial trains on, and which it holds back.
+/// Training views of a trial, and its held-out views.
 fn chosen(train: &[usize]) -> [Vec<usize>; 2] {
     let count = train.len().min(MAX_VIEWS);
     let views: Vec<usize> = (0..count).map(|k| train[k * train.len() / count]).collect();
@@ -375,7 +374,7 @@ mod tests {
         assert!(!time([200, 150], 500, CPU) && !time([320, 240], 1_500, GPU));
     }
 
-    /// Where few pixels cost as much as many, photos stay as large as they may be.
+    /// Photos stay as large as they may be if few pixels cost as much as many.
     #[test]
     fn photos_shrink_only_where_that_saves_time() {
         let settings = LumaSettings::new(3_500);

@@ -1,4 +1,4 @@
-//! What training looks at.
+//! Training views.
 
 use super::LumaError;
 use crate::capture::{Camera, CaptureError, Exposure, downscale};
@@ -6,14 +6,13 @@ use crate::capture::{Camera, CaptureError, Exposure, downscale};
 /// One photograph to train on.
 #[derive(Clone, Debug)]
 pub struct TrainingView {
-    /// Where it was taken.
+    /// Camera of the photo.
     pub camera: Camera,
     /// sRGB-encoded gray, `[height, width]`.
     pub gray: Vec<u8>,
-    /// What each pixel counts, `[height, width]`: 255 fully, 0 not at all. `None` where
-    /// all do.
+    /// Weight of each pixel, `[height, width]`: 255 fully, 0 not at all. `None` if all count fully.
     pub mask: Option<Vec<u8>>,
-    /// How bright it shows the scene.
+    /// Exposure of the photo.
     pub exposure: Exposure,
 }
 
@@ -45,12 +44,12 @@ impl TrainingView {
         }
     }
 
-    /// Whether a pixel is not masked.
+    /// Returns true if a pixel is not masked.
     pub(super) fn counts(&self, pixel: usize) -> bool {
         self.mask.as_ref().is_none_or(|mask| mask[pixel] >= 128)
     }
 
-    /// Of the pixels that count what is `shown` of a picture, and what the photo shows, 0 to 1.
+    /// `shown` of a render and the gray of the photo, 0 to 1, at the pixels that count.
     pub(super) fn compared(
         &self,
         picture: &[f32],
@@ -62,7 +61,7 @@ impl TrainingView {
             .unzip()
     }
 
-    /// What each pixel counts, where some do not as where all do.
+    /// Mask with 255 everywhere if the view has none.
     pub(super) fn whole_mask(&mut self) -> Vec<u8> {
         let pixels = self.gray.len();
         self.mask.take().unwrap_or_else(|| vec![255; pixels])
@@ -72,16 +71,16 @@ impl TrainingView {
 /// The views of a training. Photos are loaded when they are needed, by several threads; a
 /// `Vec` of views has them all.
 pub trait TrainingViews: Send + Sync {
-    /// How many there are.
+    /// Number of views.
     fn count(&self) -> usize;
 
-    /// Where one was taken.
+    /// Camera of a view.
     fn camera(&self, view: usize) -> &Camera;
 
-    /// How bright it shows the scene.
+    /// Exposure of a view.
     fn exposure(&self, view: usize) -> Exposure;
 
-    /// Whether some pixels of some of them do not count.
+    /// Returns true if any view has masked pixels.
     fn masked(&self) -> bool;
 
     /// A view with its photo, the same whenever it is loaded.

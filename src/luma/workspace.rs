@@ -34,7 +34,7 @@ impl Kernels {
     }
 }
 
-/// What has to be made anew when the number of Gaussians or the room changes.
+/// Buffers that are reallocated when the number of Gaussians or the tile-list capacity changes.
 pub struct Workspace {
     pub lists: Lists,
     pub layer: Layer,

@@ -116,7 +116,7 @@ impl AdamStep {
         );
     }
 
-    /// What an adjoint that steps at once binds.
+    /// Buffers to bind in an adjoint that steps at once.
     pub fn of<'a>(&'a self, moments: &'a AdamMoments) -> StepBuffers<'a> {
         StepBuffers {
             parameters: &self.parameters,
@@ -125,7 +125,7 @@ impl AdamStep {
     }
 }
 
-/// What Adam needs for a step.
+/// Buffers of an Adam step.
 #[derive(Clone, Copy)]
 pub struct StepBuffers<'a> {
     /// Uniform with rates and corrections.
@@ -136,7 +136,7 @@ pub struct StepBuffers<'a> {
 
 /// Adam on a stored gradient.
 pub struct Adam {
-    /// Of the values.
+    /// Moments of the values.
     pub moments: AdamMoments,
     step: AdamStep,
     bindings: Bindings,

@@ -18,8 +18,7 @@ const LUMA_FIGURES: usize = 8;
 /// Figures of a color record on frozen geometry: its gradient, then its curvature.
 pub const COLOR_FIGURES: usize = 4;
 
-/// What an adjoint writes on the way. Adjoints that run one after the other may
-/// share it.
+/// Scratch buffers of an adjoint. Adjoints that run one after the other may share them.
 #[derive(Clone)]
 pub struct AdjointScratch {
     /// The gradient record of each list entry on the image plane, by emission slot, in
@@ -27,7 +26,7 @@ pub struct AdjointScratch {
     pub partials: Buffer<u32>,
     /// The gradient record of each Gaussian on the image plane; stale where not visible.
     pub gradients: Buffer<f32>,
-    /// Whether the records have figures of the geometry.
+    /// True if the records include geometry gradients.
     trains_geometry: bool,
 }
 
@@ -133,16 +132,16 @@ impl BlendAdjoint {
     }
 }
 
-/// What becomes of the gradient of luma's parameters.
+/// Use of the gradient of luma's parameters.
 pub enum Outcome<'a> {
     /// It is written: that of the field to this buffer, which several adjoints may
     /// share, that of the geometry to planes of its own.
     Gradient(&'a Buffer<f32>),
     /// Adam takes a step with it, and it is never stored.
     Step {
-        /// Of the geometry.
+        /// Step of the geometry.
         geometry: StepBuffers<'a>,
-        /// Of the field.
+        /// Step of the field.
         field: StepBuffers<'a>,
     },
 }
@@ -254,7 +253,7 @@ impl LumaAdjoint {
         })
     }
 
-    /// What it writes on the way.
+    /// Its scratch buffers.
     pub fn scratch(&self) -> &AdjointScratch {
         &self.blend.scratch
     }
@@ -273,7 +272,7 @@ impl LumaAdjoint {
     }
 }
 
-/// Where a [`ChromaAdjoint`] adds what it finds.
+/// Buffers that a [`ChromaAdjoint`] adds to.
 #[derive(Clone, Copy)]
 pub struct ChromaSums<'a> {
     /// Gradient of the field, planes `[harmonics, channels, N]`: of as many harmonics as
@@ -346,7 +345,7 @@ impl ChromaAdjoint {
 }
 
 impl Raster {
-    /// What follows on the image plane's records of luma, to the field and to the geometry.
+    /// Kernels after luma's image-plane records, for the field and for the geometry.
     fn luma_ending(&self, steps: bool) -> [&Kernel; 2] {
         match steps {
             true => [&self.shade_step, &self.projection.step],

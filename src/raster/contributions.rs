@@ -1,5 +1,5 @@
-//! How much of a picture each Gaussian makes up: the adjoint of a picture whose every pixel
-//! counts one.
+//! Contribution of each Gaussian to an image: the adjoint of an image whose every pixel has
+//! gradient one.
 
 use std::sync::Arc;
 
@@ -34,8 +34,8 @@ struct Buffers {
 }
 
 impl Contributions {
-    /// Of `splats` as `raster` draws them, nothing nearer to a camera than [`NEAR_SHARE`] of
-    /// `extent`, in world units.
+    /// Contributions of `splats` as `raster` draws them, nothing nearer to a camera than
+    /// [`NEAR_SHARE`] of `extent`, in world units.
     ///
     /// # Errors
     /// [`GpuError::TooLarge`].

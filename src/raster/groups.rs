@@ -1,5 +1,5 @@
-//! How many workgroups it takes for what the device counts (`shaders/common/groups.wgsl`): where
-//! a view shows a part of the scene, kernels over what it shows run for that part only.
+//! Number of workgroups for a count on the device (`shaders/common/groups.wgsl`): if a view shows a
+//! part of the scene, kernels over the visible Gaussians run for that part only.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -14,7 +14,7 @@ pub(super) const SORT_BLOCK: usize = 2048;
 /// Digits that a sort counts in each of its blocks.
 pub(super) const DIGITS: usize = 256;
 
-/// What workgroups do with the elements.
+/// Work on the elements.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WorkKind {
     /// A thread each.
@@ -63,7 +63,7 @@ impl Groups {
 pub struct Count(Buffer<Groups>);
 
 impl Count {
-    /// Of `count` elements, until a scan's total stands there.
+    /// Workgroups for `count` elements, until a scan's total replaces it.
     ///
     /// # Errors
     /// [`GpuError::TooLarge`].

@@ -8,7 +8,7 @@ use super::{
 };
 use crate::gpu::{Bindings, Buffer, Gpu, GpuError, Recorder, groups_for};
 
-/// What a layer draws on. Layers that are drawn one after the other may share it.
+/// Buffers that a layer draws to. Layers that are drawn one after the other may share them.
 #[derive(Clone)]
 pub struct Canvas {
     colors: Buffer<f32>,
@@ -49,7 +49,7 @@ impl Canvas {
 
 /// Buffers and bindings that draw one field.
 pub struct Layer {
-    /// What is drawn.
+    /// Kind of color.
     pub kind: ColorKind,
     /// Color of each visible Gaussian, `[N]` of the kind's stride.
     pub colors: Buffer<f32>,

@@ -1,4 +1,4 @@
-//! What a view shows: projected Gaussians and the depth-sorted list of each tile
+//! Visible Gaussians of a view: their projections and the depth-sorted list of each tile
 //! (`project`, `compact`, `tile_lists`, `tile_ranges`).
 
 use bytemuck::{Pod, Zeroable};
@@ -35,7 +35,7 @@ pub struct TileListsMode {
     pub emit: u32,
 }
 
-/// What the device counted in one view.
+/// Counts of the device in one view.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Status {
     /// Tile-list entries that an overflowing view needed; the lists were left empty.
@@ -102,7 +102,7 @@ pub struct Lists {
     pub visible: Count,
     /// Entries that the lists have room for.
     pub capacity: usize,
-    /// How dispatches over the tiles are cut.
+    /// Division of dispatches over the tiles.
     pub(super) portions: Portions,
     count: usize,
     max_tiles: usize,

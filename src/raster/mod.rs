@@ -141,7 +141,7 @@ impl Raster {
         self.options
     }
 
-    /// How accurately it computes.
+    /// Numerical accuracy.
     pub fn numerics(&self) -> RasterNumerics {
         self.numerics
     }

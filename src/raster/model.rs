@@ -1,4 +1,4 @@
-//! What a training changes: planes of parameters and Adam's moments, with one owner.
+//! Trainable state: planes of parameters and Adam's moments, with one owner.
 
 use super::{AdamMoments, Field, Geometry, constants::GEOMETRY_PLANES};
 use crate::{
@@ -12,11 +12,11 @@ pub struct Model {
     pub geometry: Geometry,
     /// Spherical harmonics of luma.
     pub field: Field,
-    /// Of the geometry.
+    /// Adam's moments of the geometry.
     pub geometry_moments: AdamMoments,
-    /// Of the harmonics.
+    /// Adam's moments of the harmonics.
     pub field_moments: AdamMoments,
-    /// So many Gaussians, the last ones, are drawn and stay as they are.
+    /// Number of fixed Gaussians, the last ones; they are drawn but not trained.
     pub held: usize,
 }
 
@@ -67,7 +67,7 @@ impl Model {
         self.geometry.count
     }
 
-    /// Whether there is none.
+    /// Returns true if there are no Gaussians.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -151,7 +151,7 @@ impl Snapshot {
         self.count
     }
 
-    /// Whether there is none.
+    /// Returns true if there are no Gaussians.
     pub fn is_empty(&self) -> bool {
         self.count == 0
     }

@@ -1,13 +1,13 @@
-//! What the rasterizer's accuracy may be traded for.
+//! Accuracy settings of the rasterizer.
 //!
-//! docs/accuracy-and-time.md has what each costs and saves (`cargo bench --bench accuracy`).
+//! docs/accuracy-and-time.md has the cost and gain of each (`cargo bench --bench accuracy`).
 
 use serde::{Deserialize, Serialize};
 
 use super::constants::{ALPHA_MIN, TRANSMITTANCE_MIN};
 
-/// How accurately a rasterizer computes. [`DEFAULT`](Self::DEFAULT) is how viewers draw;
-/// anything else is for training alone.
+/// Numerical accuracy of a rasterizer. [`DEFAULT`](Self::DEFAULT) draws as viewers do; anything
+/// else is for training alone.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(default)]
@@ -31,8 +31,8 @@ pub struct RasterNumerics {
     pub adam: AdamSteps,
 }
 
-/// How the gradient record of a list entry, eight figures, waits for its sum. Blending's
-/// adjoint writes and summing reads as many words as all else in these two together.
+/// Storage of a list entry's gradient record, eight figures, until it is summed. Blending's adjoint
+/// writes and summing reads as many words as all else in these two together.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]

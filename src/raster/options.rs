@@ -1,6 +1,6 @@
-//! What is drawn, and how a Gaussian ends.
+//! Options of the rasterizer.
 
-/// What the channels of a field mean.
+/// Color space of a field's channels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ColorKind {
     /// sRGB-encoded gray.
@@ -41,7 +41,7 @@ impl ColorKind {
     }
 }
 
-/// Effects of image formation that the rasterizer is compiled with. What is off is not in
+/// Effects of image formation that the rasterizer is compiled with. Those that are off are not in
 /// the kernels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RasterOptions {
@@ -49,11 +49,11 @@ pub struct RasterOptions {
     /// [`BLUR`](super::constants::BLUR) px² spreads it (Mip-Splatting, Yu et al. 2024): its size
     /// in pixels does not change how much it shows.
     pub antialiased: bool,
-    /// How a Gaussian ends.
+    /// Falloff of opacity.
     pub falloff: Falloff,
 }
 
-/// How a Gaussian's opacity falls towards its border.
+/// Falloff of a Gaussian's opacity towards its border.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Falloff {
     /// As a Gaussian, to where it is no longer seen (Kerbl et al. 2023).

@@ -18,7 +18,7 @@ pub struct Portion {
     pub first: u32,
 }
 
-/// Where the dispatches over a picture's tiles begin.
+/// Starts of the dispatches over an image's tiles.
 pub(super) struct Portions {
     /// The first tile of each, for the host and for the device.
     firsts: Vec<(usize, Buffer<Portion>)>,

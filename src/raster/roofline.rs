@@ -1,5 +1,5 @@
-//! What the kernels must read and write at least, if every input is read once and the
-//! caches hold the rest: the measure of how fast they could be.
+//! Minimum memory traffic of the kernels, if every input is read once and the caches hold the rest:
+//! the bound on their speed.
 
 use serde::{Deserialize, Serialize};
 
@@ -24,7 +24,7 @@ pub struct Load {
     pub channels: f64,
     /// Spherical-harmonic planes of all channels.
     pub sh_planes: f64,
-    /// How accurately was computed.
+    /// Numerical accuracy.
     pub numerics: RasterNumerics,
 }
 

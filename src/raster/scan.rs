@@ -9,7 +9,7 @@ use crate::gpu::{Bindings, Buffer, Gpu, GpuError, Kernel, Recorder, shaders};
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct ScanParameters {
-    /// Which [`WorkKind`] the elements are those of.
+    /// The elements' [`WorkKind`].
     pub which: u32,
     /// Status word for the total, `u32::MAX` for none.
     pub total_word: u32,
@@ -17,7 +17,7 @@ pub struct ScanParameters {
     pub limit: u32,
 }
 
-/// What becomes of a total.
+/// Destination of a total.
 pub struct Total<'a> {
     /// The status word that receives it.
     pub word: usize,

@@ -23,7 +23,7 @@ pub struct SceneRenderer<'a> {
     place: SceneLocation,
 }
 
-/// Where the scene is.
+/// Location of the scene.
 enum SceneLocation {
     Device(Box<Renderer>),
     Host(Streamed),

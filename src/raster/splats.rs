@@ -95,7 +95,7 @@ impl Geometry {
 
 /// Spherical-harmonic planes `[(degree + 1)², channels, N]`.
 pub struct Field {
-    /// What the channels are.
+    /// Color space of the channels.
     pub kind: ColorKind,
     /// Degree that is stored.
     pub degree: u32,

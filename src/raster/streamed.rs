@@ -14,24 +14,24 @@ use crate::{
     splats::{ShField, Splats, sh},
 };
 
-/// How far rounding on the device may be off: a share of depths and extents, and pixels.
+/// Bound on rounding errors of the device: a share of depths and extents, and pixels.
 const SLACK: f64 = 1e-3;
 const PIXEL_SLACK: f64 = 1.0;
 
-/// What a camera may show.
+/// View frustum of a camera.
 pub struct Frustum<'a> {
     camera: &'a Camera,
     near: f64,
 }
 
 impl<'a> Frustum<'a> {
-    /// Of a camera that shows nothing nearer than `near` world units.
+    /// Frustum of a camera with the near plane at `near` world units.
     pub fn new(camera: &'a Camera, near: f64) -> Self {
         Self { camera, near }
     }
 
-    /// Whether `project` may find any of a Gaussian in the picture: all that it finds, and little
-    /// else. `widest` is the largest standard deviation in world units. The bound is the largest
+    /// Returns true if `project` may find any of a Gaussian in the image: conservative, and nearly
+    /// tight. `widest` is the largest standard deviation in world units. The bound is the largest
     /// that the linearized projection can make of a ball, at an opacity of one.
     pub fn may_show(&self, mean: [f32; 3], widest: f64) -> bool {
         let camera = self.camera;
@@ -93,7 +93,7 @@ impl Streamed {
         self.splats.len()
     }
 
-    /// Whether there is none.
+    /// Returns true if there are no Gaussians.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }

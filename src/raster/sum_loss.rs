@@ -12,7 +12,7 @@ pub struct SumLossParameters {
     pub blocks: u32,
     /// Pixels to divide by.
     pub pixels: u32,
-    /// Where the mean is filed.
+    /// Entry of the ring for the mean.
     pub entry: u32,
 }
 
@@ -28,7 +28,7 @@ impl SumLossKernel {
 
 /// A ring of losses.
 pub struct LossLog {
-    /// What a loss kernel's workgroups leave, to be added up.
+    /// Sum of each workgroup of a loss kernel.
     pub block_losses: Buffer<f32>,
     /// The ring; iteration `i` stands at `i % len`.
     pub losses: Buffer<f32>,

@@ -1,13 +1,12 @@
-//! What several teachers and paint say of one photo, together.
+//! Combined colors of several teachers and hints for one photo.
 
 use crate::chroma::{
     ViewTarget,
     teacher::{AbImage, HintImage},
 };
 
-/// How much a painted pixel counts where one that a teacher colored counts 1:
-/// more than the views that see the same place from elsewhere and say something
-/// else, of which there are seldom more than a few dozen.
+/// Weight of a painted pixel, relative to 1 for a teacher's: more than the views that see the same
+/// place from elsewhere and disagree, seldom more than a few dozen.
 pub const HINT_WEIGHT: f32 = 50.0;
 
 /// The mean of several answers of one size by their weights.

@@ -38,28 +38,28 @@ const MAX_ROWS: usize = 24;
 /// Frames in the page's strip.
 const STRIP_FRAMES: usize = 12;
 
-/// What `eval` is asked to do.
+/// Options of `eval`.
 #[derive(Clone, Debug, Default)]
 pub struct EvalOptions {
     /// Run folder; the newest run by default.
     pub run: Option<PathBuf>,
-    /// The teacher, to be measured beside the scene.
+    /// Teacher to measure beside the scene.
     pub teacher: Option<PathBuf>,
-    /// How it is asked.
+    /// Settings of the teacher.
     pub teacher_settings: TeacherSettings,
     /// COLMAP folder, where it is not the one that `fit` noted.
     pub colmap: Option<PathBuf>,
     /// Frames of the path, at least 2.
     pub frames: usize,
-    /// Whether other ways to color a scene are measured beside it.
+    /// True if baselines are measured as well.
     pub baselines: bool,
-    /// Ways of others to color the scene that are measured as well.
+    /// Published methods to measure as well.
     pub recipes: Vec<Peer>,
     /// Bytes of the device that fitting RGB splats may take.
     pub memory_limit: Option<u64>,
     /// Folder of `.flo` files between the path's frames; geometric flow by default.
     pub flow: Option<PathBuf>,
-    /// A network that tells how far two pictures are apart.
+    /// LPIPS network: perceptual distance of two images.
     pub lpips: Option<PathBuf>,
 }
 

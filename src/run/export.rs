@@ -24,7 +24,7 @@ use crate::{
 /// of it are not seen.
 const COARSE: f64 = 0.1;
 
-/// What `export` is asked to do.
+/// Options of `export`.
 #[derive(Clone, Debug, Default)]
 pub struct ExportOptions {
     /// Run folder or splat file; the newest run by default.
@@ -33,18 +33,18 @@ pub struct ExportOptions {
     pub output: PathBuf,
     /// Write the luma although the scene is colored.
     pub luma: bool,
-    /// Whether centers are COLMAP's even where the scene was moved to the origin.
+    /// True if centers stay in COLMAP's coordinates even if the scene was moved to the origin.
     pub colmap_coordinates: bool,
-    /// Whether Gaussians that no training view needs are left out.
+    /// True if Gaussians that no training view needs are removed.
     pub clean: bool,
-    /// Whom the scene is fitted for; without, it is written as it is.
+    /// Viewer to fit the scene for; `None` writes it unchanged.
     pub viewer: Option<ViewerChoice>,
     /// COLMAP folder with the cameras that it is cleaned and fitted before, where it is not the
     /// one that `fit` noted.
     pub colmap: Option<PathBuf>,
 }
 
-/// What `export` wrote.
+/// Result of `export`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Exported {
     /// File that was written.
@@ -55,19 +55,19 @@ pub struct Exported {
     pub bytes: u64,
     /// Seconds that writing took.
     pub seconds: f64,
-    /// What is subtracted from COLMAP's coordinates, in world units; zero where nothing is.
+    /// Offset subtracted from COLMAP's coordinates, in world units; zero if none.
     pub offset: [f64; 3],
-    /// Whether the file says so.
+    /// True if the file stores the offset.
     pub tells_offset: bool,
-    /// What the format costs.
+    /// Loss of the format.
     pub loss: Loss,
-    /// What was left out, where that was asked for.
+    /// Removed Gaussians, if cleaning was requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cleaned: Option<Cleaned>,
-    /// What each viewer shows of the scene, where it was fitted.
+    /// PSNR in each viewer, if the scene was fitted.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub shown: Vec<ViewerCameras>,
-    /// What is doubtful.
+    /// Doubts about the file.
     pub warnings: Vec<String>,
 }
 
@@ -155,7 +155,7 @@ fn written(scene: &Scene, options: &ExportOptions) -> Result<WriteOptions, RunEr
     })
 }
 
-/// How far apart 32-bit floats are at a coordinate.
+/// Spacing of 32-bit floats at a coordinate.
 fn step_at(coordinate: f64) -> f64 {
     let below = coordinate as f32;
     f64::from(below.next_up()) - f64::from(below)

@@ -12,14 +12,14 @@ use crate::{
     tell::{Event, Observer, Stage},
 };
 
-/// A Gaussian that fills less of every training view than this many pixels is left out. What
-/// that changes is less than a PNG file rounds; half a pixel is seen (docs/lab/16-ends-and-gaps.md).
+/// A Gaussian that fills less of every training view than this many pixels is removed. The change
+/// is below the rounding of a PNG file; half a pixel is visible (docs/lab/16-ends-and-gaps.md).
 const NEEDED: f32 = 0.1;
 
-/// What was left out, and what that changes.
+/// Number of removed Gaussians, and the effect on renders.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Cleaned {
-    /// Gaussians that were left out.
+    /// Removed Gaussians.
     pub dropped: usize,
     /// Mean PSNR in dB, at most 100, of the pictures without them against those with them,
     /// before the cameras that were held out, or without any before all.

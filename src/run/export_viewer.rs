@@ -23,15 +23,15 @@ const MOST_CAMERAS: usize = 64;
 /// it has pixels, and what it finds holds at other sizes.
 const MOST_SIDE: u32 = 640;
 
-/// What a viewer shows of the scene, compared with `gs-chroma render`: mean PSNR in dB before
-/// the cameras that were held out, or without any before all.
+/// Agreement of a viewer with `gs-chroma render`: mean PSNR in dB over the held-out cameras, or
+/// over all if none is held out.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct ViewerCameras {
-    /// Which viewer.
+    /// The viewer.
     pub viewer: Viewer,
-    /// Of the scene as it is in the run.
+    /// PSNR of the scene as in the run.
     pub before: f64,
-    /// Of what was written.
+    /// PSNR of the written scene.
     pub after: f64,
 }
 
@@ -40,7 +40,7 @@ pub(super) struct Cameras<'a> {
     pub opened: &'a Opened,
     /// COLMAP folder, where it is not the one that `fit` noted.
     pub colmap: Option<&'a Path>,
-    /// What the scene's centers lack of COLMAP's, in world units.
+    /// Offset from the scene's centers to COLMAP's, in world units.
     pub moved: DVec3,
 }
 

@@ -23,7 +23,7 @@ const FILM: &str = "flight.mp4";
 /// Becomes a film where one can be made.
 pub(super) struct FlightOutput {
     writer: Option<FilmWriter>,
-    /// What keeps it from being made.
+    /// Error of the film's writer.
     failed: Option<String>,
 }
 
@@ -50,8 +50,8 @@ impl FlightOutput {
         }
     }
 
-    /// What the page in this folder shows of a path: a film where one could be made, its frames
-    /// where not.
+    /// Finishes the path's part of the page in this folder: a film if one could be made, else its
+    /// frames.
     pub fn end(mut self, page: &Path, path: &PathScore, observe: &mut Observer<'_>) -> Flight {
         let made = self.writer.take().is_some_and(|writer| {
             let ended = writer.finish(observe);
@@ -77,7 +77,7 @@ impl FlightOutput {
     }
 }
 
-/// What went wrong, without the file that is not in its place yet.
+/// Reason of an error, without the path of the temporary file.
 fn reason(error: StoreError) -> String {
     match error {
         StoreError::File { reason, .. } => reason,

@@ -17,8 +17,7 @@ use crate::{
     tell::{Event, Observer, keeping},
 };
 
-/// What a run folder, a splat file or a COLMAP folder holds, and what is doubtful about the
-/// last.
+/// Contents of a run folder, splat file or COLMAP folder as JSON, and doubts about the last.
 ///
 /// # Errors
 /// [`RunError`] when it is none of them or damaged.
@@ -41,7 +40,7 @@ pub fn info(path: &Path, observe: &mut Observer<'_>) -> Result<Value, RunError> 
     colmap_info(path, observe)
 }
 
-/// What a COLMAP folder holds; no photo is decoded.
+/// Contents of a COLMAP folder as JSON; no photo is decoded.
 fn colmap_info(path: &Path, observe: &mut Observer<'_>) -> Result<Value, RunError> {
     let warnings = RefCell::default();
     let mut observe = keeping(&warnings, observe);

@@ -1,4 +1,4 @@
-//! What a splat file's format costs: the file is read back and drawn beside what was written.
+//! Loss of a splat file's format: the file is read back and compared with what was written.
 
 use std::{path::Path, sync::Arc};
 
@@ -30,7 +30,7 @@ const WITHIN: f64 = 0.8;
 /// Vertical field of view of made-up cameras, in degrees.
 const FIELD_OF_VIEW: f64 = 50.0;
 
-/// What a format costs.
+/// Loss of a format.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Loss {
     /// Peak signal-to-noise ratio of the pictures, against those of what was written, in dB;
@@ -40,16 +40,16 @@ pub struct Loss {
     pub delta_e: Option<f64>,
     /// Views that were drawn.
     pub views: usize,
-    /// Which: `held-out views`, `views` where none is held out, `made-up views` of a file; or why
-    /// nothing was measured.
+    /// Kind of the views: `held-out views`, `views` if none is held out, `made-up views` of a file;
+    /// or the reason that nothing was measured.
     pub measured: String,
 }
 
-/// Where scenes are looked at from.
+/// Cameras to render scenes from.
 pub(super) enum Views {
     /// These, and what they are; with the capture's extent, in world units.
     Of(Vec<Camera>, &'static str, f64),
-    /// Nobody knows of any.
+    /// No cameras are known.
     MadeUp,
 }
 

@@ -31,7 +31,7 @@ use crate::{
     tell::{Event, Observer, Stage, keeping},
 };
 
-/// What `merge` is asked to do.
+/// Options of `merge`.
 #[derive(Clone, Debug)]
 pub struct MergeOptions {
     /// The job's folder.
@@ -200,8 +200,8 @@ fn trained(folder: &Path, job: &Job, observe: &mut Observer<'_>) -> Result<Vec<T
     Ok(blocks)
 }
 
-/// What each block has in its own cell, in the dataset's coordinates; and how many of these, the
-/// last ones, are surroundings.
+/// Gaussians of each block in its own cell, in the dataset's coordinates, and the number of
+/// surroundings, the last of these.
 fn together(
     blocks: &[Trained],
     job: &Job,
@@ -252,7 +252,7 @@ fn of_all(blocks: &[Trained]) -> Vec<ViewExposure> {
     all
 }
 
-/// What all blocks took together, and the most that one took.
+/// Totals of all blocks, and the maximum memory of one.
 fn sums(blocks: &[Trained]) -> LumaReport {
     let reports = || blocks.iter().map(|block| &block.report.luma);
     let splats: usize = reports().map(|luma| luma.splats).sum();

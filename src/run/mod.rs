@@ -56,7 +56,7 @@ use crate::{
     trajectory::TrajectoryError,
 };
 
-/// What can stop a run.
+/// Error of a command.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
     /// A file or a folder.
@@ -96,7 +96,7 @@ pub enum RunError {
         path: PathBuf,
         /// The largest of the coordinates.
         coordinate: f64,
-        /// How far floats are apart there, in world units.
+        /// Spacing of floats there, in world units.
         step: f64,
         /// The Gaussians' size in world units.
         size: f64,
@@ -138,13 +138,13 @@ pub enum RunError {
     /// The system does not let the program hear of signals.
     #[error("signals cannot be heeded: {0}")]
     Signals(String),
-    /// There is no training that was interrupted.
+    /// No interrupted training exists.
     #[error("{}: nothing to continue: the run is finished", .0.display())]
     NothingToResume(PathBuf),
     /// Nothing is left for stage 2.
     #[error("stage 1 already took {luma} iterations: choose a larger number")]
     NothingUntil {
-        /// What was asked.
+        /// Requested last iteration.
         until: usize,
         /// Iterations of stage 1.
         luma: usize,
@@ -162,12 +162,12 @@ pub enum RunError {
         /// Seconds that would do.
         needed: f64,
     },
-    /// A PSNR that was not reached; the best that was is written.
+    /// The PSNR target was not reached; the best scene is written.
     #[error("{reached:.2} dB is what could be reached, and is written")]
     TargetMissed {
-        /// What was asked for, in dB.
+        /// Target, in dB.
         target: f64,
-        /// What was reached, in dB.
+        /// Reached PSNR, in dB.
         reached: f64,
     },
 }

@@ -23,14 +23,14 @@ use crate::{
 /// The plan as a picture, in a job's folder.
 const PICTURE: &str = "plan.png";
 
-/// What `partition` is asked to do.
+/// Options of `partition`.
 #[derive(Clone, Debug)]
 pub struct PartitionOptions {
     /// The COLMAP folder.
     pub colmap_dir: PathBuf,
     /// The job's folder.
     pub output: PathBuf,
-    /// How it is to be divided.
+    /// Division into blocks.
     pub division: Division,
 }
 

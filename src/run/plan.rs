@@ -16,27 +16,27 @@ use crate::{
     tell::{Event, Observer, Stage},
 };
 
-/// What `plan` is asked to do; `None` leaves it to the preset.
+/// Options of `plan`; `None` leaves a value to the preset.
 #[derive(Clone, Debug)]
 pub struct PlanOptions {
     /// The COLMAP folder.
     pub colmap_dir: PathBuf,
     /// Amount of work; `paper` on a GPU and `draft` on a software adapter by default.
     pub preset: Option<Preset>,
-    /// How long the training would be: trials are a share of it.
+    /// Iterations of the training; trials take a share of them.
     pub iterations: Option<usize>,
-    /// How photos are loaded; the longer side is the preset's where it is `None`.
+    /// Options for loading photos; the longer side is the preset's if it is `None`.
     pub load: LoadOptions,
-    /// What is on or off whatever the evidence.
+    /// Effects that are on or off regardless of the evidence.
     pub overrules: Overrules,
 }
 
-/// What a capture calls for, and whether it is sound.
+/// Effects that a capture needs, and its soundness.
 #[derive(Clone, Debug)]
 pub struct PlanReport {
     /// The effects.
     pub plan: Plan,
-    /// How well photos and model agree.
+    /// Agreement of photos and model.
     pub soundness: Soundness,
 }
 

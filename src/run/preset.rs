@@ -1,4 +1,4 @@
-//! What a preset stands for on a device and for photos.
+//! Settings of a preset for a device and photos.
 
 use serde::{Deserialize, Serialize};
 
@@ -12,7 +12,7 @@ use crate::{
 /// An amount of work.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Workload {
-    /// How luma is trained.
+    /// Settings of luma training.
     pub settings: LumaSettings,
     /// Longer side of the photos.
     pub max_side: Option<u32>,
@@ -29,7 +29,7 @@ impl Workload {
 }
 
 impl Preset {
-    /// What there is time for on a device.
+    /// Default preset of a device.
     pub(crate) fn for_device(gpu: &Gpu) -> Self {
         if gpu.is_software() {
             Self::Draft

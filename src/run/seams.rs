@@ -1,4 +1,4 @@
-//! Whether a scene that was put together shows where.
+//! Held-out PSNR of a merged scene across block borders and inside blocks.
 
 use std::collections::HashMap;
 
@@ -23,7 +23,7 @@ pub struct SeamViews {
 /// The mean of some held-out views.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ViewMean {
-    /// How many there are.
+    /// Number of views.
     pub views: usize,
     /// Their mean PSNR in dB; none without any.
     pub psnr: Option<f64>,

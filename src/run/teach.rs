@@ -27,19 +27,19 @@ use crate::{
     tell::{Event, Observer, Stage},
 };
 
-/// Who colors the photos.
+/// Teachers, their settings and hints.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TeachOptions {
     /// Teachers and their weights, above 0; may be empty where there are hints.
     pub teachers: Vec<(PathBuf, f32)>,
-    /// How they are asked.
+    /// Settings of the teachers.
     pub settings: TeacherSettings,
-    /// What their a and b are multiplied by, 0 to 1.
+    /// Factor of their a and b, 0 to 1.
     pub strength: f32,
     /// A folder of painted hints.
     pub hints: Option<PathBuf>,
-    /// Whether a stroke colors what it lies on, in all views; otherwise it counts where it is
-    /// painted, and nowhere else.
+    /// True if a stroke also colors the surface under it in all views; otherwise it counts only
+    /// where it is painted.
     pub grow_hints: bool,
 }
 
@@ -87,7 +87,7 @@ pub fn teacher_or_photos(teacher: &Path, colmap_dir: &Path) -> PathBuf {
 /// The teachers and hints of a command, opened.
 pub(super) struct Teachers {
     teachers: Vec<Member>,
-    /// Whether the options say how a network is to be asked.
+    /// True if the options include settings for networks.
     asked_of_networks: bool,
     strength: f32,
     hints: Option<(PathBuf, HintFolder)>,
@@ -98,17 +98,17 @@ struct Member {
     path: PathBuf,
     teacher: Teacher,
     weight: f32,
-    /// Whether it is a folder that has images for some photos only: somebody's work, of which
+    /// True if the teacher is a folder with images for some photos only: hand-made work, of which
     /// none is held out.
     partial: bool,
 }
 
-/// What teachers and hints say.
+/// Combined supervision from teachers and hints.
 pub(super) struct TeacherAnswers {
     pub supervision: Supervision,
     /// Views that have hints.
     pub hinted: usize,
-    /// SHA-256 of all that is wanted.
+    /// SHA-256 of the supervision.
     pub wanted: String,
 }
 
@@ -122,11 +122,11 @@ struct TeacherQueries<'a, 'o> {
     /// For how many views that colors are learned from each teacher has an answer, and how many of
     /// these are gray, or a network's of one color.
     answered: Vec<[usize; 2]>,
-    /// Whether there is a hint for any view.
+    /// True if any view has a hint.
     hints_cover: bool,
     /// Views that have hints.
     hinted: usize,
-    /// Of all that is wanted.
+    /// Hash of the supervision.
     wanted: Hasher,
 }
 
@@ -228,7 +228,7 @@ impl Teachers {
         })
     }
 
-    /// Whether something was said of how to ask a network, and there is none.
+    /// Returns true if settings for networks were given, but no teacher is one.
     fn asks_no_network(&self) -> bool {
         let networks = self
             .teachers
@@ -258,7 +258,7 @@ impl Teachers {
         }
     }
 
-    /// What they say of one photo together, at its size; `None` where none has an answer.
+    /// Weighted mean of the teachers' answers for one photo, at its size; `None` if there is none.
     pub fn color(
         &mut self,
         query: Query<'_>,
@@ -344,8 +344,8 @@ impl Teachers {
         })
     }
 
-    /// Whether every source has something for a view that counts; `covers` says so
-    /// of each teacher and then of the hints.
+    /// Checks that every source covers a view that counts; `covers` has a flag for each teacher and
+    /// then for the hints.
     fn check(
         &self,
         covers: &[bool],
@@ -388,7 +388,7 @@ impl Teachers {
     }
 }
 
-/// How many photos have a pose.
+/// Number of photos with a pose.
 fn placed(dataset: &Dataset) -> usize {
     let photos = dataset.capture.views.iter().map(|view| &view.photo);
     photos.collect::<BTreeSet<_>>().len()
@@ -418,9 +418,9 @@ fn unplaced(
     Ok(Some((named.swap_remove(0) + &others, all.len())))
 }
 
-/// Whether a teacher has nothing for some of the photos that are trained on: then it is a folder
-/// of single images, and each counts wherever it lies. One for all photos is measured on the
-/// held-out ones.
+/// Returns true if a teacher lacks some of the training photos: then it is a folder of single
+/// images, and each counts wherever it lies. A teacher for all photos is measured on the held-out
+/// ones.
 fn is_partial(teacher: &Teacher, dataset: &Dataset) -> Result<bool, RunError> {
     for &view in &dataset.split.train {
         let query = Query::view(&dataset.capture.views[view], &dataset.cameras[view]);
@@ -461,7 +461,7 @@ fn gray_images(
     )))
 }
 
-/// Whether nothing in a picture has any color.
+/// Returns true if an image has no color.
 fn is_gray(answer: &AbImage) -> bool {
     let gray = |ab: &[f32; 2]| ab.iter().all(|value| value.abs() < GRAY);
     answer.ab.iter().all(gray)

@@ -1,4 +1,4 @@
-//! What there is to see of a run or a splat file.
+//! A run or a splat file opened for viewing.
 
 use std::{
     fs,
@@ -128,7 +128,7 @@ impl ViewedScene {
         (self.dataset.as_ref()).map(|dataset| NEAR_SHARE * dataset.extent)
     }
 
-    /// Whether somebody can say what color photos are.
+    /// Returns true if a teacher can be asked for the colors of photos.
     pub fn has_teacher(&self) -> bool {
         let chroma = self.report().and_then(|report| report.chroma.as_ref());
         self.dataset.is_some()

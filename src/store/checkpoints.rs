@@ -48,14 +48,14 @@ impl Interrupt {
     }
 }
 
-/// How a training that is interrupted can go on.
+/// Checkpoint options of a command.
 #[derive(Clone, Debug)]
 pub struct CheckpointOptions {
-    /// Whether to go on from the checkpoint in the run folder.
+    /// True to resume from the checkpoint in the run folder.
     pub resume: bool,
     /// Minutes between two; `None`: none is made but when interrupted.
     pub every: Option<f64>,
-    /// Who may interrupt it.
+    /// Interrupt flag of the command.
     pub interrupt: Arc<Interrupt>,
 }
 
@@ -72,17 +72,17 @@ impl Default for CheckpointOptions {
     }
 }
 
-/// What of a command is known before its work is.
+/// Metadata of a checkpoint.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct Header<S> {
     version: u32,
-    /// What it was asked for and given, to be compared by name.
+    /// Options and inputs of the command, to be compared by name.
     question: Value,
     /// Seconds of the command so far, all of them.
     seconds: f64,
     /// Rows of the log.
     log: String,
-    /// What it has found out.
+    /// Results of the command's setup.
     started: S,
 }
 
@@ -121,7 +121,7 @@ impl<S: DeserializeOwned, C> Found<S, C> {
         })
     }
 
-    /// What the command had found out.
+    /// Results of the command's setup.
     pub fn started(&self) -> &S {
         &self.header.started
     }
@@ -214,7 +214,7 @@ pub(crate) struct CheckpointFiles<'a, 'o, S> {
     told: bool,
     /// When the one that is being made was asked for.
     asked: Option<Instant>,
-    /// How far the work was when it was interrupted, once that is written.
+    /// Iterations done at an interrupt, once its checkpoint is written.
     interrupted: Option<Result<usize, StoreError>>,
 }
 
@@ -267,7 +267,7 @@ impl<'a, 'o, S: Serialize> CheckpointFiles<'a, 'o, S> {
         self.options.interrupt.heeded.store(false, Ordering::SeqCst);
     }
 
-    /// Whether a checkpoint is due.
+    /// Returns true if a checkpoint is due.
     pub fn is_due(&mut self) -> bool {
         let now = Instant::now();
         let is_due = self.options.interrupt.is_raised() || self.due.is_some_and(|due| due <= now);

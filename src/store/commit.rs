@@ -15,10 +15,10 @@ use crate::{
     store::StoreError,
 };
 
-/// What is complete, and is to be moved into its place.
+/// Name of a complete folder, to be moved into place.
 const COMPLETE: &str = ".commit";
 
-/// What is being written.
+/// Prefix of an incomplete folder.
 const BEGUN: &str = ".next-";
 
 /// In [`COMPLETE`], the names of what has to go, a line each.
@@ -42,7 +42,7 @@ impl Commit {
         })
     }
 
-    /// Where to write what will be `path` in the run's folder.
+    /// Temporary path of a file that will be `path` in the run's folder.
     pub fn place(&self, path: &Path) -> PathBuf {
         self.made.path().join(name(path))
     }

@@ -1,10 +1,10 @@
-//! What is wrong with a file or a folder.
+//! Errors of files and folders.
 
 use std::path::{Path, PathBuf};
 
 use crate::{programs::ProgramError, splats::SplatError};
 
-/// What is wrong with a file or a folder.
+/// Error of a file or a folder.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
     /// The file system, or what a file holds.
@@ -12,7 +12,7 @@ pub enum StoreError {
     File {
         /// File at fault.
         path: PathBuf,
-        /// What is wrong with it and what to do.
+        /// The problem and the remedy.
         reason: String,
     },
     /// A splat file's name.
@@ -29,7 +29,7 @@ pub enum StoreError {
     InUse {
         /// The run's folder.
         folder: PathBuf,
-        /// Who it is, and what it does.
+        /// The other process, and its use of the folder.
         holder: String,
     },
     /// Photos have other poses than when they were trained on.
@@ -41,7 +41,7 @@ pub enum StoreError {
         folder: PathBuf,
         /// One of these photos.
         photo: String,
-        /// How many there are.
+        /// Number of photos that moved.
         moved: usize,
         /// Photos in all.
         photos: usize,
@@ -54,7 +54,7 @@ pub enum StoreError {
     OtherCheckpoint {
         /// Checkpoint at fault.
         path: PathBuf,
-        /// What was otherwise.
+        /// Differences, by name.
         differs: String,
     },
     /// A training was ended from outside, and can go on.

@@ -216,7 +216,7 @@ pub(crate) fn check_no_original(path: &Path) -> Result<(), StoreError> {
     trust::check_no_original(path).map_err(at(path))
 }
 
-/// What makes a folder a page that may be replaced.
+/// File that marks a folder as a replaceable page.
 pub(crate) const PAGE: &str = "index.html";
 
 /// Refuses a folder that `eval` would not replace.

@@ -27,14 +27,14 @@ const FILMS: [&str; 4] = ["mp4", "mov", "mkv", "m4v"];
 /// film differ by a tenth less in a and b, for 4 % more bytes.
 const CHROMA: &str = "chroma-qp-offset=-6";
 
-/// Whether a path names a film and not a folder.
+/// Returns true if a path names a film and not a folder.
 pub fn is_film(path: &Path) -> bool {
     let extension = path.extension().unwrap_or_default().to_string_lossy();
     let known = |film: &&str| extension.eq_ignore_ascii_case(film);
     FILMS.iter().any(known) && !path.is_dir()
 }
 
-/// What a film is for.
+/// Purpose of a film.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Purpose {
     /// To be worked on: hardly to be told from its pictures, and of their very size.

@@ -1,4 +1,4 @@
-//! What a training was given, in a few digits.
+//! Hashes of a training's input.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -132,7 +132,7 @@ fn digits(mut sha256: String) -> String {
     sha256
 }
 
-/// What became of photos since they were trained on, by name.
+/// Changes of photos since training, by name.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub(crate) struct Changes {
     /// Photos that are there, of all.

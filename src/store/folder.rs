@@ -25,7 +25,7 @@ use crate::{
 /// The run in a folder of `auto`'s results.
 pub(crate) const OF_AUTO: &str = "run";
 
-/// Where runs go unless told otherwise.
+/// Default parent folder of runs.
 const RUNS: &str = "runs";
 
 /// The folder of one run; docs/run-folder.md lists what lies in it.
@@ -95,7 +95,7 @@ impl RunFolder {
         self.0.join("chroma.npy")
     }
 
-    /// What `eval` found.
+    /// Results of `eval`.
     pub fn evaluation(&self) -> PathBuf {
         self.0.join("eval.json")
     }
@@ -110,12 +110,12 @@ impl RunFolder {
         self.0.join("report.json")
     }
 
-    /// What an interrupted training goes on from.
+    /// Checkpoint of an interrupted training.
     pub fn checkpoint(&self) -> PathBuf {
         self.0.join("checkpoint")
     }
 
-    /// What an interrupted coloring goes on from.
+    /// Checkpoint of an interrupted coloring.
     pub fn color_checkpoint(&self) -> PathBuf {
         self.0.join("checkpoint-color")
     }

@@ -77,7 +77,7 @@ impl RunLock {
     }
 }
 
-/// Who holds a lock, in words.
+/// Holder of a lock, in words.
 fn holder(path: &Path) -> String {
     let told = input::read_to_string(path).unwrap_or_default();
     match told.trim().parse::<u32>() {

@@ -1,4 +1,4 @@
-//! What keeps a scene and its photos from being worked on.
+//! Errors of a scene and its photos.
 
 use std::path::PathBuf;
 
@@ -7,7 +7,7 @@ use crate::{
     store::StoreError,
 };
 
-/// What keeps a scene and its photos from being worked on.
+/// Error of a scene or its photos.
 #[derive(Debug, thiserror::Error)]
 pub enum SubjectError {
     /// A file or a folder.

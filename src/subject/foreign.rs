@@ -25,7 +25,7 @@ const GAIN: f64 = 0.2;
 /// another frame about 0.
 const CORRELATED: f64 = 0.3;
 
-/// How splats, drawn in some way, meet the photos.
+/// Agreement of splats, drawn with some options, with the photos.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Fit {
     /// Mean of the views' correlations.
@@ -34,8 +34,8 @@ struct Fit {
     psnr: f64,
 }
 
-/// How the gray splats of `path` are best drawn before the cameras of `dataset`: as the file
-/// says, unless the photos plainly say otherwise. Warns where they show something else.
+/// Raster options that fit the gray splats of `path` to the photos of `dataset`: those of the file,
+/// unless the photos clearly favor others. Warns if the splats show something else.
 pub(crate) fn drawn_like_photos(
     gpu: &Gpu,
     dataset: &Dataset,
@@ -91,7 +91,7 @@ fn of_unlike(path: &Path, fit: Fit) -> Event {
     ))
 }
 
-/// How the splats meet some of the photos, drawn in each way.
+/// Agreement of the splats with some of the photos, for each of the options.
 fn fits<const N: usize>(
     gpu: &Gpu,
     dataset: &Dataset,

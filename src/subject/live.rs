@@ -26,18 +26,18 @@ const GONE_AFTER: Duration = Duration::from_secs(6);
 const EVERY: Duration = Duration::from_secs(2);
 const RARELY: u32 = 20;
 
-/// What there is to see of a command that goes on.
+/// Live state of a running command, for viewers.
 #[derive(Debug, Default)]
 pub struct Live(Mutex<LiveState>);
 
-/// All that is shown.
+/// State that is shown.
 #[derive(Clone, Debug, Default)]
 pub struct LiveState {
     /// Photos and cameras, once they are there.
     pub dataset: Option<Arc<Dataset>>,
     /// The newest scene of each kind.
     pub scenes: [Option<LiveScene>; 2],
-    /// What is going on, in words.
+    /// Current activity, in words.
     pub doing: String,
     /// The plan of effects.
     pub plan: Vec<EffectReport>,
@@ -60,12 +60,12 @@ pub struct LiveScene {
     pub stamp: u32,
     /// The Gaussians.
     pub splats: Arc<Splats>,
-    /// How they are drawn.
+    /// Raster options of the scene.
     pub drawn: RasterOptions,
 }
 
 impl Live {
-    /// What is shown now, for somebody who asks.
+    /// Current state; marks a viewer as present.
     pub fn ask(&self) -> LiveState {
         let mut state = self.state();
         state.asked = Some(Instant::now());
@@ -140,7 +140,7 @@ impl Live {
         }
     }
 
-    /// Whether somebody wants to see Gaussians now.
+    /// Returns true if a viewer is waiting for Gaussians.
     pub(crate) fn wants(&self) -> bool {
         let mut state = self.state();
         let now = Instant::now();

@@ -19,7 +19,7 @@ use crate::{
     tell::Observer,
 };
 
-/// Who else may work on a run meanwhile.
+/// Lock on a run: the other commands that may use it meanwhile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum LockMode {
     /// Anybody.
@@ -73,11 +73,11 @@ pub(crate) struct Scene {
     /// The splat file.
     pub file: PathBuf,
     pub splats: Splats,
-    /// How they are drawn.
+    /// Raster options of the scene.
     pub drawn: RasterOptions,
-    /// What was subtracted from COLMAP's coordinates, as far as run or file tell, in world units.
+    /// Offset subtracted from COLMAP's coordinates, as far as run or file have it, in world units.
     pub offset: DVec3,
-    /// How many of them, the last ones, surround the scene.
+    /// Number of surroundings, the last of these Gaussians.
     pub surroundings: usize,
 }
 
@@ -113,7 +113,7 @@ impl Opened {
         self.report().map_or(&[], |report| &report.capture.photos)
     }
 
-    /// How photos are loaded.
+    /// Options for loading photos.
     pub fn load(&self) -> LoadOptions {
         let load = self.report().map(|report| report.capture.load.clone());
         load.unwrap_or_default()

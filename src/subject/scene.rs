@@ -1,4 +1,4 @@
-//! What several commands need of a capture: its photos, and splats to go on from.
+//! Shared access to a capture: its photos, and splats to start from.
 
 use std::path::Path;
 
@@ -35,7 +35,7 @@ pub(crate) fn open(
     })?)
 }
 
-/// How far a trial is.
+/// Progress event of a trial.
 pub(crate) fn of_trial(progress: &TrialProgress) -> Event {
     let message = match progress.effect {
         Some(effect) => format!("with {effect}"),
@@ -78,13 +78,13 @@ pub(crate) fn tell_skipped(path: &Path, read: &ReadSplats, observe: &mut Observe
 /// A splat file as a scene.
 pub(crate) struct ReadScene {
     pub splats: Splats,
-    /// How the file wants to be drawn.
+    /// Raster options from the file.
     pub drawn: RasterOptions,
-    /// What its header says was subtracted from its centers, in world units.
+    /// Offset subtracted from its centers according to its header, in world units.
     pub offset: DVec3,
 }
 
-/// Which coordinates Gaussians are wanted in.
+/// Coordinate frame of Gaussians.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Frame {
     /// COLMAP's, less this, in world units.
@@ -134,7 +134,7 @@ pub(crate) fn read_splats(
     Ok((scene.splats, scene.drawn))
 }
 
-/// How splats are written whose centers are COLMAP's less `offset`, in world units.
+/// Write options of splats whose centers are COLMAP's less `offset`, in world units.
 pub(crate) fn written_as(drawn: RasterOptions, offset: DVec3) -> WriteOptions {
     WriteOptions {
         generator: format!("gs-chroma {}", env!("CARGO_PKG_VERSION")),

@@ -1,4 +1,4 @@
-//! Whether photos and model can be worked with, and what is told where that is doubtful.
+//! Soundness of photos and model, and warnings about doubts.
 
 use std::path::Path;
 
@@ -22,7 +22,7 @@ use crate::{
 /// Fewer photos make no scene: before as few are left, all are used.
 const FEWEST: usize = 2;
 
-/// How well photos, poses and points agree; each figure `None` where nothing tells.
+/// Agreement of photos, poses and points; each figure `None` if unknown.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Soundness {
     /// The median distance of observations from where their points project, in pixels at
@@ -30,22 +30,22 @@ pub struct Soundness {
     pub reprojection_error: Option<f64>,
     /// The lowest correlation, -1 to 1, of what a photo shows at the points with their colors.
     pub lowest_correlation: Option<f64>,
-    /// That of the photo in the middle.
+    /// The median correlation of the photos.
     pub median_correlation: Option<f64>,
 }
 
 /// A capture that can be worked with.
 pub(crate) struct SoundCapture {
     pub dataset: Dataset,
-    /// What its photos say.
+    /// Evidence from its photos.
     pub evidence: Evidence,
-    /// How well it agreed before anything was left out.
+    /// Agreement before anything was left out.
     pub soundness: Soundness,
     /// Photos, cameras and points in a few digits.
     pub fingerprint: String,
 }
 
-/// What follows from the model alone.
+/// Checks of the model alone.
 pub(crate) struct Model {
     /// See [`Soundness`].
     pub reprojection_error: Option<f64>,
@@ -54,12 +54,12 @@ pub(crate) struct Model {
     tracks: Tracks,
 }
 
-/// Of what use a model's observations are.
+/// Usability of a model's observations.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Tracks {
     /// They are where its points project to.
     Sound,
-    /// Which photo saw which point is known; where says only the projection.
+    /// Points are assigned to the right photos, but their pixels are only known by projection.
     Misplaced,
     /// There are none, or they belong to something else.
     Useless,

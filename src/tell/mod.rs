@@ -15,9 +15,9 @@ pub enum Event {
     Note(String),
     /// A line about something doubtful that does not stop the run.
     Warning(String),
-    /// How far a stage is; the first of another stage ends the one before.
+    /// Progress of a stage; the first of another stage ends the one before.
     Progress {
-        /// Which stage.
+        /// The stage.
         stage: Stage,
         /// Steps done.
         done: usize,
@@ -60,7 +60,7 @@ impl From<eval::Progress<'_>> for Event {
     }
 }
 
-/// Who is told.
+/// Observer of events.
 pub type Observer<'a> = dyn FnMut(Event) + 'a;
 
 /// Tells `observe` everything and keeps the warnings.

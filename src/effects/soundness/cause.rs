@@ -1,4 +1,4 @@
-//! Why points do not project to where they were seen.
+//! Causes of large reprojection errors.
 
 use glam::{DMat3, DVec3};
 
@@ -44,8 +44,8 @@ impl Cause {
         Self::of_scale(capture, cameras).unwrap_or(Self::Unknown)
     }
 
-    /// Whether observations lie where points project to but for a scale and an offset along
-    /// each axis, the same in all photos.
+    /// Cause if projections match the observations up to a scale and an offset along each axis, the
+    /// same in all photos.
     fn of_scale(capture: &Capture, cameras: &[Camera]) -> Option<Self> {
         let mut pairs = [Vec::new(), Vec::new()];
         for point in &capture.points {
@@ -117,7 +117,7 @@ fn turned_around(camera: &Camera) -> Camera {
     }
 }
 
-/// How one coordinate follows from another.
+/// Linear map between coordinates.
 struct Line {
     scale: f64,
     offset: f64,

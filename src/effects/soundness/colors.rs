@@ -1,4 +1,4 @@
-//! Whether photos show at the points what COLMAP saw there.
+//! Correlation of photos with the colors of COLMAP's points.
 
 use super::{
     contradiction::{Contradiction, Contradictory, LEAST},
@@ -18,20 +18,19 @@ const SIDE: f64 = 1.0;
 /// in 255.
 const SPREAD: f64 = 0.02;
 
-/// What photos show where points were seen; photos are shown to it one after the other, in the
+/// Grays of photos at the observations of points; photos are passed one after the other, in the
 /// order of the views.
 #[derive(Clone, Debug)]
 pub struct PointColors {
     patch_means: PatchMeans,
-    /// Of each look-up the photo and the point's gray, 0 to 1.
+    /// Photo of each request, and the point's gray, 0 to 1.
     asked: Vec<(usize, f64)>,
 }
 
-/// How photos agree with the points' colors.
+/// Agreement of photos with the points' colors.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Agreement {
-    /// Of each photo that shows enough points, with enough difference between them, its name
-    /// and the correlation, -1 to 1.
+    /// Name and correlation, -1 to 1, of each photo that shows enough points with enough contrast.
     pub photos: Vec<(String, f64)>,
 }
 
@@ -65,7 +64,7 @@ impl PointColors {
         self.patch_means.look(view, photo);
     }
 
-    /// What all photos together say; `capture` is the one it was made of.
+    /// Agreement over all photos; `capture` is the one it was made of.
     pub fn finish(self, capture: &Capture) -> Agreement {
         let (names, _) = photos(capture);
         let mut pairs = vec![Vec::new(); names.len()];

@@ -1,4 +1,4 @@
-//! How photos, poses and points contradict each other, and why.
+//! Contradictions of photos, poses and points, and their causes.
 
 use std::{fmt, path::PathBuf};
 
@@ -23,7 +23,7 @@ pub enum Contradiction {
         /// The median reprojection error in pixels at working size; infinite where most points
         /// are behind the cameras that saw them.
         error: f64,
-        /// What is likely wrong.
+        /// Likely cause.
         cause: Cause,
     },
     /// Photos do not show what COLMAP saw.
@@ -60,8 +60,8 @@ pub(super) fn distance(error: f64) -> String {
     }
 }
 
-/// What is likely wrong with a model that contradicts itself: what, put right, makes its points
-/// project to where they were seen.
+/// Likely cause of a contradictory model: a correction of it makes the points project to their
+/// observations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Cause {
     /// Poses are camera-to-world.

@@ -1,4 +1,4 @@
-//! How many points the photos see, where no observations say so.
+//! Number of points visible in the photos, for models without observations.
 
 use super::photos::photos;
 use crate::capture::{Camera, Capture};
@@ -13,8 +13,8 @@ pub struct SparsePhotos {
     pub photos: Vec<String>,
     /// Photos in all.
     pub total: usize,
-    /// Whether some camera's principal point lies outside its photo. With points before the
-    /// cameras it would be a crop's.
+    /// True if some camera's principal point lies outside its photo. With points before the cameras
+    /// it would be a crop's.
     pub center_outside: bool,
 }
 
@@ -45,7 +45,7 @@ impl SparsePhotos {
     }
 }
 
-/// Whether a camera's principal point lies outside its photo.
+/// Returns true if a camera's principal point lies outside its photo.
 fn is_off_center(camera: &Camera) -> bool {
     let inside = |at: f64, side: u32| at > 0.0 && at < f64::from(side);
     !(inside(camera.cx, camera.width) && inside(camera.cy, camera.height))

@@ -1,4 +1,4 @@
-//! What makes a scene doubtful by itself, whatever its model says.
+//! Doubts about a scene that do not depend on its model.
 
 use glam::DVec3;
 
@@ -52,7 +52,7 @@ pub fn doubts(capture: &Capture, cameras: &[Camera]) -> Vec<String> {
     doubts
 }
 
-/// How many pixels of all photos have each gray level.
+/// Histogram of gray levels over all photos.
 #[derive(Default)]
 pub struct Levels(Vec<usize>);
 

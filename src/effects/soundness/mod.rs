@@ -1,8 +1,8 @@
-//! Whether photos, poses and points contradict each other.
+//! Consistency of photos, poses and points.
 //!
-//! Two figures tell. Of the model alone: how far from its observations a point projects. Of the
-//! photos: how the colors that COLMAP gave its points correlate with what a photo shows where it
-//! saw them. Bounds and what was measured are in docs/soundness.md.
+//! Two figures: for the model alone, the reprojection error; for the photos, the correlation of the
+//! colors of COLMAP's points with the photo at their observations. Bounds and measurements are in
+//! docs/soundness.md.
 
 mod cause;
 mod colors;

@@ -1,4 +1,4 @@
-//! How far from its observations a point projects.
+//! Reprojection errors of points.
 
 use glam::DVec3;
 
@@ -38,7 +38,7 @@ struct Median {
     error: Error,
 }
 
-/// How far one observation is off; infinitely, where the point is behind the camera.
+/// Reprojection error of one observation; infinite if the point is behind the camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Error {
     pixels: f64,
@@ -57,13 +57,13 @@ impl Median {
         })
     }
 
-    /// Whether there are enough, and they are too far off.
+    /// Returns true if there are enough, and the median error is too large.
     fn is_off(&self) -> bool {
         self.count >= ENOUGH && self.error.relative > 1.0
     }
 }
 
-/// Where a camera sees a place in front of it, inside its photo or not.
+/// Projects a place in front of a camera to a pixel, inside its photo or not.
 pub(super) fn project(camera: &Camera, place: DVec3) -> Option<[f64; 2]> {
     let at = camera.rotation * place + camera.translation;
     (at.z > 0.0).then(|| {
@@ -85,7 +85,7 @@ pub fn observe_where_projected(capture: &mut Capture) {
     }
 }
 
-/// How far apart two places in a camera's photo are.
+/// Distance of an observation from its point's projection.
 fn error(camera: &Camera, seen: [f64; 2], projected: Option<[f64; 2]>) -> Error {
     let tolerated = (SHARE * f64::from(camera.width.max(camera.height))).max(PIXELS);
     let pixels = projected.map_or(f64::INFINITY, |[x, y]| (x - seen[0]).hypot(y - seen[1]));
@@ -122,8 +122,7 @@ impl Reprojection {
         })
     }
 
-    /// What contradicts the model, if anything does; `capture` and `cameras` are those it was
-    /// made of.
+    /// Contradiction in the model, if any; `capture` and `cameras` are those it was made of.
     pub fn contradictory(&self, capture: &Capture, cameras: &[Camera]) -> Option<Contradictory> {
         if self.all.is_off() {
             return Some(Contradictory::All(Contradiction::Model {
@@ -146,7 +145,7 @@ impl Reprojection {
     }
 }
 
-/// Whether points project to where they were seen, if projected so.
+/// Returns true if points project to their observations under `projected`.
 pub(super) fn fits(
     capture: &Capture,
     cameras: &[Camera],

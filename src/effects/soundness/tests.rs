@@ -14,7 +14,7 @@ const VIEWS: usize = 6;
 
 const POINTS: usize = 60;
 
-/// Of a sequence without pattern the i-th number, 0 to 1.
+/// The i-th number of a pseudorandom sequence, 0 to 1.
 fn random(i: usize) -> f64 {
     ((i as f64 + 1.0) * 12.9898).sin().abs() * 43_758.545_3 % 1.0
 }
@@ -72,7 +72,7 @@ fn cameras(capture: &Capture) -> Vec<Camera> {
     views.map(|view| view.camera.clone()).collect()
 }
 
-/// What contradicts a model, with photos at half the size of its cameras.
+/// Contradiction in a model, with photos at half the size of its cameras.
 fn judged(capture: &Capture) -> Option<Contradictory> {
     let cameras: Vec<Camera> = cameras(capture).iter().map(halved).collect();
     let found = Reprojection::of(capture, &cameras).expect("observations");
@@ -230,7 +230,7 @@ fn a_single_wrong_pose_is_named() {
     assert_eq!(judged(&capture), None);
 }
 
-/// How photos agree with the points' colors, and what follows.
+/// Agreement of photos with the points' colors, and the resulting contradiction.
 fn compared(capture: &Capture, photos: &[Photo]) -> (Agreement, Option<Contradictory>) {
     let cameras: Vec<Camera> = cameras(capture);
     let mut colors = PointColors::of(capture, &cameras, Channel::Luma);

@@ -1,4 +1,4 @@
-//! What changes between two iterations, beside the steps of Adam.
+//! Changes of the model between two iterations, besides Adam's steps.
 
 use std::sync::Arc;
 
@@ -76,7 +76,7 @@ impl LumaTrainer {
         self.begin_surrounding(self.base)
     }
 
-    /// Whether there is nothing to be drawn that is not drawn yet.
+    /// Returns true if no surroundings are waiting to be drawn.
     pub(super) fn is_surrounded(&self) -> bool {
         self.model.held > 0 || self.surroundings.is_none()
     }

@@ -49,8 +49,8 @@ impl LumaTrainer {
         }
     }
 
-    /// Whether the goal's PSNR will be reached by the end of the schedule, where every doubling
-    /// of the iterations brings `gain` dB.
+    /// Returns true if the goal's PSNR will be reached by the end of the schedule, with a gain of
+    /// `gain` dB per doubling of the iterations.
     fn will_reach(&self, iteration: usize, gain: f64) -> bool {
         let doublings = (self.schedule.end as f64 / iteration as f64).log2();
         let expected = self.watch.last().map(|look| look.psnr + gain * doublings);

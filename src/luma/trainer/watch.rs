@@ -25,16 +25,16 @@ fn next_look(iteration: usize) -> usize {
     iteration + (step / SYNC_EVERY * SYNC_EVERY).clamp(OFTEN, RARELY)
 }
 
-/// What a look showed.
+/// Held-out score at one validation of the training.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HeldOutScore {
     /// Mean PSNR of the views, in dB.
     pub psnr: f64,
-    /// How much it rose since the look before, in dB per minute of training.
+    /// Rise since the previous validation, in dB per minute of training.
     pub per_minute: Option<f64>,
 }
 
-/// What a training is watched by.
+/// State of validation during a training.
 #[derive(Default)]
 pub(super) struct Watch {
     views: Option<Arc<dyn TrainingViews>>,
@@ -52,12 +52,12 @@ pub(super) struct Watch {
 }
 
 impl Watch {
-    /// Whether there is a look after `iteration` (counted from 1) of `end`.
+    /// Returns true if a validation follows `iteration` (counted from 1) of `end`.
     pub fn is_due(&self, iteration: usize, end: usize) -> bool {
         !self.counting.is_empty() && (iteration == end || iteration == self.next)
     }
 
-    /// What the last look showed.
+    /// Score of the last validation.
     pub fn last(&self) -> Option<HeldOutScore> {
         let last = self.curve.last()?;
         let rise = |before: &CurvePoint| {
@@ -104,7 +104,7 @@ impl LumaTrainer {
         Ok(())
     }
 
-    /// What the looks showed so far.
+    /// Held-out scores so far.
     pub fn curve(&self) -> &[CurvePoint] {
         &self.watch.curve
     }

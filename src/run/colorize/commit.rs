@@ -12,7 +12,7 @@ use crate::{
     tell::{Event, Observer},
 };
 
-/// What `colorize` wrote.
+/// Output files of `colorize`.
 #[derive(Clone, Debug)]
 pub struct Output {
     /// The colored splat file, of any format.

@@ -56,7 +56,7 @@ pub fn colorize(
     Ok((coloring.output, report))
 }
 
-/// What the teachers want, and how it is solved for.
+/// Supervision from the teachers, and settings of the solver.
 struct Supervised {
     taught: TeacherAnswers,
     settings: ChromaSettings,

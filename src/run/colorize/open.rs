@@ -25,7 +25,7 @@ use crate::{
     tell::{Event, Observer, Stage},
 };
 
-/// What is colored, and from what.
+/// Scene to color, with its inputs opened.
 pub(super) struct Coloring<'a> {
     pub request: &'a ColorizeRequest,
     pub opened: Opened,
@@ -44,7 +44,7 @@ pub(super) struct Coloring<'a> {
     /// Iterations of Adam.
     pub iterations: usize,
     pub output: Output,
-    /// How the colors are written.
+    /// Options for writing the colored scene.
     pub written: WriteOptions,
     _kept: Originals,
 }
@@ -168,7 +168,7 @@ fn photos(
     Ok(Arc::new(dataset.caching(0)))
 }
 
-/// Where the colors go; a file of its own can be written to.
+/// Paths of the output files; the folder of a separate splat file is created.
 fn output(request: &ColorizeRequest, opened: &Opened) -> Result<Output, RunError> {
     let usual = match opened {
         Opened::Run(run) => run.folder.color(),

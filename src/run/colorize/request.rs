@@ -16,13 +16,13 @@ use crate::{
 pub struct ColorizeRequest {
     /// Run folder or gray splat file; the newest run by default.
     pub run: Option<PathBuf>,
-    /// Who colors the photos.
+    /// Teachers of the photos.
     pub teach: TeachOptions,
     /// The colored splat file; `color.ply` in the run folder by default.
     pub output: Option<PathBuf>,
     /// Last iteration, counted from the start of stage 1; the preset's by default.
     pub until: Option<usize>,
-    /// How chroma is solved for. Seed and iterations are those of the run, the degree follows
+    /// Settings of the chroma solver. Seed and iterations are those of the run, the degree follows
     /// from `sh_degree`, and view correction from `correct_views`.
     pub settings: ChromaSettings,
     /// Degree of the chroma harmonics.
@@ -39,10 +39,10 @@ pub struct ColorizeRequest {
     pub force: bool,
     /// The report tells where the device's time went.
     pub timings: bool,
-    /// How it can go on where it is interrupted, if not by Adam or without a run.
+    /// Checkpoint options; unused with Adam or without a run.
     #[serde(skip)]
     pub checkpoints: CheckpointOptions,
-    /// Who looks on, if not with Adam.
+    /// State for live viewers; not updated while Adam runs.
     #[serde(skip)]
     pub live: Option<Arc<Live>>,
 }

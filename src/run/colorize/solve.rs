@@ -105,7 +105,7 @@ impl Coloring<'_> {
         })
     }
 
-    /// What a coloring is asked for and given; `taught` is a hash of what the teachers want.
+    /// Options and inputs of a coloring, for its checkpoints; `taught` is the supervision's hash.
     ///
     /// # Errors
     /// [`StoreError::File`] of the gray Gaussians.

@@ -8,7 +8,7 @@ use crate::{
     tell::{Event, Stage},
 };
 
-/// How far a solver is, with its loss.
+/// Progress of a solver, with its loss.
 pub(super) fn of(stage: Stage, progress: &ChromaProgress) -> Event {
     let (done, total) = (progress.iteration, progress.total);
     let moved = match (stage, progress.moved) {
@@ -75,7 +75,7 @@ impl Coloring<'_> {
     }
 }
 
-/// What the views held back tell of the degree.
+/// Held-out loss of each SH degree, in words.
 fn describe(chosen: &ChosenDegree) -> String {
     let losses: Vec<String> = (0..)
         .zip(&chosen.losses)

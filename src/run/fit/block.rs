@@ -29,7 +29,7 @@ const OWN: [Effect; 2] = [Effect::Lens, Effect::LumaDegree];
 /// Standard deviations up to which a Gaussian shows anything to speak of.
 const REACH: f64 = 3.0;
 
-/// Where a block has no margin to speak of, Gaussians are bounded as if it had this one.
+/// Minimum overlap for the bound on Gaussians, for blocks with almost no margin.
 const LEAST_OVERLAP: f64 = 0.05;
 
 /// Heights above and below the scene's that still belong to it, as a share of its height.
@@ -51,7 +51,7 @@ pub struct BlockPlace {
 }
 
 impl BlockPlace {
-    /// That of a block's folder; none where it is no block's, or the coarse model's.
+    /// Reads the block of a folder; `None` if it is not a block's, or the coarse model's.
     ///
     /// # Errors
     /// [`StoreError::File`] where a file of the job is damaged.
@@ -86,8 +86,7 @@ impl BlockPlace {
         }))
     }
 
-    /// How bright the photos of all blocks show the scene; none where the coarse model is not
-    /// there.
+    /// Exposures of the photos of all blocks; `None` without a coarse model.
     pub(super) fn exposures(&self) -> Option<&[ViewExposure]> {
         let (_, report) = self.coarse.as_ref()?;
         Some(&report.luma.exposures)
@@ -99,12 +98,12 @@ impl BlockPlace {
         Some(report.capture.extent)
     }
 
-    /// What is planned of it.
+    /// Plan of the block.
     pub(super) fn plan(&self) -> &Block {
         &self.block
     }
 
-    /// SHA-256 of that.
+    /// SHA-256 of the plan.
     pub(super) fn plan_sha256(&self) -> &str {
         &self.plan
     }
@@ -127,9 +126,9 @@ impl BlockPlace {
         }
     }
 
-    /// What the training starts from: points where the block is, beyond them what the coarse
-    /// model has there, as far as the block's photos show it, and its surroundings; and how many
-    /// these are. None without a coarse model, which is told.
+    /// Initial Gaussians: points in and around the block, beyond them those of the coarse model
+    /// that the block's photos show, and its surroundings; and the number of the last. `None`
+    /// without a coarse model, with a warning.
     pub(super) fn start(
         &self,
         dataset: &Dataset,
@@ -179,8 +178,8 @@ impl BlockPlace {
         Ok(Some((start, surroundings)))
     }
 
-    /// How far a Gaussian at a place may reach: the margin, and farther where the border of the
-    /// block's own cell is far.
+    /// Largest reach of a Gaussian at a place, in world units: the margin, plus the distance to the
+    /// border of the block's own cell if it is inside.
     fn free(&self, place: [f32; 3], offset: DVec3) -> f64 {
         let at = self.at(place, offset);
         let to_border = [0, 1].map(|axis| {
@@ -190,19 +189,19 @@ impl BlockPlace {
         self.margin() + to_border[0].min(to_border[1]).max(0.0)
     }
 
-    /// Where a place stands on the ground.
+    /// Ground coordinates of a place.
     fn at(&self, place: [f32; 3], offset: DVec3) -> [f64; 2] {
         (self.job.ground).place(DVec3::from(place.map(f64::from)) + offset)
     }
 
-    /// How far the block trains beyond its own cell at least, in world units.
+    /// Least distance beyond its own cell that the block trains, in world units.
     fn margin(&self) -> f64 {
         let cell = self.block.core.within(&self.job.bounds);
         let sides = cell.0.map(|[least, most]| most - least);
         self.job.overlap.max(LEAST_OVERLAP) * sides[0].min(sides[1]).max(f64::MIN_POSITIVE)
     }
 
-    /// How far over the ground a place is from the block's own cell, in world units.
+    /// Distance of a place from the block's own cell over the ground, in world units.
     fn distance(&self, place: [f32; 3], offset: DVec3) -> f64 {
         let at = self.at(place, offset);
         let beyond = [0, 1].map(|axis| {
@@ -259,7 +258,7 @@ fn most_shown(dataset: &Dataset, splats: &Splats, some: Vec<usize>, room: usize)
     kept
 }
 
-/// Whether a camera shows anything of a ball of a standard deviation.
+/// Returns true if a camera shows any of a ball with a standard deviation of `deviation`.
 pub(super) fn shows(camera: &Camera, middle: DVec3, deviation: f64) -> bool {
     let at = camera.rotation * middle + camera.translation;
     let margin = REACH * deviation * camera.fx.max(camera.fy) / at.z;
@@ -297,9 +296,9 @@ fn job_of(folder: &Path) -> PathBuf {
 }
 
 impl FitRequest {
-    /// What trains a block of a job, or its coarse model, in its own folder; none where the
-    /// folder is neither. What the coarse model found out about photos, effects and exposures
-    /// holds for all blocks.
+    /// Request to train a block of a job, or its coarse model, in its own folder; `None` if the
+    /// folder is neither. Photos, effects and exposures found by the coarse model hold for all
+    /// blocks.
     ///
     /// # Errors
     /// [`StoreError::File`] where a file of the job is damaged.
@@ -373,7 +372,7 @@ impl FitRequest {
         })
     }
 
-    /// Whether photos, effects and exposures are those of a coarse model.
+    /// Returns true if photos, effects and exposures come from a coarse model.
     pub fn inherits(&self) -> bool {
         (self.block.as_ref()).is_some_and(|block| block.coarse.is_some())
     }

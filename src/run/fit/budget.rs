@@ -1,4 +1,4 @@
-//! How much work there is time for.
+//! Amount of work within a time limit.
 //!
 //! The presets are points of one family: from a sketch over `draft` (level 0) and `balanced`
 //! (1) to `paper` (2) iterations, Gaussians and pixels grow together, between two of these
@@ -18,7 +18,7 @@ use crate::{
     tell::{Event, Observer, Stage},
 };
 
-/// Where a family begins: the level of the sketch.
+/// Lowest level of a family: that of the sketch.
 const LOWEST: f64 = -0.5;
 
 /// Between two levels whose cost is measured.
@@ -96,8 +96,8 @@ pub(super) struct Budget {
 }
 
 impl Budget {
-    /// What the options ask for, where they leave it open on this device: all of a preset, or
-    /// as much as there is time for. `begun` is when the time began to run.
+    /// Budget of a request on this device: a whole preset, or as much as fits the time limit.
+    /// `begun` is the start of the time.
     ///
     /// # Errors
     /// [`RunError::Capture`], and [`GpuError::Lost`] while an iteration is timed.
@@ -148,7 +148,7 @@ impl Budget {
     }
 }
 
-/// What a run may do, and on what.
+/// Levels of work for a capture and a request.
 struct Family<'a> {
     /// The highest level, that of the preset asked for.
     pub highest: f64,
@@ -165,7 +165,7 @@ struct Family<'a> {
 }
 
 impl<'a> Family<'a> {
-    /// What there is for the capture and the options; `max_side` holds at every level.
+    /// Family for the capture and the options; `max_side` holds at every level.
     fn of(options: &'a FitRequest, max_side: Option<u32>) -> Result<Self, RunError> {
         let of_photos = LoadOptions {
             chosen: options.load.chosen.clone(),

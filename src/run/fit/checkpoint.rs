@@ -44,7 +44,7 @@ pub(super) fn found_in(
     Ok(None)
 }
 
-/// What a run is asked for and given.
+/// Options and inputs of a run, to compare with those of a checkpoint.
 ///
 /// # Errors
 /// [`StoreError::File`] of the Gaussians to start from.

@@ -6,9 +6,9 @@ use super::{BlockPlace, FitRequest, Init};
 use crate::{effects::Overrules, luma::LumaOverlay, run::RunError, store::RunFolder};
 
 impl FitRequest {
-    /// What goes on with a run that is finished, as it was asked for: the same photos, effects
-    /// and settings, from its Gaussians, with the rates that it ended with, for as many
-    /// iterations again; none where the folder is no run.
+    /// Request to continue a finished run: the same photos, effects and settings, from its
+    /// Gaussians, with its final learning rates, for as many iterations again; `None` if the folder
+    /// is not a run.
     ///
     /// # Errors
     /// [`StoreError::File`] where the run's report is damaged.

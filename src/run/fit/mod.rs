@@ -150,11 +150,11 @@ pub fn fit(
 /// The files of a gray scene.
 pub(super) struct GrayFiles<'a> {
     pub splats: &'a Splats,
-    /// Of the contact sheet.
+    /// Rows of the contact sheet.
     pub rows: &'a [Row],
     /// `log.csv`.
     pub log: &'a str,
-    /// Told of the file with the scene.
+    /// Report, completed with the scene's file.
     pub report: &'a mut Report,
 }
 

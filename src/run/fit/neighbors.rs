@@ -23,17 +23,17 @@ pub struct Neighbors {
     pub luma: PathBuf,
     /// SHA-256 of the file.
     pub sha256: String,
-    /// How many of its Gaussians, the last ones, are surroundings.
+    /// Number of surroundings, the last of its Gaussians.
     pub surroundings: usize,
 }
 
 impl FitRequest {
-    /// Of a block that goes on among its neighbors its photos without what they show beyond it,
-    /// for else its Gaussians would stand in for that and be wrong once blocks are put together;
-    /// and what the merged scene has in its cell and margin, to start from. Surroundings come
-    /// last. Of other trainings the photos as they are.
+    /// For a block trained among its neighbors, its photos minus the scene beyond it, which its
+    /// Gaussians would otherwise reproduce and be wrong after merging; and the merged scene's
+    /// Gaussians in its cell and margin, to start from, surroundings last. For other trainings, the
+    /// photos unchanged.
     ///
-    /// The merged scene is drawn for each photo, as far as the photo shows it.
+    /// The merged scene is rendered for each photo, as far as it is visible there.
     ///
     /// # Errors
     /// [`RunError`] of the splat files, of the device, and where `folder` cannot be written to.
@@ -89,17 +89,17 @@ impl FitRequest {
     }
 }
 
-/// What a scene has and a part of it has not.
+/// Difference of a scene and a part of it.
 struct Complement<'a> {
     raster: &'a Arc<Raster>,
     whole: &'a Splats,
     part: &'a Splats,
-    /// Of each view.
+    /// Exposure of each view.
     exposures: &'a [Exposure],
 }
 
 impl Complement<'_> {
-    /// What photos show of it.
+    /// Renders the difference for each view.
     fn layers(
         &self,
         dataset: &Dataset,

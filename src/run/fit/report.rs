@@ -68,7 +68,7 @@ impl Job<'_> {
     }
 }
 
-/// What a report says about exposures: nothing where they are alike.
+/// Exposures for the report; empty if the effect is off.
 fn exposures(dataset: &Dataset, plan: &Plan) -> Vec<ViewExposure> {
     let all = dataset.capture.views.iter().zip(&plan.exposures);
     all.filter(|_| plan.has(Effect::Exposure))

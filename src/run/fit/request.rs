@@ -24,7 +24,7 @@ pub enum Init {
         folder: RunFolder,
         /// Its iterations so far.
         iterations: usize,
-        /// How many of its Gaussians, the last ones, are surroundings.
+        /// Number of surroundings, the last of its Gaussians.
         surroundings: usize,
     },
 }
@@ -46,7 +46,7 @@ impl Init {
         }
     }
 
-    /// How many of them are surroundings.
+    /// Number of surroundings among them.
     fn surroundings(&self) -> usize {
         match self {
             Self::File(_) => 0,
@@ -68,27 +68,27 @@ pub struct FitRequest {
     /// Settings in the place of the preset's. Not the iterations together with a
     /// time limit or a target, nor what the plan of effects decides.
     pub settings: LumaOverlay,
-    /// How photos are loaded; the longer side is the preset's where it is `None`.
+    /// Options for loading photos; the longer side is the preset's if it is `None`.
     pub load: LoadOptions,
     /// Longer side at which held-out views are measured; that of training by default.
     pub measure_side: Option<u32>,
-    /// Effects that are on or off whatever the evidence.
+    /// Effects that are on or off regardless of the evidence.
     pub overrules: Overrules,
     /// Gaussians to start from.
     pub init: Option<Init>,
     /// The block of a larger scene that it is.
     pub block: Option<BlockPlace>,
-    /// What a trained block goes on among.
+    /// Neighbors of a block that continues its training.
     pub around: Option<Neighbors>,
-    /// What is to end the run; seconds are those of all of it. A PSNR is that of the held-out
-    /// views, or of some training views where none is held out.
+    /// Stopping goal; its seconds cover the whole run. A PSNR is that of the held-out views, or of
+    /// some training views if none is held out.
     pub goal: Goal,
     /// The report tells where the device's time went.
     pub timings: bool,
-    /// How it can go on where it is interrupted.
+    /// Checkpoints of the run.
     #[serde(skip)]
     pub checkpoints: CheckpointOptions,
-    /// Who looks on.
+    /// State for live viewers.
     #[serde(skip)]
     pub live: Option<Arc<Live>>,
 }
@@ -114,7 +114,7 @@ impl FitRequest {
         }
     }
 
-    /// How many of the Gaussians to start from, the last ones, are surroundings.
+    /// Number of surroundings, the last of the initial Gaussians.
     pub(super) fn surroundings(&self) -> usize {
         self.init.as_ref().map_or(0, Init::surroundings)
     }

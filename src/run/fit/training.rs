@@ -41,18 +41,18 @@ use crate::{
 /// take a good part of it.
 const TRIAL_FROM: f64 = 300.0;
 
-/// What a training needs.
+/// Input of a training.
 pub(super) struct Job<'a> {
     pub options: &'a FitRequest,
     pub gpu: &'a Gpu,
     pub raster: &'a Arc<Raster>,
     /// Photos at the size that is trained on.
     pub dataset: &'a Arc<Dataset>,
-    /// What they say.
+    /// Evidence from the photos.
     pub evidence: &'a Evidence,
     /// Their files.
     pub photos: &'a [PhotoReport],
-    /// What a block among its neighbors starts from.
+    /// Initial Gaussians of a block among its neighbors.
     pub among: Option<Splats>,
     /// Photos at the size that is measured at.
     pub judge: &'a Arc<Dataset>,
@@ -62,13 +62,13 @@ pub(super) struct Job<'a> {
     pub loading: f64,
 }
 
-/// What came of it.
+/// Result of a training.
 pub(super) struct Trained {
     pub scene: LumaScene,
     /// `train.csv`.
     pub log: String,
     pub held_out_views: Vec<LumaView>,
-    /// Of the contact sheet.
+    /// Rows of the contact sheet.
     pub rows: Vec<Row>,
     pub timings: Option<Vec<KernelReport>>,
     /// Seconds of measuring.

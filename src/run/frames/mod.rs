@@ -48,28 +48,28 @@ const OPEN: f64 = 0.005;
 /// photos the files are read again.
 const KEPT: usize = 1 << 28;
 
-/// What `frames` is asked to do.
+/// Options of `frames`.
 #[derive(Clone, Debug, Default)]
 pub struct FramesOptions {
     /// Run folder; the newest run by default.
     pub run: Option<PathBuf>,
     /// COLMAP folder, where it is not the one that `fit` noted.
     pub colmap: Option<PathBuf>,
-    /// Who colors what the scene does not cover; the run's teachers by default.
+    /// Teacher for what the scene does not cover; the run's by default.
     pub teacher: Option<PathBuf>,
-    /// How it is asked.
+    /// Settings of the teacher.
     pub teacher_settings: TeacherSettings,
     /// A folder for pictures, or a film by its extension.
     pub output: PathBuf,
     /// A folder of painted hints, for what the scene does not cover; the run's by default.
     pub hints: Option<PathBuf>,
-    /// Whether the scene is left out: the teacher's own pictures, to compare with.
+    /// True if the scene is left out, for comparison with the teacher's images alone.
     pub teacher_alone: bool,
     /// Frames a second of a film; by default those of the film that the photos come from, or 24.
     pub frame_rate: Option<[u32; 2]>,
 }
 
-/// What `frames` did.
+/// Result of `frames`.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Frames {
@@ -77,11 +77,11 @@ pub struct Frames {
     pub output: PathBuf,
     /// Photos in color.
     pub photos: usize,
-    /// How many of them have a pose.
+    /// Photos with a pose.
     pub placed: usize,
-    /// How many take their neighbors' colors.
+    /// Photos with colors carried from their neighbors.
     pub carried: usize,
-    /// How many show strokes on what the scene leaves open.
+    /// Photos with strokes on what the scene does not cover.
     pub painted: usize,
     /// Share of photos with a pose that the scene covers.
     pub covered: f64,

@@ -1,4 +1,4 @@
-//! Where colored photos go: a folder or a film.
+//! Output of colored photos: a folder or a film.
 
 use std::path::PathBuf;
 
@@ -14,7 +14,7 @@ use crate::{
     tell::Observer,
 };
 
-/// Where colored photos go.
+/// Output of colored photos.
 pub(super) enum FrameOutput {
     Folder(PathBuf),
     Film(Box<FilmWriter>),

@@ -17,7 +17,7 @@ const REACH: usize = 200;
 /// A share of a photo that is worth going on with.
 const LEAST: f64 = 0.002;
 
-/// What strokes claim of each photo.
+/// Strokes of each photo, its own or carried from a painted one.
 #[derive(Default)]
 pub(super) struct Painted(BTreeMap<usize, Strokes>);
 

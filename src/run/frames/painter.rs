@@ -1,4 +1,4 @@
-//! What the photos' colors are found with.
+//! Sources of a photo's colors.
 
 use super::shots::Shot;
 use crate::{
@@ -8,7 +8,7 @@ use crate::{
     run::{RunError, teach::Teachers},
 };
 
-/// What a photo's colors are found with.
+/// Sources of a photo's colors: scene, exposures and teachers.
 pub(super) struct Painter<'a> {
     pub drawer: SceneDrawer<'a>,
     pub exposures: Vec<Exposure>,
@@ -62,7 +62,7 @@ impl<'a> Painter<'a> {
         ((longer * scale).round() as u32).max(1)
     }
 
-    /// That of the first view.
+    /// Scale of the first view.
     fn usual_scale(&self) -> Option<f64> {
         let view = self.dataset.capture.views.first()?;
         let seen = ViewOf {
@@ -80,7 +80,7 @@ impl<'a> Painter<'a> {
         Ok(self.drawer.draw(&views, canvas)?)
     }
 
-    /// What the teachers say of a photo.
+    /// The teachers' colors of a photo, a and b of each pixel.
     pub fn answer(
         &mut self,
         name: &str,

@@ -19,7 +19,7 @@ pub(super) struct Shot {
     pub views: Range<usize>,
     /// The path of its picture in color below a folder.
     pub output: String,
-    /// How many frames of a film show it.
+    /// Number of the film's frames that show it.
     pub repeats: usize,
 }
 

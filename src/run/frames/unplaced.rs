@@ -52,7 +52,7 @@ pub(super) struct Unknown<'a> {
     pub original: Option<Original>,
 }
 
-/// What is known before and after photos without a pose.
+/// Known photos before and after some without a pose.
 pub(super) struct Bracket<'a> {
     pub before: Option<&'a Known>,
     pub after: Option<&'a Known>,
@@ -195,7 +195,7 @@ fn in_ranges(photos: &[usize], shots: &[Shot]) -> String {
     words.join(", ")
 }
 
-/// What is carried from both sides, each by its share.
+/// Weighted mean of the colors carried from both sides.
 fn joined(pixels: usize, sides: [(Option<WeightedColors>, f32); 2]) -> WeightedColors {
     let mut all = WeightedColors::nothing(pixels);
     let mut total = vec![0.0; pixels];

@@ -40,14 +40,14 @@ pub enum Views {
     All,
 }
 
-/// What `render` is asked to do.
+/// Options of `render`.
 #[derive(Clone, Debug)]
 pub struct RenderOptions {
     /// Run folder or splat file; the newest run by default.
     pub run: Option<PathBuf>,
     /// COLMAP folder, where it is not the one that `fit` noted.
     pub colmap: Option<PathBuf>,
-    /// Which views; those held out by default, or all where none is.
+    /// Views to render; held-out ones by default, or all if none is held out.
     pub views: Option<Views>,
     /// Draw the luma although the scene is colored.
     pub luma: bool,

@@ -30,10 +30,10 @@ const SIZE: [u32; 2] = [1280, 720];
 /// Vertical field of view where no camera says one, in degrees.
 const FIELD_OF_VIEW: f64 = 50.0;
 
-/// How long a path takes where nobody says, in seconds.
+/// Default duration of a path, in seconds.
 const SECONDS: f64 = 10.0;
 
-/// Where a path goes.
+/// Shape of a camera path.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum PathShape {
     /// Around what the cameras look at, or around a splat file's Gaussians.
@@ -44,16 +44,16 @@ pub enum PathShape {
     File(PathBuf),
 }
 
-/// What `render --path` is asked to do.
+/// Options of `render --path`.
 #[derive(Clone, Debug)]
 pub struct PathOptions {
     /// Run folder or splat file; the newest run by default.
     pub run: Option<PathBuf>,
     /// COLMAP folder, where it is not the one that `fit` noted.
     pub colmap: Option<PathBuf>,
-    /// Where the path goes.
+    /// Shape of the path.
     pub way: PathShape,
-    /// How long it takes, in seconds, above 0; 10 by default. A file says for itself.
+    /// Duration, in seconds, above 0; 10 by default. A file has its own.
     pub seconds: Option<f64>,
     /// Frames a second, as a fraction; the file's by default, or 24.
     pub rate: Option<[u32; 2]>,
@@ -67,11 +67,11 @@ pub struct PathOptions {
     pub output: Option<PathBuf>,
     /// Film to write, by FFmpeg.
     pub video: Option<PathBuf>,
-    /// Where the path itself is written.
+    /// File to write the path to.
     pub save_path: Option<PathBuf>,
 }
 
-/// What `render --path` did.
+/// Result of `render --path`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rendered {
     /// Pictures of the path.
@@ -230,7 +230,7 @@ fn beside(pictures: Vec<RgbImage>) -> RgbImage {
     all
 }
 
-/// Where pictures go.
+/// Outputs of the rendered images: a folder, a film or both.
 struct PathOutput {
     folder: Option<PathBuf>,
     film: Option<FilmWriter>,

@@ -34,7 +34,7 @@ pub(crate) struct Sound {
     source: PathBuf,
     /// When the shot begins, in seconds from the beginning of its film.
     start: f64,
-    /// How long it is, in seconds.
+    /// Duration, in seconds.
     seconds: f64,
     streams: Vec<Stream>,
 }
@@ -44,11 +44,11 @@ struct Stream {
     /// FFmpeg's number of it.
     index: u64,
     codec: String,
-    /// How it can be written, the best way first.
+    /// Codecs for writing it, the best first.
     ways: Vec<AudioCodec>,
 }
 
-/// How a stream is written.
+/// Codec and filters for writing a stream.
 struct AudioCodec {
     /// FFmpeg's name of the codec, or `copy`.
     codec: String,
@@ -59,8 +59,8 @@ struct AudioCodec {
 }
 
 impl Sound {
-    /// That of a film, for a container by FFmpeg's name of it; none where it has none. `tell`
-    /// hears what is missing.
+    /// Sound of a film, for a container by FFmpeg's name; `None` if it has none. `tell` receives a
+    /// message about anything missing.
     pub fn of(film: &Film, container: &str, tell: &mut dyn FnMut(String)) -> Option<Self> {
         if !film.audio {
             return None;
@@ -220,7 +220,7 @@ impl Sound {
     }
 }
 
-/// How a stream of so many channels can be written, the best way first; `together` is whether it
+/// Codecs for writing a stream with this many channels, the best first; `together` is true if it
 /// begins with the pictures.
 fn ways(codec: &str, channels: u64, together: bool, container: &str) -> Vec<AudioCodec> {
     let way = |codec: &str, filters: &str, lost: &str| AudioCodec {
