@@ -26,13 +26,13 @@ pub struct Film {
     pub source: PathBuf,
     /// When the first frame is shown in the film, in seconds.
     pub start: f64,
-    /// How long all frames take, in seconds.
+    /// Duration of all frames, in seconds.
     pub seconds: f64,
     /// Frames a second: numerator and denominator.
     ///
     /// Both positive.
     pub frame_rate: [u32; 2],
-    /// Whether the film has sound.
+    /// True if the film has sound.
     pub audio: bool,
     /// Width and height of a frame, in pixels.
     pub size: [u32; 2],

@@ -179,7 +179,7 @@ pub struct Observation {
 pub struct Rejected {
     /// The photo's name, or the points file's.
     pub name: String,
-    /// What is wrong with it.
+    /// Reason for which it was left out.
     pub reason: String,
 }
 

@@ -17,11 +17,11 @@ pub struct LoadOptions {
     ///
     /// `None` leaves them as they are.
     pub max_side: Option<u32>,
-    /// Whether every 8th view is held out.
+    /// True if every 8th view is held out.
     pub holdout: bool,
-    /// Whether lens distortion is removed; `auto`: if visible.
+    /// Removal of lens distortion; `auto`: if visible.
     pub lens: Choice,
-    /// What of color photos becomes gray.
+    /// Channel of color photos that becomes gray.
     pub channel: Channel,
     /// Encoding of the files; `auto`: floats linear, others sRGB.
     pub encoding: Encoding,
@@ -29,9 +29,9 @@ pub struct LoadOptions {
     pub normalize: Normalize,
     /// Source of masks: `beside` the photos, their `alpha`, `off`, or a folder.
     pub masks: MaskSource,
-    /// What becomes of masked pixels; `remove`: black.
+    /// Use of masked pixels; `remove`: black.
     pub masked: MaskUse,
-    /// Whether photos that contradict the model are used.
+    /// True if photos that contradict the model are used.
     #[serde(default)]
     pub force: bool,
     /// Photos left out because they contradict the model.

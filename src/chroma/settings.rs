@@ -27,7 +27,7 @@ impl SolverKind {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct ChromaSettings {
-    /// Who solves.
+    /// Solver.
     pub solver: SolverKind,
     /// Degree of the chroma harmonics, 0 to 3.
     ///
@@ -61,7 +61,7 @@ pub struct ChromaSettings {
     pub rest_share: f64,
     /// Seed of the order of Adam's views.
     pub seed: u64,
-    /// Whether views are corrected in saturation and tint.
+    /// True if views are corrected in saturation and tint.
     ///
     /// Least squares brings each view's teacher into line with the others.
     pub correct_views: bool,
@@ -87,11 +87,11 @@ pub struct ChromaSettings {
     ///
     /// Solving and baking bring views that do not fit one at a time.
     pub memory_limit: Option<u64>,
-    /// Whether colors are scaled to the teachers' strength.
+    /// True if colors are scaled to the teachers' strength.
     ///
     /// As far as these agree.
     pub match_saturation: bool,
-    /// Whether what no view shows well takes its neighbors' color.
+    /// True if Gaussians that no view shows well take their neighbors' color.
     ///
     /// After least squares.
     pub fill: bool,

@@ -79,7 +79,7 @@ pub struct TeacherInfo {
     ///
     /// Hexadecimal; `None` for a folder.
     pub sha256: Option<String>,
-    /// Where the network ran.
+    /// Device that the network ran on.
     ///
     /// `None` for a folder.
     pub device: Option<TeacherDevice>,
