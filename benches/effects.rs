@@ -1,4 +1,4 @@
-//! What each effect of image formation costs, against an iteration without it:
+//! Cost of each effect of image formation, against an iteration without it:
 //!
 //! ```sh
 //! cargo bench --bench effects
@@ -32,7 +32,7 @@ const VIEWS: usize = 4;
 const ITERATIONS: usize = 8;
 const TURNS: usize = 7;
 
-/// What is switched on.
+/// Effects that are switched on.
 #[derive(Clone, Copy, Default)]
 struct Effects {
     exposed: bool,
@@ -40,7 +40,7 @@ struct Effects {
     antialiased: bool,
     background: bool,
     robust: bool,
-    /// How often outliers are looked for in a turn; they are masked either way.
+    /// Searches for outliers in a turn; they are masked either way.
     searches: usize,
     sh_degree: u32,
 }
@@ -190,7 +190,7 @@ fn compare(gpu: &Gpu, name: &str, effects: Effects) -> Result<(), LumaError> {
     Ok(())
 }
 
-/// What a search for outliers takes, in iterations, for each photo.
+/// Cost of a search for outliers, in iterations, for each photo.
 fn search(gpu: &Gpu) -> Result<f64, LumaError> {
     let robust = |searches| Effects {
         robust: true,

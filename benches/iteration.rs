@@ -1,5 +1,4 @@
-//! What an iteration costs, kernel by kernel, against the number of Gaussians and
-//! of pixels:
+//! Time of an iteration, kernel by kernel, against the number of Gaussians and of pixels:
 //!
 //! ```sh
 //! cargo bench                                # 10⁴ and 10⁵ Gaussians, 320 to 1,280 pixels
@@ -39,7 +38,7 @@ const PATIENCE: f64 = 20.0;
 /// Gaussians, and pixels across.
 type Size = (usize, u32);
 
-/// What was measured of one size.
+/// Times of one size.
 struct Cost {
     splats: usize,
     width: u32,

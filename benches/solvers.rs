@@ -1,5 +1,5 @@
-//! How fast the two solvers of stage 2 get where: the plain loss against seconds and
-//! view passes, on a run that `fit` made.
+//! Convergence of the two solvers of stage 2: the plain loss against seconds and view passes, on a
+//! run that `fit` made.
 //!
 //! ```sh
 //! cargo bench --bench solvers -- RUN TEACHER [--csv F] [--iterations N] [--scales N]

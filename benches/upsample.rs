@@ -1,5 +1,5 @@
-//! What a small answer loses by being enlarged: true a/b of color photos, made 3.1 times
-//! smaller and enlarged again, evenly and along the photo's edges.
+//! Error of upsampling a small answer: true a/b of color photos, made 3.1 times smaller and
+//! enlarged again, evenly and along the photo's edges.
 //!
 //! ```text
 //! cargo bench --bench upsample -- FOLDER
@@ -16,7 +16,7 @@ use gs_chroma::{
 };
 use image::{RgbImage, imageops};
 
-/// How many times smaller an answer is: 256 pixels for a photo of 800.
+/// Ratio of the photo's size to an answer's: 256 pixels for a photo of 800.
 const SMALLER: f64 = 3.125;
 
 const WAYS: [(&str, Upsample); 2] = [

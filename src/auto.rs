@@ -25,27 +25,27 @@ use crate::{
     tell::{Event, Observer, Stage},
 };
 
-/// What each result was made from.
+/// File with the digest of each result's inputs.
 const KEPT: &str = "auto.json";
 
 /// Frames of the page's path.
 const PATH: usize = 60;
 
-/// What `auto` is asked to do.
+/// Options of `auto`.
 pub struct AutoOptions {
-    /// How the input is prepared; its output is not heeded.
+    /// Options of the preparation; its output is ignored.
     pub prepare: PrepareOptions,
     /// The folder for everything.
     pub output: PathBuf,
-    /// Who colors the photos.
+    /// Teacher of the colors: a file, a folder or a known name.
     pub teacher: PathBuf,
-    /// How a network is asked.
+    /// Options of a network.
     pub teacher_settings: TeacherSettings,
     /// A folder of painted hints.
     pub hints: Option<PathBuf>,
-    /// How long is trained; by the device by default.
+    /// Length of the training; by the device by default.
     pub preset: Option<Preset>,
-    /// What interrupts training and coloring so that they can go on.
+    /// Interrupt flag of training and coloring, after which they can continue.
     pub interrupt: Arc<Interrupt>,
 }
 
@@ -90,13 +90,13 @@ impl Step {
     }
 }
 
-/// What is told while it goes on.
+/// Event of a run of `auto`.
 pub enum AutoEvent {
     /// A step begins, and goes through these stages.
     Begins(Step, Vec<Stage>),
-    /// A step's result is there.
+    /// A step's result exists already.
     Skips(Step),
-    /// Of the present step.
+    /// Event of the present step.
     Event(Event),
 }
 
@@ -109,14 +109,14 @@ const PICTURES: &str = "colored";
 /// The scene for viewers.
 const SCENE: &str = "scene.ply";
 
-/// What lies where.
+/// Paths of the results.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct Results {
     /// The photos in color: a film, or a folder.
     pub colored: PathBuf,
     /// The scene for viewers.
     pub scene: PathBuf,
-    /// What was measured, to be opened in a browser.
+    /// Page of the evaluation, to be opened in a browser.
     pub page: PathBuf,
     /// Photos beside gray scene, teacher and colored scene.
     pub contact_sheet: PathBuf,
@@ -126,7 +126,7 @@ pub struct Results {
     pub run: PathBuf,
 }
 
-/// What stopped it.
+/// Error of `auto`.
 #[derive(Debug, thiserror::Error)]
 pub enum AutoError {
     /// Frames or poses.
@@ -281,7 +281,7 @@ fn check(options: &AutoOptions) -> Result<(), AutoError> {
     Ok(())
 }
 
-/// Where results of photos and poses in `house` go.
+/// Paths of the results of photos and poses in `house`.
 fn results(options: &AutoOptions, house: &Path, run: &RunFolder) -> Result<Results, AutoError> {
     let film = Film::read(house).map_err(RunError::from)?;
     Ok(Results {
@@ -349,7 +349,7 @@ fn checkpoints(options: &AutoOptions) -> CheckpointOptions {
     }
 }
 
-/// Of the masks beside the photos, where there are some.
+/// Digest of the masks beside the photos; empty without any.
 fn masks(house: &Path) -> Result<String, PrepareError> {
     let masks = house.join("masks");
     match masks.is_dir() {
@@ -358,7 +358,7 @@ fn masks(house: &Path) -> Result<String, PrepareError> {
     }
 }
 
-/// Of a teacher's file or folder; a name stands for what the catalog says.
+/// Digest of a teacher's file or folder; empty for a known name.
 fn teacher_digest(teacher: &Path) -> Result<String, PrepareError> {
     match teacher.exists() {
         true => digest(teacher),
@@ -366,7 +366,7 @@ fn teacher_digest(teacher: &Path) -> Result<String, PrepareError> {
     }
 }
 
-/// What results were made from, by step; of a step that has only begun with `begun` behind.
+/// Digests of the inputs by step; a step that has only begun has `begun` behind its name.
 struct StepRecords {
     path: PathBuf,
     made: BTreeMap<String, String>,
@@ -384,7 +384,7 @@ impl StepRecords {
         })
     }
 
-    /// Whether a step has to be done: nothing of it is there, or it was made from something else.
+    /// Returns true if a step is due: its results are missing, or had other inputs.
     fn due(&self, step: Step, from: &str, results: &[&Path]) -> bool {
         let same = self
             .made
@@ -393,7 +393,7 @@ impl StepRecords {
         !(same && results.iter().all(|result| result.exists()))
     }
 
-    /// Whether a step was begun from the same and not ended.
+    /// Returns true if a step was begun from the same inputs and not ended.
     fn begun(&self, step: Step, from: &str) -> bool {
         let begun = self.made.get(&begun(step));
         begun.is_some_and(|begun| begun == from)

@@ -16,7 +16,7 @@ use ureq::{
     tls::{RootCerts, TlsConfig},
 };
 
-/// How often a transfer that breaks off is taken up again without bringing much.
+/// Retries in a row of a transfer that breaks off without much progress.
 const TRIES: usize = 3;
 
 /// Bytes of a file whose length the table does not name.
@@ -38,7 +38,7 @@ const BLOCK: usize = 1 << 16;
 /// A file to be fetched.
 #[derive(Clone, Debug)]
 pub(crate) struct DownloadSource<'a> {
-    /// Where it lies; `https` only.
+    /// URL of the file; `https` only.
     pub url: &'a str,
     /// Its SHA-256 in lower-case hexadecimal.
     pub sha256: &'a str,
@@ -46,11 +46,11 @@ pub(crate) struct DownloadSource<'a> {
     pub bytes: Option<u64>,
     /// Hosts that `url` and its redirects may name; `.example.org` stands for all below it.
     pub hosts: &'a [String],
-    /// How long a host may keep silent.
+    /// Time limit of a host's silence.
     pub patience: Duration,
 }
 
-/// Why a file was not fetched.
+/// Error of a download.
 #[derive(Debug, thiserror::Error)]
 pub enum DownloadError {
     /// The connection failed or broke off, again and again.
@@ -58,43 +58,43 @@ pub enum DownloadError {
     Broken {
         /// Name of the host.
         host: String,
-        /// What the network said.
+        /// The network's error.
         reason: String,
         /// Bytes that are there and will not be asked for again.
         done: u64,
     },
-    /// The host has another answer than the file.
+    /// The host answers with an error status.
     #[error("{url}: the host answers with status {status}")]
     Status {
-        /// What was asked for.
+        /// URL of the request.
         url: String,
         /// The status of HTTP.
         status: u16,
     },
-    /// A URL or a redirect leads where nothing may be fetched.
+    /// A URL or a redirect leads to a host that is not allowed.
     #[error("{url}: leads to {to}, which is not among the hosts that the table names")]
     Host {
-        /// What was asked for.
+        /// URL of the request.
         url: String,
-        /// Where it leads.
+        /// Target of the redirect.
         to: String,
     },
     /// The file is longer or shorter than it should be.
     #[error("{url}: has {found} bytes instead of {expected}; the file there is another one now")]
     Length {
-        /// What was asked for.
+        /// URL of the request.
         url: String,
         /// Bytes there.
         found: u64,
         /// Bytes expected.
         expected: u64,
     },
-    /// The bytes are not those that were asked for.
+    /// The bytes have an unexpected SHA-256.
     #[error("{url}: has SHA-256 {found} instead of {expected}; it was not kept")]
     Hash {
-        /// What was asked for.
+        /// URL of the request.
         url: String,
-        /// SHA-256 of what came.
+        /// SHA-256 of the bytes received.
         found: String,
         /// SHA-256 expected.
         expected: String,
@@ -118,7 +118,7 @@ pub enum DownloadError {
     },
 }
 
-/// What will not have to be fetched again, in words.
+/// Note on the bytes kept for the next try.
 fn kept(done: u64) -> String {
     match done {
         0 => String::new(),

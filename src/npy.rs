@@ -5,7 +5,7 @@
 //!
 //! Format: <https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html>.
 
-/// What every file of version 1.0 begins with.
+/// Magic bytes of version 1.0.
 const MAGIC: &[u8] = b"\x93NUMPY\x01\x00";
 
 /// Values begin at a multiple of so many bytes.

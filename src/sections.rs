@@ -7,7 +7,7 @@ use std::{
 
 use sha2::{Digest, Sha256};
 
-/// What the file begins with.
+/// Magic bytes of the file.
 const MAGIC: &[u8] = b"gs-chroma sections\n";
 
 /// Bytes of the SHA-256.
@@ -36,7 +36,7 @@ pub(crate) fn write(to: &mut dyn Write, sections: &[(&str, &[u8])]) -> io::Resul
     Ok(size + SUM as u64)
 }
 
-/// What [`write`] wrote; `None` of what is damaged or something else.
+/// Sections that [`write`] wrote; `None` if the bytes are damaged or something else.
 pub(crate) fn read(bytes: &[u8]) -> Option<BTreeMap<String, Vec<u8>>> {
     let (body, sum) = bytes.split_at_checked(bytes.len().checked_sub(SUM)?)?;
     if Sha256::digest(body)[..] != *sum {
@@ -51,7 +51,7 @@ pub(crate) fn read(bytes: &[u8]) -> Option<BTreeMap<String, Vec<u8>>> {
     Some(sections)
 }
 
-/// What is preceded by its length.
+/// Bytes preceded by their length.
 fn take<'a>(rest: &mut &'a [u8]) -> Option<&'a [u8]> {
     let (length, behind) = rest.split_at_checked(8)?;
     let length = u64::from_le_bytes(length.try_into().ok()?);

@@ -1,4 +1,4 @@
-//! How far picture and gradient are from the oracle's, which leaves nothing out.
+//! Errors of picture and gradient against the oracle's, which leaves nothing out.
 
 use std::sync::Arc;
 
@@ -42,7 +42,7 @@ pub struct Error {
 /// The gradient's groups, each `[asked, …]`.
 type Groups = Vec<Vec<f64>>;
 
-/// What a group has of each Gaussian.
+/// Values of a group for some of the Gaussians.
 fn asked_of(group: &[f64], count: usize, asked: &[usize]) -> Vec<f64> {
     let each = group.len() / count;
     (asked.iter())

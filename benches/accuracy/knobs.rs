@@ -9,7 +9,7 @@ pub struct Knob {
     pub value: &'static str,
 }
 
-/// How the oracle tells what the knobs leave out: a Gaussian that shows less than this
+/// Settings of the oracle against which cut-offs are measured: a Gaussian that shows less than this
 /// does not change the eighth digit, even if there are thousands.
 pub const NOTHING_LEFT_OUT: oracle::numerics::Numerics = oracle::numerics::Numerics {
     alpha_min: 1e-12,
@@ -26,8 +26,8 @@ const fn knob(key: &'static str, value: &'static str) -> Knob {
 const TOGETHER: &str =
     "alpha-min=0.008,transmittance-min=0.001,depth-bits=16,storage=half,ssim-window=7,adam=lazy";
 
-/// What is measured, the default first. The second is the default but for rounding: what
-/// differs from the default no more than it does is no effect of a knob.
+/// Knobs measured, the default first. The second is the default but for rounding: a difference from
+/// the default no larger than its own is no effect of a knob.
 pub const KNOBS: [Knob; 17] = [
     knob("default", ""),
     knob("alpha-min", "0.003922"),
@@ -49,7 +49,7 @@ pub const KNOBS: [Knob; 17] = [
 ];
 
 impl Knob {
-    /// What it sets.
+    /// Numerics with this value.
     ///
     /// # Panics
     /// Never for [`KNOBS`].

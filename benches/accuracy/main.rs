@@ -1,5 +1,5 @@
-//! What numerical accuracy costs in time: each knob of `fit --numerics` at several
-//! values, its error beside the time of an iteration.
+//! Cost of numerical accuracy in time: each knob of `fit --numerics` at several values, its error
+//! beside the time of an iteration.
 //!
 //! ```sh
 //! cargo bench --bench accuracy                                 # random Gaussians, bundled scene
@@ -33,7 +33,7 @@ use table::Row;
 
 type Fallible<T> = Result<T, Box<dyn std::error::Error>>;
 
-/// What was asked for.
+/// Options of the command line.
 #[derive(Default)]
 struct Options {
     run: Option<PathBuf>,

@@ -1,4 +1,4 @@
-//! What is measured on: random Gaussians, or those of a run with its photos.
+//! Subjects of the measurement: random Gaussians, or those of a run with its photos.
 
 use glam::DMat3;
 use gs_chroma::{
@@ -24,13 +24,13 @@ use crate::{
 
 /// Gaussians before cameras, twice: small for the oracle, larger for the clock.
 pub struct Subject {
-    /// What it is called in the table.
+    /// Name in the table.
     pub name: String,
     /// World units.
     pub extent: f64,
     /// Gaussians that the oracle draws.
     pub small: Splats,
-    /// From where, and the photo there.
+    /// Camera and photo of the oracle's picture.
     pub view: TrainingView,
     /// Gaussians that are timed.
     pub large: Splats,

@@ -1,4 +1,4 @@
-//! What was measured as Markdown and as CSV.
+//! Results as Markdown and as CSV.
 
 use std::fmt::Write;
 
@@ -6,10 +6,10 @@ use serde::Serialize;
 
 use crate::{error::Error, knobs::Knob, time::Time, training::Fit};
 
-/// What was measured of one value of one knob.
+/// Results of one value of one knob.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
-    /// What on.
+    /// Name of the subject.
     pub subject: String,
     /// The knob.
     pub knob: &'static str,
@@ -19,7 +19,7 @@ pub struct Row {
     pub error: Error,
     /// Against the default.
     pub time: Time,
-    /// How far from the default's parameters training ends.
+    /// Distance of the trained parameters from the default's.
     pub drift: Option<f64>,
     /// Whole trainings.
     pub fit: Option<Fit>,

@@ -1,4 +1,4 @@
-//! How long an iteration takes with each knob, as a ratio to the default's.
+//! Time of an iteration with each knob, as a ratio to the default's.
 
 use std::{array, collections::BTreeMap, sync::Arc, time::Instant};
 
@@ -44,13 +44,13 @@ const STAGES: [(&str, &[&str]); 5] = [
 /// The times of one value of one knob; the default's are 1.
 #[derive(Clone, Debug, Serialize)]
 pub struct Time {
-    /// Of an iteration, the median over the rounds.
+    /// Time of an iteration over the default's, the median over the rounds.
     pub ratio: f64,
     /// The rounds' quartiles.
     pub quartiles: [f64; 2],
     /// Milliseconds of an iteration: the default's median times the ratio.
     pub milliseconds: f64,
-    /// Of each stage, the median over the rounds.
+    /// Time of each stage over the default's, the median over the rounds.
     pub stages: BTreeMap<&'static str, f64>,
 }
 
@@ -74,9 +74,9 @@ fn trainer(raster: &Arc<Raster>, subject: &Subject, numerics: Numerics) -> Falli
     Ok(trainer)
 }
 
-/// What every round gives of each knob, over what the default gives right before and
-/// right after it, `[rounds, knobs]`: what else the machine does changes slowly. The order
-/// changes as well, for whoever follows may find the caches cold.
+/// Ratios of each knob's times to the default's right before and right after it, `[rounds, knobs]`:
+/// the machine's other load changes slowly. The order changes as well, for the next one may find
+/// the caches cold.
 fn rounds<const N: usize>(
     count: usize,
     mut turn: impl FnMut(usize) -> Result<[f64; N], LumaError>,

@@ -1,4 +1,4 @@
-//! What a training makes of each knob: where the parameters end, and held-out PSNR.
+//! Result of a training with each knob: the distance of its parameters, and held-out PSNR.
 
 use std::{
     path::{Path, PathBuf},
@@ -53,8 +53,8 @@ fn groups(splats: &Splats) -> Vec<Vec<f64>> {
     ]
 }
 
-/// How far from the default's parameters each knob's are after some iterations of the
-/// same set of Gaussians, over how far the default's have moved.
+/// Distance of each knob's parameters from the default's after some iterations of the same set of
+/// Gaussians, relative to the distance that the default's have moved.
 pub fn drifts(gpu: &Gpu, subject: &Subject) -> Fallible<Vec<f64>> {
     let raster = Arc::new(Raster::new(gpu));
     let train = |numerics: Numerics| -> Fallible<Vec<Vec<f64>>> {

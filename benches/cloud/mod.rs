@@ -1,4 +1,4 @@
-//! What several benchmarks share.
+//! Scene, camera and median that several benchmarks share.
 
 use gs_chroma::{capture::Camera, luma::frontal_camera};
 

@@ -87,14 +87,14 @@ impl Auto {
     }
 }
 
-/// Which step of how many.
+/// Heading of a step, with its number and the count of steps.
 fn heading(step: Step, more: &str) -> String {
     let place = Step::ALL.iter().position(|&other| other == step);
     let (place, of) = (place.unwrap_or_default() + 1, Step::ALL.len());
     format!("step {place} of {of}, {}{more}", step.command())
 }
 
-/// What lies where.
+/// Paths of the results, a line each.
 fn in_words(results: &Results) -> String {
     let lines: [(&Path, &str); 6] = [
         (&results.colored, "the photos in color"),

@@ -21,10 +21,10 @@ const BAR: usize = 12;
 /// shake the time that is left, short enough to follow a training whose Gaussians grow.
 const MEMORY: f64 = 15.0;
 
-/// How often a line is drawn anew where nothing is heard.
+/// Redraw interval where no progress is reported.
 const TICK: Duration = Duration::from_millis(250);
 
-/// A line on standard error that shows how far something is; none where that is no terminal.
+/// Progress line on standard error; hidden where that is no terminal.
 pub(super) struct Bar {
     shown: ProgressBar,
     state: Arc<Mutex<BarText>>,
@@ -85,7 +85,7 @@ fn locked(state: &Mutex<BarText>) -> MutexGuard<'_, BarText> {
     state.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// What a bar says.
+/// Text of a progress bar.
 struct BarText {
     name: String,
     place: String,
@@ -167,7 +167,7 @@ impl BarText {
     }
 }
 
-/// What a step that takes so many seconds amounts to.
+/// Steps per second, or seconds per step where a step takes longer than one.
 fn rate(each: f64) -> String {
     match each <= 1.0 {
         true => format!("{:.1}/s", 1.0 / each),

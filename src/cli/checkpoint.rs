@@ -9,7 +9,7 @@ use super::{
 };
 use crate::store::{CheckpointOptions, EVERY};
 
-/// How a command can go on.
+/// Options of checkpoints.
 #[derive(Args)]
 pub struct CheckpointArguments {
     /// Continue from the checkpoint in the run folder; without one, start anew.
@@ -34,7 +34,7 @@ fn minutes(text: &str) -> Result<Minutes, String> {
 }
 
 impl CheckpointArguments {
-    /// What was said of them; the next signal interrupts the work.
+    /// The checkpoint options; the next signal interrupts the work.
     pub(super) fn options(&self) -> CheckpointOptions {
         CheckpointOptions {
             resume: self.resume,

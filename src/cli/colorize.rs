@@ -22,13 +22,13 @@ use crate::chroma::{
 use crate::report::timings_table;
 use crate::run::{ColorizeRequest, TeachOptions, colorize};
 
-/// How a teacher's small picture becomes as large as the photo.
+/// Methods of upsampling a teacher's output to the photo's size.
 const UPSAMPLE: &[(Upsample, &str)] = &[
     (Upsample::Guided, "Along the photo's edges"),
     (Upsample::Bilinear, "Bilinearly: colors spill over edges"),
 ];
 
-/// How chroma is solved for.
+/// Solvers of chroma.
 const SOLVERS: &[(SolverKind, &str)] = &[
     (
         SolverKind::Irls,

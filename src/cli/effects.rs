@@ -19,7 +19,7 @@ const EFFECTS: &[(Effect, &str)] = &[
     (Effect::LumaDegree, "Luma that changes with the view (SH)"),
 ];
 
-/// What the user wants regardless of evidence.
+/// Overrides of the plan's decisions.
 #[derive(Args, Clone)]
 pub struct EffectArguments {
     /// Simulate an effect, whatever the plan decides; repeatable.

@@ -1,4 +1,4 @@
-//! What can stop the program.
+//! Errors of the command line.
 
 use std::path::PathBuf;
 
@@ -8,7 +8,7 @@ use crate::{
     store::StoreError, tradeoff::TradeoffError, view::ViewerError,
 };
 
-/// What stopped a command; one line that names the file and the remedy.
+/// Error of a command; one line that names the file and the remedy.
 #[derive(Debug, thiserror::Error)]
 pub enum CliError {
     /// A run.
@@ -32,12 +32,12 @@ pub enum CliError {
     /// A network was not fetched.
     #[error("{}", remedy::of_download(error, by_hand.as_ref()))]
     Fetch {
-        /// What happened.
+        /// Error of the download.
         error: DownloadError,
         /// The URL to fetch by hand, and where to put the file.
         by_hand: Option<(String, PathBuf)>,
     },
-    /// Nobody can say whether a network is to be fetched.
+    /// A network needs consent to its license, and standard input is no terminal.
     #[error(
         "{name} is given away under {license}: say --yes to fetch it where nobody can be asked"
     )]

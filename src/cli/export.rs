@@ -142,7 +142,7 @@ impl Export {
     }
 }
 
-/// What each viewer shows, and would have shown.
+/// PSNR in each viewer, with and without cameras fitted to it.
 fn line_of(shown: &[ViewerCameras]) -> String {
     let each = |of: fn(&ViewerCameras) -> f64| {
         let each = (shown.iter()).map(|s| format!("{} {:.1} dB", s.viewer, of(s)));
@@ -155,7 +155,7 @@ fn line_of(shown: &[ViewerCameras]) -> String {
     )
 }
 
-/// What the format takes and costs.
+/// Bytes per Gaussian and loss of the format.
 fn cost(wrote: &Exported) -> String {
     let bytes = wrote.bytes as f64 / wrote.splats.max(1) as f64;
     let loss = &wrote.loss;

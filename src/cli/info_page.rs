@@ -1,4 +1,4 @@
-//! What `info` found, as a page to read.
+//! Findings of `info`, as a page to read.
 
 use std::{fmt::Write, fs, path::Path};
 
@@ -44,7 +44,7 @@ fn wrapped(line: &str, columns: usize) -> Vec<String> {
     lines
 }
 
-/// What a run says of itself.
+/// Page of a run, from its report.
 pub(super) fn of_run(path: &Path, report: &Report) -> String {
     let mut page = Page::default();
     page.about("Run", [path.display().to_string()]);
@@ -183,7 +183,7 @@ fn of_colors(page: &mut Page, report: &Report) {
     page.about("Colors", teachers.chain(lines));
 }
 
-/// What a COLMAP folder or a splat file holds, from what `info --json` prints of it.
+/// Page of a COLMAP folder or a splat file, from what `info --json` prints of it.
 pub(super) fn of_found(path: &Path, found: &Value) -> String {
     let number = |key: &str| found[key].as_u64().unwrap_or(0) as usize;
     let triple = |key: &str| {
@@ -310,7 +310,7 @@ fn duration(seconds: f64) -> String {
     }
 }
 
-/// What a stage took at most, as far as the system told.
+/// Peak memory of a stage, as far as the system reports it.
 fn memory(host: Option<u64>, device: Option<u64>) -> String {
     let host = host.map(|most| format!("{} of memory", bytes(most)));
     let device = device.map(|most| format!("{} on the device", bytes(most)));

@@ -20,10 +20,10 @@ const TERMINATED: i32 = 143;
 /// True if the signal was SIGTERM.
 static TOLD_TO_END: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
 
-/// What a signal interrupts, where it does not end the program.
+/// Interrupt flag that a signal raises, where it does not end the program.
 static HEEDED: OnceLock<Arc<Interrupt>> = OnceLock::new();
 
-/// Whether a signal is how the command is meant to end.
+/// True if a signal is the normal end of the command.
 static ENDS_WELL: AtomicBool = AtomicBool::new(false);
 
 /// Lets signals end the program without leaving files behind that were only begun.
@@ -58,12 +58,12 @@ pub(super) fn heed_signals() -> Result<(), CliError> {
     Ok(())
 }
 
-/// What the first signal interrupts from now on, where that can be kept.
+/// Interrupt flag that the first signal raises from now on, where the work can be saved.
 pub(super) fn interrupt() -> Arc<Interrupt> {
     HEEDED.get_or_init(Arc::default).clone()
 }
 
-/// From now on nothing is left to be done but to be ended by a signal.
+/// From now on a signal is the normal end of the command.
 pub(super) fn ends_well() {
     ENDS_WELL.store(true, Ordering::SeqCst);
 }

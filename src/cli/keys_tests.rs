@@ -152,7 +152,7 @@ fn join(path: &str, name: &str) -> String {
     format!("{path}.{name}").trim_start_matches('.').to_owned()
 }
 
-/// What a value, or an item of a list, can be.
+/// Alternatives of a value, or of an item of a list.
 fn alternatives(schema: &Value) -> Vec<&Value> {
     let below = ["anyOf", "oneOf"].map(|key| schema[key].as_array());
     match (below, schema.get("items")) {

@@ -8,7 +8,7 @@ use super::{
 };
 use crate::luma::{FLAT, LumaOverlay, Numerics};
 
-/// What is asked for instead of the preset's settings.
+/// Overrides of the preset's settings.
 #[derive(Args)]
 pub(super) struct LumaArguments {
     /// Number of iterations; turns early stopping off [default: the preset's].
@@ -46,7 +46,7 @@ pub(super) struct LumaArguments {
 }
 
 impl LumaArguments {
-    /// What changes the preset's settings.
+    /// Changes to the preset's settings.
     pub(super) fn overlay(&self) -> LumaOverlay {
         LumaOverlay {
             iterations: self.iterations.map(|count| count as usize),

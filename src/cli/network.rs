@@ -1,4 +1,4 @@
-//! How a network is to be asked, wherever a command takes one.
+//! Options of a network, wherever a command takes one.
 
 use clap::Args;
 
@@ -17,7 +17,7 @@ const DEVICES: &[(TeacherDevice, &str)] = &[
     (TeacherDevice::CoreMl, "Apple devices"),
 ];
 
-/// How a network is to be asked.
+/// Options of a network.
 #[derive(Args, Clone)]
 pub struct NetworkArguments {
     /// Input and output conventions of the network [default: detected].
@@ -36,7 +36,7 @@ pub struct NetworkArguments {
 }
 
 impl NetworkArguments {
-    /// What was said of it, and defaults for the rest.
+    /// Settings by the options, and defaults for the rest.
     pub(super) fn settings(self) -> TeacherSettings {
         TeacherSettings {
             profile: self.teacher_profile,

@@ -1,4 +1,4 @@
-//! What to type after a command.
+//! Suggestions of the next command.
 
 use std::{env, path::Path};
 

@@ -35,7 +35,7 @@ const MASK_USES: &[(MaskUse, &str)] = &[
     ),
 ];
 
-/// How photos are loaded.
+/// Options of loading photos.
 #[derive(Args, Clone)]
 pub(super) struct Photos {
     /// Shrink photos to this longer side, in pixels [default: the preset's].

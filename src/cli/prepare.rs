@@ -32,7 +32,7 @@ const MATCHINGS: &[(Matching, &str)] = &[
     (Matching::Exhaustive, "Each with each; slow for many photos"),
 ];
 
-/// What is prepared, and how.
+/// Input of `prepare` and its options.
 #[derive(Args)]
 pub struct InputArguments {
     /// A film, or a folder of photos.
@@ -75,7 +75,7 @@ pub struct InputArguments {
 }
 
 impl InputArguments {
-    /// What was said of it, for an output folder; ends the program where it makes no sense.
+    /// Options for an output folder; ends the program where they contradict each other.
     pub(super) fn options(self, output: PathBuf, force: bool) -> PrepareOptions {
         if let (Some(start), Some(end)) = (self.start, self.end)
             && end <= start
@@ -140,7 +140,7 @@ impl Prepare {
     }
 }
 
-/// What there is now, and what comes next.
+/// Summary of the result, in one line.
 fn in_words(prepared: &Prepared) -> String {
     let Prepared {
         photos,

@@ -17,8 +17,8 @@ pub(super) fn line(text: &str) -> String {
     printable(&text.replace('\n', "\\n"))
 }
 
-/// Whether a terminal does something else with it than show it: control characters, and those
-/// that turn the direction of writing (Unicode standard annex 9).
+/// Returns true if a terminal acts on the character instead of showing it: control characters, and
+/// those that change the direction of writing (Unicode standard annex 9).
 fn acts(c: char) -> bool {
     c.is_control() || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }

@@ -1,4 +1,4 @@
-//! What a command says while it runs, on standard error, and at its end.
+//! Progress of a command on standard error, and its closing lines.
 
 use std::{
     path::Path,
@@ -30,7 +30,7 @@ pub(super) struct Progress {
     stages: Vec<Stage>,
     /// The present one, when it began, and its bar.
     present: Option<(Stage, Instant, Bar)>,
-    /// What each took.
+    /// Time spent in each stage.
     spent: Vec<(Stage, Duration)>,
     /// All warnings so far.
     pub warnings: Vec<String>,

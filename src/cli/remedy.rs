@@ -1,4 +1,4 @@
-//! What the program can do about an error: the library knows none of its options.
+//! Remedies for errors: the library knows none of the program's options.
 
 use std::path::PathBuf;
 
@@ -19,7 +19,7 @@ use crate::{
     view::ViewerError,
 };
 
-/// What the user reads of an error of a run.
+/// Message of an error of a run.
 pub(super) fn of_run(error: &RunError) -> String {
     match error {
         RunError::Store(error) => of_store(error),
@@ -61,7 +61,7 @@ pub(super) fn of_run(error: &RunError) -> String {
     }
 }
 
-/// What the user reads of a scene and photos that cannot be worked on.
+/// Message of an error of a scene and its photos.
 fn of_subject(error: &SubjectError) -> String {
     match error {
         SubjectError::Store(error) => of_store(error),
@@ -79,7 +79,7 @@ fn of_subject(error: &SubjectError) -> String {
     }
 }
 
-/// What the user reads of a file or folder that is wrong.
+/// Message of an error of a file or folder.
 pub(super) fn of_store(error: &StoreError) -> String {
     match error {
         StoreError::Program(program) => of_program(program),
@@ -107,7 +107,7 @@ fn of_program(program: &ProgramError) -> String {
     }
 }
 
-/// What the user reads of an error of a sweep.
+/// Message of an error of a sweep.
 pub(super) fn of_sweep(error: &TradeoffError) -> String {
     match error {
         TradeoffError::Run(error) => of_run(error),
@@ -116,7 +116,7 @@ pub(super) fn of_sweep(error: &TradeoffError) -> String {
     }
 }
 
-/// What the user reads of what keeps a scene from being shown.
+/// Message of an error of the viewer's page.
 pub(super) fn of_viewer(error: &ViewerError) -> String {
     match error {
         ViewerError::Run(error) => of_run(error),
@@ -126,7 +126,7 @@ pub(super) fn of_viewer(error: &ViewerError) -> String {
     }
 }
 
-/// What the user reads of what keeps a film or photos from being prepared.
+/// Message of an error of `prepare`.
 pub(super) fn of_preparing(error: &PrepareError) -> String {
     match error {
         PrepareError::Capture(error) => of_capture(error),
@@ -145,7 +145,7 @@ pub(super) fn of_preparing(error: &PrepareError) -> String {
     }
 }
 
-/// What the user reads of an error of a step of the whole.
+/// Message of an error of a step of `auto`.
 pub(super) fn of_auto(error: &AutoError) -> String {
     match error {
         AutoError::Prepare(PrepareError::OtherInput { folder, input }) => format!(
@@ -164,7 +164,7 @@ pub(super) fn of_auto(error: &AutoError) -> String {
     }
 }
 
-/// What the user reads of a network that was not fetched.
+/// Message of an error of fetching a network.
 pub(super) fn of_download(error: &DownloadError, by_hand: Option<&(String, PathBuf)>) -> String {
     match by_hand {
         Some((url, path)) => format!(

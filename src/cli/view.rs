@@ -58,7 +58,7 @@ impl View {
     }
 }
 
-/// What shows a scene while it is made.
+/// Options of the live view.
 #[derive(Args)]
 pub(super) struct ViewArguments {
     /// Show the scene in the browser while it is made.

@@ -21,13 +21,13 @@ const COUNT: usize = 40;
 /// A scene before a view.
 #[derive(Clone, Debug)]
 pub struct HardCase {
-    /// As the kernels get it; values that are not finite included.
+    /// Scene as the kernels receive it; values that are not finite included.
     pub scene: Scene<f64, 1>,
-    /// From where it is looked at.
+    /// View of the scene.
     pub view: View,
     /// Gaussians that must leave no trace.
     pub broken: Vec<usize>,
-    /// How many Gaussians must be counted as poisoned.
+    /// Gaussians that must be counted as poisoned.
     pub poisoned: usize,
 }
 
@@ -61,9 +61,9 @@ impl HardCase {
 pub struct Case {
     /// Name in tables.
     pub name: &'static str,
-    /// What goes wrong where nothing is done about it.
+    /// Failure of a rasterizer that does nothing about the case.
     pub trouble: &'static str,
-    /// Makes it.
+    /// Constructor of the case.
     pub make: fn() -> HardCase,
     /// Worst error seen of the picture (absolute) and of the gradient
     /// (relative L2), on llvmpipe of Mesa 22.3.

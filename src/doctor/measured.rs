@@ -12,21 +12,21 @@ use crate::{
 /// Pixels whose decisions are closer than this to falling the other way may do so in `f32`.
 pub const MARGIN: f64 = 1e-4;
 
-/// What a bound leaves above the worst that was seen. The figures in the tables
-/// were seen on Mesa 22.3's llvmpipe; WGSL allows `exp`, `sqrt` and quotients
-/// several units in the last place, of which other drivers make other use.
+/// Factor of a bound over the worst error seen. The figures in the tables were seen on Mesa 22.3's
+/// llvmpipe; WGSL allows `exp`, `sqrt` and quotients several units in the last place, of which
+/// other drivers make other use.
 pub fn headroom(gpu: &Gpu) -> f64 {
     let measured = gpu.is_software() && gpu.info().driver_info.contains("Mesa 22.3");
     if measured { 1.05 } else { 16.0 }
 }
 
-/// What a kernel gave and what the oracle says, of one input.
+/// Values of a kernel and of the oracle for one input.
 pub struct Sample {
     /// The kernel's values.
     pub actual: Vec<f64>,
-    /// The oracle's.
+    /// The oracle's values.
     pub expected: Vec<f64>,
-    /// Which of them stand close to a discontinuity; empty where none can.
+    /// True for values close to a discontinuity; empty where none can be.
     pub may_flip: Vec<bool>,
 }
 
@@ -47,7 +47,7 @@ impl Sample {
 pub struct Allowance(f64);
 
 impl Allowance {
-    /// What this device is allowed.
+    /// Bounds for this device.
     pub fn of(gpu: &Gpu) -> Self {
         Self(headroom(gpu))
     }
@@ -158,11 +158,11 @@ pub struct Row {
     pub largest_error: f64,
     /// Largest relative L2 error.
     pub relative_l2: f64,
-    /// How much of the bound was used, at most 1.
+    /// Share of the bound that was used, at most 1.
     pub used: f64,
     /// The bound in words.
     pub bound: String,
-    /// What is wrong, if anything is.
+    /// Failures, if any.
     pub failures: Vec<String>,
 }
 

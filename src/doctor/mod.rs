@@ -1,5 +1,5 @@
-//! Hard cases on the user's own device: what the kernels give against what the
-//! oracle says. The first thing to ask of someone who reports a bad picture.
+//! Hard cases on the user's own device: results of the kernels against those of the oracle. The
+//! first thing to ask of someone who reports a bad picture.
 
 pub mod cases;
 pub mod kernels;
@@ -39,29 +39,29 @@ const TIGHTEST: f64 = 2e-6;
 /// has no relative error.
 const SMALL_GROUP: f64 = 1e-3;
 
-/// How a case came out.
+/// Result of a case.
 #[derive(Clone, Debug, Serialize)]
 pub struct Verdict {
     /// Name of the case.
     pub name: &'static str,
-    /// What goes wrong where nothing is done about it.
+    /// Failure of a rasterizer that does nothing about the case.
     pub trouble: &'static str,
     /// Largest error of a pixel that had no choice, in units of the brightest
     /// pixel or of 1, whichever is larger.
     pub picture_error: f64,
-    /// What it may be.
+    /// Bound of the picture error.
     pub picture_bound: f64,
     /// Largest relative L2 error of the gradient of a group of parameters.
     pub gradient_error: f64,
-    /// What it may be.
+    /// Bound of the gradient error.
     pub gradient_bound: f64,
     /// Gaussians that the device counted as poisoned.
     pub poisoned: usize,
-    /// What is wrong, if anything is.
+    /// Failures, joined into one line, if any.
     pub failure: Option<String>,
 }
 
-/// What the device is, and how each case came out on it.
+/// Properties of the device, and the result of each case.
 #[derive(Clone, Debug, Serialize)]
 pub struct Diagnosis {
     /// The adapter's name.
@@ -70,7 +70,7 @@ pub struct Diagnosis {
     pub driver: String,
     /// Vulkan, Metal or DX12.
     pub backend: String,
-    /// Whether it computes on the processor.
+    /// True if it is a software adapter.
     pub software: bool,
     /// Largest binding in bytes: what bounds the number of Gaussians.
     pub max_binding_bytes: u64,
@@ -127,14 +127,14 @@ impl Diagnosis {
         })
     }
 
-    /// How many kernels' quantities and cases failed.
+    /// Number of kernels' quantities and cases that failed.
     pub fn failures(&self) -> usize {
         let kernels = self.kernels.iter().filter(|row| !row.failures.is_empty());
         let cases = self.cases.iter().filter(|case| case.failure.is_some());
         kernels.count() + cases.count()
     }
 
-    /// How many there are in all.
+    /// Number of kernels' quantities and cases in all.
     pub fn checks(&self) -> usize {
         self.kernels.len() + self.cases.len()
     }
@@ -258,8 +258,8 @@ pub fn examine_with(
     })
 }
 
-/// What a contribution at the floor of alpha shows, or the last one that a transmittance
-/// at its floor lets through.
+/// Largest step in a picture: a contribution at the floor of alpha, or the last one that a
+/// transmittance at its floor lets through.
 fn jump(numerics: &Numerics) -> f64 {
     (2.0 * numerics.alpha_min).max(numerics.transmittance_min / (1.0 - ALPHA_MAX))
 }
@@ -273,8 +273,7 @@ fn nan_is_worst(worst: f64, error: f64) -> f64 {
     }
 }
 
-/// What must be seen: Gaussians that must leave no trace replaced by ones that
-/// nobody draws.
+/// Expected scene: Gaussians that must leave no trace replaced by invisible ones.
 fn without_broken(hard: &HardCase) -> Scene<f64, 1> {
     let scene = &hard.scene;
     let gaussians = (0..scene.len()).map(|i| {

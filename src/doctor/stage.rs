@@ -246,7 +246,7 @@ impl Stage {
         self.layer.read_image(&self.raster.gpu, pixels)
     }
 
-    /// What the device counted since the last reset.
+    /// Counts of the device since the last reset.
     ///
     /// # Errors
     /// [`GpuError::Lost`].
@@ -282,7 +282,7 @@ impl Stage {
     }
 }
 
-/// What the adjoint leaves, as planes.
+/// Gradient that the adjoint writes, as planes.
 #[derive(PartialEq)]
 pub struct Gradient {
     count: usize,
@@ -297,7 +297,7 @@ pub struct Gradient {
 }
 
 impl Gradient {
-    /// Of `count` Gaussians, geometry and field as planes, and no statistics.
+    /// Gradient of `count` Gaussians, geometry and field as planes, and no statistics.
     pub fn of_planes(count: usize, geometry: Vec<f32>, field: Vec<f32>) -> Self {
         Self {
             count,

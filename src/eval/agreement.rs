@@ -1,5 +1,5 @@
-//! Whether pictures of one place agree: along a rendered path, and between the
-//! photographed views.
+//! Color consistency of pictures of one place: along a rendered path, and between the photographed
+//! views.
 
 use std::{collections::VecDeque, path::Path};
 
@@ -36,7 +36,7 @@ const LEAST_OVERLAP: f64 = 0.2;
 /// Triangulated points that each pair's flow is checked on; of more, an even choice.
 const MAX_POINTS: usize = 2000;
 
-/// What of a drawing is compared.
+/// Parts of a drawing that are compared.
 struct Frame {
     camera: Camera,
     depth: Vec<f32>,

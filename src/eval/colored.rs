@@ -1,4 +1,4 @@
-//! How good a colored scene is, as far as `colorize` itself says.
+//! Quality of a colored scene, as `colorize` reports it.
 
 use std::sync::Arc;
 
@@ -16,10 +16,10 @@ use crate::{
 const SHEET_ROWS: usize = 4;
 const PAINTED_ROWS: usize = 2;
 
-/// What the contact sheet of a colored scene shows, left to right.
+/// Columns of the contact sheet of a colored scene, left to right.
 pub const COLUMNS: [&str; 4] = ["photo", "gray scene", "teacher", "colored scene"];
 
-/// Pictures of the measured views and what they amount to.
+/// Pictures of the measured views and their scores.
 pub struct Measured {
     /// The exported file against the native pictures, mean over the views.
     pub bake: ColorError,

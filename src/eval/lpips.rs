@@ -130,7 +130,7 @@ fn tensor(pixels: &[[f32; 3]], size: [u32; 2], wanted: [u32; 2]) -> ort::Result<
     Tensor::from_array((shape, values))
 }
 
-/// What an error says, without what follows.
+/// First line of an error's message.
 fn first_line(error: impl ToString) -> String {
     let text = error.to_string();
     text.lines().next().unwrap_or_default().to_owned()

@@ -1,4 +1,4 @@
-//! How good a gray scene is.
+//! Quality of a gray scene.
 
 use std::sync::Arc;
 
@@ -46,7 +46,7 @@ pub fn measure_luma(
     Ok(views)
 }
 
-/// What the contact sheet of a gray scene shows, left to right.
+/// Columns of the contact sheet of a gray scene, left to right.
 pub const GRAY_COLUMNS: [&str; 2] = ["photo", "gray scene"];
 
 /// Views on it.

@@ -1,4 +1,4 @@
-//! How good a scene is: its pictures against photos, and against each other.
+//! Quality of a scene: its pictures against photos, and against each other.
 
 mod agreement;
 mod colored;
@@ -33,7 +33,7 @@ use crate::{
     gpu::GpuError,
 };
 
-/// What can end an evaluation.
+/// Error of an evaluation.
 #[derive(Debug, thiserror::Error)]
 pub enum EvalError {
     /// The photos or their poses.
@@ -48,31 +48,31 @@ pub enum EvalError {
     /// The teacher.
     #[error(transparent)]
     Teacher(#[from] TeacherError),
-    /// The teacher has no colors for any view that it is asked about.
+    /// The teacher has no colors for any of the views.
     #[error("the teacher has no colors for these views")]
     NothingTaught,
-    /// A network that should tell how far two pictures are apart.
+    /// The perceptual network cannot be used.
     #[error("{}: {reason}", path.display())]
     Network {
         /// The model.
         path: PathBuf,
-        /// What is wrong with it and what to do.
+        /// Defect, and remedy.
         reason: String,
     },
-    /// A file of optical flow is not there.
+    /// A file of optical flow cannot be read.
     #[error("{}: {error}", path.display())]
     NoFlow {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The system's error.
         error: std::io::Error,
     },
-    /// A file of optical flow is no use.
+    /// A file of optical flow is damaged or does not fit.
     #[error("{}: {reason}", path.display())]
     Flow {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// Defect of the file.
         reason: String,
     },
 }

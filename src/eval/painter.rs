@@ -33,7 +33,7 @@ pub enum Layer {
 
 /// A viewpoint.
 pub struct Drawing {
-    /// Where from.
+    /// Camera of the viewpoint.
     pub camera: Camera,
     /// One channel, encoded sRGB.
     pub gray: RenderedImage,
@@ -112,7 +112,7 @@ impl<'a> Painter<'a> {
         }
     }
 
-    /// Whether the teacher has an answer for a photo.
+    /// Returns true if the teacher has an answer for a photo.
     pub fn answers(&self, view: usize) -> bool {
         (self.teacher.as_ref()).is_some_and(|teacher| teacher.answers(view))
     }

@@ -35,7 +35,7 @@ pub enum Peer {
 }
 
 impl Peer {
-    /// What its pictures are called.
+    /// Method name of its pictures.
     pub fn method(self) -> Method {
         match self {
             Self::RgbSplats => Method::RgbSplats,
@@ -134,7 +134,7 @@ impl Peer {
     }
 }
 
-/// How RGB splats are solved for.
+/// Solver settings of the RGB splats.
 fn rgb_settings() -> ChromaSettings {
     ChromaSettings {
         sh_degree: sh::MAX_DEGREE,

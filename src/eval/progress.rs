@@ -1,6 +1,6 @@
-//! How far an evaluation is.
+//! Progress of an evaluation.
 
-/// What an evaluation is doing.
+/// Task of an evaluation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Task {
     /// Asking the teacher.
@@ -19,10 +19,10 @@ pub enum Task {
     Strength,
 }
 
-/// How far it is.
+/// Progress within a task.
 #[derive(Clone, Copy, Debug)]
 pub struct Progress<'a> {
-    /// What is being done.
+    /// Task in progress.
     pub task: Task,
     /// Steps done.
     pub done: usize,
@@ -32,5 +32,5 @@ pub struct Progress<'a> {
     pub name: &'a str,
 }
 
-/// Who is told.
+/// Receiver of progress.
 pub type Observer<'a> = dyn FnMut(Progress<'_>) + 'a;

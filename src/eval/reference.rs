@@ -8,7 +8,7 @@ use crate::{
     report::{ColorError, LumaQuality, ViewExposure},
 };
 
-/// A photo, how bright it shows the scene, and which of its pixels count.
+/// A photo with its exposure and its mask.
 ///
 /// Pictures that are measured are those that the photo would show ([`Reference::luma_shown`],
 /// [`Reference::shown`]), for how bright a photo became is no matter of the scene.
@@ -16,11 +16,11 @@ use crate::{
 pub struct Reference<'a> {
     /// The photo.
     pub photo: &'a Photo,
-    /// How bright it shows the scene.
+    /// Exposure of the photo.
     pub exposure: Exposure,
 }
 
-/// By view of `dataset`, the exposures that a report tells; none where it tells none.
+/// Exposures by view of `dataset`, from a report; [`Exposure::NONE`] for views not in it.
 pub fn exposures(dataset: &Dataset, told: &[ViewExposure]) -> Vec<Exposure> {
     let by_name: HashMap<&str, Exposure> = (told.iter())
         .map(|view| (view.name.as_str(), view.exposure))
@@ -32,7 +32,7 @@ pub fn exposures(dataset: &Dataset, told: &[ViewExposure]) -> Vec<Exposure> {
 }
 
 impl<'a> Reference<'a> {
-    /// Whether any pixel counts; a photo of which none does measures nothing.
+    /// Returns true if any pixel counts; a photo without one measures nothing.
     pub fn measures(&self) -> bool {
         (0..self.photo.gray.len()).any(|pixel| self.photo.counts(pixel))
     }
@@ -47,13 +47,13 @@ impl<'a> Reference<'a> {
         self.photo.rgb.as_ref().map(|_| self.photo.rgb_values())
     }
 
-    /// What the photo would show of a gray picture, in [0, 1].
+    /// The gray picture under the photo's exposure, in [0, 1].
     pub fn luma_shown(&self, luma: &[f32]) -> Vec<f32> {
         luma.iter().map(|&value| self.channel(value)).collect()
     }
 
-    /// What the photo would show of an RGB picture, in [0, 1]: an exposure treats all
-    /// channels alike.
+    /// The RGB picture under the photo's exposure, in [0, 1]: an exposure treats all channels
+    /// alike.
     pub fn shown(&self, rgb: &[[f32; 3]]) -> Vec<[f32; 3]> {
         (rgb.iter())
             .map(|rgb| rgb.map(|value| self.channel(value)))

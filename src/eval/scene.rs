@@ -1,4 +1,4 @@
-//! What is measured: a scene with its photos, its luma and its colors.
+//! Subject of the evaluation: a scene with its photos, its luma and its colors.
 
 use super::Reference;
 use crate::{
@@ -10,7 +10,7 @@ use crate::{
 pub struct ColoredScene {
     /// Its photos.
     pub dataset: Dataset,
-    /// How bright each view's photo shows the scene.
+    /// Exposure of each view's photo.
     pub exposures: Vec<Exposure>,
     /// Geometry and luma.
     pub luma: Splats,

@@ -27,7 +27,7 @@ pub struct Scored {
 pub struct Shot {
     /// Part of its file's name.
     pub file: &'static str,
-    /// What it shows.
+    /// Caption.
     pub caption: &'static str,
     /// RGB in [0, 1], `[height, width]`.
     pub pixels: Vec<[f32; 3]>,
@@ -195,7 +195,7 @@ fn gray_of(rgb: &[[f32; 3]]) -> Vec<f32> {
     rgb.iter().map(gray).collect()
 }
 
-/// What the export costs, of the scene as it is.
+/// Color error of the export, under the scene's own exposure.
 fn bake(drawing: &Drawing) -> Option<ColorError> {
     let of = |method| Some(drawing.layer(method)?.rgb(&drawing.gray));
     let (native, exported) = (of(Method::Native)?, of(Method::Exported)?);

@@ -67,7 +67,7 @@ impl MeasuredTeacher {
         })
     }
 
-    /// Whether there is an answer for a view.
+    /// Returns true if there is an answer for a view.
     pub fn answers(&self, view: usize) -> bool {
         self.of_view[view].is_some()
     }
@@ -81,7 +81,7 @@ impl MeasuredTeacher {
         Ok(kept.transpose()?.map(|target| target.ab()))
     }
 
-    /// What the teacher makes of a drawn gray picture; `None` without that baseline.
+    /// The teacher's colors for a drawn gray picture; `None` without that baseline.
     ///
     /// # Errors
     /// [`EvalError::Teacher`].

@@ -9,12 +9,12 @@ const SIDE: usize = 256;
 /// Difference of gray, in 8-bit levels, at which what was followed is believed by half.
 const UNLIKE: f32 = 24.0;
 
-/// What moves between two neighboring photos.
+/// Optical flow between two neighboring photos.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Between {
-    /// From each pixel of the first photo to the second, and the other way round.
+    /// Flow from the first photo to the second, and back.
     flows: [Flow; 2],
-    /// Which pixels of the first, and of the second, are seen in the other.
+    /// True for pixels of the first, and of the second, that are visible in the other.
     seen: [Vec<bool>; 2],
 }
 
@@ -99,7 +99,7 @@ impl ColoredPhoto<'_> {
     }
 }
 
-/// Of each small pixel how far it is displaced in all; none where it is hidden on the way.
+/// Total displacement of each small pixel; `None` where it is occluded on the way.
 fn followed(steps: &[&Between], side: usize, size: [usize; 2]) -> Vec<Option<[f32; 2]>> {
     let mut places: Vec<Option<[f32; 2]>> = vec![Some([0.0; 2]); size[0] * size[1]];
     for step in steps {

@@ -44,28 +44,28 @@ const SPREAD: f32 = 1.0;
 /// σ, in 8-bit levels of gray.
 const GRAY_DEVIATION: f32 = 6.0;
 
-/// What an edge counts at least, so that nothing is cut off from everything.
+/// Least weight of an edge, so that every pixel stays connected.
 const LEAST_EDGE: f32 = 1e-4;
 
-/// ε: what the colors around count beside a pixel that is believed.
+/// ε: weight of the surrounding colors at a pixel without scene.
 const FILL: f32 = 0.02;
 
-/// τ: what the photo before counts there.
+/// τ: weight of the previous photo's colors there.
 const BEFORE: f32 = 0.2;
 
-/// The root mean square of what is left, in CIELAB units, at which the solution is near enough:
-/// below what 8 bits can tell.
+/// Residual of the solution, root mean square in CIELAB units, at which the solver stops: below
+/// what 8 bits can tell.
 const LEFT: f64 = 0.01;
 
 /// Steps of conjugate gradients at most.
 const STEPS: usize = 200;
 
-/// Colors and how far each pixel of them is to be believed.
+/// Colors and the confidence of each pixel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WeightedColors {
     /// CIELAB a and b, `[height, width]`.
     pub ab: Vec<[f32; 2]>,
-    /// 0 to 1.
+    /// Confidence, 0 to 1.
     pub weight: Vec<f32>,
 }
 
@@ -143,9 +143,8 @@ pub fn blend(
         .collect()
 }
 
-/// How far the teacher's detail can be believed at each pixel, 0 to 1: where it and the scene, of
-/// which `scene` is the difference from it, say the same but for a cast and a saturation of the
-/// whole photo.
+/// Confidence in the teacher's detail at each pixel, 0 to 1: high where it agrees with the scene,
+/// of which `scene` is the difference from it, but for a cast and a saturation of the whole photo.
 fn likeness(scene: &WeightedColors, teacher: &[[f32; 2]], size: [usize; 2]) -> Vec<f32> {
     let casts = [0, 1].map(|k: usize| {
         let points = teacher.iter().zip(&scene.ab).zip(&scene.weight);
@@ -257,14 +256,14 @@ struct System {
     size: [usize; 2],
     /// λw of the edge to the right neighbor and to the one below; 0 at the border.
     edges: Vec<[f32; 2]>,
-    /// What each pixel's own terms count.
+    /// Sum of the weights of each pixel's own terms.
     own: Vec<f32>,
     /// The right-hand side.
     wanted: Vec<[f32; 2]>,
 }
 
 impl System {
-    /// `edge` is what the edge between two pixels counts.
+    /// Assembles the system; `edge` gives the weight of the edge between two pixels.
     fn new(
         size: [usize; 2],
         edge: impl Fn(usize, usize) -> f32,
@@ -392,7 +391,7 @@ impl System {
     }
 }
 
-/// Of each channel.
+/// Dot product of each channel.
 fn dot(a: &[[f32; 2]], b: &[[f32; 2]]) -> [f64; 2] {
     let mut sum = [0.0; 2];
     for (a, b) in a.iter().zip(b) {
@@ -403,7 +402,7 @@ fn dot(a: &[[f32; 2]], b: &[[f32; 2]]) -> [f64; 2] {
     sum
 }
 
-/// 0 where nothing is left to divide.
+/// `a / b`; 0 where `b` is 0.
 fn ratio(a: f64, b: f64) -> f32 {
     if b > 0.0 { (a / b) as f32 } else { 0.0 }
 }

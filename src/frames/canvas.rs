@@ -14,9 +14,9 @@ pub struct Canvas {
     pub height: u32,
     /// sRGB-encoded gray, `[height, width]`.
     pub gray: Vec<u8>,
-    /// What each pixel counts by the photo's mask, 0 to 255; `None` where all count.
+    /// Weight of each pixel by the photo's mask, 0 to 255; `None` where all count.
     pub mask: Option<Vec<u8>>,
-    /// How the photo stands.
+    /// Orientation of the sensor.
     pub stance: SensorOrientation,
 }
 
@@ -56,12 +56,12 @@ impl Canvas {
         }
     }
 
-    /// How many pixels it has.
+    /// Number of pixels.
     pub fn len(&self) -> usize {
         self.gray.len()
     }
 
-    /// Whether it has none; never.
+    /// Returns true if it has no pixels; never.
     pub fn is_empty(&self) -> bool {
         self.gray.is_empty()
     }

@@ -18,7 +18,7 @@ pub struct Colored {
     pub height: u32,
     /// R, G and B in 65,535ths, `[height, width]`.
     pub rgb: Vec<[u16; 3]>,
-    /// Whether the photo told more than 256 levels apart.
+    /// True if the photo has more than 8 bits a channel.
     pub deep: bool,
     /// The photo's EXIF, as it is for the upright picture.
     pub exif: Option<Vec<u8>>,

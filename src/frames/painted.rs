@@ -10,7 +10,7 @@ use crate::{
     color::gray_to_lightness,
 };
 
-/// Of a pixel: from here on it is the scene that a photo shows there.
+/// Weight of a pixel from which on the photo shows the scene there.
 const COVERED: f32 = 0.5;
 
 /// Depths, in any unit, of what the scene shows and of what it does not: an edge to strokes.
@@ -25,7 +25,7 @@ const RIM: usize = 2;
 /// Neighboring pixels of one thing differ by less, in units of `L*`.
 const ALIKE: f32 = 4.0;
 
-/// What strokes claim of a photo at working size.
+/// Claims of strokes on a photo at working size.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Strokes {
     /// a and b at the middle lightness, rounded, `[height, width]`.
@@ -35,8 +35,8 @@ pub struct Strokes {
 }
 
 impl Strokes {
-    /// What paint claims of a photo of which `seen` is the scene: nothing where the scene is
-    /// believed, and with `grow` what is alike beside a stroke.
+    /// Claims of paint on a photo of which `seen` is the scene: none where the scene is believed,
+    /// and with `grow` what is alike beside a stroke.
     pub fn of(canvas: &Canvas, seen: &WeightedColors, paint: &HintImage, grow: bool) -> Self {
         let paint = paint.resized(canvas.width, canvas.height);
         let lightness = lightness(canvas);
@@ -58,7 +58,7 @@ impl Strokes {
         Self::new(&claims)
     }
 
-    /// From α a, α b, α.
+    /// Strokes from α a, α b, α.
     fn new(claims: &[[f32; 3]]) -> Self {
         let byte = |value: f32| value.round().clamp(-128.0, 127.0) as i8;
         Self {
@@ -74,13 +74,13 @@ impl Strokes {
         }
     }
 
-    /// Which share of the photo is claimed.
+    /// Share of the photo that is claimed.
     pub fn share(&self) -> f64 {
         let sum: f64 = self.alphas.iter().map(|&alpha| f64::from(alpha)).sum();
         sum / (255.0 * self.alphas.len().max(1) as f64)
     }
 
-    /// What they claim of the photo `to`, of which `seen` is the scene: it comes after `from`, on
+    /// Their claims on the photo `to`, of which `seen` is the scene: it comes after `from`, on
     /// which they are, by `way`, in order, or, with `backwards`, before it.
     pub fn carried(
         &self,
@@ -131,7 +131,7 @@ impl Strokes {
             .collect()
     }
 
-    /// Those of the photos before and after, of which the second counts `nearness`, 0 to 1.
+    /// Mean of the strokes of two photos; the later one has weight `nearness`, 0 to 1.
     pub fn between(before: &Self, after: &Self, nearness: f32) -> Self {
         let pairs = (0..before.alphas.len()).map(|i| {
             let mut sum = [0.0; 3];
@@ -148,7 +148,7 @@ impl Strokes {
     }
 }
 
-/// What paint claims of what the scene leaves open.
+/// Claims of paint on pixels that the scene leaves open.
 fn grown(
     canvas: &Canvas,
     seen: &WeightedColors,
@@ -197,14 +197,14 @@ fn widened(
         .collect()
 }
 
-/// Whether all of a pixel's neighbors are, and it is.
+/// Returns true if a pixel and all its neighbors are set.
 fn inside(all: &[bool], [width, height]: [usize; 2], i: usize) -> bool {
     let (x, y) = (i % width, i / width);
     let mut rows = y.saturating_sub(1)..(y + 2).min(height);
     rows.all(|y| (x.saturating_sub(1)..(x + 2).min(width)).all(|x| all[y * width + x]))
 }
 
-/// What brings a color of this lightness to the middle one.
+/// Factor that brings a color of this lightness to the middle one.
 fn middle_over(lightness: f32) -> f32 {
     at_middle_lightness([1.0, 0.0], lightness)[0]
 }

@@ -1,4 +1,4 @@
-//! Which colors the scene has where a photo was taken, and how far they can be believed there.
+//! Colors of the scene from a photo's viewpoint, and the confidence in them.
 
 use std::sync::Arc;
 
@@ -24,7 +24,7 @@ const REACH: usize = 3;
 /// Draws a colored scene as photos show it.
 pub struct SceneDrawer<'a> {
     renderer: SceneRenderer<'a>,
-    /// Where views show the pixels of a photo, for the lenses met last.
+    /// Positions of a photo's pixels in its views, for the lenses met last.
     lenses: Vec<Lens>,
 }
 
@@ -42,7 +42,7 @@ pub struct ViewOf<'a> {
     pub view: &'a View,
     /// Its camera at working size.
     pub camera: &'a Camera,
-    /// How bright the photo shows the scene.
+    /// Exposure of the photo.
     pub exposure: Exposure,
 }
 
@@ -56,8 +56,8 @@ pub fn believable(splats: usize, surroundings: usize) -> ShField {
 }
 
 impl<'a> SceneDrawer<'a> {
-    /// Of a scene with native a/b harmonics; `believed` is where it may be believed
-    /// ([`believable`]), `extent` the capture's, in world units.
+    /// A drawer of a scene with native a/b harmonics; `believed` marks the believable part
+    /// ([`believable`]), `extent` is the capture's, in world units.
     ///
     /// # Errors
     /// [`GpuError::NoColor`].
@@ -124,7 +124,7 @@ impl<'a> SceneDrawer<'a> {
         Ok(believed)
     }
 
-    /// Where a view's picture shows each pixel of the canvas.
+    /// Position of each pixel of the canvas in a view's picture.
     fn places(&mut self, seen: &ViewOf<'_>, canvas: &Canvas) -> Arc<Vec<[f32; 2]>> {
         let size = [canvas.width, canvas.height];
         let Camera {
@@ -201,7 +201,7 @@ fn step(value: f32, [low, high]: [f32; 2]) -> f32 {
     t * t * (3.0 - 2.0 * t)
 }
 
-/// How unlike drawing and photo are around each pixel, 1 where the scene is believed by half.
+/// Difference of drawing and photo around each pixel; at 1 the scene's weight is halved.
 fn compared(differences: &[Option<f32>], size: [usize; 2]) -> Vec<f32> {
     let sums: Vec<[f32; 2]> = (differences.iter())
         .map(|d| d.map_or([0.0; 2], |d| [d, 1.0]))

@@ -1,4 +1,4 @@
-//! How much colors differ between two pictures of one scene.
+//! Color difference between two pictures of one scene.
 
 use super::flow::{Flow, sample};
 
@@ -75,7 +75,7 @@ impl Consistency {
         self.error().map(|error| LAB_STEPS * error.sqrt())
     }
 
-    /// What the sum is divided by: visible pixels × 2 channels.
+    /// Divisor of the sum: visible pixels × 2 channels.
     pub fn values(&self) -> u64 {
         2 * self.visible
     }

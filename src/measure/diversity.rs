@@ -1,4 +1,4 @@
-//! How many colors a picture has.
+//! Effective number of colors in a picture.
 
 use std::collections::BTreeMap;
 

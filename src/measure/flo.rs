@@ -6,7 +6,7 @@
 
 use super::Flow;
 
-/// What a `.flo` file begins with.
+/// Magic bytes of a `.flo` file.
 const TAG: &[u8; 4] = b"PIEH";
 
 /// Values of at least this size say that the flow is not known.

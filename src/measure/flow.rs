@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use crate::capture::Camera;
 
-/// Where each pixel of one picture lies in another.
+/// Optical flow: displacement of each pixel from one picture to another.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Flow {
     /// Width in pixels.
@@ -76,7 +76,7 @@ impl Flow {
         miss.is_finite().then_some((index, miss))
     }
 
-    /// Where the center of a pixel goes, in pixels from the top left corner.
+    /// Target of a pixel's center, in pixels from the top left corner.
     pub fn target(&self, index: usize) -> [f64; 2] {
         let [u, v] = self.vectors[index].map(f64::from);
         [

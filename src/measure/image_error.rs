@@ -2,8 +2,7 @@
 
 use crate::color::{ciede2000, srgb_to_lab};
 
-/// What stands in reports for the PSNR of pictures without a difference, in dB: JSON knows
-/// no infinity.
+/// PSNR in reports for pictures without a difference, in dB: JSON knows no infinity.
 pub const IDENTICAL_PSNR: f64 = 100.0;
 
 /// Peak signal-to-noise ratio in decibels: `-10 log10(mean (a - b)²)`, peak 1.

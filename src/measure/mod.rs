@@ -1,5 +1,5 @@
-//! How good a picture is: fidelity to a reference, colorfulness, and whether views of
-//! one scene agree.
+//! Quality of a picture: fidelity to a reference, colorfulness, and consistency between views of
+//! one scene.
 //!
 //! Images are row by row from the top left, encoded sRGB in `[0, 1]`.
 

@@ -23,7 +23,7 @@ const WARPS: usize = 4;
 /// Sweeps over all pixels for each warp.
 const SWEEPS: usize = 24;
 
-/// What smoothness counts beside data, both in units of local contrast.
+/// Weight of smoothness relative to data, both in units of local contrast.
 const SMOOTHNESS: f32 = 0.12;
 
 /// Below this, penalties are quadratic: of data, in local contrasts, and of slopes, in pixels.
@@ -293,7 +293,7 @@ fn refine(from: &Gray, to: &Gray, vectors: &mut [[f32; 2]]) {
     }
 }
 
-/// Of each component, over three by three pixels.
+/// Median of each component, over three by three pixels.
 fn median(vectors: &[[f32; 2]], [width, height]: [usize; 2]) -> Vec<[f32; 2]> {
     (0..vectors.len())
         .map(|i| {

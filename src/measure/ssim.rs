@@ -9,7 +9,7 @@ const SIGMA: f64 = 1.5;
 const C1: f64 = 0.01 * 0.01;
 const C2: f64 = 0.03 * 0.03;
 
-/// What a window averages: a, b, a², b² and ab.
+/// Moments that a window averages: a, b, a², b² and ab.
 type Moments = [f64; 5];
 
 /// Mean structural similarity of two single-channel images.

@@ -1,4 +1,4 @@
-//! Which pixels of one picture can be compared with another.
+//! Visibility of one picture's pixels in another.
 
 use super::flow::{Flow, sample};
 
@@ -12,7 +12,7 @@ const ROUND_TRIP: [f64; 2] = [0.01, 0.5];
 /// Share of the squared flow, and its offset, that the squared gradient may reach.
 const BOUNDARY: [f64; 2] = [0.01, 0.002];
 
-/// Which pixels of the first picture are seen in the second as well, `[height, width]`.
+/// True for pixels of the first picture that are visible in the second, `[height, width]`.
 ///
 /// `forward` (F, with components u and v) leads from the first picture to the second,
 /// `backward` (B) from the second to the first. The rule is that of W.-S. Lai et al.,

@@ -5,17 +5,17 @@ use crate::capture::Photo;
 /// A border is no lighter than this, of 255: transfers raise black, and compression adds noise.
 const BLACK: u8 = 32;
 
-/// What a border ends at is lighter by so much: where the picture itself is as dark, nobody can
-/// tell where it begins, and nothing there would be matched.
+/// The content beside a border is lighter by at least this, in levels of 255: the edge of darker
+/// content cannot be located, and no features would match there.
 const STEP: u8 = 24;
 
-/// Of a line's pixels so many are dust or hairs, which do not make it part of the picture.
+/// Share of a line's pixels that may be dust or hairs and still leave the line black.
 const DUST: f64 = 0.02;
 
-/// Of all pictures so many may have a line that is lighter.
+/// Share of the frames in which a border line may be lighter.
 const FEW: f64 = 0.1;
 
-/// Borders are masked with so many pixels more: compression smears their edge.
+/// Pixels by which the mask exceeds a border: compression smears its edge.
 const MARGIN: u32 = 2;
 
 /// A border of one pixel belongs to the margin of any camera.
@@ -28,13 +28,13 @@ const WIDEST: f64 = 0.35;
 #[derive(Default)]
 pub(super) struct Borders {
     size: [u32; 2],
-    /// Of each picture how light each row is.
+    /// Brightness of each row, 0 to 255, by picture.
     rows: Vec<Vec<u8>>,
-    /// And each column.
+    /// Brightness of each column, by picture.
     columns: Vec<Vec<u8>>,
 }
 
-/// How many pixels do not belong to the picture.
+/// Width of the black border on each side, in pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Frame {
     pub left: u32,
@@ -81,7 +81,7 @@ impl Borders {
 }
 
 impl Frame {
-    /// What each pixel of a picture of this size counts, `[height, width]`.
+    /// Mask of a picture of this size, `[height, width]`: 255 inside, 0 on the border.
     pub fn mask(self, [width, height]: [u32; 2]) -> Vec<u8> {
         let inside =
             |at: u32, before: u32, after: u32, side: u32| at >= before && at + after < side;
@@ -96,12 +96,12 @@ impl Frame {
     }
 }
 
-/// How light a line is but for dust.
+/// Brightness of a line apart from dust: a high quantile of its pixels, 0 to 255.
 fn light(mut line: Vec<u8>) -> u8 {
     quantile(&mut line, 1.0 - DUST)
 }
 
-/// How light each line is in most pictures.
+/// Brightness of each line in most pictures: a high quantile over the pictures.
 fn usual(pictures: &[Vec<u8>]) -> Vec<u8> {
     let lines = pictures.first().map_or(0, Vec::len);
     let of_all = |line: usize| pictures.iter().map(|lines| lines[line]).collect();
@@ -118,7 +118,7 @@ fn quantile(values: &mut [u8], share: f64) -> u8 {
         .1
 }
 
-/// How many lines at either end are a border.
+/// Border widths at both ends, in lines; 0 without a border.
 fn ends(lines: &[u8]) -> [u32; 2] {
     let begins = border(lines.iter().copied(), lines.len());
     let ends = border(lines.iter().rev().copied(), lines.len());

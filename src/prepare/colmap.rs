@@ -30,7 +30,7 @@ const MATCHING: [&str; 2] = ["SiftMatching.use_gpu", "FeatureMatching.use_gpu"];
 /// So many frames to either side of one are matched with it.
 const OVERLAP: u32 = 10;
 
-/// Which photos one camera with one lens took.
+/// Groups of photos that share one camera with one lens.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Cameras {
@@ -42,7 +42,7 @@ pub enum Cameras {
     Photo,
 }
 
-/// Which photos are matched with which.
+/// Pairs of photos that are matched.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Matching {
@@ -52,21 +52,21 @@ pub enum Matching {
     Exhaustive,
 }
 
-/// What features are looked for in.
+/// Input of feature extraction.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Features<'a> {
     pub images: &'a Path,
-    /// Of each photo `masks/NAME.png`.
+    /// Folder of masks: `NAME.png` for each photo.
     pub masks: Option<&'a Path>,
     pub cameras: Cameras,
     /// COLMAP's name of the camera model.
     pub lens: &'a str,
 }
 
-/// How far a step is: done and, where it is known, of how many.
+/// Progress of a step: items done and, if known, items in all.
 pub(super) type StepProgress<'a> = dyn FnMut(usize, Option<usize>) + 'a;
 
-/// Who finds poses.
+/// The COLMAP installation that finds poses.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Colmap {
     /// The program, in this version.
@@ -268,7 +268,7 @@ fn version(said: &str) -> String {
     named.unwrap_or("of an unknown version").to_owned()
 }
 
-/// How far COLMAP is, if a line says so: what is done and, where it is known, of how many.
+/// Progress that a line of COLMAP's output reports: items done and, if known, items in all.
 fn progress(line: &str) -> Option<(usize, Option<usize>)> {
     let words = [
         "Processed file [",

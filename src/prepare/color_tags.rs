@@ -1,4 +1,4 @@
-//! How a film's pictures are to be looked at: tags of its colors, and its projection.
+//! Color tags and projection of a film.
 
 use serde_json::Value;
 

@@ -1,10 +1,10 @@
-//! What can stop `prepare`.
+//! Errors of `prepare`.
 
 use std::path::{Path, PathBuf};
 
 use crate::{capture::CaptureError, programs::ProgramError, store::StoreError};
 
-/// What stopped it; one line that names the file and the remedy.
+/// Error of `prepare`; one line that names the file and the remedy.
 #[derive(Debug, thiserror::Error)]
 pub enum PrepareError {
     /// The photos.
@@ -58,10 +58,10 @@ pub enum PrepareError {
     OtherInput {
         /// Folder at fault.
         folder: PathBuf,
-        /// What it was prepared from.
+        /// Input it was prepared from.
         input: PathBuf,
     },
-    /// What would be replaced is not what was made.
+    /// A result that would be replaced was changed since it was made.
     #[error(
         "{}: was changed since it was made, and would be replaced; move it elsewhere", path.display()
     )]
@@ -72,7 +72,7 @@ pub enum PrepareError {
     /// COLMAP placed nothing.
     #[error("no photo has a pose: {remedy}")]
     NoPoses {
-        /// What to try.
+        /// Suggested remedy.
         remedy: String,
     },
 }

@@ -1,5 +1,5 @@
-//! What FFmpeg is asked: what a film is, where it is cut, whether it is interlaced; and all frames
-//! of a shot.
+//! Queries to FFmpeg: a film's properties, its cuts, interlacing; and extraction of all frames of a
+//! shot.
 
 use std::path::{Path, PathBuf};
 
@@ -42,7 +42,7 @@ pub(super) struct FilmSource {
     pub(super) tick_rate: Option<[u32; 2]>,
     /// Seconds; 0 where the file does not say.
     pub seconds: f64,
-    /// Whether there is sound.
+    /// True if the film has sound.
     pub audio: bool,
     /// FFmpeg's name of the container, the first of several.
     pub(super) container: String,
@@ -52,9 +52,9 @@ pub(super) struct FilmSource {
     pub late: f64,
     /// Its colors and its projection.
     pub color_tags: ColorTags,
-    /// Whether pixels are square.
+    /// True if pixels are square.
     square: bool,
-    /// Whether it has more than 8 bits a channel.
+    /// True if a channel has more than 8 bits.
     deep: bool,
 }
 
@@ -255,7 +255,7 @@ impl FilmSource {
             .collect())
     }
 
-    /// Whether the pictures of a part are interlaced.
+    /// Scan type of a part: progressive, interlaced or telecined.
     ///
     /// # Errors
     /// [`ProgramError`].
@@ -313,7 +313,7 @@ fn unlisted(said: &str) -> Option<&str> {
     before.rsplit('[').next()?.split(' ').next()
 }
 
-/// What `ffprobe` tells; warnings may stand before it, on another stream.
+/// JSON in the output of `ffprobe`; warnings of another stream may precede it.
 pub(super) fn json(said: &str) -> Option<Value> {
     let json = &said[said.find('{').unwrap_or(0)..];
     serde_json::Deserializer::from_str(json)
@@ -340,8 +340,8 @@ fn ratio(text: &str) -> Option<[u32; 2]> {
     (!ratio.contains(&0)).then_some(ratio)
 }
 
-/// Whether a pixel format has more than 8 bits a channel: these name their byte order, as do
-/// some that pack less than 8 into 16.
+/// Returns true if a pixel format has more than 8 bits a channel: these name their byte order, as
+/// do some that pack less than 8 into 16.
 fn is_deep(format: &str) -> bool {
     let packed = ["rgb565", "bgr565", "rgb555", "bgr555", "rgb444", "bgr444"];
     (format.ends_with("le") || format.ends_with("be"))

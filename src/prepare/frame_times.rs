@@ -76,7 +76,7 @@ pub(super) fn stamps(said: &str) -> Vec<f64> {
         .collect()
 }
 
-/// Whether frames are not shown at an even rate.
+/// Returns true if the frame rate varies.
 fn varies(times: &[f64], rate: f64) -> bool {
     let uneven = |(k, time): (usize, &f64)| {
         let even = times[0] + k as f64 / rate;

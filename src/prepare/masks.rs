@@ -1,4 +1,4 @@
-//! What of the photos counts: all but black borders and what the user's masks cover.
+//! Masks of the photos: all but black borders and the areas that the user's masks cover.
 
 use std::{
     collections::BTreeMap,
@@ -27,7 +27,7 @@ const LOOKED_AT: usize = 40;
 /// Fewer photos may be dark at their border by chance.
 const FEWEST: usize = 5;
 
-/// Where masks come from.
+/// Sources of masks.
 #[derive(Default)]
 pub(super) struct Sources {
     /// Black borders.
@@ -38,7 +38,7 @@ pub(super) struct Sources {
     pub each: Option<NamedFiles>,
 }
 
-/// What masks were made.
+/// Counts of the masks that were written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct MaskFiles {
     /// Photos with a mask.
@@ -156,7 +156,7 @@ impl Sources {
         Ok(made)
     }
 
-    /// What each pixel of a photo counts.
+    /// Mask of a photo, `[height, width]`, 0 to 255.
     fn counts(
         &self,
         own: Option<&Path>,

@@ -44,10 +44,10 @@ use masks::Sources;
 use photos::Photos;
 use state::{OutputState, Step, of};
 
-/// Where masks go.
+/// Folder of the masks.
 const MASKS: &str = "masks";
 
-/// Where copies of 8 bits go that COLMAP looks at.
+/// Folder of the 8-bit copies that COLMAP reads.
 const STRETCHED: &str = "stretched";
 
 /// COLMAP's features and matches.
@@ -59,7 +59,7 @@ const SPARSE: &str = "sparse";
 /// More photos are not matched each with each: that takes hours on a processor.
 const EXHAUSTIVE: usize = 200;
 
-/// What `prepare` is asked to do; `None` leaves it to what the input calls for.
+/// Options of `prepare`; `None` is decided by the input.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct PrepareOptions {
     /// A film, or a folder of photos.
@@ -68,37 +68,37 @@ pub struct PrepareOptions {
     /// The folder for `fit`: a new one, or one that was prepared before.
     #[serde(skip)]
     pub output: PathBuf,
-    /// Where in the film the shot begins, in seconds; the longest shot by default.
+    /// Start of the shot in the film, in seconds; the longest shot by default.
     pub start: Option<f64>,
-    /// Where it ends; the next cut by default.
+    /// End of the shot, in seconds; the next cut by default.
     pub end: Option<f64>,
-    /// How many frames a second get a pose; 30 to 120 in all by default.
+    /// Frames a second that get a pose; 30 to 120 in all by default.
     pub per_second: Option<f64>,
     /// A mask for all photos.
     pub mask: Option<PathBuf>,
     /// A folder of masks by the photos' names.
     pub masks: Option<PathBuf>,
-    /// Which photos one camera took; all of a film, and those of one folder that have one size.
+    /// Photos that share a camera; all of a film, and those of one folder that have one size.
     pub cameras: Option<Cameras>,
     /// COLMAP's name of the camera model.
     pub lens: String,
-    /// Which photos are matched with which; those of a film one after the other.
+    /// Pairs of photos that are matched; each frame of a film with those next to it.
     pub matching: Option<Matching>,
-    /// Whether `pycolmap` is installed where there is no COLMAP.
+    /// True if `pycolmap` is installed where COLMAP is missing.
     #[serde(skip)]
     pub install: bool,
-    /// Whether all is made anew.
+    /// True if all results are made anew.
     #[serde(skip)]
     pub force: bool,
 }
 
-/// What was prepared.
+/// Result of `prepare`.
 #[derive(Clone, Debug, Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Prepared {
     /// The folder, as it was named.
     pub folder: PathBuf,
-    /// What is in `film.json`; `None` where photos are no frames.
+    /// Content of `film.json`; `None` where photos are no frames.
     pub film: Option<Film>,
     /// From when to when each shot lasts, in seconds; empty if unknown.
     ///
@@ -106,11 +106,11 @@ pub struct Prepared {
     pub shots: Vec<[f64; 2]>,
     /// Photos that COLMAP was given.
     pub photos: usize,
-    /// How many of them have a mask.
+    /// Photos that have a mask.
     pub masked: usize,
-    /// Who found the poses.
+    /// The COLMAP that found the poses.
     pub colmap: String,
-    /// What came of it.
+    /// Poses and points that COLMAP found.
     pub poses: Poses,
     /// All that is doubtful.
     pub warnings: Vec<String>,
@@ -211,7 +211,7 @@ fn make(
     })
 }
 
-/// Whether the input is a film; else it is a folder.
+/// Returns true if the input is a film, false if it is a folder.
 fn check_input(named: &Path, input: &Path) -> Result<bool, PrepareError> {
     if input.to_str().is_none() {
         let reason = "its path is no UTF-8; rename it";
@@ -404,7 +404,7 @@ fn stretch(
     Ok(if folder.is_dir() { folder } else { images })
 }
 
-/// Which photos are matched with which.
+/// Pairs of photos to match.
 fn matching(
     options: &PrepareOptions,
     is_film: bool,
@@ -425,7 +425,7 @@ fn matching(
     }
 }
 
-/// Which photos one camera took: where the sizes in a folder differ, each has its own.
+/// Photos that share a camera: where the sizes in a folder differ, each has its own.
 fn cameras(options: &PrepareOptions, is_film: bool, photos: &Photos) -> Cameras {
     let of_one_size = photos.folders().values().all(|sizes| sizes.len() == 1);
     match options.cameras {

@@ -19,7 +19,7 @@ use crate::{
     store::files,
 };
 
-/// Of each photo so many values are looked at to find the range of all.
+/// Values sampled per photo to find the range of all.
 const SAMPLED: usize = 4096;
 
 /// Photos whose values fill less of the scale than this are stretched for COLMAP, which looks at
@@ -75,8 +75,8 @@ impl Photos {
         folders
     }
 
-    /// Whether COLMAP needs other files: these values of all photos, as shares of white, should
-    /// be black and white.
+    /// Range of values to stretch for COLMAP, `[black, white]` as shares of white; `None` if it can
+    /// read the photos themselves.
     ///
     /// # Errors
     /// If a photo cannot be read.
@@ -103,13 +103,13 @@ impl Photos {
     }
 }
 
-/// Whether a file or a folder that it lies in is hidden, as on systems that put files of their
-/// own everywhere.
+/// Returns true if a file or one of its folders is hidden, such as files that operating systems
+/// add.
 fn hidden(name: &str) -> bool {
     name.split('/').any(|part| part.starts_with('.')) || name.ends_with("Thumbs.db")
 }
 
-/// What is wrong with a file, without its path.
+/// Reason of an error, without the file's path.
 fn reason(error: &CaptureError) -> String {
     match error {
         CaptureError::Photo { reason, .. } => reason.clone(),

@@ -31,7 +31,7 @@ const USUAL: f64 = 0.1;
 /// Names that are told in one line.
 const TOLD_NAMES: usize = 6;
 
-/// What came of it.
+/// Poses and points that COLMAP found.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Poses {
@@ -47,10 +47,10 @@ pub struct Poses {
     pub pieces: Vec<usize>,
 }
 
-/// What poses are to be found of.
+/// Input of pose estimation.
 pub(super) struct Task<'a> {
     pub photos: &'a Photos,
-    /// The folder of what COLMAP looks at.
+    /// The folder of the photos that COLMAP reads.
     pub seen: &'a Path,
     pub masks: Option<PathBuf>,
     pub cameras: Cameras,
@@ -289,7 +289,7 @@ impl Task<'_> {
         })
     }
 
-    /// What to try where photos have no pose.
+    /// Remedies to suggest when photos have no pose.
     fn remedies(&self) -> String {
         let exhaustive = match self.matching {
             Matching::Sequential => ", --match exhaustive",
@@ -306,7 +306,7 @@ impl Task<'_> {
     }
 }
 
-/// Whether COLMAP failed for want of photos that fit together.
+/// Returns true if COLMAP failed because no photos overlap enough.
 fn has_no_pair(error: &PrepareError) -> bool {
     let PrepareError::Program(ProgramError::Failed { said, .. }) = error else {
         return false;

@@ -13,13 +13,13 @@ use crate::{
     store::files,
 };
 
-/// What does with `pycolmap` what the program's commands do.
+/// Python script that runs COLMAP's commands through `pycolmap`.
 const SCRIPT: &str = include_str!("pycolmap.py");
 
-/// What is installed where nothing is there.
+/// Requirement that is installed where COLMAP is missing.
 pub(crate) const PINNED: &str = "pycolmap==4.2.1";
 
-/// The same, and all that it needs, with the SHA-256 of each wheel.
+/// The same and its dependencies, with the SHA-256 of each wheel.
 const REQUIREMENTS: &str = include_str!("pycolmap.txt");
 
 /// Reasons given if Python cannot make an environment, or if there is no wheel for it.
@@ -107,7 +107,7 @@ fn version(interpreter: impl Into<OsString>, lens: &str) -> Result<String, Progr
     Ok(version.unwrap_or_default().trim().to_owned())
 }
 
-/// Where it is installed.
+/// Folder of the virtual environment.
 fn environment() -> Option<PathBuf> {
     cache_folder("pycolmap")
 }

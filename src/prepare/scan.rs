@@ -1,4 +1,4 @@
-//! Interlaced and telecined films: how they are told, and made progressive.
+//! Detection of interlaced and telecined films, and filters that make them progressive.
 
 /// Share of frames with a repeated field above which 30 fps video is telecined 24 fps film; 3:2
 /// pulldown repeats a field in two of five frames.
@@ -7,14 +7,14 @@ const REPEATED: f64 = 0.2;
 /// Video of 30 (29.97) frames a second, which film of 24 may have become.
 const VIDEO_RATE: [f64; 2] = [29.5, 30.5];
 
-/// How the pictures of a shot are made progressive.
+/// Scan type of a shot's frames; each has the filters that make them progressive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Scan {
-    /// They are.
+    /// The frames are progressive already.
     Progressive,
-    /// Each frame is of two moments.
+    /// Each frame holds fields of two moments.
     Interlaced,
-    /// Each four frames of film were made five of video.
+    /// Every four frames of film became five of video.
     Telecined,
 }
 

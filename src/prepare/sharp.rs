@@ -1,4 +1,4 @@
-//! Which frames of a shot are given to COLMAP: the sharpest of each time step.
+//! Choice of the frames for COLMAP: the sharpest of each time step.
 
 use std::path::Path;
 
@@ -42,7 +42,7 @@ pub(super) fn sharpest(sharpness: &[f64], frames_a_second: f64, per_second: f64)
         .collect()
 }
 
-/// How sharp a frame is, compared with others of about the same content.
+/// Sharpness of a frame, comparable among frames of similar content: variance of the Laplacian.
 ///
 /// # Errors
 /// If it cannot be read.

@@ -1,4 +1,4 @@
-//! Where a film is cut: from tiny frames, however much it flickers.
+//! Detection of a film's cuts from tiny frames, robust to flicker.
 
 use std::{collections::VecDeque, ops::Range};
 
@@ -29,9 +29,9 @@ type Shape = Option<Vec<f32>>;
 pub(super) struct ShotDetector {
     /// The last three frames.
     last: VecDeque<Shape>,
-    /// How much the frames on either side of each boundary differ: before frame 1, 2, ….
+    /// Difference of the frames on either side of each boundary: before frame 1, 2, ….
     differences: Vec<f32>,
-    /// Whether frames show nothing.
+    /// True for each frame that shows nothing.
     empty: Vec<bool>,
 }
 
@@ -50,12 +50,12 @@ impl ShotDetector {
         }
     }
 
-    /// How many frames have been looked at.
+    /// Number of frames seen.
     pub fn frames(&self) -> usize {
         self.empty.len()
     }
 
-    /// Whether there is a cut or nothing to see behind the first shot already.
+    /// Returns true if the first shot has ended in a cut or an empty frame.
     pub fn has_first(&self) -> bool {
         let begun = self.empty.iter().position(|empty| !empty);
         let settled = self.frames().saturating_sub(AROUND + 2);
@@ -74,8 +74,8 @@ impl ShotDetector {
         shots(&self.differences, &self.empty)
     }
 
-    /// How much the frames before the one at `at` differ from it and those after: the least of
-    /// up to four pairs, so that a single frame that is white, torn or missing is no cut.
+    /// Records the boundary before frame `at`: the least difference of up to four pairs of frames
+    /// around it, so that a single white, torn or missing frame is no cut.
     fn judge(&mut self, at: usize) {
         let before = self.last.range(at.saturating_sub(2)..at);
         let after: Vec<_> = self.last.range(at..).take(2).collect();
@@ -126,7 +126,7 @@ fn shots(differences: &[f32], empty: &[bool]) -> Vec<Range<usize>> {
     shots
 }
 
-/// Whether there is a cut behind the frame `at`.
+/// Returns true if there is a cut after frame `at`.
 fn is_cut(differences: &[f32], empty: &[bool], at: usize) -> bool {
     // How empty frames differ says nothing of how the camera moves.
     let shows = |at: usize| !(empty[at] || empty[at + 1]);

@@ -26,7 +26,7 @@ const FILE: &str = "prepare.json";
 /// Locked while it is worked on, and left behind empty.
 const LOCK: &str = "prepare.lock";
 
-/// What folders begin with whose content is not whole yet.
+/// Prefix of folders whose content is still incomplete.
 const DRAFT: &str = ".prepare-";
 
 /// All that a step can have made: what else the file names is none of it.
@@ -34,7 +34,7 @@ const RESULTS: [&str; 7] = [FRAMES, FILM, IMAGES, MASKS, STRETCHED, DATABASE, SP
 
 const VERSION: u32 = 1;
 
-/// What one wants to know when it is there again.
+/// Record of the last run, the content of `prepare.json`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct Record {
     version: u32,
@@ -44,7 +44,7 @@ struct Record {
     input: PathBuf,
     /// The options of the last time.
     options: PrepareOptions,
-    /// What was done.
+    /// Steps done so far.
     steps: BTreeMap<Step, Done>,
     /// The shots of the whole film, in seconds, and what they were found in.
     shots: Option<(String, Vec<[f64; 2]>)>,
@@ -72,9 +72,9 @@ impl Record {
 /// A step that was done, or is about to be.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 struct Done {
-    /// What of, in a few digits; empty where it was only begun.
+    /// Digest of the step's inputs; empty where it was only begun.
     from: String,
-    /// Its results by their names in the output folder, each in a few digits.
+    /// Digests of its results by their names in the output folder.
     results: BTreeMap<String, String>,
 }
 
@@ -167,12 +167,12 @@ impl OutputState {
         Ok(state)
     }
 
-    /// Where something of the capture is, or will be.
+    /// Path of a file of the capture, which need not exist.
     pub fn path(&self, name: &str) -> PathBuf {
         self.folder.join(name)
     }
 
-    /// Whether a step was done from the same before, and its results are there.
+    /// Returns true if a step was done from the same inputs and its results are there.
     pub fn is_done(&self, step: Step, from: &str) -> bool {
         self.record.steps.get(&step).is_some_and(|done| {
             let mut results = done.results.keys();
@@ -180,7 +180,7 @@ impl OutputState {
         })
     }
 
-    /// Whether a step was ever done, of whatever.
+    /// Returns true if a step was ever done, from any inputs.
     pub fn was_done(&self, step: Step) -> bool {
         let done = self.record.steps.get(&step);
         done.is_some_and(|done| !done.from.is_empty())

@@ -1,4 +1,4 @@
-//! How FFmpeg and ffprobe are given a film: as one file that leads to no other.
+//! FFmpeg's and ffprobe's input options: a film is one file that leads to no other.
 
 use std::{ffi::OsString, path::Path};
 

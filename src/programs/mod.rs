@@ -21,10 +21,10 @@ use said::{Last, Stream, listen};
 
 use crate::disk;
 
-/// What films are read and written with.
+/// Program that reads and writes films.
 pub(crate) const FFMPEG: &str = "ffmpeg";
 
-/// How often a program is looked after that has closed its output.
+/// Interval of polling a program that has closed its output.
 const PATIENCE: Duration = Duration::from_millis(5);
 
 /// Streams and format of a film in the words of `ffprobe`, which are JSON.
@@ -51,7 +51,7 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// What kept a program from doing its part.
+/// Error of an external program.
 #[derive(Debug, thiserror::Error)]
 pub enum ProgramError {
     /// It is not installed.
@@ -65,19 +65,19 @@ pub enum ProgramError {
     Failed {
         /// Name of the program, as it was started.
         program: String,
-        /// What it said last, and how it ended.
+        /// Its last lines, and its exit status.
         said: String,
     },
 }
 
 impl ProgramError {
-    /// Whether FFmpeg, or what comes with it, is not installed.
+    /// Returns true if FFmpeg or ffprobe is not installed.
     pub fn lacks_ffmpeg(&self) -> bool {
         matches!(self, Self::Missing { program } if matches!(program.as_str(), "ffmpeg" | "ffprobe"))
     }
 }
 
-/// How a program is installed.
+/// Installation hint of a program.
 fn remedy(program: &str) -> &'static str {
     match program {
         "ffmpeg" | "ffprobe" => {
@@ -105,7 +105,7 @@ pub(crate) fn end_all() -> impl Sized {
 /// A program with its arguments.
 #[derive(Clone, Debug)]
 pub(crate) struct Program {
-    /// What it is found by: a name on `PATH`, or a path.
+    /// Name on `PATH`, or path.
     name: OsString,
     arguments: Vec<OsString>,
 }

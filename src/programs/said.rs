@@ -1,4 +1,4 @@
-//! What a program says: its lines, as they come, and the last of them, for an error.
+//! Output of a program: its lines, as they come, and the last of them, for an error.
 
 use std::{
     collections::VecDeque,
@@ -10,7 +10,7 @@ use std::{
 /// Lines that are kept to be told if a program fails.
 pub(super) const KEPT_LINES: usize = 20;
 
-/// Of these, as many of the last go into an error.
+/// Last lines that go into an error.
 const TOLD_LINES: usize = 2;
 
 /// A longer line is no message; the rest of it is not kept.
@@ -51,14 +51,14 @@ pub(super) fn listen(
     });
 }
 
-/// Where a program says something.
+/// Output stream of a program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Stream {
     Output,
     Error,
 }
 
-/// What a program said last.
+/// Last lines of a program's output.
 #[derive(Default)]
 pub(super) struct Last(VecDeque<(Stream, String)>);
 

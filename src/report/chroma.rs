@@ -19,7 +19,7 @@ pub struct ChromaReport {
     pub teachers: Vec<TeacherReport>,
     /// Factor on the teachers' a and b.
     pub strength: f32,
-    /// How answers smaller than the photo were enlarged.
+    /// Method of upsampling answers smaller than the photo.
     pub upsample: Upsample,
     /// Views with painted hints.
     pub hints: usize,
@@ -40,7 +40,7 @@ pub struct ChromaReport {
     ///
     /// A teacher colored them, or they have hints.
     pub colored_views: usize,
-    /// How chroma was solved for.
+    /// Settings of the chroma solver.
     pub settings: ChromaSettings,
     /// Share of the Gaussians that no colored view shows well.
     ///
@@ -95,7 +95,7 @@ pub struct ChromaReport {
     pub pictures: ColorQuality,
     /// Each of these views.
     pub views: Vec<ColorView>,
-    /// Where the device's time went, with `--timings`.
+    /// Device time of each kernel, with `--timings`.
     // Its table is one of its own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[cfg_attr(test, schemars(skip))]
@@ -173,7 +173,7 @@ pub struct ColorQuality {
     ///
     /// On RGB from 0 to 255.
     pub colorfulness: f64,
-    /// That of the teacher's pictures.
+    /// Colorfulness of the teacher's pictures.
     ///
     /// `None` where it has none.
     pub teacher_colorfulness: Option<f64>,

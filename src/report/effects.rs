@@ -1,30 +1,30 @@
-//! What is reported about the effects of image formation.
+//! Report of the effects of image formation.
 
 use serde::{Deserialize, Serialize};
 
 use crate::effects::{Decider, Decision, Effect};
 
-/// What was decided about an effect, and why.
+/// Decision about an effect, and its reasons.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct EffectReport {
     /// As for `--with` and `--without`.
     pub name: Effect,
-    /// Whether it was simulated.
+    /// True if it was simulated.
     pub on: bool,
     /// Figure that decides, if the capture has one.
     pub evidence: Option<f64>,
     /// Evidence above which it is simulated.
     pub threshold: f64,
-    /// What both count.
+    /// Unit of evidence and threshold.
     pub unit: String,
-    /// Who decided.
+    /// Source of the decision.
     pub decided_by: Decider,
     /// Gain of a short training on views held back, in dB.
     ///
     /// `None` without a trial.
     pub trial: Option<f64>,
-    /// What it costs.
+    /// Cost of simulating it.
     pub cost: String,
 }
 

@@ -1,5 +1,4 @@
-//! What `eval` measures: `eval.json` and its tables. docs/run-folder.md describes
-//! every key.
+//! Results of `eval`: `eval.json` and its tables. docs/run-folder.md describes every key.
 
 use std::fmt;
 
@@ -11,7 +10,7 @@ use crate::measure::{Consistency, DENOMINATOR_RULE, MASK_RULE, SCALE_RULE};
 /// Version of the evaluation's layout; raised when a key changes its meaning.
 pub const EVALUATION_VERSION: u32 = 1;
 
-/// Whose pictures.
+/// Method that made the pictures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
@@ -42,7 +41,7 @@ impl Method {
         name.replace('_', "-")
     }
 
-    /// What its pictures are called, in tables and under pictures.
+    /// Name of its pictures, in tables and under pictures.
     pub fn name(self) -> &'static str {
         match self {
             Self::Native => "ours, native",
@@ -75,7 +74,7 @@ pub struct Evaluation {
     pub program: String,
     /// Name of the COLMAP folder.
     pub scene: String,
-    /// Who colored the photos, with `--teacher`.
+    /// Teacher that colored the photos, with `--teacher`.
     #[cfg_attr(test, schemars(with = "Option<crate::chroma::teacher::TeacherInfo>"))]
     pub teacher: Option<serde_json::Value>,
     /// Colorfulness of all pictures of the teacher, mean.
@@ -94,7 +93,7 @@ pub struct Evaluation {
     pub views: Vec<ViewScore>,
     /// Cost of `--baselines` and `--recipe`.
     pub peers: Vec<PeerReport>,
-    /// How consistency is computed.
+    /// Rules by which consistency is computed.
     pub rules: Rules,
     /// Warnings of `eval`.
     pub warnings: Vec<String>,
@@ -121,17 +120,17 @@ pub struct LumaScore {
     pub ssim: f64,
     /// Variance of the Laplacian, of grays from 0 to 255.
     pub sharpness: f64,
-    /// That of the photo.
+    /// Sharpness of the photo.
     pub photo_sharpness: f64,
     /// Learned perceptual distance, with `--lpips`.
     pub lpips: Option<f64>,
 }
 
-/// What coloring the scene in another way took.
+/// Cost of coloring the scene by another method.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct PeerReport {
-    /// Which way to color.
+    /// Method of coloring.
     pub method: Method,
     /// Rounds of least squares, or iterations of Adam.
     pub iterations: usize,
@@ -145,7 +144,7 @@ pub struct PeerReport {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct PictureScore {
-    /// Whose pictures.
+    /// Method of the pictures.
     pub method: Method,
     /// PSNR of R, G and B together, in dB.
     pub psnr: Option<f64>,
@@ -190,15 +189,15 @@ pub struct ViewScore {
     pub pictures: Vec<PictureScore>,
 }
 
-/// How the figures of consistency come about, in words.
+/// Definitions of the consistency figures, in words.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Rules {
-    /// Which pixels are not compared.
+    /// Pixels that are not compared.
     pub mask: String,
-    /// What is squared.
+    /// Values whose differences are squared.
     pub scale: String,
-    /// What the sum is divided by.
+    /// Divisor of the sum.
     pub denominator: String,
 }
 
@@ -234,7 +233,7 @@ pub struct PathScore {
 pub struct PathConsistency {
     /// Distance of the two pictures, in frames.
     pub delta: usize,
-    /// Whose pictures, and the figures.
+    /// Method of the pictures, and the figures.
     #[serde(flatten)]
     pub score: ConsistencyScore,
 }
@@ -263,7 +262,7 @@ pub struct BetweenScore {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct ConsistencyScore {
-    /// Whose pictures.
+    /// Method of the pictures.
     pub method: Method,
     /// Pairs of pictures.
     pub pairs: u64,

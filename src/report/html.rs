@@ -1,4 +1,4 @@
-//! What pages have in common.
+//! Parts that all pages share.
 
 use std::fmt::Write;
 
@@ -7,7 +7,7 @@ use super::table::Table;
 /// The look of every page.
 const STYLE: &str = include_str!("style.css");
 
-/// What a page may do: show itself, and the pictures and films beside it.
+/// Content security policy: a page shows itself, and the pictures and films beside it.
 const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src 'self' file: data:; media-src 'self' file:; base-uri 'none'; form-action 'none'";
 
 /// The end of every page.

@@ -1,5 +1,4 @@
-//! What a run tells about itself: `report.json`, the contact sheet, and what `eval`
-//! finds.
+//! Reports of a run: `report.json`, the contact sheet, and the findings of `eval`.
 //! docs/run-folder.md describes every key.
 
 mod chroma;
@@ -50,7 +49,7 @@ pub struct Report {
     pub program: String,
     /// The photos and their poses.
     pub capture: CaptureReport,
-    /// What it ran on.
+    /// Graphics device of the run.
     pub device: DeviceReport,
     /// Source of settings that were not given.
     pub preset: Preset,
@@ -69,7 +68,7 @@ pub struct Report {
     pub chroma: Option<ChromaReport>,
 }
 
-/// What was photographed.
+/// Photos and poses of the capture.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct CaptureReport {
@@ -85,7 +84,7 @@ pub struct CaptureReport {
     pub points: usize,
     /// Photos and points left out, and why.
     pub rejected: Vec<String>,
-    /// How the photos were loaded.
+    /// Options that the photos were loaded with.
     #[serde(flatten)]
     pub load: LoadOptions,
     /// Views whose photo has a mask.
@@ -108,7 +107,7 @@ pub struct CaptureReport {
 }
 
 impl CaptureReport {
-    /// Of the photos of a COLMAP folder, but for their fingerprints.
+    /// Report of a COLMAP folder, still without fingerprints of the photos.
     pub fn of(colmap_dir: &Path, dataset: &Dataset) -> Self {
         let capture = &dataset.capture;
         let path = std::fs::canonicalize(colmap_dir).unwrap_or_else(|_| colmap_dir.to_owned());
@@ -171,7 +170,7 @@ pub struct PhotoReport {
     pub pose: String,
 }
 
-/// What it ran on.
+/// Graphics device of the run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct DeviceReport {
@@ -179,12 +178,12 @@ pub struct DeviceReport {
     pub name: String,
     /// `Vulkan`, `Metal` or `Dx12`.
     pub backend: String,
-    /// Whether it is a software adapter.
+    /// True if it is a software adapter.
     pub software: bool,
 }
 
 impl DeviceReport {
-    /// Of a device.
+    /// Report of a device.
     pub fn of(gpu: &Gpu) -> Self {
         Self {
             name: gpu.describe(),
@@ -198,7 +197,7 @@ impl DeviceReport {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct LumaReport {
-    /// What it was trained with.
+    /// Settings of the training.
     pub settings: LumaSettings,
     /// Iterations that led to the splats, earlier runs included.
     pub iterations: usize,
@@ -206,9 +205,9 @@ pub struct LumaReport {
     pub given_up: Option<usize>,
     /// Gaussians at the end.
     pub splats: usize,
-    /// Of these, the shell around the scene, last in `luma.ply`.
+    /// Gaussians of these in the shell around the scene, last in `luma.ply`.
     ///
-    /// It stands for what no photo shows.
+    /// They cover directions that no photo shows.
     #[serde(default)]
     pub surroundings: usize,
     /// SHA-256 of the merged scene among which a block went on.
@@ -230,9 +229,9 @@ pub struct LumaReport {
     /// Of grays from 0 to 1. JSON has `null` for what is not finite.
     #[serde(deserialize_with = "number_or_nan")]
     pub loss: f64,
-    /// What was to end the run, by `--time-limit` or `--target-psnr`.
+    /// Condition that ends the run, by `--time-limit` or `--target-psnr`.
     ///
-    /// Its seconds are those of all of it.
+    /// Its seconds count the whole run.
     pub goal: Goal,
     /// Wall time.
     pub seconds: LumaSeconds,
@@ -263,7 +262,7 @@ pub struct LumaReport {
     pub held_out: Option<LumaQuality>,
     /// Each held-out view.
     pub held_out_views: Vec<LumaView>,
-    /// Where the device's time went, with `--timings`.
+    /// Device time of each kernel, with `--timings`.
     // Its table is one of its own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[cfg_attr(test, schemars(skip))]
@@ -276,7 +275,7 @@ pub struct LumaReport {
 pub struct LumaSeconds {
     /// Reading photos and placing the first Gaussians, in seconds.
     pub load: f64,
-    /// Of these, trials, in seconds.
+    /// Trials of the plan, in seconds; part of `load`.
     ///
     /// 0 in reports of former versions.
     #[serde(default)]
@@ -321,7 +320,7 @@ impl LumaQuality {
     }
 }
 
-/// How bright a photo shows the scene.
+/// Exposure of one photo.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct ViewExposure {
@@ -374,8 +373,8 @@ impl Report {
         )
     }
 
-    /// What the training gained with time, as a table of at most so many rows; nothing
-    /// where there was but one look.
+    /// Gain of the training over time, as a table of at most `rows` rows; `None` for a single
+    /// checkpoint.
     pub fn curve_table(&self, rows: usize) -> Option<String> {
         let curve = &self.luma.curve;
         if curve.len() < 2 {

@@ -22,7 +22,7 @@ pub const MAP_END: f64 = 30.0;
 
 /// A picture on the page.
 pub struct Figure {
-    /// What it shows.
+    /// Caption.
     pub caption: String,
     /// Its file, beside the page.
     pub file: String,
@@ -36,8 +36,7 @@ pub struct PageRow {
     pub figures: Vec<Figure>,
 }
 
-/// What each pixel's error looks like, `[height, width]` of RGB in [0, 1]; what is not
-/// finite is white.
+/// Error map, `[height, width]` of RGB in [0, 1]; non-finite errors are white.
 pub fn error_map(errors: &[f64]) -> Vec<[f32; 3]> {
     let color = |&error: &f64| {
         if !error.is_finite() {
@@ -65,7 +64,7 @@ pub struct Flight {
     pub bytes: u64,
 }
 
-/// What the page does under the pointer.
+/// Script of the page.
 const SCRIPT: &str = include_str!("page.js");
 
 /// The page's HTML: a verdict, tables, the path, and a row of pictures a view. `strip` are some

@@ -4,13 +4,13 @@ use std::fmt;
 
 /// A table: title, head, rows and what has to be said below it.
 pub struct Table {
-    /// What it shows.
+    /// Title.
     pub title: String,
     /// Names of the columns.
     pub head: Vec<String>,
     /// Cells by row.
     pub rows: Vec<Vec<String>>,
-    /// What has to be known to read it, a line each.
+    /// Notes on reading it, a line each.
     pub notes: Vec<String>,
 }
 
@@ -29,7 +29,7 @@ impl Table {
     }
 }
 
-/// What stands where there is no figure.
+/// Placeholder of a missing figure.
 const DASH: &str = "–";
 
 /// A figure with so many digits behind the point, or a dash.

@@ -1,4 +1,4 @@
-//! Where the device's time went, beside what the memory traffic alone would take.
+//! Device time of each kernel, beside the least memory traffic.
 
 use std::fmt::Write;
 
@@ -29,7 +29,7 @@ pub fn minimum_bytes(kernel: &str, load: &Load) -> Option<f64> {
 pub struct KernelReport {
     /// Its name, as in `shaders/`.
     pub kernel: String,
-    /// How often it ran.
+    /// Number of dispatches.
     pub dispatches: u64,
     /// Total on the device, in seconds.
     ///

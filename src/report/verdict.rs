@@ -1,4 +1,4 @@
-//! What an evaluation amounts to, in words that follow from its figures.
+//! Verdict on an evaluation, in words that follow from its figures.
 
 use super::{ConsistencyScore, Evaluation, Method, PictureScore};
 
@@ -13,7 +13,7 @@ const UNSEEN: f64 = 1.0;
 const FAINT: f64 = 2.0;
 
 impl Evaluation {
-    /// What the figures say, a line each. docs/guide.md has the bounds.
+    /// Verdict, a line each. docs/guide.md has the bounds.
     pub fn verdict(&self) -> Vec<String> {
         [
             self.agreement(Method::Teacher, "the teacher's own pictures"),
@@ -33,14 +33,14 @@ impl Evaluation {
         self.pictures.iter().find(|score| score.method == method)
     }
 
-    /// How much photographed views of one place differ.
+    /// Difference between photographed views of one place, RMS in CIELAB units.
     fn between(&self, method: Method) -> Option<f64> {
         let scores = self.between.consistency.iter();
         let mut own = scores.filter(|score: &&ConsistencyScore| score.method == method);
         own.next()?.rms
     }
 
-    /// How well views agree beside another's.
+    /// Agreement between views, compared with another method's.
     fn agreement(&self, other: Method, name: &str) -> Option<String> {
         let (ours, theirs) = (self.between(Method::Exported)?, self.between(other)?);
         let figures = format!("({ours:.2} against {theirs:.2} CIELAB units)");
@@ -49,7 +49,7 @@ impl Evaluation {
         Some(format!("views agree {} {name} {figures}", times(ratio)))
     }
 
-    /// How strong colors are beside the teacher's.
+    /// Colorfulness, compared with the teacher's.
     fn strength(&self) -> Option<String> {
         let ours = self.picture(Method::Exported)?.colorfulness;
         let theirs = self.picture(Method::Teacher)?.colorfulness;
@@ -67,7 +67,7 @@ impl Evaluation {
         ))
     }
 
-    /// How near colors are to the photos', where these are in color.
+    /// Color error, ΔE00 to the photos, where these are in color.
     fn truth(&self) -> Option<String> {
         let of = |method| Some(self.picture(method)?.delta_e?.mean);
         let ours = of(Method::Exported)?;
@@ -85,7 +85,7 @@ impl Evaluation {
         ))
     }
 
-    /// What the export changes.
+    /// Color change by the export, in ΔE00.
     fn export(&self) -> Option<String> {
         let change = self.bake?.mean;
         let how = match () {
@@ -98,7 +98,7 @@ impl Evaluation {
         ))
     }
 
-    /// How good the gray scene is.
+    /// Quality of the gray scene.
     fn gray(&self) -> String {
         let luma = &self.luma;
         let sharp = luma.sharpness / luma.photo_sharpness;
@@ -120,7 +120,7 @@ impl Evaluation {
     }
 }
 
-/// How a ratio is said, large ones being good.
+/// A ratio in words; larger is better.
 fn times(ratio: f64) -> String {
     let often = |ratio: f64| match ratio < 10.0 {
         true => format!("{ratio:.1} times"),

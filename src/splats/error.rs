@@ -1,4 +1,4 @@
-//! What can be wrong with a splat file of any format.
+//! Errors of splat files of any format.
 
 use std::{
     io,
@@ -10,10 +10,10 @@ use ply_rs_bw::ply::ElementDef;
 use super::Format;
 use crate::input::excerpt;
 
-/// Why a splat file could not be read or written.
+/// Error of reading or writing a splat file.
 #[derive(Debug, thiserror::Error)]
 pub enum SplatError {
-    /// The file system refused.
+    /// The file system returned an error.
     #[error("{}: {source}", path.display())]
     Io {
         /// File at fault.
@@ -21,7 +21,7 @@ pub enum SplatError {
         /// The system's reason.
         source: io::Error,
     },
-    /// The name to write to is that of no format.
+    /// The extension of the output file belongs to no format.
     #[error(
         "{}: no format of splat files has this extension; those known are {}", path.display(), Format::list(|_| true)
     )]
@@ -29,7 +29,7 @@ pub enum SplatError {
         /// File at fault.
         path: PathBuf,
     },
-    /// The file's name is that of a format that is not read.
+    /// The file has a format that is not read.
     #[error(
         "{}: {format} files are not read; {remedy} (those read are {})", path.display(), Format::list(Format::is_read)
     )]
@@ -38,17 +38,17 @@ pub enum SplatError {
         path: PathBuf,
         /// Extension of the file.
         format: String,
-        /// A way to one that is read.
+        /// Conversion to a format that is read.
         remedy: &'static str,
     },
-    /// A file is not what its format says.
+    /// A part of the file contradicts its format.
     #[error("{}: {field}: {reason}", path.display())]
     Damaged {
         /// File at fault.
         path: PathBuf,
         /// The part of the file.
         field: &'static str,
-        /// What is wrong with it.
+        /// Defect of that part.
         reason: String,
     },
     /// The format's numbers are too coarse for the scene.
@@ -68,7 +68,7 @@ pub enum SplatError {
     NotWritten {
         /// The file that was to be written.
         path: PathBuf,
-        /// What is wrong.
+        /// Reason of the refusal.
         reason: String,
     },
     /// The vertices are points, not Gaussians.
@@ -79,7 +79,7 @@ pub enum SplatError {
         /// File at fault.
         path: PathBuf,
     },
-    /// A property that every Gaussian needs is not there.
+    /// A property that every Gaussian needs is missing.
     #[error("{}: not a splat file: vertices have no property \"{property}\"", path.display())]
     MissingProperty {
         /// The splat file.
@@ -104,7 +104,7 @@ pub enum SplatError {
     RestCount {
         /// The splat file.
         path: PathBuf,
-        /// How many there are.
+        /// Number of `f_rest_*` properties.
         count: usize,
     },
     /// The file ends before its last Gaussian.

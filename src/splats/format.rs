@@ -33,7 +33,7 @@ impl Format {
         Self::Usda,
     ];
 
-    /// What names end in, with its dot.
+    /// File name extension, with its dot.
     pub fn extension(self) -> &'static str {
         match self {
             Self::Ply => ".ply",
@@ -60,22 +60,22 @@ impl Format {
         }
     }
 
-    /// Whether its files are read, too.
+    /// Returns true if the format can be read, not only written.
     pub fn is_read(self) -> bool {
         !matches!(self, Self::Glb | Self::Usda)
     }
 
-    /// Whether its files can say that they want to be drawn antialiased.
+    /// Returns true if its files can mark scenes as antialiased.
     pub fn tells_antialiasing(self) -> bool {
         self != Self::Splat
     }
 
-    /// Whether its colors can depend on where they are seen from.
+    /// Returns true if it stores view-dependent color: harmonics above degree 0.
     pub fn has_harmonics(self) -> bool {
         self != Self::Splat
     }
 
-    /// Whether its files can say what was subtracted from the coordinates.
+    /// Returns true if its files can store the offset subtracted from the coordinates.
     pub fn tells_offset(self) -> bool {
         !matches!(self, Self::Splat | Self::Spz)
     }

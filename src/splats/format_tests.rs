@@ -1,4 +1,4 @@
-//! What every format keeps, and what none survives without a word.
+//! Fidelity of every format, and its warnings.
 
 use std::{fs, path::Path};
 
@@ -29,13 +29,13 @@ fn read(name: &str, bytes: &[u8]) -> Result<ReadSplats, SplatError> {
 struct Bounds {
     /// World units.
     center: f64,
-    /// Of logarithms.
+    /// Error of log-scales.
     scale: f64,
     /// 1 less the magnitude of the product of two quaternions.
     rotation: f64,
-    /// Of the color shown, 0 to 1.
+    /// Error of the color shown, 0 to 1.
     color: f64,
-    /// Of harmonics above degree 0; none where there are none.
+    /// Error of harmonics above degree 0; `None` without any.
     harmonic: Option<f64>,
 }
 

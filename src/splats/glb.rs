@@ -140,7 +140,7 @@ impl Parts {
         self.add(name, bytes, accessor);
     }
 
-    /// What is shown of each by programs that know no splats.
+    /// Color and opacity of each Gaussian for programs that do not support splats.
     fn colors(&mut self, splats: &Splats) {
         let bytes = (0..splats.len()).flat_map(|index| {
             let constant = &splats.sh.of(index)[..CHANNELS];

@@ -31,7 +31,7 @@ pub struct InitialPoint {
 }
 
 impl From<([f32; 3], f32)> for InitialPoint {
-    /// Of a position and a gray.
+    /// A point at a position with a gray, without a spacing.
     fn from((position, gray): ([f32; 3], f32)) -> Self {
         Self {
             position,

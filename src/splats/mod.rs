@@ -42,7 +42,7 @@ pub struct Splats {
     pub log_scales: Vec<[f32; 3]>,
     /// Logits of the opacities, `[N]`.
     pub opacity_logits: Vec<f32>,
-    /// What the Gaussians show: luma (1 channel), chroma (2) or RGB (3).
+    /// SH coefficients of the color: luma (1 channel), chroma (2) or RGB (3).
     pub sh: ShField,
 }
 
@@ -97,7 +97,7 @@ impl Splats {
         self.sh.coefficients.append(&mut others.sh.coefficients);
     }
 
-    /// Whether there is no Gaussian at all.
+    /// Returns true if there is no Gaussian.
     pub fn is_empty(&self) -> bool {
         self.means.is_empty()
     }
@@ -123,8 +123,8 @@ impl Splats {
         }
     }
 
-    /// Whether the channels of every coefficient differ by at most `tolerance`,
-    /// in units of the coefficients. NaN is not gray.
+    /// Returns true if the channels of every coefficient differ by at most `tolerance`, in units of
+    /// the coefficients. NaN is not gray.
     pub fn is_gray(&self, tolerance: f32) -> bool {
         let channels = self.sh.channels.max(1);
         let mut coefficients = self.sh.coefficients.chunks_exact(channels);

@@ -104,7 +104,7 @@ impl PointTree {
     }
 }
 
-/// What a search counts to `k`.
+/// Unit in which a search counts to `k`.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Counted {
     /// Points, each duplicate on its own.

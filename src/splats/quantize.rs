@@ -1,5 +1,5 @@
-//! What the formats that quantize have in common: bytes of opacities, levels between two
-//! bounds, quaternions by their smallest three components.
+//! Quantization shared by the formats: bytes of opacities, levels between two bounds, quaternions
+//! by their smallest three components.
 
 use super::opacity;
 
@@ -36,7 +36,7 @@ pub(super) fn level(share: f64, highest: u32) -> u32 {
     ((share * f64::from(highest)).round() as u32).min(highest)
 }
 
-/// Where a value lies between two bounds: 0 to 1, and 0 where these are one.
+/// Position of a value between two bounds, 0 to 1; 0 where the bounds are equal.
 pub(super) fn share(value: f64, low: f64, high: f64) -> f64 {
     match high > low {
         true => ((value - low) / (high - low)).clamp(0.0, 1.0),
@@ -49,7 +49,7 @@ pub(super) fn between(low: f64, high: f64, share: f64) -> f64 {
     low + (high - low) * share
 }
 
-/// Which component of a unit quaternion is largest, and the others in order as shares of √½, in
+/// Index of the largest component of a unit quaternion, and the others in order as shares of √½, in
 /// [-1, 1], signed so that the largest is positive.
 pub(super) fn smallest_three(quaternion: [f32; 4]) -> (usize, [f64; 3]) {
     let largest = (1..4).fold(0, |best, k| {

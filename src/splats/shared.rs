@@ -1,4 +1,4 @@
-//! What the formats of splat files have in common.
+//! Parts that all formats of splat files share.
 
 use std::path::Path;
 
@@ -19,7 +19,7 @@ const TOLD: f64 = 0.01;
 /// compressed one: a file that announces more is cut off, or made to fill the memory.
 const MEMORY: [usize; 2] = [8 << 20, 56];
 
-/// What a splat file holds.
+/// Content of a splat file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ReadSplats {
     /// The Gaussians, with an RGB field. Quaternions are as in the file, not
@@ -29,12 +29,12 @@ pub struct ReadSplats {
     /// quaternion zero. An infinite opacity is not counted: it is opaque or transparent; nor is
     /// a scale of minus infinity: it is flat.
     pub skipped: usize,
-    /// What was subtracted from the centers, in world units, as the file says
-    /// ([`offset_comment`](super::ply::offset_comment) in a `.ply`); zero where it says nothing.
+    /// Offset subtracted from the centers, in world units, by the file
+    /// ([`offset_comment`](super::ply::offset_comment) in a `.ply`); zero without one.
     pub offset: DVec3,
     /// Bytes behind all that the header announces: its count is likely too small.
     pub surplus: u64,
-    /// Whether the file says that the Gaussians were trained antialiased
+    /// True if the file marks the Gaussians as trained antialiased
     /// ([`ANTIALIASED`](super::ply::ANTIALIASED), or Postshot's `antialiased 1`, in a `.ply`).
     pub antialiased: bool,
     /// Conversions applied on reading, a line each.
@@ -43,16 +43,16 @@ pub struct ReadSplats {
     pub doubts: Vec<String>,
 }
 
-/// How a splat file is written, and what it says of its Gaussians.
+/// Options of writing a splat file, and metadata for its header.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct WriteOptions {
     /// The program that writes, as files name it.
     pub generator: String,
-    /// Whether the Gaussians were trained antialiased.
+    /// True if the Gaussians were trained antialiased.
     pub antialiased: bool,
     /// Added to the centers in f64 before they are rounded, in world units.
     pub added: DVec3,
-    /// What the centers lack, as the file says, in world units.
+    /// Offset subtracted from the centers, noted in the file, in world units.
     pub offset: DVec3,
 }
 
@@ -205,7 +205,7 @@ impl SplatBuilder {
         splats.sh.coefficients.extend(sh);
     }
 
-    /// What was read.
+    /// The scene as read.
     pub fn finish(self) -> ReadSplats {
         self.read
     }

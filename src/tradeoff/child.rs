@@ -13,10 +13,10 @@ use crate::{disk, input};
 /// Set for a program that is to end when its standard input does.
 const TETHER: &str = "GS_CHROMA_ENDS_WITH_STDIN";
 
-/// How often a child is looked after.
+/// Interval of polling a child process.
 const PATIENCE: Duration = Duration::from_millis(50);
 
-/// How often the observer is told.
+/// Interval of calls to the observer.
 const TELL: Duration = Duration::from_millis(500);
 
 /// Ends this program when the one that started it is gone, where that one asked for

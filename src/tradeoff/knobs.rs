@@ -1,4 +1,4 @@
-//! What can be turned, and how far around the base.
+//! Knobs of a sweep, and their range around the base.
 
 use super::sweep::{PointStage, Setting};
 use crate::{
@@ -9,7 +9,7 @@ use crate::{
 /// Share of an iteration of stage 1 that goes by pixels and not by Gaussians: about half.
 const PIXELS_SHARE: f64 = 0.5;
 
-/// Less than this `fit` refuses.
+/// Least side in pixels that `fit` accepts.
 const LEAST_SIDE: u32 = 16;
 
 /// The knob that turns many at once, and is not turned with others.

@@ -45,7 +45,7 @@ pub struct TradeoffOptions {
     pub knobs: Vec<String>,
 }
 
-/// What can stop a sweep.
+/// Error of a sweep.
 #[derive(Debug, thiserror::Error)]
 pub enum TradeoffError {
     /// The photos, the device or the file system.
@@ -57,17 +57,17 @@ pub enum TradeoffError {
     /// Nothing is held out, and quality cannot be weighed against time.
     #[error("{}: no view is held out to measure on: leave --no-holdout out, or name a folder with more photos", .0.display())]
     NothingToMeasure(PathBuf),
-    /// What everything is compared with does not run.
+    /// A base, which all other points are compared with, failed.
     #[error("{point}, which all other points are compared with, failed: {reason}")]
     Base {
         /// Name of the point, also of its folder.
         point: String,
-        /// What the program said.
+        /// Message of the program.
         reason: String,
     },
 }
 
-/// What `tradeoff` writes, beside the points' folders.
+/// Files of `tradeoff`, beside the points' folders.
 pub const FILES: [&str; 3] = ["tradeoff.csv", "tradeoff.json", "tradeoff.html"];
 
 /// The folder of the points' folders.

@@ -17,7 +17,7 @@ const COLORS: [&str; KNOBS.len()] = [
 /// Color of what turns several knobs.
 const COMBINED: &str = "#9aa0a8";
 
-/// Where the axes of a plot of 560 by 360 end.
+/// Edges of the axes in a plot of 560 by 360.
 const LEFT: f64 = 62.0;
 const RIGHT: f64 = 546.0;
 const TOP: f64 = 14.0;
@@ -138,14 +138,14 @@ impl Axis {
         }
     }
 
-    /// Where a value lies.
+    /// Position of a value.
     fn at(&self, value: f64) -> f64 {
         let [low, high] = self.values;
         let [first, last] = self.ends;
         first + (last - first) * (value - low) / (high - low)
     }
 
-    /// Its ticks: where they lie, and what they say.
+    /// Its ticks: positions and labels.
     fn ticks(&self) -> impl Iterator<Item = (f64, String)> {
         let digits = (-self.step.log10().floor()).clamp(0.0, 12.0) as usize;
         let [low, high] = self.values;

@@ -27,7 +27,7 @@ const MEASURE_SIDE: &str = "--measure-side";
 /// Frames of `eval`'s path, of which nothing is used: as few as it takes.
 const FRAMES: &str = "2";
 
-/// Where points run.
+/// Folder and subject of the points.
 pub(super) struct Bench {
     /// `points/` of the sweep, absolute.
     points: PathBuf,
@@ -164,7 +164,7 @@ impl Bench {
         })
     }
 
-    /// What the reports of a point say.
+    /// Outcome of a point, from its reports.
     fn outcome(&self, task: &Task, sweep: &Tradeoff) -> Result<Outcome, TradeoffError> {
         let folder = self.folder(&task.name);
         let report = folder.read_report()?;
@@ -202,7 +202,7 @@ impl Bench {
     }
 }
 
-/// How far the exported pictures of photographed views are apart.
+/// Difference between the exported pictures of photographed views, RMS in CIELAB units.
 fn consistency(folder: &RunFolder) -> Result<Option<f64>, RunError> {
     let path = folder.evaluation();
     let text = input::read_to_string(&path).map_err(files::at(&path))?;

@@ -115,7 +115,7 @@ fn table(sweep: &Tradeoff, stage: PointStage, title: &str, points: &[&SweepPoint
     }
 }
 
-/// What this page needs besides the style of all.
+/// Style of this page, besides that of all pages.
 const STYLE: &str = "<style>
 .plots { display: grid; grid-template-columns: repeat(auto-fit, minmax(380px, 1fr)); gap: 1rem; }
 .plots svg { display: block; color: var(--ink); fill: var(--quiet); background: var(--card); }
@@ -264,7 +264,7 @@ mod tests {
         assert_eq!(html.matches("<svg").count(), 2);
     }
 
-    /// What the shell itself makes of it.
+    /// The line as the shell itself splits it.
     #[cfg(unix)]
     #[test]
     fn a_shell_reads_the_same_arguments() {

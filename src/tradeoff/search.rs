@@ -1,5 +1,5 @@
-//! Which point comes next: the bases, every setting alone, then pairs of settings that alone
-//! are on the front by now, the cheapest first.
+//! Choice of the next point: the bases, every setting alone, then pairs of settings that alone are
+//! on the front by now, the cheapest first.
 //!
 //! Everything follows from the points that are there and the seconds that are left, so
 //! that a sweep that goes on asks for what one without a break would have asked for.
@@ -16,7 +16,7 @@ pub(super) struct Task {
     pub stage: PointStage,
     /// Phase of the sweep that wants it.
     pub phase: Phase,
-    /// What differs from the base.
+    /// Settings that differ from the base.
     pub settings: Vec<Setting>,
     /// Wall seconds that it should take; `None` for a base, which runs anyway.
     pub expected: Option<f64>,
@@ -57,7 +57,7 @@ pub(super) fn next(values: &[Value], sweep: &Tradeoff, color: bool) -> Option<Ta
         .or_else(|| cheapest(values, sweep, Phase::Front, pairs))
 }
 
-/// Of choices that have not been tried the one that should take least, if it fits.
+/// The untried choice with the least expected time, if it fits the budget.
 fn cheapest<'a>(
     values: &[Value],
     sweep: &Tradeoff,
@@ -179,7 +179,7 @@ mod tests {
         EFFECTS.iter().map(value).collect()
     }
 
-    /// What running a task comes to.
+    /// Simulated result of a task.
     fn run(task: &Task) -> SweepPoint {
         let (mut seconds, mut quality) = (40.0, 0.0);
         for setting in &task.settings {

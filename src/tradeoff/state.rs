@@ -24,7 +24,7 @@ pub(super) struct SweepState {
     _lock: File,
     /// File at fault.
     path: PathBuf,
-    /// What it holds.
+    /// Content of the file.
     pub sweep: Tradeoff,
 }
 

@@ -13,7 +13,7 @@ pub struct Tradeoff {
     pub version: u32,
     /// Version of the program.
     pub program: String,
-    /// What is swept.
+    /// Subject of the sweep.
     pub subject: Subject,
     /// Adapter and driver, once the first point has run.
     pub device: Option<String>,
@@ -23,7 +23,7 @@ pub struct Tradeoff {
     pub points: Vec<SweepPoint>,
 }
 
-/// What is swept; a folder holds points of one subject only.
+/// Subject of a sweep; a folder holds points of one subject only.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Subject {
     /// The COLMAP folder, absolute.
@@ -34,28 +34,28 @@ pub struct Subject {
     pub options: Vec<String>,
 }
 
-/// One choice of settings, and what came of it.
+/// One choice of settings, and its outcome.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SweepPoint {
     /// Name of its run folder under `points/`.
     pub name: String,
-    /// What it says something about.
+    /// Stage that it measures.
     pub stage: PointStage,
-    /// Why it was asked for.
+    /// Phase that asked for it.
     pub phase: Phase,
-    /// What differs from the base; empty for the base itself.
+    /// Settings that differ from the base; empty for the base itself.
     pub settings: Vec<Setting>,
     /// The program's arguments, one list for each time it was called.
     pub commands: Vec<Vec<String>>,
     /// Wall seconds of all these calls, measuring among them.
     pub took: f64,
-    /// Why there is no outcome.
+    /// Reason of the failure, if it has no outcome.
     pub failed: Option<String>,
-    /// What was measured.
+    /// Figures measured.
     pub outcome: Option<Outcome>,
 }
 
-/// What a point says something about.
+/// Stage that a point measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum PointStage {
@@ -73,7 +73,7 @@ impl PointStage {
     pub const ALL: [Self; 2] = [Self::Luma, Self::Color];
 }
 
-/// Why a point was asked for.
+/// Phase of the sweep that asked for a point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Phase {
@@ -94,7 +94,7 @@ pub struct Setting {
     pub value: String,
 }
 
-/// What a point's reports say. Means are over the held-out views.
+/// Figures from a point's reports. Means are over the held-out views.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
     /// Iterations of stage 1.

@@ -26,17 +26,17 @@ use super::{
 };
 use crate::{capture::Camera, disk, input};
 
-/// Where nerfstudio notes how it moved a scene.
+/// File with nerfstudio's transform of a scene.
 const MOVED: &str = "dataparser_transforms.json";
 
-/// A path longer than any film: what counts more is no path.
+/// Largest number of frames of a path.
 pub const MOST_FRAMES: usize = 100_000;
 
-/// How far axes of a pose may be from orthogonal, as the cosine between them: files have few
-/// digits, and what is worse is no pose.
+/// Largest cosine between two axes of a pose, ideally 0: files have few digits, and larger ones are
+/// no pose.
 const SKEW: f64 = 1e-2;
 
-/// What keeps a camera path from being read.
+/// Error of reading a camera path.
 #[derive(Debug, thiserror::Error)]
 pub enum TrajectoryError {
     /// The file system.
@@ -44,13 +44,13 @@ pub enum TrajectoryError {
     Io {
         /// File at fault.
         path: PathBuf,
-        /// What the system says.
+        /// The system's error.
         source: io::Error,
     },
     /// It would have too many frames.
     #[error("a path of {frames:.0} frames: {MOST_FRAMES} at most")]
     Long {
-        /// How many.
+        /// Number of frames.
         frames: f64,
     },
     /// It is no camera path.
@@ -58,12 +58,12 @@ pub enum TrajectoryError {
     Bad {
         /// File at fault.
         path: PathBuf,
-        /// What is wrong with which field.
+        /// Defect, with the name of the field.
         reason: String,
     },
 }
 
-/// What the coordinates of a path are.
+/// Coordinate system of a path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Coordinates {
     /// COLMAP's.
@@ -79,7 +79,7 @@ pub struct PathFile {
     pub cameras: Vec<Camera>,
     /// Frames a second, above 0, where the file says.
     pub rate: Option<f64>,
-    /// What they are in.
+    /// Coordinate system of the cameras.
     pub coordinates: Coordinates,
 }
 
@@ -155,7 +155,7 @@ struct Trained {
     fy: f64,
 }
 
-/// How nerfstudio moves COLMAP's world: x becomes `scale` · (`transform` · x).
+/// Nerfstudio's transform of COLMAP's world: x becomes `scale` · (`transform` · x).
 #[derive(Deserialize)]
 struct WorldTransform {
     transform: Vec<[f64; 4]>,
@@ -368,7 +368,7 @@ impl Trained {
 }
 
 impl Lens {
-    /// What is given here, else there.
+    /// Values of `self`, else of `other`.
     fn or(self, other: Self) -> Self {
         Self {
             fl_x: self.fl_x.or(other.fl_x),
@@ -438,7 +438,7 @@ fn to_opengl(camera: &Camera) -> [f64; 16] {
 }
 
 impl WorldTransform {
-    /// What lies beside a path, if it does.
+    /// The transform beside a path, if there is one.
     fn beside(path: &Path) -> Result<Option<Self>, TrajectoryError> {
         let path = path.with_file_name(MOVED);
         if !path.exists() {

@@ -7,12 +7,12 @@ use glam::{DMat3, DVec3};
 use super::looking;
 use crate::{capture::Camera, splats::Splats};
 
-/// How much cameras held upright count for which way is up, against cameras held level: enough
-/// to decide where these leave it open, as where all look one way.
+/// Weight of cameras held upright in the choice of the up direction, against cameras held level:
+/// enough to decide where these leave it open, as where all look one way.
 const UPRIGHT: f64 = 0.05;
 
-/// How much points that cameras see count for what they look at, against where their axes meet:
-/// enough to decide where these are parallel.
+/// Weight of points that cameras see in the choice of the focus, against the meeting point of their
+/// axes: enough to decide where these are parallel.
 const SEEN: f64 = 0.05;
 
 /// Length of the mean of all directions from which on all cameras look one way: within about 30°
@@ -27,7 +27,7 @@ const GAP: f64 = TAU / 3.0;
 /// so much that sides show that no photo does.
 const SWAY: [f64; 2] = [0.03, 0.25];
 
-/// How far above a ball it is looked at from, in radians: 15°.
+/// Elevation from which a ball is looked at, in radians: 15°.
 const RISE: f64 = TAU / 24.0;
 
 /// Gaussians that are asked where they are, at most.
@@ -36,9 +36,9 @@ const SAMPLES: usize = 20_000;
 /// Rounds of inverse iteration: each brings the answer closer by the ratio of two eigenvalues.
 const ROUNDS: usize = 100;
 
-/// What the way goes around, seen from above.
+/// Center and axes of the orbit, seen from above.
 struct OrbitCenter {
-    /// What is looked at.
+    /// Point that cameras look at.
     focus: DVec3,
     up: DVec3,
     /// Across, right of the middle direction.
@@ -176,8 +176,8 @@ impl OrbitCenter {
     }
 }
 
-/// Which way is up: across the sides of all pictures, which photographers hold level, and where
-/// these leave it open as pictures are held.
+/// Up direction: across the sides of all pictures, which photographers hold level, and where these
+/// leave it open as pictures are held.
 fn up_of(cameras: &[&Camera]) -> DVec3 {
     let upward = |camera: &Camera| -camera.rotation.row(1);
     let mean: DVec3 = cameras.iter().map(|camera| upward(camera)).sum();
@@ -232,7 +232,7 @@ fn focus_of(cameras: &[&Camera], seen: &[DVec3]) -> DVec3 {
     left.inverse() * right
 }
 
-/// Where the largest gap between angles begins, and how large it is, in radians.
+/// Start and size of the largest gap between angles, in radians.
 fn gap_of(mut angles: Vec<f64>) -> (f64, f64) {
     angles.sort_by(f64::total_cmp);
     let next = |i: usize| match angles.get(i + 1) {

@@ -48,7 +48,7 @@ pub fn camera_path(cameras: &[&Camera], extent: f64, frames: usize) -> Vec<Camer
         .collect()
 }
 
-/// How far two viewpoints are apart: the way in extents plus the turn in radians.
+/// Distance of two viewpoints: translation in extents plus rotation in radians.
 pub fn distance(a: &Camera, b: &Camera, extent: f64) -> f64 {
     let turn = DQuat::from_mat3(&(a.rotation.transpose() * b.rotation));
     // The shorter way round; acos would lose small angles.

@@ -14,7 +14,7 @@ use serde_json::Value;
 use super::{lens, looking};
 use crate::capture::Camera;
 
-/// What SuperSplat takes where a file does not say: frames, frames a second, smoothness, degrees.
+/// SuperSplat's defaults where a file has none: frames, frames a second, smoothness, degrees.
 const FRAMES: f64 = 180.0;
 const RATE: f64 = 30.0;
 const SMOOTHNESS: f64 = 1.0;

@@ -1,4 +1,4 @@
-//! What the page says of a scene: cameras, figures, curves, the plan of effects.
+//! Description of a scene for the page: cameras, figures, curves, the plan of effects.
 
 use std::collections::BTreeMap;
 
@@ -13,7 +13,7 @@ use crate::{
 /// Points of a curve that are drawn, at most.
 const POINTS: usize = 200;
 
-/// What the page is told of a run or a splat file. Without cameras it begins at `start`, and
+/// Description of a run or a splat file for the page. Without cameras it begins at `start`, and
 /// shows nothing nearer than the depth that comes with it.
 pub fn of_look(viewed: &ViewedScene, start: Option<(&Camera, Option<f64>)>) -> Value {
     let scenes: Vec<&str> = viewed.scenes().map(|kind| kind.name()).collect();
@@ -140,7 +140,7 @@ pub fn thinned(rows: &[[f64; 2]]) -> Vec<[f64; 2]> {
     rows.iter().step_by(step).copied().collect()
 }
 
-/// What was decided about the effects, and on what evidence.
+/// Decisions about the effects, and their evidence.
 pub fn plan(effects: &[EffectReport]) -> Vec<Value> {
     let of = |effect: &EffectReport| {
         let why = match effect.evidence {

@@ -4,7 +4,7 @@
 /// The page, which names [`STYLE`] and [`script`].
 pub const PAGE: &str = include_str!("../../assets/viewer/index.html");
 
-/// How it looks.
+/// Style sheet.
 pub const STYLE: &str = include_str!("../../assets/viewer/style.css");
 
 /// The modules, each behind those that it imports.

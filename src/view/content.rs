@@ -1,4 +1,4 @@
-//! What is served: the page's files, scenes, photos.
+//! Content that is served: the page's files, scenes, photos.
 
 use std::{
     io::Cursor,
@@ -23,7 +23,7 @@ use crate::{
 /// Longer side of the photos that the page shows, in pixels: what screens have.
 const SIDE: u32 = 2048;
 
-/// What a page shows.
+/// Content of a page.
 pub trait Content: Send + Sync {
     /// All but scenes and pictures, see [`about`].
     ///
@@ -132,12 +132,12 @@ pub struct RunContent {
 #[derive(Clone)]
 struct Packed {
     bytes: Arc<Vec<u8>>,
-    /// Where to look from without cameras, and the nearest depth.
+    /// Start camera where the run has none, and the nearest depth.
     overview: (Camera, f64),
 }
 
 impl RunContent {
-    /// What there is to see, with the first of its scenes read.
+    /// Content of a run, with the first of its scenes read.
     ///
     /// # Errors
     /// [`ViewerError::Nothing`] without a scene, and [`RunError`] of its file.
@@ -199,7 +199,7 @@ impl Content for RunContent {
     }
 }
 
-/// How the pictures of a view are turned, as its camera is.
+/// Orientation of a view's pictures, that of its camera.
 pub(super) fn upright(dataset: Option<&Dataset>, view: usize) -> Orientation {
     let view = dataset.and_then(|dataset| dataset.capture.views.get(view));
     let upright = view.map(|view| view.stance.upright.without_mirrors());

@@ -24,10 +24,10 @@ use crate::{
 const POSTER_SIDE: f64 = 1280.0;
 const POSTER_QUALITY: u8 = 85;
 
-/// What a page that holds all there is may do: nothing but run what is in it.
+/// Content security policy of a page in one file: it runs nothing but its own parts.
 const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:; worker-src blob:";
 
-/// What was written.
+/// Statistics of the written file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Written {
     /// Number of Gaussians.
@@ -36,7 +36,7 @@ pub struct Written {
     pub bytes: usize,
 }
 
-/// Whether a path names such a file.
+/// Returns true if a path has the extension of an HTML file.
 pub fn is_html(path: &Path) -> bool {
     let extension = path.extension().unwrap_or_default();
     ["html", "htm"]

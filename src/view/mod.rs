@@ -19,7 +19,7 @@ pub use server::{Request, Response, Server};
 
 use crate::{run::RunError, store::StoreError};
 
-/// What can keep a scene from being shown.
+/// Error of showing a scene.
 #[derive(Debug, thiserror::Error)]
 pub enum ViewerError {
     /// The run or the file.

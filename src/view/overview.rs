@@ -1,4 +1,4 @@
-//! Where to look from at Gaussians without cameras.
+//! Viewpoint of Gaussians without cameras.
 
 use crate::{
     capture::Camera,

@@ -23,28 +23,28 @@ const HEAD_BYTES: usize = 16 << 10;
 /// Headers of a request; a browser's has some twenty.
 const HEADERS: usize = 64;
 
-/// How long a request may take to arrive.
+/// Time limit of receiving a request.
 const HEARD_WITHIN: Duration = Duration::from_secs(5);
 
-/// How long an answer may take to be taken, and how much longer for each MiB.
+/// Time limit of sending an answer, and the extra time for each MiB.
 const TAKEN_WITHIN: Duration = Duration::from_secs(10);
 const EACH_MIB: Duration = Duration::from_secs(1);
 
 /// Connections at a time; a browser opens six. Others wait until one ends.
 const CONNECTIONS: usize = 512;
 
-/// What is written at once.
+/// Bytes of one write.
 const CHUNK: usize = 256 << 10;
 
-/// What a page may do: nothing but show what this server has.
+/// Content security policy: a page shows nothing but content of this server.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; connect-src 'self'; worker-src blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
-/// What is asked for.
+/// A request.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Request {
     /// The path, as it was sent.
     pub path: String,
-    /// The tag of what is known already.
+    /// Entity tag that the browser has cached.
     pub known: Option<String>,
 }
 
@@ -55,7 +55,7 @@ pub struct Response {
     pub status: &'static str,
     /// The body's kind.
     pub kind: &'static str,
-    /// What tells this body from others.
+    /// Entity tag of the body.
     pub tag: Option<String>,
     /// Bytes of the answer.
     pub body: Arc<Vec<u8>>,
@@ -111,7 +111,7 @@ impl Server {
         Ok(Self { listener, address })
     }
 
-    /// Where a browser finds it.
+    /// URL of the page.
     pub fn url(&self) -> String {
         format!("http://{}/", self.address)
     }
@@ -230,7 +230,7 @@ fn tell(stream: &mut TcpStream, answer: &Response) -> io::Result<()> {
     stream.flush()
 }
 
-/// What is left of the time.
+/// Time left until a deadline.
 fn left(until: Instant) -> io::Result<Duration> {
     let left = until.saturating_duration_since(Instant::now());
     match left.is_zero() {
@@ -239,8 +239,8 @@ fn left(until: Instant) -> io::Result<Duration> {
     }
 }
 
-/// What a head asks for, if it is GET and came to one of our names: a page of another site that
-/// had its name lead here is refused.
+/// Parses a head that is GET and came to one of our names: a page of another site that had its name
+/// lead here is refused.
 fn understood(head: &[u8], names: &[String]) -> Result<Request, Response> {
     let bad = || Response::refused("400 Bad Request", "this is no HTTP request");
     let mut headers = [httparse::EMPTY_HEADER; HEADERS];

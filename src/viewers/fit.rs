@@ -26,8 +26,8 @@ const MORE_ROOM: f64 = 1.5;
 /// Seed of the order of views.
 const SEED: u64 = 0;
 
-/// What a Gaussian of PlayCanvas' is short of, as its scales are: the tails that are cut off
-/// and the blur.
+/// Factor on scales that makes up for PlayCanvas' narrower Gaussians: it cuts tails off and blurs
+/// less.
 const PLAYCANVAS_WIDER: f32 = 1.1;
 
 /// Settings of a fit.
@@ -51,7 +51,7 @@ pub struct FitSettings {
 }
 
 impl FitSettings {
-    /// What export takes: docs/lab/15-viewers-and-files.md has what was tried.
+    /// Settings of the export: docs/lab/15-viewers-and-files.md has the experiments.
     pub const DEFAULT: Self = Self {
         iterations: 400,
         log_scales: 1e-2,
@@ -76,8 +76,8 @@ impl FitSettings {
     }
 }
 
-/// Where a fit to these viewers begins: constant colors between black and white, scales as much
-/// wider as they are on average; for Spark alone, centers and rotations as it keeps them.
+/// Start of a fit to these viewers: constant colors between black and white, scales as much wider
+/// as they are on average; for Spark alone, centers and rotations as it keeps them.
 pub fn start(viewers: &[Viewer], splats: &Splats) -> Splats {
     let mut start = match viewers {
         [Viewer::Spark] => packed::placed(splats),

@@ -1,4 +1,4 @@
-//! What draws a scene as one viewer does, and takes a step towards what is wanted.
+//! Kernels that draw a scene as one viewer does, and take a step toward the target pictures.
 
 use std::sync::Arc;
 
@@ -92,8 +92,8 @@ impl ViewerKernels {
         recorder.submit();
     }
 
-    /// How many entries the tile lists would have needed, where a view since they were made
-    /// had too many: no step was taken since.
+    /// Entries that the tile lists would have needed, where a view since they were made had too
+    /// many: no step was taken since.
     ///
     /// # Errors
     /// [`GpuError::Lost`].

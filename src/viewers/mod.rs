@@ -1,4 +1,4 @@
-//! What viewers of splat files make of a scene, and scenes fitted to them.
+//! Viewers' pictures of a scene, and scenes fitted to them.
 //!
 //! Viewers do not draw alike: PlayCanvas' engine cuts a Gaussian's tails off and blurs it less,
 //! Spark packs a Gaussian into 16 bytes, and neither knows by itself that a scene was trained
@@ -38,7 +38,7 @@ impl Viewer {
     /// All of them.
     pub const ALL: [Self; 2] = [Self::Spark, Self::PlayCanvas];
 
-    /// How it draws. Neither antialiases unless it is told to.
+    /// Drawing options of the viewer. Neither antialiases by default.
     pub fn drawing(self) -> RasterOptions {
         RasterOptions {
             antialiased: false,
@@ -104,8 +104,8 @@ pub fn pictures(
     shown.collect()
 }
 
-/// How near `viewer`'s pictures of an RGB scene come to those that are wanted: the mean PSNR in
-/// dB over the cameras.
+/// Mean PSNR in dB of `viewer`'s pictures of an RGB scene against those that are wanted, over the
+/// cameras.
 ///
 /// # Errors
 /// [`GpuError`] when buffers do not fit or the device is lost.

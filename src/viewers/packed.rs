@@ -1,5 +1,5 @@
-//! What Spark keeps of a Gaussian unless it is told otherwise: 16 bytes, and harmonics in 5 to 8
-//! bits. Read in its source, version 2.2 (`setPackedSplat`, `encodeSh1Rgb` and on).
+//! Spark's default encoding of a Gaussian: 16 bytes, and harmonics in 5 to 8 bits. Read in its
+//! source, version 2.2 (`setPackedSplat`, `encodeSh1Rgb` and on).
 
 use half::f16;
 

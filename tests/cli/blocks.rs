@@ -46,7 +46,7 @@ fn names(list: &Value) -> BTreeSet<String> {
         .collect()
 }
 
-/// Which edges of its cell a place is beyond: none where it is in it.
+/// Returns true if a point lies within the block's cell.
 fn holds(block: &Value, job: &Value, place: [f64; 3]) -> bool {
     let axes = ["along", "across"].map(|axis| &job["ground"][axis]);
     let at = axes.map(|axis| {

@@ -36,7 +36,7 @@ fn assert_near(found: [f64; 3], wanted: [f64; 3]) {
     }
 }
 
-/// Whether a splat file shows in gray from the cameras what `run/` has of the run's luma.
+/// Checks that a splat file renders in gray like the run's luma, whose images are in `run/`.
 #[track_caller]
 fn draws_like_the_run(place: &Place, file: &str) {
     let ply = format!("{file}.ply");

@@ -46,8 +46,8 @@ fn every_key_of_an_evaluation_and_no_other() {
     are_documented(&evaluation, "## eval.json");
 }
 
-/// Whether the tables of a section of the page name the keys of a value and no other, but for
-/// those of what would be in a list that is empty.
+/// Checks that the tables of a section of the page name the keys of a value and no other, but for
+/// those of items of an empty list.
 fn are_documented(value: &Value, section: &str) {
     let keys = keys(value);
     assert!(keys.len() > 50, "{keys:?}");
@@ -68,7 +68,7 @@ pub fn keys(value: &Value) -> BTreeSet<String> {
     keys
 }
 
-/// What the tables of a section of a page name.
+/// Keys in the tables of a section of a page.
 pub fn documented(page: &str, section: &str) -> BTreeSet<String> {
     // Rows of tables whose first cell is one or more paths.
     let (_, section) = page.split_once(section).expect("the section");

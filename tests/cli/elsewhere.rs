@@ -1,5 +1,5 @@
-//! What comes from elsewhere: splats that another program trained, and photos that are in color
-//! or were taken in another light.
+//! Input from elsewhere: splats that another program trained, and photos that are in color or were
+//! taken in another light.
 
 use std::fs;
 

@@ -1,5 +1,5 @@
-//! What of a photo `eval` and `colorize` hold pictures against: not how bright it became,
-//! nor what its mask hides.
+//! Photos as references of `eval` and `colorize`: neither their exposure counts nor pixels that
+//! their mask hides.
 
 use image::{GrayImage, Luma, Rgb, RgbImage};
 use serde_json::{Value, json};
@@ -22,7 +22,7 @@ fn measured(place: &Place) -> Value {
     ])
 }
 
-/// Of the held-out view 8: PSNR, SSIM, then of the exported picture ΔE00, a/b error and
+/// Figures of the held-out view 8: PSNR, SSIM, then of the exported picture ΔE00, a/b error and
 /// PSNR; and PSNR after the photo's own gain and offset.
 fn figures(found: &Value) -> [f64; 6] {
     let views = found["views"].as_array().expect("views");

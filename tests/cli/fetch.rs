@@ -12,7 +12,7 @@ use super::host::{Answer, Host};
 use super::program::{Done, Place};
 use super::shared::{QUICK_FIT, onnx, place_with_scene};
 
-/// Where the network of the tests ends up.
+/// Path of the tests' network in the cache.
 const KEPT: &str = "cache/gs-chroma/teachers/small.onnx";
 
 fn network() -> Vec<u8> {

@@ -37,8 +37,8 @@ fn two_processes_do_not_write_into_one_run() {
     place.succeed(&[&fit[..], &["--iterations", "3"]].concat());
 }
 
-/// What a process leaves that dies while it writes: files that were begun, and a set of files
-/// that was complete but not yet in its place.
+/// Leftovers of a process that died while it wrote: unfinished files, and a complete set of files
+/// that was not yet in its place.
 #[test]
 fn what_a_dead_process_left_is_finished_or_removed() {
     let place = place_with_run();

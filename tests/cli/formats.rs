@@ -333,7 +333,7 @@ fn openusd_reads_the_same_gaussians() {
     );
 }
 
-/// Whether two files have the same attributes with the same numbers.
+/// Checks that two files have the same attributes with the same numbers.
 fn same_glb(ours: &[u8], theirs: &[u8]) {
     let attributes = |file: &[u8]| {
         let length = u32::from_le_bytes(file[12..16].try_into().expect("a length")) as usize;

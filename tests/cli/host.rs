@@ -14,14 +14,14 @@ use rustls::{ServerConfig, ServerConnection, StreamOwned};
 
 use super::program::{Done, Place};
 
-/// What comes of a request.
+/// Answer to a request.
 #[derive(Clone)]
 pub enum Answer {
-    /// The file from where it is asked for.
+    /// The file, from the requested offset.
     File(Vec<u8>),
-    /// The whole file, wherever it is asked for.
+    /// The whole file, whatever the requested offset.
     Always(Vec<u8>),
-    /// So many bytes of what is asked for, then the connection closes.
+    /// So many bytes of the answer, then the connection closes.
     CutOff(Vec<u8>, usize),
     /// So many bytes, then silence.
     Silent(Vec<u8>, usize),
@@ -78,7 +78,7 @@ impl Host {
         }
     }
 
-    /// What was asked for so far.
+    /// Requests so far: path and offset.
     pub fn asked(&self) -> Vec<(String, u64)> {
         self.asked.lock().expect("no panic").clone()
     }

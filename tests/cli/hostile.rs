@@ -144,7 +144,7 @@ fn names_do_not_steer_the_terminal() {
     assert!(done.stderr.contains(expected), "{:?}", done.stderr);
 }
 
-/// Where the system names no folder for caches, none depends on the current one.
+/// Without a cache folder from the system, no path depends on the current folder.
 #[test]
 fn no_library_comes_out_of_the_current_folder() {
     let place = place_with_scene();

@@ -75,7 +75,7 @@ fn transparency_is_taken_for_masks_and_told() {
     assert_eq!(warnings(&done), [""; 0]);
 }
 
-/// What lies under the transparency says nothing: neither to the evidence nor to training.
+/// Transparent pixels affect neither the evidence nor the training.
 #[test]
 fn what_is_transparent_does_not_count() {
     let [cut, masked] = [true, false].map(|alpha| {

@@ -140,7 +140,7 @@ fn the_source_names_pages_that_exist() {
     assert!(count > 40, "{count}");
 }
 
-/// What `--help` prints, by command.
+/// Output of `--help`, by command.
 fn helps(place: &Place) -> BTreeMap<&'static str, String> {
     let help = |command| {
         let mut text = place.succeed(&[command, "--help"]);

@@ -15,7 +15,7 @@ use tempfile::TempDir;
 /// An empty folder to run the program in.
 pub struct Place(TempDir);
 
-/// What a run of the program left.
+/// Exit code and output of a run of the program.
 #[derive(Debug)]
 pub struct Done {
     pub code: Option<i32>,
@@ -114,7 +114,7 @@ pub fn send(signal: Signal, process: u32) {
     kill(Pid::from_raw(process as i32), signal).expect("a process");
 }
 
-/// Whether a process is there.
+/// Returns true if a process exists.
 #[cfg(unix)]
 pub fn is_running(process: u32) -> bool {
     kill(Pid::from_raw(process as i32), None).is_ok()

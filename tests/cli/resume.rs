@@ -405,7 +405,7 @@ fn a_coloring_by_others_is_not_gone_on_with() {
     assert!(!place.path("runs/scene/checkpoint-color").exists());
 }
 
-/// What a training with a time limit took before it was killed counts.
+/// Training time before a kill counts toward the time limit.
 #[test]
 #[ignore = "takes the 12 seconds of its limit: make test-all"]
 fn a_time_limit_goes_on_where_it_was() {

@@ -182,7 +182,7 @@ pub fn write_tracks(folder: &Path, at: impl Fn([f64; 2]) -> bool) {
     fs::write(folder.join("sparse/points3D.txt"), lines).expect("writable");
 }
 
-/// Where a view shows a place, if it does.
+/// Pixel of a point in a view, if it is visible there.
 fn pixel(index: usize, position: [f64; 3]) -> Option<[f64; 2]> {
     let view = view(index, [0.0; 3]);
     let [x, y, z]: [f64; 3] = std::array::from_fn(|row| {

@@ -16,7 +16,7 @@ const DEMO: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/demo");
 /// The bundled scene's model, to be changed and written as text.
 #[derive(Clone)]
 struct Model {
-    /// Of each image its name and its camera.
+    /// Name and camera of each image.
     images: Vec<(String, Camera)>,
     points: Vec<Point>,
 }
@@ -133,8 +133,8 @@ const PLAN: [&str; 7] = [
     "160",
 ];
 
-/// What a command prints, which has to succeed with one warning, in words and in JSON, that
-/// says these words.
+/// Output of a command that succeeds with one warning, in words and in JSON, that contains these
+/// words.
 #[track_caller]
 fn warns(place: &Place, arguments: &[&str], words: &[&str]) -> Value {
     let done = place.run(arguments);
@@ -150,7 +150,7 @@ fn warns(place: &Place, arguments: &[&str], words: &[&str]) -> Value {
     printed
 }
 
-/// Whether `plan` and `fit` refuse the scene with one line that says these words, and write
+/// Checks that `plan` and `fit` refuse the scene with one line that contains these words, and write
 /// nothing.
 #[track_caller]
 fn is_refused(place: &Place, words: &[&str]) {

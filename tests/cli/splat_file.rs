@@ -1,4 +1,4 @@
-//! What viewers want of a splat file, and a reader that is not the crate's.
+//! Viewers' requirements on a splat file, and a reader that is not the crate's.
 
 use super::oracle::scene::{Gaussian, Scene};
 use super::program::Place;
@@ -47,7 +47,7 @@ impl SplatFile {
         line.expect("a vertex element").parse().expect("a count")
     }
 
-    /// Where a row has a property.
+    /// Column of a property.
     pub fn place(&self, property: &str) -> usize {
         let line = format!("property float {property}");
         let names = self

@@ -1,4 +1,4 @@
-//! What people paint: strokes that color things, and colors of single photos, wherever they lie.
+//! Painted input: strokes that color things, and colors of single photos, wherever they lie.
 
 use std::fs;
 
@@ -114,7 +114,7 @@ fn paint(place: &Place, folder: &str, views: &[usize]) {
 
 const SHORT: [&str; 5] = ["colorize", "--solver", "adam", "--until", "70"];
 
-/// Of the scene's photos the first and the ninth are held out.
+/// The first and the ninth of the scene's photos are held out.
 #[test]
 fn hints_on_a_held_out_photo_count_and_it_is_not_measured() {
     let place = place_with_run();

@@ -8,7 +8,7 @@ use super::shared::{QUICK_FIT, place_with_scene};
 /// Columns of the terminal, more than any bar may take: what is longer than it may be is seen.
 const COLUMNS: usize = 200;
 
-/// What a command shows, line by line in the order of drawing, and what it prints at the end.
+/// Lines that a command draws, in the order of drawing, and its output at the end.
 fn shown(place: &Place, arguments: &[&str]) -> Vec<String> {
     let program = env!("CARGO_BIN_EXE_gs-chroma");
     let command = format!(

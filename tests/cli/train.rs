@@ -84,7 +84,7 @@ fn a_memory_limit_lowers_the_cap() {
     assert!(cap.as_u64().is_some_and(|cap| cap < 12_000), "{luma}");
 }
 
-/// What training computes with is in the report and changes what it makes.
+/// The training's numerics are in the report and change its result.
 #[test]
 fn numerics_are_told_and_change_the_training() {
     let place = place_with_scene();

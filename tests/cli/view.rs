@@ -4,7 +4,7 @@ use super::program::Place;
 use super::scene;
 use super::shared::{QUICK_FIT, place_with_run, place_with_scene};
 
-/// Whether no pixel of a picture has a color.
+/// Returns true if all pixels of a picture are gray.
 fn is_gray(place: &Place, name: &str) -> bool {
     let image = image::open(place.path(name))
         .expect("a picture")

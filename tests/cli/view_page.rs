@@ -365,7 +365,7 @@ fn strip(value: &mut Value) {
 /// Node's script that opens pages.
 const SCRIPT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tools/viewers/page.mjs");
 
-/// What the browser found at a page.
+/// Findings of the browser at a page.
 fn looked_at(arguments: &[&str]) -> Value {
     let done = Command::new("node")
         .arg(SCRIPT)

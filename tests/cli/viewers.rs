@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use super::program::Place;
 
-/// Where the harness lies.
+/// Folder of the harness.
 fn tools() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tools/viewers")
 }

@@ -43,11 +43,11 @@ static ALONE: Mutex<()> = Mutex::new(());
 /// No file of these sizes may take longer.
 const PATIENCE: Duration = Duration::from_secs(10);
 
-/// What reading may take however small a file is: buffers, tables of decoders.
+/// Bytes that reading may take even for the smallest file: buffers, tables of decoders.
 const FIXED: usize = 24 << 20;
 
-/// What the `tiff` crate may reserve for a directory's lists before it can be told of limits;
-/// what no file fills is never touched.
+/// Bytes that the `tiff` crate may reserve for a directory's lists before limits apply; pages that
+/// no file fills are never touched.
 const TIFF: usize = 256 << 20;
 
 /// Times a file's size, of what is stored as it is read: lists and maps of small parts.
@@ -62,13 +62,13 @@ struct Kind<'a> {
     name: &'a str,
     /// Sound files of it.
     corpus: Vec<Vec<u8>>,
-    /// Where it is read from.
+    /// Path that it is read from.
     path: PathBuf,
     /// Reads it; whether it is accepted.
     read: &'a dyn Fn(&Path) -> bool,
     /// Bytes of memory for each of the file's.
     memory: usize,
-    /// How often it is tried by default.
+    /// Number of tries by default.
     cases: u32,
 }
 

@@ -21,7 +21,7 @@ const MANY_BLOCKS: [usize; 2] = [301, 243];
 /// Weight of the teacher: exact in f32, and not 1.
 const TEACHER: f64 = 0.75;
 
-/// What the kernel takes.
+/// Input of the kernel.
 pub struct ChromaInput<'a> {
     /// Width and height.
     pub size: [usize; 2],
@@ -31,19 +31,19 @@ pub struct ChromaInput<'a> {
     pub wanted: &'a [[f64; 2]],
     /// The coarser scale's picture, of the size in `weights`; read where `weights` say so.
     pub coarser: &'a [[f64; 2]],
-    /// How much each pixel counts; read where `weights` say so.
+    /// Weight of each pixel; read where `weights` say so.
     pub pixel_weights: &'a [f64],
-    /// One for each view.
+    /// Correction of each view.
     pub corrections: &'a [Correction],
-    /// What weighs them.
+    /// Weights of the loss terms.
     pub weights: ChromaLossWeights,
 }
 
-/// What it gives.
+/// Output of the kernel.
 pub struct ChromaOutput {
-    /// The mean over the pixels.
+    /// Mean loss over the pixels.
     pub loss: f64,
-    /// With respect to the image, `[pixels, 2]`.
+    /// Gradient with respect to the image, `[pixels, 2]`.
     pub gradient: Vec<f32>,
     /// Slope over residual, `[pixels, 2]`.
     pub curvatures: Vec<f32>,
@@ -135,14 +135,14 @@ fn upsample(coarser: &[[f64; 2]], from: [usize; 2], to: [usize; 2]) -> Vec<[f64;
         .collect()
 }
 
-/// How a row asks for the loss.
+/// Variant of the loss that a row measures.
 #[derive(Clone, Copy)]
 struct LossRequest {
     agreement: f64,
     decline: f64,
-    /// Whether pixels have weights and the teacher is corrected.
+    /// True if pixels carry weights and the teacher is corrected.
     weighed: bool,
-    /// Whether a and b are judged together.
+    /// True if a and b are judged together.
     joint: bool,
 }
 

@@ -53,7 +53,7 @@ fn applied(
     apply(gpu, kernel, &plan, OLD, &source)?.read(gpu)
 }
 
-/// What one row of the plan makes of the geometry, in `f64`.
+/// Geometry by one row of the plan, in `f64`.
 fn descendant(old: &[f32], descent: &Descent) -> Vec<f64> {
     let i = descent.source as usize;
     let mut new: Vec<f64> = (0..GEOMETRY_PLANES)

@@ -94,8 +94,8 @@ fn frozen<const C: usize>(
     }))
 }
 
-/// What the RGB adjoint gives: the plain gradient, but for channels that are black and
-/// would become darker.
+/// Result of the RGB adjoint: the plain gradient, but for channels that are black and would become
+/// darker.
 fn brightening(scene: &Scene<f64, 3>, view: &View, plain: Scene<f64, 3>) -> Scene<f64, 3> {
     let mut gradient = plain;
     let harmonics = scene.sh.len() / scene.len();

@@ -255,7 +255,7 @@ impl Problem {
     }
 }
 
-/// What anchors pull of what pictures do.
+/// Weight of the anchors relative to the pictures.
 const ANCHOR: f64 = 0.25;
 
 /// Losses that sum to the whole: more than a workgroup has threads.

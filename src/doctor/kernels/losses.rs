@@ -52,7 +52,7 @@ type Tone = (f64, f64);
 
 const TONES: [Tone; 2] = [(0.5, 0.5), (0.4, 0.1)];
 
-/// Where the variances in SSIM cancel most.
+/// Tones at which the variances in SSIM cancel most.
 const BRIGHT_AND_FLAT: [Tone; 1] = [(0.97, 0.005)];
 
 /// A picture and a photo.

@@ -25,7 +25,7 @@ use crate::{
 /// Figures of luma's gradient record.
 const FIGURES: usize = 8;
 
-/// What `doctor` tries: each knob on either side of its usual value where it has two.
+/// Numerics that `doctor` tries: each knob on either side of its usual value where it has two.
 pub const CUTS: [Numerics; 5] = [
     Numerics {
         alpha_min: 1.0 / 64.0,
@@ -123,7 +123,7 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
     Ok(rows)
 }
 
-/// What an adjoint leaves in its scratch.
+/// Scratch memory after an adjoint.
 struct ScratchValues {
     /// By emission slot.
     records: Vec<u32>,

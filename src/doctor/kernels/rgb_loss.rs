@@ -18,7 +18,7 @@ use crate::{
     raster::Raster,
 };
 
-/// What wanted RGB are rounded to.
+/// Quantization steps of target RGB between 0 and 1.
 const STEPS: f64 = 1023.0;
 
 /// All terms of `lab_loss`, none of which drowns another.

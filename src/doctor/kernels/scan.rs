@@ -19,7 +19,7 @@ const LENGTHS: [usize; 16] = [
     1, 2, 3, 4, 5, 255, 256, 257, 1023, 1024, 1025, 2048, 70_000, 262_144, 262_145, 300_000,
 ];
 
-/// What a scan leaves.
+/// Result of a scan.
 pub struct Scanned {
     /// The exclusive sums.
     pub sums: Vec<u32>,

@@ -113,7 +113,7 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
 const COUNT: usize = 300;
 const HELD: usize = 30;
 
-/// What a step leaves.
+/// Results of an optimizer step.
 const QUANTITIES: [&str; 3] = ["value after a step", "first moment", "second moment"];
 
 fn measure(raster: &Arc<Raster>, kernels: &[&'static str]) -> Result<Vec<Row>, GpuError> {

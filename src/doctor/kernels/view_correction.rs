@@ -20,7 +20,7 @@ struct TestView {
     size: [usize; 2],
     /// Weight (the mean over both channels), rendered and taught a/b.
     pixels: Vec<Pixel>,
-    /// How much each pixel counts, if not alike.
+    /// Weight of each pixel, unless all are alike.
     weights: Option<Vec<f64>>,
 }
 

@@ -1,6 +1,6 @@
-//! How viewers draw, and the adjoint that fits scenes to them: `project` and `blend` by
-//! PlayCanvas' falloff; `blend_backward`, `sum_instances`, `shade_backward` and
-//! `project_backward` of RGB, by either falloff.
+//! Viewers' drawing, and the adjoint that fits scenes to them: `project` and `blend` by PlayCanvas'
+//! falloff; `blend_backward`, `sum_instances`, `shade_backward` and `project_backward` of RGB, by
+//! either falloff.
 
 use std::sync::Arc;
 

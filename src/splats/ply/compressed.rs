@@ -77,7 +77,7 @@ const ROTATION_BITS: u32 = 10;
 /// Harmonics beyond are clipped.
 const SH_LIMIT: f32 = 4.0;
 
-/// Whether a header is that of a compressed file.
+/// Returns true if the header is that of a compressed file.
 pub(super) fn is_compressed(header: &Header) -> bool {
     let vertex = header.elements.get("vertex");
     vertex.is_some_and(|vertex| vertex.properties.contains_key(PACKED[0]))
@@ -184,7 +184,7 @@ struct Table<'a> {
     bytes: &'a [u8],
 }
 
-/// Where a row has a number.
+/// Byte offset of a number within a row, and its type.
 struct Column {
     at: usize,
     kind: ScalarType,

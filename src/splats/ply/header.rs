@@ -28,14 +28,14 @@ const HARMLESS: &str = "nx ny nz red green blue alpha f_rest_ obj_dc_ ins_feat_ 
 /// Names that a sentence lists.
 const LISTED: usize = 3;
 
-/// Which numbers of a vertex make a Gaussian.
+/// Vertex properties that make up a Gaussian.
 pub(super) struct VertexLayout {
     /// SH degree.
     pub degree: u32,
     /// For each needed number, in the order center, SH, shape, filter if there is one: the place
     /// among the vertex's properties; none for the third scale of a disc.
     pub columns: Vec<Option<usize>>,
-    /// Whether the first three SH are colors of 8 bits.
+    /// True if the first three SH are colors of 8 bits.
     pub byte_colors: bool,
     /// True if `ushort` columns hold half-precision floats.
     pub half: bool,
@@ -96,8 +96,8 @@ pub(super) fn read_header(path: &Path, file: &mut impl BufRead) -> Result<Header
     Ok(header)
 }
 
-/// Whether the header's comments say that the Gaussians were trained antialiased, as
-/// Brush or Postshot write it; the last one counts.
+/// Returns true if the header's comments mark the Gaussians as trained antialiased, as Brush or
+/// Postshot write it; the last one counts.
 pub(super) fn is_antialiased(comments: &[String]) -> bool {
     let mut modes = comments.iter().filter_map(|comment| {
         let words: Vec<_> = comment.split_whitespace().collect();
@@ -110,7 +110,7 @@ pub(super) fn is_antialiased(comments: &[String]) -> bool {
     modes.next_back().unwrap_or(false)
 }
 
-/// What the header's comments say was subtracted from the centers; the last one counts.
+/// Offset subtracted from the centers, by the header's comments; the last one counts.
 pub(super) fn offset(comments: &[String]) -> DVec3 {
     let mut offsets = comments.iter().filter_map(|comment| {
         let words: Vec<_> = comment.split_whitespace().collect();

@@ -66,7 +66,7 @@ fn sh_names(degree: u32) -> impl Iterator<Item = String> {
     dc.chain((0..rest_count(degree)).map(|i| format!("f_rest_{i}")))
 }
 
-/// How many `f_rest_*` properties a degree has: 0, 9, 24 or 45.
+/// Number of `f_rest_*` properties of a degree: 0, 9, 24 or 45.
 fn rest_count(degree: u32) -> usize {
     CHANNELS * (coefficient_count(degree) - 1)
 }
@@ -76,8 +76,8 @@ fn degree_of_rest_count(count: usize) -> Option<u32> {
     (0..=MAX_DEGREE).find(|&degree| rest_count(degree) == count)
 }
 
-/// Where coefficient `(k, channel)` of one Gaussian stands among the SH
-/// properties: `f_rest_*` holds all coefficients of red, then green, then blue.
+/// Position of coefficient `(k, channel)` of one Gaussian among the SH properties: `f_rest_*` holds
+/// all coefficients of red, then green, then blue.
 fn sh_position(degree: u32, k: usize, channel: usize) -> usize {
     match k {
         0 => channel,

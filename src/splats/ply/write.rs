@@ -54,7 +54,7 @@ pub fn write_ply(
     file.persist(path).map_err(io_error(path))
 }
 
-/// Whether Gaussians can be written to a file of any format, `offset` added to their centers.
+/// Checks that Gaussians can be written to a file of any format, `offset` added to their centers.
 ///
 /// # Errors
 /// As [`write_ply`].

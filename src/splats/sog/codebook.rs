@@ -101,8 +101,8 @@ impl Groups {
         self.counts.len() - 1
     }
 
-    /// What groups `begin..end` gain by an entry of their own: the sum of squares that their
-    /// mean takes away.
+    /// Gain of an entry for groups `begin..end` alone: the sum of squares that their mean takes
+    /// away.
     fn gain(&self, begin: usize, end: usize) -> f64 {
         let sum = self.sums[end] - self.sums[begin];
         sum * sum / (self.counts[end] - self.counts[begin])

@@ -39,7 +39,7 @@ const META: &str = "meta.json";
 
 const VERSION: u32 = 2;
 
-/// Of `model`: the scene is to be drawn antialiased.
+/// Value of `model` for scenes trained antialiased.
 const ANTIALIASED: &str = "antialiased";
 
 /// The alpha of a quaternion whose first component is largest.
@@ -51,7 +51,7 @@ const ENTRIES_PER_ROW: usize = 64;
 /// The most entries that 16 bits tell apart.
 const MOST_ENTRIES: usize = 1 << 16;
 
-/// What `meta.json` holds.
+/// Content of `meta.json`.
 #[derive(Serialize, Deserialize)]
 struct Meta {
     #[serde(default)]
@@ -71,7 +71,7 @@ struct Meta {
     sh_n: Option<Harmonics>,
 }
 
-/// Who wrote the file, and what the coordinates lack.
+/// Program that wrote the file, and the offset subtracted from the coordinates.
 #[derive(Default, Serialize, Deserialize)]
 struct Asset {
     #[serde(default)]

@@ -28,11 +28,11 @@ const ROUNDS: usize = 5;
 /// Values of a point, filled up with zeros.
 type Point = Vec<[f32; LANES]>;
 
-/// The palette and who uses what of it.
+/// The palette and the entry that each point uses.
 pub(super) struct Palette {
     /// `[entries, dimensions]`.
     pub entries: Vec<Vec<f32>>,
-    /// Of each point the entry, `[N]`.
+    /// Entry of each point, `[N]`.
     pub labels: Vec<u16>,
 }
 

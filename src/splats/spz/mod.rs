@@ -71,13 +71,13 @@ const AXES: u32 = 0xADBE_0003;
 /// The extension with what a viewer's camera may do, which changes no picture.
 const ORBIT: u32 = 0xADBE_0002;
 
-/// Which way x, y and z look: left or right, up or down, back or front.
+/// Directions of the axes x, y and z: left or right, up or down, back or front.
 const SYSTEMS: [&str; 16] = [
     "LDB", "RDB", "LUB", "RUB", "LDF", "RDF", "LUF", "RUF", "LFD", "RFD", "LFU", "RFU", "LBD",
     "RBD", "LBU", "RBU",
 ];
 
-/// What a unit of the constant coefficient is of a color's range.
+/// Share of a color's range per unit of the constant coefficient.
 const COLOR_SCALE: f64 = 0.15;
 
 /// Steps of a logarithm of a scale.

@@ -16,7 +16,7 @@ use crate::splats::{
 /// Longest extensions that are read, in bytes.
 const MOST_EXTENSIONS: u64 = 1 << 16;
 
-/// What the header says.
+/// Fields of the header.
 struct Header {
     version: u32,
     count: usize,

@@ -1,4 +1,4 @@
-//! What can be wrong with photos and poses.
+//! Errors of photos and poses.
 
 use super::{Case, FIT, Place, case, nothing};
 use crate::scene::SIZE;

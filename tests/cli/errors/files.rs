@@ -1,4 +1,4 @@
-//! What can be wrong with runs, splat files and places to write to.
+//! Errors of runs, splat files and output paths.
 
 use super::{COLORIZE, Case, Place, case, nothing};
 

@@ -11,7 +11,7 @@ use super::shared::{onnx, place_with_run};
 
 /// One way to go wrong.
 struct Case {
-    /// What is wrong, for the test's own messages.
+    /// Description of the error, for the test's own messages.
     name: &'static str,
     /// Breaks something in a folder with `scene/`, `runs/scene` and `onnx/`.
     arrange: fn(&Place),
@@ -20,7 +20,7 @@ struct Case {
     /// Environment of the program.
     environment: &'static [(&'static str, &'static str)],
     code: i32,
-    /// What the line has to say: the file, the field, the remedy.
+    /// Words that the line must contain: the file, the field, the remedy.
     words: &'static [&'static str],
 }
 

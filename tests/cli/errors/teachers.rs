@@ -1,4 +1,4 @@
-//! What can be wrong with a teacher, ONNX Runtime and the device.
+//! Errors of a teacher, ONNX Runtime and the device.
 
 use super::{COLORIZE, Case, Place, case, nothing};
 use crate::scene;

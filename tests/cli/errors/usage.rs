@@ -1,4 +1,4 @@
-//! What clap refuses: exit code 2.
+//! Command lines that clap refuses: exit code 2.
 
 use super::{Case, case, nothing};
 

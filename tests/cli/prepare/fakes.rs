@@ -169,7 +169,7 @@ pub fn refused(place: &Place, arguments: &[&str], words: &[&str]) {
     }
 }
 
-/// How programs were called since the last time, but for questions.
+/// Calls of programs since the last time, but for queries of version and help.
 pub fn calls(place: &Place) -> Vec<String> {
     let log = fs::read_to_string(place.path("fake/log")).unwrap_or_default();
     let _ = fs::remove_file(place.path("fake/log"));

@@ -55,7 +55,7 @@ fn name(frame: usize) -> String {
     format!("{:06}.png", frame + 1)
 }
 
-/// What `ffprobe` will say, but for a change.
+/// Fake output of `ffprobe`, after a change.
 fn probe(place: &Place, change: fn(&mut Value)) {
     let mut said = json!({
         "streams": [

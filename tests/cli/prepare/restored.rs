@@ -65,7 +65,7 @@ fn film(place: &Place) {
     assert!(child.wait().expect("ffmpeg").success());
 }
 
-/// What `ffprobe` says of a film's streams of a kind, `v` or `a`.
+/// Streams of a film of a kind, `v` or `a`, by `ffprobe`.
 fn streams(place: &Place, film: &str, kind: &str) -> Value {
     let said = Command::new("ffprobe")
         .args(["-v", "error", "-count_frames", "-of", "json"])
@@ -102,7 +102,7 @@ fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
     values.sum::<f64>() / count
 }
 
-/// How colorful a frame is.
+/// Mean CIELAB chroma of a frame.
 fn chroma(frame: &[[f64; 3]]) -> f64 {
     mean(frame.iter().map(|lab| lab[1].hypot(lab[2])))
 }

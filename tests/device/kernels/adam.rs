@@ -29,7 +29,7 @@ fn after_an_overflow_nothing_moves() {
     }
 }
 
-/// What is no number, or has no square, moves nothing and is counted.
+/// Gradients that are not a number, or have no finite square, are not applied and are counted.
 #[test]
 fn refused_gradients_are_counted() {
     let kernel = AdamKernel::new(gpu());

@@ -1,5 +1,5 @@
-//! What the antialiased projection is for: a picture of fewer pixels shows what the
-//! pixels of a finer one show on average.
+//! Purpose of the antialiased projection: a picture of fewer pixels shows the mean of the pixels of
+//! a finer one.
 
 use crate::kernels::{
     harness::{Stage, splats},

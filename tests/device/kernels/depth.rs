@@ -14,7 +14,7 @@ use crate::kernels::harness::raster;
 
 /// Spacing of the wall's Gaussians in world units.
 const STEP: f64 = 0.05;
-/// Where the world lies: far from its origin.
+/// Position of the world: far from its origin.
 const PLACE: DVec3 = DVec3::new(500.0, -300.0, 800.0);
 /// The wall's depth grows by this much to the right.
 const SLANT: f64 = 0.4;

@@ -114,7 +114,7 @@ fn a_device_that_is_lost_while_it_colors_is_an_error() {
     assert!(words.contains("device"), "{words}");
 }
 
-/// What the device refuses is an error of whoever waits next, and no panic.
+/// An allocation that the device refuses is an error of the next wait, and no panic.
 #[test]
 fn memory_that_is_not_there_is_an_error() {
     let gpu = Gpu::open().unwrap();

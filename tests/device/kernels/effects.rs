@@ -51,7 +51,7 @@ fn what_is_off_is_in_no_kernel() {
     }
 }
 
-/// What the cameras see of the scene, in 8 bits.
+/// Pictures of the scene from the cameras, in 8 bits.
 fn photos(splats: &Splats) -> Vec<(Camera, Vec<u8>)> {
     let geometry = Geometry::upload(gpu(), splats).unwrap();
     let field = Field::upload(gpu(), &splats.sh).unwrap();

@@ -1,4 +1,4 @@
-//! What gradients and statistics remember of other views.
+//! Gradients and statistics accumulated over several views.
 
 use gs_chroma::raster::constants::{STAT_PULL, STAT_VIEWS};
 

@@ -1,4 +1,4 @@
-//! What both sides must agree on: struct layouts and constants.
+//! Struct layouts and constants on which host and device must agree.
 
 use std::{collections::BTreeMap, mem::offset_of};
 

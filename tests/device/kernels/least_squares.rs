@@ -101,7 +101,7 @@ impl Problem {
         luma
     }
 
-    /// What each coefficient adds to each pixel, `[views · pixels][coefficients]`.
+    /// Design matrix: weight of each coefficient at each pixel, `[views · pixels][coefficients]`.
     fn design(&self) -> Matrix {
         let count = self.scene.sh.len();
         let mut design = vec![vec![0.0; count]; self.views.len() * PIXELS];

@@ -26,7 +26,7 @@ fn input<'a>(image: &'a [[f64; 2]], weights: ChromaLossWeights) -> ChromaInput<'
     }
 }
 
-/// Where the teacher is met there is no slope, far from it the slope of L1.
+/// The slope is 0 at the teacher's colors, and that of L1 far from them.
 #[test]
 fn chroma_slopes_at_rest_and_far_away() {
     for (away, slope) in [(0.0, 0.0), (300.0, 1.0), (-1e6, -1.0)] {

@@ -1,4 +1,4 @@
-//! What both stages take on the device is what was said before.
+//! Estimates of both stages' device memory hold.
 
 use std::{ops::ControlFlow, sync::Arc};
 
@@ -20,8 +20,8 @@ use crate::kernels::{
 
 const COUNT: usize = 100_000;
 
-/// What stage 2 solves for, in harmonics of a degree, each kind and each degree once; RGB is for
-/// new light.
+/// Color fields that stage 2 solves for, in harmonics of a degree, each kind and each degree once;
+/// RGB is for new light.
 const SOLVED: [(ColorKind, u32); 2] = [(ColorKind::Chroma, 3), (ColorKind::Rgb, 0)];
 
 fn start(count: usize, sh_degree: u32) -> Splats {

@@ -56,7 +56,7 @@ fn hard_cases_hold_with_records_at_half_the_size() {
     }
 }
 
-/// What is left out by default is what the rasterizer is known by.
+/// Default cut-offs are the oracle's.
 #[test]
 fn defaults_are_those_of_the_oracle() {
     let (own, oracle) = (Numerics::default().raster, numerics::Numerics::DEFAULT);

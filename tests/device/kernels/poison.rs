@@ -14,10 +14,10 @@ use crate::kernels::{
 
 const COUNT: usize = 60;
 
-/// Where in the array the broken one stands.
+/// Index of the broken Gaussian.
 const AT: usize = 17;
 
-/// What is broken, how, and how many Gaussians are counted as poisoned for it.
+/// Name of a defect, the defect, and the number of Gaussians counted as poisoned for it.
 type Breakage = (&'static str, fn(&mut Splats), usize);
 
 const GEOMETRY: [Breakage; 12] = [

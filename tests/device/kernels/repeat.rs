@@ -127,7 +127,7 @@ pub fn settings(start: &Splats) -> LumaSettings {
     settings
 }
 
-/// What the views show of a scene.
+/// Photos of a scene from the views.
 pub fn photos(target: &Splats) -> Vec<TrainingView> {
     let geometry = Geometry::upload(gpu(), target).unwrap();
     let field = Field::upload(gpu(), &target.sh).unwrap();
@@ -298,7 +298,7 @@ fn a_flat_curve_ends_a_training() {
     assert_eq!(run(200).0, [250, 300]);
 }
 
-/// What is no gain is given up: the bytes are those of a training that never went beyond.
+/// Iterations without gain are rolled back, to the bytes of a training that stops there.
 #[test]
 fn a_training_that_gets_worse_goes_back_to_its_best() {
     let [start, target] = start_and_target();

@@ -50,7 +50,7 @@ impl Checkpointing for Ends {
 /// Iteration, loss, Gaussians, poisoned ones and PSNR where it was looked.
 type Told = (usize, u64, usize, usize, Option<u64>);
 
-/// What is reported but for times.
+/// Reported values but for times.
 fn told(progress: &LumaProgress) -> Told {
     let looked = progress.looked.map(|look| look.psnr.to_bits());
     let loss = progress.loss.to_bits();
@@ -127,7 +127,7 @@ fn a_set_that_is_split() {
     assert_eq!(keeps_and_resumes(&of, &start).0, [25, 50]);
 }
 
-/// What stands around a scene comes late, stays as it is, and takes of the cap.
+/// Surroundings join late, stay unchanged, and count toward the cap.
 #[test]
 fn with_surroundings() {
     let [start, target] = start_and_target();
@@ -201,7 +201,7 @@ fn with_every_effect() {
     assert_eq!(keeps_and_resumes(&of, &start).0, [25, 50, 75, 100, 125]);
 }
 
-/// What it goes back to was kept.
+/// The best state, to which it rolls back, was kept.
 #[test]
 fn a_training_that_goes_back_to_its_best() {
     let [start, target] = start_and_target();

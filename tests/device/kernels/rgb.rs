@@ -28,7 +28,7 @@ fn drawn(splats: &Splats, fields: &[&ShField]) -> Vec<Vec<RenderedImage>> {
         .collect()
 }
 
-/// What a viewer shows.
+/// Pictures as a viewer shows them.
 fn shown(splats: &Splats) -> Vec<Vec<[f32; 3]>> {
     (drawn(splats, &[&splats.sh]).iter())
         .map(|pictures| {

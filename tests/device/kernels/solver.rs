@@ -24,8 +24,8 @@ fn solved(settings: &ChromaSettings, luma: &Splats, views: &[ChromaView]) -> ShF
     solver.chroma().unwrap()
 }
 
-/// Whether all views stay on the device, some, or none, and whether what is wanted waits
-/// in memory or in a file.
+/// Results are equal if all views stay on the device, some, or none, and if targets wait in memory
+/// or in a file.
 #[test]
 fn results_do_not_depend_on_the_budget() {
     let (luma, views) = (wall(), six_views());

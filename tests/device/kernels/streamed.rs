@@ -130,7 +130,7 @@ fn what_a_view_may_show_draws_its_picture() {
     assert!(fewer, "no camera shows less than half");
 }
 
-/// Where not even what a view shows has room, it is drawn in parts.
+/// A view is drawn in parts if even its visible Gaussians exceed a binding.
 #[test]
 fn what_the_adapter_cannot_bind_draws_its_picture() {
     let luma = splats(&random_scene::<1>(7, 900, 2).0);

@@ -14,7 +14,7 @@ use crate::kernels::{
     },
 };
 
-/// How far, relative to the cutoff, `f32` may misjudge whether a tile is touched.
+/// Error of `f32`, relative to the cutoff, within which a tile may be misjudged as touched.
 const SLACK: f64 = 1e-4;
 
 /// Checks all tiles; gives the entries beyond the oracle's.

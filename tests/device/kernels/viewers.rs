@@ -31,7 +31,7 @@ fn wanted(splats: &Splats, antialiased: bool) -> Pictures {
     pictures(&raster(), splats, drawn, &cameras(), EXTENT).unwrap()
 }
 
-/// What viewers show of the scene itself and of one that is fitted to some of them.
+/// PSNR in dB in the viewers, of the scene itself and of one that is fitted to some of them.
 fn shown(viewers: &[Viewer], antialiased: bool) -> [[f64; 2]; 2] {
     let scene = scene();
     let (wanted, cameras) = (wanted(&scene, antialiased), cameras());

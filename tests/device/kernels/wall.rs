@@ -142,7 +142,7 @@ pub fn truth(x: f64, y: f64) -> [f64; 2] {
     ]
 }
 
-/// That field in the pixels of a camera before the wall.
+/// The field in the pixels of a camera before the wall.
 pub fn pictured(camera: &Camera) -> Vec<[f64; 2]> {
     (0..PIXELS)
         .map(|p| {

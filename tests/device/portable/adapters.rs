@@ -12,14 +12,14 @@ use serde_json::{Value, json};
 
 use crate::portable::{places, say};
 
-/// Where drivers tell the Vulkan loader of themselves.
+/// Folders of the Vulkan loader's driver manifests.
 const MANIFESTS: [&str; 3] = [
     "/etc/vulkan/icd.d",
     "/usr/local/share/vulkan/icd.d",
     "/usr/share/vulkan/icd.d",
 ];
 
-/// Where browsers keep their software driver.
+/// Paths of browsers' software drivers.
 const SWIFTSHADER: [&str; 4] = [
     "/usr/lib/chromium/libvk_swiftshader.so",
     "/usr/lib/chromium-browser/libvk_swiftshader.so",
@@ -53,7 +53,7 @@ fn swiftshader() -> Option<PathBuf> {
     Some(manifest)
 }
 
-/// What `doctor` says of the only driver that it is let see, everything in order.
+/// Report of `doctor` with this driver as the only one, everything in order.
 fn doctor(manifest: &Path, variables: &[(&str, &str)]) -> Value {
     let mut command = Command::new(env!("CARGO_BIN_EXE_gs-chroma"));
     command

@@ -26,7 +26,7 @@ use crate::portable::{places::folder, say};
 /// Cases that a browser without a GPU takes long for.
 const SLOW: [&str; 2] = ["65,600 tiles", "600 in one tile"];
 
-/// Of the others, every how many-th is asked of the browser.
+/// Step between the other cases that the browser runs.
 const EVERY: usize = 5;
 
 fn open() -> Gpu {
@@ -50,12 +50,12 @@ fn examined(gpu: &Gpu) -> (Vec<Row>, Vec<Verdict>) {
     (rows, verdicts.collect())
 }
 
-/// Where what draws in the browser lies.
+/// Folder of the tools that draw in the browser.
 fn tools() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tools/viewers")
 }
 
-/// What the browser answers to a tape, a read each, and what it says of itself.
+/// The browser's answers to a tape, one per read, and its own description.
 fn asked(tape: &Tape) -> (Vec<Vec<u8>>, Value) {
     let folder = folder("browser");
     let write = |name: &str, bytes: &[u8]| {
@@ -119,7 +119,7 @@ fn doctor_holds_in_a_browser() {
     ));
 }
 
-/// What another device answers is what is judged: zeros do not pass.
+/// The answers of another device are judged: zeros do not pass.
 #[test]
 fn answers_are_what_is_judged() {
     let device = open();

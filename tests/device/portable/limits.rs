@@ -1,4 +1,4 @@
-//! What each pipeline takes, against what devices have: the table in docs/gpu.md.
+//! Needs of each pipeline, against limits of devices: the table in docs/gpu.md.
 //!
 //! `WRITE_DOCS=1 cargo test --release --test device limits` writes it.
 
@@ -14,13 +14,13 @@ const DOCS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/gpu.md");
 const BEGIN: &str = "<!-- limits: begin -->\n";
 const END: &str = "<!-- limits: end -->\n";
 
-/// What an entry point takes of a device.
+/// Resources that an entry point needs.
 #[derive(Clone, Copy)]
 struct Needs {
     threads: u32,
     workgroup_bytes: u32,
     storage_buffers: u32,
-    /// Of these, those that are written.
+    /// Storage buffers among these that are written.
     written: u32,
     uniform_buffers: u32,
     /// The highest binding number.
@@ -123,7 +123,7 @@ fn the_table_is_what_the_kernels_take() {
     }
 }
 
-/// What `Gpu` asks of a device is what the largest kernel takes.
+/// `Gpu` requests exactly the needs of the largest kernels.
 #[test]
 fn a_device_is_asked_for_what_the_kernels_take_and_no_more() {
     let all = all();

@@ -1,5 +1,5 @@
-//! Whether the kernels are ready for devices that are not here: on every adapter and in every
-//! language that this machine knows. docs/gpu.md says what was found.
+//! Readiness of the kernels for other devices: on every adapter and in every language that this
+//! machine knows. docs/gpu.md has the findings.
 
 mod adapters;
 mod browser;

@@ -49,7 +49,7 @@ fn word(text: &str) -> &str {
     &text[..end.unwrap_or(text.len())]
 }
 
-/// What follows `crate::stability::` in code: one name, or the first names of a list in braces.
+/// Names after `crate::stability::` in code: one name, or the first names of a list in braces.
 fn imports(text: &str) -> BTreeSet<String> {
     let lines = text
         .lines()
@@ -115,7 +115,7 @@ fn imports_go_down_only() {
     assert!(wrong.is_empty(), "{wrong:?}");
 }
 
-/// What production runs must not be what it is compared with.
+/// The oracle judges production code, which must not depend on it.
 #[test]
 fn only_the_doctor_asks_the_oracle() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
@@ -134,7 +134,7 @@ fn only_the_doctor_asks_the_oracle() {
     }
 }
 
-/// What reads and writes files, by whatever name.
+/// Functions that read or write files, by any name.
 const ACCESS: [&str; 11] = [
     "File::open",
     "File::create",

@@ -9,7 +9,7 @@ use gs_chroma::{
 
 use crate::gpu;
 
-/// Which of these cases fail when `kernel` is compiled with `from` replaced by `to`.
+/// Those of the cases that fail when `kernel` is compiled with `from` replaced by `to`.
 fn failing(
     cases: &[&'static str],
     kernel: &'static str,

@@ -41,7 +41,7 @@ type Names = Vec<String>;
 
 #[derive(Default)]
 struct Module {
-    /// What it imports, by the name that this has here; of all of a module by `*` and a number.
+    /// Imports, by their local name; glob imports of a module by `*` and a number.
     imports: BTreeMap<String, Names>,
     defined: BTreeSet<String>,
     /// Paths in its code as they stand there.

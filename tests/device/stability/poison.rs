@@ -75,7 +75,7 @@ fn bits(values: &[f32]) -> Vec<u32> {
     values.iter().map(|v| v.to_bits()).collect()
 }
 
-/// Whether the oracle, which has the range of `f64`, sees the same picture.
+/// Returns true if the oracle, which has the range of `f64`, draws the same picture.
 fn as_the_oracle_says(picture: &[f32], changed: &Splats) -> bool {
     let (scene, view) = &*SCENE;
     let mut wanted = scene.clone();
@@ -102,14 +102,14 @@ fn as_the_oracle_says(picture: &[f32], changed: &Splats) -> bool {
     })
 }
 
-/// Whether a Gaussian of the healthy scene is in view.
+/// Returns true if a Gaussian of the healthy scene is in view.
 fn seen(gaussian: usize) -> bool {
     let (scene, view) = &*SCENE;
     let list = visible(scene, view, Shading::Offset);
     list.iter().any(|visible| visible.index == gaussian)
 }
 
-/// What poison `value` in one place does.
+/// Checks the effect of poison `value` in one place.
 fn check(gaussian: usize, place: usize, value: f32) -> Result<(), TestCaseError> {
     let healthy = splats(&SCENE.0);
     let mut changed = healthy.clone();

@@ -15,7 +15,7 @@ use naga::{
 };
 use reasons::REASONS;
 
-/// What the lint found in one function.
+/// Findings of the lint in one function.
 #[derive(Default)]
 struct Findings {
     /// `!=` between floats.

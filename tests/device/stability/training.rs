@@ -25,7 +25,7 @@ const ITERATIONS: usize = 150;
 /// differently, and a training amplifies that.
 const BAND: f64 = 0.5;
 
-/// What the units of the ordinary world are multiplied by, and how it lies.
+/// Unit scale and pose of a world, relative to the ordinary one.
 #[derive(Clone, Copy)]
 struct Frame {
     scale: f64,
@@ -377,7 +377,7 @@ fn black_white_and_constant_photos_train() {
     }
 }
 
-/// Where a rule would remove every Gaussian, it removes none.
+/// A rule that would remove every Gaussian removes none.
 #[test]
 fn a_rule_that_would_remove_all_removes_none() {
     let world = world(Frame::ORDINARY, 2);

@@ -1,10 +1,10 @@
-//! What can go wrong.
+//! Errors of making a variant.
 
 use std::path::PathBuf;
 
 use gs_chroma::capture::CaptureError;
 
-/// Why a variant was not made.
+/// Error of making a variant.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// The source is no usable COLMAP folder.

@@ -49,7 +49,7 @@ pub fn polish(scene: &mut Scene, seed: u64) -> String {
     )
 }
 
-/// Where most of the scene is.
+/// Center and width of most of the scene.
 struct Places {
     center: DVec3,
     width: f64,
@@ -70,8 +70,8 @@ fn middle_half(scene: &Scene) -> Places {
     }
 }
 
-/// Where each camera is between the two that are farthest apart, −1 to 1, of mean zero
-/// before it is cut.
+/// Position of each camera between the two that are farthest apart, −1 to 1, of mean zero before it
+/// is clamped.
 fn sides(scene: &Scene) -> Vec<f64> {
     let centers: Vec<DVec3> = scene.views.iter().map(View::center).collect();
     let pairs = centers

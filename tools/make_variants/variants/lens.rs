@@ -49,7 +49,7 @@ impl Lens {
         }
     }
 
-    /// Where the ray `(x, y, 1)` goes.
+    /// Distorted image point of the ray `(x, y, 1)`.
     pub fn bend(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         match *self {
             Self::Pinhole => [x, y],
@@ -128,7 +128,7 @@ impl Camera {
         self.lens.straighten(bent)
     }
 
-    /// Whether a pixel lies in the image, `margin` pixels from its border.
+    /// Returns true if a pixel lies in the image, `margin` pixels from its border.
     pub fn contains(&self, pixel: [f64; 2], margin: f64) -> bool {
         (0..2).all(|k| (margin..=f64::from(self.size[k]) - margin).contains(&pixel[k]))
     }

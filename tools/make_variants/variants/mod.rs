@@ -24,8 +24,8 @@ use std::path::Path;
 pub use error::Error;
 use scene::Scene;
 
-/// What can be made of a scene. For each but the last five there is a control: made in
-/// the same way, without the effect.
+/// Variants of a scene. For each but the last five there is a control: made in the same way,
+/// without the effect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Variant {
     /// A wide lens: COLMAP's OPENCV model, which bends the corners by a tenth

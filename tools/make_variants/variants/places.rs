@@ -1,4 +1,4 @@
-//! Where in space a pixel's content is, roughly: from the observations around it.
+//! Approximate position in space of a pixel's content, from the observations around it.
 
 use super::scene::Scene;
 

@@ -27,11 +27,11 @@ pub struct View {
     pub developed: Option<Developed>,
     /// 0 where the photo shall be ignored, else 255.
     pub mask: Option<GrayImage>,
-    /// Whether `fit` measures with it.
+    /// True if the view is held out of `fit` for measuring.
     pub held_out: bool,
 }
 
-/// What a photo's file holds other than 8-bit RGB.
+/// Content of a photo's file that is not 8-bit RGB.
 pub enum Developed {
     Gray(GrayImage),
     Gray16(ImageBuffer<Luma<u16>, Vec<u16>>),
@@ -45,7 +45,7 @@ pub struct Point {
     pub track: Vec<Observation>,
 }
 
-/// Where a view sees a point.
+/// Pixel of a view that shows a point.
 pub struct Observation {
     pub view: usize,
     /// x and y; the center of the top left pixel is at (0.5, 0.5).

@@ -4,14 +4,14 @@ use super::lens::{Camera, Lens};
 use super::resample::remap;
 use super::scene::Scene;
 
-/// What `barrel` moves the corners by, in parts of their distance to the center: the part
-/// that grows with the third power of it, and with the fifth. Real wide lenses have as much.
+/// Shift of the corners by `barrel`, as a share of their distance to the center: the part that
+/// grows with the third power of it, and with the fifth. Real wide lenses have as much.
 const BARREL: [f64; 2] = [-0.11, 0.02];
 
-/// Of tangential distortion at the corners, in the same unit: a lens not quite centered.
+/// Tangential distortion at the corners, in the same unit: a lens not quite centered.
 const TANGENTIAL: [f64; 2] = [0.002, -0.001];
 
-/// What `barrel-control` moves the corners by, in pixels.
+/// Shift of the corners by `barrel-control`, in pixels.
 const CONTROL_SHIFT: f64 = 0.25;
 
 /// An ordinary fisheye, a little off from an angle's proportional radius.

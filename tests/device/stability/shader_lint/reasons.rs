@@ -1,4 +1,4 @@
-//! What keeps each operation finite that could leave the numbers.
+//! Reasons why operations that could overflow or divide by zero stay finite.
 
 /// `(function, expression, what keeps it finite)`.
 pub const REASONS: &[(&str, &str, &str)] = &[
