@@ -40,7 +40,7 @@ test-all: export PYTHON := $(CURDIR)/target/test-all/bin/python
 test-all: export PATH := $(CURDIR)/target/test-all/bin:$(PATH)
 test-all: setup-all lint
 	cargo clippy --release --lib --test fuzz --no-default-features -- -D warnings
-	cargo test --release -- --include-ignored
+	cargo test --release --workspace -- --include-ignored
 	$(if $(filter-out 0,$(shell id -u)),sudo -n --preserve-env=HOME) tools/bare_machine.sh
 
 lint:

@@ -134,8 +134,63 @@ impl LbfgsKernels {
     }
 }
 
-/// An entry point and what it works on.
+/// An entry point and its buffers.
 struct Bound(Kernel, Bindings);
+
+// Binding numbers of `shaders/lbfgs.wgsl`.
+const PARAMETERS: u32 = 0;
+const PAIR: u32 = 1;
+const UNKNOWNS: u32 = 2;
+const GRADIENT: u32 = 3;
+const DIAGONAL: u32 = 4;
+const FLOORS: u32 = 5;
+const LOSSES: u32 = 6;
+const ACCEPTED_UNKNOWNS: u32 = 7;
+const ACCEPTED_GRADIENT: u32 = 8;
+const INVERSE: u32 = 9;
+const DIRECTION: u32 = 10;
+const DISPLACEMENT: u32 = 11;
+const CHANGE: u32 = 12;
+const SUMS: u32 = 13;
+const SCALARS: u32 = 14;
+const LEFT: u32 = 15;
+const RIGHT: u32 = 16;
+const ANCHORS: u32 = 17;
+const PULLS: u32 = 18;
+
+/// Buffers by binding number, of which each entry point takes some.
+#[derive(Clone)]
+struct Slots<'a> {
+    gpu: &'a Gpu,
+    buffers: [&'a wgpu::Buffer; 19],
+}
+
+impl<'a> Slots<'a> {
+    /// The parameters alone: in the other slots, too, where wgpu refuses them as no storage.
+    fn new(gpu: &'a Gpu, parameters: &'a wgpu::Buffer) -> Self {
+        Self {
+            gpu,
+            buffers: [parameters; 19],
+        }
+    }
+
+    fn with<const N: usize>(&self, more: [(u32, &'a Buffer<f32>); N]) -> Self {
+        let mut slots = self.clone();
+        for (slot, buffer) in more {
+            slots.buffers[slot as usize] = buffer.raw();
+        }
+        slots
+    }
+
+    /// Ties an entry point to the parameters and the buffers in `used`.
+    fn bind(&self, kernel: &Kernel, used: &[u32]) -> Bound {
+        let used = [PARAMETERS].iter().chain(used);
+        let buffers: Vec<_> = used
+            .map(|&slot| (slot, self.buffers[slot as usize]))
+            .collect();
+        Bound(kernel.clone(), kernel.bind_at(self.gpu, &buffers))
+    }
+}
 
 /// Kernels of one pair.
 struct PairKernels {
@@ -149,6 +204,59 @@ struct PairKernels {
     along_change: Bound,
     beta: Bound,
     add_displacement: Bound,
+}
+
+impl PairKernels {
+    /// Kernels of the pair `index`, whose buffers are in `slots`.
+    fn new(kernels: &LbfgsKernels, index: usize, slots: &Slots<'_>) -> Result<Self, GpuError> {
+        let index = Buffer::uniform(slots.gpu, "pair", &(index as u32))?;
+        let mut slots = slots.clone();
+        slots.buffers[PAIR as usize] = index.raw();
+        let of = |slot: u32| slots.buffers[slot as usize];
+        let product = |left: u32, right: u32| {
+            let mut slots = slots.clone();
+            (slots.buffers[LEFT as usize], slots.buffers[RIGHT as usize]) = (of(left), of(right));
+            slots.bind(&kernels.dot, &[SUMS, LEFT, RIGHT])
+        };
+        let add = |left: u32| {
+            let mut slots = slots.clone();
+            slots.buffers[LEFT as usize] = of(left);
+            slots.bind(&kernels.add, &[DIRECTION, SCALARS, LEFT])
+        };
+        let sum = |kernel: &Kernel| slots.bind(kernel, &[PAIR, SUMS, SCALARS]);
+        Ok(Self {
+            keep: slots.bind(
+                &kernels.keep,
+                &[
+                    UNKNOWNS,
+                    GRADIENT,
+                    ACCEPTED_UNKNOWNS,
+                    ACCEPTED_GRADIENT,
+                    DISPLACEMENT,
+                    CHANGE,
+                    SCALARS,
+                ],
+            ),
+            curvature: [
+                product(DISPLACEMENT, CHANGE),
+                slots.bind(&kernels.curvature, &[SUMS, SCALARS]),
+            ],
+            spread: [
+                slots.bind(&kernels.spread, &[INVERSE, CHANGE, SUMS]),
+                sum(&kernels.scale),
+            ],
+            moved: [
+                slots.bind(&kernels.moved, &[DIAGONAL, DISPLACEMENT, SUMS]),
+                slots.bind(&kernels.mean, &[SUMS, SCALARS]),
+            ],
+            along_displacement: product(DISPLACEMENT, DIRECTION),
+            alpha: sum(&kernels.alpha),
+            add_change: add(CHANGE),
+            along_change: product(CHANGE, DIRECTION),
+            beta: sum(&kernels.beta),
+            add_displacement: add(DISPLACEMENT),
+        })
+    }
 }
 
 /// The kernels tied to one system.
@@ -231,156 +339,70 @@ impl Lbfgs {
             },
         )?;
         let zeros = |label| Buffer::<f32>::zeros(gpu, label, length);
+        let named = |name: &str, buffer: &Buffer<f32>| (name.to_owned(), buffer.clone());
         let [accepted_unknowns, accepted_gradient] = [zeros("accepted")?, zeros("accepted")?];
         let (preconditioner, direction) = (zeros("preconditioner")?, zeros("direction")?);
         let anchors = zeros("anchors")?;
         let pulls = Buffer::<f32>::zeros(gpu, "pulls", system.diagonal.len())?;
         let block_sums = Buffer::<f32>::zeros(gpu, "lbfgs sums", 2 * blocks as usize)?;
         let scalars = Buffer::<f32>::zeros(gpu, "scalars", SHARED_SCALARS + 2 * MEMORY)?;
-        let bind = |kernel: &Kernel, used: &[(u32, &wgpu::Buffer)]| {
-            Bound(kernel.clone(), kernel.bind_at(gpu, used))
-        };
-        let (parameters, unknowns) = ((0, parameters.raw()), (2, system.unknowns.raw()));
-        let (gradient, floors) = ((3, system.gradient.raw()), (5, system.floors.raw()));
-        let mut kept: Vec<(String, Buffer<f32>)> = [
-            ("accepted unknowns", &accepted_unknowns),
-            ("accepted gradient", &accepted_gradient),
-            ("preconditioner", &preconditioner),
-            ("direction", &direction),
-            ("anchors", &anchors),
-            ("pulls", &pulls),
-        ]
-        .map(|(name, buffer)| (name.to_owned(), buffer.clone()))
-        .into();
-        let diagonal = (4, system.diagonal.raw());
-        let (anchors, pulls) = ((17, anchors.raw()), (18, pulls.raw()));
-        let inverse = (9, preconditioner.raw());
-        let sums = (13, block_sums.raw());
-        let (of_direction, of_scalars) = ((10, direction.raw()), (14, scalars.raw()));
-
-        let pairs = (0..MEMORY)
-            .map(|index| {
-                let displacement = zeros("displacement")?;
-                let change = zeros("change")?;
-                kept.push((format!("displacement {index}"), displacement.clone()));
-                kept.push((format!("change {index}"), change.clone()));
-                let index = Buffer::uniform(gpu, "pair", &(index as u32))?;
-                let index = (1, index.raw());
-                let product = |left: &Buffer<f32>, right: &Buffer<f32>| {
-                    bind(
-                        &kernels.dot,
-                        &[parameters, sums, (15, left.raw()), (16, right.raw())],
-                    )
-                };
-                let sum = |kernel: &Kernel| bind(kernel, &[parameters, index, sums, of_scalars]);
-                let add = |left: &Buffer<f32>| {
-                    bind(
-                        &kernels.add,
-                        &[parameters, of_direction, of_scalars, (15, left.raw())],
-                    )
-                };
-                Ok(PairKernels {
-                    keep: bind(
-                        &kernels.keep,
-                        &[
-                            parameters,
-                            unknowns,
-                            gradient,
-                            (7, accepted_unknowns.raw()),
-                            (8, accepted_gradient.raw()),
-                            (11, displacement.raw()),
-                            (12, change.raw()),
-                            of_scalars,
-                        ],
-                    ),
-                    curvature: [
-                        product(&displacement, &change),
-                        bind(&kernels.curvature, &[parameters, sums, of_scalars]),
-                    ],
-                    spread: [
-                        bind(
-                            &kernels.spread,
-                            &[parameters, inverse, (12, change.raw()), sums],
-                        ),
-                        sum(&kernels.scale),
-                    ],
-                    moved: [
-                        bind(
-                            &kernels.moved,
-                            &[parameters, diagonal, (11, displacement.raw()), sums],
-                        ),
-                        bind(&kernels.mean, &[parameters, sums, of_scalars]),
-                    ],
-                    along_displacement: product(&displacement, &direction),
-                    alpha: sum(&kernels.alpha),
-                    add_change: add(&change),
-                    along_change: product(&change, &direction),
-                    beta: sum(&kernels.beta),
-                    add_displacement: add(&displacement),
-                })
-            })
-            .collect::<Result<_, GpuError>>()?;
-        kept.push(("scalars".to_owned(), scalars.clone()));
+        let mut kept = vec![
+            named("accepted unknowns", &accepted_unknowns),
+            named("accepted gradient", &accepted_gradient),
+            named("preconditioner", &preconditioner),
+            named("direction", &direction),
+            named("anchors", &anchors),
+            named("pulls", &pulls),
+        ];
+        let slots = Slots::new(gpu, parameters.raw()).with([
+            (UNKNOWNS, &system.unknowns),
+            (GRADIENT, &system.gradient),
+            (DIAGONAL, &system.diagonal),
+            (FLOORS, &system.floors),
+            (LOSSES, &system.losses),
+            (ACCEPTED_UNKNOWNS, &accepted_unknowns),
+            (ACCEPTED_GRADIENT, &accepted_gradient),
+            (INVERSE, &preconditioner),
+            (DIRECTION, &direction),
+            (SUMS, &block_sums),
+            (SCALARS, &scalars),
+            (LEFT, &system.gradient),
+            (RIGHT, &direction),
+            (ANCHORS, &anchors),
+            (PULLS, &pulls),
+        ]);
+        let mut pairs = Vec::with_capacity(MEMORY);
+        for index in 0..MEMORY {
+            let [displacement, change] = [zeros("displacement")?, zeros("change")?];
+            kept.push(named(&format!("displacement {index}"), &displacement));
+            kept.push(named(&format!("change {index}"), &change));
+            let slots = slots.with([(DISPLACEMENT, &displacement), (CHANGE, &change)]);
+            pairs.push(PairKernels::new(kernels, index, &slots)?);
+        }
+        kept.push(named("scalars", &scalars));
+        let sum = [SUMS, SCALARS];
         let lbfgs = Self {
             kept,
-            ridge: bind(
-                &kernels.ridge,
-                &[parameters, unknowns, gradient, sums, anchors, pulls],
-            ),
-            judge: bind(
-                &kernels.judge,
-                &[parameters, (6, system.losses.raw()), sums, of_scalars],
-            ),
-            anchor: bind(
+            ridge: slots.bind(&kernels.ridge, &[UNKNOWNS, GRADIENT, SUMS, ANCHORS, PULLS]),
+            judge: slots.bind(&kernels.judge, &[LOSSES, SUMS, SCALARS]),
+            anchor: slots.bind(
                 &kernels.anchor,
-                &[
-                    parameters,
-                    (7, accepted_unknowns.raw()),
-                    diagonal,
-                    anchors,
-                    pulls,
-                ],
+                &[ACCEPTED_UNKNOWNS, DIAGONAL, ANCHORS, PULLS],
             ),
-            begin: bind(
+            begin: slots.bind(
                 &kernels.begin,
                 &[
-                    parameters,
-                    unknowns,
-                    gradient,
-                    diagonal,
-                    floors,
-                    inverse,
-                    of_direction,
-                    of_scalars,
-                    pulls,
+                    UNKNOWNS, GRADIENT, DIAGONAL, FLOORS, INVERSE, DIRECTION, SCALARS, PULLS,
                 ],
             ),
-            precondition: bind(
-                &kernels.precondition,
-                &[parameters, inverse, of_direction, of_scalars],
-            ),
+            precondition: slots.bind(&kernels.precondition, &[INVERSE, DIRECTION, SCALARS]),
             slope: [
-                bind(
-                    &kernels.dot,
-                    &[
-                        parameters,
-                        sums,
-                        (15, system.gradient.raw()),
-                        (16, direction.raw()),
-                    ],
-                ),
-                bind(&kernels.slope, &[parameters, sums, of_scalars]),
+                slots.bind(&kernels.dot, &[SUMS, LEFT, RIGHT]),
+                slots.bind(&kernels.slope, &sum),
             ],
-            step: bind(
+            step: slots.bind(
                 &kernels.step,
-                &[
-                    parameters,
-                    unknowns,
-                    floors,
-                    inverse,
-                    of_direction,
-                    of_scalars,
-                ],
+                &[UNKNOWNS, FLOORS, INVERSE, DIRECTION, SCALARS],
             ),
             pairs,
             newest: 0,

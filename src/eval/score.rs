@@ -72,22 +72,7 @@ impl Scored {
         };
         show("photo", "photo", shown.clone());
         show("luma", "luma", drawn_gray.clone());
-        let quality = reference.luma_quality(&drawing.gray.pixels);
-        let wanted_gray = reference.gray();
-        let luma = LumaScore {
-            psnr: quality.psnr,
-            corrected_psnr: quality.corrected_psnr,
-            ssim: quality.ssim,
-            sharpness: reference.sharpness(&luma_shown),
-            photo_sharpness: reference.sharpness(&wanted_gray),
-            lpips: match &mut lpips {
-                Some(lpips) => {
-                    let gray = rgb_of(&reference.gray());
-                    Some(lpips.distance(&reference.patched(&drawn_gray, &gray), &gray, size)?)
-                }
-                None => None,
-            },
-        };
+        let luma = luma_score(reference, drawing, &luma_shown, lpips.as_deref_mut())?;
         // Fidelity to a gray photo's colors is no figure.
         let truth = reference.rgb();
         let truth = truth.as_deref();
@@ -139,24 +124,10 @@ impl Scored {
             }
         }
         if let (Some(truth), Some(exported)) = (truth, of(Method::Exported)) {
-            let wanted = ab_of(truth);
-            let nothing = vec![0.0; wanted.len()];
-            // What does not count is no error.
-            let mut map = |file, caption, errors: &[f64]| {
-                show(
-                    file,
-                    caption,
-                    error_map(&reference.patched(errors, &nothing)),
-                );
-            };
-            map("delta-e", "ΔE00, ours", &measure::delta_e(exported, truth));
-            if let Some(layer) = drawing.layer(Method::Exported) {
-                let errors = distances(&layer.ab(), &wanted);
-                map("ab", "a/b error, ours", &errors);
-            }
-            if let Some(answer) = answer {
-                let errors = distances(&answer.ab, &wanted);
-                map("ab-teacher", "a/b error, teacher", &errors);
+            for (file, caption, errors) in error_maps(drawing, answer, exported, truth) {
+                // Pixels that do not count have no error.
+                let none = vec![0.0; errors.len()];
+                show(file, caption, error_map(&reference.patched(&errors, &none)));
             }
         }
         scores.push(PictureScore {
@@ -182,6 +153,51 @@ impl Scored {
             shots,
         })
     }
+}
+
+/// Luma of a view against its photo.
+fn luma_score(
+    reference: Reference<'_>,
+    drawing: &Drawing,
+    shown: &[f32],
+    lpips: Option<&mut Lpips>,
+) -> Result<LumaScore, EvalError> {
+    let (photo, wanted) = (reference.photo, reference.gray());
+    let quality = reference.luma_quality(&drawing.gray.pixels);
+    let distance = |lpips: &mut Lpips| {
+        let [drawn, wanted] = [rgb_of(shown), rgb_of(&wanted)];
+        let drawn = reference.patched(&drawn, &wanted);
+        lpips.distance(&drawn, &wanted, [photo.width, photo.height])
+    };
+    Ok(LumaScore {
+        psnr: quality.psnr,
+        corrected_psnr: quality.corrected_psnr,
+        ssim: quality.ssim,
+        sharpness: reference.sharpness(shown),
+        photo_sharpness: reference.sharpness(&wanted),
+        lpips: lpips.map(distance).transpose()?,
+    })
+}
+
+/// Color errors of each pixel, by file and caption.
+fn error_maps(
+    drawing: &Drawing,
+    answer: Option<&AbImage>,
+    exported: &[[f32; 3]],
+    truth: &[[f32; 3]],
+) -> Vec<(&'static str, &'static str, Vec<f64>)> {
+    let wanted = ab_of(truth);
+    let ab = drawing.layer(Method::Exported).map(Layer::ab);
+    let ours = ab.map(|ab| ("ab", "a/b error, ours", distances(&ab, &wanted)));
+    let teacher = answer.map(|answer| {
+        let errors = distances(&answer.ab, &wanted);
+        ("ab-teacher", "a/b error, teacher", errors)
+    });
+    let delta_e = ("delta-e", "ΔE00, ours", measure::delta_e(exported, truth));
+    [Some(delta_e), ours, teacher]
+        .into_iter()
+        .flatten()
+        .collect()
 }
 
 /// Gray as RGB.

@@ -1,3 +1,3 @@
-//! The WGSL of every kernel and variant, compiled from `shaders/` by `build.rs`.
+//! The WGSL of every kernel and variant, compiled from `shaders/` by `tools/compile_shaders`.
 
-include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
+include!("../../shaders/compiled/kernels.rs");

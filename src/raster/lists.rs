@@ -151,49 +151,28 @@ impl Lists {
         let starts = words("tile starts", max_tiles + 1)?;
         let all = Count::new(gpu, n)?;
         let (in_view, entries) = (Count::new(gpu, 0)?, Count::new(gpu, 0)?);
-        let by_depth = Sort::new(
-            gpu,
-            &raster.sort,
-            &raster.scan,
-            &status,
-            &in_view,
-            n,
-            32 - raster.numerics.depth_bits..32,
-        )?;
+        let sort = |count, len, bits| {
+            Sort::new(gpu, &raster.sort, &raster.scan, &status, count, len, bits)
+        };
+        let by_depth = sort(&in_view, n, 32 - raster.numerics.depth_bits..32)?;
         let tile_bits = usize::BITS - max_tiles.leading_zeros();
-        let by_tile = Sort::new(
-            gpu,
-            &raster.sort,
-            &raster.scan,
-            &status,
-            &entries,
-            capacity,
-            0..tile_bits,
-        )?;
-        let scan_visible = Scan::new(
-            gpu,
-            &raster.scan,
-            &visible,
-            &status,
-            (&all, WorkKind::Scan),
-            Some(Total {
-                word: STATUS_VISIBLE,
-                count: &in_view,
-                limit: n,
-            }),
-        )?;
-        let scan_offsets = Scan::new(
-            gpu,
-            &raster.scan,
-            &offsets,
-            &status,
-            (&in_view, WorkKind::Scan),
-            Some(Total {
-                word: STATUS_INSTANCES,
-                count: &entries,
-                limit: capacity,
-            }),
-        )?;
+        let by_tile = sort(&entries, capacity, 0..tile_bits)?;
+        let scan = |values, count, total| {
+            let work = (count, WorkKind::Scan);
+            Scan::new(gpu, &raster.scan, values, &status, work, Some(total))
+        };
+        let visible_total = Total {
+            word: STATUS_VISIBLE,
+            count: &in_view,
+            limit: n,
+        };
+        let scan_visible = scan(&visible, &all, visible_total)?;
+        let entry_total = Total {
+            word: STATUS_INSTANCES,
+            count: &entries,
+            limit: capacity,
+        };
+        let scan_offsets = scan(&offsets, &in_view, entry_total)?;
         let kernels = &raster.lists;
         let project = raster.projection.project.bind(
             gpu,

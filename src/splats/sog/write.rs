@@ -20,6 +20,56 @@ use crate::splats::{
 /// Levels of a coordinate's logarithm.
 const LEVELS: u32 = 65_535;
 
+/// Least and greatest logarithm of the means' coordinates on each axis.
+fn bounds(means: &[[f32; 3]]) -> [[f64; 3]; 2] {
+    let bound = |pick: fn(f64, f64) -> f64| {
+        [0, 1, 2].map(|axis| {
+            let logarithms = means.iter().map(|mean| logarithm(mean[axis].into()));
+            logarithms.reduce(pick).unwrap_or(0.0)
+        })
+    };
+    [bound(f64::min), bound(f64::max)]
+}
+
+/// SH above degree 0 by a palette.
+struct Rest {
+    meta: Harmonics,
+    /// Entries of the palette, one after the other.
+    centroids: Texture,
+    /// Entry of each Gaussian.
+    labels: Vec<u16>,
+}
+
+fn palette_of_rest(splats: &Splats) -> Rest {
+    let (count, degree) = (splats.len(), splats.sh.degree);
+    let terms = coefficient_count(degree) - 1;
+    let points: Vec<f32> = (0..count)
+        .flat_map(|index| &splats.sh.of(index)[CHANNELS..])
+        .copied()
+        .collect();
+    let palette = palette(&points, terms * CHANNELS, entries(count));
+    let values: Vec<f32> = palette.entries.concat();
+    let book = codebook(&values);
+    let rows = palette.entries.len().div_ceil(ENTRIES_PER_ROW);
+    let mut centroids = Texture::black(ENTRIES_PER_ROW * terms, rows);
+    // Entries follow one another, across rows, too.
+    for (pixel, values) in centroids.rgba.iter_mut().zip(values.chunks_exact(CHANNELS)) {
+        for (channel, &value) in pixel.iter_mut().zip(values) {
+            *channel = nearest(&book, value);
+        }
+    }
+    Rest {
+        meta: Harmonics {
+            count: palette.entries.len(),
+            bands: degree,
+            codebook: book,
+            files: ["shN_centroids.webp", "shN_labels.webp"].map(str::to_owned),
+        },
+        centroids,
+        labels: palette.labels,
+    }
+}
+
 /// The bytes of a file. Gaussians are put in an order in which neighbors are neighbors.
 ///
 /// # Errors
@@ -37,13 +87,7 @@ pub(in crate::splats) fn encode(
             reason: format!("{count} Gaussians do not fit into a picture of {LONGEST_SIDE} pixels"),
         });
     }
-    let bound = |pick: fn(f64, f64) -> f64, start: f64| {
-        [0, 1, 2].map(|axis| {
-            let logarithms = splats.means.iter().map(|mean| logarithm(mean[axis].into()));
-            logarithms.reduce(pick).unwrap_or(start)
-        })
-    };
-    let (mins, maxs) = (bound(f64::min, 0.0), bound(f64::max, 0.0));
+    let [mins, maxs] = bounds(&splats.means);
     fidelity.steps(|mean| {
         let steps = [0, 1, 2].map(|axis| {
             let step = (maxs[axis] - mins[axis]) / f64::from(LEVELS);
@@ -105,36 +149,16 @@ pub(in crate::splats) fn encode(
         }),
     );
     let sh_n = (degree > 0 && count > 0).then(|| {
-        let terms = coefficient_count(degree) - 1;
-        let points: Vec<f32> = (0..count)
-            .flat_map(|index| &splats.sh.of(index)[CHANNELS..])
-            .copied()
-            .collect();
-        let palette = palette(&points, terms * CHANNELS, entries(count));
-        let values: Vec<f32> = palette.entries.concat();
-        let book = codebook(&values);
-        let rows = palette.entries.len().div_ceil(ENTRIES_PER_ROW);
-        let mut centroids = Texture::black(ENTRIES_PER_ROW * terms, rows);
-        // Entries follow one another, across rows, too.
-        for (pixel, values) in centroids.rgba.iter_mut().zip(values.chunks_exact(CHANNELS)) {
-            for (channel, &value) in pixel.iter_mut().zip(values) {
-                *channel = nearest(&book, value);
-            }
-        }
-        files.add("shN_centroids.webp", &centroids);
+        let rest = palette_of_rest(splats);
+        files.add("shN_centroids.webp", &rest.centroids);
         files.add(
             "shN_labels.webp",
             &texture(&|index| {
-                let [low, high] = palette.labels[index].to_le_bytes();
+                let [low, high] = rest.labels[index].to_le_bytes();
                 [low, high, 0, u8::MAX]
             }),
         );
-        Harmonics {
-            count: palette.entries.len(),
-            bands: degree,
-            codebook: book,
-            files: ["shN_centroids.webp", "shN_labels.webp"].map(str::to_owned),
-        }
+        rest.meta
     });
     let meta = Meta {
         version: VERSION,

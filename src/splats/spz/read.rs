@@ -1,8 +1,12 @@
 //! Reading.
 
-use std::{io::Read, path::Path};
+use std::{
+    io::{self, Read},
+    path::Path,
+};
 
 use flate2::read::MultiGzDecoder;
+use ruzstd::decoding::StreamingDecoder;
 
 use super::*;
 use crate::splats::{
@@ -112,7 +116,8 @@ fn read_streams(path: &Path, bytes: &[u8]) -> Result<ReadSplats, SplatError> {
             SplatError::damaged(path, "streams", reason)
         })?;
         at = end;
-        let unpacked = zstd::Decoder::new(stream)
+        let unpacked = StreamingDecoder::new(stream)
+            .map_err(io::Error::other)
             .and_then(|stream| stream.take(wanted as u64).read_to_end(&mut parts[index]));
         let reason = match unpacked {
             Ok(found) if found == wanted => continue,

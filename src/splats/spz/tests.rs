@@ -4,6 +4,7 @@ use std::io::{Read, Write};
 use std::path::Path;
 
 use flate2::{Compression, read::GzDecoder, write::GzEncoder};
+use ruzstd::encoding::{CompressionLevel, compress_to_vec};
 
 use super::*;
 use crate::splats::{ReadSplats, ShField, SplatError, Splats, WriteOptions};
@@ -52,7 +53,7 @@ fn version_4() -> Vec<u8> {
     let mut streams = Vec::new();
     for size in part_bytes(3, 1) {
         let (part, rest) = parts.split_at(size);
-        let stream = zstd::bulk::compress(part, 1).unwrap();
+        let stream = compress_to_vec(part, CompressionLevel::Fastest);
         bytes.extend(
             [stream.len() as u64, size as u64]
                 .map(u64::to_le_bytes)

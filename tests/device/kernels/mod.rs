@@ -8,6 +8,7 @@ use gs_chroma::{compare, oracle};
 mod adam;
 mod antialiasing;
 mod blend;
+mod compiled;
 mod contributions;
 mod convergence;
 mod depth;

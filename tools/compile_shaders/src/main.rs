@@ -1,9 +1,12 @@
-//! Compiles the WESL kernels in `shaders/` to plain WGSL, one file for each
-//! kernel and variant, and writes the constants of `src/gpu/shaders.rs` that hold them.
+//! Compiles the WESL kernels in `shaders/` to plain WGSL, a file in `shaders/compiled/` for each
+//! kernel and variant, with the constants of `src/gpu/shaders.rs` that hold them:
+//! `cargo run --release -p compile_shaders` after a change. The program is built without it.
 
-use std::{env, fmt::Write, fs, path::Path};
+use std::{collections::BTreeMap, fmt::Write, fs, path::Path};
 
 use wesl::{ModulePath, Wesl};
+
+mod stamp;
 
 /// Kernels that know nothing of color channels.
 const PLAIN: &[&str] = &[
@@ -36,8 +39,21 @@ const SSIM_WINDOWS: [(&str, &str); 3] = [
     ("window5", "_window5"),
 ];
 
+/// The repository.
+const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
+
 fn main() {
-    println!("cargo::rerun-if-changed=shaders");
+    let folder = Path::new(ROOT).join("shaders/compiled");
+    // A variant that is no more has no file.
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir(&folder).expect("shaders/ is writable");
+    for (name, text) in compiled() {
+        fs::write(folder.join(name), text).expect("shaders/compiled/ is writable");
+    }
+}
+
+/// Text of each file in `shaders/compiled/`.
+fn compiled() -> BTreeMap<String, String> {
     let mut kernels = Kernels::default();
     let mut compile = |kernel, suffix: &str, features: &[&str]| {
         kernels.compile(kernel, suffix, features);
@@ -108,7 +124,7 @@ fn main() {
     }
     compile("project", "_playcanvas", &["playcanvas"]);
     compile("blend", "_rgb_playcanvas", &["rgb", "playcanvas"]);
-    kernels.write();
+    kernels.files()
 }
 
 /// Everything compiled so far.
@@ -118,12 +134,13 @@ struct Kernels {
     constants: String,
     /// Name and constant of each.
     all: String,
+    files: BTreeMap<String, String>,
 }
 
 impl Kernels {
     /// Compiles a kernel with these conditions; `suffix` tells the variant from others.
     fn compile(&mut self, kernel: &str, suffix: &str, features: &[&str]) {
-        let mut compiler = Wesl::new("shaders");
+        let mut compiler = Wesl::new(Path::new(ROOT).join("shaders"));
         compiler.keep_all_entrypoints();
         for feature in [
             "luma",
@@ -155,13 +172,18 @@ impl Kernels {
             .compile(&module)
             .unwrap_or_else(|error| panic!("shaders/{kernel}.wgsl: {error}"));
         let name = format!("{kernel}{suffix}");
-        write(&format!("{name}.wgsl"), &wgsl.to_string());
+        // What is imported comes in another order each time, which means nothing in WGSL.
+        let text = wgsl.to_string();
+        let mut declarations: Vec<&str> = text.trim_end().split("\n\n").collect();
+        declarations.sort_unstable();
+        let text = declarations.join("\n\n") + "\n";
+        self.files.insert(format!("{name}.wgsl"), text);
         let conditions = match features {
             [] => String::new(),
             some => format!(" with {}", some.join(", ")),
         };
         let constant = name.to_uppercase();
-        let file = format!("include_str!(concat!(env!(\"OUT_DIR\"), \"/{name}.wgsl\"))");
+        let file = format!("include_str!(\"{name}.wgsl\")");
         // Writing to a string cannot fail.
         let _ = write!(
             self.constants,
@@ -170,18 +192,38 @@ impl Kernels {
         let _ = write!(self.all, "(\"{name}\", {constant}), ");
     }
 
-    /// Writes the constants.
-    fn write(self) {
-        let Self { constants, all } = self;
+    /// The kernels and the constants.
+    fn files(self) -> BTreeMap<String, String> {
+        let Self {
+            constants,
+            all,
+            mut files,
+        } = self;
         let list = format!(
             "/// Every compiled kernel by name, for tests that reflect them.\n\
              pub const ALL: &[(&str, &str)] = &[{all}];\n"
         );
-        write("shaders.rs", &(constants + &list));
+        files.insert("kernels.rs".to_owned(), constants + &list);
+        files.insert(stamp::FILE.to_owned(), stamp::of(Path::new(ROOT)));
+        files
     }
 }
 
-fn write(name: &str, text: &str) {
-    let out = env::var("OUT_DIR").expect("cargo sets OUT_DIR");
-    fs::write(Path::new(&out).join(name), text).expect("OUT_DIR is writable");
+#[test]
+fn the_compiled_kernels_are_those_of_the_sources() {
+    let folder = Path::new(ROOT).join("shaders/compiled");
+    let mut there: Vec<String> = fs::read_dir(&folder)
+        .expect("shaders/compiled/ is there")
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    there.sort();
+    let compiled = compiled();
+    assert_eq!(there, compiled.keys().cloned().collect::<Vec<_>>());
+    for (name, text) in compiled {
+        let old = fs::read_to_string(folder.join(&name)).unwrap();
+        assert!(
+            old == text,
+            "{name} is stale: cargo run --release -p compile_shaders"
+        );
+    }
 }

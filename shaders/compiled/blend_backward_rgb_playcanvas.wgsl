@@ -1,0 +1,357 @@
+@compute @workgroup_size(THREADS)
+fn blend_backward(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) thread: u32) {
+    let tile = portion.first + linear_group(group);
+    if tile >= view.tiles.x * view.tiles.y {
+        return;
+    }
+    let corner = vec2u(tile % view.tiles.x, tile / view.tiles.x) * TILE_SIDE;
+    let first = corner + vec2u(thread % TILE_SIDE, (thread / TILE_SIDE) * PART);
+    let part = thread / PART;
+    var upper = load(first);
+    var lower = load(first + vec2u(0u, 4u));
+    let most = max(upper.last, lower.last);
+    if thread < PARTS {
+        atomicStore(&part_lasts[thread], 0u);
+    }
+    workgroupBarrier();
+    atomicMax(&part_lasts[part], max(max(most.x, most.y), max(most.z, most.w)));
+    workgroupBarrier();
+    if thread == 0u {
+        uniform_last = max(max(atomicLoad(&part_lasts[0]), atomicLoad(&part_lasts[1])), max(atomicLoad(&part_lasts[2]), atomicLoad(&part_lasts[3])));
+    }
+    let used = workgroupUniformLoad(&uniform_last);
+    let start = starts[tile];
+    for (var batch = 0u; batch < used; batch += BATCH) {
+        let members = min(BATCH, used - batch);
+        if thread < PARTS {
+            atomicStore(&touching[thread], 0u);
+        }
+        workgroupBarrier();
+        if thread < members {
+            let slot = slots[start + batch + thread];
+            let i = instance_splats[slot];
+            let splat = projected[i];
+            batch_slots[thread] = slot;
+            means[thread] = splat.mean;
+            conic_opacities[thread] = splat.conic_opacity;
+            {
+                batch_colors[thread] = colors[i];
+            }
+            let cutoff = power_cutoff(splat.conic_opacity.w);
+            var parts = 0u;
+            for (var p = 0u; p < PARTS; p++) {
+                let low = vec2f(corner + vec2u(p % 2u, p / 2u) * PART) + 0.5;
+                if batch + thread < atomicLoad(&part_lasts[p]) && touches(splat, cutoff, low, low + f32(PART - 1u)) {
+                    parts |= 1u << p;
+                    atomicOr(&touching[p], 1u << thread);
+                }
+            }
+            touched[thread] = parts;
+        }
+        workgroupBarrier();
+        var left = atomicLoad(&touching[part]);
+        while (left != 0u) {
+            let member = firstTrailingBit(left);
+            left &= left - 1u;
+            let own = batch + member;
+            let conic_opacity = conic_opacities[member];
+            let d = vec2f(first) + 0.5 - means[member];
+            var share = Share();
+            {
+                let color = batch_colors[member];
+                accumulate(&share, &upper, own, conic_opacity, d, color);
+                accumulate(&share, &lower, own, conic_opacity, d + vec2f(0.0, 4.0), color);
+            }
+            let at = (member * THREADS + thread) * SHARE;
+            {
+                shares[at] = share.moments.x;
+                shares[at + 1u] = share.moments.y;
+                shares[at + 2u] = share.moments.z;
+                shares[at + 3u] = share.moments.w;
+                shares[at + 4u] = share.moments_y.x;
+                shares[at + 5u] = share.moments_y.y;
+                shares[at + PARTIAL_PULL] = share.pull;
+            }
+            {
+                shares[at + PARTIAL_COLOR] = share.color.x;
+                shares[at + PARTIAL_COLOR + 1u] = share.color.y;
+                shares[at + PARTIAL_COLOR + 2u] = share.color.z;
+            }
+            {
+                shares[at + PARTIAL_OPACITY] = share.opacity;
+            }
+        }
+        workgroupBarrier();
+        for (var task = thread; task < PARTIAL_WORDS * members; task += THREADS) {
+            let member = task / PARTIAL_WORDS;
+            let word = task % PARTIAL_WORDS;
+            partials[batch_slots[member] * PARTIAL_WORDS + word] = record_word(member, word);
+        }
+        workgroupBarrier();
+    }
+    let count = starts[tile + 1u] - start;
+    for (var own = used + thread; own < count; own += THREADS) {
+        let at = slots[start + own] * PARTIAL_WORDS;
+        for (var c = 0u; c < PARTIAL_WORDS; c++) {
+            partials[at + c] = PartialWord();
+        }
+    }
+}
+
+@group(0) @binding(0)
+var<uniform> view: View;
+
+@group(0) @binding(1)
+var<storage, read> starts: array<u32>;
+
+@group(0) @binding(10)
+var<uniform> portion: Portion;
+
+@group(0) @binding(2)
+var<storage, read> slots: array<u32>;
+
+@group(0) @binding(3)
+var<storage, read> instance_splats: array<u32>;
+
+@group(0) @binding(4)
+var<storage, read> projected: array<Projected>;
+
+@group(0) @binding(5)
+var<storage, read> lasts: array<u32>;
+
+@group(0) @binding(6)
+var<storage, read> image_gradient: array<Color>;
+
+@group(0) @binding(7)
+var<storage, read_write> partials: array<PartialWord>;
+
+@group(0) @binding(8)
+var<storage, read> colors: array<Color>;
+
+@group(0) @binding(9)
+var<storage, read> image: array<Color>;
+
+alias Color = vec3f;
+
+alias PartialWord = f32;
+
+alias Quad = mat3x4f;
+
+const ALPHA_MAX: f32 = 0.99;
+
+const BATCH: u32 = 16u;
+
+const CHANNELS: u32 = 3u;
+
+const MAX_GROUPS: u32 = 65535u;
+
+const PART: u32 = 8u;
+
+const PARTIAL_COLOR: u32 = 7u;
+
+const PARTIAL_OPACITY: u32 = PARTIAL_COLOR + CHANNELS;
+
+const PARTIAL_PULL: u32 = 6u;
+
+const PARTIAL_STRIDE: u32 = PARTIAL_OPACITY + 1u;
+
+const PARTIAL_WORDS: u32 = PARTIAL_STRIDE;
+
+const PARTS: u32 = 4u;
+
+const RESCALE: f32 = 1.0186573603637743;
+
+const SHARE: u32 = PARTIAL_STRIDE | 1u;
+
+const TAIL: f32 = 0.01831563888873418;
+
+const THREADS: u32 = 32u;
+
+const TILE_SIDE: u32 = 16u;
+
+fn accumulate(share: ptr<function, Share>, pixels: ptr<function, Pixels>, own: u32, conic_opacity: vec4f, d: vec2f, color: Color) {
+    let power = powers(conic_opacity.xyz, d);
+    let raw = conic_opacity.w * falloff(power);
+    let alpha = quad_alpha(raw);
+    let before = (*pixels).transmittance;
+    let hit = contributes(power, alpha) & (vec4u(own) < (*pixels).last);
+    let weight = select(vec4f(0.0), alpha * before, hit);
+    (*share).color += gathered(weight, (*pixels).gradient);
+    (*pixels).transmittance = select(before, before * (1.0 - alpha), hit);
+    {
+        let contribution = (*pixels).gradient * color;
+        let behind = (*pixels).remaining - weight * contribution;
+        (*pixels).remaining = behind;
+        let v_alpha = before * contribution - behind / (1.0 - alpha);
+        let v_raw = select(vec4f(0.0), v_alpha, hit & (raw < vec4f(ALPHA_MAX)));
+        let v_power = -conic_opacity.w * RESCALE * exp(-power) * v_raw;
+        let rows = d.y + vec4f(0.0, 1.0, 2.0, 3.0);
+        let sum = v_power.x + v_power.y + v_power.z + v_power.w;
+        let sum_y = dot(v_power, rows);
+        (*share).moments += vec4f(sum, sum * d.x, sum_y, sum * d.x * d.x);
+        (*share).moments_y += vec2f(sum_y * d.x, dot(v_power, rows * rows));
+        let to_ndc = 0.5 * vec2f(view.size);
+        let slope_x = to_ndc.x * (conic_opacity.x * d.x + conic_opacity.y * rows);
+        let slope_y = to_ndc.y * (conic_opacity.y * d.x + conic_opacity.z * rows);
+        (*share).pull += dot(abs(v_power), sqrt(slope_x * slope_x + slope_y * slope_y));
+        {
+            (*share).opacity += dot(alpha, v_raw);
+        }
+    }
+}
+
+fn color_dot(a: Color, b: Color) -> f32 {
+    return dot(a, b);
+}
+
+fn contributes(power: vec4f, alpha: vec4f) -> vec4<bool> {
+    return (power >= vec4f(0.0)) & (alpha >= vec4f(ALPHA_MIN));
+}
+
+fn falloff(power: vec4f) -> vec4f {
+    return RESCALE * (exp(-power) - TAIL);
+}
+
+fn figure_sum(member: u32, figure: u32) -> f32 {
+    var parts = touched[member];
+    var sum = 0.0;
+    while (parts != 0u) {
+        let at = (member * THREADS + firstTrailingBit(parts) * PART) * SHARE + figure;
+        parts &= parts - 1u;
+        for (var t = 0u; t < PART; t++) {
+            sum += shares[at + t * SHARE];
+        }
+    }
+    return sum;
+}
+
+fn gathered(weight: vec4f, quad: Quad) -> Color {
+    return weight * quad;
+}
+
+fn insert(quad: Quad, k: u32, color: Color) -> Quad {
+    var q = quad;
+    q[0][k] = color.x;
+    q[1][k] = color.y;
+    q[2][k] = color.z;
+    return q;
+}
+
+fn least_power(splat: Projected, low: vec2f, high: vec2f) -> f32 {
+    let conic = splat.conic_opacity.xyz;
+    let nearest = clamp(splat.mean, low, high) - splat.mean;
+    if nearest.x == 0.0 && nearest.y == 0.0 {
+        return 0.0;
+    }
+    let lower = low - splat.mean;
+    let upper = high - splat.mean;
+    let on_vertical = vec2f(nearest.x, clamp(-conic.y * nearest.x / conic.z, lower.y, upper.y));
+    let on_horizontal = vec2f(clamp(-conic.y * nearest.y / conic.x, lower.x, upper.x), nearest.y);
+    return min(power_at(conic, on_vertical), power_at(conic, on_horizontal));
+}
+
+fn linear_group(group: vec3u) -> u32 {
+    return group.x + group.y * MAX_GROUPS;
+}
+
+fn load(first: vec2u) -> Pixels {
+    var pixels = Pixels();
+    pixels.transmittance = vec4f(1.0);
+    for (var k = 0u; k < 4u; k++) {
+        let at = first + vec2u(0u, k);
+        if all(at < view.size) {
+            let p = at.y * view.size.x + at.x;
+            pixels.gradient = insert(pixels.gradient, k, image_gradient[p]);
+            pixels.last[k] = lasts[p];
+            {
+                pixels.remaining[k] = color_dot(image_gradient[p], image[p]);
+            }
+        }
+    }
+    return pixels;
+}
+
+fn power_at(conic: vec3f, d: vec2f) -> f32 {
+    return 0.5 * (conic.x * d.x * d.x + conic.z * d.y * d.y) + conic.y * d.x * d.y;
+}
+
+fn power_cutoff(opacity: f32) -> f32 {
+    return log(opacity / ALPHA_MIN);
+}
+
+fn powers(conic: vec3f, d: vec2f) -> vec4f {
+    let dy = d.y + vec4f(0.0, 1.0, 2.0, 3.0);
+    return 0.5 * (conic.x * d.x * d.x + conic.z * dy * dy) + conic.y * d.x * dy;
+}
+
+fn quad_alpha(raw: vec4f) -> vec4f {
+    return min(vec4f(ALPHA_MAX), raw);
+}
+
+fn record_word(member: u32, word: u32) -> f32 {
+    return figure_sum(member, word);
+}
+
+fn touches(splat: Projected, cutoff: f32, low: vec2f, high: vec2f) -> bool {
+    return least_power(splat, low, high) <= cutoff;
+}
+
+override ALPHA_MIN: f32 = 0.00392156862745098;
+
+struct Pixels {
+    transmittance: vec4f,
+    remaining: vec4f,
+    gradient: Quad,
+    last: vec4u
+}
+
+struct Portion {
+    first: u32
+}
+
+struct Projected {
+    mean: vec2f,
+    extent: vec2f,
+    conic_opacity: vec4f
+}
+
+struct Share {
+    moments: vec4f,
+    moments_y: vec2f,
+    pull: f32,
+    opacity: f32,
+    color: Color
+}
+
+struct View {
+    row0: vec4f,
+    row1: vec4f,
+    row2: vec4f,
+    center_near: vec4f,
+    intrinsics: vec4f,
+    slope_limits: vec4f,
+    size: vec2u,
+    tiles: vec2u,
+    splat_count: u32,
+    sh_degree: u32,
+    instance_capacity: u32,
+    padding: u32
+}
+
+var<workgroup> batch_colors: array<Color, BATCH>;
+
+var<workgroup> batch_slots: array<u32, BATCH>;
+
+var<workgroup> conic_opacities: array<vec4f, BATCH>;
+
+var<workgroup> means: array<vec2f, BATCH>;
+
+var<workgroup> part_lasts: array<atomic<u32>, PARTS>;
+
+var<workgroup> shares: array<f32, BATCH * THREADS * SHARE>;
+
+var<workgroup> touched: array<u32, BATCH>;
+
+var<workgroup> touching: array<atomic<u32>, PARTS>;
+
+var<workgroup> uniform_last: u32;

@@ -1,0 +1,245 @@
+@compute @workgroup_size(256)
+fn shade_backward(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
+    let i = linear_group(group) * 256u + local;
+    let n = view.splat_count;
+    if i >= n {
+        return;
+    }
+    {
+        if atomicLoad(&status[STATUS_OVERFLOW]) != 0u {
+            return;
+        }
+    }
+    let count = (view.sh_degree + 1u) * (view.sh_degree + 1u);
+    {
+        if ranks[i] == INVISIBLE {
+            return;
+        }
+    }
+    let v_color = color_gradient(colors[i], gradient_of(i));
+    let offset = vec3f(geometry[i], geometry[n + i], geometry[2u * n + i]) - view.center_near.xyz;
+    let distance = length(offset);
+    let direction = offset / distance;
+    var v_direction = vec3f(0.0);
+    for (var k = 0u; k < count; k++) {
+        let term = sh_term(k, direction);
+        {
+            v_direction += term.slope * color_dot(sh[plane_index(k, i)], v_color);
+        }
+        store(k, i, term.value * v_color);
+    }
+    {
+        let v_mean = (v_direction - direction * dot(direction, v_direction)) / distance;
+        mean_gradient[i] = v_mean.x;
+        mean_gradient[n + i] = v_mean.y;
+        mean_gradient[2u * n + i] = v_mean.z;
+    }
+}
+
+@group(0) @binding(0)
+var<uniform> view: View;
+
+@group(0) @binding(1)
+var<storage, read> geometry: array<f32>;
+
+@group(0) @binding(10)
+var<storage, read_write> first_moment: array<f32>;
+
+@group(0) @binding(11)
+var<storage, read_write> second_moment: array<f32>;
+
+@group(0) @binding(2)
+var<storage, read> ranks: array<u32>;
+
+@group(0) @binding(3)
+var<storage, read> colors: array<Color>;
+
+@group(0) @binding(4)
+var<storage, read> gradients: array<f32>;
+
+@group(0) @binding(6)
+var<storage, read_write> sh: array<f32>;
+
+@group(0) @binding(7)
+var<storage, read_write> mean_gradient: array<f32>;
+
+@group(0) @binding(8)
+var<storage, read_write> status: array<atomic<u32>>;
+
+@group(0) @binding(9)
+var<uniform> parameters: AdamParameters;
+
+alias Color = f32;
+
+const BETA1: f32 = 0.9;
+
+const BETA2: f32 = 0.999;
+
+const CHANNELS: u32 = 1u;
+
+const EPSILON: f32 = 1e-15;
+
+const GRADIENT_MAX: f32 = 1e18;
+
+const INVISIBLE: u32 = 4294967295u;
+
+const MAX_GROUPS: u32 = 65535u;
+
+const ONE_LESS_BETA2: f32 = 0.001;
+
+const PARTIAL_COLOR: u32 = 7u;
+
+const PARTIAL_STRIDE: u32 = PARTIAL_COLOR + CHANNELS;
+
+const SH_C0: f32 = 0.28209479177387814;
+
+const SH_C1: f32 = 0.4886025119029199;
+
+const SH_C2: array<f32, 5> = array<f32, 5>(1.0925484305920792, -1.0925484305920792, 0.31539156525252005, -1.0925484305920792, 0.5462742152960396);
+
+const SH_C3: array<f32, 7> = array<f32, 7>(-0.5900435899266435, 2.890611442640554, -0.4570457994644658, 0.3731763325901154, -0.4570457994644658, 1.445305721320277, -0.5900435899266435);
+
+const STATUS_OVERFLOW: u32 = 0u;
+
+const STATUS_REFUSED: u32 = 6u;
+
+fn adam_step(state: vec3f, gradient: f32, rate: f32, correction: vec2f) -> vec3f {
+    let m = BETA1 * state.y + (1.0 - BETA1) * gradient;
+    let v = BETA2 * state.z + ONE_LESS_BETA2 * gradient * gradient;
+    return vec3f(state.x - rate * (m * correction.x) / (sqrt(v * correction.y) + EPSILON), m, v);
+}
+
+fn color_dot(a: Color, b: Color) -> f32 {
+    return a * b;
+}
+
+fn color_gradient(color: Color, gradient: Color) -> Color {
+    return select(0.0, gradient, color > 0.0);
+}
+
+fn descend(plane: u32, i: u32, gradient: f32) {
+    let k = plane * view.splat_count + i;
+    sh[k] = descended(plane, i, view.splat_count, sh[k], gradient);
+}
+
+fn descended(plane: u32, i: u32, count: u32, value: f32, gradient: f32) -> f32 {
+    if i >= parameters.trained {
+        return value;
+    }
+    if !is_within(gradient, GRADIENT_MAX) {
+        atomicAdd(&status[STATUS_REFUSED], 1u);
+        return value;
+    }
+    let k = plane * count + i;
+    let rate = parameters.learning_rates[plane / 4u][plane % 4u];
+    let correction = vec2f(parameters.correction1, parameters.correction2);
+    let next = adam_step(vec3f(value, first_moment[k], second_moment[k]), gradient, rate, correction);
+    first_moment[k] = next.y;
+    second_moment[k] = next.z;
+    return next.x;
+}
+
+fn gradient_of(i: u32) -> Color {
+    return gradients[i * PARTIAL_STRIDE + PARTIAL_COLOR];
+}
+
+fn is_within(x: f32, bound: f32) -> bool {
+    return (bitcast<u32>(x) & 2147483647u) <= bitcast<u32>(bound);
+}
+
+fn linear_group(group: vec3u) -> u32 {
+    return group.x + group.y * MAX_GROUPS;
+}
+
+fn plane_index(k: u32, i: u32) -> u32 {
+    return k * CHANNELS * view.splat_count + i;
+}
+
+fn sh_term(k: u32, d: vec3f) -> ShTerm {
+    let x = d.x;
+    let y = d.y;
+    let z = d.z;
+    switch k {
+        case 0u {
+            return ShTerm(SH_C0, vec3f(0.0));
+        }
+        case 1u {
+            return ShTerm(-SH_C1 * y, vec3f(0.0, -SH_C1, 0.0));
+        }
+        case 2u {
+            return ShTerm(SH_C1 * z, vec3f(0.0, 0.0, SH_C1));
+        }
+        case 3u {
+            return ShTerm(-SH_C1 * x, vec3f(-SH_C1, 0.0, 0.0));
+        }
+        case 4u {
+            return ShTerm(SH_C2[0] * x * y, SH_C2[0] * vec3f(y, x, 0.0));
+        }
+        case 5u {
+            return ShTerm(SH_C2[1] * y * z, SH_C2[1] * vec3f(0.0, z, y));
+        }
+        case 6u {
+            return ShTerm(SH_C2[2] * (2.0 * z * z - x * x - y * y), SH_C2[2] * vec3f(-2.0 * x, -2.0 * y, 4.0 * z));
+        }
+        case 7u {
+            return ShTerm(SH_C2[3] * x * z, SH_C2[3] * vec3f(z, 0.0, x));
+        }
+        case 8u {
+            return ShTerm(SH_C2[4] * (x * x - y * y), SH_C2[4] * vec3f(2.0 * x, -2.0 * y, 0.0));
+        }
+        case 9u {
+            return ShTerm(SH_C3[0] * y * (3.0 * x * x - y * y), SH_C3[0] * vec3f(6.0 * x * y, 3.0 * (x * x - y * y), 0.0));
+        }
+        case 10u {
+            return ShTerm(SH_C3[1] * x * y * z, SH_C3[1] * vec3f(y * z, x * z, x * y));
+        }
+        case 11u {
+            return ShTerm(SH_C3[2] * y * (4.0 * z * z - x * x - y * y), SH_C3[2] * vec3f(-2.0 * x * y, 4.0 * z * z - x * x - 3.0 * y * y, 8.0 * y * z));
+        }
+        case 12u {
+            return ShTerm(SH_C3[3] * z * (2.0 * z * z - 3.0 * x * x - 3.0 * y * y), SH_C3[3] * vec3f(-6.0 * x * z, -6.0 * y * z, 6.0 * z * z - 3.0 * x * x - 3.0 * y * y));
+        }
+        case 13u {
+            return ShTerm(SH_C3[4] * x * (4.0 * z * z - x * x - y * y), SH_C3[4] * vec3f(4.0 * z * z - 3.0 * x * x - y * y, -2.0 * x * y, 8.0 * x * z));
+        }
+        case 14u {
+            return ShTerm(SH_C3[5] * z * (x * x - y * y), SH_C3[5] * vec3f(2.0 * x * z, -2.0 * y * z, x * x - y * y));
+        }
+        case default {
+            return ShTerm(SH_C3[6] * x * (x * x - 3.0 * y * y), SH_C3[6] * vec3f(3.0 * (x * x - y * y), -6.0 * x * y, 0.0));
+        }
+    }
+}
+
+fn store(k: u32, i: u32, value: Color) {
+    descend(k, i, value);
+}
+
+struct AdamParameters {
+    splat_count: u32,
+    planes: u32,
+    correction1: f32,
+    correction2: f32,
+    trained: u32,
+    learning_rates: array<vec4f, 12>
+}
+
+struct ShTerm {
+    value: f32,
+    slope: vec3f
+}
+
+struct View {
+    row0: vec4f,
+    row1: vec4f,
+    row2: vec4f,
+    center_near: vec4f,
+    intrinsics: vec4f,
+    slope_limits: vec4f,
+    size: vec2u,
+    tiles: vec2u,
+    splat_count: u32,
+    sh_degree: u32,
+    instance_capacity: u32,
+    padding: u32
+}
