@@ -33,20 +33,20 @@ TEST_THREADS = $(shell echo $$(($$(getconf _NPROCESSORS_ONLN) + 1)))
 test test-all: export MESA_SHADER_CACHE_DIR := $(CURDIR)/target/mesa
 test test-all: export RUST_TEST_THREADS := $(TEST_THREADS)
 test: setup lint
-	cargo test --release
+	cargo test
 
 # A missing program fails a test here. `PYTHON` has OpenUSD.
 test-all: export PYTHON := $(CURDIR)/target/test-all/bin/python
 test-all: export PATH := $(CURDIR)/target/test-all/bin:$(PATH)
 test-all: setup-all lint
-	cargo clippy --release --lib --test fuzz --no-default-features -- -D warnings
-	cargo test --release --workspace -- --include-ignored
+	cargo clippy --lib --test fuzz --no-default-features -- -D warnings
+	cargo test --workspace -- --include-ignored
 	$(if $(filter-out 0,$(shell id -u)),sudo -n --preserve-env=HOME) tools/bare_machine.sh
 
 lint:
 	@cargo fmt --version >/dev/null 2>&1 && cargo clippy --version >/dev/null 2>&1 || rustup component add rustfmt clippy
 	cargo fmt --check
-	cargo clippy --release --all-targets -- -D warnings
+	cargo clippy --all-targets -- -D warnings
 	@$(MAKE) --no-print-directory prose
 
 # Names and tables are no prose, nor is the style guide's list of words.

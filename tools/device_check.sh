@@ -26,7 +26,7 @@ cd "$(dirname "$0")/.." || exit 1
 pack() {
     mkdir -p "$1" && {
         cargo build --release --message-format json
-        cargo test --release --no-run --message-format json
+        cargo test --no-run --message-format json
         cargo bench --no-run --message-format json
     } | "${PYTHON:-python3}" -c '
 import json, sys
@@ -94,7 +94,7 @@ bench() {
 # all_tests: every test program although one fails.
 all_tests() {
     local test code=0
-    [ -n "$prebuilt" ] || { cargo test --release --no-fail-fast; return; }
+    [ -n "$prebuilt" ] || { cargo test --no-fail-fast; return; }
     for test in "$prebuilt"/test-* "$prebuilt"/*-unit; do "$test" || code=1; done
     return $code
 }

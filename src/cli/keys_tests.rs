@@ -41,7 +41,7 @@ fn tables_are_those_of_the_types() {
     if std::env::var_os("WRITE_DOCS").is_some() {
         fs::write(PAGE, wanted).expect("docs are writable");
     } else {
-        let command = "WRITE_DOCS=1 cargo test --release --lib keys_tests";
+        let command = "WRITE_DOCS=1 cargo test --lib keys_tests";
         assert!(page == wanted, "{PAGE}: `{command}` writes it anew");
     }
 }

@@ -31,7 +31,7 @@ and gray photos; 100,000 Gaussians in one tile; a strip as wide as 8K. A whole 8
 trains one iteration, half a minute without a GPU. `tests/cli` and `src/color` test
 georeferenced coordinates, color conversions and files.
 
-`WRITE_DOCS=1 cargo test --release --test cli doctor_says` writes this page.
+`WRITE_DOCS=1 cargo test --test cli doctor_says` writes this page.
 ";
 
 const KERNELS: &str = "## Kernels on random inputs

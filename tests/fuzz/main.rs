@@ -1,7 +1,7 @@
 //! Damaged files of every kind that is read: no panic, no wait, and no more memory than the
 //! file's size can explain.
 //!
-//! `cargo test --release --test fuzz` tries each kind a thousand times or less;
+//! `cargo test --test fuzz` tries each kind a thousand times or less;
 //! `GS_CHROMA_MUTATIONS=100000` as often as it says. What failed once is kept in
 //! `tests/proptest-regressions/fuzz/`.
 

@@ -1,6 +1,6 @@
 //! Needs of each pipeline, against limits of devices: the table in docs/gpu.md.
 //!
-//! `WRITE_DOCS=1 cargo test --release --test device limits` writes it.
+//! `WRITE_DOCS=1 cargo test --test device limits` writes it.
 
 use std::{collections::BTreeMap, fmt::Write, fs};
 
