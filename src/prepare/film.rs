@@ -6,23 +6,20 @@ use std::{
 };
 
 use super::{
-    PrepareError, PrepareOptions,
+    PrepareError,
     ffmpeg::{self, FilmSource, Part},
+    options::{FILM, PrepareOptions},
     photos::link_all,
     scan::Scan,
     sharp,
     state::{OutputState, Step, digest, of},
-    tell,
 };
 use crate::{
     capture::{CaptureError, FRAMES, Film, IMAGES, in_order, photo_header},
     disk,
     store::files,
-    tell::{Event, Observer, Stage},
+    tell::{Event, Observer, Stage, count},
 };
-
-/// The file that says which film it is.
-pub(super) const FILM: &str = "film.json";
 
 /// Shots that are told in one line.
 const TOLD_SHOTS: usize = 12;
@@ -100,7 +97,7 @@ fn choose(
         _ => {
             let only_first = chosen && options.end.is_none();
             let found = source.shots(asked, only_first, &mut |seen| {
-                tell(observe, Stage::Cuts, seen as usize, total);
+                count(observe, Stage::Cuts, seen as usize, total);
             })?;
             if !chosen {
                 state.keep_shots(same_film.to_owned(), found.clone())?;
@@ -185,7 +182,7 @@ fn extract(
     let frames = draft.path().join(FRAMES);
     disk::make_folder(&frames).map_err(files::at(&frames))?;
     source.extract(part, (scan, &colors), &frames, &mut |written| {
-        tell(
+        count(
             observe,
             Stage::Frames,
             written,
@@ -294,7 +291,7 @@ fn choose_sharp(
             |_, found| {
                 sharpness.push(found?);
                 if sharpness.len() % 8 == 0 {
-                    tell(observe, Stage::Sharpness, sharpness.len(), paths.len());
+                    count(observe, Stage::Sharpness, sharpness.len(), paths.len());
                 }
                 Ok::<_, CaptureError>(())
             },

@@ -10,19 +10,19 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::{
-    DATABASE, PrepareError, SPARSE,
-    colmap::{self, Cameras, Colmap, Features, Matching},
+    PrepareError,
+    colmap::{self, Colmap, Features},
     masks,
+    options::{Cameras, DATABASE, Matching, SPARSE},
     photos::Photos,
     state::{OutputState, Step, digest, of},
-    tell,
 };
 use crate::{
     capture::{Piece, names::by_number},
     disk,
     programs::ProgramError,
     store::files,
-    tell::{Event, Observer, Stage},
+    tell::{Event, Observer, Stage, count},
 };
 
 /// A share of the photos without a pose that is not worth a word: COLMAP seldom places all.
@@ -137,9 +137,9 @@ impl Task<'_> {
             lens: self.lens,
         };
         let photos = self.photos.headers.len();
-        tell(observe, Stage::Features, 0, photos);
+        count(observe, Stage::Features, 0, photos);
         colmap.features(&database, &features, &mut |done, total| {
-            tell(observe, Stage::Features, done, total.unwrap_or(photos));
+            count(observe, Stage::Features, done, total.unwrap_or(photos));
         })?;
         // What COLMAP makes is checked where it is used; that it made nothing, here.
         if !database.is_file() {
@@ -175,9 +175,9 @@ impl Task<'_> {
             ));
         }
         let pairs = list.is_some().then_some(&*path);
-        tell(observe, Stage::Matches, 0, photos);
+        count(observe, Stage::Matches, 0, photos);
         colmap.matches(&database, (self.matching, pairs), &mut |done, total| {
-            tell(observe, Stage::Matches, done, total.unwrap_or(photos));
+            count(observe, Stage::Matches, done, total.unwrap_or(photos));
         })?;
         state.place(Step::Matches, from, &[(database, DATABASE)])
     }
@@ -199,10 +199,10 @@ impl Task<'_> {
         disk::copy(&state.path(DATABASE), &database).map_err(files::at(&database))?;
         let photos = self.photos.headers.len();
         let mut placed = 0;
-        tell(observe, Stage::Poses, 0, photos);
+        count(observe, Stage::Poses, 0, photos);
         let ended = colmap.poses(&database, self.seen, &found, &mut |done, total| {
             placed = placed.max(done);
-            tell(observe, Stage::Poses, placed, total.unwrap_or(photos));
+            count(observe, Stage::Poses, placed, total.unwrap_or(photos));
         });
         let mut pieces = Vec::new();
         for model in colmap::models(&found) {

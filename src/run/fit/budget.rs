@@ -8,7 +8,7 @@ use std::{sync::Arc, time::Instant};
 
 use serde::{Deserialize, Serialize};
 
-use super::FitRequest;
+use super::request::FitRequest;
 use crate::{
     capture::{Capture, LoadOptions},
     gpu::GpuError,

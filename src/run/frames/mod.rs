@@ -142,7 +142,7 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
         range: own_range(&dataset, film.as_ref(), &shots, observe),
         side: None,
     };
-    let out = FrameOutput::open(options, rate, film.as_ref(), &shots, observe)?;
+    let out = FrameOutput::open(&options.output, rate, film.as_ref(), &shots, observe)?;
     let painted = find_painted(options, report, &shots, &mut painter, observe)?;
     let mut coloring = Coloring {
         painter,
