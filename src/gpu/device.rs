@@ -54,6 +54,7 @@ struct Patch {
     to: &'static str,
 }
 
+#[derive(Clone)]
 struct Inner {
     device: wgpu::Device,
     queue: wgpu::Queue,
@@ -61,7 +62,7 @@ struct Inner {
     /// Error reported by the device, such as memory exhaustion.
     failed: Arc<OnceLock<String>>,
     /// Compiled kernels: drivers without a cache take up to a second for one.
-    kernels: Mutex<HashMap<Recipe, Kernel>>,
+    kernels: Arc<Mutex<HashMap<Recipe, Kernel>>>,
 }
 
 impl Gpu {
@@ -156,7 +157,7 @@ impl Gpu {
                 queue,
                 info,
                 failed,
-                kernels: Mutex::default(),
+                kernels: Arc::default(),
             }),
             patch: None,
             stopwatch: None,
@@ -166,27 +167,12 @@ impl Gpu {
 
     /// The same device with another name and driver.
     fn named(&self, name: &str) -> Self {
-        let Inner {
-            device,
-            queue,
-            info,
-            failed,
-            ..
-        } = &*self.inner;
-        let info = wgpu::AdapterInfo {
-            name: name.to_owned(),
-            driver: String::new(),
-            driver_info: String::new(),
-            ..info.clone()
-        };
+        let mut inner = (*self.inner).clone();
+        inner.info.name = name.to_owned();
+        inner.info.driver.clear();
+        inner.info.driver_info.clear();
         Self {
-            inner: Arc::new(Inner {
-                device: device.clone(),
-                queue: queue.clone(),
-                info,
-                failed: failed.clone(),
-                kernels: Mutex::default(),
-            }),
+            inner: Arc::new(inner),
             ..self.clone()
         }
     }

@@ -167,7 +167,7 @@ impl Recorder {
                 self.flush();
                 let _ = self.gpu.wait();
                 if let Some(mut stopwatch) = self.gpu.stopwatch() {
-                    stopwatch.add(kernel.name, begun.elapsed());
+                    stopwatch.add(kernel.name, begun.elapsed().as_secs_f64());
                 }
             }
         }

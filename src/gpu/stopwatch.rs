@@ -4,8 +4,6 @@
 //! the device records without waiting. Devices without them are timed from the host, which submits
 //! each dispatch alone and waits for it.
 
-use std::time::Duration;
-
 use super::readback::RawReadback;
 
 /// Timestamps of one query set: WebGPU's limit.
@@ -124,12 +122,8 @@ impl Stopwatch {
         pending.push((std::mem::take(claimed), times));
     }
 
-    /// Notes what the host measured.
-    pub(super) fn add(&mut self, kernel: &'static str, taken: Duration) {
-        self.note(kernel, taken.as_secs_f64());
-    }
-
-    fn note(&mut self, kernel: &'static str, seconds: f64) {
+    /// Adds the time of a dispatch.
+    pub(super) fn add(&mut self, kernel: &'static str, seconds: f64) {
         match self.times.iter_mut().find(|time| time.kernel == kernel) {
             Some(time) => {
                 time.dispatches += 1;
@@ -156,7 +150,7 @@ impl Stopwatch {
             let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(&bytes);
             for (kernel, ticks) in kernels.into_iter().zip(ticks.chunks_exact(2)) {
                 // A driver may reset its clock in between.
-                self.note(kernel, ticks[1].saturating_sub(ticks[0]) as f64 * period);
+                self.add(kernel, ticks[1].saturating_sub(ticks[0]) as f64 * period);
             }
         }
         Ok(std::mem::take(&mut self.times))

@@ -204,15 +204,10 @@ fn check_apart(options: &PrepareOptions, input: &Path, output: &Path) -> Result<
 
 /// Refuses for photos what is said about films.
 fn check_film_options(options: &PrepareOptions) -> Result<(), PrepareError> {
-    let given = [
-        ("--start", options.start.is_some()),
-        ("--end", options.end.is_some()),
-        ("--per-second", options.per_second.is_some()),
-    ];
-    match given.iter().find(|(_, given)| *given) {
-        Some((option, _)) => Err(PrepareError::at(
+    match options.start.or(options.end).or(options.per_second) {
+        Some(_) => Err(PrepareError::at(
             &options.input,
-            format!("is a folder of photos, and {option} is for films; leave it out"),
+            "is a folder of photos; start, end and frames a second are for films",
         )),
         None => Ok(()),
     }
@@ -297,14 +292,11 @@ fn make_masks(
                 "black borders are masked: left {left}, right {right}, top {top}, bottom {bottom} pixels"
             )));
         }
+        let named = (options.masks.as_deref()).map(|dir| masks::named(dir, photos));
         let sources = Sources {
             borders,
             one: options.mask.clone(),
-            each: options
-                .masks
-                .as_deref()
-                .map(|dir| masks::named(dir, photos))
-                .transpose()?,
+            each: named.transpose()?,
         };
         let draft = state.draft()?;
         let masks = draft.path().join(MASKS);
@@ -323,10 +315,8 @@ fn make_masks(
             _ => state.place(Step::Masks, &from, &[(masks, MASKS)])?,
         }
     }
-    let masked = photos
-        .headers
-        .keys()
-        .filter(|name| folder.join(format!("{name}.png")).is_file());
+    let names = photos.headers.keys();
+    let masked = names.filter(|name| folder.join(format!("{name}.png")).is_file());
     Ok(masked.count())
 }
 
@@ -369,7 +359,7 @@ fn matching(
         None if is_film => Matching::Sequential,
         None if many => {
             observe(Event::Note(format!(
-                "more than {EXHAUSTIVE} photos: matching neighbors by name; --match exhaustive matches all pairs"
+                "more than {EXHAUSTIVE} photos: matching neighbors by name; exhaustive matching takes all pairs"
             )));
             Matching::Sequential
         }

@@ -171,7 +171,7 @@ impl Task<'_> {
             files::write(&path, list.as_bytes())?;
         } else if names.is_some() {
             observe(Event::Warning(
-                "photos are matched by name, IMG 10 before IMG 2: rename them without spaces or with leading zeros, or give --match exhaustive".to_owned(),
+                "photos are matched by name, IMG 10 before IMG 2: rename them without spaces or with leading zeros, or choose exhaustive matching".to_owned(),
             ));
         }
         let pairs = list.is_some().then_some(&*path);
@@ -258,15 +258,10 @@ impl Task<'_> {
             )));
         }
         if unplaced.len() as f64 > USUAL * self.photos.headers.len() as f64 {
-            let alone = unplaced
-                .iter()
-                .filter(|name| !elsewhere.contains(**name))
-                .count();
-            let names: Vec<&str> = unplaced
-                .iter()
-                .take(TOLD_NAMES)
-                .map(|name| name.as_str())
-                .collect();
+            let alone = unplaced.iter().filter(|name| !elsewhere.contains(**name));
+            let alone = alone.count();
+            let names = unplaced.iter().take(TOLD_NAMES);
+            let names: Vec<&str> = names.map(|name| name.as_str()).collect();
             let more = if unplaced.len() > TOLD_NAMES {
                 ", …"
             } else {
@@ -292,12 +287,12 @@ impl Task<'_> {
     /// Remedies to suggest when photos have no pose.
     fn remedies(&self) -> String {
         let exhaustive = match self.matching {
-            Matching::Sequential => ", --match exhaustive",
+            Matching::Sequential => ", exhaustive matching",
             Matching::Exhaustive => "",
         };
         match self.is_film {
             true => format!(
-                "the camera moved too little or too fast for these frames; try more of them (--per-second){exhaustive}, or another shot (--start)"
+                "the camera moved too little or too fast for these frames; try more of them a second{exhaustive}, or another shot"
             ),
             false => format!(
                 "photos have to overlap by two thirds and to be taken from different places; try more of them{exhaustive}"

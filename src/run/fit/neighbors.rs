@@ -81,7 +81,7 @@ impl FitRequest {
                 && folder.read_report()?.luma.around.is_some()
             {
                 observe(Event::Warning(format!(
-                    "{} has nothing beyond its margin any more: go on with --around, or what it shows there will be wrong",
+                    "{} has nothing beyond its margin any more: train it among its neighbors, or what it shows there will be wrong",
                     block.plan().name
                 )));
             }

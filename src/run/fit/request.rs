@@ -77,7 +77,7 @@ pub struct Neighbors {
 const OWN: [Effect; 2] = [Effect::Lens, Effect::LumaDegree];
 
 /// A request to train a gray scene; `None` leaves a value to the preset.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct FitRequest {
     /// The COLMAP folder.
     pub colmap_dir: PathBuf,
@@ -119,19 +119,7 @@ impl FitRequest {
     pub fn new(colmap_dir: PathBuf) -> Self {
         Self {
             colmap_dir,
-            output: None,
-            preset: None,
-            settings: LumaOverlay::default(),
-            load: LoadOptions::default(),
-            measure_side: None,
-            overrules: Overrules::default(),
-            init: None,
-            block: None,
-            around: None,
-            goal: Goal::Fixed,
-            timings: false,
-            checkpoints: CheckpointOptions::default(),
-            live: None,
+            ..Self::default()
         }
     }
 
@@ -149,7 +137,7 @@ impl FitRequest {
         let block = BlockPlace::read(folder)?;
         let coarse = block.as_ref().and_then(|block| block.coarse.as_ref());
         let (load, overrules) = match coarse {
-            Some((_, report)) => (report.capture.load.clone(), decided(&report.effects)),
+            Some((_, report)) => (report.capture.load.clone(), decided(&report.effects, &OWN)),
             None => Default::default(),
         };
         let settings = LumaOverlay {
@@ -189,12 +177,12 @@ impl FitRequest {
 }
 
 /// Effects as they were decided, those aside that are decided anew.
-fn decided(effects: &[EffectReport]) -> Overrules {
+pub(super) fn decided(effects: &[EffectReport], anew: &[Effect]) -> Overrules {
     let named = |on| {
         let of_kind = effects.iter().filter(|effect| effect.on == on);
         of_kind
             .map(|effect| effect.name)
-            .filter(|name| !OWN.contains(name))
+            .filter(|name| !anew.contains(name))
             .collect()
     };
     Overrules {
