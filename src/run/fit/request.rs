@@ -128,7 +128,7 @@ impl FitRequest {
     /// blocks.
     ///
     /// # Errors
-    /// [`StoreError::File`] where a file of the job is damaged.
+    /// [`RunError::Store`] where a file of the job is damaged.
     pub fn of_block(folder: &Path) -> Result<Option<Self>, RunError> {
         let Some(file) = BlockFile::read(folder)? else {
             return Ok(None);

@@ -128,7 +128,7 @@ fn only_the_doctor_asks_the_oracle() {
         let mut files = Vec::new();
         rust_files(&path, &mut files);
         for text in files {
-            let code = text.split("#[cfg(test)]").next().unwrap_or_default();
+            let code = without_tests(&text);
             assert!(!imports(code).contains("oracle"), "{name}: {text}");
         }
     }
@@ -165,8 +165,7 @@ fn files_are_read_and_written_in_one_place() {
             return;
         }
         let text = fs::read_to_string(path).expect("a source file");
-        let code = text.split("#[cfg(test)]").next().unwrap_or_default();
-        let code = code.replace("use tempfile::", "use ");
+        let code = without_tests(&text).replace("use tempfile::", "use ");
         let used = ACCESS.iter().filter(|access| code.contains(**access));
         found.extend(used.map(|access| format!("{name}: {access}")));
     }

