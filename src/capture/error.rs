@@ -6,8 +6,6 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
-use super::names::AmbiguousNames;
-
 /// Position of an error in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Position {
@@ -291,4 +289,15 @@ impl CaptureError {
             source,
         }
     }
+}
+
+/// A file or a photo cannot be matched by name.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum AmbiguousNames {
+    /// Two files would belong to one photo.
+    #[error("{} and {}: both would belong to one photo; keep one of them", .0[0].display(), .0[1].display())]
+    Files([PathBuf; 2]),
+    /// A file would belong to two photos, of these names.
+    #[error("{}: may belong to photo {} or to {}; put the photo's full name before its extension, such as {}.png", .0.display(), .1[0], .1[1], .1[0])]
+    Photos(PathBuf, [String; 2]),
 }

@@ -13,9 +13,10 @@ use super::mask::{self, MaskFolder, Masked};
 use super::options::{LoadOptions, MaskSource, Normalize};
 use super::orientation::SensorOrientation;
 use super::original::Original;
-use super::photo::{Photo, stance, working_size};
+use super::photo::{Photo, working_size};
 use super::sample::Depth;
 use super::tone;
+use super::view::stance;
 use super::{Camera, Capture, View};
 
 /// Pixels of each photo that are sampled to find the range of all: of 20 photos, 400 lie beyond

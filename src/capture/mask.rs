@@ -4,13 +4,12 @@ use std::path::{Path, PathBuf};
 
 use super::decode::{self, DecodedImage};
 use super::error::CaptureError;
-use super::names::{self, NamedFiles, composed, is_one_of, visit_files};
+use super::names::{self, NamedFiles, composed, is_one_of, photos_in, visit_files};
 use super::options::MaskSource;
 use super::orientation::{Orientation, SensorOrientation};
 use super::photo::same_shape;
 use super::resample::downscale;
 use super::sample::{Depth, Header, Samples};
-use super::unplaced::photos_in;
 use super::{Capture, IMAGES, View, first_views};
 
 /// Default folder of masks, beside `images/`.
@@ -71,7 +70,7 @@ impl MaskFolder {
             }
         });
         read.map_err(|(path, source)| CaptureError::Read { path, source })?;
-        files.know(names::known(capture));
+        files.know(names::known(&capture.views, &capture.rejected));
         let (mut photos, mut masked) = (0, 0);
         for view in first_views(&capture.views) {
             photos += 1;

@@ -31,6 +31,7 @@ mod split;
 mod tiff;
 mod tone;
 mod unplaced;
+mod view;
 
 #[cfg(test)]
 mod depth_tests;
@@ -53,23 +54,23 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DQuat, DVec3};
-use serde::{Deserialize, Serialize};
 
 use arrangement::Arrangement;
 pub use camera::Camera;
 pub use dataset::{Dataset, Notice};
 pub(crate) use decode::decode_image;
-pub use error::{CaptureError, Position};
+pub use error::{AmbiguousNames, CaptureError, Position};
 pub use exposure::Exposure;
 pub use film::{FRAMES, Film};
 pub(crate) use in_order::in_order;
 pub use layers::Layers;
 pub use lens::IMPERCEPTIBLE;
-use lens::Undistortion;
 pub use loader::{Headers, Loader, Shrunk, first_views};
 pub use mask::Masked;
-pub use names::AmbiguousNames;
-pub use options::{Channel, Chosen, Encoding, LoadOptions, MaskSource, MaskUse, Normalize};
+pub(crate) use names::photos_in;
+pub use options::{
+    Channel, Choice, Chosen, Encoding, LoadOptions, MaskSource, MaskUse, Normalize, Rejected,
+};
 pub use order::view_at;
 pub use orientation::{Orientation, SensorOrientation};
 pub use original::Original;
@@ -77,7 +78,7 @@ pub use photo::Photo;
 pub use resample::downscale;
 pub use split::{Split, split, split_as};
 pub use unplaced::Unplaced;
-pub(crate) use unplaced::photos_in;
+pub use view::{Observation, Point, View};
 #[cfg(feature = "cli")]
 pub(crate) use {
     decode::header as photo_header,
@@ -109,79 +110,6 @@ const EXTENT_MARGIN: f64 = 1.1;
 /// Cameras closer together than this part of the distance to the points stand,
 /// for the scene's size, in one place.
 const COINCIDENT: f64 = 1e-4;
-
-/// One photo, or one face of a photo that is too wide for one, with its camera.
-#[derive(Clone, Debug, PartialEq)]
-pub struct View {
-    /// The photo's name; of a face `@` and the face's name before the extension:
-    /// `left/0001@front.jpg`.
-    pub name: String,
-    /// The photo's path below `images/`, with `/` between folders.
-    pub photo: String,
-    /// The photo's file; it exists when the capture is loaded.
-    pub image_path: PathBuf,
-    /// The pinhole that shows the view, in the size of COLMAP's model; the file may
-    /// differ, see [`Loader::load`].
-    pub camera: Camera,
-    /// Mapping from the photo to the view's image; none if the photo is the image.
-    pub undistortion: Option<Undistortion>,
-    /// Orientation of the photo; known once a [`Dataset`] has read its header.
-    pub stance: SensorOrientation,
-}
-
-impl View {
-    /// Width and height of the photo in the size of COLMAP's model.
-    pub fn photo_size(&self) -> [u32; 2] {
-        match &self.undistortion {
-            Some(Undistortion { lens, .. }) => [lens.width, lens.height],
-            None => [self.camera.width, self.camera.height],
-        }
-    }
-}
-
-/// Switch: on if the photos require it, always or never.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[cfg_attr(test, derive(schemars::JsonSchema))]
-#[serde(rename_all = "lowercase")]
-pub enum Choice {
-    /// On if its effect can be seen.
-    #[default]
-    Auto,
-    /// Wherever it has any effect.
-    On,
-    /// Distortion is kept.
-    Off,
-}
-
-/// A point that COLMAP triangulated.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Point {
-    /// World position; finite.
-    pub position: DVec3,
-    /// Encoded sRGB.
-    pub color: [u8; 3],
-    /// Observations in the order of the file; empty where the model was written without them.
-    pub track: Vec<Observation>,
-}
-
-/// Observation of a point in a view.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Observation {
-    /// Index into [`Capture::views`].
-    pub view: usize,
-    /// x and y in pixels of the view's camera, at the size of COLMAP's model; finite.
-    pub pixel: [f64; 2],
-}
-
-/// Something in the model that was left out.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[cfg_attr(test, derive(schemars::JsonSchema))]
-pub struct Rejected {
-    /// The photo's name, or the points file's.
-    pub name: String,
-    /// Reason for which it was left out.
-    pub reason: String,
-}
 
 /// Photos with poses, and the sparse points seen in them.
 #[derive(Clone, Debug, PartialEq)]
@@ -239,14 +167,11 @@ impl Capture {
         // Tracks know an image by its place in the file.
         let mut images: Vec<_> = model.images.into_iter().enumerate().collect();
         images.sort_by(|(_, a), (_, b)| a.name.cmp(&b.name));
-        if let Some(pair) = images
-            .windows(2)
-            .find(|pair| pair[0].1.name == pair[1].1.name)
-        {
-            let name = pair[0].1.name.clone();
+        let mut pairs = images.windows(2);
+        if let Some(pair) = pairs.find(|pair| pair[0].1.name == pair[1].1.name) {
             return Err(CaptureError::DuplicateName {
+                name: pair[0].1.name.clone(),
                 path: model.images_path,
-                name,
             });
         }
 
@@ -347,16 +272,10 @@ impl Capture {
     /// where that too is zero.
     pub fn extent(&self) -> f64 {
         let center = self.center();
-        let radius = self
-            .views
-            .iter()
-            .map(|view| view.camera.center().distance(center))
-            .fold(0.0, f64::max);
-        let mut distances: Vec<f64> = self
-            .points
-            .iter()
-            .map(|point| point.position.distance(center))
-            .collect();
+        let radii = (self.views.iter()).map(|view| view.camera.center().distance(center));
+        let radius = radii.fold(0.0, f64::max);
+        let distances = (self.points.iter()).map(|point| point.position.distance(center));
+        let mut distances: Vec<f64> = distances.collect();
         let middle = distances.len() / 2;
         let to_points = match distances.get(middle) {
             Some(_) => *distances.select_nth_unstable_by(middle, f64::total_cmp).1,
@@ -414,13 +333,10 @@ fn retain_places(points: &mut Vec<Point>, path: &Path) -> Result<Option<Rejected
 
 /// Photos that were chosen and that the model does not place.
 fn not_placed(chosen: Option<&Chosen>, images: &[(usize, colmap::Image)]) -> Vec<Rejected> {
-    let placed: BTreeSet<&str> = images
-        .iter()
-        .map(|(_, image)| image.name.as_str())
-        .collect();
-    let wanted = chosen
-        .into_iter()
-        .flat_map(|chosen| chosen.train.union(&chosen.test));
+    let names = images.iter().map(|(_, image)| image.name.as_str());
+    let placed: BTreeSet<&str> = names.collect();
+    let chosen = chosen.into_iter();
+    let wanted = chosen.flat_map(|chosen| chosen.train.union(&chosen.test));
     let missing = wanted.filter(|name| !placed.contains(name.as_str()));
     missing
         .map(|name| Rejected {
@@ -467,10 +383,8 @@ fn pose([w, x, y, z]: [f64; 4], translation: DVec3) -> Result<DMat3, String> {
 /// Returns true if coordinates are finite and of a size that a scene can have.
 fn is_place(position: DVec3) -> bool {
     // NaN fails the comparison.
-    position
-        .to_array()
-        .iter()
-        .all(|c| c.abs() <= LARGEST_COORDINATE)
+    let all = position.to_array();
+    all.iter().all(|c| c.abs() <= LARGEST_COORDINATE)
 }
 
 fn check_photos_exist(views: &[View]) -> Result<(), CaptureError> {

@@ -7,12 +7,15 @@ use std::path::{Path, PathBuf};
 
 use unicode_normalization::UnicodeNormalization;
 
-use super::{Capture, View};
+use super::{error::AmbiguousNames, options::Rejected, view::View};
 
 /// Extensions of pictures; what follows a dot otherwise is part of a name.
 const EXTENSIONS: [&str; 9] = [
     "jpg", "jpeg", "jpe", "png", "tif", "tiff", "bmp", "webp", "dng",
 ];
+
+/// File extensions of photos.
+const PHOTOS: [&str; 5] = ["jpg", "jpeg", "png", "tif", "tiff"];
 
 /// A name without the extension of a picture, if it has one.
 pub fn stem(name: &str) -> &str {
@@ -36,10 +39,8 @@ pub(super) fn is_one_of(extension: &str, known: &[&str]) -> bool {
 /// The one spelling of a name: file systems and programs differ in whether an accent is a
 /// character of its own. Without `.` between slashes.
 pub(super) fn composed(name: &str) -> String {
-    let parts: Vec<&str> = name
-        .split('/')
-        .filter(|part| !matches!(*part, "" | "."))
-        .collect();
+    let parts = name.split('/').filter(|part| !matches!(*part, "" | "."));
+    let parts: Vec<&str> = parts.collect();
     parts.join("/").nfc().collect()
 }
 
@@ -96,13 +97,23 @@ pub fn visit_files(
     Ok(())
 }
 
+/// The paths of photos below `images/`, as far as it can be read.
+pub fn photos_in(images: &Path) -> Vec<String> {
+    let mut photos = Vec::new();
+    let _ = visit_files(images, &mut |name, path| {
+        let extension = path.extension().unwrap_or_default().to_string_lossy();
+        if is_one_of(&extension, &PHOTOS) {
+            photos.push(name);
+        }
+    });
+    photos
+}
+
 /// Every name that a file for a photo or a view of a capture may go by.
-pub fn known(capture: &Capture) -> impl Iterator<Item = &str> {
-    let rejected = capture.rejected.iter().map(|photo| photo.name.as_str());
-    let views = capture.views.iter();
-    views
-        .flat_map(|view| [view.photo.as_str(), view.name.as_str()])
-        .chain(rejected)
+pub fn known<'a>(views: &'a [View], rejected: &'a [Rejected]) -> impl Iterator<Item = &'a str> {
+    let of_views = |view: &'a View| [view.photo.as_str(), view.name.as_str()];
+    let rejected = rejected.iter().map(|photo| photo.name.as_str());
+    views.iter().flat_map(of_views).chain(rejected)
 }
 
 /// Finds photos whose names are spelled otherwise on the disk than in the model.
@@ -134,17 +145,6 @@ pub struct NamedFiles {
     photos: BTreeSet<String>,
     /// Photos by their path without extension.
     photos_of: BTreeMap<String, Vec<String>>,
-}
-
-/// A file or a photo cannot be matched by name.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum AmbiguousNames {
-    /// Two files would belong to one photo.
-    #[error("{} and {}: both would belong to one photo; keep one of them", .0[0].display(), .0[1].display())]
-    Files([PathBuf; 2]),
-    /// A file would belong to two photos, of these names.
-    #[error("{}: may belong to photo {} or to {}; put the photo's full name before its extension, such as {}.png", .0.display(), .1[0], .1[1], .1[0])]
-    Photos(PathBuf, [String; 2]),
 }
 
 impl NamedFiles {

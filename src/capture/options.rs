@@ -6,8 +6,6 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Choice, Rejected};
-
 /// Options of loading a capture's photos. `report.json` keeps them, so that every later command
 /// loads photos alike.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -60,6 +58,30 @@ impl Default for LoadOptions {
             chosen: None,
         }
     }
+}
+
+/// Switch: on if the photos require it, always or never.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(rename_all = "lowercase")]
+pub enum Choice {
+    /// On if its effect can be seen.
+    #[default]
+    Auto,
+    /// Wherever it has any effect.
+    On,
+    /// Distortion is kept.
+    Off,
+}
+
+/// Something in the model that was left out.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct Rejected {
+    /// The photo's name, or the points file's.
+    pub name: String,
+    /// Reason for which it was left out.
+    pub reason: String,
 }
 
 /// Photos of a part of a capture, by their paths below `images/`; no other photo of it is used,

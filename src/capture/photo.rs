@@ -1,11 +1,7 @@
 //! Photos as the program uses them.
 
-use super::View;
-use super::error::CaptureError;
 use super::options::MaskUse;
-use super::orientation::SensorOrientation;
 use super::resample::{downscale, downscale_masked};
-use super::sample::Header;
 use crate::color::GrayTable;
 
 /// A photo may differ from its camera by so many pixels a side: undistortion
@@ -151,27 +147,6 @@ pub(super) fn working_size(size: [u32; 2], max_side: Option<u32>) -> [u32; 2] {
         let exact = f64::from(side) * f64::from(target) / f64::from(longer);
         (exact.round() as u32).max(1)
     })
-}
-
-/// Orientation of a photo against the image that COLMAP saw, by the sides of the view's camera;
-/// refuses a photo that cannot be that camera's.
-pub(super) fn stance(view: &View, header: &Header) -> Result<SensorOrientation, CaptureError> {
-    let (camera, photo) = (view.photo_size(), header.size);
-    let turned = header.orientation.size(photo);
-    // Nearly square photos have about the camera's shape either way.
-    let is_turned = match (photo == camera, turned == camera) {
-        (true, _) => false,
-        (_, true) => true,
-        _ => !same_shape(photo, camera),
-    };
-    if is_turned && !same_shape(turned, camera) {
-        return Err(CaptureError::PhotoSize {
-            path: view.image_path.clone(),
-            photo,
-            camera,
-        });
-    }
-    Ok(SensorOrientation::new(header.orientation, is_turned))
 }
 
 /// Returns true if two images can be of one shape: they differ by rounding, or in scale.

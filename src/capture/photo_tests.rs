@@ -6,7 +6,7 @@ use image::{DynamicImage, GrayImage, Rgb, RgbImage, RgbaImage};
 use tempfile::{TempDir, tempdir};
 
 use super::*;
-use crate::capture::{Camera, LoadOptions, Loader};
+use crate::capture::{Camera, CaptureError, LoadOptions, Loader, View};
 use crate::color::gray_from_rgb;
 
 fn view(path: &Path, width: u32, height: u32) -> View {

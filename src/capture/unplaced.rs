@@ -4,11 +4,8 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::names::{composed, is_one_of, visit_files};
+use super::names::{composed, photos_in};
 use super::{Capture, CaptureError, IMAGES, colmap, first_views};
-
-/// File extensions of photos.
-const EXTENSIONS: [&str; 5] = ["jpg", "jpeg", "png", "tif", "tiff"];
 
 /// A share of the photos without a pose that is not worth a word: COLMAP seldom places all.
 const USUAL: f64 = 0.1;
@@ -55,18 +52,6 @@ impl Unplaced {
             better,
         }))
     }
-}
-
-/// The paths of photos below `images/`, as far as it can be read.
-pub(crate) fn photos_in(images: &Path) -> Vec<String> {
-    let mut photos = Vec::new();
-    let _ = visit_files(images, &mut |name, path| {
-        let extension = path.extension().unwrap_or_default().to_string_lossy();
-        if is_one_of(&extension, &EXTENSIONS) {
-            photos.push(name);
-        }
-    });
-    photos
 }
 
 /// The model in a folder of `sparse/` that places the most images, if these are more than those

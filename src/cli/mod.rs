@@ -36,18 +36,12 @@ mod usage;
 mod values;
 mod view;
 
-use std::{
-    fmt::Display,
-    io::{self, Write},
-    path::Path,
-    process::ExitCode,
-};
+use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 
 pub use error::CliError;
-
-use crate::store::StoreError;
+use printable::{print, print_as_is};
 
 /// Turns grayscale photos or films into a colored 3D Gaussian splat scene.
 #[derive(Parser)]
@@ -115,26 +109,11 @@ impl Cli {
             Command::Frames(command) => command.run(),
             Command::Eval(command) => command.run(),
             Command::Export(command) => command.run(),
-            Command::Tradeoff(command) => command.run(),
+            Command::Tradeoff(command) => command.run(Self::command()),
             Command::Info(command) => command.run(),
             Command::Doctor(command) => command.run(),
-            Command::Completions(command) => command.run(),
-            Command::Man(command) => command.run(),
+            Command::Completions(command) => command.run(Self::command()),
+            Command::Man(command) => command.run(Self::command()),
         }
-    }
-}
-
-/// Prints a line to standard output, with what a terminal would act on escaped.
-fn print(line: impl Display) -> Result<(), CliError> {
-    print_as_is(&printable::printable(&line.to_string()))
-}
-
-/// The same for text of our own. A reader that has seen enough (`| head`) is no error.
-fn print_as_is(text: &str) -> Result<(), CliError> {
-    match writeln!(io::stdout(), "{text}") {
-        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(CliError::Store(
-            StoreError::file(Path::new("standard output"), error.to_string()),
-        )),
-        _ => Ok(()),
     }
 }

@@ -1,5 +1,14 @@
 //! Text for terminals: names of files may hold anything, also what moves a cursor.
 
+use std::{
+    fmt::Display,
+    io::{self, Write},
+    path::Path,
+};
+
+use super::error::CliError;
+use crate::store::StoreError;
+
 /// The text with what a terminal would act on escaped, such as `\u{1b}`, and lines as they are.
 pub(super) fn printable(text: &str) -> String {
     let mut printable = String::with_capacity(text.len());
@@ -15,6 +24,21 @@ pub(super) fn printable(text: &str) -> String {
 /// The same for what is one line.
 pub(super) fn line(text: &str) -> String {
     printable(&text.replace('\n', "\\n"))
+}
+
+/// Prints a line to standard output, with what a terminal would act on escaped.
+pub(super) fn print(line: impl Display) -> Result<(), CliError> {
+    print_as_is(&printable(&line.to_string()))
+}
+
+/// The same for text of our own. A reader that has seen enough (`| head`) is no error.
+pub(super) fn print_as_is(text: &str) -> Result<(), CliError> {
+    match writeln!(io::stdout(), "{text}") {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(CliError::Store(
+            StoreError::file(Path::new("standard output"), error.to_string()),
+        )),
+        _ => Ok(()),
+    }
 }
 
 /// Returns true if a terminal acts on the character instead of showing it: control characters, and

@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::{Args, Command, CommandFactory};
+use clap::{Args, Command};
 use clap_complete::{Shell, generate};
 use clap_mangen::Man;
 
-use super::{Cli, CliError, print, print_as_is};
+use super::{CliError, print, print_as_is};
 use crate::{disk, store::files};
 
 /// Print a completion script for a shell.
@@ -19,9 +19,9 @@ pub struct Completions {
 }
 
 impl Completions {
-    pub(super) fn run(self) -> Result<(), CliError> {
+    pub(super) fn run(self, mut program: Command) -> Result<(), CliError> {
         let mut script = Vec::new();
-        generate(self.shell, &mut Cli::command(), "gs-chroma", &mut script);
+        generate(self.shell, &mut program, "gs-chroma", &mut script);
         print_as_is(String::from_utf8_lossy(&script).trim_end())
     }
 }
@@ -37,8 +37,7 @@ pub struct ManPages {
 }
 
 impl ManPages {
-    pub(super) fn run(self) -> Result<(), CliError> {
-        let mut program = Cli::command();
+    pub(super) fn run(self, mut program: Command) -> Result<(), CliError> {
         program.build();
         disk::make_folder(&self.folder).map_err(files::at(&self.folder))?;
         let count = write(&program, "gs-chroma", &self.folder)?;

@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, Parser, builder::PossibleValuesParser};
+use clap::{Args, Command, builder::PossibleValuesParser};
 
 use super::{
-    Cli, CliError,
+    CliError,
     headings::{BUDGET, OUTPUT, TEACHER},
     next, print,
     progress::Progress,
@@ -53,12 +53,12 @@ pub struct Tradeoff {
 }
 
 impl Tradeoff {
-    pub(super) fn run(self) -> Result<(), CliError> {
+    pub(super) fn run(self, program: Command) -> Result<(), CliError> {
         let preset = self.preset.iter();
         let preset = preset.flat_map(|preset| ["--preset".to_owned(), preset.to_string()]);
         let fit: Vec<String> = preset.chain(self.fit).collect();
         let words = ["gs-chroma", "fit", "scene", "-o", "point"].map(str::to_owned);
-        if let Err(error) = Cli::try_parse_from(words.iter().chain(&fit)) {
+        if let Err(error) = program.try_get_matches_from(words.iter().chain(&fit)) {
             error.exit();
         }
         let mut progress = Progress::through(vec![Stage::Sweep]);

@@ -14,7 +14,7 @@ pub struct FlipBounds {
 }
 
 /// Counts of flipped elements by direction.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct FlipFigures {
     /// Reason why nothing could be compared, if any.
     pub unfit: Option<String>,
@@ -40,13 +40,8 @@ impl FlipBounds {
     pub fn compare(&self, actual: &[f64], expected: &[f64], may_flip: &[bool]) -> FlipFigures {
         let mut figures = FlipFigures {
             unfit: unfit(actual, expected),
-            up: 0,
-            down: 0,
-            share: 0.0,
             cap: self.cap,
-            astray: None,
-            leap: None,
-            rest_used: 0.0,
+            ..FlipFigures::default()
         };
         if may_flip.len() != expected.len() {
             figures.unfit = Some(format!(

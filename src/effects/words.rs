@@ -36,7 +36,7 @@ impl Effect {
     fn unknown(self) -> &'static str {
         match self {
             Self::Masks => "no photo has a mask",
-            Self::ChromaDegree => "not tried; --sh-degree auto tries it",
+            Self::ChromaDegree => "not tried; an automatic SH degree is",
             _ => "no point that several photos show tells",
         }
     }

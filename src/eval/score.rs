@@ -113,10 +113,8 @@ impl Scored {
             score(Method::Teacher, layer.rgb(&gray_picture(photo)), &answer.ab)?;
         }
         let of = |method: Method| {
-            rendered
-                .iter()
-                .find(|(m, _)| *m == method)
-                .map(|(_, rgb)| rgb)
+            let found = rendered.iter().find(|(m, _)| *m == method);
+            found.map(|(_, rgb)| rgb)
         };
         for (method, file) in SHOWN {
             if let Some(rgb) = of(method) {

@@ -1,10 +1,10 @@
 //! Typed storage buffers and reading them back.
 
-use std::{marker::PhantomData, sync::mpsc};
+use std::marker::PhantomData;
 
 use bytemuck::Pod;
 
-use super::{Gpu, GpuError};
+use super::{device::Gpu, error::GpuError, readback::RawReadback};
 
 /// A storage buffer of `len` elements of `T`, zeroed when made. Clones share it.
 #[derive(Clone)]
@@ -51,11 +51,6 @@ impl<T: Pod> Buffer<T> {
     pub fn indirect(gpu: &Gpu, label: &str, len: usize) -> Result<Self, GpuError> {
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT;
         Self::with_usage(gpu, label, len, usage)
-    }
-
-    /// A buffer that timestamps are resolved into.
-    pub(super) fn for_queries(gpu: &Gpu, label: &str, len: usize) -> Result<Self, GpuError> {
-        Self::with_usage(gpu, label, len, wgpu::BufferUsages::QUERY_RESOLVE)
     }
 
     fn with_usage(
@@ -144,27 +139,12 @@ impl<T: Pod> Buffer<T> {
 
     /// Orders a copy of the present content; the device goes on meanwhile.
     pub fn read_later(&self, gpu: &Gpu) -> Readback<T> {
-        let size = self.raw.size();
-        let staging = gpu.device().create_buffer(&wgpu::BufferDescriptor {
-            label: Some("read-back"),
-            size,
-            usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
-            mapped_at_creation: false,
-        });
-        let mut encoder = gpu.device().create_command_encoder(&Default::default());
-        encoder.copy_buffer_to_buffer(&self.raw, 0, &staging, 0, size);
-        gpu.queue().submit([encoder.finish()]);
-        let (sender, done) = mpsc::channel();
-        staging.map_async(wgpu::MapMode::Read, .., move |result| {
-            // The receiver is gone when nobody wants the answer any more.
-            let _ = sender.send(result);
-        });
+        let copy = RawReadback::order(gpu.device(), gpu.queue(), &self.raw);
         if let Some(mut tape) = gpu.tape() {
             tape.read(&self.raw);
         }
         Readback {
-            staging,
-            done,
+            copy,
             answer: gpu.answer(),
             len: self.len,
             element: PhantomData,
@@ -174,8 +154,7 @@ impl<T: Pod> Buffer<T> {
 
 /// A copy on its way from the device.
 pub struct Readback<T> {
-    staging: wgpu::Buffer,
-    done: mpsc::Receiver<Result<(), wgpu::BufferAsyncError>>,
+    copy: RawReadback,
     /// Answer of another device, used instead.
     answer: Option<Vec<u8>>,
     len: usize,
@@ -188,22 +167,14 @@ impl<T: Pod> Readback<T> {
     /// # Errors
     /// [`GpuError::Lost`].
     pub fn wait(self, gpu: &Gpu) -> Result<Vec<T>, GpuError> {
-        let lost = |reason: String| GpuError::Lost(gpu.describe(), reason);
         gpu.wait()?;
-        self.done
-            .recv()
-            .map_err(|error| lost(error.to_string()))?
-            .map_err(|error| lost(error.to_string()))?;
-        let view = self
-            .staging
-            .get_mapped_range(..)
-            .map_err(|error| lost(error.to_string()))?;
+        let view = self.copy.bytes().map_err(|reason| gpu.lost(reason))?;
         let bytes = self.len * size_of::<T>();
         match self.answer {
             None => Ok(bytemuck::pod_collect_to_vec(&view[..bytes])),
             Some(answer) => (answer.get(..bytes))
                 .map(bytemuck::pod_collect_to_vec)
-                .ok_or_else(|| lost("its tape has no such answer".to_owned())),
+                .ok_or_else(|| gpu.lost("its tape has no such answer")),
         }
     }
 }

@@ -6,112 +6,11 @@ use std::{
 };
 
 use super::{
-    Kernel,
-    kernel::Recipe,
+    error::GpuError,
+    pipeline::{Kernel, Recipe},
     stopwatch::{KernelTime, Stopwatch},
-    tape::TapeMode,
+    tape::{Tape, TapeMode},
 };
-
-/// Error of the device.
-#[derive(Debug, thiserror::Error)]
-pub enum GpuError {
-    /// There is no adapter to run on.
-    #[error(
-        "no Vulkan, Metal or DirectX 12 adapter found ({0}): install a graphics driver, or a software one \
-         (Debian: apt-get install mesa-vulkan-drivers)"
-    )]
-    NoAdapter(String),
-    /// No adapter has the name in the environment variable.
-    #[error(
-        "WGPU_ADAPTER_NAME: no adapter's name contains {wanted:?} (there is: {found}): choose one of these, or unset it"
-    )]
-    NoSuchAdapter {
-        /// Requested name.
-        wanted: String,
-        /// Names of the adapters.
-        found: String,
-    },
-    /// The adapter refused a device.
-    #[error(
-        "adapter {adapter}: no device ({reason}): update its driver or choose another with WGPU_ADAPTER_NAME"
-    )]
-    NoDevice {
-        /// The adapter's name.
-        adapter: String,
-        /// Reason from the driver.
-        reason: String,
-    },
-    /// A field that no kernel shades.
-    #[error("no color has {0} channels: gray has 1, a/b 2, RGB 3")]
-    NoColor(usize),
-    /// A buffer is larger than the adapter can bind.
-    #[error("buffer `{label}` needs {needed} bytes but the adapter binds at most {limit}")]
-    TooLarge {
-        /// Label of the buffer.
-        label: String,
-        /// Bytes wanted.
-        needed: u64,
-        /// Bytes that one binding may have.
-        limit: u64,
-    },
-    /// A set of Gaussians needs a buffer that the adapter cannot bind.
-    #[error(
-        "{splats} Gaussians: buffer `{label}` exceeds the {limit} bytes that the adapter binds; about {fits} would fit"
-    )]
-    TooManySplats {
-        /// Number of Gaussians.
-        splats: usize,
-        /// Number of Gaussians that would fit, roughly.
-        fits: usize,
-        /// Label of the buffer.
-        label: String,
-        /// Bytes that one binding may have.
-        limit: u64,
-    },
-    /// A training needs more than it was allowed.
-    #[error(
-        "{splats} Gaussians and their tile lists need {} MiB of the device but may take {}", needed.div_ceil(1 << 20), limit >> 20
-    )]
-    OverLimit {
-        /// Number of Gaussians.
-        splats: usize,
-        /// Bytes wanted.
-        needed: u64,
-        /// Bytes allowed.
-        limit: u64,
-    },
-    /// The device was lost or a read-back failed.
-    #[error(
-        "device {0}: work on it failed ({1}): its memory may be full or the driver may have reset; run again with fewer splats or smaller images"
-    )]
-    Lost(String, String),
-    /// A training that had no room is asked to go on.
-    #[error(
-        "the training had no room on the device and cannot continue: start it again with fewer Gaussians"
-    )]
-    NoWorkspace,
-}
-
-impl GpuError {
-    /// Adds the number of Gaussians to an error of a buffer that grows with the set, and how many
-    /// of these `splats` would fit.
-    #[must_use]
-    pub fn of_splats(self, splats: usize) -> Self {
-        match self {
-            Self::TooLarge {
-                label,
-                needed,
-                limit,
-            } => Self::TooManySplats {
-                splats,
-                fits: (splats as f64 * limit as f64 / needed as f64) as usize,
-                label,
-                limit,
-            },
-            other => other,
-        }
-    }
-}
 
 /// Storage buffers that a kernel binds, at most. WebGPU promises 8, and every Metal, D3D12 and
 /// desktop Vulkan device has more; browsers offer 10.
@@ -155,6 +54,7 @@ struct Patch {
     to: &'static str,
 }
 
+#[derive(Clone)]
 struct Inner {
     device: wgpu::Device,
     queue: wgpu::Queue,
@@ -162,7 +62,7 @@ struct Inner {
     /// Error reported by the device, such as memory exhaustion.
     failed: Arc<OnceLock<String>>,
     /// Compiled kernels: drivers without a cache take up to a second for one.
-    kernels: Mutex<HashMap<Recipe, Kernel>>,
+    kernels: Arc<Mutex<HashMap<Recipe, Kernel>>>,
 }
 
 impl Gpu {
@@ -257,7 +157,7 @@ impl Gpu {
                 queue,
                 info,
                 failed,
-                kernels: Mutex::default(),
+                kernels: Arc::default(),
             }),
             patch: None,
             stopwatch: None,
@@ -266,41 +166,68 @@ impl Gpu {
     }
 
     /// The same device with another name and driver.
-    pub(super) fn named(&self, name: &str) -> Self {
-        let Inner {
-            device,
-            queue,
-            info,
-            failed,
-            ..
-        } = &*self.inner;
-        let info = wgpu::AdapterInfo {
-            name: name.to_owned(),
-            driver: String::new(),
-            driver_info: String::new(),
-            ..info.clone()
-        };
+    fn named(&self, name: &str) -> Self {
+        let mut inner = (*self.inner).clone();
+        inner.info.name = name.to_owned();
+        inner.info.driver.clear();
+        inner.info.driver_info.clear();
         Self {
-            inner: Arc::new(Inner {
-                device: device.clone(),
-                queue: queue.clone(),
-                info,
-                failed: failed.clone(),
-                kernels: Mutex::default(),
-            }),
+            inner: Arc::new(inner),
             ..self.clone()
         }
     }
 
-    pub(super) fn with_tape_mode(&self, tape_mode: TapeMode) -> Self {
+    /// The same device, on which everything from now on is written down.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn taped(&self) -> Self {
         Self {
-            tape_mode: Some(Arc::new(tape_mode)),
+            tape_mode: Some(Arc::new(TapeMode::Recording(Mutex::default()))),
             ..self.clone()
         }
     }
 
-    pub(super) fn tape_mode(&self) -> Option<&TapeMode> {
-        self.tape_mode.as_deref()
+    /// Takes the recording so far; empty unless the device is [`Self::taped`].
+    #[doc(hidden)]
+    pub fn take_tape(&self) -> Tape {
+        self.tape()
+            .map(|mut tape| std::mem::take(&mut *tape))
+            .unwrap_or_default()
+    }
+
+    /// The same device under another name, whose reads give `answers`, one after the other:
+    /// what another device answered to a tape of the same requests.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn answering(&self, name: &str, answers: Vec<Vec<u8>>) -> Self {
+        let answers = TapeMode::Answering(Mutex::new(answers.into()));
+        Self {
+            tape_mode: Some(Arc::new(answers)),
+            ..self.named(name)
+        }
+    }
+
+    pub(super) fn tape(&self) -> Option<MutexGuard<'_, Tape>> {
+        match self.tape_mode.as_deref()? {
+            TapeMode::Recording(tape) => Some(tape.lock().unwrap_or_else(PoisonError::into_inner)),
+            TapeMode::Answering(_) => None,
+        }
+    }
+
+    /// Returns true if another device's answers replace computation on this one.
+    pub(super) fn answers(&self) -> bool {
+        matches!(self.tape_mode.as_deref(), Some(TapeMode::Answering(_)))
+    }
+
+    /// The next answer in the device's place, empty where there is none left.
+    pub(super) fn answer(&self) -> Option<Vec<u8>> {
+        match self.tape_mode.as_deref()? {
+            TapeMode::Recording(_) => None,
+            TapeMode::Answering(answers) => {
+                let mut answers = answers.lock().unwrap_or_else(PoisonError::into_inner);
+                Some(answers.pop_front().unwrap_or_default())
+            }
+        }
     }
 
     /// Compiled kernels.
@@ -336,24 +263,22 @@ impl Gpu {
     }
 
     /// The same device, on which every dispatch recorded from now on is timed.
-    ///
-    /// # Errors
-    /// [`GpuError::TooLarge`].
-    pub fn timed(&self) -> Result<Self, GpuError> {
-        let stopwatch = Stopwatch::new(self)?;
-        Ok(Self {
+    #[must_use]
+    pub fn timed(&self) -> Self {
+        let stopwatch = Stopwatch::new(self.device());
+        Self {
             stopwatch: Some(Arc::new(Mutex::new(stopwatch))),
             ..self.clone()
-        })
+        }
     }
 
     /// [`Self::open`], and [`Self::timed`] where that is asked for.
     ///
     /// # Errors
-    /// As these.
+    /// As there.
     pub fn open_timed(timed: bool) -> Result<Self, GpuError> {
         let gpu = Self::open()?;
-        if timed { gpu.timed() } else { Ok(gpu) }
+        Ok(if timed { gpu.timed() } else { gpu })
     }
 
     /// Time of each kernel since the last call, in order of first use; empty unless the device is
@@ -363,7 +288,12 @@ impl Gpu {
     /// [`GpuError::Lost`].
     pub fn timings(&self) -> Result<Vec<KernelTime>, GpuError> {
         match self.stopwatch() {
-            Some(mut stopwatch) => stopwatch.take(self),
+            Some(mut stopwatch) => {
+                stopwatch.read_later(self.device(), self.queue());
+                self.wait()?;
+                let times = stopwatch.take(self.queue().get_timestamp_period());
+                times.map_err(|reason| self.lost(reason))
+            }
             None => Ok(Vec::new()),
         }
     }
@@ -467,10 +397,14 @@ impl Gpu {
         self.inner
             .device
             .poll(wgpu::PollType::wait_indefinitely())
-            .map_err(|error| GpuError::Lost(self.describe(), error.to_string()))?;
+            .map_err(|error| self.lost(error))?;
         match self.inner.failed.get() {
             None => Ok(()),
-            Some(words) => Err(GpuError::Lost(self.describe(), words.clone())),
+            Some(words) => Err(self.lost(words)),
         }
+    }
+
+    pub(super) fn lost(&self, reason: impl ToString) -> GpuError {
+        GpuError::Lost(self.describe(), reason.to_string())
     }
 }

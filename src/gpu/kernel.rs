@@ -1,8 +1,8 @@
-//! Compute pipelines and the recording of their dispatches.
+//! Kernels with their buffers, and the recording of dispatches.
 
 use std::time::Instant;
 
-use super::{Gpu, stopwatch::Timing, tape::Step};
+use super::{device::Gpu, pipeline::Kernel, stopwatch::Timing, tape::Step};
 
 /// Threads in a workgroup of the kernels that give a thread to each element.
 pub const LINEAR_WORKGROUP: u32 = 256;
@@ -29,19 +29,6 @@ enum Groups<'a> {
     Indirect(&'a wgpu::Buffer, u64),
 }
 
-/// One compiled entry point; clones share it.
-#[derive(Clone)]
-pub struct Kernel {
-    pub(super) pipeline: wgpu::ComputePipeline,
-    layout: wgpu::BindGroupLayout,
-    pub(super) name: &'static str,
-    pub(super) source: &'static str,
-    pub(super) constants: Vec<(String, f64)>,
-}
-
-/// Key of a compiled entry point: its name, its source, and the bits of its overridable constants.
-pub(super) type Recipe = (&'static str, &'static str, Vec<(String, u64)>);
-
 impl Kernel {
     /// Compiles the entry point `name` of `source`, unless the device has it already. All
     /// bindings are in group 0.
@@ -57,7 +44,7 @@ impl Kernel {
         constants: &[(&str, f64)],
     ) -> Self {
         if let Some(broken) = gpu.broken(name, source) {
-            return Self::compile(gpu, name, source, Some(broken), constants);
+            return Self::compile(gpu.device(), name, source, Some(broken), constants);
         }
         let bits = constants.iter();
         let bits = bits.map(|&(name, value)| (name.to_owned(), value.to_bits()));
@@ -65,63 +52,9 @@ impl Kernel {
         if let Some(kernel) = gpu.kernels().get(&recipe) {
             return kernel.clone();
         }
-        let kernel = Self::compile(gpu, name, source, None, constants);
+        let kernel = Self::compile(gpu.device(), name, source, None, constants);
         gpu.kernels().insert(recipe, kernel.clone());
         kernel
-    }
-
-    fn compile(
-        gpu: &Gpu,
-        name: &'static str,
-        source: &'static str,
-        broken: Option<String>,
-        constants: &[(&str, f64)],
-    ) -> Self {
-        let describe = |source| wgpu::ShaderModuleDescriptor {
-            label: Some(name),
-            source: wgpu::ShaderSource::Wgsl(source),
-        };
-        let module = match broken {
-            Some(broken) => gpu.device().create_shader_module(describe(broken.into())),
-            // SAFETY: without loop bounding a shader must not loop for ever, without
-            // division checks it must not divide an integer by zero. The sources are
-            // this crate's own: every loop counts towards a bound that its body does
-            // not move, and every integer divisor is a constant or a size that the
-            // host makes at least 1. Bounds checks stay on.
-            None => unsafe {
-                gpu.device().create_shader_module_trusted(
-                    describe(source.into()),
-                    wgpu::ShaderRuntimeChecks {
-                        force_loop_bounding: false,
-                        int_div_checks: false,
-                        ..wgpu::ShaderRuntimeChecks::checked()
-                    },
-                )
-            },
-        };
-        let pipeline = gpu
-            .device()
-            .create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-                label: Some(name),
-                layout: None,
-                module: &module,
-                entry_point: Some(name),
-                compilation_options: wgpu::PipelineCompilationOptions {
-                    constants,
-                    // Every kernel writes its workgroup memory before it reads it.
-                    zero_initialize_workgroup_memory: false,
-                },
-                cache: None,
-            });
-        Self {
-            layout: pipeline.get_bind_group_layout(0),
-            pipeline,
-            name,
-            source,
-            constants: (constants.iter())
-                .map(|&(name, value)| (name.to_owned(), value))
-                .collect(),
-        }
     }
 
     /// Ties buffers to bindings 0, 1, 2 …
@@ -234,7 +167,7 @@ impl Recorder {
                 self.flush();
                 let _ = self.gpu.wait();
                 if let Some(mut stopwatch) = self.gpu.stopwatch() {
-                    stopwatch.add(kernel.name, begun.elapsed());
+                    stopwatch.add(kernel.name, begun.elapsed().as_secs_f64());
                 }
             }
         }
@@ -310,7 +243,7 @@ impl Recorder {
         if let Some(mut stopwatch) = self.gpu.stopwatch()
             && stopwatch.is_filling()
         {
-            stopwatch.read_later(&self.gpu);
+            stopwatch.read_later(self.gpu.device(), self.gpu.queue());
         }
     }
 

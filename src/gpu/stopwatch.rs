@@ -4,9 +4,7 @@
 //! the device records without waiting. Devices without them are timed from the host, which submits
 //! each dispatch alone and waits for it.
 
-use std::time::Duration;
-
-use super::{Buffer, Gpu, GpuError, Readback};
+use super::readback::RawReadback;
 
 /// Timestamps of one query set: WebGPU's limit.
 const QUERIES: u32 = wgpu::QUERY_SET_MAX_QUERIES;
@@ -25,7 +23,7 @@ pub struct KernelTime {
     pub seconds: f64,
 }
 
-/// Times the dispatches of one [`Gpu`] and its clones.
+/// Times the dispatches of a device and its clones.
 pub(super) struct Stopwatch {
     clock: Clock,
     times: Vec<KernelTime>,
@@ -34,11 +32,11 @@ pub(super) struct Stopwatch {
 enum Clock {
     Device {
         queries: wgpu::QuerySet,
-        resolved: Buffer<u64>,
+        resolved: wgpu::Buffer,
         /// Kernels whose two timestamps stand in the set, in order.
         claimed: Vec<&'static str>,
         /// Sets that were full, on their way.
-        pending: Vec<(Vec<&'static str>, Readback<u64>)>,
+        pending: Vec<(Vec<&'static str>, RawReadback)>,
     },
     Host,
 }
@@ -54,28 +52,30 @@ pub(super) enum Timing {
 }
 
 impl Stopwatch {
-    /// # Errors
-    /// [`GpuError::TooLarge`].
-    pub(super) fn new(gpu: &Gpu) -> Result<Self, GpuError> {
-        let features = gpu.device().features();
-        let clock = if features.contains(wgpu::Features::TIMESTAMP_QUERY) {
+    pub(super) fn new(device: &wgpu::Device) -> Self {
+        let clock = if device.features().contains(wgpu::Features::TIMESTAMP_QUERY) {
             Clock::Device {
-                queries: gpu.device().create_query_set(&wgpu::QuerySetDescriptor {
+                queries: device.create_query_set(&wgpu::QuerySetDescriptor {
                     label: Some("stopwatch"),
                     ty: wgpu::QueryType::Timestamp,
                     count: QUERIES,
                 }),
-                resolved: Buffer::for_queries(gpu, "timestamps", QUERIES as usize)?,
+                resolved: device.create_buffer(&wgpu::BufferDescriptor {
+                    label: Some("timestamps"),
+                    size: u64::from(QUERIES) * size_of::<u64>() as u64,
+                    usage: wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC,
+                    mapped_at_creation: false,
+                }),
                 claimed: Vec::new(),
                 pending: Vec::new(),
             }
         } else {
             Clock::Host
         };
-        Ok(Self {
+        Self {
             clock,
             times: Vec::new(),
-        })
+        }
     }
 
     /// Claims two queries for a dispatch of `kernel`.
@@ -101,7 +101,7 @@ impl Stopwatch {
     }
 
     /// Orders the timestamps taken so far and makes room for others.
-    pub(super) fn read_later(&mut self, gpu: &Gpu) {
+    pub(super) fn read_later(&mut self, device: &wgpu::Device, queue: &wgpu::Queue) {
         let Clock::Device {
             queries,
             resolved,
@@ -114,19 +114,16 @@ impl Stopwatch {
         if claimed.is_empty() {
             return;
         }
-        let mut encoder = gpu.device().create_command_encoder(&Default::default());
+        let mut encoder = device.create_command_encoder(&Default::default());
         let taken = 2 * claimed.len() as u32;
-        encoder.resolve_query_set(queries, 0..taken, resolved.raw(), 0);
-        gpu.queue().submit([encoder.finish()]);
-        pending.push((std::mem::take(claimed), resolved.read_later(gpu)));
+        encoder.resolve_query_set(queries, 0..taken, resolved, 0);
+        queue.submit([encoder.finish()]);
+        let times = RawReadback::order(device, queue, resolved);
+        pending.push((std::mem::take(claimed), times));
     }
 
-    /// Notes what the host measured.
-    pub(super) fn add(&mut self, kernel: &'static str, taken: Duration) {
-        self.note(kernel, taken.as_secs_f64());
-    }
-
-    fn note(&mut self, kernel: &'static str, seconds: f64) {
+    /// Adds the time of a dispatch.
+    pub(super) fn add(&mut self, kernel: &'static str, seconds: f64) {
         match self.times.iter_mut().find(|time| time.kernel == kernel) {
             Some(time) => {
                 time.dispatches += 1;
@@ -140,23 +137,20 @@ impl Stopwatch {
         }
     }
 
-    /// Waits for all timestamps; gives the times by kernel in order of first use,
-    /// and forgets them.
-    ///
-    /// # Errors
-    /// [`GpuError::Lost`].
-    pub(super) fn take(&mut self, gpu: &Gpu) -> Result<Vec<KernelTime>, GpuError> {
-        self.read_later(gpu);
+    /// Gives the times by kernel in order of first use, and forgets them; the device was waited
+    /// for, and its clock ticks every `period` nanoseconds.
+    pub(super) fn take(&mut self, period: f32) -> Result<Vec<KernelTime>, String> {
         let sets = match &mut self.clock {
             Clock::Device { pending, .. } => std::mem::take(pending),
             Clock::Host => Vec::new(),
         };
-        let period = 1e-9 * f64::from(gpu.queue().get_timestamp_period());
+        let period = 1e-9 * f64::from(period);
         for (kernels, readback) in sets {
-            let ticks = readback.wait(gpu)?;
+            let bytes = readback.bytes()?;
+            let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(&bytes);
             for (kernel, ticks) in kernels.into_iter().zip(ticks.chunks_exact(2)) {
                 // A driver may reset its clock in between.
-                self.note(kernel, ticks[1].saturating_sub(ticks[0]) as f64 * period);
+                self.add(kernel, ticks[1].saturating_sub(ticks[0]) as f64 * period);
             }
         }
         Ok(std::mem::take(&mut self.times))

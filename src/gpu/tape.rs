@@ -1,14 +1,14 @@
 //! Recording of a device's commands for replay on another: WebGPU in a browser, say, whose answers
-//! [`Gpu::answering`] then returns instead of the device's own.
+//! [`Gpu::answering`](super::Gpu::answering) then returns instead of the device's own.
 
 use std::{
     collections::{HashMap, VecDeque},
-    sync::{Mutex, MutexGuard, PoisonError},
+    sync::Mutex,
 };
 
 use serde::Serialize;
 
-use super::{Gpu, Kernel};
+use super::pipeline::Kernel;
 
 /// One command of a device. Buffers and kernels are numbered from 0 in the order in which they are
 /// made.
@@ -170,58 +170,9 @@ impl Tape {
     }
 }
 
-/// Mode of a [`Gpu`] with a tape: recording commands, or answering instead of its device.
+/// Mode of a device with a tape: recording commands, or answering instead of its device.
 #[derive(Debug)]
 pub(super) enum TapeMode {
     Recording(Mutex<Tape>),
     Answering(Mutex<VecDeque<Vec<u8>>>),
-}
-
-impl Gpu {
-    /// The same device, on which everything from now on is written down.
-    #[doc(hidden)]
-    #[must_use]
-    pub fn taped(&self) -> Self {
-        self.with_tape_mode(TapeMode::Recording(Mutex::default()))
-    }
-
-    /// Takes the recording so far; empty unless the device is [`Self::taped`].
-    #[doc(hidden)]
-    pub fn take_tape(&self) -> Tape {
-        self.tape()
-            .map(|mut tape| std::mem::take(&mut *tape))
-            .unwrap_or_default()
-    }
-
-    /// The same device under another name, whose reads give `answers`, one after the other:
-    /// what another device answered to a tape of the same requests.
-    #[doc(hidden)]
-    #[must_use]
-    pub fn answering(&self, name: &str, answers: Vec<Vec<u8>>) -> Self {
-        self.named(name)
-            .with_tape_mode(TapeMode::Answering(Mutex::new(answers.into())))
-    }
-
-    pub(super) fn tape(&self) -> Option<MutexGuard<'_, Tape>> {
-        match self.tape_mode()? {
-            TapeMode::Recording(tape) => Some(tape.lock().unwrap_or_else(PoisonError::into_inner)),
-            TapeMode::Answering(_) => None,
-        }
-    }
-
-    /// Returns true if another device's answers replace computation on this one.
-    pub(super) fn answers(&self) -> bool {
-        matches!(self.tape_mode(), Some(TapeMode::Answering(_)))
-    }
-
-    /// The next answer in the device's place, empty where there is none left.
-    pub(super) fn answer(&self) -> Option<Vec<u8>> {
-        match self.tape_mode()? {
-            TapeMode::Recording(_) => None,
-            TapeMode::Answering(answers) => {
-                let mut answers = answers.lock().unwrap_or_else(PoisonError::into_inner);
-                Some(answers.pop_front().unwrap_or_default())
-            }
-        }
-    }
 }

@@ -6,9 +6,11 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use serde::{Deserialize, Serialize};
-
-use super::{DATABASE, PrepareError, pycolmap};
+use super::{
+    PrepareError,
+    options::{Cameras, DATABASE, Matching},
+    pycolmap,
+};
 use crate::{
     capture::lens::MODELS,
     disk,
@@ -29,28 +31,6 @@ const MATCHING: [&str; 2] = ["SiftMatching.use_gpu", "FeatureMatching.use_gpu"];
 
 /// So many frames to either side of one are matched with it.
 const OVERLAP: u32 = 10;
-
-/// Groups of photos that share one camera with one lens.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Cameras {
-    /// One camera took all photos.
-    One,
-    /// Those of one folder.
-    Folder,
-    /// Each its own, as where the lens zooms; from its EXIF data where it has some.
-    Photo,
-}
-
-/// Pairs of photos that are matched.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Matching {
-    /// Each with its neighbors by name, and ever fewer farther away.
-    Sequential,
-    /// Each with each.
-    Exhaustive,
-}
 
 /// Input of feature extraction.
 #[derive(Clone, Copy, Debug)]

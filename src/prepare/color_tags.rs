@@ -92,13 +92,13 @@ impl ColorTags {
         match self.projection.as_deref() {
             Some("equirectangular") if asked == USUAL => {
                 observe(Event::Note(format!(
-                    "the film is spherical: using --lens {SPHERE}"
+                    "the film is spherical: using the lens {SPHERE}"
                 )));
                 return SPHERE.to_owned();
             }
             None | Some("rectilinear" | "equirectangular") => {}
             Some(other) if asked == USUAL => observe(Event::Warning(format!(
-                "the film is spherical ({other}): make it equirectangular first (ffmpeg's filter v360), or name its --lens"
+                "the film is spherical ({other}): make it equirectangular first (ffmpeg's filter v360), or name its lens"
             ))),
             Some(_) => {}
         }

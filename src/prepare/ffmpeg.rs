@@ -8,7 +8,6 @@ use serde_json::Value;
 use super::{
     PrepareError,
     color_tags::ColorTags,
-    frame_times::stamps,
     scan::{Scan, scan},
     shots::{self, ShotDetector},
 };
@@ -314,7 +313,7 @@ fn unlisted(said: &str) -> Option<&str> {
 }
 
 /// JSON in the output of `ffprobe`; warnings of another stream may precede it.
-pub(super) fn json(said: &str) -> Option<Value> {
+fn json(said: &str) -> Option<Value> {
     let json = &said[said.find('{').unwrap_or(0)..];
     serde_json::Deserializer::from_str(json)
         .into_iter()
@@ -323,9 +322,23 @@ pub(super) fn json(said: &str) -> Option<Value> {
 }
 
 /// A time that `ffprobe` tells, in seconds.
-pub(super) fn stamp(value: &Value) -> Option<f64> {
+fn stamp(value: &Value) -> Option<f64> {
     let seconds = value.as_str()?.parse::<f64>().ok();
     seconds.filter(|seconds| seconds.is_finite())
+}
+
+/// The time stamps of packets that are shown, or of frames, from what `ffprobe` says.
+fn stamps(said: &str) -> Vec<f64> {
+    let json = json(said).unwrap_or_default();
+    let all = json["packets"].as_array().or(json["frames"].as_array());
+    let shown = all.into_iter().flatten().filter(|one| {
+        let flags = one["flags"].as_str().unwrap_or_default();
+        // What an edit list leaves out is decoded and discarded.
+        !flags.contains('D')
+    });
+    shown
+        .filter_map(|one| stamp(&one["pts_time"]).or(stamp(&one["best_effort_timestamp_time"])))
+        .collect()
 }
 
 /// A time as FFmpeg reads it, to the microsecond.
@@ -411,6 +424,17 @@ and another"#;
             let error = FilmSource::parse(path, said).unwrap_err();
             assert!(error.contains(word), "{error}");
         }
+    }
+
+    #[test]
+    fn shown_packets_have_stamps() {
+        let said = r#"a warning
+{"packets": [{"pts_time": "1.500"}, {"pts_time": "1.000"}, {}, {"pts_time": "N/A"},
+  {"pts_time": "0.900", "flags": "KD_"}]}"#;
+        assert_eq!(stamps(said), [1.5, 1.0]);
+        let frames = r#"{"frames": [{"best_effort_timestamp_time": "1.5"}]}"#;
+        assert_eq!(stamps(frames), [1.5]);
+        assert!(stamps("nothing").is_empty());
     }
 
     #[test]

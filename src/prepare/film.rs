@@ -6,23 +6,20 @@ use std::{
 };
 
 use super::{
-    PrepareError, PrepareOptions,
+    PrepareError,
     ffmpeg::{self, FilmSource, Part},
+    options::{FILM, PrepareOptions},
     photos::link_all,
     scan::Scan,
     sharp,
     state::{OutputState, Step, digest, of},
-    tell,
 };
 use crate::{
     capture::{CaptureError, FRAMES, Film, IMAGES, in_order, photo_header},
     disk,
     store::files,
-    tell::{Event, Observer, Stage},
+    tell::{Event, Observer, Stage, count},
 };
-
-/// The file that says which film it is.
-pub(super) const FILM: &str = "film.json";
 
 /// Shots that are told in one line.
 const TOLD_SHOTS: usize = 12;
@@ -81,7 +78,7 @@ fn choose(
     let start = options.start.unwrap_or(0.0);
     if source.seconds > 0.0 && start >= source.seconds {
         return Err(no_film(format!(
-            "ends after {}, before --start; give an earlier one",
+            "ends after {}, before the start; give an earlier one",
             clock(source.seconds)
         )));
     }
@@ -89,18 +86,15 @@ fn choose(
         start,
         seconds: options.end.map(|end| end - start),
     };
-    let total = asked
-        .seconds
-        .unwrap_or(source.seconds - start)
-        .ceil()
-        .max(1.0) as usize;
+    let seconds = asked.seconds.unwrap_or(source.seconds - start);
+    let total = seconds.ceil().max(1.0) as usize;
     let chosen = options.start.is_some() || options.end.is_some();
     let shots = match state.shots(same_film) {
         Some(known) if !chosen => known.to_vec(),
         _ => {
             let only_first = chosen && options.end.is_none();
             let found = source.shots(asked, only_first, &mut |seen| {
-                tell(observe, Stage::Cuts, seen as usize, total);
+                count(observe, Stage::Cuts, seen as usize, total);
             })?;
             if !chosen {
                 state.keep_shots(same_film.to_owned(), found.clone())?;
@@ -127,7 +121,7 @@ fn choose(
     if !chosen {
         if shots.len() > 1 {
             observe(Event::Note(format!(
-                "{} shots; using the longest, {}; choose another with --start: {}",
+                "{} shots; using the longest, {}; choose another by its start: {}",
                 shots.len(),
                 span(*longest),
                 list(&shots)
@@ -180,21 +174,17 @@ fn extract(
     }
     let frame_rate = scan.rate(source.frame_rate);
     let rate = f64::from(frame_rate[0]) / f64::from(frame_rate[1]);
-    let expected = part.seconds.unwrap_or(source.seconds - part.start) * rate;
+    let seconds = part.seconds.unwrap_or(source.seconds - part.start);
+    let expected = (seconds * rate).round().max(1.0) as usize;
     let draft = state.draft()?;
     let frames = draft.path().join(FRAMES);
     disk::make_folder(&frames).map_err(files::at(&frames))?;
     source.extract(part, (scan, &colors), &frames, &mut |written| {
-        tell(
-            observe,
-            Stage::Frames,
-            written,
-            expected.round().max(1.0) as usize,
-        );
+        count(observe, Stage::Frames, written, expected);
     })?;
     let names = names_in(&frames)?;
     let Some(first) = names.first() else {
-        let reason = "has no frame there; choose another part with --start and --end";
+        let reason = "has no frame there; choose another part";
         return Err(PrepareError::at(&source.path, reason));
     };
     let header = photo_header(&frames.join(first))?;
@@ -267,22 +257,20 @@ fn choose_sharp(
     observe: &mut Observer<'_>,
 ) -> Result<(), PrepareError> {
     let frames = state.path(FRAMES);
-    let asked = options
-        .per_second
-        .map_or(String::new(), |rate| rate.to_string());
+    let asked = options.per_second;
+    let asked = asked.map_or(String::new(), |rate| rate.to_string());
     let from = of(&["images", &digest(&frames)?, &asked]);
     if state.is_done(Step::Images, &from) {
         return Ok(());
     }
     state.check_own(IMAGES)?;
     let film = Film::read(&state.path("."))?;
-    let gone = || PrepareError::at(&state.path(FILM), "is gone; start over with --force");
+    let gone = || PrepareError::at(&state.path(FILM), "is gone; prepare another folder");
     let film = film.ok_or_else(gone)?;
     let [numerator, denominator] = film.frame_rate.map(f64::from);
     let rate = numerator / denominator;
-    let per_second = options
-        .per_second
-        .unwrap_or_else(|| sharp::usual_rate(film.seconds));
+    let usual = || sharp::usual_rate(film.seconds);
+    let per_second = options.per_second.unwrap_or_else(usual);
     let chosen: Vec<&String> = if per_second >= rate {
         film.frames.iter().collect()
     } else {
@@ -294,16 +282,13 @@ fn choose_sharp(
             |_, found| {
                 sharpness.push(found?);
                 if sharpness.len() % 8 == 0 {
-                    tell(observe, Stage::Sharpness, sharpness.len(), paths.len());
+                    count(observe, Stage::Sharpness, sharpness.len(), paths.len());
                 }
                 Ok::<_, CaptureError>(())
             },
         )?;
-        let chosen = sharp::sharpest(&sharpness, rate, per_second);
-        chosen
-            .into_iter()
-            .map(|frame| &film.frames[frame])
-            .collect()
+        let chosen = sharp::sharpest(&sharpness, rate, per_second).into_iter();
+        chosen.map(|frame| &film.frames[frame]).collect()
     };
     observe(Event::Note(format!(
         "using {} of {} frames for poses, {:.1} a second",

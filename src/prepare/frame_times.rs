@@ -2,7 +2,7 @@
 
 use super::{
     PrepareError,
-    ffmpeg::{FilmSource, Part, json, stamp},
+    ffmpeg::{FilmSource, Part},
 };
 
 /// Frames a second of a film whose rate varies, at most.
@@ -62,20 +62,6 @@ impl FilmSource {
     }
 }
 
-/// The time stamps of packets that are shown, or of frames, from what `ffprobe` says.
-pub(super) fn stamps(said: &str) -> Vec<f64> {
-    let json = json(said).unwrap_or_default();
-    let all = json["packets"].as_array().or(json["frames"].as_array());
-    let shown = all.into_iter().flatten().filter(|one| {
-        let flags = one["flags"].as_str().unwrap_or_default();
-        // What an edit list leaves out is decoded and discarded.
-        !flags.contains('D')
-    });
-    shown
-        .filter_map(|one| stamp(&one["pts_time"]).or(stamp(&one["best_effort_timestamp_time"])))
-        .collect()
-}
-
 /// Returns true if the frame rate varies.
 fn varies(times: &[f64], rate: f64) -> bool {
     let uneven = |(k, time): (usize, &f64)| {
@@ -100,12 +86,5 @@ mod tests {
             .map(|k: u32| f64::from(k) - 0.5 * f64::from(k.saturating_sub(50)))
             .collect();
         assert!(varies(&fast, 99.0 / 74.5));
-        let said = r#"a warning
-{"packets": [{"pts_time": "1.500"}, {"pts_time": "1.000"}, {}, {"pts_time": "N/A"},
-  {"pts_time": "0.900", "flags": "KD_"}]}"#;
-        assert_eq!(stamps(said), [1.5, 1.0]);
-        let frames = r#"{"frames": [{"best_effort_timestamp_time": "1.5"}]}"#;
-        assert_eq!(stamps(frames), [1.5]);
-        assert!(stamps("nothing").is_empty());
     }
 }

@@ -12,6 +12,7 @@ mod ffmpeg;
 mod film;
 mod frame_times;
 mod masks;
+mod options;
 mod photos;
 mod poses;
 pub(crate) mod pycolmap;
@@ -26,71 +27,27 @@ use std::{
     path::{self, Path, PathBuf},
 };
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
-pub use colmap::{Cameras, Matching};
 pub use error::PrepareError;
+pub use options::{Cameras, Matching, PrepareOptions};
 pub use poses::Poses;
 pub(crate) use state::{digest, of as digest_of};
 
 use crate::{
     capture::{CaptureError, Film, IMAGES, photo_header},
     store::files,
-    tell::{Event, Observer, Stage, keeping},
+    tell::{Event, Observer, Stage, count, keeping},
 };
 use colmap::Colmap;
 use ffmpeg::FilmSource;
 use masks::Sources;
+use options::{MASKS, SPARSE, STRETCHED};
 use photos::Photos;
 use state::{OutputState, Step, of};
 
-/// Folder of the masks.
-const MASKS: &str = "masks";
-
-/// Folder of the 8-bit copies that COLMAP reads.
-const STRETCHED: &str = "stretched";
-
-/// COLMAP's features and matches.
-const DATABASE: &str = "database.db";
-
-/// COLMAP's models.
-const SPARSE: &str = "sparse";
-
 /// More photos are not matched each with each: that takes hours on a processor.
 const EXHAUSTIVE: usize = 200;
-
-/// Options of `prepare`; `None` is decided by the input.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct PrepareOptions {
-    /// A film, or a folder of photos.
-    #[serde(skip)]
-    pub input: PathBuf,
-    /// The folder for `fit`: a new one, or one that was prepared before.
-    #[serde(skip)]
-    pub output: PathBuf,
-    /// Start of the shot in the film, in seconds; the longest shot by default.
-    pub start: Option<f64>,
-    /// End of the shot, in seconds; the next cut by default.
-    pub end: Option<f64>,
-    /// Frames a second that get a pose; 30 to 120 in all by default.
-    pub per_second: Option<f64>,
-    /// A mask for all photos.
-    pub mask: Option<PathBuf>,
-    /// A folder of masks by the photos' names.
-    pub masks: Option<PathBuf>,
-    /// Photos that share a camera; all of a film, and those of one folder that have one size.
-    pub cameras: Option<Cameras>,
-    /// COLMAP's name of the camera model.
-    pub lens: String,
-    /// Pairs of photos that are matched; each frame of a film with those next to it.
-    pub matching: Option<Matching>,
-    /// True if `pycolmap` is installed where COLMAP is missing.
-    #[serde(skip)]
-    pub install: bool,
-    /// True if all results are made anew.
-    #[serde(skip)]
-    pub force: bool,
-}
 
 /// Result of `prepare`.
 #[derive(Clone, Debug, Serialize)]
@@ -247,15 +204,10 @@ fn check_apart(options: &PrepareOptions, input: &Path, output: &Path) -> Result<
 
 /// Refuses for photos what is said about films.
 fn check_film_options(options: &PrepareOptions) -> Result<(), PrepareError> {
-    let given = [
-        ("--start", options.start.is_some()),
-        ("--end", options.end.is_some()),
-        ("--per-second", options.per_second.is_some()),
-    ];
-    match given.iter().find(|(_, given)| *given) {
-        Some((option, _)) => Err(PrepareError::at(
+    match options.start.or(options.end).or(options.per_second) {
+        Some(_) => Err(PrepareError::at(
             &options.input,
-            format!("is a folder of photos, and {option} is for films; leave it out"),
+            "is a folder of photos; start, end and frames a second are for films",
         )),
         None => Ok(()),
     }
@@ -273,11 +225,6 @@ fn check_masks(options: &PrepareOptions) -> Result<(), PrepareError> {
         }
         _ => Ok(()),
     }
-}
-
-/// Tells how far a stage is.
-fn tell(observe: &mut Observer<'_>, stage: Stage, done: usize, total: usize) {
-    observe(Event::progress(stage, done.min(total), total, ""));
 }
 
 /// Puts a folder's photos into `images/`.
@@ -332,7 +279,7 @@ fn make_masks(
     if !(painted || state.is_done(Step::Masks, &from)) {
         state.check_own(MASKS)?;
         let borders = masks::borders(photos, &images, &mut |done, total| {
-            tell(observe, Stage::Masks, done, total);
+            count(observe, Stage::Masks, done, total);
         })?;
         if let Some(borders::Frame {
             left,
@@ -345,20 +292,17 @@ fn make_masks(
                 "black borders are masked: left {left}, right {right}, top {top}, bottom {bottom} pixels"
             )));
         }
+        let named = (options.masks.as_deref()).map(|dir| masks::named(dir, photos));
         let sources = Sources {
             borders,
             one: options.mask.clone(),
-            each: options
-                .masks
-                .as_deref()
-                .map(|dir| masks::named(dir, photos))
-                .transpose()?,
+            each: named.transpose()?,
         };
         let draft = state.draft()?;
         let masks = draft.path().join(MASKS);
         crate::disk::make_folder(&masks).map_err(files::at(&masks))?;
         let made = sources.write(photos, &images, &masks, &mut |done, total| {
-            tell(observe, Stage::Masks, done, total);
+            count(observe, Stage::Masks, done, total);
         })?;
         if made.strays > 0 {
             observe(Event::Warning(format!(
@@ -371,10 +315,8 @@ fn make_masks(
             _ => state.place(Step::Masks, &from, &[(masks, MASKS)])?,
         }
     }
-    let masked = photos
-        .headers
-        .keys()
-        .filter(|name| folder.join(format!("{name}.png")).is_file());
+    let names = photos.headers.keys();
+    let masked = names.filter(|name| folder.join(format!("{name}.png")).is_file());
     Ok(masked.count())
 }
 
@@ -395,7 +337,7 @@ fn stretch(
                 let draft = state.draft()?;
                 let made = draft.path().join(STRETCHED);
                 photos::stretch_all(photos, &images, &made, range, &mut |done| {
-                    tell(observe, Stage::Photos, done, photos.headers.len());
+                    count(observe, Stage::Photos, done, photos.headers.len());
                 })?;
                 state.place(Step::Stretched, &from, &[(made, STRETCHED)])?;
             }
@@ -417,7 +359,7 @@ fn matching(
         None if is_film => Matching::Sequential,
         None if many => {
             observe(Event::Note(format!(
-                "more than {EXHAUSTIVE} photos: matching neighbors by name; --match exhaustive matches all pairs"
+                "more than {EXHAUSTIVE} photos: matching neighbors by name; exhaustive matching takes all pairs"
             )));
             Matching::Sequential
         }

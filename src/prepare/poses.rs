@@ -10,19 +10,19 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::{
-    DATABASE, PrepareError, SPARSE,
-    colmap::{self, Cameras, Colmap, Features, Matching},
+    PrepareError,
+    colmap::{self, Colmap, Features},
     masks,
+    options::{Cameras, DATABASE, Matching, SPARSE},
     photos::Photos,
     state::{OutputState, Step, digest, of},
-    tell,
 };
 use crate::{
     capture::{Piece, names::by_number},
     disk,
     programs::ProgramError,
     store::files,
-    tell::{Event, Observer, Stage},
+    tell::{Event, Observer, Stage, count},
 };
 
 /// A share of the photos without a pose that is not worth a word: COLMAP seldom places all.
@@ -137,9 +137,9 @@ impl Task<'_> {
             lens: self.lens,
         };
         let photos = self.photos.headers.len();
-        tell(observe, Stage::Features, 0, photos);
+        count(observe, Stage::Features, 0, photos);
         colmap.features(&database, &features, &mut |done, total| {
-            tell(observe, Stage::Features, done, total.unwrap_or(photos));
+            count(observe, Stage::Features, done, total.unwrap_or(photos));
         })?;
         // What COLMAP makes is checked where it is used; that it made nothing, here.
         if !database.is_file() {
@@ -171,13 +171,13 @@ impl Task<'_> {
             files::write(&path, list.as_bytes())?;
         } else if names.is_some() {
             observe(Event::Warning(
-                "photos are matched by name, IMG 10 before IMG 2: rename them without spaces or with leading zeros, or give --match exhaustive".to_owned(),
+                "photos are matched by name, IMG 10 before IMG 2: rename them without spaces or with leading zeros, or choose exhaustive matching".to_owned(),
             ));
         }
         let pairs = list.is_some().then_some(&*path);
-        tell(observe, Stage::Matches, 0, photos);
+        count(observe, Stage::Matches, 0, photos);
         colmap.matches(&database, (self.matching, pairs), &mut |done, total| {
-            tell(observe, Stage::Matches, done, total.unwrap_or(photos));
+            count(observe, Stage::Matches, done, total.unwrap_or(photos));
         })?;
         state.place(Step::Matches, from, &[(database, DATABASE)])
     }
@@ -199,10 +199,10 @@ impl Task<'_> {
         disk::copy(&state.path(DATABASE), &database).map_err(files::at(&database))?;
         let photos = self.photos.headers.len();
         let mut placed = 0;
-        tell(observe, Stage::Poses, 0, photos);
+        count(observe, Stage::Poses, 0, photos);
         let ended = colmap.poses(&database, self.seen, &found, &mut |done, total| {
             placed = placed.max(done);
-            tell(observe, Stage::Poses, placed, total.unwrap_or(photos));
+            count(observe, Stage::Poses, placed, total.unwrap_or(photos));
         });
         let mut pieces = Vec::new();
         for model in colmap::models(&found) {
@@ -258,15 +258,10 @@ impl Task<'_> {
             )));
         }
         if unplaced.len() as f64 > USUAL * self.photos.headers.len() as f64 {
-            let alone = unplaced
-                .iter()
-                .filter(|name| !elsewhere.contains(**name))
-                .count();
-            let names: Vec<&str> = unplaced
-                .iter()
-                .take(TOLD_NAMES)
-                .map(|name| name.as_str())
-                .collect();
+            let alone = unplaced.iter().filter(|name| !elsewhere.contains(**name));
+            let alone = alone.count();
+            let names = unplaced.iter().take(TOLD_NAMES);
+            let names: Vec<&str> = names.map(|name| name.as_str()).collect();
             let more = if unplaced.len() > TOLD_NAMES {
                 ", …"
             } else {
@@ -292,12 +287,12 @@ impl Task<'_> {
     /// Remedies to suggest when photos have no pose.
     fn remedies(&self) -> String {
         let exhaustive = match self.matching {
-            Matching::Sequential => ", --match exhaustive",
+            Matching::Sequential => ", exhaustive matching",
             Matching::Exhaustive => "",
         };
         match self.is_film {
             true => format!(
-                "the camera moved too little or too fast for these frames; try more of them (--per-second){exhaustive}, or another shot (--start)"
+                "the camera moved too little or too fast for these frames; try more of them a second{exhaustive}, or another shot"
             ),
             false => format!(
                 "photos have to overlap by two thirds and to be taken from different places; try more of them{exhaustive}"

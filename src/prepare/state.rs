@@ -11,7 +11,10 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 
-use super::{DATABASE, MASKS, PrepareError, PrepareOptions, SPARSE, STRETCHED, film::FILM};
+use super::{
+    PrepareError,
+    options::{DATABASE, FILM, MASKS, PrepareOptions, SPARSE, STRETCHED},
+};
 use crate::{
     capture::{FRAMES, IMAGES, names::visit_files},
     disk,

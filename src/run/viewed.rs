@@ -247,7 +247,7 @@ fn views(
     match found {
         Err(error) if colmap.is_none() => {
             observe(Event::Warning(format!(
-                "no cameras and photos: {error} (name their folder with --colmap)"
+                "no cameras and photos: {error} (name their COLMAP folder)"
             )));
             Ok(None)
         }

@@ -297,7 +297,7 @@ impl<'a, 'o, S: Serialize> CheckpointFiles<'a, 'o, S> {
             Ok(size) if !self.told => {
                 self.told = true;
                 self.journal.tell(Event::Note(format!(
-                    "wrote {}, {:.1} MiB: --resume continues from there",
+                    "wrote {}, {:.1} MiB: resumed, the command continues from there",
                     self.path.display(),
                     size as f64 / f64::from(1 << 20)
                 )));
@@ -326,7 +326,7 @@ fn wait(minutes: f64) -> Duration {
 pub(crate) fn tell_given_up(path: &Path, observe: &mut Observer<'_>) {
     if path.exists() {
         observe(Event::Warning(format!(
-            "{} is left of an interrupted command, which is dropped: --resume would continue it",
+            "{} is left of an interrupted command, which is dropped: resumed, it would continue",
             path.display()
         )));
     }

@@ -29,7 +29,7 @@ pub(crate) fn open(
                 Event::progress(Stage::Survey, done, total, name)
             }
             Notice::Normalized([low, high]) => Event::Note(format!(
-                "photos are normalized: {low:.6} becomes black, {high:.6} white (--normalize off turns this off)"
+                "photos are normalized: {low:.6} becomes black, {high:.6} white (normalization can be turned off)"
             )),
         });
     })?)

@@ -200,7 +200,7 @@ pub(crate) fn open_examined(
     let transparent = dataset.settle_transparency();
     if transparent > 0 && options.masks != MaskSource::Alpha {
         observe(Event::Warning(format!(
-            "{transparent} photos have transparency, which is taken for their masks (--masks alpha says so, --masks off ignores it)"
+            "{transparent} photos have transparency, which is taken for their masks (masks from alpha say so, masks off ignore it)"
         )));
     }
     let soundness = Soundness {

@@ -45,6 +45,11 @@ impl Event {
     }
 }
 
+/// Tells how far a stage is, whose total may be an estimate.
+pub(crate) fn count(observe: &mut Observer<'_>, stage: Stage, done: usize, total: usize) {
+    observe(Event::progress(stage, done.min(total), total, ""));
+}
+
 impl From<eval::Progress<'_>> for Event {
     fn from(progress: eval::Progress<'_>) -> Self {
         let stage = match progress.task {

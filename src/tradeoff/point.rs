@@ -7,8 +7,9 @@ use std::{
 };
 
 use super::{
-    TradeoffError, TradeoffOptions, child,
+    child,
     knobs::{self, Base},
+    request::{POINTS, TradeoffError, TradeoffOptions},
     search::{Task, base_name},
     sweep::{Outcome, Phase, PointStage, Subject, SweepPoint, Tradeoff},
 };
@@ -53,7 +54,7 @@ impl Bench {
         let teacher = teacher.as_deref().map(located).transpose()?;
         let teacher = teacher.map(|teacher| text(&absolute(&teacher)?));
         Ok(Self {
-            points: absolute(folder)?.join(super::POINTS),
+            points: absolute(folder)?.join(POINTS),
             subject: Subject {
                 scene: text(&absolute(&options.colmap_dir)?)?,
                 teacher: teacher.transpose()?,

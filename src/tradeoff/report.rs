@@ -5,6 +5,7 @@ use std::fmt::Write;
 
 use super::{
     plot::{group, plot},
+    request::POINTS,
     sweep::{Measure, Outcome, PointStage, SweepPoint, Tradeoff},
 };
 use crate::report::{
@@ -182,11 +183,7 @@ fn push_stage(html: &mut String, sweep: &Tradeoff, stage: PointStage) {
     html.push_str("<div class=\"row\">\n");
     for point in sweep.best(stage) {
         // A name is letters, digits, `.`, `+` and `-`.
-        let sheet = format!(
-            "{}/{}/contact-sheet.png",
-            super::POINTS,
-            escaped(&point.name)
-        );
+        let sheet = format!("{}/{}/contact-sheet.png", POINTS, escaped(&point.name));
         let _ = writeln!(
             html,
             "<figure><a href=\"{sheet}\"><img src=\"{sheet}\" alt=\"\" loading=\"lazy\"></a><figcaption>{}</figcaption></figure>",

@@ -6,7 +6,7 @@ use std::{
 };
 
 use super::{
-    FILES, POINTS,
+    request::{FILES, POINTS},
     sweep::{Phase, Subject, SweepPoint, TRADEOFF_VERSION, Tradeoff},
 };
 use crate::{

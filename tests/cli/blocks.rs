@@ -218,7 +218,10 @@ fn blocks_are_trained_and_put_together() {
     );
     let alone = place.json(&["fit", "job/block-2", "--iterations", "1", "--json"]);
     let warnings = alone["warnings"].to_string();
-    assert!(warnings.contains("go on with --around"), "{warnings}");
+    assert!(
+        warnings.contains("train it among its neighbors"),
+        "{warnings}"
+    );
     for (command, code) in [
         (&["fit", "job/block-2", "--around", "nowhere"][..], 1),
         (&["fit", "agreed", "--around", "city"], 1),

@@ -57,7 +57,7 @@ fn transparency_is_taken_for_masks_and_told() {
         panic!("{told:?}")
     };
     assert!(line.starts_with("10 photos have transparency"), "{line}");
-    assert!(line.contains("--masks off") && line.contains("--masks alpha"));
+    assert!(line.contains("masks off") && line.contains("masks from alpha"));
     assert!(masked.is_some_and(|share| (share - 25.0).abs() < 0.1));
     // Whoever says what is to be is told nothing.
     let (_, told, masked) = plan(&place, &["--masks", "alpha"]);

@@ -174,8 +174,7 @@ fn what_cannot_go_on_is_refused_with_what_differs() {
     // Without the option it is given up, which is told.
     let done = place.run(&fit(&[]));
     assert_eq!(done.code, Some(0), "{}", done.stderr);
-    let told =
-        |line: &str| line.starts_with("warning: run/checkpoint") && line.contains("--resume");
+    let told = |line: &str| line.starts_with("warning: run/checkpoint") && line.contains("resumed");
     assert!(done.stderr.lines().any(told), "{}", done.stderr);
     assert!(!place.path("run/checkpoint").exists());
     refused(

@@ -4,9 +4,9 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
+use super::model::{IMAGE, LONGEST_NAME};
 use super::records::RecordSource;
 use super::tracks::Sighting;
-use super::{IMAGE, LONGEST_NAME};
 use crate::capture::error::{CaptureError, Position};
 use crate::capture::lens::ModelName;
 use crate::input::{self, excerpt};

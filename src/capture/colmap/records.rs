@@ -4,10 +4,11 @@ use std::path::PathBuf;
 
 use glam::{DQuat, DVec3};
 
+use super::model::{Cameras, Image, lens, relative_name};
 use super::tracks::{Sighting, Sightings};
-use super::{Cameras, Chosen, Image, Point, lens, relative_name};
 use crate::capture::error::{CaptureError, Position};
 use crate::capture::lens::{MOST_PARAMETERS, ModelName};
+use crate::capture::{Chosen, Point};
 
 /// A rotation, of about unit length, and a translation.
 pub(super) type Pose = (DQuat, DVec3);

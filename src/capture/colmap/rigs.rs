@@ -5,7 +5,7 @@ use std::collections::HashMap;
 
 use glam::{DQuat, DVec3};
 
-use super::Image;
+use super::model::Image;
 use super::records::{Pose, RecordSource};
 use crate::capture::error::CaptureError;
 

@@ -6,7 +6,7 @@ use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use super::IMAGE;
+use super::model::IMAGE;
 use super::records::RecordSource;
 use super::tracks::Sighting;
 use crate::capture::error::{CaptureError, Position};

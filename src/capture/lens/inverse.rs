@@ -4,8 +4,8 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 use glam::DVec2;
 
-use super::Projection;
 use super::distortion::{Distortion, determinant};
+use super::projection::Projection;
 
 /// Angles from the axis at which a distortion is looked at: 0.18° apart.
 const ANGLES: usize = 512;

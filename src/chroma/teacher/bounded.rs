@@ -53,7 +53,7 @@ fn bounded_by<T: Send + 'static>(
             Err(RecvTimeoutError::Disconnected) => return Err(("panicked".to_owned(), None)),
             Err(RecvTimeoutError::Timeout) => {}
         }
-        let remedy = "ask it at a smaller --teacher-size";
+        let remedy = "ask it at a smaller size";
         if begun.elapsed() >= limit {
             break format!("gave no answer within {} s: {remedy}", limit.as_secs_f64());
         }

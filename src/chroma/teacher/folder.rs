@@ -85,12 +85,12 @@ impl FolderTeacher {
 
     fn doubt(&self, path: &Path, transparent: f64, gray: f64) {
         if transparent >= TRANSPARENT {
-            let doubt = "are transparent in part, and teach the colors that are hidden there: where only a part is painted, give them as --hints";
+            let doubt = "are transparent in part, and teach the colors that are hidden there: where only a part is painted, give them as hints";
             self.images.doubt(path, Some(transparent), doubt.to_owned());
         }
         // Whole ones are told of elsewhere.
         if (GRAY..1.0).contains(&gray) {
-            let doubt = "are gray in large part, and what they show there becomes gray: where only a part is colored, give them as --hints";
+            let doubt = "are gray in large part, and what they show there becomes gray: where only a part is colored, give them as hints";
             self.images.doubt(path, Some(gray), doubt.to_owned());
         }
     }

@@ -91,7 +91,7 @@ impl NamedImages {
 
     /// Says which photos there are, so that an image of one is not taken for another's.
     pub fn know(&mut self, capture: &Capture) {
-        self.images.know(known(capture));
+        self.images.know(known(&capture.views, &capture.rejected));
     }
 
     /// Returns true if there is an image for a photo, which may be given by its path below the

@@ -1,16 +1,8 @@
 //! The best on the way, which a training goes back to when what came after was not worth
 //! its time.
 
-use super::LumaTrainer;
-use crate::{gpu::GpuError, raster::Snapshot};
-
-/// All that a training changes but what it leaves out as outliers, in host memory: the
-/// device may have no room for a second set.
-pub(super) struct Best {
-    pub iteration: usize,
-    pub psnr: f64,
-    pub model: Snapshot,
-}
+use super::{scores::Best, state::LumaTrainer};
+use crate::gpu::GpuError;
 
 impl LumaTrainer {
     /// Remembers the present set if none was better by the looks so far, the last of which

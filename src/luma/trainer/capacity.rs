@@ -1,6 +1,6 @@
 //! Room on the device for what is trained.
 
-use super::LumaTrainer;
+use super::state::LumaTrainer;
 use crate::{
     gpu::{GpuError, Recorder},
     luma::workspace::Workspace,

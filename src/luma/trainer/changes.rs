@@ -1,8 +1,6 @@
 //! Changes of the model between two iterations, besides Adam's steps.
 
-use std::sync::Arc;
-
-use super::LumaTrainer;
+use super::state::{Grows, LumaTrainer};
 use crate::{
     gpu::{Buffer, GpuError},
     luma::{
@@ -14,9 +12,6 @@ use crate::{
     raster::constants::{GEOMETRY_PLANES, PLANE_MEAN, STAT_PULL},
     splats::Splats,
 };
-
-/// Says of a place, in the training's coordinates, whether Gaussians may be split there.
-pub type Grows = Arc<dyn Fn([f32; 3]) -> bool + Send + Sync>;
 
 /// Lets nothing pull at Gaussians where none may be split.
 fn calm(geometry: &[f32], statistics: &mut [f32], grows: &Grows) {
@@ -111,6 +106,8 @@ impl LumaTrainer {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
     use crate::raster::constants::{STAT_VIEWS, STATISTICS_PLANES};
 

@@ -1,6 +1,6 @@
 //! Going on from a checkpoint, and making one.
 
-use super::{LumaTrainer, best::Best};
+use super::{scores::Best, state::LumaTrainer};
 use crate::{
     effects::Plan,
     gpu::GpuError,

@@ -1,11 +1,7 @@
 //! When a training ends, where its schedule alone does not say.
 
-use super::LumaTrainer;
+use super::state::LumaTrainer;
 use crate::{gpu::GpuError, luma::curve::gain_of_doubling};
-
-/// A run with time left takes at most so many times its iterations: beyond, a larger set
-/// or larger photos would have been worth more.
-pub(super) const LONGER: usize = 3;
 
 /// No curve is called flat before this share of the iterations, or [`GROWN`] if that is
 /// less: the set still grows, and what it learned is lost for a while each time

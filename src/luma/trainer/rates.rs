@@ -1,6 +1,6 @@
 //! Learning rates and degree of the harmonics at an iteration.
 
-use super::LumaTrainer;
+use super::state::LumaTrainer;
 use crate::{raster::constants::*, splats::sh};
 
 impl LumaTrainer {

@@ -2,7 +2,7 @@
 
 use std::{sync::Arc, time::Instant};
 
-use super::{LumaTrainer, best::Best};
+use super::{scores::Watch, state::LumaTrainer};
 use crate::{
     gpu::{GpuError, Recorder},
     luma::{LumaError, TrainingView, TrainingViews, curve::CurvePoint, settings::SYNC_EVERY, view},
@@ -23,53 +23,6 @@ const RARELY: usize = 500;
 fn next_look(iteration: usize) -> usize {
     let step = (STEP * iteration as f64) as usize;
     iteration + (step / SYNC_EVERY * SYNC_EVERY).clamp(OFTEN, RARELY)
-}
-
-/// Held-out score at one validation of the training.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct HeldOutScore {
-    /// Mean PSNR of the views, in dB.
-    pub psnr: f64,
-    /// Rise since the previous validation, in dB per minute of training.
-    pub per_minute: Option<f64>,
-}
-
-/// State of validation during a training.
-#[derive(Default)]
-pub(super) struct Watch {
-    views: Option<Arc<dyn TrainingViews>>,
-    /// Those of which something counts.
-    counting: Vec<usize>,
-    /// The next look is after this iteration.
-    pub next: usize,
-    pub curve: Vec<CurvePoint>,
-    /// Seconds spent on it.
-    pub seconds: f64,
-    /// The best set that was looked at, while the training may go back to it.
-    pub best: Option<Best>,
-    /// The iteration that it went back from.
-    pub given_up: Option<usize>,
-}
-
-impl Watch {
-    /// Returns true if a validation follows `iteration` (counted from 1) of `end`.
-    pub fn is_due(&self, iteration: usize, end: usize) -> bool {
-        !self.counting.is_empty() && (iteration == end || iteration == self.next)
-    }
-
-    /// Score of the last validation.
-    pub fn last(&self) -> Option<HeldOutScore> {
-        let last = self.curve.last()?;
-        let rise = |before: &CurvePoint| {
-            let minutes = (last.seconds - before.seconds) / 60.0;
-            (minutes > 0.0).then(|| (last.psnr - before.psnr) / minutes)
-        };
-        let before = self.curve.iter().nth_back(1);
-        Some(HeldOutScore {
-            psnr: last.psnr,
-            per_minute: before.and_then(rise),
-        })
-    }
 }
 
 impl LumaTrainer {

@@ -1,6 +1,6 @@
 //! The files of colors that were found.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::{open::Coloring, solve::Solved};
 use crate::{
@@ -11,15 +11,6 @@ use crate::{
     store::{commit::Commit, files, fingerprint::of_file, log::with_rows},
     tell::{Event, Observer},
 };
-
-/// Output files of `colorize`.
-#[derive(Clone, Debug)]
-pub struct Output {
-    /// The colored splat file, of any format.
-    pub ply: PathBuf,
-    /// The contact sheet, when a run was colored.
-    pub contact_sheet: Option<PathBuf>,
-}
 
 impl Coloring<'_> {
     /// Writes them: into the run folder, if one is colored, all or none; what was measured of

@@ -9,11 +9,10 @@ mod words;
 
 use std::{cell::RefCell, ops::ControlFlow, time::Instant};
 
-pub use commit::Output;
-use open::Coloring;
-pub use request::ColorizeRequest;
+use open::{Coloring, Supervised};
+pub use request::{ColorizeRequest, Output};
 
-use super::{RunError, teach::TeacherAnswers};
+use super::RunError;
 use crate::{
     chroma::{ChromaSettings, Colored, relight, unseen_share},
     eval::{Measured, exposures},
@@ -54,12 +53,6 @@ pub fn colorize(
     }
     coloring.commit(&solved, &measured.rows, &mut report, observe)?;
     Ok((coloring.output, report))
-}
-
-/// Supervision from the teachers, and settings of the solver.
-struct Supervised {
-    taught: TeacherAnswers,
-    settings: ChromaSettings,
 }
 
 impl Coloring<'_> {

@@ -4,16 +4,20 @@ use std::{path::PathBuf, sync::Arc, time::Duration};
 
 use glam::DVec3;
 
-use super::{ColorizeRequest, Output};
+use super::request::{ColorizeRequest, Output};
 use crate::{
     capture::{Dataset, LoadOptions},
+    chroma::ChromaSettings,
     disk::trust::Originals,
     effects::Overrules,
     gpu::Gpu,
     luma::{LumaSettings, Preset},
     raster::Raster,
     report::LumaReport,
-    run::{RunError, teach::Teachers},
+    run::{
+        RunError,
+        teach::{TeacherAnswers, Teachers},
+    },
     splats::{Format, Splats, WriteOptions},
     store::{RunFolder, files, fingerprint::check_poses, originals::OriginalFiles},
     subject::{
@@ -47,6 +51,12 @@ pub(super) struct Coloring<'a> {
     /// Options for writing the colored scene.
     pub written: WriteOptions,
     _kept: Originals,
+}
+
+/// Supervision from the teachers, and settings of the solver.
+pub(super) struct Supervised {
+    pub taught: TeacherAnswers,
+    pub settings: ChromaSettings,
 }
 
 impl<'a> Coloring<'a> {

@@ -1,6 +1,9 @@
 //! The report of a coloring.
 
-use super::{Supervised, open::Coloring, solve::Solved};
+use super::{
+    open::{Coloring, Supervised},
+    solve::Solved,
+};
 use crate::{
     eval::Measured,
     report::{

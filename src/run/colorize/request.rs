@@ -1,4 +1,4 @@
-//! A request to `colorize`.
+//! A request to `colorize`, and the files that it makes.
 
 use std::{path::PathBuf, sync::Arc};
 
@@ -65,4 +65,13 @@ impl Default for ColorizeRequest {
             live: None,
         }
     }
+}
+
+/// Output files of `colorize`.
+#[derive(Clone, Debug)]
+pub struct Output {
+    /// The colored splat file, of any format.
+    pub ply: PathBuf,
+    /// The contact sheet, when a run was colored.
+    pub contact_sheet: Option<PathBuf>,
 }

@@ -4,7 +4,7 @@ use std::{ops::ControlFlow, time::Instant};
 
 use serde_json::Value;
 
-use super::{Supervised, open::Coloring};
+use super::open::{Coloring, Supervised};
 use crate::{
     chroma::{
         ChromaCheckpoint, ChromaCheckpointing, ChromaSettings, Colored, Distill,

@@ -5,26 +5,20 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use super::{FitRequest, Init, Neighbors, checkpoint::sha256_of};
 use crate::{
     blocks::{Area, Block, BlockFile, COARSE, FAR_PART, Job, Kind, Region},
-    capture::{Camera, Dataset, LoadOptions},
-    effects::{Effect, Overrules},
+    capture::{Camera, Dataset},
     luma::{
-        LumaOverlay, LumaSettings, Preset,
+        LumaSettings,
         start::{first_points, room_at_first},
     },
-    report::{EffectReport, Report, ViewExposure},
+    report::{Report, ViewExposure},
     run::RunError,
     splats::{Splats, initial_splats},
     store::{RunFolder, StoreError},
     subject::scene::{Frame, read_splats},
     tell::{Event, Observer},
 };
-
-/// Effects that each block decides for itself: how far a lens displaces pixels depends on the
-/// photos' size, and harmonics of any degree can be put together.
-const OWN: [Effect; 2] = [Effect::Lens, Effect::LumaDegree];
 
 /// Standard deviations up to which a Gaussian shows anything to speak of.
 const REACH: f64 = 3.0;
@@ -35,19 +29,15 @@ const LEAST_OVERLAP: f64 = 0.05;
 /// Heights above and below the scene's that still belong to it, as a share of its height.
 const HEADROOM: f64 = 0.5;
 
-/// A block that goes on takes so small a part of its iterations so far: it only has to agree
-/// with its neighbors.
-const AGREEING_PART: usize = 6;
-
 /// A block and the job that it belongs to.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BlockPlace {
-    job: Job,
-    block: Block,
+    pub(super) job: Job,
+    pub(super) block: Block,
     /// See [`Job::plan_of`].
     plan: String,
     /// The coarse model, once it is trained.
-    coarse: Option<(RunFolder, Box<Report>)>,
+    pub(super) coarse: Option<(RunFolder, Box<Report>)>,
 }
 
 impl BlockPlace {
@@ -290,108 +280,9 @@ fn evenly(places: &[[f32; 3]], room: usize) -> Vec<usize> {
 }
 
 /// The folder of the job that a block's folder lies in.
-fn job_of(folder: &Path) -> PathBuf {
+pub(super) fn job_of(folder: &Path) -> PathBuf {
     let folder = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
     folder.parent().unwrap_or(&folder).to_owned()
-}
-
-impl FitRequest {
-    /// Request to train a block of a job, or its coarse model, in its own folder; `None` if the
-    /// folder is neither. Photos, effects and exposures found by the coarse model hold for all
-    /// blocks.
-    ///
-    /// # Errors
-    /// [`StoreError::File`] where a file of the job is damaged.
-    pub fn of_block(folder: &Path) -> Result<Option<Self>, RunError> {
-        let Some(file) = BlockFile::read(folder)? else {
-            return Ok(None);
-        };
-        let job = Job::read(&job_of(folder))?;
-        let block = BlockPlace::read(folder)?;
-        let coarse = block.as_ref().and_then(|block| block.coarse.as_ref());
-        let (load, overrules) = match coarse {
-            Some((_, report)) => (report.capture.load.clone(), decided(&report.effects)),
-            None => Default::default(),
-        };
-        let settings = LumaOverlay {
-            max_splats: file.max_splats,
-            iterations: file.iterations,
-            // Those of the coarse model surround all blocks.
-            surround: coarse.map(|_| false),
-            // What is divided into blocks is larger than a device.
-            stream_photos: block.as_ref().map(|_| true),
-            haste: (block.as_ref()).map(|block| block.job.haste(&block.block)),
-            ..LumaOverlay::default()
-        };
-        Ok(Some(Self {
-            output: Some(folder.to_owned()),
-            preset: (file.kind == Kind::Coarse).then_some(Preset::Draft),
-            settings,
-            load: LoadOptions {
-                max_side: None,
-                chosen: Some(file.photos),
-                ..load
-            },
-            overrules,
-            block,
-            ..Self::new(job.capture)
-        }))
-    }
-
-    /// Goes on with a trained block among what its neighbors have in a run of `merge`, for a
-    /// sixth of its iterations so far.
-    ///
-    /// # Errors
-    /// [`StoreError::File`] where the run is none of the same photos, or this is no trained block.
-    pub fn among(self, merged: &Path) -> Result<Self, RunError> {
-        let folder = RunFolder::at(merged);
-        let report = folder.read_report()?;
-        let (Some(block), Some(Init::Run { iterations, .. })) = (&self.block, &self.init) else {
-            let path = self.output.unwrap_or(self.colmap_dir);
-            return Err(RunError::NoTrainedBlock(path));
-        };
-        if Path::new(&report.capture.path) != block.job.capture {
-            let reason = "is no scene of the block's photos: give the run of `gs-chroma merge`";
-            return Err(StoreError::file(merged, reason).into());
-        }
-        let luma = folder.luma();
-        let iterations = Some(iterations.div_ceil(AGREEING_PART));
-        Ok(Self {
-            around: Some(Neighbors {
-                sha256: sha256_of(luma.clone())?,
-                surroundings: report.luma.surroundings,
-                luma,
-            }),
-            settings: LumaOverlay {
-                iterations,
-                ..self.settings
-            },
-            // Only photos at the size that is trained on are without what is beyond.
-            measure_side: None,
-            ..self
-        })
-    }
-
-    /// Returns true if photos, effects and exposures come from a coarse model.
-    pub fn inherits(&self) -> bool {
-        (self.block.as_ref()).is_some_and(|block| block.coarse.is_some())
-    }
-}
-
-/// Effects as they were decided, those aside that are decided anew.
-fn decided(effects: &[EffectReport]) -> Overrules {
-    let named = |on| {
-        let of_kind = effects.iter().filter(|effect| effect.on == on);
-        of_kind
-            .map(|effect| effect.name)
-            .filter(|name| !OWN.contains(name))
-            .collect()
-    };
-    Overrules {
-        with: named(true),
-        without: named(false),
-        sh_degree: None,
-    }
 }
 
 #[cfg(test)]

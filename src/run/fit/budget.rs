@@ -8,7 +8,7 @@ use std::{sync::Arc, time::Instant};
 
 use serde::{Deserialize, Serialize};
 
-use super::FitRequest;
+use super::request::FitRequest;
 use crate::{
     capture::{Capture, LoadOptions},
     gpu::GpuError,
@@ -122,7 +122,7 @@ impl Budget {
         let Some(limit) = options.goal.seconds() else {
             if options.preset.is_none() && options.goal == Goal::Fixed && raster.gpu.is_software() {
                 observe(Event::Note(format!(
-                    "{} is not a GPU: using preset draft (--preset overrules)",
+                    "{} is not a GPU: using preset draft unless another is named",
                     raster.gpu.info().name
                 )));
             }

@@ -2,7 +2,7 @@
 
 use std::{fs, path::Path};
 
-use super::{BlockPlace, FitRequest, Init};
+use super::{BlockPlace, FitRequest, Init, request::decided};
 use crate::{effects::Overrules, luma::LumaOverlay, run::RunError, store::RunFolder};
 
 impl FitRequest {
@@ -18,10 +18,6 @@ impl FitRequest {
             return Ok(None);
         }
         let report = folder.read_report()?;
-        let named = |on| {
-            let of_kind = report.effects.iter().filter(move |effect| effect.on == on);
-            of_kind.map(|effect| effect.name).collect()
-        };
         let mut settings = report.luma.settings.clone();
         let [_, last] = settings.rates.means;
         settings.rates.means = [last; 2];
@@ -33,9 +29,8 @@ impl FitRequest {
                 ..LumaOverlay::default()
             },
             overrules: Overrules {
-                with: named(true),
-                without: named(false),
                 sh_degree: Some(report.luma.settings.sh_degree),
+                ..decided(&report.effects, &[])
             },
             load: report.capture.load,
             measure_side: report.luma.measured_side,

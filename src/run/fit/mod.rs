@@ -37,7 +37,6 @@ use crate::{
 pub use block::BlockPlace;
 use budget::Budget;
 use checkpoint::{found_in, question};
-pub use neighbors::Neighbors;
 pub use request::{FitRequest, Init};
 use training::Job;
 

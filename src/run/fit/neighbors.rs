@@ -1,33 +1,62 @@
 //! `fit JOB/block-3 --around RUN`: a trained block among its neighbors.
 
-use std::{path::PathBuf, sync::Arc};
+use std::{path::Path, sync::Arc};
 
-use serde::{Deserialize, Serialize};
-
-use super::{FitRequest, Init};
+use super::{
+    checkpoint::sha256_of,
+    request::{FitRequest, Init, Neighbors},
+};
 use crate::{
     capture::{Dataset, Exposure, Layers},
     eval::exposures,
+    luma::LumaOverlay,
     raster::{Raster, SceneRenderer},
     run::RunError,
     splats::Splats,
-    store::RunFolder,
+    store::{RunFolder, StoreError},
     subject::scene::{Frame, read_splats},
     tell::{Event, Observer, Stage},
 };
 
-/// The scene of a merged run, of which a block takes what is in its cell and margin.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Neighbors {
-    /// Its splat file.
-    pub luma: PathBuf,
-    /// SHA-256 of the file.
-    pub sha256: String,
-    /// Number of surroundings, the last of its Gaussians.
-    pub surroundings: usize,
-}
+/// A block that goes on takes so small a part of its iterations so far: it only has to agree
+/// with its neighbors.
+const AGREEING_PART: usize = 6;
 
 impl FitRequest {
+    /// Goes on with a trained block among what its neighbors have in a run of `merge`, for a
+    /// sixth of its iterations so far.
+    ///
+    /// # Errors
+    /// [`StoreError::File`] where the run is none of the same photos, or this is no trained block.
+    pub fn among(self, merged: &Path) -> Result<Self, RunError> {
+        let folder = RunFolder::at(merged);
+        let report = folder.read_report()?;
+        let (Some(block), Some(Init::Run { iterations, .. })) = (&self.block, &self.init) else {
+            let path = self.output.unwrap_or(self.colmap_dir);
+            return Err(RunError::NoTrainedBlock(path));
+        };
+        if Path::new(&report.capture.path) != block.job.capture {
+            let reason = "is no scene of the block's photos: give the run of `gs-chroma merge`";
+            return Err(StoreError::file(merged, reason).into());
+        }
+        let luma = folder.luma();
+        let iterations = Some(iterations.div_ceil(AGREEING_PART));
+        Ok(Self {
+            around: Some(Neighbors {
+                sha256: sha256_of(luma.clone())?,
+                surroundings: report.luma.surroundings,
+                luma,
+            }),
+            settings: LumaOverlay {
+                iterations,
+                ..self.settings
+            },
+            // Only photos at the size that is trained on are without what is beyond.
+            measure_side: None,
+            ..self
+        })
+    }
+
     /// For a block trained among its neighbors, its photos minus the scene beyond it, which its
     /// Gaussians would otherwise reproduce and be wrong after merging; and the merged scene's
     /// Gaussians in its cell and margin, to start from, surroundings last. For other trainings, the
@@ -52,7 +81,7 @@ impl FitRequest {
                 && folder.read_report()?.luma.around.is_some()
             {
                 observe(Event::Warning(format!(
-                    "{} has nothing beyond its margin any more: go on with --around, or what it shows there will be wrong",
+                    "{} has nothing beyond its margin any more: train it among its neighbors, or what it shows there will be wrong",
                     block.plan().name
                 )));
             }

@@ -70,7 +70,7 @@ pub struct FramesOptions {
 }
 
 /// Result of `frames`.
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Frames {
     /// The folder or film.
@@ -142,7 +142,7 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
         range: own_range(&dataset, film.as_ref(), &shots, observe),
         side: None,
     };
-    let out = FrameOutput::open(options, rate, film.as_ref(), &shots, observe)?;
+    let out = FrameOutput::open(&options.output, rate, film.as_ref(), &shots, observe)?;
     let painted = find_painted(options, report, &shots, &mut painter, observe)?;
     let mut coloring = Coloring {
         painter,
@@ -155,13 +155,7 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
         unread: Vec::new(),
         told: Frames {
             output: options.output.clone(),
-            photos: 0,
-            placed: 0,
-            carried: 0,
-            painted: 0,
-            covered: 0.0,
-            warnings: Vec::new(),
-            seconds: 0.0,
+            ..Frames::default()
         },
     };
     for (index, shot) in shots.iter().enumerate() {

@@ -1,8 +1,8 @@
 //! Output of colored photos: a folder or a film.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use super::{FramesOptions, shots::Shot};
+use super::shots::Shot;
 use crate::{
     capture::Film,
     frames::Colored,
@@ -22,23 +22,23 @@ pub(super) enum FrameOutput {
 
 impl FrameOutput {
     pub fn open(
-        options: &FramesOptions,
+        output: &Path,
         rate: [u32; 2],
         film: Option<&Film>,
         shots: &[Shot],
         observe: &mut Observer<'_>,
     ) -> Result<Self, StoreError> {
-        if !is_film(&options.output) {
-            files::make_pictures_folder(&options.output)?;
+        if !is_film(output) {
+            files::make_pictures_folder(output)?;
             for shot in shots {
-                if let Some(folder) = options.output.join(&shot.output).parent() {
+                if let Some(folder) = output.join(&shot.output).parent() {
                     files::make_folder(folder)?;
                 }
             }
-            return Ok(Self::Folder(options.output.clone()));
+            return Ok(Self::Folder(output.to_owned()));
         }
-        files::make_folder_of(&options.output)?;
-        let writer = FilmWriter::new(&options.output, rate, Purpose::Editing)?;
+        files::make_folder_of(output)?;
+        let writer = FilmWriter::new(output, rate, Purpose::Editing)?;
         Ok(Self::Film(Box::new(writer.sounding_like(film, observe))))
     }
 

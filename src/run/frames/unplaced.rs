@@ -2,7 +2,7 @@
 
 use std::{num::NonZero, thread};
 
-use super::{FrameOutput, Painter, shots::Shot};
+use super::{out::FrameOutput, painter::Painter, shots::Shot};
 use crate::{
     capture::{CaptureError, Original, in_order},
     frames::{Between, Canvas, Colored, ColoredPhoto, Strokes, WeightedColors, blend, finish},

@@ -277,7 +277,7 @@ fn a_sphere_has_its_lens_or_is_refused_before_any_work() {
     version(&place, "4.1.0");
     let done = succeed(&place, &FILM);
     assert!(
-        done.stderr.contains("using --lens EQUIRECTANGULAR"),
+        done.stderr.contains("using the lens EQUIRECTANGULAR"),
         "{done:?}"
     );
 }

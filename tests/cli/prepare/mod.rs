@@ -291,7 +291,7 @@ fn nothing_that_fits_together() {
     refused(
         &place,
         &with(&["--match", "sequential"]),
-        &["--match exhaustive"],
+        &["exhaustive matching"],
     );
 }
 
@@ -475,6 +475,6 @@ fn wrong_usage_is_told() {
     refused(
         &place,
         &with(&["--per-second", "3"]),
-        &["--per-second", "folder of photos"],
+        &["frames a second", "folder of photos"],
     );
 }

@@ -128,7 +128,7 @@ fn only_the_doctor_asks_the_oracle() {
         let mut files = Vec::new();
         rust_files(&path, &mut files);
         for text in files {
-            let code = text.split("#[cfg(test)]").next().unwrap_or_default();
+            let code = without_tests(&text);
             assert!(!imports(code).contains("oracle"), "{name}: {text}");
         }
     }
@@ -165,8 +165,7 @@ fn files_are_read_and_written_in_one_place() {
             return;
         }
         let text = fs::read_to_string(path).expect("a source file");
-        let code = text.split("#[cfg(test)]").next().unwrap_or_default();
-        let code = code.replace("use tempfile::", "use ");
+        let code = without_tests(&text).replace("use tempfile::", "use ");
         let used = ACCESS.iter().filter(|access| code.contains(**access));
         found.extend(used.map(|access| format!("{name}: {access}")));
     }
@@ -178,30 +177,84 @@ fn files_are_read_and_written_in_one_place() {
     assert!(found.is_empty(), "{found:?}");
 }
 
-/// The texts of errors.
-fn error_texts(code: &str) -> impl Iterator<Item = &str> {
-    let texts = code.split("#[error(").skip(1);
-    texts.map(|text| text.split(")]").next().unwrap_or(text))
+/// String literals of code.
+fn literals(code: &str) -> Vec<&str> {
+    let mut found = Vec::new();
+    let mut rest = code;
+    while let Some(at) = rest.find(['"', '/', '\'']) {
+        let (before, tail) = rest.split_at(at);
+        let length = match tail.as_bytes() {
+            [b'/', b'/', ..] => tail.find('\n').unwrap_or(tail.len()),
+            [b'\'', b'\\', _, b'\'', ..] => 4,
+            [b'\'', _, b'\'', ..] => 3,
+            [b'"', ..] => {
+                let mut escaped = false;
+                let end = match before.ends_with("r#") {
+                    true => tail[1..].find("\"#"),
+                    false => tail[1..].find(|c| {
+                        let ends = c == '"' && !escaped;
+                        escaped = c == '\\' && !escaped;
+                        ends
+                    }),
+                };
+                let end = end.map_or(tail.len(), |end| end + 1);
+                found.push(&tail[1..end]);
+                tail.len().min(end + 1)
+            }
+            _ => 1,
+        };
+        rest = &tail[length..];
+    }
+    found
+}
+
+/// Code before the tests in a file.
+pub(super) fn without_tests(text: &str) -> &str {
+    let marks = text.match_indices("#[cfg(test)]\n");
+    let mut tests = marks.map(|(at, mark)| (at, text[at + mark.len()..].lines().next()));
+    let inline = |line: &str| line.contains("mod ") && line.ends_with('{');
+    let tests = tests.find(|(_, line)| line.is_some_and(inline));
+    &text[..tests.map_or(text.len(), |(at, _)| at)]
+}
+
+#[test]
+fn literals_are_found() {
+    let text = r##"f("a\"b", 'c', '"', "//d"); // "e
+        g(r#"h"i"#); #[cfg(test)]
+mod j;
+#[cfg(test)]
+mod tests {
+    k("l");
+}"##;
+    assert_eq!(literals(without_tests(text)), [r#"a\"b"#, "//d", r#"h"i"#]);
+}
+
+/// Returns true if words name an option of the program: those of COLMAP have underscores, and
+/// a word alone is an argument of another program.
+fn names_option(words: &str) -> bool {
+    let options = words.match_indices("--").map(|(at, _)| {
+        let end = words[at..].find(|c: char| !(c.is_alphanumeric() || "-_".contains(c)));
+        &words[at + 2..end.map_or(words.len(), |end| at + end)]
+    });
+    let mut own = options.filter(|option| !option.contains('_'));
+    words.contains(' ') && own.any(|option| option.starts_with(|c: char| c.is_ascii_lowercase()))
 }
 
 /// Remedies of the command line are its own: `cli/remedy.rs` adds them.
 #[test]
-fn errors_below_the_command_line_name_no_options() {
+fn words_below_the_command_line_name_no_options() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
     let mut wrong = Vec::new();
     for entry in fs::read_dir(&root).expect("src") {
         let path = entry.expect("an entry").path();
-        if path.ends_with("cli") || path.ends_with("tradeoff") {
+        let name = path.file_stem().expect("a name").to_string_lossy();
+        if ["cli", "auto", "tradeoff"].contains(&&*name) {
             continue;
         }
         let mut files = Vec::new();
         rust_files(&path, &mut files);
-        let texts = files.iter().flat_map(|text| error_texts(text));
-        let named = texts.filter(|text| {
-            let mut options = text.match_indices("--");
-            options.any(|(at, _)| text[at + 2..].starts_with(|c: char| c.is_ascii_lowercase()))
-        });
-        wrong.extend(named.map(str::to_owned));
+        let words = files.iter().flat_map(|text| literals(without_tests(text)));
+        wrong.extend(words.filter(|words| names_option(words)).map(str::to_owned));
     }
     assert!(wrong.is_empty(), "{wrong:?}");
 }
