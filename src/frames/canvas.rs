@@ -61,11 +61,6 @@ impl Canvas {
         self.gray.len()
     }
 
-    /// Returns true if it has no pixels; never.
-    pub fn is_empty(&self) -> bool {
-        self.gray.is_empty()
-    }
-
     /// Width and height.
     pub fn size(&self) -> [usize; 2] {
         [self.width as usize, self.height as usize]

@@ -88,8 +88,7 @@ pub fn eval(
     let mut lpips = options.lpips.as_deref().map(Lpips::open).transpose()?;
     let mut teacher = ask(options, &run, &scene, observe)?;
     observe(Event::begins(Stage::Device));
-    let drawn = report.luma.settings.raster_options();
-    let raster = Arc::new(Raster::with(&Gpu::open()?, drawn));
+    let raster = report.luma.settings.raster(&Gpu::open()?);
     let peers = match &teacher {
         Some(teacher) => paint(options, &raster, (&scene, teacher), report, page, observe)?,
         None => Vec::new(),

@@ -7,7 +7,7 @@ mod range;
 mod shots;
 mod unplaced;
 
-use std::{cell::RefCell, path::PathBuf, sync::Arc};
+use std::{cell::RefCell, path::PathBuf};
 
 use out::FrameOutput;
 use painted::Painted;
@@ -26,7 +26,6 @@ use crate::{
     eval::exposures,
     frames::{Canvas, SceneDrawer, Strokes, WeightedColors, believable, blend, finish},
     gpu::Gpu,
-    raster::Raster,
     report::Report,
     store::{
         RunFolder,
@@ -130,9 +129,8 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
     }
     let teachers = open_teachers(options, report, folder, &dataset, observe)?;
     let luma = scene.splats.to_luma();
-    let drawn = report.luma.settings.raster_options();
     observe(Event::begins(Stage::Device));
-    let raster = Arc::new(Raster::with(&Gpu::open()?, drawn));
+    let raster = report.luma.settings.raster(&Gpu::open()?);
     let believed = believable(luma.len(), report.luma.surroundings);
     let mut painter = Painter {
         drawer: SceneDrawer::new(&raster, &luma, [&chroma, &believed], dataset.extent)?,
