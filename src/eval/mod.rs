@@ -45,7 +45,6 @@ pub enum EvalError {
     /// RGB splats to compare with, or answers that were kept.
     #[error(transparent)]
     Chroma(#[from] ChromaError),
-    /// The teacher.
     #[error(transparent)]
     Teacher(#[from] TeacherError),
     /// The teacher has no colors for any of the views.

@@ -16,7 +16,6 @@ pub struct Canvas {
     pub gray: Vec<u8>,
     /// Weight of each pixel by the photo's mask, 0 to 255; `None` where all count.
     pub mask: Option<Vec<u8>>,
-    /// Orientation of the sensor.
     pub stance: SensorOrientation,
 }
 

@@ -38,14 +38,12 @@ const MAX_ROWS: usize = 24;
 /// Frames in the page's strip.
 const STRIP_FRAMES: usize = 12;
 
-/// Options of `eval`.
 #[derive(Clone, Debug, Default)]
 pub struct EvalOptions {
     /// Run folder; the newest run by default.
     pub run: Option<PathBuf>,
     /// Teacher to measure beside the scene.
     pub teacher: Option<PathBuf>,
-    /// Settings of the teacher.
     pub teacher_settings: TeacherSettings,
     /// COLMAP folder, where it is not the one that `fit` noted.
     pub colmap: Option<PathBuf>,

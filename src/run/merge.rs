@@ -29,7 +29,6 @@ use crate::{
     tell::{Event, Observer, Stage, keeping},
 };
 
-/// Options of `merge`.
 #[derive(Clone, Debug)]
 pub struct MergeOptions {
     /// The job's folder.

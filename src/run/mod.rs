@@ -123,7 +123,6 @@ pub enum RunError {
         named: String,
         /// Photos with a pose.
         placed: usize,
-        /// Photos in all.
         photos: usize,
         /// One with a pose.
         example: String,

@@ -47,7 +47,6 @@ const OPEN: f64 = 0.005;
 /// photos the files are read again.
 const KEPT: usize = 1 << 28;
 
-/// Options of `frames`.
 #[derive(Clone, Debug, Default)]
 pub struct FramesOptions {
     /// Run folder; the newest run by default.
@@ -56,7 +55,6 @@ pub struct FramesOptions {
     pub colmap: Option<PathBuf>,
     /// Teacher for what the scene does not cover; the run's by default.
     pub teacher: Option<PathBuf>,
-    /// Settings of the teacher.
     pub teacher_settings: TeacherSettings,
     /// A folder for pictures, or a film by its extension.
     pub output: PathBuf,
@@ -91,9 +89,6 @@ pub struct Frames {
 }
 
 /// Colors the photos of a run and writes them.
-///
-/// # Errors
-/// [`RunError`].
 pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Frames, RunError> {
     let begun = std::time::Instant::now();
     let warnings = RefCell::default();
