@@ -16,8 +16,8 @@ use glam::{DMat3, DVec3};
 use gs_chroma::{
     capture::{Camera, Capture, CaptureError, Choice, Exposure, LoadOptions, Loader},
     gpu::Gpu,
+    low_level::oracle::random::Random,
     luma::{LumaError, LumaSettings, LumaTrainer, Schedule, TrainingView},
-    oracle::random::Random,
     raster::{Raster, RasterOptions},
     splats::{ShField, Splats, dome::dome, sh},
 };

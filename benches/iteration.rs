@@ -23,8 +23,8 @@ use std::{
 use cloud::{camera, cloud, median};
 use gs_chroma::{
     gpu::Gpu,
+    low_level::oracle::random::Random,
     luma::{LumaError, LumaSettings, LumaTrainer, TrainingView},
-    oracle::random::Random,
     raster::Raster,
 };
 

@@ -12,7 +12,6 @@ use gs_chroma::{
     },
     gpu::Gpu,
     luma::{self, LumaEvent, LumaSettings},
-    raster::Raster,
     splats::ply,
 };
 
@@ -52,11 +51,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
         ControlFlow::Continue(())
     })?;
-    let raster = Arc::new(Raster::with(&gpu, scene.settings.raster_options()));
     let settings = ChromaSettings::irls();
     let go_on = &mut |_: chroma::ColorizeEvent<'_>| ControlFlow::Continue(());
     let colored = chroma::colorize(
-        &raster,
+        &scene.raster(&gpu),
         &dataset,
         &scene.splats,
         &mut Sepia,

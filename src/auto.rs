@@ -31,7 +31,6 @@ const KEPT: &str = "auto.json";
 /// Frames of the page's path.
 const PATH: usize = 60;
 
-/// Options of `auto`.
 pub struct AutoOptions {
     /// Options of the preparation; its output is ignored.
     pub prepare: PrepareOptions,
@@ -49,7 +48,6 @@ pub struct AutoOptions {
     pub interrupt: Arc<Interrupt>,
 }
 
-/// A step of the whole.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Step {
     /// Frames and poses.
@@ -126,7 +124,6 @@ pub struct Results {
     pub run: PathBuf,
 }
 
-/// Error of `auto`.
 #[derive(Debug, thiserror::Error)]
 pub enum AutoError {
     /// Frames or poses.

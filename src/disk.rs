@@ -55,18 +55,12 @@ pub struct Scratch(File);
 
 impl Scratch {
     /// An empty one in `folder`.
-    ///
-    /// # Errors
-    /// As the operating system says.
     pub fn new(folder: &Path) -> io::Result<Self> {
         step()?;
         tempfile::tempfile_in(folder).map(Self)
     }
 
     /// Adds bytes at its end; where they begin.
-    ///
-    /// # Errors
-    /// As the operating system says.
     pub fn append(&mut self, bytes: &[u8]) -> io::Result<u64> {
         step()?;
         let place = self.0.seek(SeekFrom::End(0))?;
@@ -75,9 +69,6 @@ impl Scratch {
     }
 
     /// Fills `bytes` with those that begin at `place`.
-    ///
-    /// # Errors
-    /// As the operating system says.
     pub fn read_at(&mut self, place: u64, bytes: &mut [u8]) -> io::Result<()> {
         self.0.seek(SeekFrom::Start(place))?;
         self.0.read_exact(bytes)
@@ -244,9 +235,6 @@ impl Draft {
     }
 
     /// Puts the file where it belongs, once all of it is on the disk.
-    ///
-    /// # Errors
-    /// The system's.
     pub fn persist(self, path: &Path) -> io::Result<()> {
         step()?;
         self.file.as_file().sync_all()?;
@@ -282,9 +270,6 @@ impl DraftFolder {
     }
 
     /// Puts the folder where it belongs.
-    ///
-    /// # Errors
-    /// The system's.
     pub fn persist(self, path: &Path) -> io::Result<()> {
         rename(self.path(), path)?;
         // What it would remove is elsewhere now.
@@ -294,9 +279,6 @@ impl DraftFolder {
 }
 
 /// An empty folder in another one, whose name begins with `prefix`.
-///
-/// # Errors
-/// The system's.
 pub(crate) fn create_folder(prefix: &str, folder: &Path) -> io::Result<DraftFolder> {
     step()?;
     let mut builder = Builder::new();
@@ -313,9 +295,6 @@ pub(crate) fn create_folder(prefix: &str, folder: &Path) -> io::Result<DraftFold
 }
 
 /// A file without a name, in the system's folder for these.
-///
-/// # Errors
-/// The system's.
 pub(crate) fn scratch() -> io::Result<File> {
     step()?;
     tempfile::tempfile().map_err(plain)
@@ -335,9 +314,6 @@ pub(crate) fn open_in_place(path: &Path) -> io::Result<File> {
 }
 
 /// Makes a folder and those above it, where they are missing.
-///
-/// # Errors
-/// The system's.
 pub(crate) fn make_folder(path: &Path) -> io::Result<()> {
     if path.is_dir() {
         return Ok(());
@@ -348,18 +324,12 @@ pub(crate) fn make_folder(path: &Path) -> io::Result<()> {
 }
 
 /// Tries whether a folder can be written to.
-///
-/// # Errors
-/// The system's.
 pub(crate) fn try_folder(path: &Path) -> io::Result<()> {
     step()?;
     tempfile::tempfile_in(path).map(drop).map_err(plain)
 }
 
 /// Renames a file or a folder.
-///
-/// # Errors
-/// The system's.
 pub(crate) fn rename(from: &Path, to: &Path) -> io::Result<()> {
     step()?;
     let _moving = unfinished();
@@ -373,9 +343,6 @@ pub(crate) fn sync(folder: &Path) {
 }
 
 /// Removes a file or a folder with all that is in it. Nothing there is no error.
-///
-/// # Errors
-/// The system's.
 pub(crate) fn remove(path: &Path) -> io::Result<()> {
     let removed = path.symlink_metadata().and_then(|metadata| {
         step()?;
@@ -391,9 +358,6 @@ pub(crate) fn remove(path: &Path) -> io::Result<()> {
 }
 
 /// A file of its own with the same content.
-///
-/// # Errors
-/// The system's.
 #[cfg(feature = "cli")]
 pub(crate) fn copy(from: &Path, to: &Path) -> io::Result<()> {
     step()?;
@@ -401,9 +365,6 @@ pub(crate) fn copy(from: &Path, to: &Path) -> io::Result<()> {
 }
 
 /// The same file in two places, copied where the file system cannot do that.
-///
-/// # Errors
-/// The system's.
 #[cfg(feature = "cli")]
 pub(crate) fn link(from: &Path, to: &Path) -> io::Result<()> {
     step()?;

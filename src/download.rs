@@ -138,9 +138,6 @@ fn io_error(path: &Path) -> impl Fn(io::Error) -> DownloadError {
 ///
 /// `observe` is told bytes there and bytes in all, where the host says that, first when the
 /// host has answered and nothing is fetched yet; it may end the transfer.
-///
-/// # Errors
-/// [`DownloadError`].
 pub(crate) fn download(
     source: &DownloadSource<'_>,
     path: &Path,

@@ -18,9 +18,6 @@ impl Hasher {
     }
 
     /// Takes all that is left of a file.
-    ///
-    /// # Errors
-    /// The system's.
     pub fn update_with(&mut self, mut file: impl Read) -> io::Result<()> {
         let mut block = vec![0; BLOCK];
         loop {
@@ -39,9 +36,6 @@ impl Hasher {
 }
 
 /// SHA-256 of all that is left of a file.
-///
-/// # Errors
-/// The system's.
 pub(crate) fn of_file(file: impl Read) -> io::Result<String> {
     let mut hasher = Hasher::default();
     hasher.update_with(file)?;

@@ -28,9 +28,6 @@ pub(crate) fn open(path: &Path) -> io::Result<File> {
 }
 
 /// All bytes of a file.
-///
-/// # Errors
-/// As [`open`].
 pub(crate) fn read(path: &Path) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     open(path)?.read_to_end(&mut bytes)?;

@@ -7,8 +7,8 @@
 //! → capture, splats → gpu, color, sections, download, npy, programs, oracle, compare → disk, hash, input
 //! ```
 //!
-//! [`doctor`] compares the kernels of [`raster`], [`luma`] and [`chroma`] with the [`oracle`],
-//! which uses nothing else of the crate. The feature `cli` adds the program.
+//! `doctor` compares the kernels of [`raster`], [`luma`] and [`chroma`] with the `oracle`, which
+//! uses nothing else of the crate. The feature `cli` adds the program.
 //!
 //! # A whole job
 //!
@@ -24,7 +24,6 @@
 //!     chroma::{self, ChromaSettings, teacher::{Teacher, TeacherSettings}},
 //!     gpu::Gpu,
 //!     luma::{self, LumaSettings},
-//!     raster::Raster,
 //! };
 //!
 //! # fn main() -> Result<(), Box<dyn Error>> {
@@ -33,54 +32,109 @@
 //! let gpu = Gpu::open()?;
 //! let scene = luma::fit(&gpu, &dataset, &LumaSettings::new(20), &mut |_| ControlFlow::Continue(()))?;
 //!
-//! let raster = Arc::new(Raster::with(&gpu, scene.settings.raster_options()));
 //! let mut teacher = Teacher::open(Path::new("assets/demo/images"), None, &TeacherSettings::default())?;
 //! let settings = ChromaSettings { rounds: 2, ..ChromaSettings::irls() };
 //! let colored = chroma::colorize(
-//!     &raster, &dataset, &scene.splats, &mut teacher, &settings, &mut |_| ControlFlow::Continue(()),
+//!     &scene.raster(&gpu), &dataset, &scene.splats, &mut teacher, &settings, &mut |_| ControlFlow::Continue(()),
 //! )?;
 //! assert_eq!(colored.splats.sh.channels, 3);
 //! # Ok(())
 //! # }
 //! ```
 
+#![cfg_attr(
+    not(feature = "cli"),
+    allow(
+        dead_code,
+        unused_imports,
+        reason = "what the lower floors have for the program alone"
+    )
+)]
+
 #[cfg(feature = "cli")]
-pub mod auto;
-pub mod blocks;
+mod auto;
+#[cfg(feature = "cli")]
+mod blocks;
 pub mod capture;
 pub mod chroma;
 #[cfg(feature = "cli")]
-pub mod cli;
+mod cli;
 pub mod color;
-pub mod compare;
+mod compare;
 mod disk;
-pub mod doctor;
+#[cfg(feature = "cli")]
+mod doctor;
 #[cfg(feature = "cli")]
 mod download;
 pub mod effects;
-pub mod eval;
-pub mod frames;
+#[cfg(feature = "cli")]
+mod eval;
+#[cfg(feature = "cli")]
+mod frames;
 pub mod gpu;
 mod hash;
 mod input;
 pub mod luma;
 pub mod measure;
 mod npy;
-pub mod oracle;
+mod oracle;
 #[cfg(feature = "cli")]
-pub mod prepare;
+mod prepare;
+#[cfg(feature = "cli")]
 mod programs;
 pub mod raster;
-pub mod report;
-pub mod run;
+#[cfg(feature = "cli")]
+mod report;
+#[cfg(feature = "cli")]
+mod run;
+#[cfg(feature = "cli")]
 mod sections;
 pub mod splats;
-pub mod store;
-pub mod subject;
-pub mod tell;
 #[cfg(feature = "cli")]
-pub mod tradeoff;
+mod store;
+#[cfg(feature = "cli")]
+mod subject;
+#[cfg(feature = "cli")]
+mod tell;
+#[cfg(feature = "cli")]
+mod tradeoff;
 pub mod trajectory;
 #[cfg(feature = "cli")]
-pub mod view;
-pub mod viewers;
+mod view;
+#[cfg(feature = "cli")]
+mod viewers;
+
+/// Kernels, oracle, doctor and the program's own floors, for its tests, benchmarks and tools; no
+/// promises between versions.
+pub mod low_level {
+    #[cfg(feature = "cli")]
+    pub use crate::{cli::Cli, store::RunFolder};
+
+    /// Comparators.
+    pub mod compare {
+        pub use crate::compare::*;
+    }
+
+    /// Kernels against the oracle, on the user's own device.
+    #[cfg(feature = "cli")]
+    pub mod doctor {
+        pub use crate::doctor::*;
+    }
+
+    /// Every kernel once more, in `f64` and plain loops.
+    pub mod oracle {
+        pub use crate::oracle::*;
+    }
+
+    /// A training with everything that the program adds.
+    #[cfg(feature = "cli")]
+    pub mod run {
+        pub use crate::run::{FitRequest, Preset, fit};
+    }
+
+    /// Scenes for other viewers.
+    #[cfg(feature = "cli")]
+    pub mod viewers {
+        pub use crate::viewers::{FitSettings, Pictures, Viewer, fit, pictures, shown_psnr, start};
+    }
+}

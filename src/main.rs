@@ -3,11 +3,10 @@
 use std::process::ExitCode;
 
 use clap::Parser;
-use gs_chroma::cli::Cli;
+use gs_chroma::low_level::Cli;
 
 fn main() -> ExitCode {
     set_environment();
-    gs_chroma::tradeoff::end_with_parent();
     Cli::parse().main()
 }
 

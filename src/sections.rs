@@ -14,9 +14,6 @@ const MAGIC: &[u8] = b"gs-chroma sections\n";
 const SUM: usize = 32;
 
 /// Writes sections; gives how many bytes these take.
-///
-/// # Errors
-/// The writer's.
 pub(crate) fn write(to: &mut dyn Write, sections: &[(&str, &[u8])]) -> io::Result<u64> {
     let mut hasher = Sha256::new();
     let mut size = 0;

@@ -3,17 +3,19 @@
 use std::sync::Arc;
 
 use gs_chroma::{
-    doctor::stage::Stage,
     gpu::Gpu,
-    luma::SsimWindow,
-    oracle::{
-        self,
-        gradient::gradient_of,
-        luma_loss::{LumaEffects, luma_loss_gradient},
-        render::render,
-        scene::Scene,
-        shade::Shading,
+    low_level::{
+        doctor::stage::Stage,
+        oracle::{
+            self,
+            gradient::gradient_of,
+            luma_loss::{LumaEffects, luma_loss_gradient},
+            render::render,
+            scene::Scene,
+            shade::Shading,
+        },
     },
+    luma::SsimWindow,
     raster::Raster,
 };
 use serde::Serialize;

@@ -1,6 +1,6 @@
 //! The knobs and the values that are measured.
 
-use gs_chroma::{luma::Numerics, oracle};
+use gs_chroma::{low_level::oracle, luma::Numerics};
 
 /// One value of one knob, as `fit --numerics KEY=VALUE` takes it; nothing is the default.
 #[derive(Clone, Copy, Debug)]

@@ -26,7 +26,7 @@ mod cloud;
 
 use std::{fs, path::PathBuf, process::ExitCode, time::Instant};
 
-use gs_chroma::{gpu::Gpu, store::RunFolder};
+use gs_chroma::{gpu::Gpu, low_level::RunFolder};
 use knobs::KNOBS;
 use scene::Subject;
 use table::Row;

@@ -3,18 +3,20 @@
 use glam::DMat3;
 use gs_chroma::{
     capture::{Camera, Capture, LoadOptions, Loader, split},
-    luma::TrainingView,
-    oracle::{
-        numerics::Numerics,
-        random::{Random, round},
-        render::render,
-        scene::{Gaussian, Scene},
-        shade::Shading,
-        view::View,
+    low_level::{
+        RunFolder,
+        oracle::{
+            numerics::Numerics,
+            random::{Random, round},
+            render::render,
+            scene::{Gaussian, Scene},
+            shade::Shading,
+            view::View,
+        },
     },
+    luma::TrainingView,
     raster::constants::NEAR_SHARE,
     splats::{Splats, ply},
-    store::RunFolder,
 };
 
 use crate::{

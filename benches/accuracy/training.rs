@@ -8,9 +8,9 @@ use std::{
 use gs_chroma::{
     capture::LoadOptions,
     gpu::Gpu,
+    low_level::run::{FitRequest, Preset, fit},
     luma::{LumaOverlay, LumaSettings, LumaTrainer, Numerics, Schedule},
     raster::Raster,
-    run::{FitRequest, Preset, fit},
     splats::Splats,
 };
 use serde::Serialize;

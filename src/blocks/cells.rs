@@ -247,6 +247,11 @@ mod tests {
         areas.iter().map(held).collect()
     }
 
+    fn evenly(places: &[[f64; 2]]) -> GroundWork<'_> {
+        let weights = &[1.0; 4000];
+        GroundWork { places, weights }
+    }
+
     #[test]
     fn cells_have_equal_work_and_cover_the_ground_once() {
         let places = places();
@@ -275,11 +280,8 @@ mod tests {
 
     #[test]
     fn cells_have_the_work_that_is_asked() {
-        let (places, weights) = (places(), vec![1.0; 4000]);
-        let work = GroundWork {
-            places: &places,
-            weights: &weights,
-        };
+        let places = places();
+        let work = evenly(&places);
         let shares = [1.0, 2.0, 4.0, 3.0];
         for blocks in [Blocks::Count(4), Blocks::Grid([2, 2])] {
             let areas = work.cells(blocks, &shares).leaves();
@@ -292,11 +294,8 @@ mod tests {
 
     #[test]
     fn cells_are_balanced_with_their_margins() {
-        let (places, weights) = (places(), vec![1.0; 4000]);
-        let work = GroundWork {
-            places: &places,
-            weights: &weights,
-        };
+        let places = places();
+        let work = evenly(&places);
         let bounds = Area([[0.0, 30.0], [0.0, 10.0]]);
         let near = |core: &Area| core.within(&bounds).grown(0.2);
         // How much more the fullest has than the emptiest.
@@ -315,11 +314,8 @@ mod tests {
 
     #[test]
     fn the_longer_side_is_cut_and_a_grid_is_cut_as_asked() {
-        let (places, weights) = (places(), vec![1.0; 4000]);
-        let work = GroundWork {
-            places: &places,
-            weights: &weights,
-        };
+        let places = places();
+        let work = evenly(&places);
         let [left, right] = work.cells(Blocks::Count(2), &[1.0; 2]).leaves()[..] else {
             panic!("two");
         };
@@ -349,11 +345,8 @@ mod tests {
 
     #[test]
     fn a_cell_is_joined_with_its_neighbor() {
-        let (places, weights) = (places(), vec![1.0; 4000]);
-        let work = GroundWork {
-            places: &places,
-            weights: &weights,
-        };
+        let places = places();
+        let work = evenly(&places);
         let mut cell = work.cells(Blocks::Count(4), &[1.0; 4]);
         let four = cell.leaves();
         cell.join(3);

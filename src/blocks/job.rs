@@ -51,7 +51,6 @@ pub struct Job {
     pub whole: Estimate,
     /// The coarse model.
     pub coarse: Estimate,
-    /// The blocks.
     pub blocks: Vec<Block>,
 }
 
@@ -65,7 +64,6 @@ pub struct Block {
     pub core: Area,
     /// The cell with its margin, on which it is trained.
     pub near: Area,
-    /// Its photos.
     pub photos: usize,
     /// Those of them that are held out.
     pub held_out: usize,
@@ -93,7 +91,6 @@ pub struct BlockFile {
     pub version: u32,
     /// Kind of training.
     pub kind: Kind,
-    /// Its photos.
     pub photos: Chosen,
     /// Its Gaussians, at most, where that was asked for.
     pub max_splats: Option<usize>,
@@ -181,7 +178,6 @@ impl Job {
         to_file(self)
     }
 
-    /// A block of this name.
     pub fn block(&self, name: &str) -> Option<&Block> {
         self.blocks.iter().find(|block| block.name == name)
     }
@@ -209,9 +205,6 @@ impl BlockFile {
 }
 
 /// Refuses a folder of a job that lies elsewhere.
-///
-/// # Errors
-/// [`BlocksError::File`].
 pub fn refuse_link(folder: &Path) -> Result<(), BlocksError> {
     match folder.is_symlink() {
         true => Err(BlocksError::File {

@@ -75,9 +75,6 @@ pub struct PartitionPlan {
 }
 
 /// Divides a capture; `root` is its folder's absolute path.
-///
-/// # Errors
-/// [`BlocksError::MemoryLimit`].
 pub fn plan(
     capture: &Capture,
     root: PathBuf,

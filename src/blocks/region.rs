@@ -9,7 +9,6 @@ use super::{Area, Ground};
 pub struct Region {
     /// The ground of COLMAP's world.
     pub ground: Ground,
-    /// The area of it.
     pub area: Area,
     /// Offset that was subtracted from COLMAP's coordinates, in world units.
     pub offset: DVec3,

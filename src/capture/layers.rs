@@ -50,9 +50,6 @@ impl Layers {
     }
 
     /// Takes a view's picture off its photo, which has as many pixels.
-    ///
-    /// # Errors
-    /// [`CaptureError::Read`].
     pub(super) fn take_off(&self, view: usize, gray: &mut [u8]) -> Result<(), CaptureError> {
         let Some(place) = self.places[view] else {
             return Ok(());

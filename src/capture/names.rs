@@ -173,9 +173,6 @@ impl NamedFiles {
     }
 
     /// The file that belongs to a photo, if there is one.
-    ///
-    /// # Errors
-    /// [`AmbiguousNames`].
     pub fn of(&self, photo: &str) -> Result<Option<&Path>, AmbiguousNames> {
         let photo = composed(photo);
         let found = match self.exact(&photo)? {

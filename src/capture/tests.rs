@@ -340,31 +340,16 @@ fn faulty_text_names_its_line() {
         files[file] = text.replacen(from, to, 1).into_bytes();
         load_files(&model, files, "txt")
     };
-    assert_says(
-        replaced(0, "10 11", "10 eleven"),
-        "cameras.txt",
-        &["line 2", "\"eleven\""],
-    );
-    assert_says(
-        replaced(0, " 3\n", "\n"),
-        "cameras.txt",
-        &["line 2", "the parameters"],
-    );
-    assert_says(
-        replaced(1, "0.25 2 7 b.png", "0.25"),
-        "images.txt",
-        &["line 3", "the translation"],
-    );
-    assert_says(
-        replaced(1, " b.png", ""),
-        "images.txt",
-        &["line 3", "names no file"],
-    );
-    assert_says(
-        replaced(2, "200", "256"),
-        "points3D.txt",
-        &["line 1", "the color"],
-    );
+    for (file, from, to, said) in [
+        (0, "10 11", "10 eleven", ["line 2", "\"eleven\""]),
+        (0, " 3\n", "\n", ["line 2", "the parameters"]),
+        (1, "0.25 2 7 b.png", "0.25", ["line 3", "the translation"]),
+        (1, " b.png", "", ["line 3", "names no file"]),
+        (2, "200", "256", ["line 1", "the color"]),
+    ] {
+        let name = ["cameras.txt", "images.txt", "points3D.txt"][file];
+        assert_says(replaced(file, from, to), name, &said);
+    }
     let mut files = model.text();
     files[2][0] = 0xff;
     assert_says(

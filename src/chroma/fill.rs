@@ -119,22 +119,7 @@ fn relaxed(
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// A row of Gaussians one unit apart.
-    fn row(grays: &[f32]) -> Splats {
-        let count = grays.len();
-        Splats {
-            means: (0..count).map(|i| [i as f32, 0.0, 0.0]).collect(),
-            quats: vec![[1.0, 0.0, 0.0, 0.0]; count],
-            log_scales: vec![[0.0; 3]; count],
-            opacity_logits: vec![0.0; count],
-            sh: ShField {
-                degree: 0,
-                channels: 1,
-                coefficients: grays.iter().map(|g| (g - 0.5) / sh::C0 as f32).collect(),
-            },
-        }
-    }
+    use crate::splats::fixtures::row;
 
     fn chroma(values: &[[f32; 2]]) -> ShField {
         ShField {

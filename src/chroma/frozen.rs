@@ -184,9 +184,6 @@ impl FrozenViews {
     }
 
     /// Harmonics of all Gaussians, to be drawn.
-    ///
-    /// # Errors
-    /// [`ChromaError::Gpu`].
     pub(super) fn colors<'a>(&self, field: &'a ShField) -> Result<Colors<'a>, ChromaError> {
         Ok(match self.streamed {
             Some(_) => Colors::Host(field),

@@ -67,9 +67,6 @@ impl HostSystem {
     }
 
     /// Adds what the device found of the gradient and the curvature of some Gaussians.
-    ///
-    /// # Errors
-    /// [`ChromaError::Gpu`].
     pub fn receive(
         &mut self,
         gpu: &Gpu,

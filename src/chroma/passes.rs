@@ -210,9 +210,6 @@ impl<'a> Passes<'a> {
     }
 
     /// The harmonics so far.
-    ///
-    /// # Errors
-    /// [`ChromaError::Gpu`].
     pub fn harmonics(&self) -> Result<ShField, ChromaError> {
         match &self.on_host {
             Some(on_host) => Ok(on_host.field()),
@@ -221,9 +218,6 @@ impl<'a> Passes<'a> {
     }
 
     /// See [`Passes::diagonal`], of all Gaussians.
-    ///
-    /// # Errors
-    /// [`ChromaError::Gpu`].
     pub fn curvature(&self) -> Result<Vec<f32>, ChromaError> {
         match &self.on_host {
             Some(on_host) => Ok(on_host.diagonal.clone()),
@@ -232,9 +226,6 @@ impl<'a> Passes<'a> {
     }
 
     /// Takes other harmonics, of the same degree and channels.
-    ///
-    /// # Errors
-    /// [`ChromaError::Gpu`].
     pub fn put(&mut self, field: &ShField) -> Result<(), ChromaError> {
         match &mut self.on_host {
             Some(on_host) => on_host.put(field),

@@ -64,9 +64,6 @@ pub(super) type Between<'a> = (
 );
 
 /// [`solve`] that can be interrupted and go on, if not by Adam.
-///
-/// # Errors
-/// As [`solve`], and [`ChromaError::OtherCheckpoint`].
 pub(super) fn solve_from(
     (from, between): Between<'_>,
     frozen: &FrozenViews,

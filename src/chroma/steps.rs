@@ -48,9 +48,6 @@ pub(super) struct StepStatus {
 
 impl Steps {
     /// Begins where `passes` are.
-    ///
-    /// # Errors
-    /// [`ChromaError::Gpu`].
     pub fn new(
         kernels: &LbfgsKernels,
         passes: &Passes<'_>,
@@ -92,9 +89,6 @@ impl Steps {
     }
 
     /// A step from where all views are drawn, and where it stands.
-    ///
-    /// # Errors
-    /// [`ChromaError::Gpu`].
     pub fn step(&mut self, passes: &mut Passes<'_>) -> Result<LbfgsState, ChromaError> {
         match self {
             Self::Device(_, lbfgs) => {
@@ -108,9 +102,6 @@ impl Steps {
     }
 
     /// Judges the last step, where all views are drawn for their loss.
-    ///
-    /// # Errors
-    /// [`ChromaError::Gpu`].
     pub fn end(&mut self, passes: &mut Passes<'_>) -> Result<LbfgsState, ChromaError> {
         let gpu = passes.frozen.gpu();
         match self {
@@ -154,9 +145,6 @@ impl Steps {
     }
 
     /// All that the next step goes by.
-    ///
-    /// # Errors
-    /// [`ChromaError::Gpu`].
     pub fn kept(&self, passes: &Passes<'_>) -> Result<StepStatus, ChromaError> {
         let gpu = passes.frozen.gpu();
         let mut kept = StepStatus::default();

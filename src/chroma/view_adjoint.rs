@@ -49,9 +49,6 @@ pub(super) struct ViewAdjoint {
 
 impl ViewAdjoint {
     /// Those of a view at a scale.
-    ///
-    /// # Errors
-    /// [`ChromaError::Gpu`].
     pub fn new(
         shared: &SolveBuffers<'_>,
         view: usize,

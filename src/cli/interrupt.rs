@@ -27,9 +27,6 @@ static HEEDED: OnceLock<Arc<Interrupt>> = OnceLock::new();
 static ENDS_WELL: AtomicBool = AtomicBool::new(false);
 
 /// Lets signals end the program without leaving files behind that were only begun.
-///
-/// # Errors
-/// [`RunError::Signals`].
 pub(super) fn heed_signals() -> Result<(), CliError> {
     let handled = ctrlc::set_handler(|| {
         if HEEDED.get().is_some_and(|interrupt| interrupt.raise()) {

@@ -85,6 +85,7 @@ enum Command {
 impl Cli {
     /// Runs the command; what stops it is told in one line on standard error.
     pub fn main(self) -> ExitCode {
+        crate::tradeoff::end_with_parent();
         match interrupt::heed_signals().and_then(|()| self.run()) {
             Ok(()) => ExitCode::SUCCESS,
             Err(error) => {

@@ -123,18 +123,12 @@ impl Progress {
     }
 
     /// The last lines of a command: what took how long, what lies where, and what to type next.
-    ///
-    /// # Errors
-    /// [`CliError`] of standard output.
     pub fn close(&mut self, wrote: &[&Path], next: &str) -> Result<(), CliError> {
         self.told(wrote)?;
         print(format_args!("next: {next}"))
     }
 
     /// The same of a command that made `scene`, and how to look at it.
-    ///
-    /// # Errors
-    /// As [`Self::close`].
     pub fn close_with(
         &mut self,
         scene: &Path,

@@ -91,7 +91,6 @@ fn originals() -> MutexGuard<'static, Vec<(u64, HashMap<FileId, &'static str>)>>
 pub(crate) struct Originals(u64);
 
 impl Originals {
-    /// Keeps these.
     pub fn keep(files: HashMap<FileId, &'static str>) -> Self {
         let mut all = originals();
         let number = all.last().map_or(0, |(last, _)| last + 1);
@@ -138,9 +137,6 @@ fn links(_: &Metadata) -> u64 {
 
 /// Size, time of change and number of an open file: as long as they are the same, so are the
 /// bytes.
-///
-/// # Errors
-/// The system's.
 pub(crate) fn stamp(file: &File) -> io::Result<String> {
     let there = file.metadata()?;
     #[cfg(unix)]

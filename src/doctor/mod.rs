@@ -92,9 +92,6 @@ pub const STEPS: usize = TOPICS.len() + CASES.len();
 impl Diagnosis {
     /// Measures every kernel and runs every case, telling `observe` which one is
     /// next of [`STEPS`].
-    ///
-    /// # Errors
-    /// [`GpuError`] when the device has no room for a case or is lost.
     pub fn of(gpu: &Gpu, observe: &mut dyn FnMut(usize, &'static str)) -> Result<Self, GpuError> {
         let raster = Arc::new(Raster::new(gpu));
         let mut kernels = Vec::new();
@@ -165,17 +162,11 @@ impl Diagnosis {
 }
 
 /// Runs one case.
-///
-/// # Errors
-/// [`GpuError`] when the device has no room for it or is lost.
 pub fn examine(raster: &Arc<Raster>, case: &Case) -> Result<Verdict, GpuError> {
     examine_with(raster, case, Numerics::DEFAULT)
 }
 
 /// Runs one case of which device and oracle leave out as much as this.
-///
-/// # Errors
-/// [`GpuError`] when the device has no room for it or is lost.
 pub fn examine_with(
     raster: &Arc<Raster>,
     case: &Case,

@@ -89,9 +89,6 @@ enum Adjoint {
 
 impl Stage {
     /// A stage with room for every Gaussian in every tile.
-    ///
-    /// # Errors
-    /// [`GpuError::TooLarge`].
     pub fn new(raster: &Arc<Raster>, splats: &Splats, view: &View) -> Result<Self, GpuError> {
         let [columns, rows] =
             [view.width, view.height].map(|side| side.div_ceil(TILE_SIDE as usize));
@@ -100,9 +97,6 @@ impl Stage {
 
     /// A stage with room for so many tile-list entries, antialiased if the view is, that
     /// leaves out what the view says.
-    ///
-    /// # Errors
-    /// [`GpuError::TooLarge`].
     pub fn with_capacity(
         raster: &Arc<Raster>,
         splats: &Splats,
@@ -173,9 +167,6 @@ impl Stage {
     }
 
     /// Draws, and gives the picture `[pixels, channels]`.
-    ///
-    /// # Errors
-    /// [`GpuError::Lost`].
     pub fn forward(&self) -> Result<Vec<f32>, GpuError> {
         self.record().submit();
         self.image()
@@ -183,17 +174,11 @@ impl Stage {
 
     /// Draws, and differentiates `Σ upstream · picture`; `upstream` is
     /// `[pixels, channels]`. Of a/b and RGB its first channels stand for the curvatures too.
-    ///
-    /// # Errors
-    /// [`GpuError::Lost`].
     pub fn backward(&self, upstream: &[f64]) -> Result<Gradient, GpuError> {
         self.backward_onto(upstream, &[])
     }
 
     /// The same, of a/b and RGB added to these values of the field's gradient.
-    ///
-    /// # Errors
-    /// [`GpuError::Lost`].
     pub fn backward_onto(&self, upstream: &[f64], before: &[f32]) -> Result<Gradient, GpuError> {
         let gpu = &self.raster.gpu;
         let mut recorder = self.record();
@@ -238,26 +223,17 @@ impl Stage {
     }
 
     /// The picture last drawn.
-    ///
-    /// # Errors
-    /// [`GpuError::Lost`].
     pub fn image(&self) -> Result<Vec<f32>, GpuError> {
         let pixels = self.view.pixel_count();
         self.layer.read_image(&self.raster.gpu, pixels)
     }
 
     /// Counts of the device since the last reset.
-    ///
-    /// # Errors
-    /// [`GpuError::Lost`].
     pub fn status(&self) -> Result<Status, GpuError> {
         self.lists.status(&self.raster.gpu)
     }
 
     /// The projection of each Gaussian, none where it is not visible.
-    ///
-    /// # Errors
-    /// [`GpuError::Lost`].
     pub fn projected(&self) -> Result<Vec<Option<Projected>>, GpuError> {
         let gpu = &self.raster.gpu;
         let ranks = self.lists.ranks.read(gpu)?;
@@ -268,9 +244,6 @@ impl Stage {
     }
 
     /// The Gaussians of each tile in the order in which they are blended.
-    ///
-    /// # Errors
-    /// [`GpuError::Lost`].
     pub fn tiles(&self) -> Result<Vec<Vec<usize>>, GpuError> {
         let gpu = &self.raster.gpu;
         let (slots, starts) = (self.lists.slots().read(gpu)?, self.lists.starts.read(gpu)?);

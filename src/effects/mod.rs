@@ -21,12 +21,9 @@ mod tracks;
 mod words;
 
 pub use background::{Backdrop, FarPlaces};
-pub use direction::left_out_errors;
 pub use evidence::{Evidence, Survey};
-pub use exposure::{Exposures, find_exposures, find_photo_exposures};
+pub use exposure::Exposures;
 pub use plan::{Decider, Decision, Effect, Overrules, Plan, TrainingBudget, Trials};
-pub use sampling::sampling_spread;
-pub use shell::Shell;
 pub use soundness::{
     Agreement, Cause, Contradiction, Contradictory, FEW_POINTS, Levels, PointColors, Reprojection,
     SparsePhotos, doubts, observe_where_projected,

@@ -76,13 +76,8 @@ impl Shell {
         }
     }
 
-    /// The views whose photos tell what there is, ascending.
-    pub fn views(&self) -> &[usize] {
-        &self.views
-    }
-
     /// Takes what the photo of a view, at working size, shows of the places; of a view that is
-    /// none of [`Self::views`], nothing.
+    /// none of its views, nothing.
     pub fn look(&mut self, view: usize, photo: &Photo) {
         let Ok(index) = self.views.binary_search(&view) else {
             return;
@@ -170,7 +165,7 @@ mod tests {
         let mut shown = photo(&camera, |x, _| if x < 32 { 51 } else { 204 });
         shown.mask = masked.then(|| vec![0; 64 * 64]);
         let mut shell = Shell::new(DVec3::ZERO, 10.0, 600, (&[3], &[camera]));
-        assert_eq!(shell.views(), [3]);
+        assert_eq!(shell.views, [3]);
         shell.look(2, &shown);
         assert!(shell.splats(0).is_empty());
         shell.look(3, &shown);

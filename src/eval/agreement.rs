@@ -43,7 +43,6 @@ struct Frame {
     colors: Vec<(Method, Vec<[f32; 2]>)>,
 }
 
-/// Sums of each method.
 #[derive(Default)]
 struct Sums(Vec<(Method, Consistency)>);
 
@@ -194,9 +193,6 @@ pub fn along_path<E: From<EvalError>>(
 /// Compares the photographed views in pairs; where there is a teacher, those that it
 /// colored. What photos in color differ by among themselves tells how much is due to
 /// light, noise and the flow.
-///
-/// # Errors
-/// [`EvalError`] of a photo, the device or the teacher.
 pub fn between_views(
     painter: &mut Painter<'_>,
     scene: &ColoredScene,

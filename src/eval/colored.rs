@@ -23,7 +23,6 @@ pub const COLUMNS: [&str; 4] = ["photo", "gray scene", "teacher", "colored scene
 pub struct Measured {
     /// The exported file against the native pictures, mean over the views.
     pub bake: ColorError,
-    /// Each view.
     pub views: Vec<ColorView>,
     /// Some of them, for the contact sheet.
     pub rows: Vec<Row>,
@@ -32,9 +31,6 @@ pub struct Measured {
 impl Measured {
     /// Draws and measures the held-out views, or those that color was learned from where none is
     /// left: `luma` with `chroma` against `baked`, and that against the photos.
-    ///
-    /// # Errors
-    /// [`EvalError`] of a photo or the device, or when wanted colors cannot be read.
     pub fn of(
         raster: &Arc<Raster>,
         dataset: &Dataset,

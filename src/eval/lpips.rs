@@ -63,9 +63,6 @@ impl Lpips {
     }
 
     /// The distance of two pictures, RGB in [0, 1] of one width and height.
-    ///
-    /// # Errors
-    /// [`EvalError::Network`].
     pub fn distance(
         &mut self,
         a: &[[f32; 3]],

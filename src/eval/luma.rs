@@ -11,9 +11,6 @@ use crate::{
 };
 
 /// Gray pictures of each held-out view of `dataset`, as viewers show them, against its photo.
-///
-/// # Errors
-/// [`EvalError`] of a photo or the device.
 pub fn measure_luma(
     raster: &Arc<Raster>,
     dataset: &Dataset,
@@ -54,9 +51,6 @@ const SHEET_ROWS: usize = 4;
 
 /// The rows of a contact sheet: some of the held-out views, or of all where none is held out, as
 /// far apart as they are in the photos' order.
-///
-/// # Errors
-/// [`EvalError`] of a photo or the device.
 pub fn gray_rows(
     raster: &Arc<Raster>,
     dataset: &Dataset,

@@ -24,7 +24,7 @@ pub use peers::Peer;
 pub use progress::{Observer, Progress, Task};
 pub use reference::{Reference, exposures};
 pub use scene::ColoredScene;
-pub use score::{Scored, Shot, mean_bake, mean_luma, mean_pictures, teacher_colorfulness};
+pub use score::{Scored, mean_bake, mean_luma, mean_pictures, teacher_colorfulness};
 pub use teacher::MeasuredTeacher;
 
 use crate::{
@@ -45,7 +45,6 @@ pub enum EvalError {
     /// RGB splats to compare with, or answers that were kept.
     #[error(transparent)]
     Chroma(#[from] ChromaError),
-    /// The teacher.
     #[error(transparent)]
     Teacher(#[from] TeacherError),
     /// The teacher has no colors for any of the views.

@@ -44,9 +44,6 @@ pub struct Drawing {
 impl<'a> Painter<'a> {
     /// A painter of the scene's own pictures, of RGB splats on its geometry, and of
     /// what a teacher makes of the gray pictures.
-    ///
-    /// # Errors
-    /// [`EvalError::Gpu`].
     pub fn new(
         raster: &Arc<Raster>,
         scene: &'a ColoredScene,
@@ -66,9 +63,6 @@ impl<'a> Painter<'a> {
     }
 
     /// Draws what `camera` sees; `name` is for the teacher's errors.
-    ///
-    /// # Errors
-    /// [`EvalError`] of the device or the teacher.
     pub fn draw(&mut self, camera: &Camera, name: &str) -> Result<Drawing, EvalError> {
         let mut pictures = self.renderer.render(camera)?;
         // One picture a field: gray, RGB, and a/b last.
@@ -94,9 +88,6 @@ impl<'a> Painter<'a> {
 
     /// The scene's median depth along the camera's z axis in world units, `[height,
     /// width]`; NaN where it is not opaque enough to have one.
-    ///
-    /// # Errors
-    /// [`EvalError::Gpu`].
     pub fn depth(&mut self, camera: &Camera) -> Result<Vec<f32>, EvalError> {
         Ok(self.renderer.depth(camera)?)
     }

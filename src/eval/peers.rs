@@ -55,9 +55,6 @@ impl Peer {
     /// RGB splats on the run's geometry, fitted to the teacher's pictures of the training
     /// views, whose exposures and masks they are told; and what that took. `seed` is that of
     /// the views' order.
-    ///
-    /// # Errors
-    /// [`EvalError`] of a photo or the solver, [`EvalError::NothingTaught`].
     pub fn color(
         self,
         raster: &Arc<Raster>,

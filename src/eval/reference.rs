@@ -14,7 +14,6 @@ use crate::{
 /// [`Reference::shown`]), for how bright a photo became is no matter of the scene.
 #[derive(Clone, Copy)]
 pub struct Reference<'a> {
-    /// The photo.
     pub photo: &'a Photo,
     /// Exposure of the photo.
     pub exposure: Exposure,

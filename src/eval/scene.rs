@@ -6,7 +6,6 @@ use crate::{
     splats::{ShField, Splats},
 };
 
-/// A colored scene.
 pub struct ColoredScene {
     /// Its photos.
     pub dataset: Dataset,

@@ -27,7 +27,6 @@ pub struct Scored {
 pub struct Shot {
     /// Part of its file's name.
     pub file: &'static str,
-    /// Caption.
     pub caption: &'static str,
     /// RGB in [0, 1], `[height, width]`.
     pub pixels: Vec<[f32; 3]>,
@@ -47,9 +46,6 @@ const SHOWN: [(Method, &str); 6] = [
 impl Scored {
     /// Measures what was drawn, and the teacher's answer, against a photo: what was drawn
     /// as the photo would show it.
-    ///
-    /// # Errors
-    /// [`EvalError::Network`] of `lpips`.
     pub fn of(
         name: &str,
         reference: Reference<'_>,
@@ -255,9 +251,6 @@ pub fn mean_luma(views: &[Scored]) -> LumaScore {
 }
 
 /// Mean colorfulness of the teacher's pictures of all photos.
-///
-/// # Errors
-/// [`EvalError`] of a photo, or when kept answers cannot be read.
 pub fn teacher_colorfulness(
     painter: &Painter<'_>,
     scene: &ColoredScene,

@@ -24,9 +24,6 @@ pub struct MeasuredTeacher {
 
 impl MeasuredTeacher {
     /// Asks `teacher` for all photos; `frames`, where given, is asked for drawn pictures.
-    ///
-    /// # Errors
-    /// [`EvalError`] of a photo or the teacher, [`EvalError::NothingTaught`].
     pub fn ask(
         mut teacher: Teacher,
         frames: Option<Teacher>,
@@ -82,9 +79,6 @@ impl MeasuredTeacher {
     }
 
     /// The teacher's colors for a drawn gray picture; `None` without that baseline.
-    ///
-    /// # Errors
-    /// [`EvalError::Teacher`].
     pub fn color_frame(
         &mut self,
         name: &str,

@@ -56,11 +56,8 @@ fn where_it_covers_nothing_the_teacher_is_taken_as_it_is() {
 fn beside_the_scene_the_teacher_is_moved_in_line_with_it_and_keeps_its_detail() {
     let (width, height) = (40, 12);
     let canvas = Canvas {
-        width,
-        height,
         gray: vec![128; (width * height) as usize],
-        mask: None,
-        stance: Default::default(),
+        ..halves(width, height, 0)
     };
     // The teacher is 12 units too red everywhere, and has a stripe of its own on the right.
     let stripe = |i: usize| if i % 40 >= 30 { 15.0 } else { 0.0 };
@@ -140,11 +137,8 @@ fn whatever_the_size_and_nothing_known_it_ends() {
 fn where_the_teacher_is_plainly_wrong_nothing_of_it_is_left_and_a_cast_costs_no_detail() {
     let (width, height) = (60, 40);
     let canvas = Canvas {
-        width,
-        height,
         gray: vec![128; (width * height) as usize],
-        mask: None,
-        stance: Default::default(),
+        ..halves(width, height, 0)
     };
     let at = |i: usize| (i % 60, i / 60);
     // Stripes that blurred geometry has lost; a cast of 9 units; a patch of another color.

@@ -16,7 +16,6 @@ pub struct Canvas {
     pub gray: Vec<u8>,
     /// Weight of each pixel by the photo's mask, 0 to 255; `None` where all count.
     pub mask: Option<Vec<u8>>,
-    /// Orientation of the sensor.
     pub stance: SensorOrientation,
 }
 
@@ -59,11 +58,6 @@ impl Canvas {
     /// Number of pixels.
     pub fn len(&self) -> usize {
         self.gray.len()
-    }
-
-    /// Returns true if it has no pixels; never.
-    pub fn is_empty(&self) -> bool {
-        self.gray.is_empty()
     }
 
     /// Width and height.

@@ -38,7 +38,6 @@ struct Lens {
 /// One view of a photo: the photo itself, or a face of it.
 #[derive(Clone, Copy)]
 pub struct ViewOf<'a> {
-    /// The view.
     pub view: &'a View,
     /// Its camera at working size.
     pub camera: &'a Camera,
@@ -58,9 +57,6 @@ pub fn believable(splats: usize, surroundings: usize) -> ShField {
 impl<'a> SceneDrawer<'a> {
     /// A drawer of a scene with native a/b harmonics; `believed` marks the believable part
     /// ([`believable`]), `extent` is the capture's, in world units.
-    ///
-    /// # Errors
-    /// [`GpuError::NoColor`].
     pub fn new(
         raster: &Arc<Raster>,
         luma: &'a Splats,
@@ -85,9 +81,6 @@ impl<'a> SceneDrawer<'a> {
     }
 
     /// The scene's colors on a photo's canvas.
-    ///
-    /// # Errors
-    /// [`GpuError`].
     pub fn draw(
         &mut self,
         views: &[ViewOf<'_>],

@@ -21,9 +21,6 @@ pub(super) fn unknown(photo: &Photo) -> Option<Vec<u8>> {
 
 /// The Gaussians that lie inside the silhouettes of the training views; all of them where
 /// nothing would be left.
-///
-/// # Errors
-/// [`CaptureError`] of a photo.
 pub fn carved(dataset: &Dataset, splats: &Splats) -> Result<Splats, CaptureError> {
     let places: Vec<DVec3> = (splats.means.iter())
         .map(|mean| DVec3::from(mean.map(f64::from)))

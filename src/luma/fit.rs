@@ -56,6 +56,11 @@ pub struct LumaScene {
 }
 
 impl LumaScene {
+    /// Rasterizer that draws the scene as it was trained.
+    pub fn raster(&self, gpu: &Gpu) -> Arc<Raster> {
+        self.settings.raster(gpu)
+    }
+
     /// Exposure of each view.
     pub fn exposures(&self) -> &[Exposure] {
         &self.plan.exposures

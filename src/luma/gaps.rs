@@ -46,9 +46,6 @@ pub(super) struct GapPoint {
 }
 
 /// At most `most` points where the training photos show something and the capture has none.
-///
-/// # Errors
-/// [`CaptureError`] of a photo.
 pub(super) fn gap_points(dataset: &Dataset, most: usize) -> Result<Vec<GapPoint>, CaptureError> {
     let train = &dataset.split.train;
     let count = train.len().min(MAX_VIEWS);

@@ -106,9 +106,6 @@ impl Targets {
 
     /// The photos of `views`, of at most so many pixels each; `streams` is whether they come to
     /// the device one by one.
-    ///
-    /// # Errors
-    /// [`LumaError`].
     pub fn new(
         gpu: &Gpu,
         effects: LossEffects,
@@ -129,9 +126,6 @@ impl Targets {
 
     /// Readies a photo for what is submitted next, and gives its buffers' place; the photos
     /// of `next` come after it.
-    ///
-    /// # Errors
-    /// [`LumaError`] of the photo.
     pub fn show(
         &mut self,
         gpu: &Gpu,

@@ -30,7 +30,7 @@ mod view;
 mod workspace;
 
 pub use checkpoint::{Checkpoint, Checkpointing, NoCheckpoints};
-pub use curve::{CurvePoint, gain_of_doubling};
+pub use curve::CurvePoint;
 pub use densify::DensifyParameters;
 pub use error::LumaError;
 pub use fit::{Fit, LumaEvent, LumaObserver, LumaScene, fit};

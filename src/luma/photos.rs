@@ -28,9 +28,6 @@ pub struct Photos {
 
 impl Photos {
     /// The photos of `views`, which are loaded now or, `streamed`, when they are shown.
-    ///
-    /// # Errors
-    /// [`LumaError`].
     pub fn new(
         gpu: &Gpu,
         views: &Arc<dyn TrainingViews>,
@@ -92,9 +89,6 @@ impl Photos {
     }
 
     /// The same with a bit for each pixel that does not count, as [`Photos::left_out`] has them.
-    ///
-    /// # Errors
-    /// [`LumaError`] of the photo.
     pub fn leave_out_bits(
         &mut self,
         gpu: &Gpu,
@@ -122,9 +116,6 @@ impl Photos {
 
     /// Readies a photo for what is submitted next, and gives its picture's place; those of
     /// `next` are loaded meanwhile.
-    ///
-    /// # Errors
-    /// [`LumaError`] of the photo.
     pub fn show(
         &mut self,
         gpu: &Gpu,

@@ -1,12 +1,15 @@
 //! The settings of stage 1. Rates are of the 3DGS paper (Kerbl et al. 2023) unless another
 //! reason is given.
 
+use std::sync::Arc;
+
 use serde::{Deserialize, Serialize, de::IgnoredAny};
 
 use super::Numerics;
 use crate::{
     effects::{Effect, Plan, TrainingBudget},
-    raster::RasterOptions,
+    gpu::Gpu,
+    raster::{Raster, RasterOptions},
 };
 
 /// Luma iterations of ChromaDistill (WACV 2025, supplement).
@@ -200,7 +203,12 @@ impl LumaSettings {
         }
     }
 
-    /// Rasterizer options of the scene.
+    /// Rasterizer that draws a scene of these settings.
+    pub fn raster(&self, gpu: &Gpu) -> Arc<Raster> {
+        Arc::new(Raster::with(gpu, self.raster_options()))
+    }
+
+    /// Options of this rasterizer.
     pub fn raster_options(&self) -> RasterOptions {
         RasterOptions {
             antialiased: self.antialiased,

@@ -113,9 +113,6 @@ impl TrainingViews for Vec<TrainingView> {
 }
 
 /// A view with its photo.
-///
-/// # Errors
-/// [`LumaError`] of a photo that cannot be loaded or has not its camera's size.
 pub(super) fn load(views: &dyn TrainingViews, view: usize) -> Result<TrainingView, LumaError> {
     let loaded = views.load(view)?;
     let expected = loaded.camera.width as usize * loaded.camera.height as usize;

@@ -49,9 +49,6 @@ pub struct Workspace {
 
 impl Workspace {
     /// A workspace to train `model` with tile lists of `capacity` entries.
-    ///
-    /// # Errors
-    /// [`GpuError::TooLarge`].
     pub fn new(
         raster: &Raster,
         kernels: &Kernels,

@@ -28,9 +28,6 @@ pub(crate) const FFMPEG: &str = "ffmpeg";
 const PATIENCE: Duration = Duration::from_millis(5);
 
 /// Streams and format of a film in the words of `ffprobe`, which are JSON.
-///
-/// # Errors
-/// [`ProgramError`].
 pub(crate) fn probe(film: &Path) -> Result<String, ProgramError> {
     let told = [
         "-v",
@@ -60,7 +57,6 @@ pub enum ProgramError {
         /// Name of the program, as it was started.
         program: String,
     },
-    /// It failed.
     #[error("{program} failed: {said}")]
     Failed {
         /// Name of the program, as it was started.
@@ -152,9 +148,6 @@ impl Program {
 
     /// Runs it in a folder, and hands every line that it says to `heard`; at the end all that
     /// was said of the last [`said::KEPT_LINES`] lines.
-    ///
-    /// # Errors
-    /// [`ProgramError`].
     pub fn run(self, folder: &Path, heard: &mut dyn FnMut(&str)) -> Result<(), ProgramError> {
         let (running, _, output, error) = self.start(folder, Stdio::null())?;
         let mut last = Last::default();
@@ -166,9 +159,6 @@ impl Program {
     }
 
     /// Starts it in the current folder, to be given bytes on its standard input.
-    ///
-    /// # Errors
-    /// As [`Self::run`].
     pub fn feed(self) -> Result<PipedProgram, ProgramError> {
         let (running, input, output, error) = self.start(Path::new("."), Stdio::piped())?;
         Ok(PipedProgram {
@@ -181,9 +171,6 @@ impl Program {
 
     /// Runs it in the current folder, and gives all that it says on standard output and standard
     /// error.
-    ///
-    /// # Errors
-    /// As [`Self::run`].
     pub fn ask(self) -> Result<String, ProgramError> {
         let mut said = String::new();
         self.run(Path::new("."), &mut |line| {
@@ -195,9 +182,6 @@ impl Program {
 
     /// Runs it in the current folder and lets `take` read its standard output, until that is
     /// at an end or `take` says that it has enough (`false`).
-    ///
-    /// # Errors
-    /// As [`Self::run`].
     #[cfg(feature = "cli")]
     pub fn read(
         self,
@@ -309,9 +293,6 @@ impl PipedProgram {
     }
 
     /// Lets it come to its end.
-    ///
-    /// # Errors
-    /// [`ProgramError::Failed`].
     pub fn finish(mut self) -> Result<(), ProgramError> {
         self.end()
     }

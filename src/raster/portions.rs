@@ -27,9 +27,6 @@ pub(super) struct Portions {
 
 impl Portions {
     /// For pictures of at most `max_tiles` tiles.
-    ///
-    /// # Errors
-    /// [`GpuError::TooLarge`].
     pub fn new(gpu: &Gpu, max_tiles: usize) -> Result<Self, GpuError> {
         let size = gpu.tiles_at_once();
         let firsts = (0..max_tiles.max(1)).step_by(size).map(|first| {

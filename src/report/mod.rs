@@ -19,7 +19,7 @@ pub use evaluation::{
     BetweenScore, ConsistencyScore, EVALUATION_VERSION, Evaluation, LumaScore, Method,
     PathConsistency, PathScore, PeerReport, PictureScore, Rules, ViewScore,
 };
-pub use page::{Figure, Flight, MAP_END, PageRow, error_map, evaluation_page};
+pub use page::{Figure, Flight, PageRow, error_map, evaluation_page};
 pub use table::Table;
 pub use timings::{KernelReport, kernel_reports, timings_table};
 

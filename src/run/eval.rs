@@ -38,14 +38,12 @@ const MAX_ROWS: usize = 24;
 /// Frames in the page's strip.
 const STRIP_FRAMES: usize = 12;
 
-/// Options of `eval`.
 #[derive(Clone, Debug, Default)]
 pub struct EvalOptions {
     /// Run folder; the newest run by default.
     pub run: Option<PathBuf>,
     /// Teacher to measure beside the scene.
     pub teacher: Option<PathBuf>,
-    /// Settings of the teacher.
     pub teacher_settings: TeacherSettings,
     /// COLMAP folder, where it is not the one that `fit` noted.
     pub colmap: Option<PathBuf>,
@@ -88,8 +86,7 @@ pub fn eval(
     let mut lpips = options.lpips.as_deref().map(Lpips::open).transpose()?;
     let mut teacher = ask(options, &run, &scene, observe)?;
     observe(Event::begins(Stage::Device));
-    let drawn = report.luma.settings.raster_options();
-    let raster = Arc::new(Raster::with(&Gpu::open()?, drawn));
+    let raster = report.luma.settings.raster(&Gpu::open()?);
     let peers = match &teacher {
         Some(teacher) => paint(options, &raster, (&scene, teacher), report, page, observe)?,
         None => Vec::new(),

@@ -24,7 +24,6 @@ use crate::{
 /// of it are not seen.
 const COARSE: f64 = 0.1;
 
-/// Options of `export`.
 #[derive(Clone, Debug, Default)]
 pub struct ExportOptions {
     /// Run folder or splat file; the newest run by default.

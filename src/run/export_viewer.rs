@@ -27,7 +27,6 @@ const MOST_SIDE: u32 = 640;
 /// over all if none is held out.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct ViewerCameras {
-    /// The viewer.
     pub viewer: Viewer,
     /// PSNR of the scene as in the run.
     pub before: f64,

@@ -40,7 +40,6 @@ impl FlightOutput {
         Self { writer, failed }
     }
 
-    /// Adds a frame.
     pub fn add(&mut self, name: &str, frame: &RgbImage) {
         if let Some(mut writer) = self.writer.take() {
             match writer.write(name, frame) {

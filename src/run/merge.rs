@@ -3,7 +3,6 @@
 use std::{
     cell::RefCell,
     path::{Path, PathBuf},
-    sync::Arc,
     time::Instant,
 };
 
@@ -19,7 +18,6 @@ use crate::{
     gpu::Gpu,
     input,
     luma::{LumaSettings, start::started},
-    raster::Raster,
     report::{CaptureReport, LumaReport, LumaSeconds, Report, ViewExposure},
     splats::Splats,
     store::{RunFolder, StoreError, fingerprint::of_photos, lock::RunLock},
@@ -31,7 +29,6 @@ use crate::{
     tell::{Event, Observer, Stage, keeping},
 };
 
-/// Options of `merge`.
 #[derive(Clone, Debug)]
 pub struct MergeOptions {
     /// The job's folder.
@@ -91,7 +88,7 @@ pub fn merge(
     };
     let shown = exposures(&dataset, &told);
     let settings = &first.report.luma.settings;
-    let raster = Arc::new(Raster::with(&gpu, settings.raster_options()));
+    let raster = settings.raster(&gpu);
     let measuring = Instant::now();
     let mut tell = |progress: Progress<'_>| observe(progress.into());
     let views = measure_luma(&raster, &dataset, &splats, &mut tell)?;

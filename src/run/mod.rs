@@ -23,13 +23,12 @@ mod viewed;
 
 use std::path::PathBuf;
 
-pub use answers::HINT_WEIGHT;
-pub use colorize::{ColorizeRequest, Output, colorize};
+pub use colorize::{ColorizeRequest, colorize};
 pub use eval::{EvalOptions, eval};
 pub use export::{ExportOptions, Exported, export};
 pub use export_clean::Cleaned;
 pub use export_viewer::ViewerCameras;
-pub use fit::{BlockPlace, FitRequest, Init, fit};
+pub use fit::{FitRequest, Init, fit};
 pub use frames::{Frames, FramesOptions, frames};
 pub use info::info;
 pub use loss::Loss;
@@ -124,7 +123,6 @@ pub enum RunError {
         named: String,
         /// Photos with a pose.
         placed: usize,
-        /// Photos in all.
         photos: usize,
         /// One with a pose.
         example: String,

@@ -23,7 +23,6 @@ use crate::{
 /// The plan as a picture, in a job's folder.
 const PICTURE: &str = "plan.png";
 
-/// Options of `partition`.
 #[derive(Clone, Debug)]
 pub struct PartitionOptions {
     /// The COLMAP folder.

@@ -41,9 +41,6 @@ pub struct PlanReport {
 }
 
 /// Examines a capture as `fit` would.
-///
-/// # Errors
-/// [`RunError`].
 pub fn plan(options: &PlanOptions, observe: &mut Observer<'_>) -> Result<PlanReport, RunError> {
     let preset = match options.preset {
         Some(preset) => preset,

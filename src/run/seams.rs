@@ -23,7 +23,6 @@ pub struct SeamViews {
 /// The mean of some held-out views.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ViewMean {
-    /// Number of views.
     pub views: usize,
     /// Their mean PSNR in dB; none without any.
     pub psnr: Option<f64>,

@@ -32,7 +32,6 @@ use crate::{
 pub struct TeachOptions {
     /// Teachers and their weights, above 0; may be empty where there are hints.
     pub teachers: Vec<(PathBuf, f32)>,
-    /// Settings of the teachers.
     pub settings: TeacherSettings,
     /// Factor of their a and b, 0 to 1.
     pub strength: f32,

@@ -101,9 +101,6 @@ impl ViewedScene {
     }
 
     /// A scene, and how it is drawn; none where there is no such scene.
-    ///
-    /// # Errors
-    /// [`RunError`] of the file.
     pub fn read(
         &self,
         kind: SceneKind,
@@ -137,9 +134,6 @@ impl ViewedScene {
 
     /// The photo of a view in its teacher's colors: from the answers that the run has kept, or
     /// asked anew. None where the teacher has no answer, or there is no such view.
-    ///
-    /// # Errors
-    /// [`RunError`] of the photo, or where the teacher is not there any more.
     pub fn teacher(&self, view: usize) -> Result<Option<RgbImage>, RunError> {
         let (Some(dataset), Some(photo)) = (&self.dataset, self.photo(view)?) else {
             return Ok(None);

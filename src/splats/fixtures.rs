@@ -32,3 +32,19 @@ pub(crate) fn scattered(count: usize, degree: u32) -> Splats {
     }
     splats
 }
+
+/// A row of gray Gaussians one unit apart.
+pub(crate) fn row(grays: &[f32]) -> Splats {
+    let count = grays.len();
+    Splats {
+        means: (0..count).map(|i| [i as f32, 0.0, 0.0]).collect(),
+        quats: vec![[1.0, 0.0, 0.0, 0.0]; count],
+        log_scales: vec![[0.0; 3]; count],
+        opacity_logits: vec![0.0; count],
+        sh: ShField {
+            degree: 0,
+            channels: 1,
+            coefficients: grays.iter().map(|g| (g - 0.5) / sh::C0 as f32).collect(),
+        },
+    }
+}

@@ -39,11 +39,9 @@ pub enum StoreError {
     OtherModel {
         /// The COLMAP folder.
         folder: PathBuf,
-        /// One of these photos.
         photo: String,
         /// Number of photos that moved.
         moved: usize,
-        /// Photos in all.
         photos: usize,
     },
     /// A run's file is not the one that its report describes.

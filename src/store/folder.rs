@@ -46,9 +46,6 @@ impl RunFolder {
     }
 
     /// The run at `path`, or that of `auto`'s results there; the newest where none is named.
-    ///
-    /// # Errors
-    /// [`StoreError::NoRun`].
     pub fn find(path: Option<&Path>) -> Result<Self, StoreError> {
         let Some(path) = path else {
             return Self::newest();
@@ -59,9 +56,6 @@ impl RunFolder {
     }
 
     /// The run under `runs/` whose report is newest.
-    ///
-    /// # Errors
-    /// [`StoreError::NoRun`].
     pub fn newest() -> Result<Self, StoreError> {
         let written = |path: &Path| -> Option<SystemTime> {
             fs::metadata(Self::at(path).report()).ok()?.modified().ok()
@@ -162,9 +156,6 @@ impl RunFolder {
     }
 
     /// Reads the report of a run whose files it describes.
-    ///
-    /// # Errors
-    /// As [`Self::parse_report`] and [`Self::check_files`].
     pub fn read_report(&self) -> Result<Report, StoreError> {
         let report = self.parse_report()?;
         self.check_files(&report)?;

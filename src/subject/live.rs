@@ -39,7 +39,6 @@ pub struct LiveState {
     pub scenes: [Option<LiveScene>; 2],
     /// Current activity, in words.
     pub doing: String,
-    /// The plan of effects.
     pub plan: Vec<EffectReport>,
     /// Iterations and losses.
     pub losses: Vec<[f64; 2]>,
@@ -78,9 +77,6 @@ impl Live {
     }
 
     /// The photo of a view; none as long as there are no photos, or no such view.
-    ///
-    /// # Errors
-    /// [`SubjectError::Capture`] of the photo.
     pub fn photo(&self, view: usize) -> Result<Option<Arc<Photo>>, SubjectError> {
         let dataset = self.state().dataset.clone();
         match dataset.filter(|dataset| view < dataset.cameras.len()) {

@@ -8,10 +8,9 @@ pub(crate) mod scene;
 pub(crate) mod sound;
 
 pub use error::SubjectError;
+pub use live::Live;
 pub(crate) use live::LiveCheckpoints;
-pub use live::{Live, LiveScene, LiveState};
 pub(crate) use opened::{LockMode, Opened, Run, Scene};
-pub use sound::Soundness;
 
 /// One of a run's scenes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -120,9 +120,6 @@ impl Opened {
     }
 
     /// The COLMAP folder that is named, or the one that `fit` noted.
-    ///
-    /// # Errors
-    /// [`SubjectError::NoCameras`] of a file.
     pub fn colmap(&self, named: Option<&Path>) -> Result<PathBuf, SubjectError> {
         match (self, named) {
             (_, Some(path)) => Ok(path.to_owned()),

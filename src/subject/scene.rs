@@ -35,7 +35,6 @@ pub(crate) fn open(
     })?)
 }
 
-/// Progress event of a trial.
 pub(crate) fn of_trial(progress: &TrialProgress) -> Event {
     let message = match progress.effect {
         Some(effect) => format!("with {effect}"),

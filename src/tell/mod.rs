@@ -17,7 +17,6 @@ pub enum Event {
     Warning(String),
     /// Progress of a stage; the first of another stage ends the one before.
     Progress {
-        /// The stage.
         stage: Stage,
         /// Steps done.
         done: usize,
@@ -65,7 +64,6 @@ impl From<eval::Progress<'_>> for Event {
     }
 }
 
-/// Observer of events.
 pub type Observer<'a> = dyn FnMut(Event) + 'a;
 
 /// Tells `observe` everything and keeps the warnings.

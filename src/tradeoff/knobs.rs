@@ -21,7 +21,6 @@ pub(super) struct Knob {
     pub name: &'static str,
     /// The stage whose time and quality it changes.
     pub stage: PointStage,
-    /// The option.
     pub option: &'static str,
     /// Values to try, nearest to the base first.
     values: fn(&Base) -> Vec<String>,
@@ -181,7 +180,6 @@ pub(super) const KNOBS: [Knob; 8] = [
     },
 ];
 
-/// The names of all knobs.
 pub fn knob_names() -> [&'static str; KNOBS.len()] {
     KNOBS.map(|knob| knob.name)
 }

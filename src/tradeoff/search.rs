@@ -12,7 +12,6 @@ use super::sweep::{Phase, PointStage, Setting, Tradeoff};
 pub(super) struct Task {
     /// Its name, which the settings determine.
     pub name: String,
-    /// Its stage.
     pub stage: PointStage,
     /// Phase of the sweep that wants it.
     pub phase: Phase,

@@ -90,7 +90,6 @@ pub enum Phase {
 pub struct Setting {
     /// Name of the setting, as for `--knobs`.
     pub knob: String,
-    /// Its value.
     pub value: String,
 }
 
@@ -226,12 +225,10 @@ impl Tradeoff {
         self.points.iter().map(|point| point.took).sum()
     }
 
-    /// The point of that name.
     pub fn find(&self, name: &str) -> Option<&SweepPoint> {
         self.points.iter().find(|point| point.name == name)
     }
 
-    /// The points of a stage.
     pub fn of(&self, stage: PointStage) -> impl Iterator<Item = &SweepPoint> {
         self.points.iter().filter(move |point| point.stage == stage)
     }

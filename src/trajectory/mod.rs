@@ -8,7 +8,7 @@ mod supersplat;
 
 pub use file::{Coordinates, MOST_FRAMES, PathFile, TrajectoryError, read_path, write_path};
 pub use orbit::{ball_of_splats, orbit_of_ball, orbit_of_cameras};
-pub use spline::{camera_path, distance};
+pub use spline::camera_path;
 
 use glam::{DMat3, DVec3};
 

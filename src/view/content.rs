@@ -26,27 +26,15 @@ const SIDE: u32 = 2048;
 /// Content of a page.
 pub trait Content: Send + Sync {
     /// All but scenes and pictures, see [`about`].
-    ///
-    /// # Errors
-    /// [`RunError`] of the scene's file.
     fn about(&self) -> Result<Value, RunError>;
 
     /// A scene, [packed](pack); none where there is no such one.
-    ///
-    /// # Errors
-    /// [`RunError`] of its file.
     fn scene(&self, kind: SceneKind) -> Result<Option<Arc<Vec<u8>>>, RunError>;
 
     /// The gray photo of a view, as it was trained on.
-    ///
-    /// # Errors
-    /// [`RunError`] of its file.
     fn photo(&self, view: usize) -> Result<Option<GrayImage>, RunError>;
 
     /// The photo of a view in its teacher's colors.
-    ///
-    /// # Errors
-    /// [`RunError`] of the photo or the teacher.
     fn teacher(&self, view: usize) -> Result<Option<RgbImage>, RunError>;
 }
 

@@ -45,9 +45,6 @@ pub fn is_html(path: &Path) -> bool {
 }
 
 /// Writes a scene, the colored one where there is one and `luma` is not wanted, as one file.
-///
-/// # Errors
-/// [`ViewerError`] of the scene, the device or the file.
 pub fn write_html(
     viewed: &ViewedScene,
     luma: bool,

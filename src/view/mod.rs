@@ -10,12 +10,12 @@ mod overview;
 mod packed;
 mod server;
 
-pub use content::{Content, RunContent, answer};
-pub use html::{Written, is_html, write_html};
+pub use content::{RunContent, answer};
+pub use html::{is_html, write_html};
 pub use live::LiveContent;
 pub use overview::overview;
 pub use packed::pack;
-pub use server::{Request, Response, Server};
+pub use server::Server;
 
 use crate::{run::RunError, store::StoreError};
 

@@ -96,9 +96,6 @@ pub fn start(viewers: &[Viewer], splats: &Splats) -> Splats {
 /// pictures for `cameras` come near those that are wanted there; of several viewers each has
 /// its turn. `observe` hears of iterations done and in all. The same input gives the same bytes
 /// on the same machine.
-///
-/// # Errors
-/// [`GpuError`] when buffers do not fit or the device is lost.
 pub fn fit(
     raster: &Arc<Raster>,
     viewers: &[Viewer],

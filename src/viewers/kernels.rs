@@ -36,9 +36,6 @@ impl ViewerKernels {
     }
 
     /// Buffers with room for so many entries of tile lists; steps move `model`.
-    ///
-    /// # Errors
-    /// [`GpuError::TooLarge`].
     pub fn canvas(
         &self,
         loss: &Kernel,
@@ -94,9 +91,6 @@ impl ViewerKernels {
 
     /// Entries that the tile lists would have needed, where a view since they were made had too
     /// many: no step was taken since.
-    ///
-    /// # Errors
-    /// [`GpuError::Lost`].
     pub fn overflow(&self, canvas: &Canvas) -> Result<Option<usize>, GpuError> {
         Ok(canvas.lists.status(&self.raster.gpu)?.overflow)
     }

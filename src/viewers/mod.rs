@@ -85,9 +85,6 @@ impl ViewerChoice {
 pub type Pictures = Vec<Vec<[f32; 3]>>;
 
 /// Draws `splats` for each camera.
-///
-/// # Errors
-/// [`GpuError`] when buffers do not fit or the device is lost.
 pub fn pictures(
     raster: &Arc<Raster>,
     splats: &Splats,
@@ -106,9 +103,6 @@ pub fn pictures(
 
 /// Mean PSNR in dB of `viewer`'s pictures of an RGB scene against those that are wanted, over the
 /// cameras.
-///
-/// # Errors
-/// [`GpuError`] when buffers do not fit or the device is lost.
 pub fn shown_psnr(
     raster: &Arc<Raster>,
     viewer: Viewer,

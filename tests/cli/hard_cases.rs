@@ -3,8 +3,8 @@
 use std::fmt::Write;
 
 use gs_chroma::{
-    doctor::{Diagnosis, Verdict, measured::Row},
     gpu::Gpu,
+    low_level::doctor::{Diagnosis, Verdict, measured::Row},
 };
 
 const DOCS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/hard-cases.md");

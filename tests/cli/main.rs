@@ -3,7 +3,7 @@
 //! A Vulkan, Metal or DirectX 12 adapter and ONNX Runtime are needed
 //! (`tools/setup.py` installs both); a software adapter will do.
 
-use gs_chroma::oracle;
+use gs_chroma::low_level::oracle;
 
 mod auto;
 mod blocks;

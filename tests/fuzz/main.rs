@@ -16,10 +16,9 @@ use std::{
 use gs_chroma::{
     capture::{Capture, LoadOptions, Loader, View},
     chroma::teacher::{GrayImage, Teacher, TeacherError, TeacherSettings},
+    low_level::oracle,
     measure::decode_flo,
-    oracle,
     splats::{self, Format, WriteOptions, read_ply, read_splats, write_splats},
-    store::RunFolder,
 };
 use peak_alloc::PeakAlloc;
 use proptest::{
@@ -343,10 +342,11 @@ fn splat_files() {
 }
 
 #[test]
+#[cfg(feature = "cli")]
 fn reports() {
     let place = place();
     let path = place.path().join("report.json");
-    let folder = RunFolder::at(place.path());
+    let folder = gs_chroma::low_level::RunFolder::at(place.path());
     survives(&Kind {
         name: "report",
         corpus: vec![include_bytes!("../fixtures/report.json").to_vec()],

@@ -103,9 +103,6 @@ impl StrokeWeights {
 
 /// Lays the strokes of a supervision over what its teachers want, in all views that color learns
 /// from: `frozen` has these and no others, in their order.
-///
-/// # Errors
-/// [`ChromaError`] of a photo, of the device or of the file that wanted colors wait in.
 pub(super) fn lay(
     frozen: &FrozenViews,
     dataset: &Dataset,

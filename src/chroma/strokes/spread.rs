@@ -152,23 +152,7 @@ fn quantile(values: &mut [f32], share: f64) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::splats::ShField;
-
-    /// A row of Gaussians one unit apart.
-    fn row(grays: &[f32]) -> Splats {
-        let count = grays.len();
-        Splats {
-            means: (0..count).map(|i| [i as f32, 0.0, 0.0]).collect(),
-            quats: vec![[1.0, 0.0, 0.0, 0.0]; count],
-            log_scales: vec![[0.0; 3]; count],
-            opacity_logits: vec![0.0; count],
-            sh: ShField {
-                degree: 0,
-                channels: 1,
-                coefficients: grays.iter().map(|g| (g - 0.5) / sh::C0 as f32).collect(),
-            },
-        }
-    }
+    use crate::splats::fixtures::row;
 
     /// A photo shows the first `shown` of these and claims the first `red`.
     fn claims(grays: &[f32], red: usize, shown: usize) -> Vec<f32> {

@@ -356,9 +356,6 @@ pub(super) static BUILT_IN: &[BuiltIn] = &[
 
 impl BuiltIn {
     /// Its contract; a test reads them all.
-    ///
-    /// # Errors
-    /// [`TeacherError::BadManifest`].
     pub fn profile(&self) -> Result<Profile, TeacherError> {
         Profile::parse(self.text).map_err(|reason| TeacherError::BadManifest {
             path: self.names[0].into(),

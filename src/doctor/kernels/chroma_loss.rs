@@ -51,9 +51,6 @@ pub struct ChromaOutput {
 
 impl ChromaInput<'_> {
     /// Runs the kernel.
-    ///
-    /// # Errors
-    /// [`GpuError`].
     pub fn run(&self, gpu: &Gpu) -> Result<ChromaOutput, GpuError> {
         let agrees = self.weights.agreement > 0.0;
         let shader = if agrees {

@@ -31,9 +31,6 @@ pub struct Scanned {
 
 /// Scans on the device; `total_word` of the status receives the total, unless that is beyond
 /// `limit`.
-///
-/// # Errors
-/// [`GpuError`].
 pub fn scan_on(
     raster: &Raster,
     values: &[u32],

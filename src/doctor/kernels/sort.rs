@@ -27,9 +27,6 @@ const LENGTHS: [usize; 10] = [1, 2, 255, 256, 257, 2047, 2048, 2049, 20_000, 100
 
 /// Sorts the first `count` keys by these `bits` of theirs on the device; gives them
 /// with the places they had.
-///
-/// # Errors
-/// [`GpuError`].
 pub fn sort_on(
     raster: &Raster,
     keys: &[u32],

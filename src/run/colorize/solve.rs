@@ -106,9 +106,6 @@ impl Coloring<'_> {
     }
 
     /// Options and inputs of a coloring, for its checkpoints; `taught` is the supervision's hash.
-    ///
-    /// # Errors
-    /// [`StoreError::File`] of the gray Gaussians.
     fn question(
         &self,
         folder: &RunFolder,

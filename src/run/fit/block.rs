@@ -88,12 +88,10 @@ impl BlockPlace {
         Some(report.capture.extent)
     }
 
-    /// Plan of the block.
     pub(super) fn plan(&self) -> &Block {
         &self.block
     }
 
-    /// SHA-256 of the plan.
     pub(super) fn plan_sha256(&self) -> &str {
         &self.plan
     }

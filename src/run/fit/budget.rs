@@ -184,7 +184,6 @@ impl<'a> Family<'a> {
         })
     }
 
-    /// The work at a level.
     fn work(&self, level: f64) -> Workload {
         let mut work = at_level(level.clamp(LOWEST, self.highest), self.longest_side);
         self.overlay.apply(&mut work.settings);

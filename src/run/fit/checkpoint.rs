@@ -45,9 +45,6 @@ pub(super) fn found_in(
 }
 
 /// Options and inputs of a run, to compare with those of a checkpoint.
-///
-/// # Errors
-/// [`StoreError::File`] of the Gaussians to start from.
 pub(super) fn question(
     options: &FitRequest,
     budget: &Budget,

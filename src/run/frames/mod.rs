@@ -7,7 +7,7 @@ mod range;
 mod shots;
 mod unplaced;
 
-use std::{cell::RefCell, path::PathBuf, sync::Arc};
+use std::{cell::RefCell, path::PathBuf};
 
 use out::FrameOutput;
 use painted::Painted;
@@ -26,7 +26,6 @@ use crate::{
     eval::exposures,
     frames::{Canvas, SceneDrawer, Strokes, WeightedColors, believable, blend, finish},
     gpu::Gpu,
-    raster::Raster,
     report::Report,
     store::{
         RunFolder,
@@ -48,7 +47,6 @@ const OPEN: f64 = 0.005;
 /// photos the files are read again.
 const KEPT: usize = 1 << 28;
 
-/// Options of `frames`.
 #[derive(Clone, Debug, Default)]
 pub struct FramesOptions {
     /// Run folder; the newest run by default.
@@ -57,7 +55,6 @@ pub struct FramesOptions {
     pub colmap: Option<PathBuf>,
     /// Teacher for what the scene does not cover; the run's by default.
     pub teacher: Option<PathBuf>,
-    /// Settings of the teacher.
     pub teacher_settings: TeacherSettings,
     /// A folder for pictures, or a film by its extension.
     pub output: PathBuf,
@@ -92,9 +89,6 @@ pub struct Frames {
 }
 
 /// Colors the photos of a run and writes them.
-///
-/// # Errors
-/// [`RunError`].
 pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Frames, RunError> {
     let begun = std::time::Instant::now();
     let warnings = RefCell::default();
@@ -130,9 +124,8 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
     }
     let teachers = open_teachers(options, report, folder, &dataset, observe)?;
     let luma = scene.splats.to_luma();
-    let drawn = report.luma.settings.raster_options();
     observe(Event::begins(Stage::Device));
-    let raster = Arc::new(Raster::with(&Gpu::open()?, drawn));
+    let raster = report.luma.settings.raster(&Gpu::open()?);
     let believed = believable(luma.len(), report.luma.surroundings);
     let mut painter = Painter {
         drawer: SceneDrawer::new(&raster, &luma, [&chroma, &believed], dataset.extent)?,

@@ -40,7 +40,6 @@ pub enum Views {
     All,
 }
 
-/// Options of `render`.
 #[derive(Clone, Debug)]
 pub struct RenderOptions {
     /// Run folder or splat file; the newest run by default.
@@ -56,9 +55,6 @@ pub struct RenderOptions {
 }
 
 /// Draws the scene and gives the number of pictures.
-///
-/// # Errors
-/// [`RunError`].
 pub fn render(options: &RenderOptions, observe: &mut Observer<'_>) -> Result<usize, RunError> {
     let colmap = options.colmap.as_deref();
     let subject = Subject::open(options.run.as_deref(), colmap, options.luma, observe)?;
@@ -147,7 +143,6 @@ impl Subject {
         })
     }
 
-    /// The capture.
     fn cameras(&self) -> Result<&Capture, SubjectError> {
         let none = || SubjectError::NoCameras(self.scene.file.clone());
         self.capture.as_ref().ok_or_else(none)

@@ -51,7 +51,6 @@ pub struct PathOptions {
     pub run: Option<PathBuf>,
     /// COLMAP folder, where it is not the one that `fit` noted.
     pub colmap: Option<PathBuf>,
-    /// Shape of the path.
     pub way: PathShape,
     /// Duration, in seconds, above 0; 10 by default. A file has its own.
     pub seconds: Option<f64>,
@@ -83,9 +82,6 @@ pub struct Rendered {
 }
 
 /// Draws a scene along a path.
-///
-/// # Errors
-/// [`RunError`].
 pub fn render_path(
     options: &PathOptions,
     observe: &mut Observer<'_>,

@@ -55,9 +55,6 @@ pub fn write_ply(
 }
 
 /// Checks that Gaussians can be written to a file of any format, `offset` added to their centers.
-///
-/// # Errors
-/// As [`write_ply`].
 pub(in crate::splats) fn check(
     path: &Path,
     splats: &Splats,

@@ -30,9 +30,6 @@ struct Header {
 }
 
 /// Reads a file of version 1 to 4.
-///
-/// # Errors
-/// [`SplatError::Damaged`].
 pub(in crate::splats) fn read(path: &Path, bytes: &[u8]) -> Result<ReadSplats, SplatError> {
     match bytes.starts_with(&MAGIC) {
         true => read_streams(path, bytes),

@@ -3,9 +3,11 @@
 use glam::{DMat3, DVec3};
 use gs_chroma::{
     capture::Camera,
-    doctor::stage,
+    low_level::{
+        doctor::stage,
+        oracle::random::{opaque_stack, random_scene_before, random_view},
+    },
     measure::{Consistency, Flow, visible},
-    oracle::random::{opaque_stack, random_scene_before, random_view},
     raster::SceneRenderer,
     splats::{ShField, Splats, sh},
 };

@@ -10,7 +10,6 @@ use gs_chroma::{
     },
     gpu::{Buffer, Gpu, GpuError, STORAGE_BUFFERS, WORKGROUP_BYTES},
     luma::{self, LumaSettings},
-    raster::Raster,
 };
 
 /// A device of the adapter of [`Gpu::open`] with other limits.
@@ -92,12 +91,11 @@ fn a_device_that_is_lost_while_it_colors_is_an_error() {
         &mut |_| ControlFlow::Continue(()),
     );
     let scene = scene.unwrap();
-    let raster = Arc::new(Raster::with(&gpu, scene.settings.raster_options()));
     let photos = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/demo/images");
     let mut teacher = Teacher::open(&photos, None, &TeacherSettings::default()).unwrap();
     let mut rounds = 0;
     let colored = chroma::colorize(
-        &raster,
+        &scene.raster(&gpu),
         &dataset,
         &scene.splats,
         &mut teacher,

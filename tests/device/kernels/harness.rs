@@ -4,12 +4,12 @@ use std::sync::{Arc, LazyLock};
 
 use gs_chroma::{
     capture::Camera,
-    doctor::stage,
+    low_level::doctor::stage,
     raster::{Projected, Raster, Status},
     splats::Splats,
 };
 
-pub use gs_chroma::doctor::stage::{Gradient, camera, splats};
+pub use gs_chroma::low_level::doctor::stage::{Gradient, camera, splats};
 
 use crate::kernels::oracle::{
     random::{oblique_view, random_scene},

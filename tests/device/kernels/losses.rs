@@ -2,7 +2,7 @@
 
 use gs_chroma::{
     chroma::{ChromaLossWeights, Correction},
-    doctor::kernels::ChromaInput,
+    low_level::doctor::kernels::ChromaInput,
 };
 
 use crate::kernels::{harness::gpu, oracle::chroma_loss::chroma_loss};

@@ -3,7 +3,7 @@
 //! The errors of each kernel on random inputs are the doctor's, which `tests/cli/doctor.rs` runs.
 //! A Vulkan, Metal or DirectX 12 adapter is needed; a software one will do.
 
-use gs_chroma::{compare, oracle};
+use gs_chroma::low_level::{compare, oracle};
 
 mod adam;
 mod antialiasing;

@@ -1,7 +1,7 @@
 //! Kernels that compute less accurately, on the hard cases.
 
 use gs_chroma::{
-    doctor::{cases::CASES, examine_with, kernels::numerics::CUTS, stage::cutting},
+    low_level::doctor::{cases::CASES, examine_with, kernels::numerics::CUTS, stage::cutting},
     luma::Numerics,
     raster::{RasterNumerics, Storage},
 };

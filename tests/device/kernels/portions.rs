@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use gs_chroma::{
-    doctor::{kernels::TOPICS, stage},
     gpu::default_tiles_at_once,
+    low_level::doctor::{kernels::TOPICS, stage},
     raster::Raster,
 };
 

@@ -4,7 +4,7 @@ use std::sync::{Arc, LazyLock};
 
 use gs_chroma::{
     capture::view_at,
-    doctor::stage,
+    low_level::doctor::stage,
     luma::{Goal, LearningRates, LumaProgress, LumaSettings, LumaTrainer, Schedule, TrainingView},
     raster::{Field, Geometry, Raster, Renderer},
     splats::Splats,

@@ -1,7 +1,7 @@
 //! `scan`: what happens beyond a limit, and without a total.
 
 use gs_chroma::{
-    doctor::kernels::{Scanned, scan_on},
+    low_level::doctor::kernels::{Scanned, scan_on},
     raster::{constants::*, groups::Groups},
 };
 

@@ -1,6 +1,6 @@
 //! `sort`: counts below the capacity, keys of fewer bits.
 
-use gs_chroma::doctor::kernels::sort_on;
+use gs_chroma::low_level::doctor::kernels::sort_on;
 
 use crate::kernels::{harness::raster, oracle::random::Random};
 

@@ -1,9 +1,9 @@
 //! Scenes fitted to viewers.
 
 use gs_chroma::{
+    low_level::viewers::{FitSettings, Pictures, Viewer, fit, pictures, shown_psnr, start},
     raster::RasterOptions,
     splats::Splats,
-    viewers::{FitSettings, Pictures, Viewer, fit, pictures, shown_psnr, start},
 };
 
 use crate::kernels::harness::{bits, cameras, overlapping, raster};

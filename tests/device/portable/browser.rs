@@ -9,14 +9,14 @@ use std::{
 };
 
 use gs_chroma::{
-    doctor::{
+    gpu::{Gpu, STORAGE_BUFFERS, Step, Tape, WORKGROUP_BYTES, shaders},
+    low_level::doctor::{
         Verdict,
         cases::{CASES, Case},
         examine,
         kernels::TOPICS,
         measured::{Row, table},
     },
-    gpu::{Gpu, STORAGE_BUFFERS, Step, Tape, WORKGROUP_BYTES, shaders},
     raster::Raster,
 };
 use serde_json::{Value, json};

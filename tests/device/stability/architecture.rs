@@ -49,15 +49,15 @@ fn word(text: &str) -> &str {
     &text[..end.unwrap_or(text.len())]
 }
 
-/// Names after `crate::stability::` in code: one name, or the first names of a list in braces.
+/// Names after `crate::` in code: one name, or the first names of a list in braces.
 fn imports(text: &str) -> BTreeSet<String> {
     let lines = text
         .lines()
         .map(|line| line.split("//").next().unwrap_or(""));
     let code: String = lines.collect::<Vec<_>>().join("\n");
     let mut found = BTreeSet::new();
-    for (start, _) in code.match_indices("crate::stability::") {
-        let rest = &code[start + "crate::stability::".len()..];
+    for (start, _) in code.match_indices("crate::") {
+        let rest = &code[start + "crate::".len()..];
         let Some(list) = rest.strip_prefix('{') else {
             found.insert(word(rest).to_owned());
             continue;
@@ -83,7 +83,7 @@ fn imports(text: &str) -> BTreeSet<String> {
 
 #[test]
 fn imports_are_found() {
-    let text = "use crate::stability::{a::{b, c}, d}; // crate::stability::no\nfn f(x: crate::stability::e::F) {}\nuse crate::stability::g::h;";
+    let text = "use crate::{a::{b, c}, d}; // crate::no\nfn f(x: crate::e::F) {}\nuse crate::g::h;";
     let expected = ["a", "d", "e", "g"].map(str::to_owned);
     assert_eq!(imports(text), BTreeSet::from(expected));
 }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use gs_chroma::{
-    doctor::{cases::CASES, examine, kernels::TOPICS},
+    low_level::doctor::{cases::CASES, examine, kernels::TOPICS},
     raster::Raster,
 };
 

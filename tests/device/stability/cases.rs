@@ -3,7 +3,7 @@
 
 use std::collections::BTreeSet;
 
-use gs_chroma::{
+use gs_chroma::low_level::{
     doctor::cases::{CASES, ODD},
     oracle::{render::visible, shade::Shading},
 };

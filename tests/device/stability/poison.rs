@@ -6,16 +6,18 @@
 use std::sync::{Arc, LazyLock};
 
 use gs_chroma::{
-    doctor::{
-        MARGIN,
-        stage::{Gradient, Stage, splats},
-    },
-    oracle::{
-        random::random_scene,
-        render::{render_pixels, visible},
-        scene::Scene,
-        shade::Shading,
-        view::View,
+    low_level::{
+        doctor::{
+            MARGIN,
+            stage::{Gradient, Stage, splats},
+        },
+        oracle::{
+            random::random_scene,
+            render::{render_pixels, visible},
+            scene::Scene,
+            shade::Shading,
+            view::View,
+        },
     },
     raster::Raster,
     splats::Splats,

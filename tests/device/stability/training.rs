@@ -9,9 +9,9 @@ use std::{
 use glam::{DMat3, DVec3};
 use gs_chroma::{
     capture::{Camera, downscale},
+    low_level::oracle::random::Random,
     luma::{LumaError, LumaProgress, LumaSettings, LumaTrainer, Schedule, TrainingView},
     measure::psnr,
-    oracle::random::Random,
     raster::{Field, Geometry, Raster, Renderer},
     splats::{ShField, Splats, init::initial_splats, sh},
 };
