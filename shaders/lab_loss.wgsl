@@ -1,14 +1,15 @@
 // The loss of the recipes that RGB splats are colored by elsewhere: differences of L, a and b
-// between RGB pictures as drawn and as wanted, and how much neighboring pixels differ; value
-// and gradient. `agreeing`: a and b shall agree with those of the next coarser scale as well.
-import package::common::lab::{lab_of, rgb_gradient};
+// between RGB pictures as drawn and as wanted, at full size and pooled, and how much neighboring
+// pixels differ; value and gradient. `agreeing`: a and b shall agree with those of the next
+// coarser scale as well.
+import package::common::lab::{Lab, lab_of, rgb_gradient};
 import package::common::group_sum::group_sum;
 import package::common::numeric::linear_group;
 import package::common::pyramid::place_in_coarser;
 import package::common::view::View;
 import package::common::wanted::{SMOOTHING, wanted_rgb};
 
-// Black to white, in CIELAB's lightness.
+// Black to white, in CIELAB's lightness, and in R, G and B where these are compared.
 const UNITS: f32 = 100.0;
 
 struct LabLossParameters {
@@ -20,10 +21,16 @@ struct LabLossParameters {
     chroma: f32,
     // Weight of the agreement of a and of b with the coarser scale.
     agreement: f32,
-    // Weight of the total variation of R, G and B.
+    // Weight of the total variation of R, G and B: half the sum of the mean squared differences
+    // across and down.
     variation: f32,
     // 1 where pixel_weights has a weight for each pixel.
     weighted: u32,
+    // Coarser scales, each half as large as the last, at which both pictures are pooled and
+    // compared; all scales count alike.
+    pooled: u32,
+    // 1 where R, G and B are compared in place of L, a and b.
+    in_rgb: u32,
 }
 
 @group(0) @binding(0) var<uniform> view: View;
@@ -38,39 +45,103 @@ struct LabLossParameters {
 // RGB rendered at the next coarser scale.
 @if(agreeing) @group(0) @binding(7) var<storage, read> coarser: array<vec3f>;
 
-// |r|, smoothed over `width`, and its slope.
+// |r|, smoothed, and its slope.
 struct Distance {
     value: vec3f,
     slope: vec3f,
 }
 
-fn distance_of(r: vec3f, width: f32) -> Distance {
-    let length = sqrt(r * r + width * width);
-    return Distance(length - width, r / length);
+fn distance_of(r: vec3f) -> Distance {
+    let length = sqrt(r * r + SMOOTHING * SMOOTHING);
+    return Distance(length - SMOOTHING, r / length);
 }
 
-fn total_variation(p: u32) -> Distance {
+// A loss, and its gradient by the drawn R, G and B.
+struct Loss {
+    value: f32,
+    gradient: vec3f,
+}
+
+// Share of the total variation that a pixel answers for.
+fn total_variation(p: u32) -> Loss {
     let width = view.size.x;
     let at = vec2u(p % width, p / width);
     let here = image[p];
-    let smoothing = SMOOTHING / UNITS;
-    var sum = Distance(vec3f(0.0), vec3f(0.0));
+    // One over the values that each mean is over.
+    let pairs = 3u * (max(view.size, vec2u(2u)) - 1u) * view.size.yx;
+    let across = 1.0 / f32(pairs.x);
+    let down = 1.0 / f32(pairs.y);
+    var sum = Loss(0.0, vec3f(0.0));
     // What lies right and below is counted here; what lies left and above, there.
     if at.x + 1u < width {
-        let right = distance_of(here - image[p + 1u], smoothing);
-        sum = Distance(sum.value + right.value, sum.slope + right.slope);
+        let right = here - image[p + 1u];
+        sum = Loss(sum.value + 0.5 * across * dot(right, right), sum.gradient + across * right);
     }
     if at.y + 1u < view.size.y {
-        let below = distance_of(here - image[p + width], smoothing);
-        sum = Distance(sum.value + below.value, sum.slope + below.slope);
+        let below = here - image[p + width];
+        sum = Loss(sum.value + 0.5 * down * dot(below, below), sum.gradient + down * below);
     }
     if at.x > 0u {
-        sum.slope += distance_of(here - image[p - 1u], smoothing).slope;
+        sum.gradient += across * (here - image[p - 1u]);
     }
     if at.y > 0u {
-        sum.slope += distance_of(here - image[p - width], smoothing).slope;
+        sum.gradient += down * (here - image[p - width]);
     }
     return sum;
+}
+
+fn weight_of(p: u32) -> f32 {
+    if parameters.weighted == 0u {
+        return 1.0;
+    }
+    return pixel_weights[p];
+}
+
+// A color as it is compared.
+fn compared(rgb: vec3f) -> Lab {
+    if parameters.in_rgb != 0u {
+        return Lab(UNITS * rgb, vec3f(UNITS), vec3f(0.0));
+    }
+    return lab_of(rgb);
+}
+
+fn gradient_of(color: Lab, slope: vec3f) -> vec3f {
+    if parameters.in_rgb != 0u {
+        return slope * color.by_encoded;
+    }
+    return rgb_gradient(color, slope);
+}
+
+// Share of a scale's mean loss that a pixel answers for. A coarser pixel is the mean of the 2×2
+// pixels around its center (bilinear, half-pixel centers); what is beyond the last whole one does
+// not count. Where one of the four is not known, neither is their mean.
+fn of_scale(at: vec2u, scale: u32) -> Loss {
+    let side = select(2u, 1u, scale == 0u);
+    let cell = at >> vec2u(scale);
+    let first = (cell << vec2u(scale)) + ((1u << scale) - side) / 2u;
+    let cells = view.size >> vec2u(scale);
+    if any(cell >= cells) || any(at < first) || any(at >= first + side) {
+        return Loss(0.0, vec3f(0.0));
+    }
+    let pixels = side * side;
+    var drawn_rgb = vec3f(0.0);
+    var aim = vec3f(0.0);
+    var weight = weight_of(at.y * view.size.x + at.x);
+    for (var k = 0u; k < pixels; k++) {
+        let q = (first.y + k / side) * view.size.x + first.x + k % side;
+        drawn_rgb += image[q] / f32(pixels);
+        aim += wanted_rgb(wanted[q]) / f32(pixels);
+        weight = min(weight, weight_of(q));
+    }
+    let drawn = compared(drawn_rgb);
+    let residual = drawn.value - compared(aim).value;
+    let apart = distance_of(residual);
+    let squared = parameters.squared != 0u;
+    let scales = vec3f(parameters.lightness, vec2f(parameters.chroma));
+    let value = vec3f(select(apart.value.x, residual.x * residual.x, squared), apart.value.yz);
+    let slope = vec3f(select(apart.slope.x, 2.0 * residual.x, squared), apart.slope.yz);
+    let share = weight / f32(pixels * cells.x * cells.y);
+    return Loss(share * dot(scales, value), share * gradient_of(drawn, scales * slope));
 }
 
 // a and b of the coarser picture at this pixel, bilinear.
@@ -94,30 +165,25 @@ fn lab_loss(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index
     let pixels = view.size.x * view.size.y;
     var own = 0.0;
     if p < pixels {
-        var weight = 1.0;
-        if parameters.weighted != 0u {
-            weight = pixel_weights[p];
-        }
-        let drawn = lab_of(image[p]);
-        let residual = drawn.value - lab_of(wanted_rgb(wanted[p])).value;
-        let apart = distance_of(residual, SMOOTHING);
-        let squared = parameters.squared != 0u;
-        let scales = weight * vec3f(parameters.lightness, vec2f(parameters.chroma));
-        let value = vec3f(select(apart.value.x, residual.x * residual.x, squared), apart.value.yz);
-        let slope = vec3f(select(apart.slope.x, 2.0 * residual.x, squared), apart.slope.yz);
-        var loss = dot(scales, value);
-        var by_lab = scales * slope;
-        @if(agreeing) {
-            let coarse = upsampled(vec2u(p % view.size.x, p / view.size.x));
-            let drift = distance_of(vec3f(0.0, drawn.value.yz - coarse), SMOOTHING);
-            loss += parameters.agreement * (drift.value.y + drift.value.z);
-            by_lab += parameters.agreement * vec3f(0.0, drift.slope.yz);
-        }
+        let at = vec2u(p % view.size.x, p / view.size.x);
         let variation = total_variation(p);
-        loss += parameters.variation * dot(variation.value, vec3f(1.0));
-        let gradient = rgb_gradient(drawn, by_lab) + parameters.variation * variation.slope;
-        own = loss;
-        image_gradient[p] = vec4f(gradient, 0.0) / f32(pixels);
+        var loss = parameters.variation * variation.value;
+        var gradient = parameters.variation * variation.gradient;
+        for (var scale = 0u; scale <= parameters.pooled; scale++) {
+            let part = of_scale(at, scale);
+            loss += part.value / f32(parameters.pooled + 1u);
+            gradient += part.gradient / f32(parameters.pooled + 1u);
+        }
+        @if(agreeing) {
+            let drawn = lab_of(image[p]);
+            let drift = distance_of(vec3f(0.0, drawn.value.yz - upsampled(at)));
+            let share = parameters.agreement / f32(pixels);
+            loss += share * (drift.value.y + drift.value.z);
+            gradient += rgb_gradient(drawn, share * vec3f(0.0, drift.slope.yz));
+        }
+        // The log divides by the pixels.
+        own = f32(pixels) * loss;
+        image_gradient[p] = vec4f(gradient, 0.0);
     }
     let sum = group_sum(local, own);
     if local == 0u && block * 256u < pixels {

@@ -5,24 +5,17 @@ fn lab_loss(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index
     let pixels = view.size.x * view.size.y;
     var own = 0.0;
     if p < pixels {
-        var weight = 1.0;
-        if parameters.weighted != 0u {
-            weight = pixel_weights[p];
-        }
-        let drawn = lab_of(image[p]);
-        let residual = drawn.value - lab_of(wanted_rgb(wanted[p])).value;
-        let apart = distance_of(residual, SMOOTHING);
-        let squared = parameters.squared != 0u;
-        let scales = weight * vec3f(parameters.lightness, vec2f(parameters.chroma));
-        let value = vec3f(select(apart.value.x, residual.x * residual.x, squared), apart.value.yz);
-        let slope = vec3f(select(apart.slope.x, 2.0 * residual.x, squared), apart.slope.yz);
-        var loss = dot(scales, value);
-        var by_lab = scales * slope;
+        let at = vec2u(p % view.size.x, p / view.size.x);
         let variation = total_variation(p);
-        loss += parameters.variation * dot(variation.value, vec3f(1.0));
-        let gradient = rgb_gradient(drawn, by_lab) + parameters.variation * variation.slope;
-        own = loss;
-        image_gradient[p] = vec4f(gradient, 0.0) / f32(pixels);
+        var loss = parameters.variation * variation.value;
+        var gradient = parameters.variation * variation.gradient;
+        for (var scale = 0u; scale <= parameters.pooled; scale++) {
+            let part = of_scale(at, scale);
+            loss += part.value / f32(parameters.pooled + 1u);
+            gradient += part.gradient / f32(parameters.pooled + 1u);
+        }
+        own = f32(pixels) * loss;
+        image_gradient[p] = vec4f(gradient, 0.0);
     }
     let sum = group_sum(local, own);
     if local == 0u && block * 256u < pixels {
@@ -69,9 +62,23 @@ const TO_Z: vec3f = vec3f(0.01775791409, 0.1094765209, 0.872765565);
 
 const UNITS: f32 = 100.0;
 
-fn distance_of(r: vec3f, width: f32) -> Distance {
-    let length = sqrt(r * r + width * width);
-    return Distance(length - width, r / length);
+fn compared(rgb: vec3f) -> Lab {
+    if parameters.in_rgb != 0u {
+        return Lab(UNITS * rgb, vec3f(UNITS), vec3f(0.0));
+    }
+    return lab_of(rgb);
+}
+
+fn distance_of(r: vec3f) -> Distance {
+    let length = sqrt(r * r + SMOOTHING * SMOOTHING);
+    return Distance(length - SMOOTHING, r / length);
+}
+
+fn gradient_of(color: Lab, slope: vec3f) -> vec3f {
+    if parameters.in_rgb != 0u {
+        return slope * color.by_encoded;
+    }
+    return rgb_gradient(color, slope);
 }
 
 fn group_sum(local: u32, own: f32) -> f32 {
@@ -109,37 +116,75 @@ fn linear_group(group: vec3u) -> u32 {
     return group.x + group.y * MAX_GROUPS;
 }
 
+fn of_scale(at: vec2u, scale: u32) -> Loss {
+    let side = select(2u, 1u, scale == 0u);
+    let cell = at >> vec2u(scale);
+    let first = (cell << vec2u(scale)) + ((1u << scale) - side) / 2u;
+    let cells = view.size >> vec2u(scale);
+    if any(cell >= cells) || any(at < first) || any(at >= first + side) {
+        return Loss(0.0, vec3f(0.0));
+    }
+    let pixels = side * side;
+    var drawn_rgb = vec3f(0.0);
+    var aim = vec3f(0.0);
+    var weight = weight_of(at.y * view.size.x + at.x);
+    for (var k = 0u; k < pixels; k++) {
+        let q = (first.y + k / side) * view.size.x + first.x + k % side;
+        drawn_rgb += image[q] / f32(pixels);
+        aim += wanted_rgb(wanted[q]) / f32(pixels);
+        weight = min(weight, weight_of(q));
+    }
+    let drawn = compared(drawn_rgb);
+    let residual = drawn.value - compared(aim).value;
+    let apart = distance_of(residual);
+    let squared = parameters.squared != 0u;
+    let scales = vec3f(parameters.lightness, vec2f(parameters.chroma));
+    let value = vec3f(select(apart.value.x, residual.x * residual.x, squared), apart.value.yz);
+    let slope = vec3f(select(apart.slope.x, 2.0 * residual.x, squared), apart.slope.yz);
+    let share = weight / f32(pixels * cells.x * cells.y);
+    return Loss(share * dot(scales, value), share * gradient_of(drawn, scales * slope));
+}
+
 fn rgb_gradient(lab: Lab, slope: vec3f) -> vec3f {
     let by_f = vec3f(500.0 * slope.y, 116.0 * slope.x - 500.0 * slope.y + 200.0 * slope.z, -200.0 * slope.z);
     let s = by_f * lab.by_relative;
     return (s.x * TO_X + s.y * TO_Y + s.z * TO_Z) * lab.by_encoded;
 }
 
-fn total_variation(p: u32) -> Distance {
+fn total_variation(p: u32) -> Loss {
     let width = view.size.x;
     let at = vec2u(p % width, p / width);
     let here = image[p];
-    let smoothing = SMOOTHING / UNITS;
-    var sum = Distance(vec3f(0.0), vec3f(0.0));
+    let pairs = 3u * (max(view.size, vec2u(2u)) - 1u) * view.size.yx;
+    let across = 1.0 / f32(pairs.x);
+    let down = 1.0 / f32(pairs.y);
+    var sum = Loss(0.0, vec3f(0.0));
     if at.x + 1u < width {
-        let right = distance_of(here - image[p + 1u], smoothing);
-        sum = Distance(sum.value + right.value, sum.slope + right.slope);
+        let right = here - image[p + 1u];
+        sum = Loss(sum.value + 0.5 * across * dot(right, right), sum.gradient + across * right);
     }
     if at.y + 1u < view.size.y {
-        let below = distance_of(here - image[p + width], smoothing);
-        sum = Distance(sum.value + below.value, sum.slope + below.slope);
+        let below = here - image[p + width];
+        sum = Loss(sum.value + 0.5 * down * dot(below, below), sum.gradient + down * below);
     }
     if at.x > 0u {
-        sum.slope += distance_of(here - image[p - 1u], smoothing).slope;
+        sum.gradient += across * (here - image[p - 1u]);
     }
     if at.y > 0u {
-        sum.slope += distance_of(here - image[p - width], smoothing).slope;
+        sum.gradient += down * (here - image[p - width]);
     }
     return sum;
 }
 
 fn wanted_rgb(word: u32) -> vec3f {
     return vec3f((vec3u(word) >> vec3u(0u, 10u, 20u)) & vec3u(1023u)) / 1023.0;
+}
+
+fn weight_of(p: u32) -> f32 {
+    if parameters.weighted == 0u {
+        return 1.0;
+    }
+    return pixel_weights[p];
 }
 
 struct Distance {
@@ -160,7 +205,14 @@ struct LabLossParameters {
     chroma: f32,
     agreement: f32,
     variation: f32,
-    weighted: u32
+    weighted: u32,
+    pooled: u32,
+    in_rgb: u32
+}
+
+struct Loss {
+    value: f32,
+    gradient: vec3f
 }
 
 struct View {

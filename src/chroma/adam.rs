@@ -85,10 +85,14 @@ impl<'a> AdamSolver<'a> {
         luma: &Splats,
         seed: u64,
     ) -> Result<Self, ChromaError> {
-        let start = luma.sh.to_rgb();
-        let of_rest = match recipe.rest_share {
-            Some(_) => sh::coefficient_count(start.degree) - 1,
-            None => 0,
+        let gray = luma.sh.to_rgb();
+        let (start, of_rest) = match recipe.rest_share {
+            Some(_) => {
+                let start = gray.raised(sh::MAX_DEGREE);
+                let of_rest = sh::coefficient_count(start.degree) - 1;
+                (start, of_rest)
+            }
+            None => (gray, 0),
         };
         let schedule = AdamSchedule {
             iterations: recipe.iterations,

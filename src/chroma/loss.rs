@@ -89,10 +89,16 @@ pub struct LabLossParameters {
     pub chroma: f32,
     /// Weight of the agreement of a and of b with the coarser image; 0 where there is none.
     pub agreement: f32,
-    /// Weight of the total variation of R, G and B.
+    /// Weight of the total variation of R, G and B: half the sum of the mean squared differences
+    /// across and down.
     pub variation: f32,
     /// 1 where each pixel has a weight.
     pub weighted: u32,
+    /// Coarser scales, each half as large as the last, at which both pictures are pooled and
+    /// compared; all scales count alike.
+    pub pooled: u32,
+    /// 1 where R, G and B are compared in place of L, a and b.
+    pub in_rgb: u32,
 }
 
 /// Color space in which RGB pictures are judged; a/b have one only.

@@ -13,8 +13,8 @@ pub struct Recipe {
     /// Adam's rate of the constant harmonics at the first and the last iteration, exponential
     /// between.
     pub rates: [f64; 2],
-    /// The rate of the other harmonics as a share of it; `None`: they stay as luma has them,
-    /// the same in all channels.
+    /// The rate of the other harmonics, up to degree 3, as a share of it; `None`: they stay as
+    /// luma has them, the same in all channels.
     pub rest_share: Option<f64>,
     /// Scales that are drawn, 0 the full one, each half as large as the last.
     pub scales: RangeInclusive<usize>,
@@ -28,7 +28,8 @@ impl Recipe {
     /// ChromaDistill's paper (WACV 2025) for splats: the square of lightness's difference and
     /// the size of a's and of b's in CIELAB units, coarse to fine by algorithm 1, from
     /// iteration 15,000 to 30,000 at the rates of 3DGS, by which all harmonics learn. The
-    /// number of scales it leaves open; three are taken, as for a/b by Adam here.
+    /// number of scales it leaves open; three are taken, as for a/b by Adam here. Of the losses
+    /// that the algorithm sums, each scale's takes a step of its own.
     pub fn chromadistill_paper() -> Self {
         Self {
             iterations: 15_000,
@@ -45,22 +46,47 @@ impl Recipe {
         }
     }
 
-    /// ChromaDistill's released code for splats: 3,000 steps of the constant harmonics at half
-    /// the size, on L/50, a/110 and b/110, with total variation. Its content loss, a
-    /// thousandth of VGG's features, needs a network that it brings along; it is left out.
+    /// The paper's without coarser scales.
+    pub fn chromadistill_one_scale() -> Self {
+        Self {
+            scales: 0..=0,
+            agreement: 0.0,
+            ..Self::chromadistill_paper()
+        }
+    }
+
+    /// ChromaDistill's released code for splats: 3,000 steps of the constant harmonics on L/50,
+    /// a/110 and b/110 of the picture at full, half and quarter size, with total variation.
+    /// L is to be the gray photo's, as by default there. Its content loss, a thousandth of
+    /// VGG's features, needs a network that it brings along; it is left out.
     pub fn chromadistill_code() -> Self {
         Self {
             iterations: 3_000,
             rates: [1e-2, 1e-3],
             rest_share: None,
-            scales: 1..=1,
+            scales: 0..=0,
             agreement: 0.0,
             loss: LabLossParameters {
                 lightness: 1.0 / 50.0,
                 chroma: 1.0 / 110.0,
-                variation: 1.0 / 3.0,
+                variation: 1.0,
+                pooled: 2,
                 ..LabLossParameters::default()
             },
+        }
+    }
+
+    /// The code's on R, G and B from 0 to 1 in place of L, a and b.
+    pub fn chromadistill_rgb() -> Self {
+        let code = Self::chromadistill_code();
+        Self {
+            loss: LabLossParameters {
+                lightness: 1.0 / 100.0,
+                chroma: 1.0 / 100.0,
+                in_rgb: 1,
+                ..code.loss
+            },
+            ..code
         }
     }
 

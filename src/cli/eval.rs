@@ -28,8 +28,13 @@ const RECIPES: &[(Peer, &str)] = &[
     ),
     (
         Peer::ChromadistillCode,
-        "As the released code: 3,000 iterations, SH degree 0, half size, without its VGG loss",
+        "As the released code: 3,000 iterations, SH degree 0, scales 1, 1/2, 1/4, no VGG loss",
     ),
+    (
+        Peer::ChromadistillOneScale,
+        "The paper's without coarser scales",
+    ),
+    (Peer::ChromadistillRgb, "The code's in RGB, not CIELAB"),
 ];
 
 /// Measure a colored run: fidelity, colorfulness and consistency between views.

@@ -30,8 +30,12 @@ pub enum Peer {
     RgbSplats,
     /// [`Recipe::chromadistill_paper`].
     ChromadistillPaper,
+    /// [`Recipe::chromadistill_one_scale`].
+    ChromadistillOneScale,
     /// [`Recipe::chromadistill_code`].
     ChromadistillCode,
+    /// [`Recipe::chromadistill_rgb`].
+    ChromadistillRgb,
 }
 
 impl Peer {
@@ -40,7 +44,9 @@ impl Peer {
         match self {
             Self::RgbSplats => Method::RgbSplats,
             Self::ChromadistillPaper => Method::ChromadistillPaper,
+            Self::ChromadistillOneScale => Method::ChromadistillOneScale,
             Self::ChromadistillCode => Method::ChromadistillCode,
+            Self::ChromadistillRgb => Method::ChromadistillRgb,
         }
     }
 
@@ -48,7 +54,9 @@ impl Peer {
         match self {
             Self::RgbSplats => None,
             Self::ChromadistillPaper => Some(Recipe::chromadistill_paper()),
+            Self::ChromadistillOneScale => Some(Recipe::chromadistill_one_scale()),
             Self::ChromadistillCode => Some(Recipe::chromadistill_code()),
+            Self::ChromadistillRgb => Some(Recipe::chromadistill_rgb()),
         }
     }
 

@@ -34,12 +34,14 @@ pub struct Shot {
 
 /// Methods on the page, and part of their files' names; the exported picture stands for the
 /// native one, and what that costs is the bake's figure.
-const SHOWN: [(Method, &str); 6] = [
+const SHOWN: [(Method, &str); 8] = [
     (Method::Teacher, "teacher"),
     (Method::Exported, "ours"),
     (Method::RgbSplats, "rgb-splats"),
     (Method::ChromadistillPaper, "chromadistill-paper"),
+    (Method::ChromadistillOneScale, "chromadistill-one-scale"),
     (Method::ChromadistillCode, "chromadistill-code"),
+    (Method::ChromadistillRgb, "chromadistill-rgb"),
     (Method::PerFrame, "per-frame"),
 ];
 

@@ -1,7 +1,9 @@
-//! The loss of the recipes that RGB splats are colored by elsewhere: differences in CIELAB,
-//! agreement with a coarser picture, total variation.
+//! The loss of the recipes that RGB splats are colored by elsewhere: differences in CIELAB at
+//! full size and pooled, agreement with a coarser picture, total variation.
 
-use super::{Number, chroma_loss::smooth_l1, constants::CHROMA_EPSILON, lift};
+use num_dual::Dual64;
+
+use super::{Number, chroma_loss::smooth_l1, lift};
 
 /// Linear sRGB to X, Y and Z relative to white: ITU-R BT.709 primaries and D65 in six digits,
 /// rows divided by their sums.
@@ -19,7 +21,7 @@ pub const RELATIVE_XYZ: [[f64; 3]; 3] = [
     ],
 ];
 
-/// Black to white in CIELAB's lightness.
+/// Black to white in CIELAB's lightness, and in R, G and B where these are compared.
 const UNITS: f64 = 100.0;
 
 /// L, a and b of encoded sRGB.
@@ -52,6 +54,10 @@ pub struct LabWeights {
     pub agreement: f64,
     /// Weight of the total variation of R, G and B.
     pub variation: f64,
+    /// Coarser scales at which both pictures are pooled and compared.
+    pub pooled: usize,
+    /// True if R, G and B are compared in place of L, a and b.
+    pub in_rgb: bool,
 }
 
 /// Pictures `[height, width]`, and what they are compared with.
@@ -90,62 +96,129 @@ impl LabTarget {
         Some(mix(top, bottom, y.2))
     }
 
-    /// Loss of pixel `p`, without the total variation.
-    fn own<T: Number>(&self, p: usize, rgb: [T; 3]) -> T {
-        let of = &self.of;
-        let drawn = lab(rgb);
-        let wanted = lab(self.rgb[p]);
-        let [l, a, b] = [0, 1, 2].map(|k| drawn[k] - wanted[k]);
-        let lightness = if of.squared { l * l } else { smooth_l1(l) };
-        let chroma = smooth_l1(a) + smooth_l1(b);
-        let mut sum = (lightness * of.lightness + chroma * of.chroma) * self.weights[p];
-        if let Some(coarse) = self.coarse_ab(p) {
-            let drift = smooth_l1(drawn[1] - coarse[0]) + smooth_l1(drawn[2] - coarse[1]);
-            sum += drift * of.agreement;
+    /// A color as it is compared.
+    fn compared<T: Number>(&self, rgb: [T; 3]) -> [T; 3] {
+        match self.of.in_rgb {
+            true => rgb.map(|v| v * UNITS),
+            false => lab(rgb),
         }
-        sum
     }
 
-    /// Pairs of neighbors, the first one left of or above the second.
-    fn neighbors(&self) -> Vec<[usize; 2]> {
-        let [width, height] = self.size;
-        (0..width * height)
-            .flat_map(|p| {
-                let right = (p % width + 1 < width).then_some([p, p + 1]);
-                let below = (p / width + 1 < height).then_some([p, p + width]);
-                right.into_iter().chain(below)
+    /// Pixels that each pixel of a scale is the mean of: one at full size, four around its
+    /// center at coarser ones.
+    fn cells(&self, scale: usize) -> Vec<Vec<usize>> {
+        let [width, height] = self.size.map(|side| side >> scale);
+        let places = |cell: usize| match scale {
+            0 => vec![cell],
+            _ => {
+                let center = (cell << scale) + (1 << (scale - 1));
+                vec![center - 1, center]
+            }
+        };
+        let cells = (0..height).flat_map(|row| (0..width).map(move |column| [column, row]));
+        cells
+            .map(|[column, row]| {
+                let rows = places(row).into_iter();
+                rows.flat_map(|y| {
+                    places(column)
+                        .into_iter()
+                        .map(move |x| y * self.size[0] + x)
+                })
+                .collect()
             })
             .collect()
     }
 
+    /// Loss of a pixel of a scale, the mean of those of `cell`, drawn as `rgb`.
+    fn own<T: Number>(&self, cell: &[usize], rgb: [T; 3]) -> T {
+        let of = &self.of;
+        let known = (cell.iter().map(|&p| self.weights[p])).fold(f64::INFINITY, f64::min);
+        let drawn = self.compared(rgb);
+        let wanted = self.compared(mean(cell, &self.rgb));
+        let [l, a, b] = [0, 1, 2].map(|k| drawn[k] - wanted[k]);
+        let lightness = if of.squared { l * l } else { smooth_l1(l) };
+        let chroma = smooth_l1(a) + smooth_l1(b);
+        (lightness * of.lightness + chroma * of.chroma) * known
+    }
+
+    /// Disagreement of pixel `p` with the coarser picture.
+    fn drift<T: Number>(&self, p: usize, rgb: [T; 3]) -> T {
+        let Some(coarse) = self.coarse_ab(p) else {
+            return T::zero();
+        };
+        let [_, a, b] = lab(rgb);
+        (smooth_l1(a - coarse[0]) + smooth_l1(b - coarse[1])) * self.of.agreement
+    }
+
+    /// Pairs of neighbors, the first one left of the second or above it, each with its share
+    /// of the total variation.
+    fn neighbors(&self) -> Vec<([usize; 2], f64)> {
+        let [width, height] = self.size;
+        let across = (0..width * height).filter(|p| p % width + 1 < width);
+        let down = 0..width * (height - 1);
+        let pairs = [
+            across.map(|p| [p, p + 1]).collect::<Vec<_>>(),
+            down.map(|p| [p, p + width]).collect(),
+        ];
+        let shared = pairs.into_iter().flat_map(|pairs| {
+            let share = 0.5 / (3 * pairs.len()) as f64;
+            pairs.into_iter().map(move |pair| (pair, share))
+        });
+        shared.collect()
+    }
+
     /// The loss of drawn RGB.
     pub fn loss<T: Number>(&self, drawn: &[[T; 3]]) -> T {
-        let own = (drawn.iter().enumerate()).map(|(p, &rgb)| self.own(p, rgb));
-        let mut sum = own.fold(T::zero(), |sum, own| sum + own);
-        for [p, q] in self.neighbors() {
-            for (&first, &second) in drawn[p].iter().zip(&drawn[q]) {
-                sum += varied(first - second) * self.of.variation;
+        let mut sum = T::zero();
+        for scale in 0..=self.of.pooled {
+            let cells = self.cells(scale);
+            let share = 1.0 / (cells.len() * (1 + self.of.pooled)) as f64;
+            for cell in cells {
+                sum += self.own(&cell, mean(&cell, drawn)) * share;
             }
         }
-        sum / drawn.len() as f64
+        for (p, &rgb) in drawn.iter().enumerate() {
+            sum += self.drift(p, rgb) / drawn.len() as f64;
+        }
+        for ([p, q], share) in self.neighbors() {
+            for (&first, &second) in drawn[p].iter().zip(&drawn[q]) {
+                sum += (first - second) * (first - second) * (share * self.of.variation);
+            }
+        }
+        sum
     }
 
     /// The loss's gradient with respect to drawn RGB.
     pub fn gradient(&self, drawn: &[[f64; 3]]) -> Vec<[f64; 3]> {
-        let count = drawn.len() as f64;
-        let mut gradient: Vec<[f64; 3]> = (drawn.iter().enumerate())
-            .map(|(p, rgb)| {
-                [0, 1, 2].map(|c| {
-                    let mut dual = rgb.map(lift);
-                    dual[c].eps = 1.0;
-                    self.own(p, dual).eps / count
-                })
+        let mut gradient = vec![[0.0; 3]; drawn.len()];
+        let slopes = |rgb: [f64; 3], loss: &dyn Fn([Dual64; 3]) -> Dual64| {
+            [0, 1, 2].map(|c| {
+                let mut dual = rgb.map(lift);
+                dual[c].eps = 1.0;
+                loss(dual).eps
             })
-            .collect();
-        for [p, q] in self.neighbors() {
+        };
+        for scale in 0..=self.of.pooled {
+            let cells = self.cells(scale);
+            let share = 1.0 / (cells.len() * (1 + self.of.pooled)) as f64;
+            for cell in cells {
+                let slopes = slopes(mean(&cell, drawn), &|rgb| self.own(&cell, rgb));
+                for &p in &cell {
+                    for c in 0..3 {
+                        gradient[p][c] += slopes[c] * share / cell.len() as f64;
+                    }
+                }
+            }
+        }
+        for (p, &rgb) in drawn.iter().enumerate() {
+            let slopes = slopes(rgb, &|rgb| self.drift(p, rgb));
             for c in 0..3 {
-                let apart = super::seed(drawn[p][c] - drawn[q][c]);
-                let slope = self.of.variation * varied(apart).eps / count;
+                gradient[p][c] += slopes[c] / drawn.len() as f64;
+            }
+        }
+        for ([p, q], share) in self.neighbors() {
+            for c in 0..3 {
+                let slope = 2.0 * share * self.of.variation * (drawn[p][c] - drawn[q][c]);
                 gradient[p][c] += slope;
                 gradient[q][c] -= slope;
             }
@@ -154,10 +227,10 @@ impl LabTarget {
     }
 }
 
-/// `|r|` of a difference in RGB, smoothed as one in CIELAB is.
-fn varied<T: Number>(r: T) -> T {
-    let smoothing = CHROMA_EPSILON / UNITS;
-    (r * r + smoothing * smoothing).sqrt() - smoothing
+/// Mean color of some pixels.
+fn mean<T: Number>(cell: &[usize], rgb: &[[T; 3]]) -> [T; 3] {
+    let sum = |c: usize| cell.iter().fold(T::zero(), |sum, &p| sum + rgb[p][c]);
+    [0, 1, 2].map(|c| sum(c) / cell.len() as f64)
 }
 
 #[cfg(test)]
@@ -183,9 +256,9 @@ mod tests {
         let mut random = Random::new(7);
         let mut rgb = |count: usize| (0..count).map(|_| random.array(0.0, 1.0)).collect();
         let target = LabTarget {
-            size: [4, 3],
-            rgb: rgb(12),
-            weights: (0..12).map(|p| [1.0, 0.5, 0.0][p % 3]).collect(),
+            size: [7, 5],
+            rgb: rgb(35),
+            weights: (0..35).map(|p| [1.0, 0.5, 0.0, 1.0, 1.0][p % 5]).collect(),
             coarser: Some(([2, 1], rgb(2))),
             of: LabWeights {
                 lightness: 0.3,
@@ -193,18 +266,22 @@ mod tests {
                 chroma: 0.7,
                 agreement: 0.4,
                 variation: 2.0,
+                pooled: 0,
+                in_rgb: false,
             },
         };
-        (target, rgb(12))
+        (target, rgb(35))
     }
 
     #[test]
     fn the_gradient_is_that_of_the_whole_loss() {
         let (mut target, drawn) = target();
-        for squared in [true, false] {
+        for (squared, pooled, in_rgb) in [(true, 0, false), (false, 2, false), (false, 1, true)] {
             target.of.squared = squared;
+            target.of.pooled = pooled;
+            target.of.in_rgb = in_rgb;
             let gradient = target.gradient(&drawn);
-            for p in 0..12 {
+            for p in 0..35 {
                 for c in 0..3 {
                     let mut dual: Vec<_> = drawn.iter().map(|rgb| rgb.map(lift)).collect();
                     dual[p][c].eps = 1.0;
@@ -219,9 +296,33 @@ mod tests {
     fn what_is_wanted_costs_nothing_but_its_variation() {
         let (mut target, drawn) = target();
         target.coarser = None;
+        target.of.pooled = 2;
         target.rgb.clone_from(&drawn);
         let all = target.loss(&drawn);
         target.of.variation = 0.0;
         assert!(target.loss(&drawn).abs() < 1e-14 && all > 0.1);
+    }
+    /// As torch resizes at these factors: 2×2 means, and the middle ones of 4×4.
+    #[test]
+    fn coarser_pixels_lie_between_four() {
+        let (target, _) = target();
+        assert_eq!(target.cells(1).len(), 6);
+        assert_eq!(target.cells(1)[4], [16, 17, 23, 24]);
+        assert_eq!(target.cells(2), [[8, 9, 15, 16]]);
+    }
+
+    #[test]
+    fn total_variation_is_half_of_two_mean_squares() {
+        let (mut target, _) = target();
+        target.of = LabWeights {
+            lightness: 0.0,
+            chroma: 0.0,
+            agreement: 0.0,
+            variation: 1.0,
+            ..target.of
+        };
+        // A ramp across, in one channel.
+        let ramp: Vec<[f64; 3]> = (0..35).map(|p| [0.1 * (p % 7) as f64, 0.5, 0.5]).collect();
+        assert!((target.loss(&ramp) - 0.5 * 0.01 / 3.0).abs() < 1e-15);
     }
 }

@@ -25,8 +25,12 @@ pub enum Method {
     RgbSplats,
     /// The same by the recipe of ChromaDistill's paper.
     ChromadistillPaper,
-    /// The same by that of its released code.
+    /// The same at full size alone.
+    ChromadistillOneScale,
+    /// The same by the recipe of its released code.
     ChromadistillCode,
+    /// The same on R, G and B in place of CIELAB.
+    ChromadistillRgb,
     /// The gray scene, drawn and then colored by the teacher frame by frame.
     PerFrame,
     /// The photo itself.
@@ -49,7 +53,9 @@ impl Method {
             Self::Teacher => "teacher",
             Self::RgbSplats => "RGB splats",
             Self::ChromadistillPaper => "ChromaDistill, paper",
+            Self::ChromadistillOneScale => "ChromaDistill, one scale",
             Self::ChromadistillCode => "ChromaDistill, code",
+            Self::ChromadistillRgb => "ChromaDistill, RGB",
             Self::PerFrame => "teacher per frame",
             Self::Photo => "photo",
         }

@@ -6,13 +6,15 @@ use super::{
 };
 
 /// The order of the rows: the file that viewers show comes first.
-const ROWS: [Method; 8] = [
+const ROWS: [Method; 10] = [
     Method::Exported,
     Method::Native,
     Method::Teacher,
     Method::RgbSplats,
     Method::ChromadistillPaper,
+    Method::ChromadistillOneScale,
     Method::ChromadistillCode,
+    Method::ChromadistillRgb,
     Method::PerFrame,
     Method::Photo,
 ];

@@ -105,6 +105,23 @@ impl ShField {
         }
     }
 
+    /// The same functions with coefficients up to at least `degree`; those that are new are zero.
+    pub fn raised(&self, degree: u32) -> Self {
+        let degree = self.degree.max(degree);
+        let [old, new] =
+            [self.degree, degree].map(|degree| coefficient_count(degree) * self.channels);
+        let mut coefficients = Vec::with_capacity(self.coefficients.len() / old * new);
+        for of_splat in self.coefficients.chunks_exact(old) {
+            coefficients.extend_from_slice(of_splat);
+            coefficients.resize(coefficients.len() + new - old, 0.0);
+        }
+        Self {
+            degree,
+            channels: self.channels,
+            coefficients,
+        }
+    }
+
     /// Those of some Gaussians, in the order of `indices`.
     pub fn chosen(&self, indices: &[usize]) -> Self {
         let coefficients = indices.iter().flat_map(|&i| self.of(i));
@@ -214,6 +231,19 @@ mod tests {
             assert_eq!(part[..count], full[..count]);
             assert!(part[count..].iter().all(|&v| v == 0.0));
         }
+    }
+
+    #[test]
+    fn a_raised_field_is_the_same_function() {
+        let field = ShField {
+            degree: 0,
+            channels: 3,
+            coefficients: vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0],
+        };
+        let raised = field.raised(2);
+        assert_eq!((raised.degree, raised.coefficients.len()), (2, 54));
+        assert_eq!(raised.of(1)[..4], [4.0, 5.0, 6.0, 0.0]);
+        assert_eq!(raised.raised(1), raised);
     }
 
     #[test]

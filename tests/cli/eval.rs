@@ -141,7 +141,7 @@ fn another_recipe_is_measured_beside_the_scene() {
     assert_eq!(peers[0]["method"], "chromadistill_code");
     assert_eq!(
         (&peers[0]["iterations"], &peers[0]["passes"]),
-        (&3000.into(), &750.0.into())
+        (&3000.into(), &3000.0.into())
     );
     let [theirs, ours, teacher] =
         ["chromadistill_code", "native", "teacher"].map(|method| of(&found["pictures"], method));
@@ -151,10 +151,11 @@ fn another_recipe_is_measured_beside_the_scene() {
     let luma = &found["luma"];
     assert!((number(&ours["gray_psnr"]) - number(&luma["psnr"])).abs() < 0.1);
     assert!((number(&ours["sharpness"]) / number(&luma["sharpness"]) - 1.0).abs() < 0.05);
-    assert!(
-        (number(&theirs["gray_psnr"]) - number(&luma["psnr"])).abs() > 0.01,
-        "{theirs} {luma}"
-    );
+    let lost = number(&luma["psnr"]) - number(&theirs["gray_psnr"]);
+    let kept = number(&theirs["sharpness"]) / number(&luma["sharpness"]);
+    // Its authors report 0.3 dB and 0.97.
+    assert!(lost.abs() > 0.01 && lost < 1.0, "{theirs} {luma}");
+    assert!(kept > 0.9, "{theirs} {luma}");
     assert_eq!(number(&teacher["gray_psnr"]), 100.0);
     // Its splats can be looked at.
     let words = place.succeed(&["info", "runs/scene/eval/chromadistill-code.ply"]);

@@ -1,4 +1,4 @@
-//! `rgb_loss`, and `lab_loss` with and without a coarser picture.
+//! `rgb_loss`, and `lab_loss` with and without coarser pictures.
 
 use std::sync::Arc;
 
@@ -27,7 +27,9 @@ const WEIGHTS: LabWeights = LabWeights {
     squared: false,
     chroma: 0.75,
     agreement: 0.25,
-    variation: 2.0,
+    variation: 200.0,
+    pooled: 0,
+    in_rgb: false,
 };
 
 /// RGB as the device has pictures.
@@ -91,16 +93,10 @@ fn wanted(random: &mut Random, count: usize, hard: bool, darkest: f64) -> Vec<[f
         .collect()
 }
 
-/// Weights of pixels: all alike, or some unknown and some half known.
-fn weights(count: usize, differ: bool) -> Vec<f64> {
-    let weight = |p: usize| {
-        if differ {
-            [0.0, 0.375, 1.0][p % 3]
-        } else {
-            1.0
-        }
-    };
-    (0..count).map(weight).collect()
+/// Weights of pixels: those given in turn, or all alike.
+fn weights(count: usize, differ: bool, given: &[f64]) -> Vec<f64> {
+    let given = if differ { given } else { &[1.0] };
+    given.iter().copied().cycle().take(count).collect()
 }
 
 /// Values, gradients and curvatures of `rgb_loss`. Pictures are near what is wanted, or `hard`
@@ -124,7 +120,7 @@ fn of_rgb(gpu: &Gpu, hard: bool) -> Result<[Vec<Sample>; 3], GpuError> {
             .collect();
         let wanted = RgbTargets {
             rgb,
-            weights: weights(count, hard),
+            weights: weights(count, hard, &[0.0, 0.375, 1.0]),
         };
         let compared = Compared {
             size,
@@ -150,11 +146,16 @@ fn of_rgb(gpu: &Gpu, hard: bool) -> Result<[Vec<Sample>; 3], GpuError> {
     }))
 }
 
-/// Values and gradients of `lab_loss`. Pictures that are `hard` are beyond black and white, far
-/// off, or not off at all; a `full` comparison has weights, a coarser picture and squares of
-/// lightness.
-fn of_lab(gpu: &Gpu, hard: bool, full: bool) -> Result<[Vec<Sample>; 2], GpuError> {
-    let source = match full {
+/// Values and gradients of `lab_loss` with terms `of`, with weights where pixels are `weighted`.
+/// Pictures that are `hard` are beyond black and white, far off, or not off at all; without
+/// squares of lightness there is no coarser picture to agree with.
+fn of_lab(
+    gpu: &Gpu,
+    hard: bool,
+    weighted: bool,
+    of: LabWeights,
+) -> Result<[Vec<Sample>; 2], GpuError> {
+    let source = match of.squared {
         true => shaders::LAB_LOSS_AGREEING,
         false => shaders::LAB_LOSS,
     };
@@ -180,12 +181,9 @@ fn of_lab(gpu: &Gpu, hard: bool, full: bool) -> Result<[Vec<Sample>; 2], GpuErro
         let target = LabTarget {
             size,
             rgb,
-            weights: weights(count, full),
-            coarser: full.then(|| (coarse, of_coarse.collect())),
-            of: LabWeights {
-                squared: full,
-                ..WEIGHTS
-            },
+            weights: weights(count, weighted, &[0.0, 0.375, 1.0, 1.0, 0.75, 1.0, 1.0]),
+            coarser: of.squared.then(|| (coarse, of_coarse.collect())),
+            of,
         };
         let compared = Compared {
             size,
@@ -193,13 +191,15 @@ fn of_lab(gpu: &Gpu, hard: bool, full: bool) -> Result<[Vec<Sample>; 2], GpuErro
             wanted: &target.rgb,
             weights: &target.weights,
             parameters: LabLossParameters {
-                coarser_size: coarse.map(|side| if full { side as u32 } else { 0 }),
-                lightness: WEIGHTS.lightness as f32,
-                squared: u32::from(full),
-                chroma: WEIGHTS.chroma as f32,
-                agreement: WEIGHTS.agreement as f32,
-                variation: WEIGHTS.variation as f32,
-                weighted: u32::from(full),
+                coarser_size: coarse.map(|side| if of.squared { side as u32 } else { 0 }),
+                lightness: of.lightness as f32,
+                squared: u32::from(of.squared),
+                chroma: of.chroma as f32,
+                agreement: of.agreement as f32,
+                variation: of.variation as f32,
+                weighted: u32::from(weighted),
+                pooled: of.pooled as u32,
+                in_rgb: u32::from(of.in_rgb),
             },
             coarser: target.coarser.as_ref().map(|(_, rgb)| &rgb[..]),
         };
@@ -233,14 +233,20 @@ pub(super) fn rgb_rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
 pub(super) fn lab_rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
     let (gpu, allowed) = (&raster.gpu, Allowance::of(&raster.gpu));
     let mut rows = Vec::new();
+    let [mut agreeing, mut pooled, mut in_rgb] = [WEIGHTS; 3];
+    agreeing.squared = true;
+    pooled.pooled = 2;
+    in_rgb.in_rgb = true;
     // a and b are 500 and 200 times small differences: what f32 rounds in these is seen.
-    for (kind, [hard, full], [l2, worst]) in [
-        ("", [false, false], [5e-6, 8e-5]),
-        (", agreeing", [false, true], [3e-6, 8e-5]),
-        (", hard", [true, false], [5.4e-5, 1.7e-4]),
+    for (kind, [hard, weighted], of, [value, l2, worst]) in [
+        ("", [false, false], WEIGHTS, [9e-7, 5e-6, 8e-5]),
+        (", agreeing", [false, true], agreeing, [9e-7, 3e-6, 8e-5]),
+        (", pooled", [false, true], pooled, [9e-7, 5e-6, 8e-5]),
+        (", in RGB", [false, false], in_rgb, [1.2e-6, 1e-6, 8e-5]),
+        (", hard", [true, false], WEIGHTS, [9e-7, 5.4e-5, 1.7e-4]),
     ] {
-        let [values, gradients] = of_lab(gpu, hard, full)?;
-        rows.push(allowed.values("lab_loss", format!("value{kind}"), [9e-7, 0.0], &values));
+        let [values, gradients] = of_lab(gpu, hard, weighted, of)?;
+        rows.push(allowed.values("lab_loss", format!("value{kind}"), [value, 0.0], &values));
         let what = format!("gradient × pixels{kind}");
         rows.push(allowed.gradients("lab_loss", what, [l2, worst, 100.0], &gradients));
     }

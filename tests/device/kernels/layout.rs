@@ -146,7 +146,9 @@ fn twins() -> Vec<Twin> {
                 chroma,
                 agreement,
                 variation,
-                weighted
+                weighted,
+                pooled,
+                in_rgb
             }
         ),
         twin!(

@@ -220,7 +220,14 @@ fn broken_losses_of_color_are_noticed() {
             "vec4f(residual, UNITS)",
             "vec4f(residual, 1.0)",
         ],
-        ["lab loss", "lab_loss", "if at.x > 0u", "if at.x > 1u"],
+        ["lab loss", "lab_loss", "at.x > 0u", "at.x > 1u"],
+        ["lab loss", "lab_loss", "((1u << scale) - side) / 2u", "0u"],
+        [
+            "lab loss",
+            "lab_loss",
+            "min(weight, weight_of(q))",
+            "weight",
+        ],
         ["lab loss", "lab_loss", "2.0 * residual.x", "residual.x"],
         ["chroma loss", "sum_loss", "k += 256u", "k += 512u"],
     ]);

@@ -243,8 +243,39 @@ pub const REASONS: &[(&str, &str, &str)] = &[
     ),
     (
         "lab_loss",
-        "vec4f(gradient, 0.0) / f32(pixels)",
+        "part.value / f32(parameters.pooled + 1u)",
+        "there is one scale at least",
+    ),
+    (
+        "lab_loss",
+        "part.gradient / f32(parameters.pooled + 1u)",
+        "there is one scale at least",
+    ),
+    (
+        "lab_loss",
+        "parameters.agreement / f32(pixels)",
         "the kernel runs for images of at least one pixel",
+    ),
+    ("of_scale", "image[q] / f32(pixels)", "one pixel or four"),
+    (
+        "of_scale",
+        "wanted_rgb(wanted[q]) / f32(pixels)",
+        "one pixel or four",
+    ),
+    (
+        "of_scale",
+        "weight / f32(pixels * cells.x * cells.y)",
+        "a pixel has come here that lies in one of the cells",
+    ),
+    (
+        "total_variation",
+        "1.0 / f32(pairs.x)",
+        "sides count as two pixels at least",
+    ),
+    (
+        "total_variation",
+        "1.0 / f32(pairs.y)",
+        "sides count as two pixels at least",
     ),
     (
         "lab_of",
