@@ -35,8 +35,8 @@ pub struct ChromaSettings {
     pub sh_degree: u32,
     /// Coarser scales of Adam beside the full one.
     ///
-    /// Each is half as large as the last. The paper leaves it open; see
-    /// docs/lab/07-chroma-solver.md for the ablation.
+    /// Each is half as large as the last. The paper leaves their number open. By least squares,
+    /// coarser scales make colors paler (docs/lab/07-chroma-solver.md, coarser scales).
     pub scales: u32,
     /// Weight of Adam's agreement with the next coarser scale.
     ///
