@@ -9,7 +9,7 @@ use gs_chroma::{
 
 const DOCS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/hard-cases.md");
 
-const HEADER: &str = "# HardCase cases
+const HEADER: &str = "# Hard cases
 
 Scenes at which splat rasterizers break (`src/doctor/cases.rs`), and how far this one is
 from the f64 oracle on them. *Picture error* is the largest of a pixel, in units of the
