@@ -242,11 +242,10 @@ impl<'a> AdamSolver<'a> {
 impl AdamSolver<'_> {
     /// Buffers that the next step goes by.
     fn kept(&self) -> [(&'static str, &Buffer<f32>); 3] {
-        let moments = &self.adam.moments;
         [
             ("harmonics", &self.passes.field.planes),
-            ("first moments", &moments.first),
-            ("second moments", &moments.second),
+            ("first moments", &self.adam.moments.first),
+            ("second moments", &self.adam.moments.second),
         ]
     }
 }

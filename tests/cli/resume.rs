@@ -280,7 +280,7 @@ fn a_coloring_that_is_killed_goes_on() {
 #[test]
 fn a_descent_that_is_killed_goes_on() {
     let colorize = ["colorize", "runs/scene", "--teacher", "colored"];
-    let adam = ["--solver", "adam", "--until", "660", "--sh-degree", "1"];
+    let adam = ["--as-paper", "--until", "660", "--sh-degree", "1"];
     killed_and_resumed(&[&colorize[..], &adam].concat());
 }
 
@@ -370,6 +370,16 @@ fn a_coloring_of_gaussians_that_wait_on_the_host() {
         );
     }
     let streamed = colors(&place);
+    // Adam needs all of them there.
+    let adam = ["--solver", "adam", "--until", "62", "--memory-limit", "1"];
+    let refused = place.run(&[&colorize[..6], &adam].concat());
+    assert_eq!(refused.code, Some(1), "{}", refused.stderr);
+    let errors = refused
+        .stderr
+        .lines()
+        .filter(|line| line.starts_with("error:"));
+    assert_eq!(errors.count(), 1, "{}", refused.stderr);
+    assert!(colors(&place) == streamed);
 
     let (whole, _) = many();
     whole.succeed(&colorize);
