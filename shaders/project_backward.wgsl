@@ -13,6 +13,9 @@ import package::common::projected::Projected;
 import package::common::rotation::{quat_gradient, rotation_from_quat};
 import package::common::view::View;
 
+// True where densification asks as 3DGS does: pixels that pull apart cancel.
+override SIGNED_PULLS: bool = false;
+
 @group(0) @binding(0) var<uniform> view: View;
 @if(!step) @group(0) @binding(1) var<storage, read> geometry: array<f32>;
 @if(step) @group(0) @binding(1) var<storage, read_write> geometry: array<f32>;
@@ -139,6 +142,7 @@ fn project_backward(@builtin(workgroup_id) group: vec3u, @builtin(local_invocati
     if overflow {
         return;
     }
-    statistics[STAT_PULL * n + i] += gradients[at + PARTIAL_PULL];
+    let signed_pull = length(0.5 * vec2f(view.size) * v_center);
+    statistics[STAT_PULL * n + i] += select(gradients[at + PARTIAL_PULL], signed_pull, SIGNED_PULLS);
     statistics[STAT_VIEWS * n + i] += 1.0;
 }

@@ -74,7 +74,8 @@ fn project_backward(@builtin(workgroup_id) group: vec3u, @builtin(local_invocati
     if overflow {
         return;
     }
-    statistics[STAT_PULL * n + i] += gradients[at + PARTIAL_PULL];
+    let signed_pull = length(0.5 * vec2f(view.size) * v_center);
+    statistics[STAT_PULL * n + i] += select(gradients[at + PARTIAL_PULL], signed_pull, SIGNED_PULLS);
     statistics[STAT_VIEWS * n + i] += 1.0;
 }
 
@@ -236,6 +237,8 @@ fn store(index: u32, i: u32, value: f32) {
 fn world_to_camera(view: View) -> mat3x3f {
     return transpose(mat3x3f(view.row0.xyz, view.row1.xyz, view.row2.xyz));
 }
+
+override SIGNED_PULLS: bool = false;
 
 struct AdamParameters {
     splat_count: u32,

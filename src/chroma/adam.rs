@@ -6,12 +6,13 @@ use std::{ops::RangeInclusive, time::Instant};
 use super::{
     ChromaError, ChromaObserver, ChromaProgress, ChromaSettings, FrozenViews, Recipe, Targets,
     Task,
+    checkpoint::{Interruptible, SolverState},
     loss::Space,
     passes::{LossOutput, LossSettings, Passes},
 };
 use crate::{
     capture::view_at,
-    gpu::{Gpu, Recorder},
+    gpu::{Buffer, Gpu, Recorder},
     raster::{Adam, Load},
     splats::{ShField, Splats, sh},
 };
@@ -39,6 +40,8 @@ pub struct AdamSolver<'a> {
     adam: Adam,
     /// Iterations done.
     done: usize,
+    /// Seconds of those before.
+    seconds: f64,
 }
 
 impl<'a> AdamSolver<'a> {
@@ -135,6 +138,7 @@ impl<'a> AdamSolver<'a> {
             schedule,
             adam,
             done: 0,
+            seconds: 0.0,
         })
     }
 
@@ -182,13 +186,14 @@ impl<'a> AdamSolver<'a> {
                     loss: recent.iter().map(|&loss| f64::from(loss)).sum::<f64>()
                         / recent.len() as f64,
                     passes: done as f64 * self.schedule.scales.clone().map(share).sum::<f64>(),
-                    seconds: begun.elapsed().as_secs_f64(),
+                    seconds: self.seconds + begun.elapsed().as_secs_f64(),
                 });
                 if told.is_break() {
                     return Err(ChromaError::Cancelled);
                 }
             }
         }
+        self.seconds += begun.elapsed().as_secs_f64();
         Ok(())
     }
 
@@ -235,6 +240,46 @@ impl<'a> AdamSolver<'a> {
             recorder.submit();
         }
         Ok(())
+    }
+}
+
+impl AdamSolver<'_> {
+    /// Buffers that the next step goes by.
+    fn kept(&self) -> [(&'static str, &Buffer<f32>); 3] {
+        [
+            ("harmonics", &self.passes.field.planes),
+            ("first moments", &self.adam.moments.first),
+            ("second moments", &self.adam.moments.second),
+        ]
+    }
+}
+
+impl Interruptible for AdamSolver<'_> {
+    fn go_on(&mut self, observe: &mut ChromaObserver<'_>) -> Result<bool, ChromaError> {
+        let goes_on = self.done < self.schedule.iterations;
+        // To where all losses are told.
+        self.run_to(self.done + REPORT_EVERY, observe)?;
+        Ok(goes_on)
+    }
+
+    fn so_far(&self) -> Result<ShField, ChromaError> {
+        self.harmonics()
+    }
+
+    fn state(&self) -> Result<SolverState, ChromaError> {
+        let mut state = SolverState::default();
+        state.rounds.done = self.done;
+        for (name, buffer) in self.kept() {
+            let values = buffer.read(self.gpu())?;
+            state.buffers.insert(name.to_owned(), values);
+        }
+        Ok(state)
+    }
+
+    fn go_on_from(&mut self, state: &SolverState) -> bool {
+        self.done = state.rounds.done;
+        let mut kept = self.kept().into_iter();
+        kept.all(|(name, buffer)| state.put(name, buffer, self.gpu()))
     }
 }
 

@@ -4,11 +4,14 @@ use std::{collections::BTreeMap, time::Duration};
 
 use serde::{Deserialize, Serialize};
 
-use super::{ChosenDegree, ChromaProgress};
-use crate::splats::ShField;
+use super::{ChosenDegree, ChromaError, ChromaObserver, ChromaProgress};
+use crate::{
+    gpu::{Buffer, Gpu},
+    splats::ShField,
+};
 
-/// A distillation after a round of [`IrlsSolver`](super::IrlsSolver). What goes on from it
-/// ends with the bytes of one that was never interrupted.
+/// A distillation between two rounds of its solver; those of Adam are the iterations that it
+/// reports together. What goes on from it ends with the bytes of one that was never interrupted.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ChromaCheckpoint {
     pub(super) state: SolveDecisions,
@@ -36,10 +39,34 @@ pub(super) struct SolverState {
     pub doubles: BTreeMap<String, Vec<f64>>,
 }
 
+impl SolverState {
+    /// Writes back the contents of a buffer; `false` where they are missing or of another length.
+    pub fn put(&self, name: &str, buffer: &Buffer<f32>, gpu: &Gpu) -> bool {
+        let values = self.buffers.get(name);
+        let values = values.filter(|values| values.len() == buffer.len());
+        values.map(|values| buffer.write(gpu, values)).is_some()
+    }
+}
+
+/// A solver that can be interrupted between two rounds.
+pub(super) trait Interruptible {
+    /// Does a round; `false` if none was left.
+    fn go_on(&mut self, observe: &mut ChromaObserver<'_>) -> Result<bool, ChromaError>;
+
+    /// The harmonics so far.
+    fn so_far(&self) -> Result<ShField, ChromaError>;
+
+    /// All that the next rounds go by.
+    fn state(&self) -> Result<SolverState, ChromaError>;
+
+    /// Goes on from a state of the same problem; `false` where it is of another.
+    fn go_on_from(&mut self, state: &SolverState) -> bool;
+}
+
 /// A solver's counters on the host.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Rounds {
-    /// Rounds done.
+    /// Rounds done, or iterations of Adam.
     pub done: usize,
     /// See [`IrlsSolver`](super::IrlsSolver).
     pub plain: bool,
@@ -89,7 +116,7 @@ impl ChromaCheckpointing for NoChromaCheckpoints {
 }
 
 impl ChromaCheckpoint {
-    /// Rounds done.
+    /// Rounds done, or iterations of Adam.
     pub fn rounds(&self) -> usize {
         self.solver.rounds.done
     }

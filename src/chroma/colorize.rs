@@ -4,9 +4,11 @@ use std::{cell::Cell, ops::ControlFlow, sync::Arc, time::Instant};
 
 use super::{
     ChosenDegree, ChromaError, ChromaProgress, ChromaSettings, Colorizer, Correction, Degree,
-    FrozenViews, IrlsSolver, MemoryBudget, SolverKind, Supervision, Task,
+    FrozenViews, MemoryBudget, SolverKind, Supervision, Task,
     bake::{BakeStep, bake_telling},
-    checkpoint::{ChromaCheckpoint, ChromaCheckpointing, NoChromaCheckpoints, SolveDecisions},
+    checkpoint::{
+        ChromaCheckpoint, ChromaCheckpointing, Interruptible, NoChromaCheckpoints, SolveDecisions,
+    },
     choose_degree, match_saturation, plan,
     solve::solve_from,
     strokes::lay,
@@ -211,10 +213,10 @@ impl Distill<'_> {
         let mut effects = [correction, plan::degree(self.sh_degree, chosen.as_ref())];
         go_on(observe(ColorizeEvent::Plan(&effects)))?;
         let mut solved = |settings: &ChromaSettings, from, uncorrected| {
-            let between = &mut |solver: &IrlsSolver<'_>| {
+            let between = &mut |solver: &dyn Interruptible| {
                 if checkpointing.looks_on() {
                     let asked = Instant::now();
-                    checkpointing.show(&solver.chroma()?, asked.elapsed());
+                    checkpointing.show(&solver.so_far()?, asked.elapsed());
                 }
                 if !checkpointing.wants() {
                     return Ok(true);

@@ -8,7 +8,7 @@ use std::time::Instant;
 use super::{
     ChromaError, ChromaObserver, ChromaProgress, ChromaSettings, Correction, FrozenViews, Targets,
     Task,
-    checkpoint::{Rounds, SolverState},
+    checkpoint::{Interruptible, Rounds, SolverState},
     lbfgs::LbfgsState,
     loss::Space,
     passes::{LossOutput, LossSettings, Passes},
@@ -153,82 +153,6 @@ impl<'a> IrlsSolver<'a> {
     /// [`ChromaError`] when the device is lost or targets cannot be read.
     pub fn run(&mut self, observe: &mut ChromaObserver<'_>) -> Result<(), ChromaError> {
         self.run_to(self.settings.rounds, observe)
-    }
-
-    /// The same, with `between` after each round: `false` ends it.
-    ///
-    /// # Errors
-    /// As [`IrlsSolver::run`], those of `between`, and [`ChromaError::Cancelled`].
-    pub(super) fn run_between(
-        &mut self,
-        observe: &mut ChromaObserver<'_>,
-        between: &mut dyn FnMut(&Self) -> Result<bool, ChromaError>,
-    ) -> Result<(), ChromaError> {
-        while self.done < self.settings.rounds && !self.ended {
-            self.run_to(self.done + 1, observe)?;
-            if !between(self)? {
-                return Err(ChromaError::Cancelled);
-            }
-        }
-        Ok(())
-    }
-
-    /// All that the next rounds go by.
-    ///
-    /// # Errors
-    /// [`ChromaError::Gpu`] when the device is lost.
-    pub(super) fn state(&self) -> Result<SolverState, ChromaError> {
-        let gpu = self.gpu();
-        let StepStatus {
-            newest,
-            mut buffers,
-            doubles,
-        } = self.steps.kept(&self.passes)?;
-        for (name, buffer) in self.passes.corrections.kept() {
-            let values = bytemuck::cast_slice(&buffer.read(gpu)?).to_vec();
-            buffers.insert(name.to_owned(), values);
-        }
-        let rounds = Rounds {
-            done: self.done,
-            plain: self.plain,
-            settled: self.settled,
-            undone: self.undone,
-            corrected: self.corrected,
-            anchored: self.anchored,
-            ended: self.ended,
-            newest,
-            spent: self.spent,
-        };
-        Ok(SolverState {
-            rounds,
-            buffers,
-            doubles,
-        })
-    }
-
-    /// Goes on from a state of the same problem; `false` where it is of another.
-    pub(super) fn go_on_from(&mut self, state: &SolverState) -> bool {
-        let gpu = self.gpu();
-        let mut fits = self.steps.go_on_from(state, &mut self.passes);
-        for (name, buffer) in self.passes.corrections.kept() {
-            let values = state.buffers.get(name).map(Vec::as_slice);
-            let found: Result<&[Correction], _> =
-                bytemuck::try_cast_slice(values.unwrap_or_default());
-            match found {
-                Ok(found) if found.len() == buffer.len() => buffer.write(gpu, found),
-                _ => fits = false,
-            }
-        }
-        let rounds = state.rounds;
-        self.done = rounds.done;
-        self.plain = rounds.plain;
-        self.settled = rounds.settled;
-        self.undone = rounds.undone;
-        self.corrected = rounds.corrected;
-        self.anchored = rounds.anchored;
-        self.ended = rounds.ended;
-        self.spent = rounds.spent;
-        fits
     }
 
     /// Goes on until so many rounds are done, and leaves the rest for later.
@@ -405,6 +329,73 @@ impl<'a> IrlsSolver<'a> {
         }
         self.spent += if adjoint { 1.0 } else { DRAWING } * self.passes.tasks.len() as f64;
         Ok(())
+    }
+}
+
+impl Interruptible for IrlsSolver<'_> {
+    fn go_on(&mut self, observe: &mut ChromaObserver<'_>) -> Result<bool, ChromaError> {
+        let goes_on = self.done < self.settings.rounds && !self.ended;
+        if goes_on {
+            self.run_to(self.done + 1, observe)?;
+        }
+        Ok(goes_on)
+    }
+
+    fn so_far(&self) -> Result<ShField, ChromaError> {
+        self.chroma()
+    }
+
+    fn state(&self) -> Result<SolverState, ChromaError> {
+        let gpu = self.gpu();
+        let StepStatus {
+            newest,
+            mut buffers,
+            doubles,
+        } = self.steps.kept(&self.passes)?;
+        for (name, buffer) in self.passes.corrections.kept() {
+            let values = bytemuck::cast_slice(&buffer.read(gpu)?).to_vec();
+            buffers.insert(name.to_owned(), values);
+        }
+        let rounds = Rounds {
+            done: self.done,
+            plain: self.plain,
+            settled: self.settled,
+            undone: self.undone,
+            corrected: self.corrected,
+            anchored: self.anchored,
+            ended: self.ended,
+            newest,
+            spent: self.spent,
+        };
+        Ok(SolverState {
+            rounds,
+            buffers,
+            doubles,
+        })
+    }
+
+    fn go_on_from(&mut self, state: &SolverState) -> bool {
+        let gpu = self.gpu();
+        let mut fits = self.steps.go_on_from(state, &mut self.passes);
+        for (name, buffer) in self.passes.corrections.kept() {
+            let values = state.buffers.get(name).map(Vec::as_slice);
+            let found: Result<&[Correction], _> =
+                bytemuck::try_cast_slice(values.unwrap_or_default());
+            match found {
+                Ok(found) if found.len() == buffer.len() => buffer.write(gpu, found),
+                _ => fits = false,
+            }
+        }
+        let rounds = state.rounds;
+        self.done = rounds.done;
+        self.plain = rounds.plain;
+        self.settled = rounds.settled;
+        self.undone = rounds.undone;
+        self.corrected = rounds.corrected;
+        self.anchored = rounds.anchored;
+        self.ended = rounds.ended;
+        self.spent = rounds.spent;
+        fits
     }
 }
 

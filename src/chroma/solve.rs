@@ -2,7 +2,9 @@
 
 use super::{
     AdamSolver, ChromaError, ChromaObserver, ChromaSettings, Correction, FrozenViews, IrlsSolver,
-    SolverKind, Targets, Task, checkpoint::SolverState, fill_unseen,
+    SolverKind, Targets, Task,
+    checkpoint::{Interruptible, SolverState},
+    fill_unseen,
 };
 use crate::{
     raster::Load,
@@ -60,12 +62,12 @@ pub fn solve(
 /// State to go on from, and the call after each round.
 pub(super) type Between<'a> = (
     Option<&'a SolverState>,
-    &'a mut dyn FnMut(&IrlsSolver<'_>) -> Result<bool, ChromaError>,
+    &'a mut dyn FnMut(&dyn Interruptible) -> Result<bool, ChromaError>,
 );
 
-/// [`solve`] that can be interrupted and go on, if not by Adam.
+/// [`solve`] that can be interrupted and go on.
 pub(super) fn solve_from(
-    (from, between): Between<'_>,
+    between: Between<'_>,
     frozen: &FrozenViews,
     settings: &ChromaSettings,
     targets: &Targets,
@@ -76,7 +78,7 @@ pub(super) fn solve_from(
     match settings.solver {
         SolverKind::Adam => {
             let mut adam = AdamSolver::new(frozen, settings.clone(), targets, tasks)?;
-            adam.run(observe)?;
+            run(&mut adam, between, observe)?;
             Ok(Solved {
                 chroma: adam.harmonics()?,
                 corrections: Vec::new(),
@@ -86,10 +88,7 @@ pub(super) fn solve_from(
         }
         SolverKind::Irls => {
             let mut solver = IrlsSolver::new(frozen, settings, targets, tasks)?;
-            if from.is_some_and(|state| !solver.go_on_from(state)) {
-                return Err(ChromaError::OtherCheckpoint);
-            }
-            solver.run_between(observe, between)?;
+            run(&mut solver, between, observe)?;
             let mut chroma = solver.chroma()?;
             let seen = solver.seen()?;
             if settings.fill {
@@ -106,4 +105,21 @@ pub(super) fn solve_from(
             })
         }
     }
+}
+
+/// Runs a solver to its last round.
+fn run(
+    solver: &mut dyn Interruptible,
+    (from, between): Between<'_>,
+    observe: &mut ChromaObserver<'_>,
+) -> Result<(), ChromaError> {
+    if from.is_some_and(|state| !solver.go_on_from(state)) {
+        return Err(ChromaError::OtherCheckpoint);
+    }
+    while solver.go_on(observe)? {
+        if !between(solver)? {
+            return Err(ChromaError::Cancelled);
+        }
+    }
+    Ok(())
 }

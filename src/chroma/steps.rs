@@ -173,11 +173,7 @@ impl Steps {
         let gpu = passes.frozen.gpu();
         match self {
             Self::Device(system, lbfgs) => {
-                let put = |name: &str, buffer: &Buffer<f32>| {
-                    let values = kept.buffers.get(name);
-                    let values = values.filter(|values| values.len() == buffer.len());
-                    values.map(|values| buffer.write(gpu, values)).is_some()
-                };
+                let put = |name: &str, buffer: &Buffer<f32>| kept.put(name, buffer, gpu);
                 let of_system = of_system(system).into_iter();
                 let fits = of_system.fold(true, |fits, (name, buffer)| fits & put(name, buffer));
                 let of_steps = lbfgs.kept().1.iter();

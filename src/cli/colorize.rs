@@ -40,6 +40,9 @@ const SOLVERS: &[(SolverKind, &str)] = &[
     ),
 ];
 
+/// Last iteration of the paper's schedule, counted from the start of stage 1.
+const PAPER_UNTIL: u32 = 30_000;
+
 /// Color a gray run or splat file, with a colorization network or colored photos.
 #[derive(Args)]
 #[command(after_long_help = "Example:
@@ -88,6 +91,12 @@ pub struct Colorize {
     /// How a network's small picture is enlarged.
     #[arg(long, value_parser = one_of(UPSAMPLE), default_value = "guided", help_heading = TEACHER, hide_short_help = true)]
     upsample: Upsample,
+    /// Color as the ChromaDistill paper does.
+    ///
+    /// --solver adam until iteration 30,000, at three scales. With --until the same descent in
+    /// proportion.
+    #[arg(long, conflicts_with = "solver", help_heading = BUDGET)]
+    as_paper: bool,
     /// Maximum rounds of least squares; ends sooner once colors settle [default: 12].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000), help_heading = BUDGET)]
     rounds: Option<u32>,
@@ -220,7 +229,11 @@ impl Colorize {
         }
     }
 
-    pub(super) fn run(self) -> Result<(), CliError> {
+    pub(super) fn run(mut self) -> Result<(), CliError> {
+        if self.as_paper {
+            self.solver = SolverKind::Adam;
+            self.until = self.until.or(Some(PAPER_UNTIL));
+        }
         self.check_solver();
         let settings = self.settings();
         let run = self.run.as_deref().unwrap_or("colorize".as_ref());

@@ -21,7 +21,7 @@ use super::{
 use crate::{
     capture::LoadOptions,
     effects::Overrules,
-    luma::Goal,
+    luma::{DensifyRules, Goal},
     report::timings_table,
     run::{FitRequest, Init, Preset, fit},
 };
@@ -46,6 +46,12 @@ pub struct Fit {
     /// How much work to do [default: paper on a GPU, else draft].
     #[arg(long, value_parser = one_of(PRESETS), help_heading = BUDGET)]
     preset: Option<Preset>,
+    /// Train as the ChromaDistill paper does.
+    ///
+    /// --preset paper, all 15,000 iterations, --densify 3dgs, --sh-degree 3. With --iterations the
+    /// same schedule in proportion.
+    #[arg(long, conflicts_with_all = ["preset", "densify", "stop_when_flat", "time_limit", "target_psnr"], help_heading = BUDGET)]
+    as_paper: bool,
     /// Finish in this many minutes: chooses photo size, Gaussians and iterations.
     ///
     /// With --preset, no more work than that. Counts everything from start to end.
@@ -121,10 +127,16 @@ impl Fit {
 
     /// The request: what the first argument names, with what else is given over it.
     fn request(&self) -> Result<FitRequest, CliError> {
-        let (load, overrules) = (
+        let (load, mut overrules) = (
             self.photos.clone().options(),
             self.effects.clone().overrules(),
         );
+        let mut overlay = self.luma.overlay();
+        let paper = self.as_paper.then_some(Preset::Paper);
+        if self.as_paper {
+            overrules.sh_degree = overrules.sh_degree.or(Some(3));
+            overlay.rules = Some(DensifyRules::Published);
+        }
         let asked = match FitRequest::continuing(&self.colmap_dir)? {
             Some(run) => self.further(run, &load, &overrules)?,
             None if self.around.is_some() => refuse(
@@ -143,8 +155,8 @@ impl Fit {
         let seconds = self.time_limit.map(|minutes| 60.0 * minutes);
         Ok(FitRequest {
             output: self.output.clone().or(asked.output),
-            preset: self.preset.or(asked.preset),
-            settings: self.luma.overlay().over(asked.settings),
+            preset: paper.or(self.preset).or(asked.preset),
+            settings: overlay.over(asked.settings),
             measure_side: self.measure_side.or(asked.measure_side),
             init: self.init.clone().map(Init::File).or(asked.init),
             goal: match (self.target_psnr, seconds) {
@@ -168,6 +180,7 @@ impl Fit {
         let names_others = *load != LoadOptions::default()
             || *overrules != Overrules::default()
             || self.preset.is_some()
+            || self.as_paper
             || self.init.is_some();
         if names_others {
             refuse(

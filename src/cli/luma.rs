@@ -4,9 +4,15 @@ use clap::Args;
 
 use super::{
     headings::{BUDGET, EXPERT, QUALITY},
-    values::{mebibytes, positive},
+    values::{mebibytes, one_of, positive},
 };
-use crate::luma::{FLAT, LumaOverlay, Numerics};
+use crate::luma::{DensifyRules, FLAT, LumaOverlay, Numerics};
+
+/// Rules of densification.
+const RULES: &[(DensifyRules, &str)] = &[
+    (DensifyRules::Own, "Splits alone, by absolute gradients"),
+    (DensifyRules::Published, "As 3D Gaussian Splatting has it"),
+];
 
 /// Overrides of the preset's settings.
 #[derive(Args)]
@@ -17,6 +23,12 @@ pub(super) struct LumaArguments {
     /// Maximum number of Gaussians [default: the preset's].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = QUALITY)]
     max_splats: Option<u32>,
+    /// Rules of densification: own, or 3dgs as published (Kerbl et al. 2023) [default: own].
+    ///
+    /// 3dgs: splits and clones by signed gradients, opacity resets, removal of large Gaussians, an SH
+    /// degree every 1,000 iterations, and its learning rates; without early stopping.
+    #[arg(long, value_parser = one_of(RULES), hide_possible_values = true, value_name = "own|3dgs", help_heading = EXPERT, hide_short_help = true)]
+    densify: Option<DensifyRules>,
     /// Leave black what no photo shows, instead of surrounding the scene with a shell of gray.
     #[arg(long, help_heading = QUALITY, hide_short_help = true)]
     no_surround: bool,
@@ -55,6 +67,7 @@ impl LumaArguments {
                 // Who says how many iterations wants them all.
                 None => self.iterations.map(|_| 0.0),
             },
+            rules: self.densify,
             max_splats: self.max_splats.map(|count| count as usize),
             surround: self.no_surround.then_some(false),
             fill_gaps: self.no_fill_gaps.then_some(false),

@@ -67,7 +67,7 @@ pub struct Evidence<'a> {
 }
 
 /// One that stays as it is.
-fn survivor(source: usize) -> Descent {
+pub fn survivor(source: usize) -> Descent {
     Descent {
         source: source as u32,
         survives: 1,
@@ -75,10 +75,26 @@ fn survivor(source: usize) -> Descent {
     }
 }
 
-/// Plans one densification: survivors in their old order, then the halves of
-/// splits, then those that are held. Where growth or the cap does not admit all, the Gaussians with the
-/// strongest pull come first (ties by index).
+/// Plans one densification by our own rules.
 pub fn plan(settings: &LumaSettings, evidence: &Evidence<'_>) -> Vec<Descent> {
+    let n = evidence.geometry.len() / GEOMETRY_PLANES;
+    let at = |plane: usize, i: usize| f64::from(evidence.geometry[plane * n + i]);
+    let halved = |i: usize| {
+        let log_scales = std::array::from_fn(|axis| at(PLANE_LOG_SCALE + axis, i));
+        halves(i as u32, log_scales, at(PLANE_OPACITY, i))
+    };
+    plan_by(settings, evidence, halved, |_| true)
+}
+
+/// Plans one densification: survivors in their old order, then the two that each of the others is
+/// `divided` into, then those that are held; no others than `stays` keeps. Where growth or the cap
+/// does not admit all, the Gaussians with the strongest pull come first (ties by index).
+pub fn plan_by(
+    settings: &LumaSettings,
+    evidence: &Evidence<'_>,
+    divided: impl FnMut(usize) -> [Descent; 2],
+    stays: impl Fn(&Descent) -> bool,
+) -> Vec<Descent> {
     let n = evidence.geometry.len() / GEOMETRY_PLANES;
     let at = |plane: usize, i: usize| evidence.geometry[plane * n + i];
     let opacity = |i: usize| 1.0 / (1.0 + f64::from(-at(PLANE_OPACITY, i)).exp());
@@ -102,7 +118,7 @@ pub fn plan(settings: &LumaSettings, evidence: &Evidence<'_>) -> Vec<Descent> {
         .filter(|&(pull, _)| pull >= settings.pull_threshold)
         .collect();
     candidates.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-    // A split adds one.
+    // A split or a clone adds one.
     let taken = evidence.held + evidence.reserved + survivors.len();
     let room = settings.max_splats.saturating_sub(taken);
     let growth = (survivors.len() as f64 * settings.growth).ceil() as usize;
@@ -115,10 +131,8 @@ pub fn plan(settings: &LumaSettings, evidence: &Evidence<'_>) -> Vec<Descent> {
         .filter(|i| splits.binary_search(i).is_err())
         .map(|&i| survivor(i))
         .collect();
-    plan.extend(splits.into_iter().flat_map(|i| {
-        let log_scales = std::array::from_fn(|axis| f64::from(at(PLANE_LOG_SCALE + axis, i)));
-        halves(i as u32, log_scales, f64::from(at(PLANE_OPACITY, i)))
-    }));
+    plan.extend(splits.into_iter().flat_map(divided));
+    plan.retain(stays);
     if !plan.is_empty() {
         plan.extend((n - evidence.held..n).map(survivor));
     }

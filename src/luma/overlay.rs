@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{LumaSettings, Numerics};
+use super::{DensifyRules, LumaSettings, Numerics};
 
 /// Settings of stage 1 in the place of those of a preset or a time limit; `None` leaves them.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -14,6 +14,8 @@ pub struct LumaOverlay {
     pub iterations: Option<usize>,
     /// Early stopping, in dB; 0 for none.
     pub stop_when_flat: Option<f64>,
+    /// Rules of densification.
+    pub rules: Option<DensifyRules>,
     /// Gaussians at most.
     pub max_splats: Option<usize>,
     /// A shell of gray around the scene.
@@ -42,6 +44,9 @@ impl LumaOverlay {
         }
         put(&self.settings, settings);
         put(&self.iterations, &mut settings.iterations);
+        if let Some(rules) = self.rules {
+            *settings = settings.clone().by(rules);
+        }
         put(&self.max_splats, &mut settings.max_splats);
         put(&self.surround, &mut settings.surround);
         put(&self.fill_gaps, &mut settings.fill_gaps);
@@ -67,6 +72,7 @@ impl LumaOverlay {
             settings: under.settings,
             iterations: self.iterations.or(under.iterations),
             stop_when_flat: self.stop_when_flat.or(under.stop_when_flat),
+            rules: self.rules.or(under.rules),
             max_splats: self.max_splats.or(under.max_splats),
             surround: self.surround.or(under.surround),
             fill_gaps: self.fill_gaps.or(under.fill_gaps),

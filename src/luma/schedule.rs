@@ -2,7 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{LumaSettings, PAPER_ITERATIONS, settings::SHORT_RUN};
+use super::{
+    DensifyRules, LumaSettings, PAPER_ITERATIONS,
+    settings::{SHORT_RUN, SYNC_EVERY},
+};
 
 /// When things happen in a training, in iterations.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -15,6 +18,9 @@ pub struct Schedule {
     pub densify_until: usize,
     /// Iterations between densifications.
     pub densify_every: usize,
+    /// Iterations between two resets of all opacities, if there are any.
+    #[serde(default)]
+    pub reset_every: Option<usize>,
     /// Iterations between two degrees of spherical harmonics.
     pub raise_degree_every: usize,
     /// From here on all learning rates fall, to [`SETTLED`] at the end.
@@ -27,11 +33,37 @@ pub struct Schedule {
 }
 
 impl Schedule {
+    /// The schedule of these settings, by their rules of densification.
+    pub fn of(settings: &LumaSettings) -> Self {
+        match settings.rules {
+            DensifyRules::Own => Self::own(settings),
+            DensifyRules::Published => Self::published(settings),
+        }
+    }
+
+    /// As 3DGS publishes it for 30,000 iterations, of which ChromaDistill's luma takes the first
+    /// half: densification goes on to its end, "as Gaussian densification and pruning occur only up
+    /// to this point". A shorter run passes through it in proportion.
+    fn published(settings: &LumaSettings) -> Self {
+        let of_paper = |at: usize| (at * settings.iterations).div_ceil(PAPER_ITERATIONS);
+        let share = |at: usize| of_paper(at).clamp(1, at);
+        Self {
+            densify_from: share(500),
+            densify_until: share(15_000),
+            // Each takes a while.
+            densify_every: share(100).max(SYNC_EVERY),
+            reset_every: Some(share(3_000)),
+            raise_degree_every: share(1_000),
+            settle_from: settings.iterations,
+            ..Self::own(settings)
+        }
+    }
+
     /// The paper's schedule is written for 15,000 iterations; a shorter run passes
     /// through the same phases in proportion. There are no opacity resets, splitting
     /// ends with four fifths of the run, and harmonics come sooner than every 1,000
     /// iterations (measured in docs/lab/03-densification.md).
-    pub fn of(settings: &LumaSettings) -> Self {
+    fn own(settings: &LumaSettings) -> Self {
         let iterations = settings.iterations;
         let share = |of_paper: usize| (of_paper * iterations).div_ceil(PAPER_ITERATIONS);
         Self {
@@ -51,6 +83,7 @@ impl Schedule {
             } else {
                 100
             },
+            reset_every: None,
             raise_degree_every: share(1_000).clamp(1, RAISED_BY),
             settle_from: iterations * 7 / 10,
             surround_at: (SURROUND_AT * iterations as f64) as usize,
@@ -122,6 +155,12 @@ impl Schedule {
             && iteration.is_multiple_of(self.densify_every)
     }
 
+    /// Returns true if all opacities are reset after `iteration` (counted from 1).
+    pub fn resets_after(&self, iteration: usize) -> bool {
+        let every = self.reset_every;
+        every.is_some_and(|every| iteration < self.densify_until && iteration.is_multiple_of(every))
+    }
+
     /// Number of densifications.
     pub fn densifications(&self) -> usize {
         (1..self.densify_until)
@@ -170,6 +209,7 @@ mod tests {
                 densify_from: 500,
                 densify_until: 12_000,
                 densify_every: 100,
+                reset_every: None,
                 raise_degree_every: 250,
                 settle_from: 10_500,
                 surround_at: 4_500,

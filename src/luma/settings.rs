@@ -62,6 +62,20 @@ impl Default for LearningRates {
 }
 
 impl LearningRates {
+    /// Those of 3DGS, whose means slow down a hundredfold over 30,000 iterations: a training of
+    /// 15,000 is their first half, which a shorter one passes through in proportion.
+    fn published(iterations: usize) -> Self {
+        let over = iterations.max(PAPER_ITERATIONS) as f64 / (2 * PAPER_ITERATIONS) as f64;
+        Self {
+            means: [1.6e-4, 1.6e-4 * 0.01_f64.powf(over.min(1.0))],
+            quats: 1e-3,
+            log_scales: 5e-3,
+            opacity_logits: 5e-2,
+            sh_constant: 2.5e-3,
+            sh_rest: 2.5e-3 / 20.0,
+        }
+    }
+
     /// All of them times a factor.
     pub fn times(&self, factor: f64) -> Self {
         Self {
@@ -79,6 +93,19 @@ impl LearningRates {
         let [first, last] = self.means;
         extent * first * (last / first).powf(t)
     }
+}
+
+/// Rules of densification, with learning rates and a schedule of their own.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(rename_all = "lowercase")]
+pub enum DensifyRules {
+    /// Ours (docs/decisions/22-densification.md).
+    #[default]
+    Own,
+    /// Those of 3DGS (Kerbl et al. 2023), as published.
+    #[serde(rename = "3dgs")]
+    Published,
 }
 
 /// Settings of one training: what presets produce, the command line overlays and the report
@@ -108,11 +135,14 @@ pub struct LumaSettings {
     #[serde(default, skip_serializing)]
     #[cfg_attr(test, schemars(skip))]
     pub coarse: IgnoredAny,
+    /// Rules of densification.
+    #[serde(default)]
+    pub rules: DensifyRules,
     /// Share of Gaussians that a densification adds at most.
     pub growth: f64,
     /// Gradient of a center above which a Gaussian is split.
     ///
-    /// Mean absolute pull (`STAT_PULL`).
+    /// Mean pull (`STAT_PULL`): absolute by our rules, signed by those of 3DGS.
     pub pull_threshold: f64,
     /// Opacity below which a Gaussian is removed.
     pub prune_opacity: f64,
@@ -168,6 +198,7 @@ impl LumaSettings {
             stop_when_flat: None,
             densify: IgnoredAny,
             coarse: IgnoredAny,
+            rules: DensifyRules::Own,
             growth: 0.3,
             // gsplat's advice for absolute gradients.
             pull_threshold: 8e-4,
@@ -181,6 +212,29 @@ impl LumaSettings {
             memory_limit: None,
             stream_photos: false,
             numerics: Numerics::default(),
+        }
+    }
+
+    /// The same by these rules of densification, with their thresholds, rates and early stopping.
+    #[must_use]
+    pub fn by(self, rules: DensifyRules) -> Self {
+        let own = Self::new(self.iterations);
+        match rules {
+            DensifyRules::Own => Self {
+                rules,
+                growth: own.growth,
+                pull_threshold: own.pull_threshold,
+                rates: own.rates,
+                ..self
+            },
+            DensifyRules::Published => Self {
+                rules,
+                growth: 1.0,
+                pull_threshold: 2e-4,
+                rates: LearningRates::published(self.iterations),
+                stop_when_flat: None,
+                ..self
+            },
         }
     }
 

@@ -1,8 +1,9 @@
 //! The Gaussians that a training starts from.
 
 use super::{
-    LumaSettings, Schedule,
+    DensifyRules, LumaSettings, Schedule,
     carve::carved,
+    densify_3dgs,
     gaps::{GapPoint, gap_points},
 };
 use crate::{
@@ -47,6 +48,9 @@ pub fn placed_splats(
     let room = settings.max_splats - reserved;
     let points = first_points(dataset, settings, room, |_| true)?;
     let mut splats = initial_splats(&points, dataset.extent as f32, settings.sh_degree);
+    if settings.rules == DensifyRules::Published {
+        densify_3dgs::begin(&mut splats);
+    }
     if dataset.removes_masked() {
         splats = carved(dataset, &splats)?;
     }

@@ -108,7 +108,7 @@ impl LumaTrainer {
             self.step(iteration)?;
             iteration += 1;
             let schedule = &self.schedule;
-            let densifies = schedule.densifies_after(iteration);
+            let densifies = schedule.densifies_after(iteration) || schedule.resets_after(iteration);
             let finds_outliers =
                 self.settings.robust && schedule.find_outliers_at.contains(&iteration);
             let ends = iteration == schedule.end;
@@ -170,6 +170,9 @@ impl LumaTrainer {
             }
             if self.schedule.densifies_after(iteration) {
                 self.densify(iteration)?;
+            }
+            if self.schedule.resets_after(iteration) {
+                self.reset_opacities()?;
             }
             if surrounds {
                 self.begin_surrounding(iteration)?;

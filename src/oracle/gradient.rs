@@ -148,6 +148,33 @@ pub fn pulls<const C: usize>(
     shading: Shading,
     upstream: &[[f64; C]],
 ) -> Vec<f64> {
+    of_pixels(scene, view, shading, upstream, |slopes| {
+        slopes.map(|[x, y]| x.hypot(y)).sum()
+    })
+}
+
+/// The same where pixels that pull apart cancel, `[N]`: the length of the sum.
+pub fn signed_pulls<const C: usize>(
+    scene: &Scene<f64, C>,
+    view: &View,
+    shading: Shading,
+    upstream: &[[f64; C]],
+) -> Vec<f64> {
+    of_pixels(scene, view, shading, upstream, |slopes| {
+        let [x, y] = slopes.fold([0.0; 2], |[x, y], slope| [x + slope[0], y + slope[1]]);
+        x.hypot(y)
+    })
+}
+
+/// A figure of each Gaussian, `[N]`, from each pixel's gradient with respect to its center in
+/// normalized device coordinates.
+fn of_pixels<const C: usize>(
+    scene: &Scene<f64, C>,
+    view: &View,
+    shading: Shading,
+    upstream: &[[f64; C]],
+    figure: impl Fn(&mut dyn Iterator<Item = [f64; 2]>) -> f64,
+) -> Vec<f64> {
     let tape = Tape::record(scene, view, shading, upstream);
     let half = [view.width, view.height].map(|side| side as f64 / 2.0);
     let mut result = vec![0.0; scene.len()];
@@ -158,7 +185,7 @@ pub fn pulls<const C: usize>(
             let slopes = tape.derivatives(position, &varied);
             slopes.map(|v| v * half[axis]).collect::<Vec<_>>()
         });
-        result[index] = x.into_iter().zip(y).map(|(x, y)| x.hypot(y)).sum();
+        result[index] = figure(&mut x.into_iter().zip(y).map(|(x, y)| [x, y]));
     }
     result
 }

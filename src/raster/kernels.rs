@@ -138,8 +138,8 @@ impl ProjectionKernels {
         };
         Self {
             project: Kernel::with(gpu, "project", project, &numerics.alpha_cutoff()),
-            backward: Kernel::new(gpu, "project_backward", backward),
-            step: Kernel::new(gpu, "project_backward", step),
+            backward: Kernel::with(gpu, "project_backward", backward, &numerics.pulls()),
+            step: Kernel::with(gpu, "project_backward", step, &numerics.pulls()),
         }
     }
 }

@@ -29,6 +29,10 @@ pub struct RasterNumerics {
     pub storage: Storage,
     /// Whose parameters Adam moves; `lazy`: of Gaussians in view.
     pub adam: AdamSteps,
+    /// True if pixels that pull a Gaussian apart cancel in its pull: as 3DGS measures it.
+    #[serde(skip)]
+    #[cfg_attr(test, schemars(skip))]
+    pub signed_pulls: bool,
 }
 
 /// Storage of a list entry's gradient record, eight figures, until it is summed. Blending's adjoint
@@ -77,7 +81,13 @@ impl RasterNumerics {
         depth_bits: 32,
         storage: Storage::Full,
         adam: AdamSteps::Exact,
+        signed_pulls: false,
     };
+
+    /// For the kernel that measures pulls.
+    pub(super) fn pulls(&self) -> [(&'static str, f64); 1] {
+        [("SIGNED_PULLS", f64::from(u8::from(self.signed_pulls)))]
+    }
 
     /// For the kernels that look at alphas only.
     pub(super) fn alpha_cutoff(&self) -> [(&'static str, f64); 1] {

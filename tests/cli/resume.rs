@@ -273,13 +273,31 @@ fn killed(place: &Place, colorize: &[&str]) {
 
 #[test]
 fn a_coloring_that_is_killed_goes_on() {
+    killed_and_resumed(&COLORIZE);
+}
+
+/// Adam's moments are kept as well; it is killed with hundreds of iterations to go.
+#[test]
+fn a_descent_that_is_killed_goes_on() {
+    let colorize = ["colorize", "runs/scene", "--teacher", "colored"];
+    let adam = ["--as-paper", "--until", "660", "--sh-degree", "1"];
+    killed_and_resumed(&[&colorize[..], &adam].concat());
+}
+
+fn killed_and_resumed(colorize: &[&str]) {
     let whole = place_to_color();
-    whole.succeed(&COLORIZE);
+    whole.succeed(colorize);
     let chroma = whole.report("runs/scene")["chroma"].clone();
     let whole = colors(&whole);
     let place = place_to_color();
-    killed(&place, &COLORIZE);
-    place.succeed(&[&COLORIZE[..], &["--resume"]].concat());
+    killed(&place, colorize);
+    let resumed = place.run(&[colorize, &["--resume"]].concat());
+    assert_eq!(resumed.code, Some(0), "{}", resumed.stderr);
+    assert!(
+        !resumed.stderr.contains("starts over"),
+        "{}",
+        resumed.stderr
+    );
     assert!(colors(&place) == whole);
     let now = place.report("runs/scene")["chroma"].clone();
     for key in [
@@ -352,6 +370,16 @@ fn a_coloring_of_gaussians_that_wait_on_the_host() {
         );
     }
     let streamed = colors(&place);
+    // Adam needs all of them there.
+    let adam = ["--solver", "adam", "--until", "62", "--memory-limit", "1"];
+    let refused = place.run(&[&colorize[..6], &adam].concat());
+    assert_eq!(refused.code, Some(1), "{}", refused.stderr);
+    let errors = refused
+        .stderr
+        .lines()
+        .filter(|line| line.starts_with("error:"));
+    assert_eq!(errors.count(), 1, "{}", refused.stderr);
+    assert!(colors(&place) == streamed);
 
     let (whole, _) = many();
     whole.succeed(&colorize);
@@ -387,12 +415,11 @@ fn a_coloring_by_others_is_not_gone_on_with() {
     assert_eq!(done.code, Some(1), "{}", done.stderr);
     assert!(done.stderr.contains("taught"), "{}", done.stderr);
     // Adam does not go by what the other solver has kept.
-    let kept = place.read("runs/scene/checkpoint-color");
     let adam = ["colorize", "runs/scene", "--teacher", "colored", "--resume"];
     let done = place.run(&[&adam[..], &["--solver", "adam", "--until", "62"]].concat());
-    assert_eq!(done.code, Some(0), "{}", done.stderr);
-    assert!(done.stderr.contains("starts over"), "{}", done.stderr);
-    place.write("runs/scene/checkpoint-color", kept);
+    assert_eq!(done.code, Some(1), "{}", done.stderr);
+    let solver = "settings.solver (\"irls\", now \"adam\")";
+    assert!(done.stderr.contains(solver), "{}", done.stderr);
     // Begun anew it says that it gives up what there is.
     let done = place.run(&[&COLORIZE[..4], &["--rounds", "1", "--sh-degree", "0"]].concat());
     assert_eq!(done.code, Some(0), "{}", done.stderr);

@@ -235,6 +235,52 @@ fn init_starts_from_a_file() {
     }
 }
 
+/// The paper's schedule scaled down to a few iterations: 15,000 of luma, chroma until 30,000.
+#[test]
+fn as_the_paper_does_it() {
+    let place = place_with_scene();
+    let fit = ["fit", "scene", "--as-paper", "--no-fill-gaps", "--json"];
+    let fit = [&fit[..], &["--iterations", "60", "-o", "runs/scene"]].concat();
+    let report = place.json(&fit);
+    assert_eq!(report["preset"], "paper");
+    let luma = &report["luma"];
+    assert_eq!(luma["iterations"], 60);
+    let settings = &luma["settings"];
+    assert_eq!(settings["rules"], "3dgs");
+    assert_eq!(settings["iterations"], 60);
+    assert_eq!(settings["sh_degree"], 3);
+    assert_eq!(settings["stop_when_flat"], json!(null));
+    assert_eq!(settings["pull_threshold"], 2e-4);
+    assert_eq!(settings["prune_opacity"], 0.005);
+    let rates = &settings["rates"];
+    assert_eq!(rates["opacity_logits"], 0.05);
+    assert_eq!(rates["sh_constant"], 0.0025);
+    let [first, last] = [0, 1].map(|k| rates["means"][k].as_f64().expect("a rate"));
+    assert!(
+        (first - 1.6e-4).abs() < 1e-12 && (last - 1.6e-5).abs() < 1e-12,
+        "{last}"
+    );
+
+    let teacher = super::shared::onnx("ddcolor_tiny.onnx");
+    let colorize = ["colorize", "runs/scene", "--as-paper", "--json"];
+    let until = ["--until", "120", "--teacher", &teacher];
+    let chroma = &place.json(&[&colorize[..], &until].concat())["chroma"];
+    assert_eq!(chroma["settings"]["solver"], "adam");
+    assert_eq!(chroma["settings"]["scales"], 2);
+    assert_eq!(chroma["settings"]["iterations"], 60);
+    assert_eq!(chroma["until"], 120);
+
+    for more in [
+        &["fit", "scene", "--preset", "draft"][..],
+        &["fit", "scene", "--densify", "own"],
+        &["fit", "runs/scene"],
+        &["colorize", "--teacher", &teacher, "--solver", "adam"],
+    ] {
+        let done = place.run(&[more, &["--as-paper"]].concat());
+        assert_eq!(done.code, Some(2), "{more:?}: {}", done.stderr);
+    }
+}
+
 #[test]
 fn presets_and_what_overrules_them() {
     let place = place_with_scene();

@@ -4,12 +4,13 @@ use super::state::{Grows, LumaTrainer};
 use crate::{
     gpu::{Buffer, GpuError},
     luma::{
-        LumaError,
+        DensifyRules, LumaError,
         densify::{self, Evidence},
+        densify_3dgs::{self, Moment},
         memory::ENTRIES_PER_SPLAT,
         outliers,
     },
-    raster::constants::{GEOMETRY_PLANES, PLANE_MEAN, STAT_PULL},
+    raster::constants::{GEOMETRY_PLANES, PLANE_MEAN, PLANE_OPACITY, STAT_PULL},
     splats::Splats,
 };
 
@@ -41,7 +42,18 @@ impl LumaTrainer {
                 false => self.surroundings.as_ref().map_or(0, Splats::len),
             },
         };
-        let plan = densify::plan(&self.settings, &evidence);
+        let plan = match self.settings.rules {
+            DensifyRules::Own => densify::plan(&self.settings, &evidence),
+            DensifyRules::Published => {
+                let reset_every = self.schedule.reset_every;
+                let moment = Moment {
+                    iteration,
+                    extent: self.extent,
+                    removes_large: reset_every.is_some_and(|every| iteration > every),
+                };
+                densify_3dgs::plan(&self.settings, &evidence, &moment)
+            }
+        };
         if plan.is_empty() {
             // Nothing would be left: keep what there is and go on.
             return Ok(());
@@ -54,6 +66,23 @@ impl LumaTrainer {
         let present = self.workspace()?.lists.capacity;
         let capacity = present.max(self.model.len() * ENTRIES_PER_SPLAT);
         self.renew(capacity, iteration)
+    }
+
+    /// Makes all Gaussians but the held ones faint, and lets Adam forget where their opacities
+    /// went: what is needed becomes opaque again.
+    pub(super) fn reset_opacities(&mut self) -> Result<(), GpuError> {
+        let (model, gpu) = (&self.model, &self.gpu);
+        let first = PLANE_OPACITY * model.len();
+        let planes = &model.geometry.planes;
+        let mut logits = planes.read(gpu)?.split_off(first);
+        logits.truncate(model.len() - model.held);
+        densify_3dgs::reset(&mut logits);
+        planes.write_at(gpu, first, &logits);
+        logits.fill(0.0);
+        let moments = &model.geometry_moments;
+        moments.first.write_at(gpu, first, &logits);
+        moments.second.write_at(gpu, first, &logits);
+        Ok(())
     }
 
     /// Draws these Gaussians from [`Schedule::surround_at`](crate::luma::Schedule) on, behind the

@@ -8,14 +8,14 @@ use crate::{
     effects::Plan,
     gpu::{Gpu, GpuError},
     luma::{
-        Goal, LumaError, LumaSettings, Schedule,
+        DensifyRules, Goal, LumaError, LumaSettings, Schedule,
         loss::{LossEffects, Targets},
         memory::{Demand, ENTRIES_PER_SPLAT, resident_photos},
         pace::Pace,
         view::TrainingViews,
         workspace::{Kernels, Workspace},
     },
-    raster::{Load, Model, Raster, constants::NEAR_SHARE},
+    raster::{Load, Model, Raster, RasterNumerics, constants::NEAR_SHARE},
     splats::{Splats, sh},
 };
 
@@ -83,7 +83,10 @@ impl LumaTrainer {
             return Err(LumaError::NoViews);
         }
         let raster = raster.drawing(settings.raster_options());
-        let raster = raster.computing(settings.numerics.raster);
+        let raster = raster.computing(RasterNumerics {
+            signed_pulls: settings.rules == DensifyRules::Published,
+            ..settings.numerics.raster
+        });
         let gpu = raster.gpu.clone();
         let effects = LossEffects {
             exposed: (all.clone()).any(|view| views.exposure(view) != Exposure::NONE),

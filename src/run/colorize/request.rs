@@ -39,10 +39,10 @@ pub struct ColorizeRequest {
     pub force: bool,
     /// The report tells where the device's time went.
     pub timings: bool,
-    /// Checkpoint options; unused with Adam or without a run.
+    /// Checkpoint options; unused without a run.
     #[serde(skip)]
     pub checkpoints: CheckpointOptions,
-    /// State for live viewers; not updated while Adam runs.
+    /// State for live viewers.
     #[serde(skip)]
     pub live: Option<Arc<Live>>,
 }

@@ -39,15 +39,15 @@ impl Coloring<'_> {
         observe: &mut Observer<'_>,
     ) -> Result<Solved, RunError> {
         let (request, settings) = (self.request, &supervised.settings);
-        let (kept, total) = match settings.solver {
-            SolverKind::Irls => (self.kept(), settings.rounds),
-            // Adam keeps no checkpoints.
-            SolverKind::Adam => (None, settings.iterations),
+        let kept = self.kept();
+        let total = match settings.solver {
+            SolverKind::Irls => settings.rounds,
+            SolverKind::Adam => settings.iterations,
         };
         let found = match request.checkpoints.resume {
             true => found_in(kept, observe)?,
             false => {
-                if let Some(folder) = self.kept() {
+                if let Some(folder) = kept {
                     tell_given_up(&folder.color_checkpoint(), observe);
                 }
                 None

@@ -190,7 +190,11 @@ fn a_part_that_is_asked_for_is_taken() {
     assert!(done.stderr.contains("from 0:02.00 to 0:03.50"), "{done:?}");
     assert!(extraction(&place).contains("-ss 1.950000 -t 1.500000"));
     let late = [&FILM[..], &["--start", "13"]].concat();
-    refused(&place, &late, &["ends after 0:12.00", "--start"]);
+    refused(
+        &place,
+        &late,
+        &["ends after 0:12.00", "give an earlier one"],
+    );
 }
 
 #[test]

@@ -11,6 +11,7 @@ mod blend;
 mod compiled;
 mod contributions;
 mod convergence;
+mod densify_3dgs;
 mod depth;
 mod device;
 mod effects;

@@ -9,7 +9,8 @@ use std::{
 
 use gs_chroma::{
     luma::{
-        Checkpoint, Checkpointing, LumaError, LumaProgress, LumaSettings, LumaTrainer, Schedule,
+        Checkpoint, Checkpointing, DensifyRules, LumaError, LumaProgress, LumaSettings,
+        LumaTrainer, Schedule,
     },
     splats::{ShField, Splats},
 };
@@ -125,6 +126,46 @@ fn a_set_that_is_split() {
     let [start, target] = start_and_target();
     let of = |from: &Splats| trainer(from, &target);
     assert_eq!(keeps_and_resumes(&of, &start).0, [25, 50]);
+}
+
+/// By 3DGS's rules: clones, random halves, and resets that leave surroundings alone.
+#[test]
+fn a_set_that_is_cloned_and_reset() {
+    let [start, target] = start_and_target();
+    let around = start.chosen(&[0, 1, 2]);
+    let of = |from: &Splats| {
+        let own = settings(&start);
+        let settings = LumaSettings {
+            iterations: 120,
+            max_splats: 2 * start.len(),
+            ..own.by(DensifyRules::Published)
+        };
+        let settings = LumaSettings {
+            pull_threshold: 1e-6,
+            ..settings
+        };
+        let schedule = Schedule {
+            densify_from: 20,
+            densify_until: 110,
+            reset_every: Some(50),
+            surround_at: 20,
+            ..Schedule::of(&settings)
+        };
+        let mut trainer = trainer_by(settings, schedule, 4.0, from, photos(&target));
+        trainer.surround(around.clone());
+        trainer
+    };
+    let (kept, trainer) = keeps_and_resumes(&of, &start);
+    assert_eq!(kept, [25, 50, 75, 100]);
+    let trained = trainer.splats().unwrap();
+    let behind = trained.len() - trainer.surroundings();
+    assert!(behind > start.len(), "{behind}");
+    assert!(trained.opacity_logits[behind..] == around.opacity_logits[..]);
+    // Twenty steps after the last reset of at most 0.1: the second moment begins anew, its
+    // correction does not.
+    let most = -4.595 + 20.0 * 0.1;
+    let opacities = &trained.opacity_logits[..behind];
+    assert!(opacities.iter().all(|&logit| logit < most), "{opacities:?}");
 }
 
 /// Surroundings join late, stay unchanged, and count toward the cap.
