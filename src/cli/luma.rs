@@ -8,7 +8,6 @@ use super::{
 };
 use crate::luma::{DensifyRules, FLAT, LumaOverlay, Numerics};
 
-/// Rules of densification.
 const RULES: &[(DensifyRules, &str)] = &[
     (DensifyRules::Own, "Splits alone, by absolute gradients"),
     (DensifyRules::Published, "As 3D Gaussian Splatting has it"),

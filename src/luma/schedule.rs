@@ -50,7 +50,6 @@ impl Schedule {
         Self {
             densify_from: share(500),
             densify_until: share(15_000),
-            // Each takes a while.
             densify_every: share(100).max(SYNC_EVERY),
             reset_every: Some(share(3_000)),
             raise_degree_every: share(1_000),
