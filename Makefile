@@ -26,7 +26,7 @@ demo: setup
 	@echo "Contact sheet:   runs/demo/contact-sheet.png"
 	@echo "In the browser:  target/release/gs-chroma view runs/demo"
 
-# One more than there are cores, for tests wait for programs and devices.
+# Two more than there are cores, for tests wait for programs and devices.
 TEST_THREADS = $(shell echo $$(($$(getconf _NPROCESSORS_ONLN) + 1)))
 
 # Programs that tests give another cache folder share what Mesa compiled for the others.
