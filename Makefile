@@ -27,7 +27,7 @@ demo: setup
 	@echo "In the browser:  target/release/gs-chroma view runs/demo"
 
 # Two more than there are cores, for tests wait for programs and devices.
-TEST_THREADS = $(shell echo $$(($$(getconf _NPROCESSORS_ONLN) + 1)))
+TEST_THREADS = $(shell echo $$(($$(getconf _NPROCESSORS_ONLN) + 2)))
 
 # Programs that tests give another cache folder share what Mesa compiled for the others.
 test test-all: export MESA_SHADER_CACHE_DIR := $(CURDIR)/target/mesa

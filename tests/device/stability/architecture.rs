@@ -122,7 +122,8 @@ fn only_the_doctor_asks_the_oracle() {
     for entry in fs::read_dir(&root).expect("src") {
         let path = entry.expect("an entry").path();
         let name = path.file_stem().expect("a name").to_string_lossy();
-        if ["oracle", "doctor", "compare"].contains(&&*name) {
+        // The crate's root hands it to tests.
+        if ["oracle", "doctor", "compare", "lib"].contains(&&*name) {
             continue;
         }
         let mut files = Vec::new();
