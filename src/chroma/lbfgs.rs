@@ -1,9 +1,12 @@
 //! L-BFGS that stays on the device (`shaders/lbfgs.wgsl`).
 
+mod slots;
+
 use bytemuck::{Pod, Zeroable};
+use slots::*;
 
 use crate::{
-    gpu::{Bindings, Buffer, Gpu, GpuError, Kernel, Readback, Recorder, groups_for, shaders},
+    gpu::{Buffer, Gpu, GpuError, Kernel, Readback, Recorder, groups_for, shaders},
     splats::sh,
 };
 
@@ -134,64 +137,6 @@ impl LbfgsKernels {
     }
 }
 
-/// An entry point and its buffers.
-struct Bound(Kernel, Bindings);
-
-// Binding numbers of `shaders/lbfgs.wgsl`.
-const PARAMETERS: u32 = 0;
-const PAIR: u32 = 1;
-const UNKNOWNS: u32 = 2;
-const GRADIENT: u32 = 3;
-const DIAGONAL: u32 = 4;
-const FLOORS: u32 = 5;
-const LOSSES: u32 = 6;
-const ACCEPTED_UNKNOWNS: u32 = 7;
-const ACCEPTED_GRADIENT: u32 = 8;
-const INVERSE: u32 = 9;
-const DIRECTION: u32 = 10;
-const DISPLACEMENT: u32 = 11;
-const CHANGE: u32 = 12;
-const SUMS: u32 = 13;
-const SCALARS: u32 = 14;
-const LEFT: u32 = 15;
-const RIGHT: u32 = 16;
-const ANCHORS: u32 = 17;
-const PULLS: u32 = 18;
-
-/// Buffers by binding number, of which each entry point takes some.
-#[derive(Clone)]
-struct Slots<'a> {
-    gpu: &'a Gpu,
-    buffers: [&'a wgpu::Buffer; 19],
-}
-
-impl<'a> Slots<'a> {
-    /// The parameters alone: in the other slots, too, where wgpu refuses them as no storage.
-    fn new(gpu: &'a Gpu, parameters: &'a wgpu::Buffer) -> Self {
-        Self {
-            gpu,
-            buffers: [parameters; 19],
-        }
-    }
-
-    fn with<const N: usize>(&self, more: [(u32, &'a Buffer<f32>); N]) -> Self {
-        let mut slots = self.clone();
-        for (slot, buffer) in more {
-            slots.buffers[slot as usize] = buffer.raw();
-        }
-        slots
-    }
-
-    /// Ties an entry point to the parameters and the buffers in `used`.
-    fn bind(&self, kernel: &Kernel, used: &[u32]) -> Bound {
-        let used = [PARAMETERS].iter().chain(used);
-        let buffers: Vec<_> = used
-            .map(|&slot| (slot, self.buffers[slot as usize]))
-            .collect();
-        Bound(kernel.clone(), kernel.bind_at(self.gpu, &buffers))
-    }
-}
-
 /// Kernels of one pair.
 struct PairKernels {
     keep: Bound,
@@ -210,17 +155,13 @@ impl PairKernels {
     /// Kernels of the pair `index`, whose buffers are in `slots`.
     fn new(kernels: &LbfgsKernels, index: usize, slots: &Slots<'_>) -> Result<Self, GpuError> {
         let index = Buffer::uniform(slots.gpu, "pair", &(index as u32))?;
-        let mut slots = slots.clone();
-        slots.buffers[PAIR as usize] = index.raw();
-        let of = |slot: u32| slots.buffers[slot as usize];
+        let slots = slots.put(PAIR, index.raw());
         let product = |left: u32, right: u32| {
-            let mut slots = slots.clone();
-            (slots.buffers[LEFT as usize], slots.buffers[RIGHT as usize]) = (of(left), of(right));
+            let slots = slots.copy(LEFT, left).copy(RIGHT, right);
             slots.bind(&kernels.dot, &[SUMS, LEFT, RIGHT])
         };
         let add = |left: u32| {
-            let mut slots = slots.clone();
-            slots.buffers[LEFT as usize] = of(left);
+            let slots = slots.copy(LEFT, left);
             slots.bind(&kernels.add, &[DIRECTION, SCALARS, LEFT])
         };
         let sum = |kernel: &Kernel| slots.bind(kernel, &[PAIR, SUMS, SCALARS]);

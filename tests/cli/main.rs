@@ -12,6 +12,7 @@ mod coordinates;
 mod doctor;
 mod documented;
 mod elsewhere;
+mod ends;
 mod errors;
 mod eval;
 mod eval_photos;
