@@ -86,6 +86,12 @@ impl<'a> Painter<'a> {
         })
     }
 
+    /// What the exported file shows `camera`, RGB in [0, 1], `[height, width]`.
+    pub fn exported(&mut self, camera: &Camera) -> Result<Vec<[f32; 3]>, EvalError> {
+        // Its field comes first after luma's.
+        Ok(self.renderer.render(camera)?.swap_remove(1).shown())
+    }
+
     /// The scene's median depth along the camera's z axis in world units, `[height,
     /// width]`; NaN where it is not opaque enough to have one.
     pub fn depth(&mut self, camera: &Camera) -> Result<Vec<f32>, EvalError> {

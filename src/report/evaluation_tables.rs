@@ -125,14 +125,18 @@ impl Evaluation {
         let between = self.between.consistency.clone();
         columns.push(("photographed views".to_owned(), between));
         let rms = |method: Method, scores: &[ConsistencyScore]| {
-            let score = scores.iter().find(|score| score.method == method);
-            score.and_then(|score| score.rms)
+            let score = scores.iter().find(|score| score.method == method)?;
+            Some((score.rms?, score.equal_rms))
+        };
+        let cell = |&found: &Option<(f64, Option<f64>)>| match found {
+            Some((rms, Some(equal))) => format!("{rms:.2} ({equal:.2})"),
+            found => figure(found.map(|(rms, _)| rms), 2),
         };
         let rows = ROWS.into_iter().filter_map(|method| {
             let figures: Vec<_> = (columns.iter())
                 .map(|(_, scores)| rms(method, scores))
                 .collect();
-            let cells = figures.iter().map(|&rms| figure(rms, 2));
+            let cells = figures.iter().map(cell);
             let row = std::iter::once(method.to_string()).chain(cells).collect();
             figures.iter().any(Option::is_some).then_some(row)
         });
@@ -145,7 +149,8 @@ impl Evaluation {
             })
             .collect();
         let mut notes = vec![
-            "Root mean square in CIELAB units.".to_owned(),
+            "Root mean square in CIELAB units; in brackets at the teacher's colorfulness."
+                .to_owned(),
             format!(
                 "Pairs of pictures, and how much of them is visible in both: {}.",
                 compared.join(", ")

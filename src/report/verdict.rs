@@ -5,6 +5,9 @@ use super::{ConsistencyScore, Evaluation, Method, PictureScore};
 /// Ratios between these are no difference worth a word: other views would give as much.
 const ALIKE: [f64; 2] = [0.9, 1.1];
 
+/// Ratios between these are level with a method that colors the same Gaussians for the same views.
+const LEVEL: [f64; 2] = [0.98, 1.02];
+
 /// Ratios from which on something is so many times better.
 const TIMES: f64 = 1.5;
 
@@ -17,42 +20,61 @@ impl Evaluation {
     pub fn verdict(&self) -> Vec<String> {
         [
             self.agreement(Method::Teacher, "the teacher's own pictures"),
-            self.agreement(Method::RgbSplats, "RGB splats fitted to these"),
             self.agreement(Method::PerFrame, "the teacher frame by frame"),
+        ]
+        .into_iter()
+        .chain(self.peers.iter().map(|peer| self.recipe(peer.method)))
+        .chain([
             self.strength(),
             self.truth(),
             self.export(),
             Some(self.gray()),
-        ]
-        .into_iter()
+        ])
         .flatten()
         .collect()
+    }
+
+    /// Agreement at equal colorfulness and a/b error, compared with another way to color.
+    fn recipe(&self, other: Method) -> Option<String> {
+        let compared = |of: &dyn Fn(Method) -> Option<f64>, what: &str| {
+            let (ours, theirs) = (of(Method::Exported)?, of(other)?);
+            let ended = match ours / theirs {
+                ratio if ratio < LEVEL[0] => "a win",
+                ratio if ratio <= LEVEL[1] => "level",
+                _ => "a loss",
+            };
+            Some(format!("{what} {ours:.2} against {theirs:.2}, {ended}"))
+        };
+        let differ = |method| self.consistency(method)?.equal_rms;
+        let miss = |method| self.picture(method)?.ab_error;
+        let agreement = compared(&differ, "views differ at equal colorfulness by")?;
+        let error = compared(&miss, "; colors miss the photos' by").unwrap_or_default();
+        Some(format!("beside {other}: {agreement}{error} (CIELAB units)"))
     }
 
     fn picture(&self, method: Method) -> Option<&PictureScore> {
         self.pictures.iter().find(|score| score.method == method)
     }
 
-    /// Difference between photographed views of one place, RMS in CIELAB units.
-    fn between(&self, method: Method) -> Option<f64> {
-        let scores = self.between.consistency.iter();
-        let mut own = scores.filter(|score: &&ConsistencyScore| score.method == method);
-        own.next()?.rms
+    /// Difference between photographed views of one place.
+    fn consistency(&self, method: Method) -> Option<&ConsistencyScore> {
+        let mut scores = self.between.consistency.iter();
+        scores.find(|score| score.method == method)
     }
 
     /// Agreement between views, compared with another method's.
     fn agreement(&self, other: Method, name: &str) -> Option<String> {
-        let (ours, theirs) = (self.between(Method::Exported)?, self.between(other)?);
+        let rms = |method| self.consistency(method)?.rms;
+        let (ours, theirs) = (rms(Method::Exported)?, rms(other)?);
         let figures = format!("({ours:.2} against {theirs:.2} CIELAB units)");
         // What rounds to nothing is nothing.
         let ratio = theirs.max(0.01) / ours.max(0.01);
         Some(format!("views agree {} {name} {figures}", times(ratio)))
     }
 
-    /// Colorfulness, compared with the teacher's.
+    /// Colorfulness over all photos, compared with the teacher's.
     fn strength(&self) -> Option<String> {
-        let ours = self.picture(Method::Exported)?.colorfulness;
-        let theirs = self.picture(Method::Teacher)?.colorfulness;
+        let (ours, theirs) = (self.colorfulness?, self.teacher_colorfulness?);
         let ratio = ours / theirs;
         if !(ratio.is_finite() && theirs > 0.0) {
             return None;

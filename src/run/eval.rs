@@ -13,8 +13,7 @@ use crate::{
     chroma::teacher::{Teacher, TeacherSettings},
     eval::{
         ColoredScene, EvalError, Lpips, MeasuredTeacher, Painter, Peer, Progress, Scored,
-        along_path, between_views, exposures, mean_bake, mean_luma, mean_pictures,
-        teacher_colorfulness,
+        along_path, between_views, exposures, mean_bake, mean_luma, mean_pictures, strengths,
     },
     gpu::Gpu,
     raster::Raster,
@@ -111,9 +110,9 @@ pub fn eval(
     };
     let mut told = |progress: Progress<'_>| observe(Event::from(progress));
     let frames = options.frames;
-    let path = along_path(&mut painter, &scene, frames, flow, &mut told, &mut keep)?;
-    let between = between_views(&mut painter, &scene, &mut told)?;
-    let teacher_colorfulness = teacher_colorfulness(&painter, &scene, &mut told)?;
+    let mut path = along_path(&mut painter, &scene, frames, flow, &mut told, &mut keep)?;
+    let mut between = between_views(&mut painter, &scene, &mut told)?;
+    let [colorfulness, teacher_colorfulness] = strengths(&mut painter, &scene, &mut told)?;
     if !path.skipped.is_empty() {
         observe(Event::Warning(format!(
             "a path of {} frames is too short for Δ = {:?}: choose more",
@@ -122,16 +121,22 @@ pub fn eval(
     }
     observe(Event::begins(Stage::Page));
     let flight = filmed.end(page, &path, observe);
+    let pictures = mean_pictures(&views);
+    let of_path = path.consistency.iter_mut().map(|entry| &mut entry.score);
+    for score in of_path.chain(&mut between.consistency) {
+        score.equal_rms = score.at_equal_colorfulness(&pictures);
+    }
     let evaluation = Evaluation {
         version: EVALUATION_VERSION,
         program: env!("CARGO_PKG_VERSION").to_owned(),
         scene: scene.name(),
         teacher: painter.teacher(),
         teacher_colorfulness,
+        colorfulness,
         measured_on: scene.dataset.measured().0.to_owned(),
         luma: mean_luma(&views),
         bake: mean_bake(&views),
-        pictures: mean_pictures(&views),
+        pictures,
         views: views.into_iter().map(|scored| scored.score).collect(),
         peers: peers.into_iter().map(|(_, told)| told).collect(),
         rules: Rules::default(),
