@@ -108,7 +108,15 @@ impl Task<'_> {
         if !state.is_done(Step::Matches, &matches) {
             self.match_photos(state, colmap, &matches, observe)?;
         }
-        let seen = Matches::read(&state.path(DATABASE))?;
+        let seen = match Matches::read(&state.path(DATABASE)) {
+            Err(error) if self.motion.is_none() => {
+                observe(Event::Warning(format!(
+                    "{error}; poses are looked for as of a camera that moves"
+                )));
+                Matches::default()
+            }
+            read => read?,
+        };
         let found = motion::found(&seen, self.motion);
         if let Some((motion, _)) = &found {
             observe(Event::Note(motion.in_words()));
