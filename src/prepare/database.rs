@@ -47,7 +47,16 @@ impl Matches {
 }
 
 fn read(path: &Path) -> rusqlite::Result<Matches> {
-    let database = Connection::open_with_flags(path, OpenFlags::SQLITE_OPEN_READ_ONLY)?;
+    // Immutable, or SQLite would lay its log beside the file.
+    let escaped = path
+        .to_string_lossy()
+        .replace('%', "%25")
+        .replace('?', "%3f")
+        .replace('#', "%23");
+    let database = Connection::open_with_flags(
+        format!("file:{escaped}?immutable=1"),
+        OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_URI,
+    )?;
     let mut found = Matches::default();
     let mut indices = BTreeMap::new();
     let mut images = database.prepare(

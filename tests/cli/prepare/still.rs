@@ -93,6 +93,13 @@ fn a_camera_that_turns_has_poses_without_depth() {
     assert_eq!(told["poses"]["placed"], 10, "{told}");
     let turned = told["motion"]["turned"].as_f64().expect("degrees");
     assert!((turned - 18.0).abs() < 0.5, "{turned}");
+    // Nothing is left beside the database.
+    assert!(
+        !place
+            .files("house")
+            .iter()
+            .any(|file| file.ends_with("-wal"))
+    );
     // No depth is looked for.
     assert_eq!(
         commands(&place),
