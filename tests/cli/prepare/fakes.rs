@@ -87,7 +87,9 @@ const FFPROBE: &str = r#"#!/bin/sh
 
 /// A database without photos; SQLite does not read what follows it.
 fn database(path: &Path) {
-    let tables = "CREATE TABLE cameras (camera_id, width, height);
+    // As COLMAP keeps it.
+    let tables = "PRAGMA journal_mode = WAL;
+        CREATE TABLE cameras (camera_id, width, height);
         CREATE TABLE images (image_id, name, camera_id);
         CREATE TABLE keypoints (image_id, cols, data);
         CREATE TABLE two_view_geometries (pair_id, rows, data);";
