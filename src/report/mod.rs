@@ -97,6 +97,9 @@ pub struct CaptureReport {
     ///
     /// Radius of the cameras as 3DGS takes it.
     pub extent: f64,
+    /// True if all photos were taken from one place, and the scene has no depth.
+    #[serde(default)]
+    pub panorama: bool,
     /// Subtracted from COLMAP's x, y and z, in world units.
     pub offset: [f64; 3],
     /// The photos, by which commands detect changes.
@@ -126,6 +129,7 @@ impl CaptureReport {
             masked_views: dataset.masked_views,
             not_finite: dataset.not_finite(),
             extent: dataset.extent,
+            panorama: capture.is_panorama(),
             offset: capture.offset.to_array(),
             photos: Vec::new(),
         }

@@ -85,6 +85,15 @@ pub fn export(options: &ExportOptions, observe: &mut Observer<'_>) -> Result<Exp
     let opened = Opened::find(options.run.as_deref(), LockMode::Free)?;
     let _kept = opened.keep(OriginalFiles::default()).keep();
     let mut scene = opened.read(options.luma, None, observe)?;
+    if opened
+        .report()
+        .is_some_and(|report| report.capture.panorama)
+    {
+        observe(Event::Note(
+            "the scene is a panorama without depth: it is right from its camera's place only"
+                .to_owned(),
+        ));
+    }
     files::make_folder_of(output)?;
     let before = &Cameras {
         opened: &opened,
