@@ -7,8 +7,8 @@ use std::{
 };
 
 use super::{
-    Checkpoint, Checkpointing, CurvePoint, Demand, Goal, Grows, LumaError, LumaProgress,
-    LumaSettings, LumaTrainer, NoCheckpoints, PlannedViews, TrialProgress,
+    AlbumPicture, Checkpoint, Checkpointing, CurvePoint, Demand, Goal, Grows, LumaError,
+    LumaProgress, LumaSettings, LumaTrainer, NoCheckpoints, PlannedViews, TrialProgress,
     carve::carved,
     planned, resident_photos,
     start::{placed_splats, started, surroundings},
@@ -41,6 +41,8 @@ pub struct LumaScene {
     pub iterations: usize,
     /// Held-out scores of the validations during training.
     pub curve: Vec<CurvePoint>,
+    /// Pictures of one view at some of these; none unless asked for.
+    pub album: Vec<AlbumPicture>,
     /// The iteration at which the training gave up what had brought no gain.
     pub given_up: Option<usize>,
     /// The last report.
@@ -132,6 +134,7 @@ pub fn fit(
         exposures: None,
         grows: None,
         watched: None,
+        album: false,
     }
     .run(settings, observe)
 }
@@ -160,6 +163,8 @@ pub struct Fit<'a> {
     pub grows: Option<Grows>,
     /// Views that are looked at on the way; a few of the held-out ones by default.
     pub watched: Option<(&'a Arc<Dataset>, Vec<usize>)>,
+    /// True to keep pictures of one of them.
+    pub album: bool,
 }
 
 impl Fit<'_> {
@@ -231,9 +236,12 @@ impl Fit<'_> {
         let exposures = plan.exposures.clone();
         trainer.watch(PlannedViews::watched(
             photographed.clone(),
-            views,
+            views.clone(),
             exposures,
         ))?;
+        if self.album {
+            trainer.keep_album();
+        }
         trainer.remember(plan.clone());
         if let Some(checkpoint) = checkpoint {
             trainer.resume(checkpoint)?;
@@ -248,6 +256,8 @@ impl Fit<'_> {
             peak_device_memory = peak_device_memory.max(gpu.allocated_bytes());
             observe(LumaEvent::Training(progress))
         })?;
+        let mut album = trainer.album();
+        (album.iter_mut()).for_each(|picture| picture.view = views[picture.view]);
         let mut splats = trainer.splats()?;
         if dataset.removes_masked() {
             splats = carved(dataset, &splats)?;
@@ -261,6 +271,7 @@ impl Fit<'_> {
             extent: dataset.extent,
             iterations: trainer.schedule().end,
             curve: trainer.curve().to_vec(),
+            album,
             given_up: trainer.given_up(),
             last,
             load: trainer.load(),

@@ -5,17 +5,17 @@ use std::fmt::Write;
 
 use super::{
     knobs::KNOBS,
-    sweep::{Measure, Outcome, Phase, PointStage, SweepPoint, Tradeoff},
+    sweep::{Measure, Outcome, PointStage, SweepPoint, Tradeoff},
 };
 use crate::report::html::escaped;
 
 /// Colors of the knobs, in their order.
 const COLORS: [&str; KNOBS.len()] = [
-    "#3b6ea8", "#c8643c", "#4f8f4f", "#8a5a9e", "#b0912f", "#3f9aa0", "#b3557c", "#7a6a58",
+    "#3b6ea8", "#c8643c", "#4f8f4f", "#8a5a9e", "#b0912f", "#3f9aa0", "#b3557c",
 ];
 
-/// Color of what turns several knobs.
-const COMBINED: &str = "#9aa0a8";
+/// Color of what is tried on smaller photos.
+const SMALL: &str = "#9aa0a8";
 
 /// Edges of the axes in a plot of 560 by 360.
 const LEFT: f64 = 62.0;
@@ -25,13 +25,13 @@ const BOTTOM: f64 = 314.0;
 
 /// A point's group and its color.
 pub(super) fn group(point: &SweepPoint) -> (&str, &'static str) {
-    match (point.phase, &point.settings[..]) {
-        (Phase::Base, _) => ("base", "currentColor"),
-        (Phase::One, [only]) => {
+    match &point.settings[..] {
+        [] => ("base", "currentColor"),
+        [only] => {
             let place = KNOBS.iter().position(|knob| knob.name == only.knob);
-            (&only.knob, place.map_or(COMBINED, |place| COLORS[place]))
+            (&only.knob, place.map_or(SMALL, |place| COLORS[place]))
         }
-        _ => ("combinations", COMBINED),
+        _ => ("smaller photos", SMALL),
     }
 }
 
@@ -79,8 +79,9 @@ pub(super) fn plot(sweep: &Tradeoff, stage: PointStage, measure: &Measure) -> St
         "<path d=\"{path}\" fill=\"none\" stroke=\"currentColor\" stroke-dasharray=\"2 3\"/>"
     );
     for (point, outcome, [x, y]) in &placed {
-        let size = match point.phase {
-            Phase::Base => 8,
+        let size = match point.after {
+            Some(_) => 3,
+            None if point.is_base() => 8,
             _ if front.iter().any(|found| found.name == point.name) => 6,
             _ => 4,
         };

@@ -7,11 +7,11 @@ use std::{
 };
 
 use super::{
-    child,
+    child, curve,
     knobs::{self, Base},
     request::{POINTS, TradeoffError, TradeoffOptions},
     search::{Task, base_name},
-    sweep::{Outcome, Phase, PointStage, Subject, SweepPoint, Tradeoff},
+    sweep::{Outcome, PointStage, Subject, SweepPoint, Tradeoff},
 };
 use crate::{
     chroma::teacher::located,
@@ -24,6 +24,9 @@ use crate::{
 /// The option of `fit` for the longer side at which held-out views are measured: only
 /// at one size can points of several `max-side` be compared.
 const MEASURE_SIDE: &str = "--measure-side";
+
+/// The option of `fit` that keeps pictures of its way.
+const ALBUM: &str = "--album";
 
 /// Frames of `eval`'s path, of which nothing is used: as few as it takes.
 const FRAMES: &str = "2";
@@ -71,14 +74,19 @@ impl Bench {
 
     /// The base of a stage that has run.
     pub fn base(&self, stage: PointStage) -> Result<Base, RunError> {
+        self.trained(base_name(stage))
+    }
+
+    /// A point that has run.
+    fn trained(&self, name: &str) -> Result<Base, RunError> {
         Ok(Base {
-            report: self.folder(base_name(stage)).read_report()?,
+            report: self.folder(name).read_report()?,
             largest_side: self.largest_side,
         })
     }
 
-    /// Runs a point in an empty folder and reads what its reports say; `tell` hears now
-    /// and then how many seconds it has taken.
+    /// Runs a point in an empty folder and reads what its reports say, along its way too; `tell`
+    /// hears now and then how many seconds it has taken.
     ///
     /// # Errors
     /// [`RunError`] when the folder cannot be made. What the program itself fails at is
@@ -88,7 +96,7 @@ impl Bench {
         task: &Task,
         sweep: &Tradeoff,
         tell: &mut dyn FnMut(f64),
-    ) -> Result<SweepPoint, RunError> {
+    ) -> Result<Vec<SweepPoint>, RunError> {
         let begun = Instant::now();
         let folder = self.folder(&task.name);
         // Of a sweep that was stopped in the middle of this point.
@@ -106,15 +114,37 @@ impl Bench {
             let outcome = self.outcome(task, sweep);
             outcome.map_err(|error| error.to_string())
         });
-        Ok(SweepPoint {
+        let point = SweepPoint {
             name: task.name.clone(),
             stage: task.stage,
-            phase: task.phase,
             settings: task.settings.clone(),
+            after: None,
+            picture: picture_of(&folder, &folder.contact_sheet()).filter(|_| outcome.is_ok()),
             commands,
             took: begun.elapsed().as_secs_f64(),
             failed: outcome.as_ref().err().cloned(),
             outcome: outcome.ok(),
+        };
+        let along = match point.outcome {
+            Some(_) => self.along(&point)?,
+            None => Vec::new(),
+        };
+        Ok([vec![point], along].concat())
+    }
+
+    /// Points on the way of one that ran: of luma where it was looked at as it was measured, of
+    /// color those of the base, which fewer rounds repeat.
+    fn along(&self, point: &SweepPoint) -> Result<Vec<SweepPoint>, RunError> {
+        let folder = self.folder(&point.name);
+        let trained = self.trained(&point.name)?;
+        let measured = trained.report.luma.measured_side;
+        let alike = measured.is_none_or(|side| side == trained.side());
+        Ok(match point.stage {
+            PointStage::Luma if alike => curve::of_luma(point, &trained.report, &folder),
+            PointStage::Color if point.is_base() => {
+                curve::of_color(point, &trained.report, &folder)
+            }
+            _ => Vec::new(),
         })
     }
 
@@ -149,14 +179,16 @@ impl Bench {
                 vec![[colorize, turned_words].concat(), eval]
             }
             _ => {
-                let fit = owned(&["fit", &self.subject.scene, "-o", &folder]);
+                let fit = owned(&["fit", &self.subject.scene, "-o", &folder, ALBUM]);
                 let mut options = self.subject.options.clone();
                 for [option, _] in turned {
                     options = without(options, option);
                 }
                 options.extend(turned_words);
-                if task.phase != Phase::Base && !options.iter().any(|o| o.starts_with(MEASURE_SIDE))
-                {
+                let sized = options
+                    .iter()
+                    .any(|option| option.starts_with(MEASURE_SIDE));
+                if !task.settings.is_empty() && !sized {
                     let side = self.base(PointStage::Luma)?.side();
                     options.extend([MEASURE_SIDE.to_owned(), side.to_string()]);
                 }
@@ -191,8 +223,11 @@ impl Bench {
             let asked = base.and_then(|base| base.outcome.as_ref());
             let seconds = &chroma.seconds;
             outcome.teacher_seconds = asked.map_or(seconds.teacher, |base| base.teacher_seconds);
-            outcome.seconds +=
+            outcome.seconds =
                 outcome.teacher_seconds + seconds.distill + seconds.bake + seconds.measure;
+            // Other targets, or more freedom to meet them, are no smaller error.
+            let same = task.settings.iter().all(|setting| setting.knob == "rounds");
+            outcome.loss = same.then_some(chroma.loss);
             outcome.delta_e = chroma.pictures.delta_e.map(|error| error.mean);
             outcome.consistency = consistency(&folder)?;
             outcome.colorfulness = Some(chroma.pictures.colorfulness);
@@ -201,6 +236,14 @@ impl Bench {
         }
         Ok(outcome)
     }
+}
+
+/// A file of a point, below the sweep's folder; names are letters, digits, `.`, `+` and `-`.
+pub(super) fn picture_of(folder: &RunFolder, file: &Path) -> Option<String> {
+    let below = file.strip_prefix(folder.path().parent()?).ok()?;
+    let parts = below.iter().map(|part| part.to_str());
+    let parts: Option<Vec<&str>> = [Some(POINTS)].into_iter().chain(parts).collect();
+    Some(parts?.join("/"))
 }
 
 /// Difference between the exported pictures of photographed views, RMS in CIELAB units.
@@ -259,12 +302,12 @@ mod tests {
         let task = Task {
             name: "here".to_owned(),
             stage,
-            phase: Phase::One,
             settings: vec![Setting {
                 knob: knob.to_owned(),
                 value: value.to_owned(),
             }],
             expected: None,
+            information: 0.0,
         };
         assert!(bench.outcome(&task, &sweep(Vec::new())).is_err(), "no run");
         let commands = bench.commands(&task).expect("names");
@@ -276,13 +319,13 @@ mod tests {
         assert_eq!(
             commands(PointStage::Luma, "max-side", "48"),
             [
-                "fit /my scene -o /out/points/here --preset draft --measure-side 50 --max-splats 70 --max-side 48"
+                "fit /my scene -o /out/points/here --album --preset draft --measure-side 50 --max-splats 70 --max-side 48"
             ]
         );
         assert_eq!(
             commands(PointStage::Luma, "max-splats", "35"),
             [
-                "fit /my scene -o /out/points/here --preset draft --max-side=64 --measure-side 50 --max-splats 35"
+                "fit /my scene -o /out/points/here --album --preset draft --max-side=64 --measure-side 50 --max-splats 35"
             ]
         );
     }

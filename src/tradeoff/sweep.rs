@@ -4,7 +4,10 @@
 use serde::{Deserialize, Serialize};
 
 /// Version of the file's layout; raised when a key changes its meaning.
-pub const TRADEOFF_VERSION: u32 = 3;
+pub const TRADEOFF_VERSION: u32 = 4;
+
+/// Budget in times of the bases, where none is given.
+pub(super) const BASES: f64 = 4.0;
 
 /// `tradeoff.json`: a sweep, finished or not.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -17,9 +20,10 @@ pub struct Tradeoff {
     pub subject: Subject,
     /// Adapter and driver, once the first point has run.
     pub device: Option<String>,
-    /// Wall seconds that the points may take together.
-    pub budget: f64,
-    /// Every point that ran, in the order in which they did.
+    /// Wall seconds that the points may take together; `None`: [`BASES`] times what the bases
+    /// took.
+    pub budget: Option<f64>,
+    /// Every point, in the order in which they were found.
     pub points: Vec<SweepPoint>,
 }
 
@@ -37,15 +41,17 @@ pub struct Subject {
 /// One choice of settings, and its outcome.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SweepPoint {
-    /// Name of its run folder under `points/`.
+    /// Name of its run folder under `points/`, or of that and a place along its curve.
     pub name: String,
     /// Stage that it measures.
     pub stage: PointStage,
-    /// Phase that asked for it.
-    pub phase: Phase,
-    /// Settings that differ from the base; empty for the base itself.
+    /// Settings that differ from the base; none of the base itself, several on smaller photos.
     pub settings: Vec<Setting>,
-    /// The program's arguments, one list for each time it was called.
+    /// Iterations or rounds after which the run was looked at; `None` at its end.
+    pub after: Option<usize>,
+    /// Its picture, below the sweep's folder.
+    pub picture: Option<String>,
+    /// The program's arguments, one list for each time it was called; none along a curve.
     pub commands: Vec<Vec<String>>,
     /// Wall seconds of all these calls, measuring among them.
     pub took: f64,
@@ -65,24 +71,9 @@ pub enum PointStage {
     Color,
 }
 
-serde_plain::derive_display_from_serialize!(PointStage);
-serde_plain::derive_display_from_serialize!(Phase);
-
 impl PointStage {
     /// Both, in the order in which they run.
     pub const ALL: [Self; 2] = [Self::Luma, Self::Color];
-}
-
-/// Phase of the sweep that asked for a point.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Phase {
-    /// Everything as the preset has it.
-    Base,
-    /// One setting changed.
-    One,
-    /// Two settings that alone are on the front.
-    Front,
 }
 
 /// A knob and where it stands.
@@ -100,7 +91,7 @@ pub struct Outcome {
     pub iterations: usize,
     /// Number of Gaussians.
     pub splats: usize,
-    /// Wall seconds of all stages.
+    /// Wall seconds of its stage.
     pub seconds: f64,
     /// Those of asking the teacher: of the point that asked, where this one took its answers.
     pub teacher_seconds: f64,
@@ -108,6 +99,8 @@ pub struct Outcome {
     pub psnr: Option<f64>,
     /// Structural similarity of the gray pictures.
     pub ssim: Option<f64>,
+    /// Loss of the color solver in CIELAB units, where it is the base's but for its rounds.
+    pub loss: Option<f64>,
     /// Mean ΔE00 of the colored pictures to the photos, where these have colors.
     pub delta_e: Option<f64>,
     /// Root mean square difference of a and b, in CIELAB units, between photographed
@@ -125,7 +118,7 @@ pub struct Outcome {
 pub struct Measure {
     /// The stage whose points have it.
     pub stage: PointStage,
-    /// Name and unit, for axes and columns.
+    /// Name and, behind a comma, unit, for axes and columns.
     pub title: &'static str,
     /// Digits worth printing.
     pub digits: usize,
@@ -137,7 +130,7 @@ pub struct Measure {
 }
 
 /// The measures of both stages, the one that decides first.
-pub(super) const MEASURES: [Measure; 5] = [
+pub(super) const MEASURES: [Measure; 6] = [
     Measure {
         stage: PointStage::Luma,
         title: "PSNR, dB",
@@ -173,6 +166,13 @@ pub(super) const MEASURES: [Measure; 5] = [
         sign: 0.0,
         value: |outcome| outcome.colorfulness,
     },
+    Measure {
+        stage: PointStage::Color,
+        title: "loss",
+        digits: 3,
+        sign: -1.0,
+        value: |outcome| outcome.loss,
+    },
 ];
 
 impl Measure {
@@ -186,6 +186,25 @@ impl Measure {
         }
     }
 
+    /// How much better an outcome is than another; empty without figures or where neither more
+    /// nor less is better.
+    pub fn gain(&self, outcome: &Outcome, other: Option<&Outcome>) -> String {
+        let [found, before] = [Some(outcome), other].map(|of| of.and_then(self.value));
+        let gain = found.zip(before).filter(|_| self.sign != 0.0);
+        let digits = self.digits;
+        gain.map_or(String::new(), |(found, before)| {
+            format!("{:+.digits$}", self.sign * (found - before))
+        })
+    }
+
+    /// Unit of a difference.
+    pub fn unit(&self) -> &'static str {
+        match self.title.split_once(", ") {
+            Some((_, unit)) => unit,
+            None => self.title,
+        }
+    }
+
     /// An outcome's figure with its digits; empty without.
     pub fn figure(&self, outcome: &Outcome) -> String {
         let digits = self.digits;
@@ -194,19 +213,29 @@ impl Measure {
 }
 
 impl SweepPoint {
-    /// Its settings in words, `base` without any.
+    /// Returns true for a run as the preset has it.
+    pub fn is_base(&self) -> bool {
+        self.settings.is_empty() && self.after.is_none()
+    }
+
+    /// Its settings in words, `base` without any, and where along its run it is.
     pub fn label(&self) -> String {
-        let settings: Vec<String> = (self.settings.iter())
+        let settings = self.settings.iter();
+        let mut words: Vec<String> = settings
             .map(|setting| format!("{} {}", setting.knob, setting.value))
             .collect();
-        match settings.is_empty() {
-            true => "base".to_owned(),
-            false => settings.join(", "),
+        if words.is_empty() {
+            words.push("base".to_owned());
         }
+        words.extend(self.after.map(|steps| match self.stage {
+            PointStage::Luma => format!("after {steps} iterations"),
+            PointStage::Color => format!("after {steps} rounds"),
+        }));
+        words.join(", ")
     }
 
     /// Seconds and, larger where it is better, figure of merit.
-    fn place(&self, measure: &Measure) -> Option<[f64; 2]> {
+    pub fn place(&self, measure: &Measure) -> Option<[f64; 2]> {
         let outcome = self.outcome.as_ref()?;
         let place = [outcome.seconds, measure.sign * (measure.value)(outcome)?];
         (measure.sign != 0.0 && place.iter().all(|figure| figure.is_finite())).then_some(place)
@@ -218,6 +247,15 @@ impl Tradeoff {
     pub fn to_json(&self) -> String {
         // Plain structs with string keys: serializing them cannot fail.
         serde_json::to_string_pretty(self).unwrap_or_default()
+    }
+
+    /// Wall seconds that the points may take together.
+    pub fn limit(&self) -> f64 {
+        let bases = PointStage::ALL
+            .into_iter()
+            .filter_map(|stage| self.base(stage));
+        let took: f64 = bases.map(|base| base.took).sum();
+        self.budget.unwrap_or(BASES * took)
     }
 
     /// Wall seconds that the points took.
@@ -235,7 +273,21 @@ impl Tradeoff {
 
     /// The base of a stage, where it ran.
     pub fn base(&self, stage: PointStage) -> Option<&SweepPoint> {
-        self.of(stage).find(|point| point.phase == Phase::Base)
+        self.of(stage).find(|point| point.is_base())
+    }
+
+    /// The first on smaller photos, which others there are compared with.
+    pub fn small(&self) -> Option<&SweepPoint> {
+        self.points.iter().find(|point| point.settings.len() > 1)
+    }
+
+    /// The point that another is compared with.
+    pub fn reference(&self, point: &SweepPoint) -> Option<&SweepPoint> {
+        let small = self.small().filter(|small| small.name != point.name);
+        match point.settings.len() > 1 {
+            true => small.or_else(|| self.base(point.stage)),
+            false => self.base(point.stage),
+        }
     }
 
     /// The measures that some point of a stage has.

@@ -193,6 +193,7 @@ impl Job<'_> {
                 None => near.map(|near| Arc::new(move |place| near.holds(place)) as Grows),
             },
             watched: reaches.then(|| (self.judge, self.judge.split.test.clone())),
+            album: options.album,
         };
         let journal = &Journal::new(self.log(found), observe);
         let mut checkpointing = CheckpointFiles::new(
