@@ -7,9 +7,6 @@ use crate::report::{ChromaReport, Report};
 /// Gaussians, but no fewer pixels along a side than this.
 const SMALL_SIDE: f64 = 100.0;
 
-/// Expected time on them over the base's: half goes by pixels, half by Gaussians.
-const SMALL_TIME: f64 = 0.4;
-
 /// Their knobs.
 const MAX_SIDE: &str = "max-side";
 const MAX_SPLATS: &str = "max-splats";
@@ -19,7 +16,7 @@ pub(super) struct Knob {
     /// Name in tables and for `--knobs`.
     pub name: &'static str,
     /// The stage whose time and quality it changes.
-    stage: PointStage,
+    pub stage: PointStage,
     option: &'static str,
     /// The base's count; 0 without.
     count: fn(&Base) -> f64,
@@ -35,27 +32,29 @@ pub(super) struct Knob {
     share: f64,
     /// Range over scenes of what twice the work changes, in dB or ΔE00
     /// (docs/lab/04-presets.md#what-a-point-tells).
-    spread: f64,
-    /// True if the sign of the change is that on smaller photos.
-    carries: bool,
+    pub spread: f64,
 }
 
 /// A value of a knob.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub(super) struct Value {
-    /// The stage it belongs to.
-    pub stage: PointStage,
-    pub knob: &'static str,
+    pub knob: &'static Knob,
     /// As a point has them.
     pub settings: Vec<Setting>,
     /// True if it is compared with the base's settings on smaller photos.
     pub small: bool,
     /// How many times the work doubles from what it is compared with.
     pub doublings: f64,
+}
+
+impl Value {
     /// Expected time over that of what it is compared with.
-    pub time: f64,
-    /// Range of what twice the work changes, in dB or ΔE00.
-    pub spread: f64,
+    pub fn time(&self) -> f64 {
+        let time = 1.0 - self.knob.share + self.knob.share * self.doublings.exp2();
+        // Smaller photos have as much fewer Gaussians.
+        let both = self.settings.len() > 1 && !self.small;
+        if both { time * time } else { time }
+    }
 }
 
 /// The base, around which knobs are turned.
@@ -102,21 +101,20 @@ const PLAIN: Knob = Knob {
     power: 1.0,
     share: 0.0,
     spread: 0.0,
-    carries: false,
 };
 
 /// Harmonics up to a degree are counted along a side of their square.
 const DEGREES: fn(&Base) -> [f64; 2] = |_| [1.0, 4.0];
 
 /// The knobs of both stages.
-pub(super) const KNOBS: [Knob; 7] = [
+pub(super) static KNOBS: [Knob; 6] = [
     Knob {
         name: "iterations",
         option: "--iterations",
         count: |base| base.report.luma.iterations as f64,
         factors: &[2.0, 4.0],
         share: 1.0,
-        spread: 1.7,
+        spread: 2.0,
         ..PLAIN
     },
     Knob {
@@ -139,20 +137,6 @@ pub(super) const KNOBS: [Knob; 7] = [
         factors: &[0.5, 0.25, 2.0],
         share: 0.5,
         spread: 1.5,
-        carries: true,
-        ..PLAIN
-    },
-    Knob {
-        name: "sh-degree",
-        option: "--sh-degree",
-        count: |base| f64::from(base.report.luma.settings.sh_degree) + 1.0,
-        range: DEGREES,
-        factors: &[2.0, 0.5, 4.0 / 3.0, 3.0, 0.25],
-        less: 1.0,
-        power: 2.0,
-        share: 0.05,
-        spread: 0.1,
-        carries: true,
         ..PLAIN
     },
     Knob {
@@ -196,13 +180,13 @@ pub(super) const KNOBS: [Knob; 7] = [
     },
 ];
 
-pub fn knob_names() -> [&'static str; KNOBS.len()] {
-    KNOBS.map(|knob| knob.name)
+pub fn knob_names() -> Vec<&'static str> {
+    KNOBS.iter().map(|knob| knob.name).collect()
 }
 
 impl Knob {
     /// Values to try, and where the sign carries over the same compared with `small`.
-    fn values(&self, base: &Base, small: Option<&Value>) -> Vec<Value> {
+    fn values(&'static self, base: &Base, small: Option<&Value>) -> Vec<Value> {
         let (count, [least, most]) = ((self.count)(base), (self.range)(base));
         let mut values: Vec<Value> = Vec::new();
         for factor in self.factors {
@@ -213,22 +197,16 @@ impl Knob {
                 continue;
             }
             let value = Value {
-                stage: self.stage,
-                knob: self.name,
+                knob: self,
                 settings: vec![setting(self.name, wanted - self.less)],
                 small: false,
                 doublings,
-                time: 1.0 - self.share + self.share * doublings.exp2(),
-                spread: self.spread,
             };
-            if let Some(small) = small.filter(|_| self.carries) {
-                let mut settings = small.settings.clone();
-                match self.name {
-                    MAX_SPLATS => settings[1] = setting(MAX_SPLATS, (wanted / 4.0).ceil()),
-                    _ => settings.extend(value.settings.clone()),
-                }
+            // The sign is that on smaller photos.
+            if let Some(small) = small.filter(|_| self.name == MAX_SPLATS) {
+                let count = setting(MAX_SPLATS, (wanted / 4.0).ceil());
                 values.push(Value {
-                    settings,
+                    settings: vec![small.settings[0].clone(), count],
                     small: true,
                     ..value.clone()
                 });
@@ -244,13 +222,10 @@ pub(super) fn values(base: &Base, wanted: &[String]) -> Vec<Value> {
     let side = (f64::from(base.side()) / 2.0).floor();
     let splats = (base.report.luma.splats as f64 / 4.0).ceil();
     let small = Value {
-        stage: PointStage::Luma,
-        knob: MAX_SIDE,
+        knob: &KNOBS[1],
         settings: vec![setting(MAX_SIDE, side), setting(MAX_SPLATS, splats)],
         small: false,
         doublings: -2.0,
-        time: SMALL_TIME,
-        spread: KNOBS[1].spread,
     };
     let small = (side >= SMALL_SIDE).then_some(&small);
     let chosen = KNOBS

@@ -56,7 +56,7 @@ pub fn tradeoff(
     }
     let sides = capture.views.iter().flat_map(|view| view.photo_size());
     let largest_side = sides.max().unwrap_or(0);
-    files::make_own_folder(&folder, &[".lock", FILES[0]], &[])?;
+    files::make_own_folder(&folder, &[FILES[0], request::POINTS], &[])?;
     let bench = Bench::new(options, &folder, largest_side)?;
     let mut state = SweepState::open(&folder, bench.subject.clone(), options.budget)?;
 
@@ -79,13 +79,6 @@ pub fn tradeoff(
                 reason,
             });
         }
-    }
-    let mut points = state.sweep.points.iter();
-    if points.all(|point| point.settings.is_empty()) {
-        observe(Event::Note(format!(
-            "only the base fits into {:.0} minutes: the same command with a larger --budget continues from here",
-            state.sweep.limit() / 60.0
-        )));
     }
     // An earlier start may have been stopped between its files.
     write(&folder, &state)?;

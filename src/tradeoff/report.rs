@@ -2,6 +2,8 @@
 
 use std::fmt::Write;
 
+use plotters::style::RGBColor;
+
 use super::{
     plot::{group, plot},
     sweep::{Measure, Outcome, PointStage, SweepPoint, Tradeoff},
@@ -114,14 +116,14 @@ fn push_stage(html: &mut String, sweep: &Tradeoff, stage: PointStage) {
     let Some(front) = front_table(sweep, stage) else {
         return;
     };
-    let mut legend: Vec<(&str, &str)> = Vec::new();
+    let mut legend = Vec::new();
     html.push_str("<p class=\"legend\">");
     for group in sweep.of(stage).map(group) {
         if !legend.contains(&group) {
-            let (name, color) = group;
+            let (name, RGBColor(red, green, blue)) = group;
             let _ = write!(
                 html,
-                "<i style=\"background:{color}\"></i>{}",
+                "<i style=\"background:rgb({red} {green} {blue})\"></i>{}",
                 escaped(name)
             );
             legend.push(group);

@@ -11,6 +11,9 @@ use super::{
 /// Share of what a value tells that smaller photos tell: the sign.
 const SIGN: f64 = 0.5;
 
+/// Share that is left where another value has told in which direction quality goes.
+const KNOWN: f64 = 0.25;
+
 /// A point to run.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Task {
@@ -76,32 +79,35 @@ fn task(value: &Value, values: &[Value], sweep: &Tradeoff) -> Option<Task> {
     let name = name(&value.settings);
     let with = match value.small {
         true => sweep.small()?,
-        false => sweep.base(value.stage)?,
+        false => sweep.base(value.knob.stage)?,
     };
     let outcome = with.outcome.as_ref()?;
     // Only the base, and whoever sees photos at another size, asks the teacher.
-    let asks = value.knob == "teacher-size";
+    let asks = value.knob.name == "teacher-size";
     let asking = if asks { 0.0 } else { outcome.teacher_seconds };
     let known = values.iter().filter(|other| {
         let point = sweep.find(&self::name(&other.settings));
-        other.knob == value.knob && point.is_some_and(|point| point.outcome.is_some())
+        other.knob.name == value.knob.name && point.is_some_and(|point| point.outcome.is_some())
     });
     let known: Vec<&Value> = known.collect();
-    let signed = known
-        .iter()
-        .any(|other| other.small && other.doublings == value.doublings);
-    let alike = known.iter().filter(|other| other.small == value.small);
-    // A value farther away than a doubling tells little more.
+    let same_way = |other: &&Value| (other.doublings < 0.0) == (value.doublings < 0.0);
+    let told = if known.iter().any(same_way) {
+        KNOWN
+    } else {
+        1.0
+    };
+    let share = if value.small { SIGN * told } else { told };
+    // A value farther away than a doubling tells little more; full photos tell about smaller ones.
+    let alike = known.iter().filter(|other| value.small || !other.small);
     let news = alike
         .map(|other| (other.doublings - value.doublings).abs())
         .fold(value.doublings.abs().min(1.0), f64::min);
-    let share = if value.small || signed { SIGN } else { 1.0 };
     sweep.find(&name).is_none().then(|| Task {
         name,
-        stage: value.stage,
+        stage: value.knob.stage,
         settings: value.settings.clone(),
-        expected: Some((with.took - asking) * value.time),
-        information: share * value.spread * news,
+        expected: Some((with.took - asking) * value.time()),
+        information: share * value.knob.spread * news,
     })
 }
 
@@ -117,38 +123,21 @@ fn name(settings: &[Setting]) -> String {
 mod tests {
     use super::super::{
         fixtures,
+        knobs::KNOBS,
         sweep::{Outcome, SweepPoint},
     };
     use super::*;
 
-    /// A value with its doublings, its time and what it may tell; those on smaller photos.
-    type Known = (PointStage, &'static str, &'static str, f64, f64, f64, bool);
-
-    const VALUES: [Known; 8] = [
-        (PointStage::Luma, "iterations", "1400", 1.0, 2.0, 1.7, false),
-        (
-            PointStage::Luma,
-            "max-splats",
-            "500",
-            -1.0,
-            0.75,
-            1.5,
-            false,
-        ),
-        (PointStage::Luma, "max-splats", "500", -1.0, 0.75, 1.5, true),
-        (PointStage::Luma, "max-splats", "250", -2.0, 0.6, 1.5, false),
-        (PointStage::Luma, "max-side", "160", -2.0, 0.4, 1.3, false),
-        (PointStage::Luma, "sh-degree", "3", 4.0, 1.8, 0.1, false),
-        (PointStage::Color, "rounds", "2", -1.0, 0.8, 0.1, false),
-        (
-            PointStage::Color,
-            "teacher-size",
-            "128",
-            -2.0,
-            0.8,
-            0.3,
-            false,
-        ),
+    /// Knobs with a value and how many times its work doubles.
+    const VALUES: [(&str, &str, f64); 8] = [
+        ("iterations", "1400", 1.0),
+        ("max-splats", "500", -1.0),
+        ("max-splats", "small", -1.0),
+        ("max-splats", "250", -2.0),
+        ("max-side", "160", -2.0),
+        ("chroma-degree", "1", 2.0),
+        ("rounds", "2", -1.0),
+        ("teacher-size", "128", -2.0),
     ];
 
     fn values() -> Vec<Value> {
@@ -156,18 +145,20 @@ mod tests {
             knob: knob.to_owned(),
             value: value.to_owned(),
         };
-        let value = |&(stage, knob, value, doublings, time, spread, small): &Known| Value {
-            stage,
-            knob,
-            settings: match (small, knob) {
-                (true, _) => vec![setting("max-side", "160"), setting(knob, value)],
-                (false, "max-side") => vec![setting(knob, value), setting("max-splats", "1")],
-                _ => vec![setting(knob, value)],
-            },
-            small,
-            doublings,
-            time,
-            spread,
+        let value = |&(knob, value, doublings): &(&str, &str, f64)| {
+            let mut settings = vec![setting(knob, value)];
+            // With fewer Gaussians, and what is tried there.
+            settings.extend((knob == "max-side").then(|| setting("max-splats", "9")));
+            let small = value == "small";
+            if small {
+                settings.insert(0, setting("max-side", "160"));
+            }
+            Value {
+                knob: KNOBS.iter().find(|k| k.name == knob).expect("a knob"),
+                settings,
+                small,
+                doublings,
+            }
         };
         VALUES.iter().map(value).collect()
     }
@@ -223,21 +214,21 @@ mod tests {
         assert_eq!(most_telling(left.into_iter(), 50.0), None);
     }
 
-    /// The sign of `max-splats` comes from smaller photos, once these are known; then it tells
-    /// less than a value farther away. The budget is four times the bases'.
+    /// The sign of `max-splats` comes from smaller photos, once these are known; other values tell
+    /// less then. The budget is four times the bases'.
     #[test]
     fn bases_then_what_tells_most_for_its_seconds() {
         let order = [
             "base",
             "color",
-            "max-splats-250",
-            "max-side-160+max-splats-1",
-            "max-side-160+max-splats-500",
+            "max-side-160+max-splats-9",
+            "max-side-160+max-splats-small",
             "iterations-1400",
+            "max-splats-250",
             "max-splats-500",
             "teacher-size-128",
+            "chroma-degree-1",
             "rounds-2",
-            "sh-degree-3",
         ];
         assert_eq!(names(&swept(Vec::new(), Some(1e5))), order);
         let sweep = swept(Vec::new(), None);

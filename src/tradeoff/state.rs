@@ -99,7 +99,11 @@ mod tests {
         let open = |budget| SweepState::open(folder.path(), subject.clone(), budget);
         let mut state = open(None).expect("new");
         state.add(vec![luma("base", 3.0, 24.0)], Some("llvmpipe".to_owned()));
-        state.add(vec![failed("sh-degree-3", "no memory")], None);
+        let odd = SweepPoint {
+            settings: luma("rounds-3", 1.0, 1.0).settings,
+            ..failed("rounds-3", "no memory")
+        };
+        state.add(vec![odd], None);
         assert_eq!((state.sweep.limit(), state.sweep.spent()), (12.0, 4.0));
         state.write().expect("written");
         let refusal = open(None).err().expect("refused").to_string();

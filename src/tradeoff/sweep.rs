@@ -131,49 +131,39 @@ pub struct Measure {
 
 /// The measures of both stages, the one that decides first.
 pub(super) const MEASURES: [Measure; 6] = [
-    Measure {
-        stage: PointStage::Luma,
-        title: "PSNR, dB",
-        digits: 2,
-        sign: 1.0,
-        value: |outcome| outcome.psnr,
-    },
-    Measure {
-        stage: PointStage::Luma,
-        title: "SSIM",
-        digits: 4,
-        sign: 1.0,
-        value: |outcome| outcome.ssim,
-    },
-    Measure {
-        stage: PointStage::Color,
-        title: "ΔE00 to the photos",
-        digits: 2,
-        sign: -1.0,
-        value: |outcome| outcome.delta_e,
-    },
-    Measure {
-        stage: PointStage::Color,
-        title: "inconsistency of views, a/b",
-        digits: 2,
-        sign: -1.0,
-        value: |outcome| outcome.consistency,
-    },
-    Measure {
-        stage: PointStage::Color,
-        title: "colorfulness",
-        digits: 1,
-        sign: 0.0,
-        value: |outcome| outcome.colorfulness,
-    },
-    Measure {
-        stage: PointStage::Color,
-        title: "loss",
-        digits: 3,
-        sign: -1.0,
-        value: |outcome| outcome.loss,
-    },
+    measure(PointStage::Luma, "PSNR, dB", 2, 1.0, |o| o.psnr),
+    measure(PointStage::Luma, "SSIM", 4, 1.0, |o| o.ssim),
+    measure(PointStage::Color, "ΔE00 to the photos", 2, -1.0, |o| {
+        o.delta_e
+    }),
+    measure(
+        PointStage::Color,
+        "inconsistency of views, a/b",
+        2,
+        -1.0,
+        |o| o.consistency,
+    ),
+    measure(PointStage::Color, "colorfulness", 1, 0.0, |o| {
+        o.colorfulness
+    }),
+    measure(PointStage::Color, "loss", 3, -1.0, |o| o.loss),
 ];
+
+const fn measure(
+    stage: PointStage,
+    title: &'static str,
+    digits: usize,
+    sign: f64,
+    value: fn(&Outcome) -> Option<f64>,
+) -> Measure {
+    Measure {
+        stage,
+        title,
+        digits,
+        sign,
+        value,
+    }
+}
 
 impl Measure {
     /// An outcome's figure in words; empty without.
@@ -224,13 +214,12 @@ impl SweepPoint {
         let mut words: Vec<String> = settings
             .map(|setting| format!("{} {}", setting.knob, setting.value))
             .collect();
-        if words.is_empty() {
-            words.push("base".to_owned());
-        }
-        words.extend(self.after.map(|steps| match self.stage {
-            PointStage::Luma => format!("after {steps} iterations"),
-            PointStage::Color => format!("after {steps} rounds"),
-        }));
+        words.extend(self.settings.is_empty().then(|| "base".to_owned()));
+        let steps = match self.stage {
+            PointStage::Luma => "iterations",
+            PointStage::Color => "rounds",
+        };
+        words.extend(self.after.map(|after| format!("after {after} {steps}")));
         words.join(", ")
     }
 
@@ -251,9 +240,7 @@ impl Tradeoff {
 
     /// Wall seconds that the points may take together.
     pub fn limit(&self) -> f64 {
-        let bases = PointStage::ALL
-            .into_iter()
-            .filter_map(|stage| self.base(stage));
+        let bases = self.points.iter().filter(|point| point.is_base());
         let took: f64 = bases.map(|base| base.took).sum();
         self.budget.unwrap_or(BASES * took)
     }
@@ -283,11 +270,9 @@ impl Tradeoff {
 
     /// The point that another is compared with.
     pub fn reference(&self, point: &SweepPoint) -> Option<&SweepPoint> {
-        let small = self.small().filter(|small| small.name != point.name);
-        match point.settings.len() > 1 {
-            true => small.or_else(|| self.base(point.stage)),
-            false => self.base(point.stage),
-        }
+        let among = |small: &&SweepPoint| point.settings.len() > 1 && small.name != point.name;
+        let small = self.small().filter(among);
+        small.or_else(|| self.base(point.stage))
     }
 
     /// The measures that some point of a stage has.
@@ -327,36 +312,26 @@ mod tests {
     use super::super::fixtures::{failed, luma, sweep};
     use super::*;
 
+    /// The definition, applied to every pair; another stage, failures and what is not finite do
+    /// not count.
     #[test]
-    fn the_front_is_of_one_stage_and_leaves_failures_out() {
-        let mut color = luma("color", 1.0, 99.0);
-        color.stage = PointStage::Color;
-        let sweep = sweep(vec![
-            luma("base", 10.0, 24.0),
-            color,
-            failed("sh-3", "no memory"),
-            luma("side-200", 5.0, 22.0),
-            luma("splats-5", 12.0, 23.0),
-            luma("splats-6", 5.0, 22.0),
-            luma("splats-7", 1.0, f64::INFINITY),
-        ]);
-        let names: Vec<&str> = (sweep.best(PointStage::Luma).iter())
-            .map(|point| &point.name[..])
-            .collect();
-        assert_eq!(names, ["side-200", "base"]);
-        assert!(sweep.best(PointStage::Color).is_empty());
-        assert_eq!(sweep.measures(PointStage::Luma).count(), 2);
-    }
-
-    /// The definition, applied to every pair.
-    #[test]
-    fn against_the_definition() {
+    fn the_front_is_what_no_other_beats() {
         let mut random = fastrand::Rng::with_seed(3);
         for _ in 0..200 {
             let places: Vec<[f64; 2]> = (0..random.usize(1..12))
                 .map(|_| [random.u8(0..6), random.u8(0..6)].map(f64::from))
                 .collect();
-            let points = places.iter().map(|&[x, y]| luma("side-1", x, y)).collect();
+            let mut points: Vec<SweepPoint> =
+                places.iter().map(|&[x, y]| luma("side-1", x, y)).collect();
+            let color = SweepPoint {
+                stage: PointStage::Color,
+                ..luma("color", -1.0, 99.0)
+            };
+            points.extend([
+                color,
+                failed("sh-3", ""),
+                luma("side-2", -1.0, f64::INFINITY),
+            ]);
             let beats = |a: [f64; 2], b: [f64; 2]| a != b && a[0] <= b[0] && a[1] >= b[1];
             let mut expected: Vec<[f64; 2]> = (places.iter().copied())
                 .filter(|&place| !places.iter().any(|&other| beats(other, place)))
@@ -368,6 +343,7 @@ mod tests {
                 .filter_map(|point| point.place(&MEASURES[0]))
                 .collect();
             assert_eq!(found, expected, "{places:?}");
+            assert!(sweep.best(PointStage::Color).is_empty());
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Quality that more or less time would give: the sentence that a sweep ends with.
 
-use super::sweep::{Measure, PointStage, Tradeoff};
+use super::sweep::{PointStage, SweepPoint, Tradeoff};
 
 /// Times that differ by this share are the same.
 const SAME: f64 = 0.1;
@@ -9,22 +9,24 @@ const SAME: f64 = 0.1;
 /// reaches either.
 pub(super) fn sentence(sweep: &Tradeoff, stage: PointStage) -> Option<String> {
     let measure = sweep.measures(stage).next()?;
-    let base = sweep.base(stage)?.place(measure)?[0];
-    let places = sweep.of(stage).filter_map(|point| point.place(measure));
-    in_words(places.collect(), base, measure)
-}
-
-/// The same for points of seconds and, larger where it is better, merit.
-fn in_words(mut places: Vec<[f64; 2]>, base: f64, measure: &Measure) -> Option<String> {
-    places.sort_by(|a, b| a[0].total_cmp(&b[0]));
-    let now = merit_at(&places, base)?;
+    let [base, _] = sweep.base(stage)?.place(measure)?;
+    let placed = |point: &SweepPoint| point.place(measure);
+    let front: Vec<[f64; 2]> = (sweep.front(stage, measure).into_iter())
+        .filter_map(placed)
+        .collect();
+    let longest = sweep
+        .of(stage)
+        .filter_map(placed)
+        .map(|[seconds, _]| seconds);
+    let longest = longest.fold(0.0, f64::max);
+    let now = merit_at(&front, longest, base)?;
     let unit = measure.unit();
     let said = |difference: f64| match difference < 0.05 {
         true => "nothing".to_owned(),
         false => format!("{difference:.1} {unit}"),
     };
-    let twice = merit_at(&places, 2.0 * base).map(|merit| said(merit - now));
-    let half = merit_at(&places, 0.5 * base).map(|merit| said(now - merit));
+    let twice = merit_at(&front, longest, 2.0 * base).map(|merit| said(merit - now));
+    let half = merit_at(&front, longest, 0.5 * base).map(|merit| said(now - merit));
     match (twice, half) {
         (Some(gain), Some(loss)) => Some(format!("twice the time buys {gain}, half costs {loss}")),
         (Some(gain), None) => Some(format!("twice the time buys {gain}")),
@@ -33,78 +35,59 @@ fn in_words(mut places: Vec<[f64; 2]>, base: f64, measure: &Measure) -> Option<S
     }
 }
 
-/// Best merit that so many seconds give by points sorted by seconds, linear in their logarithm
-/// between two of the front; `None` outside of what was measured.
-fn merit_at(places: &[[f64; 2]], seconds: f64) -> Option<f64> {
-    let longest = places.last()?[0];
-    let mut before: Option<[f64; 2]> = None;
-    for &[x, merit] in places {
-        match before {
-            // On no front: slower, and no better.
-            Some([_, best]) if merit <= best => {}
-            Some([start, best]) if x >= seconds => {
-                let share = (seconds / start).ln() / (x / start).ln();
-                return Some(best + (merit - best) * share);
-            }
-            None if x > seconds * (1.0 + SAME) => return None,
-            _ => before = Some([x, merit]),
+/// Best merit that so many seconds give, linear in their logarithm between two points of the
+/// front; `None` where it does not reach, and nothing was measured up to `longest`.
+fn merit_at(front: &[[f64; 2]], longest: f64, seconds: f64) -> Option<f64> {
+    let after = front.partition_point(|[x, _]| *x < seconds);
+    match (front[..after].last(), front.get(after)) {
+        (Some([x, merit]), Some([end, best])) => {
+            Some(merit + (best - merit) * (seconds / x).ln() / (end / x).ln())
         }
+        (Some([_, best]), None) => (seconds <= longest * (1.0 + SAME)).then_some(*best),
+        (None, Some([x, merit])) => (*x <= seconds * (1.0 + SAME)).then_some(*merit),
+        (None, None) => None,
     }
-    let [_, best] = before?;
-    (seconds <= longest * (1.0 + SAME)).then_some(best)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::sweep::MEASURES;
+    use super::super::fixtures::{luma, sweep};
     use super::*;
 
-    fn said(places: &[[f64; 2]], base: f64) -> Option<String> {
-        in_words(places.to_vec(), base, &MEASURES[0])
+    /// What is said of a base and other points.
+    fn said(base: [f64; 2], others: &[[f64; 2]]) -> Option<String> {
+        let mut points = vec![luma("base", base[0], base[1])];
+        points.extend(others.iter().map(|&[x, y]| luma("side-1", x, y)));
+        sentence(&sweep(points), PointStage::Luma)
     }
 
     #[test]
     fn between_two_points_of_the_front_by_the_logarithm_of_time() {
         // 2 dB for four times the time: 1 dB for each doubling.
-        let front = [[10.0, 22.0], [40.0, 24.0], [160.0, 25.0]];
-        let words = "twice the time buys 0.5 dB, half costs 1.0 dB";
-        assert_eq!(said(&front, 40.0).as_deref(), Some(words));
-        assert_eq!(merit_at(&front, 20.0), Some(23.0));
-        // In any order; a point that is slower and worse changes nothing.
-        let beside = [
-            [160.0, 25.0],
-            [20.0, 21.0],
-            [10.0, 22.0],
-            [40.0, 24.0],
-            [81.0, 23.9],
-        ];
-        assert_eq!(said(&beside, 40.0).as_deref(), Some(words));
+        let front = [[160.0, 25.0], [10.0, 22.0]];
+        let words = Some("twice the time buys 0.5 dB, half costs 1.0 dB");
+        assert_eq!(said([40.0, 24.0], &front).as_deref(), words);
+        // Points that are slower and worse change nothing.
+        let beside = [[160.0, 25.0], [20.0, 21.0], [10.0, 22.0], [81.0, 23.9]];
+        assert_eq!(said([40.0, 24.0], &beside).as_deref(), words);
     }
 
     /// The base itself is off the front, and more time makes it worse.
     #[test]
     fn a_curve_that_falls() {
-        let falling = [[10.0, 22.0], [20.0, 25.0], [40.0, 24.0], [80.0, 23.0]];
+        let falling = [[10.0, 22.0], [20.0, 25.0], [80.0, 23.0]];
         let words = "twice the time buys nothing, half costs nothing";
-        assert_eq!(said(&falling, 40.0).as_deref(), Some(words));
+        assert_eq!(said([40.0, 24.0], &falling).as_deref(), Some(words));
     }
 
     #[test]
     fn nothing_is_said_where_nothing_was_measured() {
-        assert_eq!(said(&[[40.0, 24.0]], 40.0), None);
-        assert_eq!(
-            said(&[[30.0, 23.0], [40.0, 24.0], [60.0, 24.5]], 40.0),
-            None
-        );
-        let short = [[15.0, 22.0], [40.0, 24.0]];
-        assert_eq!(
-            said(&short, 40.0).as_deref(),
-            Some("half the time costs 1.4 dB")
-        );
-        let long = [[40.0, 24.0], [78.0, 25.0]];
-        assert_eq!(
-            said(&long, 40.0).as_deref(),
-            Some("twice the time buys 1.0 dB")
-        );
+        let said = |others: &[[f64; 2]]| said([40.0, 24.0], others);
+        assert_eq!(said(&[]), None);
+        assert_eq!(said(&[[30.0, 23.0], [60.0, 24.5]]), None);
+        let half = said(&[[15.0, 22.0]]);
+        assert_eq!(half.as_deref(), Some("half the time costs 1.4 dB"));
+        let twice = said(&[[78.0, 25.0]]);
+        assert_eq!(twice.as_deref(), Some("twice the time buys 1.0 dB"));
     }
 }
