@@ -5,7 +5,10 @@ use super::{
     point::picture_of,
     sweep::{Outcome, SweepPoint},
 };
-use crate::{input, report::Report, store::RunFolder};
+use crate::{
+    input,
+    store::{RunFolder, StoreError},
+};
 
 /// Share of a run before which it has nothing to show.
 const FROM: f64 = 1.0 / 16.0;
@@ -15,13 +18,17 @@ const STEP: f64 = 1.4;
 
 /// Held-out PSNR of luma wherever a picture was kept. Fewer views are watched than measured: by
 /// how much these differ at the end they differ all along.
-pub(super) fn of_luma(point: &SweepPoint, report: &Report, folder: &RunFolder) -> Vec<SweepPoint> {
-    let (Some(end), Some(outcome)) = (report.luma.curve.last(), &point.outcome) else {
-        return Vec::new();
+pub(super) fn of_luma(
+    point: &SweepPoint,
+    folder: &RunFolder,
+) -> Result<Vec<SweepPoint>, StoreError> {
+    let curve = folder.read_report()?.luma.curve;
+    let (Some(end), Some(outcome)) = (curve.last(), &point.outcome) else {
+        return Ok(Vec::new());
     };
     let shift = outcome.psnr.map(|psnr| psnr - end.psnr);
     let mut points: Vec<SweepPoint> = Vec::new();
-    for look in &report.luma.curve {
+    for look in &curve {
         let picture = folder.album(look.iteration);
         let early = (look.iteration as f64) < FROM * end.iteration as f64;
         if early || look == end || !picture.is_file() {
@@ -42,11 +49,15 @@ pub(super) fn of_luma(point: &SweepPoint, report: &Report, folder: &RunFolder) -
         points.retain(|point| point.name != found.name);
         points.push(found);
     }
-    points
+    Ok(points)
 }
 
 /// Loss of color after some of its rounds.
-pub(super) fn of_color(point: &SweepPoint, report: &Report, folder: &RunFolder) -> Vec<SweepPoint> {
+pub(super) fn of_color(
+    point: &SweepPoint,
+    folder: &RunFolder,
+) -> Result<Vec<SweepPoint>, StoreError> {
+    let before = folder.read_report()?.luma.iterations;
     let log = input::read_to_string(&folder.log()).unwrap_or_default();
     let rounds = log.lines().filter_map(|line| {
         let figures = line.split(',').map_while(|cell| cell.parse().ok());
@@ -54,12 +65,12 @@ pub(super) fn of_color(point: &SweepPoint, report: &Report, folder: &RunFolder) 
             return None;
         };
         let round = iteration as usize;
-        let round = round.checked_sub(report.luma.iterations)?;
+        let round = round.checked_sub(before)?;
         (round > 0).then_some((round, loss, seconds))
     });
     let mut rounds: Vec<(usize, f64, f64)> = rounds.collect();
     let (Some((_, _, end)), Some(outcome)) = (rounds.pop(), &point.outcome) else {
-        return Vec::new();
+        return Ok(Vec::new());
     };
     let mut points: Vec<SweepPoint> = Vec::new();
     for (round, loss, seconds) in rounds {
@@ -75,7 +86,7 @@ pub(super) fn of_color(point: &SweepPoint, report: &Report, folder: &RunFolder) 
             points.push(along(point, round, reached));
         }
     }
-    points
+    Ok(points)
 }
 
 /// A point along another.

@@ -1,36 +1,8 @@
 //! Quality against seconds as SVG, drawn into the page: nothing is fetched.
 
-use plotters::{prelude::*, style::RGBColor};
+use plotters::prelude::*;
 
-use super::{
-    knobs::KNOBS,
-    sweep::{Measure, PointStage, SweepPoint, Tradeoff},
-};
-
-/// Colors of the knobs, in their order.
-const COLORS: [RGBColor; 6] = [
-    RGBColor(59, 110, 168),
-    RGBColor(200, 100, 60),
-    RGBColor(79, 143, 79),
-    RGBColor(138, 90, 158),
-    RGBColor(176, 145, 47),
-    RGBColor(63, 154, 160),
-];
-
-/// Color of what is tried on smaller photos.
-const SMALL: RGBColor = RGBColor(154, 160, 168);
-
-/// A point's group and its color, black that of the page's text.
-pub(super) fn group(point: &SweepPoint) -> (&str, RGBColor) {
-    match &point.settings[..] {
-        [] => ("base", BLACK),
-        [only] => {
-            let place = KNOBS.iter().position(|knob| knob.name == only.knob);
-            (&only.knob, place.map_or(SMALL, |place| COLORS[place]))
-        }
-        _ => ("smaller photos", SMALL),
-    }
-}
+use super::sweep::{Measure, PointStage, SweepPoint, Tradeoff};
 
 /// A plot as SVG; empty without points.
 pub(super) fn plot(sweep: &Tradeoff, stage: PointStage, measure: &Measure) -> String {
@@ -90,13 +62,14 @@ fn draw(
         steps.push(at);
     }
     chart.draw_series(LineSeries::new(steps, BLACK.mix(0.5)))?;
-    chart.draw_series(points.into_iter().map(|(point, at)| {
-        let size = match point.after {
-            Some(_) => 3,
-            None if point.is_base() => 8,
-            None => 5,
+    let style = ("sans-serif", 11).into_font().color(&BLACK.mix(0.7));
+    chart.draw_series(points.iter().map(|(point, at)| {
+        let (size, label) = match point.after {
+            Some(_) => (3, String::new()),
+            None => (5, point.label()),
         };
-        Circle::new(at, size, group(point).1.filled())
+        let label = Text::new(label, (6, -4), style.clone());
+        EmptyElement::at(*at) + Circle::new((0, 0), size, BLACK.filled()) + label
     }))?;
     area.present()?;
     Ok(())

@@ -9,7 +9,7 @@ use std::{
 use super::{
     child, curve,
     knobs::{self, Base},
-    request::{POINTS, TradeoffError, TradeoffOptions},
+    request::{POINTS, TradeoffOptions},
     search::{Task, base_name},
     sweep::{Outcome, PointStage, Subject, SweepPoint, Tradeoff},
 };
@@ -74,13 +74,8 @@ impl Bench {
 
     /// The base of a stage that has run.
     pub fn base(&self, stage: PointStage) -> Result<Base, RunError> {
-        self.trained(base_name(stage))
-    }
-
-    /// A point that has run.
-    fn trained(&self, name: &str) -> Result<Base, RunError> {
         Ok(Base {
-            report: self.folder(name).read_report()?,
+            report: self.folder(base_name(stage)).read_report()?,
             largest_side: self.largest_side,
         })
     }
@@ -125,27 +120,15 @@ impl Bench {
             failed: outcome.as_ref().err().cloned(),
             outcome: outcome.ok(),
         };
-        let along = match point.outcome {
-            Some(_) => self.along(&point)?,
-            None => Vec::new(),
+        let of_base = |knob: &str| point.settings.iter().all(|setting| setting.knob == knob);
+        let along = match point.stage {
+            _ if point.failed.is_some() => Vec::new(),
+            PointStage::Luma if of_base("iterations") => curve::of_luma(&point, &folder)?,
+            PointStage::Color if point.is_base() => curve::of_color(&point, &folder)?,
+            // Others would crowd out what matters.
+            _ => Vec::new(),
         };
         Ok([vec![point], along].concat())
-    }
-
-    /// Points on the way of one that ran: of luma where it was looked at as it was measured, of
-    /// color those of the base, which fewer rounds repeat.
-    fn along(&self, point: &SweepPoint) -> Result<Vec<SweepPoint>, RunError> {
-        let folder = self.folder(&point.name);
-        let trained = self.trained(&point.name)?;
-        let measured = trained.report.luma.measured_side;
-        let alike = measured.is_none_or(|side| side == trained.side());
-        Ok(match point.stage {
-            PointStage::Luma if alike => curve::of_luma(point, &trained.report, &folder),
-            PointStage::Color if point.is_base() => {
-                curve::of_color(point, &trained.report, &folder)
-            }
-            _ => Vec::new(),
-        })
     }
 
     /// A point in color has the base's luma and, but for the first that asked, the
@@ -198,7 +181,7 @@ impl Bench {
     }
 
     /// Outcome of a point, from its reports.
-    fn outcome(&self, task: &Task, sweep: &Tradeoff) -> Result<Outcome, TradeoffError> {
+    fn outcome(&self, task: &Task, sweep: &Tradeoff) -> Result<Outcome, RunError> {
         let folder = self.folder(&task.name);
         let report = folder.read_report()?;
         let luma = &report.luma;
@@ -212,10 +195,6 @@ impl Bench {
             peak_device_memory: luma.peak_device_memory,
             ..Outcome::default()
         };
-        if outcome.psnr.is_none() {
-            let scene = self.subject.scene.clone().into();
-            return Err(TradeoffError::NothingToMeasure(scene));
-        }
         if let Some(chroma) = &report.chroma {
             // One that asks at another size finds no answers.
             let asks = task.settings.iter().any(|s| s.knob == "teacher-size");

@@ -2,11 +2,9 @@
 
 use std::fmt::Write;
 
-use plotters::style::RGBColor;
-
 use super::{
-    plot::{group, plot},
-    sweep::{Measure, Outcome, PointStage, SweepPoint, Tradeoff},
+    plot::plot,
+    sweep::{Measure, PointStage, SweepPoint, Tradeoff},
     worth,
 };
 use crate::report::{
@@ -75,7 +73,6 @@ fn table(sweep: &Tradeoff, stage: PointStage, title: &str, points: &[&SweepPoint
 const STYLE: &str = "<style>
 .plots { display: grid; grid-template-columns: repeat(auto-fit, minmax(380px, 1fr)); gap: 1rem; }
 .plots svg { display: block; color: var(--ink); fill: var(--quiet); background: var(--card); }
-.legend i { display: inline-block; width: .7rem; height: .7rem; border-radius: 50%; margin: 0 .35rem 0 1rem; color: var(--ink); }
 pre { white-space: pre-wrap; overflow-wrap: anywhere; font-size: .78rem; }
 </style>
 ";
@@ -116,50 +113,32 @@ fn push_stage(html: &mut String, sweep: &Tradeoff, stage: PointStage) {
     let Some(front) = front_table(sweep, stage) else {
         return;
     };
-    let mut legend = Vec::new();
-    html.push_str("<p class=\"legend\">");
-    for group in sweep.of(stage).map(group) {
-        if !legend.contains(&group) {
-            let (name, RGBColor(red, green, blue)) = group;
-            let _ = write!(
-                html,
-                "<i style=\"background:rgb({red} {green} {blue})\"></i>{}",
-                escaped(name)
-            );
-            legend.push(group);
-        }
-    }
-    html.push_str("</p>\n<div class=\"plots\">\n");
+    html.push_str("<div class=\"plots\">\n");
     for measure in sweep.measures(stage) {
         html.push_str(&plot(sweep, stage, measure));
     }
     html.push_str("</div>\n");
     push_table(html, &front);
     html.push_str("<div class=\"row\">\n");
-    let mut shown: Vec<(&Outcome, &str, String)> = (sweep.of(stage))
-        .filter_map(|point| {
-            Some((
-                point.outcome.as_ref()?,
-                point.picture.as_deref()?,
-                point.label(),
-            ))
-        })
-        .collect();
-    shown.sort_by(|(a, ..), (b, ..)| a.seconds.total_cmp(&b.seconds));
-    for (outcome, picture, label) in shown {
-        let picture = escaped(picture);
-        let first = sweep.measures(stage).next();
+    let seconds = |point: &SweepPoint| point.outcome.as_ref().map_or(0.0, |o| o.seconds);
+    let mut points: Vec<&SweepPoint> = sweep.of(stage).collect();
+    points.sort_by(|a, b| seconds(a).total_cmp(&seconds(b)));
+    let first = sweep.measures(stage).next();
+    for point in &points {
+        let (Some(picture), Some(outcome)) = (&point.picture, &point.outcome) else {
+            continue;
+        };
         let _ = writeln!(
             html,
             "<figure><a href=\"{picture}\"><img src=\"{picture}\" alt=\"\" loading=\"lazy\"></a><figcaption>{}: {:.1} s{}</figcaption></figure>",
-            escaped(&label),
+            escaped(&point.label()),
             outcome.seconds,
             first.map_or(String::new(), |measure| measure.in_words(outcome)),
+            picture = escaped(picture),
         );
     }
     html.push_str("</div>\n");
-    let all: Vec<&SweepPoint> = sweep.of(stage).collect();
-    push_table(html, &table(sweep, stage, "All points", &all));
+    push_table(html, &table(sweep, stage, "All points", &points));
 }
 
 /// The program with these arguments, quoted for a POSIX shell.
