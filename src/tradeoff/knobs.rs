@@ -114,7 +114,7 @@ pub(super) static KNOBS: [Knob; 6] = [
         count: |base| base.report.luma.iterations as f64,
         factors: &[2.0, 4.0],
         share: 1.0,
-        spread: 2.0,
+        spread: 2.2,
         ..PLAIN
     },
     Knob {
@@ -126,7 +126,7 @@ pub(super) static KNOBS: [Knob; 6] = [
         factors: &[0.75, 1.5, 0.5],
         power: 2.0,
         share: 0.5,
-        spread: 1.3,
+        spread: 2.5,
         ..PLAIN
     },
     Knob {
@@ -136,7 +136,7 @@ pub(super) static KNOBS: [Knob; 6] = [
         range: |base| [1.0, base.most_splats()],
         factors: &[0.5, 0.25, 2.0],
         share: 0.5,
-        spread: 1.5,
+        spread: 1.7,
         ..PLAIN
     },
     Knob {
@@ -146,7 +146,7 @@ pub(super) static KNOBS: [Knob; 6] = [
         count: |base| base.color(|chroma| Some(chroma.iterations as f64)),
         factors: &[0.5, 0.25],
         share: 0.5,
-        spread: 0.1,
+        spread: 0.35,
         ..PLAIN
     },
     Knob {
@@ -159,7 +159,7 @@ pub(super) static KNOBS: [Knob; 6] = [
         less: 1.0,
         power: 2.0,
         share: 0.05,
-        spread: 0.2,
+        spread: 0.22,
         ..PLAIN
     },
     Knob {
@@ -175,7 +175,7 @@ pub(super) static KNOBS: [Knob; 6] = [
         factors: &[0.5, 1.5],
         power: 2.0,
         share: 0.2,
-        spread: 0.3,
+        spread: 2.3,
         ..PLAIN
     },
 ];
