@@ -30,7 +30,7 @@ pub(super) struct Knob {
     power: f64,
     /// Share of the stage's time that goes by this work.
     share: f64,
-    /// Range over scenes of what twice the work changes, in dB or ΔE00
+    /// Range of what twice the work changed, in dB of luma's error or of that between views
     /// (docs/lab/04-presets.md#what-a-point-tells).
     pub spread: f64,
 }
@@ -146,7 +146,7 @@ pub(super) static KNOBS: [Knob; 6] = [
         count: |base| base.color(|chroma| Some(chroma.iterations as f64)),
         factors: &[0.5, 0.25],
         share: 0.5,
-        spread: 0.35,
+        spread: 0.8,
         ..PLAIN
     },
     Knob {
@@ -159,7 +159,7 @@ pub(super) static KNOBS: [Knob; 6] = [
         less: 1.0,
         power: 2.0,
         share: 0.05,
-        spread: 0.22,
+        spread: 1.4,
         ..PLAIN
     },
     Knob {
@@ -175,7 +175,7 @@ pub(super) static KNOBS: [Knob; 6] = [
         factors: &[0.5, 1.5],
         power: 2.0,
         share: 0.2,
-        spread: 2.3,
+        spread: 0.7,
         ..PLAIN
     },
 ];

@@ -90,7 +90,8 @@ mod tests {
         assert!(svg.starts_with("<svg ") && svg.trim_end().ends_with("</svg>"));
         assert_eq!(svg.matches("<circle").count(), 2, "{svg}");
         // From the faster point to the slower one's time, then up.
-        let line = svg.split("<polyline").find(|part| part.contains("0.5"));
+        let half = "opacity=\"0.5\"";
+        let line = svg.split("<polyline").find(|part| part.contains(half));
         let corners = line.and_then(|line| line.split("points=\"").nth(1));
         let corners = corners.and_then(|corners| corners.split('"').next());
         assert_eq!(
@@ -98,6 +99,7 @@ mod tests {
             Some(3),
             "{svg}"
         );
+        assert!(!svg.contains("<200>"), "{svg}");
         assert!(plot(&sweep, PointStage::Color, measure).is_empty());
     }
 }

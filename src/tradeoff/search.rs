@@ -24,7 +24,7 @@ pub(super) struct Task {
     pub settings: Vec<Setting>,
     /// Wall seconds that it should take; `None` for a base, which runs anyway.
     pub expected: Option<f64>,
-    /// Range of what it may show, in dB or ΔE00.
+    /// Range of what it may show, in dB.
     pub information: f64,
 }
 
@@ -91,12 +91,8 @@ fn task(value: &Value, values: &[Value], sweep: &Tradeoff) -> Option<Task> {
     });
     let known: Vec<&Value> = known.collect();
     let same_way = |other: &&Value| (other.doublings < 0.0) == (value.doublings < 0.0);
-    let told = if known.iter().any(same_way) {
-        KNOWN
-    } else {
-        1.0
-    };
-    let share = if value.small { SIGN * told } else { told };
+    let told = known.iter().any(same_way).then_some(KNOWN);
+    let share = told.unwrap_or(1.0) * if value.small { SIGN } else { 1.0 };
     // A value farther away than a doubling tells little more; full photos tell about smaller ones.
     let alike = known.iter().filter(|other| value.small || !other.small);
     let news = alike

@@ -183,7 +183,8 @@ impl Measure {
         let gain = found.zip(before).filter(|_| self.sign != 0.0);
         let digits = self.digits;
         gain.map_or(String::new(), |(found, before)| {
-            format!("{:+.digits$}", self.sign * (found - before))
+            // No minus before nothing.
+            format!("{:+.digits$}", self.sign * (found - before) + 0.0)
         })
     }
 

@@ -5,6 +5,9 @@ use super::sweep::{PointStage, SweepPoint, Tradeoff};
 /// Times that differ by this share are the same.
 const SAME: f64 = 0.1;
 
+/// Least factor on the base's time of which something is said.
+const WORTH_SAYING: f64 = 1.5;
+
 /// Gain of twice the base's seconds and loss of half of them, in words; `None` where no point
 /// reaches either.
 pub(super) fn sentence(sweep: &Tradeoff, stage: PointStage) -> Option<String> {
@@ -14,36 +17,40 @@ pub(super) fn sentence(sweep: &Tradeoff, stage: PointStage) -> Option<String> {
     let front: Vec<[f64; 2]> = (sweep.front(stage, measure).into_iter())
         .filter_map(placed)
         .collect();
-    let longest = sweep
-        .of(stage)
-        .filter_map(placed)
-        .map(|[seconds, _]| seconds);
-    let longest = longest.fold(0.0, f64::max);
-    let now = merit_at(&front, longest, base)?;
+    let all = sweep.of(stage).filter_map(placed);
+    let longest = all.fold(0.0, |longest, [seconds, _]| seconds.max(longest));
+    let now = merit_at(&front, base)?;
     let unit = measure.unit();
     let said = |difference: f64| match difference < 0.05 {
         true => "nothing".to_owned(),
         false => format!("{difference:.1} {unit}"),
     };
-    let twice = merit_at(&front, longest, 2.0 * base).map(|merit| said(merit - now));
-    let half = merit_at(&front, longest, 0.5 * base).map(|merit| said(now - merit));
+    // What takes twice the iterations may take a little less than twice the time.
+    let more = (longest / base).min(2.0);
+    let times = match more * (1.0 + SAME) >= 2.0 {
+        true => "twice".to_owned(),
+        false => format!("{more:.1} times"),
+    };
+    let twice = merit_at(&front, more * base).filter(|_| more >= WORTH_SAYING);
+    let twice = twice.map(|merit| format!("{times} the time buys {}", said(merit - now)));
+    let half = merit_at(&front, 0.5 * base).map(|merit| said(now - merit));
     match (twice, half) {
-        (Some(gain), Some(loss)) => Some(format!("twice the time buys {gain}, half costs {loss}")),
-        (Some(gain), None) => Some(format!("twice the time buys {gain}")),
+        (Some(gain), Some(loss)) => Some(format!("{gain}, half costs {loss}")),
+        (gain @ Some(_), None) => gain,
         (None, Some(loss)) => Some(format!("half the time costs {loss}")),
         (None, None) => None,
     }
 }
 
 /// Best merit that so many seconds give, linear in their logarithm between two points of the
-/// front; `None` where it does not reach, and nothing was measured up to `longest`.
-fn merit_at(front: &[[f64; 2]], longest: f64, seconds: f64) -> Option<f64> {
+/// front and beyond its end the last; `None` before its beginning.
+fn merit_at(front: &[[f64; 2]], seconds: f64) -> Option<f64> {
     let after = front.partition_point(|[x, _]| *x < seconds);
     match (front[..after].last(), front.get(after)) {
         (Some([x, merit]), Some([end, best])) => {
             Some(merit + (best - merit) * (seconds / x).ln() / (end / x).ln())
         }
-        (Some([_, best]), None) => (seconds <= longest * (1.0 + SAME)).then_some(*best),
+        (Some([_, best]), None) => Some(*best),
         (None, Some([x, merit])) => (*x <= seconds * (1.0 + SAME)).then_some(*merit),
         (None, None) => None,
     }
@@ -84,10 +91,12 @@ mod tests {
     fn nothing_is_said_where_nothing_was_measured() {
         let said = |others: &[[f64; 2]]| said([40.0, 24.0], others);
         assert_eq!(said(&[]), None);
-        assert_eq!(said(&[[30.0, 23.0], [60.0, 24.5]]), None);
+        assert_eq!(said(&[[30.0, 23.0], [50.0, 24.5]]), None);
         let half = said(&[[15.0, 22.0]]);
         assert_eq!(half.as_deref(), Some("half the time costs 1.4 dB"));
         let twice = said(&[[78.0, 25.0]]);
         assert_eq!(twice.as_deref(), Some("twice the time buys 1.0 dB"));
+        let less = said(&[[64.0, 25.0]]);
+        assert_eq!(less.as_deref(), Some("1.6 times the time buys 1.0 dB"));
     }
 }

@@ -59,18 +59,16 @@ impl Watch {
 
     /// Keeps a picture, values from 0 to 1, if the one before is of much fewer iterations.
     pub fn keep(&mut self, iteration: usize, [width, height]: [u32; 2], shown: &[f32]) {
-        let Some(album) = &mut self.album else {
+        let (view, Some(album)) = (self.counting[0], &mut self.album) else {
             return;
         };
-        let least = album
-            .last()
-            .map_or(0.0, |last| ALBUM_STEP * last.iteration as f64);
-        if iteration as f64 >= least {
+        let last = album.last().map_or(0, |last| last.iteration);
+        if iteration as f64 >= ALBUM_STEP * last as f64 {
             let gray = |value: &f32| (value.clamp(0.0, 1.0) * 255.0).round() as u8;
             let image = GrayImage::from_raw(width, height, shown.iter().map(gray).collect());
             album.extend(image.map(|image| AlbumPicture {
                 iteration,
-                view: self.counting[0],
+                view,
                 image,
             }));
         }
