@@ -232,16 +232,7 @@ impl Fit<'_> {
             Some(limit) => self.goal.with_seconds(limit - preparing),
             None => self.goal,
         });
-        let (photographed, views) = self.watched();
-        let exposures = plan.exposures.clone();
-        trainer.watch(PlannedViews::watched(
-            photographed.clone(),
-            views.clone(),
-            exposures,
-        ))?;
-        if self.album {
-            trainer.keep_album();
-        }
+        self.watch(&mut trainer, plan.exposures.clone())?;
         trainer.remember(plan.clone());
         if let Some(checkpoint) = checkpoint {
             trainer.resume(checkpoint)?;
@@ -256,8 +247,6 @@ impl Fit<'_> {
             peak_device_memory = peak_device_memory.max(gpu.allocated_bytes());
             observe(LumaEvent::Training(progress))
         })?;
-        let mut album = trainer.album();
-        (album.iter_mut()).for_each(|picture| picture.view = views[picture.view]);
         let mut splats = trainer.splats()?;
         if dataset.removes_masked() {
             splats = carved(dataset, &splats)?;
@@ -271,7 +260,7 @@ impl Fit<'_> {
             extent: dataset.extent,
             iterations: trainer.schedule().end,
             curve: trainer.curve().to_vec(),
-            album,
+            album: self.pictures(&mut trainer),
             given_up: trainer.given_up(),
             last,
             load: trainer.load(),
@@ -281,6 +270,30 @@ impl Fit<'_> {
             plan,
             splats,
         })
+    }
+
+    /// Lets a training look at views on its way.
+    fn watch(&self, trainer: &mut LumaTrainer, exposures: Vec<Exposure>) -> Result<(), LumaError> {
+        let (photographed, views) = self.watched();
+        trainer.watch(PlannedViews::watched(
+            photographed.clone(),
+            views,
+            exposures,
+        ))?;
+        if self.album {
+            trainer.keep_album();
+        }
+        Ok(())
+    }
+
+    /// Pictures from its way.
+    fn pictures(&self, trainer: &mut LumaTrainer) -> Vec<AlbumPicture> {
+        let (_, views) = self.watched();
+        let of_dataset = |picture: AlbumPicture| AlbumPicture {
+            view: views[picture.view],
+            ..picture
+        };
+        trainer.album().into_iter().map(of_dataset).collect()
     }
 
     /// Gaussians to train, and those around them that stay.

@@ -52,6 +52,8 @@ fn draw(
         .configure_mesh()
         .light_line_style(TRANSPARENT)
         .bold_line_style(BLACK.mix(0.12))
+        .x_labels(5)
+        .x_label_formatter(&|seconds| format!("{seconds}"))
         .x_desc("seconds")
         .y_desc(measure.title)
         .draw()?;

@@ -140,12 +140,7 @@ pub fn fit(
         report: &mut report,
     }
     .write(&folder)?;
-    for picture in trained.scene.album.iter().cloned() {
-        let path = folder.album(picture.iteration);
-        files::make_folder_of(&path)?;
-        let upright = dataset.capture.views[picture.view].stance.upright;
-        files::write_png(&path, &upright.image(picture.image.into()).into_rgb8())?;
-    }
+    trained.write_album(&dataset, &folder)?;
     match options.goal.psnr().and_then(|psnr| trained.misses(psnr)) {
         Some(error) => Err(error),
         None => Ok((folder, report)),
