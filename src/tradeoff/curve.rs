@@ -1,8 +1,10 @@
 //! Points along a run: what it had reached before its end, by its report and its log. They are
 //! free.
 
+use std::path::Path;
+
 use super::{
-    point::picture_of,
+    request::POINTS,
     sweep::{Outcome, SweepPoint},
 };
 use crate::{
@@ -100,4 +102,12 @@ fn along(point: &SweepPoint, after: usize, reached: Outcome) -> SweepPoint {
         outcome: Some(reached),
         ..point.clone()
     }
+}
+
+/// A file of a point, below the sweep's folder; names are letters, digits, `.`, `+` and `-`.
+pub(super) fn picture_of(folder: &RunFolder, file: &Path) -> Option<String> {
+    let below = file.strip_prefix(folder.path().parent()?).ok()?;
+    let parts = below.iter().map(|part| part.to_str());
+    let parts: Option<Vec<&str>> = [Some(POINTS)].into_iter().chain(parts).collect();
+    Some(parts?.join("/"))
 }

@@ -114,7 +114,8 @@ impl Bench {
             stage: task.stage,
             settings: task.settings.clone(),
             after: None,
-            picture: picture_of(&folder, &folder.contact_sheet()).filter(|_| outcome.is_ok()),
+            picture: curve::picture_of(&folder, &folder.contact_sheet())
+                .filter(|_| outcome.is_ok()),
             commands,
             took: begun.elapsed().as_secs_f64(),
             failed: outcome.as_ref().err().cloned(),
@@ -215,14 +216,6 @@ impl Bench {
         }
         Ok(outcome)
     }
-}
-
-/// A file of a point, below the sweep's folder; names are letters, digits, `.`, `+` and `-`.
-pub(super) fn picture_of(folder: &RunFolder, file: &Path) -> Option<String> {
-    let below = file.strip_prefix(folder.path().parent()?).ok()?;
-    let parts = below.iter().map(|part| part.to_str());
-    let parts: Option<Vec<&str>> = [Some(POINTS)].into_iter().chain(parts).collect();
-    Some(parts?.join("/"))
 }
 
 /// Difference between the exported pictures of photographed views, RMS in CIELAB units.
