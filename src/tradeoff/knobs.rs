@@ -160,7 +160,6 @@ pub(super) static KNOBS: [Knob; 6] = [
         power: 2.0,
         share: 0.05,
         spread: 1.4,
-        ..PLAIN
     },
     Knob {
         name: "teacher-size",

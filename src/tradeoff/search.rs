@@ -219,12 +219,12 @@ mod tests {
             "color",
             "max-side-160+max-splats-9",
             "max-side-160+max-splats-small",
+            "chroma-degree-1",
             "iterations-1400",
+            "rounds-2",
+            "teacher-size-128",
             "max-splats-250",
             "max-splats-500",
-            "teacher-size-128",
-            "chroma-degree-1",
-            "rounds-2",
         ];
         assert_eq!(names(&swept(Vec::new(), Some(1e5))), order);
         let sweep = swept(Vec::new(), None);
