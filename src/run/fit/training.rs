@@ -25,8 +25,9 @@ use crate::{
     run::RunError,
     splats::Splats,
     store::{
-        RunFolder,
+        RunFolder, StoreError,
         checkpoints::{CheckpointFiles, Journal},
+        files,
         log::with_rows,
     },
     subject::{
@@ -91,6 +92,17 @@ impl Trained {
         };
         let watched = || self.scene.curve.last().map(|point| point.psnr);
         self.held_out().map(of).or_else(watched)
+    }
+
+    /// Writes pictures from its way into the run folder.
+    pub fn write_album(&self, dataset: &Dataset, folder: &RunFolder) -> Result<(), StoreError> {
+        for picture in self.scene.album.iter().cloned() {
+            let path = folder.album(picture.iteration);
+            files::make_folder_of(&path)?;
+            let upright = dataset.capture.views[picture.view].stance.upright;
+            files::write_png(&path, &upright.image(picture.image.into()).into_rgb8())?;
+        }
+        Ok(())
     }
 
     /// The error, if it does not reach so many dB.
@@ -193,6 +205,7 @@ impl Job<'_> {
                 None => near.map(|near| Arc::new(move |place| near.holds(place)) as Grows),
             },
             watched: reaches.then(|| (self.judge, self.judge.split.test.clone())),
+            album: options.album,
         };
         let journal = &Journal::new(self.log(found), observe);
         let mut checkpointing = CheckpointFiles::new(
