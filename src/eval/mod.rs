@@ -2,9 +2,13 @@
 
 mod agreement;
 mod colored;
+mod detections;
+mod detector;
 mod lpips;
 mod luma;
+mod network;
 mod painter;
+mod path_frames;
 mod peers;
 mod picture;
 mod progress;
@@ -15,16 +19,18 @@ mod teacher;
 
 use std::path::PathBuf;
 
-pub use agreement::{along_path, between_views};
+pub use agreement::{along_path, between_views, path_of};
 pub use colored::{COLUMNS, Measured};
+pub use detector::{Detected, Detector};
 pub use lpips::Lpips;
 pub use luma::{GRAY_COLUMNS, gray_rows, mean_quality, measure_luma};
-pub use painter::{Drawing, Layer, Painter};
+pub use painter::{Drawing, Layer, Painter, Source};
+pub use path_frames::frames_in;
 pub use peers::Peer;
 pub use progress::{Observer, Progress, Task};
 pub use reference::{Reference, exposures};
 pub use scene::ColoredScene;
-pub use score::{Scored, mean_bake, mean_luma, mean_pictures, teacher_colorfulness};
+pub use score::{Scored, Shot, mean_bake, mean_luma, mean_pictures, teacher_colorfulness};
 pub use teacher::MeasuredTeacher;
 
 use crate::{
@@ -50,7 +56,38 @@ pub enum EvalError {
     /// The teacher has no colors for any of the views.
     #[error("the teacher has no colors for these views")]
     NothingTaught,
-    /// The perceptual network cannot be used.
+    /// A folder has too few or too many frames of the path.
+    #[error("{}: holds {found} pictures; the path has {wanted} frames", folder.display())]
+    FrameCount {
+        /// The folder.
+        folder: PathBuf,
+        /// Its PNG, JPEG and TIFF files.
+        found: usize,
+        /// Frames of the path.
+        wanted: usize,
+    },
+    /// A frame of the path has another size.
+    #[error(
+        "{}: has {}×{} pixels; frames of the path have {}×{}",
+        file.display(), found[0], found[1], wanted[0], wanted[1]
+    )]
+    FrameSize {
+        /// The file.
+        file: PathBuf,
+        /// Its width and height.
+        found: [u32; 2],
+        /// The path's.
+        wanted: [u32; 2],
+    },
+    /// A frame of the path cannot be read.
+    #[error("{}: {reason}", file.display())]
+    Frame {
+        /// The file.
+        file: PathBuf,
+        /// Defect, and remedy.
+        reason: String,
+    },
+    /// A network that measures cannot be used.
     #[error("{}: {reason}", path.display())]
     Network {
         /// The model.
