@@ -10,7 +10,7 @@ use super::{
     network::NetworkArguments,
     next, print,
     progress::Progress,
-    values::{Named, folder, mebibytes, named, one_of},
+    values::{folder, mebibytes, named, one_of},
 };
 use crate::{
     eval::Peer,
@@ -62,7 +62,7 @@ pub struct Eval {
     /// Splats lie in COLMAP's frame. A folder holds a PNG or JPEG for each frame of
     /// --gray-frames, of the same size and in the same order.
     #[arg(long, help_heading = COMPARE, value_name = "NAME=FILE|DIR", value_parser = named)]
-    against: Vec<Named>,
+    against: Vec<(String, PathBuf)>,
     /// Limit device memory for --baselines and --recipe, in MiB.
     #[arg(long, help_heading = COMPARE, value_name = "MIB", value_parser = mebibytes(), requires = "teacher")]
     memory_limit: Option<u64>,
@@ -105,9 +105,7 @@ impl Eval {
             flow: self.flow,
             lpips: self.lpips,
             detector: self.detector,
-            against: (self.against.into_iter())
-                .map(|Named(name, path)| (name, path))
-                .collect(),
+            against: self.against,
             gray_frames: self.gray_frames,
         };
         let mut progress = Progress::through(options.stages());

@@ -37,12 +37,11 @@ pub enum BoxLayout {
 impl BoxLayout {
     /// The layout of an output of this shape for an input of this width and height.
     pub fn of(shape: &[i64], size: [u32; 2]) -> Option<Self> {
-        let cells = STRIDES.map(|stride| i64::from((size[0] / stride) * (size[1] / stride)));
         let &[1, rows, columns] = shape else {
             return None;
         };
         match () {
-            () if columns > 5 && rows == cells.iter().sum::<i64>() => Some(Self::Grids),
+            () if columns > 5 && rows == cells(size).len() as i64 => Some(Self::Grids),
             () if columns > 5 && rows > columns => Some(Self::Rows),
             () if rows > 4 && columns > rows => Some(Self::Columns),
             () => None,
@@ -51,28 +50,27 @@ impl BoxLayout {
 
     /// Objects with scores of [`LEAST_SCORE`] or more, the best first, each once.
     pub fn decode(self, shape: &[i64], values: &[f32], size: [u32; 2]) -> Vec<Detection> {
-        let [height, width] = [1, 2].map(|axis| shape[axis] as usize);
-        let boxes = match self {
-            Self::Grids | Self::Rows => height,
-            Self::Columns => width,
+        let [rows, columns] = [1, 2].map(|axis| shape[axis] as usize);
+        let is_turned = self == Self::Columns;
+        let (boxes, numbers, classes) = match is_turned {
+            true => (columns, rows, 4),
+            false => (rows, columns, 5),
         };
+        let cells = cells(size);
         let found = (0..boxes).filter_map(|index| {
-            let numbers: Vec<f32> = match self {
-                Self::Grids | Self::Rows => values[index * width..][..width].to_vec(),
-                Self::Columns => (0..height).map(|k| values[k * width + index]).collect(),
+            let number = |k: usize| match is_turned {
+                true => values[k * columns + index],
+                false => values[index * columns + k],
             };
-            let (objectness, classes) = match self {
-                Self::Grids | Self::Rows => (numbers[4], &numbers[5..]),
-                Self::Columns => (1.0, &numbers[4..]),
-            };
-            let best = classes.iter().enumerate();
-            let (class, share) = best.max_by(|(_, a), (_, b)| a.total_cmp(b))?;
-            let score = objectness * share;
-            let center = [numbers[0], numbers[1], numbers[2], numbers[3]];
-            let [x, y, w, h] = match self {
-                Self::Grids => in_pixels(center, cell(index, size)),
-                Self::Rows | Self::Columns => center,
-            };
+            let shares = (classes..numbers).map(number).enumerate();
+            let (class, share) = shares.max_by(|(_, a), (_, b)| a.total_cmp(b))?;
+            let score = if is_turned { share } else { share * number(4) };
+            let [mut x, mut y, mut w, mut h] = [0, 1, 2, 3].map(number);
+            if self == Self::Grids {
+                let [column, row, stride] = cells[index];
+                (x, y) = ((x + column) * stride, (y + row) * stride);
+                (w, h) = (w.exp() * stride, h.exp() * stride);
+            }
             // NaN fails the comparison.
             (score >= LEAST_SCORE).then_some(Detection {
                 class,
@@ -84,25 +82,14 @@ impl BoxLayout {
     }
 }
 
-/// Column, row and stride of a cell.
-fn cell(mut index: usize, [width, height]: [u32; 2]) -> [f32; 3] {
-    for stride in STRIDES {
-        let [columns, rows] = [width, height].map(|side| (side / stride) as usize);
-        if index < columns * rows {
-            return [
-                (index % columns) as f32,
-                (index / columns) as f32,
-                stride as f32,
-            ];
-        }
-        index -= columns * rows;
-    }
-    [f32::NAN; 3]
-}
-
-fn in_pixels([x, y, w, h]: [f32; 4], [column, row, stride]: [f32; 3]) -> [f32; 4] {
-    let size = [w, h].map(|side| side.exp() * stride);
-    [(x + column) * stride, (y + row) * stride, size[0], size[1]]
+/// Column, row and stride of the cells of all grids.
+fn cells([width, height]: [u32; 2]) -> Vec<[f32; 3]> {
+    let grid = |stride: u32| {
+        let rows = (0..height / stride).map(|row| row as f32);
+        let columns = move || (0..width / stride).map(|column| column as f32);
+        rows.flat_map(move |row| columns().map(move |column| [column, row, stride as f32]))
+    };
+    STRIDES.into_iter().flat_map(grid).collect()
 }
 
 /// Those that no better one of their class overlaps by more than [`SAME_OBJECT`], the best first.
@@ -134,18 +121,17 @@ fn overlap(a: &Detection, b: &Detection) -> f32 {
 /// place, each there for one here.
 pub fn kept(first: &[Detection], next: &[Detection]) -> usize {
     let mut free: Vec<&Detection> = next.iter().collect();
-    let mut count = 0;
-    for one in first {
-        let same = (free.iter().enumerate()).filter(|(_, other)| other.class == one.class);
-        let nearest = same
-            .map(|(place, other)| (place, overlap(one, other)))
-            .max_by(|(_, a), (_, b)| a.total_cmp(b));
-        if let Some((place, SAME_PLACE..)) = nearest {
-            free.swap_remove(place);
-            count += 1;
-        }
-    }
-    count
+    let is_kept = |one: &&Detection| {
+        let same = free
+            .iter()
+            .enumerate()
+            .filter(|(_, b)| b.class == one.class);
+        let same = same.map(|(place, other)| (place, overlap(one, other)));
+        let nearest = same.max_by(|(_, a), (_, b)| a.total_cmp(b));
+        let found = nearest.filter(|(_, overlap)| *overlap >= SAME_PLACE);
+        found.map(|(place, _)| free.swap_remove(place)).is_some()
+    };
+    first.iter().filter(is_kept).count()
 }
 
 #[cfg(test)]
@@ -155,88 +141,56 @@ mod tests {
     /// An input with 16, 4 and 1 cells.
     const SIZE: [u32; 2] = [32, 32];
 
-    /// Numbers of a box: center, size, objectness, three classes.
-    const NUMBERS: usize = 8;
-
-    fn output(shape: [i64; 3], boxes: &[(usize, [f32; NUMBERS])]) -> Vec<f32> {
-        let mut values = vec![0.0; (shape[1] * shape[2]) as usize];
-        for (row, numbers) in boxes {
-            values[row * NUMBERS..][..NUMBERS].copy_from_slice(numbers);
-        }
-        values
-    }
-
     #[test]
-    fn shapes_tell_the_layout() {
-        for (shape, size, layout) in [
-            (&[1, 3549, 85][..], [416, 416], Some(BoxLayout::Grids)),
-            (&[1, 10647, 85], [416, 416], Some(BoxLayout::Rows)),
-            (&[1, 8400, 85], [416, 416], Some(BoxLayout::Rows)),
-            (&[1, 84, 8400], [640, 640], Some(BoxLayout::Columns)),
-            (&[1, 5, 21], SIZE, Some(BoxLayout::Columns)),
-            (&[1, -1, 85], [416, 416], None),
-            (&[1, 3549, 4], [416, 416], None),
-            (&[2, 3549, 85], [416, 416], None),
-            (&[1, 1000], [416, 416], None),
-        ] {
-            assert_eq!(BoxLayout::of(shape, size), layout, "{shape:?}");
-        }
-    }
-
-    #[test]
-    fn boxes_on_grids_by_hand() {
-        let shape = [1, 21, NUMBERS as i64];
-        let layout = BoxLayout::of(&shape, SIZE).expect("a layout");
+    fn boxes_by_hand() {
+        const NUMBERS: usize = 8;
         let ln2 = std::f32::consts::LN_2;
-        let values = output(
-            shape,
-            &[
-                // Column 1 and row 1 of the finest grid: center (12, 10), 16 by 8 pixels.
-                (5, [0.5, 0.25, ln2, 0.0, 0.9, 0.1, 0.8, 0.2]),
-                // The same object from the middle grid, first cell: center (12, 10), 16 by 8.
-                (16, [0.75, 0.625, 0.0, -ln2, 0.9, 0.0, 0.5, 0.0]),
-                // The same place, another class.
-                (17, [-0.25, 0.625, 0.0, -ln2, 0.5, 0.7, 0.0, 0.0]),
-                // The coarsest grid: all of the picture, too faint.
-                (20, [0.5, 0.5, 0.0, 0.0, 0.5, 0.5, 0.0, 0.0]),
-            ],
-        );
-        let found = layout.decode(&shape, &values, SIZE);
-        let wanted = [(1, 0.72), (0, 0.35)];
-        assert_eq!(found.len(), 2, "{found:?}");
-        for (one, (class, score)) in found.iter().zip(wanted) {
-            assert_eq!(one.class, class);
-            assert!((one.score - score).abs() < 1e-6, "{one:?}");
-            for (side, want) in one.corners.iter().zip([4.0, 6.0, 20.0, 14.0]) {
-                assert!((side - want).abs() < 1e-5, "{one:?}");
-            }
+        let mut values = vec![0.0; 21 * NUMBERS];
+        for (row, numbers) in [
+            // Column 1 and row 1 of the finest grid: center (12, 10), 16 by 8 pixels.
+            (5, [0.5, 0.25, ln2, 0.0, 0.9, 0.1, 0.8, 0.2]),
+            // The same from the middle grid, whose first cell it is; then another class.
+            (16, [0.75, 0.625, 0.0, -ln2, 0.9, 0.0, 0.5, 0.0]),
+            (17, [-0.25, 0.625, 0.0, -ln2, 0.5, 0.7, 0.0, 0.0]),
+            // Too faint.
+            (20, [0.5, 0.5, 0.0, 0.0, 0.5, 0.5, 0.0, 0.0]),
+        ] {
+            values[row * NUMBERS..][..NUMBERS].copy_from_slice(&numbers);
         }
-        // Taken for pixels, the same numbers are other boxes.
-        assert_ne!(BoxLayout::Rows.decode(&shape, &values, SIZE), found);
-    }
-
-    #[test]
-    fn columns_are_rows_turned_without_objectness() {
-        let rows = output(
-            [1, 9, NUMBERS as i64],
-            &[(4, [10.0, 8.0, 4.0, 2.0, 1.0, 0.2, 0.3, 0.6])],
-        );
-        let columns: Vec<f32> = (0..NUMBERS)
-            .filter(|&number| number != 4)
-            .flat_map(|number| (0..9).map(move |row| row * NUMBERS + number))
-            .map(|at| rows[at])
-            .collect();
-        let found = BoxLayout::Columns.decode(&[1, 7, 9], &columns, SIZE);
-        let wanted = Detection {
-            class: 2,
-            score: 0.6,
-            corners: [8.0, 7.0, 12.0, 9.0],
+        let shape = [1, 21, NUMBERS as i64];
+        assert_eq!(BoxLayout::of(&shape, SIZE), Some(BoxLayout::Grids));
+        assert_eq!(BoxLayout::of(&[1, 63, 8], SIZE), Some(BoxLayout::Rows));
+        assert_eq!(BoxLayout::of(&[1, 7, 21], SIZE), Some(BoxLayout::Columns));
+        assert_eq!(BoxLayout::of(&[1, -1, 8], SIZE), None);
+        let found = BoxLayout::Grids.decode(&shape, &values, SIZE);
+        let [(1, first), (0, second)] = [0, 1].map(|k| (found[k].class, &found[k])) else {
+            panic!("{found:?}");
         };
-        assert_eq!(found, [wanted.clone()]);
-        let of_rows = BoxLayout::Rows.decode(&[1, 9, 8], &rows, SIZE);
-        assert_eq!(of_rows, [wanted]);
-        let broken = vec![f32::NAN; 63];
-        assert_eq!(BoxLayout::Columns.decode(&[1, 7, 9], &broken, SIZE), []);
+        for (one, score) in [(first, 0.72), (second, 0.35)] {
+            let wanted = [4.0, 6.0, 20.0, 14.0, score];
+            let figures = one.corners.iter().chain([&one.score]);
+            assert!(
+                figures.zip(wanted).all(|(a, b)| (a - b).abs() < 1e-5),
+                "{one:?}"
+            );
+        }
+        // In pixels the first is 0.69 pixels wide and 0 high; turned and without objectness, its
+        // score is that of the class.
+        let score = |found: Vec<Detection>| found.first().map(|one| one.score);
+        assert_eq!(
+            score(BoxLayout::Rows.decode(&shape, &values, SIZE)),
+            Some(0.9 * 0.8)
+        );
+        let turned: Vec<f32> = ([0, 1, 2, 3, 5, 6, 7].into_iter())
+            .flat_map(|k| (0..21).map(move |row| row * NUMBERS + k))
+            .map(|at| values[at])
+            .collect();
+        assert_eq!(
+            score(BoxLayout::Columns.decode(&[1, 7, 21], &turned, SIZE)),
+            Some(0.8)
+        );
+        let broken = [f32::NAN; 7 * 21];
+        assert_eq!(BoxLayout::Columns.decode(&[1, 7, 21], &broken, SIZE), []);
     }
 
     #[test]
@@ -247,17 +201,16 @@ mod tests {
             corners: [x, 0.0, x + 30.0, 10.0],
         };
         // Moved by 10 of 30: 20 shared of 40; by 11: 19 of 41.
-        assert_eq!(kept(&[at(0, 0.0)], &[at(0, 10.0)]), 1);
-        assert_eq!(kept(&[at(0, 0.0)], &[at(0, 11.0)]), 0);
-        assert_eq!(kept(&[at(0, 0.0)], &[at(1, 0.0)]), 0);
-        assert_eq!(kept(&[at(0, 0.0), at(0, 2.0)], &[at(0, 1.0)]), 1);
-        assert_eq!(kept(&[], &[at(0, 1.0)]), 0);
-        // Of two that overlap by 20 of 40, which is more than 0.45, the better one is one object.
-        let better = Detection {
-            score: 0.9,
-            ..at(0, 10.0)
-        };
-        assert_eq!(each_once(vec![at(0, 0.0), better.clone()]), [better]);
+        for (first, next, count) in [
+            (vec![at(0, 0.0)], vec![at(0, 10.0)], 1),
+            (vec![at(0, 0.0)], vec![at(0, 11.0)], 0),
+            (vec![at(0, 0.0)], vec![at(1, 0.0)], 0),
+            (vec![at(0, 0.0), at(0, 2.0)], vec![at(0, 1.0)], 1),
+        ] {
+            assert_eq!(kept(&first, &next), count, "{first:?} {next:?}");
+        }
+        // 20 of 40 are more than 0.45, 18 of 42 are not.
+        assert_eq!(each_once(vec![at(0, 0.0), at(0, 10.0)]).len(), 1);
         assert_eq!(each_once(vec![at(0, 0.0), at(0, 12.0)]).len(), 2);
     }
 }

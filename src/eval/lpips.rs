@@ -24,23 +24,10 @@ impl Lpips {
     pub fn open(path: &Path) -> Result<Self, EvalError> {
         let network = Network::open(path)?;
         let outputs = network.outputs().map(|outputs| outputs.len());
-        let size = match (network.inputs().as_deref(), outputs) {
-            (Some([a, b]), Some(1)) if a == b => match a[..] {
-                [1 | -1, 3, height, width] => Some([width, height].map(u32::try_from)),
-                _ => None,
-            },
-            _ => None,
-        };
-        match size {
-            Some(size) => Ok(Self {
-                network,
-                size: match size {
-                    [Ok(width), Ok(height)] if width > 0 && height > 0 => Some([width, height]),
-                    _ => None,
-                },
-            }),
-            None => Err(network.failure(
-                "a perceptual distance has two inputs [1,3,H,W] of 32-bit floats and one output: export it so".to_owned(),
+        match (network.image_inputs().as_deref(), outputs) {
+            (Some(&[a, b]), Some(1)) if a == b => Ok(Self { network, size: a }),
+            _ => Err(network.failure(
+                "a perceptual distance has two inputs [1,3,H,W] of 32-bit floats and one output: export it so",
             )),
         }
     }

@@ -56,34 +56,19 @@ pub enum EvalError {
     /// The teacher has no colors for any of the views.
     #[error("the teacher has no colors for these views")]
     NothingTaught,
-    /// A folder has too few or too many frames of the path.
-    #[error("{}: holds {found} pictures; the path has {wanted} frames", folder.display())]
-    FrameCount {
-        /// The folder.
-        folder: PathBuf,
-        /// Its PNG, JPEG and TIFF files.
-        found: usize,
-        /// Frames of the path.
-        wanted: usize,
-    },
-    /// A frame of the path has another size.
-    #[error(
-        "{}: has {}×{} pixels; frames of the path have {}×{}",
-        file.display(), found[0], found[1], wanted[0], wanted[1]
-    )]
-    FrameSize {
-        /// The file.
-        file: PathBuf,
-        /// Its width and height.
-        found: [u32; 2],
-        /// The path's.
-        wanted: [u32; 2],
+    /// Pictures of another program are not those of the path's frames.
+    #[error("{}: {reason}", path.display())]
+    OtherFrames {
+        /// The folder or the file.
+        path: PathBuf,
+        /// Number or size of the pictures, and that of the path.
+        reason: String,
     },
     /// A frame of the path cannot be read.
-    #[error("{}: {reason}", file.display())]
+    #[error("{}: {reason}", path.display())]
     Frame {
         /// The file.
-        file: PathBuf,
+        path: PathBuf,
         /// Defect, and remedy.
         reason: String,
     },

@@ -22,31 +22,35 @@ impl Network {
     /// # Errors
     /// [`EvalError::Network`]; [`EvalError::Teacher`] without ONNX Runtime.
     pub fn open(path: &Path) -> Result<Self, EvalError> {
-        let failure = |reason: String| EvalError::Network {
-            path: path.to_owned(),
-            reason,
-        };
-        if !path.is_file() {
-            return Err(failure("no such file; an ONNX model is needed".to_owned()));
-        }
-        let session = load_model(path).map_err(|error| match error {
-            TeacherError::BadModel { reason, .. } => {
-                failure(format!("not a usable ONNX model: {reason}"))
+        let path = path.to_owned();
+        let session = match path.is_file().then(|| load_model(&path)) {
+            Some(Ok(session)) => session,
+            Some(Err(TeacherError::BadModel { reason, .. })) => {
+                let reason = format!("not a usable ONNX model: {reason}");
+                return Err(EvalError::Network { path, reason });
             }
-            other => other.into(),
-        })?;
-        Ok(Self {
-            path: path.to_owned(),
-            session,
-        })
+            Some(Err(other)) => return Err(other.into()),
+            None => {
+                let reason = "no such file; an ONNX model is needed".to_owned();
+                return Err(EvalError::Network { path, reason });
+            }
+        };
+        Ok(Self { path, session })
     }
 
-    /// Shapes of the inputs, -1 where left open; `None` where one is no tensor of 32-bit floats.
-    pub fn inputs(&self) -> Option<Vec<Vec<i64>>> {
-        self.session.inputs().iter().map(shape).collect()
+    /// Width and height of each input, where fixed; `None` if one is no `[1, 3, H, W]`.
+    pub fn image_inputs(&self) -> Option<Vec<Option<[u32; 2]>>> {
+        let size = |outlet| match shape(outlet)?[..] {
+            [1 | -1, 3, height, width] => match [width, height].map(u32::try_from) {
+                [Ok(width @ 1..), Ok(height @ 1..)] => Some(Some([width, height])),
+                _ => Some(None),
+            },
+            _ => None,
+        };
+        self.session.inputs().iter().map(size).collect()
     }
 
-    /// The same of the outputs.
+    /// Shapes of the outputs, -1 where left open.
     pub fn outputs(&self) -> Option<Vec<Vec<i64>>> {
         self.session.outputs().iter().map(shape).collect()
     }
@@ -64,18 +68,19 @@ impl Network {
         let asked = ask();
         asked.map_err(|error| {
             let text = error.to_string();
-            self.failure(text.lines().next().unwrap_or_default().to_owned())
+            self.failure(text.lines().next().unwrap_or_default())
         })
     }
 
-    pub fn failure(&self, reason: String) -> EvalError {
+    pub fn failure(&self, reason: impl Into<String>) -> EvalError {
         EvalError::Network {
             path: self.path.clone(),
-            reason,
+            reason: reason.into(),
         }
     }
 }
 
+/// The shape of a tensor of 32-bit floats.
 fn shape(outlet: &Outlet) -> Option<Vec<i64>> {
     match outlet.dtype() {
         ValueType::Tensor {

@@ -18,8 +18,7 @@ use crate::{
 /// Draws every method's picture.
 pub struct Painter<'a> {
     renderer: SceneRenderer<'a>,
-    has_native: bool,
-    /// Methods that are RGB harmonics on the scene's geometry, in the order of their fields.
+    /// Methods that are harmonics on the scene's geometry, in the order of their fields.
     fields: Vec<Method>,
     splats: Vec<(Method, SceneRenderer<'a>)>,
     frames: Vec<(Method, &'a [PathBuf])>,
@@ -28,7 +27,7 @@ pub struct Painter<'a> {
 
 /// Source of a method's pictures.
 pub enum Source<'a> {
-    /// RGB harmonics on the scene's geometry.
+    /// Harmonics of RGB, or of a and b, on the scene's geometry.
     Field(&'a ShField),
     /// Splats with a geometry of their own, and what draws them.
     Splats(&'a Splats, Arc<Raster>),
@@ -55,8 +54,8 @@ pub struct Drawing {
 }
 
 impl<'a> Painter<'a> {
-    /// A painter of the scene's own pictures, of other methods', and of what a teacher makes of
-    /// the gray pictures.
+    /// A painter of the gray scene, of what methods make of it, and of what a teacher makes of the
+    /// gray pictures.
     pub fn new(
         raster: &Arc<Raster>,
         scene: &'a ColoredScene,
@@ -79,10 +78,8 @@ impl<'a> Painter<'a> {
                 Source::Frames(files) => frames.push((method, files)),
             }
         }
-        drawn.extend(&scene.chroma);
         Ok(Self {
             renderer: SceneRenderer::of(raster, &scene.luma, &drawn, extent)?,
-            has_native: scene.chroma.is_some(),
             fields,
             splats,
             frames,
@@ -93,18 +90,13 @@ impl<'a> Painter<'a> {
     /// Draws what `camera` sees; `name` is for the teacher's errors.
     pub fn draw(&mut self, camera: &Camera, name: &str) -> Result<Drawing, EvalError> {
         let mut pictures = self.renderer.render(camera)?;
-        // One picture a field: gray, RGB, and a/b last.
         let gray = pictures.remove(0);
-        let mut layers = Vec::new();
-        if self.has_native {
-            layers.extend(pictures.pop().map(|ab| (Method::Native, Layer::Ab(ab))));
-        }
-        for (method, picture) in self.fields.iter().zip(&pictures) {
-            layers.push((method.clone(), Layer::Rgb(picture.shown())));
-        }
+        let mut layers: Vec<(Method, Layer)> = (self.fields.iter().cloned())
+            .zip(pictures.into_iter().map(Layer::of))
+            .collect();
         for (method, renderer) in &mut self.splats {
-            let picture = renderer.render(camera)?.remove(0);
-            layers.push((method.clone(), Layer::Rgb(picture.shown())));
+            let pictures = renderer.render(camera)?.into_iter();
+            layers.extend(pictures.map(|picture| (method.clone(), Layer::of(picture))));
         }
         if let Some(teacher) = &mut self.teacher
             && let Some(answer) = teacher.color_frame(name, &gray)?
@@ -165,6 +157,13 @@ impl Drawing {
 }
 
 impl Layer {
+    fn of(picture: RenderedImage) -> Self {
+        match picture.channels {
+            2 => Self::Ab(picture),
+            _ => Self::Rgb(picture.shown()),
+        }
+    }
+
     /// a and b of each pixel, `[height, width]`.
     pub fn ab(&self) -> Vec<[f32; 2]> {
         match self {

@@ -11,16 +11,15 @@ use crate::{
 /// The pictures in a folder in the order of their numbers, one for each of the path's `cameras`.
 ///
 /// # Errors
-/// [`EvalError::FrameCount`], [`EvalError::FrameSize`], and [`EvalError::Frame`] of a file that
-/// cannot be read.
+/// [`EvalError::OtherFrames`], and those of a file that cannot be read.
 pub fn frames_in(folder: &Path, cameras: &[Camera]) -> Result<Vec<PathBuf>, EvalError> {
     let mut names = photos_in(folder);
     names.sort_by(|a, b| by_number(a, b));
     if names.len() != cameras.len() {
-        return Err(EvalError::FrameCount {
-            folder: folder.to_owned(),
-            found: names.len(),
-            wanted: cameras.len(),
+        let (found, wanted) = (names.len(), cameras.len());
+        return Err(EvalError::OtherFrames {
+            path: folder.to_owned(),
+            reason: format!("holds {found} pictures; the path has {wanted} frames"),
         });
     }
     let files: Vec<PathBuf> = names.iter().map(|name| folder.join(name)).collect();
@@ -35,7 +34,7 @@ pub(super) fn read_frame(file: &Path, camera: &Camera) -> Result<Vec<[f32; 3]>, 
     let bytes = input::read(file).map_err(|error| error.to_string());
     let decoded = bytes.and_then(decode_image);
     let image = decoded.map_err(|reason| EvalError::Frame {
-        file: file.to_owned(),
+        path: file.to_owned(),
         reason,
     })?;
     let image = image.image.into_rgb32f();
@@ -43,14 +42,15 @@ pub(super) fn read_frame(file: &Path, camera: &Camera) -> Result<Vec<[f32; 3]>, 
     Ok(image.pixels().map(|pixel| pixel.0).collect())
 }
 
-fn check_size(file: &Path, found: [u32; 2], camera: &Camera) -> Result<(), EvalError> {
-    let wanted = [camera.width, camera.height];
-    if found != wanted {
-        return Err(EvalError::FrameSize {
-            file: file.to_owned(),
-            found,
-            wanted,
-        });
+fn check_size(file: &Path, [x, y]: [u32; 2], camera: &Camera) -> Result<(), EvalError> {
+    if [x, y] == [camera.width, camera.height] {
+        return Ok(());
     }
-    Ok(())
+    Err(EvalError::OtherFrames {
+        path: file.to_owned(),
+        reason: format!(
+            "has {x}×{y} pixels; frames of the path have {}×{}",
+            camera.width, camera.height
+        ),
+    })
 }

@@ -265,12 +265,14 @@ fn rgb_ssim(reference: Reference<'_>, shown: &[[f32; 3]], truth: &[[f32; 3]]) ->
 }
 
 /// The mean of those that are there.
-fn mean(values: impl Iterator<Item = Option<f64>>) -> Option<f64> {
+pub(super) fn mean(values: impl Iterator<Item = Option<f64>>) -> Option<f64> {
     let values: Vec<f64> = values.flatten().collect();
     (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }
 
-fn mean_error(errors: impl Iterator<Item = Option<ColorError>> + Clone) -> Option<ColorError> {
+pub(super) fn mean_error(
+    errors: impl Iterator<Item = Option<ColorError>> + Clone,
+) -> Option<ColorError> {
     Some(ColorError {
         mean: mean(errors.clone().map(|e| Some(e?.mean)))?,
         percentile_95: mean(errors.map(|e| Some(e?.percentile_95)))?,

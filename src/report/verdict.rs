@@ -55,14 +55,14 @@ impl Evaluation {
             Some(figures) => ("views", figures),
             None => ("frames of the path", both(&frames)?),
         };
-        let strength = |method: &Method| {
+        let colorful = |method: &Method| {
             let mut pictures = self.path.pictures.iter();
             Some(pictures.find(|score| score.method == *method)?.colorfulness)
         };
-        let strength = strength(&Method::Exported).zip(strength(other));
-        let strength = strength.map_or(String::new(), |(ours, theirs)| {
-            format!("; colorfulness {ours:.1} against {theirs:.1}")
-        });
+        let strength = match (colorful(&Method::Exported), colorful(other)) {
+            (Some(ours), Some(theirs)) => format!("; colorfulness {ours:.1} against {theirs:.1}"),
+            _ => String::new(),
+        };
         let figures = format!("({ours:.2} against {theirs:.2} CIELAB units{strength})");
         // What rounds to nothing is nothing.
         let ratio = theirs.max(0.01) / ours.max(0.01);

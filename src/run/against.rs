@@ -1,9 +1,6 @@
 //! Other programs' results that `eval` measures beside the scene.
 
-use std::{
-    path::{Path, PathBuf},
-    sync::Arc,
-};
+use std::{path::PathBuf, sync::Arc};
 
 use super::RunError;
 use crate::{
@@ -41,29 +38,20 @@ impl Against {
     ) -> Result<Vec<(Method, Self)>, RunError> {
         let mut opened: Vec<(Method, Self)> = Vec::new();
         for (name, from) in named {
-            let method = Method::other(name).filter(|method| {
-                let stem = method.file_stem().to_lowercase();
-                let mut others = opened.iter();
-                !others.any(|(other, _)| other.file_stem().to_lowercase() == stem)
-            });
+            // File names may not tell upper case from lower.
+            let is_taken = |(other, _): &(Method, Self)| other.name().eq_ignore_ascii_case(name);
+            let method = Method::other(name).filter(|_| !opened.iter().any(is_taken));
             let method = method.ok_or_else(|| RunError::NameTaken(name.clone()))?;
-            opened.push((method, Self::open(from, dataset, path, observe)?));
+            let read = if !is_splat_file(from)? && from.is_dir() {
+                Self::Frames(frames_in(from, path)?)
+            } else {
+                let frame = Frame::World(dataset.capture.offset);
+                let (splats, drawn) = read_splats(from, frame, observe)?;
+                Self::Splats(from.clone(), Box::new(splats), drawn)
+            };
+            opened.push((method, read));
         }
         Ok(opened)
-    }
-
-    fn open(
-        from: &Path,
-        dataset: &Dataset,
-        path: &[Camera],
-        observe: &mut Observer<'_>,
-    ) -> Result<Self, RunError> {
-        if !is_splat_file(from)? && from.is_dir() {
-            return Ok(Self::Frames(frames_in(from, path)?));
-        }
-        let frame = Frame::World(dataset.capture.offset);
-        let (splats, drawn) = read_splats(from, frame, observe)?;
-        Ok(Self::Splats(from.to_owned(), Box::new(splats), drawn))
     }
 
     /// The source of its pictures; splats are drawn as they match the photos best.

@@ -110,6 +110,7 @@ pub fn eval(
         None => Vec::new(),
     };
     let mut sources = vec![(Method::Exported, Source::Field(&scene.exported))];
+    sources.extend((scene.chroma.iter()).map(|field| (Method::Native, Source::Field(field))));
     sources.extend((peers.iter()).map(|(field, told)| (told.method.clone(), Source::Field(field))));
     for (method, other) in &against {
         let source = other.source(&gpu, &scene.dataset, observe)?;

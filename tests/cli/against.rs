@@ -201,6 +201,8 @@ fn what_cannot_be_compared_is_said_with_the_remedy() {
     // The photos are not written over, and nothing of another program is.
     let error = fails(&place, &["--gray-frames", "scene/images"]);
     assert!(error.contains("scene/images"), "{error}");
-    let usage = place.run(&["eval", "--against", "film"]);
-    assert_eq!(usage.code, Some(2), "{}", usage.stderr);
+    for named in ["film", "=film", "film=", "a film=film"] {
+        let usage = place.run(&["eval", "--against", named]);
+        assert_eq!(usage.code, Some(2), "{named}: {}", usage.stderr);
+    }
 }
