@@ -46,7 +46,7 @@ def main() -> None:
     arguments.output.mkdir(parents=True, exist_ok=True)
     for index, (file, gray) in enumerate(zip(files, grays)):
         near = answers[max(index - arguments.mean, 0) : index + arguments.mean + 1]
-        lightness = rgb_to_lab(np.repeat(np.asarray(gray, np.float64)[..., None] / 255, 3, axis=-1))[..., :1]
+        lightness = rgb_to_lab(np.asarray(gray.convert("RGB"), np.float64) / 255)[..., :1]
         rgb = lab_to_rgb(np.concatenate([lightness, np.mean(near, axis=0)], axis=-1))
         Image.fromarray((255 * rgb).round().astype(np.uint8)).save(arguments.output / file.name)
 

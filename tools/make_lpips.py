@@ -138,8 +138,8 @@ def distance(weights: dict[str, Parameters], net: str) -> onnx.ModelProto:
     total = ""
     for k, (ours, theirs) in enumerate(zip(*both)):
         apart = graph.add("Sub", ours, theirs)
-        kernel = graph.constant(weights[f"NetLinLayer_{k}"]["Conv_0"]["kernel"].transpose(3, 2, 0, 1))
-        weighed = graph.add("Conv", graph.add("Mul", apart, apart), kernel)
+        kernel = weights[f"NetLinLayer_{k}"]["Conv_0"]["kernel"].transpose(3, 2, 0, 1)
+        weighed = graph.add("Conv", graph.add("Mul", apart, apart), graph.constant(kernel))
         mean = graph.add("ReduceMean", weighed, axes=[2, 3], keepdims=1)
         total = graph.add("Add", total, mean) if total else mean
     graph.nodes.append(helper.make_node("Identity", [total], ["distance"]))

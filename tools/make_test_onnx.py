@@ -318,7 +318,7 @@ def perceptual(path: Path, height: int | str, width: int | str) -> None:
 
 
 def detector_tiny(path: Path) -> None:
-    """YOLOX's contract: one box of 16 x 8 pixels around (12, 10), and the channels' means as scores."""
+    """YOLOX's contract: one box of 16 x 8 pixels around (12, 10), scored by the channels' means."""
     boxes, numbers, row = 21, 8, 5
     constant = [0.0] * (boxes * numbers)
     constant[row * numbers : row * numbers + 5] = [0.5, 0.25, math.log(2.0), 0.0, 1.0]
