@@ -34,6 +34,9 @@ pub(super) fn of_run(error: &RunError) -> String {
         RunError::Eval(EvalError::Flow { .. }) => {
             format!("{error}: make it from the frames that `eval` writes, with as many --frames")
         }
+        RunError::Eval(EvalError::OtherFrames { .. }) => format!(
+            "{error}: color those of --gray-frames, with as many --frames, and keep their size"
+        ),
         RunError::Coarse { .. } => format!(
             "{error}: leave --colmap-coordinates out, and the file lies near the origin and says by how much"
         ),

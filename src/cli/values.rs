@@ -113,6 +113,17 @@ pub(super) fn mebibytes() -> impl TypedValueParser<Value = u64> {
         .map(|mib| u64::from(mib) << 20)
 }
 
+/// `NAME=PATH`; the name stands in tables and files.
+pub(super) fn named(text: &str) -> Result<(String, PathBuf), String> {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
+    match text.split_once('=').unwrap_or_default() {
+        (name, path) if !name.is_empty() && !path.is_empty() && name.chars().all(is_plain) => {
+            Ok((name.to_owned(), path.into()))
+        }
+        _ => Err("give a name of letters, digits, - _ . and a path: film=colored/".to_owned()),
+    }
+}
+
 /// Frames a second: numerator and denominator, both positive.
 #[derive(Clone, Copy)]
 pub(super) struct Rate(pub [u32; 2]);

@@ -103,6 +103,12 @@ impl<'a> Reference<'a> {
         }
     }
 
+    /// PSNR of a gray picture where it counts, in dB.
+    pub fn gray_psnr(&self, gray: &[f32]) -> f64 {
+        let shown: Vec<f32> = gray.iter().map(|value| value.clamp(0.0, 1.0)).collect();
+        measure::reported_psnr(&self.counted(&shown), &self.counted(&self.gray()))
+    }
+
     /// Variance of the Laplacian of a gray picture where it counts, on the scale of 0 to 255.
     pub fn sharpness(&self, gray: &[f32]) -> f64 {
         let (width, height) = (self.photo.width as usize, self.photo.height as usize);

@@ -16,8 +16,8 @@ pub use chroma::{ChromaReport, ChromaSeconds, ColorError, ColorQuality, ColorVie
 pub use contact_sheet::{Row, contact_sheet, to_image, write_text};
 pub use effects::EffectReport;
 pub use evaluation::{
-    BetweenScore, ConsistencyScore, EVALUATION_VERSION, Evaluation, LumaScore, Method,
-    PathConsistency, PathScore, PeerReport, PictureScore, Rules, ViewScore,
+    BetweenScore, ConsistencyScore, DetectionScore, EVALUATION_VERSION, Evaluation, LumaScore,
+    Method, PathConsistency, PathScore, PeerReport, PictureScore, Rules, ViewScore,
 };
 pub use page::{Figure, Flight, PageRow, error_map, evaluation_page};
 pub use table::Table;

@@ -15,44 +15,64 @@ const FAINT: f64 = 2.0;
 impl Evaluation {
     /// Verdict, a line each. docs/guide.md has the bounds.
     pub fn verdict(&self) -> Vec<String> {
-        [
-            self.agreement(Method::Teacher, "the teacher's own pictures"),
-            self.agreement(Method::RgbSplats, "RGB splats fitted to these"),
-            self.agreement(Method::PerFrame, "the teacher frame by frame"),
+        let others = self.compared().into_iter();
+        let agreement = others.filter_map(|other| self.agreement(&other));
+        let rest = [
             self.strength(),
             self.truth(),
             self.export(),
             Some(self.gray()),
-        ]
-        .into_iter()
-        .flatten()
-        .collect()
+        ];
+        agreement.chain(rest.into_iter().flatten()).collect()
     }
 
-    fn picture(&self, method: Method) -> Option<&PictureScore> {
-        self.pictures.iter().find(|score| score.method == method)
+    fn picture(&self, method: &Method) -> Option<&PictureScore> {
+        self.pictures.iter().find(|score| score.method == *method)
     }
 
-    /// Difference between photographed views of one place, RMS in CIELAB units.
-    fn between(&self, method: Method) -> Option<f64> {
-        let scores = self.between.consistency.iter();
-        let mut own = scores.filter(|score: &&ConsistencyScore| score.method == method);
-        own.next()?.rms
-    }
-
-    /// Agreement between views, compared with another method's.
-    fn agreement(&self, other: Method, name: &str) -> Option<String> {
-        let (ours, theirs) = (self.between(Method::Exported)?, self.between(other)?);
-        let figures = format!("({ours:.2} against {theirs:.2} CIELAB units)");
+    /// Agreement between photographed views, or frames where a method has nothing else, compared
+    /// with ours.
+    fn agreement(&self, other: &Method) -> Option<String> {
+        let name = match other {
+            Method::Exported | Method::Native | Method::Photo => return None,
+            Method::Teacher => "the teacher's own pictures",
+            Method::RgbSplats => "RGB splats fitted to these",
+            Method::PerFrame => "the teacher frame by frame",
+            other => other.name(),
+        };
+        let views: Vec<&ConsistencyScore> = self.between.consistency.iter().collect();
+        // Frames that are farthest apart come first.
+        let path = self.path.consistency.iter().rev();
+        let frames: Vec<&ConsistencyScore> = path.map(|one| &one.score).collect();
+        let both = |scores: &[&ConsistencyScore]| {
+            let rms = |method: &Method| {
+                let mut own = scores.iter().filter(|score| score.method == *method);
+                own.find_map(|score| score.rms)
+            };
+            Some([rms(&Method::Exported)?, rms(other)?])
+        };
+        let (what, [ours, theirs]) = match both(&views) {
+            Some(figures) => ("views", figures),
+            None => ("frames of the path", both(&frames)?),
+        };
+        let colorful = |method: &Method| {
+            let mut pictures = self.path.pictures.iter();
+            Some(pictures.find(|score| score.method == *method)?.colorfulness)
+        };
+        let strength = match (colorful(&Method::Exported), colorful(other)) {
+            (Some(ours), Some(theirs)) => format!("; colorfulness {ours:.1} against {theirs:.1}"),
+            _ => String::new(),
+        };
+        let figures = format!("({ours:.2} against {theirs:.2} CIELAB units{strength})");
         // What rounds to nothing is nothing.
         let ratio = theirs.max(0.01) / ours.max(0.01);
-        Some(format!("views agree {} {name} {figures}", times(ratio)))
+        Some(format!("{what} agree {} {name} {figures}", times(ratio)))
     }
 
     /// Colorfulness, compared with the teacher's.
     fn strength(&self) -> Option<String> {
-        let ours = self.picture(Method::Exported)?.colorfulness;
-        let theirs = self.picture(Method::Teacher)?.colorfulness;
+        let ours = self.picture(&Method::Exported)?.colorfulness;
+        let theirs = self.picture(&Method::Teacher)?.colorfulness;
         let ratio = ours / theirs;
         if !(ratio.is_finite() && theirs > 0.0) {
             return None;
@@ -70,8 +90,8 @@ impl Evaluation {
     /// Color error, ΔE00 to the photos, where these are in color.
     fn truth(&self) -> Option<String> {
         let of = |method| Some(self.picture(method)?.delta_e?.mean);
-        let ours = of(Method::Exported)?;
-        let Some(theirs) = of(Method::Teacher) else {
+        let ours = of(&Method::Exported)?;
+        let Some(theirs) = of(&Method::Teacher) else {
             return Some(format!("colors miss the photos' by ΔE00 {ours:.1}"));
         };
         let ratio = ours / theirs;
