@@ -27,6 +27,9 @@ pub(super) struct SolveDecisions {
     pub uncorrected: Option<[f64; 2]>,
     /// The solver's last report.
     pub last: Option<ChromaProgress>,
+    /// Seconds of the distillation so far.
+    #[serde(default)]
+    pub seconds: f64,
 }
 
 /// A solver between two rounds.
@@ -79,6 +82,9 @@ pub(super) struct Rounds {
     pub newest: usize,
     /// Passes over all views.
     pub spent: f64,
+    /// Seconds of these rounds.
+    #[serde(default)]
+    pub seconds: f64,
 }
 
 /// Receiver of checkpoints.
@@ -186,6 +192,7 @@ mod tests {
                 }),
                 uncorrected: None,
                 last: None,
+                seconds: 2.5,
             },
             solver: SolverState {
                 rounds: Rounds {
