@@ -28,7 +28,6 @@ pub(super) struct SolveDecisions {
     /// The solver's last report.
     pub last: Option<ChromaProgress>,
     /// Seconds of the distillation so far.
-    #[serde(default)]
     pub seconds: f64,
 }
 
@@ -83,7 +82,6 @@ pub(super) struct Rounds {
     /// Passes over all views.
     pub spent: f64,
     /// Seconds of these rounds.
-    #[serde(default)]
     pub seconds: f64,
 }
 
