@@ -233,6 +233,7 @@ fn of_teacher(error: &TeacherError) -> String {
             "{error}: choose another --teacher-device, or let ORT_DYLIB_PATH name a library that has it"
         ),
         TeacherError::UnknownProfile { .. } => format!("--teacher-profile {error}"),
+        TeacherError::NoClass { .. } => format!("{error}: leave out --teacher-class"),
         TeacherError::BadSize { path, size, reason } => {
             format!("{}: --teacher-size {size}: {reason}", path.display())
         }

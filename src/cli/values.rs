@@ -25,7 +25,7 @@ pub(super) const PRESETS: &[(Preset, &str)] = &[
     ),
     (
         Preset::Paper,
-        "The last tenths of a dB, as in the ChromaDistill paper: 15,000 iterations, 3,000,000 Gaussians, full size; stops early below 0.1 dB",
+        "The last tenths of a dB: 15,000 iterations, 3,000,000 Gaussians, full size; stops early below 0.1 dB",
     ),
 ];
 
