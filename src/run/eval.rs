@@ -13,14 +13,14 @@ use crate::{
     chroma::teacher::{Teacher, TeacherSettings},
     eval::{
         ColoredScene, EvalError, Lpips, MeasuredTeacher, Painter, Peer, Progress, Scored,
-        along_path, between_views, exposures, mean_bake, mean_luma, mean_pictures,
-        teacher_colorfulness,
+        along_path, between_views, exposures, mean_bake, mean_luma, mean_pictures, mean_quality,
+        measure_luma, teacher_colorfulness,
     },
     gpu::Gpu,
     raster::Raster,
     report::{
-        EVALUATION_VERSION, Evaluation, Figure, Method, PageRow, PeerReport, Report, Rules,
-        TeacherReport, evaluation_page, to_image,
+        EVALUATION_VERSION, Evaluation, Figure, LumaScore, Method, PageRow, PeerReport, Report,
+        Rules, TeacherReport, evaluation_page, to_image,
     },
     splats::{ShField, Splats, is_splat_file, write_splats},
     store::{RunFolder, StoreError, commit::Commit, files},
@@ -114,6 +114,16 @@ pub fn eval(
     let path = along_path(&mut painter, &scene, frames, flow, &mut told, &mut keep)?;
     let between = between_views(&mut painter, &scene, &mut told)?;
     let teacher_colorfulness = teacher_colorfulness(&painter, &scene, &mut told)?;
+    let plain_psnr = match report.luma.settings.antialiased {
+        true => mean_quality(&measure_luma(
+            &raster,
+            &scene.dataset,
+            &scene.luma,
+            &mut told,
+        )?),
+        false => None,
+    };
+    let plain_psnr = plain_psnr.and_then(|quality| quality.plain_psnr);
     if !path.skipped.is_empty() {
         observe(Event::Warning(format!(
             "a path of {} frames is too short for Δ = {:?}: choose more",
@@ -129,7 +139,10 @@ pub fn eval(
         teacher: painter.teacher(),
         teacher_colorfulness,
         measured_on: scene.dataset.measured().0.to_owned(),
-        luma: mean_luma(&views),
+        luma: LumaScore {
+            plain_psnr,
+            ..mean_luma(&views)
+        },
         bake: mean_bake(&views),
         pictures: mean_pictures(&views),
         views: views.into_iter().map(|scored| scored.score).collect(),
