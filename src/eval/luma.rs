@@ -19,24 +19,18 @@ pub fn measure_luma(
 ) -> Result<Vec<LumaView>, EvalError> {
     let extent = dataset.extent;
     let mut renderer = SceneRenderer::of(raster, splats, &[&splats.sh], extent)?;
-    let mut plainly = match raster.options.antialiased {
-        true => {
-            let cameras = dataset
-                .split
-                .train
-                .iter()
-                .map(|&view| &dataset.cameras[view]);
-            let exported = plain(splats, cameras, extent);
-            let viewer = raster.drawing(RasterOptions::default());
-            Some(SceneRenderer::of(
-                &viewer,
-                &exported,
-                &[&exported.sh],
-                extent,
-            )?)
-        }
-        false => None,
-    };
+    let viewer = raster.drawing(RasterOptions::default());
+    let exported = raster.options().antialiased.then(|| {
+        let cameras = dataset
+            .split
+            .train
+            .iter()
+            .map(|&view| &dataset.cameras[view]);
+        plain(splats, cameras, extent)
+    });
+    let plainly = exported.as_ref();
+    let plainly = plainly.map(|splats| SceneRenderer::of(&viewer, splats, &[&splats.sh], extent));
+    let mut plainly = plainly.transpose()?;
     let (mut views, mut done) = (Vec::new(), 0);
     dataset.visit(&dataset.split.test, |view, photo| {
         observe(Progress {
