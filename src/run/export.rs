@@ -105,7 +105,7 @@ pub fn export(options: &ExportOptions, observe: &mut Observer<'_>) -> Result<Exp
         (scene.splats, shown) = fitted(choice, (&scene.splats, drawn), before, observe)?;
         // As these viewers draw it.
         scene.drawn = RasterOptions::default();
-    } else if scene.drawn.antialiased && !options.antialiased {
+    } else if scene.drawn.antialiased && !options.antialiased && opened.report().is_some() {
         plainly(&mut scene, before, observe);
     }
     let written = written(&scene, options)?;
