@@ -99,6 +99,7 @@ impl<'a> Reference<'a> {
         LumaQuality {
             psnr: measure::reported_psnr(&ours, &right),
             corrected_psnr: Some(measure::corrected_psnr(&ours, &right)),
+            plain_psnr: None,
             ssim: self.ssim(&shown, &truth),
         }
     }

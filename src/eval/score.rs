@@ -206,6 +206,7 @@ fn luma_score(
     Ok(LumaScore {
         psnr: quality.psnr,
         corrected_psnr: quality.corrected_psnr,
+        plain_psnr: None,
         ssim: quality.ssim,
         sharpness: reference.sharpness(shown),
         photo_sharpness: reference.sharpness(&wanted),
@@ -285,6 +286,7 @@ pub fn mean_luma(views: &[Scored]) -> LumaScore {
     LumaScore {
         psnr: mean(lumas().map(|l| Some(l.psnr))).unwrap_or(f64::NAN),
         corrected_psnr: mean(lumas().map(|l| l.corrected_psnr)),
+        plain_psnr: None,
         ssim: mean(lumas().map(|l| Some(l.ssim))).unwrap_or(f64::NAN),
         sharpness: mean(lumas().map(|l| Some(l.sharpness))).unwrap_or(f64::NAN),
         photo_sharpness: mean(lumas().map(|l| Some(l.photo_sharpness))).unwrap_or(f64::NAN),

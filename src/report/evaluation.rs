@@ -141,6 +141,11 @@ pub struct LumaScore {
     /// `None` in files that do not know it.
     #[serde(default)]
     pub corrected_psnr: Option<f64>,
+    /// PSNR of the exported file in a viewer without antialiasing, in dB.
+    ///
+    /// Mean over the held-out views, only where the scene is antialiased.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub plain_psnr: Option<f64>,
     /// Structural similarity, 1 for equal pictures.
     pub ssim: f64,
     /// Variance of the Laplacian, of grays from 0 to 255.

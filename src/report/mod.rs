@@ -305,6 +305,11 @@ pub struct LumaQuality {
     /// `None` in files that do not know it.
     #[serde(default)]
     pub corrected_psnr: Option<f64>,
+    /// PSNR of the exported file in a viewer without antialiasing, in dB.
+    ///
+    /// Only where the scene is antialiased.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub plain_psnr: Option<f64>,
     /// Structural similarity, 1 for equal pictures.
     pub ssim: f64,
 }
@@ -315,12 +320,15 @@ impl LumaQuality {
         self.corrected_psnr.unwrap_or(self.psnr)
     }
 
-    /// Both kinds of PSNR, in words.
+    /// All kinds of PSNR, in words.
     pub fn psnr_in_words(&self) -> String {
         let corrected = self.corrected_psnr.map_or(String::new(), |psnr| {
             format!(" ({psnr:.2} dB after each photo's own gain and offset)")
         });
-        format!("PSNR {:.2} dB{corrected}", self.psnr)
+        let plain = self.plain_psnr.map_or(String::new(), |psnr| {
+            format!(", exported to viewers without antialiasing {psnr:.2} dB")
+        });
+        format!("PSNR {:.2} dB{corrected}{plain}", self.psnr)
     }
 }
 

@@ -133,8 +133,11 @@ impl Evaluation {
         let corrected = luma.corrected_psnr.map_or(String::new(), |psnr| {
             format!(" ({psnr:.1} dB after each photo's own gain and offset)")
         });
+        let plain = luma.plain_psnr.map_or(String::new(), |psnr| {
+            format!("; the exported file, in viewers without antialiasing, with {psnr:.1} dB")
+        });
         format!(
-            "the gray scene shows {which} with {:.1} dB{corrected}{sharp}",
+            "the gray scene shows {which} with {:.1} dB{corrected}{sharp}{plain}",
             luma.psnr
         )
     }

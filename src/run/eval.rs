@@ -19,14 +19,14 @@ use crate::{
     disk::trust::Originals,
     eval::{
         ColoredScene, Detector, EvalError, Lpips, MeasuredTeacher, Painter, Peer, Progress, Scored,
-        Source, between_views, exposures, mean_bake, mean_luma, mean_pictures, path_of,
-        teacher_colorfulness,
+        Source, between_views, exposures, mean_bake, mean_luma, mean_pictures, mean_quality,
+        measure_luma, path_of, teacher_colorfulness,
     },
     gpu::Gpu,
     raster::Raster,
     report::{
-        EVALUATION_VERSION, Evaluation, Method, PageRow, PeerReport, Report, Rules, TeacherReport,
-        evaluation_page,
+        EVALUATION_VERSION, Evaluation, LumaScore, Method, PageRow, PeerReport, Report, Rules,
+        TeacherReport, evaluation_page,
     },
     splats::{ShField, Splats, is_splat_file, write_splats},
     store::{RunFolder, StoreError, commit::Commit, files, originals::OriginalFiles},
@@ -125,6 +125,16 @@ pub fn eval(
     let mut told = |progress: Progress<'_>| observe(Event::from(progress));
     let between = between_views(&mut painter, &scene, &mut told)?;
     let teacher_colorfulness = teacher_colorfulness(&painter, &scene, &mut told)?;
+    let plain_psnr = match report.luma.settings.antialiased {
+        true => mean_quality(&measure_luma(
+            &raster,
+            &scene.dataset,
+            &scene.luma,
+            &mut told,
+        )?),
+        false => None,
+    };
+    let plain_psnr = plain_psnr.and_then(|quality| quality.plain_psnr);
     observe(Event::begins(Stage::Page));
     let evaluation = Evaluation {
         version: EVALUATION_VERSION,
@@ -133,7 +143,10 @@ pub fn eval(
         teacher: painter.teacher(),
         teacher_colorfulness,
         measured_on: scene.dataset.measured().0.to_owned(),
-        luma: mean_luma(&views),
+        luma: LumaScore {
+            plain_psnr,
+            ..mean_luma(&views)
+        },
         bake: mean_bake(&views),
         pictures: mean_pictures(views.iter().flat_map(|view| &view.score.pictures)),
         views: views.into_iter().map(|scored| scored.score).collect(),

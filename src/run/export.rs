@@ -12,7 +12,7 @@ use super::{
     loss::{Views, loss},
 };
 use crate::{
-    raster::RasterOptions,
+    raster::{RasterOptions, plain},
     splats::{Splats, WriteOptions, write_splats},
     store::{files, originals::OriginalFiles},
     subject::{LockMode, Opened, Scene, scene::written_as},
@@ -38,6 +38,8 @@ pub struct ExportOptions {
     pub clean: bool,
     /// Viewer to fit the scene for; `None` writes it unchanged.
     pub viewer: Option<ViewerChoice>,
+    /// True if an antialiased scene is written for viewers that antialias.
+    pub antialiased: bool,
     /// COLMAP folder with the cameras that it is cleaned and fitted before, where it is not the
     /// one that `fit` noted.
     pub colmap: Option<PathBuf>,
@@ -112,6 +114,8 @@ pub fn export(options: &ExportOptions, observe: &mut Observer<'_>) -> Result<Exp
         (scene.splats, shown) = fitted(choice, (&scene.splats, drawn), before, observe)?;
         // As these viewers draw it.
         scene.drawn = RasterOptions::default();
+    } else if scene.drawn.antialiased && !options.antialiased && opened.report().is_some() {
+        plainly(&mut scene, before, observe);
     }
     let written = written(&scene, options)?;
 
@@ -139,6 +143,20 @@ pub fn export(options: &ExportOptions, observe: &mut Observer<'_>) -> Result<Exp
         shown,
         warnings: warnings.take(),
     })
+}
+
+/// Gives an antialiased scene opacities for viewers without antialiasing, where the cameras are
+/// known.
+fn plainly(scene: &mut Scene, before: &Cameras<'_>, observe: &mut Observer<'_>) {
+    match before.open(usize::MAX, u32::MAX) {
+        Ok((train, _, extent)) => {
+            scene.splats = plain(&scene.splats, &train, extent);
+            scene.drawn = RasterOptions::default();
+        }
+        Err(_) => observe(Event::Warning(
+            "the scene is written to be drawn antialiased, since its cameras are not known: most viewers will draw it too bold".to_owned(),
+        )),
+    }
 }
 
 /// Coordinates that the scene is written in.
