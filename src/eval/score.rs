@@ -133,8 +133,7 @@ impl Scored {
                 answer.ab.clone(),
             )
         });
-        let mut pictures: Vec<(Method, Vec<[f32; 3]>, Vec<[f32; 2]>)> =
-            layers.chain(taught).collect();
+        let mut pictures: Vec<_> = layers.chain(taught).collect();
         pictures.sort_by(|(a, ..), (b, ..)| a.cmp(b));
         let of = |method: &Method| {
             let mut all = pictures.iter();
