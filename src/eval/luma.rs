@@ -126,6 +126,7 @@ pub fn mean_quality(views: &[LumaView]) -> Option<LumaQuality> {
         psnr: mean(|quality| quality.psnr),
         corrected_psnr: mean_of_known(|quality| quality.corrected_psnr),
         plain_psnr: mean_of_known(|quality| quality.plain_psnr),
+        lost_detail: mean_of_known(|quality| quality.lost_detail),
         ssim: mean(|quality| quality.ssim),
     })
 }

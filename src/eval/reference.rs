@@ -100,8 +100,15 @@ impl<'a> Reference<'a> {
             psnr: measure::reported_psnr(&ours, &right),
             corrected_psnr: Some(measure::corrected_psnr(&ours, &right)),
             plain_psnr: None,
+            lost_detail: Some(self.lost_detail(&shown, &truth)),
             ssim: self.ssim(&shown, &truth),
         }
+    }
+
+    /// Share of the photo's textured blocks of which a picture shows hardly any detail.
+    fn lost_detail(&self, shown: &[f32], truth: &[f32]) -> f64 {
+        let (width, height) = (self.photo.width as usize, self.photo.height as usize);
+        measure::lost_detail(width, height, &self.patched(shown, truth), truth)
     }
 
     /// PSNR of a gray picture where it counts, in dB.

@@ -144,7 +144,7 @@ pub struct LumaScore {
     /// PSNR of the exported file in a viewer without antialiasing, in dB.
     ///
     /// Mean over the held-out views, only where the scene is antialiased.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default)]
     pub plain_psnr: Option<f64>,
     /// Structural similarity, 1 for equal pictures.
     pub ssim: f64,

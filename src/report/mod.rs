@@ -308,8 +308,11 @@ pub struct LumaQuality {
     /// PSNR of the exported file in a viewer without antialiasing, in dB.
     ///
     /// Only where the scene is antialiased.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default)]
     pub plain_psnr: Option<f64>,
+    /// Share of the photo's textured blocks that show less than 15 % of its detail.
+    #[serde(default)]
+    pub lost_detail: Option<f64>,
     /// Structural similarity, 1 for equal pictures.
     pub ssim: f64,
 }

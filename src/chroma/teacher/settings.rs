@@ -92,7 +92,7 @@ pub struct TeacherInfo {
     /// `None` for a folder. Twice the shorter side where the longer follows the photo's aspect.
     pub input_size: Option<[u32; 2]>,
     /// Class that the network was asked with, where one was chosen.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default)]
     pub class: Option<u16>,
 }
 
